@@ -25,12 +25,8 @@ MOST = 2.0
 def pace(statistics: npt.ArrayLike, stride_hz: npt.ArrayLike) -> Floats:
     """Stride rates (...) as standard deviations between people from the mean, at most `MOST`.
 
-    Parameters
-    ----------
-    statistics : (2, ...)
-        Mean and standard deviation of the stride rate, as section GAIT begins.
-    stride_hz : (...)
-        0: not known, as if it were the mean.
+    `statistics` (2, ...): mean and standard deviation of the stride rate, as section GAIT begins; `stride_hz`
+    (...) is 0 where it is not known, as if it were the mean.
     """
     mean, sd = np.asarray(statistics, float)[:2]
     rate = np.asarray(stride_hz, float)
@@ -58,10 +54,7 @@ def slope_of(sections: Mapping[str, Any], name: str = "model") -> Floats | None:
 
     Errors call the model `name`.
 
-    Raises
-    ------
-    UserError
-        If PACE is no Fourier series that this many phases can show.
+    UserError if PACE is no Fourier series that this many phases can show.
     """
     if "PACE" not in sections:
         return None
@@ -100,25 +93,12 @@ def curves(
 class ModelCurves:
     """Angles and root motion of a model over the stride.
 
-    Parameters
-    ----------
-    sections : mapping
-        Of the blob, from `gait.io.blob.decode`.
-
-    Attributes
-    ----------
-    names : list of str
-        M channels: the angles, then the root's.
-    samples : ndarray of shape (1 + q, T, M)
-        Mean, then components times their standard deviations; radians or statures.
-    residual, static : ndarray of shape (M,)
-        Standard deviations of what the components leave, and of a person's constant offset.
-    height_change : ndarray of shape (p,)
-        Of the pelvis, relatively, by one standard deviation of each of the limbs' proportions.
-    faster : ndarray of shape (T, M)
-        Change of the mean per unit of `pace`; 0 in models whose mean does not follow the rate.
-    stride_hz, stride_length : float
-        Means of the training set; per second, statures.
+    `sections`: of the blob, from `gait.io.blob.decode`. `names`: M channels: the angles, then the root's.
+    `samples` (1 + q, T, M): mean, then components times their standard deviations; radians or statures.
+    `residual`, `static` (M,): standard deviations of what the components leave, and of a person's constant
+    offset. `height_change` (p,): of the pelvis, relatively, by one standard deviation of each of the limbs'
+    proportions. `faster` (T, M): change of the mean per unit of `pace`; 0 in models whose mean does not
+    follow the rate. `stride_hz`, `stride_length`: means of the training set; per second, statures.
     """
 
     def __init__(self, sections: Mapping[str, npt.NDArray[Any]]) -> None:
@@ -139,15 +119,8 @@ class ModelCurves:
     def channel(self, name: str, phase: Floats, coef: Floats, stride_hz: npt.ArrayLike = 0.0) -> Floats:
         """Values of one channel.
 
-        Parameters
-        ----------
-        name : str
-        phase : ndarray of shape (...)
-            Strides, of any cycle.
-        coef : ndarray of shape (..., k)
-            Scores of the first k components; broadcast against `phase`.
-        stride_hz : array_like
-            Stride rates, broadcast against `phase`; 0: the mean rate.
+        `phase` (...): strides, of any cycle. `coef` (..., k): scores of the first k components; broadcast
+        against `phase`. `stride_hz`: stride rates, broadcast against `phase`; 0: the mean rate.
         """
         at = self.names.index(name)
         curve = np.vstack([self.samples[: 1 + coef.shape[-1], :, at], self.faster[:, at]])

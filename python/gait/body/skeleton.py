@@ -79,28 +79,17 @@ class Proportions:
 
 @dataclass(frozen=True)
 class Skeleton:
-    """Frames, points and limbs in the form the blob stores.
+    """Frames, points and limbs in the form the blob stores."""
 
-    Attributes
-    ----------
-    frames : list of str
-        F names, parents first.
-    links : int32 (F, 8)
-        Rows of FRMI: parent, number of rotations, then (signed axis, channel) pairs.
-    origins : float (F, 3)
-        In the parent frame.
-    points, point_frames, point_positions
-        P names, their frames (P,) and positions (P, 3).
-    limbs, limb_frames, limb_shapes
-        L names, rows of LIMI (L, 2), rows of LIMF (L, 10).
-    """
-
-    frames: list[str] = field(default_factory=list)
+    frames: list[str] = field(default_factory=list)  #: F names, parents first
+    #: (F, 8) rows of FRMI: parent, number of rotations, then (signed axis, channel) pairs.
     links: npt.NDArray[np.int32] = field(default_factory=lambda: np.zeros((0, 8), np.int32))
-    origins: Floats = field(default_factory=lambda: np.zeros((0, 3)))
+    origins: Floats = field(default_factory=lambda: np.zeros((0, 3)))  #: (F, 3) in the parent frame
+    #: P names, their frames (P,) and positions (P, 3).
     points: list[str] = field(default_factory=list)
     point_frames: npt.NDArray[np.int32] = field(default_factory=lambda: np.zeros(0, np.int32))
     point_positions: Floats = field(default_factory=lambda: np.zeros((0, 3)))
+    #: L names, rows of LIMI (L, 2), rows of LIMF (L, 10).
     limbs: list[str] = field(default_factory=list)
     limb_frames: npt.NDArray[np.int32] = field(default_factory=lambda: np.zeros((0, 2), np.int32))
     limb_shapes: Floats = field(default_factory=lambda: np.zeros((0, 10)))
@@ -253,27 +242,12 @@ def pose(
 ) -> tuple[Floats, Floats]:
     """Joints of N hypotheses: curves (Ormoneit 2000, eq. 3), then forward kinematics.
 
-    Parameters
-    ----------
-    model : mapping or path
-        Sections of a blob as `gait.io.blob.read` returns them, or its file.
-    phase, stature, heading, pitch, roll : (N,) or scalar
-        Strides, metres, radians.
-    coef : (N, k) or (k,)
-        Scores in standard deviations, k <= q; the rest are 0.
-    pelvis : (N, 3) or (3,)
-        Pelvis joint in the world, metres.
-    proportion : (N, l) or (l,)
-        Scores of the limbs' proportions, l <= p; the rest are 0.
-    stride_hz : (N,) or scalar
-        Stride rate, which the mean cycle follows; 0: the mean rate.
-
-    Returns
-    -------
-    joints : (N, P, 3)
-        Metres, world.
-    angles : (N, A)
-        Radians.
+    `model`: sections of a blob as `gait.io.blob.read` returns them, or its file. `phase`, `stature`,
+    `heading`, `pitch`, `roll` (N,): strides, metres, radians. `coef` (N, k) or (k,): scores in standard
+    deviations, k <= q; the rest are 0. `pelvis` (N, 3) or (3,): pelvis joint in the world, metres.
+    `proportion` (N, l) or (l,): scores of the limbs' proportions, l <= p; the rest are 0. `stride_hz` (N,):
+    stride rate, which the mean cycle follows; 0: the mean rate. Returns `joints` (N, P, 3): metres, world;
+    `angles` (N, A): radians.
     """
     sections = model if isinstance(model, Mapping) else blobs.read(model)
     coef = np.atleast_2d(np.asarray(coef, float))

@@ -33,15 +33,8 @@ Array = npt.NDArray[np.generic]
 def encode(sections: Mapping[str, Array]) -> bytes:
     """Pack arrays into the bytes of a blob.
 
-    Parameters
-    ----------
-    sections : mapping of str to array
-        Four-letter ASCII tag to an array of uint8, int32 or float32 with 1 to 4 axes, in file order.
-
-    Raises
-    ------
-    ValueError
-        If a tag, element type or number of axes cannot be stored.
+    `sections`: four-letter ASCII tag to an array of uint8, int32 or float32 with 1 to 4 axes, in file order.
+    ValueError if a tag, element type or number of axes cannot be stored.
     """
     arrays = {tag: _storable(tag, array) for tag, array in sections.items()}
     offset = _aligned(HEADER.size + ENTRY.size * len(arrays))
@@ -62,17 +55,8 @@ def encode(sections: Mapping[str, Array]) -> bytes:
 def decode(blob: bytes, name: str = "blob") -> dict[str, Array]:
     """Unpack a blob into read-only arrays, checking every bound and the checksum.
 
-    Parameters
-    ----------
-    blob : bytes
-        The whole file.
-    name : str
-        What to call it in errors.
-
-    Raises
-    ------
-    UserError
-        If it is not a blob, of another major version, truncated or damaged.
+    `blob`: the whole file; `name`: what to call it in errors. UserError if it is not a blob, of another major
+    version, truncated or damaged.
     """
     if len(blob) < HEADER.size or blob[:8] != MAGIC:
         raise UserError(f"{name}: not a .gait model; make one with gait learn")
@@ -116,13 +100,7 @@ def write(path: str | os.PathLike[str], sections: Mapping[str, Array]) -> bytes:
 
 
 def read(path: str | os.PathLike[str]) -> dict[str, Array]:
-    """Read a blob from a file.
-
-    Raises
-    ------
-    UserError
-        If the file cannot be read or is not a sound blob.
-    """
+    """Read a blob from a file. UserError if the file cannot be read or is not a sound blob."""
     try:
         with open(path, "rb") as file:
             blob = file.read()

@@ -22,11 +22,7 @@ _LAST_FRAME = 2**53  # larger whole numbers are not exact as floating point
 class Fields:
     """A mapping read from a file, with checked access and errors that name file and key.
 
-    Parameters
-    ----------
-    where : str
-        Name of the file (and table) for messages.
-    data : mapping
+    `where`: name of the file (and table) for messages.
     """
 
     def __init__(self, where: str, data: Mapping[str, Any]) -> None:
@@ -116,14 +112,7 @@ def _double(number: float) -> float:
 
 
 def read_json(path: str | os.PathLike[str], what: str) -> Fields:
-    """Read a JSON object.
-
-    Parameters
-    ----------
-    path : path
-    what : str
-        What the file is, for messages: ``"camera"``.
-    """
+    """Read a JSON object. `what`: what the file is, for messages: ``"camera"``."""
     if not Path(path).is_file():
         raise UserError(f"{path}: no such {what} file")
     data = json_object(
@@ -155,20 +144,9 @@ def json_of(
 ) -> dict[str, Any]:
     """Content of UTF-8 text, with or without a byte order mark, that holds one JSON object.
 
-    Parameters
-    ----------
-    name : str
-        For messages: where the text is from.
-    text : bytes
-    remedy, form : str
-        For messages: what to do about a text that is no JSON, and about one that holds something else.
-    pairs : callable
-        Makes a mapping of keys and values, which may be there twice.
-
-    Raises
-    ------
-    UserError
-        One line with the name and the remedy.
+    `name`: for messages: where the text is from; `remedy`, `form`: for messages: what to do about a text that
+    is no JSON, and about one that holds something else; `pairs`: makes a mapping of keys and values, which
+    may be there twice. UserError with the name and the remedy.
     """
     with parsing(name, "JSON", remedy):
         data = json.loads(text.decode("utf-8-sig"), object_pairs_hook=pairs)
@@ -181,10 +159,7 @@ def json_of(
 def parsing(name: str, kind: str, remedy: str) -> Iterator[None]:
     """Turn what makes a text no valid JSON or TOML into one line.
 
-    Raises
-    ------
-    UserError
-        With the name of the file, the `kind` that it is not and the remedy.
+    UserError with the name of the file, the `kind` that it is not and the remedy.
     """
     try:
         yield
@@ -198,10 +173,7 @@ def parsing(name: str, kind: str, remedy: str) -> Iterator[None]:
 def frame_numbers(path: str | os.PathLike[str], column: NDArray[np.float64]) -> NDArray[np.int64]:
     """Column `frame` of a table, whose rows start in line 2, as numbers of frames.
 
-    Raises
-    ------
-    UserError
-        If they are not whole numbers that increase, with the first such line.
+    UserError if they are not whole numbers that increase, with the first such line.
     """
     wrong = (column != column.round()) | (np.abs(column) > _LAST_FRAME)
     wrong[1:] |= np.diff(column) <= 0
@@ -222,10 +194,7 @@ def table_rows(text: str) -> list[tuple[int, list[str]]]:
 
     Where that is a semicolon, commas below the header are decimal points.
 
-    Raises
-    ------
-    csv.Error
-        If it is no such text.
+    csv.Error if it is no such text.
     """
     first = text.split("\n", 1)[0]
     delimiter = max(DELIMITERS, key=first.count)

@@ -20,10 +20,7 @@ def replacing(path: str | os.PathLike[str]) -> Iterator[Path]:
 
     Through a symbolic link the file is written that it points to.
 
-    Raises
-    ------
-    UserError
-        If a file cannot be put there, as by `require_writable`, or the disk is full.
+    UserError if a file cannot be put there, as by `require_writable`, or the disk is full.
     """
     require_writable(path)
     target = Path(os.path.realpath(path))
@@ -61,10 +58,7 @@ def require_writable(path: str | os.PathLike[str]) -> None:
 def require_outputs(outputs: Sequence[str | None], inputs: Sequence[str | None]) -> None:
     """Raise UserError unless each output can be written, is named once, and is none of the inputs.
 
-    Parameters
-    ----------
-    outputs, inputs : sequence of str or None
-        Files, None where the user names none.
+    `outputs`, `inputs`: files, None where the user names none.
     """
     written: set[str] = set()
     for path in outputs:
@@ -88,10 +82,7 @@ def require_unread(path: str, inputs: Sequence[str | None]) -> None:
 def filling(path: str | os.PathLike[str]) -> Iterator[Path]:
     """Yield an empty folder; if the block succeeds its files go to the folder `path`, pages (.html) last.
 
-    Raises
-    ------
-    UserError
-        If there can be no such folder, as by `require_folder`.
+    UserError if there can be no such folder, as by `require_folder`.
     """
     require_folder(path)
     folder = Path(path)
@@ -131,13 +122,7 @@ def _require_name(path: str | os.PathLike[str]) -> None:
 
 
 def text_lines(path: Path) -> list[str]:
-    """Lines of a text file in any encoding that keeps ASCII.
-
-    Raises
-    ------
-    UserError
-        If it cannot be read.
-    """
+    """Lines of a text file in any encoding that keeps ASCII. UserError if it cannot be read."""
     try:
         return path.read_text(encoding="latin-1").splitlines()
     except OSError as error:

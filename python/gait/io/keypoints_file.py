@@ -32,27 +32,14 @@ FURTHEST = 1e6  # pixels, or units of an orthographic view
 
 @dataclass(frozen=True)
 class Keypoints:
-    """Points followed in one view over T frames.
+    """Points followed in one view over T frames."""
 
-    Attributes
-    ----------
-    frame : ndarray of int, shape (T,)
-        Increasing.
-    time : ndarray of shape (T,)
-        Seconds, increasing.
-    names : tuple of str
-        The J points.
-    uv : ndarray of shape (T, J, 2)
-        Pixels (or metres of an orthographic view), u to the right, v down; NaN where not seen.
-    confidence : ndarray of shape (T, J)
-        From 0 to 1; 1 where the file has none.
-    """
-
-    frame: NDArray[np.int64]
-    time: Array
-    names: tuple[str, ...]
+    frame: NDArray[np.int64]  #: (T,) increasing
+    time: Array  #: (T,) seconds, increasing
+    names: tuple[str, ...]  #: the J points
+    #: (T, J, 2) pixels (or metres of an orthographic view), u to the right, v down; NaN where not seen.
     uv: Array
-    confidence: Array
+    confidence: Array  #: (T, J) from 0 to 1; 1 where the file has none
 
     @property
     def visible(self) -> NDArray[np.bool_]:
@@ -101,16 +88,8 @@ def read(
 ) -> tuple[Keypoints, list[str]]:
     """Read keypoints of points named in `known`.
 
-    Returns
-    -------
-    keypoints : Keypoints
-    ignored : list of str
-        Points that are not in `known`.
-
-    Raises
-    ------
-    UserError
-        If the file is malformed, holds no point, or one that is not known unless `ignore_unknown`.
+    Returns `ignored`: points that are not in `known`. UserError if the file is malformed, holds no point, or
+    one that is not known unless `ignore_unknown`.
     """
     head, rows = _table(path)
     columns = {name: i for i, name in enumerate(head)}

@@ -43,13 +43,7 @@ def header(components: int, angle_names: tuple[str, ...]) -> list[str]:
 class TrackWriter:
     """Write a track file row by row; it appears under its name when the ``with`` block ends without error.
 
-    Parameters
-    ----------
-    path : path
-    components : int
-        Scores per row.
-    joint_names, angle_names : tuple of str
-        Of the model.
+    `components`: scores per row; `joint_names`, `angle_names`: of the model.
     """
 
     def __init__(
@@ -103,21 +97,11 @@ class TrackWriter:
 
 @dataclass(frozen=True)
 class Joints:
-    """Joint positions over frames, the truth of a clip.
+    """Joint positions over frames, the truth of a clip."""
 
-    Attributes
-    ----------
-    frame : ndarray of int, shape (n,)
-        Increasing.
-    time : ndarray of shape (n,)
-        Seconds.
-    places : dict of str to ndarray of shape (n, 3)
-        Metres, world; at least EVAL15.
-    """
-
-    frame: NDArray[np.int64]
-    time: Array
-    places: dict[str, Array]
+    frame: NDArray[np.int64]  #: (n,) increasing
+    time: Array  #: (n,) seconds
+    places: dict[str, Array]  #: (n, 3) metres, world; at least EVAL15
 
     def eval15(self) -> Array:
         """Return the positions of EVAL15, shape (n, 15, 3)."""
@@ -126,22 +110,12 @@ class Joints:
 
 @dataclass(frozen=True)
 class Track(Joints):
-    """A track file.
+    """A track file."""
 
-    Attributes
-    ----------
-    status : list of str
-        Of each frame: init, tracking, ambiguous or lost.
-    phase : ndarray of shape (n,)
-    sd : dict of str to ndarray of shape (n, 3)
-        Posterior standard deviations, metres.
-    numbers : dict of str to ndarray of shape (n,)
-        Every other column of numbers by its name: state, scores, angles and their standard deviations.
-    """
-
-    status: list[str]
-    phase: Array
-    sd: dict[str, Array]
+    status: list[str]  #: of each frame: init, tracking, ambiguous or lost
+    phase: Array  #: (n,)
+    sd: dict[str, Array]  #: (n, 3) posterior standard deviations, metres
+    #: (n,) every other column of numbers by its name: state, scores, angles and their standard deviations.
     numbers: dict[str, Array] = field(default_factory=dict)
 
     def eval15_sd(self) -> Array:

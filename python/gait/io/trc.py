@@ -22,19 +22,8 @@ HEAD = 5  # lines of the header; an empty one may follow
 def read_trc(path: Path) -> tuple[list[str], Array, float]:
     """Read the points of a .trc.
 
-    Returns
-    -------
-    labels : list of str
-        M labels.
-    points : ndarray of shape (T, M, 3)
-        Metres, axes of the file; NaN where cells are empty.
-    rate : float
-        Frames per second.
-
-    Raises
-    ------
-    UserError
-        Naming file, line and remedy.
+    Returns M labels, points (T, M, 3) in metres and the axes of the file, NaN where cells are empty, and
+    frames per second.  UserError names file, line and remedy.
     """
     lines = text_lines(path)
     if len(lines) < HEAD or not set(lines[1].split()) >= NAMED:
@@ -102,15 +91,7 @@ def write_trc(
 ) -> None:
     """Write joints (n, P, 3) in metres, z up, as OpenSim's y-up frame: x_trc = y, y_trc = z, z_trc = x.
 
-    Parameters
-    ----------
-    path : path
-    names : tuple of str
-        The P joints.
-    times : ndarray of shape (n,)
-        Seconds.
-    rate : float
-        Frames per second.
+    `names`: the P joints; `times` (n,): seconds; `rate`: frames per second.
     """
     count, markers = joints.shape[:2]
     head = [

@@ -31,12 +31,7 @@ _BONES += [(f"{s}_{a}", f"{s}_{b}") for s in "lr" for a, b in (("shoulder", "elb
 def static_pose(model: dict[str, Any], truth: Joints) -> Array:
     """Mean pose of the model at the true hip midpoint and walking direction, EVAL15 (n, 15, 3).
 
-    Parameters
-    ----------
-    model : dict
-        Sections of the blob.
-    truth : Joints
-        Gives place, direction and the stature that fits its limbs.
+    `model`: sections of the blob; `truth`: gives place, direction and the stature that fits its limbs.
     """
     joints = _poses(model, _PHASES, stature(model, truth)).mean(axis=0)
     joints -= joints[HIPS].mean(axis=0)
@@ -113,10 +108,7 @@ _TINY = 1e-9  # metres; an sd of 0 would claim to be exact
 def coverage(found: Array, sd: Array, true: Array) -> dict[str, float]:
     """Share of the coordinates inside the normal 50 % and 90 % intervals.
 
-    Parameters
-    ----------
-    found, sd, true : ndarray of the same shape
-        Estimate, its standard deviation, truth.
+    `found`, `sd`, `true`: estimate, its standard deviation, truth.
     """
     off = np.abs(found - true)
     return {level: float((off <= half * sd).mean()) for level, half in _HALF.items()}
@@ -125,19 +117,12 @@ def coverage(found: Array, sd: Array, true: Array) -> dict[str, float]:
 def calibration(found: Array, sd: Array, true: Array) -> dict[str, Any]:
     """Measures of the intervals beyond their coverage.
 
-    Parameters
-    ----------
-    found, sd, true : ndarray of shape (n, 15, 3)
-        EVAL15 in metres, frame by frame.
-
-    Returns
-    -------
-    dict
-        ``pit``: shares of 10 equal bins of the probability integral transform over frames `APART` apart,
-        ``pit_chi2`` their chi-square statistic against flat and ``pit_p`` its p-value as if coordinates were
-        independent (they are not: read it as a ranking); ``z2``: mean squared error in variances, 1 where the
-        standard deviations are right; ``crps_mm``: continuous ranked probability score of a normal (Gneiting
-        and Raftery 2007), lower is better; ``width_mm``: mean width of the 90 % intervals.
+    `found`, `sd`, `true` (n, 15, 3): EVAL15 in metres, frame by frame. Returns ``pit``: shares of 10 equal
+    bins of the probability integral transform over frames `APART` apart, ``pit_chi2`` their chi-square
+    statistic against flat and ``pit_p`` its p-value as if coordinates were independent (they are not: read it
+    as a ranking); ``z2``: mean squared error in variances, 1 where the standard deviations are right;
+    ``crps_mm``: continuous ranked probability score of a normal (Gneiting and Raftery 2007), lower is better;
+    ``width_mm``: mean width of the 90 % intervals.
     """
     z = (true - found) / np.maximum(sd, _TINY)
     counts, _ = np.histogram(ndtr(z[::APART]), _BINS, (0.0, 1.0))
@@ -175,31 +160,14 @@ def evaluate(
 ) -> Measures:
     """Compare the frames that both have.
 
-    Parameters
-    ----------
-    track, truth
-    strikes : Strikes
-        Heel strikes of the truth.
-    model : dict
-        Sections of the model blob, for the baselines.
-    camera : Camera, optional
-        For the distance in the picture.
-
-    Returns
-    -------
-    dict
-        ``frames``; ``abs``, ``root`` (mm) and ``px`` each as ``median``, ``mean``, ``p90``; ``lost`` (share);
-        ``phase`` (cycles; see `phase_errors`) and ``px`` are None where they, strikes or camera are unknown;
-        ``coverage`` (share) of the ``50`` and ``90`` % intervals; ``static`` and ``free``: the baselines;
-        ``root12``: as ``root`` over shoulders, elbows, wrists, hips, knees and ankles, the joints that 2-D
-        pose networks have; ``proc``: after the best rotation, scale and shift of every frame, to compare
-        with literature only; ``status``, ``trust`` (see `trust`); ``calibration`` (see
-        `gait.motion.evaluate`).
-
-    Raises
-    ------
-    UserError
-        If they have no frame in common.
+    `strikes`: heel strikes of the truth; `model`: sections of the model blob, for the baselines; `camera`:
+    for the distance in the picture. Returns ``frames``; ``abs``, ``root`` (mm) and ``px`` each as ``median``,
+    ``mean``, ``p90``; ``lost`` (share); ``phase`` (cycles; see `phase_errors`) and ``px`` are None where
+    they, strikes or camera are unknown; ``coverage`` (share) of the ``50`` and ``90`` % intervals; ``static``
+    and ``free``: the baselines; ``root12``: as ``root`` over shoulders, elbows, wrists, hips, knees and
+    ankles, the joints that 2-D pose networks have; ``proc``: after the best rotation, scale and shift of
+    every frame, to compare with literature only; ``status``, ``trust`` (see `trust`); ``calibration`` (see
+    `gait.motion.evaluate`). UserError if they have no frame in common.
     """
     common, ours, theirs = np.intersect1d(track.frame, truth.frame, return_indices=True)
     if len(common) == 0:

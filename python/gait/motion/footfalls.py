@@ -118,11 +118,7 @@ def _foot(truth: Joints, side: str) -> Array:
 def furthest(time: Array, reach: Array) -> Array:
     """Return the times of the maxima of `reach`, refined by the parabola through three frames.
 
-    Parameters
-    ----------
-    time : ndarray of shape (n,)
-    reach : ndarray of shape (n,)
-        Metres that a foot is ahead of the pelvis (or behind it, to find toe-offs).
+    `time` (n,); `reach` (n,): metres that a foot is ahead of the pelvis (or behind it, to find toe-offs).
     """
     from scipy.signal import find_peaks  # slow to load
 
@@ -156,14 +152,9 @@ _NEAR = 0.25  # seconds: further apart two events are not the same
 
 @dataclass(frozen=True)
 class Events:
-    """Strikes and toe-offs of both feet, seconds, each increasing.
+    """Strikes and toe-offs of both feet, seconds, each increasing."""
 
-    Attributes
-    ----------
-    strike, off : dict of str to ndarray of shape (k,)
-        By side, "right" or "left".
-    """
-
+    #: Times (k,) by side, "right" or "left".
     strike: dict[str, Array]
     off: dict[str, Array]
 
@@ -175,22 +166,13 @@ class Events:
 
 @dataclass(frozen=True)
 class Contacts:
-    """Contacts of one foot with the ground; leading axes (...) may run over draws.
+    """Contacts of one foot with the ground; leading axes (...) may run over draws."""
 
-    Attributes
-    ----------
-    strike, off : ndarray of shape (..., k)
-        Seconds; `off` ends the contact that `strike` begins, NaN where it was not seen.
-    place : ndarray of shape (..., k, 3)
-        Heel while the foot is flat, metres, world; NaN where the track ends before.
-    pelvis : ndarray of shape (..., k, 3)
-        At the strike.
-    """
-
+    #: (..., k) seconds; `off` ends the contact that `strike` begins, NaN where it was not seen.
     strike: Array
     off: Array
-    place: Array
-    pelvis: Array
+    place: Array  #: (..., k, 3) heel while the foot is flat, metres, world; NaN where the track ends before
+    pelvis: Array  #: (..., k, 3) at the strike
 
 
 def find_events(joints: Joints) -> Events:
@@ -220,17 +202,7 @@ def same_events(found: Events, wanted: Events) -> Events:
 
 
 def contacts(joints: Joints, events: Events, side: str, stride: float) -> Contacts:
-    """Contacts of one foot.
-
-    Parameters
-    ----------
-    joints : Joints
-    events : Events
-    side : str
-        "right" or "left".
-    stride : float
-        Seconds of a stride, about.
-    """
+    """Contacts of one foot. `side`: "right" or "left"; `stride`: seconds of a stride, about."""
     strike = events.strike[side]
     return Contacts(
         strike=strike,
@@ -284,30 +256,16 @@ _FLAT = 0.2  # of a stride after the strike
 
 @dataclass(frozen=True)
 class Draws:
-    """Motions drawn from the posterior of a whole clip.
+    """Motions drawn from the posterior of a whole clip."""
 
-    Attributes
-    ----------
-    frame : ndarray of int, shape (n,)
-    time : ndarray of shape (n,)
-        Seconds.
-    joint_names, angle_names : tuple of str
-        Of P joints and A angles.
-    joints : ndarray of float32, shape (D, n, P, 3)
-        Metres, world.
-    angles : ndarray of float32, shape (D, n, A)
-        Radians.
-    phase : ndarray of float32, shape (D, n)
-        [0, 1) of the stride.
-    """
-
-    frame: NDArray[np.int64]
-    time: Array
+    frame: NDArray[np.int64]  #: (n,)
+    time: Array  #: (n,) seconds
+    #: The D draws are of P joints and A angles.
     joint_names: tuple[str, ...]
     angle_names: tuple[str, ...]
-    joints: NDArray[np.float32]
-    angles: NDArray[np.float32]
-    phase: NDArray[np.float32]
+    joints: NDArray[np.float32]  #: (D, n, P, 3) metres, world
+    angles: NDArray[np.float32]  #: (D, n, A) radians
+    phase: NDArray[np.float32]  #: (D, n) [0, 1) of the stride
 
     def motion(self, draw: int) -> Joints:
         """One of the motions."""

@@ -52,49 +52,28 @@ MIRRORED = ("step_time_s", "step_length_m", "stance_percent")
 
 @dataclass(frozen=True)
 class Strides:
-    """Strides of one foot, from strike to strike.
+    """Strides of one foot, from strike to strike."""
 
-    Attributes
-    ----------
-    side : str
-        "right" or "left".
-    start, end : ndarray of shape (k,)
-        Seconds.
-    values, sd : dict of str to ndarray of shape (k,)
-        `QUANTITIES` and their standard deviations; NaN where the track does not show one.
-    draws : dict of str to ndarray of shape (D, k)
-        The same of every draw.
-    sure : ndarray of bool, shape (k,)
-        No frame of the stride was lost or ambiguous.
-    """
-
-    side: str
+    side: str  #: "right" or "left"
+    #: (k,) seconds.
     start: Array
     end: Array
+    #: (k,) `QUANTITIES` and their standard deviations; NaN where the track does not show one.
     values: dict[str, Array]
     sd: dict[str, Array]
-    draws: dict[str, Array]
-    sure: NDArray[np.bool_]
+    draws: dict[str, Array]  #: (D, k) the same of every draw
+    sure: NDArray[np.bool_]  #: (k,) no frame of the stride was lost or ambiguous
 
 
 @dataclass(frozen=True)
 class Parameters:
-    """What `measure` finds.
+    """What `measure` finds."""
 
-    Attributes
-    ----------
-    events, event_sd : Events
-        Strikes and toe-offs, seconds.
-    strides : dict of str to Strides
-        By side.
-    source : str
-        Where the uncertainty comes from, in words.
-    """
-
+    #: Strikes and toe-offs, seconds.
     events: Events
     event_sd: Events
-    strides: dict[str, Strides]
-    source: str
+    strides: dict[str, Strides]  #: by side
+    source: str  #: where the uncertainty comes from, in words
 
     def summary(self) -> dict[str, dict[str, Any]]:
         """Means over the sure strides: by quantity, for right, left and both feet.
@@ -141,17 +120,8 @@ class Parameters:
 def measure(track: Track, draws: Draws | None = None) -> Parameters:
     """Gait parameters of a track.
 
-    Parameters
-    ----------
-    track : Track
-        Of at least three frames.
-    draws : Draws, optional
-        Motions drawn from the posterior; without them the standard deviations of the track are used.
-
-    Raises
-    ------
-    UserError
-        If no foot strikes twice in the track.
+    `track`: of at least three frames. `draws`: motions drawn from the posterior; without them the standard
+    deviations of the track are used. UserError if no foot strikes twice in the track.
     """
     if len(track.frame) < 3:
         raise UserError("has fewer than three frames; track at least two strides")
@@ -186,12 +156,8 @@ def stride_quantities(foot: Contacts, other: Contacts, between: NDArray[np.int64
 
     The step is the one that ends the stride: from the other foot's strike within it.
 
-    Parameters
-    ----------
-    foot, other : Contacts
-        Of the foot and of the other one, with the same leading axes.
-    between : ndarray of int, shape (k - 1,)
-        Which strike of the other foot lies within each stride; -1: none.
+    `foot`, `other`: of the foot and of the other one, with the same leading axes. `between` (k - 1,): which
+    strike of the other foot lies within each stride; -1: none.
     """
     start, end = foot.strike[..., :-1], foot.strike[..., 1:]
     middle, last_off = _pick(other.strike, between), _pick(other.off, np.where(between > 0, between - 1, -1))
@@ -257,21 +223,13 @@ _SMALL = 0.005  # strides, for slopes
 
 @dataclass(frozen=True)
 class AngleCycle:
-    """One angle over the cycle, degrees, each array of shape (101,) unless stated otherwise.
+    """One angle over the cycle, degrees, each array of shape (101,) unless stated otherwise."""
 
-    Attributes
-    ----------
-    strides : ndarray of shape (k, 101)
-        Of the sure strides.
-    mean, sd : ndarray
-        Mean of the strides, and its posterior standard deviation (NaN if the track has none).
-    norm_mean, norm_sd : ndarray
-        Of the people the model was learned from, at the stride rate of these strides.
-    """
-
-    strides: Array
+    strides: Array  #: (k, 101) of the sure strides
+    #: Mean of the strides, and its posterior standard deviation (NaN if the track has none).
     mean: Array
     sd: Array
+    #: Of the people the model was learned from, at the stride rate of these strides.
     norm_mean: Array
     norm_sd: Array
 
@@ -298,15 +256,8 @@ def angle_cycles(
 ) -> dict[str, AngleCycle]:
     """Cycles of every angle that both track and model have.
 
-    Parameters
-    ----------
-    track : Track
-    parameters : Parameters
-        Of the track.
-    curves : ModelCurves
-        The norm; without draws also how scores and phase move the angles.
-    draws : Draws, optional
-        Motions drawn from the posterior.
+    `parameters`: of the track. `curves`: the norm; without draws also how scores and phase move the angles.
+    `draws`: motions drawn from the posterior.
     """
     angles = {name[: -len("_deg")]: v for name, v in track.numbers.items() if name.endswith("_deg")}
     out = {}

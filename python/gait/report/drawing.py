@@ -85,14 +85,7 @@ def side_colour(name: str) -> Colour:
 
 
 class Overlay:
-    """Draws into the frames of one camera.
-
-    Parameters
-    ----------
-    model : Model
-    camera : Camera
-        Its lens distortion is applied to what is drawn.
-    """
+    """Draws into the frames of one camera. `camera`: its lens distortion is applied to what is drawn."""
 
     def __init__(self, model: Model, camera: Camera) -> None:
         self.model, self.camera = model, camera

@@ -17,15 +17,8 @@ def svg_figure(
 ) -> str:
     """Draw rows of axes, each by its painter.
 
-    Parameters
-    ----------
-    rows : sequence of sequence of callable
-    size : (float, float)
-        Width and height, inches.
-    font : float
-        Points.
-    legend : bool
-        Show one legend above all axes, that of the first.
+    `size`: width and height, inches; `font`: points; `legend`: show one legend above all axes,
+    that of the first.
     """
     with matplotlib.rc_context({"svg.fonttype": "none", "svg.hashsalt": "gait", "font.size": font}):
         figure = Figure(figsize=size, layout="constrained")

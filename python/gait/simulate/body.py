@@ -56,21 +56,12 @@ _UPRIGHT = ("ankle_height", "shank", "thigh", "hip_drop", "neck_up", "head_up")
 
 @dataclass(frozen=True)
 class Anatomy:
-    """Lengths of one person.
+    """Lengths of one person."""
 
-    Attributes
-    ----------
-    stature : float
-        Height of the head's top over the ground in the rest pose, shoes on, metres.
-    lengths : dict of float
-        Keys of the proportions table, metres.
-    rest : dict of ndarray of shape (3,)
-        Joints and reported points in the rest pose (limbs hang, feet forward; x forward, y left, z up)
-        relative to the pelvis joint, metres.
-    """
-
-    stature: float
-    lengths: dict[str, float]
+    stature: float  #: height of the head's top over the ground in the rest pose, shoes on, metres
+    lengths: dict[str, float]  #: keys of the proportions table, metres
+    #: (3,) joints and reported points in the rest pose (limbs hang, feet forward; x forward, y left, z up)
+    #: relative to the pelvis joint, metres.
     rest: dict[str, Array]
 
     def __getitem__(self, name: str) -> float:
@@ -121,29 +112,15 @@ def _rest_pose(k: dict[str, float]) -> dict[str, Array]:
 
 @dataclass
 class Part:
-    """A piece of surface in the rest pose, relative to the pelvis joint, metres.
+    """A piece of surface in the rest pose, relative to the pelvis joint, metres."""
 
-    Attributes
-    ----------
-    vertices : ndarray of shape (n, 3)
-    faces : ndarray of shape (m, 3)
-        Anticlockwise seen from outside.
-    uv : ndarray of shape (n, 2)
-        Texture coordinates: metres along the cloth, or 0..1 for a picture.
-    material : int
-        Index of the texture.
-    bones : ndarray of shape (n, 2)
-        The bone towards the trunk and the one it blends into; the second turns about its own joint.
-    blend : ndarray of shape (n,)
-        Share of the second bone.
-    """
-
-    vertices: Array
-    faces: Ints
-    uv: Array
-    material: int
+    vertices: Array  #: (n, 3)
+    faces: Ints  #: (m, 3) anticlockwise seen from outside
+    uv: Array  #: (n, 2) texture coordinates: metres along the cloth, or 0..1 for a picture
+    material: int  #: index of the texture
+    #: (n, 2) the bone towards the trunk and the one it blends into; the second turns about its own joint.
     bones: Ints
-    blend: Array
+    blend: Array  #: (n,) share of the second bone
 
     def bind(self, first: str, second: str | None = None, blend: ArrayLike = 0.0) -> Part:
         """Fix every vertex to one bone, or blend it (n,) from `first` to its child `second`."""
@@ -184,16 +161,10 @@ def loft(
 ) -> Part:
     """Return the surface through superelliptic rings.
 
-    Parameters
-    ----------
-    stations : array of shape (k, 6)
-        Per control ring: centre x, y, z, radius along `x_axis`, radius along `y_axis`, exponent (2 = ellipse,
-        larger = squarer), metres.
-    count, segments : int
-        Rings and vertices per ring of the result.
-    x_axis, y_axis : array of shape (3,)
-        Directions of the ring's radii; their cross product must point from the first ring to the last, or the
-        surface faces inwards.
+    `stations` (k, 6): per control ring: centre x, y, z, radius along `x_axis`, radius along `y_axis`,
+    exponent (2 = ellipse, larger = squarer), metres. `count`, `segments`: rings and vertices per ring of the
+    result. `x_axis`, `y_axis` (3,): directions of the ring's radii; their cross product must point from the
+    first ring to the last, or the surface faces inwards.
     """
     rows = refine(stations, count)
     angle = 2 * np.pi * np.arange(segments + 1) / segments

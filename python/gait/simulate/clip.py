@@ -230,23 +230,9 @@ def simulate(
 ) -> dict[str, Any]:
     """Write a clip and everything known about it into `folder`, which is made if need be.
 
-    Parameters
-    ----------
-    scenario : Scenario
-    folder : path
-        Gets the files of `FILES`, in the formats that `gait capture` and `gait eval` read.
-    progress : callable, optional
-        Called with the number of frames done.
-
-    Returns
-    -------
-    dict
-        The contents of meta.json.
-
-    Raises
-    ------
-    UserError
-        If the folder cannot be written or the options contradict each other.
+    `folder`: gets the files of `FILES`, in the formats that `gait capture` and `gait eval` read; `progress`:
+    called with the number of frames done. Returns the contents of meta.json. UserError if the folder cannot
+    be written or the options contradict each other.
     """
     stage = set_stage(scenario)
     target = _folder(folder)

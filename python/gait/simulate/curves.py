@@ -62,17 +62,10 @@ def fourier(phase: ArrayLike) -> Array:
 
 @dataclass(frozen=True)
 class Curves:
-    """One person's joint angles as Fourier series.
+    """One person's joint angles as Fourier series."""
 
-    Attributes
-    ----------
-    mean : ndarray of shape (channels, 1 + 2 harmonics)
-        Radians, rows in the order of `NAMES`.
-    modes : ndarray of shape (modes, channels, 1 + 2 harmonics)
-        How strides differ from one another, radians per unit score.
-    """
-
-    mean: Array
+    mean: Array  #: (channels, 1 + 2 harmonics) radians, rows in the order of `NAMES`
+    #: (modes, channels, 1 + 2 harmonics) how strides differ from one another, radians per unit score.
     modes: Array
 
     def angles(self, phase: Array, scores: Array) -> dict[str, Array]:
@@ -160,10 +153,7 @@ def curves_of_model(path: str, rng: np.random.Generator, cadence: float) -> Curv
 
     cadence : strides per second, which the mean cycle follows.
 
-    Raises
-    ------
-    UserError
-        If the file is not a sound model or lacks the legs' angles.
+    UserError if the file is not a sound model or lacks the legs' angles.
     """
     sections = blob.read(path)
     for tag in ("CHNM", "CURV", "SCST"):

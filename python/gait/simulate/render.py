@@ -18,37 +18,21 @@ from gait.simulate.wardrobe import FACE, LEGS, SIZE, TOP, Appearance
 
 
 class Hits(NamedTuple):
-    """The nearest surface at every covered pixel.
+    """The nearest surface at every covered pixel."""
 
-    Attributes
-    ----------
-    row, column : ndarray of shape (n,)
-        Pixels, each once.
-    face : ndarray of shape (n,)
-        Triangle seen there.
-    weights : ndarray of shape (n, 3)
-        Barycentric weights of its corners in the picture plane.
-    """
-
+    #: (n,) pixels, each once.
     row: Ints
     column: Ints
-    face: Ints
-    weights: Floats
+    face: Ints  #: (n,) triangle seen there
+    weights: Floats  #: (n, 3) barycentric weights of its corners in the picture plane
 
 
 def rasterise(xy: Floats, nearness: Floats, faces: Ints, width: int, height: int) -> Hits:
     """Find the visible triangle of every pixel.
 
-    Parameters
-    ----------
-    xy : ndarray of shape (n, 2)
-        Vertices in pixels, pixel centres at integers.
-    nearness : ndarray of shape (n,)
-        Larger is nearer, linear in the picture (1 / depth for a perspective camera).
-    faces : ndarray of shape (m, 3)
-        Triangles; those clockwise in a picture with v down (the back sides) are dropped.
-    width, height : int
-        Of the picture, pixels.
+    `xy` (n, 2): vertices in pixels, pixel centres at integers. `nearness` (n,): larger is nearer, linear in
+    the picture (1 / depth for a perspective camera). `faces` (m, 3): triangles; those clockwise in a picture
+    with v down (the back sides) are dropped. `width`, `height`: of the picture, pixels.
     """
     a, b, c = (xy[faces[:, k]] for k in range(3))
     area = _cross(b - a, c - a)
@@ -191,13 +175,7 @@ class _Instant:
 
 
 class Renderer:
-    """Draws any frame of one walk.
-
-    Parameters
-    ----------
-    camera, scene, mesh, appearance, walk
-        What is seen.
-    """
+    """Draws any frame of one walk."""
 
     def __init__(self, camera: Camera, scene: Scene, mesh: Mesh, appearance: Appearance, walk: Walk) -> None:
         self.camera, self.scene, self.mesh, self.appearance, self.walk = camera, scene, mesh, appearance, walk

@@ -24,51 +24,28 @@ _SIZE = (64, 4096)
 
 @dataclass(frozen=True)
 class Scenario:
-    """Options of `gait simulate`; None lets the seed decide.
+    """Options of `gait simulate`; None lets the seed decide."""
 
-    Attributes
-    ----------
-    view, direction : str
-        One of `VIEWS`; ``lr`` walks to the right of the picture, ``rl`` to the left.
-    frames : int
-    fps : float
-        Frames per second.
-    size : (int, int)
-        Width and height, even, pixels.
-    stature : float, optional
-        Metres, shoes on.
-    speed, stride_hz : float, optional
-        Metres per second, strides (two steps) per second; one implies the other.
-    distance, camera_height : float, optional
-        Of the camera from the middle of the path, horizontally, and over the ground, metres.
-    seed : int
-        Of everything random: body, clothes, gait, scene, noise.
-    pole, clutter : bool
-        A pole before the path; a stronger background.
-    flicker : float
-        Standard deviation of the exposure, per cent.
-    noise : float
-        Standard deviation of the sensor noise, grey levels.
-    gait : str
-        ``generator`` or the name of a ``.gait`` model whose curves are walked.
-    """
-
+    #: One of `VIEWS`; ``lr`` walks to the right of the picture, ``rl`` to the left.
     view: str = "side"
     direction: str = "lr"
     frames: int = 120
-    fps: float = 30.0
-    size: tuple[int, int] = (640, 480)
-    stature: float | None = None
+    fps: float = 30.0  #: frames per second
+    size: tuple[int, int] = (640, 480)  #: width and height, even, pixels
+    stature: float | None = None  #: metres, shoes on
+    #: Metres per second, strides (two steps) per second; one implies the other.
     speed: float | None = None
     stride_hz: float | None = None
+    #: Of the camera from the middle of the path, horizontally, and over the ground, metres.
     distance: float | None = None
     camera_height: float | None = None
-    seed: int = 1
+    seed: int = 1  #: of everything random: body, clothes, gait, scene, noise
+    #: A pole before the path; a stronger background.
     pole: bool = False
     clutter: bool = False
-    flicker: float = 0.0
-    noise: float = 2.0
-    gait: str = GENERATOR
+    flicker: float = 0.0  #: standard deviation of the exposure, per cent
+    noise: float = 2.0  #: standard deviation of the sensor noise, grey levels
+    gait: str = GENERATOR  #: ``generator`` or the name of a ``.gait`` model whose curves are walked
 
     def __post_init__(self) -> None:
         """Check every option; the message names it as on the command line."""

@@ -77,15 +77,8 @@ class Layout:
 def draw_layout(camera: Camera, ground: Array, clutter: bool, pole: bool, rng: np.random.Generator) -> Layout:
     """Draw a yard or street behind the path.
 
-    Parameters
-    ----------
-    camera : Camera
-    ground : ndarray of shape (n, 2)
-        The path on the ground, metres.
-    clutter : bool
-        More and stronger things behind the person.
-    pole : bool
-        Stand a pole between camera and path.
+    `ground` (n, 2): the path on the ground, metres; `clutter`: more and stronger things behind the person;
+    `pole`: stand a pole between camera and path.
     """
     wall_y = float(ground[:, 1].max() + rng.uniform(2.2, 3.4))
     side, high = rng.choice([-1.0, 1.0]), np.radians(rng.uniform(42, 58))
@@ -286,25 +279,14 @@ _SAMPLES = 2  # rays per pixel, each way
 
 @dataclass(frozen=True)
 class Scene:
-    """Pictures of the empty scene at the clip's size.
+    """Pictures of the empty scene at the clip's size."""
 
-    Attributes
-    ----------
-    ambient, direct : ndarray of shape (h, w, 3)
-        Linear light; their sum is the plate.
-    position : ndarray of shape (h, w, 3)
-        World place of each pixel's surface, metres; far away for the sky.
-    front : ndarray of shape (h, w)
-        Share of the pixel covered by something in front of the person.
-    to_sun : ndarray of shape (3,)
-        Unit vector.
-    """
-
+    #: (h, w, 3) linear light; their sum is the plate.
     ambient: Floats
     direct: Floats
-    position: Floats
-    front: Floats
-    to_sun: Array
+    position: Floats  #: (h, w, 3) world place of each pixel's surface, metres; far away for the sky
+    front: Floats  #: (h, w) share of the pixel covered by something in front of the person
+    to_sun: Array  #: (3,) unit vector
 
     @property
     def plate(self) -> Floats:

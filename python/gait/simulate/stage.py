@@ -39,22 +39,9 @@ def make_camera(
 ) -> Camera:
     """Place the camera at (0, -distance, height) with the longest lens that keeps all `points` in view.
 
-    Parameters
-    ----------
-    view : str
-    size : (int, int)
-        Width and height, pixels.
-    points : ndarray of shape (n, 3)
-        Everything the person reaches, world, metres.
-    distance : float, optional
-        From the origin, horizontally, metres; by default such that the person keeps well away.
-    height : float, optional
-        Metres.
-
-    Raises
-    ------
-    UsageError
-        If the person would come too close to the lens.
+    `size`: width and height, pixels. `points` (n, 3): everything the person reaches, world,
+    metres. `distance`: from the origin, horizontally, metres; by default such that the person keeps well
+    away. `height`: metres. UsageError if the person would come too close to the lens.
     """
     near = -float(points[:, 1].min())
     if distance is None:
@@ -101,20 +88,13 @@ _SURFACE = 0.10  # metres from a joint to the skin, hair or shoe around it
 
 @dataclass(frozen=True)
 class Stage:
-    """What is in front of the camera.
-
-    Attributes
-    ----------
-    scenario, body, walk, camera
-    frames : ndarray of shape (frames,)
-        Index of each frame on the walk's time grid.
-    """
+    """What is in front of the camera."""
 
     scenario: Scenario
     body: Anatomy
     walk: Walk
     camera: Camera
-    frames: Ints
+    frames: Ints  #: (frames,) index of each frame on the walk's time grid
 
 
 @dataclass(frozen=True)
@@ -128,13 +108,7 @@ class Set:
 
 
 def set_stage(scenario: Scenario) -> Stage:
-    """Draw a person and let them walk before a camera.
-
-    Raises
-    ------
-    UserError
-        If the options contradict each other.
-    """
+    """Draw a person and let them walk before a camera. UserError if the options contradict each other."""
     rng = scenario.stream("body")
     stature = scenario.stature or float(np.clip(rng.normal(1.73, 0.08), 1.55, 1.95))
     body = draw_anatomy(stature, rng)

@@ -24,17 +24,10 @@ from gait.simulate.geometry import Array, Ints, about, apply, euler, limb, unit
 
 @dataclass(frozen=True)
 class Path:
-    """Curve on the ground by arc length; arc length 0 is the middle of the clip.
+    """Curve on the ground by arc length; arc length 0 is the middle of the clip."""
 
-    Attributes
-    ----------
-    heading : float
-        Direction of travel at arc length 0, radians from world x towards world y.
-    radius : float
-        Of the circle about the origin, metres, positive to the left (anticlockwise); 0 = straight.
-    """
-
-    heading: float
+    heading: float  #: direction of travel at arc length 0, radians from world x towards world y
+    #: Of the circle about the origin, metres, positive to the left (anticlockwise); 0 = straight.
     radius: float = 0.0
 
     def direction(self, along: ArrayLike) -> Array:
@@ -57,23 +50,12 @@ MARGIN_STRIDES = 2  # whole strides simulated before and after the clip, so that
 
 @dataclass(frozen=True)
 class Timing:
-    """Fine time grid and the gait phase on it.
+    """Fine time grid and the gait phase on it."""
 
-    Attributes
-    ----------
-    time : ndarray of shape (T,)
-        Seconds, uniform, 0 = first frame of the clip; the frames lie on the grid.
-    phase : ndarray of shape (T,)
-        Unwrapped strides of the right foot; whole numbers are right heel strikes.
-    scores : ndarray of shape (T, modes)
-        Smooth stride-to-stride scores, unit variance.
-    per_frame : int
-        Grid steps per frame, a multiple of 4 so that a half shutter opens and closes on the grid.
-    """
-
-    time: Array
-    phase: Array
-    scores: Array
+    time: Array  #: (T,) seconds, uniform, 0 = first frame of the clip; the frames lie on the grid
+    phase: Array  #: (T,) unwrapped strides of the right foot; whole numbers are right heel strikes
+    scores: Array  #: (T, modes) smooth stride-to-stride scores, unit variance
+    #: Grid steps per frame, a multiple of 4 so that a half shutter opens and closes on the grid.
     per_frame: int
 
     @property
@@ -157,21 +139,11 @@ def rolling_ankle(pitch: Array, bend: Array, body: Anatomy) -> tuple[Array, Arra
 
 @dataclass(frozen=True)
 class Footfall:
-    """One planted step.
+    """One planted step."""
 
-    Attributes
-    ----------
-    stride : int
-        The foot's stride number: it is on the ground from phase `stride` to `stride` + TOE_OFF.
-    place : ndarray of shape (2,)
-        Ground under the ankle of the flat foot, world, metres.
-    yaw : float
-        Direction of the foot, radians.
-    """
-
-    stride: int
-    place: Array
-    yaw: float
+    stride: int  #: the foot's stride number: it is on the ground from phase `stride` to `stride` + TOE_OFF
+    place: Array  #: (2,) ground under the ankle of the flat foot, world, metres
+    yaw: float  #: direction of the foot, radians
 
 
 def foot_track(
@@ -179,18 +151,9 @@ def foot_track(
 ) -> tuple[Array, Array]:
     """Return the ankle (T, 3) and the yaw (T,) of a foot that stays where it is planted.
 
-    Parameters
-    ----------
-    phase : ndarray of shape (T,)
-        Unwrapped phase of this foot.
-    free : ndarray of shape (T, 3)
-        Ankle as the joint angles alone would carry it; gives the swing its shape.
-    step : float
-        Grid step, seconds.
-    falls : list of Footfall
-        Consecutive steps.
-    rolled : two ndarrays of shape (T,)
-        The planted ankle, from `rolling_ankle`.
+    `phase` (T,): unwrapped phase of this foot. `free` (T, 3): ankle as the joint angles alone would carry it;
+    gives the swing its shape. `step`: grid step, seconds. `falls`: consecutive steps. `rolled` (T,): the
+    planted ankle, from `rolling_ankle`.
     """
     ankle, yaw = free.copy(), np.zeros(len(phase))
     forward, up = rolled
@@ -256,31 +219,15 @@ _LEAD = 0.010  # how far the pelvis is ahead of where the angles would have it o
 
 @dataclass(frozen=True)
 class Walk:
-    """Pose of every bone at every step of the time grid.
-
-    Attributes
-    ----------
-    timing : Timing
-    body : Anatomy
-    origins : ndarray of shape (T, bones, 3)
-        Joint of each bone, world, metres.
-    turns : ndarray of shape (T, bones, 3, 3)
-        Bone to world.
-    heading : ndarray of shape (T,)
-        Direction of the path under the pelvis, radians.
-    pelvis_yaw : ndarray of shape (T,)
-        Turn of the pelvis against that direction, radians.
-    speed : ndarray of shape (T,)
-        Forward speed along the path, m/s.
-    """
+    """Pose of every bone at every step of the time grid."""
 
     timing: Timing
     body: Anatomy
-    origins: Array
-    turns: Array
-    heading: Array
-    pelvis_yaw: Array
-    speed: Array
+    origins: Array  #: (T, bones, 3) joint of each bone, world, metres
+    turns: Array  #: (T, bones, 3, 3) bone to world
+    heading: Array  #: (T,) direction of the path under the pelvis, radians
+    pelvis_yaw: Array  #: (T,) turn of the pelvis against that direction, radians
+    speed: Array  #: (T,) forward speed along the path, m/s
 
     def points(self, index: Ints | slice = slice(None)) -> dict[str, Array]:
         """Return the reported points (n, 3) at grid indices, world, metres."""
@@ -302,10 +249,7 @@ def make_walk(
 ) -> Walk:
     """Compute a walk at `speed` m/s (mean over the grid) along `path`.
 
-    Raises
-    ------
-    UsageError
-        If no step length of this person and cadence gives that speed.
+    UsageError if no step length of this person and cadence gives that speed.
     """
     angles = curves.angles(timing.phase, timing.scores)
     gain = _stride_gain(angles, timing, body, speed)

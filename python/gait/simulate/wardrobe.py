@@ -30,35 +30,19 @@ _SHOES = ((44, 38, 36), (206, 204, 198), (96, 66, 44), (60, 64, 74))
 
 @dataclass(frozen=True)
 class Appearance:
-    """Cut and colours of one person.
+    """Cut and colours of one person."""
 
-    Attributes
-    ----------
-    trunk, limbs, hips : float
-        Girth factors, 1 = average.
-    long_sleeves, long_hair : bool
-    hem : float
-        How far the top reaches below the pelvis joint, metres at 1.75 m stature.
-    loose : float
-        Extra width of the trousers, 0 (slim) to 1.
-    tiles : ndarray of shape (8, SIZE, SIZE, 3)
-        Linear RGB of each material, 0..1.
-    spans : ndarray of shape (8,)
-        Metres covered by one texture; 1 where texture coordinates run 0..1.
-    notes : dict
-        Words for meta.json.
-    """
-
+    #: Girth factors, 1 = average.
     trunk: float
     limbs: float
     hips: float
     long_sleeves: bool
     long_hair: bool
-    hem: float
-    loose: float
-    tiles: Floats
-    spans: Array
-    notes: dict[str, str]
+    hem: float  #: how far the top reaches below the pelvis joint, metres at 1.75 m stature
+    loose: float  #: extra width of the trousers, 0 (slim) to 1
+    tiles: Floats  #: (8, SIZE, SIZE, 3) linear RGB of each material, 0..1
+    spans: Array  #: (8,) metres covered by one texture; 1 where texture coordinates run 0..1
+    notes: dict[str, str]  #: words for meta.json
 
 
 def draw_appearance(rng: np.random.Generator) -> Appearance:
