@@ -47,7 +47,7 @@ typedef struct gait_start_config { GAIT_START_CONFIG_FIELDS(GAIT_DECLARE, GAIT_D
           float, foot, [2], "pixels")                                                                                 \
     FIELD("Crown of the head.",                                                                                       \
           float, head, [2], "pixels")                                                                                 \
-    FIELD("Standard deviation of these coordinates, beside config joint_sd.",                                         \
+    FIELD("Standard deviation of these coordinates.",                                                                 \
           float, sd, , "pixels")
 
 typedef struct gait_box { GAIT_BOX_FIELDS(GAIT_DECLARE) } gait_box;

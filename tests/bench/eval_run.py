@@ -27,7 +27,7 @@ from gait.io.track_file import Track, TrackWriter, read_track, read_truth
 from gait.io.video import Frame, Image, median_plate, read_plate
 from gait.motion.evaluate import evaluate
 from gait.motion.footfalls import Strikes, strikes_of
-from gait.track.auto_start import AutoStart, find_start
+from gait.track.box_start import BoxStart, find_start
 
 
 @dataclass
@@ -95,7 +95,7 @@ def _run(job: Job) -> Result:
     tracker = Tracker(model, camera, config, background=plate)
     begun = time.perf_counter()
     start = _start(job, video, camera, plate, model)
-    kept = _follow(job, video, tracker, start, AutoStart(camera, plate, model, clip.height))
+    kept = _follow(job, video, tracker, start, BoxStart(camera, plate, model, clip.height))
     seconds = time.perf_counter() - begun
     track = read_track(job.folder / f"{job.stem}.csv")
     result = _judge(job, track, camera)
@@ -131,7 +131,7 @@ def _start(job: Job, video: Video, camera: Camera, plate: Image | None, model: M
     return Start.read(path, model)
 
 
-def _follow(job: Job, video: Video, tracker: Tracker, start: Start, auto_start: AutoStart) -> _Kept:
+def _follow(job: Job, video: Video, tracker: Tracker, start: Start, auto_start: BoxStart) -> _Kept:
     """Track into the run's CSV file; whoever is lost is looked for, as in `gait track`."""
     model, kept = tracker.model, _Kept()
     spread = eval_measures.Spread(job.clip.truth, model) if job.arm.mode == "default" else None

@@ -301,3 +301,37 @@ def test_brackets_too_deep_to_read_are_one_line(tmp_path):
         (tmp_path / name).write_text(text)
         with pytest.raises(UserError, match=f"{name}: not valid (JSON|TOML) .brackets within"):
             Camera.read(str(tmp_path / name))
+
+
+FACES_UP = [[1, 0, 0], [0, 1, 0], [0, 0, 1]]
+ON_ITS_HEAD = [[1, 0, 0], [0, 0, 1], [0, -1, 0]]
+
+
+@pytest.mark.parametrize(
+    "pose, words",
+    [
+        ({"R": FACES_UP, "t": [0, 0, 0]}, "its lens is 0 m above the floor"),
+        ({"t": [100, 1600, 5000]}, "1600 m above the floor; R and t are in metres, not millimetres"),
+        ({"R": FACES_UP, "t": [0, 1.6, 5.0]}, "its lens is -5 m above"),
+        ({"R": FACES_UP, "t": [0, 1.6, -5.0]}, "nobody who stands on the floor would be upright"),
+        ({"R": ON_ITS_HEAD, "t": [0, -1.6, 5.0]}, "nobody who stands on the floor would be upright"),
+    ],
+)
+def test_a_camera_that_cannot_be_is_refused(tmp_path, pose, words):
+    view = Camera.read(write_json(tmp_path / "c.json", **pose))
+    with pytest.raises(UserError, match=f"c.json: .*{words}.*; give R and t"):
+        view.check_place("c.json")
+
+
+def test_cameras_that_can_be_are_accepted(tmp_path):
+    Camera.read(write_json(tmp_path / "c.json")).check_place("c.json")
+    for place in ([0, -3, 0.3], [2, -40, 12], [0, -3, 8]):
+        Camera.looking(place, [0, 0, 0.8], (640, 480), 700).check_place("c.json")
+
+
+@needs_data
+def test_cameras_of_all_clips_are_accepted():
+    files = sorted(DATA.glob("*/**/camera.json"))
+    assert files
+    for path in files:
+        Camera.read(str(path)).check_place(str(path))

@@ -70,10 +70,7 @@ def errors(folder):
         [rows.places[name] for name in ("l_knee", "r_knee", "l_ankle", "r_ankle")],
         axis=1,
     )
-    order = [
-        MODEL.joint_names.index(name)
-        for name in ("l_knee", "r_knee", "l_ankle", "r_ankle")
-    ]
+    order = [MODEL.joint_names.index(name) for name in ("l_knee", "r_knee", "l_ankle", "r_ankle")]
     return rows, mine, order
 
 
@@ -81,9 +78,7 @@ def test_every_frame_is_covered_from_a_start_in_the_middle(folder, capsys):
     more = ("--overlay", folder / "o.mp4", "--trc", folder / "o.trc")
     assert track(folder, *more) == 0
     rows, mine, order = errors(folder)
-    assert rows.frame.tolist() == list(range(len(FRAMES))) and set(rows.status) == {
-        "tracking"
-    }
+    assert rows.frame.tolist() == list(range(len(FRAMES))) and set(rows.status) == {"tracking"}
     off = np.linalg.norm(mine - JOINTS[:, order], axis=2).mean(axis=1)
     assert off.max() < 0.12 and np.median(off[:START]) < 0.06
     assert Video(folder / "o.mp4").count == len(FRAMES)
@@ -95,9 +90,7 @@ def test_the_smoother_covers_the_frames_before_the_start_too(folder):
     assert track(folder, "--smooth", "--draws", folder / "d.npz") == 0
     rows, mine, order = errors(folder)
     with np.load(folder / "d.npz") as draws:
-        assert (
-            rows.frame.tolist() == draws["frame"].tolist() == list(range(len(FRAMES)))
-        )
+        assert rows.frame.tolist() == draws["frame"].tolist() == list(range(len(FRAMES)))
     assert np.linalg.norm(mine - JOINTS[:, order], axis=2).mean() < 0.12
 
 
@@ -105,9 +98,7 @@ def test_frames_from_the_last_to_the_first(folder, monkeypatch):
     film = Video(folder / "walk.mp4")
     monkeypatch.setattr(video, "_CHUNK_BYTES", 1)  # the least chunk, 8 frames
     back, forth = list(film.backwards(21, 2)), list(film.frames(2, 21))
-    assert [(f.number, f.time) for f in back] == [
-        (f.number, f.time) for f in reversed(forth)
-    ]
+    assert [(f.number, f.time) for f in back] == [(f.number, f.time) for f in reversed(forth)]
     assert np.array_equal(back[0].image, forth[-1].image)
 
 
@@ -119,9 +110,7 @@ def test_a_person_who_comes_back_is_found_by_keypoints(folder, capsys):
     uv = np.full((count, len(MODEL.joint_names), 2), np.nan)
     uv[: len(FRAMES)] = uv[-len(FRAMES) :] = camera().project(JOINTS)
     frame = np.arange(count)
-    found = keypoints_file.Keypoints(
-        frame, frame / 30, MODEL.joint_names, uv, np.ones(uv.shape[:2])
-    )
+    found = keypoints_file.Keypoints(frame, frame / 30, MODEL.joint_names, uv, np.ones(uv.shape[:2]))
     keypoints_file.write(folder / "k.csv", found)
     assert track(folder, "--keypoints", folder / "k.csv") == 0
     rows, mine, order = errors(folder)
@@ -134,9 +123,7 @@ def test_a_person_who_comes_back_is_found_by_keypoints(folder, capsys):
 
 def test_a_film_of_noise_ends_with_a_warning(folder, capsys):
     random = np.random.default_rng(1)
-    write(
-        folder / "walk.mp4", random.integers(0, 255, (40, 240, 320, 3), dtype=np.uint8)
-    )
+    write(folder / "walk.mp4", random.integers(0, 255, (40, 240, 320, 3), dtype=np.uint8))
     assert track(folder, "--background", "auto") == 1
     assert "the person was lost nearly all the time" in capsys.readouterr().err
     rows = read_track(folder / "o.csv")
@@ -146,9 +133,7 @@ def test_a_film_of_noise_ends_with_a_warning(folder, capsys):
 @pytest.fixture(scope="module")
 def estimate():
     """What a tracker has of the walk's last frame."""
-    tracker = Tracker(
-        MODEL, camera(), TrackerConfig.default(particles=200), background=wall()
-    )
+    tracker = Tracker(MODEL, camera(), TrackerConfig.default(particles=200), background=wall())
     mean, sd = MODEL.prior()
     sd.pelvis[:] = sd.heading = sd.phase = 0.02
     tracker.start(TRUE[-1], sd, 0)
@@ -159,9 +144,7 @@ def estimate():
 
 def found(shift=0.0, joints=JOINTS[-1]):
     """Keypoints of a person so many metres aside."""
-    return FrameKeypoints(
-        MODEL.joint_names, camera().project(joints + [shift, 0, 0]), 2.0
-    )
+    return FrameKeypoints(MODEL.joint_names, camera().project(joints + [shift, 0, 0]), 2.0)
 
 
 def test_keypoints_of_another_person_are_left_out(estimate):
@@ -175,9 +158,7 @@ def test_keypoints_of_another_person_are_left_out(estimate):
 
 
 def test_legs_that_keypoints_show_elsewhere_are_no_agreement(estimate):
-    legs = [
-        i for i, name in enumerate(MODEL.joint_names) if name[2:] in ("knee", "ankle")
-    ]
+    legs = [i for i, name in enumerate(MODEL.joint_names) if name[2:] in ("knee", "ankle")]
     astride = JOINTS[-1].copy()
     astride[legs, 0] += [0.25 * (-1) ** i for i in range(len(legs))]
     people = PersonKeypoints(camera(), {0: {0: found(joints=astride)}}, 0)
@@ -193,7 +174,5 @@ def test_without_keypoints_a_walk_must_be_plausible(estimate, jump, grown, statu
     for i in range(40):
         mean = replace(TRUE[-1], stature=1.75 + grown, heading=0.0)
         mean.pelvis = np.array([1.2 * i / 30 + jump * (i > 20), 0.0, 0.95])
-        now = plausible.judged(
-            Frame(i, i / 30, FRAMES[0]), replace(estimate, mean=mean, speed=1.2)
-        )
+        now = plausible.judged(Frame(i, i / 30, FRAMES[0]), replace(estimate, mean=mean, speed=1.2))
     assert now.status == TrackStatus[status]

@@ -7,6 +7,7 @@ enum {
     ANOTHER = 18,    /* change of half of an image that means another scene, grey levels */
     GAP = 3,         /* cells of low contrast that may interrupt a body */
     LEAST_HEIGHT = 15,
+    PEOPLE_PART = 2, /* one cell in so many that change belongs to people, or the background is another */
     MOST_CELLS = 320 /* each way */
 };
 
@@ -152,6 +153,7 @@ int32_t blob_find(const blob_finder *f, const gait_image *image, const gait_imag
                   int32_t capacity)
 {
     int32_t area[GAIT_START_MAX_PEOPLE], found = 0;
+    int64_t changed = 0, of_people = 0; /* cells */
     int32_t const most = i_min(capacity, GAIT_START_MAX_PEOPLE);
     compare(f, image, background);
     int32_t const noise = NOISE_STEPS * smooth(f) * 3 / 2, least = i_max(noise, 4 * LEAST_STEP);
@@ -161,6 +163,8 @@ int32_t blob_find(const blob_finder *f, const gait_image *image, const gait_imag
         if (f->mask[i] != 1)
             continue;
         patch const p = flood(f, i);
+        changed += p.area;
+        of_people += person_like(f, &p) ? p.area : 0;
         if (!person_like(f, &p) || (found == most && p.area <= area[found - 1]))
             continue;
         int32_t at = found < most ? found++ : found - 1;
@@ -171,5 +175,5 @@ int32_t blob_find(const blob_finder *f, const gait_image *image, const gait_imag
         area[at] = p.area;
         out[at] = measure(f, &p);
     }
-    return found;
+    return of_people * PEOPLE_PART < changed ? 0 : found;
 }

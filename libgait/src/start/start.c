@@ -28,17 +28,21 @@ static const double IN_PLACE = 8.0;   /* twice the log odds of a walk over one i
 static const double DEGREES = 4.0;    /* of freedom of the keypoints' errors */
 static const double BEHIND = 1e3;     /* standard deviations for joints behind the camera */
 static const double LEAD = 0.1; /* statures by which the lower foot is nearer to the camera than the body */
-static const double BOX_PLACE = 0.08; /* metres, of boxes for as long as shadows and clothes stay the same */
-static const double OPEN = 0.3;       /* information on a heading that boxes leave open, per square radian */
-static const float OPEN_SD = 0.9f;    /* radians of standard deviation from which a heading is unknown */
+static const double BOX_MISS = 0.01; /* of heights, by hair, shoes and blur */
+static const double FOOT_SD = 0.06;  /* metres by which all foot points of a person may be off */
+static const double BOX_PLACE = 0.1; /* metres, of boxes for as long as shadows and clothes stay the same */
+static const double COURSE = 0.15;   /* radians: people do not walk exactly where their box moves */
+static const double OPEN = 0.3;      /* information on a heading that boxes leave open, per square radian */
+static const float OPEN_SD = 0.9f;   /* radians of standard deviation from which a heading is unknown */
 static const float BUILD_SHARE =
     0.25f;                           /* of the sd of scores and posture: few particles find the phase first */
 static const float SPEEDS_UP = 0.4f; /* sd of the rate, as a share of what it is below the usual one */
 static const float FITS = 1.8f;      /* chi-square per coordinate up to which a walk fits */
 static const float LEAST_RATE = 0.3f;   /* strides per second; a person who stands fits a very slow walk */
 static const float LEAST_SPEED = 0.25f; /* metres per second of a person who walks */
+static const float LIKELY = 0.25f;      /* probability of one of several people who walk, at least */
 static const float BOX_SPEED = 0.4f;    /* the same by boxes */
-static const double STANDS = 0.1;       /* probability of a person who stays, against one who walks */
+static const double STANDS = 0.5;       /* probability of a person who stays, against one who walks */
 
 /* Steps of the differences that stand for derivatives. */
 static const double STEP[N] = {0.02, 0.02, 0.03, 0.03, 0.01, 0.01, 0.01, 0.01, 0.1, 0.1, 0.1};
@@ -375,7 +379,7 @@ static void prior_residuals(const gait_start *s, const double *q, bool in_place,
     r[START_SPEED] = in_place ? q[START_SPEED] / STILL_SD : (q[START_SPEED] - usual) / SPEED_SD;
     r[START_RATE] = (q[START_RATE] - (double)m->stride_hz) / RATE_SD;
     r[START_STATURE] = (q[START_STATURE] - (double)s->cfg.stature) / (double)s->cfg.stature_sd;
-    r[START_FLOOR] = q[START_FLOOR] / FLOOR_SD;
+    r[START_FLOOR] = q[START_FLOOR] / (p->person ? FOOT_SD : FLOOR_SD);
     for (int32_t k = 0; k < START_SCORES; k++)
         r[START_SCORE + k] = q[START_SCORE + k];
 }
@@ -395,7 +399,7 @@ static void costs(const gait_start *s, const double (*theta)[N], int32_t lanes, 
     for (int32_t i = 0; i < lanes; i++) {
         double r[N];
         prior_residuals(s, theta[i], in_place, r);
-        cost[i] = chi2[i] * w->problem.share + (in_place ? IN_PLACE : 0.0);
+        cost[i] = chi2[i] * w->problem.share + (in_place && !w->problem.person ? IN_PLACE : 0.0);
         for (int32_t k = 0; k < N; k++)
             cost[i] += r[k] * r[k];
     }
@@ -571,8 +575,18 @@ static void leave_open(const gait_start *s, const start_candidate *c, gait_hypot
     h->mean.phase = 0.0f;
     h->sd.phase = s->prior_sd.phase;
     h->mean.pelvis[2] -= (float)c->theta[START_FLOOR]; /* an error of the boxes, not of the floor */
-    for (int32_t k = 0; k < 2; k++)
-        h->sd.pelvis[k] = root((double)h->sd.pelvis[k] * (double)h->sd.pelvis[k] + BOX_PLACE * BOX_PLACE);
+    float ray[3];
+    camera_to(&s->cfg.camera, h->mean.pelvis, ray);
+    for (int32_t k = 0; k < 2; k++) { /* along the viewing ray */
+        double const share = (double)(ray[k] * ray[k] / (ray[0] * ray[0] + ray[1] * ray[1])),
+                     own = (double)h->sd.pelvis[k];
+        h->sd.pelvis[k] = root(own * own + share * BOX_PLACE * BOX_PLACE);
+    }
+    if (c->in_place) {
+        h->mean.stride_hz = s->model->stride_hz;
+        h->sd.stride_hz = s->prior_sd.stride_hz;
+    }
+    h->sd.heading = root((double)h->sd.heading * (double)h->sd.heading + COURSE * COURSE);
     if (c->in_place || h->sd.heading > OPEN_SD) {
         h->mean.heading = c->in_place ? 0.0f : h->mean.heading;
         h->sd.heading = PI_F;
@@ -638,7 +652,7 @@ static int32_t solve_problem(gait_start *s, int64_t utime, gait_hypothesis *out,
     if (!choose_frames(s, &w->problem))
         return -1;
     double const pixels = rough_place(s, &w->problem);
-    set_noise(s, (double)s->cfg.joint_sd * pixels);
+    set_noise(s, (boxes ? BOX_MISS : (double)s->cfg.joint_sd) * pixels);
     int32_t const proposed = propose(s), refined = i_min(proposed, START_REFINED);
     best_first(w->candidate, proposed, refined);
     for (int32_t i = 0; i < refined; i++)
@@ -719,7 +733,8 @@ bool start_walks(const gait_hypothesis *h)
 {
     bool const boxes = h->sd.phase >= 0.5f;
     if (boxes)
-        return !h->in_place && h->speed > BOX_SPEED && h->sd.heading < PI_F && h->chi2_per_observation < FITS;
+        return !h->in_place && h->speed > f_max(BOX_SPEED, 2.0f * h->speed_sd) && h->probability > LIKELY &&
+               h->sd.heading < PI_F && h->chi2_per_observation < FITS;
     return h->mean.stride_hz > LEAST_RATE && (h->in_place || h->speed > LEAST_SPEED) &&
            h->chi2_per_observation < FITS;
 }

@@ -27,7 +27,7 @@ from typing import Any, NamedTuple
 ABI = 7
 ALIGN = 64
 MAX_JOINTS, MAX_ANGLES, MAX_COMPONENTS, MAX_PROPORTIONS, MAX_CAMERAS = 32, 32, 16, 8, 4
-MAX_HYPOTHESES = 8  # of a start
+MAX_HYPOTHESES, MAX_PEOPLE = 8, 4  # of a start
 
 
 class Status(IntEnum):

@@ -1,16 +1,43 @@
-"""The automatic start: hypotheses of where a person is and how they walk, from a second of keypoints."""
+"""The automatic start: hypotheses of where a person is and how they walk, from a second of observations."""
 
 from __future__ import annotations
 
 import ctypes
+from collections.abc import Sequence
 from dataclasses import dataclass
 
+import numpy as np
+from numpy.typing import NDArray
+
 from gait.bindings import abi
-from gait.bindings.frame import FrameKeypoints, keypoint_array
+from gait.bindings.frame import FrameKeypoints, image_view, keypoint_array
 from gait.bindings.library import call, library, make
 from gait.bindings.model import Model, camera_c
 from gait.bindings.state import State
 from gait.camera.camera import Camera
+from gait.io.video import Image
+
+
+@dataclass(frozen=True)
+class Box:
+    """A person who stands on the floor in full view, pixels as captured.
+
+    Attributes
+    ----------
+    foot, head : ndarray of shape (2,)
+        Lowest point of the feet and crown, at the middle of the body.
+    sd : float
+        Standard deviation of these coordinates.
+    """
+
+    foot: NDArray[np.float64]
+    head: NDArray[np.float64]
+    sd: float
+
+    @property
+    def tall(self) -> float:
+        """Height in the picture."""
+        return float(np.hypot(*(self.foot - self.head)))
 
 
 @dataclass(frozen=True)
@@ -28,7 +55,9 @@ class Hypothesis:
     chi2_per_observation : float
         Robust squared error per coordinate, in standard deviations; about 1 if the model fits.
     in_place : bool
-        The person walks in place, as on a treadmill.
+        The person stays in place, as on a treadmill.
+    walks : bool
+        A walk that fits what was observed, to start with at once.
     """
 
     mean: State
@@ -38,10 +67,11 @@ class Hypothesis:
     probability: float
     chi2_per_observation: float
     in_place: bool
+    walks: bool
 
 
 class StartFit:
-    """Fits the cyclic model to keypoints of one person, in memory of fixed size (``gait_start.h``).
+    """Fits a walk to keypoints of one person, or to boxes around people (``gait_start.h``).
 
     Parameters
     ----------
@@ -50,6 +80,8 @@ class StartFit:
         Calibrated; it must not move.
     stature, stature_sd : float, optional
         Of the person, metres; the model's adults if left out.
+    box_time : float, optional
+        Seconds over which the boxes of a person must lie.
 
     Raises
     ------
@@ -58,18 +90,52 @@ class StartFit:
     """
 
     def __init__(
-        self, model: Model, camera: Camera, *, stature: float | None = None, stature_sd: float | None = None
+        self,
+        model: Model,
+        camera: Camera,
+        *,
+        stature: float | None = None,
+        stature_sd: float | None = None,
+        box_time: float | None = None,
     ) -> None:
-        self._model, config = model, abi.StartConfigC()
+        self._model, self._camera, config = model, camera, abi.StartConfigC()
         library().gait_start_fill(config, ctypes.sizeof(config))
         config.camera = camera_c(camera)
         config.stature = config.stature if stature is None else stature
         config.stature_sd = config.stature_sd if stature_sd is None else stature_sd
+        config.box_time = config.box_time if box_time is None else box_time
         self._handle, self._memory = make("start", model.handle, config)
 
     def add(self, utime: int, keypoints: FrameKeypoints) -> None:
         """Add the keypoints of one frame; the time, microseconds, must increase."""
         call("gait_start_add", self._handle, utime, keypoint_array(keypoints, self._model.joint_names))
+
+    def add_boxes(self, utime: int, boxes: Sequence[Box]) -> None:
+        """Add boxes around the people in one frame, the most certain first; the time must increase.
+
+        Boxes that make a person shorter than 1.2 m or taller than 2.4 m are left out.
+        """
+        call("gait_start_add_boxes", self._handle, utime, _boxes_c(boxes), len(boxes))
+
+    def find_boxes(self, image: Image, background: Image) -> list[Box]:
+        """Find people-sized regions that differ from the empty scene, the largest first."""
+        found, count = (abi.BoxC * abi.MAX_PEOPLE)(), ctypes.c_int32()
+        views = [image_view(picture, self._camera, "frame") for picture in (image, background)]
+        call("gait_start_find_boxes", self._handle, *views, found, len(found), count)
+        return [Box(np.array(c.foot), np.array(c.head), c.sd) for c in found[: count.value]]
+
+    def other_scene(self, image: Image, background: Image) -> bool:
+        """Whether half of a picture differs from the background: another scene, or the camera has moved."""
+        other = ctypes.c_int32()
+        views = [image_view(picture, self._camera, "frame") for picture in (image, background)]
+        call("gait_start_other_scene", self._handle, *views, other)
+        return bool(other.value)
+
+    def stature(self, box: Box) -> float:
+        """Stature of the person in a box by the camera, metres; NaN if there is no floor under the feet."""
+        found = ctypes.c_float()
+        call("gait_start_box_stature", self._handle, _boxes_c([box]), found)
+        return found.value
 
     def reset(self) -> None:
         """Forget the frames."""
@@ -81,7 +147,8 @@ class StartFit:
         Raises
         ------
         GaitError
-            If too few frames show hips and ankles (four or more over 0.3 s are needed), or nothing fits.
+            If too few frames show hips and ankles (four or more over 0.3 s are needed) or a box of one
+            person (eight or more over `box_time`), or nothing fits.
         """
         found, count = (abi.HypothesisC * abi.MAX_HYPOTHESES)(), ctypes.c_int32()
         call("gait_start_solve", self._handle, utime, found, abi.MAX_HYPOTHESES, count)
@@ -97,4 +164,12 @@ class StartFit:
             c.probability,
             c.chi2_per_observation,
             bool(c.in_place),
+            bool(library().gait_hypothesis_walks(c)),
         )
+
+
+def _boxes_c(boxes: Sequence[Box]) -> ctypes.Array[abi.BoxC]:
+    found = (abi.BoxC * max(len(boxes), 1))()
+    for c, box in zip(found, boxes, strict=False):
+        c.foot[:], c.head[:], c.sd = box.foot.tolist(), box.head.tolist(), box.sd
+    return found

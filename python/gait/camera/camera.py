@@ -28,6 +28,9 @@ if TYPE_CHECKING:
 
 
 Array = NDArray[np.float64]
+_LEAST_ABOVE, _MOST_ABOVE = 0.05, 200.0  # metres of a lens over the floor
+_UPSIDE_DOWN = 0.3  # upward part of the picture's downward direction
+_PERSON, _LEAST_TALL = 1.7, 20.0  # metres; pixels
 
 
 @dataclass(frozen=True, eq=False)
@@ -171,6 +174,30 @@ class Camera:
         if abs(self.height * factor - height) < 1:
             raise UserError(f"{made}; scale width, height, fx, fy, cx, cy by {factor:.6g}")
         raise UserError(f"{made}, another aspect; calibrate for this video or undo its crop")
+
+    def check_place(self, where: str) -> None:
+        """Raise UserError unless people who stand on the floor, z = 0, would be upright in the picture."""
+        above, fault = float(self.centre[2]), ""
+        if above < _LEAST_ABOVE:
+            fault = f"its lens is {above:.3g} m above the floor"
+        elif above > _MOST_ABOVE:
+            fault = f"its lens is {above:.4g} m above the floor; R and t are in metres, not millimetres"
+        elif self.R[1, 2] > _UPSIDE_DOWN or not self._shows_person():
+            fault = "nobody who stands on the floor would be upright in its picture"
+        if fault:
+            raise UserError(
+                f"{where}: {fault}; give R and t from world to camera in metres, z up, the floor at z = 0 "
+                "(gait camera makes such a file)"
+            )
+
+    def _shows_person(self) -> bool:
+        """Whether somewhere in the picture a person who stands on the floor is tall enough to be tracked."""
+        u, v = np.meshgrid(np.linspace(0, self.width - 1, 9), np.linspace(0, self.height - 1, 9))
+        floor = self.on_plane(np.stack([u, v], axis=-1).reshape(-1, 2))
+        floor = floor[np.isfinite(floor).all(axis=1)]
+        up = self.project(floor) - self.project(floor + [0.0, 0.0, _PERSON])
+        with np.errstate(invalid="ignore"):
+            return bool(((up[:, 1] > _LEAST_TALL) & (np.abs(up[:, 0]) < up[:, 1])).any())
 
     def to_dict(self) -> dict[str, Any]:
         """Return the keys of the JSON camera file."""

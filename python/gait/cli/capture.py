@@ -172,7 +172,7 @@ def _start(args: argparse.Namespace, source: FileSource | DeviceSource, setup: S
         return start
     if isinstance(source, DeviceSource) or setup.camera is None:
         raise UsageError("--init auto: needs a video file and --camera; give an init file")
-    from gait.track.auto_start import find_start  # slow to load, and only needed here
+    from gait.track.box_start import find_start  # slow to load, and only needed here
 
     return find_start(
         source.video,

@@ -12,7 +12,7 @@ from gait.bindings.estimate import Estimate
 from gait.bindings.initial import Start, set_height
 from gait.io.trc import write_trc
 from gait.progress import note
-from gait.track.auto_start import AutoStart
+from gait.track.box_start import BoxStart
 from gait.track.clip_output import write
 from gait.track.follow import Follower
 from gait.track.keypoint_start import find_keypoint_start
@@ -88,7 +88,7 @@ def _follower(
 
     auto_start = None
     if not options.smooth and not scene.people:
-        auto_start = AutoStart(scene.camera, scene.plate, scene.model, options.height)
+        auto_start = BoxStart(scene.camera, scene.plate, scene.model, options.height)
     return Follower(
         tracker, scene.video, keypoints, plausibility, find_again, auto_start, one_pass=options.smooth
     )

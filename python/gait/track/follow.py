@@ -11,7 +11,7 @@ from gait.bindings.abi import Flag, TrackStatus
 from gait.bindings.estimate import Estimate
 from gait.bindings.initial import DEFAULT_SD, Start
 from gait.io.video import Frame, Video
-from gait.track.auto_start import AutoStart
+from gait.track.box_start import BoxStart
 from gait.track.person_keypoints import PersonKeypoints
 from gait.track.plausible import Plausibility
 from gait.track.tracker import Tracker
@@ -36,7 +36,7 @@ class Follower:
     plausibility : Plausibility
         Of its estimates.
     find_again : FindAgain
-    auto_start : AutoStart, optional
+    auto_start : BoxStart, optional
         Finds a lost person by the pictures.
     one_pass : bool
         Each estimate comes from the same forward pass, as the smoother needs it: tracking backwards only
@@ -50,7 +50,7 @@ class Follower:
         keypoints: PersonKeypoints,
         plausibility: Plausibility,
         find_again: FindAgain,
-        auto_start: AutoStart | None = None,
+        auto_start: BoxStart | None = None,
         *,
         one_pass: bool = False,
     ) -> None:
@@ -94,16 +94,16 @@ class Follower:
         tracker.start(start.mean, start.sd, utime)
         self._plausibility.restart()
 
-    def _restarted(self, auto_start: AutoStart, frame: Frame, estimate: Estimate) -> bool:
+    def _restarted(self, auto_start: BoxStart, frame: Frame, estimate: Estimate) -> bool:
         """Whether a person who was lost is found in the pictures; the tracker starts anew with them."""
         if estimate.status in _FOLLOWED:
             auto_start.forget()
         if estimate.status != TrackStatus.LOST:
             return False
         auto_start.observe(frame)
-        if not auto_start.walks_in(frame):
+        anew = auto_start.walks_in(frame)
+        if anew is None:
             return False
-        anew = auto_start.state(latest=True)
         self._start(self._tracker, anew, frame.utime)
         return True
 

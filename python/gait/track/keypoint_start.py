@@ -18,14 +18,8 @@ from gait.io.keypoints_file import Keypoints
 
 _WINDOW = 1.0  # seconds of keypoints that are fitted
 _STEP = 0.2  # seconds from one window to the next
-_FITS = 1.8  # squared error per coordinate up to which a window is taken at once
 _FITS_BEST = 4.0  # and up to which the best of all is taken
-_LEAST_SPEED = 0.25  # metres per second of a person who walks
-_LEAST_RATE = 0.3  # strides per second; a standing person fits a very slow walk
 _STATURE_SD = 0.05  # metres, of one that the user gives
-_LEAST_SD = {"heading": 0.08, "phase": 0.03, "stature": 0.03, "stride_hz": 0.03}
-_SPEEDS_UP = 0.4  # standard deviation of the stride rate, as a share of what it is below the usual one
-_LEAST_PLACE_SD = 0.05  # metres
 CUE_MISS = 0.01
 
 _JOINT_SD = {"elbow": 0.02, "wrist": 0.04, "heel": 0.03, "toe": 0.04, "shoulder": 0.01, "hip": 0.01}
@@ -94,11 +88,11 @@ def find_keypoint_start(
         if time < begin + _STEP:
             continue
         begin = time
-        found = _fit_window(model, fit, by_frame, frames, times, at)
+        found = _fit_window(fit, by_frame, frames, times, at)
         if found is None:
             continue
         start, hypothesis = found
-        if _walks(hypothesis) and hypothesis.chi2_per_observation < _FITS:
+        if hypothesis.walks:
             return start
         if best is None or hypothesis.chi2_per_observation < best[1].chi2_per_observation:
             best = found
@@ -106,7 +100,6 @@ def find_keypoint_start(
 
 
 def _fit_window(
-    model: Model,
     fit: StartFit,
     by_frame: dict[int, FrameKeypoints],
     frames: np.ndarray[tuple[int], np.dtype[np.int64]],
@@ -123,17 +116,5 @@ def _fit_window(
         hypothesis = fit.solve(round(1e6 * times[at]))[0]
     except GaitError:
         return None
-    sd = hypothesis.sd
-    for name, least in _LEAST_SD.items():
-        setattr(sd, name, max(getattr(sd, name), least))
-    # Someone who only begins to walk is slower than soon after.
-    sd.stride_hz = max(sd.stride_hz, _SPEEDS_UP * (model.info.stride_hz - hypothesis.mean.stride_hz))
-    sd.pelvis = np.clip(sd.pelvis, _LEAST_PLACE_SD, 10.0)
-    hypothesis.mean.phase %= 1.0
-    start = Start(int(frames[at]), hypothesis.mean, sd, in_place=hypothesis.in_place)
+    start = Start(int(frames[at]), hypothesis.mean, hypothesis.sd, in_place=hypothesis.in_place)
     return start, hypothesis
-
-
-def _walks(hypothesis: Hypothesis) -> bool:
-    steps = hypothesis.mean.stride_hz > _LEAST_RATE
-    return steps and (hypothesis.in_place or hypothesis.speed > _LEAST_SPEED)

@@ -10,6 +10,7 @@ from gait.bindings.abi import Mode
 from gait.bindings.frame import FrameKeypoints
 from gait.bindings.initial import OUTSIDE, Start
 from gait.bindings.model import Model
+from gait.bindings.start_fit import StartFit
 from gait.camera.camera import Camera
 from gait.detect import weights
 from gait.errors import UserError
@@ -17,11 +18,12 @@ from gait.io import keypoints_file
 from gait.io.keypoints_file import Keypoints
 from gait.io.video import Image, Video, background
 from gait.progress import note, progress
-from gait.track.auto_start import find_start
+from gait.track.box_start import find_start
 from gait.track.from_walk import Calibration, calibrate
 from gait.track.keypoint_start import CUE_MISS, find_keypoint_start, keypoint_noise
 from gait.track.options import ClipOptions
-from gait.track.person_detection import another_scene, one_is_grey
+
+_COLOUR = 4.0  # grey levels between the channels of half of a picture in colour, at least
 
 
 @dataclass(frozen=True)
@@ -69,6 +71,10 @@ class Scene:
         video = Video(options.video)
         camera = Camera.read(options.camera, video.size) if options.camera else None
         model = Model(options.model)
+        if camera is not None and options.camera:
+            camera.check_place(options.camera)
+            if options.init != "auto":
+                _read_start(options, camera, model)  # refuse a wrong one before the work on the whole clip
         frames = clip_frames(video, options.start or 0, options.stop)
         with progress("background", video.count, options.quiet) as update:
             plate = background(options.background, video, update)
@@ -108,7 +114,7 @@ def clip_frames(video: Video, start: int, stop: int | None) -> range:
 def first_state(options: ClipOptions, scene: Scene) -> Start:
     """First state, from the init file or found in the clip."""
     if options.init != "auto":
-        start = Start.read(options.init, scene.model, frame=options.start, height=options.height)
+        start = _read_start(options, scene.camera, scene.model)
         clip_frames(scene.video, start.frame, options.stop)
         _require_scene(options, scene, start.frame)
         start = replace(start, in_place=_in_place(scene, start.frame))
@@ -116,8 +122,14 @@ def first_state(options: ClipOptions, scene: Scene) -> Start:
         _require_scene(options, scene, scene.frames.start)
         start = _find_first_state(options, scene)
         _note_start(options, scene, start)
-    if not scene.camera.shows(scene.model.pose(start.mean)[0]):
-        note(f"{options.init}: {OUTSIDE}", options.quiet)
+    return start
+
+
+def _read_start(options: ClipOptions, camera: Camera, model: Model) -> Start:
+    """Read a start from the init file; it must be in the picture."""
+    start = Start.read(options.init, model, frame=options.start, height=options.height)
+    if not camera.shows(model.pose(start.mean)[0]):
+        raise UserError(f"{options.init}: {OUTSIDE}")
     return start
 
 
@@ -174,7 +186,7 @@ def _require_scene(options: ClipOptions, scene: Scene, first: int) -> None:
             f"{options.background}: of it and {scene.video.path} one is grey, the other in colour; "
             "take both alike"
         )
-    if not another_scene(frame.image, scene.plate):
+    if not StartFit(scene.model, scene.camera).other_scene(frame.image, scene.plate):
         return
     differs = f"half of frame {first} differs from"
     if options.background != "auto":
@@ -185,6 +197,12 @@ def _require_scene(options: ClipOptions, scene: Scene, first: int) -> None:
         f"{differs} the median of the clip, the background: if the camera moves, --background none",
         options.quiet,
     )
+
+
+def one_is_grey(image: Image, plate: Image) -> bool:
+    """Whether one of two BGR pictures is grey throughout and the other in colour."""
+    colour = [float(np.median(np.ptp(one[::4, ::4], axis=2))) for one in (image, plate)]
+    return min(colour) == 0 and max(colour) > _COLOUR
 
 
 def _detect(options: ClipOptions, video: Video, frames: range) -> tuple[dict[int, Keypoints], int]:

@@ -25,7 +25,7 @@ from gait.io.video import Frame, Image, Video
 from gait.track.tasks import PythonTasks, Runner, TaskSource, threads
 
 if TYPE_CHECKING:
-    from gait.track.auto_start import AutoStart  # needs OpenCV
+    from gait.track.box_start import BoxStart  # needs OpenCV
 
 
 class Tracker:
@@ -174,7 +174,7 @@ class Tracker:
         video: Video,
         start: Start,
         stop: int | None = None,
-        auto_start: AutoStart | None = None,
+        auto_start: BoxStart | None = None,
         keypoints: Mapping[int, FrameKeypoints] | None = None,
     ) -> Iterator[tuple[Frame, Estimate]]:
         """Track one person through a video: yield each frame from ``start.frame`` on with its estimate.
@@ -186,7 +186,7 @@ class Tracker:
         start : Start
         stop : int, optional
             First frame not to use.
-        auto_start : AutoStart, optional
+        auto_start : BoxStart, optional
             Looks for the person while the tracker has lost them; where it finds one the track starts anew.
         keypoints : mapping of int to FrameKeypoints, optional
             Found in frames, by number; see `step`.
@@ -201,8 +201,8 @@ class Tracker:
                 auto_start.forget()
             elif auto_start and estimate.status == TrackStatus.LOST:
                 auto_start.observe(frame)
-                if auto_start.walks_in(frame):
-                    anew = auto_start.state(latest=True)
+                anew = auto_start.walks_in(frame)
+                if anew is not None:
                     self.start(anew.mean, anew.sd, frame.utime)
 
     def particles(self) -> tuple[NDArray[np.void], NDArray[np.float32]]:

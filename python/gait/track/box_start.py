@@ -1,0 +1,195 @@
+"""Automatic start from pictures: boxes around people, in the whole clip until somebody walks.
+
+People are found where frames differ from the empty scene or, without one, by their shape; the library fits a
+walk to a second of their boxes (`gait.bindings.start_fit`).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+
+import numpy as np
+
+from gait.bindings.initial import Start
+from gait.bindings.model import Model
+from gait.bindings.start_fit import Box, Hypothesis, StartFit
+from gait.camera.camera import Camera
+from gait.detect.shapes import find_people
+from gait.errors import GaitError, UserError
+from gait.io.video import Frame, Image, Video
+
+ENOUGH = 8  # frames with a person, at least
+SELDOM = 0.09  # seconds, at least, between frames searched without a background: that is slow
+_WINDOW = 1.0  # seconds of boxes that are fitted
+_LEAST_WINDOW = 0.3  # the same in a clip that is not longer
+_STEP = 0.1  # seconds from one fit to the next
+_STATURE_SD = 0.03  # metres, of one that the user gives
+_PLAUSIBLE = (1.2, 2.4)  # metres, of boxes that are people
+_BEYOND = 4.0  # standard deviations by which an apparent stature contradicts the one expected
+
+
+class BoxStart:
+    """Watches frames for a person to start with.
+
+    Parameters
+    ----------
+    camera, plate, model
+        `plate` is the empty scene, BGR; without one people are found by their shape, every `SELDOM` seconds.
+    height : float, optional
+        Known stature, metres.
+    window : float
+        Seconds for which a person must be in view.
+
+    Attributes
+    ----------
+    misplaced : list of float
+        A stature for each frame in which the camera makes the largest person's stature implausible.
+    found : int
+        Frames with a person so far.
+    """
+
+    def __init__(
+        self,
+        camera: Camera,
+        plate: Image | None,
+        model: Model,
+        height: float | None = None,
+        window: float = _WINDOW,
+    ) -> None:
+        known = {} if height is None else {"stature": height, "stature_sd": _STATURE_SD}
+        self._fit = StartFit(model, camera, box_time=window, **known)
+        self._expected = model.prior()[0].stature if height is None else height
+        self._plate, self._window = plate, window
+        self.misplaced: list[float] = []
+        self.found = 0
+        self._times: list[tuple[int, float]] = []  # frames observed
+        self._statures: list[float] = []
+        self._last_fit = -np.inf
+
+    def forget(self) -> None:
+        """Start afresh."""
+        self._fit.reset()
+        self._times.clear()
+        self._statures.clear()
+
+    def observe(self, frame: Frame) -> None:
+        """Find people in a frame and give their boxes to the fit."""
+        if self._plate is None and self._times and 0 <= frame.time - self._times[-1][1] < SELDOM:
+            return
+        boxes = self._boxes(frame.image)
+        self._times.append((frame.number, frame.time))
+        self._fit.add_boxes(frame.utime, boxes)
+        self.found += bool(boxes)
+        self._statures += [self._fit.stature(box) for box in boxes[:1]]
+
+    def best(self, frame: Frame, *, latest: bool = False) -> tuple[Start, Hypothesis] | None:
+        """Most probable start after a frame: at its moment, or a window earlier; None before there is one."""
+        back = 0.0 if latest else self._window
+        at = next((item for item in self._times if item[1] >= frame.time - back - 1e-6), None)
+        if at is None:
+            return None
+        try:
+            one = self._fit.solve(round(1e6 * at[1]))[0]
+        except GaitError:
+            return None
+        apparent = float(np.median(self._statures))
+        sure = abs(apparent - self._expected) < _BEYOND * np.hypot(0.07, 0.03 * self._expected)
+        return Start(at[0], one.mean, one.sd, None if sure else apparent), one
+
+    def walks_in(self, frame: Frame) -> Start | None:
+        """Start at a frame just observed, if somebody walks in it."""
+        if not self._times or self._times[-1][0] != frame.number:
+            return None
+        if 0 <= frame.time - self._last_fit < _STEP:
+            return None
+        self._last_fit = frame.time
+        found = self.best(frame, latest=True)
+        return found[0] if found is not None and found[1].walks else None
+
+    def _boxes(self, image: Image) -> list[Box]:
+        if self._plate is None:
+            return find_people(image, self._fit.stature)
+        boxes = self._fit.find_boxes(image, self._plate)
+        statures = [self._fit.stature(box) for box in boxes]
+        people = [
+            box for box, tall in zip(boxes, statures, strict=True) if _PLAUSIBLE[0] <= tall <= _PLAUSIBLE[1]
+        ]
+        if statures and not people:
+            self.misplaced.append(statures[0])
+        return people
+
+
+def find_start(
+    video: Video,
+    camera: Camera,
+    plate: Image | None,
+    model: Model,
+    *,
+    first: int = 0,
+    stop: int | None = None,
+    height: float | None = None,
+) -> Start:
+    """Find the first state of the first person who walks in a clip.
+
+    If nobody walks, a person who stands out against the empty scene is taken, with an unknown heading.
+
+    Parameters
+    ----------
+    video, camera, plate, model
+        `plate` is the empty scene, BGR.  Without it, or where no person stands out against it, people are
+        found by their shape.
+    first, stop : int
+        Frames to search, `first` <= number < `stop`.
+    height : float, optional
+        Known stature, metres.
+
+    Raises
+    ------
+    UserError
+        If no person is in full view for long enough.
+    """
+    misplaced: list[float] = []
+    few = min(video.count, video.count if stop is None else stop) - first
+    window = float(np.clip(0.9 * few / video.fps, _LEAST_WINDOW, _WINDOW))
+    standing: Start | None = None
+    for finder in _finders(camera, plate, model, height, window):
+        last_fit = -np.inf
+        for frame in video.frames(first, stop):
+            finder.observe(frame)
+            if frame.time - last_fit < _STEP:
+                continue
+            last_fit = frame.time
+            found = finder.best(frame)
+            if found is not None and found[1].walks:
+                return found[0]
+            if found is not None and plate is not None and standing is None:
+                standing = found[0]
+        misplaced += finder.misplaced
+    if standing is not None:
+        return standing
+    raise UserError(f"{video.path}: {_nobody(few, misplaced)}")
+
+
+def _finders(
+    camera: Camera, plate: Image | None, model: Model, height: float | None, window: float
+) -> Iterator[BoxStart]:
+    """Yield the ways to find a person: by change first, as it gives the place better."""
+    if plate is not None:
+        yield BoxStart(camera, plate, model, height, window)
+    yield BoxStart(camera, None, model, height, window)
+
+
+def _nobody(few: int, misplaced: list[float]) -> str:
+    """Say why there is no start, and what to do."""
+    if few < ENOUGH:
+        frames = f"frame{'s'[: few != 1]}"
+        return f"only {few} {frames} to track, --init auto needs {ENOUGH}; give --init FILE.json"
+    if len(misplaced) < ENOUGH:
+        return f"--init auto found no person in full view for {ENOUGH} frames; give --init FILE.json"
+    what = f"makes {np.nanmedian(misplaced):.2g} m tall" if np.isfinite(misplaced).any() else ""
+    if np.isnan(misplaced).mean() > 0.5:
+        what = "puts above the horizon"
+    return (
+        f"--init auto found a person in {len(misplaced)} frames that the camera {what}; "
+        "check the camera's height and tilt, or give --init FILE.json"
+    )
