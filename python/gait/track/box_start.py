@@ -150,7 +150,7 @@ def find_start(
     """
     misplaced: list[float] = []
     few = min(video.count, video.count if stop is None else stop) - first
-    window = float(np.clip(0.9 * few / video.fps, _LEAST_WINDOW, _WINDOW))
+    window = float(np.clip(0.8 * few / video.fps, _LEAST_WINDOW, _WINDOW))
     standing: Start | None = None
     for finder in _finders(camera, plate, model, height, window):
         last_fit = -np.inf
