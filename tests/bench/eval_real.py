@@ -29,6 +29,7 @@ from facts import facts
 from real_clip import KINDS, Clip, Score, contact_sheet, read_clips, score
 
 from gait import Camera, Video
+from gait.io.track_file import read_estimates
 from gait.progress import progress
 
 ROOT = Path(__file__).resolve().parents[2]
@@ -42,11 +43,11 @@ STRIDE = 0.03  # error of the stride rate, as a share, at most
 
 
 _READING = """\
-Films of real people against the joints of a 2-D detector that were looked through by eye; most cameras are
+Films of real people against the joints of a 2-D detector that were looked through by position; most cameras are
 guessed.  good: knees and ankles within 9 % of the person's height on average, hips in place; swap: left and
-right exchanged; legs: hips in place, legs not; off: hips or legs elsewhere; none: not in the track.  wrong:
+right swapped; legs: hips in place, legs not; off: hips or legs elsewhere; none: not in the track.  wrong:
 frames under `tracking` that are not good.  Heel strikes: median distance of those by the phase from those
-counted by eye (tests/bench/real_strikes.json).  Rates are of the whole command, detector and all."""
+counted by position (tests/bench/real_strikes.json).  Rates are of the whole command, detector and all."""
 
 
 @dataclass(frozen=True)
@@ -116,9 +117,9 @@ def _run(clip: Clip, arm: str, extra: list[str]) -> Result:
     if done.returncode or not out.exists():
         why = (done.stderr.strip().splitlines() or ["no message"])[-1]
         return Result(name, arm, Score({kind: float(kind == "none") for kind in KINDS}), cpu, np.nan, why)
-    camera = Camera.read(found if arm == "nocam" else given, video.size)
-    contact_sheet(clip, out, camera, OUT / f"{name}_{arm}.png")
-    return Result(name, arm, score(clip, out, camera), cpu, video.count / wall)
+    camera, track = Camera.read(str(found if arm == "nocam" else given), video.size), read_estimates(out)
+    contact_sheet(clip, track, camera, OUT / f"{name}_{arm}.png")
+    return Result(name, arm, score(clip, track, camera), cpu, video.count / wall)
 
 
 def _missed(results: list[Result], everything: list[Result]) -> list[str]:

@@ -12,7 +12,7 @@ import cv2
 import numpy as np
 
 from gait import Camera, Video
-from gait.io.track_file import Track, read_estimates
+from gait.io.track_file import Track
 from gait.report.drawing import draw_bones
 
 Points = dict[str, np.ndarray]
@@ -21,7 +21,7 @@ LEGS = ("l_knee", "r_knee", "l_ankle", "r_ankle")
 HIPS = ("l_hip", "r_hip")
 JOINTS = tuple(f"{side}_{joint}" for joint in ("shoulder", "elbow", "wrist") for side in "lr") + HIPS + LEGS
 KINDS = ("good", "swap", "legs", "off", "none")
-"""Of a frame: all in place; left and right exchanged; legs elsewhere; hips elsewhere; not in the track."""
+"""Of a frame: all in place; left and right swapped; legs elsewhere; hips elsewhere; not in the track."""
 _GOOD, _HIPS, _LEGS = 0.09, 0.15, 0.20  # limits of these, person's heights
 _STRIKES = Path(__file__).parent / "real_strikes.json"
 _TILES, _TILE = 8, 300  # of a contact sheet; pixels
@@ -38,11 +38,11 @@ class Clip:
         Frames in which the person walks in full view.
     fps, stature : float
     stride_hz : float or None
-        Counted by eye.
+        Counted by position.
     strikes : list of (float, float)
-        Frame of a heel strike, by eye, and its phase: 0 right, 0.5 left.
+        Frame of a heel strike, by position, and its phase: 0 right, 0.5 left.
     reference : dict of int to Points
-        Joints of a 2-D detector by frame, looked through by eye, pixels.
+        Joints of a 2-D detector by frame, looked through by position, pixels.
     """
 
     folder: Path
@@ -71,7 +71,7 @@ class Score:
     stride_error : float
         Of the stride rate, as a share.
     strike_error : float
-        Median distance of a heel strike by the phase from the one by eye, frames.
+        Median distance of a heel strike by the phase from the one by position, frames.
     """
 
     share: dict[str, float]
@@ -115,9 +115,8 @@ def _read_reference(path: Path) -> dict[int, Points]:
     return found
 
 
-def score(clip: Clip, path: Path, camera: Camera) -> Score:
-    """Compare a track file with the reference."""
-    track = read_estimates(path)
+def score(clip: Clip, track: Track, camera: Camera) -> Score:
+    """Compare a track with the reference."""
     at = {frame: i for i, frame in enumerate(track.frame.tolist())}
     frames = [frame for frame in range(clip.first, clip.last + 1) if frame in clip.reference]
     kinds, errors, tracking, wrong = Counter[str](), [], 0, 0
@@ -183,9 +182,8 @@ def project(track: Track, row: int, camera: Camera) -> Points:
     return {name: at for name, at in zip(names, uv, strict=True) if np.isfinite(at).all()}
 
 
-def contact_sheet(clip: Clip, path: Path, camera: Camera, out: Path) -> None:
+def contact_sheet(clip: Clip, track: Track, camera: Camera, out: Path) -> None:
     """Write a picture of frames over the whole clip: the track's bones, and the reference joints as dots."""
-    track = read_estimates(path)
     at = {frame: i for i, frame in enumerate(track.frame.tolist())}
     chosen = set(np.linspace(clip.first, clip.last, _TILES).round().astype(int).tolist())
     tiles = []

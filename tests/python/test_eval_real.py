@@ -1,0 +1,108 @@
+"""What `make eval-real` counts as good, against tracks of which it is known."""
+
+import sys
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+from test_evaluate import FIRST_PHASE, RATE, TRUTH, track
+
+from gait import Camera
+
+sys.path.insert(0, str(Path(__file__).resolve().parents[1] / "bench"))
+import eval_real
+import real_clip
+
+CAMERA = Camera.looking((7.0, -6.0, 1.5), (2.6, -0.7, 0.9), (640, 480), 500.0)
+OTHER = {"l": "r", "r": "l"}
+
+
+def reference(swapped=False):
+    """Joints of the truth in the picture by frame, with ears and heels."""
+    found = {}
+    for row, frame in enumerate(TRUTH.frame.tolist()):
+        points = real_clip.project(track(), row, CAMERA)
+        points |= {ear: points["head_top"] + [0.0, 10.0] for ear in ("l_ear", "r_ear")}
+        if swapped:
+            points = {
+                OTHER.get(name[0], name[0]) + name[1:] if name[1] == "_" else name: at
+                for name, at in points.items()
+            }
+        found[frame] = points
+    return found
+
+
+def clip(**changes):
+    right = ((np.arange(1, 4) - FIRST_PHASE) / RATE * 30).tolist()
+    made = real_clip.Clip(
+        folder=Path("clip"),
+        video=Path("video.mp4"),
+        first=0,
+        last=99,
+        fps=30.0,
+        stature=1.7,
+        stride_hz=RATE,
+        strikes=[(frame, 0.0) for frame in right],
+        reference=reference(),
+    )
+    return replace(made, **changes)
+
+
+def test_the_truth_is_good_and_on_time():
+    score = real_clip.score(clip(), track(), CAMERA)
+    assert score.share == {"good": 1.0, "swap": 0.0, "legs": 0.0, "off": 0.0, "none": 0.0}
+    assert (score.tracking, score.wrong) == (100, 0)
+    assert score.error < 1e-6 and abs(score.stride_error) < 1e-6 and score.strike_error < 1e-3
+
+
+def test_a_track_elsewhere_is_wrong_only_under_tracking():
+    away = real_clip.score(clip(), track(move=1.0), CAMERA)
+    assert away.share["off"] == 1.0 and away.wrong == 100
+    lost = real_clip.score(clip(), track(move=1.0, status=["lost"] * 100), CAMERA)
+    assert lost.share["off"] == 1.0 and (lost.tracking, lost.wrong) == (0, 0)
+
+
+def test_exchanged_legs_are_a_swap_where_they_are_apart():
+    score = real_clip.score(clip(reference=reference(swapped=True)), track(), CAMERA)
+    assert score.share["swap"] > 0.5 and score.wrong == round(100 * (1 - score.share["good"]))
+
+
+def test_frames_that_are_not_in_the_track_count():
+    half = {frame: points for frame, points in reference().items() if frame < 50}
+    assert real_clip.score(clip(reference=half), track(), CAMERA).share["good"] == 1.0
+    truth = replace(
+        TRUTH,
+        frame=TRUTH.frame[:50],
+        time=TRUTH.time[:50],
+        places={name: at[:50] for name, at in TRUTH.places.items()},
+    )
+    score = real_clip.score(clip(), track(truth), CAMERA)
+    assert score.share["none"] == 0.5 and score.share["good"] == 0.5
+
+
+def result(arm="auto", good=1.0, **changes):
+    share = dict.fromkeys(real_clip.KINDS, 0.0) | {"good": good, "off": 1.0 - good}
+    score = real_clip.Score(share, tracking=100, stride_error=0.0)
+    return eval_real.Result("clip", arm, replace(score, **changes), cpu=1.0, fps=10.0)
+
+
+@pytest.mark.parametrize(
+    ("results", "words"),
+    [
+        ([result(), result(good=0.9)], None),
+        ([result(), result(good=0.6)], "clip auto: good 60%"),
+        ([result(good=0.8), result(good=0.8)], "auto: good 80% on average"),
+        ([result(wrong=3)], "3 of 100 frames"),
+        ([result(stride_error=-0.04)], "stride rate -4.0%"),
+        ([replace(result(), failed="no person")], "clip auto: no person"),
+    ],
+)
+def test_a_missed_bound_is_named(results, words):
+    missed = eval_real._missed(results, results)
+    assert (missed == []) if words is None else any(words in line for line in missed)
+
+
+def test_the_arm_without_background_is_judged_beside_auto():
+    everything = [result(), result("nobg", good=0.9)]
+    assert "nobg: good 90% on average, auto 100%" in eval_real._missed(everything[1:], everything)
