@@ -29,7 +29,7 @@ from gait.io.files import replacing, require_outputs
 from gait.io.keypoints_file import Keypoints
 from gait.io.video import Video
 from gait.progress import note, progress
-from gait.track.from_walk import Calibration, calibrate
+from gait.track.from_walk import calibrate
 
 _LARGE = 3.0  # pixels, rms, above which the points should be checked
 
@@ -92,7 +92,7 @@ def _from_walk(args: argparse.Namespace) -> int:
     keypoints, size = _keypoints(args, model)
     found = calibrate(keypoints, size, model, args.height, fov=args.fov, where=args.walk)
     _write(args.output, found.camera)
-    print(json.dumps(_figures(found)) if args.json else "\n".join(found.describe()))
+    print(json.dumps(found.figures()) if args.json else "\n".join(found.describe()))
     return 0
 
 
@@ -114,18 +114,6 @@ def _keypoints(args: argparse.Namespace, model: Model) -> tuple[Keypoints, tuple
             f"{args.walk}: no person found; the whole body should be in view, 80 pixels or taller"
         )
     return people[main_person(people)], video.size
-
-
-def _figures(found: Calibration) -> dict[str, object]:
-    camera, sd = found.camera, found.sd
-    height = float(camera.centre[2])
-    return {
-        "focal_px": camera.fx, "focal_px_sd": camera.fx * sd[0],
-        "tilt_deg": float(np.degrees(found.tilt)), "tilt_deg_sd": float(np.degrees(sd[1])),
-        "roll_deg": float(np.degrees(found.roll)), "roll_deg_sd": float(np.degrees(sd[2])),
-        "height_m": height, "height_m_sd": height * sd[3],
-        "in_place": found.in_place, "misfit": found.misfit,
-    }  # fmt: skip
 
 
 def _size(text: str) -> tuple[int, int]:

@@ -57,7 +57,8 @@ def track_clip(options: ClipOptions) -> dict[str, Any]:
     if options.trc:
         times, joints = np.array(results.times), np.array(results.joints)
         write_trc(options.trc, scene.model.joint_names, times, joints, scene.video.fps)
-    return results.summary(options.threads)
+    camera = {} if scene.calibration is None else {"camera": scene.calibration.figures()}
+    return results.summary(options.threads) | camera
 
 
 def _stature(options: ClipOptions, scene: Scene, start: Start) -> tuple[float, float]:

@@ -11,6 +11,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from dataclasses import dataclass, replace
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -23,23 +24,23 @@ from gait.bindings.state import State
 from gait.camera.camera import Camera
 from gait.errors import GaitError, UserError
 from gait.io.keypoints_file import Keypoints
+from gait.reproducible import one_thread
 from gait.track.keypoint_start import keypoint_noise
 
 Array = NDArray[np.float64]
 
-CAMERA = ("focal length", "tilt", "roll", "height")
 USUAL_FOV = 65.0  #: degrees along the longer side of the picture, of a usual phone
 _FOV_SD = 0.45  # of the focal length's logarithm; of --fov:
 _GIVEN_FOV_SD = 0.05
-_HEIGHT, _HEIGHT_SD = 1.25, 0.4  # metres; of the logarithm
-_TILT, _TILT_SD, _ROLL_SD = 0.05, 0.15, 0.02  # radians
+_HEIGHT, _HEIGHT_SD = 1.3, 0.5  # metres; of the logarithm
+_TILT, _TILT_SD, _ROLL_SD = 0.05, 0.2, 0.02  # radians
 _STATURE_SD = 0.015  # of the stature, shoes included
 _STARTS = (0.6, 0.85, 1.2, 2.2, 4.0)  # focal lengths to start from, longer sides of the picture
 _WINDOW = 1.2  # seconds of walking to start with
 _GROWTH = 1.0  # seconds by which the part that is explained grows on either side
 _LONGEST = 12.0  # seconds of a walk that are used
 _RATE = 10.0  # frames per second that are used
-_ERROR_TIME = 0.25  # seconds for which errors of a detector last
+_ERROR_TIME = 0.5  # seconds for which errors of a detector last
 _KNOTS = 0.5  # seconds between knots
 _MISS = 0.012  # of the person's height, noise of a joint at full confidence
 _SHARE = {"elbow": 2.0, "wrist": 4.0, "toe": 2.5, "heel": 2.0}  # times as much
@@ -52,6 +53,7 @@ _SCORES = 5  # components of the model that are fitted
 _DEGREES = 4.0  # of freedom of Student's t
 _FITS = 9.0  # squared robust error per coordinate up to which more of the clip is explained by the walk
 _WORST = 6.0  # and up to which the result is accepted
+_LEAST_RATE = 0.4  # strides per second of a person who walks
 _UNKNOWN = 0.2  # relative standard deviation from which the focal length counts as not determined
 
 
@@ -110,6 +112,16 @@ class Calibration:
             )
         return lines
 
+    def figures(self) -> dict[str, Any]:
+        """Give the figures of ``--json``."""
+        height = float(self.camera.centre[2])
+        scale = np.array([self.camera.fx, np.degrees(1.0), np.degrees(1.0), height])
+        values = (self.camera.fx, np.degrees(self.tilt), np.degrees(self.roll), height)
+        names = ("focal_px", "tilt_deg", "roll_deg", "height_m")
+        sds = {f"{name}_sd": float(sd) for name, sd in zip(names, scale * self.sd, strict=True)}
+        means = {name: float(value) for name, value in zip(names, values, strict=True)}
+        return means | sds | {"in_place": self.in_place, "misfit": self.misfit}
+
     def widened(self, time: float, estimate: Estimate) -> Estimate:
         """Add the doubt of the camera to an estimate made with it, seconds `time` in the clip."""
         at = [np.interp(time, self.time, column) for column in self.doubt.reshape(len(self.time), -1).T]
@@ -164,22 +176,31 @@ def calibrate(
     chosen = _choose(keypoints)
     if len(chosen.frame) < 8 or chosen.time[-1] - chosen.time[0] < _WINDOW - 0.4:
         raise UserError(
-            f"{where}: {len(chosen.frame)} frames show the whole person; a camera needs a second of walking "
-            "in full view, or give --camera"
+            f"{where}: shows the whole person for less than a second; film a walk in full view or give "
+            "--camera"
         )
-    prior = _Prior.of(size, fov)
+    with one_thread():
+        return _calibrate(chosen, size, model, height, _Prior.of(size, fov), where)
+
+
+def _calibrate(
+    chosen: Keypoints, size: tuple[int, int], model: Model, height: float, prior: _Prior, where: str
+) -> Calibration:
     body = _Body(model, chosen.names)
     best: _Fit | None = None
     for start in _starts(chosen, size, model, height, prior):
         fit = _Fit(chosen, size, body, height, prior, start)
-        fit.refine(8)
+        fit.refine(6)
         if best is None or fit.cost_per_frame < best.cost_per_frame:
             best = fit
     if best is None or best.misfit > _WORST:
         raise UserError(
             f"{where}: no second of it fits a person who walks; film a walk in full view, or give --camera"
         )
-    return best.grow().result()
+    found = best.grow().result()
+    if best.rate < _LEAST_RATE:
+        raise UserError(f"{where}: the person stands; film a walk in full view, or give --camera")
+    return found
 
 
 def _choose(keypoints: Keypoints) -> Keypoints:
@@ -228,7 +249,7 @@ class _Prior:
         )
 
 
-def _camera(q: Array, size: tuple[int, int]) -> Camera:
+def make_camera(q: Array, size: tuple[int, int]) -> Camera:
     """Camera of log focal length, tilt, roll and log height."""
     (focal, tilt, roll, height), (width, tall) = q, size
     ct, st, cr, sr = np.cos(tilt), np.sin(tilt), np.cos(roll), np.sin(roll)
@@ -264,7 +285,9 @@ class _Body:
         self.table = table[:, :, rows]
         self.parts = len(states) - 2  # scores and proportions
         self.rate, self.rate_sd = model.info.stride_hz, model.info.stride_hz_sd
-        self.stride = self._stride(table, model.joint_names)
+        # The ankle rolls forward over the foot, so it goes back more slowly than the floor.
+        backwards = self._stride(table, model.joint_names)
+        self.stride = backwards * model.info.stride_length / backwards[0]
         self.offsets = 3 * len(self.names)  # of the detector's joints: forward, left, up
 
     def _cycle(self, model: Model, state: State) -> Array:
@@ -277,7 +300,7 @@ class _Body:
         return out
 
     def _stride(self, table: Array, names: tuple[str, ...]) -> Array:
-        """Stride length in statures of the mean and of each part: how fast feet on the floor go back."""
+        """Way back of ankles on the floor, statures per stride: of the mean, and change with each part."""
         phase = np.arange(self.PHASES) / self.PHASES
         speed = -self.PHASES * (np.roll(table[..., 0], -1, axis=1) - np.roll(table[..., 0], 1, axis=1)) / 2
         flat = [(names.index("r_ankle"), 0.10, 0.40), (names.index("l_ankle"), 0.60, 0.90)]
@@ -331,7 +354,7 @@ def _starts(
         q = _level(q, keypoints, size, height, prior)
         best: _Start | None = None
         for middle in middles:
-            fit = StartFit(model, _camera(q, size), stature=height, stature_sd=_STATURE_SD * height)
+            fit = StartFit(model, make_camera(q, size), stature=height, stature_sd=_STATURE_SD * height)
             near = np.abs(keypoints.time - middle) <= 0.5 * _WINDOW
             for frame, time in zip(keypoints.frame[near], keypoints.time[near], strict=True):
                 fit.add(round(1e6 * time), noise[int(frame)])
@@ -358,7 +381,7 @@ def _level(q: Array, keypoints: Keypoints, size: tuple[int, int], height: float,
     q = q.copy()
 
     def residuals(p: Array) -> Array:
-        camera = _camera(np.array([q[0], p[0], 0.0, p[1]]), size)
+        camera = make_camera(np.array([q[0], p[0], 0.0, p[1]]), size)
         foot = camera.on_plane(ankle, 0.06 * height)
         top = camera.project(foot + [0.0, 0.0, 0.46 * height])
         off = (top - hip)[:, 1] / np.median(np.abs(hip - ankle)[:, 1])
@@ -430,7 +453,7 @@ class _Fit:
         _, now = self._knots(q)
         rates = np.interp(self._t, self._middles(), self._rates(q))
         joints = self._joints(q, now, rates)
-        camera = _camera(q[:4], self._size)
+        camera = make_camera(q[:4], self._size)
         x = joints @ camera.R.T + camera.t
         depth = np.maximum(x[..., 2:], 0.05)
         uv = camera.fx * x[..., :2] / depth + [camera.cx, camera.cy]
@@ -488,6 +511,11 @@ class _Fit:
         return float(self._thin * robust.sum() + (self._expected(q) ** 2).sum())
 
     @property
+    def rate(self) -> float:
+        """Strides per second, on average."""
+        return float(self._rates(self._q).mean())
+
+    @property
     def misfit(self) -> float:
         """Squared robust error per coordinate."""
         return float(np.mean(self._frame_misfit()))
@@ -514,7 +542,10 @@ class _Fit:
             moved[columns] += h
             change = (self._errors(moved) - errors) * (weight / h)
             data[..., columns] = change[..., None] * share
-        for k in range(len(q)):
+        own = np.arange(self._fixed - self._body.offsets, self._fixed)  # each offset is expected by itself
+        prior[:, own] = 0.0
+        prior[own, own] = 1.0 / _OFFSET_SD
+        for k in np.delete(np.arange(len(q)), own):
             moved = q.copy()
             moved[k] += h
             prior[:, k] = (self._expected(moved) - expected) / h
@@ -602,7 +633,7 @@ class _Fit:
         doubt = np.linalg.solve(root, covariance[:4, self._fixed :]).T.reshape(-1, 4, 4)[:, :3]
         knots = self._q[self._fixed :].reshape(-1, 4)
         return Calibration(
-            _camera(self._q[:4], self._size),
+            make_camera(self._q[:4], self._size),
             np.sqrt(np.diag(camera)),
             float(self._q[1]),
             float(self._q[2]),

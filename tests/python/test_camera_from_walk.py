@@ -1,0 +1,177 @@
+"""A camera is found from projected walks, with the doubt that the walk leaves."""
+
+import json
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from gait.bindings.model import Model
+from gait.camera.camera import read_camera
+from gait.cli import main
+from gait.errors import UserError
+from gait.io.keypoints_file import Keypoints, write
+from gait.track.from_walk import calibrate, make_camera
+
+MODEL = Model()
+SIZE = (1280, 720)
+NAMES = tuple(
+    name for name in MODEL.joint_names if name not in ("pelvis", "neck", "head_top")
+)
+TOWARDS, ACROSS = (
+    (-1.3, (0.3, 7.5)),
+    (0.0, (-1.8, 5.0)),
+)  # heading from -y to the right, and first place
+
+
+def keypoints(
+    camera,
+    walk=TOWARDS,
+    *,
+    speed=1.25,
+    stature=1.75,
+    seconds=3.0,
+    noise=1.5,
+    seed=0,
+    standing=False,
+    belt=0.0,
+):
+    """Keypoints at 15 frames per second of a person who walks straight on."""
+    rng = np.random.default_rng(seed)
+    time = np.arange(0.0, seconds, 1 / 15)
+    prior, _ = MODEL.prior()
+    heading, place = walk
+    rate = speed / (MODEL.info.stride_length * stature)
+    uv = []
+    for t in time:
+        way = 0.0 if standing else (speed - belt) * t
+        state = replace(
+            prior, phase=0.3 if standing else (0.3 + rate * t) % 1.0, stature=stature
+        )
+        state.heading, state.stride_hz = heading, rate
+        x, y = place[0] + way * np.cos(heading), place[1] + way * np.sin(heading)
+        state.pelvis = np.array([x, y, 0.0])
+        state.pelvis[2] = MODEL.pelvis_height(state)
+        joints = MODEL.pose(state)[0]
+        uv.append(
+            camera.project(joints)[[MODEL.joint_names.index(name) for name in NAMES]]
+        )
+    uv = np.array(uv) + noise * rng.standard_normal((len(time), len(NAMES), 2))
+    return Keypoints(np.arange(len(time)), time, NAMES, uv, np.ones(uv.shape[:2]))
+
+
+def view(focal=1000.0, tilt=0.08, roll=0.0, height=1.4):
+    return make_camera(np.array([np.log(focal), tilt, roll, np.log(height)]), SIZE)
+
+
+@pytest.mark.parametrize(
+    "truth",
+    [
+        {},
+        {"focal": 1500.0, "height": 1.0, "tilt": 0.0},
+        {"focal": 800.0, "height": 1.8, "tilt": 0.2, "roll": 0.03},
+    ],
+    ids=["phone", "long", "wide"],
+)
+def test_a_walk_towards_the_camera_gives_all_of_it(truth):
+    camera = view(**truth)
+    found = calibrate(keypoints(camera), SIZE, MODEL, 1.75)
+    focal, height = (
+        np.log(found.camera.fx / camera.fx),
+        np.log(found.camera.centre[2] / camera.centre[2]),
+    )
+    assert abs(focal) < 0.15 and abs(height) < 0.08
+    assert abs(found.tilt - truth.get("tilt", 0.08)) < np.radians(1.5)
+    off = np.array(
+        [
+            focal,
+            found.tilt - truth.get("tilt", 0.08),
+            found.roll - truth.get("roll", 0.0),
+            height,
+        ]
+    )
+    assert (np.abs(off) < 2.6 * found.sd).all(), (off, found.sd)
+    assert len(found.describe()) == 1 and not found.in_place
+
+
+def test_a_straight_path_across_leaves_the_focal_length_open():
+    camera = view()
+    across = calibrate(keypoints(camera, ACROSS), SIZE, MODEL, 1.75)
+    towards = calibrate(keypoints(camera), SIZE, MODEL, 1.75)
+    assert across.sd[0] > 1.5 * towards.sd[0]
+    assert abs(np.log(across.camera.fx / camera.fx)) < 2 * across.sd[0]
+    given = calibrate(keypoints(camera, ACROSS), SIZE, MODEL, 1.75, fov=65.2)
+    assert given.sd[0] < 0.06 and given.camera.fx == pytest.approx(1000, rel=0.1)
+
+
+def test_the_doubt_covers_the_path():
+    camera = view()
+    found = calibrate(keypoints(camera), SIZE, MODEL, 1.75)
+    heading, place = TOWARDS
+    way = 1.25 * found.time[:, None] * [np.cos(heading), np.sin(heading)]
+    off = found.path[:, :2] - (np.array(place) + way)
+    sd = np.linalg.norm(found.doubt[:, :2], axis=2)
+    assert (np.abs(off) < 3 * np.hypot(sd, 0.1)).all() and sd.max() > 0.05
+
+
+def test_a_treadmill_is_in_place():
+    camera = view()
+    found = calibrate(
+        keypoints(camera, (0.4, (0.0, 3.5)), belt=1.25), SIZE, MODEL, 1.75
+    )
+    assert found.in_place and found.sd[0] > 0.1
+    assert np.ptp(found.path[:, :2], axis=0).max() < 0.1
+    assert "a walk in place says little" in found.describe()[1] or found.sd[0] < 0.2
+
+
+@pytest.mark.parametrize(
+    ("change", "words"),
+    [
+        ({"seconds": 0.13}, "for less than a second"),
+        ({"standing": True}, "the person stands"),
+    ],
+    ids=["two frames", "standing"],
+)
+def test_what_is_no_walk_is_refused(change, words):
+    with pytest.raises(UserError, match=words):
+        calibrate(keypoints(view(), **change), SIZE, MODEL, 1.75)
+
+
+def test_noise_is_refused():
+    walk = keypoints(view())
+    uv = np.random.default_rng(1).uniform(0, 700, walk.uv.shape)
+    with pytest.raises(UserError, match="no second of it fits"):
+        calibrate(replace(walk, uv=uv), SIZE, MODEL, 1.75)
+
+
+def test_the_command_writes_the_camera(tmp_path, capsys):
+    write(tmp_path / "k.csv", keypoints(view()))
+    words = [
+        "camera",
+        "--walk",
+        tmp_path / "k.csv",
+        "--size",
+        "1280x720",
+        "-o",
+        tmp_path / "c.json",
+    ]
+    assert main([*map(str, words), "--height", "1.75", "--json"]) == 0
+    figures = json.loads(capsys.readouterr().out)
+    camera = read_camera(str(tmp_path / "c.json"))
+    assert (
+        camera.fx == pytest.approx(figures["focal_px"]) and figures["height_m_sd"] > 0
+    )
+    assert camera.centre[2] == pytest.approx(1.4, rel=0.08) and camera.size == SIZE
+
+
+@pytest.mark.parametrize(
+    ("words", "text"),
+    [
+        (["--walk", "k.csv", "--height", "1.75"], "give the size of the picture"),
+        (["--walk", "walk.mp4"], "needs --height M"),
+        (["p.csv", "--lens", "l.yaml", "--fov", "60"], "go with --walk"),
+        ([], "give POINTS.csv and --lens FILE, or --walk VIDEO"),
+    ],
+)
+def test_options_that_do_not_fit(words, text, capsys):
+    assert main(["camera", *words, "-o", "camera.json"]) == 2
+    assert text in capsys.readouterr().err
