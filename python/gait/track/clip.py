@@ -8,7 +8,6 @@ import numpy as np
 
 from gait.bindings.abi import Term
 from gait.bindings.config import TrackerConfig
-from gait.bindings.estimate import Estimate
 from gait.bindings.initial import Start, set_height
 from gait.io.trc import write_trc
 from gait.progress import note
@@ -78,11 +77,9 @@ def _follower(
     keypoints: PersonKeypoints,
     plausibility: Plausibility,
 ) -> Follower:
-    def find_again(first: int, lost: Estimate) -> Start | None:
+    def find_start(first: int, stop: int, stature: float) -> Start | None:
         if not scene.people:
             return None
-        stature = options.height or lost.mean.stature
-        stop = scene.frames.stop
         return find_keypoint_start(
             scene.people[scene.person], scene.camera, scene.model, first=first, stop=stop, height=stature
         )
@@ -91,5 +88,5 @@ def _follower(
     if not options.smooth and not scene.people:
         auto_start = BoxStart(scene.camera, scene.plate, scene.model, options.height)
     return Follower(
-        tracker, scene.video, keypoints, plausibility, find_again, auto_start, one_pass=options.smooth
+        tracker, scene.video, keypoints, plausibility, find_start, auto_start, one_pass=options.smooth
     )

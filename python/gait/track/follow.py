@@ -17,11 +17,12 @@ from gait.track.plausible import Plausibility
 from gait.track.tracker import Tracker
 
 _GIVE_UP = 1.0  # seconds after a loss for which the person is looked for backwards
+_LEAST_BEFORE = 1.0  # seconds before a track in which the person is looked for
 _CONTRADICTED = 0.5  # seconds of keypoints elsewhere after which the person is lost
 _FOLLOWED = (TrackStatus.TRACKING, TrackStatus.AMBIGUOUS)
 
-FindAgain = Callable[[int, Estimate], Start | None]
-"""Finds where a person who was lost at an estimate walks, in a frame or later; None: nowhere."""
+FindStart = Callable[[int, int, float], Start | None]
+"""Finds the first start from a frame on and before another, of a person of a stature; None: there is none."""
 
 
 class Follower:
@@ -35,7 +36,8 @@ class Follower:
     keypoints : PersonKeypoints
     plausibility : Plausibility
         Of its estimates.
-    find_again : FindAgain
+    find_start : FindStart
+        Finds the person anew after a loss, and where they were in view before.
     auto_start : BoxStart, optional
         Finds a lost person by the pictures.
     one_pass : bool
@@ -49,27 +51,28 @@ class Follower:
         video: Video,
         keypoints: PersonKeypoints,
         plausibility: Plausibility,
-        find_again: FindAgain,
+        find_start: FindStart,
         auto_start: BoxStart | None = None,
         *,
         one_pass: bool = False,
     ) -> None:
         self._tracker, self._video, self._keypoints = tracker, video, keypoints
         self._plausibility = plausibility
-        self._find_again, self._auto_start, self._one_pass = find_again, auto_start, one_pass
+        self._find_start, self._auto_start, self._one_pass = find_start, auto_start, one_pass
 
     def follow(self, start: Start, frames: range) -> Iterator[tuple[Frame, Estimate]]:
         """Yield the frames in order from the first in which the person is visible, each with its estimate."""
-        following: Start | None
-        following, before = self._earlier(start, frames.start)
+        given, before = self._earlier(start, frames.start)
+        first, before = self._first(given, before, frames.start)
+        following: Start | None = first
         now: Estimate | None = None
         lost, supported = True, 0.0
-        for frame in self._video.frames(min(before, default=following.frame), frames.stop):
+        for frame in self._video.frames(min([first.frame, *before]), frames.stop):
             if following is not None and frame.number == following.frame:
-                if lost:
+                if lost or following is given:
                     self._start(self._tracker, following, frame.utime)
                     now, lost, supported = None, False, frame.time
-                following = None
+                following = given if frame.number < given.frame else None
             elif now is None and lost:
                 yield frame, before[frame.number]
                 continue
@@ -78,13 +81,28 @@ class Follower:
                 supported = frame.time
             was_lost, lost = lost, now.status == TrackStatus.LOST or frame.time - supported > _CONTRADICTED
             if lost and not was_lost:
-                following = self._find_again(frame.number + 1, now)
-                if following is not None:
-                    following, before = self._earlier(following, frame.number + 1)
+                stop = frames.stop if following is None else following.frame
+                found = self._find_start(frame.number + 1, stop, now.mean.stature)
+                if found is not None:
+                    following, more = self._earlier(found, frame.number + 1)
+                    before |= more
             estimate = replace(now, status=TrackStatus.LOST) if lost else now
             yield frame, before.get(frame.number, estimate) if lost else estimate
             if self._auto_start and self._restarted(self._auto_start, frame, estimate):
                 now, lost, supported = None, False, frame.time
+
+    def _first(
+        self, start: Start, before: dict[int, Estimate], first: int
+    ) -> tuple[Start, dict[int, Estimate]]:
+        """Find a start at an earlier time when the person was in view, or keep this one."""
+        stop = min(before, default=start.frame)
+        if stop - first < _LEAST_BEFORE * self._video.fps:
+            return start, before
+        found = self._find_start(first, stop, start.mean.stature)
+        if found is None:
+            return start, before
+        found, more = self._earlier(found, first)
+        return found, before | more
 
     def _step(self, tracker: Tracker, frame: Frame, utime: int, last: Estimate | None) -> Estimate:
         joints = self._keypoints.choose(frame.number, last)
