@@ -43,11 +43,11 @@ STRIDE = 0.03  # error of the stride rate, as a share, at most
 
 
 _READING = """\
-Films of real people against the joints of a 2-D detector that were looked through by position; most cameras are
+Films of real people against the joints of a 2-D detector that a person checked; most cameras are
 guessed.  good: knees and ankles within 9 % of the person's height on average, hips in place; swap: left and
 right swapped; legs: hips in place, legs not; off: hips or legs elsewhere; none: not in the track.  wrong:
 frames under `tracking` that are not good.  Heel strikes: median distance of those by the phase from those
-counted by position (tests/bench/real_strikes.json).  Rates are of the whole command, detector and all."""
+counted in the pictures (tests/bench/real_strikes.json).  Rates are of the whole command, detector and all."""
 
 
 @dataclass(frozen=True)

@@ -38,11 +38,11 @@ class Clip:
         Frames in which the person walks in full view.
     fps, stature : float
     stride_hz : float or None
-        Counted by position.
+        Counted in the pictures.
     strikes : list of (float, float)
-        Frame of a heel strike, by position, and its phase: 0 right, 0.5 left.
+        Frame of a heel strike in the pictures, and its phase: 0 right, 0.5 left.
     reference : dict of int to Points
-        Joints of a 2-D detector by frame, looked through by position, pixels.
+        Joints of a 2-D detector by frame, checked by a person, pixels.
     """
 
     folder: Path
@@ -71,7 +71,7 @@ class Score:
     stride_error : float
         Of the stride rate, as a share.
     strike_error : float
-        Median distance of a heel strike by the phase from the one by position, frames.
+        Median distance of a heel strike by the phase from the one counted, frames.
     """
 
     share: dict[str, float]
