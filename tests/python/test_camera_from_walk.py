@@ -1,6 +1,7 @@
 """A camera is found from projected walks, with the doubt that the walk leaves."""
 
 import json
+import re
 from dataclasses import replace
 
 import numpy as np
@@ -10,7 +11,8 @@ from gait.camera.camera import read_camera
 from gait.cli import main
 from gait.errors import UserError
 from gait.io.keypoints_file import Keypoints, write
-from gait.track.from_walk import calibrate, make_camera
+from gait.track.from_walk import calibrate, contradiction, make_camera
+from gait.track.keypoint_start import find_keypoint_start
 
 MODEL = Model()
 SIZE = (1280, 720)
@@ -134,6 +136,26 @@ def test_a_treadmill_is_in_place():
 def test_what_is_no_walk_is_refused(change, words):
     with pytest.raises(UserError, match=words):
         calibrate(keypoints(view(), **change), SIZE, MODEL, 1.75)
+
+
+@pytest.mark.parametrize(
+    ("change", "words"),
+    [
+        ({}, None),
+        ({"height": 1.4 * 4 / 3}, "m tall by it, --height is 1.75"),
+        ({"focal": 1500.0}, r"check its focal length \(1500 px\)"),
+    ],
+    ids=["right", "height", "focal"],
+)
+def test_a_camera_that_contradicts_the_walk_is_reported(change, words):
+    given, seen = view(**change), keypoints(view())
+    start = find_keypoint_start(seen, given, MODEL, height=1.75)
+    told = contradiction(given, start.mean.stature, seen, MODEL, 1.75)
+    assert (
+        told is None
+        if words is None
+        else re.search(words, told) and "height 1." in told
+    )
 
 
 def test_noise_is_refused():

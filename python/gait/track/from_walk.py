@@ -53,6 +53,7 @@ _SCORES = 5  # components of the model that are fitted
 _DEGREES = 4.0  # of freedom of Student's t
 _FITS = 9.0  # squared robust error per coordinate up to which more of the clip is explained by the walk
 _WORST = 6.0  # and up to which the result is accepted
+_CONTRADICTS = 0.1  # of the stature, by which a person who appears taller or shorter contradicts a camera
 _LEAST_RATE = 0.4  # strides per second of a person who walks
 _UNKNOWN = 0.2  # relative standard deviation from which the focal length counts as not determined
 
@@ -201,6 +202,32 @@ def _calibrate(
     if best.rate < _LEAST_RATE:
         raise UserError(f"{where}: the person stands; film a walk in full view, or give --camera")
     return found
+
+
+def contradiction(
+    given: Camera, appears: float | None, keypoints: Keypoints, model: Model, height: float
+) -> str | None:
+    """Say how a given camera contradicts a walk, and which one would fit; None: it does not.
+
+    Parameters
+    ----------
+    given : Camera
+    appears : float or None
+        Stature of the person by this camera, metres; None: no walk on the floor fits.
+    keypoints, model, height
+        As for `calibrate`.
+    """
+    if appears is not None and abs(appears / height - 1) < _CONTRADICTS:
+        return None
+    try:
+        fits = calibrate(keypoints, given.size, model, height)
+    except UserError:
+        return None
+    what = "no walk fits it" if appears is None else f"the person appears {appears:.2f} m tall by it"
+    return (
+        f"{what}, --height is {height:g}; check its focal length ({given.fx:.0f} px) and place "
+        f"({given.centre[2]:.2f} m high): {fits.describe()[0]}"
+    )
 
 
 def _choose(keypoints: Keypoints) -> Keypoints:

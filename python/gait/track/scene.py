@@ -19,7 +19,7 @@ from gait.io.keypoints_file import Keypoints
 from gait.io.video import Image, Video, background
 from gait.progress import note, progress
 from gait.track.box_start import find_start
-from gait.track.from_walk import Calibration, calibrate
+from gait.track.from_walk import Calibration, calibrate, contradiction
 from gait.track.keypoint_start import CUE_MISS, find_keypoint_start, keypoint_noise
 from gait.track.options import ClipOptions
 
@@ -169,11 +169,22 @@ def _find_first_state(options: ClipOptions, scene: Scene) -> Start:
         found = find_keypoint_start(
             keypoints, camera, model, first=frames.start, stop=frames.stop, height=height
         )
+        _check_camera(options, scene, found)
         if found is not None:
             return found
     return find_start(
         scene.video, camera, scene.plate, model, first=frames.start, stop=options.stop, height=height
     )
+
+
+def _check_camera(options: ClipOptions, scene: Scene, start: Start | None) -> None:
+    """Report a camera file that contradicts the walk and the person's stature."""
+    if options.camera is None or options.height is None:
+        return
+    appears = None if start is None else start.mean.stature
+    keypoints = scene.people[scene.person]
+    if words := contradiction(scene.camera, appears, keypoints, scene.model, options.height):
+        note(f"{options.camera}: {words}", options.quiet)
 
 
 def _require_scene(options: ClipOptions, scene: Scene, first: int) -> None:
