@@ -202,6 +202,8 @@ FAULTS = [
     (["--background", "none", "--init", "auto"], "walk.mp4: --init auto found no person in full view"),
     (["-m", "{}/camera.json"], "camera.json: .*"),
     (["-m", "{}/none.gait"], "none.gait: no such model file"),
+    (["-o", "{}/init.json/out.csv"], "out.csv: .*init.json is a file, not a folder; choose another place"),
+    (["--detector", "lite"], "pose_detection.tflite: the detector's weights are not in .*GAIT_WEIGHTS"),
     (["-o", "{}/none/out.csv"], "out.csv: folder .* does not exist"),
     (["--overlay", "{}/none/o.mp4"], "o.mp4: folder .* does not exist"),
     (["--overlay", "{}/o.gif"], "o.gif: unknown video suffix"),
@@ -210,7 +212,7 @@ FAULTS = [
     (["--trc", "{}/fault.csv"], "fault.csv: two outputs have this name"),
     (["--keypoints", "{}/none.csv"], "none.csv: no such file of keypoints"),
     (["--trc", "{}/none/o.trc"], "o.trc: folder .* does not exist"),
-    (["--init", "{}/late.json"], "walk.mp4: no frame from 20 up to 20; it has 20"),
+    (["--init", "{}/late.json"], "late.json: frame is 20, the frames to track end at 19; give one"),
     (["--init", "auto", "--start", "500"], "walk.mp4: no frame from 500 up to 20; it has 20"),
 ]
 

@@ -94,4 +94,4 @@ def test_the_module_runs_and_passes_the_exit_code(tmp_path):
     words = [sys.executable, "-m", "gait", "eval", "track.csv", "--truth", "none.csv"]
     done = subprocess.run(words, cwd=tmp_path, capture_output=True, text=True, check=False)
     assert (done.returncode, done.stdout) == (1, "")
-    assert done.stderr == "gait eval: none.csv: no such truth file\n"
+    assert done.stderr == "gait eval: none.csv: no such truth file; check the name\n"

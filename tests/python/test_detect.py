@@ -3,6 +3,7 @@ import subprocess
 import sys
 from pathlib import Path
 
+import cv2
 import numpy as np
 import pytest
 
@@ -118,7 +119,9 @@ def test_tiles_cover_the_picture():
 
 def test_absent_weights_name_the_remedy(tmp_path, monkeypatch):
     monkeypatch.setenv("GAIT_WEIGHTS", str(tmp_path))
-    with pytest.raises(UserError, match="pose_detection.tflite: .* run gait detect --fetch"):
+    with pytest.raises(
+        UserError, match=f"pose_detection.tflite: .* not in {tmp_path}; run gait detect --fetch"
+    ):
         weights.load(weights.PERSON)
 
 
@@ -127,6 +130,21 @@ def test_damaged_weights_are_refused(tmp_path, monkeypatch):
     (tmp_path / weights.PERSON.file).write_bytes(b"another network")
     with pytest.raises(UserError, match="is damaged or of another network; delete it"):
         weights.load(weights.PERSON)
+
+
+def test_a_folder_of_weights_that_is_none_is_refused(tmp_path, monkeypatch, capsys):
+    monkeypatch.setenv("GAIT_WEIGHTS", str(tmp_path / "nowhere"))
+    with pytest.raises(UserError, match="GAIT_WEIGHTS: .*nowhere is no folder; unset it, or run gait detect"):
+        weights.find(weights.PERSON)
+
+
+@pytest.mark.parametrize("command", [["detect"], ["camera", "--height", "1.7", "--walk"]])
+def test_a_picture_is_no_film(command, tmp_path, capsys):
+    cv2.imwrite(str(tmp_path / "picture.png"), np.zeros((64, 64, 3), np.uint8))
+    out = tmp_path / "out.csv"
+    assert cli.main([*command, str(tmp_path / "picture.png"), "-o", str(out)]) == 1
+    assert "picture.png: has only 1 frame; give a video of a second or more" in capsys.readouterr().err
+    assert not out.exists()
 
 
 def test_a_package_that_cannot_be_had_is_one_line(tmp_path, monkeypatch):

@@ -239,7 +239,7 @@ def read_camera(path: str, size: tuple[int, int] | None = None, *, placed: bool 
     """
     file, name = _split(str(path))
     if not Path(file).is_file():
-        raise UserError(f"{file}: no such camera file")
+        raise UserError(f"{file}: no such camera file; check the name")
     suffix = Path(file).suffix.lower()
     if suffix == ".json":
         camera = _from_json(file, placed)

@@ -104,9 +104,14 @@ def _keypoints(args: argparse.Namespace, model: Model) -> tuple[Keypoints, tuple
         return keypoints_file.read(args.walk, model.joint_names, ignore_unknown=True)[0], args.size
     if args.size:
         raise UsageError("--size: is for KEYPOINTS.csv; a video has its own")
-    from gait.detect.people import detect, main_person  # here, as they load the networks' runtime
+    from gait.detect.people import (
+        detect,
+        main_person,
+        require_length,
+    )  # here, as they load the networks' runtime
 
     video = Video(args.walk)
+    require_length(video)
     with progress("detecting", video.count, args.quiet) as update:
         people = detect(video, update=update)
     if not people:

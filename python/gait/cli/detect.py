@@ -59,9 +59,10 @@ def run(args: argparse.Namespace) -> int:
     if not args.video or not args.output:
         raise UsageError("give VIDEO and -o KEYPOINTS.csv, or --fetch")
     require_outputs((args.output,), (args.video,))
-    from gait.detect.people import detect, height, main_person  # here, as it loads OpenCV
+    from gait.detect.people import detect, height, main_person, require_length  # here, as it loads OpenCV
 
     video = Video(args.video)
+    require_length(video)
     with progress("detecting", video.count, args.quiet) as update:
         people = detect(video, args.network, args.people, update=update)
     if not people:

@@ -174,7 +174,7 @@ def run(args: argparse.Namespace) -> int:
     suffix = Path(args.input).suffix.lower()
     video = suffix not in (".csv", ".txt") and bool(suffix or args.placement)
     if video and not set("%:") & set(args.input) and not Path(args.input).exists():
-        raise UserError(f"{args.input}: no such file")
+        raise UserError(f"{args.input}: no such file; check the name")
     _require_own(args, video)
     require_outputs(
         (args.output, args.trc, args.overlay),

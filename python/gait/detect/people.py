@@ -15,6 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from gait.detect.networks import JOINTS, Crop, LandmarkNetwork, Person, PersonNetwork, whole_picture
+from gait.errors import UserError
 from gait.io.keypoints_file import Keypoints
 from gait.io.video import Frame, Image, Video
 
@@ -199,6 +200,13 @@ def height(keypoints: Keypoints) -> float:
     """Median height of a person in the picture, from shoulder to foot, pixels."""
     v = keypoints.uv[np.isfinite(keypoints.uv).all(axis=(1, 2)), :, 1]
     return float(np.median(np.ptp(v, axis=1)))
+
+
+def require_length(video: Video) -> None:
+    """Refuse a picture, or a video too short to find people in."""
+    if video.count < _LEAST_FRAMES:
+        frames = "1 frame" if video.count == 1 else f"{video.count} frames"
+        raise UserError(f"{video.path}: has only {frames}; give a video of a second or more")
 
 
 def main_person(people: dict[int, Keypoints]) -> int:

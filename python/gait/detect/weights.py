@@ -74,7 +74,16 @@ def folders() -> list[Path]:
 
 
 def find(weights: Weights) -> Path | None:
-    """Path of a file of weights on this machine, None if it was not fetched."""
+    """Path of a file of weights on this machine, None if it was not fetched.
+
+    Raises
+    ------
+    UserError
+        If GAIT_WEIGHTS is set and no folder.
+    """
+    named = os.environ.get("GAIT_WEIGHTS")
+    if named and not Path(named).is_dir():
+        raise UserError(f"GAIT_WEIGHTS: {named} is no folder; unset it, or {FETCH}")
     return next((f / weights.file for f in folders() if (f / weights.file).is_file()), None)
 
 
@@ -88,7 +97,11 @@ def load(weights: Weights) -> bytes:
     """
     path = find(weights)
     if path is None:
-        raise UserError(f"{weights.file}: the detector's weights are not on this machine; {FETCH}")
+        searched = " or ".join(map(str, folders()))
+        raise UserError(
+            f"{weights.file}: the detector's weights are not in {searched}; {FETCH}, or set GAIT_WEIGHTS to "
+            "the folder that has them"
+        )
     data = path.read_bytes()
     if hashlib.sha256(data).hexdigest() != weights.sha256:
         raise UserError(f"{path}: is damaged or of another network; delete it and {FETCH}")

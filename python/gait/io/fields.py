@@ -114,7 +114,7 @@ def _double(number: float) -> float:
 def read_json(path: str | os.PathLike[str], what: str) -> Fields:
     """Read a JSON object. `what`: what the file is, for messages: ``"camera"``."""
     if not Path(path).is_file():
-        raise UserError(f"{path}: no such {what} file")
+        raise UserError(f"{path}: no such {what} file; check the name")
     data = json_object(
         path, f"mend it or write the {what} anew", f"{what} files are objects of keys in braces"
     )

@@ -47,6 +47,8 @@ def require_writable(path: str | os.PathLike[str]) -> None:
         raise UserError(f"{path}: is a folder; give the name of a file in it")
     if target.exists() and not target.is_file():
         raise UserError(f"{path}: is a device or a pipe, not a file; give the name of a file")
+    if target.parent.is_file():
+        raise UserError(f"{path}: {target.parent} is a file, not a folder; choose another place")
     if not target.parent.is_dir():
         raise UserError(f"{path}: folder {target.parent} does not exist; create it first")
     if not _takes_files(target.parent):

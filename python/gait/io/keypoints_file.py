@@ -201,7 +201,7 @@ class _Numbers:
 def _table(path: str | os.PathLike[str]) -> tuple[list[str], list[list[str]]]:
     """Header and rows of a CSV, all of one width."""
     if not Path(path).is_file():
-        raise UserError(f"{path}: no such file of keypoints")
+        raise UserError(f"{path}: no such file of keypoints; check the name")
     try:
         text = Path(path).read_text(encoding="utf-8-sig")
         lines = [row for _, row in table_rows(text) if row]

@@ -183,7 +183,7 @@ class _Table:
     def __init__(self, path: str | os.PathLike[str], what: str) -> None:
         self.path, self.what = path, what
         if not Path(path).is_file():
-            raise UserError(f"{path}: no such {what} file")
+            raise UserError(f"{path}: no such {what} file; check the name")
         try:
             with open(path, newline="", encoding="utf-8-sig") as file:
                 lines = list(csv.reader(file))

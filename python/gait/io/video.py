@@ -68,7 +68,7 @@ class Video:
 
         self.path = Path(path)
         if not self.path.is_file():
-            raise UserError(f"{self.path}: no such video file")
+            raise UserError(f"{self.path}: no such video file; check the name")
         try:
             self._probe()
         except av.error.FFmpegError as exc:

@@ -74,8 +74,9 @@ class Scene:
         if camera is not None and options.camera:
             camera.check_place(options.camera)
             if options.init != "auto":
-                _read_start(options, camera, model)  # refuse a wrong one before the work on the whole clip
+                _read_start(options, video, camera, model)  # refused before the work on the whole clip
         frames = clip_frames(video, options.start or 0, options.stop)
+        _require_detector(options)
         with progress("background", video.count, options.quiet) as update:
             plate = background(options.background, video, update)
         if options.keypoints:
@@ -114,8 +115,7 @@ def clip_frames(video: Video, start: int, stop: int | None) -> range:
 def first_state(options: ClipOptions, scene: Scene) -> Start:
     """First state, from the init file or found in the clip."""
     if options.init != "auto":
-        start = _read_start(options, scene.camera, scene.model)
-        clip_frames(scene.video, start.frame, options.stop)
+        start = _read_start(options, scene.video, scene.camera, scene.model)
         _require_scene(options, scene, start.frame)
         start = replace(start, in_place=_in_place(scene, start.frame))
     else:
@@ -125,9 +125,14 @@ def first_state(options: ClipOptions, scene: Scene) -> Start:
     return start
 
 
-def _read_start(options: ClipOptions, camera: Camera, model: Model) -> Start:
-    """Read a start from the init file; it must be in the picture."""
+def _read_start(options: ClipOptions, video: Video, camera: Camera, model: Model) -> Start:
+    """Read a start from the init file; it must be in the picture, in a frame to track."""
     start = Start.read(options.init, model, frame=options.start, height=options.height)
+    stop = video.count if options.stop is None else min(options.stop, video.count)
+    if start.frame >= stop:
+        raise UserError(
+            f"{options.init}: frame is {start.frame}, the frames to track end at {stop - 1}; give one"
+        )
     if not camera.shows(model.pose(start.mean)[0]):
         raise UserError(f"{options.init}: {OUTSIDE}")
     return start
@@ -230,6 +235,15 @@ def _detect(options: ClipOptions, video: Video, frames: range) -> tuple[dict[int
     with progress("detecting", len(frames), options.quiet) as update:
         people = detect(video, network, first=frames.start, stop=frames.stop, update=update)
     return people, main_person(people) if people else -1
+
+
+def _require_detector(options: ClipOptions) -> None:
+    """Refuse weights that are damaged, or absent although asked for, before long work."""
+    if options.keypoints or options.detector == "none" or options.mode == Mode.PAPER:
+        return
+    if options.detector != "auto" or _has_detector(options):
+        weights.load(weights.PERSON)
+        weights.load(weights.LANDMARKS["full" if options.detector == "auto" else options.detector])
 
 
 def _has_detector(options: ClipOptions) -> bool:
