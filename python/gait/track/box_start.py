@@ -22,6 +22,7 @@ ENOUGH = 8  # frames with a person, at least
 SELDOM = 0.09  # seconds, at least, between frames searched without a background: that is slow
 _WINDOW = 1.0  # seconds of boxes that are fitted
 _LEAST_WINDOW = 0.3  # the same in a clip that is not longer
+_PROBES = 6  # frames of a clip that must not all be empty
 _STEP = 0.1  # seconds from one fit to the next
 _STATURE_SD = 0.03  # metres, of one that the user gives
 _PLAUSIBLE = (1.2, 2.4)  # metres, of boxes that are people
@@ -81,6 +82,14 @@ class BoxStart:
         self._fit.add_boxes(frame.utime, boxes)
         self.found += bool(boxes)
         self._statures += [self._fit.stature(box) for box in boxes[:1]]
+
+    def worth(self, video: Video, first: int, stop: int) -> bool:
+        """Whether frames spread over a clip show anybody: without the empty scene the search is slow."""
+        if self._plate is not None:
+            return True
+        probes = np.unique(np.linspace(first, stop - 1, _PROBES).astype(int)).tolist()
+        shown = (frame for n in probes for frame in video.frames(n, n + 1))
+        return any(self._boxes(frame.image) for frame in shown)
 
     def best(self, frame: Frame, *, latest: bool = False) -> tuple[Start, Hypothesis] | None:
         """Most probable start after a frame: at its moment, or a window earlier; None before there is one."""
@@ -154,6 +163,8 @@ def find_start(
     standing: Start | None = None
     for finder in _finders(camera, plate, model, height, window):
         last_fit = -np.inf
+        if not finder.worth(video, first, first + few):
+            continue
         for frame in video.frames(first, stop):
             finder.observe(frame)
             if frame.time - last_fit < _STEP:
