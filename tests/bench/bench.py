@@ -30,7 +30,7 @@ def run(command: list[str]) -> str:
 
 
 def compiler(command: str) -> str:
-    """First line that a compiler says of itself."""
+    """First line that a compiler prints about itself."""
     done = subprocess.run([*command.split(), "--version"], capture_output=True, text=True, check=False)
     return (done.stdout.splitlines() or [f"{command}, version unknown"])[0]
 

@@ -71,10 +71,10 @@ def draw_stages(axes: Axes, rows: list[Row]) -> None:
     names = [f"{r['isa']}\n{per_particle(r, 'cpu_ms'):,.0f} ns" for r in runs]
     left = [0.0] * len(runs)
     for k, stage in enumerate(stages(runs[0])):
-        wide = [100 * number(r, stage) / number(r, "cpu_ms") for r in runs]
+        broad = [100 * number(r, stage) / number(r, "cpu_ms") for r in runs]
         label = stage.split("_")[1]
-        axes.barh(names, wide, left=left, label=label, color=plt.get_cmap("tab20")(k))
-        left = [a + b for a, b in zip(left, wide, strict=True)]
+        axes.barh(names, broad, left=left, label=label, color=plt.get_cmap("tab20")(k))
+        left = [a + b for a, b in zip(left, broad, strict=True)]
     rest = [100 - a for a in left]
     axes.barh(names, rest, left=left, label="the rest", color="lightgrey")
     axes.set_xlim(0, 100)

@@ -1,4 +1,4 @@
-"""What a bench says was wanted, over several runs: a busy host spoils some of them, seldom most."""
+"""What a bench states was wanted, over several runs: a busy host spoils some of them, seldom most."""
 
 from __future__ import annotations
 
@@ -25,9 +25,9 @@ class Wanted(NamedTuple):
         return figure < self.wanted or (self.relation == "<=" and figure == self.wanted)
 
 
-def wanted(said: str) -> list[Wanted]:
+def wanted(printed: str) -> list[Wanted]:
     """Lines that end with a verdict, in their order."""
-    found = (ROW.match(line) for line in said.splitlines())
+    found = (ROW.match(line) for line in printed.splitlines())
     return [Wanted(m[1], m[2], float(m[3]), float(m[4])) for m in found if m]
 
 
@@ -39,7 +39,7 @@ def summary(runs: Sequence[str]) -> str:
     runs : sequence of str
         What the same program printed on the same machine, run by run.
     """
-    rows = [wanted(said) for said in runs]
+    rows = [wanted(printed) for printed in runs]
     lines = [f"{f'{len(runs)} runs':62}    {'wanted':>8} {'median':>10} {'least':>10} {'most':>10}  runs"]
     for row in zip(*rows, strict=True):
         first, figures = row[0], [run.figure for run in row]

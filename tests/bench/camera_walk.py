@@ -113,8 +113,8 @@ def _clip(folder: Path) -> tuple[list[Any], list[bool]]:
     joints = np.stack([tracks[0].places[name] for name in EVAL15], axis=1)
     rows = np.searchsorted(truth.frame, tracks[0].frame)
     pelvis = joints[:, HIPS].mean(axis=1) - true[rows][:, HIPS].mean(axis=1)
-    spread = np.stack([tracks[0].sd[name] for name in ("l_hip", "r_hip")]).mean(axis=0)
-    held = np.abs(pelvis[:, :2]) < WITHIN * spread[:, :2]
+    sd_hips = np.stack([tracks[0].sd[name] for name in ("l_hip", "r_hip")]).mean(axis=0)
+    held = np.abs(pelvis[:, :2]) < WITHIN * sd_hips[:, :2]
     row = [
         folder.name,
         *_shown(off, sd),

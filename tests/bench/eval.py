@@ -178,7 +178,7 @@ def record(name: str, rows: list[dict[str, Any]], parts: list[tuple[str, str]], 
     write_csv(RESULTS / f"{name}.csv", rows)
     text = [f"# Evaluation of the tracker\n\n{facts(words)}  A row for each run is in {name}.csv.\n"]
     text += [f"## {heading}\n\n{table}\n" for heading, table in reversed(parts)]
-    text += [f"- gave up: {words}\n" for words in eval_table.failures(rows)]
+    text += [f"- failed: {words}\n" for words in eval_table.failures(rows)]
     with replacing(RESULTS / f"{name}.md") as path:
         path.write_text("\n".join([*text, fill(eval_table.LEGEND, 110), ""]), encoding="utf-8")
 
@@ -237,7 +237,7 @@ def main() -> int:
             print(f"\n{heading}\n{table}")
         print("\n" + fill(eval_table.LEGEND, 110))
         for words in eval_table.failures(rows):
-            print(f"gave up: {words}")
+            print(f"failed: {words}")
     if args.record:
         parts = tables(rows, eval_table.markdown, [], not args.simulated)
         record(args.record, rows, parts, f"make eval ARGS='{' '.join(map(str, sys.argv[1:]))}'")

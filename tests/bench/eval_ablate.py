@@ -23,7 +23,7 @@ _FEATURES: dict[str, dict[str, Any]] = {
     "turning": {"turn_time": 0.0},
     "tilt": {"tilt_noise": 0.0},
     "frames alike": {"evidence_time": 0.0},
-    "mingling": {"rejuvenation_time": 0.0},
+    "rejuvenation": {"rejuvenation_time": 0.0},
     "rate return": {"rate_time": 0.0},
     "missed foreground": {"missed_weight": 0.0},
 }
@@ -106,7 +106,7 @@ def interval(differences: np.ndarray) -> tuple[float, float, float]:
 
 def grid(lines: list[dict[str, Any]]) -> list[list[str]]:
     """Head and lines: positive is an increase; a star where the interval excludes 0."""
-    head = ["", "gave up", *MEASURES.values()]
+    head = ["", "failed", *MEASURES.values()]
     return [head, *([line["name"], line["refused"], *map(_cell, _values(line))] for line in lines)]
 
 

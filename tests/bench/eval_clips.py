@@ -27,7 +27,7 @@ MOCAP = DATA / "mocap" / "cmu_walk"
 OUTDOOR = "outdoor"
 OUTDOOR_FRAMES = (64, 187)  # she is in full view
 OUTDOOR_HEIGHT = 1.65  # metres
-SPREAD = {"pelvis": 0.03, "heading_rad": 0.05, "phase": 0.03, "stride_hz": 0.03, "stature_m": 0.003}
+SD = {"pelvis": 0.03, "heading_rad": 0.05, "phase": 0.03, "stride_hz": 0.03, "stature_m": 0.003}
 """Standard deviations of a start, and of its noise about the truth; the stature is known to 3 mm."""
 
 
@@ -94,7 +94,7 @@ def meta_of(folder: Path) -> dict[str, Any]:
     return dict(json.loads(path.read_text())) if path.is_file() else {}
 
 
-def walkers() -> tuple[list[Clip], dict[str, Path]]:
+def people() -> tuple[list[Clip], dict[str, Path]]:
     """Clips with true joints, and models learnt without each one's subject."""
     clips = [clip for clip in shared_clips(None) if clip.truth]
     with progress("learning", None) as update:
@@ -138,7 +138,7 @@ def _learn(subject: str, path: Path) -> None:
 def noisy_start(clip: Clip, seed: int, stature_error: float) -> dict[str, Any]:
     """First state in the form of an ``--init`` file: the clip's own, or the truth plus noise by the seed.
 
-    A wrong stature comes with the deviation of a start that gives none: the user believes the number.
+    A wrong stature comes with the sd of a start that gives none: the user believes the number.
     """
     start = json.loads(clip.init.read_text()) if clip.init else _noisy_truth(clip, seed)
     if stature_error:
@@ -154,16 +154,16 @@ def _noisy_truth(clip: Clip, seed: int) -> dict[str, Any]:
     noise = np.random.default_rng(seed).standard_normal(7)
     true = _cadence(clip, truth) | {"stature_m": meta_of(clip.folder)["stature_m"], "heading_rad": heading}
     drawn = {"phase": noise[0], "stride_hz": noise[1], "stature_m": 0.0, "heading_rad": noise[3]}
-    start = {key: float(value + SPREAD[key] * drawn[key]) for key, value in true.items()}
+    start = {key: float(value + SD[key] * drawn[key]) for key, value in true.items()}
     if "phase" in start:
         start["phase"] %= 1.0
-    pelvis = truth.places["pelvis"][0] + SPREAD["pelvis"] * noise[4:]
-    spread = {key: SPREAD[key] for key in (*start, "pelvis")}
-    return {"frame": int(truth.frame[0]), **start, "pelvis": pelvis.tolist(), "sd": spread}
+    pelvis = truth.places["pelvis"][0] + SD["pelvis"] * noise[4:]
+    sd = {key: SD[key] for key in (*start, "pelvis")}
+    return {"frame": int(truth.frame[0]), **start, "pelvis": pelvis.tolist(), "sd": sd}
 
 
 def _cadence(clip: Clip, truth: Joints) -> dict[str, float]:
-    """Phase and stride rate at the first frame; nothing where nobody walks or steps are too few."""
+    """Phase and stride rate at the first frame; nothing where no person walks or steps are too few."""
     cycles = strikes_of(truth, clip.folder / "meta.json").cycles(truth.frame[:2])
     if cycles is None or not clip.steady:
         return {}

@@ -1,7 +1,7 @@
 """New clips out of simulated ones: frames held, reversed, covered, cut out or joined, the truth with them.
 
 Each edit reads the folders of its sources, writes a clip into a new folder, and returns what its meta.json
-says beyond the first source: ``steady`` False where the phase means nothing, ``person`` False without one.
+states beyond the first source: ``steady`` False where the phase means nothing, ``person`` False without one.
 """
 
 from __future__ import annotations
@@ -23,26 +23,26 @@ from gait.io.video import Image
 Edit = Callable[[Sequence[Path], Path], dict[str, Any]]
 
 _NOISE = 2.0  # of the sensor on frames that are held, grey levels
-_STOP = 50  # frame at which the walker of `stopping` freezes
-_HIDDEN = (40, 70)  # frames without sight of the walker: a second
-_DIFFERENT = 24  # grey levels from the plate that make a pixel somebody's
+_STOP = 50  # frame at which the person of `stopping` freezes
+_HIDDEN = (40, 70)  # frames without a view of the person: a second
+_DIFFERENT = 24  # grey levels from the plate that make a pixel part of a person
 
 
 def standing(sources: Sequence[Path], target: Path) -> dict[str, Any]:
-    """Somebody stands in mid-stride from the start."""
+    """A person stands in mid-stride from the start."""
     return _held(sources[0], target, [0] * 90)
 
 
 def stopping(sources: Sequence[Path], target: Path) -> dict[str, Any]:
-    """A walker who freezes."""
+    """A person who freezes."""
     return _held(sources[0], target, [min(n, _STOP) for n in range(_STOP + 60)])
 
 
 def _held(source: Path, target: Path, picked: list[int]) -> dict[str, Any]:
     frames = _frames(source)
     rng = np.random.default_rng(1)
-    seen = (_noisy(frames[n], rng) if i and picked[i - 1] == n else frames[n] for i, n in enumerate(picked))
-    _write(source, target, seen, picked)
+    shown = (_noisy(frames[n], rng) if i and picked[i - 1] == n else frames[n] for i, n in enumerate(picked))
+    _write(source, target, shown, picked)
     return {"steady": False, "difficulty": ["held frames"]}
 
 
@@ -55,7 +55,7 @@ def backwards(sources: Sequence[Path], target: Path) -> dict[str, Any]:
 
 
 def hidden(sources: Sequence[Path], target: Path) -> dict[str, Any]:
-    """A textured screen before the walker's whole way for a second."""
+    """A textured screen before the person's whole way for a second."""
     source = sources[0]
     screen = cv2.GaussianBlur(np.random.default_rng(2).uniform(40, 215, _plate(source).shape), (0, 0), 4)
     frames = _frames(source)
@@ -67,7 +67,7 @@ def hidden(sources: Sequence[Path], target: Path) -> dict[str, Any]:
 
 
 def leaves(sources: Sequence[Path], target: Path) -> dict[str, Any]:
-    """The middle of the picture only: the walker enters and leaves."""
+    """The middle of the picture only: the person enters and leaves."""
     source = sources[0]
     camera = Camera.read(str(source / "camera.json"))
     left = camera.width // 4 // 2 * 2
@@ -82,26 +82,26 @@ def leaves(sources: Sequence[Path], target: Path) -> dict[str, Any]:
 
 
 def second_person(sources: Sequence[Path], target: Path) -> dict[str, Any]:
-    """Somebody else crosses in front, cut out of a clip of their own (so without a shadow)."""
+    """Another person crosses in front, cut out of a clip of their own (so without a shadow)."""
     frames, others, plate = _frames(sources[0]), _frames(sources[1]), _plate(sources[1])
     made = []
     for mine, other in zip(frames, others, strict=True):
         off = np.abs(other.astype(int) - plate.astype(int)).max(axis=2).astype(np.uint8)
         mask = cv2.morphologyEx((off > _DIFFERENT).astype(np.uint8), cv2.MORPH_CLOSE, np.ones((7, 7)))
         _, labels, stats, _ = cv2.connectedComponentsWithStats(mask)
-        somebody = labels == 1 + int(stats[1:, cv2.CC_STAT_AREA].argmax()) if len(stats) > 1 else mask > 1
-        soft = cv2.GaussianBlur(somebody.astype(np.float32), (0, 0), 0.8)[..., None]
-        made.append(np.rint(soft * other + (1 - soft) * mine).astype(np.uint8))
+        person = labels == 1 + int(stats[1:, cv2.CC_STAT_AREA].argmax()) if len(stats) > 1 else mask > 1
+        blurred = cv2.GaussianBlur(person.astype(np.float32), (0, 0), 0.8)[..., None]
+        made.append(np.rint(blurred * other + (1 - blurred) * mine).astype(np.uint8))
     _write(sources[0], target, made, list(range(len(made))))
     return {"distractors": ["a second person crosses in front"]}
 
 
-def nobody(sources: Sequence[Path], target: Path) -> dict[str, Any]:
-    """The empty scene, with a start that claims somebody."""
+def no_person(sources: Sequence[Path], target: Path) -> dict[str, Any]:
+    """The empty scene, with a start that claims a person."""
     plate, rng = _plate(sources[0]), np.random.default_rng(3)
     _write(sources[0], target, (_noisy(plate, rng) for _ in range(60)), None)
     shutil.copy(sources[0] / "init.json", target / "init.json")
-    return {"person": False, "difficulty": ["nobody"]}
+    return {"person": False, "difficulty": ["no_person"]}
 
 
 def _write(source: Path, target: Path, frames: Iterable[Image], rows: list[int] | None) -> None:
@@ -135,12 +135,12 @@ def _noisy(image: Image, rng: np.random.Generator) -> Image:
 
 
 def _box(folder: Path, frame: int, margin: float) -> tuple[np.ndarray, np.ndarray]:
-    """Corners in pixels of the walker's joints at `frame`, wider by `margin` of their height."""
+    """Corners in pixels of the person's joints at `frame`, wider by `margin` of their height."""
     camera, truth = Camera.read(str(folder / "camera.json")), read_truth(folder / "truth.csv")
     uv = camera.project(truth.eval15()[frame])
-    room = margin * np.ptp(uv[:, 1])
+    space = margin * np.ptp(uv[:, 1])
     size = [camera.width, camera.height]
     return (
-        np.clip(uv.min(axis=0) - room, 0, size).astype(int),
-        np.clip(uv.max(axis=0) + room, 0, size).astype(int),
+        np.clip(uv.min(axis=0) - space, 0, size).astype(int),
+        np.clip(uv.max(axis=0) + space, 0, size).astype(int),
     )

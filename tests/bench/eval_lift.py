@@ -4,7 +4,7 @@
     make eval-lift
 
 Each part is a script of its own that publishes tables (table.py) and fails if a bound is missed.  The exact
-identities (F1-F3, F5-F7) are tests (decisions.md says which), speeds are make bench-lift.
+identities (F1-F3, F5-F7) are tests (decisions.md states which), speeds are make bench-lift.
 """
 
 from __future__ import annotations

@@ -42,7 +42,7 @@ class Marks:
     frames: np.ndarray
     joints: list[str]
     uv: np.ndarray
-    seen: np.ndarray
+    visible: np.ndarray
     near: str
     strikes: Strikes
 
@@ -62,7 +62,7 @@ class Marks:
 
     def distances(self, track: Track, camera: Camera) -> np.ndarray:
         """Pixels from each mark to the estimate, (n, k); NaN where the frame was not tracked."""
-        out = np.full(self.seen.shape, np.nan)
+        out = np.full(self.visible.shape, np.nan)
         _, rows, at = np.intersect1d(self.frames, track.frame, return_indices=True)
         for k, joint in enumerate(self.joints):
             if joint == "head_centre":
@@ -89,26 +89,26 @@ class Marks:
         off = self.distances(track, camera)
         tracked = np.isfinite(off).all(axis=1)
         leg = [self.joints.index(f"{self.near}_{name}") for name in LEG]
-        near = off[:, leg][(self.seen[:, leg] >= _GUESSED) & tracked[:, None]]
-        clear = off[(self.seen == _CLEAR) & tracked[:, None]]
+        near = off[:, leg][(self.visible[:, leg] >= _GUESSED) & tracked[:, None]]
+        clear = off[(self.visible == _CLEAR) & tracked[:, None]]
         true = self.strikes.phase(track.frame)
-        said = {n for n, status in zip(track.frame.tolist(), track.status, strict=True) if status == "lost"}
+        lost = {n for n, status in zip(track.frame.tolist(), track.status, strict=True) if status == "lost"}
         far = self._mean_distance(off)[tracked] > LOST_SHARE * self.height
-        told = np.array([n in said for n in self.frames[tracked].tolist()])
+        reported = np.array([n in lost for n in self.frames[tracked].tolist()])
         believed = np.isin(self.frames[tracked], track.frame[np.array(track.status) == "tracking"])
         return {
             "near_px": float(np.median(near)),
             "clear_px": float(np.median(clear)),
             "joint_px": {
-                name: float(np.median(off[:, k][(self.seen[:, k] == _CLEAR) & tracked]))
+                name: float(np.median(off[:, k][(self.visible[:, k] == _CLEAR) & tracked]))
                 for k, name in enumerate(self.joints)
-                if ((self.seen[:, k] == _CLEAR) & tracked).any()
+                if ((self.visible[:, k] == _CLEAR) & tracked).any()
             },
             "phase": phase_errors(track.phase, true),
-            "lost": float((far | told).mean()),
+            "lost": float((far | reported).mean()),
             "trust": {
                 "wrong_tracking": float((far & believed).mean()),
-                "weighted_lost": float(((far | told) + 1.0 * (far & believed)).mean()),
+                "weighted_lost": float(((far | reported) + 1.0 * (far & believed)).mean()),
             },
             "status": shares(track),
         }
@@ -124,5 +124,5 @@ class Marks:
         }
 
     def _mean_distance(self, off: np.ndarray) -> np.ndarray:
-        seen = self.seen > 0
-        return np.where(seen, off, 0).sum(axis=1) / seen.sum(axis=1)
+        visible = self.visible > 0
+        return np.where(visible, off, 0).sum(axis=1) / visible.sum(axis=1)

@@ -44,10 +44,10 @@ def against_truth(track: Track, truth: Joints, camera: Camera) -> dict[str, np.n
         "true_path": truth.places["pelvis"][theirs, :2],
         "offset": 1000 * (found - true)[:, hips].mean(axis=1) @ camera.R.T,
     }
-    return {name: _spread_out(values, ours, len(track.frame)) for name, values in measured.items()}
+    return {name: _expanded(values, ours, len(track.frame)) for name, values in measured.items()}
 
 
-def _spread_out(values: np.ndarray, rows: np.ndarray, count: int) -> np.ndarray:
+def _expanded(values: np.ndarray, rows: np.ndarray, count: int) -> np.ndarray:
     out = np.full((count, *values.shape[1:]), np.nan)
     out[rows] = values
     return out
@@ -140,7 +140,7 @@ def lost_at_end(series: dict[str, np.ndarray]) -> bool:
     return bool(lost.mean() > 0.5 or lost[-20:].all())
 
 
-class Spread:
+class Uncertainty:
     """NEES (Bar-Shalom et al. 2001) of all joints together, by the particles' own covariance."""
 
     def __init__(self, truth: Path | None, model: Model) -> None:

@@ -19,7 +19,7 @@ from gait.io.files import replacing
 STYLE = """
 body{font:14px/1.45 system-ui,sans-serif;max-width:88em;margin:2em auto;padding:0 1em;color:#222}
 h1{font-size:1.5em}h2{font-size:1.2em;margin-top:2em}h3{font-size:1em;margin:1.4em 0 .3em}
-.wide{overflow-x:auto}table{border-collapse:collapse;font-size:12.5px;white-space:nowrap}
+.scroll{overflow-x:auto}table{border-collapse:collapse;font-size:12.5px;white-space:nowrap}
 td,th{padding:.15em .6em;text-align:right;border-bottom:1px solid #e4e4e4;font-variant-numeric:tabular-nums}
 td:nth-child(-n+2),th:nth-child(-n+2){text-align:left}.words td{text-align:left}
 .FAIL{background:#fbe3e3}.pass{background:#e8f4e4}
@@ -69,9 +69,9 @@ def faults(row: dict[str, Any]) -> list[str]:
     if row["arm"].startswith("paper"):
         return found
     if row["empty"]:
-        return [f"says tracking in {row['track_pct']:.0f} % of the frames"] if row["track_pct"] else []
+        return [f"states tracking in {row['track_pct']:.0f} % of the frames"] if row["track_pct"] else []
     if row["side"] == "wrong":
-        found.append("left and right exchanged under tracking")
+        found.append("left and right swapped under tracking")
     if row["locked"] is False:
         found.append("phase not locked after 1 s")
     if (row["silent_pct"] or 0) > 1:
@@ -121,4 +121,4 @@ def _table(lines: list[list[str]], kind: str = "", classes: list[str] | None = N
     for i, line in enumerate(lines[1:]):
         name = f' class="{classes[i]}"' if classes else ""
         body += f"<tr{name}>" + "".join(f"<td>{escape(line[k])}</td>" for k in kept) + "</tr>"
-    return f'<div class="wide"><table class="{kind}"><tr>{head}</tr>{body}</table></div>'
+    return f'<div class="scroll"><table class="{kind}"><tr>{head}</tr>{body}</table></div>'

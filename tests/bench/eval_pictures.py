@@ -22,7 +22,7 @@ if TYPE_CHECKING:
 Array = np.ndarray
 WIDTH, HEIGHT = 480, 420  # of a picture, pixels
 KNOWN = (255, 60, 255)  # colour of truth and marks, BGR
-_ROOM = 1.35  # height of the picture in heights of the person
+_SPACE = 1.35  # height of the picture in heights of the person
 
 
 def pictures(
@@ -37,8 +37,8 @@ def pictures(
             estimate, known = estimates[frame.number], _known(result, model, camera, frame.number)
             canvas = overlay.body(frame.image, estimate.mean)
             overlay.skeleton(canvas, estimate.joints)
-            seen = np.vstack([camera.project(estimate.joints), known])
-            picture, place = _crop(canvas, seen[np.isfinite(seen).all(axis=1)])
+            shown = np.vstack([camera.project(estimate.joints), known])
+            picture, place = _crop(canvas, shown[np.isfinite(shown).all(axis=1)])
             _draw_known(picture, place(known), model.joint_names if result.job.clip.truth else None)
             out[frame.number] = cv2.imencode(".jpg", picture, [cv2.IMWRITE_JPEG_QUALITY, 82])[1].tobytes()
     return [(words, out[number]) for number, words in chosen if number in out]
@@ -74,15 +74,15 @@ def _known(result: Result, model: Model, camera: Camera, number: int) -> Array:
     if clip.marks is not None:
         marks = Marks.read(clip.marks)
         row = marks.frames == number
-        return marks.uv[row][marks.seen[row] > 0]
+        return marks.uv[row][marks.visible[row] > 0]
     return np.zeros((0, 2))
 
 
-def _crop(canvas: Image, seen: Array) -> tuple[Image, Callable[[Array], Array]]:
+def _crop(canvas: Image, shown: Array) -> tuple[Image, Callable[[Array], Array]]:
     """Picture of the surroundings of the points `seen`, and what takes pixels there."""
     height, width = canvas.shape[:2]
-    low, high = np.clip([seen.min(axis=0), seen.max(axis=0)], 0, [width - 1, height - 1])
-    tall = max(_ROOM * float((high - low)[1]), _ROOM * float((high - low)[0]) * HEIGHT / WIDTH, 60.0)
+    low, high = np.clip([shown.min(axis=0), shown.max(axis=0)], 0, [width - 1, height - 1])
+    tall = max(_SPACE * float((high - low)[1]), _SPACE * float((high - low)[0]) * HEIGHT / WIDTH, 60.0)
     scale = HEIGHT / tall
     move = 0.5 * np.array([WIDTH, HEIGHT]) - scale * 0.5 * (low + high)
     picture = cv2.warpAffine(

@@ -28,13 +28,13 @@ class Clip:
     first, stop : int
         Frames to use, `first` <= frame < `stop`.
     height : float or None
-        Stature that ``auto`` is told, metres.
+        Stature given to ``auto``, metres.
     subject : str or None
         Left out of learning; None: the shipped model.
     steady : bool
-        Somebody walks throughout, so that the phase means something.
+        A person walks throughout, so that the phase means something.
     empty : bool
-        Nobody is there.
+        No person is there.
     """
 
     name: str

@@ -43,7 +43,7 @@ class Result:
     pictures : list of (str, bytes)
         Caption and JPEG.
     failure : str
-        The tracker's or the start's one line, if it gave up.
+        The tracker's or the start's one line, if it failed.
     """
 
     job: Job
@@ -79,7 +79,7 @@ class _Kept:
 def run(job: Job) -> Result:
     """Track and judge; an error of the user's kind is a result, not the end of the evaluation."""
     cv2.setNumThreads(1)  # jobs run side by side
-    library()  # a library that does not load is nobody's result
+    library()  # a library that does not load is no result
     try:
         return _run(job)
     except (UserError, GaitError) as exc:
@@ -132,9 +132,9 @@ def _start(job: Job, video: Video, camera: Camera, plate: Image | None, model: M
 
 
 def _follow(job: Job, video: Video, tracker: Tracker, start: Start, auto_start: BoxStart) -> _Kept:
-    """Track into the run's CSV file; whoever is lost is looked for, as in `gait track`."""
+    """Track into the run's CSV file; a person who is lost is looked for, as in `gait track`."""
     model, kept = tracker.model, _Kept()
-    spread = eval_measures.Spread(job.clip.truth, model) if job.arm.mode == "default" else None
+    uncertainty = eval_measures.Uncertainty(job.clip.truth, model) if job.arm.mode == "default" else None
     rows = TrackWriter(
         job.folder / f"{job.stem}.csv", model.info.components, model.joint_names, model.angle_names
     )
@@ -143,8 +143,8 @@ def _follow(job: Job, video: Video, tracker: Tracker, start: Start, auto_start: 
             rows.write(frame, estimate)
             kept.estimates[frame.number] = estimate
             kept.steps.append(1000 * tracker.step_seconds)
-            if spread is not None and spread.wants(frame.number):
-                kept.nees.append(spread.nees(frame.number, estimate, *tracker.particles()))
+            if uncertainty is not None and uncertainty.wants(frame.number):
+                kept.nees.append(uncertainty.nees(frame.number, estimate, *tracker.particles()))
     if not kept.steps:
         raise UserError(f"{video.path}: no frame from {start.frame} on")
     return kept

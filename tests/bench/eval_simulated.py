@@ -1,7 +1,7 @@
 """Hard cases by `gait simulate`: paces, statures, views and light that the development clips lack.
 
 What simulate cannot walk is made from its clips (see `eval_edits`): standing still, walking backwards, a
-second person, an occlusion, leaving the picture, nobody.  Running is an OpenSim recording, learned.
+second person, an occlusion, leaving the picture, no person.  Running is an OpenSim recording, learned.
 Not made: sitting, stairs, carried things, a moving camera, sharp turns on the spot.
 """
 
@@ -45,7 +45,7 @@ EDITS: dict[str, tuple[eval_edits.Edit, tuple[str, ...]]] = {
     "hidden_1s": (eval_edits.hidden, ("side",)),
     "leaves": (eval_edits.leaves, ("side",)),
     "second_person": (eval_edits.second_person, ("side", "crossing")),
-    "nobody": (eval_edits.nobody, ("side",)),
+    "no_person": (eval_edits.no_person, ("side",)),
 }
 
 

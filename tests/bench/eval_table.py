@@ -29,7 +29,7 @@ _FROM = {  # column: path into the measures, factor
     "lost2_pct": ("trust.weighted_lost", 100),
     "silent_pct": ("trust.wrong_tracking", 100),
     "swapped_pct": ("start.flipped_silently", 100),
-    "said_lost_pct": ("status.lost", 100),
+    "reported_lost_pct": ("status.lost", 100),
     "ambig_pct": ("status.ambiguous", 100),
     "init_pct": ("status.init", 100),
     "track_pct": ("status.tracking", 100),
@@ -85,19 +85,20 @@ HONESTY = {  # of the second table
     "init %": ("init_pct", 0),
     "tracking %": ("track_pct", 0),
     "ambiguous %": ("ambig_pct", 0),
-    "lost %": ("said_lost_pct", 0),
+    "lost %": ("reported_lost_pct", 0),
     "silent %": ("silent_pct", 1),
     "swapped %": ("swapped_pct", 1),
 }
-_SPREAD = ("root", "abs", "px")  # columns that also show least and most over the seeds
+_SD = ("root", "abs", "px")  # columns that also show least and most over the seeds
 
 LEGEND = (
     "Medians over the seeds of a clip's median over frames (least-most). root abs proc 12j: mm, hips laid "
     "together, as it stands, after the best similarity of each frame (to compare with literature only), "
     "root over 12 limb joints; MPipe: MediaPipe Pose in the measure of 12j; static: mean pose at the true "
     "place (root); free: mean cycle running free from the true start (root); px: distance in the image, "
-    "outdoor: near leg; clear: all clear marks; lost: root > 150 mm or said so; twice: the same, frames "
-    "under tracking counted twice; c90: share of joint coordinates inside the 90 % intervals; HS: heel "
+    "outdoor: near leg; clear: all clear marks; lost: root > 150 mm or reported as lost; twice: "
+    "the same, frames under tracking counted twice; c90: share of joint coordinates inside the 90 % "
+    "intervals; HS: heel "
     "strikes within 2 frames; from: first frame tracked; ms: a step. Intervals and status: PIT chi2: "
     "probability integral transform against flat, 10 bins; z2: squared error in variances, 1 is right; "
     "NEES: error of all joints in the particles' covariance per dimension, 1 is right; CRPS: score of the "
@@ -121,9 +122,9 @@ def figures(result: Result) -> dict[str, Any]:
     row["mediapipe_mm"] = MEDIAPIPE.get(job.clip.name)
     row["failure"] = result.failure.replace(f"{job.clip.folder}/", "")
     row["empty"] = job.clip.empty
-    if job.clip.empty:  # nobody is there: to give up is right
+    if job.clip.empty:  # no person is there: to find no person is right
         row["lost_run"] = False
-    elif result.failure:  # who gives up has lost every frame
+    elif result.failure:  # a run that failed has lost every frame
         row["lost_pct"] = row["lost2_pct"] = 100.0
     return row
 
@@ -153,7 +154,7 @@ def summaries(rows: list[dict[str, Any]]) -> list[dict[str, Any]]:
 
 
 def failures(rows: list[dict[str, Any]]) -> list[str]:
-    """Runs that gave up, with their one line; equal lines together."""
+    """Runs that failed, with their one line; equal lines together."""
     lines: dict[str, list[str]] = {}
     for row in rows:
         if row["failure"]:
@@ -170,7 +171,7 @@ def cells(summary: dict[str, Any], shown: dict[str, tuple[str, int]]) -> list[st
             out.append("")
             continue
         text = f"{value:.{decimals}f}"
-        if column in _SPREAD and summary["runs"] > 1:
+        if column in _SD and summary["runs"] > 1:
             low, high = summary[f"{name}_range"]
             text += f" ({low:.{min(decimals, 1)}f}-{high:.{min(decimals, 1)}f})"
         out.append(text)

@@ -18,7 +18,7 @@ AUTO = "default/auto"
 
 @dataclass(frozen=True)
 class Verdict:
-    """One line: `passed` is None where nothing was run that tells."""
+    """One line: `passed` is None where no run shows it."""
 
     measure: str
     wanted: str
@@ -32,7 +32,7 @@ class Verdict:
 
 
 def verdicts(rows: Rows) -> list[Verdict]:
-    """All lines that the runs can tell about; the others say so."""
+    """All lines that the runs show; the others state so."""
     return [check(rows) for check in _CHECKS]
 
 
@@ -53,7 +53,7 @@ def _of(rows: Rows, arm: str, outdoor: bool | None = False) -> Rows:
 
 
 def per_clip(rows: Rows, name: str) -> dict[str, float]:
-    """Median over the seeds of each clip; a run that gave up counts as without bound."""
+    """Median over the seeds of each clip; a run that failed counts as without bound."""
     out = {}
     for clip in dict.fromkeys(row["clip"] for row in rows):
         runs = [row for row in rows if row["clip"] == clip]
@@ -172,24 +172,24 @@ def _beside(rows: Rows, arm: str) -> list[str]:
     """What an arm does to errors not judged: absolute in the worst clip, pixels in the real one."""
     base, other = (per_clip(_of(rows, name), "abs_mm") for name in (BASE, arm))
     pairs = {clip: (base[clip], other[clip]) for clip in other if clip in base}
-    told = []
+    reported = []
     if pairs:
         worst = max(pairs, key=lambda clip: pairs[clip][1] - pairs[clip][0])
-        told.append("absolute, worst change {} {:.0f} -> {:.0f} mm".format(worst, *pairs[worst]))
+        reported.append("absolute, worst change {} {:.0f} -> {:.0f} mm".format(worst, *pairs[worst]))
     before, after = (per_clip(_of(rows, name, True), "clear_px").get(OUTDOOR) for name in (BASE, arm))
     if before is not None and after is not None:
-        told.append(f"real clip {before:.1f} -> {after:.1f} px")
-    return told
+        reported.append(f"real clip {before:.1f} -> {after:.1f} px")
+    return reported
 
 
 def _slower(rows: Rows) -> Verdict:
     measure, wanted = "15 and 10 frames/s", "root within 10 %"
     found = [_against_base(rows, f"every {k}", measure, wanted, "--every 2 3") for k in (2, 3)]
-    told = [v for v in found if v.passed is not None]
-    if not told:
+    reported = [v for v in found if v.passed is not None]
+    if not reported:
         return found[0]
-    passed = all(v.passed for v in told) if len(told) == 2 else None
-    return Verdict(measure, wanted, "; ".join(v.reached for v in told), passed)
+    passed = all(v.passed for v in reported) if len(reported) == 2 else None
+    return Verdict(measure, wanted, "; ".join(v.reached for v in reported), passed)
 
 
 def _against_base(rows: Rows, arm: str, measure: str, wanted: str, how: str) -> Verdict:

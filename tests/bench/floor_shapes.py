@@ -16,7 +16,7 @@ from gait.learn.prior.fit import Learned
 
 MOST = 12  # dimensions of a particle for its shape
 LENGTHS = MOST - DEFAULT_COMPONENTS
-USED = 5  # components that the tracker uses by default (population.c)
+USED = 5  # components that the tracker uses by default
 OURS, PLAIN_BODY = "libgait", "libgait, no proportions"
 TRACKED, UNMOVED = "libgait, as tracked", "libgait, as tracked without offsets"
 ALL_OFFSETS = "+ offsets of all angles"

@@ -85,16 +85,16 @@ def ppca(values: Floats, mask: Mask, components: int) -> Floats:
     _, s, v = np.linalg.svd(filled - center, full_matrices=False)
     load, noise = v[:components].T * s[:components] / np.sqrt(len(x)), 1.0
     for _ in range(PPCA_PASSES):
-        spread = noise * np.linalg.inv(_grams(visible, load) + noise * np.eye(components))
-        scores = np.einsum("rkl,rl->rk", spread, (visible * (x - center)) @ load) / noise
+        covariance = noise * np.linalg.inv(_grams(visible, load) + noise * np.eye(components))
+        scores = np.einsum("rkl,rl->rk", covariance, (visible * (x - center)) @ load) / noise
         before, model = filled, center + scores @ load.T
         # Each entry's row of loadings from the rows that have it.
-        second = (spread + scores[:, :, None] * scores[:, None]).reshape(len(x), -1)
+        second = (covariance + scores[:, :, None] * scores[:, None]).reshape(len(x), -1)
         gram = (visible.T @ second).reshape(-1, components, components) + 1e-9 * np.eye(components)
         cross = (visible * (x - center)).T @ scores
         load = np.linalg.solve(gram, cross[..., None])[..., 0]
         center = (visible * (x - scores @ load.T)).sum(axis=0) / np.maximum(visible.sum(axis=0), 1)
-        rest = np.sum(spread * _grams(visible, load))
+        rest = np.sum(covariance * _grams(visible, load))
         noise = float(np.sum((visible * (x - center - scores @ load.T)) ** 2) + rest) / float(visible.sum())
         filled = np.where(visible > 0, x, model)
         if np.sqrt(np.mean((filled - before) ** 2)) <= PPCA_TOLERANCE * np.sqrt(noise):

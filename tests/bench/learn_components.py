@@ -140,7 +140,7 @@ def _angles() -> Iterator[Row]:
 
 def _scores() -> Iterator[Row]:
     """L11: scores and their standard deviations between and within people."""
-    correlation, spread, parts = [], [], []
+    correlation, sd_errors, parts = [], [], []
     for seed in range(SEEDS):
         case = cases.people(_rng(11, seed))
         found = pca.fit(case.values, case.mask, 5)
@@ -148,12 +148,12 @@ def _scores() -> Iterator[Row]:
         correlation += [np.corrcoef(scores[:, k], case.scores[:, k])[0, 1] for k in range(5)]
         centred = case.scores - case.scores.mean(axis=0)
         true = np.linalg.svd(centred, compute_uv=False) / np.sqrt(len(centred) - 1)
-        spread.append(np.abs(found.sd / np.sqrt(found.mean.size) / true - 1).max())
+        sd_errors.append(np.abs(found.sd / np.sqrt(found.mean.size) / true - 1).max())
         pairs = zip(anova(scores, case.subject), anova(case.scores, case.subject), strict=True)
         parts.append([np.abs(a / b - 1).max() for a, b in pairs])
     between, within = np.max(parts, axis=0)
     yield _row("L11", "20 % missing", "least correlation of scores", min(correlation), 1, 0.99)
-    yield _row("L11", "20 % missing", "error of sd, relative", max(spread), 0.05)
+    yield _row("L11", "20 % missing", "error of sd, relative", max(sd_errors), 0.05)
     yield _row("L11", "20 % missing", "error of sd between people, relative", between, 0.15)
     yield _row("L11", "20 % missing", "error of sd within people, relative", within, 0.15)
 

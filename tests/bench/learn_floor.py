@@ -96,7 +96,7 @@ Mean distance of 14 joints after alignment of the pelvis, mm, averaged over a su
   *libgait, as tracked* is what the tracker has by default: {used} components, no proportions, and offsets of
   trunk, shoulders and elbows.
 - offsets: constants added to single angles, the last of the dimensions, the most probable ones given their
-  deviation among the learners (section `CHST`, learnt anew without the subject) and that of a joint's
+  sd among the learners (section `CHST`, learnt anew without the subject) and that of a joint's
   coordinate, which is what the model leaves of the walk without offsets.  Where every frame counts, these
   outweigh what was learnt, and the offsets are nearly free; with *frames alike* a walk counts as one frame,
   since a model errs alike in all strides.  Scores and proportions are free in all rows.  The sd

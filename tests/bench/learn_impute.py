@@ -121,8 +121,8 @@ def _row(
 ) -> list[Any]:
     ratio = errors / best[: len(errors)]
     middle = None if seconds is None else float(np.median(seconds))
-    spread = float(np.median(errors)), float(np.median(ratio)), float(ratio.max())
-    return [name, version, count, *spread, middle, len(errors)]
+    summary = float(np.median(errors)), float(np.median(ratio)), float(ratio.max())
+    return [name, version, count, *summary, middle, len(errors)]
 
 
 def _peer_runs(peers: Path, problems: list[Any]) -> Iterator[tuple[tuple[str, int], Run]]:

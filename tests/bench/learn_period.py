@@ -45,7 +45,7 @@ ALIGNMENTS = 334  # for each of the styles
 GAUGES = 10
 ADDED = (0.123456, 0.25, 0.5)  # cycles, to all phases
 HIPS = (7, 15)  # right and left hip flexion of the generator
-BY_STYLE = "L5 by style"  # told, not judged
+BY_STYLE = "L5 by style"  # reported, not judged
 COLUMNS = ("measure", "case", "figure", "value", "wanted", "met")
 
 
@@ -160,7 +160,7 @@ def _periods(run: Callable[..., Iterable[Any]]) -> list[Row]:
 
 
 def _jitter(run: Callable[..., Iterable[Any]]) -> Row:
-    """L1 with strides of unlike times: told beside the floor, no bound."""
+    """L1 with strides of unlike times: reported beside the floor, no bound."""
     true, frames, runs = JITTERED
     rms = float(np.sqrt(np.mean(np.square(list(run(_jittered, range(runs)))))))
     floor = JITTER * true / np.sqrt(frames / true)
@@ -173,7 +173,7 @@ def _multiples(run: Callable[..., Iterable[Any]]) -> Row:
     ratio = np.array(list(run(_styled, range(MULTIPLES))))
     wrong = sum(np.abs(ratio / k - 1) < 0.02 for k in (2, 3, 4, 5, 1 / 2, 1 / 3, 1 / 4, 1 / 5))
     count = int(np.sum((wrong > 0) | (np.abs(ratio - 1) > 0.02)))
-    return _row("L2", f"{MULTIPLES} walkers", "not within 2 % of the period", count, "0", count == 0)
+    return _row("L2", f"{MULTIPLES} people", "not within 2 % of the period", count, "0", count == 0)
 
 
 def _alignment(run: Callable[..., Iterable[Any]]) -> list[Row]:
@@ -283,8 +283,8 @@ def main() -> int:
         "above 0.125 frames (p = 240.2, T = 600: 2.5 cycles) no method can keep that, so four times it. "
         "The floor where stride times vary is jitter x p / sqrt(T / p), the spread of the mean of so many "
         "strides; nothing is wanted there. The literal mode is judged where its fold drifts less than two "
-        "frames; all else that it finds is told. L2: random style, 3 degrees, 10 % missing. L5: eight "
-        "walkers each, 3 degrees of noise. Judged are the errors of styles of 0, 2 and 4 degrees together, a "
+        "frames; all else that it finds is reported. L2: random style, 3 degrees, 10 % missing. L5: eight "
+        "people each, 3 degrees of noise. Judged are the errors of styles of 0, 2 and 4 degrees together, a "
         "third of the runs each; the rows by style hold each style alone to the same bounds, and what they "
         "miss does not fail this command. An objective rises if any pass ends above the one before by more "
         "than rounding (1e-9). L6: the constant is added to the phases at which the alignment begins.",

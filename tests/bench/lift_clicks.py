@@ -16,7 +16,7 @@ from gait.motion.evaluate import root_errors
 
 Array = NDArray[np.float64]
 
-WIDTH90 = 1.645  # deviations of half a 90 % interval
+WIDTH90 = 1.645  # standard deviations of half a 90 % interval
 POINTING = 3.0  # pixels, standard deviation of a click
 
 
@@ -85,6 +85,6 @@ def corrected(
 
 
 def _apart(off: Array, count: int) -> list[int]:
-    """Frames of the largest errors, each the worst of its stretch of the clip."""
-    stretches = np.array_split(np.arange(len(off)), count)
-    return [int(part[np.argmax(off[part])]) for part in stretches if len(part)]
+    """Frames of the largest errors, each the worst of its interval of the clip."""
+    intervals = np.array_split(np.arange(len(off)), count)
+    return [int(part[np.argmax(off[part])]) for part in intervals if len(part)]

@@ -4,7 +4,7 @@
     make eval-lift, or lift_images.py ../shared/data/mocap/cmu_walk
 
 Publishes tests/bench/results/lift_sticks.md (F9, F10), lift_clips.md and lift_outdoor.md; fails if a bound is
-missed.  Corrections come from a simulated user (lift_clicks.py).  Priors leave out the walker's subject.
+missed.  Corrections come from a simulated user (lift_clicks.py).  Priors leave out the person's subject.
 """
 
 from __future__ import annotations
@@ -22,7 +22,7 @@ import numpy as np
 import table
 from eval_plan import Clip
 from lift_clicks import POINTING, Score, corrected, score
-from lift_sticks import Walk, bends, depth_gaps, jump, stick_clip
+from lift_sticks import Walk, bends, depth_gaps, spike, stick_clip
 from scipy import stats
 
 from gait.bindings.model import read_cyclic
@@ -48,7 +48,7 @@ FRAMES = slice(10, 50)
 WITHIN = 1.3  # of the error with known markers
 ENOUGH = 60.0  # mm
 MOST = 0.5  # corrections per frame
-JUMP = 0.01  # statures
+SPIKE = 0.01  # statures
 HELD = (0.80, 0.95)  # coverage of 90 % intervals, mean of the rows
 MARKS = {"head_centre"}  # marked joints that the prior has not
 
@@ -74,7 +74,7 @@ def main(argv: Sequence[str] | None = None) -> int:
 
 
 def _models(subjects: Sequence[str], clips: Sequence[Clip]) -> dict[str, Path]:
-    """Models learnt from everybody but one of the subjects, who walk in the clips."""
+    """Models learnt from everyone but one of the subjects, who walk in the clips."""
     wanted = [clip for clip in clips if clip.subject in subjects]
     folder = eval_clips.ROOT / "build" / "eval" / "models"
     with progress("learning", None) as update:
@@ -94,7 +94,7 @@ def _sticks(mocap: Path, models: dict[str, Path]) -> bool:
     ratio, most, bend, inside = np.array([row[5:6] + row[7:10] for row in rows]).T
     mean, half = float(ratio.mean()), _interval(ratio)
     pooled = [float(np.sqrt(np.mean(values**2))) for values in (bend, inside)]
-    met = [mean <= WITHIN, most.max() < 100 * JUMP, pooled[0] <= pooled[1]]
+    met = [mean <= WITHIN, most.max() < 100 * SPIKE, pooled[0] <= pooled[1]]
     none: list[Any] = [None] * 4
     rows.append([f"F9 mean <= {WITHIN:g} (+- {half:.2f})", *none, mean, *none, None, _met(met[0])])
     rows.append(["F10 largest jump < 1 %", *none, None, None, float(most.max()), *none[:3], _met(met[1])])
@@ -175,7 +175,7 @@ def _joins(prior: SegmentPrior, walk: Walk, angle: float) -> list[float]:
         clip = replace(placed, settings=Settings(joined=False))
         fit = fit_clip(clip)
         gaps.append(np.abs(depth_gaps(clip, fit.sequence)).max())
-        most.append(jump(clip, fit))
+        most.append(spike(clip, fit))
         here, elsewhere = bends(clip, fit)
         bent.append(here)
         inside.append(elsewhere)

@@ -56,7 +56,7 @@ COVERAGE = (0.80, 0.95)
 GROWTH = 1.15  # of the error at 30 % missing
 AXES = np.array([[1.0, 0, 0], [0, 0, 1]])  # of the picture: depth is along y
 DEPTH = 1
-WITHIN = 1.645  # deviations that hold 90 %
+WITHIN = 1.645  # standard deviations that hold 90 %
 WITHIN_SCALED = 1.81  # scaled ones: Student's t of ten degrees, chosen by lift_modes
 
 
@@ -72,7 +72,7 @@ class HeldOut:
 
 @dataclass(frozen=True)
 class Errors:
-    """Of one noise, over segments: mean errors in mm, and what the posterior says of itself."""
+    """Of one noise, over segments: mean errors in mm, and what the posterior states of itself."""
 
     segments: int
     mean: float
@@ -132,7 +132,7 @@ def one_of_each() -> Iterator[tuple[str, HeldOut]]:
 
 
 def _observed(known: HeldOut, sd: float, missing: float) -> Iterator[tuple[int, Floats, Floats, Floats]]:
-    """Side, truth (F, J, 3) turned to it, picture and deviations of every segment, from sides in turn."""
+    """Side, truth (F, J, 3) turned to it, picture and sd of every segment, from sides in turn."""
     rng = np.random.default_rng(1)
     for k, segment in enumerate(known.segments * known.stature):
         truth = segment @ axis_rotation(2, -_turn(k % SIDES)).T
@@ -251,26 +251,26 @@ def _publish(rows: list[list[object]], missing: list[list[object]]) -> None:
         "of least squares in the modes (likelihood only), of the posterior mean (Bayes), of "
         "the segment's own projection on the modes (floor; Bayes has what lies outside them too), and of "
         "Bayes with the best of five weights of the prior (best; over: Bayes by that). Coverage: of the 90 % "
-        f"intervals of the depth, +- {WITHIN} deviations; scaled: of +- {WITHIN_SCALED} deviations times "
+        f"intervals of the depth, +- {WITHIN} sd; scaled: of +- {WITHIN_SCALED} sd times "
         "Lifter.scale, which are wider where the segment's own modes are larger than the prior expects; "
         f"held: whether from {COVERAGE[0]} to {COVERAGE[1]}. "
         "Volume: log10 of the posterior's over the prior's. The walk's prior is learnt from cmu_walk, "
-        f"{MODES['cmu_walk']} modes; the others' from cmu_misc, {MODES['cmu_misc']} modes (lift_modes says "
+        f"{MODES['cmu_walk']} modes; the others' from cmu_misc, {MODES['cmu_misc']} modes (lift_modes states "
         "why) or a quarter of the segments; all but what the sequence's subject did (--segments only). "
         "Wanted: Bayes "
         f"better at every noise, by {RATIO} at 50 mm (met); both coverages held by all together at every "
-        "noise, as the reference counts (which motions alone hold them is told); of all together Bayes at "
-        f"most {NEAR_BEST} of the best weight's."
+        "noise, as the reference counts (which motions alone hold them is reported); of all together Bayes "
+        f"at most {NEAR_BEST} of the best weight's."
     )
     head = ["measure", "left out", "noise mm", "segments", "mean", "likelihood", "Bayes", "floor", "ratio"]
     head += ["best", "over", "coverage", "held", "scaled", "scaled held", "volume", "met"]
     table.publish("lift_mocap", "Held-out motion capture", head, rows, note)
     note = (
         "The same with points missing at random, noise 20 mm: mm per marker. Growth: at 30 % over none, as "
-        f"it is and as the posterior deviations say. Wanted: at most {GROWTH}."
+        f"it is and as the posterior standard deviations state. Wanted: at most {GROWTH}."
     )
     shares = [f"{share:.0%} missing" for share in MISSING]
-    head = ["measure", "left out", *shares, "growth", "growth said", "met"]
+    head = ["measure", "left out", *shares, "growth", "stated growth", "met"]
     table.publish("lift_missing", "Points missing", head, missing, note)
 
 

@@ -39,9 +39,9 @@ def main() -> int:
     if not eval_clips.DATA.is_dir():
         print(f"eval-lift: {eval_clips.DATA} is not there, left out", file=sys.stderr)
         return 0
-    clips, models = eval_clips.walkers()
+    clips, models = eval_clips.people()
     measured: dict[str, list[list[float]]] = {part: [] for part in PARTS}
-    told = {}
+    reported = {}
     with one_thread(), progress("clips", len(clips)) as update:
         for done, clip in enumerate(clips, 1):
             prior = SegmentPrior.load(models[str(clip.subject)])
@@ -51,9 +51,9 @@ def main() -> int:
                 tracks = _part(whole, names)
                 found = lift_tracks.lifted(prior, tracks, camera, lift_tracks.NOISE)
                 measured[part].append(lift_tracks.judged(found, joints.eval15()))
-                told[part] = shows_distance(tracks)
+                reported[part] = shows_distance(tracks)
             update(done)
-    _publish(measured, told)
+    _publish(measured, reported)
     return 0
 
 
@@ -68,18 +68,18 @@ def _part(whole: Keypoints, names: list[str]) -> Keypoints:
     )
 
 
-def _publish(measured: dict[str, list[list[float]]], told: dict[str, bool]) -> None:
+def _publish(measured: dict[str, list[list[float]]], reported: dict[str, bool]) -> None:
     rows = []
     for part, clips in measured.items():
         root, far, share = np.array(clips).T
         worst = [root.max(), far.max(), share.min()]
         middle = [np.median(root), np.median(far), np.median(share)]
-        rows.append(["parts", part, *np.ravel([middle, worst], order="F"), "" if told[part] else "yes"])
+        rows.append(["parts", part, *np.ravel([middle, worst], order="F"), "" if reported[part] else "yes"])
     head = ["root mm", "worst root", "abs mm", "worst abs", "coverage", "least coverage"]
     note = (
         "The development clips as above, but only these joints are in the tracks; all 15 are judged. Medians "
         "and the worst over the clips: root-aligned and absolute error, share of coordinates in their 90 % "
-        "intervals. warns: gait lift says that the tracks hardly tell how far away the person is."
+        "intervals. warns: gait lift states that the tracks hardly show how far away the person is."
     )
     table.publish("lift_parts", "Parts of the body", ["measure", "seen", *head, "warns"], rows, note)
 

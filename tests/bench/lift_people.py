@@ -3,9 +3,9 @@
 
     make eval-lift, or lift_people.py
 
-The development clips show six people near the mean stature on exact floors: too few to tell whether
+The development clips show six people near the mean stature on exact floors: too few to show whether
 intervals of places are honest, because a stature or a floor that is off moves a whole clip.  Here other walks
-of the same people, whom their priors do not know, are made taller or shorter and put higher or lower, and
+of the same people, unknown to their priors, are made taller or shorter and put higher or lower, and
 seen by the cameras of the clips.
 """
 
@@ -48,7 +48,7 @@ SEED = 1
 
 @dataclass(frozen=True)
 class Walk:
-    """Somebody's joints EVAL15 (T, 15, 3) in the world, and who sees them."""
+    """A person's joints EVAL15 (T, 15, 3) in the world, and who sees them."""
 
     clip: str
     places: Floats
@@ -59,7 +59,7 @@ class Walk:
 
 @dataclass(frozen=True)
 class Outcome:
-    """Relative error and deviation of the distance, coverage in the world and about the hips."""
+    """Relative error and standard deviation of the distance, coverage in the world and about the hips."""
 
     off: float
     sd: float
@@ -72,12 +72,12 @@ def main() -> int:
     if not eval_clips.DATA.is_dir():
         print(f"lift_people: {eval_clips.DATA} is not there, left out", file=sys.stderr)
         return 0
-    everybody, found = walks(np.random.default_rng(SEED)), []
-    with one_thread(), progress("people", len(everybody)) as update:
-        for done, walk in enumerate(everybody, 1):
+    everyone, found = walks(np.random.default_rng(SEED)), []
+    with one_thread(), progress("people", len(everyone)) as update:
+        for done, walk in enumerate(everyone, 1):
             found.append((walk.clip, *_lifted(walk)))
             update(done)
-    names = dict.fromkeys(walk.clip for walk in everybody)
+    names = dict.fromkeys(walk.clip for walk in everyone)
     of = {name: [one for one in found if one[0] == name] for name in names}
     rows = [_row(name, its) for name, its in of.items()]
     rows.append(_row("all", found))
@@ -87,7 +87,7 @@ def main() -> int:
 
 def walks(rng: np.random.Generator) -> list[Walk]:
     """Walks of all clips' people, each of them `TIMES` in a row."""
-    clips, paths = eval_clips.walkers()
+    clips, paths = eval_clips.people()
     return [walk for clip in clips for walk in _walks(clip, paths[str(clip.subject)], rng)]
 
 
@@ -158,7 +158,7 @@ def _judged(walk: Walk, places: Floats, sd: Floats, rooted_sd: Floats | None, tr
 
 
 def _row(title: str, found: list[tuple[str, Outcome, Outcome]]) -> list[object]:
-    """One line: mean and rms error of the distance and its deviation, percent, and coverage."""
+    """One line: mean and rms error of the distance and its standard deviation, percent, and coverage."""
     cells: list[object] = []
     for outcomes in ([live for _, live, _ in found], [whole for _, _, whole in found]):
         off = 100 * np.array([o.off for o in outcomes])
@@ -175,12 +175,13 @@ def _publish(rows: list[list[object]]) -> None:
         f"Other walks of the clips' people, made {100 * STATURE_SD:g} cm taller or shorter and put "
         f"{100 * FLOOR_SD:g} cm higher or lower (standard deviations), seen by the clips' cameras with "
         f"{lift_tracks.NOISE:g} px of noise, {lift_tracks.GAPS:.0%} missing. mean, rms: error of the "
-        "distance from the camera, percent (negative: too near), beside the deviation that the estimate "
-        "says; coverage of the 90 % intervals of places in the world, and about the hips; live and as a "
+        "distance from the camera, percent (negative: too near), beside the standard deviation that the "
+        "estimate states; coverage of the 90 % intervals of places in the world, and about the hips; "
+        "live and as a "
         f"whole. Wanted of all together: coverage from {COVERAGE[0]:g} to {COVERAGE[1]:g}."
     )
-    head = ["clip", "walks", "live: mean %", "live: rms %", "live: said %", "live: coverage"]
-    head += ["whole: mean %", "whole: rms %", "whole: said %", "whole: coverage", "about hips", "met"]
+    head = ["clip", "walks", "live: mean %", "live: rms %", "live: stated %", "live: coverage"]
+    head += ["whole: mean %", "whole: rms %", "whole: stated %", "whole: coverage", "about hips", "met"]
     table.publish("lift_people", "People of any stature", head, rows, note)
 
 

@@ -1,5 +1,5 @@
 #!/usr/bin/env python3
-"""gait lift where a detector exchanges left and right for some frames.
+"""gait lift where a detector swaps left and right for some frames.
 
 make eval-lift, or lift_sides.py
 """
@@ -38,12 +38,12 @@ EACH, APART = 3, 4  # cases of a walk, and how far apart they are in the list
 
 @dataclass(frozen=True)
 class Case:
-    """What is exchanged for how many frames, at frames a second, among what share of wild points."""
+    """What is swapped for how many frames, at frames a second, among what share of outliers."""
 
     part: str
     length: int
     rate: float = lift_people.RATE
-    wild: float = 0.0
+    outliers: float = 0.0
 
 
 CASES = (
@@ -53,11 +53,11 @@ CASES = (
     Case("legs and arms", 5),
     Case("legs and arms", 10),
     Case("legs and arms", 20),
-    Case("legs", 10, wild=0.05),
+    Case("legs", 10, outliers=0.05),
     Case("legs", 5, rate=15.0),
     Case("legs", 5, rate=10.0),
-    Case("nothing", 20, wild=0.05),
-    Case("nothing", 20, wild=0.1),
+    Case("nothing", 20, outliers=0.05),
+    Case("nothing", 20, outliers=0.1),
 )
 
 
@@ -80,17 +80,17 @@ def main() -> int:
 
 
 def _case(walk: lift_people.Walk, case: Case, rng: np.random.Generator) -> list[float]:
-    """Root errors of a walk as seen, exchanged and put back, and how many lifts the putting back lasts.
+    """Root errors of a walk as seen, swapped and put back, and how many lifts the putting back lasts.
 
-    Then points exchanged, left so and moved in vain.
+    Then points swapped, left so and moved in vain.
     """
     places = walk.places[:: round(lift_people.RATE / case.rate)]
     frames = np.arange(len(places))
     true = Joints(frames, frames / case.rate, dict(zip(EVAL15, places.transpose(1, 0, 2), strict=True)))
     tracks = lift_tracks.tracked(true, walk.camera, lift_tracks.NOISE, lift_tracks.GAPS)
-    tracks = lift_tracks.wild(tracks, case.wild, rng)
+    tracks = lift_tracks.with_outliers(tracks, case.outliers, rng)
     begin = int(rng.integers(1, len(frames) - case.length))
-    spoilt = exchanged(tracks, PARTS[case.part], begin, begin + case.length)
+    spoilt = swapped(tracks, PARTS[case.part], begin, begin + case.length)
     clock = [time.perf_counter()]
     back = undo_swaps(walk, spoilt)
     clock.append(time.perf_counter())
@@ -125,8 +125,8 @@ def undo_swaps(walk: lift_people.Walk, tracks: Keypoints) -> Keypoints:
     )[0]
 
 
-def exchanged(tracks: Keypoints, joints: tuple[str, ...], begin: int, end: int) -> Keypoints:
-    """Keypoints with left and right of joints exchanged in some rows."""
+def swapped(tracks: Keypoints, joints: tuple[str, ...], begin: int, end: int) -> Keypoints:
+    """Keypoints with left and right of joints swapped in some rows."""
     left, right = ([tracks.names.index(f"{side}_{joint}") for joint in joints] for side in "lr")
     uv = tracks.uv.copy()
     uv[begin:end, left + right] = tracks.uv[begin:end, right + left]
@@ -145,26 +145,27 @@ def _publish(found: dict[Case, list[list[float]]]) -> None:
         medians, points = np.median(values[:, :4], axis=0), values[:, 4:].sum(axis=0).astype(int)
         rows.append(
             [
-                *(case.part, case.length, case.rate, f"{case.wild:.0%}", len(walks), *medians),
+                *(case.part, case.length, case.rate, f"{case.outliers:.0%}", len(walks), *medians),
                 *(*points.tolist(), int(np.isinf(values[:, 1]).sum()), int(np.isinf(values[:, 2]).sum())),
             ]
         )
     note = (
         "Other walks of the clips' people as in lift_people, 3 px of noise, 10 % missing, some of the rest "
-        f"wild ({lift_tracks.OFF:g} px); in one stretch of frames left and right are exchanged. Root-aligned "
-        "error in that stretch, median mm: as seen, exchanged (--keep-sides), put back (gait lift alone). "
+        f"outliers ({lift_tracks.OFF:g} px); in one interval of frames left and right are swapped. "
+        "Root-aligned error in that interval, median mm: as seen, swapped (--keep-sides), put back "
+        "(gait lift alone). "
         "Lifts: how long the putting back takes, over a lift of the tracks as seen, median. Points "
-        "exchanged; of these those still wrong after putting back; those moved that were right. Refused: "
-        "walks that come out of no size of a person, exchanged and put back; such an error is infinite."
+        "swapped; of these those still wrong after putting back; those moved that were right. Refused: "
+        "walks that come out of no size of a person, swapped and put back; such an error is infinite."
     )
     head = [
-        "exchanged",
+        "swapped",
         "frames",
         "frames/s",
-        "wild",
+        "outliers",
         "walks",
         "right mm",
-        "exchanged mm",
+        "swapped mm",
         "put back mm",
         "lifts",
         "points",
@@ -173,7 +174,7 @@ def _publish(found: dict[Case, list[list[float]]]) -> None:
         "refused",
         "put back refused",
     ]
-    table.publish("lift_sides", "Left and right exchanged", head, rows, note)
+    table.publish("lift_sides", "Left and right swapped", head, rows, note)
 
 
 if __name__ == "__main__":

@@ -90,7 +90,7 @@ def at_joins(clip: ClipSegments) -> NDArray[np.bool_]:
     return np.asarray(np.abs(clip.film.times[:, None] - ends).min(axis=1) < 1e-3)
 
 
-def jump(clip: ClipSegments, fit: ClipFit) -> float:
+def spike(clip: ClipSegments, fit: ClipFit) -> float:
     """Largest jump of a marker where segments begin or end, metres.
 
     A jump is what a step from one frame to the next differs from the mean of the steps before and after it.

@@ -30,9 +30,9 @@ Flags = npt.NDArray[np.bool_]
 
 LEAST = 0.80  # coverage
 WRONG = 0.05  # share of the points
-MANY = 0.15  # of the points, where the status tells what to rely on
-EXCHANGED = 10  # frames
-STRICT = 4.0  # misfit, below the usual one
+MANY = 0.15  # of the points, where the status shows what to rely on
+SWAPPED = 10  # frames
+STRICT = 4.0  # fit_threshold, below the usual one
 
 
 def main() -> int:
@@ -53,18 +53,18 @@ def main() -> int:
         f"As for lift_dev, frame by frame with a lag of {LiftConfig.default().lag}: stature unknown; given "
         "(the true one); exact: coverage if the mean stature is taken for the person's (stature_sd 0). "
         f"wrong: {WRONG:.0%} of the points, off by {lift_tracks.OFF:g} px (a standard deviation); legs: left "
-        f"and right exchanged for {EXCHANGED} frames; worst: of any frame, mm. many: {MANY:.0%} of them; "
+        f"and right swapped for {SWAPPED} frames; worst: of any frame, mm. many: {MANY:.0%} of them; "
         "tracked: share of the frames that come out as TRACKING, the only ones that count there. "
         f"Coverage of the 90 % intervals of places in the world. Wanted: at least {LEAST:g}, of unknown "
         "stature; "
         "whether they are too wide takes more people than six (lift_people)."
     )
     table.publish("lift_stream", "Live tracks of the development clips", head, rows, note)
-    _odd()
+    _unknown()
     return any("NO" in row for row in rows)
 
 
-def _odd() -> None:
+def _unknown() -> None:
     """Publish what comes out live of a motion that the prior does not know."""
     joints, cameras = lift_tracks.balancing()
     rows = []
@@ -72,8 +72,8 @@ def _odd() -> None:
         tracks = lift_tracks.tracked(joints, camera, lift_tracks.BALANCING_NOISE, 0.0)
         true = np.stack([joints.places[joint] for joint in tracks.names], axis=1)
         row: list[object] = [name]
-        for misfit in (LiftConfig.default().fit_threshold, STRICT):
-            config = LiftConfig.default(fit_threshold=misfit)
+        for threshold in (LiftConfig.default().fit_threshold, STRICT):
+            config = LiftConfig.default(fit_threshold=threshold)
             at, found, sd, tracked = streamed(tracks, camera, None, config)
             apart = np.linalg.norm(found - true[at], axis=2).mean(axis=1)
             inside = np.mean(np.abs(found - true[at]) < lift_tracks.WITHIN * sd)
@@ -81,8 +81,9 @@ def _odd() -> None:
         rows.append(row)
     note = (
         "The balancing man by the shipped prior of walks, frame by frame, "
-        f"{lift_tracks.BALANCING_NOISE:g} px of noise, as usual and with config misfit {STRICT:g}: median mm "
-        "in the world, coverage of the 90 % intervals, share of the frames that are TRACKING. Nothing is "
+        f"{lift_tracks.BALANCING_NOISE:g} px of noise, as usual and with config fit_threshold {STRICT:g}: "
+        "median mm in the world, coverage of the 90 % intervals, share of the frames that are TRACKING. "
+        "Nothing is "
         "wanted of it but that it is known."
     )
     head = [f"{which}: {what}" for which in ("usual", "strict") for what in ("abs mm", "coverage", "tracked")]
@@ -91,7 +92,7 @@ def _odd() -> None:
 
 def _wrong(tracks: Keypoints, share: float = WRONG) -> Keypoints:
     """Keypoints of a detector that puts single points elsewhere."""
-    return lift_tracks.wild(tracks, share, np.random.default_rng(2))
+    return lift_tracks.with_outliers(tracks, share, np.random.default_rng(2))
 
 
 def _legs(tracks: Keypoints) -> Keypoints:
@@ -99,8 +100,8 @@ def _legs(tracks: Keypoints) -> Keypoints:
     left, right = (
         [tracks.names.index(f"{side}_{joint}") for joint in ("hip", "knee", "ankle")] for side in "lr"
     )
-    uv, begin = tracks.uv.copy(), (len(tracks.time) - EXCHANGED) // 2
-    uv[begin : begin + EXCHANGED, left + right] = tracks.uv[begin : begin + EXCHANGED, right + left]
+    uv, begin = tracks.uv.copy(), (len(tracks.time) - SWAPPED) // 2
+    uv[begin : begin + SWAPPED, left + right] = tracks.uv[begin : begin + SWAPPED, right + left]
     return replace(tracks, uv=uv)
 
 
@@ -143,7 +144,7 @@ def _judged(at: Ints, found: Floats, sd: Floats, true: Floats) -> list[float]:
 def streamed(
     tracks: Keypoints, camera: Camera, model: Path | None, config: LiftConfig
 ) -> tuple[Ints, Floats, Floats, Flags]:
-    """Frames (n) that come out of the live lifter, joints and deviations (n, P, 3), whether TRACKING (n)."""
+    """Frames (n) that come out of the live lifter, joints and sd (n, P, 3), whether TRACKING (n)."""
     lifter = Lifter(model, camera, config)
     index = [lifter.names.index(name) for name in tracks.names]
     utimes = np.round(1e6 * tracks.time).astype(int)

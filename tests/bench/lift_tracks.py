@@ -3,7 +3,7 @@
 
     make eval-lift, or lift_tracks.py
 
-Keypoints are the true joints in the picture with noise and gaps.  Priors leave out the walker's subject.
+Keypoints are the true joints in the picture with noise and gaps.  Priors leave out the person's subject.
 """
 
 from __future__ import annotations
@@ -35,7 +35,7 @@ from gait.reproducible import one_thread
 Floats = npt.NDArray[np.float64]
 
 NOISE, GAPS = 3.0, 0.1  # pixels, share of the points
-WILD, OFF = 0.15, 150.0  # share of the points, pixels
+OUTLIERS, OFF = 0.15, 150.0  # share of the points, pixels
 TARGET = 35.0  # mm, root-aligned
 FLOOR_KNOWN = 0.01  # metres: a floor as exact as the clips' own
 COVERAGE = (0.80, 0.95)
@@ -45,7 +45,7 @@ CAMERAS = ("cam_01", "cam_02", "cam_03", "cam_04")
 BALANCING_NOISE = 5.0
 BEAM = 0.3  # metres, of the height at which he stands
 Y_UP = [2, 0, 1]  # axes of the .trc to x, y, z of the calibration
-WITHIN = 1.645  # deviations that hold 90 %
+WITHIN = 1.645  # standard deviations that hold 90 %
 HIPS = [EVAL15.index("l_hip"), EVAL15.index("r_hip")]
 
 
@@ -70,7 +70,7 @@ def tracked(joints: Joints, camera: Camera, noise: float, gaps: float) -> Keypoi
     return Keypoints(joints.frame, joints.time, names, uv, np.ones(uv.shape[:2]))
 
 
-def wild(tracks: Keypoints, share: float, rng: np.random.Generator) -> Keypoints:
+def with_outliers(tracks: Keypoints, share: float, rng: np.random.Generator) -> Keypoints:
     """Keypoints of a detector that puts a share of the points anywhere."""
     off = rng.random(tracks.visible.shape) < share
     return replace(tracks, uv=tracks.uv + off[..., None] * rng.normal(0, OFF, tracks.uv.shape))
@@ -87,7 +87,7 @@ def root_error(found: Floats, truth: Floats, hips: list[int]) -> float:
     return 1000 * float(np.median(apart.mean(axis=1)))
 
 
-def _facing(truth: Floats, hips: list[int]) -> Floats:
+def _heading(truth: Floats, hips: list[int]) -> Floats:
     """Heading (T,) by the hips."""
     across = truth[:, hips[0]] - truth[:, hips[1]]
     return np.arctan2(-across[:, 0], across[:, 1])
@@ -96,7 +96,7 @@ def _facing(truth: Floats, hips: list[int]) -> Floats:
 def _static(prior: SegmentPrior, names: tuple[str, ...], truth: Floats, hips: list[int]) -> float:
     """Error of the mean pose at the true heading."""
     pose = prior.stature * prior.mean[0][:, prior.index(names)].mean(axis=0)
-    turned = np.stack([pose @ axis_rotation(2, h).T for h in _facing(truth, hips)])
+    turned = np.stack([pose @ axis_rotation(2, h).T for h in _heading(truth, hips)])
     return root_error(turned, truth, hips)
 
 
@@ -128,7 +128,7 @@ def _upright(places: Floats, camera: Camera) -> Floats:
 
 def _clips() -> list[list[object]]:
     """Table of the development clips."""
-    clips, paths = eval_clips.walkers()
+    clips, paths = eval_clips.people()
     rows: list[list[object]] = []
     with progress("clips", len(clips)) as update:
         for done, clip in enumerate(clips, 1):
@@ -139,7 +139,7 @@ def _clips() -> list[list[object]]:
             blend = lifted(prior, tracks, camera, NOISE, "blend")
             stature = float(eval_clips.meta_of(clip.folder)["stature_m"])
             known = lifted(prior, tracks, camera, NOISE, floor_sd=FLOOR_KNOWN, stature=stature)
-            steady, _ = noise.without_spikes(wild(tracks, WILD, np.random.default_rng(2)), NOISE)
+            steady, _ = noise.without_spikes(with_outliers(tracks, OUTLIERS, np.random.default_rng(2)), NOISE)
             spoilt = lifted(prior, steady, camera, NOISE)
             order = [found.names.index(name) for name in EVAL15]
             error = root_error(found.places[:, order], truth, HIPS)
@@ -163,8 +163,8 @@ def _clips() -> list[list[object]]:
         "Coverage of the 90 % intervals: of places in the world (lift_people judges it), and about the hips. "
         f"known: the stature is given and the floor is known to {100 * FLOOR_KNOWN:g} cm, as it is in the "
         "clips (gait lift --height --floor-sd). "
-        f"wild: {WILD:.0%} of the points off by {OFF:g} px (a standard deviation); those that jump are left "
-        "out first, as gait lift does. "
+        f"outliers: {OUTLIERS:.0%} of the points off by {OFF:g} px (a standard deviation); those that jump "
+        "are left out first, as gait lift does. "
         f"Wanted: below {TARGET:g} mm with the camera."
     )
     head = [
@@ -179,9 +179,9 @@ def _clips() -> list[list[object]]:
         "about hips",
         "known: abs mm",
         "known: coverage",
-        "wild: root mm",
-        "wild: abs mm",
-        "wild: coverage",
+        "outliers: root mm",
+        "outliers: abs mm",
+        "outliers: coverage",
     ]
     table.publish("lift_dev", "Keypoints of the development clips", [*head, "met"], rows, note)
     return rows
@@ -267,8 +267,9 @@ def _balancing() -> None:
     note = (
         "A man nearly falls from a beam: the reference of four views in one of them, "
         f"{BALANCING_NOISE:g} px of noise, stature unknown; root-aligned median mm over 14 joints. "
-        "No prior has seen such a motion; deviations and coverage of the 90 % intervals are those of smooth. "
-        "resized: factor by which the fit's size was changed to that of a person's bones. In a motion so "
+        "No prior has seen such a motion; standard deviations and coverage of the 90 % intervals are those "
+        "of smooth. resized: factor by which the fit's size was changed to that of a person's bones. In "
+        "a motion so "
         "unlike and a camera so near (3 m) a small body close to the lens would fit better. "
         "Wanted is honesty alone: intervals that hold the truth."
     )

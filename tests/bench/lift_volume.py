@@ -28,7 +28,7 @@ sys.path.insert(0, str(Path(__file__).parents[1] / "reference"))
 from segment_posterior import Gaussian, Posterior, infer, place
 
 NOISE = (0.005, 0.010, 0.020, 0.050, 0.100, 0.200, 0.500, 1.000)  # metres
-PAPER = -14.0  # the paper's volume; it does not say at what noise
+PAPER = -14.0  # the paper's volume; it does not state at what noise
 EXACT = 1e-9  # of the volume, by the closed form
 
 
@@ -47,8 +47,8 @@ def main() -> int:
 def _curve(source: str, known: HeldOut) -> Iterator[list[object]]:
     """Lines of a prior: the volume at each noise, then the noise that gives the paper's."""
     gaussian = place(known.prior, stature=known.stature, ground_sd=0.0, height_sd=0.0)
-    bare = replace(gaussian, residual=np.zeros_like(gaussian.residual))
-    s = np.linalg.svd(_observed(bare, 1.0).system.design, compute_uv=False)  # metres
+    plain = replace(gaussian, residual=np.zeros_like(gaussian.residual))
+    s = np.linalg.svd(_observed(plain, 1.0).system.design, compute_uv=False)  # metres
     papers = float(brentq(lambda sd: _closed(s, sd) - PAPER, NOISE[0] / 10, 10 * NOISE[-1]))
     last = -np.inf
     for sd in (*NOISE, papers):
@@ -56,7 +56,7 @@ def _curve(source: str, known: HeldOut) -> Iterator[list[object]]:
         met = abs(volume - closed) <= EXACT * abs(closed) and (sd == papers or volume > last)
         last = volume
         yield [
-            *("F5", source, len(s), 1000 * sd, volume, _observed(bare, sd).resolved, int((s > sd).sum())),
+            *("F5", source, len(s), 1000 * sd, volume, _observed(plain, sd).resolved, int((s > sd).sum())),
             *(_lifted(known, sd), _observed(gaussian, sd).resolved, "yes" if met else "NO"),
         ]
 

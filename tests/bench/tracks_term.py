@@ -3,7 +3,7 @@
 
     tracks_term.py [CLIP...]
 
-A detector is the truth in the picture with 3 px of noise and 10 % missing.  Models leave out the walker's
+A detector is the truth in the picture with 3 px of noise and 10 % missing.  Models leave out the person's
 subject; every clip is tracked from three starts.  A part of make eval-lift.
 """
 

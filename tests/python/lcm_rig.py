@@ -56,8 +56,8 @@ def model() -> Model:
     return Model(MODEL)
 
 
-def walker(frame: int) -> State:
-    """The walker of the clip: 1.2 m/s along x, one stride a second."""
+def person(frame: int) -> State:
+    """The person of the clip: 1.2 m/s along x, one stride a second."""
     mean, _ = model().prior()
     state = replace(mean, phase=(0.1 + frame / FPS) % 1.0, stride_hz=1.0, stature=1.75, heading=0.0)
     state.pelvis = np.array([-0.5 + 1.2 * frame / FPS, 0.0, 0.0])
@@ -74,7 +74,7 @@ def plate() -> np.ndarray:
 @cache
 def picture(frame: int) -> np.ndarray:
     """One frame: the model's own limbs in flat colours over a noisy plate."""
-    ids = model().render(CAMERA, walker(frame))
+    ids = model().render(CAMERA, person(frame))
     colours = np.random.default_rng(2).integers(0, 255, (256, 3), np.uint8)
     return np.where(ids[..., None] > 0, colours[ids], plate())
 
@@ -86,7 +86,7 @@ def utime(frame: int) -> int:
 
 def start(frame: int = 0, at: int | None = None, sd: State = SD) -> Any:
     """START for a frame of the clip."""
-    return command_message(gaitmsg.command_t.START, utime(frame) if at is None else at, walker(frame), sd)
+    return command_message(gaitmsg.command_t.START, utime(frame) if at is None else at, person(frame), sd)
 
 
 def frame_message(frame: int, **changes: Any) -> Any:
@@ -120,7 +120,7 @@ def write_clip(path: Path, count: int) -> Path:
             video.write(picture(i))
     (path / "camera.json").write_text(json.dumps(CAMERA.to_dict()))
     cv2.imwrite(str(path / "background.png"), plate())
-    state = walker(2)
+    state = person(2)
     init = {
         "frame": 2,
         "pelvis": state.pelvis.tolist(),
@@ -249,12 +249,12 @@ class Listener:
 
 
 def peak_kb(pid: int) -> int:
-    """Largest resident memory that a process has had; skips where the kernel does not say."""
+    """Largest resident memory that a process has had; skips where the kernel does not state."""
     lines = Path(f"/proc/{pid}/status")
-    said = re.search(r"VmHWM:\s+(\d+) kB", lines.read_text() if lines.exists() else "")
-    if not said:
+    printed = re.search(r"VmHWM:\s+(\d+) kB", lines.read_text() if lines.exists() else "")
+    if not printed:
         pytest.skip("no VmHWM in /proc/PID/status")
-    return int(said.group(1))
+    return int(printed.group(1))
 
 
 @contextmanager

@@ -46,7 +46,7 @@ class Case:
 
 
 def rms(a, b, where):
-    """Root mean square of a - b where told."""
+    """Root mean square of a - b where known."""
     return float(np.sqrt(np.mean((a - b)[where] ** 2)))
 
 

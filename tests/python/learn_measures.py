@@ -18,7 +18,7 @@ def cramer_rao(true, frames, noise, missing):
 
 
 def persons(rng, style, noise=3.0, count=8):
-    """Signals, periods and true offsets of `count` walkers whose style has a standard deviation, degrees."""
+    """Signals, periods and true offsets of `count` people whose style has a standard deviation, degrees."""
     periods = rng.uniform(90, 150, count)
     offsets = rng.uniform(0, 1, count) * periods
     signals = []

@@ -12,10 +12,10 @@ from pathlib import Path
 
 from numpy._core._multiarray_umath import __cpu_dispatch__ as FEATURES
 
-WIDE = [name for name in FEATURES if "V4" in name or "512" in name]
+BROAD = [name for name in FEATURES if "V4" in name or "512" in name]
 PLAYED = {  # name: what the CPU must have, OpenBLAS's kernels, numpy's that are off, glibc's that are off
     "SSE": ((), "Nehalem", FEATURES, "-FMA,-FMA4,-AVX2"),
-    "AVX2": (("avx2", "fma"), "Haswell", WIDE, ""),
+    "AVX2": (("avx2", "fma"), "Haswell", BROAD, ""),
     "AVX-512": (("avx512f", "avx512bw", "avx512dq", "avx512vl"), "SkylakeX", (), ""),
 }
 

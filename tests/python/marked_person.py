@@ -1,4 +1,4 @@
-"""Markers on walkers: on the default skeleton in known poses, and on recorded bodies."""
+"""Markers on people: on the default skeleton in known poses, and on recorded bodies."""
 
 import numpy as np
 from scipy.spatial.transform import Rotation
@@ -35,22 +35,22 @@ def walk_angles(frames, period, seed=0):
     return angles
 
 
-def own_lengths(rng, spread=0.08):
-    """Log length scales of a person whose proportions are all off by `spread`."""
-    log_scales = spread * rng.choice([-1.0, 1.0], kinematics.SCALE_TABLE.shape[2])
+def own_lengths(rng, sd=0.08):
+    """Log length scales of a person whose proportions are all off by `sd`."""
+    log_scales = sd * rng.choice([-1.0, 1.0], kinematics.SCALE_TABLE.shape[2])
     log_scales[0] = np.log(1.82)
     log_scales[-len(kinematics.LIMBS) :] = 0  # both sides alike
     return log_scales
 
 
-def person(labels, frames=360, fps=120.0, period=120.0, spread=0.08, noise=0.003, seed=0, again=None):
+def person(labels, frames=360, fps=120.0, period=120.0, sd=0.08, noise=0.003, seed=0, again=None):
     """Points (T, M, 3), metres, z up, and the true pose, of a person of odd lengths and marker places.
 
     With `again` it is another recording of the person `seed`, with markers put on anew.
     """
     rng = np.random.default_rng(seed)
     angles = walk_angles(frames, period, seed)
-    log_scales = own_lengths(rng, spread)
+    log_scales = own_lengths(rng, sd)
     if again is not None:
         rng = np.random.default_rng([seed, again])
     time, phase = np.arange(frames) / fps, 2 * np.pi * np.arange(frames) / period

@@ -38,7 +38,7 @@ def test_a_missing_or_additional_field_is_caught():
 
 
 def test_structures_are_those_of_the_headers():
-    """The description says what the compiler made of the same tables: every struct, field, type and bound."""
+    """The description is what the compiler made of the same tables: every struct, field, type and bound."""
     for row in abi.fields(REAL):
         if row.name:
             assert re.search(rf"^\s+{re.escape(row.type)}, {row.name}, ", HEADERS, re.M), row

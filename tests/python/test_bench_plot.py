@@ -47,7 +47,7 @@ def figure(tmp_path):
 
 
 def words(texts):
-    """What texts say."""
+    """Contents of texts."""
     return [t.get_text() for t in texts]
 
 

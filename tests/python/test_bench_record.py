@@ -11,7 +11,7 @@ import bench
 
 
 def recorded(folder, monkeypatch, *options):
-    """The page of a program that says one line."""
+    """The page of a program that prints one line."""
     page = folder / "page.md"
     words = ["--cc", f"{sys.executable} -I", "--page", str(page), *options, "echo", "rate  8.57 fps  MISSED"]
     monkeypatch.setattr("sys.argv", ["bench.py", *words])
@@ -20,7 +20,7 @@ def recorded(folder, monkeypatch, *options):
     return page.read_text()
 
 
-def test_a_record_says_what_made_it_and_all_that_was_printed(tmp_path, monkeypatch):
+def test_a_record_states_what_made_it_and_all_that_was_printed(tmp_path, monkeypatch):
     page = recorded(tmp_path, monkeypatch, "--csv", str(tmp_path / "a-machine.csv"))
     assert page.startswith("# Speed of a step\n\n`make bench ARGS=--record` at commit")
     assert "Python 3." in page and re.search(
@@ -36,9 +36,11 @@ def test_a_record_without_a_table_of_figures(tmp_path, monkeypatch):
 
 
 def test_several_runs_are_judged_by_their_medians(tmp_path, monkeypatch, capsys):
-    said = "echo $((n + 1)) >n; echo rate '>= 30.00' 2$n fps reached; echo '  time <= 1.30' 1.$n times MISSED"
+    script = (
+        "echo $((n + 1)) >n; echo rate '>= 30.00' 2$n fps reached; echo '  time <= 1.30' 1.$n times MISSED"
+    )
     program = tmp_path / "program"
-    program.write_text(f"#!/bin/sh\nn=$(cat n)\n{said}\n")
+    program.write_text(f"#!/bin/sh\nn=$(cat n)\n{script}\n")
     program.chmod(0o755)
     (tmp_path / "n").write_text("1")
     monkeypatch.chdir(tmp_path)

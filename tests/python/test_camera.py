@@ -1,4 +1,4 @@
-"""Cameras: projection and its inverse, every file format, every fault told in one line."""
+"""Cameras: projection and its inverse, every file format, every fault reported in one line."""
 
 import json
 from pathlib import Path
@@ -64,12 +64,12 @@ def same(a, b):
 )
 def test_projecting_what_a_pixel_sees_gives_the_pixel_back(u, v, distance, k1, p1, turn):
     lens = np.array([k1, 0.02, p1, -p1, 0.0])
-    eye = np.array([1.0, -4.0, 1.7])
-    view = Camera.looking(eye, eye + [np.cos(turn), np.sin(turn), -0.1], (640, 480), 700.0)
+    position = np.array([1.0, -4.0, 1.7])
+    view = Camera.looking(position, position + [np.cos(turn), np.sin(turn), -0.1], (640, 480), 700.0)
     view = Camera(640, 480, 700.0, 690.0, 318.0, 242.0, view.R, view.t, lens)
     point = view.centre + distance * view.rays([u, v])
     np.testing.assert_allclose(view.project(point), [u, v], atol=1e-3)
-    np.testing.assert_allclose(view.centre, eye, atol=1e-9)
+    np.testing.assert_allclose(view.centre, position, atol=1e-9)
 
 
 def test_projection_is_the_documented_formula():

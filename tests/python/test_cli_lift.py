@@ -67,13 +67,13 @@ def test_lifts(folder, capsys, view, method):
 
 
 @pytest.mark.parametrize("view", ["camera", "flat"])
-def test_says_what_segments_leave_uncertain(folder, capsys, view):
+def test_states_what_segments_leave_uncertain(folder, capsys, view):
     command = ["lift", "t.csv", "-m", "m.gait", "-o", "out.csv", "--pixel-sd", "1", *VIEWS[view]]
     assert main([*command, "--json"]) == 0
     segments = json.loads(capsys.readouterr().out)["segments"]
     assert segments["log10_volume_ratio"] < 0
     first, *others = segments["least_certain"]
-    assert first["in_depth"] > 0.9 and first["rigid"] > 0.9  # how far away somebody is
+    assert first["in_depth"] > 0.9 and first["rigid"] > 0.9  # how far away the person is
     assert [first["sd_mm"] > other["sd_mm"] > 0 for other in others] == [True, True]
     assert main(command) == 0
     printed = capsys.readouterr().out.splitlines()[-1]
@@ -96,7 +96,7 @@ def test_the_joints_that_a_displacement_moves_most_are_named():
 
 
 @pytest.mark.parametrize("method", METHODS)
-def test_a_stature_is_told_where_it_was_estimated(folder, capsys, method):
+def test_a_stature_is_reported_where_it_was_estimated(folder, capsys, method):
     """Segments alone keep the stature that was believed: no estimate."""
     command = ["lift", "t.csv", "-m", "m.gait", "-o", "out.csv", "--camera", "cam.json", "--method", method]
     assert main([*command, "--json"]) == 0
@@ -147,7 +147,7 @@ def test_views_the_other_way(folder, axis, vector):
 
 
 @pytest.mark.parametrize(("share", "milli"), [(1 / 640, 1), (1, 1000)])
-def test_other_units_are_told(folder, capsys, share, milli):
+def test_other_units_are_reported(folder, capsys, share, milli):
     keypoints, _ = read("t.csv", toy_prior(FRAMES, MARKERS, 4).names)
     write("u.csv", replace(keypoints, uv=keypoints.uv * share, time=keypoints.time * milli))
     assert main(["lift", "u.csv", "-m", "m.gait", "-o", "out.csv", "--camera", "cam.json"]) == 1
@@ -260,7 +260,7 @@ def damaged(change):
     write("t.csv", replace(keypoints, uv=uv))
 
 
-def test_a_gap_is_bridged_with_larger_deviations(folder):
+def test_a_gap_is_bridged_with_larger_sd(folder):
     def hide(uv):
         uv[3:12] = np.nan
 
@@ -273,7 +273,7 @@ def test_a_gap_is_bridged_with_larger_deviations(folder):
 
 
 @pytest.mark.parametrize("method", ["smooth", "blend"])
-def test_too_little_is_said(folder, capsys, method):
+def test_too_few_points_are_reported(folder, capsys, method):
     def hide(uv):
         uv[:] = np.nan
         uv[0, 0] = 100
@@ -294,27 +294,27 @@ def test_blending_needs_every_segment(folder, capsys):
     assert "use --method smooth" in capsys.readouterr().err
 
 
-def test_one_wild_point_changes_little(folder, capsys):
+def test_one_outlier_changes_little(folder, capsys):
     keypoints, _ = read("t.csv", toy_prior(FRAMES, MARKERS, 4, seed=5).names)
     row = int(np.flatnonzero(keypoints.visible[1:-1, 3])[4]) + 1
     uv = keypoints.uv.copy()
     uv[row, 3] += 20
-    write("wild.csv", replace(keypoints, uv=uv))
+    write("outliers.csv", replace(keypoints, uv=uv))
     command = ["-m", "m.gait", "--camera", "cam.json", "--pixel-sd", "1", "--json"]
-    assert main(["lift", "wild.csv", *command, "-o", "wild.out.csv"]) == 0
+    assert main(["lift", "outliers.csv", *command, "-o", "out2.csv"]) == 0
     printed = capsys.readouterr()
     summary = json.loads(printed.out)
     assert summary["spikes"] == 1
     assert summary["left_out"] == [{"frame": int(keypoints.frame[row]), "point": keypoints.names[3]}]
     assert f"{keypoints.names[3]} in frame {keypoints.frame[row]} (--keep-spikes)" in printed.err
     assert main(["lift", "t.csv", *command, "-o", "out.csv"]) == 0
-    far = np.linalg.norm(lifted("wild.out.csv", keypoints.names) - lifted("out.csv", keypoints.names), axis=2)
+    far = np.linalg.norm(lifted("out2.csv", keypoints.names) - lifted("out.csv", keypoints.names), axis=2)
     assert far.max() < 0.1
-    assert main(["lift", "wild.csv", *command, "-o", "kept.csv", "--keep-spikes"]) == 0
+    assert main(["lift", "outliers.csv", *command, "-o", "kept.csv", "--keep-spikes"]) == 0
     assert json.loads(capsys.readouterr().out.splitlines()[-1])["spikes"] == 0
 
 
-def test_a_camera_that_cannot_be_is_said(folder, capsys):
+def test_an_impossible_camera_is_reported(folder, capsys):
     camera = json.loads((folder / "cam.json").read_text())
     command = ["lift", "t.csv", "-m", "m.gait", "--camera", "long.json", "-o", "long.csv"]
     (folder / "long.json").write_text(json.dumps(camera | {"fx": 6e7, "fy": 6e7}))
@@ -327,16 +327,16 @@ def test_a_camera_that_cannot_be_is_said(folder, capsys):
     assert code == 1 or "do not rely on" in printed
 
 
-def test_few_joints_are_told(folder, capsys, monkeypatch):
+def test_few_joints_are_reported(folder, capsys, monkeypatch):
     command = ["lift", "t.csv", "-m", "m.gait", "-o", "out.csv"]
-    for tells, view in ((True, "camera"), (False, "camera"), (False, "none")):
-        monkeypatch.setattr(size, "shows_distance", lambda keypoints, tells=tells: tells)
+    for shows, view in ((True, "camera"), (False, "camera"), (False, "none")):
+        monkeypatch.setattr(size, "shows_distance", lambda keypoints, shows=shows: shows)
         assert main([*command, *VIEWS[view]]) == 0
-        told = "hips and ankles, which determine the distance, are hardly seen" in capsys.readouterr().err
-        assert told == (view == "camera" and not tells)
+        reported = "hips and ankles, which determine the distance, are hardly seen" in capsys.readouterr().err
+        assert reported == (view == "camera" and not shows)
 
 
-def test_doubts_are_told(folder, capsys, monkeypatch):
+def test_uncertain_results_are_reported(folder, capsys, monkeypatch):
     lift = motion.lift
 
     def doubting(prior, keypoints, *args):
@@ -364,12 +364,12 @@ def test_doubts_are_told(folder, capsys, monkeypatch):
     assert "iterations" not in printed.out
 
 
-@pytest.mark.parametrize(("recordings", "told"), [(0, False), (1, True), (3, True), (4, False)])
-def test_a_prior_of_few_recordings_is_told(folder, capsys, recordings, told):
+@pytest.mark.parametrize(("recordings", "reported"), [(0, False), (1, True), (3, True), (4, False)])
+def test_a_prior_of_few_recordings_is_reported(folder, capsys, recordings, reported):
     prior = replace(toy_prior(FRAMES, MARKERS, 4, seed=5), recordings=recordings)
     (folder / "few.gait").write_bytes(toy_blob(prior))
     assert main(["lift", "t.csv", "-m", "few.gait", "--camera", "cam.json", "-o", "out.csv"]) == 0
-    assert ("deviations may come out too small" in capsys.readouterr().err) == told
+    assert ("standard deviations may come out too small" in capsys.readouterr().err) == reported
 
 
 @pytest.mark.parametrize("mark", [";", "\t"])
@@ -385,7 +385,7 @@ def test_tracks_may_be_separated_by_semicolons_or_tabs(folder, mark):
 
 
 @pytest.mark.parametrize("stature", [24.0, -7.0, np.nan])
-def test_nobody_is_so_tall(folder, capsys, monkeypatch, stature):
+def test_an_impossible_stature_is_refused(folder, capsys, monkeypatch, stature):
     """As with a camera in millimetres."""
     lift = motion.lift
     monkeypatch.setattr(motion, "lift", lambda *args: replace(lift(*args), stature=stature))

@@ -9,7 +9,7 @@ import time
 from importlib import resources
 
 import pytest
-from drawn_walker import camera, wall, write
+from drawn_person import camera, wall, write
 
 PATIENCE = 120.0  # seconds for what takes a few, on a machine busy with other things
 MODEL = resources.files("gait") / "data" / "walk.gait"
@@ -17,7 +17,7 @@ MODEL = resources.files("gait") / "data" / "walk.gait"
 
 @pytest.fixture(scope="module")
 def clip(tmp_path_factory):
-    """Video of a wall, long enough that nobody tracks it to its end; its camera and a start."""
+    """Video of a wall, long enough that no run tracks it to its end; its camera and a start."""
     folder = tmp_path_factory.mktemp("clip")
     write(folder / "video.mp4", [wall()] * 900)
     (folder / "camera.json").write_text(json.dumps(camera().to_dict()))
@@ -39,11 +39,11 @@ def test_track_leaves_no_temporary_files(clip, tmp_path, number):
             assert process.poll() is None and time.monotonic() < deadline
             time.sleep(0.01)
         process.send_signal(number)
-        _, said = process.communicate(timeout=PATIENCE)
+        _, printed = process.communicate(timeout=PATIENCE)
     finally:
         process.kill()
         process.communicate()
-    assert (process.returncode, said) == (1, "gait track: interrupted\n")
+    assert (process.returncode, printed) == (1, "gait track: interrupted\n")
     assert list(tmp_path.iterdir()) == []
 
 

@@ -7,7 +7,7 @@ import re
 import cv2
 import numpy as np
 import pytest
-from drawn_walker import DATA, camera, clip, state_at, wall, write
+from drawn_person import DATA, camera, clip, state_at, wall, write
 
 from gait import Model, Video
 from gait.bindings.model import read_blob
@@ -107,16 +107,16 @@ def test_start_and_stop_choose_the_rows(scene, capsys):
     assert capsys.readouterr().err == ""
 
 
-def test_automatic_start_says_what_it_found(scene, capsys):
+def test_automatic_start_reports_what_it_found(scene, capsys):
     assert track(scene, "--init", "auto", "--height", 1.75) == 0
     out, err = capsys.readouterr()
     assert re.match("start found at frame [0-2]: x ", err) and "20 frames, " in out and "digest " in out
 
 
-def test_a_stature_that_the_pictures_contradict_is_told(scene, capsys):
-    for height, told in ((1.75, False), (2.2, True), (1.35, True)):
+def test_a_stature_that_the_pictures_contradict_is_reported(scene, capsys):
+    for height, reported in ((1.75, False), (2.2, True), (1.35, True)):
         assert track(scene, "--init", "auto", "--height", height, "--stop", 12) == 0
-        assert ("tall by the camera" in capsys.readouterr().err) == told
+        assert ("tall by the camera" in capsys.readouterr().err) == reported
 
 
 def test_a_start_outside_of_the_picture_is_refused(scene, capsys):
@@ -148,7 +148,7 @@ def test_paper_mode_and_no_background(scene, capsys):
 
 @pytest.fixture(scope="module")
 def tracks(scene):
-    """What a detector says of the clip: 2 px of noise, one joint in five missing, and a point of its own."""
+    """What a detector finds in the clip: 2 px of noise, one joint in five missing, and a point of its own."""
     rng = np.random.default_rng(3)
     uv = np.array([camera().project(MODEL.pose(s)[0]) for s in clip(MODEL, SECTIONS, 20)[1]])
     uv += rng.normal(scale=2.0, size=uv.shape)
@@ -239,8 +239,8 @@ def test_render_a_pose(tmp_path, scene):
     state = {"phase": 0.3, "stature": 1.6, "pelvis": [0.2, 0.0, 0.85], "coef": [1.5]}
     (tmp_path / "state.json").write_text(json.dumps(state))
     words = ["render", "--state", tmp_path / "state.json", "--camera", scene / "camera.json"]
-    assert main([str(w) for w in (*words, "-o", tmp_path / "seen.png")]) == 0
-    assert cv2.imread(str(tmp_path / "seen.png")).shape == (240, 320, 3)
+    assert main([str(w) for w in (*words, "-o", tmp_path / "shown.png")]) == 0
+    assert cv2.imread(str(tmp_path / "shown.png")).shape == (240, 320, 3)
 
 
 def test_render_a_sheet(tmp_path):

@@ -48,13 +48,13 @@ def verdict(rows, words):
     return next(v for v in eval_wanted.verdicts(rows) if words in v.measure)
 
 
-def test_a_swapped_start_is_wrong_only_while_it_says_tracking():
+def test_a_swapped_start_is_wrong_only_while_it_reports_tracking():
     swapped = track(phase=(PHASE + 0.5) % 1)
     silent = eval_measures.start_quality(swapped, PHASE)
     assert silent["side"] == "wrong" and silent["locked"] and silent["flipped_silently"] == 1
     honest = eval_measures.start_quality(replace(swapped, status=["ambiguous"] * 100), PHASE)
     assert honest["side"] == "open"
-    seldom = ["ambiguous"] * 75 + ["tracking"] * 25  # right only where it says so, most of the time
+    seldom = ["ambiguous"] * 75 + ["tracking"] * 25  # right only where it states so, most of the time
     assert eval_measures.start_quality(track(status=seldom), PHASE)["side"] == "open"
     assert eval_measures.start_quality(track(status=["lost"] * 100), PHASE)["side"] == "lost"
     late = np.where(np.arange(100) < 20, (PHASE + 0.5) % 1, PHASE)  # mended within the first second
@@ -92,9 +92,9 @@ def test_marks_count_the_near_leg_and_the_clear_joints(tmp_path):
     uv = view.project(np.stack(places, axis=1)[frames])
     uv[:, 1:4] += [6.0, 0.0]  # the near leg
     uv[:, 5] += [0.0, 400.0]  # hidden: does not count
-    seen = [[2, 1, 2, 2, 2, 0, 2]] * 3
+    visible = [[2, 1, 2, 2, 2, 0, 2]] * 3
     data = {
-        **{"frame_numbers": frames, "joints": names, "uv": uv.tolist(), "vis": seen, "near_side": "left"},
+        **{"frame_numbers": frames, "joints": names, "uv": uv.tolist(), "vis": visible, "near_side": "left"},
         "heel_strikes": {"right": STRIKES.right.tolist(), "left": STRIKES.left.tolist()},
     }
     (tmp_path / "marks.json").write_text(json.dumps(data))
@@ -135,8 +135,8 @@ def test_every_wanted_line_passes_on_good_runs_and_fails_on_bad_ones():
 
 
 def test_what_was_not_run_is_neither_passed_nor_failed():
-    told = {v.measure: v.passed for v in eval_wanted.verdicts([row("a")])}
-    assert told["auto: phase locked within 1 s"] is None and told["no background plate"] is None
+    reported = {v.measure: v.passed for v in eval_wanted.verdicts([row("a")])}
+    assert reported["auto: phase locked within 1 s"] is None and reported["no background plate"] is None
     half = verdict([row("a"), row("a", arm="every 2")], "frames/s")
     assert half.passed is None and "every 2" in half.reached
 
@@ -200,12 +200,12 @@ def test_noise_on_a_start_is_the_seeds_and_a_wrong_stature_is_believed(tmp_path)
     starts = [eval_clips.noisy_start(clip, seed, 0.0) for seed in range(200)]
     phase = np.array([s["phase"] for s in starts])
     assert phase.mean() == pytest.approx(FIRST_PHASE, abs=0.01)
-    assert phase.std() == pytest.approx(eval_clips.SPREAD["phase"], rel=0.15)
+    assert phase.std() == pytest.approx(eval_clips.SD["phase"], rel=0.15)
     assert starts[3] == eval_clips.noisy_start(clip, 3, 0.0)
     assert {s["stature_m"] for s in starts} == {1.7}
     wrong = eval_clips.noisy_start(clip, 3, -0.05)
     assert wrong["stature_m"] == pytest.approx(0.95 * 1.7)
-    assert wrong["sd"]["stature_m"] < 0.05 * 1.7 < 0.1  # nobody told the tracker
+    assert wrong["sd"]["stature_m"] < 0.05 * 1.7 < 0.1  # the tracker did not know
     still = eval_clips.noisy_start(replace(clip, steady=False), 3, 0.0)
     assert "phase" not in still and "stride_hz" not in still and "phase" not in still["sd"]
 

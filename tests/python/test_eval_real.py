@@ -63,7 +63,7 @@ def test_a_track_elsewhere_is_wrong_only_under_tracking():
     assert lost.share["off"] == 1.0 and (lost.tracking, lost.wrong) == (0, 0)
 
 
-def test_exchanged_legs_are_a_swap_where_they_are_apart():
+def test_swapped_legs_are_a_swap_where_they_are_apart():
     score = real_clip.score(clip(reference=reference(swapped=True)), track(), CAMERA)
     assert score.share["swap"] > 0.5 and score.wrong == round(100 * (1 - score.share["good"]))
 

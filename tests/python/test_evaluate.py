@@ -5,7 +5,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from drawn_walker import DATA
+from drawn_person import DATA
 from scipy.spatial.transform import Rotation
 from scipy.special import ndtr
 from toy_segments import toy_prior
@@ -111,7 +111,7 @@ def test_median_mean_and_90th_percentile_are_over_frames():
     )
 
 
-def test_lost_is_far_off_or_said_so():
+def test_lost_is_far_off_or_reported():
     found = TRUTH.eval15()
     found[:10, EVAL15.index("head_top")] += [0.0, 0.0, 14 * 0.151]
     found[10:20, EVAL15.index("head_top")] += [0.0, 0.0, 14 * 0.149]
@@ -133,9 +133,9 @@ def test_phase_errors_wrap_and_flips_are_counted_apart():
 def test_coverage_is_the_share_inside_the_normal_intervals():
     true = np.zeros((4, 15, 3))
     found, sd = np.full((4, 15, 3), 0.01), np.full((4, 15, 3), 0.01)
-    assert coverage(found, sd, true) == {"50": 0.0, "90": 1.0}  # one deviation off
-    sd[:1] = 0.02  # half a deviation off in a quarter of them
-    sd[1:2] = 0.005  # two deviations
+    assert coverage(found, sd, true) == {"50": 0.0, "90": 1.0}  # one standard deviation off
+    sd[:1] = 0.02  # half a standard deviation off in a quarter of them
+    sd[1:2] = 0.005  # two standard deviations
     assert coverage(found, sd, true) == {"50": 0.25, "90": 0.75}
 
 
@@ -166,16 +166,16 @@ def test_far_off_under_tracking_counts_twice():
     assert trust(root, status) == pytest.approx({"wrong_tracking": 0.2, "weighted_lost": 4 / 5})
 
 
-def test_calibration_knows_right_deviations_from_wrong_ones():
+def test_calibration_knows_right_sd_from_wrong_ones():
     rng = np.random.default_rng(1)
     true, sd = np.zeros((600, 15, 3)), np.full((600, 15, 3), 0.02)
     found = rng.normal(0, 0.02, true.shape)
-    right, narrow, wide = (calibration(found, k * sd, true) for k in (1.0, 0.4, 2.5))
+    right, narrow, broad = (calibration(found, k * sd, true) for k in (1.0, 0.4, 2.5))
     assert right["z2"] == pytest.approx(1, abs=0.03) and right["pit_p"] > 0.01
     assert sum(right["pit"]) == pytest.approx(1)
     assert narrow["z2"] > 5 and narrow["pit"][0] > 0.2 and narrow["pit_p"] < 1e-6  # piles up at both ends
-    assert wide["z2"] < 0.2 and wide["pit"][4] > 0.18 and wide["pit_p"] < 1e-6  # heaps in the middle
-    assert right["crps_mm"] < narrow["crps_mm"] and right["crps_mm"] < wide["crps_mm"]
+    assert broad["z2"] < 0.2 and broad["pit"][4] > 0.18 and broad["pit_p"] < 1e-6  # heaps in the middle
+    assert right["crps_mm"] < narrow["crps_mm"] and right["crps_mm"] < broad["crps_mm"]
     assert right["width_mm"] == pytest.approx(2 * 1.6448536 * 20)
 
 
@@ -305,12 +305,12 @@ def test_a_model_of_segments_alone_is_refused_by_name(tmp_path):
         read_cyclic(path)
 
 
-@pytest.mark.parametrize(("rate", "told"), [(30, False), (10, True)])
-def test_frames_of_other_times_are_told(tmp_path, capsys, rate, told):
+@pytest.mark.parametrize(("rate", "reported"), [(30, False), (10, True)])
+def test_frames_of_other_times_are_reported(tmp_path, capsys, rate, reported):
     """Every third frame of a truth numbered by itself is paired with other moments."""
     places = np.stack([TRUTH.places[name] for name in JOINTS], axis=1)
     sd, frames = np.full_like(places, 0.1), np.arange(len(places))
     write_lifted(tmp_path / "truth.csv", frames, frames / 30, JOINTS, places, sd)
     write_lifted(tmp_path / "found.csv", frames, 7 + frames / rate, JOINTS, places, sd)
     assert main(["eval", str(tmp_path / "found.csv"), "--truth", str(tmp_path / "truth.csv")]) == 0
-    assert ("their times run apart by 6.60 s" in capsys.readouterr().err) == told
+    assert ("their times run apart by 6.60 s" in capsys.readouterr().err) == reported

@@ -57,7 +57,7 @@ def test_what_cannot_be_written_is_refused(tmp_path, monkeypatch):
     path = tmp_path / "a.csv"
     path.write_text("mine")
     path.chmod(0o444)
-    if os.geteuid() == 0:  # whom no permission stops: ask the bits instead
+    if os.geteuid() == 0:  # permissions do not stop root: look at the bits instead
         monkeypatch.setattr(os, "access", lambda p, mode: bool(os.stat(p).st_mode & 0o200))
     with pytest.raises(UserError, match=r"a\.csv: is read-only; choose"):
         require_writable(path)

@@ -1,11 +1,11 @@
-"""First states: from a file, with every fault told, and found in the pictures."""
+"""First states: from a file, with every fault reported, and found in the pictures."""
 
 import json
 from dataclasses import replace
 
 import numpy as np
 import pytest
-from drawn_walker import DATA, camera, clip, draw, state_at, wall, write
+from drawn_person import DATA, camera, clip, draw, state_at, wall, write
 
 from gait import Camera, Model, Start, UserError, Video
 from gait.bindings.initial import DEFAULT_SD
@@ -46,7 +46,7 @@ def init(tmp_path):
     return write_json
 
 
-def test_a_full_file_is_taken_as_it_says(init):
+def test_a_full_file_is_taken_as_it_is(init):
     start = Start.read(init(FULL), MODEL)
     mean, sd = start.mean, start.sd
     assert start.frame == 64
@@ -178,7 +178,7 @@ def walk(tmp_path, view, **motion):
 
 
 @pytest.mark.parametrize("heading, start", [(0.0, (-0.6, 0.0)), (2.6, (0.5, -0.2)), (-0.8, (-0.5, 1.2))])
-def test_a_walker_is_found_where_it_is(heading, start, tmp_path):
+def test_a_person_is_found_in_place(heading, start, tmp_path):
     view = camera(place=(0.0, -6.0, 2.2))
     video, states = walk(tmp_path, view, heading=heading, start=start)
     found = find_start(video, view, wall(), MODEL)
@@ -203,7 +203,7 @@ def test_a_known_stature_is_believed(tmp_path):
     assert known.sd.stature < unknown.sd.stature and known.mean.stature == pytest.approx(1.6, abs=0.03)
 
 
-def test_somebody_standing_has_no_heading(tmp_path):
+def test_a_standing_person_has_no_heading(tmp_path):
     view = camera(place=(0.0, -6.0, 2.2))
     pictures, states = clip(MODEL, SECTIONS, 1, view=view)
     write(tmp_path / "stand.mp4", pictures * 33)
@@ -213,7 +213,7 @@ def test_somebody_standing_has_no_heading(tmp_path):
 
 
 @pytest.mark.parametrize("count, words", [(1, "1 frame to"), (5, "5 frames to")])
-def test_too_few_frames_to_find_somebody_in_are_told(tmp_path, count, words):
+def test_too_few_frames_to_find_a_person_are_reported(tmp_path, count, words):
     write(tmp_path / "few.mp4", [wall()] * count)
     with pytest.raises(
         UserError,
@@ -222,7 +222,7 @@ def test_too_few_frames_to_find_somebody_in_are_told(tmp_path, count, words):
         find_start(Video(tmp_path / "few.mp4"), camera(), wall(), MODEL)
 
 
-def test_nobody_in_the_picture_is_told(tmp_path):
+def test_an_empty_picture_is_reported(tmp_path):
     write(tmp_path / "empty.mp4", [wall()] * 12)
     with pytest.raises(
         UserError,
@@ -241,7 +241,7 @@ CLIPS = DATA / "eval" / "dev"
 
 @pytest.mark.skipif(not CLIPS.is_dir(), reason="../shared/data is absent")
 @pytest.mark.parametrize("name", ["side_rl_16", "oblique45_pole_05", "toward300_08"])
-def test_a_walker_is_found_without_a_background(name):
+def test_a_person_is_found_without_a_background(name):
     video, truth = (
         Video(CLIPS / name / "video.mp4"),
         read_truth(CLIPS / name / "truth.csv"),
@@ -267,7 +267,7 @@ def test_who_walks_goes_before_who_stands_nearer(tmp_path):
     assert (np.abs(off) < 2.5 * found.sd.pelvis).all() and abs(found.mean.heading) < 2 * found.sd.heading
 
 
-def test_two_who_pass_are_told_apart(tmp_path):
+def test_two_people_who_pass_are_kept_apart(tmp_path):
     view = camera(place=(0.0, -6.0, 2.2))
     both = []
     for i in range(34):
@@ -281,7 +281,7 @@ def test_two_who_pass_are_told_apart(tmp_path):
     assert abs((found.mean.heading - turned + np.pi) % (2 * np.pi) - np.pi) < 2 * found.sd.heading
 
 
-def test_a_spotter_starts_with_who_walks_in(tmp_path):
+def test_the_automatic_start_takes_a_person_who_walks_in(tmp_path):
     view = camera(place=(0.0, -6.0, 2.2))
     pictures, _ = clip(MODEL, SECTIONS, 45, view=view)
     write(tmp_path / "walk.mp4", pictures)
@@ -296,7 +296,7 @@ def test_a_spotter_starts_with_who_walks_in(tmp_path):
     assert start.best(frame) is None and not start.walks_in(frame)
 
 
-def test_a_spotter_does_not_start_with_who_stands(tmp_path):
+def test_the_automatic_start_leaves_a_standing_person(tmp_path):
     view = camera(place=(0.0, -6.0, 2.2))
     pictures, _ = clip(MODEL, SECTIONS, 1, view=view)
     write(tmp_path / "stand.mp4", pictures * 45)
@@ -308,15 +308,15 @@ def test_a_spotter_does_not_start_with_who_stands(tmp_path):
 
 
 @pytest.mark.parametrize("rate", [6, 10, 15, 25, 30, 60])
-def test_looks_alone_do_at_any_frame_rate(monkeypatch, rate):
+def test_detections_alone_suffice_at_any_frame_rate(monkeypatch, rate):
     """Enough detections in time, and no more than a slow detector can give."""
     view = camera(place=(0.0, -6.0, 2.2))
-    seen = []
+    boxes = []
 
     def one(image, stature):
         foot, head = view.project(np.array([[0.0, 0, 0], [0, 0, 1.7]]))
-        seen.append(Box(foot, head, 0.04 * float(np.hypot(*(foot - head)))))
-        return seen[-1:]
+        boxes.append(Box(foot, head, 0.04 * float(np.hypot(*(foot - head)))))
+        return boxes[-1:]
 
     monkeypatch.setattr("gait.track.box_start.find_people", one)
     start = BoxStart(view, None, MODEL)
@@ -324,11 +324,11 @@ def test_looks_alone_do_at_any_frame_rate(monkeypatch, rate):
         frame = Frame(n, n / rate, wall())
         start.observe(frame)
     assert start.best(frame)
-    assert len(seen) <= 22
+    assert len(boxes) <= 22
 
 
 @pytest.mark.skipif(not CLIPS.is_dir(), reason="../shared/data is absent")
-def test_who_stands_is_not_started_with_by_looks_alone(tmp_path):
+def test_a_standing_person_does_not_start_by_detections_alone(tmp_path):
     folder = CLIPS / "oblique45_07"
     first = next(Video(folder / "video.mp4").frames(0)).image
     noise = np.random.default_rng(5)
@@ -353,7 +353,7 @@ def test_a_grey_plate_does_not_suit_colours():
     assert not one_is_grey(grey, grey) and not one_is_grey(wall(), wall(seed=1))
 
 
-def test_a_camera_whose_height_is_wrong_is_told(tmp_path):
+def test_a_camera_whose_height_is_wrong_is_reported(tmp_path):
     pictures, _ = clip(MODEL, SECTIONS, 20)
     write(tmp_path / "walk.mp4", pictures)
     true = camera()
@@ -365,7 +365,7 @@ def test_a_camera_whose_height_is_wrong_is_told(tmp_path):
         find_start(Video(tmp_path / "walk.mp4"), low, wall(), MODEL)
 
 
-def test_what_a_wrong_camera_makes_of_people_is_told_by_most_frames(tmp_path):
+def test_a_wrong_camera_is_reported_from_most_frames(tmp_path):
     pictures, _ = clip(MODEL, SECTIONS, 20)
     write(tmp_path / "walk.mp4", pictures)
     up = np.array([[1, 0, 0], [0, 0.5, -0.866], [0, 0.866, 0.5]])

@@ -32,7 +32,7 @@ def test_round_trip(tmp_path):
     assert np.isinf(found.standard_deviations(3.0)[2, 1])
 
 
-def test_zeros_are_an_origin_or_not_seen(tmp_path):
+def test_zeros_are_an_origin_or_missing(tmp_path):
     head = "frame,time,pelvis_u,pelvis_v,l_knee_u,l_knee_v"
     origin = read(written(tmp_path, f"{head}\n0,0,0,0,.1,.5\n1,.1,0,0,.2,.5\n"), KNOWN)[0]
     assert origin.visible.all()
@@ -40,7 +40,7 @@ def test_zeros_are_an_origin_or_not_seen(tmp_path):
         read(written(tmp_path, f"{head}\n0,0,0,0,0,0\n1,.1,0,0,.2,.5\n"), KNOWN)
 
 
-def test_little_confidence_is_not_seen(tmp_path):
+def test_a_point_of_little_confidence_is_missing(tmp_path):
     path = written(tmp_path, "frame,time,pelvis_u,pelvis_v,pelvis_c\n0,0,1,2,0.05\n1,0.1,1,2,\n2,0.2,1,2,1\n")
     assert read(path, KNOWN)[0].visible.ravel().tolist() == [False, False, True]
 
@@ -92,7 +92,7 @@ def test_unknown_points_can_be_left_out(tmp_path):
         read(path, ("l_wrist",), ignore_unknown=True)
 
 
-def test_points_within_their_noise_tell_nothing():
+def test_points_within_their_noise_show_nothing():
     uv = np.random.default_rng(1).uniform(0, 1, (4, 2, 2))
     keypoints = Keypoints(np.arange(4), np.arange(4) / 20, KNOWN[:2], uv, np.ones((4, 2)))
     with pytest.raises(

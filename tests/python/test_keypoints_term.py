@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from drawn_walker import FPS, camera, clip
+from drawn_person import FPS, camera, clip
 
 from gait import Model, State, Term, Tracker, TrackerConfig
 from gait.bindings.frame import FrameKeypoints
@@ -18,7 +18,7 @@ CONFIG = TrackerConfig.default(particles=300)
 
 
 def found(i: int, noise: float = 1.0) -> FrameKeypoints:
-    """What a detector says of a frame: most joints, in an order of its own, and one the model lacks."""
+    """What a detector states of a frame: most joints, in an order of its own, and one the model lacks."""
     rng = np.random.default_rng(i)
     uv = VIEW.project(MODEL.pose(TRUE[i])[0]) + noise * rng.normal(size=(len(MODEL.joint_names), 2))
     uv[rng.random(len(uv)) < 0.2] = np.nan

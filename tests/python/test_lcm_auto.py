@@ -1,4 +1,4 @@
-"""gait-trackd --init auto: starts with whoever walks through the empty scene, and again after losing them."""
+"""gait-trackd --init auto: starts with the person who walks through the empty scene, and after a loss."""
 
 import lcm_rig as rig
 import numpy as np
@@ -28,12 +28,12 @@ def test_who_walks_in_is_tracked_after_a_second(tmp_path):
     got = track(tmp_path, [*SCENE, *empty(0, 20), *later(range(45), 20)])
     begun = got.estimates[0].frame
     assert 48 <= begun <= 60 and [m.frame for m in got.estimates] == list(range(begun, 65))
-    true, found = rig.walker(begun - 20), got.estimates[0].mean
+    true, found = rig.person(begun - 20), got.estimates[0].mean
     assert np.hypot(*(np.array(found.pelvis[:2]) - true.pelvis[:2])) < 0.5
     assert abs(found.heading) < 0.5 and abs(found.stature - true.stature) < 0.15
 
 
-def test_nobody_is_found_in_an_empty_scene_or_without_one(tmp_path):
+def test_no_person_is_found_in_an_empty_scene_or_without_one(tmp_path):
     assert track(tmp_path, [*SCENE, *empty(0, 50)]).frames == 0
     assert track(tmp_path, [SCENE[0], *rig.frames(0, 50)]).frames == 0
 
@@ -51,7 +51,7 @@ def test_who_comes_back_is_tracked_again(tmp_path):
 
 
 def test_a_clock_set_back_far_is_a_new_search(tmp_path):
-    """Whoever is there is found again a second later."""
+    """A person who is there is found again a second later."""
     back = [
         ("GAIT_IMAGE_0", image_message(rig.picture(i), rig.utime(i) - 9_000_000, i)) for i in range(15, 60)
     ]
@@ -61,18 +61,19 @@ def test_a_clock_set_back_far_is_a_new_search(tmp_path):
     assert {m.frame for m in got.estimates} >= {*range(15), *range(55, 60)}
 
 
-def test_the_scene_of_another_camera_is_told_once(tmp_path):
+def test_the_scene_of_another_camera_is_reported_once(tmp_path):
     other = np.full_like(rig.plate(), 60)
     other[:, ::2] = 180
     scene = [SCENE[0], ("GAIT_BACKGROUND_0", image_message(other, rig.utime(0), -1))]
-    for begin in (scene, [*scene, rig.opening()[2]]):  # while looking for somebody, and while tracking
-        told = track(tmp_path, [*begin, *rig.frames(0, 10)]).words
+    for begin in (scene, [*scene, rig.opening()[2]]):  # while looking for a person, and while tracking
+        words = track(tmp_path, [*begin, *rig.frames(0, 10)]).words
         assert (
-            told.count("trackd: half of the image differs from the background: give that of this camera") == 1
+            words.count("trackd: half of the image differs from the background: give that of this camera")
+            == 1
         )
 
 
-def test_who_is_looked_for_and_found_is_told(tmp_path):
-    told = track(tmp_path, [*SCENE, *empty(0, 20), *later(range(45), 20)]).words
-    assert told.count("looking for a person who walks in full view") == 1
-    assert told.count("person found at frame") == 1 and "differs" not in told
+def test_search_and_detection_are_reported(tmp_path):
+    words = track(tmp_path, [*SCENE, *empty(0, 20), *later(range(45), 20)]).words
+    assert words.count("looking for a person who walks in full view") == 1
+    assert words.count("person found at frame") == 1 and "differs" not in words

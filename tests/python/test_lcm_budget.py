@@ -98,7 +98,7 @@ def test_particles_follow_the_budget_only_if_asked(url):
         assert " particles 3000 " in finish().printed
 
 
-def test_a_step_longer_than_the_budget_is_said_once(url):
+def test_a_step_longer_than_the_budget_is_reported_once(url):
     with rig.daemon(url, "-n", 40_000, "--budget-ms", 10) as (listener, finish):
         armed(listener)
         number = 0

@@ -41,13 +41,13 @@ def one_line(done, code, words):
     assert done.stdout == "" and done.stderr.count("\n") == 1, done
 
 
-def test_a_full_disk_is_told(folder):
+def test_a_full_disk_is_reported(folder):
     done = capture(folder, "file:///dev/full?mode=w")
     one_line(done, 1, "/dev/full: the log cannot be written: No space left on device")
 
 
 @pytest.mark.parametrize("missing", [COUNT * 50_000, 100], ids=["early", "in the last bytes"])
-def test_a_log_that_may_not_grow_is_told(folder, tmp_path, missing):
+def test_a_log_that_may_not_grow_is_reported(folder, tmp_path, missing):
     log = tmp_path / "x.log"
     assert capture(folder, f"file://{log}?mode=w").returncode == 0
     limit = log.stat().st_size - missing
@@ -84,7 +84,7 @@ def test_what_is_read_is_never_overwritten(folder, name):
     assert (folder / name).read_bytes() == before
 
 
-def test_a_folder_that_is_missing_is_told(folder, tmp_path):
+def test_a_folder_that_is_missing_is_reported(folder, tmp_path):
     done = capture(folder, f"file://{tmp_path}/none/x.log?mode=w")
     one_line(done, 1, "none/x.log: the log cannot be written: No such file or directory")
 

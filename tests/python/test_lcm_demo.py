@@ -21,7 +21,7 @@ def folder(tmp_path_factory):
 
 @pytest.fixture(scope="module")
 def long_video(tmp_path_factory):
-    """Ten seconds: whoever ends a demo of it does so in its midst."""
+    """Ten seconds: a demo that is ended early ends in its midst."""
     return rig.write_clip(tmp_path_factory.mktemp("long"), 10 * rig.FPS) / "video.mp4"
 
 
@@ -64,7 +64,7 @@ def test_an_interrupted_demo_leaves_nothing_running(long_video, tmp_path, number
     command = [str(rig.PYTHON), "-m", "gait", "demo", "--video", str(long_video), "-o", str(out)]
     process = subprocess.Popen(command, stderr=subprocess.PIPE, stdout=subprocess.PIPE, text=True)
     try:
-        for line in process.stderr:  # the tracker says its memory once it has the camera
+        for line in process.stderr:  # the tracker states its memory once it has the camera
             if "bytes" in line:
                 break
         process.send_signal(number)
@@ -76,7 +76,7 @@ def test_an_interrupted_demo_leaves_nothing_running(long_video, tmp_path, number
     assert not leftovers(out)
 
 
-def test_a_demo_whose_tracker_fails_says_so_and_ends(folder, tmp_path):
+def test_a_demo_whose_tracker_fails_reports_it_and_ends(folder, tmp_path):
     rig.need_multicast()
     out = tmp_path / "out"
     out.mkdir()
@@ -102,7 +102,7 @@ def test_a_second_demo_in_the_same_folder_keeps_out(folder, tmp_path):
 
 
 @pytest.mark.parametrize(
-    ("words", "said", "code"),
+    ("words", "printed", "code"),
     [
         (["--camera", "c.json"], "--camera: belongs to a clip of your own; give --video", 2),
         (["--height", "17"], "17: is not a stature", 2),
@@ -115,10 +115,10 @@ def test_a_second_demo_in_the_same_folder_keeps_out(folder, tmp_path):
         (["-o", "{}/camera.json"], "camera.json: is a file; give the name of a folder", 1),
     ],
 )
-def test_the_demo_checks_its_inputs_first(folder, tmp_path, capsys, words, said, code):
+def test_the_demo_checks_its_inputs_first(folder, tmp_path, capsys, words, printed, code):
     out = tmp_path / "out"
     try:
         ended = main(["demo", "-o", str(out), *(word.format(folder) for word in words)])
     except SystemExit as usage:
         ended = usage.code
-    assert ended == code and said in capsys.readouterr().err.splitlines()[-1] and not out.exists()
+    assert ended == code and printed in capsys.readouterr().err.splitlines()[-1] and not out.exists()

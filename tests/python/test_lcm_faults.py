@@ -37,7 +37,7 @@ def options(tmp_path, *more):
 
 
 def accepted(tmp_path, *more):
-    """The files given are of use, only the log is not; what was said."""
+    """The files given are of use, only the log is not; what was reported."""
     outcome = rig.run(*options(tmp_path, *more))
     assert outcome.code == 1 and "no frames on GAIT_IMAGE_0" in outcome.words.splitlines()[-1], outcome.words
     assert all(" particles, " in line for line in outcome.words.splitlines()[:-1]), outcome.words
@@ -243,7 +243,7 @@ def test_help_lists_every_option():
         assert option in outcome.printed
 
 
-def test_help_says_what_an_option_does_when_it_is_not_given_or_too_small():
+def test_help_states_what_an_option_does_when_it_is_not_given_or_too_small():
     printed = " ".join(rig.run("--help").printed.split())
     assert "auto, the default: start when a person has walked" in printed
     assert "a pause longer than --max-dt is bridged by predictions of at most --max-dt each" in printed
@@ -274,7 +274,7 @@ def test_the_ranges_are_those_of_the_library(name):
     fails(["-m", "x", f"--{option}", "1e9"], f"--{option} 1e9: give a number from {low} to {high}", code=2)
 
 
-def test_version_says_whether_jpeg_is_understood():
+def test_version_states_whether_jpeg_is_understood():
     outcome = rig.run("--version")
     assert outcome.code == 0
     assert outcome.printed in [f"gait-trackd {gait.__version__} jpeg {answer}\n" for answer in ("yes", "no")]
@@ -330,9 +330,9 @@ def test_a_url_that_lcm_refuses(url, remedy):
 
 
 @pytest.mark.parametrize("address", ["10.0.0.1", "127.0.0.1", "240.0.0.1"])
-def test_an_address_that_is_not_multicast_is_told(address):
-    said = f"{address} is not a multicast address; give one from 224.0.0.0 to 239.255.255.255"
-    fails(rig.command("--url", f"udpm://{address}:7667?ttl=0")[1:], said)
+def test_an_address_that_is_not_multicast_is_reported(address):
+    printed = f"{address} is not a multicast address; give one from 224.0.0.0 to 239.255.255.255"
+    fails(rig.command("--url", f"udpm://{address}:7667?ttl=0")[1:], printed)
 
 
 def test_no_multicast_route_is_one_line_with_the_remedy():

@@ -1,4 +1,4 @@
-"""gait-trackd says once why frames arrive and no person is tracked, and where it listens."""
+"""gait-trackd states once why frames arrive and no person is tracked, and where it listens."""
 
 import lcm_rig as rig
 
@@ -12,47 +12,47 @@ NO_START = "frames arrive, but no START"
 NO_SCENE = "frames arrive, but --init auto needs the background"
 
 
-def said(tmp_path, events, *options):
-    """What was said of idle frames, in order."""
+def printed(tmp_path, events, *options):
+    """What was reported of idle frames, in order."""
     outcome = rig.play(rig.write_log(tmp_path / "a.log", events), *options)
     return [line.split(": ")[1] for line in outcome.words.splitlines() if "frames arrive" in line], outcome
 
 
 def test_no_camera(tmp_path):
-    words, outcome = said(tmp_path, rig.frames(0, 5))
+    words, outcome = printed(tmp_path, rig.frames(0, 5))
     assert words == [NO_CAMERA] and outcome.frames == 0
 
 
 def test_a_camera_and_no_empty_scene(tmp_path):
-    words, _ = said(tmp_path, [CAMERA, *rig.frames(0, 5)])
+    words, _ = printed(tmp_path, [CAMERA, *rig.frames(0, 5)])
     assert len(words) == 1 and words[0].startswith(NO_SCENE)
 
 
 def test_no_start_after_stop(tmp_path):
     stop = ("GAIT_COMMAND", command_message(gaitmsg.command_t.STOP, rig.utime(0), State(), State()))
-    words, _ = said(tmp_path, [CAMERA, SCENE, stop, *rig.frames(0, 5)])
+    words, _ = printed(tmp_path, [CAMERA, SCENE, stop, *rig.frames(0, 5)])
     assert words == [NO_START]
 
 
 def test_begun_in_the_middle_of_a_stream(tmp_path):
     """Frames, then the announcement that comes every few seconds, then the START of another run."""
     events = [*rig.frames(0, 3), CAMERA, *rig.frames(3, 6), SCENE, START]
-    words, outcome = said(tmp_path, [*events, *rig.frames(6, 9)])
+    words, outcome = printed(tmp_path, [*events, *rig.frames(6, 9)])
     assert words[0] == NO_CAMERA and words[1].startswith(NO_SCENE) and len(words) == 2
     assert outcome.frames == 3
 
 
-def test_a_track_that_begins_says_nothing(tmp_path):
-    assert said(tmp_path, [*rig.opening(), *rig.frames(0, 5)])[0] == []
+def test_a_track_that_begins_prints_nothing(tmp_path):
+    assert printed(tmp_path, [*rig.opening(), *rig.frames(0, 5)])[0] == []
 
 
-def test_who_was_stopped_by_a_pause_is_told_once(tmp_path):
+def test_a_stop_by_a_pause_is_reported_once(tmp_path):
     later = [("GAIT_IMAGE_0", rig.frame_message(i, utime=rig.utime(i + 300))) for i in range(3, 6)]
-    words, outcome = said(tmp_path, [*rig.opening(), *rig.frames(0, 3), *later], "--init", "auto")
+    words, outcome = printed(tmp_path, [*rig.opening(), *rig.frames(0, 3), *later], "--init", "auto")
     assert words == [] and outcome.words.count("stopped; looking for a person again") == 1
 
 
-def test_live_it_says_where_it_listens_and_what_it_lacks():
+def test_live_it_reports_where_it_listens_and_what_it_lacks():
     rig.need_multicast()
     url = private_url()
     with rig.daemon(url) as (listener, finish):

@@ -21,7 +21,7 @@ from gait.lcm.link import gaitmsg, private_url
 from gait.lcm.messages import camera_message, tracks_message
 
 CAMERA = Camera.looking([0.0, -6.0, 1.4], [0.0, 0.0, 1.0], (640, 480), 700.0)
-NAMES_SEEN, FRAMES, LAG, SD = 15, 45, 4, 2.0
+NAMES_SHOWN, FRAMES, LAG, SD = 15, 45, 4, 2.0
 GROWTH_KB = 225  # of 900 frames: 256 bytes of each message kept would be seen
 
 
@@ -49,14 +49,14 @@ def observations() -> list[tuple[int, np.ndarray, np.ndarray]]:
     found = []
     for i in range(FRAMES):
         points = 1.7 * prior.mean[0, 0] + np.array([1.02 * (i / rig.FPS - 0.7), 0, 0])
-        uv = CAMERA.project(points)[:NAMES_SEEN] + rng.normal(size=(NAMES_SEEN, 2)) * SD
-        uv[rng.random(NAMES_SEEN) < 0.15] = np.nan
-        found.append((rig.utime(i), uv, rng.uniform(0.4, 1.0, NAMES_SEEN)))
+        uv = CAMERA.project(points)[:NAMES_SHOWN] + rng.normal(size=(NAMES_SHOWN, 2)) * SD
+        uv[rng.random(NAMES_SHOWN) < 0.15] = np.nan
+        found.append((rig.utime(i), uv, rng.uniform(0.4, 1.0, NAMES_SHOWN)))
     return found
 
 
 def events(start: int = 0) -> list[rig.Event]:
-    names = model()[1][:NAMES_SEEN]
+    names = model()[1][:NAMES_SHOWN]
     tracks = [
         ("GAIT_TRACKS_0", tracks_message(names, uv, utime, 100 + i, confidence))
         for i, (utime, uv, confidence) in enumerate(observations())
@@ -81,8 +81,8 @@ def test_joints_are_those_of_the_library(tmp_path: Path) -> None:
     messages = iter(lifted)
     for i, (utime, uv, confidence) in enumerate(observations()):
         pixels, sd = np.full((19, 2), np.nan), np.full(19, np.inf)
-        pixels[:NAMES_SEEN] = uv.astype(np.float32)
-        sd[:NAMES_SEEN] = SD / confidence.astype(np.float32).astype(float)
+        pixels[:NAMES_SHOWN] = uv.astype(np.float32)
+        sd[:NAMES_SHOWN] = SD / confidence.astype(np.float32).astype(float)
         lifter.push(utime, pixels, sd)
         want = lifter.estimate()
         assert (want is None) == (i < LAG)
@@ -105,7 +105,7 @@ def test_the_lifter_alone_costs_the_tracker_nothing(tmp_path: Path) -> None:
     """Frames and tracks in one log: the tracker's digest is what it is without them."""
     film = [*rig.opening(), *rig.frames(0, 6)]
     plain = rig.play(rig.write_log(tmp_path / "b.log", film))
-    names = model()[1][:NAMES_SEEN]
+    names = model()[1][:NAMES_SHOWN]
     tracks = [("GAIT_TRACKS_0", tracks_message(names, uv, t)) for t, uv, _ in observations()[:6]]
     both, lifted = lift(tmp_path, [*film, *tracks])
     assert both.digest == plain.digest and both.frames == 6
@@ -117,12 +117,12 @@ def test_memory_does_not_grow_with_the_stream(tmp_path: Path) -> None:
     rig.need_multicast()
     blob = tmp_path / "lift.gait"
     blob.write_bytes(model()[0])
-    seen, names, peaks = observations(), model()[1][:NAMES_SEEN], []
+    shown, names, peaks = observations(), model()[1][:NAMES_SHOWN], []
     with rig.daemon(private_url(), "--lift", "--lift-model", blob, "--lift-lag", LAG) as (listener, finish):
         listener.ask(events()[:1], lambda s: s.state != s.WAITING, "the camera")
         for first, stop in ((0, 100), (100, 1000)):
             for i in range(first, stop):
-                _, uv, confidence = seen[i % FRAMES]
+                _, uv, confidence = shown[i % FRAMES]
                 listener.send([("GAIT_TRACKS_0", tracks_message(names, uv, rig.utime(i), i, confidence))])
                 listener.until(lambda i=i: len(listener.lifted) > i - LAG, f"frame {i} lifted")
             peaks.append(rig.peak_kb(listener.pid))
@@ -167,7 +167,7 @@ def test_tracks_out_of_order_or_of_strangers_are_named(tmp_path: Path) -> None:
 
 def test_one_stamp_far_ahead_does_not_end_the_lift(tmp_path: Path) -> None:
     """It begins anew with the next tracks: all of them were rejected until a restart."""
-    happenings, names = events(), model()[1][:NAMES_SEEN]
+    happenings, names = events(), model()[1][:NAMES_SHOWN]
     ahead = tracks_message(names, observations()[9][1], rig.utime(9) + 3_600_000_000, 7777)
     happenings[10:11] = [("GAIT_TRACKS_0", ahead)]
     outcome, lifted = lift(tmp_path, happenings)
@@ -178,15 +178,15 @@ def test_one_stamp_far_ahead_does_not_end_the_lift(tmp_path: Path) -> None:
 
 
 def test_who_is_suddenly_elsewhere_is_ambiguous(tmp_path: Path) -> None:
-    """While the library says that what it saw did not fit and was searched for anew."""
+    """While the library states that what it saw did not fit and was searched for anew."""
     blob, names = model()
     lifter = Lifter(blob, camera(), LiftConfig.default(lag=LAG, sd=SD))
     happenings, want = events()[:1], []
     for i, (utime, uv, _) in enumerate(observations()):
         uv = (uv + (0 if i < 22 else 60)).astype(np.float32)
-        happenings.append(("GAIT_TRACKS_0", tracks_message(names[:NAMES_SEEN], uv, utime, i)))
+        happenings.append(("GAIT_TRACKS_0", tracks_message(names[:NAMES_SHOWN], uv, utime, i)))
         pixels = np.full((19, 2), np.nan)
-        pixels[:NAMES_SEEN] = uv
+        pixels[:NAMES_SHOWN] = uv
         lifter.push(utime, pixels)
         now = lifter.estimate()
         if now is not None:
@@ -209,7 +209,7 @@ def spoilt(message: Any) -> Any:
     """Points that are of no use: a stranger, one twice, three confidences that are none."""
     names = model()[1]
     message.tracks += [point("nose", 0.9), point(message.tracks[0].name, 0.9)]
-    message.tracks += [point(names[NAMES_SEEN + k], c) for k, c in enumerate((1.5, -0.5, math.nan))]
+    message.tracks += [point(names[NAMES_SHOWN + k], c) for k, c in enumerate((1.5, -0.5, math.nan))]
     message.ntracks = len(message.tracks)
     return message
 
@@ -220,7 +220,7 @@ def point(name: str, confidence: float) -> Any:
     return track
 
 
-def test_points_of_no_use_are_left_out_counted_and_said_once(tmp_path: Path) -> None:
+def test_points_of_no_use_are_left_out_counted_and_reported_once(tmp_path: Path) -> None:
     _, clean = lift(tmp_path, events())
     first, *tracks = events()
     outcome, lifted = lift(tmp_path, [first, *((channel, spoilt(m)) for channel, m in tracks)])

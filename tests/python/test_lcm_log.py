@@ -137,7 +137,7 @@ def test_damaged_images_are_counted_and_passed_over(tmp_path, name, data, channe
         ({"row_stride": 490}, "size 57600 for an image of 120 rows of 490 bytes; send all of them"),
     ],
 )
-def test_rows_that_are_too_short_are_told_with_the_least(tmp_path, change, words):
+def test_rows_that_are_too_short_are_reported_with_the_least(tmp_path, change, words):
     events = [*rig.opening(), *rig.frames(0, 2), ("GAIT_IMAGE_0", rig.frame_message(2, **change))]
     assert words in track(tmp_path, events).words
 
@@ -215,7 +215,7 @@ def test_a_command_sent_again_is_carried_out_once(tmp_path):
     assert tracked(twice) == tracked(once) and twice.digest == once.digest
 
 
-def test_reset_forgets_the_walker_and_the_counts(tmp_path):
+def test_reset_forgets_the_person_and_the_counts(tmp_path):
     reset = ("GAIT_COMMAND", command_message(RESET))
     outcome = track(tmp_path, [*rig.opening(), *rig.frames(0, 4), reset, *rig.frames(4, 8)])
     assert tracked(outcome) == [0, 1, 2, 3] and (outcome.frames, outcome.dropped) == (0, 0)
@@ -236,9 +236,9 @@ def test_lost_frames_are_counted_by_their_numbers(tmp_path):
 def test_repeats_are_not_dropped_frames(tmp_path):
     """`dropped` is of frames that were never tracked: by number and time, by time alone, by number alone."""
     twice = [event for event in rig.frames(0, 8) for _ in range(2)]
-    bare = [("GAIT_IMAGE_0", rig.frame_message(i // 2, metadata=[], nmetadata=0)) for i in range(16)]
+    plain = [("GAIT_IMAGE_0", rig.frame_message(i // 2, metadata=[], nmetadata=0)) for i in range(16)]
     late = [("GAIT_IMAGE_0", rig.frame_message(i // 2, utime=rig.utime(i))) for i in range(16)]
-    for frames, count in ((twice, 8), (bare, 8), (late, 16)):
+    for frames, count in ((twice, 8), (plain, 8), (late, 16)):
         outcome = track(tmp_path, [*rig.opening(), *frames])
         assert (outcome.frames, outcome.dropped) == (count, 0)
         assert not any(m.dropped for m in outcome.estimates)
@@ -259,7 +259,7 @@ def test_a_frame_that_comes_after_a_later_one_is_dropped_once(tmp_path):
 
 
 def test_frames_of_a_source_that_does_not_count(tmp_path):
-    """A bot_core publisher sends no frame numbers: nothing is counted as lost, estimates say -1."""
+    """A bot_core publisher sends no frame numbers: nothing is counted as lost, estimates state -1."""
     events = [("GAIT_IMAGE_0", rig.frame_message(i, metadata=[], nmetadata=0)) for i in range(4)]
     outcome = track(tmp_path, [*rig.opening(), *events])
     assert tracked(outcome) == [-1] * 4 and outcome.dropped == 0
@@ -272,19 +272,19 @@ def test_time_that_runs_backwards_is_refused_frame_by_frame(tmp_path):
     assert (outcome.frames, outcome.rejected) == (5, 2) and outcome.words.count("did not advance") == 1
 
 
-def test_a_clock_set_back_a_little_is_waited_for_and_said_once(tmp_path):
+def test_a_clock_set_back_a_little_is_waited_for_and_reported_once(tmp_path):
     back = [("GAIT_IMAGE_0", rig.frame_message(i, utime=rig.utime(i) - 300_000)) for i in range(6, 20)]
     outcome = track(tmp_path, [*rig.opening(), *rig.frames(0, 6), *back])
     assert tracked(outcome) == [*range(6), *range(15, 20)]
     assert outcome.rejected == 9 and outcome.words.count("did not advance") == 1
 
 
-def test_a_clock_set_back_far_stops_the_tracker_which_says_so_once(tmp_path):
+def test_a_clock_set_back_far_stops_the_tracker_which_reports_it_once(tmp_path):
     """As a long pause does: every later frame was rejected for ever, each with a line of its own."""
     back = [("GAIT_IMAGE_0", rig.frame_message(i, utime=rig.utime(i) - 900_000)) for i in range(3, 9)]
     again = ("GAIT_COMMAND", rig.start(6, at=0))
     init = tmp_path / "i.json"
-    init.write_text(json.dumps({"pelvis": rig.walker(0).pelvis.tolist(), "phase": 0.1, "heading_rad": 0}))
+    init.write_text(json.dumps({"pelvis": rig.person(0).pelvis.tolist(), "phase": 0.1, "heading_rad": 0}))
     outcome = track(
         tmp_path,
         [*rig.opening()[:2], *rig.frames(0, 3), *back[:3], again, *back[3:]],
@@ -295,7 +295,7 @@ def test_a_clock_set_back_far_stops_the_tracker_which_says_so_once(tmp_path):
     assert outcome.words.count("\n") == 2
 
 
-def test_a_long_pause_stops_the_tracker_which_says_so(tmp_path):
+def test_a_long_pause_stops_the_tracker_which_reports_it(tmp_path):
     pause = [("GAIT_IMAGE_0", rig.frame_message(i, utime=rig.utime(i) + 2_000_000)) for i in range(3, 6)]
     events = [*rig.opening(), *rig.frames(0, 3), *pause]
     outcome = track(tmp_path, events)
@@ -315,7 +315,7 @@ def test_a_shorter_pause_is_bridged_by_prediction(tmp_path):
     tracker = Tracker(
         rig.model(), rig.CAMERA, TrackerConfig.default(particles=rig.PARTICLES), background=rig.plate()
     )
-    tracker.start(rig.walker(0), rig.SD, rig.utime(0))
+    tracker.start(rig.person(0), rig.SD, rig.utime(0))
     for i in range(3):
         tracker.step(rig.picture(i), rig.utime(i))
     gap = late[0].utime - rig.utime(2)
@@ -340,7 +340,7 @@ def test_the_cloud_is_the_posterior(tmp_path):
 
 def test_reset_puts_the_init_file_in_force_again(tmp_path):
     init = tmp_path / "i.json"
-    init.write_text(json.dumps({"pelvis": rig.walker(0).pelvis.tolist(), "phase": 0.1, "heading_rad": 0}))
+    init.write_text(json.dumps({"pelvis": rig.person(0).pelvis.tolist(), "phase": 0.1, "heading_rad": 0}))
     reset = ("GAIT_COMMAND", command_message(RESET))
     outcome = track(
         tmp_path, [*rig.opening()[:2], *rig.frames(0, 3), reset, *rig.frames(3, 6)], "--init", init

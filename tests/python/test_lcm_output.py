@@ -91,7 +91,7 @@ def test_a_log_in_no_folder_is_refused_with_the_reason(tmp_path):
     one_line(done, 1, "no/x.log", "cannot be written: No such file or directory")
 
 
-def test_a_log_that_breaks_off_is_told_and_tracked_as_far_as_it_goes(tmp_path):
+def test_a_log_that_breaks_off_is_reported_and_tracked_as_far_as_it_goes(tmp_path):
     source = log(tmp_path)
     whole = source.read_bytes()
     source.write_bytes(whole[:-1000])
@@ -101,21 +101,21 @@ def test_a_log_that_breaks_off_is_told_and_tracked_as_far_as_it_goes(tmp_path):
 
 
 @pytest.mark.parametrize(("content", "words"), [(b"", "is empty"), (b"x" * 100, "damaged or truncated")])
-def test_a_log_with_nothing_in_it_is_told(tmp_path, content, words):
+def test_a_log_with_nothing_in_it_is_reported(tmp_path, content, words):
     source = tmp_path / "in.log"
     source.write_bytes(content)
     one_line(run(source, f"file://{tmp_path}/out.log?mode=w"), 1, "in.log", words)
 
 
-def test_a_log_of_which_no_frame_fits_the_camera_is_told(tmp_path):
+def test_a_log_of_which_no_frame_fits_the_camera_is_reported(tmp_path):
     camera = tmp_path / "camera.json"
     camera.write_text(json.dumps(replace(rig.CAMERA, width=320, height=240).to_dict()))
     events = [("GAIT_COMMAND", rig.start(0)), *rig.frames(0, 3)]
     source = rig.write_log(tmp_path / "in.log", events)
     done = run(source, f"file://{tmp_path}/out.log?mode=w", "--camera", camera)
     assert done.returncode == 1
-    said = "in.log: none of its 3 frames was tracked: image of 160x120, but the camera has 320x240"
-    assert said in done.stderr.splitlines()[-1]
+    printed = "in.log: none of its 3 frames was tracked: image of 160x120, but the camera has 320x240"
+    assert printed in done.stderr.splitlines()[-1]
 
 
 CAMERA, SCENE, START = rig.opening()

@@ -1,4 +1,4 @@
-"""gait record as a process: whatever ends it, the track so far is whole and the reason is told."""
+"""gait record as a process: whatever ends it, the track so far is whole and the reason is reported."""
 
 import json
 import resource
@@ -21,7 +21,7 @@ SECOND = 1_000_000  # microseconds
 
 @pytest.fixture(scope="module")
 def estimates(tmp_path_factory):
-    """What gait-trackd says about the clip."""
+    """What gait-trackd states about the clip."""
     log = rig.write_log(tmp_path_factory.mktemp("e") / "in.log", [*rig.opening(), *rig.frames(0, COUNT)])
     return rig.play(log).estimates
 
@@ -73,7 +73,7 @@ def test_an_interrupted_recording_is_whole(estimates, tmp_path, number, flowing)
 
 
 @pytest.mark.parametrize("option", ["-o", "--log"])
-def test_a_missing_folder_is_named_before_anybody_listens(tmp_path, option):
+def test_a_missing_folder_is_named_before_listening(tmp_path, option):
     files = {"-o": tmp_path / "t.csv", "--log": tmp_path / "e.log"} | {option: tmp_path / "none" / "x"}
     words = [word for pair in files.items() for word in pair]
     done = rig.gait("record", "--url", f"file://{tmp_path}/absent.log", *words)
@@ -99,7 +99,7 @@ def later(estimate, microseconds=0, **changes):
 
 
 @pytest.mark.parametrize("case", ["in turn", "one frame each", "one falls behind"])
-def test_two_trackers_on_one_url_are_told(estimates, tmp_path, case):
+def test_two_trackers_on_one_url_are_reported(estimates, tmp_path, case):
     """Both track the same frames; each receives them at its own time."""
     one, two = estimates, [later(e, 300) for e in estimates]
     order = [e for pair in zip(one, two, strict=True) for e in pair]
@@ -113,7 +113,7 @@ def test_two_trackers_on_one_url_are_told(estimates, tmp_path, case):
     assert frames == list(range(len(frames))) and f"before that showed: {len(frames)})" in done.stderr
 
 
-def test_another_stream_that_begins_is_told(estimates, tmp_path):
+def test_another_stream_that_begins_is_reported(estimates, tmp_path):
     again = [later(e, 60 * SECOND, utime=e.utime + 60 * SECOND) for e in estimates]
     done, frames = record(tmp_path, [*estimates, *again])
     assert done.returncode == 0 and frames == list(range(COUNT))
@@ -122,14 +122,14 @@ def test_another_stream_that_begins_is_told(estimates, tmp_path):
     assert quiet.returncode == 0 and quiet.stderr == ""
 
 
-def test_damaged_messages_are_left_out_and_told(estimates, tmp_path):
+def test_damaged_messages_are_left_out_and_reported(estimates, tmp_path):
     """Bytes of something else, an estimate cut short, and one without joints do not end a recording."""
-    bare = later(estimates[3], njoints=0, joints=[], nangles=0, angles=[])
+    plain = later(estimates[3], njoints=0, joints=[], nangles=0, angles=[])
     log = tmp_path / "in.log"
     writer = LogWriter(log)
     for e in estimates[:3]:
         writer.publish("GAIT_ESTIMATE", e.encode())
-    for spoilt in (bytes(30), estimates[3].encode()[:-20], bare.encode()):
+    for spoilt in (bytes(30), estimates[3].encode()[:-20], plain.encode()):
         writer.publish("GAIT_ESTIMATE", spoilt)
     for e in estimates[3:]:
         writer.publish("GAIT_ESTIMATE", e.encode())
@@ -148,7 +148,7 @@ def test_a_log_played_again_is_another_stream(estimates, tmp_path):
 
 
 def test_a_start_in_the_middle_is_the_same_stream(estimates, tmp_path):
-    """Somebody is found anew: steps count from 0 again, frames go on; the very first of them may be lost."""
+    """A person is found anew: steps count from 0 again, frames go on; the very first of them may be lost."""
     anew = [later(e, step=e.frame - 8, dropped=0) for e in estimates[8:]]
     for rest in (anew, anew[1:]):
         done, frames = record(tmp_path, [*estimates[:8], *rest], "--quiet")
@@ -158,16 +158,16 @@ def test_a_start_in_the_middle_is_the_same_stream(estimates, tmp_path):
 def test_the_log_that_is_listened_to_stays_as_it_is(estimates, tmp_path):
     log = rig.write_log(tmp_path / "in.log", [("GAIT_ESTIMATE", e) for e in estimates])
     before = log.read_bytes()
-    for words, code, said in (
+    for words, code, error in (
         (["--url", f"file://{log}?mode=w", "-o", tmp_path / "t.csv"], 2, "only read; leave ?mode= out"),
         (["--url", f"file://{log}", "-o", tmp_path / "t.csv", "--log", log], 1, "is read by this command"),
     ):
         done = rig.gait("record", *words)
-        assert done.returncode == code and said in done.stderr and done.stderr.count("\n") == 1, done.stderr
+        assert done.returncode == code and error in done.stderr and done.stderr.count("\n") == 1, done.stderr
     assert log.read_bytes() == before and [p.name for p in tmp_path.iterdir()] == ["in.log"]
 
 
-def test_a_log_that_breaks_off_is_told_and_recorded_as_far_as_it_goes(estimates, tmp_path):
+def test_a_log_that_breaks_off_is_reported_and_recorded_as_far_as_it_goes(estimates, tmp_path):
     log = rig.write_log(tmp_path / "in.log", [("GAIT_ESTIMATE", e) for e in estimates])
     log.write_bytes(log.read_bytes()[:-100])
     done = rig.gait("record", "--url", f"file://{log}?speed=0", "-o", tmp_path / "t.csv", "--quiet")
@@ -221,14 +221,14 @@ def test_ends_that_cannot_be_are_usage_errors(tmp_path, option):
     assert done.returncode == 2 and done.stderr.count("\n") == 1 and option in done.stderr
 
 
-def test_a_log_for_which_there_is_no_room_is_told(estimates, tmp_path):
-    """The last bytes wait in memory: only closing tells that they do not fit."""
+def test_a_log_for_which_there_is_no_space_is_reported(estimates, tmp_path):
+    """The last bytes wait in memory: only closing shows that they do not fit."""
     log = rig.write_log(tmp_path / "in.log", [("GAIT_ESTIMATE", e) for e in estimates])
-    room = log.stat().st_size - 100
+    space = log.stat().st_size - 100
     words = [str(rig.PYTHON), "-m", "gait", "record", "--url", f"file://{log}?speed=0"]
     done = subprocess.run(
         [*words, "-o", tmp_path / "t.csv", "--log", tmp_path / "e.log"],
-        preexec_fn=lambda: resource.setrlimit(resource.RLIMIT_FSIZE, (room, room)),
+        preexec_fn=lambda: resource.setrlimit(resource.RLIMIT_FSIZE, (space, space)),
         capture_output=True,
         text=True,
         timeout=rig.PATIENCE,

@@ -50,10 +50,10 @@ def test_a_start_long_past_is_refused(tmp_path):
 def test_unknown_fields_of_start_take_the_prior(tmp_path):
     mean, sd = rig.model().prior()
     known = {"phase": 0.1, "pelvis": [-0.5, 0, 0.95]}
-    spread = {"phase": 0.05, "pelvis": [0.05] * 3}
+    uncertainty = {"phase": 0.05, "pelvis": [0.05] * 3}
     partial, full = rig.start(0), rig.start(0)
-    partial.mean, partial.sd = state_message(known), state_message(spread)
-    mean.phase, mean.pelvis, sd.phase, sd.pelvis = 0.1, known["pelvis"], 0.05, spread["pelvis"]
+    partial.mean, partial.sd = state_message(known), state_message(uncertainty)
+    mean.phase, mean.pelvis, sd.phase, sd.pelvis = 0.1, known["pelvis"], 0.05, uncertainty["pelvis"]
     full.mean, full.sd = state_message(mean), state_message(sd)
     outcomes = [
         track(tmp_path, [*rig.opening()[:2], ("GAIT_COMMAND", start), *rig.frames(0, 3)])
@@ -66,7 +66,7 @@ def test_camera_scene_and_start_by_file_are_the_same_as_by_message(tmp_path):
     camera, scene, init = tmp_path / "c.json", tmp_path / "p.ppm", tmp_path / "i.json"
     camera.write_text(json.dumps(rig.CAMERA.to_dict()))
     cv2.imwrite(str(scene), rig.plate())  # a PPM is RGB
-    state = rig.walker(2)
+    state = rig.person(2)
     content = {
         "frame": 2,
         "pelvis": state.pelvis.tolist(),
@@ -93,7 +93,7 @@ def test_camera_scene_and_start_by_file_are_the_same_as_by_message(tmp_path):
 
 def test_a_start_at_a_lost_frame_is_dated_between_its_neighbours(tmp_path):
     init = tmp_path / "i.json"
-    init.write_text(json.dumps({"frame": 2, "pelvis": rig.walker(2).pelvis.tolist(), "phase": 0.2}))
+    init.write_text(json.dumps({"frame": 2, "pelvis": rig.person(2).pelvis.tolist(), "phase": 0.2}))
     frames = rig.frames(0, 6)
     events = [*rig.opening()[:2], *frames[:2], *frames[3:]]
     assert tracked(track(tmp_path, events, "--init", init)) == [3, 4, 5]
@@ -119,7 +119,7 @@ def bad_start(part, **change):
     ],
 )
 def test_a_senseless_start_is_refused_at_once(tmp_path, part, change, words):
-    """Before a frame or the camera comes, and while somebody is tracked, who goes on being tracked."""
+    """Before a frame or the camera comes, and while a person is tracked, who goes on being tracked."""
     camera, scene, good = rig.opening()
     bad = bad_start(part, **change)
     for events in ([camera, scene, bad], [bad, camera, scene]):

@@ -58,13 +58,13 @@ def test_a_refused_url_is_one_error_and_nothing_on_stderr(url, capfd):
     assert capfd.readouterr().err == ""
 
 
-def test_a_small_receive_buffer_is_said(monkeypatch, tmp_path):
+def test_a_small_receive_buffer_is_reported(monkeypatch, tmp_path):
     limit = tmp_path / "rmem_max"
     monkeypatch.setattr(link, "_RMEM_MAX", limit)
     for granted, expected in (("212992\n", True), ("4194304\n", False)):
         limit.write_text(granted)
-        said = link.buffer_warning(link.DEFAULT_URL)
-        assert bool(said) == expected and (not said or "sysctl" in said)
+        printed = link.buffer_warning(link.DEFAULT_URL)
+        assert bool(printed) == expected and (not printed or "sysctl" in printed)
     limit.write_text("1")
     assert link.buffer_warning("file://x") is None
 
@@ -138,7 +138,7 @@ def test_work_ahead_keeps_order_and_raises_at_its_place():
         next(items)
 
 
-def test_work_ahead_stops_when_nobody_wants_more():
+def test_work_ahead_stops_when_no_more_is_wanted():
     drawn = []
 
     def source():
@@ -208,7 +208,7 @@ def test_faults_of_capture_are_one_line(folder, options, code, words):
     assert done.returncode == code and words in done.stderr and done.stderr.count("\n") == 1, done.stderr
 
 
-def test_a_start_outside_of_the_picture_is_told(folder, tmp_path):
+def test_a_start_outside_of_the_picture_is_reported(folder, tmp_path):
     init = json.loads((folder / "init.json").read_text())
     (tmp_path / "far.json").write_text(json.dumps(init | {"pelvis": [100, 100, 1]}))
     words = [*capture_options(folder)[:-1], tmp_path / "far.json", "--rate", "max"]

@@ -1,4 +1,4 @@
-"""What gait-trackd says of frames past and of strides, on logs."""
+"""What gait-trackd states of frames past and of strides, on logs."""
 
 import lcm_rig as rig
 import numpy as np
@@ -51,7 +51,7 @@ def test_the_lag_changes_nothing_else(walk):
 
 
 @pytest.mark.parametrize("lag", [0, 5])
-def test_strides_of_the_drawn_walk_are_told(walk, lag):
+def test_strides_of_the_drawn_walk_are_reported(walk, lag):
     """One stride a second at 1.2 m/s, from phase 0.1: right strikes at 0.9 and 1.9 s, left ones at 0.4 ..."""
     strides = played(walk, "--lag", lag)[2]
     right, left = gaitmsg.stride_t.RIGHT, gaitmsg.stride_t.LEFT
@@ -66,8 +66,8 @@ def test_strides_of_the_drawn_walk_are_told(walk, lag):
         assert s.stride_length == pytest.approx(1.2, abs=0.12)
         assert s.speed == pytest.approx(s.stride_length / s.stride_time, rel=1e-5)
         assert 0 < s.stride_time_sd < 0.1 and 0 < s.stride_length_sd < 0.2
-        told = 1e6 * s.frame / rig.FPS
-        assert s.utime - begun <= told + 1 < s.utime - begun + 1e6 / rig.FPS + 1
+        reported = 1e6 * s.frame / rig.FPS
+        assert s.utime - begun <= reported + 1 < s.utime - begun + 1e6 / rig.FPS + 1
 
 
 def test_pauses_bridged_by_prediction_are_not_frames(tmp_path):
@@ -91,5 +91,5 @@ def test_lagged_estimates_can_be_recorded(walk, tmp_path):
     track = read_track(tmp_path / "t.csv")
     assert track.frame.tolist() == [m.frame for m in past]
     np.testing.assert_allclose(track.places["pelvis"], places(past)[:, 0], atol=1e-5)
-    nobody = rig.gait(*words[:-2], "--quiet")
-    assert nobody.returncode == 1 and "GAIT_ESTIMATE: no estimate" in nobody.stderr
+    none = rig.gait(*words[:-2], "--quiet")
+    assert none.returncode == 1 and "GAIT_ESTIMATE: no estimate" in none.stderr

@@ -19,14 +19,14 @@ from gait.lcm.messages import image_message, tracks_message
 from gait.track.tracker import Tracker
 
 FRAMES, SD = 16, 1.0
-SAID = re.compile(r"keypoint_messages (\d+) keypoints_used (\d+) keypoints_late (\d+)")
+PRINTED = re.compile(r"keypoint_messages (\d+) keypoints_used (\d+) keypoints_late (\d+)")
 
 
 @cache
 def found(frame: int) -> tuple[np.ndarray, np.ndarray]:
-    """What a detector says of a frame: pixels (P, 2) with gaps, and confidences."""
+    """What a detector states of a frame: pixels (P, 2) with gaps, and confidences."""
     rng = np.random.default_rng(frame)
-    uv = rig.CAMERA.project(rig.model().pose(rig.walker(frame))[0])
+    uv = rig.CAMERA.project(rig.model().pose(rig.person(frame))[0])
     uv = (uv + 0.3 * rng.normal(size=uv.shape)).astype(np.float32)
     uv[rng.random(len(uv)) < 0.15] = np.nan
     return uv, rng.uniform(0.3, 1.0, len(uv)).astype(np.float32)
@@ -47,9 +47,9 @@ def play(tmp_path: Path, events: list[rig.Event], *options: object) -> tuple[rig
     """Track a log with the term; also how many tracks came, were used and were late."""
     log = rig.write_log(tmp_path / "a.log", [*rig.opening(), *events])
     outcome = rig.play(log, "--keypoints-term", "--keypoints-sd", SD, *options)
-    said = SAID.search(outcome.printed)
-    assert said, outcome.printed
-    return outcome, tuple(int(n) for n in said.groups())
+    printed = PRINTED.search(outcome.printed)
+    assert printed, outcome.printed
+    return outcome, tuple(int(n) for n in printed.groups())
 
 
 def each(first: int = 0, stop: int = FRAMES) -> list[rig.Event]:
@@ -72,7 +72,7 @@ def by_python() -> str:
         TrackerConfig.default(particles=rig.PARTICLES, terms=terms),
         background=rig.plate(),
     )
-    tracker.start(rig.walker(0), rig.SD, rig.utime(0))
+    tracker.start(rig.person(0), rig.SD, rig.utime(0))
     for i in range(FRAMES):
         uv, confidence = found(i)
         sd = SD / confidence.astype(float)
@@ -81,8 +81,8 @@ def by_python() -> str:
 
 
 def test_joints_are_those_of_their_frame_whichever_comes_first(tmp_path: Path) -> None:
-    after, said = play(tmp_path, each())
-    assert said == (FRAMES, FRAMES, 0) and (after.frames, after.dropped) == (FRAMES, 0)
+    after, printed = play(tmp_path, each())
+    assert printed == (FRAMES, FRAMES, 0) and (after.frames, after.dropped) == (FRAMES, 0)
     assert [e.frame for e in after.estimates] == list(range(FRAMES))
     assert after.digest == by_python()
     before, _ = play(tmp_path, [event for i in range(FRAMES) for event in (tracks(i), image(i))])
@@ -92,8 +92,8 @@ def test_joints_are_those_of_their_frame_whichever_comes_first(tmp_path: Path) -
 
 def test_they_help_and_are_not_read_without_the_option(tmp_path: Path) -> None:
     log = rig.write_log(tmp_path / "b.log", [*rig.opening(), *each()])
-    plain, bare = rig.play(log), rig.play(rig.write_log(tmp_path / "c.log", [*rig.opening(), *frames()]))
-    assert plain.digest == bare.digest and "tracks" not in plain.printed
+    plain, without = rig.play(log), rig.play(rig.write_log(tmp_path / "c.log", [*rig.opening(), *frames()]))
+    assert plain.digest == without.digest and "tracks" not in plain.printed
     fog = np.full((rig.CAMERA.height, rig.CAMERA.width), 120, np.uint8)
     blank = [("GAIT_IMAGE_0", image_message(fog, rig.utime(i), i)) for i in range(FRAMES)]
     dark = [event for i in range(FRAMES) for event in (blank[i], tracks(i))]
@@ -109,7 +109,7 @@ def frames() -> list[rig.Event]:
 def error(outcome: rig.Outcome) -> float:
     """Mean distance of the joints in the second half, metres."""
     off = [
-        np.array([j.position for j in e.joints]) - rig.model().pose(rig.walker(e.frame))[0]
+        np.array([j.position for j in e.joints]) - rig.model().pose(rig.person(e.frame))[0]
         for e in outcome.estimates[FRAMES // 2 :]
     ]
     return float(np.linalg.norm(off, axis=2).mean())
@@ -124,8 +124,8 @@ def test_points_of_no_use_are_left_out_and_counted(tmp_path: Path) -> None:
             track.name, track.u, track.v, track.confidence = name, 5.0, 5.0, 0.9
             message.tracks.append(track)
         message.ntracks = len(message.tracks)
-    outcome, said = play(tmp_path, events)
-    assert outcome.digest == clean.digest and said == (FRAMES, FRAMES, 0)
+    outcome, printed = play(tmp_path, events)
+    assert outcome.digest == clean.digest and printed == (FRAMES, FRAMES, 0)
     assert f" keypoints_left_out {2 * FRAMES} " in outcome.printed
     assert outcome.words.count("'nose' is left out: the model does not know it") == 1
     assert outcome.words.count("names it twice") == 1
@@ -133,11 +133,11 @@ def test_points_of_no_use_are_left_out_and_counted(tmp_path: Path) -> None:
 
 def test_frames_do_not_wait_longer_than_for_the_next_one(tmp_path: Path) -> None:
     """Keypoints that come after that are counted and named, and change nothing."""
-    without, said = play(tmp_path, frames())
-    assert said == (0, 0, 0) and without.frames == FRAMES  # also the last one, when the log ends
+    without, printed = play(tmp_path, frames())
+    assert printed == (0, 0, 0) and without.frames == FRAMES  # also the last one, when the log ends
     late = [event for i in range(FRAMES) for event in ([image(i), tracks(i - 1)] if i else [image(0)])]
-    outcome, said = play(tmp_path, late)
-    assert said == (FRAMES - 1, 0, FRAMES - 1) and outcome.digest == without.digest
+    outcome, printed = play(tmp_path, late)
+    assert printed == (FRAMES - 1, 0, FRAMES - 1) and outcome.digest == without.digest
     assert outcome.words.count("keypoints arrived after their frame had been tracked") == 1
 
 
@@ -147,8 +147,8 @@ def test_a_clock_set_back_makes_no_later_tracks_late(tmp_path: Path) -> None:
     for _, message in back:
         message.utime -= 900_000
     again = ("GAIT_COMMAND", rig.start(1, at=0))
-    outcome, said = play(tmp_path, [*each(0, 4), *back[:4], again, *back[4:]], "--max-gap", 0.5)
-    assert said == (4 + FRAMES, 2 + FRAMES, 1) and outcome.frames == 2 + FRAMES
+    outcome, printed = play(tmp_path, [*each(0, 4), *back[:4], again, *back[4:]], "--max-gap", 0.5)
+    assert printed == (4 + FRAMES, 2 + FRAMES, 1) and outcome.frames == 2 + FRAMES
     assert outcome.words.count("capture time went back by") == 1
 
 
@@ -160,11 +160,11 @@ def test_memory_holds_the_largest_frame_and_does_not_grow(tmp_path: Path) -> Non
     plain = rig.play(rig.write_log(tmp_path / "b.log", [*rig.opening(), *frames()]))
     without = int(plain.printed.split("memory_bytes ")[1].split()[0])
     assert size[0] == size[1] and size[0] - without >= 3 * rig.CAMERA.width * rig.CAMERA.height
-    wide = image_message(rig.picture(2), rig.utime(2), 2)
-    wide.data += bytes(1 << 17)  # more than there is room for: tracked at once, its joints are late
-    wide.size = len(wide.data)
-    outcome, said = play(tmp_path, [*each(0, 2), ("GAIT_IMAGE_0", wide), tracks(2), *each(3)])
-    assert outcome.frames == FRAMES and said == (FRAMES, FRAMES - 1, 1)
+    broad = image_message(rig.picture(2), rig.utime(2), 2)
+    broad.data += bytes(1 << 17)  # more than there is space for: tracked at once, its joints are late
+    broad.size = len(broad.data)
+    outcome, printed = play(tmp_path, [*each(0, 2), ("GAIT_IMAGE_0", broad), tracks(2), *each(3)])
+    assert outcome.frames == FRAMES and printed == (FRAMES, FRAMES - 1, 1)
 
 
 @pytest.mark.parametrize(
@@ -176,7 +176,7 @@ def test_memory_holds_the_largest_frame_and_does_not_grow(tmp_path: Path) -> Non
     ],
     ids=["cut", "other", "strangers"],
 )
-def test_tracks_that_tell_nothing_are_named(tmp_path: Path, event: rig.Event, words: str) -> None:
-    outcome, said = play(tmp_path, [*each(0, 5), image(5), event, *each(6)])
+def test_keypoints_without_use_are_named(tmp_path: Path, event: rig.Event, words: str) -> None:
+    outcome, printed = play(tmp_path, [*each(0, 5), image(5), event, *each(6)])
     assert words in outcome.words
-    assert outcome.frames == FRAMES and said[1] == FRAMES - 1
+    assert outcome.frames == FRAMES and printed[1] == FRAMES - 1

@@ -25,7 +25,7 @@ from gait.lcm.messages import (
     state_of,
 )
 
-# A published type is frozen: whoever must change one makes another (estimate2_t) and leaves this line alone.
+# A published type is frozen: to change one, make another (estimate2_t) and leave this line alone.
 FINGERPRINTS = {
     "angle_t": "70ec7fc36619a1e2",
     "camera_t": "be86d3ea284d3ddd",
@@ -49,15 +49,15 @@ def test_published_types_are_frozen(name):
 
 
 def test_help_needs_no_generated_types():
-    """In a fresh clone commands explain themselves, and say in one line what is missing when they are run."""
+    """In a fresh clone commands explain themselves, and name in one line what is missing when run."""
     code = """if True:
         import contextlib, io, pathlib, gait.lcm.link as types
         from gait.cli import main
         types._PLACES = (pathlib.Path("nowhere"),)
         for name in ("capture", "record", "view", "report", "demo"):
-            with contextlib.suppress(SystemExit), contextlib.redirect_stdout(io.StringIO()) as said:
+            with contextlib.suppress(SystemExit), contextlib.redirect_stdout(io.StringIO()) as printed:
                 main([name, "--help"])
-            assert f"usage: gait {name}" in said.getvalue()
+            assert f"usage: gait {name}" in printed.getvalue()
         raise SystemExit(main(["record", "-o", "out.csv"]))
     """
     done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True)
@@ -172,7 +172,7 @@ def test_estimates_of_the_daemon_are_those_of_the_library(tmp_path):
     outcome = rig.play(rig.write_log(tmp_path / "a.log", [*rig.opening(), *rig.frames(0, 6)]))
     config = TrackerConfig.default(particles=rig.PARTICLES)
     tracker = Tracker(rig.model(), rig.CAMERA, config, background=rig.plate())
-    tracker.start(rig.walker(0), rig.SD, rig.utime(0))
+    tracker.start(rig.person(0), rig.SD, rig.utime(0))
     for i, message in enumerate(outcome.estimates):
         ours, theirs = estimate_of(message), tracker.step(rig.picture(i), rig.utime(i))
         assert message.tracker_digest & (1 << 64) - 1 == tracker.digest()

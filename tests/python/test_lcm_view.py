@@ -66,8 +66,8 @@ def test_damaged_messages_are_passed_over(log, tmp_path):
 def test_without_a_camera_nothing_is_drawn(log, tmp_path):
     path, estimates = log
     events = [rig.frames(0, 1)[0], ("GAIT_ESTIMATE", estimates[0])]
-    bare = rig.write_log(tmp_path / "bare.log", events)
-    assert view(bare) == [] and len(view(bare, rig.CAMERA)) == 1
+    plain = rig.write_log(tmp_path / "plain.log", events)
+    assert view(plain) == [] and len(view(plain, rig.CAMERA)) == 1
 
 
 def test_save_writes_one_picture(log, tmp_path):
@@ -77,7 +77,7 @@ def test_save_writes_one_picture(log, tmp_path):
     np.testing.assert_array_equal(cv2.imread(str(png)), view(log[0])[0])
 
 
-def test_save_says_when_nothing_came(tmp_path):
+def test_save_reports_when_nothing_came(tmp_path):
     empty = rig.write_log(tmp_path / "empty.log", [("OTHER", b"x")])
     done = rig.gait("view", "--url", f"file://{empty}?speed=0", "--save", tmp_path / "v.png", "--quiet")
     assert done.returncode == 1 and "no estimate" in done.stderr and done.stderr.count("\n") == 1
@@ -96,8 +96,8 @@ def test_browsers_get_the_page_and_the_moving_picture():
                 head = [stream.readline() for _ in range(4)]
                 jpeg = stream.read(int(head[2].split(b":")[1]))
                 assert stream.readline() == b"\r\n" and head[0] == b"--gait-frame\r\n"
-                seen = cv2.imdecode(np.frombuffer(jpeg, np.uint8), cv2.IMREAD_COLOR)
-                assert np.abs(seen.astype(int) - image).mean() < 12
+                viewed = cv2.imdecode(np.frombuffer(jpeg, np.uint8), cv2.IMREAD_COLOR)
+                assert np.abs(viewed.astype(int) - image).mean() < 12
                 screen.show(second)
         with urllib.request.urlopen(f"{screen.address}frame.jpg", timeout=rig.PATIENCE) as frame:
             assert frame.headers["Content-Type"] == "image/jpeg" and frame.read()[:2] == b"\xff\xd8"

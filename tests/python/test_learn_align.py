@@ -26,7 +26,7 @@ def test_offsets_are_found_below_a_frame(start):
 
 
 def spoil(monkeypatch, passes, wrong):
-    """After so many passes over 8 walkers put all offsets wrong by so many frames, in turn up and down."""
+    """After so many passes over 8 people put all offsets wrong by so many frames, in turn up and down."""
     calls, best_offset = [], align._Sequence.best_offset
 
     def spoiled(sequence, table, weights, now):
@@ -94,9 +94,9 @@ def test_the_hips_gauge_is_a_cosine_of_right_minus_left():
     curve = align.common_curve(signals, periods, found.offsets)
     first = np.fft.fft(curve[:, HIPS[0]] - curve[:, HIPS[1]])[1]
     assert abs(np.angle(first)) / (2 * np.pi) < 2e-3
-    wide = np.zeros((len(curve), 24))
-    wide[:, align.HIPS] = np.roll(curve[:, HIPS], 100, axis=0)
-    assert align.hip_phase(wide) == pytest.approx(100 / len(curve), abs=2e-3)
+    broad = np.zeros((len(curve), 24))
+    broad[:, align.HIPS] = np.roll(curve[:, HIPS], 100, axis=0)
+    assert align.hip_phase(broad) == pytest.approx(100 / len(curve), abs=2e-3)
 
 
 def test_sequences_without_whole_angles_are_aligned_by_the_others():

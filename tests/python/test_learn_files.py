@@ -45,8 +45,8 @@ def trc(folder, frames):
 
 
 def joint_table(folder, frames):
-    walker = from_bones(acclaim.read(files.write_toy(folder, frames=10)))
-    path = write_csv(folder / "a.csv", walker)
+    person = from_bones(acclaim.read(files.write_toy(folder, frames=10)))
+    path = write_csv(folder / "a.csv", person)
     path.write_text("\n".join(path.read_text().splitlines()[: 1 + frames]) + "\n")
     return path
 
@@ -188,16 +188,16 @@ RATE = 120
 
 
 @pytest.fixture(scope="module")
-def walker(tmp_path_factory):
+def person(tmp_path_factory):
     return body.from_bones(acclaim.read(files.write_toy(tmp_path_factory.mktemp("toy"), frames=480)))
 
 
-def write(path, walker, share, seed=0, every=1, unseen=()):
+def write(path, person, share, seed=0, every=1, unseen=()):
     """Joint positions with a share of the cells empty, of every `every`-th frame, without the unseen."""
     rng = np.random.default_rng(seed)
     rows = [",".join(["time", *(f"{name}_{axis}" for name in tables.JOINTS for axis in "xyz")])]
-    for t in sorted(set(range(0, walker.frames, every)) - set(unseen)):
-        numbers = np.concatenate([walker.joints[name][t] for name in tables.JOINTS])
+    for t in sorted(set(range(0, person.frames, every)) - set(unseen)):
+        numbers = np.concatenate([person.joints[name][t] for name in tables.JOINTS])
         cells = [f"{v:.5f}" if rng.random() >= share else "" for v in numbers]
         rows.append(",".join([f"{t / RATE:.6f}", *cells]))
     path.write_text("\n".join(rows) + "\n")
@@ -209,13 +209,13 @@ def sliced(found):
 
 
 @pytest.mark.parametrize("every", [1, 4])
-def test_a_tenth_of_the_cells_costs_hardly_a_cycle(walker, tmp_path, every):
-    rows = sliced(sequence.load(write(tmp_path / "a_1.csv", walker, 0.1, every=every)))
+def test_a_tenth_of_the_cells_costs_hardly_a_cycle(person, tmp_path, every):
+    rows = sliced(sequence.load(write(tmp_path / "a_1.csv", person, 0.1, every=every)))
     assert len(rows.values) >= 3 and rows.mask.mean() > 0.85
 
 
-def test_angles_of_bridged_positions_are_those_of_all(walker, tmp_path):
-    whole, part = (joints.from_table(write(tmp_path / "a.csv", walker, share)) for share in (0, 0.1))
+def test_angles_of_bridged_positions_are_those_of_all(person, tmp_path):
+    whole, part = (joints.from_table(write(tmp_path / "a.csv", person, share)) for share in (0, 0.1))
     measures = retarget.measure(whole)
     error = np.degrees(retarget.angles(part, measures) - retarget.angles(whole, measures))
     assert np.isfinite(error).mean() > 0.98
@@ -232,10 +232,10 @@ def test_long_gaps_and_ends_stay_missing():
     assert np.nanmax(np.abs(result - places)) < 3e-3
 
 
-def test_a_recording_of_which_too_little_is_seen_is_refused(walker, tmp_path):
+def test_a_recording_with_too_few_observations_is_refused(person, tmp_path):
     unseen = [t for t in range(1, 479) if t % 40 > 12]
     with pytest.raises(UserError, match=r"a_1.csv: .*too little of each cycle"):
-        sequence.load(write(tmp_path / "a_1.csv", walker, 0, unseen=unseen), LearnOptions(activity="dance"))
+        sequence.load(write(tmp_path / "a_1.csv", person, 0, unseen=unseen), LearnOptions(activity="dance"))
 
 
 @pytest.mark.parametrize("missing", [0.0, 0.5, 0.58, 0.65, 0.9])

@@ -142,7 +142,7 @@ def test_the_forkserver_starts_before_what_is_slow_to_import(jobs, large, starts
     assert run.stdout == starts * "False\n" and run.stderr.startswith("gait learn: x.asf: no such file")
 
 
-@pytest.mark.skipif(not Path("/proc/self/status").is_file(), reason="signals held back are told elsewhere")
+@pytest.mark.skipif(not Path("/proc/self/status").is_file(), reason="blocked signals are listed elsewhere")
 def test_the_server_that_imports_does_not_hear_an_interruption():
     """From a terminal it reaches the whole group; the command ends its server itself."""
     status = "print(open(f'/proc/{forkserver._forkserver._forkserver_pid}/status').read())"

@@ -167,7 +167,7 @@ def turned(person, turn):
     return replace(person, joints={name: place @ turn.T for name, place in person.joints.items()})
 
 
-def test_y_up_is_seen(person, tmp_path):
+def test_y_up_is_recognised(person, tmp_path):
     found = joints.from_table(write_csv(tmp_path / "a.csv", turned(person, Y_UP.T)))
     assert found.joints["r_knee"] == pytest.approx(person.joints["r_knee"], abs=1e-4)
 
@@ -196,7 +196,7 @@ def test_the_joint_that_is_off_the_body_is_named(person, joint, by):
 
 
 @pytest.mark.parametrize("by", [3, 20, 900])
-def test_it_is_told_with_its_line_before_the_axis_that_is_up(person, tmp_path, by):
+def test_it_is_reported_with_its_line_before_the_axis_that_is_up(person, tmp_path, by):
     path = write_csv(tmp_path / "a.csv", moved(person, "head", (by, 0, 0)))
     lines = path.read_text().splitlines(keepends=True)
     path.write_text("".join(lines[:21] + lines[26:]))  # five rows are left out

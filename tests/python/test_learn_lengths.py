@@ -45,11 +45,11 @@ def body(stature=1.7, shoulder=(0, 0, 0), **factor):
     )
 
 
-def people(count, rng, spread):
-    """Bodies whose groups' factors less 1, and shoulders, are scores @ spread, (k, 7 or 10)."""
-    changes = rng.normal(size=(count, len(spread))) @ spread
+def people(count, rng, sd):
+    """Bodies whose groups' factors less 1, and shoulders, are scores @ sd, (k, 7 or 10)."""
+    changes = rng.normal(size=(count, len(sd))) @ sd
     changes -= changes.mean(axis=0)
-    changes = np.pad(changes, ((0, 0), (0, lengths.CHANGES - len(spread[0]))))
+    changes = np.pad(changes, ((0, 0), (0, lengths.CHANGES - len(sd[0]))))
     groups, shoulders = np.split(changes, [len(lengths.GROUPS)], axis=1)
     return [
         body(rng.uniform(1.5, 1.9), shoulder, **dict(zip(lengths.GROUPS, 1 + f, strict=True)))
@@ -124,7 +124,7 @@ def test_too_few_whole_bodies_give_no_components(count):
     assert table.shape == (0, len(FRAMES) + 1) and shift.shape == (0, len(FRAMES), 3)
 
 
-def test_bodies_not_seen_whole_are_left_out():
+def test_incomplete_bodies_are_left_out():
     whole = people(5, np.random.default_rng(4), 0.03 * np.eye(7))
     unseen = replace(body(thigh=1.4), forearm=np.full(2, np.nan))
     pairs = zip(

@@ -133,11 +133,11 @@ def test_static_offset_is_what_others_do_not_explain():
     subject = np.repeat(np.arange(number), 3)
     base = smooth(rng, 1)
     rows = base + people.mirrored(base) + offset[subject][:, None]
-    spread = people.static_sd(rows, subject, 1, PLAIN)
-    assert spread[knee] == pytest.approx(0.3 / np.sqrt(number), rel=0.1)
+    uncertainty = people.static_sd(rows, subject, 1, PLAIN)
+    assert uncertainty[knee] == pytest.approx(0.3 / np.sqrt(number), rel=0.1)
     # others' learners see that person, whose image has the other knee; nothing else was ever different
     knees = [CHANNELS.index(f"{s}_knee_flexion") for s in "lr"]
-    assert np.delete(spread, knees).max() < 0.01
+    assert np.delete(uncertainty, knees).max() < 0.01
     shifted = rows + 0.3 * (rng.normal(size=number)[subject] > 0)[:, None, None] * (np.arange(30) == 0)
     assert people.static_sd(shifted, subject, 4, PLAIN)[0] < 1e-6
 
@@ -349,7 +349,7 @@ def test_a_model_whose_rates_do_not_vary_has_no_use_for_a_slope():
 
 
 def unseen_people(rng, unusual):
-    """Cycles (8, 16, 3) of four people; the last never shows channel 2, which was filled `odd` away."""
+    """Cycles (8, 16, 3) of four people; the last never shows channel 2, which was filled `outlier` away."""
     subject = np.repeat(np.arange(4), 2)
     cycles = rng.normal(size=(8, 16, 3))
     cycles[6:, :, 2] = unusual * np.cos(np.arange(16))

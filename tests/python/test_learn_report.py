@@ -103,7 +103,7 @@ def test_the_page_holds_everything_and_needs_nothing(walks, tmp_path, capsys):
     assert all(row["left_out_mm"] > row["learnt_from_mm"] > 0 for row in summary["by_subject"])
 
 
-def test_the_table_says_what_was_cut_and_why_a_sequence_was_taken(learned):
+def test_the_table_shows_what_was_cut_and_why_a_sequence_was_taken(learned):
     first = replace(learned.sequences[0], kept=(120, 400), cut=("it stands <still>", ""))
     unusual = replace(learned, sequences=[first, *learned.sequences[1:]])
     page = Page(pages._sequences(unusual))
@@ -133,7 +133,7 @@ def test_alignment_brings_the_curves_together(learned):
     figure = figures.alignment(learned)
     before, after = figure.axes[:2]
 
-    def spread(axes):
+    def sd(axes):
         """Mean distance of the drawn curves from the drawn mean."""
         x, mean = axes.lines[-1].get_data()
         parts = [
@@ -142,7 +142,7 @@ def test_alignment_brings_the_curves_together(learned):
         return np.nanmean(np.abs(np.concatenate(parts)))
 
     assert len(before.lines) == len(learned.sequences) + 1
-    assert spread(after) < 0.4 * spread(before)
+    assert sd(after) < 0.4 * sd(before)
 
 
 def test_a_strip_shows_the_person_plus_and_minus_two_sd(learned):

@@ -134,7 +134,7 @@ def test_root_channels_of_a_known_walk(heading):
     assert found[60:-60, 5] == pytest.approx(channels[60:-60, column("root_yaw")], abs=0.02)
 
 
-def test_a_pelvis_that_is_not_seen_has_no_heading():
+def test_a_missing_pelvis_has_no_heading():
     person = body_of(walk_channels()[0])
     measures = retarget.measure(person)
     person.joints["pelvis"] = np.full_like(person.joints["pelvis"], np.nan)

@@ -203,7 +203,7 @@ def parts(**runs):
     return found
 
 
-def test_zeros_long_enough_and_together_are_told():
+def test_zeros_long_enough_and_together_are_reported():
     some = slice(10, 15)
     assert recording.zero_run(parts(a=some, b=some, c=some), 3) == "a in frames 11 to 15"
     assert recording.zero_run(parts(x=[], b=slice(3, 15), c=slice(8, 40)), 2) == "b in frames 9 to 15"
@@ -265,7 +265,7 @@ def test_zeros_are_hinted_at_once(amc, tmp_path, capsys):
     assert not printed(capsys, *words, "--quiet")
 
 
-def test_labels_of_no_marker_and_a_mapping_without_markers_are_told(amc, tmp_path, capsys):
+def test_labels_of_no_marker_and_a_mapping_without_markers_are_reported(amc, tmp_path, capsys):
     for k in (1, 2):
         points, _ = mw.person(mw.FULL, frames=400, seed=k)
         write_c3d(tmp_path / f"{k}_1.c3d", mw.FULL, points)

@@ -68,8 +68,8 @@ def test_lengths_of_both_recordings_are_nearer_to_the_truth_than_those_of_either
     truth = mw.own_lengths(np.random.default_rng(2))
     found = [reported(points) for points in twice]
 
-    def error(stretch):
-        return float(np.sqrt(np.mean((stretch - truth)[LIMBS] ** 2)))
+    def error(scales):
+        return float(np.sqrt(np.mean((scales - truth)[LIMBS] ** 2)))
 
     assert error(pooled(*found)) < 0.7 * min(error(pooled(one)) for one in found)
 
@@ -96,9 +96,9 @@ def test_what_adds_up_is_the_optimum_of_a_joint_fit(monkeypatch):
 
 
 def test_lengths_that_are_held_stay(twice):
-    stretch = mw.own_lengths(np.random.default_rng(2))
-    body = markers.from_markers(FILE, mw.FULL, twice[0], 120.0, log_scales=stretch)
-    knee = kinematics.segment_origins(stretch)[SEGMENTS.index("l_shank")]
+    scales = mw.own_lengths(np.random.default_rng(2))
+    body = markers.from_markers(FILE, mw.FULL, twice[0], 120.0, log_scales=scales)
+    knee = kinematics.segment_origins(scales)[SEGMENTS.index("l_shank")]
     assert retarget.measure(body).thigh == pytest.approx(np.linalg.norm(knee), rel=1e-9)
     assert 0.002 < body.residual < 0.006
 
@@ -169,7 +169,7 @@ def test_a_recording_that_shows_nothing_does_not_count():
     assert share({"a.c3d": body(1.7), "b.c3d": None}) == ([None, None], [])
 
 
-def test_a_stranger_is_told_and_measured_apart():
+def test_a_stranger_is_reported_and_measured_apart():
     files = {"a.c3d": body(1.6), "b.c3d": body(1.8), "c.c3d": body(1.8, 0.001)}
     found, (line,) = share(files)
     assert [f.recordings if f else None for f in found] == [None, 2, 2]
@@ -256,7 +256,7 @@ def test_a_walk_and_a_run_of_one_person_share_their_lengths():
     assert 1.7 < np.exp(bodies[0].log_scales[0]) < 1.9
 
 
-def test_real_strangers_in_one_folder_are_told():
+def test_real_strangers_in_one_folder_are_reported():
     names = ("FunctionalWalk", "PlugInC3D", "ADemo1_rewrite_c3d_pc_float")
     files = [(real(f"c3d/{name}.c3d"), True) for name in names]
     lines = []

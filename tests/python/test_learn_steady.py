@@ -190,7 +190,7 @@ def log_scales(o, place=True, yaw=True):
 
 @pytest.mark.parametrize("strides", [2, 4, 8])
 @pytest.mark.parametrize("stand", [0.0, 1.0, 3.0])
-def test_the_steady_stretch_is_kept(strides, stand):
+def test_the_steady_interval_is_kept(strides, stand):
     o = g.outing(np.random.default_rng(1), TRIM_FPS, PERIOD, strides, stand=stand, stop=stand)
     kept, found = log_scales(o)
     assert abs(kept.start - o.begin) < PERIOD / 3 and abs(kept.stop - o.end) < PERIOD / 3
@@ -374,7 +374,7 @@ def test_who_limps_takes_turns_though_the_legs_are_not_alike(lag):
     assert judge(angles).accepted
 
 
-def test_legs_that_are_not_seen_show_nothing():
+def test_missing_legs_show_nothing():
     angles = gait()
     angles[:, [ANGLES.index(f"l_{name}") for name in ("hip_flexion", "knee_flexion")]] = np.nan
     assert np.isnan(verdict.legs(angles, VERDICT_PERIOD))
@@ -402,7 +402,7 @@ def test_repeats_is_the_share_that_noise_leaves():
     assert verdict.repeats(noisy, VERDICT_PERIOD) == pytest.approx(expected, abs=0.02)
 
 
-def test_feet_that_are_not_seen_do_not_count():
+def test_missing_feet_do_not_count():
     visible = feet(0.65, -0.01)
     gone = verdict.Feet(visible.ankle * np.nan, visible.ball, visible.pelvis, visible.apart)
     assert verdict.footing(gone, VERDICT_PERIOD) is None

@@ -1,4 +1,4 @@
-"""What a clip gets wrong from end to end: the estimate moves as foretold, intervals hold what they say."""
+"""Errors of a clip from end to end: the estimate moves as predicted, intervals cover the stated share."""
 
 import sys
 from dataclasses import replace
@@ -21,7 +21,7 @@ import lift_sticks
 from test_lift_video import walk
 
 ROUNDS = 6
-SMALL = 0.05  # deviations
+SMALL = 0.05  # standard deviations
 LEAST = 0.03  # metres
 
 
@@ -52,8 +52,8 @@ def chain():
     return energies, link, settled(energies, link, np.array(states))
 
 
-def seen_elsewhere(energy, state, error):
-    """The same values read where the figure with an error (in deviations) would give them."""
+def shown_elsewhere(energy, state, error):
+    """The same values read where the figure with an error (in sd) would give them."""
     reading = energy.reading
     places, _ = energy.shape.positions(state, energy.weights, energy.sticks.markers)
     uv, _ = energy.view.project(places)
@@ -78,7 +78,7 @@ def test_an_error_moves_the_estimate_as_foretold(chain, which):
     moves = descent.moves(energies, information(energies, link, states), states, np.zeros(2))
     error = np.zeros(3)
     error[which] = SMALL
-    wrong = [seen_elsewhere(e, s, error) for e, s in zip(energies, states, strict=True)]
+    wrong = [shown_elsewhere(e, s, error) for e, s in zip(energies, states, strict=True)]
     moved = markers(energies, settled(wrong, link, states)) - markers(energies, states)
     foretold = markers(energies, states + SMALL * moves[..., which]) - markers(energies, states)
     assert np.linalg.norm(foretold, axis=-1).mean() > 0.5 * SMALL * LEAST
@@ -105,7 +105,7 @@ def test_a_drift_is_a_shift_of_each_segment_by_how_far_it_drifted(chain):
         assert (first + second)[..., 3 + axis] == pytest.approx(alike, abs=1e-9)
 
 
-def test_likeness_is_the_share_of_the_sensors_that_the_figure_explains(chain):
+def test_fit_correlation_is_the_share_of_the_sensors_that_the_figure_explains(chain):
     energies, _, states = chain
     assert fit_clip.fit_correlation(energies, states) > 0.99
     rng, found = np.random.default_rng(0), []
@@ -126,7 +126,7 @@ def test_a_figure_that_explains_little_may_have_drifted():
 
 
 def stranger(seed):
-    """Somebody of a normative gait, whom the prior does not know."""
+    """A person of a normative gait, unknown to the prior."""
     stage = set_stage(Scenario(frames=24, fps=20.0, seed=seed))
     points = stage.walk.points(stage.frames)
     joints = np.stack([points[name] for name in JOINTS], axis=1)
@@ -134,13 +134,13 @@ def stranger(seed):
     return lift_sticks.Walk(list(JOINTS), joints, 20.0, heading, stage.body.stature)
 
 
-def test_intervals_hold_what_they_say(monkeypatch):
-    """Sticks of strangers from ahead to the side; deviations are neither thrice too small nor too large."""
+def test_intervals_cover_the_stated_share(monkeypatch):
+    """Sticks of strangers from ahead to the side; sd are neither thrice too small nor too large."""
     prior, squares, held = SegmentPrior.load(), [], []
     for angle, seed in ((15, 201), (45, 202), (90, 203)):
-        walker = stranger(seed)
-        clip = lift_sticks.stick_clip(prior, walker, np.radians(angle), seed)
-        truth = walker.joints[:, [JOINTS.index(name) for name in EVAL15]]
+        person = stranger(seed)
+        clip = lift_sticks.stick_clip(prior, person, np.radians(angle), seed)
+        truth = person.joints[:, [JOINTS.index(name) for name in EVAL15]]
         fit, markers = fit_clip.fit_clip(clip), prior.index(EVAL15)
         held.append(lift_clicks.score(clip, fit, truth, EVAL15).coverage)
         squares.append(np.mean(((fit.places[:, markers] - truth) / fit.sd[:, markers]) ** 2))

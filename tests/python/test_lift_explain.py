@@ -21,7 +21,7 @@ SAME = {"rtol": 1e-6, "atol": 1e-6}
 
 
 def gaussian(prior, **changes):
-    """The prior where the lifter expects somebody without a camera."""
+    """The prior where the lifter expects a person without a camera."""
     return reference.place(prior, height_sd=explain.ANY_HEIGHT, **changes)
 
 
@@ -67,7 +67,7 @@ def test_a_heading_is_found_as_by_the_numpy_search(heading):
     assert np.median(np.linalg.norm(found.places - truth, axis=2)) < 0.05
 
 
-def test_somebody_far_away_is_not_drawn_to_the_origin():
+def test_a_person_far_away_is_not_drawn_to_the_origin():
     prior, rng = toy_prior(6, 15, 6, seed=3), np.random.default_rng(4)
     camera = Camera.looking((0.0, -7.0, 2.6), (0.0, 40.0, 0.9), (640, 480), 1400.0)
     truth = reference.place(prior, heading=0.4, at=(3.0, 60.0), ground_sd=0, height_sd=0).draw(rng)
@@ -77,10 +77,10 @@ def test_somebody_far_away_is_not_drawn_to_the_origin():
     assert abs((found.places - truth).mean(axis=(0, 1))[1]) < 0.5
 
 
-def test_headings_that_look_alike_share_the_probability_and_the_course_decides():
+def test_similar_headings_share_the_probability_and_the_course_decides():
     """From the side, without perspective, forth and back is one picture of a body that is flat."""
     prior = toy_prior(4, 12, 4, seed=6)
-    flat = np.array([1.0, 0, 1])  # all in the plane of x and z: y and -y cannot be told apart
+    flat = np.array([1.0, 0, 1])  # all in the plane of x and z: y and -y cannot be distinguished
     prior.mean[...] *= flat
     prior.modes[...] *= flat
     truth = reference.place(prior, heading=0.6, ground_sd=0, height_sd=0).draw(
@@ -103,7 +103,7 @@ def test_wrong_points_are_weighted_down():
     assert heavy[2:4, 5].all() and heavy.sum() < 6
 
 
-def test_next_to_nothing_seen_is_not_explained():
+def test_too_few_observations_are_not_explained():
     prior = toy_prior(6, 15, 6)
     observed = Observations(np.zeros((6, 15, 2)), np.full((6, 15), np.inf))
     assert SegmentLifter(prior, FAR, prior.stature, 0.0).explanations(observed) == []
@@ -115,9 +115,9 @@ def test_without_a_prior_modes_have_their_least_squares():
     lifter = SegmentLifter(prior, FAR, prior.stature, 0.0)
     best = lifter.explanations(observed)
     found = explain.without_prior(prior, FAR, prior.stature, 0.0, best)[0]
-    wide = gaussian(prior)
-    wide.modes[:4] *= 1e4
-    limit = reference.infer(wide, orthographic(observed, FAR.axes[:2]))
+    broad = gaussian(prior)
+    broad.modes[:4] *= 1e4
+    limit = reference.infer(broad, orthographic(observed, FAR.axes[:2]))
     np.testing.assert_allclose(found.places, limit.points, atol=1e-3)
     np.testing.assert_allclose(found.sd, limit.sd, rtol=0.01)
     assert (found.sd >= lifter.solve(best[0]).sd).all()
@@ -140,5 +140,5 @@ def test_what_segments_leave_is_the_median_and_depth_comes_first():
     left = explain.summarise(fits, FAR)
     assert left.log10_volume == fits[1].log10_volume
     assert left.along[0] >= 0.999 and left.rigid[0] >= 0.99 and (np.diff(left.sd) <= 0).all()
-    # a displacement of all markers by the ground's deviation is that many metres of each
+    # a displacement of all markers by the ground's standard deviation is that many metres of each
     assert left.sd[0] == pytest.approx(10, rel=0.01)

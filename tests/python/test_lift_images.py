@@ -168,9 +168,9 @@ def test_sensors_with_a_plate_are_blind_to_the_scene():
     plate[:, 155:165] = 120
     places = np.stack([np.linspace(60, 260, 21), np.full(21, 120.0)], axis=1)[None]
     assert line_film(plate=plate).read(np.array([0]), places).max() < 0.02
-    bare = np.full((240, 320), 60, np.uint8)
+    plain = np.full((240, 320), 60, np.uint8)
     assert (
-        line_film(plate=bare).read(np.array([0]), places).max()
+        line_film(plate=plain).read(np.array([0]), places).max()
         > 0.3 * line_film().read(np.array([0]), places).max()
     )
 
@@ -272,8 +272,8 @@ def test_place_is_a_slice_of_the_state():
     assert np.arange(10)[PLACE].tolist() == [4, 5, 6]
 
 
-def test_a_phase_tells_which_leg_is_ahead(tmp_path):
-    """Half a stride later left and right are exchanged; hardly known, it tells nothing."""
+def test_a_phase_shows_which_leg_is_ahead(tmp_path):
+    """Half a stride later left and right are swapped; hardly known, it shows nothing."""
     prior, cycle = SegmentPrior.load(), read_cyclic(None)
     path = tmp_path / "p.json"
 

@@ -1,4 +1,4 @@
-"""`gait lift` of what detectors and calibrations deliver: refused, or told in a line."""
+"""`gait lift` of what detectors and calibrations deliver: refused, or reported in a line."""
 
 from __future__ import annotations
 
@@ -58,17 +58,17 @@ def other_camera(**changes):
     return camera
 
 
-def test_a_calibration_of_another_size_is_told(folder, capsys):
-    told = "of the points lie outside the camera's 320x240 picture: is other.json the calibration"
+def test_a_calibration_of_another_size_is_reported(folder, capsys):
+    reported = "of the points lie outside the camera's 320x240 picture: is other.json the calibration"
     other_camera(width=320, height=240)
-    assert told in lift(capsys, "t.csv", "other.json")[1]
-    assert told not in lift(capsys, "t.csv", "other.json", "--quiet")[1]
+    assert reported in lift(capsys, "t.csv", "other.json")[1]
+    assert reported not in lift(capsys, "t.csv", "other.json", "--quiet")[1]
     other_camera(width=1920, height=1080)
     for camera in ("other.json", "cam.json"):
         assert "outside" not in lift(capsys, "t.csv", camera)[1]
 
 
-def test_the_share_outside_counts_points_that_are_seen():
+def test_the_share_outside_counts_visible_points():
     uv = np.array([[[0.0, 0], [639, 479], [640, 5], [np.nan, np.nan], [3, -1]]])
     keypoints = Keypoints(np.arange(1), np.zeros(1), tuple("abcde"), uv, np.ones((1, 5)))
     assert keypoints.outside(FRONT) == 0.5
@@ -84,29 +84,29 @@ def test_minus_one_is_refused_as_zero_is(folder, capsys):
 
 
 @pytest.mark.parametrize(
-    ("joints", "place", "told"), [(2, -1000.0, True), (1, -1000.0, False), (5, 300.0, True)]
+    ("joints", "place", "reported"), [(2, -1000.0, True), (1, -1000.0, False), (5, 300.0, True)]
 )
-def test_points_at_one_place_are_told(folder, capsys, joints, place, told):
+def test_points_at_one_place_are_reported(folder, capsys, joints, place, reported):
     uv = pixels()
     uv[5:20, :joints] = place, place
-    assert (shared_place(uv) is not None) == told
+    assert (shared_place(uv) is not None) == reported
     save("u.csv", uv)
     words = f"{15 * joints} points are at exactly {place:g}, {place:g}: if the detector"
-    assert (words in lift(capsys, "u.csv", "cam.json")[1]) == told
+    assert (words in lift(capsys, "u.csv", "cam.json")[1]) == reported
 
 
 def test_joints_may_meet():
-    """Whole pixels of somebody who stands, seen from the side: hips at one place, ankles lowest of all."""
+    """Whole pixels of a person who stands, seen from the side: hips at one place, ankles lowest of all."""
     uv = np.tile(
         np.array([[10.0, 0], [12, 40], [12, 40], [12, 40], [11, 65], [11, 90], [11, 90]]), (50, 1, 1)
     )
     assert shared_place(uv) is None
 
 
-def test_an_unusual_stature_is_told(folder, capsys, monkeypatch):
+def test_an_unusual_stature_is_reported(folder, capsys, monkeypatch):
     lifted = motion.lift
     usual = toy_prior(FRAMES, MARKERS, 4, seed=5).stature
-    for stature, options, told in (
+    for stature, options, reported in (
         (usual - 3 * motion.PEOPLE_SD, [], True),
         (usual + 2 * motion.PEOPLE_SD, [], False),
         (1.72 + 3 * motion.KNOWN_SD, ["--height", "1.72"], True),
@@ -116,7 +116,7 @@ def test_an_unusual_stature_is_told(folder, capsys, monkeypatch):
         believed = 1.72 if options else usual
         words = f"{stature:.2f} m tall, where {believed:.2f} was expected: check the camera's focal length"
         printed = lift(capsys, "t.csv", "cam.json", *options)[1]
-        assert (words in printed) == told and ("m tall" in printed) == told
+        assert (words in printed) == reported and ("m tall" in printed) == reported
 
 
 @pytest.mark.parametrize("factor", [100, 1000])
@@ -151,7 +151,7 @@ def test_too_few_frames_per_second_are_named(folder, capsys, blank):
 
 
 @pytest.mark.parametrize(("stop", "where"), [(20, "in frames 10 to 19"), (99, "at frame 10")])
-def test_a_change_of_person_is_told(folder, capsys, stop, where):
+def test_a_change_of_person_is_reported(folder, capsys, stop, where):
     uv = pixels()
     uv[10:stop, :, 0] += 250
     save("u.csv", uv)
@@ -159,10 +159,10 @@ def test_a_change_of_person_is_told(folder, capsys, stop, where):
     assert f"most points jump at once: the keypoints change to another person {where}; keep" in printed
 
 
-def test_wild_points_are_no_other_person(folder):
+def test_outliers_are_no_other_person(folder):
     uv, rng = pixels(), np.random.default_rng(2)
-    wild = rng.random(uv.shape[:2]) < 0.7
-    uv[wild] += rng.normal(size=uv.shape)[wild] * 100
+    outliers = rng.random(uv.shape[:2]) < 0.7
+    uv[outliers] += rng.normal(size=uv.shape)[outliers] * 100
     names = toy_prior(FRAMES, MARKERS, 4, seed=5).names
     keypoints = Keypoints(np.arange(30), np.arange(30) / 20, names, uv, np.ones(uv.shape[:2]))
     assert noise.person_changes(keypoints) == []
@@ -177,7 +177,7 @@ def test_a_picture_upside_down_names_v(folder, capsys):
     assert code == 1 or "that v points down" in printed
 
 
-def test_exchanged_sides_are_put_back_and_told(folder, capsys):
+def test_swapped_sides_are_put_back_and_reported(folder, capsys):
     names, uv = toy_prior(FRAMES, MARKERS, 4, seed=5).names, pixels()
     for joint in ("shoulder", "elbow"):
         pair = [names.index(f"{side}_{joint}") for side in "lr"]
@@ -195,24 +195,24 @@ def test_exchanged_sides_are_put_back_and_told(folder, capsys):
         assert code == 0 and "put back" not in printed
 
 
-def test_more_wrong_points_than_it_bears_are_told(folder, capsys):
+def test_more_outliers_than_it_bears_are_reported(folder, capsys):
     rng = np.random.default_rng(2)
-    told = "of the points seem wrong"
+    reported = "of the points seem wrong"
     for share in (0.05, 0.2):
         uv = pixels()
-        wild = rng.random(uv.shape[:2]) < share
-        uv[wild] += rng.normal(0, 60, (wild.sum(), 2))
-        save("wild.csv", uv)
-        _, printed = lift(capsys, "wild.csv", "cam.json", "--pixel-sd", "1")
-        assert (told in printed) == (share == 0.2)
+        outliers = rng.random(uv.shape[:2]) < share
+        uv[outliers] += rng.normal(0, 60, (outliers.sum(), 2))
+        save("outliers.csv", uv)
+        _, printed = lift(capsys, "outliers.csv", "cam.json", "--pixel-sd", "1")
+        assert (reported in printed) == (share == 0.2)
 
 
-def test_wild_points_are_no_noise(folder):
+def test_outliers_are_no_noise(folder):
     rng = np.random.default_rng(2)
     uv = pixels() + rng.normal(0, 2, pixels().shape)
-    wild = rng.random(uv.shape[:2]) < 0.15
-    uv[wild] += rng.normal(0, 60, (wild.sum(), 2))
-    save("wild.csv", uv)
-    keypoints = read("wild.csv", toy_prior(FRAMES, MARKERS, 4, seed=5).names)[0]
+    outliers = rng.random(uv.shape[:2]) < 0.15
+    uv[outliers] += rng.normal(0, 60, (outliers.sum(), 2))
+    save("outliers.csv", uv)
+    keypoints = read("outliers.csv", toy_prior(FRAMES, MARKERS, 4, seed=5).names)[0]
     assert noise.shake(keypoints) > 1.3 * PIXEL_SD
     assert lift_run.measured_noise(keypoints, print) == PIXEL_SD

@@ -1,4 +1,4 @@
-"""Points that jump are taken out of 2-D keypoints, quick motion is not; noise is told from motion."""
+"""Spikes are taken out of 2-D keypoints, quick motion is not; noise is distinguished from motion."""
 
 from dataclasses import replace
 
@@ -30,7 +30,7 @@ def test_quick_motion_stays(rate):
 
 
 @pytest.mark.parametrize("off", [(80, 0), (0, -150), (-1000, 1000)])
-def test_a_jump_is_taken_out_and_named(off):
+def test_a_spike_is_taken_out_and_named(off):
     keypoints = swinging(30)
     keypoints.uv[20, 1] += off
     kept, spikes = without_spikes(keypoints, 3.0)
@@ -38,7 +38,7 @@ def test_a_jump_is_taken_out_and_named(off):
     assert np.isnan(kept.uv[20, 1]).all() and kept.visible.sum() == keypoints.visible.sum() - 1
 
 
-def test_many_jumps_beside_gaps():
+def test_many_spikes_beside_gaps():
     keypoints = swinging(30)
     keypoints.uv[[5, 17, 18, 40], 0] = 0.0
     keypoints.uv[30:36, 1] = np.nan
@@ -52,8 +52,8 @@ def test_spikes_are_those_of_the_numpy_version(seed):
     rng = np.random.default_rng(seed)
     keypoints = swinging(30, frames=120)
     keypoints.uv[rng.random((120, 2)) < 0.1] = np.nan
-    wild = rng.random((120, 2)) < 0.08
-    keypoints.uv[wild] += rng.normal(0, 200, (wild.sum(), 2))
+    outliers = rng.random((120, 2)) < 0.08
+    keypoints.uv[outliers] += rng.normal(0, 200, (outliers.sum(), 2))
     keypoints.uv[[0, 1, 118, 119], 0] += (300, 0)
     sd = rng.uniform(2, 4, (120, 2))
     kept = remove_spikes(keypoints.time, keypoints.uv, sd)
@@ -79,14 +79,14 @@ def test_few_points_are_left_alone():
 
 
 @pytest.mark.parametrize("noise", [0.0, 4.0, 12.0])
-def test_noise_is_told_from_motion(noise):
+def test_noise_is_distinguished_from_motion(noise):
     """The keypoints have 3 px of their own."""
     keypoints = swinging(30, frames=300)
     more = noise * np.random.default_rng(7).standard_normal(keypoints.uv.shape)
     assert shake(replace(keypoints, uv=keypoints.uv + more)) == pytest.approx(np.hypot(3, noise), rel=0.12)
 
 
-def test_noise_is_not_told_of_slow_pictures_or_single_frames():
+def test_noise_is_not_measured_in_slow_pictures_or_single_frames():
     keypoints = swinging(10)
     assert np.isnan(shake(keypoints))
     gaps = keypoints.uv.copy()

@@ -93,15 +93,15 @@ def test_the_slope_of_the_volume_counts_the_modes_that_the_noise_leaves():
     depth = s < 1e-6 * s[0]  # displacement along y, which is never seen
     assert depth.sum() == 1
     step, volumes = 1e-4, []
-    few, all_seen = 1e4 * s[0], 1e-4 * s[~depth].min()
-    for sd in (all_seen, *np.geomspace(0.001, 10, 9), few):
+    few, all_shown = 1e4 * s[0], 1e-4 * s[~depth].min()
+    for sd in (all_shown, *np.geomspace(0.001, 10, 9), few):
         low, at, high = (infer(gaussian, measured(gaussian, sd * 10**x)[1]) for x in (-step, 0, step))
         assert at.log10_volume == pytest.approx(-0.5 * np.log10(1 + s**2 / sd**2).sum(), rel=1e-9, abs=1e-12)
         slope = (high.log10_volume - low.log10_volume) / (2 * step)
         assert at.resolved == pytest.approx(slope, abs=1e-5)
         assert at.resolved == pytest.approx(np.sum(s**2 / (s**2 + sd**2)), abs=1e-6)
         volumes += [low.log10_volume, at.log10_volume, high.log10_volume]
-        if sd in (few, all_seen):
+        if sd in (few, all_shown):
             assert at.resolved == pytest.approx((s > sd).sum(), abs=1e-5)
     assert (np.diff(volumes) > 0).all()
 
@@ -139,7 +139,7 @@ def test_posterior_covers_what_is_drawn_from_the_prior():
 
 
 def test_the_least_certain_mode_is_displacement_in_depth():
-    """F6: no orthographic view tells how far somebody is away."""
+    """F6: no orthographic view shows how far away the person is."""
     gaussian = place(toy_prior(5, 10, 12))
     _, rows = measured(gaussian)
     found = infer(gaussian, rows)
@@ -176,11 +176,11 @@ def test_likelihood_only_is_least_squares_of_minimum_norm():
     flat = replace(
         gaussian, modes=1e4 * basis.reshape(gaussian.modes.shape), residual=np.zeros_like(gaussian.residual)
     )
-    assert np.abs(infer(flat, rows).subspace - found).max() < 1e-4  # its limit for a prior without a say
+    assert np.abs(infer(flat, rows).subspace - found).max() < 1e-4  # its limit for a prior without influence
 
 
 @pytest.mark.parametrize("missing", [0.1, 0.3, 0.5])
-def test_missing_markers_cost_what_the_posterior_says(missing):
+def test_missing_markers_cost_what_the_posterior_states(missing):
     """F11: the error with rows dropped is that of the analytic covariance."""
     gaussian, rng = place(toy_prior(6, 10, 8), ground_sd=0.2), np.random.default_rng(8)
     errors, expected = [], []

@@ -275,7 +275,7 @@ def test_lifting_needs_four_frames():
 
 
 def lifted_by(monkeypatch, outcomes):
-    """Lift with a smoother whose attempts end as told, one by one: an error, or a misfit."""
+    """Lift with a smoother whose attempts end as set, one by one: an error, or chi2 per observation."""
     prior, pending = toy_prior(6, 4, 3), list(outcomes)
 
     def attempt(prior, keypoints, view, options, grid, update):
@@ -312,7 +312,7 @@ def test_what_no_width_mends_is_refused_as_the_learnt_one_is(monkeypatch):
         lifted_by(monkeypatch, [UserError("too little"), 1.0])
 
 
-def test_a_motion_estimated_by_its_segments_says_so(monkeypatch):
+def test_a_motion_estimated_by_its_segments_is_reported(monkeypatch):
     """Iterations, rest and stature are then those of the segments, not of the smoother that went astray."""
     found, _ = lifted_by(monkeypatch, [1.0])  # came to no rest
     assert found.alone and found.settled and found.steps == 0 and found.stature == 1.8
@@ -323,9 +323,9 @@ def test_restricted_prior_is_its_marginal(prior):
     part = prior.restricted(prior.names[1:3])
     assert part.mean.shape == (1, FRAMES, 2, 3)
     np.testing.assert_array_equal(part.modes, prior.modes[:, :, :, 1:3])
-    odd = replace(toy_prior(7, 4, 3))
-    assert odd.restricted(odd.names).frames == 6
-    assert Grid.over(np.array([0.0, 1.0]), odd.restricted(odd.names)).blocks == 7
+    uneven = replace(toy_prior(7, 4, 3))
+    assert uneven.restricted(uneven.names).frames == 6
+    assert Grid.over(np.array([0.0, 1.0]), uneven.restricted(uneven.names)).blocks == 7
 
 
 @pytest.mark.parametrize("method", motion.METHODS)
@@ -345,8 +345,8 @@ def test_without_a_camera_the_lowest_feet_are_on_the_floor(method):
 
 
 @pytest.mark.parametrize("method", motion.METHODS)
-def test_deviations_about_the_hips_are_those_of_differences(method):
-    """About the hips the common displacement, which a far view does not tell, drops out."""
+def test_sd_about_the_hips_are_those_of_differences(method):
+    """About the hips the common displacement, which a far view does not show, drops out."""
     prior = toy_prior(FRAMES, 12, 4, seed=5)
     time = np.arange(FRAMES * 2) / 20
     drift = np.arange(len(time))[:, None, None] * (prior.mean[0, 1] - prior.mean[0, 0])

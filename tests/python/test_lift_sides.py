@@ -1,4 +1,4 @@
-"""Left and right points that were exchanged for some frames are put back; others stay."""
+"""Left and right points that were swapped for some frames are put back; others stay."""
 
 from dataclasses import replace
 
@@ -37,8 +37,8 @@ def model(keypoints):
     return -0.5 * float(np.nansum(np.minimum(square, 50)))
 
 
-def exchanged(keypoints, first, last, left=LEFT, right=RIGHT):
-    """Keypoints with sides exchanged in rows `first` to `last`."""
+def swapped(keypoints, first, last, left=LEFT, right=RIGHT):
+    """Keypoints with sides swapped in rows `first` to `last`."""
     uv, confidence = keypoints.uv.copy(), keypoints.confidence.copy()
     for values in (uv, confidence):
         values[first : last + 1, left + right] = values[first : last + 1, right + left]
@@ -57,9 +57,9 @@ def test_what_is_right_stays(rate, gaps):
 
 @pytest.mark.parametrize("rate", [10, 30, 60])
 @pytest.mark.parametrize(("first", "last"), [(20, 20), (31, 36), (30, 50), (0, 9), (75, 89)])
-def test_exchanged_legs_are_put_back_and_named(rate, first, last):
+def test_swapped_legs_are_put_back_and_named(rate, first, last):
     keypoints = walking(rate)
-    back, found = undo_swaps(exchanged(keypoints, first, last), NOISE, model)
+    back, found = undo_swaps(swapped(keypoints, first, last), NOISE, model)
     assert [each.joint for each in found] == ["knee", "ankle"]
     for each in found:
         assert abs(each.spans[0][0] - 7 - first) <= 1 and abs(each.spans[-1][1] - 7 - last) <= 1
@@ -70,31 +70,31 @@ def test_exchanged_legs_are_put_back_and_named(rate, first, last):
 
 def test_one_joint_alone_and_gaps():
     keypoints = walking(gaps=0.15)
-    back, found = undo_swaps(exchanged(keypoints, 40, 55, [3], [4]), NOISE, model)
+    back, found = undo_swaps(swapped(keypoints, 40, 55, [3], [4]), NOISE, model)
     assert [each.joint for each in found] == ["ankle"]
     assert np.nanmax(np.linalg.norm(back.uv - keypoints.uv, axis=2)) < 20
 
 
-def test_several_stretches():
-    spoilt = exchanged(exchanged(walking(), 10, 14), 60, 70)
+def test_several_intervals():
+    spoilt = swapped(swapped(walking(), 10, 14), 60, 70)
     _, found = undo_swaps(spoilt, NOISE, model)
     assert [len(each.spans) for each in found] == [2, 2]
 
 
-def test_wild_points_do_not_hide_an_exchange():
+def test_outliers_do_not_hide_a_swap():
     keypoints, rng = walking(), np.random.default_rng(3)
-    wild = rng.random(keypoints.uv.shape[:2]) < 0.05
-    keypoints.uv[wild] += 150 * rng.normal(size=(wild.sum(), 2))
-    back, found = undo_swaps(exchanged(keypoints, 60, 80), NOISE, model)
+    outliers = rng.random(keypoints.uv.shape[:2]) < 0.05
+    keypoints.uv[outliers] += 150 * rng.normal(size=(outliers.sum(), 2))
+    back, found = undo_swaps(swapped(keypoints, 60, 80), NOISE, model)
     assert [each.joint for each in found] == ["knee", "ankle"]
     off = np.linalg.norm(back.uv - keypoints.uv, axis=2)
-    assert off[~wild].max() < 30
+    assert off[~outliers].max() < 30
     assert undo_swaps(keypoints, NOISE, model)[1] == []
 
 
 def test_the_motion_decides():
-    """What goes on better exchanged stays where the motion does not fit better for it."""
-    spoilt = exchanged(walking(), 30, 50)
+    """What goes on better swapped stays where the motion does not fit better for it."""
+    spoilt = swapped(walking(), 30, 50)
     back, found = undo_swaps(spoilt, NOISE, lambda keypoints: 0.0)
     assert found == []
     np.testing.assert_array_equal(back.uv, spoilt.uv)
@@ -103,7 +103,7 @@ def test_the_motion_decides():
 def test_what_fits_hardly_better_stays():
     """Each pair has to gain `CLEAR` nats: two here."""
     right = walking()
-    spoilt = exchanged(right, 30, 50)
+    spoilt = swapped(right, 30, 50)
     gain = model(right) - model(spoilt)
     for nats, put in ((0.7 * 2 * CLEAR, False), (1.5 * 2 * CLEAR, True)):
         _, found = undo_swaps(spoilt, NOISE, lambda keypoints, share=nats / gain: share * model(keypoints))
@@ -113,16 +113,16 @@ def test_what_fits_hardly_better_stays():
 @pytest.mark.parametrize("first", [40, 50])
 def test_more_than_few_frames_are_left_alone(first):
     """Which of the two is right is open then."""
-    spoilt = exchanged(walking(), first, 89)
+    spoilt = swapped(walking(), first, 89)
     back, found = undo_swaps(spoilt, NOISE, model)
     assert found == []
     np.testing.assert_array_equal(back.uv, spoilt.uv)
 
 
 def test_slow_pictures_and_few_frames_are_left_alone():
-    spoilt = exchanged(walking(8), 30, 40)
+    spoilt = swapped(walking(8), 30, 40)
     assert undo_swaps(spoilt, NOISE, model) == (spoilt, [])
-    few = exchanged(walking(), 1, 1)
+    few = swapped(walking(), 1, 1)
     few = replace(
         few,
         frame=few.frame[:2],
@@ -137,7 +137,7 @@ def test_slow_pictures_and_few_frames_are_left_alone():
     assert undo_swaps(never, NOISE, model)[1] == []
 
 
-def test_an_outlier_is_no_exchange():
+def test_an_outlier_is_no_swap():
     keypoints = walking()
     keypoints.uv[33, 3] += [150, -60]
     assert undo_swaps(keypoints, NOISE, model)[1] == []
@@ -151,21 +151,21 @@ def test_a_false_proposal_beside_a_true_one_falls_alone(monkeypatch, right, wron
     for first, last in (right, wrong):
         flags[first : last + 1] = True
     monkeypatch.setattr(swaps, "suspected", lambda *_: flags)
-    _, found = undo_swaps(exchanged(walking(), *right), NOISE, model)
+    _, found = undo_swaps(swapped(walking(), *right), NOISE, model)
     assert [each.spans for each in found] == [[(right[0] + 7, right[1] + 7)]] * 2
 
 
 def test_a_point_whose_partner_is_missing_goes_with_its_limb():
     keypoints = walking()
     keypoints.uv[45:48, 3] = np.nan
-    back, _ = undo_swaps(exchanged(keypoints, 40, 55), NOISE, model)
+    back, _ = undo_swaps(swapped(keypoints, 40, 55), NOISE, model)
     assert np.array_equal(back.visible, keypoints.visible)
 
 
-def test_a_stretch_is_judged_by_its_surroundings_without_wild_points():
+def test_an_interval_is_judged_by_its_surroundings_without_outliers():
     keypoints, parts = walking(), []
     keypoints.uv[33, 0] += 300
-    undo_swaps(exchanged(keypoints, 30, 40), NOISE, lambda part: parts.append(part) or model(part))
+    undo_swaps(swapped(keypoints, 30, 40), NOISE, lambda part: parts.append(part) or model(part))
     assert parts
     for part in parts:
         assert part.frame[0] == 7 and abs(int(part.frame[-1]) - (40 + 30 + 7)) <= 1  # a second more

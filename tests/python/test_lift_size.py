@@ -1,4 +1,4 @@
-"""Size and depth: not drawn to the lens by what is fitted, and by the bones where the fit has no say."""
+"""Size and depth: not drawn to the lens by the fit, and by the bones where the fit has no influence."""
 
 from __future__ import annotations
 
@@ -86,7 +86,7 @@ def test_exact_pixels_of_the_prior_are_lifted_to_their_depth(walk, monkeypatch, 
     assert abs(np.mean(off)) < 1.25
 
 
-def test_noise_of_any_size_leaves_a_walker_at_their_distance(walk):
+def test_noise_of_any_size_leaves_the_distance(walk):
     """Points that noise alone put half a metre off were taken by their rays, and all drew to the lens."""
     prior, places = walk
     camera = Camera.looking(VIEWS["from the side"], (0, 0, 0.9), (640, 480), 900)
@@ -103,13 +103,13 @@ BODY = Camera.looking((0, -4, 1.5), (0, 0, 0.9), (640, 480), 600)
 
 
 def person(prior, factor):
-    """Mean body in a row of frames, zoomed about the lens, and deviations."""
+    """Mean body in a row of frames, zoomed about the lens, and standard deviations."""
     places = np.repeat(STATURE * prior.mean[0][:1], 4, axis=0)
     lens = -BODY.R.T @ BODY.t
     return places, lens + factor * (places - lens), np.full(places.shape, 0.01)
 
 
-def test_bones_tell_the_size():
+def test_bones_give_the_size():
     prior = toy_prior(6, 19, 4)
     places, small, _ = person(prior, 0.6)
     ratio = size.bones_ratio(prior, small, STATURE) / size.bones_ratio(prior, places, STATURE)
@@ -119,7 +119,7 @@ def test_bones_tell_the_size():
 
 
 def test_a_short_person_who_walks_as_learnt_is_left_short(walk):
-    """Somebody short was made a sixth larger, and put as much too far away, though floor and motion told."""
+    """A short person was made a sixth larger, and as much too far away, though floor and motion showed it."""
     prior, mean = walk
     places = 1.45 / STATURE * mean
     camera = Camera.looking(VIEWS["from the side"], (0, 0, 0.9), (640, 480), 600)
@@ -146,31 +146,31 @@ def test_people_of_the_prior_have_its_bones(walk):
     assert squares == pytest.approx(1, abs=0.06)
 
 
-def test_an_unlikely_size_is_put_right_and_its_deviations_hold_the_truth():
+def test_an_unlikely_size_is_put_right_and_its_sd_cover_the_truth():
     prior = toy_prior(6, 19, 4)
     places, small, sd = person(prior, 0.6)
     found = size.resized(size.Resized(small, sd, sd), BODY, 0.6, 0.05, 1.0)
     np.testing.assert_allclose(found.places, places, atol=1e-9)
     np.testing.assert_allclose(BODY.project(found.places), BODY.project(small))
     assert found.factor == pytest.approx(1 / 0.6)
-    assert found.sd.min() > 5 * sd.max()  # eight deviations off
+    assert found.sd.min() > 5 * sd.max()  # eight standard deviations off
     assert found.rooted_sd.min() > 5 * sd.max()
     depth = BODY.R[2]
     assert (found.sd @ abs(depth)).mean() > (found.rooted_sd @ abs(depth)).mean()
 
 
-def test_a_likely_size_is_left_alone_and_its_deviations_follow_the_misfit():
+def test_a_likely_size_is_left_alone_and_its_sd_follow_chi2():
     prior = toy_prior(6, 19, 4)
     _, small, sd = person(prior, 0.95)
-    for misfit, grown in ((4.0, 2.0), (0.5, 1.0)):
-        found = size.resized(size.Resized(small, sd, sd), BODY, 0.95, 0.05, misfit)
+    for chi2, grown in ((4.0, 2.0), (0.5, 1.0)):
+        found = size.resized(size.Resized(small, sd, sd), BODY, 0.95, 0.05, chi2)
         np.testing.assert_array_equal(found.places, small)
         np.testing.assert_allclose(found.sd, grown * sd)
         np.testing.assert_allclose(found.rooted_sd, grown * sd)
         assert found.factor == 1
 
 
-def test_parts_that_hardly_tell_the_distance():
+def test_parts_that_hardly_show_the_distance():
     def keypoints(*names, share=1.0):
         uv = np.zeros((10, len(names), 2))
         uv[round(10 * share) :] = np.nan
@@ -187,7 +187,7 @@ def test_parts_that_hardly_tell_the_distance():
     ("observed", "sure"), [(EVAL15, True), ([n for n in EVAL15 if "ankle" not in n], False)]
 )
 def test_without_ankles_the_distance_is_as_open_as_the_size(walk, observed, sure):
-    """Legs that nobody sees stand on the floor by the prior alone, which seemed to tell the distance."""
+    """Legs that are never visible stand on the floor by the prior alone, which seemed to fix the distance."""
     prior, places = walk
     camera = Camera.looking(VIEWS["towards"], (0, 0, 0.9), (640, 480), 900)
     uv = camera.project(places[:, prior.index(observed)])
@@ -201,7 +201,7 @@ def test_without_ankles_the_distance_is_as_open_as_the_size(walk, observed, sure
 
 @pytest.mark.parametrize("floats", [True, False])
 def test_one_who_fits_but_floats_is_as_large_as_the_bones(walk, floats):
-    """A walker in a circle came out small and near the lens, 0.3 m over the floor."""
+    """A person in a circle came out small and near the lens, 0.3 m over the floor."""
     prior, places = walk
     camera = Camera.looking(VIEWS["from the side"], (0, 0, 0.9), (640, 480), 600)
     lens = -camera.R.T @ camera.t

@@ -115,7 +115,7 @@ def test_known_markers_without_sensors_give_the_motion(clip, prior):
 
 
 def test_corrections_of_a_marker_err_alike_within_a_segment(clip):
-    """Several say no more of what the prior leaves out than one does; other markers know nothing of it."""
+    """Several show no more of what the prior leaves out than one does; other markers know nothing of it."""
 
     def lasting(*spots):
         held = [Correction(frame, joint, (300.0, 200.0), 3.0) for frame, joint in spots]
@@ -133,7 +133,7 @@ def test_the_papers_way_is_continuous_in_depth(clip, monkeypatch):
     gaps = lift_sticks.depth_gaps(alone, fit.sequence)
     assert len(gaps) == len(clip.starts) - 1 > 2
     assert np.abs(gaps).max() < GAP
-    assert lift_sticks.jump(alone, fit) < 0.01 * STATURE
+    assert lift_sticks.spike(alone, fit) < 0.01 * STATURE
     monkeypatch.setattr("gait.lift.video.fit_clip._continuous", lambda _, sequence: sequence)
     assert np.abs(lift_sticks.depth_gaps(alone, fit_clip(alone).sequence)).max() > 100 * GAP
 
@@ -220,7 +220,7 @@ def test_the_command_lifts_a_video(files, tmp_path, corrected, prior, capsys):
 
 
 def test_without_a_camera_the_axes_are_the_pictures(files, tmp_path, clip, capsys, monkeypatch):
-    """Sensors that the figure does not explain are told as well."""
+    """Sensors that the figure does not explain are reported as well."""
     monkeypatch.setattr(lift_video, "POOR_CORRELATION", 1.0)
     uv = clip.view.project(walk().joints)[0]
     pelvis = uv[0, JOINTS.index("pelvis")]
@@ -243,7 +243,7 @@ def test_without_a_camera_the_axes_are_the_pictures(files, tmp_path, clip, capsy
 
 @pytest.fixture
 def refused(files, tmp_path, capsys):
-    """Run the command with options of a video and give what it says; it must fail and write nothing."""
+    """Run the command with options of a video and give what it prints; it must fail and write nothing."""
 
     def run(*words, code=1):
         out = tmp_path / "out.csv"
@@ -272,8 +272,8 @@ def test_faults_are_named(files, tmp_path, refused):
     ):
         (tmp_path / "far.json").write_text(json.dumps(behind | {"pelvis": place}))
         assert words in refused(*camera, "--placement", tmp_path / "far.json")
-    wild = {"frame": 3, "joint": "l_knee", "uv": [100000, 20]}
-    (tmp_path / "c.json").write_text(json.dumps({"corrections": [wild]}))
+    outliers = {"frame": 3, "joint": "l_knee", "uv": [100000, 20]}
+    (tmp_path / "c.json").write_text(json.dumps({"corrections": [outliers]}))
     printed = refused(*camera, *placed, "--corrections", tmp_path / "c.json")
     assert "correction 1: uv is (100000, 20), far outside a picture of 640x480" in printed
     (tmp_path / "c.json").write_text('{"corrections": [{"frame": 99, "joint": "l_knee", "uv": [1, 2]}]}')

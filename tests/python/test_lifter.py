@@ -50,7 +50,7 @@ def model(size: int = 50, headings: int = 0, components: int = 1) -> tuple[bytes
 
 
 def noise_sd(rng: np.random.Generator, low: float, high: float, missing: float = 0.2) -> np.ndarray:
-    """Deviations of all observations, infinite where nothing is seen."""
+    """Standard deviations of all observations, infinite where nothing is seen."""
     sd = rng.uniform(low, high, (FRAMES, MARKERS))
     sd[rng.random(sd.shape) < missing] = np.inf
     return sd
@@ -77,7 +77,7 @@ def test_every_figure_equals_the_numpy_posterior(angle: float, stature_sd: float
     assert fit.log10_volume == pytest.approx(reference.log10_volume(gaussian, rows), rel=1e-11)
     mean, sd = lifter.positions()
     np.testing.assert_allclose(mean, want.points, atol=1e-10)
-    np.testing.assert_allclose(sd, want.sd, rtol=1e-6)  # deviations are computed in floats
+    np.testing.assert_allclose(sd, want.sd, rtol=1e-6)  # standard deviations are computed in floats
     alpha, covariance = lifter.posterior()
     np.testing.assert_allclose(alpha, want.alpha, atol=1e-9)
     np.testing.assert_allclose(alpha, papers, atol=1e-7)  # the paper's own form
@@ -91,13 +91,13 @@ def _likeliest_scale(gaussian: reference.Gaussian, rows: observe.Rows) -> float:
     """Factor of the modes by which the evidence is largest, its square inverse gamma of FREEDOM a priori."""
     own = np.arange(len(gaussian.modes)) < len(gaussian.modes) - gaussian.rigid
 
-    def loss(x: float) -> float:
+    def objective(x: float) -> float:
         modes = gaussian.modes * np.where(own, np.exp(x / 2), 1)[:, None, None, None]
         evidence = reference.infer(replace(gaussian, modes=modes), rows).log_evidence
         return FREEDOM * (x + np.exp(-x)) / 2 - evidence
 
     return float(
-        np.exp(minimize_scalar(loss, bounds=(-3, 3), method="bounded", options={"xatol": 1e-7}).x / 2)
+        np.exp(minimize_scalar(objective, bounds=(-3, 3), method="bounded", options={"xatol": 1e-7}).x / 2)
     )
 
 
@@ -119,7 +119,7 @@ def test_uncertain_displacements_equal_the_numpy_ones() -> None:
     assert share_rigid(got[0]) > 0.98
 
 
-def test_drawn_from_the_prior_intervals_cover_what_they_say() -> None:
+def test_drawn_from_the_prior_intervals_cover_the_stated_share() -> None:
     contents, prior = model(size=20)
     lifter = Lifter(contents, AXES, known(heading_sd=0.0))
     rng = np.random.default_rng(7)
@@ -185,7 +185,7 @@ def test_a_perspective_fit_is_the_maximum_of_the_posterior() -> None:
     steps = 1e-4 * np.eye(len(unknowns))
     slope = [(cost(unknowns + s) - cost(unknowns - s)) / 2e-4 for s in steps]
     curvature = [(cost(unknowns + s) - 2 * cost(unknowns) + cost(unknowns - s)) / 1e-8 for s in steps]
-    assert np.max(np.abs(np.array(slope) / np.sqrt(curvature))) < 0.02  # deviations from the maximum
+    assert np.max(np.abs(np.array(slope) / np.sqrt(curvature))) < 0.02  # standard deviations from the maximum
 
 
 @pytest.mark.parametrize("angle", [0.0, 1.0, 3.0, -2.0])
@@ -280,7 +280,7 @@ def test_intervals_hold_people_of_any_stature() -> None:
     assert abs(error) < 0.2 * predicted
 
 
-def test_missing_markers_cost_what_the_deviations_say() -> None:
+def test_missing_markers_cost_what_the_sd_state() -> None:
     contents, prior = model(size=20)
     rng = np.random.default_rng(9)
     lifter = Lifter(contents, AXES, known(heading_sd=0.0, place_sd=(10.0, 0.0, 0.03)))
@@ -344,7 +344,7 @@ def _walk(prior: SegmentPrior, times: np.ndarray, speed: float) -> np.ndarray:
     return start + np.outer(speed * times, [1.0, 0, 0])[:, None]
 
 
-def test_a_stream_follows_and_waits_as_told() -> None:
+def test_a_stream_follows_and_waits_as_set() -> None:
     _, prior = model(size=6)
     drift = 0.03 * np.arange(FRAMES)[None, :, None, None] * np.array([1.0, 0, 0])
     prior = replace(

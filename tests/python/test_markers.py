@@ -1,4 +1,4 @@
-"""Markers to bodies: derivatives, known walkers found again, gaps, agreement with the mocap path."""
+"""Markers to bodies: derivatives, known people found again, gaps, agreement with the mocap path."""
 
 from pathlib import Path
 

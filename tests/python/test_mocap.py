@@ -137,7 +137,7 @@ def test_radians_by_the_header_of_either_file(amc):
     assert acclaim.read(amc).rotation == pytest.approx(known.rotation, abs=1e-7)
 
 
-def test_the_rate_is_what_a_motion_says_unless_told(amc):
+def test_the_rate_is_that_of_the_motion_unless_given(amc):
     assert acclaim.read(amc).fps == 120
     amc.write_text(":SAMPLES-PER-SECOND 60\n" + amc.read_text())
     assert acclaim.read(amc).fps == 60 and acclaim.read(amc, 30.0).fps == 30

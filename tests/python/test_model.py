@@ -5,7 +5,7 @@ import struct
 
 import numpy as np
 import pytest
-from drawn_walker import camera
+from drawn_person import camera
 from hypothesis import given
 from hypothesis import strategies as st
 
@@ -99,11 +99,11 @@ def test_render_draws_each_limb_over_its_bones():
         assert MODEL.limb_names[ids[v, u] - 1] == limb
 
 
-def test_render_of_a_walker_out_of_sight_is_empty():
+def test_render_of_a_person_out_of_view_is_empty():
     assert not MODEL.render(camera(), State(pelvis=np.array([0.0, -20.0, 0.9]))).any()
 
 
-def test_prior_is_wide_and_sound():
+def test_prior_is_broad_and_sound():
     mean, sd = MODEL.prior()
     assert mean.stride_hz == pytest.approx(MODEL.info.stride_hz) and sd.phase >= 0.5 and sd.heading >= 3.14
     assert 1.5 < mean.stature < 1.9 and mean.pelvis[2] == pytest.approx(0.5 * mean.stature, rel=0.1)

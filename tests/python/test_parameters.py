@@ -5,7 +5,7 @@ from itertools import pairwise
 
 import numpy as np
 import pytest
-from drawn_walker import DATA
+from drawn_person import DATA
 from walking_track import STANCE, STEP, walking_track
 
 from gait import Model, UserError
@@ -59,7 +59,7 @@ def test_a_walk_by_rule_has_its_own_parameters():
     assert set(summary) == set(QUANTITIES)
 
 
-def test_deviations_follow_those_of_the_track():
+def test_sd_follow_those_of_the_track():
     once, twice = (measure(walking_track(phase_sd=s)) for s in (0.004, 0.008))
     right = once.strides["right"]
     expected = np.sqrt(2) * 0.004 / 0.9
@@ -72,7 +72,7 @@ def test_deviations_follow_those_of_the_track():
     assert both < right.sd["stride_time_s"].mean() / 2  # of a mean over seven strides
 
 
-def test_without_deviations_nothing_is_claimed():
+def test_without_sd_nothing_is_claimed():
     track = walking_track()
     del track.numbers["phase_sd"]
     parameters = measure(track)
@@ -86,7 +86,7 @@ def test_errors_that_last_cancel_between_the_ends_of_a_stride():
     """All events of a motion are late alike: its events are unsure by that much, its strides are not."""
     track = walking_track()
     parameters = measure(track, drawn(track))
-    late = 0.02 * 60**-0.5  # how well 60 draws know their deviation, roughly
+    late = 0.02 * 60**-0.5  # how well 60 draws know their standard deviation, roughly
     assert np.abs(parameters.event_sd.strike["right"][1:-1] - 0.02).max() < 3 * late
     right = parameters.strides["right"]
     assert right.sd["stride_time_s"][1:-1].max() < 0.002
@@ -140,7 +140,7 @@ def test_angle_cycles_are_put_beside_the_norm():
     assert len(cycles[right].strides) == len(measure(track).strides["right"].start)
 
 
-def test_draws_give_the_cycles_their_deviation():
+def test_draws_give_the_cycles_their_sd():
     track = walking_track(seconds=6)
     track.numbers["r_knee_flexion_deg"] = np.zeros(len(track.time))
     draws = drawn(track, late=0.0)
@@ -164,7 +164,7 @@ def test_the_norm_is_wider_where_people_differ_and_periodic():
 @pytest.mark.parametrize("meta", CLIPS, ids=lambda m: m.parent.name)
 def test_true_motions_have_their_listed_events_and_parameters(meta):
     """The clips list their events by the same rule, from 120 frames a second."""
-    truth, told = read_truth(meta.parent / "truth.csv"), read_json(meta, "meta")
+    truth, reported = read_truth(meta.parent / "truth.csv"), read_json(meta, "meta")
     events, listed = find_events(truth), strikes_from_meta(meta)
     for side in SIDES:
         found = np.interp(events.strike[side], truth.time, truth.frame)
@@ -173,5 +173,5 @@ def test_true_motions_have_their_listed_events_and_parameters(meta):
         assert all(np.abs(found - w).min() < 0.5 for w in want)
         assert all(late > early for early, late in pairwise(events.off[side]))
     assert stride_time(events) == pytest.approx(
-        told.number("stride_period_s", 0.3, 3.0, "give seconds"), rel=0.015
+        reported.number("stride_period_s", 0.3, 3.0, "give seconds"), rel=0.015
     )

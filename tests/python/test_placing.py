@@ -17,7 +17,7 @@ BENT = [-0.1, 0.05, 0.001, -0.002, 0.01]
 FLOOR = np.array([[0, 0, 0], [2, 0, 0], [2, 1.5, 0], [0, 1.5, 0], [1, 0.7, 0]], float)
 
 
-def seen(place, world=FLOOR):
+def shown(place, world=FLOOR):
     camera = Camera.looking(place, [1, 0.7, 0.3], (640, 480), 700.0)
     return camera, Points("p.csv", np.arange(2, 2 + len(world)), camera.project(world), world)
 
@@ -27,15 +27,15 @@ def test_the_true_place_comes_back(angle, distance, height, off_ground):
     world = FLOOR.copy()
     world[4, 2] = off_ground
     where = [1 + distance * np.cos(angle), 0.7 + distance * np.sin(angle), height]
-    true, points = seen(where, world)
+    true, points = shown(where, world)
     camera, off = place(true, points)
     np.testing.assert_allclose(camera.centre, where, atol=1e-4)
     np.testing.assert_allclose(camera.R, true.R, atol=1e-5)
     assert off.max() < 1e-3
 
 
-def test_noise_is_told_in_pixels():
-    true, points = seen([5, -6, 2])
+def test_noise_is_reported_in_pixels():
+    true, points = shown([5, -6, 2])
     noise = np.random.default_rng(3).normal(size=points.uv.shape)
     camera, off = place(true, Points("p.csv", points.line, points.uv + noise, points.world))
     assert 0.2 * (noise**2).sum() < (off**2).sum() < (noise**2).sum()  # six of ten numbers are fitted
@@ -43,7 +43,7 @@ def test_noise_is_told_in_pixels():
 
 
 def test_points_mirrored_have_no_camera_above_the_ground():
-    true, points = seen([5, -6, 2])
+    true, points = shown([5, -6, 2])
     with pytest.raises(UserError, match="right-handed"):
         place(true, Points("p.csv", points.line, points.uv, points.world * [1, -1, 1]))
 
@@ -68,16 +68,16 @@ def test_command_writes_a_camera_that_tracks_can_use(tmp_path, capsys):
         f"{x},{y},{u},{v}" for (x, y, _), (u, v) in zip(FLOOR, true.project(FLOOR), strict=True)
     ]
     assert main(["camera", *files(tmp_path, rows), "--json"]) == 0
-    told = json.loads(capsys.readouterr().out)
-    assert told["points"] == 5 and told["rms_px"] < 1e-3
-    np.testing.assert_allclose(told["place"], [4, -5, 1.6], atol=1e-4)
+    reported = json.loads(capsys.readouterr().out)
+    assert reported["points"] == 5 and reported["rms_px"] < 1e-3
+    np.testing.assert_allclose(reported["place"], [4, -5, 1.6], atol=1e-4)
     camera = Camera.read(str(tmp_path / "camera.json"))
     np.testing.assert_allclose(camera.distortion, BENT)
     np.testing.assert_allclose(camera.project(FLOOR), true.project(FLOOR), atol=1e-3)
 
 
-def test_command_doubts_points_that_do_not_fit(tmp_path, capsys):
-    true, points = seen([4, -5, 1.6])
+def test_command_names_points_that_do_not_fit(tmp_path, capsys):
+    true, points = shown([4, -5, 1.6])
     uv = points.uv + [[0, 0], [0, 0], [60, 0], [0, 0], [0, 0]]
     rows = ["u;v;x;y"] + [f"{u};{v};{x};{y}" for (u, v), (x, y, _) in zip(uv, FLOOR, strict=True)]
     arguments = files(tmp_path, rows)
@@ -108,10 +108,10 @@ def test_faults_of_the_points_are_one_line(tmp_path, capsys, rows, words):
     assert not (tmp_path / "camera.json").exists()
 
 
-def test_a_lens_without_focal_length_is_told(tmp_path, capsys):
+def test_a_lens_without_focal_length_is_reported(tmp_path, capsys):
     rows = [
         "u,v,x,y",
-        *[f"{u},{v},{x},{y}" for (u, v), (x, y, _) in zip(seen([5, -6, 2])[1].uv, FLOOR, strict=True)],
+        *[f"{u},{v},{x},{y}" for (u, v), (x, y, _) in zip(shown([5, -6, 2])[1].uv, FLOOR, strict=True)],
     ]
     assert main(["camera", *files(tmp_path, rows, {**LENS, "fx": 0})]) == 1
     assert "lens.json: fx" in capsys.readouterr().err

@@ -32,7 +32,7 @@ def table(path):
         return list(csv.DictReader(file))
 
 
-def test_files_say_the_same_as_the_library(folder, capsys):
+def test_files_state_the_same_as_the_library(folder, capsys):
     assert main(["report", "track", str(folder / "walk.csv"), "--json"]) == 0
     printed = json.loads(capsys.readouterr().out)
     out = folder / "walk_gait"
@@ -130,8 +130,8 @@ def lifted(source, target):
 def test_what_cannot_be_measured_is_one_line(folder, capsys, change, words):
     change(folder)
     assert main(["report", "track", str(folder / "x.csv")]) == 1
-    said = capsys.readouterr().err
-    assert words in said and said.count("\n") == 1 and not (folder / "x_gait").exists()
+    printed = capsys.readouterr().err
+    assert words in printed and printed.count("\n") == 1 and not (folder / "x_gait").exists()
 
 
 def test_the_other_report_is_still_there(capsys):

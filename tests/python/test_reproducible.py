@@ -11,7 +11,7 @@ import pytest
 from gait import reproducible
 
 PROGRAM = "from gait.cli import main; raise SystemExit(main())"
-TELL = """
+SHOW = """
 from gait import reproducible
 reproducible.settle()
 print(reproducible.chosen() == reproducible.COMMON)
@@ -35,12 +35,12 @@ def python(*words, stdin="", **environment):
     platform.machine() != "x86_64" or os.name != "posix", reason="kernels are chosen elsewhere"
 )
 def test_a_program_starts_anew_with_its_command_line():
-    assert python("-c", TELL).stdout == "True\n"
-    assert python("-c", TELL, **reproducible.COMMON).stdout == "True\n"
+    assert python("-c", SHOW).stdout == "True\n"
+    assert python("-c", SHOW, **reproducible.COMMON).stdout == "True\n"
 
 
 def test_numpy_may_lack_features_where_warnings_are_errors():
-    done = python("-c", f"{TELL}import numpy", PYTHONWARNINGS="error")
+    done = python("-c", f"{SHOW}import numpy", PYTHONWARNINGS="error")
     assert done.returncode == 0 and not done.stderr
 
 

@@ -23,7 +23,7 @@ from gait.lift.smooth.rows import orthographic
 
 @pytest.fixture(scope="module")
 def walks(tmp_path_factory):
-    """Toy walks of three people, and somebody who stands still, which is no walk."""
+    """Toy walks of three people, and a person who stands still, which is no walk."""
     folder = tmp_path_factory.mktemp("walks")
     for i, (subject, trial) in enumerate([(1, 1), (1, 2), (2, 1), (3, 1)]):
         motion = {"period": 110.0 + 6 * i, "swing": 0.85 + 0.05 * i, "seed": i, "frames": 420}
@@ -62,7 +62,7 @@ def test_the_prior_is_learnt_beside_the_cyclic_model_which_stays_the_same(walks,
     assert (tmp_path / "again.gait").read_bytes() == both.read_bytes()
 
 
-def test_options_say_what_a_segment_is(walks, tmp_path):
+def test_options_set_what_a_segment_is(walks, tmp_path):
     path = tmp_path / "m.gait"
     words = "--segment-frames 8 --segment-hop 2 --segment-fps 25 --segment-modes 12 --segment-headings 2"
     assert learn(walks, path, "--segment-mixture", 2, *words.split()) == 0
@@ -81,7 +81,7 @@ def test_eight_headings_are_of_the_world(walks, tmp_path):
     assert np.linalg.norm(ahead[0]) < 1e-5 and ahead[1][0] > 0.1
 
 
-def test_the_number_of_components_is_found_and_told(walks, tmp_path, capsys):
+def test_the_number_of_components_is_found_and_reported(walks, tmp_path, capsys):
     """`segment_mixture` is tested for which number it is."""
     path = tmp_path / "m.gait"
     assert learn(walks, path, "--segments", "only", "--segment-mixture", "auto", "--json") == 0
@@ -193,7 +193,7 @@ def test_the_shipped_prior_is_of_its_walks():
     assert prior.mean[0, -1, pelvis, 0] > 0.2  # and off along +x
 
 
-def test_of_a_walker_seen_flat_depth_is_least_certain():
+def test_of_a_person_in_a_flat_view_depth_is_least_certain():
     """F6: the five least certain modes are along depth, the first moves the whole body."""
     prior, axes, depth = SegmentPrior.load(), FRONT, np.array([0.0, 1, 0])
     gaussian = place(prior)

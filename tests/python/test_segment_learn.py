@@ -148,7 +148,7 @@ def test_markers_that_few_show_are_not_learnt_and_gappy_segments_are_left_out():
 
 
 def toy_rows(rng, count=200, frames=4, markers=5, modes=3, noise=0.01):
-    """Rows of a Gaussian with known modes, and the modes' (D, k) and deviations."""
+    """Rows of a Gaussian with known modes, and the modes' (D, k) and standard deviations."""
     base = np.linalg.qr(rng.normal(size=(3 * frames * markers, modes)))[0]
     sd = np.array([0.5, 0.3, 0.2])[:modes]
     rows = 1 + (rng.normal(size=(count, modes)) * sd) @ base.T
@@ -327,7 +327,7 @@ def shares(files: Iterable[str]) -> tuple[np.ndarray, np.ndarray]:
     [(FOUR, (0.9948, 0.9972), 10), (ALL, (0.9886, 0.9933), 13)],
     ids=["four", "all"],
 )
-def test_modes_hold_as_much_variance_as_singular_values_say(
+def test_modes_hold_as_much_variance_as_singular_values_do(
     files: tuple[str, ...], held: tuple[float, float], count: int
 ) -> None:
     have, want = shares(files)
@@ -358,7 +358,7 @@ def test_markers_are_found_by_name():
         prior.index(["nose"])
 
 
-def test_blob_without_prior_says_how_to_learn_it(tmp_path):
+def test_blob_without_prior_explains_how_to_learn_it(tmp_path):
     """A cyclic model without the sections, or with a part of them."""
     with pytest.raises(UserError, match=r"x.gait: holds no segment prior; learn it with gait learn"):
         SegmentPrior.from_sections({}, "x.gait")

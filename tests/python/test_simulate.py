@@ -112,7 +112,7 @@ def test_speed_and_heading_are_those_of_the_pelvis(clip: Path) -> None:
     np.testing.assert_allclose(along, truth["speed_m_s"][1:-1], atol=0.02)
 
 
-def test_the_start_is_near_the_truth_by_its_own_spread(clip: Path) -> None:
+def test_the_start_is_near_the_truth_by_its_own_sd(clip: Path) -> None:
     init, truth = json.loads((clip / "init.json").read_text()), read_truth(clip)
     meta = json.loads((clip / "meta.json").read_text())
     error = {
@@ -160,10 +160,10 @@ def test_heel_strikes_agree_with_the_truth(seed: int) -> None:
             np.cos(walk.heading[stage.frames[0]]),
             np.sin(walk.heading[stage.frames[0]]),
         ]
-        seen = [i for i in range(2, 118) if ahead[i] == ahead[i - 2 : i + 3].max() and ahead[i] > 0.1]
+        shown = [i for i in range(2, 118) if ahead[i] == ahead[i - 2 : i + 3].max() and ahead[i] > 0.1]
         stated = [t for t in events[f"{side}_heel_strike"] if 2 < t < 117]
-        assert len(seen) >= 3
-        assert np.abs(np.array(seen) - np.array(stated)).max() <= 0.6
+        assert len(shown) >= 3
+        assert np.abs(np.array(shown) - np.array(stated)).max() <= 0.6
     strikes = events["r_heel_strike"] / 30
     planned = np.interp(strikes, walk.timing.time, walk.timing.phase)
     assert np.abs((planned + 0.5) % 1 - 0.5).max() < 0.03
@@ -185,7 +185,7 @@ def picture_span(stage: Stage, mesh: Mesh, frame: int) -> tuple[np.ndarray, np.n
 
 
 @pytest.mark.parametrize("view", VIEWS)
-def test_every_view_shows_the_whole_walker_in_front_of_the_scene(view: str) -> None:
+def test_every_view_shows_the_whole_person_in_front_of_the_scene(view: str) -> None:
     stage = set_stage(replace(TINY, view=view, frames=40))
     made = build_set(stage)
     empty = background(made).astype(int)
@@ -212,17 +212,17 @@ def test_the_directions_are_mirrored() -> None:
 
 def test_pole_hides_joints_and_is_part_of_the_background() -> None:
     scenario = replace(TINY, view="oblique", frames=60)
-    bare, pole = (set_stage(replace(scenario, pole=flag)) for flag in (False, True))
-    np.testing.assert_array_equal(bare.walk.origins, pole.walk.origins)
+    plain, pole = (set_stage(replace(scenario, pole=flag)) for flag in (False, True))
+    np.testing.assert_array_equal(plain.walk.origins, pole.walk.origins)
     made = build_set(pole)
-    assert build_set(bare).scene.front.max() == 0
+    assert build_set(plain).scene.front.max() == 0
     front = made.scene.front > 0.99
     assert front.sum() > 200
     empty = background(made)
     quiet = replace(pole, scenario=replace(pole.scenario, noise=0.0))
     inner = cv2.erode(front.astype(np.uint8), np.ones((3, 3))) > 0
     changed = np.abs(np.stack(list(pictures(quiet, made)))[:, inner].astype(int) - empty[inner]).max()
-    assert changed <= 3  # nothing of the walker shows through the pole
+    assert changed <= 3  # nothing of the person shows through the pole
 
 
 def test_noise_and_flicker_have_their_stated_size() -> None:
@@ -353,8 +353,8 @@ def test_a_model_that_cannot_be_walked_leaves_no_folder(tmp_path: Path) -> None:
 
 
 def test_every_bone_and_point_hangs_together() -> None:
-    seen: set[str] = set()
+    shown: set[str] = set()
     for bone, parent in PARENTS.items():
-        assert parent is None or parent in seen
-        seen.add(bone)
-    assert set(POINT_BONE.values()) <= seen
+        assert parent is None or parent in shown
+        shown.add(bone)
+    assert set(POINT_BONE.values()) <= shown

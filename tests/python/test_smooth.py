@@ -6,7 +6,7 @@ from dataclasses import replace
 import cv2
 import numpy as np
 import pytest
-from drawn_walker import camera, clip, state_at, wall, write
+from drawn_person import camera, clip, state_at, wall, write
 
 from gait import Model, State, Tracker, TrackerConfig, UserError
 from gait.bindings.abi import Mode, TrackStatus
@@ -189,18 +189,18 @@ def test_who_becomes_ambiguous_has_settled_all_the_same():
     config = TrackerConfig.default(particles=64)
     tracker = Tracker(MODEL, camera(), config)
     tracker.start(state_at(MODEL, SECTIONS, 0.0), State(), 0)
-    said = [TrackStatus.AMBIGUOUS] * 2 + [TrackStatus.TRACKING] * 40 + [TrackStatus.AMBIGUOUS] * 5
+    printed = [TrackStatus.AMBIGUOUS] * 2 + [TrackStatus.TRACKING] * 40 + [TrackStatus.AMBIGUOUS] * 5
     with Spool(Transitions(CURVES, tracker.config)) as spool:
-        for i, status in enumerate([*said, TrackStatus.INIT, TrackStatus.AMBIGUOUS, TrackStatus.TRACKING]):
+        for i, status in enumerate([*printed, TrackStatus.INIT, TrackStatus.AMBIGUOUS, TrackStatus.TRACKING]):
             spool.add(tracker, replace(tracker.step(None, 33333 * i), status=status))
-        told = [spool.step_to(i).settling for i in range(1, len(spool))]
-        assert told[:32] == [True] * 32 and not any(told[33:47]) and all(told[48:])
+        reported = [spool.step_to(i).settling for i in range(1, len(spool))]
+        assert reported[:32] == [True] * 32 and not any(reported[33:47]) and all(reported[48:])
 
 
 def test_what_no_number_of_frames_makes_less_is_added_as_the_library_does():
     tracker = Tracker(MODEL, camera(), TrackerConfig.default(particles=2000))
-    spread = State(stature=0.1, phase=0.02, pelvis=np.full(3, 0.05))
-    tracker.start(state_at(MODEL, SECTIONS, 0.0), spread, 0)
+    uncertainty = State(stature=0.1, phase=0.02, pelvis=np.full(3, 0.05))
+    tracker.start(state_at(MODEL, SECTIONS, 0.0), uncertainty, 0)
     theirs = tracker.step(None, 0)
     states, _ = tracker.particles()
     with Smoother(tracker, CURVES) as smoother:

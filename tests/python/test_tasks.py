@@ -44,7 +44,7 @@ def test_one_thread_is_the_callers_and_too_many_are_refused():
         threads(100_000)
 
 
-def test_a_forked_process_works_and_ends():
+def test_a_child_process_works_and_ends():
     pool = threads(2)
     child = os.fork()
     if child == 0:

@@ -6,7 +6,7 @@ from dataclasses import replace
 import cv2
 import numpy as np
 import pytest
-from drawn_walker import camera, clip, wall, write
+from drawn_person import camera, clip, wall, write
 
 from gait import Model, Tracker, TrackerConfig, TrackStatus, Video
 from gait.bindings.frame import FrameKeypoints
@@ -169,13 +169,13 @@ def test_legs_that_keypoints_show_elsewhere_are_no_agreement(estimate):
 
 
 @pytest.mark.parametrize(
-    "jump, grown, status",
+    "spike, grown, status",
     [(0.0, 0.0, "TRACKING"), (1.0, 0.0, "AMBIGUOUS"), (0.0, 0.5, "AMBIGUOUS")],
 )
-def test_without_keypoints_a_walk_must_be_plausible(estimate, jump, grown, status):
+def test_without_keypoints_a_walk_must_be_plausible(estimate, spike, grown, status):
     plausible = Plausibility(PersonKeypoints(camera(), {}, -1), 1.75, 0.05, 0.0)
     for i in range(40):
         mean = replace(TRUE[-1], stature=1.75 + grown, heading=0.0)
-        mean.pelvis = np.array([1.2 * i / 30 + jump * (i > 20), 0.0, 0.95])
+        mean.pelvis = np.array([1.2 * i / 30 + spike * (i > 20), 0.0, 0.95])
         now = plausible.judged(Frame(i, i / 30, FRAMES[0]), replace(estimate, mean=mean, speed=1.2))
     assert now.status == TrackStatus[status]

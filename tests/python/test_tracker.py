@@ -9,7 +9,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from drawn_walker import FPS, camera, clip, wall, write
+from drawn_person import FPS, camera, clip, wall, write
 
 from gait import (
     Flag,
@@ -36,7 +36,7 @@ VIEW, PLATE = camera(), wall()
 SMALL = TrackerConfig.default(particles=200)
 
 
-def spread():
+def uncertainty():
     """Small uncertainty about a known first state."""
     sd = State(phase=0.03, stride_hz=0.03, stature=0.02, heading=0.1, pitch=0.02, roll=0.02)
     sd.pelvis = np.full(3, 0.03)
@@ -46,7 +46,7 @@ def spread():
 
 def started(config=SMALL, **options):
     tracker = Tracker(MODEL, VIEW, config, background=PLATE, **options)
-    tracker.start(TRUE[0], spread(), 0)
+    tracker.start(TRUE[0], uncertainty(), 0)
     return tracker
 
 
@@ -113,11 +113,11 @@ def test_a_drawn_walk_is_followed():
 
 def test_following_a_video_is_starting_and_stepping(tmp_path):
     write(tmp_path / "walk.mp4", FRAMES)
-    video, start = Video(tmp_path / "walk.mp4"), Start(3, TRUE[3], spread())
+    video, start = Video(tmp_path / "walk.mp4"), Start(3, TRUE[3], uncertainty())
     followed, stepped = Tracker(MODEL, VIEW, SMALL), Tracker(MODEL, VIEW, SMALL)
-    seen = [(frame.number, now.utime) for frame, now in followed.follow(video, start, 8)]
-    assert seen == [(i, frame.utime) for i, frame in enumerate(video.frames(), 0) if 3 <= i < 8]
-    stepped.start(start.mean, start.sd, seen[0][1])
+    shown = [(frame.number, now.utime) for frame, now in followed.follow(video, start, 8)]
+    assert shown == [(i, frame.utime) for i, frame in enumerate(video.frames(), 0) if 3 <= i < 8]
+    stepped.start(start.mean, start.sd, shown[0][1])
     for frame in video.frames(3, 8):
         stepped.step(frame.image, frame.utime)
     assert followed.digest() == stepped.digest()
@@ -125,7 +125,7 @@ def test_following_a_video_is_starting_and_stepping(tmp_path):
 
 def test_grey_frames_serve_too():
     tracker = Tracker(MODEL, VIEW, SMALL, background=PLATE.mean(axis=2).astype(np.uint8))
-    tracker.start(TRUE[0], spread(), 0)
+    tracker.start(TRUE[0], uncertainty(), 0)
     for i, frame in enumerate(FRAMES):
         last = tracker.step(frame.mean(axis=2).astype(np.uint8), utime(i))
     assert np.linalg.norm(last.mean.pelvis - TRUE[-1].pelvis) < 0.12
@@ -194,7 +194,7 @@ def test_an_exception_in_a_task_runner_is_raised_after_the_call():
     assert tracker.digest() == calm.digest()  # the tasks it left were done all the same
 
 
-def test_a_runner_that_forgets_tasks_is_told():
+def test_a_runner_that_forgets_tasks_is_reported():
     with pytest.raises(RuntimeError, match="tasks not called"):
         started(tasks=lambda task, count: task(0)).step(FRAMES[0], 0)
 
@@ -232,7 +232,7 @@ def test_another_time_of_day_gives_the_same_digest():
     digests = []
     for epoch in (0, 1_760_000_000_000_000, -5):
         tracker = Tracker(MODEL, VIEW, SMALL, background=PLATE)
-        tracker.start(TRUE[0], spread(), epoch)
+        tracker.start(TRUE[0], uncertainty(), epoch)
         for i in range(3):
             tracker.step(FRAMES[i], epoch + utime(i))
         digests.append(tracker.digest())
@@ -278,7 +278,7 @@ def test_calls_out_of_order_are_refused():
     with pytest.raises(GaitError) as caught:
         tracker.step(FRAMES[0], 0)
     assert caught.value.name == "GAIT_ERR_STATE"
-    tracker.start(TRUE[0], spread(), 0)
+    tracker.start(TRUE[0], uncertainty(), 0)
     tracker.step(FRAMES[0], 0)
     tracker.step(FRAMES[1], 33333)
     with pytest.raises(GaitError) as caught:
@@ -304,7 +304,7 @@ def test_frames_that_do_not_fit_are_refused(frame, words):
 def test_a_start_that_is_not_finite_is_refused(field, value):
     tracker = Tracker(MODEL, VIEW, SMALL)
     with pytest.raises(GaitArgumentError):
-        tracker.start(replace(TRUE[0], **{field: value}), spread(), 0)
+        tracker.start(replace(TRUE[0], **{field: value}), uncertainty(), 0)
 
 
 @pytest.mark.parametrize(
@@ -331,14 +331,14 @@ def test_number_of_cameras_and_threads_is_checked():
         ({"girth": "wide"}, "config girth = 'wide': give a number"),
     ],
 )
-def test_settings_that_the_library_has_no_room_for_are_named(change, words):
+def test_settings_beyond_the_capacity_of_the_library_are_named(change, words):
     with pytest.raises(ValueError, match=words):
         Tracker(MODEL, VIEW, SMALL.replace(**change))
     assert SMALL.replace(particles=np.int64(300)).to_c().particles == 300
 
 
 @pytest.mark.parametrize(
-    ("words", "options", "said"),
+    ("words", "options", "printed"),
     [
         (("x.gait", VIEW), {}, r"model: 'x.gait' is no gait.Model; give gait.Model\(FILE\)"),
         ((MODEL, None), {}, "cameras: None; give a gait.Camera or a list of them"),
@@ -346,8 +346,8 @@ def test_settings_that_the_library_has_no_room_for_are_named(change, words):
         ((MODEL, VIEW), {"tasks": 1.5}, "tasks: 1.5; give a number of threads, a callable or a pool"),
     ],
 )
-def test_arguments_of_another_kind_are_named(words, options, said):
-    with pytest.raises(ValueError, match=said):
+def test_arguments_of_another_kind_are_named(words, options, printed):
+    with pytest.raises(ValueError, match=printed):
         Tracker(*words, **options)
 
 
@@ -357,14 +357,14 @@ def test_a_capture_time_that_is_none_is_named(wrong):
     with pytest.raises(ValueError, match=f"utime = {wrong!r}: give"):
         tracker.step(FRAMES[0], wrong)
     with pytest.raises(ValueError, match="utime"):
-        tracker.start(TRUE[0], spread(), wrong)
+        tracker.start(TRUE[0], uncertainty(), wrong)
 
 
 def test_the_empty_scene_is_copied_and_not_part_of_a_snapshot():
     plate = PLATE.copy()
     tracker = Tracker(MODEL, VIEW, SMALL, background=plate)
     plate[:] = 0
-    tracker.start(TRUE[0], spread(), 0)
+    tracker.start(TRUE[0], uncertainty(), 0)
     run(tracker, 0, 4)
     same, other = Tracker(MODEL, VIEW, SMALL, background=PLATE), Tracker(MODEL, VIEW, SMALL)
     for one in (same, other):
@@ -378,7 +378,7 @@ def test_two_cameras_are_better_than_one():
     side = camera(place=(-5.0, 0.01, 1.5))
     second, _ = clip(MODEL, blob.decode(read_blob(None)), len(FRAMES), view=side)
     both = Tracker(MODEL, [VIEW, side], SMALL, background=[PLATE, PLATE])
-    both.start(TRUE[0], spread(), 0)
+    both.start(TRUE[0], uncertainty(), 0)
     for i, pair in enumerate(zip(FRAMES, second, strict=True)):
         last = both.step(list(pair), utime(i))
     assert np.linalg.norm(last.mean.pelvis - TRUE[-1].pelvis) < 0.06

@@ -134,14 +134,14 @@ def spoil(path, change):
         ),
     ],
 )
-def test_damaged_tracks_are_told(change, words, tmp_path):
+def test_damaged_tracks_are_reported(change, words, tmp_path):
     write(tmp_path / "t.csv")
     spoil(tmp_path / "t.csv", change)
     with pytest.raises(UserError, match=f"t.csv: {words}"):
         read_track(tmp_path / "t.csv")
 
 
-def test_a_negative_deviation_is_named(tmp_path):
+def test_a_negative_sd_is_named(tmp_path):
     write(tmp_path / "t.csv")
 
     def negate(lines):

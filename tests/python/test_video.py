@@ -5,7 +5,7 @@ import wave
 import cv2
 import numpy as np
 import pytest
-from drawn_walker import clip, wall, write
+from drawn_person import clip, wall, write
 
 from gait import Model, UserError, Video, VideoWriter, background
 from gait.bindings.model import read_blob
@@ -14,7 +14,7 @@ from gait.io.video import median_plate
 
 
 def pattern(i, width=64, height=48):
-    """Smooth picture with a bright bar whose place tells the frame."""
+    """Smooth picture with a bright bar whose place shows the frame."""
     image = np.full((height, width, 3), 60, np.uint8)
     image[:, 4 * i : 4 * i + 4] = (200, 180, 220)
     return image
@@ -58,10 +58,10 @@ def test_grey(film):
 
 
 @pytest.mark.parametrize("shape", [(47, 63, 3), (47, 64), (48, 63)])
-def test_odd_sizes_and_grey_are_accepted(shape, tmp_path):
-    with VideoWriter(tmp_path / "odd.mkv", 30) as writer:
+def test_uneven_sizes_and_grey_are_accepted(shape, tmp_path):
+    with VideoWriter(tmp_path / "uneven.mkv", 30) as writer:
         writer.write(np.full(shape, 100, np.uint8))
-    assert Video(tmp_path / "odd.mkv").size == (64, 48)
+    assert Video(tmp_path / "uneven.mkv").size == (64, 48)
 
 
 def test_an_error_leaves_no_file_and_not_the_old_one_changed(tmp_path):
@@ -97,7 +97,7 @@ def test_unreadable_video_is_one_clear_line(content, tmp_path):
     assert "\n" not in str(caught.value)
 
 
-def test_cut_off_video_is_told(film, tmp_path):
+def test_cut_off_video_is_reported(film, tmp_path):
     path = tmp_path / "cut.mp4"
     path.write_bytes(film.read_bytes()[:200])
     with pytest.raises(UserError, match="cut.mp4: "):
@@ -118,18 +118,18 @@ def test_sound_alone_is_no_video(tmp_path):
         Video(path)
 
 
-def test_median_plate_removes_a_walker(tmp_path):
+def test_median_plate_removes_a_person(tmp_path):
     # the walk crosses the picture, so that every pixel is free most of the time
     pictures, _ = clip(Model(), blob.decode(read_blob(None)), 60, start=(-1.6, 0.0))
     write(tmp_path / "walk.mp4", pictures)
-    seen = []
-    plate = median_plate(Video(tmp_path / "walk.mp4"), samples=21, progress=seen.append)
-    assert seen == list(range(60))
-    off, with_walker = (
+    shown = []
+    plate = median_plate(Video(tmp_path / "walk.mp4"), samples=21, progress=shown.append)
+    assert shown == list(range(60))
+    off, with_person = (
         np.abs(picture.mean(axis=2) - wall().mean(axis=2)) for picture in (plate, pictures[30])
     )
     assert np.percentile(off, 99) < 10
-    assert np.percentile(with_walker, 99) > 40  # so the walker would have been seen
+    assert np.percentile(with_person, 99) > 40  # so the person would have been seen
 
 
 def test_background_option(film, tmp_path):

@@ -18,7 +18,7 @@ STANDING = 0.05  # m/s
 
 @pytest.fixture(scope="module")
 def stage():
-    """A walker of a normative gait, whom the prior does not know."""
+    """A person of a normative gait, unknown to the prior."""
     return set_stage(Scenario(frames=FRAMES, fps=FPS, seed=301))
 
 

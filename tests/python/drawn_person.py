@@ -1,4 +1,4 @@
-"""A walker drawn by the library's own rasteriser on a noisy wall: a small clip of exactly known state."""
+"""A person drawn by the library's own rasteriser on a noisy wall: a small clip of exactly known state."""
 
 from pathlib import Path
 
@@ -26,7 +26,7 @@ def wall(seed=0):
 
 
 def state_at(model, sections, time, heading=0.0, start=(-0.6, 0.0), rate=0.9, phase=0.2, stature=1.75):
-    """State of the mean walker after `time` seconds."""
+    """State of the mean person after `time` seconds."""
     path = stature * root_path(sections, np.array([phase, phase + rate * time]), rate)
     move = path[1] - path[0]
     way = np.array([[np.cos(heading), -np.sin(heading)], [np.sin(heading), np.cos(heading)]])

@@ -1,4 +1,4 @@
-"""Points that a detector put elsewhere for longer lose their say; right ones and other motions keep it."""
+"""Points that a detector put elsewhere for longer lose their weight; right ones and other motions keep it."""
 
 from __future__ import annotations
 
@@ -24,7 +24,7 @@ CAMERA = Camera.looking((1.5, -6.0, 1.4), (1.0, 0, 0.9), (960, 720), 900)
 
 
 def points(frames: int = 8, markers: int = 15):
-    """Points as they are said to be, with noise."""
+    """Points as they are stated, with noise."""
     rng = np.random.default_rng(3)
     predicted = rng.uniform(0, 500, (frames, markers, 2))
     uv = predicted + SD * rng.normal(size=predicted.shape)
@@ -47,12 +47,12 @@ def test_a_wrong_point_loses_its_pull_the_further_the_more():
     assert pulls[1] < pulls[0] / 50 < FAR / SD
 
 
-def test_of_a_motion_that_is_another_no_point_is_doubted():
+def test_of_another_motion_no_point_is_an_outlier():
     predicted, observed = points()
     assert (weighted(observed, predicted + (30.0, 40.0)).sd == observed.sd).all()
 
 
-def test_what_is_not_seen_is_not_judged():
+def test_missing_points_are_not_judged():
     predicted, observed = points()
     observed.uv[0], observed.sd[0] = np.nan, np.inf
     assert (weighted(observed, predicted).sd == observed.sd).all()
@@ -93,11 +93,11 @@ def test_a_point_wrong_for_a_second_hardly_matters(walk):
 def spoilt(keypoints, share, seed):
     """Keypoints of which a share of the points is anywhere."""
     rng = np.random.default_rng(seed)
-    wild = rng.random(keypoints.visible.shape) < share
-    return replace(keypoints, uv=keypoints.uv + wild[..., None] * rng.normal(0, 150, keypoints.uv.shape))
+    outliers = rng.random(keypoints.visible.shape) < share
+    return replace(keypoints, uv=keypoints.uv + outliers[..., None] * rng.normal(0, 150, keypoints.uv.shape))
 
 
-def test_somebody_is_found_among_wild_points(walk):
+def test_a_person_is_found_among_outliers(walk):
     prior, places, keypoints = walk
     names = motion.output_names(prior, keypoints)
     steady, _ = noise.without_spikes(spoilt(keypoints, 0.15, 1), SD)
@@ -120,7 +120,7 @@ def live(keypoints, share, seed):
             yield now, now.markers[order], now.sd[order]
 
 
-def test_a_live_start_finds_somebody_among_wild_points(walk):
+def test_a_live_start_finds_a_person_among_outliers(walk):
     _, places, keypoints = walk
     for seed in range(6):
         frames = list(live(keypoints, 0.15, seed))
