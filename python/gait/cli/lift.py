@@ -298,11 +298,8 @@ def _check(args: argparse.Namespace) -> None:
 
 def _rate(keypoints: Keypoints) -> float:
     """Frames per second."""
-    return (
-        float((len(keypoints.time) - 1) / (keypoints.time[-1] - keypoints.time[0]))
-        if len(keypoints.time) > 1
-        else 1.0
-    )
+    time = keypoints.time
+    return float((len(time) - 1) / (time[-1] - time[0])) if len(time) > 1 else 1.0
 
 
 def _summary(args: argparse.Namespace, keypoints: Keypoints, found: motion.Motion) -> dict[str, Any]:
@@ -319,9 +316,7 @@ def _summary(args: argparse.Namespace, keypoints: Keypoints, found: motion.Motio
         "settled": found.settled,
         "log10_volume_ratio": found.log_volume_ratio,
         "segments": _segments(found.uncertain, found.names),
-        "chi2_per_observation": found.chi2_per_observation
-        if np.isfinite(found.chi2_per_observation)
-        else None,
+        "chi2_per_observation": chi2 if np.isfinite(chi2 := found.chi2_per_observation) else None,
         "prior_widened": found.wider,
         "segments_alone": found.alone,
         "outliers": 0 if found.outliers is None else int(found.outliers.sum()),

@@ -145,11 +145,8 @@ def write(path: str | os.PathLike[str], keypoints: Keypoints) -> None:
             row = [str(frame), f"{keypoints.time[t]:.6f}"]
             for j, (u, v) in enumerate(keypoints.uv[t]):
                 observed = np.isfinite(u)
-                row += (
-                    [f"{u:.4f}", f"{v:.4f}", f"{keypoints.confidence[t, j]:.3g}"]
-                    if observed
-                    else ["", "", ""]
-                )
+                cells = [f"{u:.4f}", f"{v:.4f}", f"{keypoints.confidence[t, j]:.3g}"]
+                row += cells if observed else ["", "", ""]
             table.writerow(row)
 
 

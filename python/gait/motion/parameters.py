@@ -269,11 +269,7 @@ def angle_cycles(
         strides = np.interp(when, track.time, angles[name])
         rate = 1 / float(np.median(when[:, -1] - when[:, 0]))
         norm_mean, norm_sd = curves.norm(name, PERCENT / 100 + (0.5 if left else 0.0), rate)
-        sd = (
-            _drawn_sd(draws, name, when)
-            if draws
-            else _linear_sd(track.numbers, track.time, name, curves, when)
-        )
+        sd = _drawn_sd(draws, name, when) if draws else _linear_sd(track, name, curves, when)
         out[name] = AngleCycle(strides, strides.mean(axis=0), sd, np.degrees(norm_mean), np.degrees(norm_sd))
     return out
 
@@ -292,10 +288,9 @@ def _drawn_sd(draws: Draws, name: str, when: Array) -> Array:
     return np.asarray(np.std(means, axis=0))
 
 
-def _linear_sd(
-    numbers: Mapping[str, Array], time: Array, name: str, curves: ModelCurves, when: Array
-) -> Array:
+def _linear_sd(track: Track, name: str, curves: ModelCurves, when: Array) -> Array:
     """Return the sd by linear propagation from phase and scores, with equal errors in every stride."""
+    numbers = track.numbers
     if "phase_sd" not in numbers:
         return np.full(len(PERCENT), np.nan)
     scores = sorted((n for n in numbers if n.startswith("c_") and not n.endswith("_sd")), key=_number)
@@ -309,7 +304,7 @@ def _linear_sd(
     for k, score in enumerate(scores):
         one = np.eye(len(scores))[k]
         variance += ((curves.channel(name, phase, coef + one, rate) - here) * numbers[f"{score}_sd"]) ** 2
-    return np.asarray(np.interp(when, time, np.degrees(np.sqrt(variance))).mean(axis=0))
+    return np.asarray(np.interp(when, track.time, np.degrees(np.sqrt(variance))).mean(axis=0))
 
 
 def _number(score: str) -> int:
@@ -338,14 +333,8 @@ def event_rows(track: Track, parameters: Parameters) -> Iterator[dict[str, Any]]
             times = getattr(parameters.events, kind)[side]
             for time, sd in zip(times, getattr(parameters.event_sd, kind)[side], strict=True):
                 frame = float(np.interp(time, track.time, track.frame))
-                rows.append(
-                    {
-                        "event": f"{side}_{_EVENT[kind]}",
-                        "time_s": float(time),
-                        "frame": frame,
-                        "sd_s": float(sd),
-                    }
-                )
+                event = {"event": f"{side}_{_EVENT[kind]}", "time_s": float(time)}
+                rows.append(event | {"frame": frame, "sd_s": float(sd)})
     yield from sorted(rows, key=lambda row: row["time_s"])
 
 

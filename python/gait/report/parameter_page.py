@@ -16,6 +16,10 @@ from gait.report.page import Page
 from gait.report.plots import Painter, svg_figure
 
 _WIDTH = 7.6  # inches
+_STRIDE_ROWS = (
+    ("stride_time_s", "stride_length_m", "speed_m_s"),
+    ("step_length_m", "step_width_m", "stance_percent"),
+)
 _GROUPS = (
     ("hip_flexion", "knee_flexion", "ankle_flexion"),
     ("hip_abduction", "hip_rotation", "shoulder_flexion"),
@@ -41,15 +45,8 @@ def footfall_plot(track: Track, parameters: Parameters) -> str:
                 (parameters.events.strike[side], parameters.event_sd.strike[side], 0.32),
                 (parameters.events.off[side], parameters.event_sd.off[side], -0.32),
             ):
-                axes.errorbar(
-                    times,
-                    np.full(len(times), row + bottom),
-                    xerr=2 * sds,
-                    fmt="|",
-                    color=DARK,
-                    capsize=2,
-                    lw=1,
-                )
+                at = np.full(len(times), row + bottom)
+                axes.errorbar(times, at, xerr=2 * sds, fmt="|", color=DARK, capsize=2, lw=1)
         axes.set(yticks=[0, 1], yticklabels=SIDES, xlabel="time, s", ylim=(-0.6, 1.6))
         axes.set_xlim(track.time[0], track.time[-1])
         axes.grid(axis="y", visible=False)
@@ -68,33 +65,19 @@ def stride_plot(track: Track, parameters: Parameters) -> str:
                 seen = np.isfinite(s.values[name])
                 for sure in (True, False):
                     use = seen & (s.sure == sure)
+                    filling, label = (ON_PAPER[side], side) if sure else ("white", None)
                     axes.errorbar(
-                        middle[use],
-                        s.values[name][use],
-                        yerr=2 * s.sd[name][use],
-                        fmt="o",
-                        ms=4,
-                        lw=1,
-                        color=ON_PAPER[side],
-                        mfc=ON_PAPER[side] if sure else "white",
-                        label=side if sure else None,
-                    )
+                        middle[use], s.values[name][use], yerr=2 * s.sd[name][use],
+                        fmt="o", ms=4, lw=1, color=ON_PAPER[side], mfc=filling, label=label,
+                    )  # fmt: skip
             axes.set(title=title, xlabel="time, s")
             axes.set_xlim(track.time[0], track.time[-1])
             axes.margins(y=0.25)
 
         return paint
 
-    names = (
-        "stride_time_s",
-        "stride_length_m",
-        "speed_m_s",
-        "step_length_m",
-        "step_width_m",
-        "stance_percent",
-    )
-    painters = [painter(name, QUANTITIES[name]) for name in names]
-    return svg_figure([painters[:3], painters[3:]], (_WIDTH, 4.2), legend=True)
+    rows = [[painter(name, QUANTITIES[name]) for name in names] for names in _STRIDE_ROWS]
+    return svg_figure(rows, (_WIDTH, 4.2), legend=True)
 
 
 def angle_plot(cycles: Mapping[str, AngleCycle], trunk: bool = False) -> str | None:

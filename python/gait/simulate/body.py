@@ -23,13 +23,9 @@ for _s in SIDES:
     PARENTS |= {f"{_s}_upper_arm": "torso", f"{_s}_forearm": f"{_s}_upper_arm", f"{_s}_hand": f"{_s}_forearm"}
     PARENTS |= {f"{_s}_thigh": "pelvis", f"{_s}_shank": f"{_s}_thigh", f"{_s}_foot": f"{_s}_shank"}
     PARENTS |= {f"{_s}_toes": f"{_s}_foot"}
-    JOINT_OF |= {
-        f"{_s}_upper_arm": f"{_s}_shoulder",
-        f"{_s}_forearm": f"{_s}_elbow",
-        f"{_s}_hand": f"{_s}_wrist",
-    }
-    JOINT_OF |= {f"{_s}_thigh": f"{_s}_hip", f"{_s}_shank": f"{_s}_knee", f"{_s}_foot": f"{_s}_ankle"}
-    JOINT_OF |= {f"{_s}_toes": f"{_s}_toe"}
+    JOINT_OF |= {f"{_s}_upper_arm": f"{_s}_shoulder", f"{_s}_forearm": f"{_s}_elbow"}
+    JOINT_OF |= {f"{_s}_hand": f"{_s}_wrist", f"{_s}_thigh": f"{_s}_hip", f"{_s}_shank": f"{_s}_knee"}
+    JOINT_OF |= {f"{_s}_foot": f"{_s}_ankle", f"{_s}_toes": f"{_s}_toe"}
 BONES = tuple(PARENTS)
 BONE_INDEX = {name: i for i, name in enumerate(BONES)}
 

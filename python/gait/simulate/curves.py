@@ -43,14 +43,8 @@ _MIDDLE = {
     "neck_x": (0, (0.4, -1.2), (0, 0)),
 }
 NAMES = tuple(_MIDDLE) + tuple(f"{side}_{name}" for side in "lr" for name in _LIMBS)
-_CALM = {
-    "pelvis_yaw": 0.35,
-    "pelvis_pitch": 0.25,
-    "pelvis_roll": 0.25,
-    "hip_flexion": 0.6,
-    "knee_flexion": 0.5,
-}
-_CALM |= {"hip_abduction": 0.4, "hip_rotation": 0.6}
+_CALM = {"pelvis_yaw": 0.35, "pelvis_pitch": 0.25, "pelvis_roll": 0.25}
+_CALM |= {"hip_flexion": 0.6, "knee_flexion": 0.5, "hip_abduction": 0.4, "hip_rotation": 0.6}
 
 
 def fourier(phase: ArrayLike) -> Array:
@@ -91,10 +85,10 @@ def normative(rng: np.random.Generator) -> Curves:
     return Curves(mean, stride_modes(rng))
 
 
-def stride_modes(rng: np.random.Generator, count: int = 2) -> Array:
+def stride_modes(rng: np.random.Generator) -> Array:
     """Return random directions in which strides differ, about 1 degree rms for a unit score."""
     kinds = [name[2:] if name[1] == "_" else name for name in NAMES]
-    draw = [[_calm(kind) * _smooth(rng, (0.7, 0.8, 0.4, 0.2)) for kind in kinds] for _ in range(count)]
+    draw = [[_calm(kind) * _smooth(rng, (0.7, 0.8, 0.4, 0.2)) for kind in kinds] for _ in range(2)]
     return np.radians(np.array(draw))
 
 

@@ -31,11 +31,8 @@ _SEAT = (
 )  # fmt: skip
 # height over the neck joint, forward shift, depth, width
 _NECK = (
-    (-2.5, 0.4, 4.6, 5.2),
-    (1, 0.1, 4.9, 5.0),
-    (4, 0.5, 5.3, 5.2),
-    (8, 0.7, 5.6, 5.4),
-    (11, 0.4, 5.0, 5.0),
+    *((-2.5, 0.4, 4.6, 5.2), (1, 0.1, 4.9, 5.0), (4, 0.5, 5.3, 5.2)),
+    *((8, 0.7, 5.6, 5.4), (11, 0.4, 5.0, 5.0)),
 )
 _HEAD = (
     (4.4, 4.6, 2.2, 2.2), (5.2, 4.1, 5.0, 3.9), (7.2, 3.0, 7.1, 5.3), (10.5, 2.2, 8.4, 6.5),
@@ -45,11 +42,8 @@ _HEAD = (
     (27.2, 0.7, 0.1, 0.1),
 )  # fmt: skip
 _NOSE = (
-    (10.6, 16.6, 0.4, 0.6),
-    (11.1, 14, 0.9, 1.0),
-    (11.7, 12.2, 1.5, 1.5),
-    (11.4, 11.2, 1.0, 1.4),
-    (10.8, 10.8, 0.2, 0.5),
+    *((10.6, 16.6, 0.4, 0.6), (11.1, 14, 0.9, 1.0), (11.7, 12.2, 1.5, 1.5)),
+    *((11.4, 11.2, 1.0, 1.4), (10.8, 10.8, 0.2, 0.5)),
 )
 _EAR = ((11.2, 0.1, 0.1), (12, 1.2, 0.8), (14.5, 1.9, 1.0), (16.4, 1.8, 0.9), (17.2, 0.1, 0.1))
 # azimuth from the front, degrees: where the hair ends, height over the neck joint
@@ -59,13 +53,9 @@ _SHORT, _LONG = (22.5, 22.0, 19.5, 16.0, 12.0, 8.5, 7.0), (22.5, 21.5, 16.0, 5.0
 
 def trunk_parts(body: Anatomy, appearance: Appearance) -> list[Part]:
     """Return the top, the seat of the trousers, neck, head, nose, ears and hair."""
-    cm = 0.01 * body.stature / 1.75
-    return [
-        _top(body, appearance, cm),
-        _seat(body, appearance, cm),
-        *_head(body, appearance, cm),
-        _hair(body, appearance, cm),
-    ]
+    cm = _scale(body)
+    trunk = [_top(body, appearance, cm), _seat(body, appearance, cm)]
+    return [*trunk, *_head(body, appearance, cm), _hair(body, appearance, cm)]
 
 
 def _top(body: Anatomy, appearance: Appearance, cm: float) -> Part:
@@ -143,9 +133,7 @@ def limb_parts(body: Anatomy, appearance: Appearance) -> list[Part]:
     """Return both arms and both legs."""
     parts = []
     for side, sign in zip(SIDES, (1.0, -1.0), strict=True):
-        parts += (
-            _arm(side, sign, body, appearance) + _leg(side, sign, body, appearance) + _shoe(side, sign, body)
-        )
+        parts += _arm(side, sign, body, appearance) + _leg(side, body, appearance) + _shoe(side, sign, body)
     return parts
 
 
@@ -158,11 +146,10 @@ def _down(
     side_at: np.ndarray, rows: Sequence[tuple[float, ...]], unit: float, girth: float, exponent: float
 ) -> np.ndarray:
     """Turn rows (height above the origin in metres, x shift, depth, width) into rings beside a joint."""
-    out = [
-        (side_at[0] + x * unit, side_at[1], z, d * unit * girth, w * unit * girth, exponent)
-        for z, x, d, w in rows
-    ]
-    return np.array(out)
+    x0, y, _ = side_at
+    return np.array(
+        [(x0 + x * unit, y, z, d * unit * girth, w * unit * girth, exponent) for z, x, d, w in rows]
+    )
 
 
 def _arm(side: str, sign: float, body: Anatomy, appearance: Appearance) -> list[Part]:
@@ -183,26 +170,10 @@ def _arm(side: str, sign: float, body: Anatomy, appearance: Appearance) -> list[
         (e - 6 * cm, 0.1, 4.2, 3.7),
         (e - 15 * cm, 0, 3.4, 3.0), (w + 3 * cm, 0, 2.8, 2.2), (w - 1 * cm, 0, 2.8, 2.0),
     ]  # fmt: skip
-    parts = [
-        loft(
-            _down(shoulder, sleeve, cm, appearance.limbs, 2.1),
-            34 if appearance.long_sleeves else 18,
-            16,
-            TOP,
-            -X,
-            Y,
-        ),
-        loft(
-            _down(shoulder, skin[5:] if appearance.long_sleeves else skin, cm, appearance.limbs, 2),
-            26,
-            14,
-            SKIN,
-            -X,
-            Y,
-        ),
-    ]
-    for part in parts:
-        part.bind_chain(chain, body, -Z, 7 * cm)
+    rings, bare = (34, skin[5:]) if appearance.long_sleeves else (18, skin)
+    cloth = loft(_down(shoulder, sleeve, cm, appearance.limbs, 2.1), rings, 16, TOP, -X, Y)
+    under = loft(_down(shoulder, bare, cm, appearance.limbs, 2), 26, 14, SKIN, -X, Y)
+    parts = [part.bind_chain(chain, body, -Z, 7 * cm) for part in (cloth, under)]
     return parts + _hand(side, sign, body)
 
 
@@ -228,7 +199,7 @@ def _hand(side: str, sign: float, body: Anatomy) -> list[Part]:
     return parts
 
 
-def _leg(side: str, sign: float, body: Anatomy, appearance: Appearance) -> list[Part]:
+def _leg(side: str, body: Anatomy, appearance: Appearance) -> list[Part]:
     cm, rest, loose = _scale(body), body.rest, appearance.loose
     hip = rest[f"{side}_hip"]
     h, k, a = (rest[f"{side}_{name}"][2] for name in ("hip", "knee", "ankle"))

@@ -7,24 +7,14 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from gait.body.skeleton import axis_rotation as about
+
 Array = NDArray[np.float64]
 Floats = NDArray[np.floating[Any]]
 """Single precision in the renderer's inner loops, where it halves the time."""
 Ints = NDArray[np.integer[Any]]
 Picture = NDArray[np.uint8]
 """(h, w, 3) BGR."""
-
-
-def about(axis: int, angle: ArrayLike) -> Array:
-    """Return rotations (..., 3, 3) by `angle` radians (...) about axis 0 = x, 1 = y, 2 = z."""
-    angle = np.asarray(angle, np.float64)
-    out = np.zeros((*angle.shape, 3, 3))
-    i, j = (axis + 1) % 3, (axis + 2) % 3
-    out[..., axis, axis] = 1
-    out[..., i, i] = out[..., j, j] = np.cos(angle)
-    out[..., j, i] = np.sin(angle)
-    out[..., i, j] = -np.sin(angle)
-    return out
 
 
 def euler(yaw: ArrayLike, pitch: ArrayLike, roll: ArrayLike) -> Array:

@@ -132,11 +132,8 @@ def tiles(rng: np.random.Generator) -> Paint:
 
 def asphalt(rng: np.random.Generator) -> Paint:
     """Return rolled asphalt with patches."""
-    noise, grain, colour = (
-        Noise(rng),
-        Noise(rng, fine=True),
-        linear((118, 118, 120)) * rng.uniform(0.75, 1.25),
-    )
+    noise, grain = Noise(rng), Noise(rng, fine=True)
+    colour = linear((118, 118, 120)) * rng.uniform(0.75, 1.25)
 
     def paint(u: Floats, v: Floats) -> Floats:
         speckle = 0.20 * grain(u, v, 5.3) + 0.10 * noise(u, v, 3.1)

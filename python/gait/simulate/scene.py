@@ -141,18 +141,9 @@ def _window(left: float, breadth: float, sill: float, tall: float, shutters: boo
             top = sill + tall * (0.62 if level == 0 else 1)
             out.append(Panel(x + gap, x + half - gap, z + gap, top - gap, _glass))
     if shutters:
-        out.append(
-            Panel(left - 0.1 - 0.45 * breadth, left - 0.1, sill - 0.05, sill + tall + 0.05, paint.louvres)
-        )
-        out.append(
-            Panel(
-                left + breadth + 0.1,
-                left + 0.1 + 1.45 * breadth,
-                sill - 0.05,
-                sill + tall + 0.05,
-                paint.louvres,
-            )
-        )
+        low, high = sill - 0.05, sill + tall + 0.05
+        out.append(Panel(left - 0.1 - 0.45 * breadth, left - 0.1, low, high, paint.louvres))
+        out.append(Panel(left + breadth + 0.1, left + 0.1 + 1.45 * breadth, low, high, paint.louvres))
     return out
 
 
@@ -190,13 +181,8 @@ def _hedge(left: float, right: float, y: float, low: float, rng: np.random.Gener
     while x < right:
         size = rng.uniform(0.9, 1.7)
         colour = linear((rng.uniform(70, 100), rng.uniform(98, 122), rng.uniform(50, 70)))
-        out.append(
-            Bush(
-                np.array([x, y + 1.3 * size + rng.uniform(0, 1), low + rng.uniform(0, 1.0)]),
-                np.full(3, size),
-                colour,
-            )
-        )
+        centre = np.array([x, y + 1.3 * size + rng.uniform(0, 1), low + rng.uniform(0, 1.0)])
+        out.append(Bush(centre, np.full(3, size), colour))
         x += rng.uniform(0.9, 2.4)
     return out
 
@@ -326,11 +312,8 @@ class _Caster:
     ) -> None:  # fmt: skip
         """Keep a surface, given in the window `box`, where it is nearer than what is there."""
         hit = hit & (depth < self.depth[box])
-        self.depth[box][hit], self.albedo[box][hit], self.sun_cosine[box][hit] = (
-            depth[hit],
-            albedo[hit],
-            cosine,
-        )
+        self.depth[box][hit], self.albedo[box][hit] = depth[hit], albedo[hit]
+        self.sun_cosine[box][hit] = cosine
         self.open[box][hit] = sky[hit] if isinstance(sky, np.ndarray) else sky
 
 

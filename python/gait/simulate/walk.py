@@ -16,10 +16,11 @@ from scipy.interpolate import CubicHermiteSpline, PchipInterpolator
 from scipy.ndimage import gaussian_filter1d, maximum_filter1d
 from scipy.optimize import brentq
 
+from gait.body.skeleton import axis_rotation as about
 from gait.errors import UsageError
 from gait.simulate.body import BONE_INDEX, BONES, JOINT_OF, POINT_BONE, POINTS, SIDES, Anatomy
 from gait.simulate.curves import Curves
-from gait.simulate.geometry import Array, Ints, about, apply, euler, limb, unit
+from gait.simulate.geometry import Array, Ints, apply, euler, limb, unit
 
 
 @dataclass(frozen=True)

@@ -16,13 +16,8 @@ CLOTH_TILE = 0.40  # metres of cloth in one texture
 _SKINS = ((224, 178, 150), (205, 155, 122), (168, 117, 86), (120, 80, 58), (236, 196, 170))
 _HAIRS = ((38, 28, 24), (70, 46, 30), (112, 78, 48), (150, 120, 84), (20, 18, 20))
 _TOPS = (
-    (176, 52, 46),
-    (52, 88, 140),
-    (70, 112, 78),
-    (196, 188, 172),
-    (120, 72, 110),
-    (206, 150, 62),
-    (60, 66, 78),
+    *((176, 52, 46), (52, 88, 140), (70, 112, 78), (196, 188, 172)),
+    *((120, 72, 110), (206, 150, 62), (60, 66, 78)),
 )
 _TROUSERS = ((46, 58, 86), (58, 56, 58), (120, 104, 80), (74, 84, 98), (94, 78, 66), (34, 36, 42))
 _SHOES = ((44, 38, 36), (206, 204, 198), (96, 66, 44), (60, 64, 74))
@@ -87,10 +82,9 @@ def tile_noise(rng: np.random.Generator, cells: tuple[int, int], size: int = SIZ
 
 
 def _pick(table: tuple[tuple[int, int, int], ...], rng: np.random.Generator) -> Array:
-    colour = np.array(table[int(rng.integers(len(table)))]) * (
-        1 + 0.07 * rng.uniform(-1, 1) + 0.015 * rng.standard_normal(3)
-    )
-    return linear(np.clip(colour, 8, 245))
+    colour = np.array(table[int(rng.integers(len(table)))])
+    tint = 1 + 0.07 * rng.uniform(-1, 1) + 0.015 * rng.standard_normal(3)
+    return linear(np.clip(colour * tint, 8, 245))
 
 
 def _grain(rng: np.random.Generator, depth: float) -> Floats:
@@ -100,11 +94,8 @@ def _grain(rng: np.random.Generator, depth: float) -> Floats:
 
 def _cloth(pattern: str, base: Array, rng: np.random.Generator) -> Floats:
     """Return a woven texture; rows run along the body."""
-    second = (
-        np.clip(base * rng.uniform(0.25, 0.55), 0, 1)
-        if base.mean() > 0.12
-        else np.clip(base * 2.6 + 0.1, 0, 1)
-    )
+    second = base * rng.uniform(0.25, 0.55) if base.mean() > 0.12 else base * 2.6 + 0.1
+    second = np.clip(second, 0, 1)
     y, x = np.mgrid[0:SIZE, 0:SIZE] / SIZE
     share = np.zeros((SIZE, SIZE))
     if pattern == "stripes":
@@ -118,16 +109,11 @@ def _cloth(pattern: str, base: Array, rng: np.random.Generator) -> Floats:
         share = np.clip(0.5 + 1.5 * blotch, 0, 1) * 0.8
     colour = base + share[..., None] * (second - base)
     if pattern == "denim":
-        colour = (
-            colour
-            * np.clip(1 + 0.16 * tile_noise(rng, (6, 90)) + 0.10 * tile_noise(rng, (90, 6)), 0.5, 1.6)[
-                ..., None
-            ]
-        )
+        threads = 1 + 0.16 * tile_noise(rng, (6, 90)) + 0.10 * tile_noise(rng, (90, 6))
+        colour = colour * np.clip(threads, 0.5, 1.6)[..., None]
     folds = 1 + 0.10 * tile_noise(rng, (9, 4)) + 0.06 * tile_noise(rng, (4, 9))
-    return (np.clip(colour, 0, 1) * np.clip(folds, 0.6, 1.4)[..., None] * _grain(rng, 0.05)).astype(
-        np.float32
-    )
+    shaded = np.clip(colour, 0, 1) * np.clip(folds, 0.6, 1.4)[..., None]
+    return (shaded * _grain(rng, 0.05)).astype(np.float32)
 
 
 def _band(x: Array, width: float) -> Array:
@@ -144,17 +130,8 @@ def _face(skin: Array, hair: Array, rng: np.random.Generator) -> Floats:
     def spot(u: float, v: float, ru: float, rv: float, colour: Array, share: float) -> None:
         mask = np.zeros((SIZE, SIZE), np.float32)
         centre = (round(u * SIZE), round(v * SIZE))
-        cv2.ellipse(
-            mask,
-            centre,
-            (max(round(ru * SIZE), 1), max(round(rv * SIZE), 1)),
-            0,
-            0,
-            360,
-            1.0,
-            -1,
-            cv2.LINE_AA,
-        )
+        radii = (max(round(ru * SIZE), 1), max(round(rv * SIZE), 1))
+        cv2.ellipse(mask, centre, radii, 0, 0, 360, 1.0, -1, cv2.LINE_AA)
         mask = cv2.GaussianBlur(mask, (0, 0), 1.2)[..., None] * share
         picture[:] = picture * (1 - mask) + mask * colour.astype(np.float32)
 

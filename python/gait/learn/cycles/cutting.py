@@ -34,19 +34,17 @@ class Cycles:
         return np.asarray(self.mask.any(axis=(0, 1)))
 
 
-def cut_cycles(
-    signals: list[Floats], periods: Floats, offsets: Floats, samples: int, observed: float = OBSERVED
-) -> Cycles:
+def cut_cycles(signals: list[Floats], periods: Floats, offsets: Floats, samples: int) -> Cycles:
     """Cut sequences (T_i, M) into cycles and resample each on `samples` phases.
 
     Cycle k is the frames from offset + (k - 1) period to offset + k period.  Cycles with less than the share
-    `observed` of their entries, in the channels that the sequence has, are dropped.
+    OBSERVED of their entries, in the channels that the sequence has, are dropped.
     """
     channels, rest = signals[0].shape[1], list[tuple[Mask, Floats, int, int]]()
 
     def closed() -> Iterator[Floats]:
         for i, (z, period, offset) in enumerate(zip(signals, periods, offsets, strict=True)):
-            for k, values, mask in _slices(z, float(period), float(offset), samples, observed):
+            for k, values, mask in _slices(z, float(period), float(offset), samples):
                 flat, ramp = _close(values, mask)
                 rest.append((mask, ramp, i, k))
                 yield flat
@@ -58,15 +56,13 @@ def cut_cycles(
     return Cycles(values, mask, ramp, *(np.array([row[k] for row in rest], int) for k in (2, 3)))
 
 
-def _slices(
-    z: Floats, period: float, offset: float, samples: int, observed: float
-) -> Iterator[tuple[int, Floats, Mask]]:
+def _slices(z: Floats, period: float, offset: float, samples: int) -> Iterator[tuple[int, Floats, Mask]]:
     """Yield the cycles of one sequence that are used: number, values and mask."""
     channels = int(np.isfinite(z).any(axis=0).sum())
     for k in range(int(np.ceil((len(z) - offset) / period)) + 1):
         u = np.asarray((np.arange(len(z)) - offset) / period - (k - 1), float)
         values, mask = resample(u, z, samples, 1 / period)
-        if channels and mask.sum() >= observed * samples * channels:
+        if channels and mask.sum() >= OBSERVED * samples * channels:
             yield k, values, mask
 
 

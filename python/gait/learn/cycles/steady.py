@@ -63,12 +63,8 @@ def steady_part(angles: Floats, fps: float, mode: str, path: RootPath) -> tuple[
         if kept == before or kept.stop - kept.start < period.CYCLES * found.frames:
             break
         found = period.find(angles[kept.start : kept.stop], fps, mode)
-    return Kept(
-        moving.start + kept.start,
-        moving.start + kept.stop,
-        _words(moving.before, kept.before),
-        _words(moving.after, kept.after),
-    ), found
+    why = _words(moving.before, kept.before), _words(moving.after, kept.after)
+    return Kept(moving.start + kept.start, moving.start + kept.stop, *why), found
 
 
 def active_part(angles: Floats, fps: float) -> Kept:

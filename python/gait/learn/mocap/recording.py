@@ -17,6 +17,7 @@ Y_UP = np.array([[0.0, 0, 1], [1, 0, 0], [0, 1, 0]])
 FEWEST = 3  # frames: fewer give no speeds
 FARTHEST = 1000.0  # metres from the file's origin; more is damage or another unit
 DEGREES = 3600.0  # the largest plausible angle of a joint
+SHORT = 3  # frames in a row that are exactly 0 and so missing, if zeros are declared missing
 LONG = 5  # frames in a row in which a moving part does not stay at exactly 0
 #: Parts that must be 0 at once to be reported: an angle may be clipped at 0, but no joint stays at the
 #: origin.
@@ -72,19 +73,15 @@ def require_range(path: Path, what: str, values: Floats, limit: float, unit: str
         )
 
 
-def mask_zero_runs(columns: Floats, run: int = 3) -> Floats:
-    """Copy values (T, k) of one part with NaN where at least `run` rows in a row are exactly 0.
+def mask_zero_runs(columns: Floats) -> Floats:
+    """Copy values (T, k) of one part with NaN where SHORT or more rows in a row are exactly 0.
 
     Some systems write 0 for what was occluded.  A part that is 0 throughout is fixed, not missing.
     """
     zero = (columns == 0).all(axis=1)
     result = columns.astype(float)
-    if zero.all():
-        return result
-    edges = np.diff(np.concatenate([[0], zero.astype(int), [0]]))
-    for begin, end in zip(np.flatnonzero(edges == 1), np.flatnonzero(edges == -1), strict=True):
-        if end - begin >= run:
-            result[begin:end] = np.nan
+    if not zero.all():
+        result[_runs(zero, SHORT)] = np.nan
     return result
 
 
@@ -107,7 +104,13 @@ def zero_run(parts: Mapping[str, Floats], together: int) -> str:
 def _long_zeros(columns: Floats) -> Mask:
     """Rows (T,) that belong to a run of LONG or more rows of exact zeros, of a part that moves."""
     zero = (columns == 0).all(axis=1)
-    if not (zero < np.isfinite(columns).all(axis=1)).any():
-        return np.zeros(len(zero), bool)
-    begins = np.convolve(zero, np.ones(LONG), "full")[LONG - 1 :] >= LONG  # LONG rows from here are 0
-    return np.convolve(begins, np.ones(LONG), "full")[: len(zero)] > 0
+    moves = (zero < np.isfinite(columns).all(axis=1)).any()
+    return _runs(zero, LONG) if moves else np.zeros(len(zero), bool)
+
+
+def _runs(rows: Mask, count: int) -> Mask:
+    """Rows (T,) that belong to a run of `count` or more True ones."""
+    begins = (
+        np.convolve(rows, np.ones(count), "full")[count - 1 :] >= count
+    )  # `count` rows from here are True
+    return np.convolve(begins, np.ones(count), "full")[: len(rows)] > 0
