@@ -246,7 +246,15 @@ def test_options_named_in_the_text_exist():
     """`--option` in prose is an option of some command."""
     texts = [helped(["gait", *name.split()]) for name in COMMANDS] + [helped(["build/bin/gait-trackd"])]
     known = set(re.findall(OPTION, " ".join(texts)))
-    known |= {"--version", "--record", "--runs", "--preload-nanny", "--static", "--strict"}  # of others
+    known |= {
+        "--version",
+        "--record",
+        "--runs",
+        "--preload-nanny",
+        "--static",
+        "--strict",
+        "--clips",
+    }  # of others
     unknown = []
     for page in PAGES:
         if page.name == "changelog.md":  # which lists old names
