@@ -1,4 +1,4 @@
-"""A camera is found from projected walks, with the doubt that the walk leaves."""
+"""A camera is found from projected walks, with the uncertainty that the walk leaves."""
 
 import json
 import re
@@ -105,13 +105,13 @@ def test_a_straight_path_across_leaves_the_focal_length_open():
     assert given.sd[0] < 0.06 and given.camera.fx == pytest.approx(1000, rel=0.1)
 
 
-def test_the_doubt_covers_the_path():
+def test_the_uncertainty_covers_the_path():
     camera = view()
     found = calibrate(keypoints(camera), SIZE, MODEL, 1.75)
     heading, place = TOWARDS
     way = 1.25 * found.time[:, None] * [np.cos(heading), np.sin(heading)]
     off = found.path[:, :2] - (np.array(place) + way)
-    sd = np.linalg.norm(found.doubt[:, :2], axis=2)
+    sd = np.linalg.norm(found.path_change[:, :2], axis=2)
     assert (np.abs(off) < 3 * np.hypot(sd, 0.1)).all() and sd.max() > 0.05
 
 
@@ -122,7 +122,10 @@ def test_a_treadmill_is_in_place():
     )
     assert found.in_place and found.sd[0] > 0.1
     assert np.ptp(found.path[:, :2], axis=0).max() < 0.1
-    assert "a walk in place says little" in found.describe()[1] or found.sd[0] < 0.2
+    assert (
+        "a walk in place determines the focal length poorly" in found.describe()[1]
+        or found.sd[0] < 0.2
+    )
 
 
 @pytest.mark.parametrize(
@@ -148,13 +151,13 @@ def test_what_is_no_walk_is_refused(change, words):
     ids=["right", "height", "focal"],
 )
 def test_a_camera_that_contradicts_the_walk_is_reported(change, words):
-    given, seen = view(**change), keypoints(view())
-    start = find_keypoint_start(seen, given, MODEL, height=1.75)
-    told = contradiction(given, start.mean.stature, seen, MODEL, 1.75)
+    given, walk = view(**change), keypoints(view())
+    start = find_keypoint_start(walk, given, MODEL, height=1.75)
+    words_found = contradiction(given, start.mean.stature, walk, MODEL, 1.75)
     assert (
-        told is None
+        words_found is None
         if words is None
-        else re.search(words, told) and "height 1." in told
+        else re.search(words, words_found) and "height 1." in words_found
     )
 
 

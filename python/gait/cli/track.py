@@ -1,7 +1,7 @@
 """Track a walking person in a video file.
 
 Without --camera, a camera is found from the walk, given the person's stature (see gait camera --walk); the
-standard deviations in OUT.csv include its doubt.
+standard deviations in OUT.csv include its uncertainty.
 
 The first state comes from --init: a JSON file with the person's position and phase, or auto.  auto fits a
 second of walking to the detector's keypoints (or those of --keypoints), which also gives the phase and

@@ -134,7 +134,7 @@ def write(
 
 
 def _widened(sink: Sink, calibration: Calibration | None) -> Sink:
-    """Give estimates to a sink with the doubt of a camera that was found."""
+    """Give estimates to a sink with the uncertainty of a camera that was found."""
     if calibration is None:
         return sink
     return lambda frame, estimate: sink(frame, calibration.widened(frame.time, estimate))

@@ -75,12 +75,12 @@ class Calibration:
         Seconds, of the knots of the path.
     path : ndarray of shape (K, 3)
         Place of the pelvis on the floor, metres, and heading, radians.
-    doubt : ndarray of shape (K, 3, 4)
+    path_change : ndarray of shape (K, 3, 4)
         Change of `path` with each of the four, if each is in its standard deviations and they are
         independent.
     in_place : bool
         The person walks in place, as on a treadmill.
-    misfit : float
+    chi2_per_observation : float
         Squared robust error per coordinate, about 1.
     """
 
@@ -90,9 +90,9 @@ class Calibration:
     roll: float
     time: Array
     path: Array
-    doubt: Array
+    path_change: Array
     in_place: bool
-    misfit: float
+    chi2_per_observation: float
 
     def describe(self) -> list[str]:
         """Give the camera in words, and what the walk does not determine."""
@@ -100,7 +100,7 @@ class Calibration:
         f, height = camera.fx, camera.centre[2]
         fov = 2 * np.degrees(np.arctan(0.5 * camera.width / f))
         lines = [
-            f"camera from the walk: focal length {f:.0f} +- {f * sd[0]:.0f} px (view {fov:.0f} deg wide), "
+            f"camera from the walk: focal length {f:.0f} +- {f * sd[0]:.0f} px (view {fov:.0f} deg across), "
             f"tilt {np.degrees(self.tilt):.1f} +- {np.degrees(sd[1]):.1f} deg, "
             f"roll {np.degrees(self.roll):.1f} +- {np.degrees(sd[2]):.1f} deg, "
             f"height {height:.2f} +- {height * sd[3]:.2f} m"
@@ -108,7 +108,7 @@ class Calibration:
         if sd[0] > _UNKNOWN:
             why = "in place" if self.in_place else "with little change of distance"
             lines.append(
-                f"a walk {why} says little of the focal length: distances are uncertain by "
+                f"a walk {why} determines the focal length poorly: distances are uncertain by "
                 f"{100 * sd[0]:.0f} %; give --fov, or film a walk towards or away from the camera"
             )
         return lines
@@ -121,11 +121,11 @@ class Calibration:
         names = ("focal_px", "tilt_deg", "roll_deg", "height_m")
         sds = {f"{name}_sd": float(sd) for name, sd in zip(names, scale * self.sd, strict=True)}
         means = {name: float(value) for name, value in zip(names, values, strict=True)}
-        return means | sds | {"in_place": self.in_place, "misfit": self.misfit}
+        return means | sds | {"in_place": self.in_place, "chi2_per_observation": self.chi2_per_observation}
 
     def widened(self, time: float, estimate: Estimate) -> Estimate:
-        """Add the doubt of the camera to an estimate made with it, seconds `time` in the clip."""
-        at = [np.interp(time, self.time, column) for column in self.doubt.reshape(len(self.time), -1).T]
+        """Add the uncertainty of the camera to an estimate made with it, seconds `time` in the clip."""
+        at = [np.interp(time, self.time, column) for column in self.path_change.reshape(len(self.time), -1).T]
         change = np.reshape(at, (3, 4))
         here = [np.interp(time, self.time, column) for column in self.path[:, :2].T]
         off = estimate.joints[:, :2] - here
@@ -194,7 +194,7 @@ def _calibrate(
         fit.refine(6)
         if best is None or fit.cost_per_frame < best.cost_per_frame:
             best = fit
-    if best is None or best.misfit > _WORST:
+    if best is None or best.chi2_per_observation > _WORST:
         raise UserError(
             f"{where}: no second of it fits a person who walks; film a walk in full view, or give --camera"
         )
@@ -207,7 +207,7 @@ def _calibrate(
 def contradiction(
     given: Camera, appears: float | None, keypoints: Keypoints, model: Model, height: float
 ) -> str | None:
-    """Say how a given camera contradicts a walk, and which one would fit; None: it does not.
+    """Report how a given camera contradicts a walk, and which one would fit; None: it does not.
 
     Parameters
     ----------
@@ -518,7 +518,7 @@ class _Fit:
             speed = [ahead / _STILL_SD, aside / _STILL_SD]
         else:
             usual = body.strides(rates, parts) * self._height * np.exp(q[4]) * rates
-            many = np.sqrt(len(step))  # one doubt of the whole walk
+            many = np.sqrt(len(step))  # one uncertainty of the whole walk
             speed = [(ahead - usual) / _SLIDE_SD / many, aside / _SIDEWAYS_SD / many]
         bends = np.diff(knots, 2, axis=0) / np.array([_BEND_SD, _BEND_SD, _TURN_SD, _HURRY_SD])
         return np.concatenate([
@@ -543,11 +543,11 @@ class _Fit:
         return float(self._rates(self._q).mean())
 
     @property
-    def misfit(self) -> float:
+    def chi2_per_observation(self) -> float:
         """Squared robust error per coordinate."""
-        return float(np.mean(self._frame_misfit()))
+        return float(np.mean(self._frame_chi2()))
 
-    def _frame_misfit(self) -> Array:
+    def _frame_chi2(self) -> Array:
         square = (self._errors(self._q) ** 2).sum(axis=2)
         robust = _DEGREES * np.log1p(square / _DEGREES)
         return np.asarray(robust.sum(axis=1) / np.maximum(2 * (self._inverse > 0).sum(axis=1), 1))
@@ -623,11 +623,11 @@ class _Fit:
             high = min(self._all.time[-1], high + _GROWTH) if 1 in open_ else high
             self._extend(low, high, *before)
             self.refine(4)
-            misfit = self._frame_misfit()
+            chi2 = self._frame_chi2()
             early, late = self._t < ends[0] - 1e-9, self._t > ends[1] + 1e-9
             bad = {
-                -1: early.any() and misfit[early].mean() > _FITS,
-                1: late.any() and misfit[late].mean() > _FITS,
+                -1: early.any() and chi2[early].mean() > _FITS,
+                1: late.any() and chi2[late].mean() > _FITS,
             }
             if bad[-1] or bad[1]:
                 low, high = (ends[0] if bad[-1] else low), (ends[1] if bad[1] else high)
@@ -653,11 +653,11 @@ class _Fit:
     def result(self) -> Calibration:
         """Camera, path and what the camera leaves open of it."""
         matrix, _ = self._normal(self._q)
-        covariance = np.linalg.inv(matrix) * max(self.misfit, 1.0)
+        covariance = np.linalg.inv(matrix) * max(self.chi2_per_observation, 1.0)
         camera = covariance[:4, :4]
         root = np.linalg.cholesky(camera)
         # Part of the path's covariance that comes from the camera: S_pc S_cc^-1 S_cp = D D'.
-        doubt = np.linalg.solve(root, covariance[:4, self._fixed :]).T.reshape(-1, 4, 4)[:, :3]
+        path_change = np.linalg.solve(root, covariance[:4, self._fixed :]).T.reshape(-1, 4, 4)[:, :3]
         knots = self._q[self._fixed :].reshape(-1, 4)
         return Calibration(
             make_camera(self._q[:4], self._size),
@@ -666,7 +666,7 @@ class _Fit:
             float(self._q[2]),
             self._time,
             knots[:, :3].copy(),
-            doubt,
+            path_change,
             self._in_place,
-            self.misfit,
+            self.chi2_per_observation,
         )

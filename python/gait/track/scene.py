@@ -95,7 +95,7 @@ class Scene:
 def _calibrate(options: ClipOptions, video: Video, model: Model, keypoints: Keypoints | None) -> Calibration:
     """Find the camera from the walk, and write it where it is wanted."""
     if keypoints is None:
-        remedy = "gait detect finds nobody in it" if _has_detector(options) else weights.FETCH
+        remedy = "gait detect finds no person in it" if _has_detector(options) else weights.FETCH
         raise UserError(f"{video.path}: without --camera keypoints of a walk are needed: {remedy}")
     assert options.height is not None
     found = calibrate(keypoints, video.size, model, options.height, fov=options.fov, where=str(video.path))
