@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -77,14 +78,21 @@ class Scene:
                 _read_start(options, video, camera, model)  # refused before the work on the whole clip
         frames = clip_frames(video, options.start or 0, options.stop)
         _require_detector(options)
-        with progress("background", video.count, options.quiet) as update:
-            plate = background(options.background, video, update)
-        if options.keypoints:
-            people, person = {0: _read_keypoints(options, model, frames)}, 0
-            keypoints = {0: people[0].by_frame(options.keypoints_sd)}
-        else:
-            people, person = _detect(options, video, frames)
-            keypoints = {id: keypoint_noise(found, CUE_MISS) for id, found in people.items()}
+        with ThreadPoolExecutor(1) as pool:
+            # The median of the clip is computed on another core while the detector runs.
+            beside = options.background == "auto" and _detects(options)
+            median = pool.submit(background, "auto", video) if beside else None
+            if median is None:
+                with progress("background", video.count, options.quiet) as update:
+                    plate = background(options.background, video, update)
+            if options.keypoints:
+                people, person = {0: _read_keypoints(options, model, frames)}, 0
+                keypoints = {0: people[0].by_frame(options.keypoints_sd)}
+            else:
+                people, person = _detect(options, video, frames)
+                keypoints = {id: keypoint_noise(found, CUE_MISS) for id, found in people.items()}
+            if median is not None:
+                plate = median.result()
         calibration = None
         if camera is None:
             calibration = _calibrate(options, video, model, people.get(person))
@@ -223,13 +231,9 @@ def one_is_grey(image: Image, plate: Image) -> bool:
 
 def _detect(options: ClipOptions, video: Video, frames: range) -> tuple[dict[int, Keypoints], int]:
     """Keypoints of everyone that the detector finds, and the main person; none without a detector."""
-    network = options.detector
-    if network == "none" or options.mode == Mode.PAPER:
+    if not _detects(options):
         return {}, -1
-    if network == "auto":
-        network = "full"
-        if not _has_detector(options):
-            return {}, -1
+    network = "full" if options.detector == "auto" else options.detector
     from gait.detect.people import detect, main_person  # here, as they load the networks' runtime
 
     with progress("detecting", len(frames), options.quiet) as update:
@@ -239,11 +243,16 @@ def _detect(options: ClipOptions, video: Video, frames: range) -> tuple[dict[int
 
 def _require_detector(options: ClipOptions) -> None:
     """Refuse weights that are damaged, or absent although asked for, before long work."""
-    if options.keypoints or options.detector == "none" or options.mode == Mode.PAPER:
-        return
-    if options.detector != "auto" or _has_detector(options):
+    if _detects(options):
         weights.load(weights.PERSON)
         weights.load(weights.LANDMARKS["full" if options.detector == "auto" else options.detector])
+
+
+def _detects(options: ClipOptions) -> bool:
+    """Whether the detector is to run: not beside keypoints of a file, nor by itself without weights."""
+    if options.keypoints or options.detector == "none" or options.mode == Mode.PAPER:
+        return False
+    return options.detector != "auto" or _has_detector(options)
 
 
 def _has_detector(options: ClipOptions) -> bool:
