@@ -307,7 +307,7 @@ def _around(keypoints: Keypoints, first: int, end: int) -> slice:
 def _rows(keypoints: Keypoints, part: slice) -> Keypoints:
     """Take some frames of keypoints."""
     columns = {name: getattr(keypoints, name)[part] for name in ("frame", "time", "uv", "confidence")}
-    return replace(keypoints, **columns)
+    return replace(keypoints, **columns, sd=None if keypoints.sd is None else keypoints.sd[part])
 
 
 def _swapped(keypoints: Keypoints, pairs: Ints, wrong: Flags) -> Keypoints:
@@ -326,9 +326,14 @@ def _judged(
 
     Where something was swapped, other pairs may have been along with it for as long.
     """
+    known: dict[bytes, float] = {}
 
     def score(flags: Flags) -> float:
-        return evidence(_swapped(keypoints, pairs, flags)) - CLEAR * int(flags[own].any(axis=0).sum())
+        key = flags.tobytes()
+        if key not in known:
+            known[key] = evidence(_swapped(keypoints, pairs, flags))
+            known[key] -= CLEAR * int(flags[own].any(axis=0).sum())
+        return known[key]
 
     best = wrong.copy()
     best[own] = False

@@ -243,10 +243,7 @@ def evidence(prior: SegmentPrior, keypoints: Keypoints, view: View, options: Opt
     names = tuple(name for name in prior.names if name in {*keypoints.names, *smoother.HIPS})
     smooth = replace(options, method="smooth")
     try:
-        prior = prior.restricted(names)
-        return _lift(
-            prior, keypoints, view, smooth, Grid.over(keypoints.time, prior), lambda done: None
-        ).evidence
+        return _evidence(prior.restricted(names), keypoints, view, smooth)
     except UserError:
         return -np.inf
 
@@ -321,18 +318,38 @@ def _numbers_in_range() -> Iterator[None]:
         ) from None
 
 
-@_numbers_in_range()
-def _lift(
+@dataclass(frozen=True)
+class _Task:
+    """What a sequence gives the smoother, and the segments alone."""
+
+    observed: Observed
+    freedom: Freedom
+    stature: float
+    lengths: Floats
+    fits: list[SegmentFit]
+
+    def start(self, frames: int) -> Start:
+        """Blend the segments, of blocks of `frames`."""
+        return Start(
+            heading=np.array([fit.heading for fit in self.fits]),
+            component=np.array([fit.component for fit in self.fits]),
+            stature=self.stature,
+            places=blended(np.stack([fit.places for fit in self.fits]), frames),
+            lengths=self.lengths,
+        )
+
+
+def _task(
     prior: SegmentPrior,
     keypoints: Keypoints,
     view: View,
     options: Options,
     grid: Grid,
     update: Callable[[int], None],
-) -> Motion:
-    """Estimate all markers of a prior."""
+) -> _Task:
+    """Estimate each segment alone."""
     markers = prior.index(keypoints.names)
-    points = Observations(keypoints.uv, keypoints.standard_deviations(options.pixel_sd))
+    points = Observations(keypoints.uv, keypoints.errors(options.pixel_sd))
     sampled = resampled(points, keypoints.time, grid.time).among(markers, len(prior.names))
     stature, stature_sd = believed_stature(options, prior.stature)
     lengths = np.ones(len(grid.time))
@@ -349,19 +366,42 @@ def _lift(
         fits = explain.without_prior(prior, view, stature, start_sd, course)
     else:
         fits = [lifter.solve(each) for each in course]
-    if options.method != "smooth":
-        return _alone(prior, fits, keypoints, view, grid, lengths, stature, options.method != "segment")
-    first = Start(
-        heading=np.array([fit.heading for fit in fits]),
-        component=np.array([fit.component for fit in fits]),
-        stature=stature,
-        places=blended(np.stack([fit.places for fit in fits]), grid.frames),
-        lengths=lengths,
-    )
     freedom = Freedom(stature, stature_sd, options.floor_sd if view.grounded else ANY_HEIGHT)
-    observed = Observed(keypoints.time, points, markers)
+    return _Task(Observed(keypoints.time, points, markers), freedom, stature, lengths, fits)
+
+
+@_numbers_in_range()
+def _evidence(prior: SegmentPrior, keypoints: Keypoints, view: View, options: Options) -> float:
+    """Log density of keypoints by all markers of a prior."""
+    grid = Grid.over(keypoints.time, prior)
+    task = _task(prior, keypoints, view, options, grid, lambda done: None)
+    first, contact, bones = task.start(grid.frames), options.contact, options.bones
+    return smoother.evidence(prior, task.observed, view, task.freedom, first, contact=contact, bones=bones)
+
+
+@_numbers_in_range()
+def _lift(
+    prior: SegmentPrior,
+    keypoints: Keypoints,
+    view: View,
+    options: Options,
+    grid: Grid,
+    update: Callable[[int], None],
+) -> Motion:
+    """Estimate all markers of a prior."""
+    task = _task(prior, keypoints, view, options, grid, update)
+    markers, stature, fits = task.observed.markers, task.stature, task.fits
+    if options.method != "smooth":
+        join = options.method != "segment"
+        return _alone(prior, fits, keypoints, view, grid, task.lengths, stature, join)
     found_motion = smoother.smooth(
-        prior, observed, view, freedom, first, contact=options.contact, bones=options.bones
+        prior,
+        task.observed,
+        view,
+        task.freedom,
+        task.start(grid.frames),
+        contact=options.contact,
+        bones=options.bones,
     )
     sized = _sized(prior, keypoints, view, options, found_motion, found_motion.chi2_per_observation)
     places = sized.places

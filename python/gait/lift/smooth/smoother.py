@@ -124,16 +124,46 @@ def smooth(
     bones: bool = True,
 ) -> Lifted:
     """Estimate the motion of all markers of a prior (`chain.restricted`) over a sequence."""
-    unit = float(np.mean(start.lengths)) if view.scaled else None
-    problem = _Problem(prior, observed, view, freedom, unit, contact, bones)
-    around = problem.around(start.heading, start.component, start.stature, start.places)
-    state = _State(around, start.places, start.lengths, 0)
+    problem, state = _begin(prior, observed, view, freedom, start, contact, bones)
     settled = False
     while not settled and state.steps < MOST_STEPS:
         problem.weight(state)
         before, state = state, problem.step(state, constrained=state.steps >= FREE_STEPS)
         settled = state.steps > FREE_STEPS and _change(state.places - before.places) < SETTLED
     return problem.result(state, settled)
+
+
+def evidence(
+    prior: SegmentPrior,
+    observed: Observed,
+    view: View,
+    freedom: Freedom,
+    start: Start,
+    *,
+    contact: bool,
+    bones: bool,
+) -> float:
+    """Logarithm of the density of what is seen, but for a constant, after the first steps."""
+    problem, state = _begin(prior, observed, view, freedom, start, contact, bones)
+    for step in range(FREE_STEPS + 1):
+        problem.weight(state)
+        state = problem.step(state, constrained=step >= FREE_STEPS)
+    return problem.evidence(problem.system(state, constrained=False))
+
+
+def _begin(
+    prior: SegmentPrior,
+    observed: Observed,
+    view: View,
+    freedom: Freedom,
+    start: Start,
+    contact: bool,
+    bones: bool,
+) -> tuple[_Problem, _State]:
+    unit = float(np.mean(start.lengths)) if view.scaled else None
+    problem = _Problem(prior, observed, view, freedom, unit, contact, bones)
+    around = problem.around(start.heading, start.component, start.stature, start.places)
+    return problem, _State(around, start.places, start.lengths, 0)
 
 
 @dataclass(frozen=True)
@@ -255,6 +285,10 @@ class _Problem:
         around = moved(self.prior, state.around, self.freedom, places, found.lasting)
         return _State(around, places, lengths, state.steps + 1)
 
+    def evidence(self, unconstrained: _System) -> float:
+        """Logarithm of the density of what is seen, but for a constant."""
+        return unconstrained.evidence - _cost(self.visible.points, self.points)
+
     def result(self, state: _State, settled: bool) -> Lifted:
         """Covariances and figures of the last estimate."""
         system = self.system(state, constrained=True)
@@ -275,7 +309,7 @@ class _Problem:
             steps=state.steps,
             settled=settled,
             log_volume_ratio=unconstrained.log_volume_ratio,
-            evidence=unconstrained.evidence - _cost(self.visible.points, self.points),
+            evidence=self.evidence(unconstrained),
             outliers=self.points.sd > self.visible.points.sd,
             chi2_per_observation=unconstrained.square / max(2 * int(self.visible.points.visible.sum()), 1),
         )
