@@ -14,6 +14,7 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
+from gait.detect import profile
 from gait.detect.networks import JOINTS, Crop, LandmarkNetwork, Person, PersonNetwork, whole_picture
 from gait.errors import UserError
 from gait.io.keypoints_file import Keypoints
@@ -148,6 +149,7 @@ def detect(
     first: int = 0,
     stop: int | None = None,
     update: Callable[[int], None] | None = None,
+    correct: bool = True,
 ) -> dict[int, Keypoints]:
     """Find the keypoints of everyone in a video.
 
@@ -162,6 +164,8 @@ def detect(
         Frames to use.
     update : callable, optional
         Called with the number of frames done.
+    correct : bool
+        Move the joints to where the model has them, and give their errors (`gait.detect.profile`).
 
     Returns
     -------
@@ -181,7 +185,8 @@ def detect(
         times[frame.number] = frame.time
         if update is not None:
             update(frame.number - first + 1)
-    return {one.id: _keypoints(one, times) for one in detector.people if len(one.frames) >= _LEAST_FRAMES}
+    people = {one.id: _keypoints(one, times) for one in detector.people if len(one.frames) >= _LEAST_FRAMES}
+    return {id: profile.corrected(found, network) for id, found in people.items()} if correct else people
 
 
 def _keypoints(one: Followed, times: dict[int, float]) -> Keypoints:

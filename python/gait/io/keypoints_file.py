@@ -1,5 +1,6 @@
-"""Files of 2-D joint keypoints: CSV ``frame,time,<joint>_u,<joint>_v[,<joint>_c]``, empty cells = not seen.
+"""Files of 2-D joint keypoints: CSV ``frame,time,<joint>_u,<joint>_v[,<joint>_c[,<joint>_sd]]``.
 
+Empty cells are not seen.
 Columns may also be separated by tabs, or by semicolons with decimal commas.
 """
 
@@ -40,6 +41,9 @@ class Keypoints:
     #: (T, J, 2) pixels (or metres of an orthographic view), u to the right, v down; NaN where not seen.
     uv: Array
     confidence: Array  #: (T, J) from 0 to 1; 1 where the file has none
+    #: (T, J) standard deviation along an axis of errors that last over frames, so large that frames may count
+    #: as independent: pixels, NaN where unknown.  None: keypoints are as good as they are steady.
+    sd: Array | None = None
 
     @property
     def visible(self) -> NDArray[np.bool_]:
@@ -77,9 +81,14 @@ class Keypoints:
         """Give standard deviations (T, J), `sd` at full confidence; inf where not seen."""
         return np.where(self.visible, sd / np.maximum(self.confidence, LEAST_CONFIDENCE), np.inf)
 
+    def errors(self, sd: float) -> Array:
+        """Give standard deviations (T, J) with errors that last; `sd` as in `standard_deviations`."""
+        jitter = self.standard_deviations(sd)
+        return jitter if self.sd is None else np.hypot(jitter, np.nan_to_num(self.sd))
+
     def by_frame(self, sd: float) -> dict[int, FrameKeypoints]:
         """Keypoints by frame, as the tracker takes them; `sd` as in `standard_deviations`."""
-        found = zip(self.frame.tolist(), self.uv, self.standard_deviations(sd), strict=True)
+        found = zip(self.frame.tolist(), self.uv, self.errors(sd), strict=True)
         return {frame: FrameKeypoints(self.names, uv, sds) for frame, uv, sds in found}
 
 
@@ -132,21 +141,28 @@ def read(
     if not np.isfinite(uv).any():
         raise UserError(f"{path}: no point is seen in any frame; fill _u and _v")
     refuse_sentinels(path, names, uv)
-    return Keypoints(frame, time, tuple(names), uv, confidence), ignored
+    sd = None
+    if any(f"{name}_sd" in columns for name in names):
+        sd = np.stack([numbers.standard_deviation(f"{name}_sd") for name in names], axis=1)
+    return Keypoints(frame, time, tuple(names), uv, confidence, sd), ignored
 
 
 def write(path: str | os.PathLike[str], keypoints: Keypoints) -> None:
     """Write keypoints so that `read` gets them back (hundredths of a pixel)."""
-    head = ["frame", "time", *(f"{name}_{axis}" for name in keypoints.names for axis in "uvc")]
+    values = ("u", "v", "c") if keypoints.sd is None else ("u", "v", "c", "sd")
+    head = ["frame", "time", *(f"{name}_{value}" for name in keypoints.names for value in values)]
     with replacing(path) as temporary, open(temporary, "w", newline="", encoding="utf-8") as file:
         table = csv.writer(file, lineterminator="\n")
         table.writerow(head)
         for t, frame in enumerate(keypoints.frame):
             row = [str(frame), f"{keypoints.time[t]:.6f}"]
             for j, (u, v) in enumerate(keypoints.uv[t]):
-                observed = np.isfinite(u)
-                cells = [f"{u:.4f}", f"{v:.4f}", f"{keypoints.confidence[t, j]:.3g}"]
-                row += cells if observed else ["", "", ""]
+                if not np.isfinite(u):
+                    row += [""] * len(values)
+                    continue
+                row += [f"{u:.4f}", f"{v:.4f}", f"{keypoints.confidence[t, j]:.3g}"]
+                if keypoints.sd is not None:
+                    row.append(f"{keypoints.sd[t, j]:.3f}")
             table.writerow(row)
 
 
@@ -193,6 +209,16 @@ class _Numbers:
             i = int(np.argmax(wrong))
             raise UserError(f"{self._path}: line {i + 2}: {name} is {values[i]:g}; give it from 0 to 1")
         return np.nan_to_num(values)
+
+    def standard_deviation(self, name: str) -> Array:
+        """Give standard deviations; NaN if there is no such column or the cell is empty."""
+        if name not in self._columns:
+            return np.full(len(self._rows), np.nan)
+        values = self.column(name, FURTHEST)
+        if (values < 0).any():
+            i = int(np.argmax(values < 0))
+            raise UserError(f"{self._path}: line {i + 2}: {name} is {values[i]:g}; give pixels of 0 or more")
+        return values
 
 
 def _table(path: str | os.PathLike[str]) -> tuple[list[str], list[list[str]]]:
