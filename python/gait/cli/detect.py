@@ -2,27 +2,35 @@
 
 Writes the keypoints of one person: the one in view longest and tallest, or --person ID.  The file is what
 gait lift takes.  The network's weights are fetched once: gait detect --fetch.
+
+--lcm locates the joints in frames that arrive over LCM (GAIT_IMAGE_<i>), in as many as the machine has time
+for, and sends them on GAIT_TRACKS_<i>, which gait-trackd --keypoints-term and --lift take.  Ctrl-C ends it.
 """
 
 from __future__ import annotations
 
 import argparse
+import contextlib
 import json
 import sys
 
 from gait.cli import values
+from gait.cli.signals import Interruptible
 from gait.detect import weights
 from gait.errors import UsageError, UserError
 from gait.io.files import require_outputs
 from gait.io.keypoints_file import write
 from gait.io.video import Video
-from gait.progress import progress
+from gait.progress import note, progress
+
+_TURN = 0.1  # seconds
 
 EXAMPLES = """\
 examples:
   gait detect --fetch
   gait detect walk.mp4 -o keypoints.csv
   gait lift keypoints.csv --camera camera.json -o motion.csv
+  gait detect --lcm --network lite
 """
 
 
@@ -47,15 +55,44 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         metavar="N",
         help="people followed at a time (default: 8)",
     )
+    parser.add_argument("--lcm", action="store_true", help="frames arrive over LCM, and joints go out so")
+    parser.add_argument(
+        "--stream", type=values.whole(*values.STREAM), metavar="I", help="number of the camera (default: 0)"
+    )
+    values.add_url(parser)
+
+
+def _live(args: argparse.Namespace) -> int:
+    """Answer frames that arrive over LCM until the user ends it."""
+    from gait.lcm.detect import LiveDetector  # here, as it loads OpenCV and LCM
+    from gait.lcm.link import lcm_url
+
+    if args.video or args.output or args.person is not None:
+        raise UsageError("--lcm takes no VIDEO, -o or --person; it follows the person seen longest")
+    url = lcm_url(args.url)
+    detector = LiveDetector(url, args.stream or 0, args.network, args.people)
+    note(f"listening on {url}", args.quiet)
+    with Interruptible(), contextlib.suppress(KeyboardInterrupt):  # the user ends it so
+        while True:
+            detector.handle(_TURN)
+    if detector.damage:
+        note(f"gait detect: left out: {detector.damage}", args.quiet)
+    counts = {"frames": detector.frames, "found": detector.found}
+    print(json.dumps(counts) if args.json else "{frames} frames, a person in {found}".format(**counts))
+    return 0
 
 
 def run(args: argparse.Namespace) -> int:
-    """Fetch, or detect and write."""
+    """Fetch, answer, or detect and write."""
     if args.fetch:
         folder = weights.fetch(lambda line: args.quiet or print(line, file=sys.stderr))
         print(json.dumps({"folder": str(folder)}) if args.json else f"weights in {folder}")
         if not args.video:
             return 0
+    if args.lcm:
+        return _live(args)
+    if args.url or args.stream is not None:
+        raise UsageError("--url and --stream go with --lcm")
     if not args.video or not args.output:
         raise UsageError("give VIDEO and -o KEYPOINTS.csv, or --fetch")
     require_outputs((args.output,), (args.video,))

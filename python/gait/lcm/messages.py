@@ -97,6 +97,14 @@ def image_message(image: Image, utime: int, frame: int, jpeg: int | None = None)
     return message
 
 
+def frame_number(image: Any) -> int:
+    """Return the running number of an ``image_t`` at its source; -1 if it has none."""
+    for entry in image.metadata:
+        if entry.key == _FRAME_KEY and entry.n == 8:
+            return int.from_bytes(entry.value, "big")
+    return -1
+
+
 def tracks_message(
     names: Sequence[str], uv: ArrayLike, utime: int, frame: int = -1, confidence: ArrayLike = 1.0
 ) -> Any:

@@ -1,0 +1,88 @@
+"""Joints of a person in frames that arrive over LCM: ``GAIT_IMAGE_<i>`` in, ``GAIT_TRACKS_<i>`` out."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+
+from gait.detect import profile
+from gait.detect.networks import JOINTS
+from gait.detect.people import Followed, PeopleDetector
+from gait.errors import UserError
+from gait.io.keypoints_file import Keypoints
+from gait.io.video import Frame
+from gait.lcm.link import gaitmsg, handle, is_log, open_lcm
+from gait.lcm.messages import decode, frame_number, picture, tracks_message
+
+_KEPT = 1  # frames that wait: older ones are dropped while the detector is busy
+
+
+class LiveDetector:
+    """Locates the joints of one person in every frame that the machine has time for.
+
+    The person is the one found in most frames so far, and the next one when that person is gone.
+
+    Parameters
+    ----------
+    url : str
+        A network; a log cannot be answered.
+    stream : int
+        Number of the camera.
+    network : str
+        ``full``, ``lite`` or ``heavy``.
+    people : int
+        People followed at a time.
+
+    Attributes
+    ----------
+    frames, found : int
+        Frames examined, and those of them with a person.
+    damage : str or None
+        Describes what is wrong with the first message that could not be used.
+
+    Raises
+    ------
+    UserError
+        If the weights are absent or damaged, or LCM cannot be opened.
+    """
+
+    def __init__(self, url: str, stream: int, network: str, people: int) -> None:
+        if is_log(url):
+            raise UserError(f"--url {url}: --lcm answers on a network, not in a log; use gait detect VIDEO")
+        self._network, self._detector = network, PeopleDetector(network, people)
+        self._lcm = open_lcm(url)
+        self._channel = f"GAIT_TRACKS_{stream}"
+        self._lcm.subscribe(f"GAIT_IMAGE_{stream}", self._on_image).set_queue_capacity(_KEPT)
+        self._origin: int | None = None
+        self.frames = self.found = 0
+        self.damage: str | None = None
+
+    def handle(self, seconds: float) -> None:
+        """Take in a frame, waiting at most so long, but for damaged ones."""
+        try:
+            handle(self._lcm, seconds, False)
+        except UserError as fault:
+            self.damage = self.damage or str(fault)
+
+    def _on_image(self, channel: str, data: bytes) -> None:
+        message = decode(gaitmsg.image_t, data, channel)
+        image = picture(message)
+        if image.ndim == 2:
+            image = np.repeat(image[..., None], 3, axis=2)
+        self._origin = message.utime if self._origin is None else self._origin
+        seconds = (message.utime - self._origin) / 1e6
+        people = self._detector.step(Frame(self.frames, seconds, image))
+        self.frames += 1
+        if people:
+            one, _ = max(people, key=lambda pair: len(pair[0].frames))
+            self.found += 1
+            self._lcm.publish(self._channel, self._tracks(one, message).encode())
+
+    def _tracks(self, one: Followed, image: Any) -> Any:
+        """Joints of a person in the newest frame, where the model has them."""
+        last = one.keypoints[-1]
+        frame, time = np.array(one.frames[-1:]), np.array(one.times[-1:])
+        raw = Keypoints(frame, time, tuple(JOINTS), last.uv[None], last.confidence[None])
+        uv = profile.corrected(raw, self._network).uv[0]
+        return tracks_message(JOINTS, uv, image.utime, frame_number(image), last.confidence)
