@@ -49,7 +49,7 @@ def test_left_and_right_are_mirror_images():
     )
 
 
-def test_frames_twice_as_frequent_tell_no_more():
+def test_frames_twice_as_frequent_add_nothing():
     slow, fast = (profile.corrected(points(rate=rate), "full").sd for rate in (50.0, 100.0))
     np.testing.assert_allclose(fast, slow * np.sqrt(2), rtol=1e-9)
 
@@ -66,9 +66,8 @@ def test_errors_that_last_are_written_and_read(tmp_path):
     found.uv[1, 3] = np.nan
     write(tmp_path / "k.csv", found)
     again, _ = read(tmp_path / "k.csv", NAMES)
-    seen = again.visible
-    np.testing.assert_allclose(again.sd[seen], found.sd[seen], atol=6e-4)
-    np.testing.assert_allclose(again.errors(3.0)[seen], np.hypot(3.0, again.sd[seen]))
+    np.testing.assert_allclose(again.sd[again.visible], found.sd[again.visible], atol=6e-4)
+    np.testing.assert_allclose(again.errors(3.0)[again.visible], np.hypot(3.0, again.sd[again.visible]))
     assert np.isinf(again.errors(3.0)[1, 3])
 
 

@@ -82,7 +82,7 @@ def test_joints_carry_time_and_number_of_their_frame(rigged):
     assert live._detector.times == pytest.approx([0, 0.04, 0.08, 0.12])
 
 
-def test_joints_are_the_models_of_the_person_seen_longest(rigged):
+def test_joints_are_the_models_of_the_person_in_view_longest(rigged):
     _, _, send, sent = rigged
     for n in range(3):
         send(90, 40_000 * n, n)

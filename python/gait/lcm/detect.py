@@ -85,4 +85,4 @@ class LiveDetector:
         frame, time = np.array(one.frames[-1:]), np.array(one.times[-1:])
         raw = Keypoints(frame, time, tuple(JOINTS), last.uv[None], last.confidence[None])
         uv = profile.corrected(raw, self._network).uv[0]
-        return tracks_message(JOINTS, uv, image.utime, frame_number(image), last.confidence)
+        return tracks_message(list(JOINTS), uv, image.utime, frame_number(image), last.confidence)
