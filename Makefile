@@ -313,7 +313,7 @@ $(PEERS): tests/bench/requirements-peers.txt | $(READY)
 eval-learn: setup lib $(PEERS) ## learning beside other packages: tests/bench/results/learn.md *
 	@$(PY) tests/bench/eval_learn.py $(MOCAP) $(ARGS)
 
-eval-real: setup lib ## tracks of real people's films beside joints checked by eye (ARGS='--arms auto --record')
+eval-real: setup lib ## tracks of real people's films beside joints checked by a person (ARGS='--arms auto --record')
 	@$(PY) tests/bench/eval_real.py $(ARGS)
 
 detector-profile: setup lib ## learn where the detector's joints lie beside the model's, on CLIPS= with known joints *

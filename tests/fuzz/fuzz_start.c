@@ -45,9 +45,9 @@ static uint8_t take(bytes *b)
 /* A number about the picture, or now and then one that no picture has. */
 static float number(bytes *b)
 {
-    static const float ODD[] = {NAN, INFINITY, -INFINITY, 3e38f, -1e30f, 1e-38f, 0.0f, -0.0f};
+    static const float SPECIAL[] = {NAN, INFINITY, -INFINITY, 3e38f, -1e30f, 1e-38f, 0.0f, -0.0f};
     uint8_t const k = take(b);
-    return k < 8 ? ODD[k] : (float)k * 0.25f - 4.0f + (float)take(b) * 0.01f;
+    return k < 8 ? SPECIAL[k] : (float)k * 0.25f - 4.0f + (float)take(b) * 0.01f;
 }
 
 static void show(gait_start *s, bytes *b, int64_t utime, uint8_t (*pixels)[WIDTH])

@@ -313,8 +313,8 @@ ON_ITS_HEAD = [[1, 0, 0], [0, 0, 1], [0, -1, 0]]
         ({"R": FACES_UP, "t": [0, 0, 0]}, "its lens is 0 m above the floor"),
         ({"t": [100, 1600, 5000]}, "1600 m above the floor; R and t are in metres, not millimetres"),
         ({"R": FACES_UP, "t": [0, 1.6, 5.0]}, "its lens is -5 m above"),
-        ({"R": FACES_UP, "t": [0, 1.6, -5.0]}, "nobody who stands on the floor would be upright"),
-        ({"R": ON_ITS_HEAD, "t": [0, -1.6, 5.0]}, "nobody who stands on the floor would be upright"),
+        ({"R": FACES_UP, "t": [0, 1.6, -5.0]}, "no person standing on the floor would be upright"),
+        ({"R": ON_ITS_HEAD, "t": [0, -1.6, 5.0]}, "no person standing on the floor would be upright"),
     ],
 )
 def test_a_camera_that_cannot_be_is_refused(tmp_path, pose, words):

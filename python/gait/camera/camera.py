@@ -183,7 +183,7 @@ class Camera:
         elif above > _MOST_ABOVE:
             fault = f"its lens is {above:.4g} m above the floor; R and t are in metres, not millimetres"
         elif self.R[1, 2] > _UPSIDE_DOWN or not self._shows_person():
-            fault = "nobody who stands on the floor would be upright in its picture"
+            fault = "no person standing on the floor would be upright in its picture"
         if fault:
             raise UserError(
                 f"{where}: {fault}; give R and t from world to camera in metres, z up, the floor at z = 0 "

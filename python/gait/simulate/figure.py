@@ -170,9 +170,9 @@ def _arm(side: str, sign: float, body: Anatomy, appearance: Appearance) -> list[
         (e - 6 * cm, 0.1, 4.2, 3.7),
         (e - 15 * cm, 0, 3.4, 3.0), (w + 3 * cm, 0, 2.8, 2.2), (w - 1 * cm, 0, 2.8, 2.0),
     ]  # fmt: skip
-    rings, bare = (34, skin[5:]) if appearance.long_sleeves else (18, skin)
+    rings, skin_rows = (34, skin[5:]) if appearance.long_sleeves else (18, skin)
     cloth = loft(_down(shoulder, sleeve, cm, appearance.limbs, 2.1), rings, 16, TOP, -X, Y)
-    under = loft(_down(shoulder, bare, cm, appearance.limbs, 2), 26, 14, SKIN, -X, Y)
+    under = loft(_down(shoulder, skin_rows, cm, appearance.limbs, 2), 26, 14, SKIN, -X, Y)
     parts = [part.bind_chain(chain, body, -Z, 7 * cm) for part in (cloth, under)]
     return parts + _hand(side, sign, body)
 

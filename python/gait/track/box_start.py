@@ -1,4 +1,4 @@
-"""Automatic start from pictures: boxes around people, in the whole clip until somebody walks.
+"""Automatic start from pictures: boxes around people, in the whole clip until a person walks.
 
 People are found where frames differ from the empty scene or, without one, by their shape; the library fits a
 walk to a second of their boxes (`gait.bindings.start_fit`).
@@ -84,7 +84,7 @@ class BoxStart:
         self._statures += [self._fit.stature(box) for box in boxes[:1]]
 
     def worth(self, video: Video, first: int, stop: int) -> bool:
-        """Whether frames spread over a clip show anybody: without the empty scene the search is slow."""
+        """Whether frames spread over a clip show a person: without the empty scene the search is slow."""
         if self._plate is not None:
             return True
         probes = np.unique(np.linspace(first, stop - 1, _PROBES).astype(int)).tolist()
@@ -106,7 +106,7 @@ class BoxStart:
         return Start(at[0], one.mean, one.sd, None if sure else apparent), one
 
     def walks_in(self, frame: Frame) -> Start | None:
-        """Start at a frame just observed, if somebody walks in it."""
+        """Start at a frame just observed, if a person walks in it."""
         if not self._times or self._times[-1][0] != frame.number:
             return None
         if 0 <= frame.time - self._last_fit < _STEP:
@@ -137,16 +137,19 @@ def find_start(
     first: int = 0,
     stop: int | None = None,
     height: float | None = None,
+    shapes: bool = True,
 ) -> Start:
     """Find the first state of the first person who walks in a clip.
 
-    If nobody walks, a person who stands out against the empty scene is taken, with an unknown heading.
+    If no person walks, a person who stands out against the empty scene is taken, with an unknown heading.
 
     Parameters
     ----------
     video, camera, plate, model
-        `plate` is the empty scene, BGR.  Without it, or where no person stands out against it, people are
-        found by their shape.
+        `plate` is the empty scene, BGR.
+    shapes : bool
+        Find people by their shape where none stands out against the empty scene: slow, and needless after a
+        detector that found none.
     first, stop : int
         Frames to search, `first` <= number < `stop`.
     height : float, optional
@@ -161,7 +164,7 @@ def find_start(
     few = min(video.count, video.count if stop is None else stop) - first
     window = float(np.clip(0.8 * few / video.fps, _LEAST_WINDOW, _WINDOW))
     standing: Start | None = None
-    for finder in _finders(camera, plate, model, height, window):
+    for finder in _finders(camera, plate, model, height, window, shapes):
         last_fit = -np.inf
         if not finder.worth(video, first, first + few):
             continue
@@ -178,20 +181,21 @@ def find_start(
         misplaced += finder.misplaced
     if standing is not None:
         return standing
-    raise UserError(f"{video.path}: {_nobody(few, misplaced)}")
+    raise UserError(f"{video.path}: {_no_person(few, misplaced)}")
 
 
 def _finders(
-    camera: Camera, plate: Image | None, model: Model, height: float | None, window: float
+    camera: Camera, plate: Image | None, model: Model, height: float | None, window: float, shapes: bool
 ) -> Iterator[BoxStart]:
     """Yield the ways to find a person: by change first, as it gives the place better."""
     if plate is not None:
         yield BoxStart(camera, plate, model, height, window)
-    yield BoxStart(camera, None, model, height, window)
+    if shapes:
+        yield BoxStart(camera, None, model, height, window)
 
 
-def _nobody(few: int, misplaced: list[float]) -> str:
-    """Say why there is no start, and what to do."""
+def _no_person(few: int, misplaced: list[float]) -> str:
+    """Explain why there is no start, and what to do."""
     if few < ENOUGH:
         frames = f"frame{'s'[: few != 1]}"
         return f"only {few} {frames} to track, --init auto needs {ENOUGH}; give --init FILE.json"

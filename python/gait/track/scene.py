@@ -177,6 +177,7 @@ def _note_start(options: ClipOptions, scene: Scene, start: Start) -> None:
 def _find_first_state(options: ClipOptions, scene: Scene) -> Start:
     """First state from the keypoints; without any that fit, from the pictures."""
     camera, model, frames, height = scene.camera, scene.model, scene.frames, options.height
+    detected = not options.keypoints and _detects(options)
     if scene.people:
         keypoints = scene.people[scene.person]
         found = find_keypoint_start(
@@ -186,7 +187,14 @@ def _find_first_state(options: ClipOptions, scene: Scene) -> Start:
         if found is not None:
             return found
     return find_start(
-        scene.video, camera, scene.plate, model, first=frames.start, stop=options.stop, height=height
+        scene.video,
+        camera,
+        scene.plate,
+        model,
+        first=frames.start,
+        stop=options.stop,
+        height=height,
+        shapes=not detected,
     )
 
 
