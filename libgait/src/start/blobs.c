@@ -2,16 +2,16 @@
 #include <string.h>
 
 enum {
-    LEAST_STEP = 14, /* smallest change that counts, grey levels */
-    NOISE_STEPS = 5, /* the same in robust standard deviations of the image noise */
-    ANOTHER = 18,    /* change of half of an image that means another scene, grey levels */
-    GAP = 3,         /* cells of low contrast that may interrupt a body */
-    LEAST_HEIGHT = 15,
-    PEOPLE_PART = 2, /* one cell in so many that change belongs to people, or the background is another */
+    LEAST_STEP = 14,   /* smallest change that counts, grey levels */
+    NOISE_STEPS = 5,   /* the same in robust standard deviations of the image noise */
+    ANOTHER = 18,      /* change of half of an image that means another scene, grey levels */
+    GAP = 3,           /* cells of low contrast that may interrupt a body */
+    LEAST_HEIGHT = 15, /* of a person, cells */
+    PEOPLE_PART = 2, /* unless one changed cell in so many belongs to a person, the background does not fit */
     MOST_CELLS = 320 /* each way */
 };
 
-/* Where the running sum of a histogram passes half of it. */
+/* Bin of a histogram that holds the median. */
 static int32_t middle_of(const int32_t *count, int32_t bins)
 {
     int64_t total = 0, sum = 0;
@@ -44,7 +44,8 @@ static int32_t difference(const blob_finder *f, const gait_image *a, const gait_
     return level(a, x, y, channel) - level(b, x, y, channel);
 }
 
-/* Change of each cell against the background, less that of the exposure: most of the image is background. */
+/* Change of each cell against the background, less the median change: most of the image is background, so that is the
+ * change of the exposure. */
 static void compare(const blob_finder *f, const gait_image *image, const gait_image *background)
 {
     bool const alike = image->format == background->format && image->format != GAIT_GREY8;
@@ -79,7 +80,7 @@ static int32_t smooth(const blob_finder *f)
 }
 
 typedef struct patch {
-    int32_t x0, x1, y0, y1, area; /* the last ones belong to it */
+    int32_t x0, x1, y0, y1, area; /* x1 and y1 included; cells */
 } patch;
 
 /* All cells connected to `from`, over vertical gaps of up to GAP cells, into f->queue. */
@@ -104,7 +105,7 @@ static patch flood(const blob_finder *f, int32_t from)
     return p;
 }
 
-/* Whether it is in full view and upright, and fills its box as a standing person does. */
+/* Whether a region is in full view and upright, and fills its box as a standing person does. */
 static bool person_like(const blob_finder *f, const patch *p)
 {
     int32_t const wide = p->x1 - p->x0 + 1, tall = p->y1 - p->y0 + 1;

@@ -4,6 +4,7 @@
 static const double SHORTEST = 1.2, TALLEST = 2.4; /* metres by foot and head ray, which shadows lengthen */
 static const double BLUR = 0.25;                   /* heights by which a foot point may jump */
 static const double FASTEST = 2.0;                 /* heights per second */
+static const double STANDS = 0.5; /* probability of a person who stays, against one who walks */
 
 bool people_box(const gait_camera *c, const gait_box *in, start_box *out)
 {
@@ -39,21 +40,17 @@ double people_stature(const gait_camera *c, const start_box *b)
     return above + above * flat / -foot[2] * head[2] / head_flat;
 }
 
-static double apart(const double a[2], const double b[2])
-{
-    return sqrt((a[0] - b[0]) * (a[0] - b[0]) + (a[1] - b[1]) * (a[1] - b[1]));
-}
-
-/* Distance of a box from a person's last one, as a share of how far they can have walked since. */
+/* Distance of a box from a person's last one, as a share of how far the person can have walked since. */
 static double far_from(const start_person *p, int64_t utime, const start_box *b)
 {
     int32_t const last = (p->count - 1) % GAIT_START_MAX_FRAMES;
     const start_box *const was = &p->box[last];
     double const seconds = 1e-6 * (double)(utime - p->utime[last]);
-    return apart(b->foot, was->foot) / ((BLUR + FASTEST * seconds) * apart(was->head, was->foot));
+    return people_distance(b->foot, was->foot) /
+           ((BLUR + FASTEST * seconds) * people_distance(was->head, was->foot));
 }
 
-/* The person whose box this is, one who is new, or NULL: there are too many. */
+/* The person in a box: one known from earlier frames, a new one, or NULL if there are too many. */
 static start_person *whose(start_people *people, int64_t utime, const start_box *b)
 {
     start_person *nearest = NULL, *unused = NULL;
@@ -76,14 +73,14 @@ void people_add(start_people *people, const gait_camera *c, int64_t utime, const
 {
     people->utime = utime;
     people->begun = true;
-    for (int32_t k = 0; k < GAIT_START_MAX_PEOPLE; k++) { /* forget who left */
+    for (int32_t k = 0; k < GAIT_START_MAX_PEOPLE; k++) { /* forget people who have left */
         start_person *const p = &people->person[k];
         if (p->count > 0 && p->utime[(p->count - 1) % GAIT_START_MAX_FRAMES] < utime - START_KEEP)
             p->count = 0;
     }
     for (int32_t i = 0; i < count; i++) {
         start_box b;
-        if (!people_box(c, &boxes[i], &b) || !(apart(b.head, b.foot) >= 1.0))
+        if (!people_box(c, &boxes[i], &b) || !(people_distance(b.head, b.foot) >= 1.0))
             continue;
         double const stature = people_stature(c, &b);
         start_person *const p = stature >= SHORTEST && stature <= TALLEST ? whose(people, utime, &b) : NULL;
@@ -93,4 +90,28 @@ void people_add(start_people *people, const gait_camera *c, int64_t utime, const
         p->box[p->count % GAIT_START_MAX_FRAMES] = b;
         p->count = p->count == INT32_MAX ? p->count - GAIT_START_MAX_FRAMES + 1 : p->count + 1;
     }
+}
+
+int32_t people_merge(gait_hypothesis *all, int32_t n, gait_hypothesis *own, int32_t count, int32_t frames)
+{
+    for (int32_t i = 0; i < count; i++) {
+        own[i].probability *= (float)((double)frames * (own[i].in_place ? STANDS : 1.0));
+        if (n == GAIT_START_MAX_HYPOTHESES && own[i].probability <= all[n - 1].probability)
+            continue;
+        int32_t at = n < GAIT_START_MAX_HYPOTHESES ? n++ : n - 1;
+        for (; at > 0 && all[at - 1].probability < own[i].probability; at--)
+            all[at] = all[at - 1];
+        all[at] = own[i];
+    }
+    return n;
+}
+
+int32_t people_normalise(gait_hypothesis *all, int32_t n)
+{
+    double sum = 0.0;
+    for (int32_t i = 0; i < n; i++)
+        sum += (double)all[i].probability;
+    for (int32_t i = 0; i < n; i++)
+        all[i].probability = (float)((double)all[i].probability / sum);
+    return n;
 }

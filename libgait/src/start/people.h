@@ -1,4 +1,4 @@
-/* people.h - boxes of several people, each given to a person by its place in the picture. */
+/* people.h - boxes of several people, each given to a person by its place in the picture, and the hypotheses of all. */
 #ifndef GAIT_START_PEOPLE_H
 #define GAIT_START_PEOPLE_H
 #include "base/base.h"
@@ -22,6 +22,12 @@ typedef struct start_people {
     start_person person[GAIT_START_MAX_PEOPLE];
 } start_people;
 
+static inline double people_distance(const double a[2], const double b[2])
+{
+    double const u = a[0] - b[0], v = a[1] - b[1];
+    return sqrt(u * u + v * v);
+}
+
 /* Undo the distortion; false: its numbers are not finite, or sd is negative. */
 bool people_box(const gait_camera *c, const gait_box *in, start_box *out);
 
@@ -30,4 +36,12 @@ double people_stature(const gait_camera *c, const start_box *b);
 
 /* Boxes of a frame, the most certain first. */
 void people_add(start_people *p, const gait_camera *c, int64_t utime, const gait_box *boxes, int32_t count);
+
+/* Merge the hypotheses of one person, who is in so many frames, into the n of other people, at most
+ * GAIT_START_MAX_HYPOTHESES, the most probable first; returns how many there are.  A person who walks, or is in more
+ * frames, is more probable. */
+int32_t people_merge(gait_hypothesis *all, int32_t n, gait_hypothesis *own, int32_t count, int32_t frames);
+
+/* Make the probabilities sum to 1; returns n. */
+int32_t people_normalise(gait_hypothesis *all, int32_t n);
 #endif

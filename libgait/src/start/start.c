@@ -20,34 +20,32 @@ _Static_assert((int)N < (int)BLOCK, "a block of bodies holds a candidate and its
 static const double LEAST_SPAN = 0.3; /* seconds */
 static const double LEG = 0.49;       /* from hip to ankle, statures */
 static const double RATE_SD = 0.15;   /* strides per second: people in films walk as slowly as they like */
-static const double SPEED_SD = 0.4;   /* metres per second, about that of the rate */
-static const double STILL_SD = 0.1;   /* the same in place */
+static const double SPEED_SD = 0.4;   /* metres per second, about the speed of the steps */
+static const double STILL_SD = 0.1;   /* metres per second, in place */
 static const double FLOOR_SD = 0.03;  /* metres: a camera's height is not exact */
-static const double PLACE_SD = 3.0;   /* metres, about where the legs' length puts the person */
-static const double IN_PLACE = 8.0;   /* twice the log odds of a walk over one in place */
+static const double PLACE_SD = 3.0;   /* metres, about where the length of the legs puts the person */
+static const double IN_PLACE = 8.0;   /* twice the log odds of walking along a path over walking in place */
 static const double DEGREES = 4.0;    /* of freedom of the keypoints' errors */
 static const double BEHIND = 1e3;     /* standard deviations for joints behind the camera */
 static const double LEAD = 0.1; /* statures by which the lower foot is nearer to the camera than the body */
 static const double BOX_MISS = 0.01; /* of heights, by hair, shoes and blur */
 static const double FOOT_SD = 0.06;  /* metres by which all foot points of a person may be off */
-static const double BOX_PLACE = 0.1; /* metres, of boxes for as long as shadows and clothes stay the same */
+static const double BOX_PLACE = 0.1; /* metres by which shadows and clothes move all boxes of a person */
 static const double COURSE = 0.15;   /* radians: people do not walk exactly where their box moves */
 static const double OPEN = 0.3;      /* information on a heading that boxes leave open, per square radian */
 static const float OPEN_SD = 0.9f;   /* radians of standard deviation from which a heading is unknown */
-static const float BUILD_SHARE =
-    0.25f;                           /* of the sd of scores and posture: few particles find the phase first */
-static const float SPEEDS_UP = 0.4f; /* sd of the rate, as a share of what it is below the usual one */
-static const float FITS = 1.8f;      /* chi-square per coordinate up to which a walk fits */
+static const float BUILD_SHARE = 0.25f; /* of the sd of scores and posture, while the phase is unknown */
+static const float SPEEDS_UP = 0.4f;    /* sd of the rate, as a share of what it is below the usual one */
+static const float FITS = 1.8f;         /* chi-square per coordinate up to which a walk fits */
 static const float LEAST_RATE = 0.3f;   /* strides per second; a person who stands fits a very slow walk */
-static const float LEAST_SPEED = 0.25f; /* metres per second of a person who walks */
-static const float LIKELY = 0.25f;      /* probability of one of several people who walk, at least */
-static const float BOX_SPEED = 0.4f;    /* the same by boxes */
-static const double STANDS = 0.5;       /* probability of a person who stays, against one who walks */
+static const float LEAST_SPEED = 0.25f; /* metres per second of a person who walks, from keypoints */
+static const float BOX_SPEED = 0.4f;    /* the same from boxes */
+static const float LIKELY = 0.25f;      /* least probability of the person in boxes to start with */
 
 /* Steps of the differences that stand for derivatives. */
 static const double STEP[N] = {0.02, 0.02, 0.03, 0.03, 0.01, 0.01, 0.01, 0.01, 0.1, 0.1, 0.1};
 
-typedef struct start_problem {           /* what all candidates of a mode are judged by */
+typedef struct start_problem {           /* the observations that all candidates are fitted to */
     const start_person *person;          /* whose boxes are fitted; NULL: keypoints are */
     int32_t frames, frame[START_FITTED]; /* in the ring */
     double at[START_FITTED];             /* seconds from the middle */
@@ -107,6 +105,8 @@ gait_start *start_layout(arena *a, const gait_model *m, const gait_start_config 
     *s = (gait_start){.model = m,
                       .run = run,
                       .cfg = *cfg,
+                      .hip = {find_point(m, "l_hip"), find_point(m, "r_hip")},
+                      .ankle = {find_point(m, "l_ankle"), find_point(m, "r_ankle")},
                       .keypoint = keypoint,
                       .people = people,
                       .blobs = blobs,
@@ -116,10 +116,6 @@ gait_start *start_layout(arena *a, const gait_model *m, const gait_start_config 
     if (s->cfg.stature_sd == 0.0f)
         s->cfg.stature_sd = m->stature_sd;
     s->layout = state_layout_init(m, &plain, run);
-    s->hip[0] = find_point(m, "l_hip");
-    s->hip[1] = find_point(m, "r_hip");
-    s->ankle[0] = find_point(m, "l_ankle");
-    s->ankle[1] = find_point(m, "r_ankle");
     s->crown = height_of(s, find_point(m, "head_top"));
     start_reset(s);
     return s;
@@ -157,27 +153,16 @@ void start_add(gait_start *s, int64_t utime, const gait_keypoint *keypoints)
     s->count++;
 }
 
-static const start_keypoint *keypoint(const gait_start *s, int32_t frame, int32_t joint)
-{
-    return &s->keypoint[frame][joint];
-}
-
 /* Middle of two joints; false: one is not observed. */
 static bool middle_of(const gait_start *s, int32_t frame, const int32_t joint[2], double uv[2])
 {
-    const start_keypoint *const a = keypoint(s, frame, joint[0]), *const b = keypoint(s, frame, joint[1]);
+    const start_keypoint *const a = &s->keypoint[frame][joint[0]], *const b = &s->keypoint[frame][joint[1]];
     uv[0] = 0.5 * (a->u + b->u);
     uv[1] = 0.5 * (a->v + b->v);
     return a->sd > 0.0 && b->sd > 0.0;
 }
 
-static double distance(const double a[2], const double b[2])
-{
-    double const u = a[0] - b[0], v = a[1] - b[1];
-    return sqrt(u * u + v * v);
-}
-
-/* Median of n numbers, which are sorted. */
+/* Median of n numbers, whose order changes; m_median() would take the upper of the two in the middle. */
 static double median(double *x, int32_t n)
 {
     for (int32_t i = 1; i < n; i++) {
@@ -190,7 +175,8 @@ static double median(double *x, int32_t n)
     return n % 2 ? x[n / 2] : 0.5 * (x[n / 2 - 1] + x[n / 2]);
 }
 
-/* Where the hips are if the legs have their usual length, on the floor's plane; returns the person's height, pixels. */
+/* Put the place on the floor below the hips, at the distance at which the legs have their usual length; returns the
+ * person's height, pixels. */
 static double rough_place(const gait_start *s, start_problem *p)
 {
     double leg[START_FITTED], u[START_FITTED], v[START_FITTED];
@@ -199,14 +185,14 @@ static double rough_place(const gait_start *s, start_problem *p)
         double hips[2], ankles[2];
         if (p->person) {
             const start_box *const b = &p->person->box[p->frame[k]];
-            leg[k] = LEG * distance(b->head, b->foot);
+            leg[k] = LEG * people_distance(b->head, b->foot);
             u[k] = 0.5 * (b->head[0] + b->foot[0]);
             v[k] = 0.5 * (b->head[1] + b->foot[1]);
             continue;
         }
         (void)middle_of(s, p->frame[k], s->hip, hips);
         (void)middle_of(s, p->frame[k], s->ankle, ankles);
-        leg[k] = distance(hips, ankles);
+        leg[k] = people_distance(hips, ankles);
         u[k] = hips[0];
         v[k] = hips[1];
     }
@@ -231,12 +217,12 @@ static void set_noise(gait_start *s, double miss)
     for (int32_t k = 0; k < w->problem.frames; k++)
         for (int32_t j = 0; j < (w->problem.person ? 1 : s->model->points); j++) {
             double const sd = w->problem.person ? w->problem.person->box[w->problem.frame[k]].sd
-                                                : keypoint(s, w->problem.frame[k], j)->sd;
+                                                : s->keypoint[w->problem.frame[k]][j].sd;
             w->inverse_sd[k][j] = sd > 0.0 ? 1.0 / sqrt(sd * sd + miss * miss) : 0.0;
         }
 }
 
-/* Frames of the ring in order of time that can be fitted; returns how many. */
+/* Frames of the ring that can be fitted, in order of time; returns how many. */
 static int32_t usable_frames(const gait_start *s, const start_problem *p,
                              int32_t usable[GAIT_START_MAX_FRAMES])
 {
@@ -271,7 +257,7 @@ static bool choose_frames(gait_start *s, start_problem *p)
         p->frame[k] = usable[k * (n - 1) / (p->frames - 1)];
         p->at[k] = 1e-6 * (double)(utime[p->frame[k]] - p->middle);
         for (int32_t j = 0; j < s->model->points && !p->person; j++)
-            p->observations += keypoint(s, p->frame[k], j)->sd > 0.0 ? 2 : 0;
+            p->observations += s->keypoint[p->frame[k]][j].sd > 0.0 ? 2 : 0;
         p->observations += p->person ? BOX_ROWS : 0;
     }
     double const apart =
@@ -354,7 +340,7 @@ static int32_t frame_residuals(const gait_start *s, int32_t k, const double (*th
     particle_block_bodies(&s->layout, &w->states, &w->body);
     kin_points(s->model, &w->body, w->points);
     for (int32_t j = 0; j < s->model->points; j++) {
-        const start_keypoint *const found = keypoint(s, p->frame[k], j);
+        const start_keypoint *const found = &s->keypoint[p->frame[k]][j];
         double const weight = w->inverse_sd[k][j];
         if (!(weight > 0.0))
             continue;
@@ -527,7 +513,7 @@ static int32_t propose(const gait_start *s)
     return n;
 }
 
-/* The same answer, reached from two proposals? */
+/* Whether two proposals have led to the same answer. */
 static bool same(const start_candidate *a, const start_candidate *b, bool boxes)
 {
     if (boxes && a->in_place && b->in_place)
@@ -537,7 +523,7 @@ static bool same(const start_candidate *a, const start_candidate *b, bool boxes)
     return a->in_place == b->in_place && fabsf(turn) < 0.3f && fabsf(phase) < 0.6f;
 }
 
-/* Leave out what repeats one before it; returns how many are left. */
+/* Leave out candidates that repeat an earlier one; returns how many are left. */
 static int32_t distinct(start_candidate *c, int32_t n, bool boxes)
 {
     int32_t left = 0;
@@ -556,8 +542,8 @@ static float root(double variance)
     return __builtin_sqrtf(f_max((float)variance, 0.0f));
 }
 
-/* Keypoints are never as exact as their scatter suggests: errors of a detector last, and who has only begun to walk is
- * slower than soon after. */
+/* Keypoints are less exact than their scatter suggests, because errors of a detector last.  A person who has just begun
+ * to walk will soon be faster. */
 static void widen(const gait_start *s, gait_hypothesis *h)
 {
     h->sd.phase = f_max(h->sd.phase, 0.03f);
@@ -569,7 +555,7 @@ static void widen(const gait_start *s, gait_hypothesis *h)
         h->sd.pelvis[k] = f_clamp(h->sd.pelvis[k], 0.05f, 10.0f);
 }
 
-/* What boxes leave open. */
+/* Widen the standard deviations of what boxes do not determine. */
 static void leave_open(const gait_start *s, const start_candidate *c, gait_hypothesis *h)
 {
     h->mean.phase = 0.0f;
@@ -675,45 +661,21 @@ static int32_t solve_problem(gait_start *s, int64_t utime, gait_hypothesis *out,
     return n;
 }
 
-static void most_probable_first(gait_hypothesis *h, int32_t n)
-{
-    for (int32_t i = 1; i < n; i++) {
-        gait_hypothesis const moved = h[i];
-        int32_t k = i;
-        for (; k > 0 && h[k - 1].probability < moved.probability; k--)
-            h[k] = h[k - 1];
-        h[k] = moved;
-    }
-}
-
-/* Hypotheses of everyone who is seen in boxes.  Who walks and who is seen more often is more probable. */
+/* Hypotheses of everyone in the boxes. */
 static int32_t solve_people(gait_start *s, int64_t utime, gait_hypothesis *out, int32_t capacity)
 {
     start_scratch *const w = s->scratch;
-    int32_t n = 0, enough = 0;
-    double sum = 0.0;
+    int32_t n = 0;
+    bool enough = false;
     for (int32_t k = 0; k < GAIT_START_MAX_PEOPLE; k++) {
         gait_hypothesis own[GAIT_START_MAX_HYPOTHESES];
         int32_t usable[GAIT_START_MAX_FRAMES];
         w->problem.person = &s->people->person[k];
         int32_t const found = solve_problem(s, utime, own, GAIT_START_MAX_HYPOTHESES / 2);
-        double const often = (double)usable_frames(s, &w->problem, usable);
-        enough += found >= 0;
-        for (int32_t i = 0; i < found; i++) {
-            own[i].probability *= (float)(often * (own[i].in_place ? STANDS : 1.0));
-            if (n == GAIT_START_MAX_HYPOTHESES && own[i].probability <= out[n - 1].probability)
-                continue;
-            n = i_min(n + 1, GAIT_START_MAX_HYPOTHESES);
-            out[n - 1] = own[i];
-            most_probable_first(out, n);
-        }
+        enough |= found >= 0;
+        n = people_merge(out, n, own, found, usable_frames(s, &w->problem, usable));
     }
-    n = i_min(n, capacity);
-    for (int32_t i = 0; i < n; i++)
-        sum += (double)out[i].probability;
-    for (int32_t i = 0; i < n; i++)
-        out[i].probability = (float)((double)out[i].probability / sum);
-    return enough ? n : -1;
+    return enough ? people_normalise(out, i_min(n, capacity)) : -1;
 }
 
 int32_t start_solve(gait_start *s, int64_t utime, gait_hypothesis *out, int32_t capacity)
@@ -724,15 +686,13 @@ int32_t start_solve(gait_start *s, int64_t utime, gait_hypothesis *out, int32_t 
         return n;
     gait_hypothesis of_people[GAIT_START_MAX_HYPOTHESES];
     int32_t const found = solve_people(s, utime, of_people, i_min(capacity, GAIT_START_MAX_HYPOTHESES));
-    for (int32_t i = 0; i < found; i++)
-        out[i] = of_people[i];
+    memcpy(out, of_people, (size_t)i_max(found, 0) * sizeof *out);
     return found;
 }
 
 bool start_walks(const gait_hypothesis *h)
 {
-    bool const boxes = h->sd.phase >= 0.5f;
-    if (boxes)
+    if (h->sd.phase >= 0.5f) /* from boxes, which leave it open */
         return !h->in_place && h->speed > f_max(BOX_SPEED, 2.0f * h->speed_sd) && h->probability > LIKELY &&
                h->sd.heading < PI_F && h->chi2_per_observation < FITS;
     return h->mean.stride_hz > LEAST_RATE && (h->in_place || h->speed > LEAST_SPEED) &&
