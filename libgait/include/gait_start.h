@@ -13,9 +13,9 @@
 extern "C" {
 #endif
 
-#define GAIT_START_MAX_FRAMES 64    /* frames of keypoints, and of boxes, that are kept; older ones are dropped */
+#define GAIT_START_MAX_FRAMES 64    /* frames of keypoints, and of boxes, that are kept; the oldest are dropped */
 #define GAIT_START_MAX_PEOPLE 4     /* people in boxes who are followed at a time */
-#define GAIT_START_MAX_HYPOTHESES 8 /* that gait_start_solve() returns at most */
+#define GAIT_START_MAX_HYPOTHESES 8 /* that gait_start_solve() returns, at most */
 
 typedef struct gait_start gait_start;
 
@@ -34,7 +34,7 @@ typedef struct gait_start gait_start;
           float, joint_sd, , "", 0.025f, 0.001, 1)                                                                    \
     SETTING("Errors of a detector last: frames nearer together than this count as one.",                              \
           float, error_time, , "seconds", 0.25f, 0, 10)                                                               \
-    SETTING("Time over which the boxes of a person must lie.",                                                        \
+    SETTING("Time that the boxes of a person must cover.",                                                        \
           float, box_time, , "seconds", 1, 0.3, 1.4)                                                                  \
     FIELD("Calibrated camera; the floor is the plane z = 0.",                                                         \
           gait_camera, camera, , "")
@@ -87,29 +87,29 @@ GAIT_API gait_result gait_start_init(void *mem, size_t mem_bytes, const gait_mod
 /* One frame: the model's joints in order, as in gait_frame; utime must increase. */
 GAIT_API gait_result gait_start_add(gait_start *s, int64_t utime, const gait_keypoint *keypoints, gait_error *err);
 /* One frame: boxes around people, the most certain first; utime must increase.  Boxes that make a person shorter than
- * 1.2 m or taller than 2.4 m are left out; the others are given to the people of the frames before by their place. */
+ * 1.2 m or taller than 2.4 m are left out; the others are matched to the people of earlier frames by place. */
 GAIT_API gait_result gait_start_add_boxes(gait_start *s, int64_t utime, const gait_box *boxes, int32_t count,
                                           gait_error *err);
-/* People-sized regions, the largest first, in which a frame differs from the empty scene; both are of the camera's
- * size.  What touches the image's border is left out.  At most `capacity` boxes. */
+/* Person-sized regions in which a frame differs from the empty scene, the largest first, at most `capacity`; both
+ * images are of the camera's size.  Regions that touch the border are left out. */
 GAIT_API gait_result gait_start_find_boxes(gait_start *s, const gait_image *frame, const gait_image *background,
                                            gait_box *out, int32_t capacity, int32_t *count, gait_error *err);
 /* 1 if half of the frame differs from the background, so that it shows another scene or the camera has moved. */
 GAIT_API gait_result gait_start_other_scene(gait_start *s, const gait_image *frame, const gait_image *background,
                                             int32_t *other, gait_error *err);
-/* Stature of the person in a box by the camera, standing where the ray of the foot meets the floor, metres; NAN if it
- * meets none: a camera that cannot be, or a box above the horizon. */
+/* Stature of the person in a box, who stands where the ray of the foot meets the floor, metres; NAN if it does not meet
+ * the floor: the camera is impossible, or the box is above the horizon. */
 GAIT_API gait_result gait_start_box_stature(const gait_start *s, const gait_box *box, float *stature, gait_error *err);
 /* Forget the frames. */
 GAIT_API void        gait_start_reset(gait_start *s);
-/* Fit the keypoints added, or if they are too few the boxes of each person, and return at most `capacity` hypotheses
- * for the moment `utime`, the most probable first.
+/* Fit the keypoints or, if there are too few, the boxes of each person, and return at most `capacity` hypotheses for
+ * the moment `utime`, the most probable first.
  * GAIT_ERR_STATE: too few frames show hips and ankles, four or more over 0.3 s, or a box of one person, eight or more
  * over config box_time.  GAIT_ERR_NUMERIC: nothing fits. */
 GAIT_API gait_result gait_start_solve(gait_start *s, int64_t utime, gait_hypothesis *out, int32_t capacity,
                                       int32_t *count, gait_error *err);
-/* 1: a walk that fits what was observed, to start with at once; 0: the person may stand, the direction be unknown, or
- * the observations be of something else. */
+/* 1: a walk that fits the observations, good enough to start with.  0: the person may be standing, the direction may be
+ * unknown, or the observations may be of something else. */
 GAIT_API int32_t     gait_hypothesis_walks(const gait_hypothesis *h);
 
 #ifdef __cplusplus

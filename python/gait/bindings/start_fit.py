@@ -57,7 +57,7 @@ class Hypothesis:
     in_place : bool
         The person stays in place, as on a treadmill.
     walks : bool
-        A walk that fits what was observed, to start with at once.
+        A walk that fits the observations, good enough to start with.
     """
 
     mean: State
@@ -81,7 +81,7 @@ class StartFit:
     stature, stature_sd : float, optional
         Of the person, metres; the model's adults if left out.
     box_time : float, optional
-        Seconds over which the boxes of a person must lie.
+        Seconds that the boxes of a person must cover.
 
     Raises
     ------
