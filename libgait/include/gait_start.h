@@ -34,7 +34,7 @@ typedef struct gait_start gait_start;
           float, joint_sd, , "", 0.025f, 0.001, 1)                                                                    \
     SETTING("Errors of a detector last: frames nearer together than this count as one.",                              \
           float, error_time, , "seconds", 0.25f, 0, 10)                                                               \
-    SETTING("Time that the boxes of a person must cover.",                                                        \
+    SETTING("Time that the boxes of a person must cover.",                                                            \
           float, box_time, , "seconds", 1, 0.3, 1.4)                                                                  \
     FIELD("Calibrated camera; the floor is the plane z = 0.",                                                         \
           gait_camera, camera, , "")

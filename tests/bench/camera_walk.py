@@ -3,8 +3,8 @@
 
     camera_walk.py [CLIP...]
 
-Each clip is tracked with its true camera and without any, given the stature.  The truth is turned into the
-world of a camera that is found: origin on the floor below it, which looks along y.
+Each clip is tracked with its true camera and without any, given the stature.  The truth is transformed into
+the world of a camera that is found: the origin is on the floor below it, and it looks along y.
 """
 
 from __future__ import annotations
@@ -22,6 +22,7 @@ import numpy as np
 import numpy.typing as npt
 import table
 from facts import facts
+
 from gait.body.skeleton import EVAL15
 from gait.camera.camera import Camera, read_camera
 from gait.cli import main as gait
@@ -30,7 +31,6 @@ from gait.io.track_file import read_track, read_truth
 Floats = npt.NDArray[np.float64]
 WITHIN = 1.645  # standard deviations that hold 90 %
 HIPS = [EVAL15.index("l_hip"), EVAL15.index("r_hip")]
-PARTS = ("focal", "tilt", "roll", "height")
 
 
 def main() -> int:
@@ -39,59 +39,36 @@ def main() -> int:
         print(f"camera_walk: {eval_clips.DATA} is not there, left out", file=sys.stderr)
         return 0
     folder = eval_clips.DATA / "eval" / "dev"
-    clips = [
-        c
-        for c in sorted(folder.iterdir())
-        if not sys.argv[1:] or c.name in sys.argv[1:]
-    ]
+    clips = [c for c in sorted(folder.iterdir()) if not sys.argv[1:] or c.name in sys.argv[1:]]
     rows, held = [], []
     for clip in clips:
         row, inside = _clip(clip)
         rows.append(row)
         held += inside
-    head = [
-        "clip",
-        "focal %",
-        "focal sd %",
-        "tilt deg",
-        "tilt sd",
-        "roll deg",
-        "height %",
-        "height sd %",
-    ]
+    head = ["clip", "focal %", "focal sd %", "tilt deg", "tilt sd", "roll deg", "height %", "height sd %"]
     head += ["joints mm", "with camera", "speed %", "with camera %", "pelvis in 90 %"]
     note = (
-        f"{facts('tests/bench/camera_walk.py')}\n\nErrors of focal length, tilt, roll and height of the camera, "
-        "with their reported standard deviations; root-aligned error of the 15 joints and error of the speed, "
-        "without a camera and with the true one; share of frames whose pelvis is in the 90 % interval (x and y). "
-        f"{sum(held)} of {len(held)} camera parameters are in theirs."
+        f"{facts('tests/bench/camera_walk.py')}\n\nErrors of focal length, tilt, roll and height of the "
+        "camera, with their reported standard deviations; root-aligned error of the 15 joints and error of "
+        "the speed, without a camera and with the true one; share of frames whose pelvis is in the 90 % "
+        f"interval (x and y). {sum(held)} of {len(held)} camera parameters are in theirs."
     )
     table.publish("camera_walk", "A camera found from the walk", head, rows, note)
     return 0
 
 
 def _clip(folder: Path) -> tuple[list[Any], list[bool]]:
+    """Row of a clip, and whether each parameter of the camera is in its 90 % interval."""
     truth_camera = read_camera(str(folder / "camera.json"))
     truth = read_truth(folder / "truth.csv")
-    stature = json.loads((folder / "meta.json").read_text())["limb_lengths_m"][
-        "stature"
-    ]
+    stature = json.loads((folder / "meta.json").read_text())["limb_lengths_m"]["stature"]
     turn, origin = _world(truth_camera)
     true = (np.stack([truth.places[name] for name in EVAL15], axis=1) - origin) @ turn.T
-    words = [
-        "track",
-        str(folder / "video.mp4"),
-        "--height",
-        f"{stature:.3f}",
-        "--json",
-        "--quiet",
-    ]
+    words = ["track", str(folder / "video.mp4"), "--height", f"{stature:.3f}", "--json", "--quiet"]
     with tempfile.TemporaryDirectory() as tmp:
         found, given = Path(tmp) / "found.csv", Path(tmp) / "given.csv"
         camera = Path(tmp) / "camera.json"
-        figures = _run([*words, "-o", str(found), "--camera-out", str(camera)])[
-            "camera"
-        ]
+        figures = _run([*words, "-o", str(found), "--camera-out", str(camera)])["camera"]
         _run([*words, "-o", str(given), "--camera", str(folder / "camera.json")])
         tracks = read_track(found), read_track(given)
         calibrated = read_camera(str(camera))
@@ -101,29 +78,15 @@ def _clip(folder: Path) -> tuple[list[Any], list[bool]]:
         figures["height_m_sd"] / figures["height_m"],
     ])  # fmt: skip
     off = np.array(_parts(calibrated)) - _parts(truth_camera)
-    results = []
-    for track, world in zip(
-        tracks, ((np.eye(3), np.zeros(3)), (turn, origin)), strict=True
-    ):
-        joints = (
-            np.stack([track.places[name] for name in EVAL15], axis=1) - world[1]
-        ) @ world[0].T
-        rows = np.searchsorted(truth.frame, track.frame)
-        results.append(_errors(joints, true[rows], track.time))
-    joints = np.stack([tracks[0].places[name] for name in EVAL15], axis=1)
-    rows = np.searchsorted(truth.frame, tracks[0].frame)
-    pelvis = joints[:, HIPS].mean(axis=1) - true[rows][:, HIPS].mean(axis=1)
+    joints = [np.stack([track.places[name] for name in EVAL15], axis=1) for track in tracks]
+    joints[1] = (joints[1] - origin) @ turn.T
+    rows = [np.searchsorted(truth.frame, track.frame) for track in tracks]
+    own, other = (_errors(joints[k], true[rows[k]], tracks[k].time) for k in range(2))
+    pelvis = joints[0][:, HIPS].mean(axis=1) - true[rows[0]][:, HIPS].mean(axis=1)
     sd_hips = np.stack([tracks[0].sd[name] for name in ("l_hip", "r_hip")]).mean(axis=0)
     held = np.abs(pelvis[:, :2]) < WITHIN * sd_hips[:, :2]
-    row = [
-        folder.name,
-        *_shown(off, sd),
-        results[0][0],
-        results[1][0],
-        results[0][1],
-        results[1][1],
-    ]
-    return [*row, 100 * float(held.mean())], (np.abs(off) < WITHIN * sd).tolist()
+    row = [folder.name, *_shown(off, sd), own[0], other[0], own[1], other[1], 100 * float(held.mean())]
+    return row, (np.abs(off) < WITHIN * sd).tolist()
 
 
 def _run(words: list[str]) -> dict[str, Any]:
@@ -137,9 +100,7 @@ def _run(words: list[str]) -> dict[str, Any]:
 def _world(camera: Camera) -> tuple[Floats, Floats]:
     """Rotation about z and origin that put a camera above the origin, looking along y."""
     x, y = camera.R[2, :2] / np.hypot(*camera.R[2, :2])
-    return np.array([[y, -x, 0], [x, y, 0], [0, 0, 1.0]]), np.array(
-        [*camera.centre[:2], 0.0]
-    )
+    return np.array([[y, -x, 0], [x, y, 0], [0, 0, 1.0]]), np.array([*camera.centre[:2], 0.0])
 
 
 def _parts(camera: Camera) -> Floats:
@@ -150,16 +111,9 @@ def _parts(camera: Camera) -> Floats:
 
 
 def _shown(off: Floats, sd: Floats) -> list[float]:
-    percent, degrees = 100 * np.expm1(off), np.degrees(off)
-    values = [
-        percent[0],
-        100 * sd[0],
-        degrees[1],
-        np.degrees(sd[1]),
-        degrees[2],
-        percent[3],
-        100 * sd[3],
-    ]
+    """Errors and standard deviations of a camera's parameters as the table has them: per cent and degrees."""
+    percent, degrees, tilt_sd = 100 * np.expm1(off), np.degrees(off), np.degrees(sd[1])
+    values = (percent[0], 100 * sd[0], degrees[1], tilt_sd, degrees[2], percent[3], 100 * sd[3])
     return [float(v) for v in values]
 
 

@@ -37,7 +37,7 @@ OUT = ROOT / "build" / "eval-real"
 ARMS = ("auto", "nobg", "known", "nocam")
 MEAN = {"auto": 0.85, "nocam": 0.75, "known": 0.90}  # of the good frames, at least
 LEAST = {"auto": 0.65}  # and of each clip
-NEAR = {"nobg": ("auto", 0.05)}  # mean no further below that of another arm
+NEAR = {"nobg": ("auto", 0.05)}  # mean at most so far below that of another arm
 WRONG = 0.02  # of the frames under `tracking`, at most
 STRIDE = 0.03  # error of the stride rate, as a share, at most
 
@@ -52,7 +52,7 @@ counted in the pictures (tests/bench/real_strikes.json).  Rates are of the whole
 
 @dataclass(frozen=True)
 class Result:
-    """A clip in an arm: the score, CPU seconds and frames a second; what was printed if it failed."""
+    """A clip in an arm: the score, CPU seconds, frames per second, and what was printed if it failed."""
 
     clip: str
     arm: str
@@ -63,7 +63,7 @@ class Result:
 
 
 def main() -> int:
-    """Run the arms; 1 if a bound is missed."""
+    """Run the arms and print the table; 1 if a bound is missed."""
     parser = argparse.ArgumentParser(
         description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
     )
@@ -91,6 +91,7 @@ def main() -> int:
 
 
 def _has(clip: Clip, arm: str) -> bool:
+    """Whether a clip has the files of an arm."""
     return arm != "known" or (clip.folder / "init.json").exists()
 
 
@@ -150,6 +151,7 @@ def _missed(results: list[Result], everything: list[Result]) -> list[str]:
 
 
 def _mean(results: list[Result]) -> float:
+    """Mean share of good frames."""
     return float(np.mean([r.score.share["good"] for r in results]))
 
 

@@ -21,8 +21,8 @@ LEGS = ("l_knee", "r_knee", "l_ankle", "r_ankle")
 HIPS = ("l_hip", "r_hip")
 JOINTS = tuple(f"{side}_{joint}" for joint in ("shoulder", "elbow", "wrist") for side in "lr") + HIPS + LEGS
 KINDS = ("good", "swap", "legs", "off", "none")
-"""Of a frame: all in place; left and right swapped; legs elsewhere; hips elsewhere; not in the track."""
-_GOOD, _HIPS, _LEGS = 0.09, 0.15, 0.20  # limits of these, person's heights
+"""Of a frame: all in place; left and right swapped; legs elsewhere; hips or legs far off; no row."""
+_GOOD, _HIPS, _LEGS = 0.09, 0.15, 0.20  # limits of good legs, of hips and legs far off, person's heights
 _STRIKES = Path(__file__).parent / "real_strikes.json"
 _TILES, _TILE = 8, 300  # of a contact sheet; pixels
 
@@ -83,7 +83,7 @@ class Score:
 
 
 def read_clips(folder: Path, names: list[str] | None) -> list[Clip]:
-    """Clips in a folder: video.*, meta.json and reference2d.csv each."""
+    """Clips in a folder, one per subfolder with video.*, meta.json and reference2d.csv."""
     metas = sorted(folder.glob("*/meta.json"))
     return [_read(path) for path in metas if not names or path.parent.name in names]
 
@@ -116,7 +116,7 @@ def _read_reference(path: Path) -> dict[int, Points]:
 
 
 def score(clip: Clip, track: Track, camera: Camera) -> Score:
-    """Compare a track with the reference."""
+    """Compare a track with the reference joints, in the frames of the clip that have them."""
     at = {frame: i for i, frame in enumerate(track.frame.tolist())}
     frames = [frame for frame in range(clip.first, clip.last + 1) if frame in clip.reference]
     kinds, errors, tracking, wrong = Counter[str](), [], 0, 0
@@ -136,7 +136,7 @@ def score(clip: Clip, track: Track, camera: Camera) -> Score:
 
 
 def _verdict(points: Points, reference: Points) -> tuple[str, float]:
-    """Kind of a frame, and the median error of its joints."""
+    """Kind of a frame, of KINDS, and the median error of its joints, person's heights."""
     ears = np.mean([reference[ear][1] for ear in ("l_ear", "r_ear") if ear in reference])
     size = abs(max(reference[heel][1] for heel in ("l_heel", "r_heel") if heel in reference) - ears) / 0.925
     if any(joint not in points for joint in HIPS + LEGS):
@@ -159,7 +159,7 @@ def _verdict(points: Points, reference: Points) -> tuple[str, float]:
 
 
 def _timing(clip: Clip, track: Track) -> tuple[float, float]:
-    """Errors of the stride rate and of the heel strikes."""
+    """Error of the stride rate, as a share, and of the heel strikes, frames; NaN without a reference."""
     followed = np.isin(track.status, ("tracking", "ambiguous"))
     used = followed & (track.frame >= clip.first) & (track.frame <= clip.last) & np.isfinite(track.phase)
     if used.sum() <= 15:

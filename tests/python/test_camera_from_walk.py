@@ -6,6 +6,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+
 from gait.bindings.model import Model
 from gait.camera.camera import read_camera
 from gait.cli import main
@@ -16,9 +17,7 @@ from gait.track.keypoint_start import find_keypoint_start
 
 MODEL = Model()
 SIZE = (1280, 720)
-NAMES = tuple(
-    name for name in MODEL.joint_names if name not in ("pelvis", "neck", "head_top")
-)
+NAMES = tuple(name for name in MODEL.joint_names if name not in ("pelvis", "neck", "head_top"))
 TOWARDS, ACROSS = (
     (-1.3, (0.3, 7.5)),
     (0.0, (-1.8, 5.0)),
@@ -46,17 +45,13 @@ def keypoints(
     uv = []
     for t in time:
         way = 0.0 if standing else (speed - belt) * t
-        state = replace(
-            prior, phase=0.3 if standing else (0.3 + rate * t) % 1.0, stature=stature
-        )
+        state = replace(prior, phase=0.3 if standing else (0.3 + rate * t) % 1.0, stature=stature)
         state.heading, state.stride_hz = heading, rate
         x, y = place[0] + way * np.cos(heading), place[1] + way * np.sin(heading)
         state.pelvis = np.array([x, y, 0.0])
         state.pelvis[2] = MODEL.pelvis_height(state)
         joints = MODEL.pose(state)[0]
-        uv.append(
-            camera.project(joints)[[MODEL.joint_names.index(name) for name in NAMES]]
-        )
+        uv.append(camera.project(joints)[[MODEL.joint_names.index(name) for name in NAMES]])
     uv = np.array(uv) + noise * rng.standard_normal((len(time), len(NAMES), 2))
     return Keypoints(np.arange(len(time)), time, NAMES, uv, np.ones(uv.shape[:2]))
 
@@ -117,15 +112,10 @@ def test_the_uncertainty_covers_the_path():
 
 def test_a_treadmill_is_in_place():
     camera = view()
-    found = calibrate(
-        keypoints(camera, (0.4, (0.0, 3.5)), belt=1.25), SIZE, MODEL, 1.75
-    )
+    found = calibrate(keypoints(camera, (0.4, (0.0, 3.5)), belt=1.25), SIZE, MODEL, 1.75)
     assert found.in_place and found.sd[0] > 0.1
     assert np.ptp(found.path[:, :2], axis=0).max() < 0.1
-    assert (
-        "a walk in place determines the focal length poorly" in found.describe()[1]
-        or found.sd[0] < 0.2
-    )
+    assert "a walk in place determines the focal length poorly" in found.describe()[1] or found.sd[0] < 0.2
 
 
 @pytest.mark.parametrize(
@@ -155,9 +145,7 @@ def test_a_camera_that_contradicts_the_walk_is_reported(change, words):
     start = find_keypoint_start(walk, given, MODEL, height=1.75)
     words_found = contradiction(given, start.mean.stature, walk, MODEL, 1.75)
     assert (
-        words_found is None
-        if words is None
-        else re.search(words, words_found) and "height 1." in words_found
+        words_found is None if words is None else re.search(words, words_found) and "height 1." in words_found
     )
 
 
@@ -182,9 +170,7 @@ def test_the_command_writes_the_camera(tmp_path, capsys):
     assert main([*map(str, words), "--height", "1.75", "--json"]) == 0
     figures = json.loads(capsys.readouterr().out)
     camera = read_camera(str(tmp_path / "c.json"))
-    assert (
-        camera.fx == pytest.approx(figures["focal_px"]) and figures["height_m_sd"] > 0
-    )
+    assert camera.fx == pytest.approx(figures["focal_px"]) and figures["height_m_sd"] > 0
     assert camera.centre[2] == pytest.approx(1.4, rel=0.08) and camera.size == SIZE
 
 

@@ -23,7 +23,7 @@ from gait.bindings.model import Model
 from gait.camera.camera import MAX_PIXELS, Camera, read_camera, write_camera
 from gait.camera.placing import place, read_points
 from gait.cli import values
-from gait.errors import UsageError, UserError
+from gait.errors import UsageError
 from gait.io import keypoints_file
 from gait.io.files import replacing, require_outputs
 from gait.io.keypoints_file import Keypoints
@@ -104,20 +104,14 @@ def _keypoints(args: argparse.Namespace, model: Model) -> tuple[Keypoints, tuple
         return keypoints_file.read(args.walk, model.joint_names, ignore_unknown=True)[0], args.size
     if args.size:
         raise UsageError("--size: is for KEYPOINTS.csv; a video has its own")
-    from gait.detect.people import (
-        detect,
-        main_person,
-        require_length,
-    )  # here, as they load the networks' runtime
+    # Imported here, as they load the networks' runtime.
+    from gait.detect.people import detect, main_person, require_length, require_person
 
     video = Video(args.walk)
     require_length(video)
     with progress("detecting", video.count, args.quiet) as update:
         people = detect(video, update=update)
-    if not people:
-        raise UserError(
-            f"{args.walk}: no person found; the whole body should be in view, 80 pixels or taller"
-        )
+    require_person(people, video)
     return people[main_person(people)], video.size
 
 

@@ -23,7 +23,7 @@ from gait.io.keypoints_file import write
 from gait.io.video import Video
 from gait.progress import note, progress
 
-_TURN = 0.1  # seconds
+_TURN = 0.1  # seconds that one call waits for a message
 
 EXAMPLES = """\
 examples:
@@ -55,7 +55,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         metavar="N",
         help="people followed at a time (default: 8)",
     )
-    parser.add_argument("--lcm", action="store_true", help="frames arrive over LCM, and joints go out so")
+    parser.add_argument("--lcm", action="store_true", help="take frames from LCM and send the joints over it")
     parser.add_argument(
         "--stream", type=values.whole(*values.STREAM), metavar="I", help="number of the camera (default: 0)"
     )
@@ -96,16 +96,14 @@ def run(args: argparse.Namespace) -> int:
     if not args.video or not args.output:
         raise UsageError("give VIDEO and -o KEYPOINTS.csv, or --fetch")
     require_outputs((args.output,), (args.video,))
-    from gait.detect.people import detect, height, main_person, require_length  # here, as it loads OpenCV
+    # Imported here, as they load OpenCV.
+    from gait.detect.people import detect, height, main_person, require_length, require_person
 
     video = Video(args.video)
     require_length(video)
     with progress("detecting", video.count, args.quiet) as update:
         people = detect(video, args.network, args.people, update=update)
-    if not people:
-        raise UserError(
-            f"{args.video}: no person found; the whole body should be in view, 80 pixels or taller"
-        )
+    require_person(people, video)
     chosen = main_person(people) if args.person is None else args.person
     if chosen not in people:
         ids = " ".join(map(str, people))

@@ -214,6 +214,14 @@ def require_length(video: Video) -> None:
         raise UserError(f"{video.path}: has only {frames}; give a video of a second or more")
 
 
+def require_person(people: dict[int, Keypoints], video: Video) -> None:
+    """Refuse a video in which no person was found."""
+    if not people:
+        raise UserError(
+            f"{video.path}: no person found; the whole body should be in view, 80 pixels or taller"
+        )
+
+
 def main_person(people: dict[int, Keypoints]) -> int:
     """Choose the main person of a clip: the one in view longest and tallest."""
     return max(people, key=lambda n: np.isfinite(people[n].uv[:, 0, 0]).sum() * height(people[n]))

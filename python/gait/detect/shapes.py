@@ -30,10 +30,8 @@ _STATURE, _STATURE_SD = 1.68, 0.12  # metres
 _ENOUGH = 3.0  # votes in all for a person
 _SAME = 0.3  # heights between the feet of windows about one person
 _WINDOW_SD = 0.015  # of a mean of windows, heights, from frame to frame
-
-
-_PLAUSIBLE = (1.2, 2.4)  # metres
-_FLAT = 2.0  # grey levels of standard deviation of a picture that shows nothing
+PLAUSIBLE = (1.2, 2.4)  #: metres: apparent statures of people, which shadows lengthen
+_FLAT = 2.0  # grey levels: standard deviation of a picture that shows nothing
 
 
 @functools.cache
@@ -44,7 +42,18 @@ def _detector() -> cv2.HOGDescriptor:
 
 
 def find_people(image: Image, stature: Stature) -> list[Box]:
-    """Find people who stand on the ground, the most certain first; people under `LEAST` pixels are missed."""
+    """Find people who stand on the ground.
+
+    Parameters
+    ----------
+    image : Image
+    stature : Stature
+
+    Returns
+    -------
+    people : list of Box
+        The most certain first; people under `LEAST` pixels are missed.
+    """
     if image[::8, ::8].std() < _FLAT:
         return []
     for side in SIDES:
@@ -80,13 +89,14 @@ def _box(window: Array, vote: float, stature: Stature) -> tuple[float, Box]:
     head = np.array([x + width / 2, y + (_MARGIN - 0.02) * height])
     box = Box(foot, head, _WINDOW_SD * height)
     tall = stature(box)
-    if not _PLAUSIBLE[0] <= tall <= _PLAUSIBLE[1]:
+    if not PLAUSIBLE[0] <= tall <= PLAUSIBLE[1]:
         return 0.0, box
     off = (tall - _STATURE) / _STATURE_SD
     return float(np.exp(min(vote, 3.0) - 0.5 * off * off)), box
 
 
 def _mean(near: list[tuple[float, Box]]) -> tuple[float, Box]:
+    """Mean of the boxes about one person, weighted by their votes, and the votes in all."""
     share = np.array([vote for vote, _ in near])
     foot = np.average([box.foot for _, box in near], axis=0, weights=share)
     head = np.average([box.head for _, box in near], axis=0, weights=share)

@@ -1,4 +1,4 @@
-"""Automatic start from pictures: boxes around people, in the whole clip until a person walks.
+"""Automatic start from pictures: find boxes around people in a clip until a person walks.
 
 People are found where frames differ from the empty scene or, without one, by their shape; the library fits a
 walk to a second of their boxes (`gait.bindings.start_fit`).
@@ -14,18 +14,17 @@ from gait.bindings.initial import Start
 from gait.bindings.model import Model
 from gait.bindings.start_fit import Box, Hypothesis, StartFit
 from gait.camera.camera import Camera
-from gait.detect.shapes import find_people
+from gait.detect.shapes import PLAUSIBLE, find_people
 from gait.errors import GaitError, UserError
 from gait.io.video import Frame, Image, Video
 
-ENOUGH = 8  # frames with a person, at least
-SELDOM = 0.09  # seconds, at least, between frames searched without a background: that is slow
+_ENOUGH = 8  # frames with a person, at least
+_SELDOM = 0.09  # seconds, at least, between frames searched without a background: that is slow
 _WINDOW = 1.0  # seconds of boxes that are fitted
-_LEAST_WINDOW = 0.3  # the same in a clip that is not longer
-_PROBES = 6  # frames of a clip that must not all be empty
+_LEAST_WINDOW = 0.3  # the same in a short clip, at least
+_PROBES = 6  # frames of a clip, of which one must show a person
 _STEP = 0.1  # seconds from one fit to the next
 _STATURE_SD = 0.03  # metres, of one that the user gives
-_PLAUSIBLE = (1.2, 2.4)  # metres, of boxes that are people
 _BEYOND = 4.0  # standard deviations by which an apparent stature contradicts the one expected
 
 
@@ -35,7 +34,7 @@ class BoxStart:
     Parameters
     ----------
     camera, plate, model
-        `plate` is the empty scene, BGR; without one people are found by their shape, every `SELDOM` seconds.
+        `plate` is the empty scene, BGR; without one people are found by their shape, every 0.09 s at most.
     height : float, optional
         Known stature, metres.
     window : float
@@ -44,9 +43,8 @@ class BoxStart:
     Attributes
     ----------
     misplaced : list of float
-        A stature for each frame in which the camera makes the largest person's stature implausible.
-    found : int
-        Frames with a person so far.
+        Apparent stature of the largest person, metres, in each frame in which the camera makes everyone's
+        implausible; NaN above the horizon.
     """
 
     def __init__(
@@ -62,29 +60,27 @@ class BoxStart:
         self._expected = model.prior()[0].stature if height is None else height
         self._plate, self._window = plate, window
         self.misplaced: list[float] = []
-        self.found = 0
         self._times: list[tuple[int, float]] = []  # frames observed
         self._statures: list[float] = []
         self._last_fit = -np.inf
 
     def forget(self) -> None:
-        """Start afresh."""
+        """Forget the frames observed."""
         self._fit.reset()
         self._times.clear()
         self._statures.clear()
 
     def observe(self, frame: Frame) -> None:
         """Find people in a frame and give their boxes to the fit."""
-        if self._plate is None and self._times and 0 <= frame.time - self._times[-1][1] < SELDOM:
+        if self._plate is None and self._times and 0 <= frame.time - self._times[-1][1] < _SELDOM:
             return
         boxes = self._boxes(frame.image)
         self._times.append((frame.number, frame.time))
         self._fit.add_boxes(frame.utime, boxes)
-        self.found += bool(boxes)
         self._statures += [self._fit.stature(box) for box in boxes[:1]]
 
     def worth(self, video: Video, first: int, stop: int) -> bool:
-        """Whether frames spread over a clip show a person: without the empty scene the search is slow."""
+        """Whether to search a clip: without the empty scene (slow), only if a probe shows a person."""
         if self._plate is not None:
             return True
         probes = np.unique(np.linspace(first, stop - 1, _PROBES).astype(int)).tolist()
@@ -92,7 +88,7 @@ class BoxStart:
         return any(self._boxes(frame.image) for frame in shown)
 
     def best(self, frame: Frame, *, latest: bool = False) -> tuple[Start, Hypothesis] | None:
-        """Most probable start after a frame: at its moment, or a window earlier; None before there is one."""
+        """Most probable start, at the time of a frame (`latest`) or a window earlier; None: there is none."""
         back = 0.0 if latest else self._window
         at = next((item for item in self._times if item[1] >= frame.time - back - 1e-6), None)
         if at is None:
@@ -121,7 +117,7 @@ class BoxStart:
         boxes = self._fit.find_boxes(image, self._plate)
         statures = [self._fit.stature(box) for box in boxes]
         people = [
-            box for box, tall in zip(boxes, statures, strict=True) if _PLAUSIBLE[0] <= tall <= _PLAUSIBLE[1]
+            box for box, tall in zip(boxes, statures, strict=True) if PLAUSIBLE[0] <= tall <= PLAUSIBLE[1]
         ]
         if statures and not people:
             self.misplaced.append(statures[0])
@@ -147,13 +143,12 @@ def find_start(
     ----------
     video, camera, plate, model
         `plate` is the empty scene, BGR.
-    shapes : bool
-        Find people by their shape where none stands out against the empty scene: slow, and needless after a
-        detector that found none.
     first, stop : int
         Frames to search, `first` <= number < `stop`.
     height : float, optional
         Known stature, metres.
+    shapes : bool
+        Also find people by their shape, which is slow, where none stands out against the empty scene.
 
     Raises
     ------
@@ -187,7 +182,7 @@ def find_start(
 def _finders(
     camera: Camera, plate: Image | None, model: Model, height: float | None, window: float, shapes: bool
 ) -> Iterator[BoxStart]:
-    """Yield the ways to find a person: by change first, as it gives the place better."""
+    """Yield the ways to find a person: by the empty scene first, as it gives the place better."""
     if plate is not None:
         yield BoxStart(camera, plate, model, height, window)
     if shapes:
@@ -196,11 +191,11 @@ def _finders(
 
 def _no_person(few: int, misplaced: list[float]) -> str:
     """Explain why there is no start, and what to do."""
-    if few < ENOUGH:
+    if few < _ENOUGH:
         frames = f"frame{'s'[: few != 1]}"
-        return f"only {few} {frames} to track, --init auto needs {ENOUGH}; give --init FILE.json"
-    if len(misplaced) < ENOUGH:
-        return f"--init auto found no person in full view for {ENOUGH} frames; give --init FILE.json"
+        return f"only {few} {frames} to track, --init auto needs {_ENOUGH}; give --init FILE.json"
+    if len(misplaced) < _ENOUGH:
+        return f"--init auto found no person in full view for {_ENOUGH} frames; give --init FILE.json"
     what = f"makes {np.nanmedian(misplaced):.2g} m tall" if np.isfinite(misplaced).any() else ""
     if np.isnan(misplaced).mean() > 0.5:
         what = "puts above the horizon"

@@ -29,7 +29,7 @@ from gait.track.keypoint_start import keypoint_noise
 
 Array = NDArray[np.float64]
 
-USUAL_FOV = 65.0  #: degrees along the longer side of the picture, of a usual phone
+_USUAL_FOV = 65.0  # degrees along the longer side of the picture, of a usual phone
 _FOV_SD = 0.45  # of the focal length's logarithm; of --fov:
 _GIVEN_FOV_SD = 0.05
 _HEIGHT, _HEIGHT_SD = 1.3, 0.5  # metres; of the logarithm
@@ -268,7 +268,7 @@ class _Prior:
 
     @staticmethod
     def of(size: tuple[int, int], fov: float | None) -> _Prior:
-        side, angle, sd = (max(size), USUAL_FOV, _FOV_SD) if fov is None else (size[0], fov, _GIVEN_FOV_SD)
+        side, angle, sd = (max(size), _USUAL_FOV, _FOV_SD) if fov is None else (size[0], fov, _GIVEN_FOV_SD)
         focal = 0.5 * side / np.tan(np.radians(angle) / 2)
         return _Prior(
             np.array([np.log(focal), _TILT, 0.0, np.log(_HEIGHT)]),

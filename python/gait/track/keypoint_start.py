@@ -18,12 +18,12 @@ from gait.io.keypoints_file import Keypoints
 
 _WINDOW = 1.0  # seconds of keypoints that are fitted
 _STEP = 0.2  # seconds from one window to the next
-_FITS_BEST = 4.0  # and up to which the best of all is taken
+_FITS_BEST = 4.0  # chi-square per coordinate up to which the best window is taken if no person walks in any
 _STATURE_SD = 0.05  # metres, of one that the user gives
-CUE_MISS = 0.01
+CUE_MISS = 0.01  # person's heights: the model's joints miss the detector's by this, in the likelihood
 
 _JOINT_SD = {"elbow": 0.02, "wrist": 0.04, "heel": 0.03, "toe": 0.04, "shoulder": 0.01, "hip": 0.01}
-"""Noise of a detector's joints beside what the model's joints miss them by, person's heights; others 0.01."""
+"""Noise of a detector's joints without their difference to the model's, person's heights; others 0.01."""
 
 
 def keypoint_noise(keypoints: Keypoints, miss: float = 0.0) -> dict[int, FrameKeypoints]:
@@ -36,6 +36,11 @@ def keypoint_noise(keypoints: Keypoints, miss: float = 0.0) -> dict[int, FrameKe
     miss : float
         Difference between the model's joints and the detector's: standard deviation, person's heights in
         the picture.
+
+    Returns
+    -------
+    keypoints : dict of int to FrameKeypoints
+        By number of the frame; pixels.  Joints that were not found have a negative standard deviation.
     """
     legs = [keypoints.names.index(f"{side}_{joint}") for side in "lr" for joint in ("hip", "ankle")]
     hip, ankle = keypoints.uv[:, legs[0::2]].mean(axis=1), keypoints.uv[:, legs[1::2]].mean(axis=1)
@@ -66,9 +71,9 @@ def find_keypoint_start(
     camera : Camera
     model : Model
     first, stop : int
-        Frames to use.
+        Frames to use, first <= number < stop.
     height : float, optional
-        Stature in metres.
+        Known stature, metres.
 
     Returns
     -------
@@ -106,7 +111,10 @@ def _fit_window(
     times: np.ndarray[tuple[int], np.dtype[np.float64]],
     at: int,
 ) -> tuple[Start, Hypothesis] | None:
-    """Fit the second from frame number `at` of the list; None if hips and ankles are not in view."""
+    """Fit the second from ``frames[at]`` on; None if no walk fits or hips and ankles are not in view.
+
+    `frames` (T,) are numbers, `times` (T,) their seconds.
+    """
     fit.reset()
     for frame, time in zip(frames[at:], times[at:], strict=True):
         if time > times[at] + _WINDOW:

@@ -72,3 +72,8 @@ class ClipOptions:
     draws: str | None = None
     trc: str | None = None
     quiet: bool = False
+
+    @property
+    def network(self) -> str:
+        """Landmark network that `detector` names; ``none`` for no detector."""
+        return "full" if self.detector == "auto" else self.detector

@@ -1,4 +1,4 @@
-"""What a clip gives to track: pictures, camera, empty scene, keypoints of people, and the first state."""
+"""What tracking needs to know of a clip: video, camera, empty scene, keypoints of people, first state."""
 
 from __future__ import annotations
 
@@ -29,7 +29,7 @@ _COLOUR = 4.0  # grey levels between the channels of half of a picture in colour
 
 @dataclass(frozen=True)
 class Scene:
-    """What there is to track.
+    """A clip, its camera and what was found in it before tracking.
 
     Attributes
     ----------
@@ -62,7 +62,7 @@ class Scene:
 
     @staticmethod
     def read(options: ClipOptions) -> Scene:
-        """Read the files, and run the detector where there is one.
+        """Read the files, run the detector if there is one, and find the camera if none is given.
 
         Raises
         ------
@@ -101,7 +101,7 @@ class Scene:
 
 
 def _calibrate(options: ClipOptions, video: Video, model: Model, keypoints: Keypoints | None) -> Calibration:
-    """Find the camera from the walk, and write it where it is wanted."""
+    """Find the camera from the walk of the person with these keypoints."""
     if keypoints is None:
         remedy = "gait detect finds no person in it" if _has_detector(options) else weights.FETCH
         raise UserError(f"{video.path}: without --camera keypoints of a walk are needed: {remedy}")
@@ -157,6 +157,7 @@ def _in_place(scene: Scene, frame: int) -> bool:
 
 
 def _note_start(options: ClipOptions, scene: Scene, start: Start) -> None:
+    """Report where the start is, and what makes it uncertain."""
     at, turn, turn_sd = start.mean, np.degrees(start.mean.heading), np.degrees(start.sd.heading)
     note(
         f"start found at frame {start.frame}: x {at.pelvis[0]:.2f} y {at.pelvis[1]:.2f} m, "
@@ -175,9 +176,8 @@ def _note_start(options: ClipOptions, scene: Scene, start: Start) -> None:
 
 
 def _find_first_state(options: ClipOptions, scene: Scene) -> Start:
-    """First state from the keypoints; without any that fit, from the pictures."""
+    """First state from the keypoints or, if none of them fit a walk, from the pictures."""
     camera, model, frames, height = scene.camera, scene.model, scene.frames, options.height
-    detected = not options.keypoints and _detects(options)
     if scene.people:
         keypoints = scene.people[scene.person]
         found = find_keypoint_start(
@@ -194,7 +194,7 @@ def _find_first_state(options: ClipOptions, scene: Scene) -> Start:
         first=frames.start,
         stop=options.stop,
         height=height,
-        shapes=not detected,
+        shapes=not _detects(options),  # slow, and needless where the detector found no person
     )
 
 
@@ -209,14 +209,14 @@ def _check_camera(options: ClipOptions, scene: Scene, start: Start | None) -> No
 
 
 def _require_scene(options: ClipOptions, scene: Scene, first: int) -> None:
-    """Refuse a background image of another scene than the first frame, or without its colours."""
+    """Refuse a background image of another scene than frame `first`, or of which only one has colours."""
     frame = next(iter(scene.video.frames(first, first + 1)), None)
     if scene.plate is None or frame is None:
         return
     if one_is_grey(frame.image, scene.plate):
         raise UserError(
-            f"{options.background}: of it and {scene.video.path} one is grey, the other in colour; "
-            "take both alike"
+            f"{options.background}: one of it and {scene.video.path} is grey, the other in colour; "
+            "give both in the same colours"
         )
     if not StartFit(scene.model, scene.camera).other_scene(frame.image, scene.plate):
         return
@@ -241,11 +241,10 @@ def _detect(options: ClipOptions, video: Video, frames: range) -> tuple[dict[int
     """Keypoints of everyone that the detector finds, and the main person; none without a detector."""
     if not _detects(options):
         return {}, -1
-    network = "full" if options.detector == "auto" else options.detector
     from gait.detect.people import detect, main_person  # here, as they load the networks' runtime
 
     with progress("detecting", len(frames), options.quiet) as update:
-        people = detect(video, network, first=frames.start, stop=frames.stop, update=update)
+        people = detect(video, options.network, first=frames.start, stop=frames.stop, update=update)
     return people, main_person(people) if people else -1
 
 
@@ -253,19 +252,19 @@ def _require_detector(options: ClipOptions) -> None:
     """Refuse weights that are damaged, or absent although asked for, before long work."""
     if _detects(options):
         weights.load(weights.PERSON)
-        weights.load(weights.LANDMARKS["full" if options.detector == "auto" else options.detector])
+        weights.load(weights.LANDMARKS[options.network])
 
 
 def _detects(options: ClipOptions) -> bool:
-    """Whether the detector is to run: not beside keypoints of a file, nor by itself without weights."""
+    """Whether the detector is to run: not with keypoints of a file, and as ``auto`` only with its weights."""
     if options.keypoints or options.detector == "none" or options.mode == Mode.PAPER:
         return False
     return options.detector != "auto" or _has_detector(options)
 
 
 def _has_detector(options: ClipOptions) -> bool:
-    network = "full" if options.detector == "auto" else options.detector
-    needed = (weights.PERSON, weights.LANDMARKS.get(network))
+    """Whether the weights are on this machine."""
+    needed = (weights.PERSON, weights.LANDMARKS.get(options.network))
     return all(weight is not None and weights.find(weight) for weight in needed)
 
 
