@@ -1,10 +1,10 @@
-"""Find where a camera stands, from a person who walks or from points that are measured.
+"""Find where a camera stands, from a person who walks or from measured points.
 
 --walk finds the whole camera, focal length included, from a person of known stature who walks on a level
 floor in full view: a VIDEO, in which gait detect finds the joints, or its KEYPOINTS.csv with --size.  The
 world has the origin on the floor below the camera, z up, and the camera looks along y.  A walk towards or
-away from the camera determines it best; what the walk leaves open is reported.  Square pixels and a lens
-without distortion are assumed, with the optical axis through the middle of the picture.
+away from the camera determines it best; the command reports what the walk leaves open.  Square pixels and a
+lens without distortion are assumed, with the optical axis through the middle of the picture.
 
 POINTS.csv has the columns u,v (pixels) and x,y[,z] (metres; z is up and 0 on the ground, where it may be
 left out).  Give four points or more that are far apart and not on one line.  --lens names a calibration of
@@ -54,7 +54,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 
 def run(args: argparse.Namespace) -> int:
-    """Read, place, write."""
+    """Find the camera and write it."""
     return _from_walk(args) if args.walk else _from_points(args)
 
 

@@ -1,21 +1,22 @@
 """Track a walking person in a video file.
 
-Without --camera, a camera is found from the walk, given the person's stature (see gait camera --walk); the
+Without --camera the camera is found from the walk, given the person's stature (see gait camera --walk); the
 standard deviations in OUT.csv include its uncertainty.
 
 The first state comes from --init: a JSON file with the person's position and phase, or auto.  auto fits a
 second of walking to the detector's keypoints (or those of --keypoints), which also gives the phase and
 distinguishes left from right.  Without keypoints that fit, it compares a second of frames with the
-background; this gives position, stature and heading but not the phase.  Without a background, or where no
-person stands out against it, OpenCV's people detector is used, which is less exact.  For the start from
-images the person must be in full view, feet included; of several people, one who walks is preferred; a long
-shadow misplaces the start.
+background; this gives position, stature and heading but not the phase.  If the network did not run, and there
+is no background or no person stands out against it, OpenCV's people detector is used, which is less exact.
+For the start from images the person must be in full view, feet included.  Of several people, one who walks is
+preferred.  A long shadow misplaces the start.
 
 After a start without a phase the status is init for about a second and then ambiguous until the images decide
 between left and right.
 
-A lost person is searched for near the last place, then in the whole picture.  A person who walks in full view
-for a second starts the track anew (not with --smooth).
+The person is tracked backwards from the start as well.  A lost person is searched for near the last place.
+With keypoints the track continues from the next second in which the same person walks; without them it starts
+anew with a person who walks in full view for a second (not with --smooth).
 
 --keypoints adds joints that a detector has found in the frames, in the format that gait lift reads.  Joints
 that the model does not have are left out; frames may be missing.
@@ -76,7 +77,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         "--keypoints",
         "--tracks",
         metavar="KEYPOINTS.csv",
-        help="2-D joints found in the frames, used as well",
+        help="2-D joints found in the frames, used beside the images",
     )
     add(
         "--keypoints-sd",

@@ -23,7 +23,6 @@ from gait.track.tracker import Tracker
 
 __all__ = ["KEYPOINTS_SD", "ClipOptions", "track_clip"]
 
-
 _HARDLY_FOLLOWED = "the person was lost nearly all the time; check --camera and --init by an --overlay"
 
 
@@ -61,7 +60,7 @@ def track_clip(options: ClipOptions) -> dict[str, Any]:
 
 
 def _stature(options: ClipOptions, scene: Scene, start: Start) -> tuple[float, float]:
-    """Stature to expect and its standard deviation: of the start, if pictures alone did not guess it."""
+    """Give the expected stature and its sd, metres: the start's, unless pictures alone guessed them."""
     mean, sd = start.mean, start.sd
     if options.init == "auto" and not scene.people:
         mean, sd = scene.model.prior()
@@ -77,6 +76,8 @@ def _follower(
     keypoints: PersonKeypoints,
     plausibility: Plausibility,
 ) -> Follower:
+    """Make a follower that finds a lost person by keypoints or, without any, in the pictures."""
+
     def find_start(first: int, stop: int, stature: float) -> Start | None:
         if not scene.people:
             return None

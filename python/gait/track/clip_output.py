@@ -1,4 +1,4 @@
-"""Everything that is written of a tracked clip, and the figures of the report."""
+"""Write the results of a tracked clip: its files, and the figures of the report."""
 
 from __future__ import annotations
 
@@ -28,13 +28,23 @@ from gait.track.scene import Scene
 from gait.track.smooth import Smoother
 from gait.track.tracker import Tracker
 
-_HARDLY = 0.1  # of the frames
+_HARDLY = 0.1  # of the frames: a person followed in fewer was hardly followed
 
 Sink = Callable[[Frame, Estimate], None]
 
 
 class Results:
-    """What the report at the end needs from each step."""
+    """What the report at the end needs from each step.
+
+    Attributes
+    ----------
+    times : list of float
+        Seconds, of the estimates written.
+    joints : list of ndarray of shape (J, 3)
+        Their joints, metres.
+    starts : list of (int, float, float)
+        Frame of each start of the tracker, and the place there, metres.
+    """
 
     def __init__(self, tracker: Tracker) -> None:
         self._tracker = tracker
@@ -44,17 +54,17 @@ class Results:
         self.times: list[float] = []
         self.joints: list[np.ndarray[Any, Any]] = []
         self._frames: list[tuple[int, bool, bool]] = []  # number, lost, in the picture
-        self.starts: list[tuple[int, float, float]] = []  # frame and place of each
+        self.starts: list[tuple[int, float, float]] = []
 
     def step(self, frame: Frame, estimate: Estimate) -> None:
-        """Take in a step of the tracker."""
+        """Count a step of the tracker."""
         if estimate.frame == 0:
             self.starts.append((frame.number, *estimate.mean.pelvis[:2]))
         self._steps.append(1000 * self._tracker.step_seconds)
         self._wall = time.perf_counter() - self._begun
 
     def add(self, frame: Frame, estimate: Estimate) -> None:
-        """Take in an estimate that is written."""
+        """Add an estimate that is written."""
         self._statuses.append(estimate.status)
         self.times.append(frame.time)
         self.joints.append(estimate.joints)
@@ -134,7 +144,7 @@ def write(
 
 
 def _widened(sink: Sink, calibration: Calibration | None) -> Sink:
-    """Give estimates to a sink with the uncertainty of a camera that was found."""
+    """Return a sink that adds the uncertainty of a camera that was found to each estimate."""
     if calibration is None:
         return sink
     return lambda frame, estimate: sink(frame, calibration.widened(frame.time, estimate))
@@ -143,7 +153,7 @@ def _widened(sink: Sink, calibration: Calibration | None) -> Sink:
 def _smooth(
     options: ClipOptions, video: Video, smoother: Smoother, sinks: list[Sink], plausibility: Plausibility
 ) -> None:
-    """Give every frame with its smoothed estimate to the sinks, and write the draws."""
+    """Pass every frame with its smoothed estimate to the sinks, and write the draws."""
     with progress("smoothing", len(smoother), options.quiet) as update:
         rows, draws = smoother.finish(update=update)
     if options.draws:

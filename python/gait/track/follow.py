@@ -16,13 +16,13 @@ from gait.track.person_keypoints import PersonKeypoints
 from gait.track.plausible import Plausibility
 from gait.track.tracker import Tracker
 
-_GIVE_UP = 1.0  # seconds after a loss for which the person is looked for backwards
-_LEAST_BEFORE = 1.0  # seconds before a track in which the person is looked for
+_LONGEST_GAP = 1.0  # seconds for which a lost person is tracked on backwards
+_LEAST_BEFORE = 1.0  # seconds before a track in which an earlier start is worth a search
 _CONTRADICTED = 0.5  # seconds of keypoints elsewhere after which the person is lost
 _FOLLOWED = (TrackStatus.TRACKING, TrackStatus.AMBIGUOUS)
 
 FindStart = Callable[[int, int, float], Start | None]
-"""Finds the first start from a frame on and before another, of a person of a stature; None: there is none."""
+"""First start in the frames first <= number < stop, of a person of a stature [m]; None: there is none."""
 
 
 class Follower:
@@ -32,17 +32,17 @@ class Follower:
     ----------
     tracker : Tracker
     video : Video
-        As visible by the tracker's only camera.
+        Of the tracker's only camera.
     keypoints : PersonKeypoints
     plausibility : Plausibility
         Of its estimates.
     find_start : FindStart
         Finds the person anew after a loss, and where they were in view before.
     auto_start : BoxStart, optional
-        Finds a lost person by the pictures.
+        Finds a lost person in the pictures.
     one_pass : bool
-        Each estimate comes from the same forward pass, as the smoother needs it: tracking backwards only
-        finds an earlier start.
+        All estimates come from one forward pass, which the smoother needs; tracking backwards only finds an
+        earlier start.
     """
 
     def __init__(
@@ -61,7 +61,10 @@ class Follower:
         self._find_start, self._auto_start, self._one_pass = find_start, auto_start, one_pass
 
     def follow(self, start: Start, frames: range) -> Iterator[tuple[Frame, Estimate]]:
-        """Yield the frames in order from the first in which the person is visible, each with its estimate."""
+        """Yield the frames in order from the first in which the person is visible, each with its estimate.
+
+        Frames before a start have the estimates of the tracker that ran backwards from it.
+        """
         given, before = self._earlier(start, frames.start)
         first, before = self._first(given, before, frames.start)
         following: Start | None = first
@@ -94,7 +97,10 @@ class Follower:
     def _first(
         self, start: Start, before: dict[int, Estimate], first: int
     ) -> tuple[Start, dict[int, Estimate]]:
-        """Find a start at an earlier time when the person was in view, or keep this one."""
+        """Find an earlier start, from when the person was in view with a gap after it, or keep this one.
+
+        `before` has the estimates up to the start, `first` is the first frame to track.
+        """
         stop = min(before, default=start.frame)
         if stop - first < _LEAST_BEFORE * self._video.fps:
             return start, before
@@ -105,6 +111,7 @@ class Follower:
         return found, before | more
 
     def _step(self, tracker: Tracker, frame: Frame, utime: int, last: Estimate | None) -> Estimate:
+        """Step with the person's keypoints; judge the estimate."""
         joints = self._keypoints.choose(frame.number, last)
         return self._plausibility.judged(frame, tracker.step(frame.image, utime, joints))
 
@@ -113,7 +120,7 @@ class Follower:
         self._plausibility.restart()
 
     def _restarted(self, auto_start: BoxStart, frame: Frame, estimate: Estimate) -> bool:
-        """Whether a person who was lost is found in the pictures; the tracker starts anew with them."""
+        """Start the tracker anew if a lost person walks in the pictures; whether it did."""
         if estimate.status in _FOLLOWED:
             auto_start.forget()
         if estimate.status != TrackStatus.LOST:
@@ -126,12 +133,12 @@ class Follower:
         return True
 
     def _earlier(self, start: Start, first: int) -> tuple[Start, dict[int, Estimate]]:
-        """Where to start, and the estimates of the frames before, from `first` on."""
+        """Where to start, and the estimates of the frames from `first` up to it."""
         before = self._backwards(start, first) if first < start.frame else {}
         if not self._one_pass:
             return start, before
         sure = [number for number, now in before.items() if now.status == TrackStatus.TRACKING]
-        return (_start(before[min(sure)], min(sure), start) if sure else start), {}
+        return (_start_from(before[min(sure)], min(sure), start) if sure else start), {}
 
     def _backwards(self, start: Start, first: int) -> dict[int, Estimate]:
         """Track backwards from a start to `first`: estimates by frame, as far as the person is visible."""
@@ -146,13 +153,13 @@ class Follower:
             found[frame.number] = replace(last, utime=frame.utime, frame=frame.number - start.frame)
             if last.status != TrackStatus.LOST and not last.flags & Flag.UNSUPPORTED:
                 visible, earliest = frame.time, frame.number
-            elif visible - frame.time > _GIVE_UP:
+            elif visible - frame.time > _LONGEST_GAP:
                 break
         return {n: now for n, now in sorted(found.items()) if earliest <= n < start.frame}
 
 
-def _start(now: Estimate, frame: int, start: Start) -> Start:
-    """Start from an estimate, which may be no surer than a start that a user gives."""
+def _start_from(now: Estimate, frame: int, start: Start) -> Start:
+    """Start at an estimate, with standard deviations of at least those of a start that a user gives."""
     sd = replace(
         now.sd,
         phase=max(now.sd.phase, DEFAULT_SD["phase"]),

@@ -1,7 +1,7 @@
-"""Keypoints of everyone in a clip, and which of them are of the person who is tracked.
+"""Keypoints of everyone in a clip, and which of them belong to the tracked person.
 
-Of the people found in a frame, the one counts who is where the tracker has the person, in that size.
-Keypoints of someone else, or of a detector that jumped, are left out.
+In each frame the keypoints nearest to the estimated joints are used, if they are near enough.  Keypoints of
+someone else, or of a detector that jumped, are left out.
 """
 
 from __future__ import annotations
@@ -16,7 +16,7 @@ from gait.bindings.estimate import Estimate
 from gait.bindings.frame import FrameKeypoints
 from gait.camera.camera import Camera
 
-_GATE = 0.25  # person's heights: keypoints further from the estimate, by the median, are not the person's
+_GATE = 0.25  # person's heights: keypoints whose median distance from the estimate is larger are not theirs
 _AGREE = 0.08  # person's heights up to which knees and ankles agree with the estimate, on average
 _LEGS = ("l_knee", "r_knee", "l_ankle", "r_ankle")
 
@@ -41,7 +41,7 @@ class PersonKeypoints:
     def choose(self, frame: int, last: Estimate | None) -> FrameKeypoints | None:
         """Keypoints of the person in a frame after the last estimate; None if there are none.
 
-        As long as there is no estimate of the person, they are those of the person to track.
+        Without an estimate, or with one of a lost person, they are those of the person to track.
         """
         if last is None or last.status == TrackStatus.LOST:
             return self._own(frame)
@@ -66,22 +66,24 @@ class PersonKeypoints:
         return not len(legs) or bool(legs.mean() < _AGREE)
 
     def _own(self, frame: int) -> FrameKeypoints | None:
+        """Keypoints of the person to track in a frame."""
         keypoints = self._keypoints.get(self._person, {}).get(frame)
         return keypoints if keypoints is not None and np.isfinite(keypoints.uv).any() else None
 
     def _found(self, frame: int) -> list[FrameKeypoints]:
+        """Keypoints of everyone in a frame."""
         people = (keypoints[frame] for keypoints in self._keypoints.values() if frame in keypoints)
         return [keypoints for keypoints in people if np.isfinite(keypoints.uv).any()]
 
     def _distance(self, estimate: Estimate, keypoints: FrameKeypoints) -> float:
-        """Median distance from the estimated joints."""
+        """Median distance from the estimated joints, person's heights; infinite without common joints."""
         apart = self._apart(estimate, keypoints, tuple(keypoints.names))
         return float(np.median(apart)) if len(apart) else np.inf
 
     def _apart(
         self, estimate: Estimate, keypoints: FrameKeypoints, names: tuple[str, ...]
     ) -> NDArray[np.float64]:
-        """Distances of the keypoints found from the estimated joints, person's heights."""
+        """Distances (K,) of the named keypoints found from the estimated joints, person's heights."""
         expected = self._camera.project(estimate.joints)
         if np.isnan(expected).any():  # behind the camera
             return np.full(len(names), np.inf)

@@ -1,4 +1,4 @@
-"""Which estimates are called `tracking`: what keypoints confirm or, without any, a plausible walk."""
+"""Decide which estimates are `tracking`: those that keypoints confirm or, without any, a plausible walk."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ from gait.bindings.estimate import Estimate
 from gait.io.video import Frame
 from gait.track.person_keypoints import PersonKeypoints
 
-_DEPARTURE = 0.6  # metres in a second by which a person may move otherwise than they walk
+_DEPARTURE = 0.6  # metres in a second by which the pelvis may leave the path of strides and heading
 _BEYOND = 4.0  # standard deviations from which a stature is implausible
 _LEAST_SD = 0.05  # metres, of a stature
 
@@ -41,7 +41,7 @@ class Plausibility:
         self._path.clear()
 
     def judged(self, frame: Frame, estimate: Estimate) -> Estimate:
-        """Call an estimate `ambiguous`, not `tracking`, unless keypoints or picture and walk support it."""
+        """Change `tracking` to `ambiguous` unless keypoints or, without any, image and walk support it."""
         walks = self._walks(frame.time, estimate)
         agree = self._keypoints.agree(frame.number, estimate)
         supported = not estimate.flags & Flag.UNSUPPORTED
@@ -50,7 +50,10 @@ class Plausibility:
         return replace(estimate, status=TrackStatus.AMBIGUOUS)
 
     def _walks(self, time: float, estimate: Estimate) -> bool:
-        """Whether the stature is usual and the last second's way is that of strides and heading."""
+        """Whether the stature is plausible and the last second's path follows from strides and heading.
+
+        `time` in seconds; it may run backwards.
+        """
         heading, speed = estimate.mean.heading, estimate.speed * self._travel
         velocity = speed * np.array([np.cos(heading), np.sin(heading)])
         self._path.append((time, estimate.mean.pelvis[:2], velocity))
