@@ -34,24 +34,24 @@ _FOV_SD = 0.45  # of the focal length's logarithm; of --fov:
 _GIVEN_FOV_SD = 0.05
 _HEIGHT, _HEIGHT_SD = 1.3, 0.5  # metres; of the logarithm
 _TILT, _TILT_SD, _ROLL_SD = 0.05, 0.2, 0.02  # radians
-_STATURE_SD = 0.015  # of the stature, shoes included
+_STATURE_SD = 0.015  # of the stature, with shoes
 _STARTS = (0.6, 0.85, 1.2, 2.2, 4.0)  # focal lengths to start from, longer sides of the picture
 _WINDOW = 1.2  # seconds of walking to start with
-_GROWTH = 1.0  # seconds by which the part that is explained grows on either side
+_GROWTH = 1.0  # seconds by which the fitted part grows at either end
 _LONGEST = 12.0  # seconds of a walk that are used
 _RATE = 10.0  # frames per second that are used
 _ERROR_TIME = 0.5  # seconds for which errors of a detector last
 _KNOTS = 0.5  # seconds between knots
 _MISS = 0.012  # of the person's height, noise of a joint at full confidence
-_SHARE = {"elbow": 2.0, "wrist": 4.0, "toe": 2.5, "heel": 2.0}  # times as much
+_SHARE = {"elbow": 2.0, "wrist": 4.0, "toe": 2.5, "heel": 2.0}  # noise of these joints, in units of _MISS
 _OFFSET_SD = 0.015  # of the stature, constant difference between the detector's joints and the model's
-_SLIDE_SD = 0.05  # metres per second, of feet on the floor
-_SIDEWAYS_SD = 0.05
+_SLIDE_SD = 0.05  # metres per second, of feet on the floor, along the heading
+_SIDEWAYS_SD = 0.05  # metres per second, of the walk across the heading
 _STILL_SD = 0.03  # metres per second on a treadmill
 _BEND_SD, _TURN_SD, _HURRY_SD = 0.03, 0.12, 0.02  # changes of slope at a knot: metres, radians, strides
 _SCORES = 5  # components of the model that are fitted
 _DEGREES = 4.0  # of freedom of Student's t
-_FITS = 9.0  # squared robust error per coordinate up to which more of the clip is explained by the walk
+_FITS = 9.0  # squared robust error per coordinate up to which more of the clip fits the walk
 _WORST = 6.0  # and up to which the result is accepted
 _CONTRADICTS = 0.1  # of the stature, by which a person who appears taller or shorter contradicts a camera
 _LEAST_RATE = 0.4  # strides per second of a person who walks
@@ -95,7 +95,7 @@ class Calibration:
     chi2_per_observation: float
 
     def describe(self) -> list[str]:
-        """Give the camera in words, and what the walk does not determine."""
+        """Describe the camera, and what the walk does not determine, one sentence a line."""
         camera, sd = self.camera, self.sd
         f, height = camera.fx, camera.centre[2]
         fov = 2 * np.degrees(np.arctan(0.5 * camera.width / f))
@@ -124,7 +124,7 @@ class Calibration:
         return means | sds | {"in_place": self.in_place, "chi2_per_observation": self.chi2_per_observation}
 
     def widened(self, time: float, estimate: Estimate) -> Estimate:
-        """Add the uncertainty of the camera to an estimate made with it, seconds `time` in the clip."""
+        """Add the uncertainty of the camera to the sd of an estimate, `time` seconds into the clip."""
         at = [np.interp(time, self.time, column) for column in self.path_change.reshape(len(self.time), -1).T]
         change = np.reshape(at, (3, 4))
         here = [np.interp(time, self.time, column) for column in self.path[:, :2].T]
@@ -164,10 +164,15 @@ def calibrate(
     where : str
         Name of the input in errors.
 
+    Returns
+    -------
+    Calibration
+
     Raises
     ------
     UserError
-        If no second of the keypoints fits a walk.
+        If a joint is missing, the whole person is visible for less than a second, no second of the keypoints
+        fits a walk, or the person stands.
     """
     needed = {"l_hip", "r_hip", "l_ankle", "r_ankle", "l_shoulder", "r_shoulder"}
     if missing := needed - set(keypoints.names):
@@ -207,7 +212,7 @@ def _calibrate(
 def contradiction(
     given: Camera, appears: float | None, keypoints: Keypoints, model: Model, height: float
 ) -> str | None:
-    """Report how a given camera contradicts a walk, and which one would fit; None: it does not.
+    """Report how a given camera contradicts a walk, and which camera would fit; None: it does not.
 
     Parameters
     ----------
@@ -231,7 +236,7 @@ def contradiction(
 
 
 def _choose(keypoints: Keypoints) -> Keypoints:
-    """Frames that show hips and ankles, thinned, at most `_LONGEST` seconds about the greatest change."""
+    """Choose frames with hips and ankles, thinned, of the `_LONGEST` seconds whose size changes most."""
     legs = [keypoints.names.index(name) for name in ("l_hip", "r_hip", "l_ankle", "r_ankle")]
     whole = np.isfinite(keypoints.uv[:, legs]).all(axis=(1, 2))
     time = keypoints.time[whole]
@@ -254,7 +259,7 @@ def _choose(keypoints: Keypoints) -> Keypoints:
 
 
 def _heavy_tailed(residual: Array) -> Array:
-    """Residuals whose squares are Student's t costs: unusual cameras are not pulled to the usual one."""
+    """Residuals whose squares are Student-t costs: unusual cameras are not pulled to the usual one."""
     root = np.sqrt(_DEGREES * np.log1p(residual**2 / _DEGREES))
     return np.asarray(np.sign(residual) * root)
 
@@ -277,7 +282,7 @@ class _Prior:
 
 
 def make_camera(q: Array, size: tuple[int, int]) -> Camera:
-    """Camera of log focal length, tilt, roll and log height."""
+    """Make a camera from log focal length [px], tilt, roll [rad] and log height [m]."""
     (focal, tilt, roll, height), (width, tall) = q, size
     ct, st, cr, sr = np.cos(tilt), np.sin(tilt), np.cos(roll), np.sin(roll)
     level = np.array([[1, 0, 0], [0, -st, -ct], [0, ct, -st]])
@@ -289,7 +294,7 @@ def make_camera(q: Array, size: tuple[int, int]) -> Camera:
 
 
 class _Body:
-    """Joints of the model over the stride, statures, linear in scores and proportions; pelvis above 0, 0."""
+    """Joints of the model over the stride, statures, linear in scores and proportions; pelvis at (0, 0)."""
 
     PHASES = 60
 
@@ -335,6 +340,7 @@ class _Body:
         return np.asarray(np.mean(means, axis=0))
 
     def weights(self, parts: Array, rate: Array) -> Array:
+        """Weights (T, parts + 2) of the table's rows: mean, scores and proportions, stride rate."""
         faster = np.clip((rate - self.rate) / self.rate_sd, -2.0, 2.0)
         return np.concatenate(
             [np.ones((len(rate), 1)), np.broadcast_to(parts, (len(rate), self.parts)), faster[:, None]],
@@ -470,14 +476,13 @@ class _Fit:
         step = float(np.median(np.diff(t)))
         self._thin = min(1.0, step / _ERROR_TIME)  # errors last
 
-    def _knots(self, q: Array) -> tuple[Array, Array]:
-        knots = q[self._fixed :].reshape(-1, 4)
-        now = np.stack([np.interp(self._t, self._time, column) for column in knots.T], axis=1)
-        return knots, now
+    def _knots(self, q: Array) -> Array:
+        """Knots (K, 4): x, y, metres; heading, radians; phase."""
+        return q[self._fixed :].reshape(-1, 4)
 
     def _errors(self, q: Array) -> Array:
         """Errors of the keypoints (T, J, 2), in standard deviations."""
-        _, now = self._knots(q)
+        now = np.stack([np.interp(self._t, self._time, column) for column in self._knots(q).T], axis=1)
         rates = np.interp(self._t, self._middles(), self._rates(q))
         joints = self._joints(q, now, rates)
         camera = make_camera(q[:4], self._size)
@@ -487,6 +492,7 @@ class _Fit:
         return np.asarray((uv - self._uv) * self._inverse[..., None])
 
     def _joints(self, q: Array, now: Array, rates: Array) -> Array:
+        """Joints (T, J, 3) in the world, metres, with the path `now` (T, 4) and the stride rates (T,)."""
         body, stature = self._body, self._height * np.exp(q[4])
         parts, offsets = q[5 : 5 + body.parts], q[5 + body.parts : self._fixed]
         local = stature * body.joints(now[:, 3], rates, parts, offsets)
@@ -498,15 +504,16 @@ class _Fit:
         ], axis=-1)  # fmt: skip
 
     def _middles(self) -> Array:
+        """Return the times midway between knots (K - 1,), seconds."""
         return np.asarray((self._time[1:] + self._time[:-1]) / 2)
 
     def _rates(self, q: Array) -> Array:
-        knots = q[self._fixed :].reshape(-1, 4)
-        return np.asarray(np.diff(knots[:, 3]) / np.diff(self._time))
+        """Stride rates between knots (K - 1,), hertz."""
+        return np.asarray(np.diff(self._knots(q)[:, 3]) / np.diff(self._time))
 
     def _expected(self, q: Array) -> Array:
         """Residuals of what is expected of camera and walk."""
-        body, knots = self._body, q[self._fixed :].reshape(-1, 4)
+        body, knots = self._body, self._knots(q)
         step = np.diff(self._time)
         velocity = np.diff(knots[:, :2], axis=0) / step[:, None]
         heading = (knots[1:, 2] + knots[:-1, 2]) / 2
@@ -533,9 +540,13 @@ class _Fit:
         ])  # fmt: skip
 
     def _cost(self, q: Array) -> float:
+        """Minus twice the log posterior, up to a constant."""
+        return float(self._thin * self._robust(q).sum() + (self._expected(q) ** 2).sum())
+
+    def _robust(self, q: Array) -> Array:
+        """Student-t costs of the keypoints (T, J)."""
         square = (self._errors(q) ** 2).sum(axis=2)
-        robust = _DEGREES * np.log1p(square / _DEGREES)
-        return float(self._thin * robust.sum() + (self._expected(q) ** 2).sum())
+        return np.asarray(_DEGREES * np.log1p(square / _DEGREES))
 
     @property
     def rate(self) -> float:
@@ -548,13 +559,13 @@ class _Fit:
         return float(np.mean(self._frame_chi2()))
 
     def _frame_chi2(self) -> Array:
-        square = (self._errors(self._q) ** 2).sum(axis=2)
-        robust = _DEGREES * np.log1p(square / _DEGREES)
+        """Squared robust error per coordinate in each frame (T,)."""
+        robust = self._robust(self._q)
         return np.asarray(robust.sum(axis=1) / np.maximum(2 * (self._inverse > 0).sum(axis=1), 1))
 
     @property
     def cost_per_frame(self) -> float:
-        """Cost that compares fits of other windows of the clip."""
+        """Cost by which fits of different windows of the clip are compared."""
         return self._cost(self._q) / len(self._rows)
 
     def _normal(self, q: Array) -> tuple[Array, Array]:
@@ -614,7 +625,7 @@ class _Fit:
                 break
 
     def grow(self) -> _Fit:
-        """Explain more and more of the clip, as long as it fits the walk."""
+        """Extend the fit by a second at a time at either end, as long as the new frames fit the walk."""
         low, high = self._t[0], self._t[-1]
         open_ = {-1, 1}
         while open_:
@@ -644,28 +655,27 @@ class _Fit:
     def _extend(self, low: float, high: float, q: Array, time: Array) -> None:
         """Use another interval; beyond the old knots the walk goes straight on."""
         self._use(low, high)
-        knots = q[self._fixed :].reshape(-1, 4)
+        knots = self._knots(q)
         slopes = (knots[-1] - knots[0]) / (time[-1] - time[0])
         inside = np.stack([np.interp(self._time, time, column) for column in knots.T], axis=1)
         beyond = self._time - np.clip(self._time, time[0], time[-1])
         self._q = np.concatenate([q[: self._fixed], (inside + beyond[:, None] * slopes).ravel()])
 
     def result(self) -> Calibration:
-        """Camera, path and what the camera leaves open of it."""
+        """Camera and path, and how the path changes with the camera."""
         matrix, _ = self._normal(self._q)
         covariance = np.linalg.inv(matrix) * max(self.chi2_per_observation, 1.0)
         camera = covariance[:4, :4]
         root = np.linalg.cholesky(camera)
         # Part of the path's covariance that comes from the camera: S_pc S_cc^-1 S_cp = D D'.
         path_change = np.linalg.solve(root, covariance[:4, self._fixed :]).T.reshape(-1, 4, 4)[:, :3]
-        knots = self._q[self._fixed :].reshape(-1, 4)
         return Calibration(
             make_camera(self._q[:4], self._size),
             np.sqrt(np.diag(camera)),
             float(self._q[1]),
             float(self._q[2]),
             self._time,
-            knots[:, :3].copy(),
+            self._knots(self._q)[:, :3].copy(),
             path_change,
             self._in_place,
             self.chi2_per_observation,
