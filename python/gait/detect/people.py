@@ -1,4 +1,4 @@
-"""People followed from frame to frame by the detector, each with an id.
+"""Find people and follow them from frame to frame by the detector, each with an id.
 
 A person's crop comes from the landmarks of the frame before, extrapolated at their speed.  The person network
 scans the whole picture at the start, when a person is lost, and every second to find new people.  A person
@@ -27,7 +27,7 @@ _SCAN_PERIOD = 1.0  # seconds between two scans of the whole picture
 _RETRY = 0.2  # the same while a person is lost or none was found
 _FORGET = 10.0  # seconds after which a person who comes back gets a new id
 _SAME = 0.25  # of a crop's side between the centres of crops about one person
-_REACH = 0.5  # crop sides per second that a lost person may have moved, beside `_SAME`
+_REACH = 0.5  # crop sides per second that a lost person may have moved, in addition to `_SAME`
 _ALIKE = 0.5  # correlation of colours of one person
 _MOST = 8  # people
 _LEAST_FRAMES = 3  # in which a person must be found
@@ -133,6 +133,7 @@ class PeopleDetector:
         return self.people[-1]
 
     def _add(self, one: Followed, frame: Frame, person: Person, found: list[tuple[Followed, Person]]) -> None:
+        """Add a person found in a frame to their track and to those found."""
         one.frames.append(frame.number)
         one.times.append(frame.time)
         one.keypoints.append(person)
@@ -242,4 +243,5 @@ def _colours(image: Image, person: Person) -> NDArray[np.float32]:
 
 
 def _alike(a: NDArray[np.float32], b: NDArray[np.float32] | None) -> bool:
+    """Whether two histograms may be of one person; True if one is unknown."""
     return b is None or cv2.compareHist(a, b, cv2.HISTCMP_CORREL) > _ALIKE

@@ -1,7 +1,7 @@
-"""What a detector's joints are beside the model's: where they lie, and by how much and how long they err.
+"""How a detector's joints differ from the model's: where they lie, and how much and how long they err.
 
-A detector has learnt its hips, ankles and toes from pictures; the model's are centres of joints.  A profile
-gives the difference of each joint as a sum of vectors between keypoints of the person:
+A detector has learnt hips, ankles and toes from pictures; those of the model are centres of joints.  A
+profile gives the difference of each joint as a sum of vectors between keypoints of the person:
 
     trunk      middle of the shoulders to middle of the hips
     outwards   middle of the hips to the hip of the joint's side
@@ -30,7 +30,7 @@ Array = NDArray[np.float64]
 FILE = Path(__file__).with_name("profile.json")
 LEG = 0.49  # of a person's height: hip to ankle
 _ARMS = ("shoulder", "elbow", "wrist", "hip")
-_LASTS = 1.0  # seconds of which an error that lasts for a walk counts as one observation
+_LASTS = 1.0  # seconds in which an error that lasts for a walk counts as one observation
 
 
 @dataclass(frozen=True)
@@ -40,13 +40,13 @@ class JointProfile:
     Attributes
     ----------
     offset : tuple of float
-        Shares of the vectors (see `vectors`) from the detector's joint to the model's.
+        Shares of the three `vectors` that lead from the detector's joint to the model's.
     bias : float
         Standard deviation of an error that lasts for a walk, along an axis, person's heights.
     sd : float
         The same of an error that changes within a walk.
     correlation_s : float
-        Seconds of which such errors count as one observation: twice the integral of their autocorrelation.
+        Seconds in which such errors count as one observation: twice the integral of their autocorrelation.
     """
 
     offset: tuple[float, ...]
@@ -55,7 +55,7 @@ class JointProfile:
     correlation_s: float
 
     def effective_sd(self, step: float) -> float:
-        """Give the standard deviation at which frames `step` seconds apart may count as independent."""
+        """Give the sd, person's heights, with which frames `step` seconds apart count as independent."""
         changes = max(self.correlation_s / step, 1.0)
         return float(np.sqrt(self.sd**2 * changes + self.bias**2 * max(_LASTS / step, 1.0)))
 
@@ -68,7 +68,7 @@ def load(network: str) -> dict[str, JointProfile]:
 
 
 def vectors(keypoints: Keypoints, name: str) -> Array:
-    """Vectors in the picture that a joint's offset is a sum of, shape (T, 2, 3)."""
+    """Vectors in the picture (T, 2, 3), pixels, of which a joint's offset is a weighted sum."""
 
     def at(point: str) -> Array:
         return np.asarray(keypoints.uv[:, keypoints.names.index(point)])
@@ -86,7 +86,7 @@ def vectors(keypoints: Keypoints, name: str) -> Array:
 
 
 def picture_height(keypoints: Keypoints) -> Array:
-    """Height of the person in every frame by trunk and legs, pixels; the median where they are not seen."""
+    """Height of the person in each frame (T,) from trunk and legs, pixels; the median where unknown."""
     places = [
         keypoints.names.index(f"{side}_{joint}") for joint in ("shoulder", "hip", "ankle") for side in "lr"
     ]
@@ -104,6 +104,11 @@ def corrected(keypoints: Keypoints, network: str) -> Keypoints:
         All joints of the detector.
     network : str
         ``full``, ``lite`` or ``heavy``.
+
+    Returns
+    -------
+    Keypoints
+        With `sd` in pixels, such that frames count as independent.
     """
     profile = load(network)
     step = float(np.median(np.diff(keypoints.time))) if len(keypoints.time) > 1 else _LASTS
