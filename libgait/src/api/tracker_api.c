@@ -121,7 +121,9 @@ gait_result gait_tracker_set_background(gait_tracker *t, int32_t camera, const g
     if (camera < 0 || camera >= t->cfg.cameras)
         return base_fail(err, GAIT_ERR_ARG, camera, "background: camera %d is outside [0, %d]", (int)camera,
                          (int)t->cfg.cameras - 1);
-    gait_result const s = plate && plate->data ? check_image(&t->cfg.camera[camera], camera, plate, "background", err) : GAIT_OK;
+    gait_result const s = plate && plate->data
+                              ? check_image(&t->cfg.camera[camera], camera, plate, "background", err)
+                              : GAIT_OK;
     if (s != GAIT_OK)
         return s;
     t->camera[camera].background = plate ? *plate : (gait_image){0};
@@ -178,8 +180,9 @@ static gait_result check_frame(const gait_tracker *t, const gait_frame *frame, g
                          "%.3f s since the last frame, max_dt is %.3f s: start again", 1e-6 * (double)dt,
                          (double)t->cfg.max_dt);
     for (int32_t c = 0; c < t->cfg.cameras; c++) {
-        gait_result const s =
-            frame->image[c].data ? check_image(&t->cfg.camera[c], c, &frame->image[c], "image", err) : GAIT_OK;
+        gait_result const s = frame->image[c].data
+                                  ? check_image(&t->cfg.camera[c], c, &frame->image[c], "image", err)
+                                  : GAIT_OK;
         if (s != GAIT_OK)
             return s;
     }
