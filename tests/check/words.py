@@ -67,6 +67,7 @@ ALLOWED = {
     "odd": r"\bodd[ _](?:number|size|count|width|height|order|length|harmonic|row|lane|byte|frame)s?|"
     r"even (?:and|or) odd|odd (?:and|or) even",
     "sight": r"lines? of sight",
+    "room": r"\broom_normal\b",  # name of a film
     "loss": r"(?i:track(?:ing)?[ _]?loss|loss(?:es)? of|soft_l1|huber|loss=)",
     "fork": r"\bfork\(\)",
     "exchange": r"(?i:data|file|interchange|c3d) exchange",
