@@ -15,7 +15,6 @@ from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.optimize import least_squares
 
 from gait.bindings.estimate import Estimate
 from gait.bindings.model import Model
@@ -422,6 +421,8 @@ def _level(q: Array, keypoints: Keypoints, size: tuple[int, int], height: float,
         return np.concatenate(
             [off / 0.05 / np.sqrt(len(off)) * 3, (p - prior.mean[[1, 3]]) / prior.sd[[1, 3]]]
         )
+
+    from scipy.optimize import least_squares  # here, as it takes a second to load
 
     starts = [least_squares(residuals, [tilt, np.log(_HEIGHT)]) for tilt in (0.05, 0.4)]
     q[1], q[3] = min(starts, key=lambda fit: float(fit.cost)).x
