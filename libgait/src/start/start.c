@@ -34,13 +34,14 @@ static const double BOX_PLACE = 0.1; /* metres by which shadows and clothes move
 static const double COURSE = 0.15;   /* radians: people do not walk exactly where their box moves */
 static const double OPEN = 0.3;      /* information on a heading that boxes leave open, per square radian */
 static const float OPEN_SD = 0.9f;   /* radians of standard deviation from which a heading is unknown */
-static const float BUILD_SHARE = 0.25f; /* of the sd of scores and posture, while the phase is unknown */
-static const float SPEEDS_UP = 0.4f;    /* sd of the rate, as a share of what it is below the usual one */
-static const float FITS = 1.8f;         /* chi-square per coordinate up to which a walk fits */
-static const float LEAST_RATE = 0.3f;   /* strides per second; a person who stands fits a very slow walk */
-static const float LEAST_SPEED = 0.25f; /* metres per second of a person who walks, from keypoints */
-static const float BOX_SPEED = 0.4f;    /* the same from boxes */
-static const float LIKELY = 0.25f;      /* least probability of the person in boxes to start with */
+static const float BUILD_SHARE = 0.25f;    /* of the sd of scores and posture, while the phase is unknown */
+static const float SPEEDS_UP = 0.4f;       /* sd of the rate, as a share of what it is below the usual one */
+static const float FITS = 1.8f;            /* chi-square per coordinate up to which a walk fits */
+static const float LEAST_PLACE_SD = 0.05f; /* metres */
+static const float LEAST_RATE = 0.3f;      /* strides per second; a person who stands fits a very slow walk */
+static const float LEAST_SPEED = 0.25f;    /* metres per second of a person who walks, from keypoints */
+static const float BOX_SPEED = 0.4f;       /* the same from boxes */
+static const float LIKELY = 0.25f;         /* least probability of the person in boxes to start with */
 
 /* Steps of the differences that stand for derivatives. */
 static const double STEP[N] = {0.02, 0.02, 0.03, 0.03, 0.01, 0.01, 0.01, 0.01, 0.1, 0.1, 0.1};
@@ -552,7 +553,7 @@ static void widen(const gait_start *s, gait_hypothesis *h)
     h->sd.stride_hz =
         f_max(h->sd.stride_hz, f_max(0.03f, SPEEDS_UP * (s->model->stride_hz - h->mean.stride_hz)));
     for (int32_t k = 0; k < 3; k++)
-        h->sd.pelvis[k] = f_clamp(h->sd.pelvis[k], 0.05f, 10.0f);
+        h->sd.pelvis[k] = f_clamp(h->sd.pelvis[k], LEAST_PLACE_SD, 10.0f);
 }
 
 /* Widen the standard deviations of what boxes do not determine. */
@@ -566,7 +567,7 @@ static void leave_open(const gait_start *s, const start_candidate *c, gait_hypot
     for (int32_t k = 0; k < 2; k++) { /* along the viewing ray */
         double const share = (double)(ray[k] * ray[k] / (ray[0] * ray[0] + ray[1] * ray[1])),
                      own = (double)h->sd.pelvis[k];
-        h->sd.pelvis[k] = root(own * own + share * BOX_PLACE * BOX_PLACE);
+        h->sd.pelvis[k] = f_max(root(own * own + share * BOX_PLACE * BOX_PLACE), LEAST_PLACE_SD);
     }
     if (c->in_place) {
         h->mean.stride_hz = s->model->stride_hz;
