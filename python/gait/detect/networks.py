@@ -28,7 +28,7 @@ _LEAST_PERSON = 0.5  # score of a box
 _SAME_BOX = 0.3  # intersection over union of boxes about one person
 _HEAT_RADIUS, _LEAST_HEAT = 3, 0.5
 _CROP_MARGIN = 1.25  # of the side of a crop over the diameter of the person's circle
-_THREADS = 2  # of LiteRT: a third less time for lite, and the same bits; more threads gain little
+_THREADS = 2  # of LiteRT: faster than one, with the same bits
 
 JOINTS = {
     "l_shoulder": 11, "r_shoulder": 12, "l_elbow": 13, "r_elbow": 14, "l_wrist": 15, "r_wrist": 16,

@@ -10,6 +10,7 @@ from collections.abc import Iterator
 
 import numpy as np
 
+from gait.bindings.abi import TrackStatus
 from gait.bindings.initial import Start
 from gait.bindings.model import Model
 from gait.bindings.start_fit import Box, Hypothesis, StartFit
@@ -110,6 +111,15 @@ class BoxStart:
         self._last_fit = frame.time
         found = self.best(frame, latest=True)
         return found[0] if found is not None and found[1].walks else None
+
+    def find_lost(self, frame: Frame, status: TrackStatus) -> Start | None:
+        """Start at a frame in which a person who was lost walks; while followed, frames are forgotten."""
+        if status in (TrackStatus.TRACKING, TrackStatus.AMBIGUOUS):
+            self.forget()
+        if status != TrackStatus.LOST:
+            return None
+        self.observe(frame)
+        return self.walks_in(frame)
 
     def _boxes(self, image: Image) -> list[Box]:
         if self._plate is None:

@@ -19,7 +19,6 @@ from gait.track.tracker import Tracker
 _LONGEST_GAP = 1.0  # seconds for which a lost person is tracked on backwards
 _LEAST_BEFORE = 1.0  # seconds before a track in which an earlier start is worth a search
 _CONTRADICTED = 0.5  # seconds of keypoints elsewhere after which the person is lost
-_FOLLOWED = (TrackStatus.TRACKING, TrackStatus.AMBIGUOUS)
 
 FindStart = Callable[[int, int, float], Start | None]
 """First start in the frames first <= number < stop, of a person of a stature [m]; None: there is none."""
@@ -91,7 +90,9 @@ class Follower:
                     before |= more
             estimate = replace(now, status=TrackStatus.LOST) if lost else now
             yield frame, before.get(frame.number, estimate) if lost else estimate
-            if self._auto_start and self._restarted(self._auto_start, frame, estimate):
+            anew = self._auto_start.find_lost(frame, estimate.status) if self._auto_start else None
+            if anew is not None:
+                self._start(self._tracker, anew, frame.utime)
                 now, lost, supported = None, False, frame.time
 
     def _first(
@@ -118,19 +119,6 @@ class Follower:
     def _start(self, tracker: Tracker, start: Start, utime: int) -> None:
         tracker.start(start.mean, start.sd, utime)
         self._plausibility.restart()
-
-    def _restarted(self, auto_start: BoxStart, frame: Frame, estimate: Estimate) -> bool:
-        """Start the tracker anew if a lost person walks in the pictures; whether it did."""
-        if estimate.status in _FOLLOWED:
-            auto_start.forget()
-        if estimate.status != TrackStatus.LOST:
-            return False
-        auto_start.observe(frame)
-        anew = auto_start.walks_in(frame)
-        if anew is None:
-            return False
-        self._start(self._tracker, anew, frame.utime)
-        return True
 
     def _earlier(self, start: Start, first: int) -> tuple[Start, dict[int, Estimate]]:
         """Where to start, and the estimates of the frames from `first` up to it."""

@@ -13,6 +13,7 @@ from gait.bindings.initial import Start
 from gait.bindings.model import Model
 from gait.bindings.start_fit import Hypothesis, StartFit
 from gait.camera.camera import Camera
+from gait.detect.profile import LEG
 from gait.errors import GaitError
 from gait.io.keypoints_file import Keypoints
 
@@ -44,7 +45,7 @@ def keypoint_noise(keypoints: Keypoints, miss: float = 0.0) -> dict[int, FrameKe
     """
     legs = [keypoints.names.index(f"{side}_{joint}") for side in "lr" for joint in ("hip", "ankle")]
     hip, ankle = keypoints.uv[:, legs[0::2]].mean(axis=1), keypoints.uv[:, legs[1::2]].mean(axis=1)
-    height = np.hypot(*(hip - ankle).T) / 0.49  # of the person, pixels
+    height = np.hypot(*(hip - ankle).T) / LEG  # of the person, pixels
     height = np.where(np.isfinite(height), height, np.nanmedian(height))
     share = np.array([_JOINT_SD.get(name.partition("_")[2], 0.01) for name in keypoints.names])
     sd = height[:, None] * np.hypot(miss, share / np.maximum(keypoints.confidence, 0.1))

@@ -11,7 +11,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from gait.bindings import abi
-from gait.bindings.abi import TrackStatus
 from gait.bindings.config import TrackerConfig
 from gait.bindings.estimate import Estimate
 from gait.bindings.frame import FrameKeypoints, capture_time, image_view, keypoint_array, per_camera
@@ -197,13 +196,9 @@ class Tracker:
                 self.start(start.mean, start.sd, frame.utime)
             estimate = self.step(frame.image, frame.utime, found.get(frame.number))
             yield frame, estimate
-            if auto_start and estimate.status in (TrackStatus.TRACKING, TrackStatus.AMBIGUOUS):
-                auto_start.forget()
-            elif auto_start and estimate.status == TrackStatus.LOST:
-                auto_start.observe(frame)
-                anew = auto_start.walks_in(frame)
-                if anew is not None:
-                    self.start(anew.mean, anew.sd, frame.utime)
+            anew = auto_start.find_lost(frame, estimate.status) if auto_start else None
+            if anew is not None:
+                self.start(anew.mean, anew.sd, frame.utime)
 
     def particles(self) -> tuple[NDArray[np.void], NDArray[np.float32]]:
         """All particles: structured array (N,) with the fields of ``gait_state``, and their weights (N,)."""
