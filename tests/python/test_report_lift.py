@@ -15,7 +15,7 @@ from gait.camera.camera import Camera
 from gait.cli import main, report_lift
 from gait.io.keypoints_file import Keypoints, read, write
 from gait.learn.segments import motion as segment_motion
-from gait.lift.report import motion_figures
+from gait.lift.report import motion_figures, segment_figures
 from gait.lift.segment.explain import Uncertain
 from gait.lift.segment.view import Parallel, Perspective, looking_along
 from gait.lift.smooth import motion
@@ -44,6 +44,19 @@ def test_figures_of_a_draw(folder, capsys):
     page = (folder / "r" / "report.html").read_text()
     assert page.count("data:image/png;base64,") == len(FIGURES) + 1
     assert 'src="http' not in page
+
+
+def test_the_variance_explained_is_that_of_the_segments_learnt_from(folder):
+    prior = replace(toy_prior(6, 19, 4, seed=5), gamma=60.0)  # what other people ask for does not count
+    assert prior.components == 1
+    (folder / "m.gait").write_bytes(toy_blob(prior))
+    found = segment_figures.case("m.gait", None, 1.7, "a draw", 1)
+    drawn = segment_figures.spectrum(found).figure.axes[1].lines[0].get_ydata()
+    rng = np.random.default_rng(2)
+    inside = np.tensordot(rng.normal(size=(2000, prior.size)), prior.modes[0], 1)
+    outside = rng.normal(size=inside.shape) * np.sqrt(prior.residual[0])[:, None]
+    assert drawn[-1] == pytest.approx(100 * inside.var(axis=0).sum() / (inside + outside).var(axis=0).sum(), abs=1)
+    assert 0 < drawn[0] < drawn[-1] < 100
 
 
 def test_a_bad_clip_leaves_nothing(folder, capsys):

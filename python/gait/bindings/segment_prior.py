@@ -86,6 +86,12 @@ class SegmentPrior:
         """Modes k of a component."""
         return int(self.sd.shape[1])
 
+    def explained(self) -> Floats:
+        """Share of the variance within the components that the first modes explain in what was learnt, (k,)."""
+        inside = np.cumsum(self.weights @ self.sd**2)
+        outside = 3 * self.frames * float(self.weights @ self.residual.sum(axis=1))
+        return np.asarray(inside / (inside[-1] + outside))
+
     def index(self, names: Sequence[str]) -> npt.NDArray[np.intp]:
         """Places of markers among `names`.
 

@@ -7,7 +7,6 @@ from typing import Any
 import numpy as np
 
 from gait.bindings.segment_prior import SegmentPrior
-from gait.learn.arrays import Floats
 
 SHARE = 0.91  # of the variance, as in the paper's figure 3
 
@@ -26,22 +25,15 @@ def summary(prior: SegmentPrior) -> dict[str, Any]:
         "weights": np.round(prior.weights, 4).tolist(),
         "modes": prior.size,
         f"modes_for_{100 * SHARE:.0f}_percent": modes_for(prior, SHARE),
-        "variance_explained": round(float(explained(prior)[-1]), 4),
+        "variance_explained": round(float(prior.explained()[-1]), 4),
         "gamma": round(prior.gamma, 3),
         "stature_m": round(prior.stature, 3),
     }
 
 
-def explained(prior: SegmentPrior) -> Floats:
-    """Return the share of the variance within the components that the first modes explain, (k,)."""
-    inside = np.cumsum(prior.weights @ prior.sd**2)
-    outside = 3 * prior.frames * float(prior.weights @ prior.residual.sum(axis=1))
-    return np.asarray(inside / (inside[-1] + outside))
-
-
 def modes_for(prior: SegmentPrior, share: float) -> int | None:
     """Return how many modes explain a share of the variance; None if all do not."""
-    enough = np.flatnonzero(explained(prior) >= share)
+    enough = np.flatnonzero(prior.explained() >= share)
     return int(enough[0]) + 1 if len(enough) else None
 
 

@@ -140,8 +140,8 @@ def spectrum(c: Case) -> Drawing:
     panels[0].semilogy(number, lengths, "o-", ms=3, color=BLUE)
     panels[0].semilogy(number, after, "o-", ms=3, color=ORANGE)
     panels[0].set(xlabel="mode", ylabel="variance, m²")
-    share = 100 * np.cumsum(lengths) / (lengths.sum() + 3 * c.truth.shape[0] * c.gaussian.residual.sum())
-    panels[1].plot(number, share, color=DARK)
+    share = 100 * c.prior.explained()
+    panels[1].plot(np.arange(1, len(share) + 1), share, color=DARK)
     panels[1].set(xlabel="modes", ylabel="variance explained, %", ylim=(0, 102))
     line_legend(figure, {"prior": BLUE, "posterior": ORANGE})
     return Drawing(
