@@ -16,10 +16,10 @@ sys.path.insert(0, str(Path(__file__).resolve().parents[1] / "bench"))
 import eval_ablate
 import eval_clips
 import eval_edits
-import eval_learn
 import eval_measures
 import eval_plan
 import eval_wanted
+import parts
 from eval_marks import Marks
 
 PHASE = (FIRST_PHASE + RATE * TRUTH.frame / 30) % 1
@@ -236,15 +236,18 @@ def test_models_of_an_evaluation_are_known_by_the_sources_they_are_learned_by(tm
 
 
 def test_a_part_run_alone_is_joined_with_the_last_tables_of_the_others(tmp_path, monkeypatch):
-    monkeypatch.setattr(eval_learn.table, "RESULTS", tmp_path)
+    monkeypatch.setattr(parts.table, "RESULTS", tmp_path)
+    evaluation = parts.Evaluation(
+        "eval-learn", "learn", "Learning", {"learn_size.py": (), "learn_speed.py": ()}
+    )
     for name in ("learn_size", "learn_speed"):
         (tmp_path / f"{name}.csv").write_text("measure,met\nsize,yes\n")
         (tmp_path / f"{name}.md").write_text(f"## {name}\n")
-    runs = {"learn_speed.py": eval_learn.Run("learn_speed", "at commit b", 7, "a bound is missed")}
-    eval_learn._write(runs)
-    runs = eval_learn._known() | {"learn_size.py": eval_learn.Run("learn_size", "at commit a", 3, "")}
-    eval_learn._write(runs)
-    assert eval_learn._known() == runs
+    runs = {"learn_speed.py": parts.Run("learn_speed", "at commit b", 7, "a bound is missed")}
+    evaluation.write(runs)
+    runs = evaluation.known() | {"learn_size.py": parts.Run("learn_size", "at commit a", 3, "")}
+    evaluation.write(runs)
+    assert evaluation.known() == runs
     page = (tmp_path / "learn.md").read_text()
     order = (
         "a Took: learn_size.py 3 s.",
@@ -253,12 +256,12 @@ def test_a_part_run_alone_is_joined_with_the_last_tables_of_the_others(tmp_path,
         "# learn_size",
         "# learn_speed",
     )
-    parts = [page.index(line) for line in order]
-    assert parts == sorted(parts) and "| size | 2 | 0 |" in page
+    places = [page.index(line) for line in order]
+    assert places == sorted(places) and "| size | 2 | 0 |" in page
 
 
 def test_bounds_of_learning_are_counted_by_measure(tmp_path):
     rows = ["measure,met", "auto,yes", "L10,yes", "L5,yes", "L5,NO", "L5 by style,NO", "L6,"]
     (tmp_path / "learn_a.csv").write_text("\n".join(rows) + "\n")
-    lines = eval_learn._summary([tmp_path / "learn_a.md"]).splitlines()[4:]
+    lines = parts.summary([tmp_path / "learn_a.md"]).splitlines()[4:]
     assert lines == ["| L5 | 1 | 1 |", "| L5 by style | 0 | 1 |", "| L10 | 1 | 0 |", "| auto | 1 | 0 |"]

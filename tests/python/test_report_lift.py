@@ -55,7 +55,9 @@ def test_the_variance_explained_is_that_of_the_segments_learnt_from(folder):
     rng = np.random.default_rng(2)
     inside = np.tensordot(rng.normal(size=(2000, prior.size)), prior.modes[0], 1)
     outside = rng.normal(size=inside.shape) * np.sqrt(prior.residual[0])[:, None]
-    assert drawn[-1] == pytest.approx(100 * inside.var(axis=0).sum() / (inside + outside).var(axis=0).sum(), abs=1)
+    assert drawn[-1] == pytest.approx(
+        100 * inside.var(axis=0).sum() / (inside + outside).var(axis=0).sum(), abs=1
+    )
     assert 0 < drawn[0] < drawn[-1] < 100
 
 
