@@ -219,6 +219,30 @@ static void test_variances(void)
     CHECK_NEAR(moments_of(sampled[0][F_X], DRAWS).mean, path, 0.02);
 }
 
+/* Noise ahead lies along the heading, noise aside at right angles to it, whatever the heading (eq. 8). */
+static void test_noise_follows_heading(void)
+{
+    static const float headings[] = {0.0f, 0.7f, 2.2f, -2.2f, -0.9f};
+    for (size_t k = 0; k < 5; k++)
+        for (int aside = 0; aside < 2; aside++) {
+            dynamics const d = quiet(GAIT_MODE_DEFAULT, 20 + k);
+            particle_state from = standing();
+            from.f[F_HEADING] = headings[k];
+            cfg.belt = 1.0; /* the walk itself goes nowhere */
+            *(aside ? &cfg.lateral_noise : &cfg.forward_noise) = 0.02f;
+            sample_after(&d, &from, 0.25f, 0.25f, 1.0f, sampled[0]);
+            double const c = cos((double)headings[k]), s = sin((double)headings[k]);
+            double off = 0.0;
+            for (int i = 0; i < DRAWS; i++) {
+                double const x = sampled[0][F_X][i], y = sampled[0][F_Y][i];
+                off = fmax(off, fabs(aside ? x * c + y * s : y * c - x * s));
+                sampled[1][F_X][i] = aside ? y * c - x * s : x * c + y * s;
+            }
+            CHECK_NEAR(off, 0.0, 1e-6);
+            check_moments(moments_of(sampled[1][F_X], DRAWS), 0.0, 0.01, DRAWS);
+        }
+}
+
 /* Relaxing fields end at their stationary spread, exactly, whatever the frame rate; the start's rate noise is wider. */
 static void test_stationary(void)
 {
@@ -428,6 +452,7 @@ int main(void)
     test_rate();
     test_paper_way();
     test_variances();
+    test_noise_follows_heading();
     test_stationary();
     test_slow();
     test_frame_rate();
