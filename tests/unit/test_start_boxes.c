@@ -156,6 +156,23 @@ static void test_blobs(void)
     free(s);
 }
 
+/* White where the plate is black, in a picture that has become darker: the change exceeds 255. */
+static void test_largest_change(void)
+{
+    gait_start *const s = start_new();
+    gait_image const scene = image_of(plate), frame = image_of(picture);
+    gait_box b;
+    int32_t count = -1;
+    memset(plate, 250, sizeof plate);
+    memset(picture, 10, sizeof picture);
+    for (int y = 60; y < 160; y++)
+        memset(plate[y][100], 0, 30 * 3);
+    draw(100, 130, 60, 160, 255);
+    CHECK(gait_start_find_boxes(s, &frame, &scene, &b, 1, &count, NULL) == GAIT_OK && count == 1);
+    CHECK_NEAR(b.foot[0], 115.0f, 1.5);
+    free(s);
+}
+
 static void test_refused(void)
 {
     gait_start *const s = start_new();
@@ -183,6 +200,7 @@ int main(void)
     test_headings();
     test_one_stands_and_one_walks();
     test_blobs();
+    test_largest_change();
     test_refused();
     return CHECK_DONE();
 }

@@ -57,7 +57,7 @@ static void compare(const blob_finder *f, const gait_image *image, const gait_im
             count[255 + difference(f, image, background, i, c)]++;
         int32_t const exposure = middle_of(count, 511) - 255;
         for (int32_t i = 0; i < cells; i++) {
-            int32_t const d = i_abs(difference(f, image, background, i, c) - exposure);
+            int32_t const d = i_min(i_abs(difference(f, image, background, i, c) - exposure), 255);
             f->change[i] = (int16_t)(d > f->change[i] ? d : f->change[i]);
         }
     }
