@@ -458,6 +458,9 @@ GAIT_API gait_result gait_tracker_set_particles(gait_tracker *t, int32_t particl
 /* Copy up to cap particles with normalised weights; returns how many there are, or a negative gait_result. */
 GAIT_API int32_t     gait_tracker_particles(const gait_tracker *t, gait_state *s, float *weight, int32_t cap,
                                             gait_error *err);
+/* Move n states by dt seconds in [0, config max_dt] as the dynamics at present do, with random numbers of their own:
+ * possible successors, no image seen.  The same call between the same steps gives the same. */
+GAIT_API gait_result gait_tracker_predict(const gait_tracker *t, gait_state *s, int32_t n, double dt, gait_error *err);
 /* Hash of the whole state: equal after equal input, on any machine. */
 GAIT_API uint64_t    gait_tracker_digest(const gait_tracker *t);
 /* Copy the whole state to mem, of cap bytes; mem NULL: give its size alone. */

@@ -1,15 +1,16 @@
 """Smoothing: the dynamics' twin, the exact linear case, two modes, new starts, the command."""
 
 import json
-from dataclasses import replace
 
 import cv2
 import numpy as np
 import pytest
 from drawn_person import camera, clip, state_at, wall, write
+from transitions import Step, Transitions
 
-from gait import Model, State, Tracker, TrackerConfig, UserError
-from gait.bindings.abi import Mode, TrackStatus
+from gait import GaitError, Model, State, Tracker, TrackerConfig, UserError
+from gait.bindings.abi import Mode
+from gait.bindings.library import struct_fields
 from gait.bindings.model import read_blob
 from gait.body.model_curves import ModelCurves
 from gait.cli import main
@@ -18,7 +19,6 @@ from gait.io.track_file import read_track
 from gait.io.video import Frame
 from gait.motion.footfalls import Draws
 from gait.track.smooth import Smoother, Spool, draw_motions, smoothed
-from gait.track.transitions import Step, Transitions
 
 SECTIONS = blob.decode(read_blob(None))
 if "PROP" not in SECTIONS:  # two ways in which limbs differ in length
@@ -28,85 +28,99 @@ MODEL = Model(blob.encode(SECTIONS))
 CURVES = ModelCurves(SECTIONS)
 
 
-def coasting(mode, count):
-    """A tracker that only predicts, with the table of its particles before and after each step.
+NOISE = [row.name for row in struct_fields("gait_tracker_config") if "_noise" in row.name]
+
+
+def coasting(mode, count, **changes):
+    """A tracker of 8000 particles that has only predicted, for `count` steps, and its twin.
 
     It settles soon, because without a picture it is lost after a third of a second and searches then.
     """
-    noise = {"stature_noise": 0.3, "stature_noise_start": 0.6}
-    if mode is Mode.DEFAULT:
-        noise["turn_time"] = 0.2  # so that turn rates change in the few steps looked at
-    changes = {"particles": 8000, "resample_ess": 0.0, "settle_time": 0.15} | noise
+    changes = {"particles": 8000, "resample_ess": 0.0, "settle_time": 0.15} | changes
     config = TrackerConfig.default(mode, proportions=-1 if mode is Mode.DEFAULT else 0, **changes)
     tracker = Tracker(MODEL, camera(), config, tasks=2)
-    moves = Transitions(CURVES, tracker.config)
     mean = state_at(MODEL, SECTIONS, 0.0)
-    sd = State(phase=0.1, stride_hz=0.1, stature=0.05, heading=0.2, pitch=0.03, roll=0.03)
+    sd = State(phase=0.1, stride_hz=0.1, stature=0.05, heading=0.2, pitch=0.03, roll=0.03, turn_rate=0.2)
     sd.pelvis, sd.coef, sd.offset = np.full(3, 0.05), np.ones(MODEL.info.components), np.full(24, 0.05)
     sd.proportion = np.full(MODEL.info.proportions, 0.5)
     tracker.start(mean, sd, 0)
-    tables = []
     for i in range(count):
         tracker.step(None, 33333 * i)
-        tables.append(moves.table(tracker.particles()[0]))
-    return tracker, moves, tables
+    return tracker, Transitions(CURVES, tracker.config)
 
 
 @pytest.mark.parametrize("mode", list(Mode))
-def test_the_twin_moves_states_as_the_library_does(mode):
-    tracker, moves, tables = coasting(mode, 9)
-    for i, settling in ((1, True), (7, False)):
-        before, theirs = tables[i], tables[i + 1]
-        ours = moves.move(
-            before, Step(0.033333, settling, True, tracker.start_stature_sd), np.random.default_rng(0)
-        )
-        a, b = moves.difference(ours, before), moves.difference(theirs, before)
-        tolerance = 5 * np.hypot(a.std(axis=0), b.std(axis=0)) / np.sqrt(len(a)) + 1e-7
-        np.testing.assert_array_less(np.abs(a.mean(axis=0) - b.mean(axis=0)), tolerance)
-        np.testing.assert_allclose(a.std(axis=0), b.std(axis=0), rtol=0.06, atol=1e-7)
-        assert a[:, 2].std() > 0
+@pytest.mark.parametrize("reverse", [0.0, 1.0])
+def test_states_move_as_the_twin_moves_them(mode, reverse):
+    still = dict.fromkeys(NOISE, 0.0) | {"turn_time": 0.0, "reverse": reverse}
+    tracker, twin = coasting(mode, 1, **still)
+    before = tracker.particles()[0]
+    moved = tracker.predict(before, 0.04)
+    step = Step(0.04, True, False, tracker.start_stature_sd)
+    theirs = twin.move(twin.table(before), step, np.random.default_rng(0))
+    np.testing.assert_allclose(twin.difference(twin.table(moved), theirs), 0, atol=1e-6)
+    assert np.abs(moved["pelvis"] - before["pelvis"]).max() > 0.02
+    np.testing.assert_array_equal(tracker.predict(before, 0.0), before)
 
 
-def test_tables_turn_back_into_the_states():
-    tracker, moves, tables = coasting(Mode.DEFAULT, 2)
-    states, particles = moves.states(tables[-1]), tracker.particles()[0]
-    for name in particles.dtype.names:
-        np.testing.assert_allclose(states[name], particles[name], atol=2e-6)
+@pytest.mark.parametrize("mode", list(Mode))
+@pytest.mark.parametrize("steps", [2, 7], ids=["settling", "settled"])
+def test_states_vary_as_those_of_the_twin(mode, steps):
+    changes = {"stature_noise": 0.3, "stature_noise_start": 0.6}
+    if mode is Mode.DEFAULT:
+        changes["turn_time"] = 0.2  # so that turn rates change in one step
+    tracker, twin = coasting(mode, steps, **changes)
+    particles = tracker.particles()[0]
+    before, step = twin.table(particles), Step(0.033333, steps == 2, True, tracker.start_stature_sd)
+    a = twin.difference(twin.move(before, step, np.random.default_rng(0)), before)
+    b = twin.difference(twin.table(tracker.predict(particles, 0.033333)), before)
+    tolerance = 5 * np.hypot(a.std(axis=0), b.std(axis=0)) / np.sqrt(len(a)) + 1e-6
+    np.testing.assert_array_less(np.abs(a.mean(axis=0) - b.mean(axis=0)), tolerance)
+    np.testing.assert_allclose(a.std(axis=0), b.std(axis=0), rtol=0.06, atol=1e-6)
+    assert a[:, 2].std() > 0
+
+
+def test_prediction_leaves_the_tracker_alone_and_refuses_what_cannot_move():
+    tracker, _ = coasting(Mode.DEFAULT, 1, particles=64)
+    states, digest = tracker.particles()[0], tracker.digest()
+    np.testing.assert_array_equal(tracker.predict(states, 0.03), tracker.predict(states, 0.03))
+    assert tracker.digest() == digest and len(tracker.predict(states[:0], 0.03)) == 0
+    for seconds in (-0.1, 1e3, np.nan):
+        with pytest.raises(GaitError, match="dt = .* is outside"):
+            tracker.predict(states, seconds)
+    states["turn_rate"][5] = np.nan
+    with pytest.raises(GaitError, match="not finite"):
+        tracker.predict(states, 0.03)
 
 
 class Linear:
     """Four numbers that follow a linear rule with normal noise; the first and fourth are small angles."""
 
-    columns = 4
     rule = np.eye(4) * 0.9 + 0.05 * np.eye(4, k=1)
     noise = np.diag([0.01, 0.02, 0.015, 0.01])
 
-    def move(self, before, step, random):
+    def move(self, before, random):
         return 0.5 + (before - 0.5) @ self.rule.T + random.standard_normal(before.shape) @ self.noise
 
-    def difference(self, a, b):
-        return a - b
 
+class Pairs:
+    """In place of a spool: tables of equal weights, moved by a rule; a start at the frames in `starts`."""
 
-class Particles:
-    """In place of a spool: given tables and weights; a start at the frames in `starts`."""
-
-    def __init__(self, frames, starts=(0,)):
-        self.frames, self.starts = frames, starts
+    def __init__(self, frames, rule, starts=()):
+        self.frames, self.rule, self.starts = frames, rule, {*starts, len(frames)}
+        self.random = np.random.default_rng(3)
 
     def __len__(self):
         return len(self.frames)
 
     def read(self, index):
-        return self.frames[index]
-
-    def step_to(self, index):
-        return None if index in self.starts else Step(1.0, False, False, 0.0)
+        before = self.frames[index][:: max(1, len(self.frames[index]) // 1000)]
+        return before, None if index + 1 in self.starts else self.rule.move(before, self.random)
 
 
 def test_linear_normal_dynamics_give_the_exact_smoother():
     """Against Rauch, Tung and Striebel's recursion, from samples of the Kalman filter's posteriors."""
-    rule, random, linear = Linear.rule, np.random.default_rng(1), Linear()
+    rule, random = Linear.rule, np.random.default_rng(1)
     q, h, r = Linear.noise @ Linear.noise, np.array([[1.0, 0, 0, 0], [0, 0, 1.0, 1.0]]), 0.02**2 * np.eye(2)
     x, mean, cov = np.zeros(4), np.zeros(4), 0.03**2 * np.eye(4)
     means, covs = [], []
@@ -118,11 +132,8 @@ def test_linear_normal_dynamics_give_the_exact_smoother():
         cov = cov - gain @ h @ cov
         means.append(mean)
         covs.append(cov)
-    frames = [
-        (0.5 + random.multivariate_normal(m, c, 4000), np.full(4000, 1 / 4000))
-        for m, c in zip(means, covs, strict=True)
-    ]
-    drawn = draw_motions(Particles(frames), linear, 2000, 1) - 0.5
+    frames = [0.5 + random.multivariate_normal(m, c, 4000) for m, c in zip(means, covs, strict=True)]
+    drawn = draw_motions(Pairs(frames, Linear()), 2000, 1) - 0.5
     smooth_mean, smooth_cov = means[-1], covs[-1]
     for i in range(10, -1, -1):
         ahead = rule @ covs[i] @ rule.T + q
@@ -132,16 +143,16 @@ def test_linear_normal_dynamics_give_the_exact_smoother():
         sd = np.sqrt(np.diag(smooth_cov))
         assert np.abs(drawn[:, i].mean(axis=0) - smooth_mean).max() < 0.25 * sd.max()
         np.testing.assert_allclose(drawn[:, i].std(axis=0), sd, rtol=0.12)
-    assert drawn[:, 0].std(axis=0).sum() < 0.95 * frames[0][0].std(axis=0).sum()
+    assert drawn[:, 0].std(axis=0).sum() < 0.95 * frames[0].std(axis=0).sum()
 
 
 def two_modes(count=600):
-    """A third of the particles half a stride ahead of the others, for five frames; the weights even out."""
+    """A third of the particles half a stride ahead of the others, for five frames."""
     random, frames = np.random.default_rng(2), []
     for _ in range(5):
         states = 0.5 + 0.01 * random.standard_normal((count, 4))
         states[: count // 3, 0] -= 0.4
-        frames.append((states, np.full(count, 1 / count)))
+        frames.append(states)
     return frames
 
 
@@ -150,7 +161,7 @@ class Still(Linear):
 
 
 def test_a_motion_stays_in_its_mode():
-    motions = draw_motions(Particles(two_modes()), Still(), 300, 1)
+    motions = draw_motions(Pairs(two_modes(), Still()), 300, 1)
     ahead = motions[:, :, 0] < 0.3
     assert (ahead == ahead[:, :1]).all() and ahead[:, 0].mean() == pytest.approx(1 / 3, abs=0.01)
     assert (np.abs(motions[:, :, 0] - np.where(ahead, 0.1, 0.5)) < 0.06).all()
@@ -158,43 +169,26 @@ def test_a_motion_stays_in_its_mode():
 
 def test_a_new_start_begins_motions_of_its_own():
     frames = two_modes()
-    joined, apart = (draw_motions(Particles(frames, s), Still(), 300, 1) for s in ((0,), (0, 3)))
-    together = np.corrcoef(joined[:, 2, 1], joined[:, 3, 1])[0, 1]
-    assert abs(np.corrcoef(apart[:, 2, 1], apart[:, 3, 1])[0, 1]) < 0.2 < together
+    joined, apart = (draw_motions(Pairs(frames, Still(), s), 300, 1) for s in ((), (3,)))
+    together = np.corrcoef(joined[:, 2, 3], joined[:, 3, 3])[0, 1]
+    assert abs(np.corrcoef(apart[:, 2, 3], apart[:, 3, 3])[0, 1]) < 0.2 < together
 
 
-def test_the_spool_gives_back_what_it_took_and_knows_the_starts():
-    config = TrackerConfig.default(particles=64)
-    tracker = Tracker(MODEL, camera(), config)
-    moves, kept = Transitions(CURVES, tracker.config), []
-    with Spool(moves) as spool:
-        for begin in (0, 40):
-            tracker.start(state_at(MODEL, SECTIONS, 0.0), State(), 33333 * begin)
-            for i in range(begin, begin + 35):
-                known = TrackStatus.INIT if i < begin + 2 else TrackStatus.TRACKING
-                spool.add(tracker, replace(tracker.step(None, 33333 * i), status=known))
-                kept.append(tracker.particles())
-        assert len(spool) == 70
-        for i in (0, 34, 35, 69):
-            states, weights = spool.read(i)
-            np.testing.assert_allclose(states, moves.table(kept[i][0]), atol=1e-5)
-            np.testing.assert_array_equal(weights.astype(np.float32), kept[i][1])
-        assert spool.step_to(0) is None and spool.step_to(35) is None
-        assert spool.step_to(1) == Step(pytest.approx(0.033333), True, False, tracker.start_stature_sd)
-        assert spool.step_to(31).settling and not spool.step_to(34).settling  # a second after frame 2
-        assert spool.step_to(36).settling and not spool.step_to(69).settling
-
-
-def test_who_becomes_ambiguous_has_settled_all_the_same():
-    config = TrackerConfig.default(particles=64)
-    tracker = Tracker(MODEL, camera(), config)
-    tracker.start(state_at(MODEL, SECTIONS, 0.0), State(), 0)
-    printed = [TrackStatus.AMBIGUOUS] * 2 + [TrackStatus.TRACKING] * 40 + [TrackStatus.AMBIGUOUS] * 5
-    with Spool(Transitions(CURVES, tracker.config)) as spool:
-        for i, status in enumerate([*printed, TrackStatus.INIT, TrackStatus.AMBIGUOUS, TrackStatus.TRACKING]):
-            spool.add(tracker, replace(tracker.step(None, 33333 * i), status=status))
-        reported = [spool.step_to(i).settling for i in range(1, len(spool))]
-        assert reported[:32] == [True] * 32 and not any(reported[33:47]) and all(reported[48:])
+def test_the_spool_gives_back_pairs_and_knows_the_starts():
+    tracker = Tracker(MODEL, camera(), TrackerConfig.default(particles=64))
+    with Spool(1) as spool:
+        for begin in (0, 4):
+            tracker.start(state_at(MODEL, SECTIONS, 0.0), State(turn_rate=0.1), 33333 * begin)
+            for i in range(begin, begin + 4):
+                spool.add(tracker, tracker.step(None, 33333 * i))
+        last = tracker.particles()[0]
+        assert len(spool) == 8
+        assert [spool.read(i)[1] is None for i in range(8)] == [i in (3, 7) for i in range(8)]
+        states, moved = spool.read(0)
+        assert np.abs(moved[:, 0] - states[:, 0] - 0.033333 * states[:, 1]).max() < 0.05
+        rows = {row.tobytes() for row in last.view(np.float32).reshape(len(last), -1)}
+        chosen = spool.read(7)[0]
+        assert {row.tobytes() for row in chosen} <= rows and len(chosen) == 1000
 
 
 def test_what_no_number_of_frames_makes_less_is_added_as_the_library_does():
@@ -203,7 +197,7 @@ def test_what_no_number_of_frames_makes_less_is_added_as_the_library_does():
     tracker.start(state_at(MODEL, SECTIONS, 0.0), uncertainty, 0)
     theirs = tracker.step(None, 0)
     states, _ = tracker.particles()
-    with Smoother(tracker, CURVES) as smoother:
+    with Smoother(tracker) as smoother:
         smoother.add(Frame(0, 0.0, wall()), theirs)
         ours = smoother._widened(0, smoothed(theirs, MODEL, states, *MODEL.poses(states)))
     assert tracker.start_stature_sd > 0.05

@@ -337,6 +337,34 @@ static void test_background(void)
     toy_tracker_free(t);
 }
 
+/* Predictions depend on their place in the call alone, not on how many there are, and need usable states. */
+static void test_predict(void)
+{
+    gait_tracker_config const cfg = toy_config(1);
+    gait_tracker *const t = toy_tracker_new(&cfg);
+    gait_state mean, sd, some[20], more[40];
+    gait_error err;
+    gait_tracker_prior(toy_model(), &mean, &sd, NULL);
+    toy_tracker_start(t, 0, 1.0f);
+    for (int32_t i = 0; i < 40; i++)
+        more[i] = mean;
+    memcpy(some, more, sizeof some);
+    CHECK(gait_tracker_predict(t, more, 40, 0.05, NULL) == GAIT_OK);
+    CHECK(gait_tracker_predict(t, some, 20, 0.05, NULL) == GAIT_OK);
+    CHECK(memcmp(some, more, sizeof some) == 0 && some[0].phase != some[19].phase);
+    CHECK_NEAR(some[0].phase, 0.05f * mean.stride_hz, 0.05);
+    CHECK(gait_tracker_predict(t, some, 20, 0.0, NULL) == GAIT_OK && memcmp(some, more, sizeof some) == 0);
+    some[7].stature = 0.0f;
+    CHECK(gait_tracker_predict(t, some, 20, 0.05, &err) == GAIT_ERR_ARG && strstr(err.text, "stature"));
+    CHECK(memcmp(some, more, 7 * sizeof *some) == 0); /* none has moved */
+    CHECK(gait_tracker_predict(t, more, 40, -0.01, &err) == GAIT_ERR_ARG && strstr(err.text, "dt = -0.01"));
+    CHECK(gait_tracker_predict(t, more, 40, 1e3, NULL) == GAIT_ERR_ARG);
+    CHECK(gait_tracker_predict(t, NULL, 40, 0.05, NULL) == GAIT_ERR_ARG);
+    CHECK(gait_tracker_predict(t, NULL, 0, 0.05, NULL) == GAIT_OK);
+    CHECK(gait_tracker_predict(NULL, more, 40, 0.05, NULL) == GAIT_ERR_ARG);
+    toy_tracker_free(t);
+}
+
 /* No more particles than the capacity; the number of particles is always returned. */
 static void test_particles(void)
 {
@@ -371,6 +399,7 @@ int main(void)
     test_the_widest_starts_stay_finite();
     test_prior();
     test_background();
+    test_predict();
     test_particles();
     return CHECK_DONE();
 }

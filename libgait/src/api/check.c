@@ -34,3 +34,11 @@ gait_result check_image(const gait_camera *cam, int32_t camera, const gait_image
                          least == cam->width ? "GAIT_GREY8" : "GAIT_RGB8 or GAIT_BGR8", (long long)least);
     return GAIT_OK;
 }
+
+gait_result check_pose(gait_result s, const char *function, gait_error *err)
+{
+    if (s == GAIT_OK)
+        return s;
+    return base_fail(err, s, -1,
+                     "%s: the state holds a number that is not finite, or stature is not positive", function);
+}

@@ -9,4 +9,7 @@ gait_result check_camera(const gait_camera *c, int32_t index, gait_error *err);
 /* Pixels as the camera of this number gives them; `what` is their name in errors. */
 gait_result check_image(const gait_camera *cam, int32_t camera, const gait_image *im, const char *what,
                         gait_error *err);
+
+/* Explain why a function of a state failed with s. */
+gait_result check_pose(gait_result s, const char *function, gait_error *err);
 #endif

@@ -120,21 +120,12 @@ gait_result gait_model_angle_mask(const gait_model *m, const char *names, uint32
     return GAIT_OK;
 }
 
-/* Explains why a pose failed. */
-static gait_result state_result(gait_result s, const char *function, gait_error *err)
-{
-    if (s == GAIT_OK)
-        return s;
-    return base_fail(err, s, -1,
-                     "%s: the state holds a number that is not finite, or stature is not positive", function);
-}
-
 gait_result gait_model_pose(const gait_model *m, const gait_state *s, gait_pose *out, gait_error *err)
 {
     if (!m || !s || !out)
         return base_null(err, "gait_model_pose");
     gait_result const fault = model_need_cyclic(m, err);
-    return fault != GAIT_OK ? fault : state_result(model_pose_state(m, s, out), "gait_model_pose", err);
+    return fault != GAIT_OK ? fault : check_pose(model_pose_state(m, s, out), "gait_model_pose", err);
 }
 
 gait_result gait_model_pelvis_height(const gait_model *m, const gait_state *s, float *out, gait_error *err)
@@ -143,7 +134,7 @@ gait_result gait_model_pelvis_height(const gait_model *m, const gait_state *s, f
         return base_null(err, "gait_model_pelvis_height");
     gait_result const fault = model_need_cyclic(m, err);
     return fault != GAIT_OK ? fault
-                            : state_result(model_pelvis_height(m, s, out), "gait_model_pelvis_height", err);
+                            : check_pose(model_pelvis_height(m, s, out), "gait_model_pelvis_height", err);
 }
 
 gait_result gait_render(const gait_model *m, const gait_camera *cam, const gait_state *s, uint8_t *ids,
@@ -160,5 +151,5 @@ gait_result gait_render(const gait_model *m, const gait_camera *cam, const gait_
         return base_fail(err, GAIT_ERR_ARG, -1,
                          "gait_render: ids_stride = %d is below the camera's width of %d", (int)ids_stride,
                          (int)cam->width);
-    return state_result(render_limbs(m, cam, s, ids, ids_stride), "gait_render", err);
+    return check_pose(render_limbs(m, cam, s, ids, ids_stride), "gait_render", err);
 }

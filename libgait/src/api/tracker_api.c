@@ -245,6 +245,20 @@ int32_t gait_tracker_particles(const gait_tracker *t, gait_state *s, float *weig
     return t->cfg.particles;
 }
 
+gait_result gait_tracker_predict(const gait_tracker *t, gait_state *s, int32_t n, double dt, gait_error *err)
+{
+    if (!t || (n > 0 && !s))
+        return base_null(err, "gait_tracker_predict");
+    if (!(dt >= 0.0 && dt <= (double)t->cfg.max_dt))
+        return base_fail(err, GAIT_ERR_ARG, -1, "gait_tracker_predict: dt = %g is outside [0, %g]", dt,
+                         (double)t->cfg.max_dt);
+    for (int32_t i = 0; i < n; i++)
+        if (!kin_state_usable(&s[i]))
+            return check_pose(GAIT_ERR_ARG, "gait_tracker_predict", err);
+    tracker_predict(t, s, n, (float)dt);
+    return GAIT_OK;
+}
+
 uint64_t gait_tracker_digest(const gait_tracker *t)
 {
     return t ? snapshot_digest(t) : 0;

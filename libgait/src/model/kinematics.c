@@ -33,11 +33,11 @@ void kin_points(const gait_model *m, const kin_body *b, float (*xyz)[3][BLOCK])
     }
 }
 
-static bool state_usable(const gait_state *s)
+bool kin_state_usable(const gait_state *s)
 {
-    const float place[9] = {s->phase, s->stride_hz, s->stature,   s->heading,  s->pitch,
-                            s->roll,  s->pelvis[0], s->pelvis[1], s->pelvis[2]};
-    return f_finite(place, 9) && f_finite(s->coef, GAIT_MAX_COMPONENTS) &&
+    const float place[10] = {s->phase, s->stride_hz, s->stature,   s->heading,   s->pitch,
+                             s->roll,  s->pelvis[0], s->pelvis[1], s->pelvis[2], s->turn_rate};
+    return f_finite(place, 10) && f_finite(s->coef, GAIT_MAX_COMPONENTS) &&
            f_finite(s->offset, GAIT_MAX_ANGLES) && f_finite(s->proportion, GAIT_MAX_PROPORTIONS) &&
            s->stature > 0.0f;
 }
@@ -65,7 +65,7 @@ static void place_state(const gait_model *m, const gait_state *s, float *channel
 gait_result model_place_state(const gait_model *m, const gait_state *s, kin_frames *out)
 {
     float channel[MODEL_MAX_CHANNELS];
-    if (!state_usable(s))
+    if (!kin_state_usable(s))
         return GAIT_ERR_ARG;
     place_state(m, s, channel, out);
     return GAIT_OK;
@@ -75,7 +75,7 @@ gait_result model_pose_state(const gait_model *m, const gait_state *s, gait_pose
 {
     float channel[MODEL_MAX_CHANNELS];
     kin_frames at;
-    if (!state_usable(s))
+    if (!kin_state_usable(s))
         return GAIT_ERR_ARG;
     place_state(m, s, channel, &at);
     memset(out, 0, sizeof *out);
@@ -89,7 +89,7 @@ gait_result model_pose_state(const gait_model *m, const gait_state *s, gait_pose
 
 gait_result model_pelvis_height(const gait_model *m, const gait_state *s, float *out)
 {
-    if (!state_usable(s))
+    if (!kin_state_usable(s))
         return GAIT_ERR_ARG;
     float channel[MODEL_MAX_CHANNELS];
     curves_at(m, s, channel);

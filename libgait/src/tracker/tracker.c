@@ -112,6 +112,29 @@ static void predict(gait_tracker *t, float dt, const rejuvenation *r, uint32_t c
                     t->cfg.particles, BLOCK, move_range, &j);
 }
 
+void tracker_predict(const gait_tracker *t, gait_state *s, int32_t n, float dt)
+{
+    dynamics d = tracker_dynamics(t);
+    d.seed = ~d.seed;
+    dynamics_step const step =
+        dynamics_step_init(&d, dt, hypotheses_settled_time(t), (uint32_t)t->core->frame);
+    for (int32_t first = 0; first < n && dt > 0.0f; first += BLOCK) {
+        int32_t const lanes = i_min(BLOCK, n - first);
+        particle_block from = {0}, to;
+        particle_set then = {.n = BLOCK, .fields = step.fields, .value = from.f[0]};
+        particle_set const now = {.n = BLOCK, .fields = step.fields, .value = to.f[0]};
+        for (int32_t lane = 0; lane < lanes; lane++) {
+            particle_state const p = particle_from_state(&t->layout, &s[first + lane]);
+            particle_put(&then, lane, &p);
+        }
+        t->like->run->dynamics_move(&step, first, &from, &to);
+        for (int32_t lane = 0; lane < lanes; lane++) {
+            particle_state const p = particle_get(&now, lane);
+            s[first + lane] = particle_to_state(&t->layout, &p);
+        }
+    }
+}
+
 /* ---- after the estimate ---- */
 /* Cameras with an image in this frame, as bits. */
 static uint32_t cameras_seeing(const gait_tracker *t)

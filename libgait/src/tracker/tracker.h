@@ -8,4 +8,7 @@ void tracker_start(gait_tracker *t, const gait_state *mean, const gait_state *sd
 
 /* Process one frame, already checked. */
 void tracker_step(gait_tracker *t, const gait_frame *frame, gait_estimate *out);
+
+/* Move n states by dt seconds of the dynamics, with random numbers that no step draws. */
+void tracker_predict(const gait_tracker *t, gait_state *s, int32_t n, float dt);
 #endif

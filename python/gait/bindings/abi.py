@@ -292,6 +292,7 @@ FUNCTIONS: tuple[tuple[str, list[Any], Any], ...] = (
     ("gait_tracker_lagged", [_HANDLE, c_int32, POINTER(EstimateC), _ERR], _RESULT),
     ("gait_tracker_set_particles", [_HANDLE, c_int32, _ERR], _RESULT),
     ("gait_tracker_particles", [_HANDLE, _STATE, _ARRAY, c_int32, _ERR], c_int32),
+    ("gait_tracker_predict", [_HANDLE, _ARRAY, c_int32, c_double, _ERR], _RESULT),
     ("gait_tracker_digest", [_HANDLE], c_uint64),
     ("gait_tracker_save", [_HANDLE, _ARRAY, c_size_t, _SIZE, _ERR], _RESULT),
     ("gait_tracker_restore", [_HANDLE, _ARRAY, c_size_t, _ERR], _RESULT),

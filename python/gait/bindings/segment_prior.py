@@ -87,7 +87,7 @@ class SegmentPrior:
         return int(self.sd.shape[1])
 
     def explained(self) -> Floats:
-        """Share of the variance within the components that the first modes explain in what was learnt, (k,)."""
+        """Share of the variance in the components that the first modes explain of what was learnt, (k,)."""
         inside = np.cumsum(self.weights @ self.sd**2)
         outside = 3 * self.frames * float(self.weights @ self.residual.sum(axis=1))
         return np.asarray(inside / (inside[-1] + outside))

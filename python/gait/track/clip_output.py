@@ -12,8 +12,6 @@ import numpy as np
 
 from gait.bindings.abi import TrackStatus
 from gait.bindings.estimate import Estimate
-from gait.bindings.model import read_cyclic
-from gait.body.model_curves import ModelCurves
 from gait.camera.camera import write_camera
 from gait.errors import UserError
 from gait.io.files import replacing
@@ -129,7 +127,7 @@ def write(
             )
         smoother = None
         if options.smooth:
-            smoother = stack.enter_context(Smoother(tracker, ModelCurves(read_cyclic(options.model))))
+            smoother = stack.enter_context(Smoother(tracker))
         update = stack.enter_context(progress("tracking", len(span), options.quiet))
         for done, (frame, estimate) in enumerate(found, 1):
             results.step(frame, estimate)

@@ -16,21 +16,24 @@ import tempfile
 from collections.abc import Callable
 from dataclasses import replace
 from types import TracebackType
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
-from gait.bindings.abi import Mode, TrackStatus
+from gait.bindings import abi
+from gait.bindings.abi import TrackStatus
 from gait.bindings.estimate import Estimate
 from gait.bindings.model import Model
 from gait.bindings.state import State
-from gait.body.model_curves import ModelCurves
 from gait.io.video import Frame
 from gait.motion.footfalls import Draws
 from gait.track.tracker import Tracker
-from gait.track.transitions import HEADING, PHASE, Step, Transitions, wrap
 
 Array = NDArray[np.float64]
+Table = NDArray[np.floating[Any]]
+
+PHASE, HEADING = 0, 3  # columns of a table: the numbers of a ``gait_state``
 
 _PAIRS = 1000  # particles with successors, per frame
 _WIDTH = 1.5  # of the kernel, in standard deviations of the successors
@@ -41,30 +44,23 @@ _SURE = 0.7  # least mass of the hypothesis under `tracking`
 
 
 class Spool:
-    """Particles of every frame in a temporary file, so that memory does not grow with the clip.
+    """Pairs of every frame in a temporary file, so that memory does not grow with the clip.
 
+    A pair is a particle, chosen by its weight, and where the dynamics move it until the next frame.
     Use it in a ``with`` block; the file goes with it.
 
     Parameters
     ----------
-    transitions : Transitions
-
-    Attributes
-    ----------
-    utime, step : list of int
-        Capture time and steps since start of each frame.
-    stature_sd : list of float
-        Standard deviation of the stature at the start that each frame follows, as a fraction of it.
+    seed : int
+        Of the choice.
     """
 
-    def __init__(self, transitions: Transitions) -> None:
-        self._transitions = transitions
-        self._rows: list[tuple[int, int]] = []  # offset and count of each frame
+    def __init__(self, seed: int) -> None:
+        self._random = np.random.default_rng(seed)
         self._size = 0
-        self.utime: list[int] = []
-        self.step: list[int] = []
-        self._known: list[int] = []
-        self.stature_sd: list[float] = []
+        self._last: tuple[NDArray[np.void], Estimate] | None = None  # chosen states and estimate of a frame
+        self._chosen: list[_Record] = []  # of each frame
+        self._moved: list[_Record | None] = []  # what those of the frame before became; None at a start
 
     def __enter__(self) -> Spool:
         self._file = tempfile.TemporaryFile(prefix="gait-")
@@ -76,71 +72,63 @@ class Spool:
         self._file.close()
 
     def add(self, tracker: Tracker, estimate: Estimate) -> None:
-        """Keep the particles after a step."""
+        """Keep pairs after a step."""
+        moved = None
+        if self._last is not None:
+            before, then = self._last
+            if estimate.frame == then.frame + 1:
+                moved = self._put(tracker.predict(before, 1e-6 * (estimate.utime - then.utime)))
         states, weights = tracker.particles()
-        table = np.column_stack([self._transitions.table(states), weights]).astype(np.float32)
-        self._rows.append((self._size, len(table)))
-        self._size += self._file.write(table.tobytes())
-        self.utime.append(estimate.utime)
-        self._known.append(self._known_since(estimate))
-        self.stature_sd.append(tracker.start_stature_sd)
-        self.step.append(estimate.frame)
-
-    def _known_since(self, estimate: Estimate) -> int:
-        """Index of the frame from which on phase, left and right are known; -1 if they are not.
-
-        A track that becomes ambiguous later is still known: a new start would have status ``init``.
-        """
-        now = len(self._known)
-        goes_on = now > 0 and estimate.frame == self.step[now - 1] + 1
-        before = self._known[-1] if goes_on else -1
-        paper = self._transitions.config.mode == Mode.PAPER
-        if estimate.status == TrackStatus.INIT and not paper:
-            return -1
-        settled = estimate.status == TrackStatus.TRACKING or paper and estimate.status != TrackStatus.LOST
-        return now if before < 0 and settled else before
+        chosen = states[_pick(weights, _PAIRS, self._random)]
+        self._last = chosen, estimate
+        self._moved.append(moved)
+        self._chosen.append(self._put(chosen))
 
     def __len__(self) -> int:
-        return len(self._rows)
+        return len(self._chosen)
 
-    def read(self, index: int) -> tuple[Array, Array]:
-        """States (N, columns) and weights (N,) of a frame."""
-        offset, count = self._rows[index]
-        columns = self._transitions.columns + 1
-        self._file.seek(offset)
-        table = np.frombuffer(self._file.read(4 * count * columns), np.float32).reshape(count, columns)
-        return table[:, :-1].astype(float), table[:, -1].astype(float)
+    def read(self, index: int) -> tuple[Table, Table | None]:
+        """Chosen states (N, columns) of a frame, and their successors; None if the next frame is a start."""
+        moved = self._moved[index + 1] if index + 1 < len(self) else None
+        return self._get(self._chosen[index]), None if moved is None else self._get(moved)
 
-    def step_to(self, index: int) -> Step | None:
-        """Return the interval that ends at a frame; None at a start."""
-        since = self.step[index]
-        if index == 0 or since != self.step[index - 1] + 1:
-            return None
-        known = self._known[index - 1]
-        settle_time = 1e6 * self._transitions.config.settle_time
-        age = self.utime[index] - self.utime[known] if known >= 0 else 0
-        return Step(
-            1e-6 * (self.utime[index] - self.utime[index - 1]),
-            age < settle_time,
-            age > 0,
-            self.stature_sd[index],
-        )
+    def _put(self, states: NDArray[np.void]) -> _Record:
+        table = _table(states)
+        varying = (table != table[0]).any(axis=0)
+        record = _Record(self._size, table[0], varying)
+        self._size += self._file.write(table[:, varying].tobytes())
+        return record
+
+    def _get(self, record: _Record) -> Table:
+        count = int(record.varying.sum())
+        self._file.seek(record.offset)
+        values = np.frombuffer(self._file.read(4 * count * _PAIRS), np.float32)
+        table = np.tile(record.first, (_PAIRS, 1))
+        table[:, record.varying] = values.reshape(_PAIRS, count)
+        return table
+
+
+class _Record(NamedTuple):
+    """A table in the file of a spool: its offset, its first row, and which columns are stored."""
+
+    offset: int
+    first: NDArray[np.float32]
+    varying: NDArray[np.bool_]
+
+
+def _table(states: NDArray[np.void]) -> Table:
+    """All numbers of an array (N,) of ``gait_state``, (N, columns)."""
+    return states.view(np.float32).reshape(len(states), -1)
 
 
 def draw_motions(
-    spool: Spool,
-    transitions: Transitions,
-    count: int,
-    seed: int,
-    update: Callable[[int], None] = lambda done: None,
-) -> Array:
+    spool: Spool, count: int, seed: int, update: Callable[[int], None] = lambda done: None
+) -> Table:
     """Draw motions from the posterior given all frames.
 
     Parameters
     ----------
     spool : Spool
-        Filled by a tracker from its start on; a new start within it begins motions of its own.
-    transitions : Transitions
     count : int
         How many motions, M.
     seed : int
@@ -151,45 +139,59 @@ def draw_motions(
     Returns
     -------
     ndarray of shape (M, n, columns)
-        Tables of states, see `Transitions.states`.
+        The numbers of the states.
     """
-    frames = len(spool)
     random = np.random.default_rng(seed)
-    out = np.empty((count, frames, transitions.columns))
-    for i in range(frames - 1, -1, -1):
-        states, weights = spool.read(i)
-        step = spool.step_to(i + 1) if i + 1 < frames else None
-        if step is None:
-            out[:, i] = states[_pick(weights, count, random)]
+    frames: list[Table] = []
+    for i in range(len(spool) - 1, -1, -1):
+        before, after = spool.read(i)
+        if after is None:
+            frames.append(before[random.permutation(_pick(np.ones(len(before)), count, random))])
         else:
-            before = states[_pick(weights, _PAIRS, random)]
-            after = transitions.move(before, step, random)
-            for these in _groups(out[:, i + 1]):
-                out[these, i] = _before(transitions, before, after, out[these, i + 1], random)
-        update(frames - i)
+            drawn = np.empty_like(frames[-1])
+            for these in _groups(frames[-1]):
+                drawn[these] = _before(before, after, frames[-1][these], random)
+            frames.append(drawn)
+        update(len(frames))
+    out = np.stack(frames[::-1], axis=1)
     out[..., PHASE] %= 1.0
     return out
 
 
-def _before(t: Transitions, before: Array, after: Array, s: Array, random: np.random.Generator) -> Array:
+def _before(before: Table, after: Table, s: Table, random: np.random.Generator) -> Array:
     """Draw a predecessor of each state of `s` (M, columns) from pairs of states and successors."""
+    varying = (after != after[0]).any(axis=0)
+    columns = int(varying.sum())
     close = _near(after, s[0])
-    if close.sum() > 4 * t.columns:
+    if close.sum() > 4 * columns:
         before, after = before[close], after[close]
-    a = t.difference(after, s[0])  # all relative to one of the states: phase and heading are angles
-    b = t.difference(before, s[0])
-    gain, scatter = _regression(b, a)
+    # all relative to one of the states: phase and heading are angles
+    gain, scatter = _regression(_difference(before, s[0])[:, varying], _difference(after, s[0])[:, varying])
     root = np.linalg.cholesky(scatter)
-    gap = t.difference(s[:, None], after)  # (M, N, columns)
-    distance = np.sum(np.linalg.solve(root, gap.reshape(-1, t.columns).T) ** 2, axis=0)
+    gap = _difference(s[:, None], after)[..., varying]  # (M, N, columns)
+    distance = np.sum(np.linalg.solve(root, gap.reshape(-1, columns).T) ** 2, axis=0)
     logs = -0.5 * distance.reshape(len(s), -1) / _WIDTH**2
     weights = np.exp(logs - logs.max(axis=1, keepdims=True))
     sums = np.cumsum(weights, axis=1)
     chosen = np.sum(sums < random.random((len(s), 1)) * sums[:, -1:], axis=1)
     chosen = np.minimum(chosen, len(after) - 1)
-    out = before[chosen] + gap[np.arange(len(s)), chosen] @ gain.T
+    out = before[chosen].astype(float)
+    out[:, varying] += gap[np.arange(len(s)), chosen] @ gain.T
     out[:, HEADING] = wrap(out[:, HEADING], 2 * np.pi)
-    return np.asarray(out)
+    return out
+
+
+def _difference(a: Table, b: Table) -> Array:
+    """Return a - b with phase and heading the short way round."""
+    out = np.subtract(a, b, dtype=float)
+    out[..., PHASE] = wrap(out[..., PHASE], 1.0)
+    out[..., HEADING] = wrap(out[..., HEADING], 2 * np.pi)
+    return out
+
+
+def wrap(x: Array, turn: float) -> Array:
+    """Fold into half a turn either way."""
+    return np.asarray((x + turn / 2) % turn - turn / 2)
 
 
 def _regression(b: Array, a: Array) -> tuple[Array, Array]:
@@ -200,13 +202,13 @@ def _regression(b: Array, a: Array) -> tuple[Array, Array]:
     return np.linalg.solve(scatter, a.T @ b / len(a)).T, scatter
 
 
-def _near(states: Array, one: Array) -> NDArray[np.bool_]:
+def _near(states: Table, one: Table) -> NDArray[np.bool_]:
     """Which states are similar to `one` in phase and heading."""
     phase = np.abs(wrap(states[:, PHASE] - one[PHASE], 1.0)) < _GROUP[0]
     return np.asarray(phase & (np.abs(wrap(states[:, HEADING] - one[HEADING], 2 * np.pi)) < _GROUP[1]))
 
 
-def _groups(states: Array) -> list[NDArray[np.int64]]:
+def _groups(states: Table) -> list[NDArray[np.int64]]:
     """Group the indices of similar states, each group around its first."""
     left = np.arange(len(states))
     groups = []
@@ -217,11 +219,10 @@ def _groups(states: Array) -> list[NDArray[np.int64]]:
     return groups
 
 
-def _pick(weights: Array, count: int, random: np.random.Generator) -> NDArray[np.int64]:
-    """Choose `count` particles by weight (systematic), in random order."""
+def _pick(weights: Table, count: int, random: np.random.Generator) -> NDArray[np.int64]:
+    """Choose `count` particles by weight (systematic), in their order."""
     at = (random.random() + np.arange(count)) / count * weights.sum()
-    chosen = np.minimum(np.searchsorted(np.cumsum(weights), at, side="right"), len(weights) - 1)
-    return random.permutation(chosen)
+    return np.minimum(np.searchsorted(np.cumsum(weights), at, side="right"), len(weights) - 1)
 
 
 MOTIONS = 100
@@ -236,15 +237,13 @@ class Smoother:
     Parameters
     ----------
     tracker : Tracker
-    curves : ModelCurves
-        Of its model.
     """
 
-    def __init__(self, tracker: Tracker, curves: ModelCurves) -> None:
+    def __init__(self, tracker: Tracker) -> None:
         self._tracker = tracker
-        self._transitions = Transitions(curves, tracker.config)
-        self._spool = Spool(self._transitions)
+        self._spool = Spool(tracker.config.seed)
         self._filtered: list[tuple[Frame, Estimate]] = []
+        self._stature_sd: list[float] = []  # at the start that each frame follows, as a fraction
 
     def __enter__(self) -> Smoother:
         self._spool.__enter__()
@@ -256,6 +255,7 @@ class Smoother:
     def add(self, frame: Frame, estimate: Estimate) -> None:
         """Take in a frame, whose picture is not kept, after the tracker's step."""
         self._filtered.append((frame._replace(image=_NOTHING), estimate))
+        self._stature_sd.append(self._tracker.start_stature_sd)
         self._spool.add(self._tracker, estimate)
 
     def __len__(self) -> int:
@@ -265,10 +265,9 @@ class Smoother:
         self, count: int = MOTIONS, update: Callable[[int], None] = lambda done: None
     ) -> tuple[list[tuple[Frame, Estimate]], Draws]:
         """Draw `count` motions; return the frames with smoothed estimates, and the motions."""
-        model, seed = self._tracker.model, self._tracker.config.seed
-        tables = draw_motions(self._spool, self._transitions, count, seed, update)
-        shape = tables.shape[:2]
-        states = self._transitions.states(tables.reshape(-1, tables.shape[2])).reshape(shape)
+        model = self._tracker.model
+        tables = draw_motions(self._spool, count, self._tracker.config.seed, update)
+        states = tables.view(np.ctypeslib.as_array(abi.StateC()).dtype)[..., 0]
         joints, angles = model.poses(states)
         frames = [frame for frame, _ in self._filtered]
         rows = [
@@ -290,7 +289,7 @@ class Smoother:
 
         That is what the model cannot express and, with one camera, the uncertain size of the person.
         """
-        tracker, start_sd = self._tracker, self._spool.stature_sd[index]
+        tracker, start_sd = self._tracker, self._stature_sd[index]
         share, one_view = tracker.config.joint_sd_model, len(tracker.cameras) == 1
         size = _SIZE_SD * start_sd / np.hypot(_SIZE_SD, start_sd) if one_view and share > 0 else 0.0
         rays = size * (now.joints - tracker.cameras[0].centre)

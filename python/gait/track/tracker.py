@@ -207,6 +207,25 @@ class Tracker:
         self._call("particles", states, weights, count)
         return np.ctypeslib.as_array(states), weights
 
+    def predict(self, states: NDArray[np.void], seconds: float) -> NDArray[np.void]:
+        """Where states may be after an interval, without seeing an image: one draw of the dynamics for each.
+
+        Parameters
+        ----------
+        states : ndarray of ``gait_state``, shape (N,)
+            As `particles` returns them.
+        seconds : float
+            In [0, ``config.max_dt``].
+
+        Notes
+        -----
+        The dynamics are those at present: the stature varies more soon after a start.  The same call between
+        the same steps gives the same.
+        """
+        out = states.copy()
+        self._call("predict", out, len(out), seconds)
+        return out
+
     def digest(self) -> int:
         """Hash of the whole state: equal after equal input, whatever the threads or the machine."""
         return int(library().gait_tracker_digest(self._handle))

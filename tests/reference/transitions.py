@@ -1,6 +1,5 @@
-"""Dynamics of the person's state in numpy, for many states at once: what the smoother samples from.
+"""Dynamics of the person's state in numpy, in double precision: proves gait.Tracker.predict.
 
-The model is that of the filter (libgait/src/filter/dynamics.c), whose kernel moves its own particles only.
 The states are those of `gait.Tracker.particles` with the pelvis replaced by the path that it sways about.
 """
 
@@ -11,7 +10,6 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from gait.bindings import abi
 from gait.bindings.abi import Mode
 from gait.bindings.config import TrackerConfig
 from gait.bindings.state import LEAST_STATURE
@@ -104,18 +102,6 @@ class Transitions:
         path = particles["pelvis"].astype(float) - self._about(scalars, coef, build)
         return np.hstack([scalars, path, coef, build, particles["offset"][:, self._offsets].astype(float)])
 
-    def states(self, table: Array) -> NDArray[np.void]:
-        """Give the inverse of `table`."""
-        out = np.ctypeslib.as_array((abi.StateC * len(table))())
-        coef, build = self._coef(table), table[:, self._build : self._posture]
-        for k, name in enumerate(SCALARS):
-            out[name] = table[:, k]
-        out["pelvis"] = table[:, PATH:COEF] + self._about(table, coef, build)
-        out["coef"][:, : self._scores] = coef
-        out["proportion"][:, : self._proportions] = build
-        out["offset"][:, self._offsets] = table[:, self._posture :]
-        return out
-
     def _coef(self, table: Array) -> Array:
         return table[..., COEF : COEF + self._scores]
 
@@ -141,18 +127,19 @@ class Transitions:
         c, dt, b = self.config, step.dt, before
         noise = random.standard_normal(before.shape)
         root, after = np.sqrt(dt), before.copy()
-        turn = b[:, 1] * dt + c.phase_noise * root * noise[:, 0]
+        along = -dt if c.reverse > 0 else dt  # frames in reverse order: noise as ever, motion the other way
+        turn = b[:, 1] * along + c.phase_noise * root * noise[:, 0]
         after[:, 0] = (b[:, 0] + turn) % 1.0
         rate = c.rate_noise * self.curves.stride_hz
         away = _relax(b[:, 1] - self.curves.stride_hz, dt, c.rate_time, rate, noise[:, 1])
         after[:, 1] = _reflect(self.curves.stride_hz + away)
         grown = (c.stature_noise_start if step.settling else c.stature_noise) * step.start_stature_sd
         after[:, 2] = np.maximum(b[:, 2] * (1 + grown * root * noise[:, 2]), LEAST_STATURE)
-        curve = b[:, TURN] * dt
+        curve = b[:, TURN] * along
         after[:, 3] = wrap(b[:, 3] + curve + c.heading_noise * root * noise[:, 3], 2 * np.pi)
         after[:, 4:6] = _relax(b[:, 4:6], dt, c.tilt_time, c.tilt_noise, noise[:, 4:6])
         after[:, TURN] = self._turn_rates(b[:, TURN], step, noise[:, TURN], random)
-        ahead = self._ahead(b, turn, dt) + c.forward_noise * root * noise[:, PATH]
+        ahead = self._ahead(b, turn, along) + c.forward_noise * root * noise[:, PATH]
         aside = c.lateral_noise * root * noise[:, PATH + 1]
         cos, sin = np.cos(b[:, 3] + curve / 2), np.sin(b[:, 3] + curve / 2)
         after[:, PATH] += ahead * cos - aside * sin
