@@ -10,7 +10,7 @@ CXX_FLAGS     := -fno-exceptions -fno-rtti -fno-threadsafe-statics -fvisibility-
 # Release builds use -O3 only for the sources a step or a live lift spends its time in.  What else runs for every
 # particle or row of numbers is compiled at -O2 (a third smaller, 2 % of a step), with vector code where it has loops
 # over lanes, and the rest at -Os (a fifth smaller again, no slower).  Kernels not listed here have loops over lanes.
-O3_SOURCES     := outline_kernel.c edges_kernel.c silhouette_kernel.c
+O3_SOURCES     := outline_kernel.c silhouette_kernel.c
 VECTOR_SOURCES := fmath.c
 O2_SOURCES     := segment_posterior.c kinematics.c rejuvenation.c pf.c particles.c linalg.cpp
 GCC_TIGHT      := -fno-align-functions -fno-align-loops -fno-align-jumps -fno-align-labels

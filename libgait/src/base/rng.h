@@ -21,7 +21,6 @@ static inline void rng_words(uint64_t seed, uint32_t stream, uint32_t frame, uin
 {
     uint32_t c0 = index, c1 = draw, c2 = frame, c3 = stream;
     uint32_t k0 = (uint32_t)seed, k1 = (uint32_t)(seed >> 32);
-#pragma GCC unroll 10
     for (int round = 0; round < 10; round++) {
         uint64_t const p0 = (uint64_t)0xD2511F53u * c0, p1 = (uint64_t)0xCD9E8D57u * c2;
         c0 = (uint32_t)(p1 >> 32) ^ c1 ^ k0;

@@ -9,7 +9,8 @@ enum {
     FRACTION = 256, /* fixed-point steps of a source pixel */
     MAX_SIDE = 16,  /* side of the box of source pixels that one working pixel averages */
     SPAN = 512,     /* source pixels of a row that are summed at once */
-    BOX_BYTES = 3 * (SPAN + MAX_SIDE)
+    LANES = 32,     /* numbers that are summed together */
+    BOX_BYTES = (3 * (SPAN + MAX_SIDE) + LANES - 1) / LANES * LANES
 };
 
 typedef struct places { /* source positions of one row of the working image, 1/FRACTION pixels */
@@ -170,31 +171,30 @@ static box box_of(const gait_image *im, int32_t side)
     return b;
 }
 
+/* out = a + b, `count` numbers and those up to the next multiple of LANES. */
+static void add_lanes(const uint16_t *a, const uint16_t *b, uint16_t *out, int32_t count)
+{
+    for (int32_t i = 0; i < count; i += LANES)
+        KERNEL_LANES for (int32_t k = i; k < i + LANES; k++) out[k] = (uint16_t)(a[k] + b[k]);
+}
+
 /* Into sum, for each byte: the sum over ny rows and nx pixels to the right. Sums that reach beyond the last
  * byte are incomplete. */
 static void box_sums(const uint8_t *from, int32_t stride, int32_t step, const box *b, int32_t bytes,
                      uint16_t *restrict sum)
 {
-    enum { TAIL = 3 * MAX_SIDE };
-    uint16_t part[2][BOX_BYTES + TAIL]; /* of n pixels, and of 2 n */
-    for (int32_t k = 0; k < bytes; k++)
-        part[0][k] = from[k];
-    for (int32_t y = 1; y < b->ny; y++)
+    uint16_t part[2][BOX_BYTES + 3 * MAX_SIDE]; /* of n pixels, and of 2 n */
+    memset(part, 0, sizeof part);
+    memset(sum, 0, BOX_BYTES * sizeof *sum);
+    for (int32_t y = 0; y < b->ny; y++)
         for (int32_t k = 0; k < bytes; k++)
             part[0][k] = (uint16_t)(part[0][k] + from[y * stride + k]);
-    memset(part[0] + bytes, 0, TAIL * sizeof *part[0]);
-    memset(part[1] + bytes, 0, TAIL * sizeof *part[1]);
-    memset(sum, 0, (size_t)bytes * sizeof *sum);
     for (int32_t n = 1, done = 0, of = 0; n <= b->nx; n *= 2, of = 1 - of) {
-        const uint16_t *const now = part[of];
-        uint16_t *restrict const twice = part[1 - of];
         if (b->nx & n) {
-            for (int32_t k = 0; k < bytes; k++)
-                sum[k] = (uint16_t)(sum[k] + now[k + done * step]);
+            add_lanes(part[of] + done * step, sum, sum, bytes);
             done += n;
         }
-        for (int32_t k = 0; k < bytes; k++)
-            twice[k] = (uint16_t)(now[k] + now[k + n * step]);
+        add_lanes(part[of], part[of] + n * step, part[1 - of], bytes);
     }
 }
 
@@ -230,9 +230,11 @@ KERNEL_ROW void box_row(const gait_image *im, int32_t step, int32_t side, places
         end = run_end(at, begin, &from, &to);
         box_sums(im->data + (size_t)at->v[begin] * (size_t)im->stride + (size_t)(from * step), im->stride,
                  step, &b, (to - from + b.nx) * step, sum);
-        for (int32_t c = 0; c < step; c++)
+        for (int32_t c = 0; c < step; c++) {
+            uint8_t *restrict const out = row[c];
             for (int32_t i = begin; i < end; i++)
-                row[c][i] = (uint8_t)((sum[(at->u[i] - from) * step + c] + b.half) * b.over >> 24);
+                out[i] = (uint8_t)((sum[(at->u[i] - from) * step + c] + b.half) * b.over >> 24);
+        }
     }
 }
 
@@ -278,10 +280,10 @@ void KERNEL(view_inside)(const view_map *map, const gait_camera *cam, uint64_t (
 void KERNEL(view_grey)(const view_planes *in, int32_t begin, int32_t end, uint8_t *grey)
 {
     const uint8_t *const r = in->channel[0], *const g = in->channel[1], *const b = in->channel[2];
-    int32_t const first = begin * VIEW_SIZE, last = end * VIEW_SIZE;
     if (in->channels == 1)
-        memmove(grey + first, r + first, (size_t)(last - first));
+        memmove(grey + begin * VIEW_SIZE, r + begin * VIEW_SIZE, (size_t)((end - begin) * VIEW_SIZE));
     else
-        for (int32_t i = first; i < last; i++)
-            grey[i] = (uint8_t)((77 * r[i] + 150 * g[i] + 29 * b[i] + 128) >> 8);
+        for (int32_t i = begin * VIEW_SIZE; i < end * VIEW_SIZE; i += VIEW_SIZE)
+            KERNEL_LANES for (int32_t x = i; x < i + VIEW_SIZE; x++) grey[x] =
+                (uint8_t)((77 * r[x] + 150 * g[x] + 29 * b[x] + 128) >> 8);
 }

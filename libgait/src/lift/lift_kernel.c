@@ -53,11 +53,11 @@ void KERNEL(lift_shape)(double *out, const float *s0, const float *s1, double w0
 
 void KERNEL(lift_row)(double *w, const double *shape, int32_t lanes, const double g[3])
 {
-    double *restrict const to = w;
-    const double *restrict const x = shape, *restrict const y = x + lanes, *restrict const z = y + lanes;
+    const double *const x = shape, *const y = x + lanes, *const z = y + lanes;
     double const g0 = g[0], g1 = g[1], g2 = g[2];
-    for (int32_t i = 0; i < lanes; i++)
-        to[i] = (g0 * x[i] + g1 * y[i]) + g2 * z[i];
+    for (int32_t i = 0; i < lanes; i += SIMD_F64)
+        simd_f64_store(w + i,
+                       (g0 * simd_f64_load(x + i) + g1 * simd_f64_load(y + i)) + g2 * simd_f64_load(z + i));
 }
 
 /* Eight numbers between two frames into `to`. */

@@ -81,26 +81,20 @@ static inline float mixture(float q, float log_visible, float log_occluded)
     return log_occluded + m_log(q * m_exp(f_clamp(d, -30.0f, 30.0f)) + (1.0f - q));
 }
 
-/* The robust, contrast-normalised form: mean Student-t cost. */
-static inline float robust(int32_t both, int32_t cost, float cos_tilt)
+/* Log-likelihood of a visible limb in the robust, contrast-normalised form: mean Student-t cost. */
+static inline float robust(int32_t both, int32_t cost)
 {
-    float const log_occluded = -1.6f; /* as bad as a typical mismatch */
-    float const mean = (float)cost / (float)(i_max(both, 1) * LIKE_COST_ONE);
-    float const log_mixture = mixture(cos_tilt * visible_share(both), -mean, log_occluded);
-    return both < LIKE_FEW ? log_occluded : log_mixture;
+    return -((float)cost / (float)(i_max(both, 1) * LIKE_COST_ONE));
 }
 
-/* The form of the paper: mean squared grey-level difference, normal density, sigma growing with the viewing
+/* In the form of the paper: mean squared grey-level difference, normal density, sigma growing with the viewing
  * angle. */
 static inline float literal(int32_t both, int32_t squares, float cos_tilt)
 {
     float const image_var = 9.0f, model_var = 64.0f; /* grey levels squared */
     float const tan2 = f_min((1.0f - cos_tilt * cos_tilt) / f_max(cos_tilt * cos_tilt, 1e-3f), 9.0f);
     float const var = 2.0f * image_var + model_var * (1.0f + tan2);
-    float const log_visible =
-        -0.5f * m_log(TWO_PI_F * var) - (float)squares / (2.0f * var * (float)i_max(both, 1));
-    float const log_mixture = mixture(cos_tilt * visible_share(both), log_visible, LIKE_PAPER_OCCLUDED);
-    return both < LIKE_FEW ? LIKE_PAPER_OCCLUDED : log_mixture;
+    return -0.5f * m_log(TWO_PI_F * var) - (float)squares / (2.0f * var * (float)i_max(both, 1));
 }
 
 void KERNEL(texture_costs)(const like_body *b, int32_t (*cost)[BLOCK])
@@ -118,14 +112,22 @@ void KERNEL(texture_logs)(const like_setup *s, const outline_block *outline, con
 {
     for (int32_t i = 0; i < BLOCK; i++)
         log[i] = 0.0f;
+    float const log_occluded =
+        s->paper ? LIKE_PAPER_OCCLUDED : -1.6f; /* robust: as bad as a typical mismatch */
     for (int32_t l = 0; l < s->limbs; l++) {
         const float *const cos_tilt = outline->limb[l].cos_tilt;
+        float visible[BLOCK];
         if (s->paper)
             for (int32_t i = 0; i < BLOCK; i++)
-                log[i] += literal(cost[l][i] / LIKE_COUNT_ONE, cost[l][i] % LIKE_COUNT_ONE, cos_tilt[i]);
+                visible[i] = literal(cost[l][i] / LIKE_COUNT_ONE, cost[l][i] % LIKE_COUNT_ONE, cos_tilt[i]);
         else
             for (int32_t i = 0; i < BLOCK; i++)
-                log[i] += robust(cost[l][i] / LIKE_COUNT_ONE, cost[l][i] % LIKE_COUNT_ONE, cos_tilt[i]);
+                visible[i] = robust(cost[l][i] / LIKE_COUNT_ONE, cost[l][i] % LIKE_COUNT_ONE);
+        for (int32_t i = 0; i < BLOCK; i++) {
+            int32_t const both = cost[l][i] / LIKE_COUNT_ONE;
+            float const mixed = mixture(cos_tilt[i] * visible_share(both), visible[i], log_occluded);
+            log[i] += both < LIKE_FEW ? log_occluded : mixed;
+        }
     }
 }
 

@@ -155,11 +155,12 @@ enum { PAIRS = 10 };
 KERNEL_ROW void pairs_of(const float *restrict heading, const float *restrict pitch,
                          const float *restrict roll, float (*restrict pair)[CHUNK])
 {
+    float h[2][CHUNK], p[2][CHUNK], r[2][CHUNK];
+    directions(heading, 0.5f, h);
+    directions(pitch, 0.5f, p);
+    directions(roll, 0.5f, r);
     for (int32_t i = 0; i < CHUNK; i++) {
-        float sh, ch, sp, cp, sr, cr;
-        m_sincos(0.5f * heading[i], &sh, &ch);
-        m_sincos(0.5f * pitch[i], &sp, &cp);
-        m_sincos(0.5f * roll[i], &sr, &cr);
+        float const ch = h[0][i], sh = h[1][i], cp = p[0][i], sp = p[1][i], cr = r[0][i], sr = r[1][i];
         float const w = ch * cp * cr + sh * sp * sr, x = ch * cp * sr - sh * sp * cr;
         float const y = ch * sp * cr + sh * cp * sr, z = sh * cp * cr - ch * sp * sr;
         pair[0][i] = w * w;
