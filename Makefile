@@ -89,7 +89,7 @@ UNIT := $(patsubst tests/unit/%.c,$(B)/unit/%,$(sort $(wildcard tests/unit/test_
 TOOLS := $(BIN)/gait-trackd
 LIBS := $(B)/libgait.so $(B)/libgait.a
 
-.PHONY: help setup lib tools test built check unit python-test demo model bench bench-lift detector-profile eval eval-real eval-learn eval-lift asan tsan unit-threads fuzz fuzz-run golden-check \
+.PHONY: help setup lib tools test built check unit python-test demo model bench bench-lift detector-profile eval eval-real eval-learn eval-lift mutants asan tsan unit-threads fuzz fuzz-run golden-check \
         docs lint format wheel sdist wheel-check install uninstall clean
 
 help: ## list the targets
@@ -318,6 +318,9 @@ eval-real: setup lib ## tracks of real people's films beside joints checked by a
 
 detector-profile: setup lib ## learn where the detector's joints lie beside the model's, on CLIPS= with known joints *
 	@$(PY) tests/bench/detector_profile.py $(or $(CLIPS),../shared/data/eval/dev)
+
+mutants: setup ## change each equation of both papers once: a test about its meaning has to notice
+	@$(PY) tests/bench/mutants.py $(ARGS)
 
 eval-lift: setup lib ## lifting of held-out motion, clips and a real motion: tests/bench/results/lift.md *
 	@$(PY) tests/bench/eval_lift.py $(ARGS)

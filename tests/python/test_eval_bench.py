@@ -19,6 +19,7 @@ import eval_edits
 import eval_measures
 import eval_plan
 import eval_wanted
+import mutants
 import parts
 from eval_marks import Marks
 
@@ -265,3 +266,8 @@ def test_bounds_of_learning_are_counted_by_measure(tmp_path):
     (tmp_path / "learn_a.csv").write_text("\n".join(rows) + "\n")
     lines = parts.summary([tmp_path / "learn_a.md"]).splitlines()[4:]
     assert lines == ["| L5 | 1 | 1 |", "| L5 by style | 0 | 1 |", "| L10 | 1 | 0 |", "| auto | 1 | 0 |"]
+
+
+def test_every_mutant_changes_a_line_that_is_there():
+    assert not list(mutants.stale())
+    assert list(mutants.stale((mutants.MUTANTS[0]._replace(before="no such line"),)))

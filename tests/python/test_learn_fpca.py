@@ -242,6 +242,20 @@ def test_ramp_is_taken_off_complete_cycles(drifting):
     assert np.all(drifting.ramp[~drifting.mask[:, 0].any(axis=1)] == 0)
 
 
+@pytest.mark.parametrize("rise", [0.0, 6.0])
+def test_cycles_begin_at_the_offset_and_are_closed(rise):
+    period, offset = 100.0, 60.0
+    u = (np.arange(300) - offset) / period
+    z = (np.cos(2 * np.pi * u) + rise * u)[:, None]
+    found = cutting.cut_cycles([z], np.array([period]), np.array([offset]), g.GRID)
+    grid, whole = np.arange(g.GRID) / g.GRID, found.mask[..., 0].all(axis=1)
+    assert found.cycle.tolist() == [0, 1, 2] and whole.tolist() == [False, True, True]
+    assert found.mask[0, :, 0].tolist() == (grid >= 0.4).tolist()
+    for k, values in zip(found.cycle[whole], found.values[whole, :, 0], strict=True):
+        middle = rise * (k - 0.5)  # of the rise over the cycle, which the line to its ends takes off
+        assert values == pytest.approx(np.cos(2 * np.pi * grid) + middle, abs=0.02)
+
+
 def test_cycles_are_numbered_and_short_ones_dropped(drifting):
     assert set(drifting.sequence) == set(range(12))
     assert np.all(drifting.mask.mean(axis=(1, 2)) >= cutting.OBSERVED)

@@ -140,6 +140,19 @@ static void test_rate(void)
     }
 }
 
+/* The phase advances by the rate before the step, whatever the new rate is (eq. 6). */
+static void test_phase_of_rate_before(void)
+{
+    dynamics const d = quiet(GAIT_MODE_DEFAULT, 1);
+    particle_state const from = {.f = {[F_PHASE] = 0.1f, [F_RATE] = 1.0f, [F_STATURE] = 1.7f}};
+    cfg.rate_noise = 0.2f;
+    for (int32_t i = 0; i < 5; i++) {
+        particle_state const w = move_one(&d, &from, 0.25f, 2.0f, 0, i);
+        CHECK(w.f[F_RATE] != 1.0f);
+        CHECK_NEAR(w.f[F_PHASE], 0.35, 1e-6);
+    }
+}
+
 /* Paper mode: the way depends on the rate, not on the noise of the phase (eq. 8). */
 static void test_paper_way(void)
 {
@@ -450,6 +463,7 @@ int main(void)
     test_belt();
     test_reverse();
     test_rate();
+    test_phase_of_rate_before();
     test_paper_way();
     test_variances();
     test_noise_follows_heading();
