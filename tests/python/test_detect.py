@@ -26,10 +26,15 @@ class Stage:
     def __init__(self, monkeypatch):
         self.places = {}
         monkeypatch.setattr(
-            people, "PersonNetwork", lambda: lambda image: list(map(self.crop, self.places.values()))
+            people, "PersonNetwork", lambda: lambda image, known: list(map(self.crop, self.seen()))
         )
         monkeypatch.setattr(people, "LandmarkNetwork", lambda name: self.landmarks)
         self.detector = people.PeopleDetector()
+
+    def seen(self):
+        """Places of the people in view: the last one hides those behind."""
+        places = list(self.places.values())
+        return [place for place in places if place == places[-1] or abs(place - places[-1]) > 30]
 
     @staticmethod
     def crop(place):
@@ -37,7 +42,7 @@ class Stage:
 
     def landmarks(self, image, crop):
         """See the person nearest to the middle of a crop."""
-        near = min(self.places.values(), key=lambda place: abs(place - crop.centre[0]), default=np.inf)
+        near = min(self.seen(), key=lambda place: abs(place - crop.centre[0]), default=np.inf)
         if abs(near - crop.centre[0]) > 60:
             return Person(0.1, np.zeros((16, 2)), np.zeros(16), crop)
         x = near + 15.0 * np.array([1, -1] * 8)
@@ -48,7 +53,7 @@ class Stage:
         self.places = places
         image = np.zeros((200, 640, 3), np.uint8)
         for name, place in places.items():
-            image[50:180, max(int(place) - 20, 0) : int(place) + 20] = RED if name == "red" else BLUE
+            image[50:180, max(int(place) - 20, 0) : int(place) + 20] = RED if name.startswith("red") else BLUE
         found = self.detector.step(Frame(number, number / 25, image))
         return {one.id: float(person.uv[:, 0].mean()) for one, person in found}
 
@@ -70,6 +75,21 @@ def test_two_people_keep_their_ids(stage):
     for n in range(40):
         found = stage.step(n, red=100 + 4 * n, blue=500)
         assert found == {1: pytest.approx(100 + 4 * n), 2: pytest.approx(500)}
+
+
+@pytest.mark.parametrize("other", ["blue", "red2"])
+def test_people_who_cross_keep_their_ids(other, stage):
+    """Also in the same clothes; the one behind is hidden meanwhile."""
+    for n in range(60):
+        found = stage.step(n, red=80 + 8 * n, **{other: 560 - 8 * n})
+        assert found.get(1, 80 + 8 * n) == pytest.approx(80 + 8 * n, abs=31)
+    assert found == {1: pytest.approx(80 + 8 * n), 2: pytest.approx(560 - 8 * n)}
+
+
+def test_one_who_walks_on_behind_a_wall_has_the_old_id(stage):
+    for n in range(80):
+        found = stage.step(n, **({} if 20 <= n < 60 else {"red": 40 + 6 * n}))
+    assert set(found) == {1} and len(stage.detector.people) == 1
 
 
 def test_one_who_returns_has_the_old_id(stage):

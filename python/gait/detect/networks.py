@@ -8,7 +8,7 @@ OpenCV cannot read.
 from __future__ import annotations
 
 import os
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from typing import NamedTuple
 
 import cv2
@@ -83,15 +83,19 @@ class PersonNetwork:
         self._network = network
         self._anchors = _anchors()
 
-    def __call__(self, image: Image) -> list[Crop]:
-        """Find people, the surest first; search parts of the picture if the whole shows none."""
+    def __call__(self, image: Image, known: Sequence[Crop] = ()) -> list[Crop]:
+        """Find people, the surest first; search parts of the picture if the whole shows only people known."""
         height, width = image.shape[:2]
         side = min(height, width)
-        for part in (max(height, width), side, side // 2):
+        people: list[Crop] = []
+        for part in dict.fromkeys(
+            (max(height, width), side) if known else (max(height, width), side, side // 2)
+        ):
             found = [crop for box in _tiles(width, height, part) for crop in self._find_in(image, box)]
-            if found:
-                return [crop for _, crop in _apart(sorted(found, key=lambda f: -f[0]))]
-        return []
+            people = [crop for _, crop in _apart(sorted(found, key=lambda f: -f[0]))]
+            if any(not _near(crop, known) for crop in people):
+                break
+        return people
 
     def _find_in(self, image: Image, box: tuple[int, int, int, int]) -> list[tuple[float, Crop]]:
         x, y, right, bottom = box
@@ -199,12 +203,16 @@ def _merged(score: Array, points: Array) -> list[tuple[float, Crop]]:
     return found
 
 
+def _near(crop: Crop, others: Sequence[Crop]) -> bool:
+    """Whether a crop lies about the same person as one of the others."""
+    return any(np.hypot(*(crop.centre - other.centre)) < other.side / 6 for other in others)
+
+
 def _apart(found: list[tuple[float, Crop]]) -> list[tuple[float, Crop]]:
     """Leave out a crop that lies about the same person as one before it: parts of the picture overlap."""
     kept: list[tuple[float, Crop]] = []
     for score, crop in found:
-        near = (np.hypot(*(crop.centre - other.centre)) < other.side / 6 for _, other in kept)
-        if not any(near):
+        if not _near(crop, [other for _, other in kept]):
             kept.append((score, crop))
     return kept
 

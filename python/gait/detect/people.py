@@ -1,8 +1,11 @@
 """Find people and follow them from frame to frame by the detector, each with an id.
 
 A person's crop comes from the landmarks of the frame before, extrapolated at their speed.  The person network
-scans the whole picture at the start, when a person is lost, and every second to find new people.  A person
-who comes back gets the old id if place and colours agree.
+scans the whole picture at the start, when a person is lost, and every second to find new people.
+
+People who meet in the picture are kept apart by their courses and the colours of their clothes: while two are
+near each other, landmarks off a person's course are those of somebody else, and the person counts as hidden.
+A person who comes back gets the old id if place and colours agree.
 """
 
 from __future__ import annotations
@@ -21,17 +24,30 @@ from gait.io.keypoints_file import Keypoints
 from gait.io.video import Frame, Image, Video
 
 Array = NDArray[np.float64]
+Colours = NDArray[np.float32]
+"""Histogram of lightness and hue of the clothes on the trunk, shape `_BINS`, sum 1."""
 
 _LEAST_SCORE = 0.5  # of a person in a crop
 _SCAN_PERIOD = 1.0  # seconds between two scans of the whole picture
 _RETRY = 0.2  # the same while a person is lost or none was found
-_FORGET = 10.0  # seconds after which a person who comes back gets a new id
+_FORGET = 60.0  # seconds after which a person who comes back gets a new id
 _SAME = 0.25  # of a crop's side between the centres of crops about one person
-_REACH = 0.5  # crop sides per second that a lost person may have moved, in addition to `_SAME`
-_ALIKE = 0.5  # correlation of colours of one person
+_REACH = 0.8  # crop sides per second that a lost person may have left their course by, in addition to `_SAME`
+_COURSE = 0.3  # seconds over which the speed on a course is taken
+_CONTACT = 0.35  # crop sides between people who may be taken for each other
+_LONG_CONTACT = 1.0  # seconds, after which people go together and their courses are taken anew
+_OFF_COURSE = (
+    0.12,
+    0.15,
+)  # crop sides, and more per second in contact, that a person may be off their course
+_ALIKE = 0.6  # overlap of the colours of one person; 5 % of the frames of a film in sun and shade have less
+_CLEARLY = 0.1  # by which the overlap with another's colours must be larger
 _MOST = 8  # people
 _LEAST_FRAMES = 3  # in which a person must be found
-_BINS = (16, 8)  # of hue and saturation
+_BINS = (6, 12, 12)  # of L, a and b
+_RANGES = (0, 256, 80, 176, 80, 176)
+_BLUR = [0.5 * np.eye(n) + 0.25 * (np.eye(n, k=1) + np.eye(n, k=-1)) for n in _BINS]
+_SAMPLE = 5  # frames between two samples of colours
 _TORSO = [list(JOINTS).index(name) for name in ("l_shoulder", "r_shoulder", "r_hip", "l_hip")]
 
 
@@ -46,17 +62,38 @@ class Followed:
     """Their times, seconds."""
     keypoints: list[Person] = field(default_factory=list)
     """Keypoints in these frames."""
-    colours: NDArray[np.float32] | None = None
-    """Histogram of the clothes on the trunk."""
+    colours: Colours | None = None
+    """Mean over samples."""
+    samples: int = 0
+    """Of the colours."""
+    free: int = 0
+    """Index of the last frame in which no other person was near."""
     lost: bool = False
 
     def expected(self, time: float) -> Crop:
-        """Crop at a time, moved on at the speed of the last two frames."""
+        """Crop at a time, moved on at the speed of the last two frames, or of the course after a loss."""
         last = self.keypoints[-1].crop
-        if len(self.keypoints) < 2 or self.lost:
+        if self.lost:
+            return last._replace(centre=self.on_course(time))
+        if len(self.keypoints) < 2:
             return last
         step = (last.centre - self.keypoints[-2].crop.centre) / (self.times[-1] - self.times[-2])
         return last._replace(centre=last.centre + (time - self.times[-1]) * step)
+
+    def on_course(self, time: float) -> Array:
+        """Centre of the crop at a time, if the person goes on as before others were near."""
+        free, begin = self.free, self.free
+        while begin > 0 and self.times[free] - self.times[begin - 1] <= _COURSE:
+            begin -= 1
+        centre, since = self.keypoints[free].crop.centre, self.keypoints[begin].crop.centre
+        if self.times[free] - self.times[begin] < _COURSE / 2:
+            return centre
+        speed = (centre - since) / (self.times[free] - self.times[begin])
+        return np.asarray(centre + (time - self.times[free]) * speed)
+
+    def off_course(self, time: float, person: Person) -> float:
+        """Distance of a person found from the course, crop sides."""
+        return float(np.hypot(*(person.crop.centre - self.on_course(time))) / person.crop.side)
 
 
 class PeopleDetector:
@@ -90,9 +127,18 @@ class PeopleDetector:
     def step(self, frame: Frame) -> list[tuple[Followed, Person]]:
         """Find the people of the next frame; people not returned were not found in it."""
         found: list[tuple[Followed, Person]] = []
-        for one in self.people:
+        near = {one.id: self._others_near(one, frame.time) for one in self.people if not one.lost}
+        seen = [
+            (one, self._landmarks(frame.image, one.expected(frame.time)))
+            for one in self.people
+            if not one.lost
+        ]
+        for one, person in sorted(seen, key=lambda pair: pair[0].off_course(frame.time, pair[1])):
+            same = any(_same(person, p) for _, p in found)  # two people at one place are one
+            one.lost = person.score < _LEAST_SCORE or same or self._strange(one, frame, person, near[one.id])
             if not one.lost:
-                self._follow(one, frame, found)
+                self._add(one, frame, person, near[one.id])
+                found.append((one, person))
         since = frame.time - self._scanned
         missing = not found or any(p.lost and frame.time - p.times[-1] < _SCAN_PERIOD for p in self.people)
         if since >= (_RETRY if missing else _SCAN_PERIOD):
@@ -100,46 +146,80 @@ class PeopleDetector:
             self._scan(frame, found)
         return found
 
-    def _follow(self, one: Followed, frame: Frame, found: list[tuple[Followed, Person]]) -> None:
-        """Find a person near the expected place; two people at one place are one."""
-        person = self._landmarks(frame.image, one.expected(frame.time))
-        one.lost = person.score < _LEAST_SCORE or any(_near(person.crop, p.crop) for _, p in found)
-        if not one.lost:
-            self._add(one, frame, person, found)
+    def _others_near(self, one: Followed, time: float) -> list[Followed]:
+        """Others, in view or hidden for a moment, who may be taken for a person."""
+        place = one.expected(time)
+        return [
+            other
+            for other in self.people
+            if other is not one
+            and time - other.times[-1] < _LONG_CONTACT
+            and _apart(place, other.expected(time)) < _CONTACT
+        ]
+
+    def _strange(self, one: Followed, frame: Frame, person: Person, near: list[Followed]) -> bool:
+        """Whether the person found in somebody's crop is somebody else."""
+        contact = frame.time - one.times[one.free]
+        off = one.off_course(frame.time, person) > _OFF_COURSE[0] + _OFF_COURSE[1] * contact
+        if not (off or near):
+            return False
+        colours = _colours(frame.image, person)
+        own = _alike(colours, one.colours)
+        if near:
+            return off or any(_alike(colours, other.colours) > own + _CLEARLY for other in near)
+        return own < _ALIKE
 
     def _scan(self, frame: Frame, found: list[tuple[Followed, Person]]) -> None:
-        """Search the whole picture for people who are not followed."""
-        crops = self._find(frame.image) or ([] if found else [whole_picture(frame.image)])
+        """Search the whole picture, and where people were hidden, for people who are not followed."""
+        time = frame.time
+        crops = [p.expected(time) for p in self.people if p.lost and time - p.times[-1] < _SCAN_PERIOD]
+        crops += self._find(frame.image, [p.crop for _, p in found]) or (
+            [] if found else [whole_picture(frame.image)]
+        )
         for crop in crops:
-            if len(found) >= self._most or any(_near(crop, p.crop) for _, p in found):
+            if len(found) >= self._most or any(_apart(crop, p.crop) < _SAME / 2 for _, p in found):
                 continue
             person = self._landmarks(frame.image, crop)
-            if person.score < _LEAST_SCORE or any(_near(person.crop, p.crop) for _, p in found):
+            if person.score < _LEAST_SCORE or any(_same(person, p) for _, p in found):
                 continue
             person = self._landmarks(frame.image, person.crop)  # once more, from a better crop
-            if person.score >= _LEAST_SCORE:
-                self._add(self._who(frame, person), frame, person, found)
+            if person.score >= _LEAST_SCORE and not any(_same(person, p) for _, p in found):
+                one = self._who(frame, person)
+                self._add(one, frame, person, [])
+                found.append((one, person))
 
     def _who(self, frame: Frame, person: Person) -> Followed:
         """Match a lost person by place and colours, or start a new one."""
         colours = _colours(frame.image, person)
-        for one in sorted((p for p in self.people if p.lost), key=lambda p: -p.times[-1]):
-            gap = frame.time - one.times[-1]
-            off = np.hypot(*(person.crop.centre - one.keypoints[-1].crop.centre)) / person.crop.side
-            if gap < _FORGET and off < _SAME + _REACH * gap and _alike(colours, one.colours):
-                one.lost = False
-                return one
-        self.people.append(Followed(len(self.people) + 1))
-        return self.people[-1]
+        best, least = None, np.inf
+        for one in self.people:
+            gap, alike = frame.time - one.times[-1], _alike(colours, one.colours)
+            if not one.lost or gap > _FORGET or alike < _ALIKE:
+                continue
+            reach = _SAME + _REACH * gap
+            stayed = _apart(person.crop, one.keypoints[-1].crop) / reach
+            off = min(one.off_course(frame.time, person) / reach, 0.5 + 0.5 * stayed)  # few people stop
+            if off < 1 and off - alike < least:
+                best, least = one, off - alike
+        if best is None:
+            best = Followed(len(self.people) + 1)
+            self.people.append(best)
+        best.lost = False
+        return best
 
-    def _add(self, one: Followed, frame: Frame, person: Person, found: list[tuple[Followed, Person]]) -> None:
-        """Add a person found in a frame to their track and to those found."""
+    def _add(self, one: Followed, frame: Frame, person: Person, near: list[Followed]) -> None:
+        """Add a person found in a frame to their track."""
         one.frames.append(frame.number)
         one.times.append(frame.time)
         one.keypoints.append(person)
-        if one.colours is None or len(one.frames) % 10 == 0:
-            one.colours = _colours(frame.image, person)
-        found.append((one, person))
+        if not near or frame.time - one.times[one.free] > _LONG_CONTACT:
+            one.free = len(one.frames) - 1
+        if one.colours is None or (not near and len(one.frames) % _SAMPLE == 0):
+            colours = _colours(frame.image, person)
+            one.samples += 1
+            if one.colours is None:
+                one.colours = np.zeros(_BINS, np.float32)
+            one.colours += (colours - one.colours) / np.float32(one.samples)
 
 
 def detect(
@@ -228,20 +308,36 @@ def main_person(people: dict[int, Keypoints]) -> int:
     return max(people, key=lambda n: np.isfinite(people[n].uv[:, 0, 0]).sum() * height(people[n]))
 
 
-def _near(a: Crop, b: Crop) -> bool:
-    """Whether two crops lie about the same person."""
-    return bool(np.hypot(*(a.centre - b.centre)) < _SAME * 0.5 * min(a.side, b.side))
+def _apart(a: Crop, b: Crop) -> float:
+    """Distance between the centres of two crops, sides of the smaller one."""
+    return float(np.hypot(*(a.centre - b.centre)) / min(a.side, b.side))
 
 
-def _colours(image: Image, person: Person) -> NDArray[np.float32]:
-    """Histogram of hue and saturation on the trunk."""
-    mask = np.zeros(image.shape[:2], np.uint8)
-    cv2.fillConvexPoly(mask, cv2.convexHull(person.uv[_TORSO].astype(np.int32)), 255)
-    hsv = cv2.cvtColor(image, cv2.COLOR_BGR2HSV)
-    histogram = cv2.calcHist([hsv], [0, 1], mask, list(_BINS), [0, 180, 0, 256])
-    return np.asarray(histogram / max(float(histogram.sum()), 1.0), np.float32)
+def _same(a: Person, b: Person) -> bool:
+    """Whether two sets of landmarks are of one person."""
+    if _apart(a.crop, b.crop) < _SAME / 2:
+        return True
+    off = np.median(np.hypot(*(a.uv - b.uv).T))
+    return bool(off < _SAME / 4 * min(a.crop.side, b.crop.side))
 
 
-def _alike(a: NDArray[np.float32], b: NDArray[np.float32] | None) -> bool:
-    """Whether two histograms may be of one person; True if one is unknown."""
-    return b is None or cv2.compareHist(a, b, cv2.HISTCMP_CORREL) > _ALIKE
+def _colours(image: Image, person: Person) -> Colours:
+    """Colours of the clothes on the trunk, blurred by a bin."""
+    hull = cv2.convexHull(person.uv[_TORSO].astype(np.int32))
+    x, y, width, height = cv2.boundingRect(hull)
+    top, left = max(y, 0), max(x, 0)
+    part = image[top : max(y + height, 0), left : max(x + width, 0)]
+    if not part.size:
+        return np.full(_BINS, 1 / np.prod(_BINS), np.float32)
+    mask = np.zeros(part.shape[:2], np.uint8)
+    cv2.fillConvexPoly(mask, hull - (left, top), 255)
+    lab = cv2.cvtColor(part, cv2.COLOR_BGR2LAB)
+    lab[..., 1:] = np.clip(lab[..., 1:], _RANGES[2], _RANGES[3] - 1)
+    counts = cv2.calcHist([lab], [0, 1, 2], mask, list(_BINS), list(_RANGES))
+    blurred = np.einsum("lab,Ll,Aa,Bb->LAB", counts, *_BLUR, optimize=True)
+    return np.asarray(blurred / max(float(blurred.sum()), 1e-9), np.float32)
+
+
+def _alike(a: Colours, b: Colours | None) -> float:
+    """Overlap of two histograms (Bhattacharyya), 0 to 1; 1 if one is unknown."""
+    return 1.0 if b is None else float(np.sqrt(a * b).sum())
