@@ -12,7 +12,9 @@ from gait.camera.camera import read_camera
 from gait.cli import main
 from gait.errors import UserError
 from gait.io.keypoints_file import Keypoints, write
-from gait.track.from_walk import calibrate, contradiction, make_camera
+from gait.simulate import Scenario
+from gait.simulate.stage import set_stage
+from gait.track.from_walk import _Body, calibrate, contradiction, make_camera
 from gait.track.keypoint_start import find_keypoint_start
 
 MODEL = Model()
@@ -108,6 +110,26 @@ def test_the_uncertainty_covers_the_path():
     off = found.path[:, :2] - (np.array(place) + way)
     sd = np.linalg.norm(found.path_change[:, :2], axis=2)
     assert (np.abs(off) < 3 * np.hypot(sd, 0.1)).all() and sd.max() > 0.05
+
+
+def test_a_walk_in_a_circle_gives_the_camera():
+    stage = set_stage(Scenario(view="circle", frames=110, distance=7.5, stature=1.72, speed=1.2, seed=208))
+    places = stage.walk.points(stage.frames)
+    uv = np.stack([stage.camera.project(places[name]) for name in NAMES], axis=1)
+    frame = np.arange(len(uv))
+    walk = Keypoints(frame, frame / 30.0, NAMES, uv, np.ones(uv.shape[:2]))
+    found = calibrate(walk, stage.camera.size, MODEL, 1.72)
+    assert found.camera.fx == pytest.approx(stage.camera.fx, rel=0.15)
+    assert found.camera.centre[2] == pytest.approx(stage.camera.centre[2], rel=0.08)
+
+
+def test_the_pelvis_sways_so_that_feet_stand_still():
+    body = _Body(MODEL, NAMES)
+    phase = np.linspace(0.12, 0.38, 20)
+    ankle = body.joints(phase, np.full(20, body.rate), np.zeros(body.parts), np.zeros(body.offsets))[
+        :, body.names.index("r_ankle"), 1
+    ]
+    assert np.ptp(ankle) < 0.002
 
 
 def test_a_treadmill_is_in_place():

@@ -47,7 +47,8 @@ _OFFSET_SD = 0.015  # of the stature, constant difference between the detector's
 _SLIDE_SD = 0.05  # metres per second, of feet on the floor, along the heading
 _SIDEWAYS_SD = 0.05  # metres per second, of the walk across the heading
 _STILL_SD = 0.03  # metres per second on a treadmill
-_BEND_SD, _TURN_SD, _HURRY_SD = 0.03, 0.12, 0.02  # changes of slope at a knot: metres, radians, strides
+_BEND_SD, _TURN_SD, _HURRY_SD = 0.05, 0.12, 0.02  # changes of slope at a knot: metres, radians, strides
+_CURVE_SD = 0.3  # radians per second, of the turn on average
 _SCORES = 5  # components of the model that are fitted
 _DEGREES = 4.0  # of freedom of Student's t
 _FITS = 9.0  # squared robust error per coordinate up to which more of the clip fits the walk
@@ -313,11 +314,15 @@ class _Body:
         states.append(replace(base, stride_hz=base.stride_hz + model.info.stride_hz_sd))
         table = np.array([self._cycle(model, state) for state in states])
         table[1:] -= table[0]
+        # The pelvis sways: it moves from side to side and unevenly forwards over the foot on the floor.
+        velocity = self._over_foot(table, model.joint_names)
+        backwards = velocity[..., 0].mean(axis=1)
+        way = np.cumsum(velocity - velocity.mean(axis=1, keepdims=True), axis=1) / self.PHASES
+        table[..., :2] += (way - way.mean(axis=1, keepdims=True))[:, :, None]
         self.table = table[:, :, rows]
         self.parts = len(states) - 2  # scores and proportions
         self.rate, self.rate_sd = model.info.stride_hz, model.info.stride_hz_sd
         # The ankle rolls forward over the foot, so it goes back more slowly than the floor.
-        backwards = self._stride(table, model.joint_names)
         self.stride = backwards * model.info.stride_length / backwards[0]
         self.offsets = 3 * len(self.names)  # of the detector's joints: forward, left, up
 
@@ -330,13 +335,23 @@ class _Body:
             out[k] = model.pose(posed)[0]
         return out
 
-    def _stride(self, table: Array, names: tuple[str, ...]) -> Array:
-        """Way back of ankles on the floor, statures per stride: of the mean, and change with each part."""
+    def _over_foot(self, table: Array, names: tuple[str, ...]) -> Array:
+        """Velocity (rows, PHASES, 2) of the pelvis over the foot on the floor, statures per stride.
+
+        Each foot is flat for a third of the stride; in between the velocity is interpolated.
+        """
         phase = np.arange(self.PHASES) / self.PHASES
-        speed = -self.PHASES * (np.roll(table[..., 0], -1, axis=1) - np.roll(table[..., 0], 1, axis=1)) / 2
         flat = [(names.index("r_ankle"), 0.10, 0.40), (names.index("l_ankle"), 0.60, 0.90)]
-        means = [speed[:, (phase >= low) & (phase <= high), at].mean(axis=1) for at, low, high in flat]
-        return np.asarray(np.mean(means, axis=0))
+        speed = -self.PHASES * (np.roll(table, -1, axis=1) - np.roll(table, 1, axis=1))[..., :2] / 2
+        known = [(phase >= low) & (phase <= high) for _, low, high in flat]
+        at = np.concatenate([phase[rows] for rows in known])
+        over = np.concatenate(
+            [speed[:, rows, joint] for rows, (joint, _, _) in zip(known, flat, strict=True)], axis=1
+        )
+        columns = [
+            np.interp(phase, at, column, period=1.0) for column in over.swapaxes(1, 2).reshape(-1, len(at))
+        ]
+        return np.reshape(columns, (len(table), 2, -1)).swapaxes(1, 2)
 
     def weights(self, parts: Array, rate: Array) -> Array:
         """Weights (T, parts + 2) of the table's rows: mean, scores and proportions, stride rate."""
@@ -528,7 +543,8 @@ class _Fit:
             usual = body.strides(rates, parts) * self._height * np.exp(q[4]) * rates
             many = np.sqrt(len(step))  # one uncertainty of the whole walk
             speed = [(ahead - usual) / _SLIDE_SD / many, aside / _SIDEWAYS_SD / many]
-        bends = np.diff(knots, 2, axis=0) / np.array([_BEND_SD, _BEND_SD, _TURN_SD, _HURRY_SD])
+        faster = np.diff(np.stack([ahead, aside], axis=1), axis=0) * np.diff(self._middles())[:, None]
+        bends = np.diff(knots[:, 2:], 2, axis=0) / np.array([_TURN_SD, _HURRY_SD])
         return np.concatenate([
             _heavy_tailed((q[:4] - self._prior.mean) / self._prior.sd),
             [q[4] / _STATURE_SD],
@@ -536,8 +552,9 @@ class _Fit:
             offsets / _OFFSET_SD,
             *speed,
             (rates - body.rate) / (2 * body.rate_sd) / np.sqrt(len(rates)),
+            faster.ravel() / _BEND_SD,
             bends.ravel(),
-            np.diff(knots[:, 2]) / _TURN_SD,
+            [(knots[-1, 2] - knots[0, 2]) / (self._time[-1] - self._time[0]) / _CURVE_SD],
         ])  # fmt: skip
 
     def _cost(self, q: Array) -> float:
