@@ -139,12 +139,18 @@ def _follow(job: Job, video: Video, tracker: Tracker, start: Start, auto_start: 
         job.folder / f"{job.stem}.csv", model.info.components, model.joint_names, model.angle_names
     )
     with rows:
-        for frame, estimate in tracker.follow(video, start, job.clip.stop, auto_start):
+        for frame in video.frames(start.frame, job.clip.stop):
+            if frame.number == start.frame:
+                tracker.start(start.mean, start.sd, frame.utime)
+            estimate = tracker.step(frame.image, frame.utime)
             rows.write(frame, estimate)
             kept.estimates[frame.number] = estimate
             kept.steps.append(1000 * tracker.step_seconds)
             if uncertainty is not None and uncertainty.wants(frame.number):
                 kept.nees.append(uncertainty.nees(frame.number, estimate, *tracker.particles()))
+            anew = auto_start.find_lost(frame, estimate.status)
+            if anew is not None:
+                tracker.start(anew.mean, anew.sd, frame.utime)
     if not kept.steps:
         raise UserError(f"{video.path}: no frame from {start.frame} on")
     return kept

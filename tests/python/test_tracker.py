@@ -9,7 +9,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from drawn_person import FPS, camera, clip, wall, write
+from drawn_person import FPS, camera, clip, wall
 
 from gait import (
     Flag,
@@ -17,12 +17,10 @@ from gait import (
     GaitError,
     Mode,
     Model,
-    Start,
     State,
     Tracker,
     TrackerConfig,
     UserError,
-    Video,
 )
 from gait.bindings import abi
 from gait.bindings.config import LiftConfig, reference
@@ -109,18 +107,6 @@ def test_a_drawn_walk_is_followed():
     assert last.frame == len(FRAMES) - 1 and last.utime == utime(len(FRAMES) - 1)
     assert np.array_equal(last.joint("r_knee"), last.joints[MODEL.joint_names.index("r_knee")])
     assert last.speed == pytest.approx(1.3, abs=0.35) and not last.flags & Flag.NO_IMAGE
-
-
-def test_following_a_video_is_starting_and_stepping(tmp_path):
-    write(tmp_path / "walk.mp4", FRAMES)
-    video, start = Video(tmp_path / "walk.mp4"), Start(3, TRUE[3], uncertainty())
-    followed, stepped = Tracker(MODEL, VIEW, SMALL), Tracker(MODEL, VIEW, SMALL)
-    shown = [(frame.number, now.utime) for frame, now in followed.follow(video, start, 8)]
-    assert shown == [(i, frame.utime) for i, frame in enumerate(video.frames(), 0) if 3 <= i < 8]
-    stepped.start(start.mean, start.sd, shown[0][1])
-    for frame in video.frames(3, 8):
-        stepped.step(frame.image, frame.utime)
-    assert followed.digest() == stepped.digest()
 
 
 def test_grey_frames_serve_too():

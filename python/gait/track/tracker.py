@@ -4,8 +4,7 @@ from __future__ import annotations
 
 import ctypes
 import time
-from collections.abc import Iterator, Mapping, Sequence
-from typing import TYPE_CHECKING
+from collections.abc import Sequence
 
 import numpy as np
 from numpy.typing import NDArray
@@ -14,17 +13,13 @@ from gait.bindings import abi
 from gait.bindings.config import TrackerConfig
 from gait.bindings.estimate import Estimate
 from gait.bindings.frame import FrameKeypoints, capture_time, image_view, keypoint_array, per_camera
-from gait.bindings.initial import Start
 from gait.bindings.library import aligned, call, library, make
 from gait.bindings.model import Model, camera_c
 from gait.bindings.state import LEAST_STATURE, State
 from gait.camera.camera import Camera
 from gait.errors import GaitError, UserError
-from gait.io.video import Frame, Image, Video
+from gait.io.video import Image
 from gait.track.tasks import PythonTasks, Runner, TaskSource, threads
-
-if TYPE_CHECKING:
-    from gait.track.box_start import BoxStart  # needs OpenCV
 
 
 class Tracker:
@@ -167,38 +162,6 @@ class Tracker:
                 return None
             raise
         return Estimate.from_c(out, self.model)
-
-    def follow(
-        self,
-        video: Video,
-        start: Start,
-        stop: int | None = None,
-        auto_start: BoxStart | None = None,
-        keypoints: Mapping[int, FrameKeypoints] | None = None,
-    ) -> Iterator[tuple[Frame, Estimate]]:
-        """Track one person through a video: yield each frame from ``start.frame`` on with its estimate.
-
-        Parameters
-        ----------
-        video : Video
-            As seen by the only camera.
-        start : Start
-        stop : int, optional
-            First frame not to use.
-        auto_start : BoxStart, optional
-            Looks for the person while the tracker has lost them; where it finds one the track starts anew.
-        keypoints : mapping of int to FrameKeypoints, optional
-            Found in frames, by number; see `step`.
-        """
-        found = keypoints or {}
-        for frame in video.frames(start.frame, stop):
-            if frame.number == start.frame:
-                self.start(start.mean, start.sd, frame.utime)
-            estimate = self.step(frame.image, frame.utime, found.get(frame.number))
-            yield frame, estimate
-            anew = auto_start.find_lost(frame, estimate.status) if auto_start else None
-            if anew is not None:
-                self.start(anew.mean, anew.sd, frame.utime)
 
     def particles(self) -> tuple[NDArray[np.void], NDArray[np.float32]]:
         """All particles: structured array (N,) with the fields of ``gait_state``, and their weights (N,)."""
