@@ -12,7 +12,7 @@ CXX_FLAGS     := -fno-exceptions -fno-rtti -fno-threadsafe-statics -fvisibility-
 # over lanes, and the rest at -Os (a fifth smaller again, no slower).  Kernels not listed here have loops over lanes.
 O3_SOURCES     := outline_kernel.c silhouette_kernel.c
 VECTOR_SOURCES := fmath.c
-O2_SOURCES     := segment_posterior.c kinematics.c rejuvenation.c pf.c particles.c linalg.cpp
+O2_SOURCES     := segment_posterior.c kinematics.c rejuvenation.c pf.c particles.c likelihood_step.c linalg.cpp
 GCC_TIGHT      := -fno-align-functions -fno-align-loops -fno-align-jumps -fno-align-labels
 GCC_VECTOR     := -ftree-vectorize -fvect-cost-model=dynamic
 CLANG_VECTOR   := -ftree-vectorize
