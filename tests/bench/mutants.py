@@ -287,8 +287,8 @@ MUTANTS = (
         "O 12",
         "the angle of the limb does not count",
         "libgait/src/likelihood/texture_kernel.c",
-        "mixture(cos_tilt * visible_share(both), log_visible, LIKE_PAPER_OCCLUDED)",
-        "mixture(visible_share(both), log_visible, LIKE_PAPER_OCCLUDED)",
+        "mixture(cos_tilt[i] * visible_share(both), visible[i], log_occluded)",
+        "mixture(visible_share(both), visible[i], log_occluded)",
         "test_like_texture",
     ),
     Mutant(
