@@ -26,12 +26,12 @@ class Stage:
     def __init__(self, monkeypatch):
         self.places = {}
         monkeypatch.setattr(
-            people, "PersonNetwork", lambda: lambda image, known: list(map(self.crop, self.seen()))
+            people, "PersonNetwork", lambda: lambda image, known: list(map(self.crop, self.visible()))
         )
         monkeypatch.setattr(people, "LandmarkNetwork", lambda name: self.landmarks)
         self.detector = people.PeopleDetector()
 
-    def seen(self):
+    def visible(self):
         """Places of the people in view: the last one hides those behind."""
         places = list(self.places.values())
         return [place for place in places if place == places[-1] or abs(place - places[-1]) > 30]
@@ -42,7 +42,7 @@ class Stage:
 
     def landmarks(self, image, crop):
         """See the person nearest to the middle of a crop."""
-        near = min(self.seen(), key=lambda place: abs(place - crop.centre[0]), default=np.inf)
+        near = min(self.visible(), key=lambda place: abs(place - crop.centre[0]), default=np.inf)
         if abs(near - crop.centre[0]) > 60:
             return Person(0.1, np.zeros((16, 2)), np.zeros(16), crop)
         x = near + 15.0 * np.array([1, -1] * 8)

@@ -4,7 +4,7 @@ A person's crop comes from the landmarks of the frame before, extrapolated at th
 scans the whole picture at the start, when a person is lost, and every second to find new people.
 
 People who meet in the picture are kept apart by their courses and the colours of their clothes: while two are
-near each other, landmarks off a person's course are those of somebody else, and the person counts as hidden.
+near each other, landmarks off a person's course are those of another person, and the person counts as hidden.
 A person who comes back gets the old id if place and colours agree.
 """
 
@@ -128,12 +128,12 @@ class PeopleDetector:
         """Find the people of the next frame; people not returned were not found in it."""
         found: list[tuple[Followed, Person]] = []
         near = {one.id: self._others_near(one, frame.time) for one in self.people if not one.lost}
-        seen = [
+        located = [
             (one, self._landmarks(frame.image, one.expected(frame.time)))
             for one in self.people
             if not one.lost
         ]
-        for one, person in sorted(seen, key=lambda pair: pair[0].off_course(frame.time, pair[1])):
+        for one, person in sorted(located, key=lambda pair: pair[0].off_course(frame.time, pair[1])):
             same = any(_same(person, p) for _, p in found)  # two people at one place are one
             one.lost = person.score < _LEAST_SCORE or same or self._strange(one, frame, person, near[one.id])
             if not one.lost:
@@ -158,7 +158,7 @@ class PeopleDetector:
         ]
 
     def _strange(self, one: Followed, frame: Frame, person: Person, near: list[Followed]) -> bool:
-        """Whether the person found in somebody's crop is somebody else."""
+        """Whether the person found in a crop is another person than the one it is about."""
         contact = frame.time - one.times[one.free]
         off = one.off_course(frame.time, person) > _OFF_COURSE[0] + _OFF_COURSE[1] * contact
         if not (off or near):
