@@ -7,6 +7,7 @@
 
 #define STRANGE 8.0f /* standard deviations at which a joint is as likely as without a person */
 #define BEHIND  1e6f /* squared standard deviations of a joint behind the camera */
+#define ANOTHER 4.0f /* nats: minus the log probability that the keypoints are not of this person */
 
 /* Student-t with 4 degrees of freedom in two dimensions: squared standard deviations to nats. */
 static float cost(float square)
@@ -14,7 +15,8 @@ static float cost(float square)
     return 3.0f * m_log(1.0f + 0.25f * square);
 }
 
-/* Mean cost of the joints that were found. */
+/* Mean cost of the joints that were found.  It has an upper limit, because the detector may have found another person, or
+ * jumped: keypoints that far from a body, as a whole, do not attract it. */
 static float mean_cost(const like_body *b)
 {
     const features_keypoints *const found = &b->features->keypoints;
@@ -29,7 +31,8 @@ static float mean_cost(const like_body *b)
         float const du = weight * (uv[0] - found->u[p]), dv = weight * (uv[1] - found->v[p]);
         sum += cost(depth > CAMERA_NEAR ? f_min(du * du + dv * dv, BEHIND) : BEHIND);
     }
-    return sum / (float)found->count;
+    return f_min(sum / (float)found->count,
+                 cost(STRANGE * STRANGE) + ANOTHER / b->setup->weight[LIKE_KEYPOINTS]);
 }
 
 static float log_likelihood(const like_body *b)
