@@ -16,6 +16,13 @@
 #define GAIT_ASSERT(x) assert(x)
 #endif
 
+/* Called at most a few times a frame, in a file whose other functions are compiled for speed: compiled for size. */
+#ifdef __GNUC__
+#define COLD __attribute__((cold))
+#else
+#define COLD
+#endif
+
 #define PI_F     3.14159265358979323846f
 #define TWO_PI_F 6.28318530717958647692f
 

@@ -38,7 +38,7 @@ static int32_t components_used(const gait_model *m, const gait_tracker_config *c
                                                                               : DEFAULT_COMPONENTS;
 }
 
-state_layout state_layout_init(const gait_model *m, const gait_tracker_config *cfg, const kernels *run)
+COLD state_layout state_layout_init(const gait_model *m, const gait_tracker_config *cfg, const kernels *run)
 {
     state_layout r = {.model = m,
                       .run = run,
@@ -95,7 +95,7 @@ static void pelvis_offset(const state_layout *r, const particle_state *w, float 
                        : root_channel(r->model, ROOT_HEIGHT, phase, pace, w->f + F_COEF, r->components));
 }
 
-gait_state particle_to_state(const state_layout *r, const particle_state *w)
+COLD gait_state particle_to_state(const state_layout *r, const particle_state *w)
 {
     gait_state s = {.phase = w->f[F_PHASE],
                     .stride_hz = w->f[F_RATE],
@@ -119,7 +119,7 @@ gait_state particle_to_state(const state_layout *r, const particle_state *w)
     return s;
 }
 
-particle_state particle_from_state(const state_layout *r, const gait_state *s)
+COLD particle_state particle_from_state(const state_layout *r, const gait_state *s)
 {
     particle_state w = {{0}};
     float sway, height, sn, cs;

@@ -4,7 +4,7 @@
 
 #include <string.h>
 
-void lift_table_layout(arena *a, lift_table *t)
+COLD void lift_table_layout(arena *a, lift_table *t)
 {
     const segment_prior *const p = &t->prior;
     size_t const frames = (size_t)p->components * (size_t)p->frames, points = frames * (size_t)p->markers;
@@ -58,7 +58,7 @@ static void set_frame(const lift_table *t, int32_t c, int32_t f, float *row, flo
                     *column++ = r < J ? segment_mode(&t->prior, c, i, f)[3 * t->order[r] + a] : 0.0f;
 }
 
-void lift_table_fill(lift_table *t)
+COLD void lift_table_fill(lift_table *t)
 {
     static const char *const trunk[4] = {"r_hip", "l_hip", "r_shoulder", "l_shoulder"};
     const segment_prior *const p = &t->prior;
@@ -281,8 +281,8 @@ typedef struct effects { /* displacement of a marker by one standard deviation o
 } effects;
 
 /* Effects of the unknowns on a marker, times P (3 x 3). */
-static void find_effects(const lift_table *t, const segment_posterior *b, const lift_axes *axes,
-                         const lift_marker *m, const double own[3], double P[3][3], effects *out)
+static COLD void find_effects(const lift_table *t, const segment_posterior *b, const lift_axes *axes,
+                              const lift_marker *m, const double own[3], double P[3][3], effects *out)
 {
     int32_t const k = t->prior.modes;
     double const away[2] = {own[0] - axes->place[0], own[1] - axes->place[1]};

@@ -4,7 +4,7 @@
 #include <string.h>
 
 /* Every channel of one body. */
-static void curves_at(const gait_model *m, const gait_state *s, float channel[MODEL_MAX_CHANNELS])
+static COLD void curves_at(const gait_model *m, const gait_state *s, float channel[MODEL_MAX_CHANNELS])
 {
     curves_part(m, s->phase, kin_pace(m, s->stride_hz), s->coef, 1, m->components, 0, m->channels, channel);
 }
@@ -43,7 +43,7 @@ bool kin_state_usable(const gait_state *s)
 }
 
 /* Curves of one body into channel, then its frames. */
-static void place_state(const gait_model *m, const gait_state *s, float *channel, kin_frames *out)
+static COLD void place_state(const gait_model *m, const gait_state *s, float *channel, kin_frames *out)
 {
     bodies const b = {.channel = channel,
                       .heading = &s->heading,
