@@ -62,7 +62,7 @@ typedef struct gait_box { GAIT_BOX_FIELDS(GAIT_DECLARE) } gait_box;
           float, speed, , "metres per second")                                                                        \
     FIELD("Its standard deviation.",                                                                                  \
           float, speed_sd, , "metres per second")                                                                     \
-    FIELD("Probability among the hypotheses found, in (0, 1].",                                                       \
+    FIELD("Probability among the hypotheses found, in [0, 1].",                                                       \
           float, probability, , "")                                                                                   \
     FIELD("Robust chi-square per coordinate: about 1 if the model fits.",                                             \
           float, chi2_per_observation, , "")                                                                          \
@@ -108,6 +108,13 @@ GAIT_API void        gait_start_reset(gait_start *s);
  * over config box_time.  GAIT_ERR_NUMERIC: nothing fits. */
 GAIT_API gait_result gait_start_solve(gait_start *s, int64_t utime, gait_hypothesis *out, int32_t capacity,
                                       int32_t *count, gait_error *err);
+/* Start a tracker from the hypotheses of gait_start_solve(), the most probable first: each gives particles in proportion
+ * to its probability, and the images of the next frames weigh them against each other and against nobody being there.
+ * Until they have decided the status is GAIT_TRACK_INIT.  Left out are hypotheses that are a hundred times less probable
+ * than the first, are of another place in the image, or differ in `in_place`.  Ranges as for gait_tracker_start();
+ * count is in [1, GAIT_START_MAX_HYPOTHESES]. */
+GAIT_API gait_result gait_tracker_start_hypotheses(gait_tracker *t, const gait_hypothesis *hypotheses, int32_t count,
+                                                   int64_t utime, gait_error *err);
 /* 1: a walk that fits the observations, good enough to start with.  0: the person may be standing, the direction may be
  * unknown, or the observations may be of something else. */
 GAIT_API int32_t     gait_hypothesis_walks(const gait_hypothesis *h);

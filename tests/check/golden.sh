@@ -1,5 +1,5 @@
 #!/bin/sh
-# The digests of the tracker (test_determinism, every film), the lifter and the start are those pinned in
+# The digests of the tracker (test_determinism, every film), the lifter and the starts are those pinned in
 # these tests at every optimisation level, with every compiler found and for every instruction set of the CPU, here
 # and on an emulated aarch64, where the tests of the kernels run as well.  What is missing is skipped and listed
 # at the end.
@@ -20,9 +20,9 @@ make_tests() { # CC BUILD_FOLDER OPT TEST...
     ${MAKE:-make} -s -j"$(getconf _NPROCESSORS_ONLN)" B="$folder" OPT="$opt" CC="$cc" \
         $(printf "$folder/unit/%s " "$@") >/dev/null || exit 1
 }
-# A line for each of the four instruction sets and each film: four of the tracker, one of lifter and start.
+# A line for each of the four instruction sets and each film: four of the tracker, one of the others.
 compare() { # CC BUILD_FOLDER OPT [RUNNER]
-    for part in determinism:16 lift_stream:4 start:4; do
+    for part in determinism:16 lift_stream:4 start:4 start_boxes:4 start_hypotheses:4; do
         test=test_${part%:*}
         make_tests "$1" "$2" "$3" $test
         output=$($4 "$2/unit/$test" digest)

@@ -106,7 +106,7 @@ int LLVMFuzzerTestOneInput(const uint8_t *data, size_t size)
         void *own = NULL;
         gait_tracker *const t = fuzz_tracker(shipped, &own);
         for (int32_t i = 0; i < count && t; i++)
-            if (gait_tracker_start(t, &h[i].mean, &h[i].sd, 0, NULL) != GAIT_OK)
+            if (gait_tracker_start_hypotheses(t, h + i, count - i, 0, NULL) != GAIT_OK)
                 abort();
         free(own);
     }

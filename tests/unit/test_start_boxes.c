@@ -1,7 +1,11 @@
-/* The automatic start from boxes and blobs: people of known place, direction, stature and speed are found. */
+/* The automatic start from boxes and blobs: people of known place, direction, stature and speed are found.
+ *
+ * With the argument `digest` it only prints those of a start (golden.h). */
+#include "base/hash.h"
 #include "base/rng.h"
 #include "check.h"
 #include "gait_start.h"
+#include "golden.h"
 #include "image/camera.h"
 #include "toy_model.h"
 
@@ -27,13 +31,14 @@ static gait_camera camera(void)
                          .t = {0.0f, 1.5f, 0.0f}};
 }
 
-static gait_start *start_new(void)
+static gait_start *start_new(uint32_t cpu_mask)
 {
     gait_start_config cfg;
     gait_start *s = NULL;
     size_t bytes = 0;
     gait_start_default(&cfg);
     cfg.camera = camera();
+    cfg.cpu_mask = cpu_mask;
     CHECK(gait_start_bytes(toy_model(), &cfg, &bytes, NULL) == GAIT_OK);
     void *const mem = aligned_alloc(GAIT_ALIGN, (bytes + GAIT_ALIGN - 1) / GAIT_ALIGN * GAIT_ALIGN);
     CHECK(gait_start_init(mem, bytes, toy_model(), &cfg, &s, NULL) == GAIT_OK);
@@ -58,9 +63,10 @@ static gait_box box_of(const walk *w, float t, uint32_t n)
     return b;
 }
 
-static int32_t find(const walk *w, int people, gait_hypothesis h[GAIT_START_MAX_HYPOTHESES])
+static int32_t find_by(uint32_t cpu_mask, const walk *w, int people,
+                       gait_hypothesis h[GAIT_START_MAX_HYPOTHESES])
 {
-    gait_start *const s = start_new();
+    gait_start *const s = start_new(cpu_mask);
     int32_t count = 0;
     for (int n = 0; n < FRAMES; n++) {
         gait_box b[2];
@@ -71,6 +77,11 @@ static int32_t find(const walk *w, int people, gait_hypothesis h[GAIT_START_MAX_
     CHECK(gait_start_solve(s, 0, h, GAIT_START_MAX_HYPOTHESES, &count, NULL) == GAIT_OK);
     free(s);
     return count;
+}
+
+static int32_t find(const walk *w, int people, gait_hypothesis h[GAIT_START_MAX_HYPOTHESES])
+{
+    return find_by(~0u, w, people, h);
 }
 
 static void test_headings(void)
@@ -126,7 +137,7 @@ static void draw(int x0, int x1, int y0, int y1, uint8_t value)
 
 static void test_blobs(void)
 {
-    gait_start *const s = start_new();
+    gait_start *const s = start_new(~0u);
     gait_image const scene = image_of(plate), frame = image_of(picture);
     gait_box b[3];
     int32_t count = -1, other = -1;
@@ -175,7 +186,7 @@ static void test_largest_change(void)
 
 static void test_refused(void)
 {
-    gait_start *const s = start_new();
+    gait_start *const s = start_new(~0u);
     gait_image small = image_of(picture), scene = image_of(plate);
     gait_box b = {.sd = NAN};
     gait_hypothesis h;
@@ -195,12 +206,32 @@ static void test_refused(void)
     free(s);
 }
 
-int main(void)
+/* ---- the same bits ---- */
+static uint64_t digest(uint32_t cpu_mask)
 {
+    walk const w[2] = {
+        {.heading = 0.5f, .speed = 1.2f, .stature = 1.7f, .x = -0.5f, .y = 5.0f, .noise = 1.0f},
+        {.stature = 1.8f, .x = 1.5f, .y = 6.0f, .noise = 1.0f}};
+    gait_hypothesis h[GAIT_START_MAX_HYPOTHESES];
+    memset(h, 0, sizeof h);
+    (void)find_by(cpu_mask, w, 2, h);
+    return hash_fnv1a(HASH_INIT, h, sizeof h);
+}
+
+#define GOLDEN UINT64_C(0x2f6e457b3dbd64db)
+
+int main(int argc, char **argv)
+{
+    if (argc == 2)
+        return strcmp(argv[1], "digest") == 0
+                   ? (golden_print(digest, GOLDEN, "start_boxes") + check_failed) != 0
+                   : 2;
     test_headings();
     test_one_stands_and_one_walks();
     test_blobs();
     test_largest_change();
     test_refused();
+    CHECK(golden_line(digest(0), GOLDEN, "start_boxes", "scalar") == GOLDEN);
+    CHECK(digest(~0u) == GOLDEN);
     return CHECK_DONE();
 }

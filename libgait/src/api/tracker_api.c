@@ -155,17 +155,41 @@ gait_result gait_tracker_prior(const gait_model *m, gait_state *mean, gait_state
     return gait_model_pelvis_height(m, mean, &mean->pelvis[2], err);
 }
 
+static gait_result check_start(const gait_state *mean, const gait_state *sd, gait_error *err)
+{
+    gait_result const s = fields_check("gait_state", mean, "start mean.", err);
+    return s == GAIT_OK ? fields_check_sd("gait_state", sd, MOST_SD, "start sd.", err) : s;
+}
+
 gait_result gait_tracker_start(gait_tracker *t, const gait_state *mean, const gait_state *sd, int64_t utime,
                                gait_error *err)
 {
     if (!t || !mean || !sd)
         return base_fail(err, GAIT_ERR_ARG, -1, "tracker, mean or sd is NULL");
-    gait_result s = fields_check("gait_state", mean, "start mean.", err);
+    gait_result const s = check_start(mean, sd, err);
+    gait_hypothesis const only = {.mean = *mean, .sd = *sd, .probability = 1.0f};
     if (s == GAIT_OK)
-        s = fields_check_sd("gait_state", sd, MOST_SD, "start sd.", err);
-    if (s == GAIT_OK)
-        tracker_start(t, mean, sd, utime);
+        tracker_start(t, &only, 1, true, utime);
     return s;
+}
+
+gait_result gait_tracker_start_hypotheses(gait_tracker *t, const gait_hypothesis *h, int32_t count,
+                                          int64_t utime, gait_error *err)
+{
+    if (!t || !h)
+        return base_null(err, "gait_tracker_start_hypotheses");
+    if (count < 1 || count > GAIT_START_MAX_HYPOTHESES)
+        return base_fail(err, GAIT_ERR_ARG, -1, "count = %d is outside [1, %d]", (int)count,
+                         GAIT_START_MAX_HYPOTHESES);
+    for (int32_t k = 0; k < count; k++) {
+        gait_result const s = check_start(&h[k].mean, &h[k].sd, err);
+        if (s != GAIT_OK)
+            return s;
+        if (!(h[k].probability >= 0.0f && h[k].probability <= 1.0f))
+            return base_fail(err, GAIT_ERR_ARG, k, "hypothesis %d: probability is outside [0, 1]", (int)k);
+    }
+    tracker_start(t, h, count, false, utime);
+    return GAIT_OK;
 }
 
 static gait_result check_frame(const gait_tracker *t, const gait_frame *frame, gait_error *err)

@@ -8,11 +8,14 @@
 static const float ACQUISITION_TIME = 0.5f; /* seconds until the phase is known modulo half a stride */
 static const float REFIT_TIME =
     0.4f; /* seconds in which both hypotheses find their own best before evidence counts */
+static const float AGREED = 0.9f; /* weight of one mode from which a start's hypotheses are decided */
 static const float JITTER_SCORE = 0.5f, JITTER_HEADING = 0.1f, JITTER_RATE = 0.02f,
                    JITTER_PHASE = 0.05f; /* sd */
 static const double REPORT_LOG_ODDS =
     4.5; /* from which left and right are reported as known: probability 0.99 */
 static const double MERGE_LOG_ODDS = 9.0; /* from which the other hypothesis is dropped */
+static const double NOBODY_LOG_ODDS =
+    3.0; /* of nobody over the person of a start that was found: probability 0.95 */
 
 /* ---- stages ---- */
 static float seconds_in_stage(const gait_tracker *t)
@@ -22,13 +25,29 @@ static float seconds_in_stage(const gait_tracker *t)
 
 static void enter(gait_tracker *t, int32_t stage)
 {
-    t->core->hypotheses = (hypotheses_state){
-        .stage = stage, .since = t->core->utime, .left_right_known = stage == HYPOTHESES_ONE};
+    t->core->hypotheses = (hypotheses_state){.stage = stage,
+                                             .since = t->core->utime,
+                                             .left_right_known = stage == HYPOTHESES_ONE,
+                                             .log_odds = t->core->found ? 0.0 : t->core->hypotheses.log_odds};
+}
+
+/* Share of its log-likelihood by which a frame counts, so many seconds after the last one: errors of the image terms are
+ * correlated over config evidence_time. */
+static float evidence_share(const gait_tracker *t, float seconds)
+{
+    float const time = t->cfg.evidence_time;
+    return seconds > 0.0f && seconds < time ? seconds / time : 1.0f;
 }
 
 void hypotheses_acquire(gait_tracker *t)
 {
     enter(t, t->cfg.mode == GAIT_MODE_PAPER ? HYPOTHESES_ONE : HYPOTHESES_ACQUISITION);
+}
+
+void hypotheses_compare(gait_tracker *t)
+{
+    hypotheses_acquire(t);
+    t->core->hypotheses.left_right_known = 1;
 }
 
 void hypotheses_settle(gait_tracker *t)
@@ -47,9 +66,33 @@ bool hypotheses_decided(const gait_tracker *t)
     return h->stage == HYPOTHESES_TWO && fabs(h->log_odds) > MERGE_LOG_ODDS;
 }
 
+void hypotheses_doubt(gait_tracker *t)
+{
+    t->core->hypotheses.log_odds = -NOBODY_LOG_ODDS;
+}
+
+bool hypotheses_prove(gait_tracker *t, float dt, float nats)
+{
+    hypotheses_state *const h = &t->core->hypotheses;
+    double const sum = nats == 0.0f ? 0.0 : h->log_odds + (double)(evidence_share(t, dt) * nats);
+    if (h->log_odds < 0.0)
+        h->log_odds = sum > 0.0 ? 0.0 : sum < -NOBODY_LOG_ODDS ? -NOBODY_LOG_ODDS : sum;
+    return h->log_odds >= 0.0;
+}
+
+bool hypotheses_agree(const gait_tracker *t, float weight)
+{
+    const hypotheses_state *const h = &t->core->hypotheses;
+    return h->stage == HYPOTHESES_ACQUISITION && h->left_right_known &&
+           (weight >= AGREED || seconds_in_stage(t) >= ACQUISITION_TIME);
+}
+
+/* The person is to be found first. */
 bool hypotheses_acquired(const gait_tracker *t)
 {
-    return t->core->hypotheses.stage == HYPOTHESES_ACQUISITION && seconds_in_stage(t) >= ACQUISITION_TIME;
+    const hypotheses_state *const h = &t->core->hypotheses;
+    return h->stage == HYPOTHESES_ACQUISITION && !h->left_right_known && h->log_odds >= 0.0 &&
+           seconds_in_stage(t) >= ACQUISITION_TIME;
 }
 
 bool hypotheses_open(const gait_tracker *t)
@@ -278,14 +321,6 @@ void hypotheses_split(gait_tracker *t)
 }
 
 /* ---- weights ---- */
-/* Share of its log-likelihood by which a frame counts, so many seconds after the last one: errors of the image terms are
- * correlated over config evidence_time. */
-static float evidence_share(const gait_tracker *t, float seconds)
-{
-    float const time = t->cfg.evidence_time;
-    return seconds > 0.0f && seconds < time ? seconds / time : 1.0f;
-}
-
 /* Each hypothesis has templates of its own, learnt from its heaviest particle. */
 static void learn_appearance(gait_tracker *t, int32_t hypothesis, int32_t best)
 {

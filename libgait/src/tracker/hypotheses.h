@@ -10,7 +10,8 @@
  * less, here as in the particles' weights, because their errors are correlated.
  *
  * Stages: after a start with an open phase HYPOTHESES_ACQUISITION finds the phase modulo half a stride, HYPOTHESES_TWO
- * decides between left and right, HYPOTHESES_ONE tracks. */
+ * decides between left and right, HYPOTHESES_ONE tracks.  After a start from several hypotheses with known phases,
+ * HYPOTHESES_ACQUISITION finds the right one and HYPOTHESES_ONE follows. */
 #ifndef GAIT_TRACKER_HYPOTHESES_H
 #define GAIT_TRACKER_HYPOTHESES_H
 #include "tracker/tracker_state.h"
@@ -18,8 +19,16 @@
 /* The phase is open: begin acquisition (in paper mode there is only one hypothesis). */
 void hypotheses_acquire(gait_tracker *t);
 
+/* Several hypotheses that know left and right: begin acquisition of the right one. */
+void hypotheses_compare(gait_tracker *t);
+
 /* Left and right are known: one hypothesis. */
 void hypotheses_settle(gait_tracker *t);
+
+/* Weigh the person against nobody, from even odds less the log odds of nobody before: add the log-likelihood ratio of a
+ * frame's images, 0 if they cannot tell, `dt` seconds after the last; true once the odds are even. */
+void hypotheses_doubt(gait_tracker *t);
+bool hypotheses_prove(gait_tracker *t, float dt, float nats);
 
 /* The person is lost: treat the particles as one set, redrawn as such. */
 void hypotheses_drop(gait_tracker *t);
@@ -27,6 +36,9 @@ void hypotheses_drop(gait_tracker *t);
 /* Whether the odds decide between the two; and drop the less probable one. */
 bool hypotheses_decided(const gait_tracker *t);
 void hypotheses_merge(gait_tracker *t);
+
+/* Whether the hypotheses of a start agree by now: this weight is in one mode. */
+bool hypotheses_agree(const gait_tracker *t, float weight);
 
 /* Whether acquisition has lasted long enough; and lay the particles out as two hypotheses.  The weights must be even, as after
  * resampling.  Clears the templates. */

@@ -112,6 +112,8 @@ body_evidence likelihood_of_particle(gait_tracker *t, const particle_state *p)
         like_body const b = likelihood_body(t, c, 0, 0, w, samples);
         like_parts const parts = like_silhouette_parts(&b);
         e.support += like_support(&b);
+        if (t->cfg.terms & GAIT_TERM_KEYPOINTS)
+            e.by_keypoints += t->like->weight[LIKE_KEYPOINTS] * like_keypoints.support(&b);
         e.parts.explained += parts.explained;
         e.parts.missed += parts.missed;
         e.chance += like_silhouette_chance(&b);

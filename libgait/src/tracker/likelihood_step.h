@@ -9,8 +9,9 @@ void likelihood_step(gait_tracker *t);
 typedef struct body_evidence { /* of one body, over all cameras */
     float
         support; /* log-likelihood with the body less that of an empty scene, nats; exactly 0 if no term applies */
-    like_parts parts; /* foreground explained and left over, nats */
-    float chance;     /* foreground that a body explains by chance, nats */
+    float by_keypoints; /* share of the keypoints in support */
+    like_parts parts;   /* foreground explained and left over, nats */
+    float chance;       /* foreground that a body explains by chance, nats */
 } body_evidence;
 
 /* Writes the body's surface samples to t->estimate_patch. */

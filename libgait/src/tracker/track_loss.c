@@ -122,6 +122,7 @@ track_loss_verdict track_loss_check(gait_tracker *t, bool lost, const particle_s
     track_loss_verdict v = {.support = whole  ? SUPPORT_WHOLE
                                        : part ? SUPPORT_PART
                                               : SUPPORT_NONE,
+                            .by_images = e.support - e.by_keypoints,
                             .usual_unexplained = core->usual_unexplained,
                             .phase_as_predicted = phase_as_predicted(t, gap, mean),
                             .phase_expired = gap > PHASE_TIME};

@@ -21,6 +21,7 @@ void track_loss_bound(gait_tracker *t);
 typedef enum track_loss_support { SUPPORT_NONE, SUPPORT_PART, SUPPORT_WHOLE } track_loss_support;
 typedef struct track_loss_verdict {
     track_loss_support support; /* SUPPORT_PART: only foreground that some parts of the body explain */
+    float by_images;            /* log-likelihood ratio of the images alone against an empty scene, nats */
     float usual_unexplained;    /* new value of the state's */
     bool phase_as_predicted;    /* the phase follows from that of the last supported estimate */
     bool phase_expired;         /* that one is too old to predict from */

@@ -1,6 +1,7 @@
 #include "tracker/tracker.h"
 #include "base/fmath.h"
 #include "filter/rejuvenation.h"
+#include "image/camera.h"
 #include "tracker/estimate.h"
 #include "tracker/features_step.h"
 #include "tracker/fixed_lag.h"
@@ -14,26 +15,59 @@ static const float SETTLE_TIME = 1.0f;    /* seconds after a start in which seve
 static const float PHASE_DEPARTURE =
     0.2f; /* strides from the predicted phase above which the track is ambiguous */
 static const double DEGENERATE_ESS = 2.0;
+static const float IMPROBABLE = 0.01f; /* hypotheses so much less probable than the first are left out */
+static const float BESIDE = 0.25f;     /* statures by which hypotheses that compete may stand side by side */
 
-void tracker_start(gait_tracker *t, const gait_state *mean, const gait_state *sd, int64_t utime)
+/* Whether another hypothesis competes with the first: it is not improbable, walks on the floor or on a belt as that one
+ * does, and is beside it in no image, so that one region of each shows both. */
+static bool competes(const gait_tracker *t, const gait_hypothesis *first, const gait_hypothesis *h)
+{
+    bool same = h->probability > IMPROBABLE * first->probability && h->in_place == first->in_place;
+    for (int32_t c = 0; c < t->cfg.cameras; c++) {
+        float a[3], b[3];
+        camera_to(&t->cfg.camera[c], first->mean.pelvis, a);
+        camera_to(&t->cfg.camera[c], h->mean.pelvis, b);
+        float const beside = a[0] * b[1] - a[1] * b[0], apart = BESIDE * h->mean.stature;
+        same &= beside * beside <= apart * apart * (a[0] * a[0] + a[1] * a[1]);
+    }
+    return same;
+}
+
+void tracker_start(gait_tracker *t, const gait_hypothesis *h, int32_t count, bool sure, int64_t utime)
 {
     tracker_core *const core = t->core;
+    const gait_hypothesis *from[GAIT_START_MAX_HYPOTHESES];
+    int32_t n = 0;
+    float total = 0.0f, drawn = 0.0f; /* probability */
+    bool known = true;
+    for (int32_t k = 0; k < count; k++)
+        if (k == 0 || competes(t, h, &h[k])) {
+            from[n++] = &h[k];
+            total += h[k].probability;
+            known &= h[k].sd.phase < KNOWN_PHASE_SD;
+        }
     tracker_clear(t);
     core->started = 1;
-    core->stature_sd_ratio = sd->stature / f_max(mean->stature, LEAST_STATURE);
+    core->stature_sd_ratio = h->sd.stature / f_max(h->mean.stature, LEAST_STATURE);
     core->utime = core->start_utime = core->support_utime = core->rejuvenation_utime = utime;
-    if (sd->phase < KNOWN_PHASE_SD)
-        hypotheses_settle(t);
-    else
+    if (!sure)
+        hypotheses_doubt(t);
+    if (!known)
         hypotheses_acquire(t);
+    else if (n > 1)
+        hypotheses_compare(t);
+    else
+        hypotheses_settle(t);
     tracker_set_count(t, tracker_count(t));
     tracker_even_weights(t);
-    core->last_supported = particle_from_state(&t->layout, mean);
-    core->reported_phase = mean->phase;
-    core->reported_rate = mean->stride_hz;
+    core->last_supported = particle_from_state(&t->layout, &h->mean);
+    core->reported_phase = h->mean.phase;
+    core->reported_rate = h->mean.stride_hz;
     dynamics const d = tracker_dynamics(t);
-    for (int32_t i = 0; i < t->cfg.particles; i++) {
-        particle_state const p = dynamics_draw(&d, mean, sd, i);
+    for (int32_t i = 0, k = -1; i < t->cfg.particles; i++) {
+        while (k + 1 < n && (k < 0 || ((float)i + 0.5f) * total > drawn * (float)t->cfg.particles))
+            drawn += from[++k]->probability;
+        particle_state const p = dynamics_draw(&d, &from[k]->mean, &from[k]->sd, i);
         particle_put(&t->particles, i, &p);
     }
 }
@@ -147,13 +181,14 @@ static uint32_t cameras_seeing(const gait_tracker *t)
 
 /* Record whether the frame supports the estimate.  When the person is found again, left and right are open unless the
  * phase is as predicted. */
-static void update_track_loss(gait_tracker *t, bool lost, const particle_state *mean)
+static void update_track_loss(gait_tracker *t, float dt, bool lost, const particle_state *mean)
 {
     tracker_core *const core = t->core;
     hypotheses_state *const h = &core->hypotheses;
     track_loss_verdict const v = track_loss_check(t, lost, mean);
     core->partly_hidden = v.support == SUPPORT_PART;
     core->usual_unexplained = v.usual_unexplained;
+    bool const proven = core->found || hypotheses_prove(t, dt, v.by_images);
     if (v.support == SUPPORT_NONE) {
         if (lost && (h->stage != HYPOTHESES_TWO || v.phase_expired))
             hypotheses_drop(t);
@@ -165,7 +200,7 @@ static void update_track_loss(gait_tracker *t, bool lost, const particle_state *
     core->front_back_margin = front_back_update(t, lost || !core->found, mean);
     core->support_utime = core->utime;
     core->last_supported = *mean;
-    core->found = 1;
+    core->found = proven;
 }
 
 static gait_track_status status_of(const gait_tracker *t, float dt, const gait_estimate *e)
@@ -239,7 +274,9 @@ void tracker_step(gait_tracker *t, const gait_frame *frame, gait_estimate *out)
     /* Estimate and track loss. */
     particle_state const mean = estimate_particles(t, s.best, &e);
     if (has_image)
-        update_track_loss(t, lost, &mean);
+        update_track_loss(t, dt, lost, &mean);
+    if (hypotheses_agree(t, e.hypothesis_weight))
+        hypotheses_settle(t);
     bool const degenerate = s.degenerate || s.ess < DEGENERATE_ESS;
     e.status = s.degenerate ? GAIT_TRACK_LOST : status_of(t, dt, &e);
     e.flags = (resampled ? GAIT_EST_RESAMPLED : 0) | (has_image ? 0 : GAIT_EST_NO_IMAGE) |

@@ -1,10 +1,12 @@
 /* tracker.h - start a tracker and step it: resample, rejuvenate, predict, extract features, weight, estimate. */
 #ifndef GAIT_TRACKER_TRACKER_H
 #define GAIT_TRACKER_TRACKER_H
+#include "gait_start.h"
 #include "tracker/tracker_state.h"
 
-/* Draw the particles around a person's expected state; arguments as for gait_tracker_start(), already checked. */
-void tracker_start(gait_tracker *t, const gait_state *mean, const gait_state *sd, int64_t utime);
+/* Draw the particles from hypotheses of a person's state, as many from each as it is probable; arguments as for
+ * gait_tracker_start_hypotheses(), already checked.  sure: somebody is there, as gait_tracker_start() assumes. */
+void tracker_start(gait_tracker *t, const gait_hypothesis *h, int32_t count, bool sure, int64_t utime);
 
 /* Process one frame, already checked. */
 void tracker_step(gait_tracker *t, const gait_frame *frame, gait_estimate *out);

@@ -16,8 +16,9 @@ typedef struct hypotheses_state {
     int32_t stage;
     int32_t left_right_known; /* left and right have been decided before */
     int64_t since;            /* when the stage began, microseconds */
-    double log_odds;          /* HYPOTHESES_TWO: of the second hypothesis over the first */
-    double recent_log_ratio;  /* the same over the last few frames and for all terms, nats */
+    double log_odds; /* until the person is found: of them over nobody, at most 0; HYPOTHESES_TWO: of the
+                                 second hypothesis over the first */
+    double recent_log_ratio; /* the same over the last few frames and for all terms, nats */
 } hypotheses_state;
 
 /* Saved and hashed in this order, followed by the arrays of gait_tracker up to state_end. */
@@ -29,11 +30,11 @@ typedef struct tracker_core {
     int32_t started;
     int32_t generation;       /* slot of the history that holds the current particles */
     uint32_t sampled_cameras; /* bit c: there are surface samples of camera c's previous frame */
-    int32_t found;            /* an image has supported the estimate since the start */
-    int32_t partly_hidden;    /* the last image supports only parts of the body */
-    float stature_sd_ratio;   /* standard deviation of stature at the start, fraction of the stature */
-    float usual_unexplained;  /* foreground that the estimate usually leaves unexplained, nats */
-    float front_back_margin;  /* running mean of front_back_score() */
+    int32_t found; /* since the start images have supported the estimate, against the odds of nobody */
+    int32_t partly_hidden;   /* the last image supports only parts of the body */
+    float stature_sd_ratio;  /* standard deviation of stature at the start, fraction of the stature */
+    float usual_unexplained; /* foreground that the estimate usually leaves unexplained, nats */
+    float front_back_margin; /* running mean of front_back_score() */
     double ess;
     hypotheses_state hypotheses;
     particle_state last_supported;       /* the estimate when an image last supported it */

@@ -1,0 +1,215 @@
+/* A tracker started from several hypotheses: the images choose between them, and against nobody.
+ *
+ * With the argument `digest` it only prints those of a run (golden.h). */
+#include "gait_start.h"
+#include "golden.h"
+#include "toy_film.h"
+#include "tracker/tracker.h"
+
+#include "check.h"
+
+enum { FRAMES = 40 };
+
+static gait_tracker_config config(void)
+{
+    gait_tracker_config cfg = toy_config(1);
+    cfg.acquisition_particles = 2 * cfg.particles;
+    return cfg;
+}
+
+/* The truth of the first frame. */
+static gait_hypothesis truth(float probability)
+{
+    return (gait_hypothesis){.mean = toy_walk(0.0f), .sd = toy_start_sd(1.0f), .probability = probability};
+}
+
+/* Half a stride ahead, or walking the other way. */
+static gait_hypothesis half_stride(float probability)
+{
+    gait_hypothesis h = truth(probability);
+    h.mean.phase = m_wrap1(h.mean.phase + 0.5f);
+    return h;
+}
+
+static gait_hypothesis other_way(float probability)
+{
+    gait_hypothesis h = truth(probability);
+    h.mean.heading = m_wrap_pi(h.mean.heading + PI_F);
+    return h;
+}
+
+static gait_tracker *begin(const gait_tracker_config *cfg, const gait_hypothesis *h, int32_t count)
+{
+    gait_tracker *const t = film_tracker(cfg, 0, 1.0f);
+    CHECK(gait_tracker_start_hypotheses(t, h, count, toy_frame(0).utime, NULL) == GAIT_OK);
+    return t;
+}
+
+/* Particles within a quarter of a stride and 90 degrees of a hypothesis. */
+static int particles_of(const gait_tracker *t, const gait_hypothesis *h)
+{
+    int n = 0;
+    for (int32_t i = 0; i < t->cfg.particles; i++) {
+        particle_state const p = particle_get(&t->particles, i);
+        n += fabsf(m_wrap_pi(TWO_PI_F * (p.f[F_PHASE] - h->mean.phase))) < 0.5f * PI_F &&
+             fabsf(m_wrap_pi(p.f[F_HEADING] - h->mean.heading)) < 0.5f * PI_F;
+    }
+    return n;
+}
+
+static void test_particles_follow_the_probabilities(void)
+{
+    gait_tracker_config const cfg = config();
+    gait_hypothesis h[] = {other_way(0.5f), truth(0.3f), half_stride(0.2f), half_stride(0.004f)};
+    gait_tracker *t = begin(&cfg, h, 4);
+    CHECK(t->cfg.particles == cfg.acquisition_particles); /* as long as several compete */
+    CHECK(abs(particles_of(t, &h[0]) - t->cfg.particles / 2) < 3);
+    CHECK(abs(particles_of(t, &h[1]) - t->cfg.particles * 3 / 10) < 3);
+    CHECK(abs(particles_of(t, &h[2]) - t->cfg.particles / 5) < 3);
+    toy_tracker_free(t);
+    h[1].in_place = 1;           /* cannot be tracked along with the first */
+    h[2].mean.pelvis[0] += 1.0f; /* outside of the region in which the first is looked for */
+    t = begin(&cfg, h, 4);
+    CHECK(t->cfg.particles == cfg.particles && particles_of(t, &h[0]) == cfg.particles);
+    toy_tracker_free(t);
+}
+
+/* The same bits as a start by hand. */
+static void test_one_is_a_start(void)
+{
+    gait_tracker_config const cfg = config();
+    gait_hypothesis const h = truth(1.0f);
+    gait_tracker *const a = begin(&cfg, &h, 1), *const b = film_tracker(&cfg, 0, 1.0f);
+    gait_estimate x, y;
+    for (int n = 0; n < FRAMES; n++) {
+        film_step(a, 1, n, 0, &x);
+        film_step(b, 1, n, 0, &y);
+        CHECK(!memcmp(&x.mean, &y.mean, sizeof x.mean) &&
+              (x.status == y.status || x.status == GAIT_TRACK_INIT));
+    }
+    CHECK(gait_tracker_digest(a) == gait_tracker_digest(b));
+    toy_tracker_free(a);
+    toy_tracker_free(b);
+}
+
+/* The right hypothesis is the least probable one. */
+static void test_images_choose(void)
+{
+    gait_tracker_config const cfg = config();
+    gait_hypothesis const h[] = {half_stride(0.5f), other_way(0.3f), truth(0.2f)};
+    gait_tracker *const t = begin(&cfg, h, 3);
+    gait_estimate e;
+    int tracked = 0;
+    for (int n = 0; n < FRAMES; n++) {
+        gait_state const now = toy_walk((float)n / 30.0f);
+        film_step(t, 1, n, 0, &e);
+        bool const right = fabsf(m_wrap_pi(TWO_PI_F * (e.mean.phase - now.phase))) < 0.6f &&
+                           fabsf(m_wrap_pi(e.mean.heading - now.heading)) < 0.5f;
+        tracked += e.status == GAIT_TRACK_TRACKING;
+        CHECK(e.status == GAIT_TRACK_INIT || right);
+    }
+    CHECK(tracked > FRAMES - 18 && t->core->hypotheses.stage == HYPOTHESES_ONE);
+    CHECK(t->cfg.particles == cfg.particles);
+    toy_tracker_free(t);
+}
+
+/* Clouds without a background, in which every other frame looks like a person somewhere: started by hand, the tracker
+ * reports `tracking` in most of them. */
+static void test_nobody(void)
+{
+    static uint8_t cloud[SCENE_PIXELS];
+    gait_tracker_config const cfg = config();
+    gait_hypothesis const h[] = {half_stride(0.5f), truth(0.5f)};
+    for (uint32_t seed = 0; seed < 4; seed++) {
+        gait_tracker *const t = toy_tracker_new(&cfg);
+        CHECK(gait_tracker_start_hypotheses(t, h, 1 + (int32_t)seed % 2, toy_frame(0).utime, NULL) ==
+              GAIT_OK);
+        for (int n = 0; n < FRAMES; n++) {
+            const uint8_t *const shots[SCENE_CAMERAS] = {cloud};
+            gait_estimate e;
+            for (uint32_t i = 0; i < SCENE_PIXELS; i++)
+                cloud[i] = (uint8_t)toy_cloud(100 * seed + (uint32_t)n / 2, i % SCENE_W, i / SCENE_W, 24);
+            toy_tracker_step(t, n, shots, &e);
+            CHECK(e.status == GAIT_TRACK_INIT || e.status == GAIT_TRACK_LOST);
+        }
+        toy_tracker_free(t);
+    }
+}
+
+/* With an open phase the search for it begins once the images show a person. */
+static void test_open_phase(void)
+{
+    gait_tracker_config const cfg = config();
+    gait_hypothesis h[] = {other_way(0.6f), truth(0.4f)};
+    h[0].sd.phase = h[1].sd.phase = 0.5f;
+    gait_tracker *const t = begin(&cfg, h, 2);
+    gait_estimate e;
+    CHECK(t->core->hypotheses.stage == HYPOTHESES_ACQUISITION && !t->core->hypotheses.left_right_known);
+    for (int n = 0; n < 55; n++) {
+        film_step(t, 1, n, 0, &e);
+        CHECK(n > 10 || e.status == GAIT_TRACK_INIT);
+    }
+    CHECK(t->core->found && fabsf(m_wrap_pi(e.mean.heading - toy_walk(0.0f).heading)) < 0.5f);
+    toy_tracker_free(t);
+}
+
+static void refuse(gait_hypothesis h, int32_t count, const char *text)
+{
+    gait_tracker_config const cfg = config();
+    gait_tracker *const t = toy_tracker_new(&cfg);
+    gait_error err = {0};
+    CHECK(gait_tracker_start_hypotheses(t, &h, count, 0, &err) == GAIT_ERR_ARG && strstr(err.text, text));
+    CHECK(!t->core->started);
+    toy_tracker_free(t);
+}
+
+static void test_refused(void)
+{
+    gait_hypothesis h = truth(-0.1f);
+    refuse(h, 1, "hypothesis 0: probability");
+    h.probability = NAN;
+    refuse(h, 1, "probability");
+    h = truth(1.0f);
+    refuse(h, 0, "count = 0 is outside [1, 8]");
+    refuse(h, 9, "count = 9");
+    h.mean.stature = 9.0f;
+    refuse(h, 1, "stature");
+    h = truth(1.0f);
+    h.sd.phase = -1.0f;
+    refuse(h, 1, "phase");
+    CHECK(gait_tracker_start_hypotheses(NULL, &h, 1, 0, NULL) == GAIT_ERR_ARG);
+}
+
+static uint64_t digest(uint32_t cpu_mask)
+{
+    gait_tracker_config cfg = config();
+    gait_hypothesis const h[] = {half_stride(0.5f), truth(0.3f), other_way(0.2f)};
+    cfg.cpu_mask = cpu_mask;
+    gait_tracker *const t = begin(&cfg, h, 3);
+    gait_estimate e;
+    for (int n = 0; n < 20; n++)
+        film_step(t, 1, n, 0, &e);
+    uint64_t const hash = gait_tracker_digest(t);
+    toy_tracker_free(t);
+    return hash;
+}
+
+#define GOLDEN UINT64_C(0xa6e05ff28fd9cb00)
+
+int main(int argc, char **argv)
+{
+    film_make(1, 55);
+    if (argc == 2)
+        return strcmp(argv[1], "digest") == 0
+                   ? (golden_print(digest, GOLDEN, "start_hypotheses") + check_failed) != 0
+                   : 2;
+    test_particles_follow_the_probabilities();
+    test_one_is_a_start();
+    test_images_choose();
+    test_nobody();
+    test_open_phase();
+    test_refused();
+    CHECK(golden_line(digest(0), GOLDEN, "start_hypotheses", "scalar") == GOLDEN);
+    CHECK(digest(~0u) == GOLDEN);
+    return CHECK_DONE();
+}
