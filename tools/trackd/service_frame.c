@@ -32,6 +32,20 @@ static void stop(service *s)
         s->idle = SERVICE_IDLE_START;
 }
 
+/* The tracker has started at a capture time. */
+static void run(service *s, const image_view *v, int64_t utime)
+{
+    s->last_utime = utime;
+    s->dropped_before = s->counts.dropped;
+    s->last_frame = v->frame;
+    s->last_arrived = v->utime;
+    s->missed = false;
+    s->steps = 0;
+    memset(s->past, 0xff, sizeof s->past); /* no step has such a number */
+    s->meter.running = false;
+    service_set_state(s, GAITMSG_STATUS_T_RUNNING, "tracking");
+}
+
 /* Begin to track if the frame of the start has arrived; true when the tracker runs. */
 static bool begin(service *s, const image_view *v)
 {
@@ -46,15 +60,7 @@ static bool begin(service *s, const image_view *v)
         service_complain(s, "%s", why.text);
         return false;
     }
-    s->last_utime = utime;
-    s->dropped_before = s->counts.dropped;
-    s->last_frame = v->frame;
-    s->last_arrived = v->utime;
-    s->missed = false;
-    s->steps = 0;
-    memset(s->past, 0xff, sizeof s->past); /* no step has such a number */
-    s->meter.running = false;
-    service_set_state(s, GAITMSG_STATUS_T_RUNNING, "tracking");
+    run(s, v, utime);
     return true;
 }
 
@@ -125,22 +131,21 @@ static bool observe(service *s, int64_t utime, const gait_image *frame)
 /* Look for a person to start with; true when the tracker has started with this frame. */
 static bool try_auto_start(service *s, const image_view *v, const gait_image *frame)
 {
-    gait_hypothesis h;
+    gait_hypothesis h[GAIT_START_MAX_HYPOTHESES];
     int32_t count = 0;
     if (!s->seek || !observe(s, v->utime, frame))
         return false;
     if (v->utime >= s->fitted && v->utime < s->fitted + FIT_PERIOD)
         return false;
     s->fitted = v->utime;
-    if (gait_start_solve(s->track.start, v->utime, &h, 1, &count, NULL) != GAIT_OK ||
-        !gait_hypothesis_walks(&h) || (h.in_place && s->track.config.belt == 0.0))
+    if (gait_start_solve(s->track.start, v->utime, h, GAIT_START_MAX_HYPOTHESES, &count, NULL) != GAIT_OK ||
+        !gait_hypothesis_walks(h) || (h->in_place && s->track.config.belt == 0.0) ||
+        gait_tracker_start_hypotheses(s->track.tracker, h, count, v->utime, NULL) != GAIT_OK)
         return false;
     gait_start_reset(s->track.start);
-    start_trigger_by_time(&s->start, &h.mean, &h.sd, v->utime);
-    if (!begin(s, v))
-        return false;
+    run(s, v, v->utime);
     log_line("person found at frame %" PRId64 ": x %.2f y %.2f m, heading %.0f degrees", v->frame,
-             (double)h.mean.pelvis[0], (double)h.mean.pelvis[1], (double)h.mean.heading * 57.29578);
+             (double)h->mean.pelvis[0], (double)h->mean.pelvis[1], (double)h->mean.heading * 57.29578);
     return true;
 }
 
