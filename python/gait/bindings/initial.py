@@ -9,6 +9,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from gait.bindings.model import Model
+from gait.bindings.start_fit import Hypothesis
 from gait.bindings.state import State, state_range
 from gait.errors import UserError
 from gait.io.fields import Fields, read_json
@@ -40,6 +41,8 @@ class Start:
         Stature that the pictures give, metres, if it contradicts the one in `mean`.
     in_place : bool
         The person walks in place, as on a treadmill.
+    hypotheses : tuple of Hypothesis
+        Between which the images are to choose, the most probable first; empty for a start that a user gives.
     """
 
     frame: int
@@ -47,6 +50,7 @@ class Start:
     sd: State
     apparent_stature: float | None = None
     in_place: bool = False
+    hypotheses: tuple[Hypothesis, ...] = ()
 
     @staticmethod
     def read(

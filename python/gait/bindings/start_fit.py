@@ -69,6 +69,18 @@ class Hypothesis:
     in_place: bool
     walks: bool
 
+    def to_c(self) -> abi.HypothesisC:
+        """Struct of the C library."""
+        return abi.HypothesisC(
+            mean=self.mean.to_c(),
+            sd=self.sd.to_c(),
+            speed=self.speed,
+            speed_sd=self.speed_sd,
+            probability=self.probability,
+            chi2_per_observation=self.chi2_per_observation,
+            in_place=self.in_place,
+        )
+
 
 class StartFit:
     """Fits a walk to keypoints of one person, or to boxes around people (``gait_start.h``).

@@ -95,12 +95,14 @@ class BoxStart:
         if at is None:
             return None
         try:
-            one = self._fit.solve(round(1e6 * at[1]))[0]
+            found = self._fit.solve(round(1e6 * at[1]))
         except GaitError:
             return None
         apparent = float(np.median(self._statures))
         sure = abs(apparent - self._expected) < _BEYOND * np.hypot(0.07, 0.03 * self._expected)
-        return Start(at[0], one.mean, one.sd, None if sure else apparent), one
+        one = found[0]
+        stature = None if sure else apparent
+        return Start(at[0], one.mean, one.sd, stature, hypotheses=tuple(found)), one
 
     def walks_in(self, frame: Frame) -> Start | None:
         """Start at a frame just observed, if a person walks in it."""

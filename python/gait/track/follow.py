@@ -117,7 +117,10 @@ class Follower:
         return self._plausibility.judged(frame, tracker.step(frame.image, utime, joints))
 
     def _start(self, tracker: Tracker, start: Start, utime: int) -> None:
-        tracker.start(start.mean, start.sd, utime)
+        if start.hypotheses:
+            tracker.start_hypotheses(start.hypotheses, utime)
+        else:
+            tracker.start(start.mean, start.sd, utime)
         self._plausibility.restart()
 
     def _earlier(self, start: Start, first: int) -> tuple[Start, dict[int, Estimate]]:
@@ -156,4 +159,4 @@ def _start_from(now: Estimate, frame: int, start: Start) -> Start:
         stature=max(now.sd.stature, DEFAULT_SD["stature_m"]),
         pelvis=np.maximum(now.sd.pelvis, DEFAULT_SD["pelvis"]),
     )
-    return replace(start, frame=frame, mean=now.mean, sd=sd)
+    return replace(start, frame=frame, mean=now.mean, sd=sd, hypotheses=())

@@ -122,8 +122,9 @@ def _fit_window(
             break
         fit.add(round(1e6 * time), by_frame[int(frame)])
     try:
-        hypothesis = fit.solve(round(1e6 * times[at]))[0]
+        found = fit.solve(round(1e6 * times[at]))
     except GaitError:
         return None
-    start = Start(int(frames[at]), hypothesis.mean, hypothesis.sd, in_place=hypothesis.in_place)
-    return start, hypothesis
+    best = found[0]
+    start = Start(int(frames[at]), best.mean, best.sd, in_place=best.in_place, hypotheses=tuple(found))
+    return start, best

@@ -15,6 +15,7 @@ from gait.bindings.estimate import Estimate
 from gait.bindings.frame import FrameKeypoints, capture_time, image_view, keypoint_array, per_camera
 from gait.bindings.library import aligned, call, library, make
 from gait.bindings.model import Model, camera_c
+from gait.bindings.start_fit import Hypothesis
 from gait.bindings.state import LEAST_STATURE, State
 from gait.camera.camera import Camera
 from gait.errors import GaitError, UserError
@@ -106,6 +107,24 @@ class Tracker:
         """
         self._call("start", mean.to_c(), sd.to_c(), capture_time(utime))
         self.start_stature_sd = sd.stature / max(mean.stature, LEAST_STATURE)
+
+    def start_hypotheses(self, hypotheses: Sequence[Hypothesis], utime: int = 0) -> None:
+        """Draw the particles from hypotheses of an automatic start, as many from each as it is probable.
+
+        Until images have decided between them, and against nobody being there, the status is ``INIT``.
+
+        Parameters
+        ----------
+        hypotheses : sequence of Hypothesis
+            The most probable first; those of another place in the image than the first, or of a walk in place
+            beside one along a path, are left out.
+        utime : int
+            Time of the first frame, microseconds.
+        """
+        array = (abi.HypothesisC * len(hypotheses))(*(one.to_c() for one in hypotheses))
+        self._call("start_hypotheses", array, len(array), capture_time(utime))
+        first = hypotheses[0]
+        self.start_stature_sd = first.sd.stature / max(first.mean.stature, LEAST_STATURE)
 
     def step(
         self,
