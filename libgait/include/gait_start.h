@@ -109,7 +109,7 @@ GAIT_API void        gait_start_reset(gait_start *s);
 GAIT_API gait_result gait_start_solve(gait_start *s, int64_t utime, gait_hypothesis *out, int32_t capacity,
                                       int32_t *count, gait_error *err);
 /* Start a tracker from the hypotheses of gait_start_solve(), the most probable first: each gives particles in proportion
- * to its probability, and the images of the next frames weigh them against each other and against nobody being there.
+ * to its probability, and the images of the next frames decide between them, and against an empty scene.
  * Until they have decided the status is GAIT_TRACK_INIT.  Left out are hypotheses that are a hundred times less probable
  * than the first, are of another place in the image, or differ in `in_place`.  Ranges as for gait_tracker_start();
  * count is in [1, GAIT_START_MAX_HYPOTHESES]. */

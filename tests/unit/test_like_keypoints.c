@@ -135,8 +135,8 @@ static void test_another_person(void)
                          .keypoints = true,
                          .others = 15,
                          .aside = aside[k]};
-        error const exchanged = follow(&g, &digest);
-        CHECK(exchanged.joint < 0.012 && exchanged.status[GAIT_TRACK_LOST] == 0);
+        error const e = follow(&g, &digest);
+        CHECK(e.joint < 0.012 && e.status[GAIT_TRACK_LOST] == 0);
     }
 }
 

@@ -170,7 +170,7 @@ static void test_blobs(void)
 /* White where the plate is black, in a picture that has become darker: the change exceeds 255. */
 static void test_largest_change(void)
 {
-    gait_start *const s = start_new();
+    gait_start *const s = start_new(~0u);
     gait_image const scene = image_of(plate), frame = image_of(picture);
     gait_box b;
     int32_t count = -1;

@@ -1,4 +1,4 @@
-/* A tracker started from several hypotheses: the images choose between them, and against nobody.
+/* A tracker started from several hypotheses: the images choose between them, and against no person.
  *
  * With the argument `digest` it only prints those of a run (golden.h). */
 #include "gait_start.h"
@@ -115,7 +115,7 @@ static void test_images_choose(void)
 
 /* Clouds without a background, in which every other frame looks like a person somewhere: started by hand, the tracker
  * reports `tracking` in most of them. */
-static void test_nobody(void)
+static void test_no_person(void)
 {
     static uint8_t cloud[SCENE_PIXELS];
     gait_tracker_config const cfg = config();
@@ -206,7 +206,7 @@ int main(int argc, char **argv)
     test_particles_follow_the_probabilities();
     test_one_is_a_start();
     test_images_choose();
-    test_nobody();
+    test_no_person();
     test_open_phase();
     test_refused();
     CHECK(golden_line(digest(0), GOLDEN, "start_hypotheses", "scalar") == GOLDEN);

@@ -14,8 +14,8 @@ static const float JITTER_SCORE = 0.5f, JITTER_HEADING = 0.1f, JITTER_RATE = 0.0
 static const double REPORT_LOG_ODDS =
     4.5; /* from which left and right are reported as known: probability 0.99 */
 static const double MERGE_LOG_ODDS = 9.0; /* from which the other hypothesis is dropped */
-static const double NOBODY_LOG_ODDS =
-    3.0; /* of nobody over the person of a start that was found: probability 0.95 */
+static const double PROOF =
+    3.0; /* against the person of an automatic start, until images show one: probability 0.95 */
 
 /* ---- stages ---- */
 static float seconds_in_stage(const gait_tracker *t)
@@ -66,9 +66,9 @@ bool hypotheses_decided(const gait_tracker *t)
     return h->stage == HYPOTHESES_TWO && fabs(h->log_odds) > MERGE_LOG_ODDS;
 }
 
-void hypotheses_doubt(gait_tracker *t)
+void hypotheses_require_proof(gait_tracker *t)
 {
-    t->core->hypotheses.log_odds = -NOBODY_LOG_ODDS;
+    t->core->hypotheses.log_odds = -PROOF;
 }
 
 bool hypotheses_prove(gait_tracker *t, float dt, float nats)
@@ -76,7 +76,7 @@ bool hypotheses_prove(gait_tracker *t, float dt, float nats)
     hypotheses_state *const h = &t->core->hypotheses;
     double const sum = nats == 0.0f ? 0.0 : h->log_odds + (double)(evidence_share(t, dt) * nats);
     if (h->log_odds < 0.0)
-        h->log_odds = sum > 0.0 ? 0.0 : sum < -NOBODY_LOG_ODDS ? -NOBODY_LOG_ODDS : sum;
+        h->log_odds = sum > 0.0 ? 0.0 : sum < -PROOF ? -PROOF : sum;
     return h->log_odds >= 0.0;
 }
 

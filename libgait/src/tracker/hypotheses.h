@@ -25,9 +25,10 @@ void hypotheses_compare(gait_tracker *t);
 /* Left and right are known: one hypothesis. */
 void hypotheses_settle(gait_tracker *t);
 
-/* Weigh the person against nobody, from even odds less the log odds of nobody before: add the log-likelihood ratio of a
- * frame's images, 0 if they cannot tell, `dt` seconds after the last; true once the odds are even. */
-void hypotheses_doubt(gait_tracker *t);
+/* The images have to show the person of an automatic start.  hypotheses_prove() adds to the log odds of a person over no
+ * person the log-likelihood ratio of a frame's images, `dt` seconds after the last; 0: no image term applies.  True once
+ * the odds are even, as they are from the beginning unless a proof is required. */
+void hypotheses_require_proof(gait_tracker *t);
 bool hypotheses_prove(gait_tracker *t, float dt, float nats);
 
 /* The person is lost: treat the particles as one set, redrawn as such. */

@@ -51,7 +51,7 @@ void tracker_start(gait_tracker *t, const gait_hypothesis *h, int32_t count, boo
     core->stature_sd_ratio = h->sd.stature / f_max(h->mean.stature, LEAST_STATURE);
     core->utime = core->start_utime = core->support_utime = core->rejuvenation_utime = utime;
     if (!sure)
-        hypotheses_doubt(t);
+        hypotheses_require_proof(t);
     if (!known)
         hypotheses_acquire(t);
     else if (n > 1)

@@ -16,7 +16,8 @@ typedef struct hypotheses_state {
     int32_t stage;
     int32_t left_right_known; /* left and right have been decided before */
     int64_t since;            /* when the stage began, microseconds */
-    double log_odds; /* until the person is found: of them over nobody, at most 0; HYPOTHESES_TWO: of the
+    double
+        log_odds; /* until the person is found: of a person over no person, at most 0; HYPOTHESES_TWO: of the
                                  second hypothesis over the first */
     double recent_log_ratio; /* the same over the last few frames and for all terms, nats */
 } hypotheses_state;
@@ -30,7 +31,7 @@ typedef struct tracker_core {
     int32_t started;
     int32_t generation;       /* slot of the history that holds the current particles */
     uint32_t sampled_cameras; /* bit c: there are surface samples of camera c's previous frame */
-    int32_t found; /* since the start images have supported the estimate, against the odds of nobody */
+    int32_t found; /* since the start images have supported the estimate, and shown that a person is there */
     int32_t partly_hidden;   /* the last image supports only parts of the body */
     float stature_sd_ratio;  /* standard deviation of stature at the start, fraction of the stature */
     float usual_unexplained; /* foreground that the estimate usually leaves unexplained, nats */

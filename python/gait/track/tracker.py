@@ -111,7 +111,7 @@ class Tracker:
     def start_hypotheses(self, hypotheses: Sequence[Hypothesis], utime: int = 0) -> None:
         """Draw the particles from hypotheses of an automatic start, as many from each as it is probable.
 
-        Until images have decided between them, and against nobody being there, the status is ``INIT``.
+        Until images have decided between them, and against an empty scene, the status is ``INIT``.
 
         Parameters
         ----------
