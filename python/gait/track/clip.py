@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -36,6 +37,8 @@ def track_clip(options: ClipOptions) -> dict[str, Any]:
     """
     scene = Scene.read(options)
     start = first_state(options, scene)
+    if start.in_place and options.background == "auto":
+        scene = replace(scene, plate=None)  # a median shows those who stay in place
     config = TrackerConfig.default(options.mode, seed=options.seed, belt=float(start.in_place))
     if options.particles is not None:
         config = config.replace(particles=options.particles)
