@@ -23,12 +23,12 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from gait.io.keypoints_file import Keypoints
+from gait.io.keypoints_file import LEAST_CONFIDENCE, Keypoints
 
 Array = NDArray[np.float64]
 
 FILE = Path(__file__).with_name("profile.json")
-LEG = 0.49  # of a person's height: hip to ankle
+LEG, TRUNK = 0.49, 0.28  # of a person's height: hip to ankle, shoulder to hip
 _ARMS = ("shoulder", "elbow", "wrist", "hip")
 _LASTS = 1.0  # seconds in which an error that lasts for a walk counts as one observation
 
@@ -86,13 +86,30 @@ def vectors(keypoints: Keypoints, name: str) -> Array:
 
 
 def picture_height(keypoints: Keypoints) -> Array:
-    """Height of the person in each frame (T,) from trunk and legs, pixels; the median where unknown."""
-    places = [
-        keypoints.names.index(f"{side}_{joint}") for joint in ("shoulder", "hip", "ankle") for side in "lr"
-    ]
-    shoulder, hip, ankle = keypoints.uv[:, places].reshape(-1, 3, 2, 2).mean(axis=2).swapaxes(0, 1)
-    height = (np.hypot(*(hip - shoulder).T) + np.hypot(*(ankle - hip).T)) / (0.28 + LEG)
+    """Height of the person in each frame (T,) from legs and, if known, trunk, pixels; the median where unknown."""
+    joints = ("shoulder", "hip", "ankle") if "l_shoulder" in keypoints.names else ("hip", "ankle")
+    places = [keypoints.names.index(f"{side}_{joint}") for joint in joints for side in "lr"]
+    middles = keypoints.uv[:, places].reshape(-1, len(joints), 2, 2).mean(axis=2)
+    length = np.hypot(*np.diff(middles, axis=1).T).sum(axis=0)
+    height = length / (LEG if len(joints) == 2 else TRUNK + LEG)
     return np.asarray(np.where(np.isfinite(height), height, np.nanmedian(height)))
+
+
+def frame_sd(keypoints: Keypoints, network: str = "full") -> Array:
+    """Give the standard deviations (T, J) of the errors in one frame, what lasts and what changes, pixels.
+
+    A detector whose profile is unknown is taken to err as `full` does, and a joint that is in no profile as
+    an elbow.
+    """
+    profile = load(network)
+    joints = [profile.get(name.partition("_")[2], profile["elbow"]) for name in keypoints.names]
+    return _pixels(keypoints, [float(np.hypot(joint.bias, joint.sd)) for joint in joints])
+
+
+def _pixels(keypoints: Keypoints, share: list[float]) -> Array:
+    """Standard deviations (T, J) in pixels of shares of the person's height, by confidence."""
+    sd = picture_height(keypoints)[:, None] * share
+    return np.asarray(sd / np.maximum(keypoints.confidence, LEAST_CONFIDENCE))
 
 
 def corrected(keypoints: Keypoints, network: str) -> Keypoints:
@@ -108,14 +125,13 @@ def corrected(keypoints: Keypoints, network: str) -> Keypoints:
     Returns
     -------
     Keypoints
-        With `sd` in pixels, such that frames count as independent.
+        With `frame_sd`, and with `sd` such that frames count as independent; pixels.
     """
     profile = load(network)
     step = float(np.median(np.diff(keypoints.time))) if len(keypoints.time) > 1 else _LASTS
-    height = picture_height(keypoints)
-    uv, sd = keypoints.uv.copy(), np.empty(keypoints.uv.shape[:2])
-    for j, name in enumerate(keypoints.names):
-        joint = profile[name.partition("_")[2]]
+    joints = [profile[name.partition("_")[2]] for name in keypoints.names]
+    uv = keypoints.uv.copy()
+    for j, (name, joint) in enumerate(zip(keypoints.names, joints, strict=True)):
         uv[:, j] += vectors(keypoints, name) @ np.array(joint.offset)
-        sd[:, j] = joint.effective_sd(step) * height / np.maximum(keypoints.confidence[:, j], 0.1)
-    return replace(keypoints, uv=uv, sd=sd)
+    sd = _pixels(keypoints, [joint.effective_sd(step) for joint in joints])
+    return replace(keypoints, uv=uv, sd=sd, frame_sd=frame_sd(keypoints, network))

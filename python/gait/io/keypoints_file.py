@@ -44,6 +44,8 @@ class Keypoints:
     #: (T, J) standard deviation along an axis of errors that last over frames, so large that frames may count
     #: as independent: pixels, NaN where unknown.  None: keypoints are as good as they are steady.
     sd: Array | None = None
+    #: (T, J) standard deviation along an axis of the errors in one frame, pixels.  None: unknown.
+    frame_sd: Array | None = None
 
     @property
     def visible(self) -> NDArray[np.bool_]:

@@ -13,7 +13,7 @@ from gait.bindings.initial import Start
 from gait.bindings.model import Model
 from gait.bindings.start_fit import Hypothesis, StartFit
 from gait.camera.camera import Camera
-from gait.detect.profile import LEG
+from gait.detect.profile import frame_sd
 from gait.errors import GaitError
 from gait.io.keypoints_file import Keypoints
 
@@ -21,35 +21,23 @@ _WINDOW = 1.0  # seconds of keypoints that are fitted
 _STEP = 0.2  # seconds from one window to the next
 _FITS_BEST = 4.0  # chi-square per coordinate up to which the best window is taken if no person walks in any
 _STATURE_SD = 0.05  # metres, of one that the user gives
-CUE_MISS = 0.01  # person's heights: the model's joints miss the detector's by this, in the likelihood
-
-_JOINT_SD = {"elbow": 0.02, "wrist": 0.04, "heel": 0.03, "toe": 0.04, "shoulder": 0.01, "hip": 0.01}
-"""Noise of a detector's joints without their difference to the model's, person's heights; others 0.01."""
 
 
-def keypoint_noise(keypoints: Keypoints, miss: float = 0.0) -> dict[int, FrameKeypoints]:
+def keypoint_noise(keypoints: Keypoints) -> dict[int, FrameKeypoints]:
     """Keypoints by frame, each with the standard deviation that its joint has.
 
     Parameters
     ----------
     keypoints : Keypoints
         Of one person.
-    miss : float
-        Difference between the model's joints and the detector's: standard deviation, person's heights in
-        the picture.
 
     Returns
     -------
     keypoints : dict of int to FrameKeypoints
         By number of the frame; pixels.  Joints that were not found have a negative standard deviation.
     """
-    legs = [keypoints.names.index(f"{side}_{joint}") for side in "lr" for joint in ("hip", "ankle")]
-    hip, ankle = keypoints.uv[:, legs[0::2]].mean(axis=1), keypoints.uv[:, legs[1::2]].mean(axis=1)
-    height = np.hypot(*(hip - ankle).T) / LEG  # of the person, pixels
-    height = np.where(np.isfinite(height), height, np.nanmedian(height))
-    share = np.array([_JOINT_SD.get(name.partition("_")[2], 0.01) for name in keypoints.names])
-    sd = height[:, None] * np.hypot(miss, share / np.maximum(keypoints.confidence, 0.1))
-    sd = np.where(np.isfinite(keypoints.uv).all(axis=2), sd, -1.0)
+    sd = frame_sd(keypoints) if keypoints.frame_sd is None else keypoints.frame_sd
+    sd = np.where(keypoints.visible, sd, -1.0)
     rows = zip(keypoints.frame.tolist(), keypoints.uv, sd, strict=True)
     return {frame: FrameKeypoints(keypoints.names, uv, noise) for frame, uv, noise in rows}
 

@@ -21,7 +21,7 @@ from gait.io.video import Image, Video, background
 from gait.progress import note, progress
 from gait.track.box_start import find_start
 from gait.track.from_walk import Calibration, calibrate, contradiction
-from gait.track.keypoint_start import CUE_MISS, find_keypoint_start, keypoint_noise
+from gait.track.keypoint_start import find_keypoint_start, keypoint_noise
 from gait.track.options import ClipOptions
 
 _COLOUR = 4.0  # grey levels between the channels of half of a picture in colour, at least
@@ -90,7 +90,7 @@ class Scene:
                 keypoints = {0: people[0].by_frame(options.keypoints_sd)}
             else:
                 people, person = _detect(options, video, frames)
-                keypoints = {id: keypoint_noise(found, CUE_MISS) for id, found in people.items()}
+                keypoints = {id: keypoint_noise(found) for id, found in people.items()}
             if median is not None:
                 plate = median.result()
         calibration = None
