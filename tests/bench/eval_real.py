@@ -26,7 +26,7 @@ from pathlib import Path
 import numpy as np
 import table
 from facts import facts
-from real_clip import KINDS, Clip, Score, contact_sheet, read_clips, score
+from real_clip import KINDS, Clip, Score, contact_sheet, read_cameras, read_clips, score
 
 from gait import Camera, Video
 from gait.io.track_file import read_estimates
@@ -99,7 +99,7 @@ def _run(clip: Clip, arm: str, extra: list[str]) -> Result:
     """Track a clip with `gait track` and score it."""
     name = clip.folder.name
     OUT.mkdir(parents=True, exist_ok=True)
-    out, found = OUT / f"{name}_{arm}.csv", OUT / f"{name}_{arm}_camera.json"
+    out, found, turned = (OUT / f"{name}_{arm}{end}" for end in (".csv", "_camera.json", "_cameras.csv"))
     given = clip.folder / "camera.json"
     options = {
         "auto": ["--camera", given],
@@ -107,8 +107,9 @@ def _run(clip: Clip, arm: str, extra: list[str]) -> Result:
         "known": ["--camera", given, "--init", clip.folder / "init.json"],
         "nocam": ["--height", clip.stature, "--camera-out", found],
     }[arm]
-    command = [sys.executable, "-m", "gait", "track", clip.video, "-o", out, "--quiet", *options, *extra]
-    for path in (out, found):
+    command = [sys.executable, "-m", "gait", "track", clip.video, "-o", out]
+    command += ["--cameras-out", turned, "--quiet", *options, *extra]
+    for path in (out, found, turned):
         path.unlink(missing_ok=True)
     before, begun = resource.getrusage(resource.RUSAGE_CHILDREN), time.perf_counter()
     done = subprocess.run([str(word) for word in command], capture_output=True, text=True, check=False)
@@ -119,8 +120,9 @@ def _run(clip: Clip, arm: str, extra: list[str]) -> Result:
         why = (done.stderr.strip().splitlines() or ["no message"])[-1]
         return Result(name, arm, Score({kind: float(kind == "none") for kind in KINDS}), cpu, np.nan, why)
     camera, track = Camera.read(str(found if arm == "nocam" else given), video.size), read_estimates(out)
-    contact_sheet(clip, track, camera, OUT / f"{name}_{arm}.png")
-    return Result(name, arm, score(clip, track, camera), cpu, video.count / wall)
+    cameras = read_cameras(turned, camera)
+    contact_sheet(clip, track, cameras, OUT / f"{name}_{arm}.png")
+    return Result(name, arm, score(clip, track, cameras), cpu, video.count / wall)
 
 
 def _missed(results: list[Result], everything: list[Result]) -> list[str]:

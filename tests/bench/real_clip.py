@@ -5,7 +5,8 @@ from __future__ import annotations
 import csv
 import json
 from collections import Counter
-from dataclasses import dataclass
+from collections.abc import Mapping
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 import cv2
@@ -115,8 +116,25 @@ def _read_reference(path: Path) -> dict[int, Points]:
     return found
 
 
-def score(clip: Clip, track: Track, camera: Camera) -> Score:
-    """Compare a track with the reference joints, in the frames of the clip that have them."""
+def read_cameras(path: Path, reference: Camera) -> dict[int, Camera]:
+    """Camera of each frame, from the file of ``gait track --cameras-out`` and the camera of the reference."""
+    return {
+        int(row["frame"]): replace(
+            reference,
+            fx=float(row["fx"]),
+            fy=float(row["fy"]),
+            R=np.array([float(row[f"r{i}{j}"]) for i in (1, 2, 3) for j in (1, 2, 3)]).reshape(3, 3),
+            t=np.array([float(row[f"t{axis}"]) for axis in "xyz"]),
+        )
+        for row in csv.DictReader(path.open())
+    }
+
+
+def score(clip: Clip, track: Track, cameras: Mapping[int, Camera]) -> Score:
+    """Compare a track with the reference joints, in the frames of the clip that have them.
+
+    `cameras` are those of the frames, by number.
+    """
     at = {frame: i for i, frame in enumerate(track.frame.tolist())}
     frames = [frame for frame in range(clip.first, clip.last + 1) if frame in clip.reference]
     kinds, errors, tracking, wrong = Counter[str](), [], 0, 0
@@ -124,7 +142,7 @@ def score(clip: Clip, track: Track, camera: Camera) -> Score:
         if frame not in at:
             kinds["none"] += 1
             continue
-        kind, error = _verdict(project(track, at[frame], camera), clip.reference[frame])
+        kind, error = _verdict(project(track, at[frame], cameras[frame]), clip.reference[frame])
         kinds[kind] += 1
         errors.append(error)
         if track.status[at[frame]] == "tracking":
@@ -182,7 +200,7 @@ def project(track: Track, row: int, camera: Camera) -> Points:
     return {name: at for name, at in zip(names, uv, strict=True) if np.isfinite(at).all()}
 
 
-def contact_sheet(clip: Clip, track: Track, camera: Camera, out: Path) -> None:
+def contact_sheet(clip: Clip, track: Track, cameras: Mapping[int, Camera], out: Path) -> None:
     """Write a picture of frames over the whole clip: the track's bones, and the reference joints as dots."""
     at = {frame: i for i, frame in enumerate(track.frame.tolist())}
     chosen = set(np.linspace(clip.first, clip.last, _TILES).round().astype(int).tolist())
@@ -193,7 +211,7 @@ def contact_sheet(clip: Clip, track: Track, camera: Camera, out: Path) -> None:
         canvas, points = frame.image.copy(), clip.reference.get(frame.number, {})
         status = "no row"
         if frame.number in at:
-            draw_bones(canvas, project(track, at[frame.number], camera), 2)
+            draw_bones(canvas, project(track, at[frame.number], cameras[frame.number]), 2)
             status = track.status[at[frame.number]]
         for place in points.values():
             cv2.circle(canvas, (round(place[0]), round(place[1])), 3, (255, 60, 255), -1)

@@ -15,6 +15,7 @@ import eval_real
 import real_clip
 
 CAMERA = Camera.looking((7.0, -6.0, 1.5), (2.6, -0.7, 0.9), (640, 480), 500.0)
+CAMERAS = dict.fromkeys(TRUTH.frame.tolist(), CAMERA)
 OTHER = {"l": "r", "r": "l"}
 
 
@@ -50,34 +51,34 @@ def clip(**changes):
 
 
 def test_the_truth_is_good_and_on_time():
-    score = real_clip.score(clip(), track(), CAMERA)
+    score = real_clip.score(clip(), track(), CAMERAS)
     assert score.share == {"good": 1.0, "swap": 0.0, "legs": 0.0, "off": 0.0, "none": 0.0}
     assert (score.tracking, score.wrong) == (100, 0)
     assert score.error < 1e-6 and abs(score.stride_error) < 1e-6 and score.strike_error < 1e-3
 
 
 def test_a_track_elsewhere_is_wrong_only_under_tracking():
-    away = real_clip.score(clip(), track(move=1.0), CAMERA)
+    away = real_clip.score(clip(), track(move=1.0), CAMERAS)
     assert away.share["off"] == 1.0 and away.wrong == 100
-    lost = real_clip.score(clip(), track(move=1.0, status=["lost"] * 100), CAMERA)
+    lost = real_clip.score(clip(), track(move=1.0, status=["lost"] * 100), CAMERAS)
     assert lost.share["off"] == 1.0 and (lost.tracking, lost.wrong) == (0, 0)
 
 
 def test_swapped_legs_are_a_swap_where_they_are_apart():
-    score = real_clip.score(clip(reference=reference(swapped=True)), track(), CAMERA)
+    score = real_clip.score(clip(reference=reference(swapped=True)), track(), CAMERAS)
     assert score.share["swap"] > 0.5 and score.wrong == round(100 * (1 - score.share["good"]))
 
 
 def test_frames_that_are_not_in_the_track_count():
     half = {frame: points for frame, points in reference().items() if frame < 50}
-    assert real_clip.score(clip(reference=half), track(), CAMERA).share["good"] == 1.0
+    assert real_clip.score(clip(reference=half), track(), CAMERAS).share["good"] == 1.0
     truth = replace(
         TRUTH,
         frame=TRUTH.frame[:50],
         time=TRUTH.time[:50],
         places={name: at[:50] for name, at in TRUTH.places.items()},
     )
-    score = real_clip.score(clip(), track(truth), CAMERA)
+    score = real_clip.score(clip(), track(truth), CAMERAS)
     assert score.share["none"] == 0.5 and score.share["good"] == 0.5
 
 

@@ -56,6 +56,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     values.add_camera(parser, "; without it the camera is found from the walk, which needs --height")
     values.add_fov(parser)
     add("--camera-out", metavar="CAM.json", help="also write the camera, found or given")
+    add("--cameras-out", metavar="CAMERAS.csv", help="also write each frame's camera, for one that turns")
     add("-o", "--output", required=True, metavar="OUT.csv", help="the track")
     values.add_model(parser)
     values.add_clip(parser, "track")
@@ -87,6 +88,13 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         help=f"their standard deviation at full confidence, the difference between the detector's joints and "
         f"the model's included (default: {KEYPOINTS_SD:g})",
     )
+    add(
+        "--stabilize",
+        choices=["auto", "off"],
+        default="off",
+        help="auto: undo the motion of a camera that turns; joints are then in the scene's frame, the given "
+        "camera is that of the frame that is named (default: off)",
+    )
     add("--overlay", metavar="O.mp4", help="also draw the estimates into the video")
     add(
         "--smooth", action="store_true", help="estimate each frame from the whole clip, later frames included"
@@ -112,7 +120,7 @@ def run(args: argparse.Namespace) -> int:
     if args.camera and args.fov:
         raise UsageError("--fov: is for a camera that is found; leave out --camera or --fov")
     require_outputs(
-        (args.output, args.camera_out, args.overlay, args.trc, args.draws),
+        (args.output, args.camera_out, args.cameras_out, args.overlay, args.trc, args.draws),
         (args.video, args.camera, args.model, args.init, args.background, args.keypoints),
     )
     given = {name: getattr(args, name) for name in ClipOptions.__dataclass_fields__}

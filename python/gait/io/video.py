@@ -6,7 +6,7 @@ PyAV and OpenCV are imported where they are used, so that pictures can be tracke
 from __future__ import annotations
 
 import os
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Collection, Iterator, Sequence
 from contextlib import ExitStack
 from fractions import Fraction
 from pathlib import Path
@@ -26,6 +26,7 @@ Image = NDArray[np.uint8]
 """A picture: (height, width) grey or (height, width, 3) BGR, uint8."""
 
 _CHUNK_BYTES = 100_000_000  # of pictures kept at a time when they are read backwards
+SAMPLES = 40  # frames of a clip whose median is the empty scene
 _CONTAINERS = (".mp4", ".mkv", ".mov")
 
 
@@ -37,6 +38,8 @@ class Frame(NamedTuple):
     time: float
     """Presentation time since the first frame of the file, seconds."""
     image: Image
+    captured: Image | None = None
+    """The picture as captured, if `image` is another one made of it."""
 
     @property
     def utime(self) -> int:
@@ -85,6 +88,14 @@ class Video:
         for index, time, frame in self._decode(stop):
             if index >= start:
                 yield Frame(index, time, _upright(frame, pixels))
+
+    def pick(self, wanted: Collection[int], progress: Callable[[int], None] | None = None) -> Iterator[Frame]:
+        """Yield the frames with the numbers `wanted`, as BGR; `progress` as in `sample_frames`."""
+        for index, time, frame in self._decode(None):
+            if index in wanted:
+                yield Frame(index, time, _upright(frame, "bgr24"))
+            if progress is not None:
+                progress(index)
 
     def backwards(self, stop: int, start: int = 0) -> Iterator[Frame]:
         """Yield the frames `start` <= index < `stop` from the last to the first, as BGR.
@@ -210,23 +221,34 @@ class VideoWriter:
         return stream
 
 
-def median_plate(video: Video, samples: int = 40, progress: Callable[[int], None] | None = None) -> Image:
+def sample_frames(
+    video: Video, samples: int = SAMPLES, progress: Callable[[int], None] | None = None
+) -> list[Frame]:
+    """Read `samples` frames spread evenly over the clip.
+
+    `progress` is called with the index of each frame decoded.
+    """
+    wanted = set(np.linspace(0, video.count - 1, min(samples, video.count)).round().astype(int).tolist())
+    return list(video.pick(wanted, progress))
+
+
+def median(images: Sequence[Image]) -> Image:
+    """Median of pictures of one size, pixel by pixel."""
+    plate = np.empty_like(images[0])
+    for row in range(plate.shape[0]):  # row by row: a median of the whole stack would need it twice in memory
+        plate[row] = np.median([image[row] for image in images], axis=0)
+    return plate
+
+
+def median_plate(
+    video: Video, samples: int = SAMPLES, progress: Callable[[int], None] | None = None
+) -> Image:
     """Empty scene as the temporal median of `samples` frames spread evenly over the clip, BGR.
 
     Right where every pixel shows the background in more than half of the samples: a static camera and a
     person who walks through.  `progress` is called with the index of each frame decoded.
     """
-    wanted = set(np.linspace(0, video.count - 1, min(samples, video.count)).round().astype(int).tolist())
-    picked = []
-    for frame in video.frames():
-        if frame.number in wanted:
-            picked.append(frame.image)
-        if progress is not None:
-            progress(frame.number)
-    plate = np.empty_like(picked[0])
-    for row in range(plate.shape[0]):  # row by row: a median of the whole stack would need it twice in memory
-        plate[row] = np.median([image[row] for image in picked], axis=0)
-    return plate
+    return median([frame.image for frame in sample_frames(video, samples, progress)])
 
 
 def read_plate(path: str | os.PathLike[str], size: tuple[int, int]) -> Image:

@@ -2,21 +2,24 @@
 
 from __future__ import annotations
 
+import csv
 import time
 from collections.abc import Callable, Iterable
 from contextlib import ExitStack
 from itertools import groupby
+from pathlib import Path
 from typing import Any
 
 import numpy as np
 
 from gait.bindings.abi import TrackStatus
 from gait.bindings.estimate import Estimate
+from gait.bindings.model import Model
 from gait.camera.camera import write_camera
 from gait.errors import UserError
 from gait.io.files import replacing
 from gait.io.track_file import TrackWriter
-from gait.io.video import Frame, Video, VideoWriter
+from gait.io.video import Frame, Image, Video, VideoWriter
 from gait.progress import durations, progress
 from gait.report.drawing import Overlay
 from gait.track.from_walk import Calibration
@@ -117,14 +120,14 @@ def write(
     with ExitStack() as stack:
         rows = TrackWriter(options.output, model.info.components, model.joint_names, model.angle_names)
         if options.camera_out:
-            write_camera(stack.enter_context(replacing(options.camera_out)), scene.camera)
+            write_camera(stack.enter_context(replacing(options.camera_out)), scene.reference_camera)
+        if options.cameras_out:
+            _write_cameras(stack.enter_context(replacing(options.cameras_out)), scene)
         sinks: list[Sink] = [results.add, _widened(stack.enter_context(rows).write, scene.calibration)]
         if options.overlay:
             film = stack.enter_context(VideoWriter(options.overlay, video.fps))
-            overlay = Overlay(model, tracker.cameras[0])
-            sinks.append(
-                lambda frame, estimate: film.write(overlay.draw(frame.image, estimate, frame.number))
-            )
+            draw = _drawing(model, scene)
+            sinks.append(lambda frame, estimate: film.write(draw(frame, estimate)))
         smoother = None
         if options.smooth:
             smoother = stack.enter_context(Smoother(tracker))
@@ -139,6 +142,30 @@ def write(
         if not results.times:
             raise UserError(f"{video.path}: no frame from {span.start} on can be decoded; convert it anew")
     return results
+
+
+def _write_cameras(path: Path, scene: Scene) -> None:
+    """Write the camera of each frame as captured: frame, fx fy cx cy, R by rows, t."""
+    with path.open("w", newline="") as file:
+        rows = csv.writer(file)
+        names = [f"r{row}{column}" for row in (1, 2, 3) for column in (1, 2, 3)]
+        rows.writerow(["frame", "fx", "fy", "cx", "cy", *names, "tx", "ty", "tz"])
+        for number in scene.frames:
+            one = scene.camera_at(number)
+            values = [one.fx, one.fy, one.cx, one.cy, *one.R.ravel(), *one.t]
+            rows.writerow([number, *(f"{value:.9g}" for value in values)])
+
+
+def _drawing(model: Model, scene: Scene) -> Callable[[Frame, Estimate], Image]:
+    """Return a function that draws an estimate into a frame as captured."""
+    overlay = Overlay(model, scene.camera)
+
+    def draw(frame: Frame, estimate: Estimate) -> Image:
+        if frame.captured is None:
+            return overlay.draw(frame.image, estimate, frame.number)
+        return Overlay(model, scene.camera_at(frame.number)).draw(frame.captured, estimate, frame.number)
+
+    return draw
 
 
 def _widened(sink: Sink, calibration: Calibration | None) -> Sink:

@@ -293,6 +293,11 @@ def make_camera(q: Array, size: tuple[int, int]) -> Camera:
     )
 
 
+def usual_camera(size: tuple[int, int], fov: float | None = None) -> Camera:
+    """Make the camera expected before anything is known, `fov` as in `calibrate`."""
+    return make_camera(_Prior.of(size, fov).mean, size)
+
+
 class _Body:
     """Joints of the model over the stride, statures, linear in scores and proportions; pelvis at (0, 0)."""
 

@@ -21,6 +21,8 @@ class ClipOptions:
         Its camera file; the camera is found from the walk if left out, which needs `height` and keypoints.
     camera_out : str, optional
         File to write the camera to.
+    cameras_out : str, optional
+        File to write the camera of each frame to; they differ if the camera turns.
     fov : float, optional
         Horizontal field of view, degrees, for a camera that is found.
     model : str, optional
@@ -41,6 +43,8 @@ class ClipOptions:
         File of 2-D keypoints found in the frames, instead of a detector.
     keypoints_sd : float
         Their standard deviation at full confidence, pixels.
+    stabilize : str
+        ``auto``: undo the turns of the camera; ``off``: take it for one that stands still.
     overlay, draws, trc : str, optional
         Further files to write.
     smooth : bool
@@ -57,6 +61,7 @@ class ClipOptions:
     background: str = "auto"
     height: float | None = None
     camera_out: str | None = None
+    cameras_out: str | None = None
     fov: float | None = None
     mode: Mode = Mode.DEFAULT
     particles: int | None = None
@@ -67,6 +72,7 @@ class ClipOptions:
     detector: str = "auto"
     keypoints: str | None = None
     keypoints_sd: float = KEYPOINTS_SD
+    stabilize: str = "off"
     overlay: str | None = None
     smooth: bool = False
     draws: str | None = None

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass, replace
 
@@ -17,12 +18,13 @@ from gait.detect import weights
 from gait.errors import UserError
 from gait.io import keypoints_file
 from gait.io.keypoints_file import Keypoints
-from gait.io.video import Image, Video, background
+from gait.io.video import Frame, Image, Video, background, median, sample_frames
 from gait.progress import note, progress
 from gait.track.box_start import find_start
-from gait.track.from_walk import Calibration, calibrate, contradiction
+from gait.track.from_walk import Calibration, calibrate, contradiction, usual_camera
 from gait.track.keypoint_start import find_keypoint_start, keypoint_noise
 from gait.track.options import ClipOptions
+from gait.track.stabilise import SteadyVideo, find_motion, moves
 
 _COLOUR = 4.0  # grey levels between the channels of half of a picture in colour, at least
 
@@ -38,6 +40,8 @@ class Scene:
     model : Model
     plate : image or None
         The empty scene.
+    steady : SteadyVideo or None
+        `video` if the camera turns; its frames are then as the camera of one of them would see them.
     frames : range
         Frames to track.
     people : dict of int to Keypoints
@@ -54,11 +58,21 @@ class Scene:
     camera: Camera
     model: Model
     plate: Image | None
+    steady: SteadyVideo | None
     frames: range
     people: dict[int, Keypoints]
     person: int
     keypoints: dict[int, dict[int, FrameKeypoints]]
     calibration: Calibration | None
+
+    @property
+    def reference_camera(self) -> Camera:
+        """Camera of the captured picture; if the camera turns, of the reference frame."""
+        return self.camera if self.steady is None else self.steady.reference(self.camera)
+
+    def camera_at(self, number: int) -> Camera:
+        """Camera of a frame as captured."""
+        return self.camera if self.steady is None else self.steady.camera_at(number, self.camera)
 
     @staticmethod
     def read(options: ClipOptions) -> Scene:
@@ -78,26 +92,86 @@ class Scene:
                 _read_start(options, video, camera, model)  # refused before the work on the whole clip
         frames = clip_frames(video, options.start or 0, options.stop)
         _require_detector(options)
+        given = None if options.background in ("auto", "none") else background(options.background, video)
         with ThreadPoolExecutor(1) as pool:
             # The median of the clip is computed on another core while the detector runs.
-            beside = options.background == "auto" and _detects(options)
-            median = pool.submit(background, "auto", video) if beside else None
-            if median is None:
+            beside = pool.submit(_sample, options, video) if _detects(options) else None
+            if beside is None:
                 with progress("background", video.count, options.quiet) as update:
-                    plate = background(options.background, video, update)
+                    samples, plate = _sample(options, video, update)
             if options.keypoints:
                 people, person = {0: _read_keypoints(options, model, frames)}, 0
-                keypoints = {0: people[0].by_frame(options.keypoints_sd)}
             else:
                 people, person = _detect(options, video, frames)
-                keypoints = {id: keypoint_noise(found) for id, found in people.items()}
-            if median is not None:
-                plate = median.result()
+            if beside is not None:
+                samples, plate = beside.result()
+        captured, plate = video, plate if given is None else given
+        steady = _stabilise(options, video, camera, samples, people, given)
+        if steady is not None:
+            video, plate = steady, _steady_plate(options, steady, plate)
+            people = {id: steady.keypoints(found) for id, found in people.items()}
         calibration = None
         if camera is None:
-            calibration = _calibrate(options, video, model, people.get(person))
+            calibration = _calibrate(options, captured, model, _in_reference(steady, people.get(person)))
             camera = calibration.camera
-        return Scene(video, camera, model, plate, frames, people, person, keypoints, calibration)
+        if steady is not None:
+            camera = steady.extended(camera)
+        if options.keypoints:
+            keypoints = {id: found.by_frame(options.keypoints_sd) for id, found in people.items()}
+        else:
+            keypoints = {id: keypoint_noise(found) for id, found in people.items()}
+        return Scene(video, camera, model, plate, steady, frames, people, person, keypoints, calibration)
+
+
+def _sample(
+    options: ClipOptions, video: Video, update: Callable[[int], None] | None = None
+) -> tuple[list[Frame], Image | None]:
+    """Frames over the clip, as far as they are needed, and their median if that is the background."""
+    if options.background != "auto" and options.stabilize == "off":
+        return [], None
+    samples = sample_frames(video, progress=update)
+    return samples, median([frame.image for frame in samples]) if options.background == "auto" else None
+
+
+def _stabilise(
+    options: ClipOptions,
+    video: Video,
+    camera: Camera | None,
+    samples: list[Frame],
+    people: dict[int, Keypoints],
+    given: Image | None,
+) -> SteadyVideo | None:
+    """Undo the turns of the camera, if asked to; None if it stands still or they cannot be undone."""
+    camera = camera or usual_camera(video.size, options.fov)
+    if options.stabilize == "off":
+        if samples and moves(camera, samples, people, given):
+            note("the camera moves during the clip; --stabilize auto undoes its turns", options.quiet)
+        return None
+    with progress("camera's motion", video.count, options.quiet) as update:
+        motion, why = find_motion(video, camera, samples, people, given, update)
+    if why:
+        note(f"{why}; frames are not stabilised", options.quiet)
+    if motion is None:
+        return None
+    place = "the background" if given is not None else f"frame {motion.reference}"
+    note(
+        f"the camera turned by up to {motion.furthest():.0f} px: frames are stabilised on {place}, for which "
+        "camera and places hold",
+        options.quiet,
+    )
+    return SteadyVideo(video, motion, samples)
+
+
+def _steady_plate(options: ClipOptions, steady: SteadyVideo, plate: Image | None) -> Image | None:
+    """Background of the stabilised frames."""
+    if plate is None:
+        return None
+    return steady.plate if options.background == "auto" else steady.place(plate)
+
+
+def _in_reference(steady: SteadyVideo | None, keypoints: Keypoints | None) -> Keypoints | None:
+    """Keypoints in a picture of the size of the captured ones."""
+    return keypoints if steady is None or keypoints is None else steady.of_reference(keypoints)
 
 
 def _calibrate(options: ClipOptions, video: Video, model: Model, keypoints: Keypoints | None) -> Calibration:
@@ -203,8 +277,9 @@ def _check_camera(options: ClipOptions, scene: Scene, start: Start | None) -> No
     if options.camera is None or options.height is None:
         return
     appears = None if start is None else start.mean.stature
-    keypoints = scene.people[scene.person]
-    if words := contradiction(scene.camera, appears, keypoints, scene.model, options.height):
+    keypoints = _in_reference(scene.steady, scene.people[scene.person])
+    assert keypoints is not None
+    if words := contradiction(scene.reference_camera, appears, keypoints, scene.model, options.height):
         note(f"{options.camera}: {words}", options.quiet)
 
 

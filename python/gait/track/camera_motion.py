@@ -1,0 +1,235 @@
+"""How a camera turns and zooms during a clip, measured on the static scene.
+
+Corners of a key frame are tracked into later frames (pyramidal Lucas-Kanade).  A camera that turns about its
+lens moves them as the homography K' Q K^-1, whatever their distance.  Three angles and a zoom are fitted with
+Tukey's weights, so that people and things that move do not count.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from dataclasses import dataclass, replace
+
+import cv2
+import numpy as np
+from numpy.typing import NDArray
+
+from gait.camera.camera import Camera
+from gait.io.video import Image
+
+Array = NDArray[np.float64]
+Box = tuple[float, float, float, float]
+"""Left, top, right, bottom, pixels."""
+
+_SIDE = 640  # pixels of the longer side of the pictures in which corners are tracked, at most
+_CELLS = 18  # cells along it; one corner from each, so that a thing with much texture has no larger share
+_EDGE = 8  # pixels from the picture's edge without corners
+_CORNER = 3e-4  # least smaller eigenvalue of a corner's gradients, as cornerMinEigenVal gives it
+_WINDOW, _LEVELS = (21, 21), 3  # of Lucas-Kanade
+_FEWEST = 20  # corners that agree, at least
+_STILL = 0.75  # pixels by which a corner of a still camera moves at most, from noise and compression
+_SHARE = 0.3  # of the corners that must agree, at least
+_SPREAD = 0.2  # area over which they lie, against corners all over the picture, at least
+_FEW_LEFT = 0.5  # share of a key frame's corners below which a new key frame is taken
+_TUKEY, _SHARPEST, _BLUNTEST = 4.685, 0.15, 2.0  # standard deviations to weight 0; least and most sd, pixels
+_ZOOM = 1e-4  # variance of the logarithm of the zoom
+_ITERATIONS, _COARSE = 20, 4  # of the fit; the first ones with the sd of all corners
+
+
+@dataclass(frozen=True)
+class View:
+    """Where a camera looks in a frame, against the reference.
+
+    Attributes
+    ----------
+    turn : ndarray of shape (3, 3)
+        From the axes of the camera in the reference to those in the frame.
+    zoom : float
+        Focal length over that in the reference.
+    residual : float
+        Robust standard deviation of the corners about it, pixels; NaN if no view was found in the frame.
+    """
+
+    turn: Array
+    zoom: float = 1.0
+    residual: float = 0.0
+
+    def after(self, other: View) -> View:
+        """View of the same frame against the reference of `other`, a view of this one's reference."""
+        return View(self.turn @ other.turn, self.zoom * other.zoom, self.residual)
+
+    def inverse(self) -> View:
+        """View of the reference against the frame."""
+        return replace(self, turn=self.turn.T, zoom=1 / self.zoom)
+
+    def camera(self, reference: Camera) -> Camera:
+        """Camera of the frame in the same world as that of the reference."""
+        R, t = self.turn @ reference.R, self.turn @ reference.t
+        return replace(reference, R=R, t=t, fx=self.zoom * reference.fx, fy=self.zoom * reference.fy)
+
+
+UNMOVED = View(np.eye(3))
+
+
+def map_pixels(pixels: Array, source: Camera, target: Camera) -> Array:
+    """Pixels (..., 2) of `source` as `target` sees the same directions from the same place."""
+    return target.project(target.centre + source.rays(pixels))
+
+
+class CameraMotion:
+    """Finds the view of each frame of one camera.
+
+    Parameters
+    ----------
+    camera : Camera
+        Of the reference, which is the first frame.
+
+    Attributes
+    ----------
+    scale : float
+        Size of the pictures used over that of the frames.
+    untextured : int
+        How often too few corners agreed, or only those of one thing in the picture.
+    """
+
+    def __init__(self, camera: Camera) -> None:
+        self.scale = min(1.0, _SIDE / max(camera.size))
+        self._camera = replace(camera.scaled(self.scale), R=np.eye(3), t=np.zeros(3))
+        self.untextured = 0
+        self._last = self._key_view = UNMOVED
+        self._key = self._previous = np.zeros((0, 0), np.uint8)
+        self._people: Iterable[Box] = ()
+        self._corners = np.zeros((0, 2), np.float32)
+
+    def start(self, image: Image, people: Iterable[Box] = ()) -> None:
+        """Take the reference, (h, w) grey or (h, w, 3) BGR, with boxes of people in it."""
+        self._set_key(self._small(image), people, UNMOVED)
+
+    def still(self, image: Image) -> bool:
+        """Whether the camera looks as in the key frame."""
+        after = self._track(self._small(image), UNMOVED)
+        if after is None:
+            return False
+        off = np.hypot(*(after - self._corners)[np.isfinite(after[:, 0])].T)
+        return bool((off < _STILL).mean() > _SHARE)
+
+    def step(self, image: Image, people: Iterable[Box] = ()) -> View:
+        """Find the view of the next frame; where that fails it is the last one, with residual NaN."""
+        small = self._small(image)
+        found, seen = self._match(small)
+        if seen < _FEW_LEFT:
+            self._set_key(self._previous, self._people, self._last)
+            again, _ = self._match(small)
+            found = again or found
+        view = found or replace(self._last, residual=np.nan)
+        self._last, self._previous, self._people = view, small, people
+        return replace(view, residual=view.residual / self.scale)
+
+    def _small(self, image: Image) -> Image:
+        grey = image if image.ndim == 2 else cv2.cvtColor(image, cv2.COLOR_BGR2GRAY)
+        if self.scale < 1:
+            grey = cv2.resize(grey, self._camera.size, interpolation=cv2.INTER_AREA)
+        return np.asarray(grey, np.uint8)
+
+    def _set_key(self, small: Image, people: Iterable[Box], view: View) -> None:
+        self._key, self._key_view = small, view
+        self._previous, self._people = small, people
+        self._corners = _corners(small, self.scale * np.array(list(people)).reshape(-1, 4))
+
+    def _match(self, small: Image) -> tuple[View | None, float]:
+        """View of a picture, if enough corners agree, and the share of them that are still seen."""
+        guess = self._last.after(self._key_view.inverse())
+        after = self._track(small, guess)
+        if after is None:
+            self.untextured += 1
+            return None, 0.0
+        seen = np.isfinite(after[:, 0])
+        places = after[seen].astype(float)
+        view, agree = fit_view(self._camera, self._corners[seen].astype(float), places, guess)
+        enough = agree.sum() >= _FEWEST and self._spread(places[agree])
+        self.untextured += not enough
+        found = enough and agree.mean() > _SHARE and view.residual < _BLUNTEST
+        return view.after(self._key_view) if found else None, agree.sum() / len(after)
+
+    def _spread(self, places: Array) -> bool:
+        """Whether pixels (N, 2) lie all over the picture, not on one thing in it."""
+        width, height = self._camera.size
+        return bool(np.linalg.det(np.cov(places.T)) > (_SPREAD * width * height / 12) ** 2)
+
+    def _track(self, small: Image, guess: View) -> NDArray[np.float32] | None:
+        """Places (N, 2) of the key frame's corners, NaN where they are not seen; None if too few are."""
+        if len(self._corners) < _FEWEST:
+            return None
+        expected = map_pixels(self._corners.astype(float), self._camera, guess.camera(self._camera))
+        places, found, _ = cv2.calcOpticalFlowPyrLK(
+            self._key,
+            small,
+            self._corners[:, None],
+            np.ascontiguousarray(expected[:, None], np.float32),
+            winSize=_WINDOW,
+            maxLevel=_LEVELS,
+            flags=cv2.OPTFLOW_USE_INITIAL_FLOW,
+        )
+        after = np.asarray(places[:, 0], np.float32)
+        inside = ((after > 2) & (after < np.array(self._camera.size) - 3)).all(axis=1)
+        after[(found[:, 0] == 0) | ~inside] = np.nan
+        return after if np.isfinite(after[:, 0]).sum() >= _FEWEST else None
+
+
+def _corners(grey: Image, people: Array) -> NDArray[np.float32]:
+    """Best corner (N, 2) of each cell of a grid, not in boxes (K, 4) of people."""
+    strength = cv2.cornerMinEigenVal(grey, 7)
+    for left, top, right, bottom in np.maximum(people, 0).astype(int):
+        strength[top:bottom, left:right] = 0
+    inner = strength[_EDGE:-_EDGE, _EDGE:-_EDGE]
+    side = max(grey.shape) / _CELLS
+    rows, columns = (np.arange(0, size, side).astype(int) for size in inner.shape)
+    found = []
+    for top in rows:
+        for left in columns:
+            cell = inner[top : top + int(side), left : left + int(side)]
+            v, u = np.unravel_index(cell.argmax(), cell.shape)
+            if cell[v, u] > _CORNER:
+                found.append((_EDGE + left + u, _EDGE + top + v))
+    return np.array(found, np.float32).reshape(-1, 2)
+
+
+def fit_view(
+    camera: Camera, before: Array, after: Array, start: View = UNMOVED
+) -> tuple[View, NDArray[np.bool_]]:
+    """Fit a view to points that moved from `before` to `after`, pixels (N, 2), N > 1.
+
+    Gauss-Newton with Tukey's weights from `start` on.  Also returns which points (N,) agree.
+    """
+    rays, view, sd = replace(camera, R=np.eye(3), t=np.zeros(3)).rays(before), start, np.inf
+    off = np.zeros(len(before))
+    for iteration in range(_ITERATIONS):
+        expected, slope = _motion(rays, view, camera)
+        miss = after - expected
+        off = np.hypot(*miss.T)
+        near = off if iteration < _COARSE else off[off < _TUKEY * sd]
+        spread = float(np.median(near)) / 1.177 if len(near) else np.inf  # of two normal coordinates
+        sd = max(_SHARPEST, spread if iteration < _COARSE else min(sd, spread))
+        weight = np.square(np.clip(1 - np.square(off / (_TUKEY * sd)), 0, None))
+        normal = np.einsum("nki,n,nkj->ij", slope, weight, slope)
+        right = np.einsum("nki,n,nk->i", slope, weight, miss)
+        normal[3, 3] += 1 / _ZOOM
+        right[3] -= np.log(view.zoom) / _ZOOM
+        step = np.linalg.solve(normal + 1e-6 * np.eye(4), right)
+        view = View(cv2.Rodrigues(step[:3])[0] @ view.turn, view.zoom * float(np.exp(step[3])), sd)
+        if iteration > _COARSE and np.abs(step).max() < 1e-7:
+            break
+    return view, off < _TUKEY * sd
+
+
+def _motion(rays: Array, view: View, camera: Camera) -> tuple[Array, Array]:
+    """Pixels (N, 2) of rays (N, 3) in a view, and their derivatives (N, 2, 4) by three angles and log zoom.
+
+    The derivatives leave out the lens distortion.
+    """
+    turned = rays @ view.turn.T
+    one = replace(view.camera(camera), R=np.eye(3), t=np.zeros(3))
+    x, y = (turned[:, :2] / turned[:, 2:]).T
+    across = one.fx * np.stack([-x * y, 1 + x * x, -y, x], axis=1)
+    down = one.fy * np.stack([-(1 + y * y), x * y, x, y], axis=1)
+    return one.project(turned), np.stack([across, down], axis=1)
