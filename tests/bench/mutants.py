@@ -277,7 +277,7 @@ MUTANTS = (
     ),
     Mutant(
         "O 12",
-        "visible and occluded are exchanged",
+        "visible and occluded are swapped",
         "libgait/src/likelihood/texture_kernel.c",
         "m_log(q * m_exp(f_clamp(d, -30.0f, 30.0f)) + (1.0f - q));",
         "m_log((1.0f - q) * m_exp(f_clamp(d, -30.0f, 30.0f)) + q);",
