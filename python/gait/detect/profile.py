@@ -86,7 +86,7 @@ def vectors(keypoints: Keypoints, name: str) -> Array:
 
 
 def picture_height(keypoints: Keypoints) -> Array:
-    """Height of the person in each frame (T,) from legs and, if known, trunk, pixels; the median where unknown."""
+    """Height of the person in each frame (T,) from legs and trunk, pixels; the median where unknown."""
     joints = ("shoulder", "hip", "ankle") if "l_shoulder" in keypoints.names else ("hip", "ankle")
     places = [keypoints.names.index(f"{side}_{joint}") for joint in joints for side in "lr"]
     middles = keypoints.uv[:, places].reshape(-1, len(joints), 2, 2).mean(axis=2)
@@ -107,7 +107,7 @@ def frame_sd(keypoints: Keypoints, network: str = "full") -> Array:
 
 
 def _pixels(keypoints: Keypoints, share: list[float]) -> Array:
-    """Standard deviations (T, J) in pixels of shares of the person's height, by confidence."""
+    """Give the standard deviations (T, J) in pixels of shares of the person's height, by confidence."""
     sd = picture_height(keypoints)[:, None] * share
     return np.asarray(sd / np.maximum(keypoints.confidence, LEAST_CONFIDENCE))
 
