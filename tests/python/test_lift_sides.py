@@ -32,9 +32,10 @@ def places(time):
 
 
 def model(keypoints):
-    """Log density of keypoints by one who knows how these legs swing."""
-    square = ((keypoints.uv - places(keypoints.time)) ** 2).sum(axis=2) / NOISE**2
-    return -0.5 * float(np.nansum(np.minimum(square, 50)))
+    """Log density of keypoints by one who knows how these legs swing, and where they then are."""
+    expected = places(keypoints.time)
+    square = ((keypoints.uv - expected) ** 2).sum(axis=2) / NOISE**2
+    return -0.5 * float(np.nansum(np.minimum(square, 50))), expected
 
 
 def swapped(keypoints, first, last, left=LEFT, right=RIGHT):
@@ -95,18 +96,36 @@ def test_outliers_do_not_hide_a_swap():
 def test_the_motion_decides():
     """What goes on better swapped stays where the motion does not fit better for it."""
     spoilt = swapped(walking(), 30, 50)
-    back, found = undo_swaps(spoilt, NOISE, lambda keypoints: 0.0)
+    back, found = undo_swaps(spoilt, NOISE, lambda keypoints: (0.0, keypoints.uv))
     assert found == []
     np.testing.assert_array_equal(back.uv, spoilt.uv)
+
+
+def test_what_the_motion_explains_no_better_is_not_tried():
+    """The motion is fitted with and without the proposal; nothing else may gain."""
+    tried = []
+
+    def counted(keypoints):
+        tried.append(keypoints)
+        return model(keypoints)
+
+    undo_swaps(swapped(walking(), 30, 50), NOISE, counted)
+    assert len(tried) == 2
 
 
 def test_what_fits_hardly_better_stays():
     """Each pair has to gain `CLEAR` nats: two here."""
     right = walking()
     spoilt = swapped(right, 30, 50)
-    gain = model(right) - model(spoilt)
+    gain = model(right)[0] - model(spoilt)[0]
     for nats, put in ((0.7 * 2 * CLEAR, False), (1.5 * 2 * CLEAR, True)):
-        _, found = undo_swaps(spoilt, NOISE, lambda keypoints, share=nats / gain: share * model(keypoints))
+        share = nats / gain
+
+        def scaled(keypoints, share=share):
+            density, expected = model(keypoints)
+            return share * density, expected
+
+        _, found = undo_swaps(spoilt, NOISE, scaled)
         assert bool(found) == put
 
 

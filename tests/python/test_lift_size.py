@@ -38,7 +38,7 @@ def walk():
 
 def drawn(prior, around, rng):
     """Motion drawn from the chain of a person of known stature on a known floor, (grid, J, 3)."""
-    found = chain.chain(prior, around, Freedom(STATURE, 1e-4, 1e-4))
+    found = chain.chain(chain.Prior(prior), around, Freedom(STATURE, 1e-4, 1e-4))
     information = found.information
     count, size_ = information.vector.shape
     full = np.zeros((count, size_, count, size_))

@@ -204,7 +204,7 @@ def _without_swaps(
         motion.require(prior, keypoints, view, options)
     with one_thread(), progress("sides", len(keypoints.time), quiet) as update:
 
-        def evidence(part: Keypoints) -> float:
+        def evidence(part: Keypoints) -> tuple[float, swaps.Floats]:
             update(int(np.searchsorted(keypoints.frame, part.frame[0])))
             return motion.evidence(prior, part, view, options)
 

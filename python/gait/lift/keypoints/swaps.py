@@ -201,8 +201,8 @@ NEAR = 0.5  # seconds between intervals that are judged as one
 LIMBS = (("hip", "knee", "ankle", "heel", "toe"), ("shoulder", "elbow", "wrist", "hand"))
 CLEAR = 9.0  # log-evidence that an swap must gain, each pair
 
-#: Log density of keypoints by the model of motion.
-Evidence = Callable[[Keypoints], float]
+#: Log density of keypoints by the model of motion, and where it expects them (T, P, 2).
+Evidence = Callable[[Keypoints], tuple[float, Floats]]
 
 
 @dataclass(frozen=True)
@@ -229,7 +229,8 @@ def undo_swaps(keypoints: Keypoints, sd: float, evidence: Evidence) -> tuple[Key
     sd : float
         Noise of a point at full confidence, pixels.
     evidence : callable
-        Logarithm of the density of some frames of keypoints by a model of the motion, but for a constant.
+        Logarithm of the density of some frames of keypoints by a model of the motion, but for a constant, and
+        where that motion has the points.
     """
     joints = [
         name[2:] for name in keypoints.names if name.startswith("l_") and f"r_{name[2:]}" in keypoints.names
@@ -244,9 +245,8 @@ def undo_swaps(keypoints: Keypoints, sd: float, evidence: Evidence) -> tuple[Key
     for first, end in list(_intervals(keypoints, wrong)):
         part = _around(keypoints, first, end)
         own = slice(first - part.start, end - part.start)
-        wrong[first:end] = _judged(_rows(steady, part), pairs, wrong[part], observed[part], own, evidence)[
-            own
-        ]
+        shown = _rows(steady, part), pairs, observed[part]
+        wrong[first:end] = _judged(*shown, wrong[part], own, sd, evidence)[own]
     found = [
         Swapped(joint, _spans(keypoints.frame[observed[:, k]], wrong[observed[:, k], k]))
         for k, joint in enumerate(joints)
@@ -320,32 +320,46 @@ def _swapped(keypoints: Keypoints, pairs: Ints, wrong: Flags) -> Keypoints:
 
 
 def _judged(
-    keypoints: Keypoints, pairs: Ints, wrong: Flags, observed: Flags, own: slice, evidence: Evidence
+    keypoints: Keypoints,
+    pairs: Ints,
+    observed: Flags,
+    wrong: Flags,
+    own: slice,
+    sd: float,
+    evidence: Evidence,
 ) -> Flags:
     """Take in `own` rows of a proposal (T, P) what the motion confirms: all or nothing, then each limb.
 
-    Where something was swapped, other pairs may have been along with it for as long.
+    Where something was swapped, other pairs may have been along with it for as long.  What the best motion so
+    far explains no better than before is not tried.
     """
-    known: dict[bytes, float] = {}
+    sds = keypoints.standard_deviations(sd)
 
-    def score(flags: Flags) -> float:
-        key = flags.tobytes()
-        if key not in known:
-            known[key] = evidence(_swapped(keypoints, pairs, flags))
-            known[key] -= CLEAR * int(flags[own].any(axis=0).sum())
-        return known[key]
+    def score(flags: Flags) -> tuple[float, Floats]:
+        density, predicted = evidence(_swapped(keypoints, pairs, flags))
+        return density - CLEAR * int(flags[own].any(axis=0).sum()), predicted
+
+    def misfit(flags: Flags) -> float:
+        off = _swapped(keypoints, pairs, flags).uv - predicted
+        return float(np.nansum(np.minimum(0.5 * (off**2).sum(axis=2) / sds**2, CAP)))
 
     best = wrong.copy()
     best[own] = False
-    most = score(best)
-    if (proposed := score(wrong)) > most:
-        best, most = wrong.copy(), proposed
+    most, predicted = score(best)
+    proposed = score(wrong)
+    if proposed[0] > most:
+        best, (most, predicted) = wrong.copy(), proposed
     for limb in _limbs(keypoints, pairs):
         for flags in _others(best[own], wrong[own], observed[own], limb):
             other = best.copy()
             other[own] = flags
-            if (other != best).any() and (changed := score(other)) > most:
-                best, most = other, changed
+            if (other == best).all() or (other == wrong).all():
+                continue
+            if best.any() and not misfit(other) < misfit(best):
+                continue
+            changed = score(other)
+            if changed[0] > most:
+                best, (most, predicted) = other, changed
     return best
 
 

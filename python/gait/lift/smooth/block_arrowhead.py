@@ -14,7 +14,7 @@ from dataclasses import dataclass
 
 import numpy as np
 import numpy.typing as npt
-from scipy.linalg import LinAlgError, lapack, solve_triangular
+from scipy.linalg import LinAlgError, blas, lapack
 
 Floats = npt.NDArray[np.float64]
 
@@ -39,28 +39,33 @@ class Factor:
         """Logarithm of the determinant of the information matrix."""
         return 2 * float(np.log(np.diagonal(self.lower, axis1=1, axis2=2)).sum())
 
+    def forward(self, right: Floats) -> Floats:
+        """Multiply (B, n, c) by the inverse of the factor."""
+        result = np.empty(right.shape)
+        for s, lower in enumerate(self.lower):
+            rest = right[s] if s == 0 else right[s] - self.below[s - 1] @ result[s - 1]
+            result[s] = blas.dtrsm(1.0, lower, rest, lower=1)
+        return result
+
+    def backward(self, right: Floats) -> Floats:
+        """Multiply (B, n, c) by the inverse of the factor's transpose."""
+        result = np.empty(right.shape)
+        for s in reversed(range(len(right))):
+            rest = right[s] if s + 1 == len(right) else right[s] - self.below[s].T @ result[s + 1]
+            result[s] = blas.dtrsm(1.0, self.lower[s], rest, lower=1, trans_a=1)
+        return result
+
     def solve(self, vector: Floats) -> Floats:
         """Mean (B, n, c) of Gaussians with information vectors (B, n, c)."""
-        result = np.empty_like(vector)
-        for s, lower in enumerate(self.lower):
-            rest = vector[s] if s == 0 else vector[s] - self.below[s - 1] @ result[s - 1]
-            result[s] = solve_triangular(lower, rest, lower=True, check_finite=False)
-        for s in reversed(range(len(vector))):
-            rest = result[s]
-            if s + 1 < len(vector):
-                rest = rest - self.below[s].T @ result[s + 1]
-            result[s] = solve_triangular(self.lower[s], rest, lower=True, trans=1, check_finite=False)
-        return result
+        return self.backward(self.forward(vector))
 
     def covariance(self) -> tuple[Floats, Floats]:
         """Blocks of the covariance: on the diagonal (B, n, n), of each with the one before (B - 1, n, n)."""
-        count, size = self.lower.shape[:2]
-        diagonal, across = np.empty_like(self.lower), np.empty_like(self.below)
-        unit = np.eye(size)
-        for s in reversed(range(count)):
-            half = solve_triangular(self.lower[s], unit, lower=True, check_finite=False)
+        diagonal, across = np.empty(self.lower.shape), np.empty(self.below.shape)
+        for s in reversed(range(len(diagonal))):
+            half = lapack.dtrtri(self.lower[s], lower=1)[0]
             diagonal[s] = half.T @ half
-            if s + 1 < count:
+            if s < len(across):
                 gain = self.below[s] @ half
                 across[s] = -diagonal[s + 1] @ gain
                 diagonal[s] -= gain.T @ across[s]
@@ -75,14 +80,15 @@ def factor(diagonal: Floats, below: Floats) -> Factor:
     LinAlgError
         If it is not positive definite.
     """
-    lower, left = np.empty_like(diagonal), np.empty_like(below)
+    # columns lie together, as LAPACK has them, so that nothing is copied
+    lower, left = np.empty(diagonal.shape).transpose(0, 2, 1), np.empty(below.shape)
     for s, block in enumerate(diagonal):
         rest = block if s == 0 else block - left[s - 1] @ left[s - 1].T
-        lower[s], wrong = lapack.dpotrf(rest, lower=1, clean=1)
+        lower[s], wrong = lapack.dpotrf(rest.T, lower=1, clean=1)
         if wrong:
             raise LinAlgError(f"block {s} of the information matrix is not positive definite")
         if s < len(below):
-            left[s] = solve_triangular(lower[s], below[s].T, lower=True, check_finite=False).T
+            left[s] = blas.dtrsm(1.0, lower[s], below[s].T, lower=1).T
     return Factor(lower, left)
 
 
@@ -127,15 +133,15 @@ class Solution:
     lasting: Floats
     log_det: float
     _factor: Factor
-    _reach: Floats  #: A^-1 C, (B, n, G)
-    _free: Floats  #: S^-1
+    _half: Floats  #: L^-1 C, (B, n, G), of A = L L'
+    _lower: Floats  #: factor of S
 
     def covariance(self) -> tuple[Floats, Floats]:
         """Blocks of the covariance of x: on the diagonal, and of each with the one before."""
         diagonal, across = self._factor.covariance()
-        sds = self._reach @ self._free
-        diagonal += sds @ self._reach.transpose(0, 2, 1)
-        across += sds[1:] @ self._reach[:-1].transpose(0, 2, 1)
+        reach = self._factor.backward(self._half) @ np.linalg.inv(self._lower).T
+        diagonal += reach @ reach.transpose(0, 2, 1)
+        across += reach[1:] @ reach[:-1].transpose(0, 2, 1)
         return diagonal, across
 
 
@@ -148,12 +154,11 @@ def solve(info: Information) -> Solution:
         If the information matrix is not positive definite.
     """
     inner = factor(info.diagonal, info.below)
-    reach = inner.solve(info.border)
-    alone = inner.solve(info.vector[..., None])[..., 0]
-    corner = info.corner - np.einsum("bng,bnh->gh", info.border, reach)
-    lower = np.linalg.cholesky((corner + corner.T) / 2)
-    root = np.linalg.inv(lower)
-    free = root.T @ root
-    lasting = free @ (info.edge - np.einsum("bng,bn->g", info.border, alone))
+    both = inner.forward(np.concatenate([info.border, info.vector[..., None]], axis=2))
+    flat = both.reshape(-1, both.shape[2])
+    half, alone = flat[:, :-1], flat[:, -1]
+    lower = np.linalg.cholesky(info.corner - half.T @ half)
+    lasting = lapack.dpotrs(lower.T, info.edge - half.T @ alone)[0]
+    blocks = inner.backward((alone - half @ lasting).reshape(*info.vector.shape, 1))[..., 0]
     log_det = inner.log_det + 2 * float(np.log(np.diagonal(lower)).sum())
-    return Solution(alone - reach @ lasting, lasting, log_det, inner, reach, free)
+    return Solution(blocks, lasting, log_det, inner, both[..., :-1], lower)

@@ -13,11 +13,12 @@ and where a person's joints are taken to be - are numbers g of their own, and th
 
 from __future__ import annotations
 
+from copy import copy
 from dataclasses import dataclass
 
 import numpy as np
 import numpy.typing as npt
-from scipy import linalg
+from scipy.linalg import blas, lapack
 
 from gait.bindings.segment_prior import SegmentPrior
 from gait.body.skeleton import axis_rotation
@@ -95,35 +96,79 @@ class Chain:
     log_det: float
 
 
-def chain(prior: SegmentPrior, around: Around, freedom: Freedom) -> Chain:
-    """Make the chain of a prior (`SegmentPrior.restricted`) with 2 b frames a segment."""
+@dataclass(frozen=True)
+class Common:
+    """What all segments of a component have in common, whatever their place, heading and stature.
+
+    In standard deviations of what changes from frame to frame, a segment's modes and its markers' offsets are
+    the same but for the heading.  So is the factor of their part of I + loads loads'.
+
+    Attributes
+    ----------
+    sd : (n / 3,)
+        Of a number of each marker that changes from frame to frame, statures.
+    lower : (k, k)
+        Cholesky factor of I + scaled scaled', of modes and offsets.
+    thin : (k, n)
+        lower^-1 scaled.
+    """
+
+    sd: Floats
+    lower: Floats
+    thin: Floats
+
+    @classmethod
+    def of(cls, prior: SegmentPrior, component: int, frames: int) -> Common:
+        """Prepare the first frames of a component."""
+        modes = prior.modes[component][:, :frames]
+        sd = np.sqrt((1 - LASTING) * prior.gamma * prior.residual[component])
+        offsets = _each_marker(np.full(len(sd), np.sqrt((1 - THROUGHOUT) * LASTING / (1 - LASTING))), frames)
+        scaled = np.concatenate([modes / sd[:, None], offsets]).reshape(len(modes) + len(offsets), -1)
+        lower = np.linalg.cholesky(np.eye(len(scaled)) + scaled @ scaled.T)
+        return cls(np.tile(sd, frames), lower, _divided(lower, scaled))
+
+
+class Prior:
+    """A segment prior with what its chains need over and over."""
+
+    def __init__(self, segments: SegmentPrior) -> None:
+        self.segments = segments
+        half = segments.frames // 2
+        parts = [[Common.of(segments, c, n) for n in (2 * half, half)] for c in range(len(segments.mean))]
+        self.common = tuple(tuple(part) for part in parts)
+
+
+def chain(prior: Prior, around: Around, freedom: Freedom) -> Chain:
+    """Make the chain of a prior (of `SegmentPrior.restricted`) with 2 b frames a segment."""
     segments, frames, markers = around.places.shape[:3]
     size, lasting = 3 * markers * frames // 2, WHOLE + 3 * markers
-    diagonal, below = np.zeros((segments + 1, size, size)), np.zeros((segments, size, size))
+    diagonal, below = np.zeros((segments + 1, size, size)), np.empty((segments, size, size))
     border, corner = np.zeros((segments + 1, size, lasting)), np.eye(lasting)
     vector, edge, constant, log_det = np.zeros((segments + 1, size)), np.zeros(lasting), 0.0, 0.0
+    halves = slice(0, size), slice(size, 2 * size)
     for s in range(segments):
         whole = Segment(prior, around, freedom, s)
         factors = [(1.0, whole)] if s == 0 else [(1.0, whole), (-1.0, whole.first_half())]
         for sign, part in factors:
-            information = sign * part.information()
-            product, reach = information @ part.mean, information @ part.lasting.T
-            constant += float(part.mean @ product)
+            thin, sure = part.thin / part.sd, part.sd**-2
+            both = np.vstack([part.mean, part.lasting])
+            product = sign * (both * sure - (both @ thin.T) @ thin)
+            constant += float(part.mean @ product[0])
             log_det += sign * part.log_det()
-            diagonal[s] += information[:size, :size]
-            vector[s] += product[:size]
-            border[s] -= reach[:size]
-            corner += part.lasting @ reach
-            edge -= part.lasting @ product
+            corner += part.lasting @ product[1:].T
+            edge -= part.lasting @ product[0]
+            for block, half in enumerate(halves[: 1 + (sign > 0)], s):
+                own = thin[:, half]
+                diagonal[block] -= sign * (own.T @ own)
+                diagonal[block].flat[:: size + 1] += sign * sure[half]
+                vector[block] += product[0, half]
+                border[block] -= product[1:, half].T
             if sign > 0:
-                below[s] += information[size:, :size]
-                diagonal[s + 1] += information[size:, size:]
-                vector[s + 1] += product[size:]
-                border[s + 1] -= reach[size:]
+                np.matmul(-thin[:, size:].T, thin[:, :size], out=below[s])
     return Chain(Information(diagonal, below, border, corner, vector, edge), constant, log_det)
 
 
-def moved(prior: SegmentPrior, around: Around, freedom: Freedom, places: Floats, lasting: Floats) -> Around:
+def moved(prior: Prior, around: Around, freedom: Freedom, places: Floats, lasting: Floats) -> Around:
     """Linearise around new places (grid, J, 3): headings, stature and shapes that they imply under the prior.
 
     The shapes hold the leading modes only.  What else an estimate fits goes with the noise that it is fitted
@@ -172,77 +217,85 @@ def in_turn(segments: Floats, half: int) -> Floats:
 
 
 class Segment:
-    """One segment in the world: N(mean + lasting' g, diag(variance) + loads' loads), g ~ N(0, I)."""
+    """One segment in the world: N(mean + lasting' g, diag(sd^2) + loads' loads), g ~ N(0, I).
 
-    def __init__(self, prior: SegmentPrior, around: Around, freedom: Freedom, s: int) -> None:
-        component, place = around.component[s], around.places[s]
-        turn, stature = axis_rotation(2, around.heading[s]), around.stature
+    The loads are `modes`, offsets of the markers, and `rigid`: place on the ground and heading.  The inverse
+    of the covariance is (I - thin' thin) with rows and columns divided by sd.
+    """
+
+    def __init__(self, prior: Prior, around: Around, freedom: Freedom, s: int) -> None:
+        component, place, stature = around.component[s], around.places[s], around.stature
+        known, (frames, markers) = prior.segments, place.shape[:2]
+        self._turn = axis_rotation(2, around.heading[s])
+        whole, self._half = prior.common[component]
         shape = place - _over_ground(place)
-        own = stature * prior.mean[component] @ turn.T
+        own = stature * self._turned(known.mean[component])
         middle = _over_ground(place) - _over_ground(own)
         growth = (around.grown[s] - _over_ground(around.grown[s])) / stature
         self.mean = (own + middle + (freedom.stature - stature) * growth).ravel()
-        outside = stature**2 * prior.gamma * prior.residual[component]
-        self.variance = np.broadcast_to(((1 - LASTING) * outside)[None, :, None], place.shape).ravel()
-        modes = stature * prior.modes[component] @ turn.T
-        size, markers = len(modes), place.shape[1]
-        loads = np.zeros((size + 3 + 3 * markers, *place.shape))
-        loads[:size] = modes
-        loads[size, ..., 0] = loads[size + 1, ..., 1] = GROUND_SD
-        if prior.headings == 0:
-            loads[size + 2, ..., 0], loads[size + 2, ..., 1] = -shape[..., 1], shape[..., 0]
-        loads[size + 2] *= HEADING_SD
-        loads[size + 3 :] = _each_marker(np.sqrt((1 - THROUGHOUT) * LASTING * outside), place.shape)
+        self.modes = stature * self._turned(known.modes[component]).reshape(-1, own.size)
+        rigid = np.zeros((3, *place.shape))
+        rigid[0, ..., 0] = rigid[1, ..., 1] = GROUND_SD
+        if known.headings == 0:
+            rigid[2, ..., 0], rigid[2, ..., 1] = -HEADING_SD * shape[..., 1], HEADING_SD * shape[..., 0]
+        self.rigid = rigid.reshape(3, -1)
+        outside = known.gamma * known.residual[component]
         lasting = np.zeros((WHOLE + 3 * markers, *place.shape))
         lasting[0], lasting[1, ..., 2] = freedom.stature_sd * growth, freedom.height_sd
-        own_sd = np.sqrt(THROUGHOUT * LASTING * outside + (stature * OFFSET_SD) ** 2)
-        lasting[WHOLE:] = _each_marker(own_sd, place.shape) @ turn.T
-        self.rigid = size
-        self.loads, self.lasting = loads.reshape(len(loads), -1), lasting.reshape(len(lasting), -1)
-        self._prepare()
+        offset_sd = stature * np.sqrt(THROUGHOUT * LASTING * outside + OFFSET_SD**2)
+        lasting[WHOLE:] = self._turned(_each_marker(offset_sd, frames))
+        self.lasting = lasting.reshape(len(lasting), -1)
+        self._stature = stature
+        self._prepare(whole)
 
-    def _prepare(self) -> None:
-        self._scaled = self.loads / self.variance
-        inner = np.eye(len(self.loads)) + self._scaled @ self.loads.T
-        self._lower = np.linalg.cholesky(inner)
+    def _turned(self, places: Floats) -> Floats:
+        return (places.reshape(-1, 3) @ self._turn.T).reshape(places.shape)
+
+    def _prepare(self, common: Common) -> None:
+        """Complete the factor of what segments have in common by the rigid motions."""
+        self._common, self.sd = common, np.repeat(self._stature * common.sd, 3)
+        thin, rigid = self._turned(common.thin), self.rigid / self.sd
+        self._across = rigid @ thin.T
+        self._lower = np.linalg.cholesky(np.eye(3) + rigid @ rigid.T - self._across @ self._across.T)
+        self.thin = np.concatenate([thin, _divided(self._lower, rigid - self._across @ thin)])
 
     def first_half(self) -> Segment:
         """Marginal of the first half."""
-        half = object.__new__(Segment)
+        half = copy(self)
         keep = len(self.mean) // 2
-        half.mean, half.variance = self.mean[:keep], self.variance[:keep]
-        half.loads, half.lasting, half.rigid = self.loads[:, :keep], self.lasting[:, :keep], self.rigid
-        half._prepare()
+        half.mean, half.rigid, half.lasting = self.mean[:keep], self.rigid[:, :keep], self.lasting[:, :keep]
+        half._prepare(self._half)
         return half
-
-    def information(self) -> Floats:
-        """Inverse of the covariance, given what lasts."""
-        thin = linalg.solve_triangular(self._lower, self._scaled, lower=True, check_finite=False)
-        result = -(thin.T @ thin)
-        result[np.diag_indices_from(result)] += 1 / self.variance
-        return result
 
     def log_det(self) -> float:
         """Logarithm of the determinant of the information, given what lasts."""
-        return -float(np.log(self.variance).sum() + 2 * np.log(np.diag(self._lower)).sum())
+        roots = (
+            np.abs(self.sd),
+            np.diag(self._common.lower),
+            np.diag(self._lower),
+        )  # sd has the sign of stature
+        return -2 * sum(float(np.log(values).sum()) for values in roots)
 
     def explained(self, places: Floats, lasting: Floats) -> tuple[float, Floats, Floats]:
         """Turn of places in radians, their shape by the leading modes and by all, given what lasts."""
-        rest = places - self.mean - lasting @ self.lasting
-        values = linalg.cho_solve((self._lower, True), self._scaled @ rest, check_finite=False)
-        turn = HEADING_SD * values[self.rigid + 2]
-        values[self.rigid + 3 :] = 0
-        middle = self.mean + lasting[:WHOLE] @ self.lasting[:WHOLE]
-        whole = middle + values @ self.loads
-        values[LEADING : self.rigid] = 0
-        return float(turn), middle + values @ self.loads, whole
+        values = self.thin @ ((places - self.mean - lasting @ self.lasting) / self.sd)
+        rigid = np.linalg.solve(self._lower.T, values[-3:])
+        rest = values[:-3] - rigid @ self._across
+        modes = lapack.dtrtrs(self._common.lower.T, rest)[0][: len(self.modes)]
+        middle = self.mean + lasting[:WHOLE] @ self.lasting[:WHOLE] + rigid @ self.rigid
+        leading = middle + modes[:LEADING] @ self.modes[:LEADING]
+        return HEADING_SD * float(rigid[2]), leading, leading + modes[LEADING:] @ self.modes[LEADING:]
 
 
-def _each_marker(sd: Floats, shape: tuple[int, ...]) -> Floats:
+def _divided(lower: Floats, rows: Floats) -> Floats:
+    """Multiply rows (k, n) by the inverse of a lower triangle (k, k), without copies."""
+    return np.asarray(blas.dtrsm(1.0, lower.T, rows.T, side=1).T)
+
+
+def _each_marker(sd: Floats, frames: int) -> Floats:
     """Move (3 J, F, J, 3) of each marker along each axis by its sd (J,), alike in all frames."""
-    frames, markers = shape[:2]
-    own = (np.eye(3 * markers) * np.repeat(sd, 3)).reshape(3 * markers, 1, markers, 3)
-    return np.broadcast_to(own, (3 * markers, frames, markers, 3))
+    own = (np.eye(3 * len(sd)) * np.repeat(sd, 3)).reshape(3 * len(sd), 1, len(sd), 3)
+    return np.broadcast_to(own, (3 * len(sd), frames, len(sd), 3))
 
 
 def _over_ground(places: Floats) -> Floats:

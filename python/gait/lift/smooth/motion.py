@@ -238,14 +238,17 @@ def require(prior: SegmentPrior, keypoints: Keypoints, view: View, options: Opti
         require_metres(view.camera, keypoints, prior, believed_stature(options, prior.stature)[0], options)
 
 
-def evidence(prior: SegmentPrior, keypoints: Keypoints, view: View, options: Options) -> float:
-    """Log density of keypoints by the prior and the smoother, but for a constant; -inf if it refuses them."""
+def evidence(prior: SegmentPrior, keypoints: Keypoints, view: View, options: Options) -> tuple[float, Floats]:
+    """Log density of keypoints by the prior and the smoother, but for a constant; -inf if it refuses them.
+
+    Also where the points (T, P, 2) are expected in the picture; NaN if it refuses them.
+    """
     names = tuple(name for name in prior.names if name in {*keypoints.names, *smoother.HIPS})
     smooth = replace(options, method="smooth")
     try:
         return _evidence(prior.restricted(names), keypoints, view, smooth)
     except UserError:
-        return -np.inf
+        return -np.inf, np.full_like(keypoints.uv, np.nan)
 
 
 def _widest_needed(
@@ -346,6 +349,7 @@ def _task(
     options: Options,
     grid: Grid,
     update: Callable[[int], None],
+    displacements: bool = True,
 ) -> _Task:
     """Estimate each segment alone."""
     markers = prior.index(keypoints.names)
@@ -365,18 +369,19 @@ def _task(
     if options.method == "likelihood":
         fits = explain.without_prior(prior, view, stature, start_sd, course)
     else:
-        fits = [lifter.solve(each) for each in course]
+        fits = [lifter.solve(each, displacements) for each in course]
     freedom = Freedom(stature, stature_sd, options.floor_sd if view.grounded else ANY_HEIGHT)
     return _Task(Observed(keypoints.time, points, markers), freedom, stature, lengths, fits)
 
 
 @_numbers_in_range()
-def _evidence(prior: SegmentPrior, keypoints: Keypoints, view: View, options: Options) -> float:
-    """Log density of keypoints by all markers of a prior."""
+def _evidence(
+    prior: SegmentPrior, keypoints: Keypoints, view: View, options: Options
+) -> tuple[float, Floats]:
+    """Log density of keypoints by all markers of a prior, and where they are expected."""
     grid = Grid.over(keypoints.time, prior)
-    task = _task(prior, keypoints, view, options, grid, lambda done: None)
-    first, contact, bones = task.start(grid.frames), options.contact, options.bones
-    return smoother.evidence(prior, task.observed, view, task.freedom, first, contact=contact, bones=bones)
+    task = _task(prior, keypoints, view, options, grid, lambda done: None, displacements=False)
+    return smoother.evidence(prior, task.observed, view, task.freedom, task.start(grid.frames))
 
 
 @_numbers_in_range()

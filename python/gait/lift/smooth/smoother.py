@@ -20,7 +20,7 @@ from gait.lift.keypoints.observations import Grid, Observations, interpolated
 from gait.lift.segment.view import Parallel, View
 from gait.lift.smooth import block_arrowhead, soft_constraints
 from gait.lift.smooth.block_arrowhead import Information
-from gait.lift.smooth.chain import Around, Chain, Freedom, blended, chain, moved, overlapping
+from gait.lift.smooth.chain import Around, Chain, Freedom, Prior, blended, chain, moved, overlapping
 from gait.lift.smooth.rows import rows_of, scale_free
 from gait.lift.smooth.soft_constraints import Layout, Rows
 
@@ -134,21 +134,23 @@ def smooth(
 
 
 def evidence(
-    prior: SegmentPrior,
-    observed: Observed,
-    view: View,
-    freedom: Freedom,
-    start: Start,
-    *,
-    contact: bool,
-    bones: bool,
-) -> float:
-    """Logarithm of the density of what is seen, but for a constant, after the first steps."""
-    problem, state = _begin(prior, observed, view, freedom, start, contact, bones)
-    for step in range(FREE_STEPS + 1):
+    prior: SegmentPrior, observed: Observed, view: View, freedom: Freedom, start: Start
+) -> tuple[float, Floats]:
+    """Logarithm of the density of what is seen, but for a constant, after the steps without constraints.
+
+    Returns
+    -------
+    density : float
+    predicted : (T, P, 2)
+        Where the points are then expected in the picture.
+    """
+    problem, state = _begin(prior, observed, view, freedom, start)
+    for _ in range(FREE_STEPS):
         problem.weight(state)
-        state = problem.step(state, constrained=step >= FREE_STEPS)
-    return problem.evidence(problem.system(state, constrained=False))
+        state = problem.step(state, constrained=False)
+    problem.weight(state)
+    system = problem.system(state, problem.chain(state), constrained=False)
+    return problem.evidence(system), problem.predicted(state)
 
 
 def _begin(
@@ -157,8 +159,8 @@ def _begin(
     view: View,
     freedom: Freedom,
     start: Start,
-    contact: bool,
-    bones: bool,
+    contact: bool = False,
+    bones: bool = False,
 ) -> tuple[_Problem, _State]:
     unit = float(np.mean(start.lengths)) if view.scaled else None
     problem = _Problem(prior, observed, view, freedom, unit, contact, bones)
@@ -222,10 +224,11 @@ class _Problem:
         view: View,
         freedom: Freedom,
         unit: float | None,
-        contact: bool = False,
-        bones: bool = False,
+        contact: bool,
+        bones: bool,
     ) -> None:
         self.prior, self.visible, self.view, self.freedom = prior, observed, view, freedom
+        self._chained = Prior(prior)
         self.contact, self.bones = contact, bones
         self.points = observed.points
         self.grid = Grid.over(observed.time, prior)
@@ -239,12 +242,19 @@ class _Problem:
 
     def weight(self, state: _State) -> None:
         """Down-weight points that are far from an estimate."""
-        places = self._at_video(state.places)[:, self.visible.markers]
-        self.points = weighted(self.visible.points, self.view.project(places, self._at_video(state.lengths)))
+        self.points = weighted(self.visible.points, self.predicted(state))
 
-    def system(self, state: _State, constrained: bool) -> _System:
+    def predicted(self, state: _State) -> Floats:
+        """Where points (T, P, 2) are expected in the picture."""
+        places = self._at_video(state.places)[:, self.visible.markers]
+        return self.view.project(places, self._at_video(state.lengths))
+
+    def chain(self, state: _State) -> Chain:
+        """Give the prior around an estimate."""
+        return chain(self._chained, state.around, self.freedom)
+
+    def system(self, state: _State, prior: Chain, constrained: bool) -> _System:
         """Linear problem around an estimate."""
-        prior = chain(self.prior, state.around, self.freedom)
         shape = blended(state.around.places, self.grid.frames)
         rows = Rows(self.layout)
         self._observe(rows, shape, state)
@@ -279,10 +289,10 @@ class _Problem:
 
     def step(self, state: _State, constrained: bool) -> _State:
         """Estimate by the linear problem around another."""
-        found = self.system(state, constrained).found
+        found = self.system(state, self.chain(state), constrained).found
         places = self.layout.places(found.blocks)
         lengths = self.layout.lengths(found.blocks) if self.view.scaled else state.lengths
-        around = moved(self.prior, state.around, self.freedom, places, found.lasting)
+        around = moved(self._chained, state.around, self.freedom, places, found.lasting)
         return _State(around, places, lengths, state.steps + 1)
 
     def evidence(self, unconstrained: _System) -> float:
@@ -291,16 +301,18 @@ class _Problem:
 
     def result(self, state: _State, settled: bool) -> Lifted:
         """Covariances and figures of the last estimate."""
-        system = self.system(state, constrained=True)
-        unconstrained = self.system(state, constrained=False)
+        prior = self.chain(state)
+        system = self.system(state, prior, constrained=True)
+        unconstrained = self.system(state, prior, constrained=False)
         around, places = state.around, state.places
-        diagonal, across = system.found.covariance()
+        covariance = system.found.covariance()
         every = np.arange(self.layout.markers)
+        variances = self._covariances(*covariance, every, every)
         sure = soft_constraints.contacts(Rows(self.layout), self.prior.names, places, self.grid.rate)
         return Lifted(
             places=self._at_video(places),
-            sd=_roots(self._covariances(diagonal, across, every, every)),
-            rooted_sd=_roots(self._rooted(diagonal, across)),
+            sd=_roots(variances),
+            rooted_sd=_roots(self._rooted(variances, *covariance)),
             grid=places,
             heading=around.heading,
             stature=around.stature,
@@ -314,10 +326,9 @@ class _Problem:
             chi2_per_observation=unconstrained.square / max(2 * int(self.visible.points.visible.sum()), 1),
         )
 
-    def _rooted(self, diagonal: Floats, across: Floats) -> Floats:
-        """Variances (T, J, 3) of places about the middle of the hips; of places if there are no hips."""
+    def _rooted(self, own: Floats, diagonal: Floats, across: Floats) -> Floats:
+        """Variances (T, J, 3) about the middle of the hips; `own`, of the places, if there are no hips."""
         every = np.arange(self.layout.markers)
-        own = self._covariances(diagonal, across, every, every)
         if not set(HIPS) <= set(self.prior.names):
             return own
         left, right = self.prior.index(HIPS)
