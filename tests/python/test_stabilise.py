@@ -15,12 +15,12 @@ from gait.track.camera_motion import View, map_pixels
 from gait.track.stabilise import SteadyVideo, find_motion, moves
 
 CAMERA = Camera.looking((0.0, -6.0, 1.5), (0.0, 0.0, 1.0), (320, 240), 270.0)
-WIDE = replace(CAMERA, width=800, height=600, cx=400.0, cy=300.0)
+PANORAMA = replace(CAMERA, width=800, height=600, cx=400.0, cy=300.0)
 FRAMES, PERSON = 10, 40
 
 
 def scene(texture: float) -> np.ndarray:
-    """Still picture of `WIDE`; `texture` in grey levels."""
+    """Still picture of `PANORAMA`; `texture` in grey levels."""
     rng, picture = np.random.default_rng(3), np.full((600, 800), 120.0)
     for size in (6, 15, 40):
         coarse = rng.normal(size=(600 // size + 2, 800 // size + 2))
@@ -40,7 +40,7 @@ def film(path, turned: list[View], texture: float = 25.0) -> Video:
     still, grid = scene(texture), np.stack(np.meshgrid(np.arange(320.0), np.arange(240.0)), axis=-1)
     with VideoWriter(path, 30, crf=6) as out:
         for k, view in enumerate(turned):
-            places = map_pixels(grid, view.camera(CAMERA), WIDE).astype(np.float32)
+            places = map_pixels(grid, view.camera(CAMERA), PANORAMA).astype(np.float32)
             picture = cv2.remap(still, *cv2.split(places), cv2.INTER_LINEAR)
             picture[80:200, 20 * k : 20 * k + PERSON] = 30 + 10 * k
             out.write(picture)
@@ -74,8 +74,8 @@ def test_the_turns_of_the_camera_are_found_and_undone(tmp_path, pan, shake):
         off = np.abs(frame.image[rows, columns].astype(float) - first.image[rows, columns])
         assert np.median(off) < 3
     for frame in range(FRAMES):
-        seen = steady.camera_at(frame, steady.camera)
-        wanted = map_pixels(pixels, seen, steady.camera)
+        view = steady.camera_at(frame, steady.camera)
+        wanted = map_pixels(pixels, view, steady.camera)
         moved = replace(people()[0], frame=np.array([frame]), uv=pixels[None, :2])
         assert steady.keypoints(moved).uv[0] == pytest.approx(wanted[:2], abs=0.2)
 

@@ -29,7 +29,7 @@ _WINDOW, _LEVELS = (21, 21), 3  # of Lucas-Kanade
 _FEWEST = 20  # corners that agree, at least
 _STILL = 0.75  # pixels by which a corner of a still camera moves at most, from noise and compression
 _SHARE = 0.3  # of the corners that must agree, at least
-_SPREAD = 0.2  # area over which they lie, against corners all over the picture, at least
+_AREA = 0.2  # over which they lie, against corners all over the picture, at least
 _FEW_LEFT = 0.5  # share of a key frame's corners below which a new key frame is taken
 _TUKEY, _SHARPEST, _BLUNTEST = 4.685, 0.15, 2.0  # standard deviations to weight 0; least and most sd, pixels
 _ZOOM = 1e-4  # variance of the logarithm of the zoom
@@ -116,8 +116,8 @@ class CameraMotion:
     def step(self, image: Image, people: Iterable[Box] = ()) -> View:
         """Find the view of the next frame; where that fails it is the last one, with residual NaN."""
         small = self._small(image)
-        found, seen = self._match(small)
-        if seen < _FEW_LEFT:
+        found, visible = self._match(small)
+        if visible < _FEW_LEFT:
             self._set_key(self._previous, self._people, self._last)
             again, _ = self._match(small)
             found = again or found
@@ -137,27 +137,27 @@ class CameraMotion:
         self._corners = _corners(small, self.scale * np.array(list(people)).reshape(-1, 4))
 
     def _match(self, small: Image) -> tuple[View | None, float]:
-        """View of a picture, if enough corners agree, and the share of them that are still seen."""
+        """View of a picture, if enough corners agree, and the share of them that are still visible."""
         guess = self._last.after(self._key_view.inverse())
         after = self._track(small, guess)
         if after is None:
             self.untextured += 1
             return None, 0.0
-        seen = np.isfinite(after[:, 0])
-        places = after[seen].astype(float)
-        view, agree = fit_view(self._camera, self._corners[seen].astype(float), places, guess)
-        enough = agree.sum() >= _FEWEST and self._spread(places[agree])
+        visible = np.isfinite(after[:, 0])
+        places = after[visible].astype(float)
+        view, agree = fit_view(self._camera, self._corners[visible].astype(float), places, guess)
+        enough = agree.sum() >= _FEWEST and self._everywhere(places[agree])
         self.untextured += not enough
         found = enough and agree.mean() > _SHARE and view.residual < _BLUNTEST
         return view.after(self._key_view) if found else None, agree.sum() / len(after)
 
-    def _spread(self, places: Array) -> bool:
+    def _everywhere(self, places: Array) -> bool:
         """Whether pixels (N, 2) lie all over the picture, not on one thing in it."""
         width, height = self._camera.size
-        return bool(np.linalg.det(np.cov(places.T)) > (_SPREAD * width * height / 12) ** 2)
+        return bool(np.linalg.det(np.cov(places.T)) > (_AREA * width * height / 12) ** 2)
 
     def _track(self, small: Image, guess: View) -> NDArray[np.float32] | None:
-        """Places (N, 2) of the key frame's corners, NaN where they are not seen; None if too few are."""
+        """Places (N, 2) of the key frame's corners, NaN where they are not visible; None if too few are."""
         if len(self._corners) < _FEWEST:
             return None
         expected = map_pixels(self._corners.astype(float), self._camera, guess.camera(self._camera))
@@ -208,8 +208,8 @@ def fit_view(
         miss = after - expected
         off = np.hypot(*miss.T)
         near = off if iteration < _COARSE else off[off < _TUKEY * sd]
-        spread = float(np.median(near)) / 1.177 if len(near) else np.inf  # of two normal coordinates
-        sd = max(_SHARPEST, spread if iteration < _COARSE else min(sd, spread))
+        near_sd = float(np.median(near)) / 1.177 if len(near) else np.inf  # of two normal coordinates
+        sd = max(_SHARPEST, near_sd if iteration < _COARSE else min(sd, near_sd))
         weight = np.square(np.clip(1 - np.square(off / (_TUKEY * sd)), 0, None))
         normal = np.einsum("nki,n,nkj->ij", slope, weight, slope)
         right = np.einsum("nki,n,nk->i", slope, weight, miss)

@@ -92,7 +92,7 @@ def find_motion(
             progress(frame.number)
     found = np.isfinite([view.residual for view in views])
     if found.mean() < _MOSTLY or motion.scale * np.median([v.residual for v in views]) > _TRAVELS:
-        return None, "the camera moves along, or the scene has too little texture to tell how it turns"
+        return None, "the camera moves along, or the scene has too little texture to show how it turns"
     reference = -1 if plate is not None else _middle(views)
     if reference >= 0:
         back = views[reference].inverse()
@@ -257,10 +257,10 @@ class SteadyVideo(Video):
         plate = self._warp(samples[0].image, samples[0].number, blank, cv2.BORDER_REPLICATE)
         for row in range(self.height):
             values = np.array([picture[row] for picture in pictures], np.int16)
-            seen = np.array([mask[row] for mask in shown])
-            values[~seen] = 256  # last
+            visible = np.array([mask[row] for mask in shown])
+            values[~visible] = 256  # last
             values.sort(axis=0)
-            count = seen.sum(axis=0)
+            count = visible.sum(axis=0)
             low, high = (np.maximum(count + more, 0) // 2 for more in (-1, 0))
             middle = [np.take_along_axis(values, at[None, :, None], axis=0)[0] for at in (low, high)]
             plate[row] = np.where((count > 0)[:, None], (middle[0] + middle[1]) // 2, plate[row])

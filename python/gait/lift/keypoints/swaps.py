@@ -339,7 +339,7 @@ def _judged(
         density, predicted = evidence(_swapped(keypoints, pairs, flags))
         return density - CLEAR * int(flags[own].any(axis=0).sum()), predicted
 
-    def misfit(flags: Flags) -> float:
+    def cost(flags: Flags) -> float:
         off = _swapped(keypoints, pairs, flags).uv - predicted
         return float(np.nansum(np.minimum(0.5 * (off**2).sum(axis=2) / sds**2, CAP)))
 
@@ -355,7 +355,7 @@ def _judged(
             other[own] = flags
             if (other == best).all() or (other == wrong).all():
                 continue
-            if best.any() and not misfit(other) < misfit(best):
+            if best.any() and not cost(other) < cost(best):
                 continue
             changed = score(other)
             if changed[0] > most:
