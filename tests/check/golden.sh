@@ -27,7 +27,7 @@ compare() { # CC BUILD_FOLDER OPT [RUNNER]
         make_tests "$1" "$2" "$3" $test
         output=$($4 "$2/unit/$test" digest)
         code=$?
-        lines=$(echo "$output" | grep -cE '^(digest [0-9a-f]{16} [0-9a-f]{16} |skipped )[a-z0-9-]+$')
+        lines=$(echo "$output" | grep -cE '^(digest [0-9a-f]{16} [0-9a-f]{16} |skipped )[a-z0-9_-]+$')
         runs=$((runs + 1))
         [ $code -eq 0 ] && [ "$lines" -eq "${part#*:}" ] ||
             fail "$test $1 $3: ended with $code, printed $lines of ${part#*:} lines"
