@@ -333,7 +333,7 @@ WHEEL := libgait-$(VERSION)-py3-none-manylinux_2_28_$(CPU).whl
 wheel: build/lcm/.stamp ## Python package with the library inside, in build/wheel (CC=aarch64-linux-gnu-gcc for that CPU)
 	@command -v cmake >/dev/null || { echo 'wheel: no cmake: install it' >&2; exit 1; }
 	@$(VENV)/bin/pip wheel --quiet --disable-pip-version-check --no-deps --no-build-isolation -w build/wheel ./python \
-	    $(patsubst %,-C %,wheel.tags=$(WHEEL:libgait-$(VERSION)-%.whl=%) build-dir=$(abspath build/cmake-$(CPU)) \
+	    $(patsubst %,--config-settings %,wheel.tags=$(WHEEL:libgait-$(VERSION)-%.whl=%) build-dir=$(abspath build/cmake-$(CPU)) \
 	        cmake.define.CMAKE_C_COMPILER=$(CC) cmake.define.CMAKE_CXX_COMPILER=$(CXX) cmake.define.GAIT_EIGEN=$(abspath $(EIGEN)) \
 	        $(addprefix cmake.define.GAIT_OLDEST_GLIBC=,$(OLDEST_$(CPU))) \
 	        $(if $(FOREIGN),cmake.define.CMAKE_SYSTEM_NAME=Linux cmake.define.CMAKE_SYSTEM_PROCESSOR=$(CPU)))
