@@ -1,61 +1,9 @@
-/* start.h - fit of a walk to keypoints or boxes of a second: straight and even, or in place.
+/* start.h - automatic start: from the keypoints or boxes of a second to weighted hypotheses of a person who walks.
  *
- * Unknowns: place, heading, speed, phase and rate at the middle of the frames, stature, height of the floor, and the
- * first three scores.  Every heading, phase and mode is scored by its squared error; the best are refined by
- * Levenberg-Marquardt on robust residuals (Student's t), all derivatives from one block of bodies per frame.
- * Boxes do not show the phase: their candidates differ in heading alone. */
+ * It keeps the observations, chooses the frames, and asks start_fit.h for the walks that fit them. */
 #ifndef GAIT_START_START_H
 #define GAIT_START_START_H
-#include "base/arena.h"
-#include "filter/particles.h"
-#include "gait_start.h"
-#include "start/blobs.h"
-#include "start/people.h"
-
-enum {
-    START_X,
-    START_Y,
-    START_HEADING,
-    START_SPEED,
-    START_PHASE,
-    START_RATE,
-    START_STATURE,
-    START_FLOOR,
-    START_SCORE,
-    START_SCORES = 3,
-    START_UNKNOWNS = START_SCORE + START_SCORES,
-    START_FITTED = 12, /* frames of those added that are fitted, evenly spread */
-    START_REFINED = 32 /* candidates that are refined */
-};
-
-typedef struct start_keypoint { /* of one joint in one frame: ideal pixels; sd 0: not observed */
-    double u, v, sd;
-} start_keypoint;
-
-typedef struct start_candidate {
-    double theta[START_UNKNOWNS];
-    double cost; /* squared residuals with the prior's, and twice the prior's odds of the mode */
-    double chi2; /* squared residuals of the keypoints, before errors that last are counted as one */
-    bool in_place;
-} start_candidate;
-
-typedef struct start_scratch start_scratch;
-
-struct gait_start {
-    const gait_model *model;
-    const kernels *run;
-    gait_start_config cfg;
-    state_layout layout;
-    gait_state prior_sd;      /* where nothing is known about the person */
-    int32_t hip[2], ankle[2]; /* points of the model */
-    double crown;             /* height of head_top over the floor while walking, statures */
-    int32_t count; /* frames of keypoints added, of which the last GAIT_START_MAX_FRAMES are kept */
-    int64_t utime[GAIT_START_MAX_FRAMES];
-    start_keypoint (*keypoint)[GAIT_MAX_JOINTS]; /* GAIT_START_MAX_FRAMES */
-    start_people *people;
-    blob_finder blobs;
-    start_scratch *scratch;
-};
+#include "start/start_fit.h"
 
 gait_start *start_layout(arena *a, const gait_model *m, const gait_start_config *cfg, const kernels *run);
 
