@@ -389,7 +389,7 @@ install: lib ## DESTDIR= PREFIX= LIBDIR= INCLUDEDIR=
 	for f in pkgconfig/gait.pc cmake/gait/gaitConfig.cmake cmake/gait/gaitConfigVersion.cmake; do \
 	    sed -e 's|@PREFIX@|$(PREFIX)|; s|@LIBDIR@|$(LIBDIR)|; s|@INCLUDEDIR@|$(INCLUDEDIR)|; s|@VERSION@|$(VERSION)|' \
 	        -e "s|@INCLUDES@|$$(realpath -ms --relative-to='$(LIBDIR)/cmake/gait' '$(INCLUDEDIR)')|; s|@ABI@|$(ABI)|" \
-	        libgait/$${f##*/}.in > '$(DESTDIR)$(LIBDIR)'/$$f || exit 1; done
+	        libgait/cmake/$${f##*/}.in > '$(DESTDIR)$(LIBDIR)'/$$f || exit 1; done
 
 uninstall: ## remove what install put there
 	cd '$(DESTDIR)$(LIBDIR)' && rm -rf libgait.so.$(ABI) libgait.so libgait.a pkgconfig/gait.pc cmake/gait
