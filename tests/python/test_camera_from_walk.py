@@ -14,8 +14,10 @@ from gait.errors import UserError
 from gait.io.keypoints_file import Keypoints, write
 from gait.simulate import Scenario
 from gait.simulate.stage import set_stage
-from gait.track.from_walk import _Body, calibrate, contradiction, make_camera
+from gait.track.from_walk import calibrate, contradiction
 from gait.track.keypoint_start import find_keypoint_start
+from gait.track.walk_model import WalkingBody
+from gait.track.walk_start import make_camera
 
 MODEL = Model()
 SIZE = (1280, 720)
@@ -124,7 +126,7 @@ def test_a_walk_in_a_circle_gives_the_camera():
 
 
 def test_the_pelvis_sways_so_that_feet_stand_still():
-    body = _Body(MODEL, NAMES)
+    body = WalkingBody(MODEL, NAMES)
     phase = np.linspace(0.12, 0.38, 20)
     ankle = body.joints(phase, np.full(20, body.rate), np.zeros(body.parts), np.zeros(body.offsets))[
         :, body.names.index("r_ankle"), 1

@@ -21,10 +21,11 @@ from gait.io.keypoints_file import Keypoints
 from gait.io.video import Frame, Image, Video, background, median, sample_frames
 from gait.progress import note, progress
 from gait.track.box_start import find_start
-from gait.track.from_walk import Calibration, calibrate, contradiction, usual_camera
+from gait.track.from_walk import Calibration, calibrate, contradiction
 from gait.track.keypoint_start import find_keypoint_start, keypoint_noise
 from gait.track.options import ClipOptions
 from gait.track.stabilise import SteadyVideo, find_motion, moves
+from gait.track.walk_start import usual_camera
 
 _COLOUR = 4.0  # grey levels between the channels of half of a picture in colour, at least
 

@@ -1,0 +1,304 @@
+"""A walk as the camera sees it: where the joints are expected, and how probable camera and walk are.
+
+`WalkingBody` has the joints of the cyclic model, linear in its scores and proportions; `WalkModel` places it
+on a path, projects it and compares it with keypoints.  The parameters are one vector: camera (log focal
+length, tilt, roll, log height), stature, scores and proportions, offsets of the detector's joints, and place,
+heading and phase at knots.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from gait.bindings.model import Model
+from gait.bindings.state import State
+from gait.io.keypoints_file import Keypoints
+from gait.track.walk_start import STATURE_SD, CameraPrior, make_camera
+
+Array = NDArray[np.float64]
+
+_ERROR_TIME = 0.5  # seconds for which errors of a detector last
+_KNOTS = 0.5  # seconds between knots
+_MISS = 0.012  # of the person's height, noise of a joint at full confidence
+_SHARE = {"elbow": 2.0, "wrist": 4.0, "toe": 2.5, "heel": 2.0}  # noise of these joints, in units of _MISS
+_OFFSET_SD = 0.015  # of the stature, constant difference between the detector's joints and the model's
+_SLIDE_SD = 0.05  # metres per second, of feet on the floor, along the heading
+_SIDEWAYS_SD = 0.05  # metres per second, of the walk across the heading
+_STILL_SD = 0.03  # metres per second on a treadmill
+_BEND_SD, _TURN_SD, _HURRY_SD = 0.05, 0.12, 0.02  # changes of slope at a knot: metres, radians, strides
+_CURVE_SD = 0.3  # radians per second, of the turn on average
+_SCORES = 5  # components of the model that are fitted
+_DEGREES = 4.0  # of freedom of Student's t
+
+
+def _heavy_tailed(residual: Array) -> Array:
+    """Residuals whose squares are Student-t costs: unusual cameras are not pulled to the usual one."""
+    root = np.sqrt(_DEGREES * np.log1p(residual**2 / _DEGREES))
+    return np.asarray(np.sign(residual) * root)
+
+
+class WalkingBody:
+    """Joints of the model over the stride, statures, linear in scores and proportions; pelvis at (0, 0)."""
+
+    PHASES = 60
+
+    def __init__(self, model: Model, names: tuple[str, ...]) -> None:
+        self.names = [name for name in names if name in model.joint_names]
+        self.columns = [names.index(name) for name in self.names]
+        rows = [model.joint_names.index(name) for name in self.names]
+        base, sd = model.prior()
+        base = replace(base, stature=1.0, heading=0.0)
+        width = model.info.proportions
+        scores = min(_SCORES, model.info.components)
+        states = [base]
+        for k in range(scores):
+            states.append(replace(base, coef=np.eye(model.info.components)[k]))
+        for k in range(width):
+            states.append(replace(base, proportion=np.eye(len(sd.proportion))[k]))
+        states.append(replace(base, stride_hz=base.stride_hz + model.info.stride_hz_sd))
+        table = np.array([self._cycle(model, state) for state in states])
+        table[1:] -= table[0]
+        # The pelvis sways: it moves from side to side and unevenly forwards over the foot on the floor.
+        velocity = self._over_foot(table, model.joint_names)
+        backwards = velocity[..., 0].mean(axis=1)
+        way = np.cumsum(velocity - velocity.mean(axis=1, keepdims=True), axis=1) / self.PHASES
+        table[..., :2] += (way - way.mean(axis=1, keepdims=True))[:, :, None]
+        self.table = table[:, :, rows]
+        self.parts = len(states) - 2  # scores and proportions
+        self.rate, self.rate_sd = model.info.stride_hz, model.info.stride_hz_sd
+        # The ankle rolls forward over the foot, so it goes back more slowly than the floor.
+        self.stride = backwards * model.info.stride_length / backwards[0]
+        self.offsets = 3 * len(self.names)  # of the detector's joints: forward, left, up
+
+    def _cycle(self, model: Model, state: State) -> Array:
+        out = np.empty((self.PHASES, model.info.joints, 3))
+        for k in range(self.PHASES):
+            posed = replace(state, phase=k / self.PHASES)
+            posed.pelvis[:] = 0.0
+            posed.pelvis[2] = model.pelvis_height(posed)
+            out[k] = model.pose(posed)[0]
+        return out
+
+    def _over_foot(self, table: Array, names: tuple[str, ...]) -> Array:
+        """Velocity (rows, PHASES, 2) of the pelvis over the foot on the floor, statures per stride.
+
+        Each foot is flat for a third of the stride; in between the velocity is interpolated.
+        """
+        phase = np.arange(self.PHASES) / self.PHASES
+        flat = [(names.index("r_ankle"), 0.10, 0.40), (names.index("l_ankle"), 0.60, 0.90)]
+        speed = -self.PHASES * (np.roll(table, -1, axis=1) - np.roll(table, 1, axis=1))[..., :2] / 2
+        known = [(phase >= low) & (phase <= high) for _, low, high in flat]
+        at = np.concatenate([phase[rows] for rows in known])
+        over = np.concatenate(
+            [speed[:, rows, joint] for rows, (joint, _, _) in zip(known, flat, strict=True)], axis=1
+        )
+        columns = [
+            np.interp(phase, at, column, period=1.0) for column in over.swapaxes(1, 2).reshape(-1, len(at))
+        ]
+        return np.reshape(columns, (len(table), 2, -1)).swapaxes(1, 2)
+
+    def weights(self, parts: Array, rate: Array) -> Array:
+        """Weights (T, parts + 2) of the table's rows: mean, scores and proportions, stride rate."""
+        faster = np.clip((rate - self.rate) / self.rate_sd, -2.0, 2.0)
+        return np.concatenate(
+            [np.ones((len(rate), 1)), np.broadcast_to(parts, (len(rate), self.parts)), faster[:, None]],
+            axis=1,
+        )
+
+    def joints(self, phase: Array, rate: Array, parts: Array, offsets: Array) -> Array:
+        """Joints (T, J, 3), statures."""
+        place = (phase % 1.0) * self.PHASES
+        left = np.floor(place).astype(int) % self.PHASES
+        share = (place - np.floor(place))[:, None, None]
+        weights = self.weights(parts, rate)
+        cycle = np.tensordot(weights[:1, :-1], self.table[:-1], axes=(1, 0))[0]  # parts are constant
+        out = cycle[left] * (1 - share) + cycle[(left + 1) % self.PHASES] * share
+        out = out + weights[:, -1, None, None] * self.table[-1, left]
+        return np.asarray(out + offsets.reshape(-1, 3))
+
+    def strides(self, rate: Array, parts: Array) -> Array:
+        """Stride lengths, statures."""
+        return np.asarray(self.weights(parts, rate) @ self.stride)
+
+
+class WalkModel:
+    """Keypoints of an interval, and what camera and walk say of them.
+
+    Attributes
+    ----------
+    body : WalkingBody
+    in_place : bool
+        The person walks in place, as on a treadmill.
+    time : ndarray of shape (T,)
+        Seconds, of the keypoints.
+    knot_time : ndarray of shape (K,)
+        Seconds, of the knots.
+    clip : tuple of float
+        Seconds, of the first and the last keypoint outside of the interval also.
+    fixed : int
+        Parameters before those of the knots.
+    """
+
+    def __init__(
+        self,
+        keypoints: Keypoints,
+        size: tuple[int, int],
+        body: WalkingBody,
+        height: float,
+        prior: CameraPrior,
+        *,
+        in_place: bool,
+        interval: tuple[float, float],
+    ) -> None:
+        self._all, self._size, self.body, self._height, self._prior = keypoints, size, body, height, prior
+        self.in_place = in_place
+        self.fixed = 5 + body.parts + body.offsets
+        low, high = interval
+        time = keypoints.time
+        self.clip = time[0], time[-1]
+        rows = np.flatnonzero((time >= low) & (time <= high))
+        t = time[rows]
+        count = max(2, int(np.ceil((t[-1] - t[0]) / _KNOTS)) + 1)
+        self.knot_time = np.linspace(t[0], t[-1], count)
+        self.time = t
+        uv, names = keypoints.uv[rows][:, self.body.columns], self.body.names
+        legs = [keypoints.names.index(f"{side}_{joint}") for side in "lr" for joint in ("hip", "ankle")]
+        ends = keypoints.uv[rows][:, legs]
+        tall = np.hypot(*(ends[:, 0::2].mean(axis=1) - ends[:, 1::2].mean(axis=1)).T) / 0.45
+        tall = np.maximum(tall, 0.5 * np.median(tall))
+        share = np.array([_SHARE.get(name.partition("_")[2], 1.0) for name in names])
+        sure = np.maximum(keypoints.confidence[rows][:, self.body.columns], 0.1)
+        sd = _MISS * tall[:, None] * share / sure + 0.5
+        self._inverse = np.where(np.isfinite(uv).all(axis=2), 1.0 / sd, 0.0)
+        self._uv = np.nan_to_num(uv)
+        step = float(np.median(np.diff(t)))
+        self._thin = min(1.0, step / _ERROR_TIME)  # errors last
+
+    def over(self, low: float, high: float) -> WalkModel:
+        """Make the same model of another interval, seconds."""
+        return WalkModel(
+            self._all, self._size, self.body, self._height, self._prior,
+            in_place=self.in_place, interval=(low, high),
+        )  # fmt: skip
+
+    def knots(self, q: Array) -> Array:
+        """Knots (K, 4): x, y, metres; heading, radians; phase."""
+        return q[self.fixed :].reshape(-1, 4)
+
+    def errors(self, q: Array) -> Array:
+        """Errors of the keypoints (T, J, 2), in standard deviations."""
+        now = np.stack([np.interp(self.time, self.knot_time, column) for column in self.knots(q).T], axis=1)
+        rates = np.interp(self.time, self._middles(), self.rates(q))
+        joints = self._joints(q, now, rates)
+        camera = make_camera(q[:4], self._size)
+        x = joints @ camera.R.T + camera.t
+        depth = np.maximum(x[..., 2:], 0.05)
+        uv = camera.fx * x[..., :2] / depth + [camera.cx, camera.cy]
+        return np.asarray((uv - self._uv) * self._inverse[..., None])
+
+    def _joints(self, q: Array, now: Array, rates: Array) -> Array:
+        """Joints (T, J, 3) in the world, metres, with the path `now` (T, 4) and the stride rates (T,)."""
+        body, stature = self.body, self._height * np.exp(q[4])
+        parts, offsets = q[5 : 5 + body.parts], q[5 + body.parts : self.fixed]
+        local = stature * body.joints(now[:, 3], rates, parts, offsets)
+        c, s = np.cos(now[:, 2])[:, None], np.sin(now[:, 2])[:, None]
+        return np.stack([
+            now[:, 0, None] + c * local[..., 0] - s * local[..., 1],
+            now[:, 1, None] + s * local[..., 0] + c * local[..., 1],
+            local[..., 2],
+        ], axis=-1)  # fmt: skip
+
+    def _middles(self) -> Array:
+        """Return the times midway between knots (K - 1,), seconds."""
+        return np.asarray((self.knot_time[1:] + self.knot_time[:-1]) / 2)
+
+    def rates(self, q: Array) -> Array:
+        """Stride rates between knots (K - 1,), hertz."""
+        return np.asarray(np.diff(self.knots(q)[:, 3]) / np.diff(self.knot_time))
+
+    def expected(self, q: Array) -> Array:
+        """Residuals of what is expected of camera and walk."""
+        body, knots = self.body, self.knots(q)
+        step = np.diff(self.knot_time)
+        velocity = np.diff(knots[:, :2], axis=0) / step[:, None]
+        heading = (knots[1:, 2] + knots[:-1, 2]) / 2
+        ahead = velocity[:, 0] * np.cos(heading) + velocity[:, 1] * np.sin(heading)
+        aside = velocity[:, 1] * np.cos(heading) - velocity[:, 0] * np.sin(heading)
+        rates = self.rates(q)
+        parts, offsets = q[5 : 5 + body.parts], q[5 + body.parts : self.fixed]
+        if self.in_place:
+            speed = [ahead / _STILL_SD, aside / _STILL_SD]
+        else:
+            usual = body.strides(rates, parts) * self._height * np.exp(q[4]) * rates
+            many = np.sqrt(len(step))  # one uncertainty of the whole walk
+            speed = [(ahead - usual) / _SLIDE_SD / many, aside / _SIDEWAYS_SD / many]
+        faster = np.diff(np.stack([ahead, aside], axis=1), axis=0) * np.diff(self._middles())[:, None]
+        bends = np.diff(knots[:, 2:], 2, axis=0) / np.array([_TURN_SD, _HURRY_SD])
+        return np.concatenate([
+            _heavy_tailed((q[:4] - self._prior.mean) / self._prior.sd),
+            [q[4] / STATURE_SD],
+            parts,
+            offsets / _OFFSET_SD,
+            *speed,
+            (rates - body.rate) / (2 * body.rate_sd) / np.sqrt(len(rates)),
+            faster.ravel() / _BEND_SD,
+            bends.ravel(),
+            [(knots[-1, 2] - knots[0, 2]) / (self.knot_time[-1] - self.knot_time[0]) / _CURVE_SD],
+        ])  # fmt: skip
+
+    def cost(self, q: Array) -> float:
+        """Minus twice the log posterior, up to a constant."""
+        return float(self._thin * self.robust(q).sum() + (self.expected(q) ** 2).sum())
+
+    def robust(self, q: Array) -> Array:
+        """Student-t costs of the keypoints (T, J)."""
+        square = (self.errors(q) ** 2).sum(axis=2)
+        return np.asarray(_DEGREES * np.log1p(square / _DEGREES))
+
+    def groups(self) -> Iterator[tuple[NDArray[np.int64], Array]]:
+        """Give parameters whose effects do not overlap, and which errors (T, J, 2, columns) each changes."""
+        plain = self.fixed - self.body.offsets
+        for k in range(plain):
+            yield np.array([k]), np.ones(1)
+        joints = np.eye(len(self.body.names))[:, None]
+        for axis in range(3):
+            yield np.arange(plain + axis, self.fixed, 3), joints
+        knots = np.arange(len(self.knot_time))
+        at = np.interp(self.time, self.knot_time, knots)
+        for first in range(min(4, len(knots))):  # a knot changes what is less than two knots away
+            chosen = knots[first::4]
+            near = (np.abs(at[:, None] - chosen) < 2.0)[:, None, None].astype(float)
+            for kind in range(4):
+                yield self.fixed + 4 * chosen + kind, near
+
+    def frame_chi2(self, q: Array) -> Array:
+        """Squared robust error per coordinate in each frame (T,)."""
+        robust = self.robust(q)
+        return np.asarray(robust.sum(axis=1) / np.maximum(2 * (self._inverse > 0).sum(axis=1), 1))
+
+    def normal(self, q: Array) -> tuple[Array, Array]:
+        """Form the normal equations: matrix and gradient."""
+        errors, expected = self.errors(q), self.expected(q)
+        weight = np.sqrt(self._thin / (1.0 + (errors**2).sum(axis=2, keepdims=True) / _DEGREES))
+        data = np.zeros((*errors.shape, len(q)))
+        prior = np.empty((len(expected), len(q)))
+        h = 1e-5
+        for columns, share in self.groups():
+            moved = q.copy()
+            moved[columns] += h
+            change = (self.errors(moved) - errors) * (weight / h)
+            data[..., columns] = change[..., None] * share
+        own = np.arange(self.fixed - self.body.offsets, self.fixed)  # each offset is expected by itself
+        prior[:, own] = 0.0
+        prior[own, own] = 1.0 / _OFFSET_SD
+        for k in np.delete(np.arange(len(q)), own):
+            moved = q.copy()
+            moved[k] += h
+            prior[:, k] = (self.expected(moved) - expected) / h
+        data = data.reshape(-1, len(q))
+        gradient = data.T @ (weight * errors).ravel() + prior.T @ expected
+        return data.T @ data + prior.T @ prior, gradient

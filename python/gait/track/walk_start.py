@@ -1,0 +1,157 @@
+"""Where the fit of camera and walk begins: what is expected of a camera, and first cameras and walks.
+
+For each of several focal lengths tilt and height follow from hips and ankles as upright sticks; the automatic
+start is fitted with that camera to a second of the walk.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from gait.bindings.model import Model
+from gait.bindings.start_fit import Hypothesis, StartFit
+from gait.camera.camera import Camera
+from gait.errors import GaitError
+from gait.io.keypoints_file import Keypoints
+from gait.track.keypoint_start import keypoint_noise
+
+Array = NDArray[np.float64]
+
+WINDOW = 1.2  # seconds of walking to start with
+STATURE_SD = 0.015  # of the stature, with shoes
+_USUAL_FOV = 65.0  # degrees along the longer side of the picture, of a usual phone
+_FOV_SD = 0.45  # of the focal length's logarithm; of --fov:
+_GIVEN_FOV_SD = 0.05
+_HEIGHT, _HEIGHT_SD = 1.3, 0.5  # metres; of the logarithm
+_TILT, _TILT_SD, _ROLL_SD = 0.05, 0.2, 0.02  # radians
+_STARTS = (0.6, 0.85, 1.2, 2.2, 4.0)  # focal lengths to start from, longer sides of the picture
+_LONGEST = 12.0  # seconds of a walk that are used
+_RATE = 10.0  # frames per second that are used
+
+
+@dataclass(frozen=True)
+class CameraPrior:
+    """Mean and standard deviation (4,) of log focal length, tilt, roll and log height."""
+
+    mean: Array
+    sd: Array
+
+    @staticmethod
+    def of(size: tuple[int, int], fov: float | None) -> CameraPrior:
+        """Give the usual camera's, or that of a horizontal field of view `fov` in degrees."""
+        side, angle, sd = (max(size), _USUAL_FOV, _FOV_SD) if fov is None else (size[0], fov, _GIVEN_FOV_SD)
+        focal = 0.5 * side / np.tan(np.radians(angle) / 2)
+        return CameraPrior(
+            np.array([np.log(focal), _TILT, 0.0, np.log(_HEIGHT)]),
+            np.array([sd, _TILT_SD, _ROLL_SD, _HEIGHT_SD]),
+        )
+
+
+def make_camera(q: Array, size: tuple[int, int]) -> Camera:
+    """Make a camera from log focal length [px], tilt, roll [rad] and log height [m]."""
+    (focal, tilt, roll, height), (width, tall) = q, size
+    ct, st, cr, sr = np.cos(tilt), np.sin(tilt), np.cos(roll), np.sin(roll)
+    level = np.array([[1, 0, 0], [0, -st, -ct], [0, ct, -st]])
+    R = np.array([[cr, sr, 0], [-sr, cr, 0], [0, 0, 1]]) @ level
+    f = float(np.exp(focal))
+    return Camera(
+        width, tall, f, f, (width - 1) / 2, (tall - 1) / 2, R, -R @ np.array([0, 0, np.exp(height)])
+    )
+
+
+def usual_camera(size: tuple[int, int], fov: float | None = None) -> Camera:
+    """Make the camera expected before anything is known, `fov` as in `calibrate`."""
+    return make_camera(CameraPrior.of(size, fov).mean, size)
+
+
+def choose_frames(keypoints: Keypoints) -> Keypoints:
+    """Choose frames with hips and ankles, thinned, of the `_LONGEST` seconds whose size changes most."""
+    legs = [keypoints.names.index(name) for name in ("l_hip", "r_hip", "l_ankle", "r_ankle")]
+    whole = np.isfinite(keypoints.uv[:, legs]).all(axis=(1, 2))
+    time = keypoints.time[whole]
+    rows = np.flatnonzero(whole)
+    if len(rows) > 1:
+        step = max(1, round(1.0 / _RATE / max(float(np.median(np.diff(time))), 1e-6)))
+        rows = rows[::step]
+        time = keypoints.time[rows]
+        if time[-1] - time[0] > _LONGEST:
+            size = np.ptp(keypoints.uv[rows][:, legs, 1], axis=1)
+            begin = max(
+                time[time <= time[-1] - _LONGEST],
+                key=lambda t: np.ptp(np.log(np.maximum(size[(time >= t) & (time <= t + _LONGEST)], 1.0))),
+            )
+            rows = rows[(time >= begin) & (time <= begin + _LONGEST)]
+    return Keypoints(
+        keypoints.frame[rows], keypoints.time[rows], keypoints.names, keypoints.uv[rows],
+        keypoints.confidence[rows],
+    )  # fmt: skip
+
+
+@dataclass
+class WalkStart:
+    """Where a fit begins: camera, and the walk about a time."""
+
+    camera: Array
+    walk: Hypothesis
+    time: float
+
+
+def find_starts(
+    keypoints: Keypoints, size: tuple[int, int], model: Model, height: float, prior: CameraPrior
+) -> list[WalkStart]:
+    """Fit windows of the clip with the camera at several focal lengths."""
+    noise = keypoint_noise(keypoints)
+    found = []
+    span = keypoints.time[-1] - keypoints.time[0]
+    middles = np.unique(np.round(keypoints.time[0] + span * np.array([0.3, 0.5, 0.75]), 3))
+    for share in _STARTS:
+        q = prior.mean.copy()
+        if prior.sd[0] > _GIVEN_FOV_SD:
+            q[0] = np.log(share * max(size))
+        q = _level(q, keypoints, size, height, prior)
+        best: WalkStart | None = None
+        for middle in middles:
+            fit = StartFit(model, make_camera(q, size), stature=height, stature_sd=STATURE_SD * height)
+            near = np.abs(keypoints.time - middle) <= 0.5 * WINDOW
+            for frame, time in zip(keypoints.frame[near], keypoints.time[near], strict=True):
+                fit.add(round(1e6 * time), noise[int(frame)])
+            try:
+                walk = fit.solve(round(1e6 * middle))[0]
+            except GaitError:
+                continue
+            if best is None or walk.chi2_per_observation < best.walk.chi2_per_observation:
+                best = WalkStart(q, walk, middle)
+        if best is not None:
+            found.append(best)
+        if prior.sd[0] <= _GIVEN_FOV_SD:
+            break
+    return found
+
+
+def _level(q: Array, keypoints: Keypoints, size: tuple[int, int], height: float, prior: CameraPrior) -> Array:
+    """Tilt and height of the camera, at a given focal length, from hips and ankles as upright sticks."""
+    names = keypoints.names
+    hip, ankle = (
+        np.mean([keypoints.uv[:, names.index(f"{side}_{joint}")] for side in "lr"], axis=0)
+        for joint in ("hip", "ankle")
+    )
+    q = q.copy()
+
+    def residuals(p: Array) -> Array:
+        camera = make_camera(np.array([q[0], p[0], 0.0, p[1]]), size)
+        foot = camera.on_plane(ankle, 0.06 * height)
+        top = camera.project(foot + [0.0, 0.0, 0.46 * height])
+        off = (top - hip)[:, 1] / np.median(np.abs(hip - ankle)[:, 1])
+        off = np.where(np.isfinite(off), off, 3.0)
+        return np.concatenate(
+            [off / 0.05 / np.sqrt(len(off)) * 3, (p - prior.mean[[1, 3]]) / prior.sd[[1, 3]]]
+        )
+
+    from scipy.optimize import least_squares  # here, as it takes a second to load
+
+    starts = [least_squares(residuals, [tilt, np.log(_HEIGHT)]) for tilt in (0.05, 0.4)]
+    q[1], q[3] = min(starts, key=lambda fit: float(fit.cost)).x
+    return q
