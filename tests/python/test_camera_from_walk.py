@@ -14,8 +14,9 @@ from gait.errors import UserError
 from gait.io.keypoints_file import Keypoints, write
 from gait.simulate import Scenario
 from gait.simulate.stage import set_stage
-from gait.track.from_walk import calibrate, contradiction
+from gait.track.from_walk import calibrate
 from gait.track.keypoint_start import find_keypoint_start
+from gait.track.walk_camera import contradiction
 from gait.track.walk_model import WalkingBody
 from gait.track.walk_start import make_camera
 

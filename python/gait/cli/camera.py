@@ -26,10 +26,10 @@ from gait.cli import values
 from gait.errors import UsageError
 from gait.io import keypoints_file
 from gait.io.files import replacing, require_outputs
-from gait.io.keypoints_file import Keypoints
 from gait.io.video import Video
-from gait.progress import note, progress
-from gait.track.from_walk import calibrate
+from gait.progress import note
+from gait.track.from_walk import Calibration, calibrate
+from gait.track.walk_camera import calibrate_film, find_person
 
 _LARGE = 3.0  # pixels, rms, above which the points should be checked
 
@@ -89,30 +89,24 @@ def _from_walk(args: argparse.Namespace) -> int:
         raise UsageError("--walk: needs --height M, the person's stature in metres")
     require_outputs((args.output,), (args.walk,))
     model = Model()
-    keypoints, size = _keypoints(args, model)
-    found = calibrate(keypoints, size, model, args.height, fov=args.fov, where=args.walk)
+    found = _calibrate(args, model)
     _write(args.output, found.camera)
     print(json.dumps(found.figures()) if args.json else "\n".join(found.describe()))
     return 0
 
 
-def _keypoints(args: argparse.Namespace, model: Model) -> tuple[Keypoints, tuple[int, int]]:
-    """Keypoints of the person who walks, and the size of the picture."""
+def _calibrate(args: argparse.Namespace, model: Model) -> Calibration:
+    """Find the camera of a film, or of a file of keypoints."""
     if Path(args.walk).suffix.lower() == ".csv":
         if args.size is None:
             raise UsageError(f"{args.walk}: give the size of the picture in pixels, as --size 1280x720")
-        return keypoints_file.read(args.walk, model.joint_names, ignore_unknown=True)[0], args.size
+        keypoints, _ = keypoints_file.read(args.walk, model.joint_names, ignore_unknown=True)
+        return calibrate(keypoints, args.size, model, args.height, fov=args.fov, where=args.walk)
     if args.size:
         raise UsageError("--size: is for KEYPOINTS.csv; a video has its own")
-    # Imported here, as they load the networks' runtime.
-    from gait.detect.people import detect, main_person, require_length, require_person
-
     video = Video(args.walk)
-    require_length(video)
-    with progress("detecting", video.count, args.quiet) as update:
-        people = detect(video, update=update)
-    require_person(people, video)
-    return people[main_person(people)], video.size
+    keypoints = find_person(video, args.quiet)
+    return calibrate_film(video, keypoints, model, args.height, args.fov, args.quiet)
 
 
 def _size(text: str) -> tuple[int, int]:

@@ -87,8 +87,8 @@ def add_fov(parser: ArgumentParser) -> None:
         "--fov",
         type=between(2, 150, "degrees"),
         metavar="DEG",
-        help="horizontal field of view of a camera that is found from the walk (default: unknown, near 65 "
-        "along the longer side)",
+        help="horizontal field of view of a camera that is found from the walk (default: from the focal "
+        "length that a telephone wrote into the file; else unknown, near 65 along the longer side)",
     )
 
 

@@ -23,12 +23,11 @@ from gait.io.keypoints_file import Keypoints
 from gait.reproducible import one_thread
 from gait.track.walk_fit import WalkFit
 from gait.track.walk_model import WalkingBody, WalkModel
-from gait.track.walk_start import WINDOW, CameraPrior, choose_frames, find_starts, make_camera
+from gait.track.walk_start import GIVEN_FOV_SD, WINDOW, CameraPrior, choose_frames, find_starts, make_camera
 
 Array = NDArray[np.float64]
 
 _WORST = 6.0  # squared robust error per coordinate up to which the result is accepted
-_CONTRADICTS = 0.1  # of the stature, by which a person who appears taller or shorter contradicts a camera
 _LEAST_RATE = 0.4  # strides per second of a person who walks
 _UNKNOWN = 0.2  # relative standard deviation from which the focal length counts as not determined
 
@@ -120,6 +119,7 @@ def calibrate(
     height: float,
     *,
     fov: float | None = None,
+    fov_sd: float = GIVEN_FOV_SD,
     where: str = "keypoints",
 ) -> Calibration:
     """Find the camera from the keypoints of a walking person.
@@ -136,6 +136,8 @@ def calibrate(
         The person's stature, metres.
     fov : float, optional
         Horizontal field of view, degrees, as the camera's maker gives it.
+    fov_sd : float
+        Standard deviation of the logarithm of the focal length that follows from `fov`.
     where : str
         Name of the input in errors.
 
@@ -161,7 +163,7 @@ def calibrate(
             "--camera"
         )
     with one_thread():
-        return _calibrate(chosen, size, model, height, CameraPrior.of(size, fov), where)
+        return _calibrate(chosen, size, model, height, CameraPrior.of(size, fov, fov_sd), where)
 
 
 def _calibrate(
@@ -203,30 +205,4 @@ def _result(fit: WalkFit, size: tuple[int, int]) -> Calibration:
         path_change,
         fit.model.in_place,
         fit.chi2_per_observation,
-    )
-
-
-def contradiction(
-    given: Camera, appears: float | None, keypoints: Keypoints, model: Model, height: float
-) -> str | None:
-    """Report how a given camera contradicts a walk, and which camera would fit; None: it does not.
-
-    Parameters
-    ----------
-    given : Camera
-    appears : float or None
-        Stature of the person by this camera, metres; None: no walk on the floor fits.
-    keypoints, model, height
-        As for `calibrate`.
-    """
-    if appears is not None and abs(appears / height - 1) < _CONTRADICTS:
-        return None
-    try:
-        fits = calibrate(keypoints, given.size, model, height)
-    except UserError:
-        return None
-    what = "no walk fits it" if appears is None else f"the person appears {appears:.2f} m tall by it"
-    return (
-        f"{what}, --height is {height:g}; check its focal length ({given.fx:.0f} px) and place "
-        f"({given.centre[2]:.2f} m high): {fits.describe()[0]}"
     )

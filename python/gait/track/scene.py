@@ -21,10 +21,11 @@ from gait.io.keypoints_file import Keypoints
 from gait.io.video import Frame, Image, Video, background, median, sample_frames
 from gait.progress import note, progress
 from gait.track.box_start import find_start
-from gait.track.from_walk import Calibration, calibrate, contradiction
+from gait.track.from_walk import Calibration
 from gait.track.keypoint_start import find_keypoint_start, keypoint_noise
 from gait.track.options import ClipOptions
 from gait.track.stabilise import SteadyVideo, find_motion, moves
+from gait.track.walk_camera import calibrate_film, contradiction, expected_fov, note_camera
 from gait.track.walk_start import usual_camera
 
 _COLOUR = 4.0  # grey levels between the channels of half of a picture in colour, at least
@@ -143,7 +144,7 @@ def _stabilise(
     given: Image | None,
 ) -> SteadyVideo | None:
     """Undo the turns of the camera, if asked to; None if it stands still or they cannot be undone."""
-    camera = camera or usual_camera(video.size, options.fov)
+    camera = camera or usual_camera(video.size, expected_fov(video, options.fov, quiet=True)[0])
     if options.stabilize == "off":
         if samples and moves(camera, samples, people, given):
             note("the camera moves during the clip; --stabilize auto undoes its turns", options.quiet)
@@ -181,9 +182,8 @@ def _calibrate(options: ClipOptions, video: Video, model: Model, keypoints: Keyp
         remedy = "gait detect finds no person in it" if _has_detector(options) else weights.FETCH
         raise UserError(f"{video.path}: without --camera keypoints of a walk are needed: {remedy}")
     assert options.height is not None
-    found = calibrate(keypoints, video.size, model, options.height, fov=options.fov, where=str(video.path))
-    for line in found.describe():
-        note(line, options.quiet)
+    found = calibrate_film(video, keypoints, model, options.height, options.fov, options.quiet)
+    note_camera(found, options.quiet)
     return found
 
 

@@ -126,7 +126,7 @@ class WalkingBody:
 
 
 class WalkModel:
-    """Keypoints of an interval, and what camera and walk say of them.
+    """Keypoints of an interval, and what is expected of camera and walk.
 
     Attributes
     ----------

@@ -24,7 +24,7 @@ WINDOW = 1.2  # seconds of walking to start with
 STATURE_SD = 0.015  # of the stature, with shoes
 _USUAL_FOV = 65.0  # degrees along the longer side of the picture, of a usual phone
 _FOV_SD = 0.45  # of the focal length's logarithm; of --fov:
-_GIVEN_FOV_SD = 0.05
+GIVEN_FOV_SD = 0.05
 _HEIGHT, _HEIGHT_SD = 1.3, 0.5  # metres; of the logarithm
 _TILT, _TILT_SD, _ROLL_SD = 0.05, 0.2, 0.02  # radians
 _STARTS = (0.6, 0.85, 1.2, 2.2, 4.0)  # focal lengths to start from, longer sides of the picture
@@ -40,9 +40,9 @@ class CameraPrior:
     sd: Array
 
     @staticmethod
-    def of(size: tuple[int, int], fov: float | None) -> CameraPrior:
-        """Give the usual camera's, or that of a horizontal field of view `fov` in degrees."""
-        side, angle, sd = (max(size), _USUAL_FOV, _FOV_SD) if fov is None else (size[0], fov, _GIVEN_FOV_SD)
+    def of(size: tuple[int, int], fov: float | None, fov_sd: float = GIVEN_FOV_SD) -> CameraPrior:
+        """Give the usual camera's, or that of a horizontal field of view `fov`, as for `calibrate`."""
+        side, angle, sd = (max(size), _USUAL_FOV, _FOV_SD) if fov is None else (size[0], fov, fov_sd)
         focal = 0.5 * side / np.tan(np.radians(angle) / 2)
         return CameraPrior(
             np.array([np.log(focal), _TILT, 0.0, np.log(_HEIGHT)]),
@@ -109,7 +109,7 @@ def find_starts(
     middles = np.unique(np.round(keypoints.time[0] + span * np.array([0.3, 0.5, 0.75]), 3))
     for share in _STARTS:
         q = prior.mean.copy()
-        if prior.sd[0] > _GIVEN_FOV_SD:
+        if prior.sd[0] > GIVEN_FOV_SD:
             q[0] = np.log(share * max(size))
         q = _level(q, keypoints, size, height, prior)
         best: WalkStart | None = None
@@ -126,7 +126,7 @@ def find_starts(
                 best = WalkStart(q, walk, middle)
         if best is not None:
             found.append(best)
-        if prior.sd[0] <= _GIVEN_FOV_SD:
+        if prior.sd[0] <= GIVEN_FOV_SD:
             break
     return found
 

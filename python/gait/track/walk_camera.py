@@ -1,0 +1,125 @@
+"""The camera of a film as its walk shows it: found if none is given, and compared with one that is.
+
+What `gait camera`, `gait track` and `gait lift` share.
+"""
+
+from __future__ import annotations
+
+from gait.bindings.model import Model
+from gait.camera.camera import Camera
+from gait.errors import UserError
+from gait.io.keypoints_file import Keypoints
+from gait.io.lens_tag import equivalent_mm, lens_tag, view_across
+from gait.io.video import Video
+from gait.progress import note, progress
+from gait.track.from_walk import Calibration, calibrate
+from gait.track.walk_start import GIVEN_FOV_SD
+
+_TAG_SD = 0.1  # of the focal length's logarithm; stabilised films are cropped by about as much
+_CONTRADICTS = 0.1  # of the stature, by which a person who appears taller or shorter contradicts a camera
+
+
+def find_person(video: Video, quiet: bool, first: int = 0, stop: int | None = None) -> Keypoints:
+    """Find the keypoints of the main person of a film by the detector.
+
+    Raises
+    ------
+    UserError
+        If the detector's weights are absent, or it finds no person.
+    """
+    from gait.detect.people import detect, main_person, require_length, require_person  # loads the runtime
+
+    require_length(video)
+    with progress("detecting", (stop or video.count) - first, quiet) as update:
+        people = detect(video, first=first, stop=stop, update=update)
+    require_person(people, video)
+    return people[main_person(people)]
+
+
+def expected_fov(video: Video, fov: float | None, quiet: bool) -> tuple[float | None, float]:
+    """Field of view that is known before the walk is looked at.
+
+    Parameters
+    ----------
+    video : Video
+        Its file may state a focal length.
+    fov : float or None
+        The user's, degrees, which wins.
+    quiet : bool
+        Do not report what the file states.
+
+    Returns
+    -------
+    fov : float or None
+        Horizontal field of view, degrees.
+    sd : float
+        Of the logarithm of the focal length.
+    """
+    tag = None if fov is not None else lens_tag(video.path)
+    if tag is None:
+        return fov, GIVEN_FOV_SD
+    mm = equivalent_mm(tag)
+    if mm is None:
+        note(f"{video.path}: states a focal length of {tag[:20]!r}, which is none: not used", quiet)
+        return None, GIVEN_FOV_SD
+    fov = view_across(mm, video.size)
+    note(
+        f"{video.path}: states a focal length of {mm:g} mm (35 mm film), a view of {fov:.0f} deg across: "
+        f"taken as known within {100 * _TAG_SD:.0f} % (--fov overrides it)",
+        quiet,
+    )
+    return fov, _TAG_SD
+
+
+def calibrate_film(
+    video: Video, keypoints: Keypoints, model: Model, height: float, fov: float | None, quiet: bool
+) -> Calibration:
+    """Find the camera of a film from the keypoints of the person who walks in it.
+
+    Parameters
+    ----------
+    video : Video
+    keypoints, model, height
+        As for `calibrate`.
+    fov, quiet
+        As for `expected_fov`.
+
+    Raises
+    ------
+    UserError
+        As `calibrate`; it names the file.
+    """
+    fov, sd = expected_fov(video, fov, quiet)
+    return calibrate(keypoints, video.size, model, height, fov=fov, fov_sd=sd, where=str(video.path))
+
+
+def note_camera(found: Calibration, quiet: bool) -> None:
+    """Report the camera that was found."""
+    for line in found.describe():
+        note(line, quiet)
+
+
+def contradiction(
+    given: Camera, appears: float | None, keypoints: Keypoints, model: Model, height: float
+) -> str | None:
+    """Report how a given camera contradicts a walk, and which camera would fit; None: it does not.
+
+    Parameters
+    ----------
+    given : Camera
+    appears : float or None
+        Stature of the person by this camera, metres; None: no walk on the floor fits.
+    keypoints, model, height
+        As for `calibrate`.
+    """
+    if appears is not None and abs(appears / height - 1) < _CONTRADICTS:
+        return None
+    try:
+        fits = calibrate(keypoints, given.size, model, height)
+    except UserError:
+        return None
+    what = "no walk fits it" if appears is None else f"the person appears {appears:.2f} m tall by it"
+    return (
+        f"{what}, --height is {height:g}; check its focal length ({given.fx:.0f} px) and place "
+        f"({given.centre[2]:.2f} m high): {fits.describe()[0]}"
+    )
