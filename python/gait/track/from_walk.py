@@ -173,8 +173,8 @@ def _calibrate(
     best: WalkFit | None = None
     for start in find_starts(chosen, size, model, height, prior):
         near = start.time - WINDOW / 2, start.time + WINDOW / 2
-        seen = WalkModel(chosen, size, body, height, prior, in_place=start.walk.in_place, interval=near)
-        fit = WalkFit(seen, start)
+        expected = WalkModel(chosen, size, body, height, prior, in_place=start.walk.in_place, interval=near)
+        fit = WalkFit(expected, start)
         fit.refine(6)
         if best is None or fit.cost_per_frame < best.cost_per_frame:
             best = fit
