@@ -35,7 +35,6 @@ from gait.learn.corpus import sources
 from gait.learn.cycles import cutting
 from gait.learn.cycles.sequence import Sequence, load
 from gait.learn.mocap.tables import AngleTable
-from gait.learn.options import LearnOptions
 from gait.learn.prior import components, fit, model, people
 from gait.learn.solve import readers, retarget
 from gait.progress import progress
@@ -141,7 +140,6 @@ def hold_out(sequences: list[Sequence], others: Bodies, subject: str) -> tuple[s
 
 def models(learners: list[Sequence], others: Bodies) -> tuple[dict[str, Sections], dict[str, Proportions]]:
     """Curves and proportions by the name of the model, and the bodies."""
-    paper = fit.fit(learners, LearnOptions(components=PAPER, prior="paper"))
     ours = fit.fit(learners, others=others)
     filled, subject, scale = ours.components.filled, ours.row_subject, fit.channel_scale()
     both = np.concatenate([filled, people.mirrored(filled)])
@@ -156,7 +154,7 @@ def models(learners: list[Sequence], others: Bodies) -> tuple[dict[str, Sections
         {"CURV": _alike(even, subject, metric), **follows},
     )
     made = {
-        BASELINE: {"CURV": paper.curves},
+        BASELINE: {"CURV": steps[0]["CURV"][: 1 + PAPER]},  # all channels, so that only the components differ
         **dict(zip(STEPS, steps, strict=True)),
         **{name: shape.sections(ours) | follows for name, shape in SHAPES.items()},
     }

@@ -11,12 +11,13 @@ import pytest
 
 import gait.cli
 from gait import Model
-from gait.body.skeleton import ANGLES, CHANNELS, default_skeleton
+from gait.body.skeleton import ANGLES, CHANNELS, PAPER_ANGLES, default_skeleton
 from gait.errors import UserError
 from gait.io import blob
 from gait.learn.corpus import load, sources
-from gait.learn.options import PRIORS, LearnOptions
-from gait.learn.prior import components, fit, model
+from gait.learn.cycles.fourier import decode, fourier_basis
+from gait.learn.options import PAPER_COMPONENTS, PRIORS, LearnOptions
+from gait.learn.prior import components, fit, iterated_svd, model
 
 LEGS = np.array([any(joint in name for joint in ("hip", "knee", "ankle")) for name in ANGLES])
 
@@ -48,7 +49,15 @@ def run(*words):
 
 @pytest.mark.parametrize(
     ("cycles", "wanted", "count"),
-    [(3, None, 1), (6, None, 4), (10, None, 8), (90, None, 8), (6, 4, 4), (90, 16, 16), (6, "auto", 4)],
+    [
+        (3, None, 1),
+        (6, None, 4),
+        (10, None, 8),
+        (90, None, 8),
+        (6, 4, 4),
+        (90, 16, 16),
+        (6, "auto", 4),
+    ],
 )
 def test_components_are_no_more_than_cycles_allow(cycles, wanted, count):
     assert fit.most_components(cycles, wanted) == count
@@ -57,9 +66,21 @@ def test_components_are_no_more_than_cycles_allow(cycles, wanted, count):
 @pytest.mark.parametrize(
     ("cycles", "wanted", "message"),
     [
-        (6, 5, "6 cycles are too few for 5 components; add recordings or ask for 4 at most"),
-        (2, None, "2 cycles are too few for 1 component; add recordings, 3 cycles at least"),
-        (0, "auto", "0 cycles are too few for 1 component; add recordings, 3 cycles at least"),
+        (
+            6,
+            5,
+            "6 cycles are too few for 5 components; add recordings or ask for 4 at most",
+        ),
+        (
+            2,
+            None,
+            "2 cycles are too few for 1 component; add recordings, 3 cycles at least",
+        ),
+        (
+            0,
+            "auto",
+            "0 cycles are too few for 1 component; add recordings, 3 cycles at least",
+        ),
     ],
 )
 def test_more_components_than_cycles_allow_are_an_error(cycles, wanted, message):
@@ -120,13 +141,42 @@ def test_the_body_of_a_person_is_of_the_recording_that_shows_most(sequences):
     assert arms[0] != pytest.approx(arms[2], rel=1e-3)  # no person has them, so those of the default body
 
 
-def test_paper_prior_has_the_plain_components_and_one_body(sequences):
-    learned = fit.fit(sequences, LearnOptions(components=2, prior="paper"))
+def test_paper_prior_moves_nineteen_angles_and_has_one_body(sequences):
+    learned = fit.fit(sequences, LearnOptions(prior="paper"))
     assert "PROP" not in sections(learned)
-    scale, c = fit.channel_scale(), learned.components
-    plain = components.fit(learned.cycles.values * scale, learned.cycles.mask, 2)
-    np.testing.assert_allclose(c.curves * scale, plain.curves, atol=1e-12)
-    np.testing.assert_allclose(c.sd, plain.sd)
+    assert len(learned.components.sd) == PAPER_COMPONENTS
+    assert (np.ptp(learned.curves[0], axis=0) > 0).sum() == len(PAPER_ANGLES)
+    angles = len(PAPER_ANGLES)
+    assert not learned.curves[1:, :, angles:].any()
+    k = CHANNELS.index("root_forward")
+    forward = learned.cycles.values[:, :, k][learned.cycles.mask[:, :, k]]
+    assert learned.curves[0, 0, k] == pytest.approx(forward.mean())
+
+
+def test_the_iterated_svd_recovers_planted_components_and_its_error_falls():
+    """Cycles of two components with a fifth of their entries missing in blocks."""
+    rng = np.random.default_rng(3)
+    rows, samples, channels, count = 30, 60, 4, 2
+    basis = fourier_basis(samples, 19)
+    planted, _ = np.linalg.qr(rng.normal(size=(9 * channels, count)))
+    coded = np.zeros((rows, len(basis) * channels))
+    coded[:, : 9 * channels] = 5 * rng.normal(size=(rows, count)) @ planted.T
+    truth = decode(coded, basis, channels)
+    values, mask = (
+        truth + 0.01 * rng.normal(size=truth.shape),
+        np.ones(truth.shape, bool),
+    )
+    for row in mask:
+        row[(int(rng.integers(samples)) + np.arange(12)) % samples, :] = False
+    found = components.fit(np.where(mask, values, 0.0), mask, count, fill=iterated_svd.complete)
+    assert found.converged and len(found.rmse) > 2
+    assert np.all(np.diff(found.rmse) <= 1e-12)
+    assert found.rmse[-1] < 0.02 < 5 * found.rmse[-1] < found.rmse[0]
+    assert np.sqrt(np.mean((found.filled - truth)[~mask] ** 2)) < 0.02
+    flat = found.curves.reshape(count, -1)
+    angles = np.linalg.svd(flat @ decode(np.pad(planted.T, ((0, 0), (0, coded.shape[1] - 9 * channels))),
+                                         basis, channels).reshape(count, -1).T)[1]  # fmt: skip
+    assert angles.min() > 0.9999
 
 
 @pytest.mark.parametrize("kind", PRIORS)

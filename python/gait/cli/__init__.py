@@ -57,6 +57,9 @@ COMMANDS = {
     "report lift": Command(
         "report_lift", "draw figures of the segment prior and of lifting", ("video", "report", "mocap")
     ),
+    "paper": Command(
+        "paper", "make every figure of the two papers from motion capture", ("video", "report", "mocap")
+    ),
     "view": Command("view", "watch the estimates of gait-trackd in a browser", ("video", "lcm")),
 }
 """Commands in the order of ``gait --help``."""

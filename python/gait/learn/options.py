@@ -8,6 +8,7 @@ from gait.bindings.segment_prior import HEADINGS
 from gait.learn.mocap.markers import MarkerMap
 
 DEFAULT_COMPONENTS = 8
+PAPER_COMPONENTS = 5
 MOST_COMPONENTS = 16  # the library reads no more
 PRIORS = ("people", "paper")
 PERIOD_MODES = ("refined", "literal")
@@ -53,7 +54,8 @@ class LearnOptions:
     activity: str = "walk"  #: recordings of another known activity are refused
     subjects: str = SUBJECT_RULES[0]
     components: int | str | None = None  #: a number, "auto", or None for DEFAULT_COMPONENTS
-    prior: str = PRIORS[0]  #: paper: recorded cycles only; people: also people who were not recorded
+    #: people: also of people who were not recorded; paper: the 19 angles of Ormoneit 2000 by its algorithm.
+    prior: str = PRIORS[0]
     period_mode: str = PERIOD_MODES[0]
     fps: float | None = None  #: frames per second; None: from the file
     markers: MarkerMap | None = None  #: for marker sets that are not known by themselves

@@ -33,12 +33,22 @@ class Drawing:
     caption: str
     figure: Figure
 
-    def write(self, folder: Path) -> str:
-        """Write the PNG file; return the picture as an address that a page can hold."""
+    def png(self) -> bytes:
+        """Return the picture as a PNG file."""
         buffer = io.BytesIO()
         self.figure.savefig(buffer, format="png", dpi=_DPI, metadata={"Software": None})
-        (folder / f"{self.stem}.png").write_bytes(buffer.getvalue())
-        return "data:image/png;base64," + base64.b64encode(buffer.getvalue()).decode()
+        return buffer.getvalue()
+
+    def write(self, folder: Path) -> str:
+        """Write the PNG file; return the picture as an address that a page can hold."""
+        data = self.png()
+        (folder / f"{self.stem}.png").write_bytes(data)
+        return address(data)
+
+
+def address(png: bytes) -> str:
+    """Return a PNG file as an address that a page can hold."""
+    return "data:image/png;base64," + base64.b64encode(png).decode()
 
 
 def grid(

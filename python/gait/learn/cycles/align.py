@@ -182,16 +182,18 @@ def align(
     periods: Floats,
     start: Floats | None = None,
     hips: tuple[int, int] | None = None,
+    weights: Floats | None = None,
 ) -> Alignment:
     """Find the offset of each sequence.
 
     Signals are (T_i, A), NaN where missing; a sequence may lack whole angles and is then aligned by the
     others. Periods are frames.  `start` (n,) are offsets to start from; by default circular cross-correlation
     with the curve of the first sequence, and of some others if a phase is ambiguous.  `hips` are the columns
-    of right and left hip flexion, which fix the common phase.
+    of right and left hip flexion, which fix the common phase.  `weights` (A,) are those of the angles in the
+    sum of squares, by default one over their noise.  The paper starts from offsets 0 with equal weights.
     """
     problem = _Problem(signals, np.asarray(periods, float), hips)
-    weights = _noise_weights(problem)
+    weights = _noise_weights(problem) if weights is None else weights
     if start is not None:
         return _descend(problem, np.asarray(start, float), weights)
     found = [_descend(problem, offsets, weights) for offsets in _xcorr_starts(problem, weights)]

@@ -34,18 +34,21 @@ class Cycles:
         return np.asarray(self.mask.any(axis=(0, 1)))
 
 
-def cut_cycles(signals: list[Floats], periods: Floats, offsets: Floats, samples: int) -> Cycles:
+def cut_cycles(
+    signals: list[Floats], periods: Floats, offsets: Floats, samples: int, closing: bool = True
+) -> Cycles:
     """Cut sequences (T_i, M) into cycles and resample each on `samples` phases.
 
     Cycle k is the frames from offset + (k - 1) period to offset + k period.  Cycles with less than the share
-    OBSERVED of their entries, in the channels that the sequence has, are dropped.
+    OBSERVED of their entries, in the channels that the sequence has, are dropped.  With `closing` the line
+    that joins the ends of a cycle is subtracted from it; the paper leaves the ends apart.
     """
     channels, rest = signals[0].shape[1], list[tuple[Mask, Floats, int, int]]()
 
     def closed() -> Iterator[Floats]:
         for i, (z, period, offset) in enumerate(zip(signals, periods, offsets, strict=True)):
             for k, values, mask in _slices(z, float(period), float(offset), samples):
-                flat, ramp = _close(values, mask)
+                flat, ramp = _close(values, mask) if closing else (values, np.zeros(channels))
                 rest.append((mask, ramp, i, k))
                 yield flat
             release(z)

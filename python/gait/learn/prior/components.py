@@ -7,6 +7,7 @@ curves.
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
@@ -14,6 +15,9 @@ import numpy as np
 from gait.learn.arrays import Floats, Mask, by_rows, stored
 from gait.learn.cycles.fourier import HARMONICS, decode, encode_all, fourier_basis
 from gait.learn.prior.imputation import Filling, complete, right_singular
+
+Fill = Callable[[Floats, Mask, int, Floats], Filling]
+"""Fills missing entries of values (R, T, M) by so many components in a Fourier basis (B, T)."""
 
 
 @dataclass
@@ -31,7 +35,9 @@ class Components(Filling):
         return self.mean + np.einsum("rk,ktm->rtm", self.scores[rows], self.curves)
 
 
-def fit(values: Floats, mask: Mask, components: int, harmonics: int = HARMONICS) -> Components:
+def fit(
+    values: Floats, mask: Mask, components: int, harmonics: int = HARMONICS, fill: Fill = complete
+) -> Components:
     """Fill missing entries of values (R, T, M), then compute mean curves, components and scores by an SVD."""
     rows, samples, channels = values.shape
     basis, whole = fourier_basis(samples, harmonics), bool(mask.all())
@@ -39,7 +45,7 @@ def fit(values: Floats, mask: Mask, components: int, harmonics: int = HARMONICS)
         copy = stored((values[part] for part in by_rows(values)), values.shape[1:])
         filling = Filling(copy, [], [], 0.0, converged=True)
     else:
-        filling = complete(values, mask, components, basis)
+        filling = fill(values, mask, components, basis)
     coded = encode_all(filling.filled, basis)
     mean = coded.mean(axis=0)
     singular, right = right_singular(coded, mean)

@@ -8,14 +8,24 @@ from typing import Any
 
 import numpy as np
 
-from gait.body.skeleton import ANGLES, CHANNELS, EVAL15, JOINTS, SIDES, Proportions, default_skeleton, points
+from gait.body.skeleton import (
+    ANGLES,
+    CHANNELS,
+    EVAL15,
+    JOINTS,
+    PAPER_ANGLES,
+    SIDES,
+    Proportions,
+    default_skeleton,
+    points,
+)
 from gait.errors import UserError
 from gait.learn.arrays import Floats, Indices, Mask, by_rows, release, stored
 from gait.learn.cycles import align, cutting
 from gait.learn.cycles.fourier import decode, encode, fourier_basis
 from gait.learn.cycles.sequence import Sequence
-from gait.learn.options import DEFAULT, DEFAULT_COMPONENTS, LearnOptions
-from gait.learn.prior import components, lengths, people, rank
+from gait.learn.options import DEFAULT, DEFAULT_COMPONENTS, PAPER_COMPONENTS, LearnOptions
+from gait.learn.prior import components, iterated_svd, lengths, people, rank
 from gait.learn.prior.components import Components
 from gait.learn.prior.people import ADULT_STATURE
 from gait.learn.solve.retarget import Measures, generic_proportions, known_parts
@@ -78,6 +88,7 @@ class Learned:
     lengths: Floats  #: (p, F + 1) section PROP: how limbs differ in length; empty in the paper's model
     shifts: Floats  #: (p, F, 3) section SHFT: how the origins of frames (the shoulders') differ besides
     static: Floats  #: (M,) sd over subjects of a person's constant offsets from the model
+    paper: bool = False  #: whether the components are the paper's, of 19 angles, the other channels constant
 
     @property
     def curves(self) -> Floats:
@@ -100,9 +111,7 @@ class Learned:
     @cached_property
     def by_subject(self) -> SubjectResiduals | None:
         """Residuals of each subject; None if they are too few or too many, as each costs a fit."""
-        return _subject_residuals(
-            self.cycles, self.scale, self.row_subject, len(self.components.sd), self.proportions
-        )
+        return _subject_residuals(self)
 
     @property
     def row_subject(self) -> Indices:
@@ -129,30 +138,32 @@ def fit(
     proportions = generic_proportions(own)
     signals = [s.channels for s in sequences]
     periods = np.array([s.period.frames for s in sequences])
-    alignment = align.align([z[:, : len(ANGLES)] for z in signals], periods, hips=align.HIPS)
+    paper = options.prior == "paper"
+    alignment = _aligned(signals, periods, paper)
     start = heel_strike(align.common_curve(signals, periods, alignment.offsets), proportions)
     alignment.offsets = (alignment.offsets + start * periods) % periods
     release(*signals)
-    rows = cutting.cut_cycles(signals, periods, alignment.offsets, SAMPLES)
-    wanted = most_components(len(rows.values), options.components, [str(s.source) for s in sequences])
+    rows = cutting.cut_cycles(signals, periods, alignment.offsets, SAMPLES, closing=not paper)
+    asked = PAPER_COMPONENTS if paper and options.components is None else options.components
+    wanted = most_components(len(rows.values), asked, [str(s.source) for s in sequences])
     scale = channel_scale()
     scaled, held_out = _times(rows.values, scale), np.zeros(0)
     if options.components == "auto":
         rng = np.random.default_rng(options.seed)
         wanted, held_out = rank.choose(scaled, rows.mask, rng, index[rows.sequence], largest=wanted)
-    model = _own_units(components.fit(scaled, rows.mask, wanted), scale)
+    model = _own_units(_analysed(scaled, rows.mask, wanted, paper), scale)
     row_subject = np.unique(index[rows.sequence], return_inverse=True)[1]
     metric = people.joint_metric(model.mean, proportions)
     paces = people.paces(sequences, index)
     slope, even = np.zeros(model.mean.shape), model.filled
-    if options.prior == "people":
+    if not paper:
         whole = people.bounded(model.filled, rows.mask, row_subject)
         slope = people.pace_slope(whole, row_subject, paces[rows.sequence])
         even = people.at_mean_pace(whole, paces[rows.sequence], slope)
         model = people.refine(model, even, row_subject, wanted, metric)
     static = people.static_sd(even, row_subject, wanted, metric)
     model = grounded(model, rows.visible, proportions)
-    bodies = [*own, *(others or [])] if options.prior == "people" else []
+    bodies = [] if paper else [*own, *(others or [])]
     table, shifts = lengths.learn(bodies, proportions, model.mean)
     return Learned(
         sequences=sequences,
@@ -169,6 +180,37 @@ def fit(
         lengths=table,
         shifts=shifts,
         static=static,
+        paper=paper,
+    )
+
+
+def _aligned(signals: list[Floats], periods: Floats, paper: bool) -> align.Alignment:
+    """Align sequences (T, M) by their angles, or as the paper does: its 19, alike, from offsets 0."""
+    if not paper:
+        return align.align([z[:, : len(ANGLES)] for z in signals], periods, hips=align.HIPS)
+    count = len(PAPER_ANGLES)
+    start, weights = np.zeros(len(signals)), np.ones(count)
+    return align.align([z[:, :count] for z in signals], periods, start, align.HIPS, weights)
+
+
+def _analysed(values: Floats, mask: Mask, count: int, paper: bool) -> Components:
+    """Fill and analyse cycles (R, T, M); the paper's components are of its angles, the rest is constant."""
+    if not paper:
+        return components.fit(values, mask, count)
+    angles = len(PAPER_ANGLES)
+    found = components.fit(values[:, :, :angles], mask[:, :, :angles], count, fill=iterated_svd.complete)
+    visible = mask[:, :, angles:]
+    total = np.where(visible, values[:, :, angles:], 0.0).sum(axis=(0, 1))
+    constant = total / np.maximum(visible.sum(axis=(0, 1)), 1)
+
+    def widened(curves: Floats, rest: Floats) -> Floats:
+        return np.concatenate([curves, np.broadcast_to(rest, (*curves.shape[:-1], len(rest)))], axis=-1)
+
+    return replace(
+        found,
+        filled=stored((widened(found.filled[p], constant) for p in by_rows(values)), values.shape[1:]),
+        mean=widened(found.mean, constant),
+        curves=widened(found.curves, np.zeros(len(constant))),
     )
 
 
@@ -265,17 +307,17 @@ def _from_legs(mean: Floats, proportions: Proportions) -> tuple[Floats, float]:
     return height, stride if PLAUSIBLE_STRIDE[0] <= stride <= PLAUSIBLE_STRIDE[1] else USUAL_STRIDE
 
 
-def _subject_residuals(
-    rows: cutting.Cycles, scale: Floats, subject: Indices, count: int, proportions: Proportions
-) -> SubjectResiduals | None:
-    """Fit the components of all, and of all but each subject; `proportions` are of the body compared on."""
-    values, mask = rows.values, rows.mask
+def _subject_residuals(learned: Learned) -> SubjectResiduals | None:
+    """Fit the components of all, and of all but each subject."""
+    values, mask, subject = learned.cycles.values, learned.cycles.mask, learned.row_subject
+    scale, count, proportions = learned.scale, len(learned.components.sd), learned.proportions
     number = int(subject.max()) + 1
     if not LEAST_SUBJECTS <= number <= MOST_SUBJECTS or len(values) > MOST_CYCLES:
         return None
 
     def learnt(some: Mask) -> Components:
-        return components.fit(values[some] * scale, mask[some], min(count, int(some.sum()) - 1))
+        most = min(count, int(some.sum()) - 1)
+        return _analysed(values[some] * scale, mask[some], most, learned.paper)
 
     def left(model: Components, some: Mask) -> tuple[float, float]:
         nearest = _nearest(model, values[some] * scale, mask[some]) / scale

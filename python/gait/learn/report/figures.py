@@ -45,7 +45,7 @@ SUBJECTS = (
 
 def drawings(learned: Learned) -> Iterator[Drawing]:
     """Draw the figures in the order of the page."""
-    yield Drawing("snr", "Signal-to-noise ratio against the period", SNR, ratios(learned))
+    yield Drawing("snr", "Signal-to-noise ratio against the period", SNR, ratios(richest(learned)))
     yield Drawing(
         "periods",
         "Periods of all recordings",
@@ -120,11 +120,10 @@ def richest(learned: Learned) -> Sequence:
     return max(learned.sequences, key=lambda s: s.cycles)
 
 
-def ratios(learned: Learned) -> Figure:
-    """Draw the ratio of white noise, each angle and their sum over whole periods, for one sequence."""
-    s = richest(learned)
+def ratios(s: Sequence, angles: int = len(ANGLES)) -> Figure:
+    """Draw the ratio of white noise, of each of the first angles and of their sum over whole periods."""
     noise = np.random.default_rng(0).normal(size=(len(s.channels), 1))
-    signals = np.concatenate([noise, s.channels[:, : len(ANGLES)]], axis=1)
+    signals = np.concatenate([noise, s.channels[:, :angles]], axis=1)
     candidates, table = period.curves(signals, s.fps, "literal")
     rows = [k for k in range(table.shape[1]) if np.isfinite(table[:, k]).any()]
     figure = Figure(figsize=(8, 0.27 * len(rows) + 2.4), layout="constrained")

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+
 import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
@@ -39,16 +41,16 @@ def mark_unobserved(axes: Axes) -> None:
     axes.text(0.5, 0, "not observed", ha="center", va="center", color=GREY, fontsize=9)
 
 
-def curves(learned: Learned) -> Figure:
+def curves(learned: Learned, shown: Sequence[str] = SHOWN) -> Figure:
     """Draw mean and two standard deviations of the stride rate and of each component, angle by angle."""
     mean_curve, *turns = np.degrees(learned.curves[: 1 + MOST_COMPONENTS])
     names, visible = [f"component {k + 1}" for k in range(len(turns))], learned.cycles.visible
     if learned.pace_curve.any():
         names, turns = ["stride rate", *names], [np.degrees(learned.pace_curve), *turns]
     figure = Figure(figsize=(11, 1.6 * len(names) + 0.7), layout="constrained")
-    panels = figure.subplots(len(names), len(SHOWN), sharex=True, sharey="col", squeeze=False)
+    panels = figure.subplots(len(names), len(shown), sharex=True, sharey="col", squeeze=False)
     for k, row in enumerate(panels):
-        for axes, name in zip(row, SHOWN, strict=True):
+        for axes, name in zip(row, shown, strict=True):
             plain(axes)
             c = CHANNELS.index(name)
             if not visible[c]:
@@ -77,11 +79,11 @@ def strip(learned: Learned, moved: Floats | None) -> Figure:
     turns = [0.0] if moved is None else [0.0, -2.0, 2.0]
     top = 1.05
     for turn in turns:
-        bodies = _bodies(learned, learned.curves[0] if moved is None else learned.curves[0] + turn * moved)
-        top = max(top, float(bodies[..., 2].max()))
+        joints = bodies(learned, learned.curves[0] if moved is None else learned.curves[0] + turn * moved)
+        top = max(top, float(joints[..., 2].max()))
         colour = {0.0: DARK if moved is None else GREY, -2.0: BLUE, 2.0: ORANGE}[turn]
         for axes, across in zip(panels, (0, 1), strict=True):
-            _draw(axes, bodies, across, colour)
+            _draw(axes, joints, across, colour)
     for axes, name in zip(panels, ("seen from the right", "seen from ahead"), strict=True):
         axes.set_aspect("equal")
         axes.grid(visible=False)
@@ -95,21 +97,21 @@ def strip(learned: Learned, moved: Floats | None) -> Figure:
     return figure
 
 
-def _bodies(learned: Learned, cycle: Floats) -> Floats:
-    """Return joints (PHASES, P, 3) of a cycle (T, M) in statures, the lowest point on the ground."""
-    at = np.arange(PHASES) * len(PHASE) // PHASES
+def bodies(learned: Learned, cycle: Floats, phases: int = PHASES) -> Floats:
+    """Return joints (phases, P, 3) of a cycle (T, M) in statures, the lowest point on the ground."""
+    at = np.arange(phases) * len(PHASE) // phases
     joints = points(default_skeleton(learned.proportions).sections(), cycle[at])
     joints[:, :, 2] -= joints[:, :, 2].min(axis=1, keepdims=True)
     return joints
 
 
-def _draw(axes: Axes, bodies: Floats, across: int, colour: str) -> None:
+def _draw(axes: Axes, figures: Floats, across: int, colour: str) -> None:
     """Draw stick figures side by side; the side nearer to the viewer (the right) is bolder.
 
     `across` is the coordinate along the paper: 0 forward to the right, 1 seen from ahead (its left to the
     right).
     """
-    for i, body in enumerate(bodies):
+    for i, body in enumerate(figures):
         for side, chains in STICKS.items():
             for chain in chains:
                 joints = body[[JOINTS.index(name) for name in chain]]

@@ -12,7 +12,7 @@ from gait.body.skeleton import ANGLES
 from gait.io import blob
 from gait.learn.arrays import Floats
 from gait.learn.cycles.sequence import Sequence
-from gait.learn.options import DEFAULT_COMPONENTS, LearnOptions
+from gait.learn.options import DEFAULT_COMPONENTS, PAPER_COMPONENTS, LearnOptions
 from gait.learn.prior import model, people
 from gait.learn.prior.fit import Learned, made_up_channels
 from gait.learn.segments import summary as segment_summary
@@ -119,8 +119,9 @@ def _left_out(rows: list[dict[str, Any]]) -> list[str]:
 def notes(learned: Learned, options: LearnOptions) -> Iterator[str]:
     """Yield what a user should know about what was learnt and may not expect."""
     cycles, kept = len(learned.components.scores), len(learned.components.sd)
-    if options.components is None and kept < DEFAULT_COMPONENTS:
-        yield f"{cycles} cycles allow {_count(kept, 'component')} instead of {DEFAULT_COMPONENTS}"
+    usual = PAPER_COMPONENTS if learned.paper else DEFAULT_COMPONENTS
+    if options.components is None and kept < usual:
+        yield f"{cycles} cycles allow {_count(kept, 'component')} instead of {usual}"
     if parts := model.unobserved(learned):
         yield f"no recording shows {_words(parts)}: these stay in the rest pose"
     stages = (

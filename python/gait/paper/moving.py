@@ -1,0 +1,58 @@
+"""Moving stick figures as SVG that needs no script."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from html import escape
+
+import numpy as np
+import numpy.typing as npt
+
+from gait.body.skeleton import JOINTS
+from gait.report.figures import STICKS
+
+Floats = npt.NDArray[np.float64]
+
+WIDTH, HEIGHT = 130, 220  # pixels of a figure
+SCALE = 175  # pixels per stature
+FLOOR = 200  # pixels from the top
+
+
+@dataclass(frozen=True)
+class Moving:
+    """One body over a cycle: flat joints (n, P, 2), statures, up is positive, and its colour."""
+
+    flat: Floats
+    colour: str
+
+
+def strip(cells: Sequence[tuple[str, Sequence[Moving]]], seconds: float) -> str:
+    """Return cells side by side, each with a title and the bodies that move in it, a cycle in `seconds`."""
+    return '<div class="film">' + "".join(_cell(title, bodies, seconds) for title, bodies in cells) + "</div>"
+
+
+def _cell(title: str, bodies: Sequence[Moving], seconds: float) -> str:
+    lines = "".join(_body(body, seconds) for body in bodies)
+    return (
+        f'<svg width="{WIDTH}" height="{HEIGHT}" viewBox="0 0 {WIDTH} {HEIGHT}" fill="none" '
+        f'stroke-linecap="round" stroke-linejoin="round"><line x1="0" y1="{FLOOR}" x2="{WIDTH}" y2="{FLOOR}" '
+        f'stroke="#ccc"/>{lines}<text x="4" y="{HEIGHT - 5}" font-size="11" fill="#444">{escape(title)}</text>'
+        "</svg>"
+    )
+
+
+def _body(body: Moving, seconds: float) -> str:
+    at = np.rint(body.flat * (SCALE, -SCALE) + (WIDTH / 2, FLOOR)).astype(int)
+    at = np.concatenate([at, at[:1]])
+    parts = []
+    for side, chains in STICKS.items():
+        for chain in chains:
+            index = [JOINTS.index(name) for name in chain]
+            places = [" ".join(f"{x},{y}" for x, y in frame[index]) for frame in at]
+            parts.append(
+                f'<polyline points="{places[0]}" stroke="{body.colour}" stroke-width="{1 if side == "l" else 2}">'
+                f'<animate attributeName="points" dur="{seconds:.2f}s" repeatCount="indefinite" '
+                f'values="{";".join(places)}"/></polyline>'
+            )
+    return "".join(parts)

@@ -1,0 +1,330 @@
+"""Figures 1 to 5 of Ormoneit and others (2000) and the components, with what each side finds."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+
+import cv2
+import numpy as np
+from matplotlib.figure import Figure
+from matplotlib.ticker import MaxNLocator
+
+from gait.bindings.model import Model
+from gait.bindings.state import State
+from gait.body.skeleton import ANGLES, PAPER_ANGLES, default_skeleton, frames
+from gait.io import blob
+from gait.io.video import Image
+from gait.learn.arrays import Floats
+from gait.learn.cycles.align import TABLE
+from gait.learn.options import PAPER_COMPONENTS, LearnOptions
+from gait.learn.prior import model as model_sections
+from gait.learn.prior.fit import Learned
+from gait.learn.report import figures as learn_figures
+from gait.learn.report import figures_model
+from gait.paper import ormoneit
+from gait.paper.entry import Entry, Picture, picture
+from gait.paper.moving import Moving, strip
+from gait.paper.ormoneit import Aligned, Learning
+from gait.report.colours import BLUE, DARK, GREY, ORANGE
+from gait.report.drawing import default_view, draw_standing
+from gait.report.figures import Drawing, address, grid, line_legend
+
+NOTED = (
+    "neck_z",
+    "l_shoulder_flexion",
+    "l_elbow_flexion",
+    "l_hip_flexion",
+    "l_hip_abduction",
+    "l_knee_flexion",
+)
+SHOWN = ("l_hip_flexion", "l_knee_flexion")  # of figures 3 and 4
+AXIS = 0.10  # metres
+AXES = {0: (60, 60, 220), 1: (70, 160, 60), 2: (220, 120, 40)}  # BGR of x, y, z
+JOINTED = {"head": 3, "upper_arm": 3, "forearm": 1, "thigh": 3, "shank": 1}  # angles of a joint by its frame
+PHASES = 24  # of moving figures
+SWING = 2.0  # standard deviations
+NOISE_FLAT = 0.25  # rise of the ratio of white noise that counts as none
+
+
+def entries(learning: Learning) -> Iterator[Entry]:
+    """Yield the entries in the paper's order."""
+    yield _body(learning.literal)
+    yield _periods(learning)
+    yield _offsets(learning)
+    yield _passes(learning)
+    yield _components(learning)
+
+
+def blob_of(learned: Learned, prior: str) -> bytes:
+    """Return a model as a blob."""
+    return blob.encode(model_sections.sections(learned, LearnOptions(prior=prior)))
+
+
+def _body(literal: Learned) -> Entry:
+    model = Model(blob_of(literal, "paper"))
+    image = _articulated(model, literal)
+    ok, data = cv2.imencode(".png", image)
+    assert ok
+    picture = Picture(
+        "The limbs are tapered cylinders. At each joint its axes: x red, y green, z blue along the limb, and "
+        "the number of its relative angles.",
+        f'<img style="max-width: 60%" alt="body" src="{address(data.tobytes())}">',
+    )
+    return Entry(
+        "Fig. 1: the body",
+        "Articulated cylinders: 25 degrees of freedom, 19 relative angles, 3 of translation and 3 of "
+        "rotation.",
+        f"{len(PAPER_ANGLES)} relative angles + 3 + 3; trunk and ankles rigid.",
+        f"{len(ANGLES)} relative angles (trunk 3 and ankles 2 more) + 3 + 3.",
+        "the same",
+        (
+            "Which 19 angles: neck 3, shoulders 3 each, elbows 1 each, hips 3 each, knees 1 each.",
+            "Sizes and shapes of the limbs: those of the package, tapered and elliptic; trunk and ankles "
+            "at their "
+            "mean angles.",
+        ),
+        (picture,),
+    )
+
+
+def _articulated(model: Model, literal: Learned) -> Image:
+    """Draw the mean body at mid-stance with the axes of its joints."""
+    state = State(phase=0.3, stride_hz=model.info.stride_hz, coef=np.zeros(model.info.components))
+    state.pelvis[2] = model.pelvis_height(state)
+    camera = default_view(state)
+    image = draw_standing(model, state, camera)
+    skeleton = default_skeleton(literal.proportions)
+    cycle = literal.curves[0]
+    rotations, origins, _ = frames(skeleton.sections(), cycle[[round(state.phase * len(cycle))]])
+    for name, turn, origin in zip(skeleton.frames, rotations[0], origins[0], strict=True):
+        count = next((n for part, n in JOINTED.items() if name.endswith(part)), 0)
+        if not count and name != "pelvis":
+            continue
+        at = state.pelvis + state.stature * origin
+        ends = at + AXIS * turn.T
+        start, *tips = np.rint(camera.project(np.vstack([at, ends]))).astype(int).tolist()
+        for axis, tip in enumerate(tips):
+            cv2.arrowedLine(image, start, tip, AXES[axis], 2, cv2.LINE_AA, tipLength=0.25)
+        words = str(count) if count else "6"
+        cv2.putText(image, words, (start[0] - 22, start[1] + 4), cv2.FONT_HERSHEY_DUPLEX, 0.5, (20, 20, 20), 1,
+                    cv2.LINE_AA)  # fmt: skip
+    return image
+
+
+def _periods(learning: Learning) -> Entry:
+    shown = learning.shown
+    refined = learning.refined(shown).period
+    mean, rise = ormoneit.noise_row(shown)
+    flat = abs(rise) < NOISE_FLAT
+    long_literal, long_refined = learning.long
+    total, same = len(learning.walks), learning.agreeing
+    off = np.array(
+        [abs(w.period.frames - learning.refined(w).period.frames) for w in learning.literal.sequences]
+    )
+    return Entry(
+        "Fig. 2: length of the cycle",
+        "Ratio of each angle against periods of 50 to 250 frames, white noise flat, the sum with its peak "
+        "at 126 "
+        "frames (898.65).",
+        f"{shown.name}: {shown.period.frames:.0f} frames, sum {shown.period.peak:.0f}; white noise "
+        f"{mean:.2f} on "
+        f"average, rising by {rise:+.2f} over the range. {same} of {total} walks get their cycle. A walk of "
+        f"{ormoneit.LONG_FRAMES} frames with a cycle of {ormoneit.LONG_PERIOD} frames: {long_literal:.0f}.",
+        f"{shown.name}: {refined.frames:.2f} frames; the median difference from whole frames is "
+        f"{np.median(off):.2f}. All {total} walks. The long walk: {long_refined:.2f}.",
+        f"{'reproduced' if flat else 'reproduced but for the noise'}; whole periods fail "
+        f"{'on ' + str(total - same) + ' short walks and ' if same < total else ''}where a long walk's "
+        "cycle is "
+        "no whole number of frames" if abs(long_literal - ormoneit.LONG_PERIOD) > 1 else "reproduced",
+        (
+            "Eq. 1 is read as folding modulo p, which its text says, not as the number of the cycle, which "
+            "it prints.",
+            "The frame rate: 120 frames per second, at which 126 frames are a usual stride.",
+            "Its ratio is the F of an analysis of variance; with missing data groups count by their size.",
+            "The peak's height grows with the length of a recording, so 898.65 is no target.",
+        ),
+        (
+            picture(Drawing("", "ratio", f"{shown.name} by the paper's search, whole frames; {learn_figures.SNR}",
+                            learn_figures.ratios(shown, len(PAPER_ANGLES)))),
+        ),
+    )  # fmt: skip
+
+
+def _offsets(learning: Learning) -> Entry:
+    literal, ours = learning.eight, learning.eight_ours
+    passes, errors = len(literal.found.objective), np.degrees(1) ** 2 * np.array(literal.found.objective)
+    apart = np.angle(np.exp(2j * np.pi * (literal.phases - ours.phases))) / (2 * np.pi)
+    falling = bool(np.all(np.diff(errors) <= 1e-9 * errors[0]))
+    return Entry(
+        "Figs. 3 and 4: offsets of the sequences",
+        "Eight walking sequences; from offsets 0, a periodic spline and the offsets in turns, five passes "
+        "until "
+        "the error (6.2536e+04) changes by less than 1e-6.",
+        f"{len(literal.walks)} walks of {len({w.subject for w in literal.walks})} people; {passes} passes, "
+        "error "
+        f"{errors[0]:.3g} to {errors[-1]:.3g} square degrees, "
+        f"{'falling throughout' if falling else 'not falling'}.",
+        f"{len(ours.found.objective)} passes from circular correlation, angles weighted by their noise; "
+        "offsets "
+        f"differ by {100 * np.median(np.abs(apart)):.1f} % of a cycle (median), at most "
+        f"{100 * np.abs(apart).max():.1f} %.",
+        "reproduced" if falling and np.abs(apart).max() < 0.1 else "converges elsewhere than ours",
+        (
+            "The spline: periodic, cubic, 20 uniform knots.",
+            "The change of 1e-6 is taken relative to the error; at most 100 passes.",
+            "All angles count alike in square degrees, so that the knees decide most. Offsets are found to "
+            "0.01 "
+            "frame; the paper tries whole frames.",
+            "A common shift of all offsets changes nothing. It is fixed by the hips, so that both can be "
+            "compared.",
+        ),
+        (
+            picture(Drawing("", "passes", "Error after each pass, relative to the last.", _courses(learning))),
+            picture(Drawing("", "aligned", "The walks before and after, each repeated for two cycles, one colour "
+                            "a walk; black: the fitted periodic spline.", _repeated(literal))),
+        ),
+    )  # fmt: skip
+
+
+def _courses(learning: Learning) -> Figure:
+    figure, (axes,) = grid(1, 1, 6, 2.8)
+    for aligned, colour, name in (
+        (learning.eight, ORANGE, "literal: from 0, equal weights"),
+        (learning.eight_ours, BLUE, "ours: from correlation, weighted"),
+    ):
+        course = np.array(aligned.found.objective)
+        axes.plot(np.arange(1, len(course) + 1), course / course[-1], "o-", ms=4, color=colour, label=name)
+    axes.set(xlabel="pass", ylabel="error / its last")
+    axes.xaxis.set_major_locator(MaxNLocator(integer=True))
+    axes.legend(fontsize=8, frameon=False)
+    return figure
+
+
+def _repeated(aligned: Aligned) -> Figure:
+    """Draw walks on two cycles with offsets 0 and with those found, and the spline."""
+    figure, panels = grid(len(SHOWN), 2, 9, 4.6, sharex=True, sharey="row")
+    curve = aligned.curve()
+    for row, name in enumerate(SHOWN):
+        k = PAPER_ANGLES.index(name)
+        for axes, after in zip(panels[2 * row : 2 * row + 2], (False, True), strict=True):
+            for i, walk in enumerate(aligned.walks):
+                start = aligned.phases[i] if after else 0.0
+                phase = np.arange(len(walk.channels)) / walk.period.frames - start
+                phase -= np.floor(phase[0])
+                values = np.degrees(walk.channels[:, k])
+                for turn in range(-4, 3):
+                    axes.plot(phase + turn, values, color=f"C{i}", lw=0.6, alpha=0.7)
+            if after:
+                axes.plot(np.arange(2 * TABLE) / TABLE, np.tile(curve[:, k], 2), color="k", lw=2)
+            axes.set(xlim=(0, 2))
+        panels[2 * row].set_ylabel(f"{figures_model.words(name)}\ndegrees", fontsize=9)
+    panels[0].set_title("before", fontsize=10)
+    panels[1].set_title("after", fontsize=10)
+    for axes in panels[-2:]:
+        axes.set_xlabel("cycles")
+    return figure
+
+
+def _passes(learning: Learning) -> Entry:
+    literal, removal = learning.literal, learning.removal
+    errors = np.degrees(literal.components.rmse)
+    missing = 100 * float(1 - literal.cycles.mask[:, :, : ormoneit.COUNT].mean())
+    falling = bool(np.all(np.diff(errors) <= 1e-9) and np.all(np.diff(removal.passes) <= 1e-9))
+    figure, panels = grid(1, 2, 9, 2.9)
+    for axes, course, title in (
+        (panels[0], errors, f"as recorded, {missing:.0f} % missing"),
+        (panels[1], removal.passes, f"with {100 * removal.share:.0f} % removed"),
+    ):
+        axes.semilogx(np.arange(1, len(course) + 1), course, "o-", ms=3, color=ORANGE)
+        axes.set(xlabel="pass", ylabel="error on observed entries, degrees")
+        axes.set_title(title, fontsize=10)
+    return Entry(
+        "Fig. 5: missing data by the iterated SVD",
+        "Cycles cut and resampled; mean and SVD of their first 20 Fourier coefficients replace missing "
+        "entries "
+        "until the error falls by less than 1e-6.",
+        f"{len(literal.cycles.values)} cycles, {missing:.0f} % of the entries missing: {len(errors)} passes, "
+        f"{errors[0]:.3f} to {errors[-1]:.3f} degrees. With {100 * removal.share:.0f} % removed in blocks: "
+        "these are "
+        f"filled to {removal.literal:.1f} degrees ({removal.mean:.1f} by the mean of the column).",
+        f"Variational Bayes fills the same blocks to {removal.ours:.1f} degrees, with as many components.",
+        ("reproduced: the error falls pass by pass" if falling else "the error rises in some pass")
+        + (", and it fills better than the mean" if removal.literal < removal.mean else ""),
+        (
+            "20 coefficients: complex ones, 0 to 19, in a real orthonormal basis of 39 functions, so that "
+            "distances are those of the curves.",
+            "The mean is in this basis too (as printed it is not); otherwise it jumps where cycles join.",
+            "Cycles are resampled at 120 phases by penalised cubic splines, since unconstrained ones "
+            "explode in gaps; "
+            "what lies more than 0.75 knots from a sample is missing.",
+            "Missing entries start from the mean of their column; cycles with less than 40 % observed are "
+            "left out.",
+            "The number of components used to fill: the 5 that are kept.",
+        ),
+        (picture(Drawing("", "passes", "Error of each pass.", figure)),),
+    )
+
+
+def _components(learning: Learning) -> Entry:
+    literal, ours = learning.literal, learning.ours
+    shares = [100 * np.cumsum(m.components.spectrum)[len(m.components.sd) - 1] for m in (literal, ours)]
+    printed, closed = (
+        ormoneit.jump(c) for c in (ormoneit.printed_mean(literal), literal.curves[0][:, : ormoneit.COUNT])
+    )
+    out = [_left_out(m) for m in (literal, ours)]
+    return Entry(
+        "Components",
+        "Five components (eigen-cycles) of the 19 angles.",
+        f"{len(literal.components.sd)} components with {shares[0]:.0f} % of the variance{out[0]}. The mean "
+        "steps "
+        f"by {printed:.1f} usual steps where cycles join as printed, by {closed:.1f} in the Fourier basis.",
+        f"{len(ours.components.sd)} components of 24 angles and the root's 6 channels, mirrored cycles, "
+        "every person "
+        f"alike, distances of joints; {shares[1]:.0f} % of that variance{out[1]}.",
+        "reproduced: smooth periodic curves" if closed < 3 else "the curves do not close",
+        (
+            "Signs of components: the entry of largest magnitude is positive.",
+            "Cycles keep their open ends; the package closes them by a line.",
+        ),
+        (
+            Picture(
+                f"The paper's components as moving figures: mean (grey) and {SWING:g} standard deviations "
+                "to either "
+                "side (orange +, blue -), from the right and from ahead. Right limbs are bold.",
+                _moving(literal),
+            ),
+            picture(Drawing("", "curves", f"The paper's components as curves: mean and {SWING:g} standard "
+                            "deviations.", figures_model.curves(literal, NOTED))),
+            Picture(f"The package's first {PAPER_COMPONENTS} components.", _moving(ours)),
+        ),
+    )  # fmt: skip
+
+
+def _left_out(learned: Learned) -> str:
+    """Return the errors of people left out in words; empty if they are too few or too many."""
+    found = learned.by_subject
+    if found is None:
+        return ""
+    return (
+        f"; a person left out is met to {np.nanmedian(found.degrees[1]):.1f} degrees, "
+        f"{np.nanmedian(found.millimetres[1]):.0f} mm (median)"
+    )
+
+
+def _moving(learned: Learned) -> str:
+    seconds = float(np.median([w.period.frames / w.fps for w in learned.sequences]))
+    mean, *turns = learned.curves[: 1 + PAPER_COMPONENTS]
+    cells = []
+    for across, view in ((0, ""), (1, ", ahead")):
+        cells.append((f"mean{view}", [_flat(learned, mean, across, DARK)]))
+        for k, turn in enumerate(turns, 1):
+            bodies = [
+                _flat(learned, mean + sign * SWING * turn, across, colour)
+                for sign, colour in ((0, GREY), (1, ORANGE), (-1, BLUE))
+            ]
+            cells.append((f"component {k}{view}", bodies))
+    return strip(cells, seconds)
+
+
+def _flat(learned: Learned, cycle: Floats, across: int, colour: str) -> Moving:
+    return Moving(figures_model.bodies(learned, cycle, PHASES)[:, :, [across, 2]], colour)
