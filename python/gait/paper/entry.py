@@ -41,17 +41,26 @@ def picture(drawing: Drawing) -> Picture:
     )
 
 
-def page(title: str, about: Sequence[str], papers: Sequence[tuple[str, Sequence[Entry]]]) -> str:
+@dataclass(frozen=True)
+class Paper:
+    """One of the papers with all of its entries."""
+
+    short: str  #: authors and year
+    title: str
+    entries: Sequence[Entry]
+
+
+def page(title: str, about: Sequence[str], papers: Sequence[Paper]) -> str:
     """Return the text of a page: a table of all entries, then each with its pictures."""
     made = Page(title)
     for words in about:
         made.words(words)
-    for name, entries in papers:
-        rows = [(e.heading, e.theirs, e.literal, e.ours, e.verdict) for e in entries]
-        made.grid(name, HEAD, rows)
-    for name, entries in papers:
-        for entry in entries:
-            made.figure(f"{name.split(':')[0]}, {entry.heading}", _body(entry))
+    for paper in papers:
+        rows = [(e.heading, e.theirs, e.literal, e.ours, e.verdict) for e in paper.entries]
+        made.grid(f"{paper.short}: {paper.title}", HEAD, rows)
+    for paper in papers:
+        for entry in paper.entries:
+            made.figure(f"{paper.short}, {entry.heading}", _body(entry))
     return made.text()
 
 

@@ -37,8 +37,8 @@ def _cell(title: str, bodies: Sequence[Moving], seconds: float) -> str:
     return (
         f'<svg width="{WIDTH}" height="{HEIGHT}" viewBox="0 0 {WIDTH} {HEIGHT}" fill="none" '
         f'stroke-linecap="round" stroke-linejoin="round"><line x1="0" y1="{FLOOR}" x2="{WIDTH}" y2="{FLOOR}" '
-        f'stroke="#ccc"/>{lines}<text x="4" y="{HEIGHT - 5}" font-size="11" fill="#444">{escape(title)}</text>'
-        "</svg>"
+        f'stroke="#ccc"/>{lines}<text x="4" y="{HEIGHT - 5}" font-size="11" fill="#444">'
+        f"{escape(title)}</text></svg>"
     )
 
 
@@ -50,8 +50,9 @@ def _body(body: Moving, seconds: float) -> str:
         for chain in chains:
             index = [JOINTS.index(name) for name in chain]
             places = [" ".join(f"{x},{y}" for x, y in frame[index]) for frame in at]
+            width = 1 if side == "l" else 2
             parts.append(
-                f'<polyline points="{places[0]}" stroke="{body.colour}" stroke-width="{1 if side == "l" else 2}">'
+                f'<polyline points="{places[0]}" stroke="{body.colour}" stroke-width="{width}">'
                 f'<animate attributeName="points" dur="{seconds:.2f}s" repeatCount="indefinite" '
                 f'values="{";".join(places)}"/></polyline>'
             )

@@ -27,7 +27,7 @@ from gait.paper.moving import Moving, strip
 from gait.paper.ormoneit import Aligned, Learning
 from gait.report.colours import BLUE, DARK, GREY, ORANGE
 from gait.report.drawing import default_view, draw_standing
-from gait.report.figures import Drawing, address, grid, line_legend
+from gait.report.figures import Drawing, address, grid
 
 NOTED = (
     "neck_z",
@@ -38,6 +38,11 @@ NOTED = (
     "l_knee_flexion",
 )
 SHOWN = ("l_hip_flexion", "l_knee_flexion")  # of figures 3 and 4
+COURSES = "Error after each pass, relative to the last."
+REPEATED = (
+    "The walks before and after, each repeated for two cycles, one colour a walk; black: the fitted periodic "
+    "spline."
+)
 AXIS = 0.10  # metres
 AXES = {0: (60, 60, 220), 1: (70, 160, 60), 2: (220, 120, 40)}  # BGR of x, y, z
 JOINTED = {"head": 3, "upper_arm": 3, "forearm": 1, "thigh": 3, "shank": 1}  # angles of a joint by its frame
@@ -106,8 +111,8 @@ def _articulated(model: Model, literal: Learned) -> Image:
         for axis, tip in enumerate(tips):
             cv2.arrowedLine(image, start, tip, AXES[axis], 2, cv2.LINE_AA, tipLength=0.25)
         words = str(count) if count else "6"
-        cv2.putText(image, words, (start[0] - 22, start[1] + 4), cv2.FONT_HERSHEY_DUPLEX, 0.5, (20, 20, 20), 1,
-                    cv2.LINE_AA)  # fmt: skip
+        place = start[0] - 22, start[1] + 4
+        cv2.putText(image, words, place, cv2.FONT_HERSHEY_DUPLEX, 0.5, (20, 20, 20), 1, cv2.LINE_AA)
     return image
 
 
@@ -144,8 +149,7 @@ def _periods(learning: Learning) -> Entry:
             "The peak's height grows with the length of a recording, so 898.65 is no target.",
         ),
         (
-            picture(Drawing("", "ratio", f"{shown.name} by the paper's search, whole frames; {learn_figures.SNR}",
-                            learn_figures.ratios(shown, len(PAPER_ANGLES)))),
+            picture(Drawing("", "ratio", learn_figures.SNR, learn_figures.ratios(shown, len(PAPER_ANGLES)))),
         ),
     )  # fmt: skip
 
@@ -179,9 +183,8 @@ def _offsets(learning: Learning) -> Entry:
             "compared.",
         ),
         (
-            picture(Drawing("", "passes", "Error after each pass, relative to the last.", _courses(learning))),
-            picture(Drawing("", "aligned", "The walks before and after, each repeated for two cycles, one colour "
-                            "a walk; black: the fitted periodic spline.", _repeated(literal))),
+            picture(Drawing("", "passes", COURSES, _courses(learning))),
+            picture(Drawing("", "aligned", REPEATED, _repeated(literal))),
         ),
     )  # fmt: skip
 

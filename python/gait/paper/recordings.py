@@ -1,5 +1,4 @@
-"""The recordings that the page is made from: walks for the first paper, motions of all kinds for the "
-"second."""
+"""The recordings that the page is made from: walks, and motions of all kinds."""
 
 from __future__ import annotations
 

@@ -9,14 +9,11 @@ from typing import Any
 from gait.io.files import replacing, require_writable
 from gait.learn.prior import model
 from gait.paper import entry, ormoneit, ormoneit_figures, recordings
+from gait.paper.entry import Paper
 from gait.progress import progress
 from gait.reproducible import one_thread
 
-ORMONEIT = (
-    "Ormoneit, Sidenbladh, Black, Hastie and Fleet (2000): Learning and tracking human motion using "
-    "functional "
-    "analysis"
-)
+ORMONEIT = "Ormoneit and others 2000", "Learning and tracking human motion using functional analysis"
 
 
 @dataclass(frozen=True)
@@ -36,11 +33,11 @@ def run(request: Request) -> dict[str, Any]:
         with progress("learning both ways", 4, request.quiet) as update:
             learning = ormoneit.learn(found.walks, update)
         first = list(ormoneit_figures.entries(learning))
-    papers = [(ORMONEIT, first)]
+    papers = [Paper(*ORMONEIT, first)]
     text = entry.page("Both papers, figure by figure", _about(found), papers)
     with replacing(request.output) as path:
         path.write_text(text, encoding="utf-8")
-    return {name.split(" ")[0].rstrip(","): {e.heading: e.verdict for e in each} for name, each in papers}
+    return {p.short: {e.heading: e.verdict for e in p.entries} for p in papers}
 
 
 def _about(found: recordings.Recordings) -> list[str]:
