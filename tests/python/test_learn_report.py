@@ -113,7 +113,7 @@ def test_the_table_shows_what_was_cut_and_why_a_sequence_was_taken(learned):
 
 
 def test_the_ratio_peaks_at_the_period_and_noise_is_flat(learned):
-    figure = figures.ratios(learned)
+    figure = figures.ratios(figures.richest(learned))
     rows, total = figure.axes[:-1], figure.axes[-1]
     assert [axes.get_ylabel() for axes in rows][:2] == ["white noise", "neck x"] and len(rows) == 25
     noise = rows[0].lines[0].get_ydata()

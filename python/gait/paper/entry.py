@@ -1,4 +1,4 @@
-"""What the page says about one figure or experiment, and the page itself."""
+"""What the page states about one figure or experiment, and the page itself."""
 
 from __future__ import annotations
 
@@ -29,7 +29,7 @@ class Entry:
     literal: str  #: what its algorithm gives on these recordings
     ours: str  #: what the package gives
     verdict: str
-    left_open: tuple[str, ...]  #: what the paper does not say, and what is done here
+    left_open: tuple[str, ...]  #: what the paper does not state, and what is done here
     pictures: tuple[Picture, ...]
 
 

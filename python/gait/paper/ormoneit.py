@@ -171,7 +171,7 @@ def noise_row(walk: Walk) -> tuple[float, float]:
     return float(table[valid, 0].mean()), float(slope * np.ptp(candidates[valid]))
 
 
-def jump(curves: Floats) -> float:
+def closure(curves: Floats) -> float:
     """Return the largest step of curves (T, A) from the end of a cycle to its start, in their median step."""
     steps = np.abs(np.diff(np.concatenate([curves, curves[:1]]), axis=0))
     usual = np.median(steps[:-1], axis=0)

@@ -40,14 +40,15 @@ NOTED = (
 SHOWN = ("l_hip_flexion", "l_knee_flexion")  # of figures 3 and 4
 COURSES = "Error after each pass, relative to the last."
 REPEATED = (
-    "The walks before and after, each repeated for two cycles, one colour a walk; black: the fitted periodic "
-    "spline."
+    "The walks before and after, each repeated for two cycles, one colour a walk; black: the fitted "
+    "periodic spline."
 )
+SWING = 2.0  # standard deviations
+CURVES = f"The paper's components as curves: mean and {SWING:g} sd."
 AXIS = 0.10  # metres
 AXES = {0: (60, 60, 220), 1: (70, 160, 60), 2: (220, 120, 40)}  # BGR of x, y, z
 JOINTED = {"head": 3, "upper_arm": 3, "forearm": 1, "thigh": 3, "shank": 1}  # angles of a joint by its frame
 PHASES = 24  # of moving figures
-SWING = 2.0  # standard deviations
 NOISE_FLAT = 0.25  # rise of the ratio of white noise that counts as none
 
 
@@ -71,8 +72,8 @@ def _body(literal: Learned) -> Entry:
     ok, data = cv2.imencode(".png", image)
     assert ok
     picture = Picture(
-        "The limbs are tapered cylinders. At each joint its axes: x red, y green, z blue along the limb, and "
-        "the number of its relative angles.",
+        "The limbs are tapered cylinders. At each joint its axes: x red, y green, z blue along the limb, "
+        "and the number of its relative angles.",
         f'<img style="max-width: 60%" alt="body" src="{address(data.tobytes())}">',
     )
     return Entry(
@@ -85,8 +86,7 @@ def _body(literal: Learned) -> Entry:
         (
             "Which 19 angles: neck 3, shoulders 3 each, elbows 1 each, hips 3 each, knees 1 each.",
             "Sizes and shapes of the limbs: those of the package, tapered and elliptic; trunk and ankles "
-            "at their "
-            "mean angles.",
+            "at their mean angles.",
         ),
         (picture,),
     )
@@ -129,20 +129,16 @@ def _periods(learning: Learning) -> Entry:
     return Entry(
         "Fig. 2: length of the cycle",
         "Ratio of each angle against periods of 50 to 250 frames, white noise flat, the sum with its peak "
-        "at 126 "
-        "frames (898.65).",
+        "at 126 frames (898.65).",
         f"{shown.name}: {shown.period.frames:.0f} frames, sum {shown.period.peak:.0f}; white noise "
-        f"{mean:.2f} on "
-        f"average, rising by {rise:+.2f} over the range. {same} of {total} walks get their cycle. A walk of "
-        f"{ormoneit.LONG_FRAMES} frames with a cycle of {ormoneit.LONG_PERIOD} frames: {long_literal:.0f}.",
+        f"{mean:.2f} on average, rising by {rise:+.2f} over the range. {same} of {total} walks get their "
+        f"cycle. A walk of {ormoneit.LONG_FRAMES} frames with a cycle of {ormoneit.LONG_PERIOD} frames: "
+        f"{long_literal:.0f}.",
         f"{shown.name}: {refined.frames:.2f} frames; the median difference from whole frames is "
         f"{np.median(off):.2f}. All {total} walks. The long walk: {long_refined:.2f}.",
-        f"{'reproduced' if flat else 'reproduced but for the noise'}; whole periods fail "
-        f"{'on ' + str(total - same) + ' short walks and ' if same < total else ''}where a long walk's "
-        "cycle is "
-        "no whole number of frames" if abs(long_literal - ormoneit.LONG_PERIOD) > 1 else "reproduced",
+        _whole_periods(flat, total - same, abs(long_literal - ormoneit.LONG_PERIOD) > 1),
         (
-            "Eq. 1 is read as folding modulo p, which its text says, not as the number of the cycle, which "
+            "Eq. 1 is read as folding modulo p, as its text has it, not as the number of the cycle, which "
             "it prints.",
             "The frame rate: 120 frames per second, at which 126 frames are a usual stride.",
             "Its ratio is the F of an analysis of variance; with missing data groups count by their size.",
@@ -154,6 +150,14 @@ def _periods(learning: Learning) -> Entry:
     )  # fmt: skip
 
 
+def _whole_periods(flat: bool, failed: int, long_failed: bool) -> str:
+    """Return the verdict of the search over whole periods."""
+    fails = [f"on {failed} short walks"] if failed else []
+    fails += ["where the cycle of a long walk is no whole number of frames"] if long_failed else []
+    words = "reproduced" if flat else "reproduced but for the noise"
+    return words + (f"; whole periods fail {' and '.join(fails)}" if fails else "")
+
+
 def _offsets(learning: Learning) -> Entry:
     literal, ours = learning.eight, learning.eight_ours
     passes, errors = len(literal.found.objective), np.degrees(1) ** 2 * np.array(literal.found.objective)
@@ -162,23 +166,19 @@ def _offsets(learning: Learning) -> Entry:
     return Entry(
         "Figs. 3 and 4: offsets of the sequences",
         "Eight walking sequences; from offsets 0, a periodic spline and the offsets in turns, five passes "
-        "until "
-        "the error (6.2536e+04) changes by less than 1e-6.",
+        "until the error (6.2536e+04) changes by less than 1e-6.",
         f"{len(literal.walks)} walks of {len({w.subject for w in literal.walks})} people; {passes} passes, "
-        "error "
-        f"{errors[0]:.3g} to {errors[-1]:.3g} square degrees, "
+        f"error {errors[0]:.3g} to {errors[-1]:.3g} square degrees, "
         f"{'falling throughout' if falling else 'not falling'}.",
         f"{len(ours.found.objective)} passes from circular correlation, angles weighted by their noise; "
-        "offsets "
-        f"differ by {100 * np.median(np.abs(apart)):.1f} % of a cycle (median), at most "
+        f"offsets differ by {100 * np.median(np.abs(apart)):.1f} % of a cycle (median), at most "
         f"{100 * np.abs(apart).max():.1f} %.",
         "reproduced" if falling and np.abs(apart).max() < 0.1 else "converges elsewhere than ours",
         (
             "The spline: periodic, cubic, 20 uniform knots.",
             "The change of 1e-6 is taken relative to the error; at most 100 passes.",
-            "All angles count alike in square degrees, so that the knees decide most. Offsets are found to "
-            "0.01 "
-            "frame; the paper tries whole frames.",
+            "All angles count alike in square degrees, so that the knees decide most. Offsets are found "
+            "to 0.01 frame; the paper tries whole frames.",
             "A common shift of all offsets changes nothing. It is fixed by the hips, so that both can be "
             "compared.",
         ),
@@ -244,12 +244,11 @@ def _passes(learning: Learning) -> Entry:
     return Entry(
         "Fig. 5: missing data by the iterated SVD",
         "Cycles cut and resampled; mean and SVD of their first 20 Fourier coefficients replace missing "
-        "entries "
-        "until the error falls by less than 1e-6.",
-        f"{len(literal.cycles.values)} cycles, {missing:.0f} % of the entries missing: {len(errors)} passes, "
-        f"{errors[0]:.3f} to {errors[-1]:.3f} degrees. With {100 * removal.share:.0f} % removed in blocks: "
-        "these are "
-        f"filled to {removal.literal:.1f} degrees ({removal.mean:.1f} by the mean of the column).",
+        "entries until the error falls by less than 1e-6.",
+        f"{len(literal.cycles.values)} cycles, {missing:.0f} % of the entries missing: {len(errors)} "
+        f"passes, {errors[0]:.3f} to {errors[-1]:.3f} degrees. With {100 * removal.share:.0f} % removed in "
+        f"blocks: these are filled to {removal.literal:.1f} degrees ({removal.mean:.1f} by the mean of the "
+        "column).",
         f"Variational Bayes fills the same blocks to {removal.ours:.1f} degrees, with as many components.",
         ("reproduced: the error falls pass by pass" if falling else "the error rises in some pass")
         + (", and it fills better than the mean" if removal.literal < removal.mean else ""),
@@ -258,8 +257,7 @@ def _passes(learning: Learning) -> Entry:
             "distances are those of the curves.",
             "The mean is in this basis too (as printed it is not); otherwise it jumps where cycles join.",
             "Cycles are resampled at 120 phases by penalised cubic splines, since unconstrained ones "
-            "explode in gaps; "
-            "what lies more than 0.75 knots from a sample is missing.",
+            "explode in gaps; what lies more than 0.75 knots from a sample is missing.",
             "Missing entries start from the mean of their column; cycles with less than 40 % observed are "
             "left out.",
             "The number of components used to fill: the 5 that are kept.",
@@ -272,18 +270,17 @@ def _components(learning: Learning) -> Entry:
     literal, ours = learning.literal, learning.ours
     shares = [100 * np.cumsum(m.components.spectrum)[len(m.components.sd) - 1] for m in (literal, ours)]
     printed, closed = (
-        ormoneit.jump(c) for c in (ormoneit.printed_mean(literal), literal.curves[0][:, : ormoneit.COUNT])
+        ormoneit.closure(c) for c in (ormoneit.printed_mean(literal), literal.curves[0][:, : ormoneit.COUNT])
     )
     out = [_left_out(m) for m in (literal, ours)]
     return Entry(
         "Components",
         "Five components (eigen-cycles) of the 19 angles.",
         f"{len(literal.components.sd)} components with {shares[0]:.0f} % of the variance{out[0]}. The mean "
-        "steps "
-        f"by {printed:.1f} usual steps where cycles join as printed, by {closed:.1f} in the Fourier basis.",
+        f"steps by {printed:.1f} usual steps where cycles join as printed, by {closed:.1f} in the Fourier "
+        "basis.",
         f"{len(ours.components.sd)} components of 24 angles and the root's 6 channels, mirrored cycles, "
-        "every person "
-        f"alike, distances of joints; {shares[1]:.0f} % of that variance{out[1]}.",
+        f"every person alike, distances of joints; {shares[1]:.0f} % of that variance{out[1]}.",
         "reproduced: smooth periodic curves" if closed < 3 else "the curves do not close",
         (
             "Signs of components: the entry of largest magnitude is positive.",
@@ -291,13 +288,11 @@ def _components(learning: Learning) -> Entry:
         ),
         (
             Picture(
-                f"The paper's components as moving figures: mean (grey) and {SWING:g} standard deviations "
-                "to either "
-                "side (orange +, blue -), from the right and from ahead. Right limbs are bold.",
+                f"The paper's components as moving figures: mean (grey) and {SWING:g} sd to either side "
+                "(orange +, blue -), from the right and from ahead. Right limbs are bold.",
                 _moving(literal),
             ),
-            picture(Drawing("", "curves", f"The paper's components as curves: mean and {SWING:g} standard "
-                            "deviations.", figures_model.curves(literal, NOTED))),
+            picture(Drawing("", "curves", CURVES, figures_model.curves(literal, NOTED))),
             Picture(f"The package's first {PAPER_COMPONENTS} components.", _moving(ours)),
         ),
     )  # fmt: skip

@@ -45,8 +45,7 @@ def _about(found: recordings.Recordings) -> list[str]:
     lines = [
         f"Made by gait paper from {len(found.walks)} walks of {people} people (first paper) and "
         f"{len(found.motions)} motions (second paper): {', '.join(m.name for m in found.motions)}.",
-        "theirs: what the paper states. literal: its algorithm as printed, errors of print resolved. ours: "
-        "what the "
-        "package does by default, on the same data.",
+        "theirs: what the paper states. literal: its algorithm as printed, errors of print resolved. "
+        "ours: what the package does by default, on the same data.",
     ]
     return lines + ([model.CMU] if model.from_cmu([Path(w.source) for w in found.walks]) else [])
