@@ -153,7 +153,7 @@ def test_a_strip_shows_the_person_plus_and_minus_two_sd(learned):
     heights = np.concatenate([np.asarray(line.get_ydata()) for line in side.lines])
     assert heights.min() == pytest.approx(0, abs=1e-9) and 0.9 < heights.max() < side.get_ylim()[1] < 1.2
     mean, less, more = (
-        figures_model._bodies(learned, learned.curves[0] + turn * turned) for turn in (0.0, -2.0, 2.0)
+        figures_model.bodies(learned, learned.curves[0] + turn * turned) for turn in (0.0, -2.0, 2.0)
     )
     assert np.abs(more - less).max() > 0.02
     assert (more + less) / 2 == pytest.approx(mean, abs=0.05)
