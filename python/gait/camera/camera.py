@@ -6,25 +6,24 @@ Files: the project's JSON, OpenCV FileStorage YAML/XML, and the TOML of Pose2Sim
 from __future__ import annotations
 
 import json
+import re
 import sys
-from codecs import BOM_UTF8
 from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from gait.errors import UserError
 from gait.io.fields import Fields, parsing, read_json
+from gait.io.opencv_file import read_storage
 
 if sys.version_info >= (3, 11):
     import tomllib
 else:
     import tomli as tomllib
-if TYPE_CHECKING:
-    import cv2  # at run time where it is used: JSON files are read without OpenCV
 
 
 Array = NDArray[np.float64]
@@ -210,14 +209,50 @@ LONGEST_LENS = 1000  #: focal length over the width of the picture; the longest 
 
 _JSON_KEYS = ("width", "height", "fx", "fy", "cx", "cy", "R", "t", "distortion", "note")
 
-# Names in use for the same thing in OpenCV's own samples and in ROS; the first is the documented one.
-_ALIASES = {
-    "camera_matrix": ("cameraMatrix", "K"),
-    "distortion_coefficients": ("distCoeffs", "dist_coeffs", "D"),
-    "t": ("T", "tvec"),
-    "image_width": ("image_Width",),
-    "image_height": ("image_Height",),
+#: Documented names of OpenCV files, and the others in use for the same: in OpenCV's samples of several
+#: versions, in ROS and in tutorials.  Compared in lower case without punctuation, as `_plain` gives them.
+_OPENCV_NAMES = {
+    "camera_matrix": ("cameramatrix", "k", "mtx", "intrinsicmatrix"),
+    "distortion_coefficients": (
+        *("distortioncoefficients", "distortioncoeffs", "distcoeffs", "distcoefs", "distortion", "dist", "d"),
+        "distortions",
+    ),
+    "R": ("r", "rotationmatrix"),
+    "rvec": ("rvec", "rotationvector"),
+    "t": ("t", "tvec", "translation", "translationvector"),
+    "image_width": ("imagewidth", "width"),
+    "image_height": ("imageheight", "height"),
+    "image_size": ("imagesize", "size", "resolution"),
 }
+_TOML_KEYS = ("name", "size", "matrix", "distortions", "rotation", "translation", "fisheye")
+
+#: Keys that describe a lens, as `_plain` gives them: words in them, and whole keys.
+_LENS_WORD = re.compile(
+    r"dist(?!ance)|fisheye|omni|radial|tangential|prism|equidistant|kannala|(lens|camera|projection)(model|type)"
+)
+_LENS_KEYS = re.compile(r"model|d\d+|k[1-9]|p[12]|s[1-4]|xi|tau[xy]|skew")
+#: Models of a lens that has k1 k2 p1 p2 k3 alone; a rational one with more terms has too many numbers.
+_LENSES = {
+    *(
+        "",
+        "none",
+        "pinhole",
+        "perspective",
+        "plumbbob",
+        "radtan",
+        "radialtangential",
+        "brown",
+        "brownconrady",
+    ),
+    *("opencv", "standard", "rationalpolynomial"),
+}
+#: Words in other models' names; a camera's model or type may also be that of its maker.
+_FOREIGN = re.compile(
+    r"fisheye|equidist|equisolid|stereographic|kannala|^kb\d|omni|^mei$|e?ucm|unified|doublesphere|^ds$|^fov$"
+    r"|division|ocam|scaramuzza|prism|spline|spheric|panoram"
+)
+#: How much larger or smaller than the picture the one may be of which a principal point is the middle.
+_CROPPED, _RESIZED, _ALIKE = 0.7, 0.2, 0.05
 
 
 def read_camera(path: str, size: tuple[int, int] | None = None, *, placed: bool = True) -> Camera:
@@ -240,15 +275,16 @@ def read_camera(path: str, size: tuple[int, int] | None = None, *, placed: bool 
     file, name = _split(str(path))
     if not Path(file).is_file():
         raise UserError(f"{file}: no such camera file; check the name")
-    suffix = Path(file).suffix.lower()
+    suffix, stated = Path(file).suffix.lower(), True
     if suffix == ".json":
         camera = _from_json(file, placed)
     elif suffix in (".yaml", ".yml", ".xml"):
-        camera = _from_opencv(file, size, placed)
+        camera, stated = _from_opencv(file, size, placed)
     elif suffix == ".toml":
         camera = _from_toml(file, name)
     else:
         raise UserError(f"{file}: unknown camera suffix; use .json, .yaml, .yml, .xml or .toml")
+    _check_middle(str(path), camera, stated)
     focal = max(camera.fx, camera.fy)
     if focal > LONGEST_LENS * camera.width:
         raise UserError(
@@ -282,16 +318,52 @@ def _from_json(path: str, placed: bool) -> Camera:
     return Camera(width, height, fx, fy, cx, cy, *_pose(fields, placed), lens)
 
 
-def _from_opencv(path: str, size: tuple[int, int] | None, placed: bool) -> Camera:
-    fields = _file_storage(path)
-    if "image_width" in fields or size is None:
-        remedy = "add image_width and image_height in pixels"
-        size = (
-            fields.integer("image_width", 1, MAX_PIXELS, remedy),
-            fields.integer("image_height", 1, MAX_PIXELS, remedy),
+def _check_middle(path: str, camera: Camera, stated: bool) -> None:
+    """Refuse a principal point that is the middle of a picture of another size, or of none.
+
+    Cameras have it near the middle of the sensor; only where the file has `stated` the size may a picture be
+    cropped.
+    """
+    x, y = (2 * camera.cx + 1) / camera.width, (2 * camera.cy + 1) / camera.height
+    off = max(abs(x - 1), abs(y - 1))
+    resized = off > _RESIZED and abs(x - y) < _ALIKE * max(x, y)
+    if off > (_CROPPED if stated else _RESIZED) or resized:
+        middle = f"the middle of {2 * camera.cx + 1:.0f}x{2 * camera.cy + 1:.0f}"
+        remedy = (
+            "give fx, fy, cx, cy for this size" if stated else "add image_width and image_height in pixels"
         )
-    lens = _distortion(fields, "distortion_coefficients")
-    return Camera(*size, *_intrinsics(fields, "camera_matrix"), *_pose(fields, placed), lens)
+        raise UserError(
+            f"{path}: principal point ({camera.cx:.6g}, {camera.cy:.6g}) is {middle}, the picture is "
+            f"{camera.width}x{camera.height}; {remedy}"
+        )
+
+
+def _from_opencv(path: str, size: tuple[int, int] | None, placed: bool) -> tuple[Camera, bool]:
+    """Return the camera, and whether the file has its size."""
+    fields = _opencv_fields(path)
+    stated = any(key in fields for key in ("image_width", "image_height", "image_size"))
+    if stated or size is None:
+        size = _image_size(fields)
+    intrinsics, lens = _intrinsics(fields, "camera_matrix"), _distortion(fields, "distortion_coefficients")
+    return Camera(*size, *intrinsics, *_pose(fields, placed), lens), stated
+
+
+def _image_size(fields: Fields) -> tuple[int, int]:
+    """Width and height that an OpenCV file has."""
+    remedy = "add image_width and image_height in pixels"
+    if "image_size" in fields and "image_width" not in fields:
+        return _size(fields, "image_size", remedy)
+    width, height = (fields.integer(f"image_{side}", 1, MAX_PIXELS, remedy) for side in ("width", "height"))
+    if "image_size" in fields and (width, height) != _size(fields, "image_size", remedy):
+        raise fields.fail("image_size", "differs from image_width and image_height", "correct one of them")
+    return width, height
+
+
+def _size(fields: Fields, key: str, remedy: str) -> tuple[int, int]:
+    size = fields.array(key, (2,), remedy)
+    if not ((size >= 1) & (size <= MAX_PIXELS) & (size == size.round())).all():
+        raise fields.fail(key, f"is {size.tolist()}", "give whole [width, height] in pixels")
+    return int(size[0]), int(size[1])
 
 
 def _pose(fields: Fields, placed: bool) -> tuple[Array, Array]:
@@ -302,33 +374,51 @@ def _pose(fields: Fields, placed: bool) -> tuple[Array, Array]:
     return turn, _translation(fields, "t")
 
 
-def _file_storage(path: str) -> Fields:
-    """Read the top-level nodes of an OpenCV FileStorage into a mapping under their documented names."""
-    import cv2
-
-    broken = UserError(f"{path}: not an OpenCV FileStorage file; write it with cv2.FileStorage")
-    text = Path(path).read_bytes().removeprefix(BOM_UTF8).decode("latin-1")  # only ASCII is looked at
-    try:
-        storage = cv2.FileStorage(text, cv2.FILE_STORAGE_READ | cv2.FILE_STORAGE_MEMORY)
-    except (cv2.error, SystemError):  # the constructor's binding wraps the one in the other
-        raise broken from None
-    if not storage.isOpened():
-        raise broken
-    data: dict[str, Any] = {}
-    known = ("image_width", "image_height", "camera_matrix", "distortion_coefficients", "R", "rvec", "t")
-    for key in known:
-        for alias in (key, *_ALIASES.get(key, ())):
-            node = storage.getNode(alias)
-            if not node.empty() and key not in data:
-                data[key] = _node_value(node)
-    storage.release()
-    return Fields(path, data)
+def _plain(name: str) -> str:
+    return "".join(c for c in name.lower() if c.isalnum())
 
 
-def _node_value(node: cv2.FileNode) -> Any:
-    if node.isSeq():
-        return [_node_value(node.at(i)) for i in range(node.size())]
-    return node.mat() if node.isMap() else node.string() if node.isString() else node.real()
+def _opencv_fields(path: str) -> Fields:
+    """Read the entries of an OpenCV file that describe a camera, under their documented names."""
+    content, data, others = read_storage(path), dict[str, Any](), dict[str, Any]()
+    documented = {other: name for name, others in _OPENCV_NAMES.items() for other in others}
+    source: dict[str, str] = {}
+    for key, value in content.items():
+        name = documented.get(_plain(key))
+        if name is None:
+            others[key] = value
+        elif name in data and np.ravel(data[name]).tolist() != np.ravel(value).tolist():
+            raise UserError(f"{path}: {source[name]} and {key} differ; remove one")
+        else:
+            data[name], source[name] = value, key
+    fields = Fields(path, data)
+    _refuse_other_lenses(Fields(path, others), others)
+    if (
+        "R" in fields
+        and "rvec" in fields
+        and np.abs(_rotation(fields, "R") - _rodrigues(fields, "rvec")).max() > 1e-3
+    ):
+        raise UserError(f"{path}: {source['R']} and {source['rvec']} differ; remove one")
+    return fields
+
+
+def _refuse_other_lenses(fields: Fields, others: Mapping[str, Any]) -> None:
+    """Refuse keys, none of them known, that describe a lens in another way; 0, false and '' describe none."""
+    for key, value in others.items():
+        if not _LENS_KEYS.fullmatch(_plain(key)) and not _LENS_WORD.search(_plain(key)):
+            continue
+        if isinstance(value, str):
+            made = _plain(key) in ("cameramodel", "cameratype") and not _FOREIGN.search(_plain(value))
+            if made or _plain(value) in _LENSES:
+                continue
+            what = f"is {value[:40]!r}"
+        elif not np.any(value):
+            continue
+        else:
+            what = "describes a lens in a way that is not known"
+        raise fields.fail(
+            key, what, "lenses have k1 k2 p1 p2 [k3]: undistort the video, or calibrate with them"
+        )
 
 
 def _from_toml(path: str, name: str | None) -> Camera:
@@ -344,12 +434,13 @@ def _from_toml(path: str, name: str | None) -> Camera:
     fields = Fields(f"{path}: [{name}]", cameras[name])
     if cameras[name].get("fisheye"):
         raise fields.fail("fisheye", "lenses are not supported", "undistort the video first")
-    size = fields.array("size", (2,), "give [width, height] in pixels")
-    if not ((size >= 1) & (size <= MAX_PIXELS) & (size == size.round())).all():
-        raise fields.fail("size", f"is {size.tolist()}", "give whole [width, height] in pixels")
+    _refuse_other_lenses(
+        fields, {key: value for key, value in cameras[name].items() if key not in _TOML_KEYS}
+    )
+    size = _size(fields, "size", "give [width, height] in pixels")
     lens = _distortion(fields, "distortions")
     intrinsics, turn = _intrinsics(fields, "matrix"), _rodrigues(fields, "rotation")
-    return Camera(int(size[0]), int(size[1]), *intrinsics, turn, _translation(fields, "translation"), lens)
+    return Camera(*size, *intrinsics, turn, _translation(fields, "translation"), lens)
 
 
 def _intrinsics(fields: Fields, key: str) -> tuple[float, float, float, float]:

@@ -1,0 +1,61 @@
+"""Files of OpenCV's FileStorage (.yaml, .yml, .xml), read into a mapping."""
+
+from __future__ import annotations
+
+from codecs import BOM_UTF8
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from gait.errors import UserError
+
+if TYPE_CHECKING:
+    import cv2  # at run time where it is used: other files are read without OpenCV
+
+
+def read_storage(path: str) -> dict[str, Any]:
+    """Top-level nodes by name: numbers, strings, lists, matrices as nested lists, other maps as dicts.
+
+    UserError if the file is none, is damaged, or holds a name twice or a matrix that lacks numbers.
+    """
+    import cv2
+
+    broken = UserError(f"{path}: not an OpenCV FileStorage file; write it with cv2.FileStorage")
+    text = Path(path).read_bytes().removeprefix(BOM_UTF8).decode("latin-1")  # only ASCII is looked at
+    try:
+        storage = cv2.FileStorage(text, cv2.FILE_STORAGE_READ | cv2.FILE_STORAGE_MEMORY)
+        if not storage.isOpened():
+            raise broken
+        names = storage.root().keys()
+    except (cv2.error, SystemError):  # the constructor's binding wraps the one in the other
+        raise broken from None
+    twice = next((name for name in names if names.count(name) > 1), None)
+    if twice is not None:
+        raise UserError(f"{path}: {twice} is there twice; remove one")
+    data = {name: _value(path, name, storage.getNode(name)) for name in names}
+    storage.release()
+    return data
+
+
+def _value(path: str, name: str, node: cv2.FileNode) -> Any:
+    if node.isSeq():
+        return [_value(path, name, node.at(i)) for i in range(node.size())]
+    if node.isMap():
+        content = {key: _value(path, name, node.getNode(key)) for key in node.keys()}  # noqa: SIM118
+        return _matrix(path, name, content) if {"rows", "cols"} <= set(content) else content
+    return node.string() if node.isString() else node.real()
+
+
+def _matrix(path: str, name: str, content: dict[str, Any]) -> Any:
+    """Rows of a matrix."""
+    values = content.get("data", [])
+    try:
+        rows, columns = int(content["rows"]), int(content["cols"])
+        return np.asarray(values, float).reshape(rows, columns).tolist()
+    except (TypeError, ValueError, OverflowError):
+        count = len(values) if isinstance(values, list) else 0
+        raise UserError(
+            f"{path}: {name} has {count} numbers, other than its rows and columns; the file is damaged, "
+            "write it again"
+        ) from None
