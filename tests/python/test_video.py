@@ -1,7 +1,11 @@
 """Video in and out, plates, and files that are not what they should be."""
 
+import json
+import struct
 import wave
+from pathlib import Path
 
+import av
 import cv2
 import numpy as np
 import pytest
@@ -9,8 +13,12 @@ from drawn_person import clip, wall, write
 
 from gait import Model, UserError, Video, VideoWriter, background
 from gait.bindings.model import read_blob
+from gait.bindings.segment_prior import SegmentPrior
 from gait.io import blob
 from gait.io.video import median_plate
+from gait.lift.video.run import Request, lift_video
+
+FAULTS = Path(__file__).resolve().parents[2] / "../shared/data/faults"
 
 
 def pattern(i, width=64, height=48):
@@ -152,3 +160,94 @@ def test_plates_that_do_not_fit(film, tmp_path):
     ]:
         with pytest.raises(UserError, match=words):
             background(str(tmp_path / name), video)
+
+
+def patched(film, path, box, at, values):
+    """Copy an MP4 with 32-bit numbers of a box overwritten; `at` is counted from behind the box's name."""
+    content = bytearray(film.read_bytes())
+    struct.pack_into(f">{len(values)}i", content, content.index(box) + len(box) + at, *values)
+    path.write_bytes(content)
+    return Video(path)
+
+
+def turned(film, path, a, b, c, d):
+    """Copy an MP4 with another display matrix: x to (a, b), y to (c, d)."""
+    one = 1 << 16
+    matrix = [a * one, b * one, 0, c * one, d * one, 0, 0, 0, 1 << 30]
+    return patched(film, path, b"tkhd", 40, [round(value) for value in matrix])
+
+
+@pytest.mark.parametrize(
+    "matrix, shown",
+    [
+        ((1, 0, 0, 1), lambda image: image),
+        ((-1, 0, 0, -1), lambda image: image[::-1, ::-1]),
+        ((0, 1, -1, 0), lambda image: np.rot90(image, -1)),
+        ((0, -1, 1, 0), lambda image: np.rot90(image)),
+        ((-1, 0, 0, 1), lambda image: image[:, ::-1]),
+        ((1, 0, 0, -1), lambda image: image[::-1]),
+        ((0, 1, 1, 0), lambda image: image.swapaxes(0, 1)),
+        ((0, -1, -1, 0), lambda image: image[::-1, ::-1].swapaxes(0, 1)),
+    ],
+)
+def test_pictures_are_turned_and_mirrored_as_the_container_asks(matrix, shown, film, tmp_path):
+    plain = next(Video(film).frames(5)).image
+    video = turned(film, tmp_path / "turned.mp4", *matrix)
+    np.testing.assert_array_equal(next(video.frames(5)).image, shown(plain))
+    assert video.size == shown(plain).shape[1::-1]
+    with av.open(str(tmp_path / "turned.mp4")) as container:  # the test's idea of a turn is FFmpeg's
+        rotation = next(container.decode(video=0)).rotation
+    if np.linalg.det(np.reshape(matrix, (2, 2))) > 0:
+        np.testing.assert_array_equal(np.rot90(plain, rotation // 90), shown(plain))
+
+
+@pytest.mark.parametrize(
+    "matrix", [(0.7, 0.7, -0.7, 0.7), (2, 0, 0, 1), (1, 0.5, 0, 1), (0, 0, 0, 0), (1, 0, 1, 0), (1, 1, 0, 0)]
+)
+def test_display_matrices_that_are_no_turn_are_refused(matrix, film, tmp_path):
+    with pytest.raises(UserError, match="turned.mp4: its display matrix .* convert it with ffmpeg"):
+        turned(film, tmp_path / "turned.mp4", *matrix)
+
+
+@pytest.fixture(scope="module")
+def trimmed(film, tmp_path_factory):
+    """A film whose edit list cuts off its first five frames; the header counts them."""
+    path = tmp_path_factory.mktemp("trimmed") / "trimmed.mp4"
+    with av.open(str(film)) as container:
+        stream = container.streams.video[0]
+        times = sorted(packet.pts for packet in container.demux(stream) if packet.pts is not None)
+    shift = struct.unpack_from(">i", film.read_bytes(), film.read_bytes().index(b"elst") + 16)[0]
+    return patched(film, path, b"elst", 12, [shift + times[5]])
+
+
+def test_frames_that_an_edit_list_cuts_off_are_not_counted(trimmed):
+    with av.open(str(trimmed.path)) as container:
+        assert container.streams.video[0].frames == 12
+    assert trimmed.count == len(list(trimmed.frames())) == 7
+
+
+PLACED = {"frame": 3, "pelvis_px": [30, 24], "height_px": 30, "stature_m": 1.7}
+
+
+@pytest.mark.parametrize("given", [0, 3])
+def test_lifting_names_the_frame_from_which_none_can_be_decoded(given, film, tmp_path, monkeypatch):
+    """A header may promise frames that damage hides: the first three are decoded, or none."""
+    placement = tmp_path / "placement.json"
+    placement.write_text(json.dumps(PLACED))
+    whole = Video.frames
+    monkeypatch.setattr(Video, "frames", lambda self, first, stop: whole(self, first, min(stop, given)))
+    request = Request(str(film), str(placement), background="none", start=0)
+    prior = SegmentPrior.load()
+    with pytest.raises(UserError, match=f"bars.mp4: no frame from {given} on can be decoded"):
+        lift_video(request, prior, print, quiet=True)
+
+
+@pytest.mark.skipif(not FAULTS.is_dir(), reason="../shared/data/faults is absent")
+def test_public_files():
+    cut = Video(FAULTS / "editlist" / "cut.mp4")
+    assert cut.count == len(list(cut.frames())) == 30
+    mirrored, plain = (
+        next(Video(FAULTS / "mirror_matrix" / name).frames()).image.astype(int)
+        for name in ("mirrored.mp4", "same_picture_plain.mp4")
+    )
+    assert np.abs(mirrored - plain).mean() < 3 < np.abs(mirrored[::-1, ::-1] - plain).mean()

@@ -6,6 +6,7 @@ PyAV and OpenCV are imported where they are used, so that pictures can be tracke
 from __future__ import annotations
 
 import os
+import struct
 from collections.abc import Callable, Collection, Iterator, Sequence
 from contextlib import ExitStack
 from fractions import Fraction
@@ -25,6 +26,7 @@ if TYPE_CHECKING:
 Image = NDArray[np.uint8]
 """A picture: (height, width) grey or (height, width, 3) BGR, uint8."""
 
+_ONE = 1 << 16
 _CHUNK_BYTES = 100_000_000  # of pictures kept at a time when they are read backwards
 SAMPLES = 40  # frames of a clip whose median is the empty scene
 _CONTAINERS = (".mp4", ".mkv", ".mov")
@@ -54,11 +56,11 @@ class Video:
     ----------
     path : pathlib.Path
     width, height : int
-        Pixels, after the rotation that a telephone stores beside the picture.
+        Pixels, after the rotation or mirroring that a telephone stores beside the picture.
     fps : float
         Mean frames per second.
     count : int
-        Frames in the file.
+        Frames to show: those of the file without those that an edit list cuts off.  Damage may hide some.
 
     Raises
     ------
@@ -87,13 +89,13 @@ class Video:
         pixels = "gray" if grey else "bgr24"
         for index, time, frame in self._decode(stop):
             if index >= start:
-                yield Frame(index, time, _upright(frame, pixels))
+                yield Frame(index, time, self._upright(frame, pixels))
 
     def pick(self, wanted: Collection[int], progress: Callable[[int], None] | None = None) -> Iterator[Frame]:
         """Yield the frames with the numbers `wanted`, as BGR; `progress` as in `sample_frames`."""
         for index, time, frame in self._decode(None):
             if index in wanted:
-                yield Frame(index, time, _upright(frame, "bgr24"))
+                yield Frame(index, time, self._upright(frame, "bgr24"))
             if progress is not None:
                 progress(index)
 
@@ -107,7 +109,7 @@ class Video:
             yield from reversed(list(self.frames(max(start, end - chunk), end)))
 
     def _probe(self) -> None:
-        """Read the first frame for the size, the stream's header or its packets for count and rate."""
+        """Read the first frame for the size, the packets for the count: headers count what is not shown."""
         import av
 
         with av.open(str(self.path)) as container:
@@ -115,9 +117,9 @@ class Video:
                 raise UserError(f"{self.path}: holds no video stream; give a file with pictures")
             stream = container.streams.video[0]
             self.fps = float(stream.average_rate or stream.guessed_rate or 30)
-            self.count = stream.frames or sum(1 for p in container.demux(stream) if p.pts is not None)
+            self.count = sum(p.size > 0 and not p.is_discard for p in container.demux(stream))
         for _, _, frame in self._decode(1):
-            self.height, self.width = _upright(frame, "gray").shape
+            self.height, self.width = self._upright(frame, "gray").shape
             return
         raise UserError(f"{self.path}: holds no frame that can be decoded; convert it with ffmpeg first")
 
@@ -143,15 +145,32 @@ class Video:
         except av.error.FFmpegError as exc:
             raise self._unreadable(exc) from exc
 
+    def _upright(self, frame: av.VideoFrame, pixels: str) -> Image:
+        """Picture in the pixel format asked for, turned and mirrored as the container asks."""
+        image = np.asarray(frame.to_ndarray(format=pixels), np.uint8)
+        side_data = frame.side_data.get("DISPLAYMATRIX")
+        if side_data is None:
+            return image
+        matrix = struct.unpack("=9i", bytes(side_data))  # of row vectors (x, y, 1); 16.16 fixed point
+        x, y = ([round(value / _ONE, 2) for value in matrix[row : row + 2]] for row in (0, 3))
+        across = x[0] == 0  # whether the picture's columns become rows
+        if sorted(map(abs, (*x, *y))) != [0, 0, 1, 1] or across != (y[1] == 0):
+            raise UserError(
+                f"{self.path}: its display matrix {x + y} is no turn by 90 degrees and no mirroring; convert "
+                "it with ffmpeg"
+            )
+        if across:
+            image = np.swapaxes(image, 0, 1)
+        right, down = x[0] + y[0], x[1] + y[1]  # 1 or -1
+        return np.ascontiguousarray(image[:: int(down), :: int(right)])
+
+    def no_frame(self, first: int) -> UserError:
+        """Make (not raise) the error of a file whose frames from `first` on are damaged or not there."""
+        return UserError(f"{self.path}: no frame from {first} on can be decoded; convert it anew")
+
     def _unreadable(self, exc: av.error.FFmpegError) -> UserError:
         reason = exc.strerror or type(exc).__name__
         return UserError(f"{self.path}: cannot be read as video ({reason}); give a file that ffmpeg plays")
-
-
-def _upright(frame: av.VideoFrame, pixels: str) -> Image:
-    """Picture in the pixel format asked for, turned counter-clockwise as the container asks."""
-    image = np.asarray(frame.to_ndarray(format=pixels), np.uint8)
-    return np.ascontiguousarray(np.rot90(image, frame.rotation // 90)) if frame.rotation % 360 else image
 
 
 def require_video_name(path: str | os.PathLike[str]) -> None:

@@ -16,7 +16,6 @@ from gait.bindings.abi import TrackStatus
 from gait.bindings.estimate import Estimate
 from gait.bindings.model import Model
 from gait.camera.camera import write_camera
-from gait.errors import UserError
 from gait.io.files import replacing
 from gait.io.track_file import TrackWriter
 from gait.io.video import Frame, Image, Video, VideoWriter
@@ -140,7 +139,7 @@ def write(
         if smoother is not None and len(smoother):
             _smooth(options, video, smoother, sinks, plausibility)
         if not results.times:
-            raise UserError(f"{video.path}: no frame from {span.start} on can be decoded; convert it anew")
+            raise video.no_frame(span.start)
     return results
 
 

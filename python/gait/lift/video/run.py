@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, replace
+from itertools import chain
 from typing import Any
 
 import numpy as np
@@ -169,7 +170,14 @@ def _film(
     with progress("background", video.count, quiet) as update:
         plate = background(request.background, video, update)
     with progress("sensors", frames[1] - frames[0], quiet) as update:
-        return Film.make(video.frames(*frames), height, plate, update)
+        shown = video.frames(*frames)
+        first = next(shown, None)
+        if first is None:
+            raise video.no_frame(frames[0])
+        film = Film.make(chain([first], shown), height, plate, update)
+    if placement.frame >= frames[0] + len(film.times):
+        raise video.no_frame(frames[0] + len(film.times))
+    return film
 
 
 def _require_in_picture(path: str, video: Video, pelvis: Floats, height: float) -> None:
