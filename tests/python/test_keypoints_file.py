@@ -2,12 +2,15 @@
 
 from __future__ import annotations
 
+from pathlib import Path
+
 import numpy as np
 import pytest
 
 from gait.errors import UserError
 from gait.io.keypoints_file import Keypoints, read, write
 
+FAULTS = Path(__file__).resolve().parents[2] / "../shared/data/faults/tracks_time"
 KNOWN = ("pelvis", "l_knee", "r_knee")
 
 
@@ -107,3 +110,51 @@ def test_points_within_their_noise_show_nothing():
 def test_missing_file():
     with pytest.raises(UserError, match="no such file"):
         read("nowhere.csv", KNOWN)
+
+
+TIMES = np.arange(60) / 30.0
+
+
+def counted(frame, time):
+    """Keypoints of one joint that is seen in these frames at these times."""
+    return Keypoints(
+        np.asarray(frame), np.asarray(time, float), ("pelvis",), np.ones((len(frame), 1, 2)), None
+    )
+
+
+@pytest.mark.parametrize(
+    ("every", "first"), [(1, 0), (2, 0), (1, 20), (5, 3)], ids=["all", "every second", "part", "few"]
+)
+def test_times_of_the_video_are_accepted(every, first):
+    frame = np.arange(first, 60, every)
+    assert counted(frame, TIMES[frame].round(2)).compare_times("t.csv", TIMES) == ""
+
+
+@pytest.mark.parametrize("rate", [0.5, 0.9, 1.2, 2.0])
+def test_frames_that_number_something_else_are_refused(rate):
+    with pytest.raises(UserError, match=r"t.csv: time goes on by .* s a frame, the video by 0.03333 s"):
+        counted(np.arange(30), rate * TIMES[:30]).compare_times("t.csv", TIMES)
+
+
+@pytest.mark.parametrize("shift", [-1, 1, 40])
+def test_frames_that_are_numbered_from_elsewhere_are_reported(shift):
+    frame = np.arange(10, 40)
+    words = counted(frame, (frame + shift) / 30).compare_times("t.csv", TIMES)
+    assert f"({shift:+.1f} frames)" in words
+
+
+def test_frames_left_out_but_numbered_on_are_reported():
+    """A detector that skips two frames and counts on is two frames off afterwards."""
+    time = np.delete(TIMES, [40, 41])
+    assert "0.0667 s off" in counted(np.arange(58), time).compare_times("t.csv", TIMES)
+
+
+@pytest.mark.skipif(not FAULTS.is_dir(), reason="../shared/data/faults is absent")
+def test_public_files_of_times():
+    names = ("neck", "l_knee")
+    times = np.arange(120) / 30
+    read_all = {name: read(FAULTS / f"{name}.csv", names, True)[0] for name in ("base", "from1", "half_rate")}
+    assert read_all["base"].compare_times("t.csv", times) == ""
+    assert "(-1.0 frames)" in read_all["from1"].compare_times("t.csv", times)
+    with pytest.raises(UserError, match="0.06666 s a frame"):
+        read_all["half_rate"].compare_times("t.csv", times)

@@ -43,6 +43,7 @@ def test_what_was_written_is_read_back(film):
     frames = list(video.frames())
     assert [f.number for f in frames] == list(range(12))
     assert [f.utime for f in frames] == [40000 * i for i in range(12)]
+    np.testing.assert_allclose(video.times, [f.time for f in frames])
     for frame in frames:
         assert frame.image.shape == (48, 64, 3) and frame.image.dtype == np.uint8
         assert np.abs(frame.image.astype(int) - pattern(frame.number)).mean() < 6
@@ -223,10 +224,12 @@ def trimmed(film, tmp_path_factory):
 def test_frames_that_an_edit_list_cuts_off_are_not_counted(trimmed):
     with av.open(str(trimmed.path)) as container:
         assert container.streams.video[0].frames == 12
-    assert trimmed.count == len(list(trimmed.frames())) == 7
+    shown = list(trimmed.frames())
+    assert trimmed.count == len(shown) == 7
+    np.testing.assert_allclose(trimmed.times, [frame.time for frame in shown])
 
 
-PLACED = {"frame": 3, "pelvis_px": [30, 24], "height_px": 30, "stature_m": 1.7}
+PLACED = {"frame": 3, "pelvis_px": [30, 24], "height_px": 30, "heading_rad": 0, "stature_m": 1.7}
 
 
 @pytest.mark.parametrize("given", [0, 3])

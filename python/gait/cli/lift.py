@@ -30,6 +30,7 @@ from gait.bindings.state import state_range
 from gait.body.skeleton import JOINTS
 from gait.cli import values
 from gait.errors import UsageError, UserError
+from gait.io.detector_formats import foreign_format
 from gait.io.files import require_outputs
 from gait.io.keypoints_file import FURTHEST, Keypoints
 from gait.io.track_file import write_lifted
@@ -172,9 +173,11 @@ def _add_video_arguments(parser: argparse.ArgumentParser) -> None:
 def run(args: argparse.Namespace) -> int:
     """Lift keypoints or a video."""
     suffix = Path(args.input).suffix.lower()
-    video = suffix not in (".csv", ".txt") and bool(suffix or args.placement)
+    video = suffix not in (".csv", ".tsv", ".txt") and bool(suffix or args.placement)
     if video and not set("%:") & set(args.input) and not Path(args.input).exists():
         raise UserError(f"{args.input}: no such file; check the name")
+    if Path(args.input).is_file() and (foreign := foreign_format(args.input)):
+        raise UserError(f"{args.input}: {foreign}")
     _require_own(args, video)
     require_outputs(
         (args.output, args.trc, args.overlay),

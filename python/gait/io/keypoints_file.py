@@ -18,6 +18,7 @@ from numpy.typing import NDArray
 
 from gait.bindings.frame import FrameKeypoints
 from gait.errors import UserError
+from gait.io.detector_formats import foreign_format
 from gait.io.fields import frame_numbers, table_rows
 from gait.io.files import replacing
 
@@ -28,6 +29,8 @@ LEAST_CONFIDENCE = 0.1  # points below it count as not seen
 LONGEST_STEP = 1.0  # seconds between frames; so long a step is a cycle of walking
 SHORTEST_STEP = 1e-5  # no camera is as fast
 LONGEST_GAP = 10.0  # seconds without a row that lifting bridges; nothing is known in the middle of it
+RATE_OFF = 0.05  # by which the rates of keypoints and their video differ; phones vary by less
+TIME_OFF = 0.6  # frames; times are often rounded to half a frame
 FURTHEST = 1e6  # pixels, or units of an orthographic view
 
 
@@ -66,6 +69,30 @@ class Keypoints:
                 f"{path}: all u and v lie within {extent:.3g}, less than their noise of {sd:g}; give pixels, "
                 "not shares of the picture, or the noise in their unit"
             )
+
+    def compare_times(self, path: str | os.PathLike[str], times: Array) -> str:
+        """Compare `time` with those of a video's frames, `times` (n,) seconds; describe what differs, or ''.
+
+        UserError if the rates differ: then `frame` does not number the video's frames.
+        """
+        shared = (self.frame >= 0) & (self.frame < len(times))
+        if len(times) < 2 or shared.sum() < 2:
+            return ""
+        own, shown = self.time[shared], times[self.frame[shared]]
+        interval = float(np.median(np.diff(times)))
+        rate = float(own[-1] - own[0]) / float(shown[-1] - shown[0])
+        if not abs(rate - 1) <= RATE_OFF:
+            step = float(shown[-1] - shown[0]) / float(np.ptp(self.frame[shared]))
+            raise UserError(
+                f"{path}: time goes on by {rate * step:.4g} s a frame, the video by {step:.4g} s; frame must "
+                "number the video's frames, from 0"
+            )
+        late = own - shown
+        if not np.abs(late).max() > TIME_OFF * interval:
+            return ""
+        frames = float(np.median(late)) / interval
+        remedy = "frame numbers the video's frames, from 0"
+        return f"time is up to {np.abs(late).max():.3g} s off the video's ({frames:+.1f} frames); {remedy}"
 
     def require_motion(self, path: str | os.PathLike[str]) -> None:
         """Raise UserError unless this is one interval of two frames or more."""
@@ -227,6 +254,8 @@ def _table(path: str | os.PathLike[str]) -> tuple[list[str], list[list[str]]]:
     """Header and rows of a CSV, all of one width."""
     if not Path(path).is_file():
         raise UserError(f"{path}: no such file of keypoints; check the name")
+    if foreign := foreign_format(path):
+        raise UserError(f"{path}: {foreign}")
     try:
         text = Path(path).read_text(encoding="utf-8-sig")
         lines = [row for _, row in table_rows(text) if row]

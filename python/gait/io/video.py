@@ -6,13 +6,12 @@ PyAV and OpenCV are imported where they are used, so that pictures can be tracke
 from __future__ import annotations
 
 import os
-import struct
 from collections.abc import Callable, Collection, Iterator, Sequence
 from contextlib import ExitStack
 from fractions import Fraction
 from pathlib import Path
 from types import TracebackType
-from typing import TYPE_CHECKING, NamedTuple
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -26,7 +25,7 @@ if TYPE_CHECKING:
 Image = NDArray[np.uint8]
 """A picture: (height, width) grey or (height, width, 3) BGR, uint8."""
 
-_ONE = 1 << 16
+_ONE = 1 << 16  # of a display matrix, in fixed point
 _CHUNK_BYTES = 100_000_000  # of pictures kept at a time when they are read backwards
 SAMPLES = 40  # frames of a clip whose median is the empty scene
 _CONTAINERS = (".mp4", ".mkv", ".mov")
@@ -61,6 +60,8 @@ class Video:
         Mean frames per second.
     count : int
         Frames to show: those of the file without those that an edit list cuts off.  Damage may hide some.
+    times : ndarray of shape (count,)
+        When they are shown, seconds since the first, by the file's index.
 
     Raises
     ------
@@ -117,7 +118,10 @@ class Video:
                 raise UserError(f"{self.path}: holds no video stream; give a file with pictures")
             stream = container.streams.video[0]
             self.fps = float(stream.average_rate or stream.guessed_rate or 30)
-            self.count = sum(p.size > 0 and not p.is_discard for p in container.demux(stream))
+            unit = float(stream.time_base or 0)
+            stamps = [p.pts for p in container.demux(stream) if p.size > 0 and not p.is_discard]
+            self.count = len(stamps)
+            self.times = _times(stamps, unit, self.fps)
         for _, _, frame in self._decode(1):
             self.height, self.width = self._upright(frame, "gray").shape
             return
@@ -148,11 +152,11 @@ class Video:
     def _upright(self, frame: av.VideoFrame, pixels: str) -> Image:
         """Picture in the pixel format asked for, turned and mirrored as the container asks."""
         image = np.asarray(frame.to_ndarray(format=pixels), np.uint8)
-        side_data = frame.side_data.get("DISPLAYMATRIX")
+        side_data: Any = frame.side_data.get("DISPLAYMATRIX")
         if side_data is None:
             return image
-        matrix = struct.unpack("=9i", bytes(side_data))  # of row vectors (x, y, 1); 16.16 fixed point
-        x, y = ([round(value / _ONE, 2) for value in matrix[row : row + 2]] for row in (0, 3))
+        matrix = np.frombuffer(side_data, np.int32, 9) / _ONE  # of row vectors (x, y, 1)
+        x, y = ([round(float(value), 2) for value in matrix[row : row + 2]] for row in (0, 3))
         across = x[0] == 0  # whether the picture's columns become rows
         if sorted(map(abs, (*x, *y))) != [0, 0, 1, 1] or across != (y[1] == 0):
             raise UserError(
@@ -171,6 +175,14 @@ class Video:
     def _unreadable(self, exc: av.error.FFmpegError) -> UserError:
         reason = exc.strerror or type(exc).__name__
         return UserError(f"{self.path}: cannot be read as video ({reason}); give a file that ffmpeg plays")
+
+
+def _times(stamps: list[int | None], unit: float, fps: float) -> NDArray[np.float64]:
+    """Seconds since the first of time stamps in decoding order; by the rate if any lacks."""
+    known = np.array(sorted(stamp for stamp in stamps if stamp is not None), float)
+    if len(known) < len(stamps) or (np.diff(known) <= 0).any() or not unit > 0:
+        return np.arange(len(stamps)) / fps
+    return (known - known[:1]) * unit
 
 
 def require_video_name(path: str | os.PathLike[str]) -> None:

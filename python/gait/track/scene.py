@@ -102,7 +102,7 @@ class Scene:
                 with progress("background", video.count, options.quiet) as update:
                     samples, plate = _sample(options, video, update)
             if options.keypoints:
-                people, person = {0: _read_keypoints(options, model, frames)}, 0
+                people, person = {0: _read_keypoints(options, video, model, frames)}, 0
             else:
                 people, person = _detect(options, video, frames)
             if beside is not None:
@@ -344,7 +344,7 @@ def _has_detector(options: ClipOptions) -> bool:
     return all(weight is not None and weights.find(weight) for weight in needed)
 
 
-def _read_keypoints(options: ClipOptions, model: Model, frames: range) -> Keypoints:
+def _read_keypoints(options: ClipOptions, video: Video, model: Model, frames: range) -> Keypoints:
     """Keypoints of the model's joints from a file; they must be of frames to track."""
     assert options.keypoints is not None
     read, ignored = keypoints_file.read(options.keypoints, model.joint_names, ignore_unknown=True)
@@ -355,4 +355,6 @@ def _read_keypoints(options: ClipOptions, model: Model, frames: range) -> Keypoi
         raise UserError(
             f"{options.keypoints}: has no frame that is tracked; number frames as in the video, from 0"
         )
+    if words := read.compare_times(options.keypoints, video.times):
+        note(f"{options.keypoints}: {words}", options.quiet)
     return read

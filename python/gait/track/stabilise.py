@@ -157,7 +157,7 @@ class SteadyVideo(Video):
     """
 
     def __init__(self, video: Video, motion: Motion, samples: Sequence[Frame]) -> None:
-        self.path, self.fps, self.count = video.path, video.fps, video.count
+        self.path, self.fps, self.count, self.times = video.path, video.fps, video.count, video.times
         self._video, self._motion = video, motion
         left, top, right, bottom = self._extent()
         self._corner = np.array([left, top])

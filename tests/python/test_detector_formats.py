@@ -1,0 +1,113 @@
+"""Keypoint files of other tools are named by their content, whatever their suffix."""
+
+import json
+import re
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+import gait.cli
+from gait.io.detector_formats import foreign_format
+
+FAULTS = Path(__file__).resolve().parents[2] / "../shared/data/faults/detector_formats"
+PERSON = {"keypoints": [1, 2, 0.5, 3, 4, 0.6], "score": 2.5}
+POINT = {"x": 0.5, "y": 0.4, "z": 0.0, "visibility": 0.9}
+
+FILES = {
+    "alphapose": (
+        json.dumps([{"image_id": "0.jpg", "category_id": 1, **PERSON}]),
+        "JSON of AlphaPose or COCO",
+    ),
+    "coco": (json.dumps({"images": [], "annotations": [PERSON], "categories": []}), "JSON of COCO"),
+    "openpose": (
+        json.dumps({"version": 1.3, "people": [{"pose_keypoints_2d": [1, 2, 0.5]}]}),
+        "JSON of OpenPose",
+    ),
+    "mmpose": (
+        json.dumps({"meta_info": {}, "instance_info": [{"frame_id": 1, "instances": [PERSON]}]}),
+        "MMPose",
+    ),
+    "yolo": (
+        json.dumps([{"name": "person", "class": 0, "keypoints": {"x": [1], "y": [2]}}]),
+        "JSON of Ultralytics",
+    ),
+    "mediapipe": (json.dumps({"frames": [{"landmarks": [POINT]}]}), "JSON of MediaPipe"),
+    "lines": ("\ufeff" + json.dumps({"frame": 0, "keypoints": [[1, 2]]}) + "\n{}", "JSON of a pose detector"),
+    "other": (json.dumps([[1, 2], [3, 4]]), "is JSON; keypoints are CSV"),
+    "dlc": (
+        "scorer,D,D,D\nbodyparts,l_knee,l_knee,l_knee\ncoords,x,y,likelihood\n0,1,2,0.9\n",
+        "three lines",
+    ),
+    "dlc_crlf": ("scorer,D,D\r\nbodyparts,nose,nose\r\ncoords,x,y\r\n0,1,2\r\n", "DeepLabCut.* three lines"),
+    "dlc_many": ("scorer,D,D\nindividuals,a,a\nbodyparts,nose,nose\ncoords,x,y\n0,1,2\n", "four lines"),
+    "sleap": ("track,frame_idx,instance.score,nose.x,nose.y,nose.score\n,0,0.9,1,2,0.9\n", "SLEAP"),
+    "long": ("frame,keypoint,x,y,score\n0,nose,1,2,0.9\n", "one row per point"),
+    "numbered": ("frame,x1,y1,c1,x2,y2,c2\n0,1,2,0.9,3,4,0.9\n", "numbered points"),
+    "wide": ("frame,time,nose_x,nose_y,knee_x,knee_y\n0,0,1,2,3,4\n", "columns <joint>_x,<joint>_y"),
+    "track": ("frame,time,neck_x,neck_y,neck_z\n0,0,1,2,3\n", "3-D positions"),
+    "labels": ("0 0.5 0.5 0.2 0.6 " + " ".join(["0.4 0.5 0.9"] * 17) + "\n", "YOLO labels"),
+}
+BINARY = {
+    "h5": (b"\x89HDF\r\n\x1a\n", "HDF5"),
+    "pkl": (b"\x80\x04\x95", "pickle"),
+    "npz": (b"PK\x03\x04\x14", "archive"),
+    "npy": (b"\x93NUMPY\x01", "numpy"),
+}
+
+
+@pytest.mark.parametrize("suffix", [".json", ".csv", ".txt", ".dat"])
+@pytest.mark.parametrize("kind", FILES)
+def test_text_of_other_tools_is_named_whatever_its_suffix(kind, suffix, tmp_path):
+    text, words = FILES[kind]
+    path = tmp_path / f"file{suffix}"
+    path.write_text(text, newline="")
+    found = foreign_format(path)
+    assert "keypoints are CSV with one row per frame" in found
+    assert re.search(words, found)
+
+
+@pytest.mark.parametrize("kind", BINARY)
+def test_other_files_are_named_by_their_first_bytes(kind, tmp_path):
+    (tmp_path / "a.bin").write_bytes(BINARY[kind][0] + bytes(100))
+    assert BINARY[kind][1] in foreign_format(tmp_path / "a.bin")
+
+
+@pytest.mark.parametrize("kind", ["alphapose", "dlc", "sleap"])
+@pytest.mark.parametrize("suffix", [".json", ".csv"])
+def test_lift_refuses_them_in_one_line(kind, suffix, tmp_path, capsys):
+    path = tmp_path / f"file{suffix}"
+    path.write_text(FILES[kind][0])
+    assert gait.cli.main(["lift", str(path), "-o", str(tmp_path / "a.csv")]) == 1
+    said = capsys.readouterr().err
+    assert said.count("\n") == 1 and f"{path}: is " in said and "--placement" not in said
+    assert not (tmp_path / "a.csv").exists()
+
+
+@pytest.mark.parametrize(
+    "text",
+    [
+        "frame,time,neck_u,neck_v,neck_c,hand_x,hand_y\n0,0,1,2,1,3,4\n",
+        "frame;time;neck_u;neck_v\n0;0;1,5;2\n",
+        "time,frame,label,neck_u,neck_v\n0,0,1,2,3\n",
+        "nothing",
+        "",
+        "[cam]\nsize = [1, 2]\n",
+    ],
+)
+def test_own_files_and_those_that_nobody_knows_are_left_to_the_reader(text, tmp_path):
+    (tmp_path / "a.csv").write_text(text)
+    assert foreign_format(tmp_path / "a.csv") == ""
+
+
+def test_videos_are_not_taken_for_tables(tmp_path):
+    rng = np.random.default_rng(1)
+    for seed in range(20):
+        (tmp_path / "a.mp4").write_bytes(b"\0\0\0\x20ftypisom" + rng.bytes(70000))
+        assert foreign_format(tmp_path / "a.mp4") == "", seed
+
+
+@pytest.mark.skipif(not FAULTS.is_dir(), reason="../shared/data/faults is absent")
+def test_public_files():
+    assert "JSON of AlphaPose" in foreign_format(FAULTS / "alphapose.json")
+    assert "three lines" in foreign_format(FAULTS / "dlc.csv")
