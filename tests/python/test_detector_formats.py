@@ -79,8 +79,8 @@ def test_lift_refuses_them_in_one_line(kind, suffix, tmp_path, capsys):
     path = tmp_path / f"file{suffix}"
     path.write_text(FILES[kind][0])
     assert gait.cli.main(["lift", str(path), "-o", str(tmp_path / "a.csv")]) == 1
-    said = capsys.readouterr().err
-    assert said.count("\n") == 1 and f"{path}: is " in said and "--placement" not in said
+    printed = capsys.readouterr().err
+    assert printed.count("\n") == 1 and f"{path}: is " in printed and "--placement" not in printed
     assert not (tmp_path / "a.csv").exists()
 
 
@@ -95,7 +95,7 @@ def test_lift_refuses_them_in_one_line(kind, suffix, tmp_path, capsys):
         "[cam]\nsize = [1, 2]\n",
     ],
 )
-def test_own_files_and_those_that_nobody_knows_are_left_to_the_reader(text, tmp_path):
+def test_own_files_and_unknown_ones_are_left_to_the_reader(text, tmp_path):
     (tmp_path / "a.csv").write_text(text)
     assert foreign_format(tmp_path / "a.csv") == ""
 
