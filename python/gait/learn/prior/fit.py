@@ -111,7 +111,9 @@ class Learned:
     @cached_property
     def by_subject(self) -> SubjectResiduals | None:
         """Residuals of each subject; None if they are too few or too many, as each costs a fit."""
-        return _subject_residuals(self)
+        return _subject_residuals(
+            self.cycles, self.scale, self.row_subject, len(self.components.sd), self.proportions, self.paper
+        )
 
     @property
     def row_subject(self) -> Indices:
@@ -307,17 +309,23 @@ def _from_legs(mean: Floats, proportions: Proportions) -> tuple[Floats, float]:
     return height, stride if PLAUSIBLE_STRIDE[0] <= stride <= PLAUSIBLE_STRIDE[1] else USUAL_STRIDE
 
 
-def _subject_residuals(learned: Learned) -> SubjectResiduals | None:
-    """Fit the components of all, and of all but each subject."""
-    values, mask, subject = learned.cycles.values, learned.cycles.mask, learned.row_subject
-    scale, count, proportions = learned.scale, len(learned.components.sd), learned.proportions
+def _subject_residuals(
+    rows: cutting.Cycles,
+    scale: Floats,
+    subject: Indices,
+    count: int,
+    proportions: Proportions,
+    paper: bool = False,
+) -> SubjectResiduals | None:
+    """Fit the components of all, and of all but each subject; `proportions` are of the body compared on."""
+    values, mask = rows.values, rows.mask
     number = int(subject.max()) + 1
     if not LEAST_SUBJECTS <= number <= MOST_SUBJECTS or len(values) > MOST_CYCLES:
         return None
 
     def learnt(some: Mask) -> Components:
         most = min(count, int(some.sum()) - 1)
-        return _analysed(values[some] * scale, mask[some], most, learned.paper)
+        return _analysed(values[some] * scale, mask[some], most, paper)
 
     def left(model: Components, some: Mask) -> tuple[float, float]:
         nearest = _nearest(model, values[some] * scale, mask[some]) / scale
