@@ -6,8 +6,8 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from walking_keypoints import ACROSS, MODEL, NAMES, SIZE, TOWARDS, keypoints, view
 
-from gait.bindings.model import Model
 from gait.camera.camera import read_camera
 from gait.cli import main
 from gait.errors import UserError
@@ -18,51 +18,6 @@ from gait.track.from_walk import calibrate
 from gait.track.keypoint_start import find_keypoint_start
 from gait.track.walk_camera import contradiction
 from gait.track.walk_model import WalkingBody
-from gait.track.walk_start import make_camera
-
-MODEL = Model()
-SIZE = (1280, 720)
-NAMES = tuple(name for name in MODEL.joint_names if name not in ("pelvis", "neck", "head_top"))
-TOWARDS, ACROSS = (
-    (-1.3, (0.3, 7.5)),
-    (0.0, (-1.8, 5.0)),
-)  # heading from -y to the right, and first place
-
-
-def keypoints(
-    camera,
-    walk=TOWARDS,
-    *,
-    speed=1.25,
-    stature=1.75,
-    seconds=3.0,
-    noise=1.5,
-    seed=0,
-    standing=False,
-    belt=0.0,
-):
-    """Keypoints at 15 frames per second of a person who walks straight on."""
-    rng = np.random.default_rng(seed)
-    time = np.arange(0.0, seconds, 1 / 15)
-    prior, _ = MODEL.prior()
-    heading, place = walk
-    rate = speed / (MODEL.info.stride_length * stature)
-    uv = []
-    for t in time:
-        way = 0.0 if standing else (speed - belt) * t
-        state = replace(prior, phase=0.3 if standing else (0.3 + rate * t) % 1.0, stature=stature)
-        state.heading, state.stride_hz = heading, rate
-        x, y = place[0] + way * np.cos(heading), place[1] + way * np.sin(heading)
-        state.pelvis = np.array([x, y, 0.0])
-        state.pelvis[2] = MODEL.pelvis_height(state)
-        joints = MODEL.pose(state)[0]
-        uv.append(camera.project(joints)[[MODEL.joint_names.index(name) for name in NAMES]])
-    uv = np.array(uv) + noise * rng.standard_normal((len(time), len(NAMES), 2))
-    return Keypoints(np.arange(len(time)), time, NAMES, uv, np.ones(uv.shape[:2]))
-
-
-def view(focal=1000.0, tilt=0.08, roll=0.0, height=1.4):
-    return make_camera(np.array([np.log(focal), tilt, roll, np.log(height)]), SIZE)
 
 
 @pytest.mark.parametrize(

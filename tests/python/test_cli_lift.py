@@ -238,13 +238,13 @@ def test_tracks_that_cannot_be(folder, capsys, change, words):
     assert not (folder / "out.csv").exists()
 
 
-def test_video_needs_placement(folder, capsys):
+def test_options_of_keypoints_and_of_pictures(folder, capsys):
     (folder / "clip.mp4").touch()
     assert main(["lift", "clip.mp4", "-m", "m.gait", "-o", "out.csv"]) == 2
-    assert "--placement" in capsys.readouterr().err
-    assert main(["lift", "clip.mp4", "-o", "out.csv", "--height", "1.7"]) == 2
-    assert "--height is for keypoints, and clip.mp4 is a video" in capsys.readouterr().err
-    assert main(["lift", "clip.mp4", "-o", "out.csv", "--method", "smooth"]) == 2
+    assert "--height M for a camera that is found" in capsys.readouterr().err
+    assert main(["lift", "clip.mp4", "-o", "out.csv", "--overlay", "o.mp4", "--height", "1.7"]) == 2
+    assert "--overlay needs --placement" in capsys.readouterr().err
+    assert main(["lift", "clip.mp4", "-o", "out.csv", "--placement", "p.json", "--method", "smooth"]) == 2
     assert "--method is for keypoints" in capsys.readouterr().err
     assert main(["lift", "absent", "-o", "out.csv", "--method", "smooth"]) == 1
     assert "absent: no such file" in capsys.readouterr().err

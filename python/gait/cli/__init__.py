@@ -39,7 +39,7 @@ COMMANDS = {
     "track": Command("track", "track a walking person in a video file", ("video",)),
     "eval": Command("evaluate", "compare a track with the truth", ("video",)),
     "detect": Command("detect", "find the 2-D keypoints of the people in a video", ("video",)),
-    "lift": Command("lift", "lift 2-D keypoints, or a video, to 3-D motion", ("video", "mocap")),
+    "lift": Command("lift", "lift a video, or 2-D keypoints, to 3-D motion", ("video", "mocap")),
     "render": Command("render", "draw a pose or a model", ("video",)),
     "camera": Command("camera", "find where a camera stands from points measured on the ground", ("video",)),
     "simulate": Command("simulate", "make a test clip of a walking person with exact truth", ("video",)),

@@ -5,14 +5,17 @@ right, v down, pixel centres at integers) and a confidence from 0 to 1, which di
 Empty cells mean "not seen".  Joints are those of the model's segment prior (gait info M.gait).  The prior
 over short segments of motion supplies the depth and the joints that are not seen (Leventon and Freeman 1998).
 
+A VIDEO instead of keypoints is searched for a person who walks (see gait detect).  Without --camera the
+camera is found from the walk, given the person's stature (see gait camera --walk); the standard deviations in
+OUT.csv include its uncertainty.  With --placement the pictures themselves are lifted, without a detector: see
+the options under "from a video's pictures".
+
 Views: with --camera the result is in the camera's world.  --orthographic looks from far away along an axis of
 a world with z up; the scale comes from the person's stature unless --metres-per-unit gives it.  Without
 either, the camera is assumed to be level and far away (looking along y), with a slowly changing scale.
 Neither determines the position along the line of sight; the lowest foot is put on the floor.
 
 OUT.csv: frame,time and for each joint _x,_y,_z (metres) and _sx,_sy,_sz (posterior standard deviations).
-
-A VIDEO instead of keypoints needs --placement: see the options under "from a video".
 """
 
 from __future__ import annotations
@@ -22,16 +25,19 @@ import json
 import sys
 from collections.abc import Callable
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from gait.bindings.model import Model, read_blob
 from gait.bindings.state import state_range
 from gait.body.skeleton import JOINTS
+from gait.camera.camera import Camera, read_camera, write_camera
 from gait.cli import values
 from gait.errors import UsageError, UserError
+from gait.io.blob import decode
 from gait.io.detector_formats import foreign_format
-from gait.io.files import require_outputs
+from gait.io.files import replacing, require_outputs
 from gait.io.keypoints_file import FURTHEST, Keypoints
 from gait.io.track_file import write_lifted
 from gait.io.trc import write_trc
@@ -39,10 +45,22 @@ from gait.lift import run as lift_run
 from gait.lift.segment.explain import Uncertain
 from gait.lift.smooth import motion
 
+if TYPE_CHECKING:
+    from gait.bindings.segment_prior import SegmentPrior
+    from gait.io.video import Video
+    from gait.track.from_walk import Calibration
+
+EXAMPLES = """\
+examples:
+  gait lift walk.mp4 --height 1.75 -o motion.csv --camera-out camera.json
+  gait lift keypoints.csv --camera camera.json -o motion.csv
+  gait lift walk.mp4 --camera camera.json --placement init.json -o motion.csv --suggest 5
+"""
 FILES = """\
 P.json gives where the person roughly is in one frame; with --camera in the format of gait track --init:
   {"frame": 64, "pelvis": [-0.1, 5.5, 0.9], "heading_rad": -1.57, "stature_m": 1.65}
-and without a camera in pixels; the result is then in the picture's axes (x to the right, y away, z up):
+and without a camera, or with one that is found from the walk (--height), in pixels; the result is then in the
+picture's axes (x to the right, y away, z up):
   {"frame": 64, "pelvis_px": [1376, 734], "height_px": 415, "heading_rad": 3.14, "stature_m": 1.65}
 "phase" (of walking; 0: right heel strike, 0.5: left heel strike) determines which leg is in front; without it
 a person seen from the side may come out with left and right swapped.
@@ -52,10 +70,11 @@ C.json gives positions of joints (or other markers of the model) and optionally 
 """
 
 _ONLY_KEYPOINTS = (
-    *("orthographic", "metres_per_unit", "height", "pixel_sd", "floor_sd", "method", "no_contact"),
+    *("orthographic", "metres_per_unit", "pixel_sd", "floor_sd", "method", "no_contact"),
     *("no_bones", "ignore_unknown", "keep_sides", "keep_spikes", "trc"),
 )
-_ONLY_VIDEO = ("placement", "corrections", "background", "start", "stop", "alone", "overlay", "suggest")
+_ONLY_PICTURES = ("corrections", "background", "alone", "overlay", "suggest")
+_ONLY_VIDEO = ("placement", *_ONLY_PICTURES, "start", "stop", "fov", "camera_out")
 PIXEL_SD, FLOOR_SD = motion.Options.pixel_sd, motion.Options.floor_sd  # pixels, metres
 MOVED = 3  # joints named that a displacement moves most
 WHOLE = 0.5  # share of a displacement's energy from which it moves the whole body
@@ -65,7 +84,7 @@ UNKNOWN_MM = 1000.0  # a displacement less certain than that is the distance, in
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Add the command's options."""
     parser.add_argument(
-        "input", metavar="KEYPOINTS.csv|VIDEO", help="2-D keypoints, or a video with --placement"
+        "input", metavar="KEYPOINTS.csv|VIDEO", help="2-D keypoints, or a video in which they are found"
     )
     parser.add_argument(
         "-o", "--output", required=True, metavar="OUT.csv", help="positions and standard deviations, metres"
@@ -73,8 +92,12 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "-m", "--model", metavar="M.gait", help="model with a segment prior (default: the shipped one)"
     )
+    values.add_camera(parser, "; without it the camera of a VIDEO is found from the walk, given --height")
     parser.add_argument(
-        "--camera", metavar="CAM", help="calibration: JSON, OpenCV YAML or XML, or FILE.toml:name"
+        "--height",
+        type=values.stature,
+        metavar="M",
+        help="the person's stature in metres (default: unknown, near that of the people learnt from)",
     )
     parser.add_argument(
         "--all-markers", action="store_true", help="write all markers of the prior, not its joints alone"
@@ -90,12 +113,6 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         type=values.between(1e-6, 1e3, "metres"),
         metavar="M",
         help="length of a unit of u and v, with --orthographic (default: from the person's stature)",
-    )
-    add(
-        "--height",
-        type=values.stature,
-        metavar="M",
-        help="the person's stature in metres (default: unknown, near that of the people learnt from)",
     )
     add(
         "--pixel-sd",
@@ -137,9 +154,21 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 def _add_video_arguments(parser: argparse.ArgumentParser) -> None:
     """Add the options that only a video has."""
-    group = parser.add_argument_group("from a video", FILES)
+    group = parser.add_argument_group("from a video")
+    values.add_fov(group)
+    group.add_argument("--camera-out", metavar="CAM.json", help="also write the camera, found or given")
     group.add_argument(
-        "--placement", metavar="P.json", help="where the person roughly is in one frame; a video needs it"
+        "--start",
+        type=values.whole(0),
+        metavar="F",
+        help="first frame to use (default: that of --placement, or 0)",
+    )
+    group.add_argument(
+        "--stop", type=values.whole(0), metavar="F", help="first frame not to use (default: to the end)"
+    )
+    group = parser.add_argument_group("from a video's pictures", FILES)
+    group.add_argument(
+        "--placement", metavar="P.json", help="where the person roughly is in one frame; lifts the pictures"
     )
     group.add_argument(
         "--corrections", metavar="C.json", help="positions of joints in any frames, given by hand"
@@ -149,12 +178,6 @@ def _add_video_arguments(parser: argparse.ArgumentParser) -> None:
         metavar="PNG|auto|none",
         help="the empty scene, whose edges the sensors ignore: an image; auto (default), the median of the "
         "clip; or none",
-    )
-    group.add_argument(
-        "--start", type=values.whole(0), metavar="F", help="first frame to use (default: the placement's)"
-    )
-    group.add_argument(
-        "--stop", type=values.whole(0), metavar="F", help="first frame not to use (default: to the end)"
     )
     group.add_argument(
         "--alone",
@@ -179,11 +202,13 @@ def run(args: argparse.Namespace) -> int:
     if Path(args.input).is_file() and (foreign := foreign_format(args.input)):
         raise UserError(f"{args.input}: {foreign}")
     _require_own(args, video)
+    if args.stop is not None:
+        values.require_order(args.start or 0, args.stop)
     require_outputs(
-        (args.output, args.trc, args.overlay),
+        (args.output, args.trc, args.overlay, args.camera_out),
         (args.input, args.model, args.camera, args.placement, args.corrections, args.background),
     )
-    summary, text = _lift_video(args) if video else _lift_keypoints(args)
+    summary, text = _lift_pictures(args) if args.placement else _lift_keypoints(args, video)
     print(json.dumps(summary) if args.json else text)
     return 0
 
@@ -193,14 +218,17 @@ def warner(quiet: bool) -> Callable[[str], None]:
     return lambda words: None if quiet else print(words, file=sys.stderr)
 
 
-def _lift_keypoints(args: argparse.Namespace) -> tuple[dict[str, Any], str]:
-    """Lift keypoints; the summary, and in words."""
-    _check(args)
+def _lift_keypoints(args: argparse.Namespace, video: bool) -> tuple[dict[str, Any], str]:
+    """Lift keypoints of a file, or found in a video; the summary, and in words."""
+    _check(args, video)
     warn = warner(args.quiet)
+    prior = lift_run.load_prior(args.model, warn)
+    keypoints, calibration = _find_keypoints(args, prior) if video else (None, None)
     request = lift_run.Request(
         options=_options(args),
         pixel_sd_given=args.pixel_sd is not None,
         camera=args.camera,
+        calibration=calibration,
         axis=args.orthographic,
         metres=args.metres_per_unit,
         ignore_unknown=args.ignore_unknown,
@@ -208,8 +236,10 @@ def _lift_keypoints(args: argparse.Namespace) -> tuple[dict[str, Any], str]:
         keep_spikes=args.keep_spikes,
         all_markers=args.all_markers,
     )
-    prior = lift_run.load_prior(args.model, warn)
-    lifted = lift_run.lift_file(args.input, prior, request, warn, args.quiet)
+    if keypoints is None:
+        lifted = lift_run.lift_file(args.input, prior, request, warn, args.quiet)
+    else:
+        lifted = lift_run.lift_keypoints(args.input, keypoints, prior, request, warn, args.quiet)
     keypoints, found = lifted.keypoints, lifted.motion
     _require_person(args, found)
     for words in lift_run.warnings_of(lifted, prior.stature):
@@ -217,25 +247,65 @@ def _lift_keypoints(args: argparse.Namespace) -> tuple[dict[str, Any], str]:
     write_lifted(args.output, keypoints.frame, keypoints.time, found.names, found.places, found.sd)
     if args.trc:
         write_trc(args.trc, found.names, keypoints.time, found.places, _rate(keypoints))
+    _write_camera(args, calibration)
     summary = _summary(args, keypoints, found) | lifted.repairs | {"pixel_sd": lifted.options.pixel_sd}
+    summary |= {} if calibration is None else {"camera": calibration.figures()}
     return summary, _text(summary)
 
 
-def _lift_video(args: argparse.Namespace) -> tuple[dict[str, Any], str]:
-    """Lift a video; the summary, and in words."""
-    from gait.io.video import require_video_name  # OpenCV and PyAV, which keypoints do not need
-    from gait.lift.video import run as video_run
+def _find_keypoints(args: argparse.Namespace, prior: SegmentPrior) -> tuple[Keypoints, Calibration | None]:
+    """Find the keypoints of the person in a video and, unless the view is given, the camera."""
+    from gait.io.video import Video  # PyAV, and below OpenCV, which files of keypoints do not need
+    from gait.track.walk_camera import find_person
 
-    if not args.placement:
-        raise UsageError("--placement: a video needs it; it gives where the person roughly is in one frame")
+    if not (args.camera or args.orthographic or args.height):
+        raise UsageError("give --camera CAM, or --height M for a camera that is found from the walk")
+    video = Video(args.input)
+    if args.camera:
+        Camera.read(args.camera, video.size).check_place(args.camera)
+    keypoints = find_person(video, args.quiet, args.start or 0, args.stop)
+    calibration = None if args.camera or args.orthographic else _calibrate(args, video, keypoints)
+    return keypoints.certain(), calibration
+
+
+def _calibrate(args: argparse.Namespace, video: Video, keypoints: Keypoints) -> Calibration:
+    """Find the camera from the walk, and report it."""
+    from gait.track.walk_camera import calibrate_film, note_camera
+
+    cyclic = args.model and "CURV" in decode(read_blob(args.model))  # a model may have a segment prior alone
+    model = Model(args.model if cyclic else None)
+    found = calibrate_film(video, keypoints, model, args.height, args.fov, args.quiet)
+    note_camera(found, args.quiet)
+    return found
+
+
+def _write_camera(args: argparse.Namespace, calibration: Calibration | None) -> None:
+    """Write the camera, found or given, if asked to."""
+    if args.camera_out:
+        with replacing(args.camera_out) as temporary:
+            write_camera(temporary, read_camera(args.camera) if calibration is None else calibration.camera)
+
+
+def _lift_pictures(args: argparse.Namespace) -> tuple[dict[str, Any], str]:
+    """Lift the pictures of a video; the summary, and in words."""
+    from gait.io.video import Video, require_video_name  # OpenCV and PyAV, which keypoints do not need
+    from gait.lift.video import run as video_run
+    from gait.track.walk_camera import find_person
+
     if args.overlay:
         require_video_name(args.overlay)
     warn = warner(args.quiet)
+    calibration = None
+    if args.height:
+        video = Video(args.input)
+        calibration = _calibrate(args, video, find_person(video, args.quiet))
     request = video_run.Request(
         video=args.input,
         placement=args.placement,
         model=args.model,
         camera=args.camera,
+        calibration=calibration,
+        height=args.height,
         corrections=args.corrections,
         background=args.background or "auto",
         start=args.start,
@@ -250,7 +320,9 @@ def _lift_video(args: argparse.Namespace) -> tuple[dict[str, Any], str]:
     write_lifted(args.output, fit.frame, fit.time, names, fit.places[:, shown], fit.sd[:, shown])
     if args.overlay:
         video_run.draw_overlay(args.overlay, lifted, args.quiet)
+    _write_camera(args, calibration)
     summary = video_run.summary(lifted, args.suggest or 0)
+    summary |= {} if calibration is None else {"camera": calibration.figures()}
     return summary, _video_text(summary)
 
 
@@ -266,12 +338,28 @@ def _options(args: argparse.Namespace) -> motion.Options:
 
 
 def _require_own(args: argparse.Namespace, video: bool) -> None:
-    """Refuse options of a video for keypoints and vice versa, which would have no effect."""
-    kind, other = ("is a video", "keypoints") if video else ("holds keypoints", "a video")
-    for option in _ONLY_KEYPOINTS if video else _ONLY_VIDEO:
+    """Refuse options that would have no effect."""
+    useless: tuple[str, ...]
+    if not video:
+        useless, why = _ONLY_VIDEO, f"is for a video, and {args.input} holds keypoints"
+    elif args.placement:
+        useless, why = _ONLY_KEYPOINTS, "is for keypoints, and --placement for the pictures of a video"
+    else:
+        useless, why = (
+            _ONLY_PICTURES,
+            "needs --placement, where the person roughly is in one frame",
+        )
+    given = bool(args.camera or args.orthographic)
+    for option in useless:
         value = getattr(args, option)
         if value is not None and value is not False:
-            raise UsageError(f"--{option.replace('_', '-')} is for {other}, and {args.input} {kind}")
+            raise UsageError(f"--{option.replace('_', '-')} {why}")
+    if video and args.placement and args.camera and args.height:
+        raise UsageError("--height: the placement has the stature; leave it out, or --camera")
+    if args.fov and (given or not args.height):
+        raise UsageError("--fov: is for a camera that is found from the walk, with --height and no --camera")
+    if args.camera_out and not (args.camera or (args.height and not given)):
+        raise UsageError("--camera-out: there is no camera; give --camera, or --height for one from the walk")
 
 
 def _require_person(args: argparse.Namespace, found: motion.Motion) -> None:
@@ -286,7 +374,7 @@ def _require_person(args: argparse.Namespace, found: motion.Motion) -> None:
         )
 
 
-def _check(args: argparse.Namespace) -> None:
+def _check(args: argparse.Namespace, video: bool) -> None:
     """Refuse options that do not go together."""
     smooth = args.method in (None, "smooth")
     if args.camera and args.orthographic:
@@ -295,7 +383,8 @@ def _check(args: argparse.Namespace) -> None:
         raise UsageError("--metres-per-unit goes with --orthographic")
     if not smooth and (args.no_contact or args.no_bones):
         raise UsageError("--no-contact and --no-bones go with --method smooth")
-    if args.floor_sd and not (smooth and args.camera):
+    camera = args.camera or (args.height and video and not args.orthographic)
+    if args.floor_sd and not (smooth and camera):
         raise UsageError("--floor-sd goes with --camera and --method smooth")
 
 

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from argparse import ArgumentParser, ArgumentTypeError
+from argparse import ArgumentParser, ArgumentTypeError, _ActionsContainer
 from collections.abc import Callable
 
 from gait.bindings.abi import Mode
@@ -81,7 +81,7 @@ def add_camera(parser: ArgumentParser, note: str = "", required: bool = False) -
     parser.add_argument("--camera", required=required, metavar="CAM", help=CAMERA + note)
 
 
-def add_fov(parser: ArgumentParser) -> None:
+def add_fov(parser: _ActionsContainer) -> None:
     """Add ``--fov``."""
     parser.add_argument(
         "--fov",

@@ -10,7 +10,7 @@ import csv
 import os
 import sys
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 import numpy as np
@@ -54,6 +54,10 @@ class Keypoints:
     def visible(self) -> NDArray[np.bool_]:
         """Which points are seen, shape (T, J)."""
         return np.asarray(np.isfinite(self.uv).all(axis=2))
+
+    def certain(self) -> Keypoints:
+        """Keypoints without those of little confidence, as a file of them is read."""
+        return replace(self, uv=np.where(self.confidence[..., None] < LEAST_CONFIDENCE, np.nan, self.uv))
 
     def outside(self, size: tuple[int, int]) -> float:
         """Share of the points seen that lie outside of a picture of `size` (width, height)."""

@@ -85,6 +85,13 @@ class Video:
         """Width and height in pixels."""
         return self.width, self.height
 
+    def span(self, start: int, stop: int | None) -> range:
+        """Numbers of the frames start <= number < stop; UserError if there are none."""
+        stop = self.count if stop is None else min(stop, self.count)
+        if start >= stop:
+            raise UserError(f"{self.path}: no frame from {start} up to {stop}; it has {self.count}")
+        return range(start, stop)
+
     def frames(self, start: int = 0, stop: int | None = None, *, grey: bool = False) -> Iterator[Frame]:
         """Yield the frames `start` <= index < `stop` in order, as BGR or grey."""
         pixels = "gray" if grey else "bgr24"

@@ -20,6 +20,7 @@ from gait.lift.smooth import motion, size
 from gait.lift.smooth.motion import Motion, Options
 from gait.progress import progress
 from gait.reproducible import one_thread
+from gait.track.from_walk import Calibration
 
 FEW = 4  # recordings; with two of one person, intervals of other people's walks covered as little as 70 %
 MOST_NAMED = 5  # spikes, changes of person
@@ -43,7 +44,9 @@ class Request:
     options : Options
         Of the method; `pixel_sd` counts only if `pixel_sd_given`, else the points' jitter is measured.
     camera : str, optional
-        File of the calibration; without it the view is from far away.
+        File of the calibration; without one the view is from far away.
+    calibration : Calibration, optional
+        Camera found from the walk instead; its uncertainty is added to the standard deviations.
     axis : str, optional
         Direction of such a view; level and with a slowly changing scale if left out.
     metres : float, optional
@@ -61,6 +64,7 @@ class Request:
     options: Options
     pixel_sd_given: bool = False
     camera: str | None = None
+    calibration: Calibration | None = None
     axis: str | None = None
     metres: float | None = None
     ignore_unknown: bool = False
@@ -113,8 +117,18 @@ def lift_file(path: str, prior: SegmentPrior, request: Request, warn: Warn, quie
     UserError
         One line that names the file.
     """
+    keypoints, ignored = keypoints_file.read(path, prior.names, request.ignore_unknown)
+    if ignored:
+        warn(f"left out, unknown to the model: {' '.join(ignored)}")
+    return lift_keypoints(path, keypoints, prior, request, warn, quiet)
+
+
+def lift_keypoints(
+    path: str, keypoints: Keypoints, prior: SegmentPrior, request: Request, warn: Warn, quiet: bool
+) -> Lifted:
+    """Lift keypoints of the prior's markers as `lift_file` does; errors name `path`, where they are from."""
     options, hint = request.options, request.hints
-    keypoints = _read(path, prior, options.pixel_sd, request.ignore_unknown, warn)
+    _check(path, keypoints, options.pixel_sd, warn)
     if not request.pixel_sd_given:
         options = replace(options, pixel_sd=measured_noise(keypoints, warn))
     view = _view(keypoints, request, warn)
@@ -130,16 +144,16 @@ def lift_file(path: str, prior: SegmentPrior, request: Request, warn: Warn, quie
     # matrices are too small for several threads to gain
     with one_thread(), progress("segments", segments, quiet) as update, _naming(path):
         lifted = motion.lift(prior, keypoints, view, options, names, update)
+    if request.calibration is not None:
+        wider = request.calibration.joint_sd(keypoints.time, lifted.places, lifted.sd)
+        lifted = replace(lifted, sd=wider)
     return Lifted(keypoints, view, options, lifted, repairs)
 
 
-def _read(path: str, prior: SegmentPrior, sd: float, ignore_unknown: bool, warn: Warn) -> Keypoints:
-    """Read keypoints of a prior's markers whose noise is `sd`; warn about what is left out or looks wrong."""
-    keypoints, ignored = keypoints_file.read(path, prior.names, ignore_unknown)
+def _check(path: str, keypoints: Keypoints, sd: float, warn: Warn) -> None:
+    """Refuse keypoints, whose noise is `sd`, that are no motion; warn about what looks wrong."""
     keypoints.require_motion(path)
     keypoints.require_extent(path, sd)
-    if ignored:
-        warn(f"left out, unknown to the model: {' '.join(ignored)}")
     if found := keypoints_file.shared_place(keypoints.uv):
         (u, v), count = found
         warn(
@@ -154,7 +168,6 @@ def _read(path: str, prior: SegmentPrior, sd: float, ignore_unknown: bool, warn:
             f"most points jump at once: the keypoints change to another person {', '.join(places)}; keep one "
             "person's points only"
         )
-    return keypoints
 
 
 def measured_noise(keypoints: Keypoints, warn: Warn) -> float:
@@ -175,6 +188,8 @@ def measured_noise(keypoints: Keypoints, warn: Warn) -> float:
 
 def _view(keypoints: Keypoints, request: Request, warn: Warn) -> View:
     """View of the keypoints; warn if they cannot be of the camera's picture."""
+    if request.calibration is not None:
+        return Perspective(request.calibration.camera)
     if request.camera:
         camera = Camera.read(request.camera)
         outside = keypoints.outside(camera.size)

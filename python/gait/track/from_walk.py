@@ -99,17 +99,39 @@ class Calibration:
 
     def widened(self, time: float, estimate: Estimate) -> Estimate:
         """Add the uncertainty of the camera to the sd of an estimate, `time` seconds into the clip."""
-        at = [np.interp(time, self.time, column) for column in self.path_change.reshape(len(self.time), -1).T]
-        change = np.reshape(at, (3, 4))
-        here = [np.interp(time, self.time, column) for column in self.path[:, :2].T]
-        off = estimate.joints[:, :2] - here
-        x = np.linalg.norm(change[0] - off[:, 1:] * change[2], axis=1)
-        y = np.linalg.norm(change[1] + off[:, :1] * change[2], axis=1)
-        joint_sd = np.hypot(estimate.joint_sd, np.stack([x, y, np.zeros(len(x))], axis=1))
-        x, y, turn = np.linalg.norm(change, axis=1)
+        at = np.array([time])
+        joint_sd = self.joint_sd(at, estimate.joints[None], estimate.joint_sd[None])[0]
+        x, y, turn = np.linalg.norm(self._path_change(at)[0], axis=1)
         pelvis = np.hypot(estimate.sd.pelvis, [x, y, 0.0])
         sd = replace(estimate.sd, pelvis=pelvis, heading=float(np.hypot(estimate.sd.heading, turn)))
         return replace(estimate, joint_sd=joint_sd, sd=sd)
+
+    def joint_sd(self, time: Array, joints: Array, sd: Array) -> Array:
+        """Add the uncertainty of the camera to the standard deviations of joints.
+
+        Parameters
+        ----------
+        time : ndarray of shape (T,)
+            Seconds into the clip.
+        joints, sd : ndarray of shape (T, J, 3)
+            In the camera's world, metres.
+
+        Returns
+        -------
+        ndarray of shape (T, J, 3)
+        """
+        change = self._path_change(time)[:, None]
+        here = np.stack([np.interp(time, self.time, column) for column in self.path[:, :2].T], axis=1)
+        off = joints[..., :2] - here[:, None]
+        x = np.linalg.norm(change[..., 0, :] - off[..., 1:] * change[..., 2, :], axis=2)
+        y = np.linalg.norm(change[..., 1, :] + off[..., :1] * change[..., 2, :], axis=2)
+        return np.asarray(np.hypot(sd, np.stack([x, y, np.zeros_like(x)], axis=2)))
+
+    def _path_change(self, time: Array) -> Array:
+        """Give `path_change` at times (T,): shape (T, 3, 4)."""
+        columns = self.path_change.reshape(len(self.time), -1).T
+        at = np.stack([np.interp(time, self.time, column) for column in columns], axis=1)
+        return at.reshape(len(time), 3, 4)
 
 
 def calibrate(

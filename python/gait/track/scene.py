@@ -92,7 +92,7 @@ class Scene:
             camera.check_place(options.camera)
             if options.init != "auto":
                 _read_start(options, video, camera, model)  # refused before the work on the whole clip
-        frames = clip_frames(video, options.start or 0, options.stop)
+        frames = video.span(options.start or 0, options.stop)
         _require_detector(options)
         given = None if options.background in ("auto", "none") else background(options.background, video)
         with ThreadPoolExecutor(1) as pool:
@@ -185,14 +185,6 @@ def _calibrate(options: ClipOptions, video: Video, model: Model, keypoints: Keyp
     found = calibrate_film(video, keypoints, model, options.height, options.fov, options.quiet)
     note_camera(found, options.quiet)
     return found
-
-
-def clip_frames(video: Video, start: int, stop: int | None) -> range:
-    """Frames to track from `start` on; UserError if there are none."""
-    stop = video.count if stop is None else min(stop, video.count)
-    if start >= stop:
-        raise UserError(f"{video.path}: no frame from {start} up to {stop}; it has {video.count}")
-    return range(start, stop)
 
 
 def first_state(options: ClipOptions, scene: Scene) -> Start:

@@ -24,6 +24,7 @@ from gait.lift.video.fit_clip import ENOUGH, HELD, POOR_CORRELATION, ClipFit, fi
 from gait.lift.video.sensors import CameraView, Film, FlatView, View
 from gait.progress import progress
 from gait.reproducible import one_thread
+from gait.track.from_walk import Calibration
 
 Floats = npt.NDArray[np.float64]
 
@@ -43,6 +44,10 @@ class Request:
         Files.
     model, camera, corrections : str, optional
         Files; the shipped model, a view without a camera and no corrections if left out.
+    calibration : Calibration, optional
+        Camera found from the walk instead; its uncertainty is added to the standard deviations.
+    height : float, optional
+        Stature by which it was found, metres.
     background : str
         An image, ``auto`` (median of the clip) or ``none``.
     start, stop : int, optional
@@ -55,6 +60,8 @@ class Request:
     placement: str
     model: str | None = None
     camera: str | None = None
+    calibration: Calibration | None = None
+    height: float | None = None
     corrections: str | None = None
     background: str = "auto"
     start: int | None = None
@@ -89,6 +96,9 @@ def lift_video(request: Request, prior: SegmentPrior, warn: Warn, quiet: bool) -
     video = Video(request.video)
     camera = Camera.read(request.camera, video.size) if request.camera else None
     placement = read_placement(request.placement, prior, camera is not None)
+    if request.calibration is not None:
+        camera = request.calibration.camera
+        placement = _on_floor(request, placement, prior)
     if placement.unused:
         keys = " and ".join(placement.unused)
         warn(f"{request.placement}: not used {'with' if camera else 'without'} --camera: {keys}")
@@ -107,7 +117,27 @@ def lift_video(request: Request, prior: SegmentPrior, warn: Warn, quiet: bool) -
     free, fit = _fits(clip, quiet)
     if fit.fit_correlation < POOR_CORRELATION:
         warn(_poor_correlation(request, fit.fit_correlation))
+    if request.calibration is not None:
+        free, fit = (_widened(one, request.calibration) for one in (free, fit))
     return LiftedVideo(video, clip, free, fit, Figure.fit(fit.places, prior.names))
+
+
+def _on_floor(request: Request, placement: Placement, prior: SegmentPrior) -> Placement:
+    """Placement in the world of a camera found from the walk: the pelvis in the picture, at its height."""
+    assert request.calibration is not None and request.height is not None
+    pelvis = request.height * prior.mean[0, 0, prior.index(["pelvis"])[0], 2]
+    ground = request.calibration.camera.on_plane(np.array(placement.pelvis_px), pelvis)[:2]
+    if not np.isfinite(ground).all():
+        raise UserError(
+            f"{request.placement}: pelvis_px is above the horizon of the camera found from the walk; give "
+            "the pelvis in the picture"
+        )
+    return replace(placement, ground=ground, stature=request.height)
+
+
+def _widened(fit: ClipFit, calibration: Calibration) -> ClipFit:
+    """Add the uncertainty of the camera to the standard deviations of an estimate."""
+    return replace(fit, sd=calibration.joint_sd(fit.time, fit.places, fit.sd))
 
 
 def _poor_correlation(request: Request, fit_correlation: float) -> str:
