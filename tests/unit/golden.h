@@ -6,8 +6,9 @@
 #define GOLDEN_H
 #include "gait.h"
 
+#include "check.h"
+
 #include <stdint.h>
-#include <stdio.h>
 
 static inline uint64_t golden_line(uint64_t have, uint64_t wanted, const char *name, const char *set)
 {
@@ -32,5 +33,18 @@ static inline int golden_print(uint64_t (*digest)(uint32_t mask), uint64_t wante
         else
             wrong += golden_line(digest(set[k].mask), wanted, name, set[k].name) != wanted;
     return wrong;
+}
+
+/* main() of a test with one digest: all its tests and every mask, or with the argument `digest` only the lines. */
+static inline int golden_main(int argc, char **argv, void (*tests)(void), uint64_t (*digest)(uint32_t mask),
+                              uint64_t wanted, const char *name)
+{
+    if (argc == 2)
+        return strcmp(argv[1], "digest") == 0 ? (golden_print(digest, wanted, name) + check_failed) != 0 : 2;
+    tests();
+    for (uint32_t mask = 0; mask <= (GAIT_CPU_BASE | GAIT_CPU_AVX2 | GAIT_CPU_AVX512); mask++)
+        CHECK(digest(mask) == wanted);
+    CHECK(golden_line(digest(~0u), wanted, name, "best") == wanted);
+    return check_done(argv[0]);
 }
 #endif
