@@ -8,12 +8,14 @@ from typing import Any
 
 from gait.io.files import replacing, require_writable
 from gait.learn.prior import model
-from gait.paper import entry, ormoneit, ormoneit_figures, recordings
+from gait.paper import entry, leventon, leventon_figures, ormoneit, ormoneit_figures, recordings
 from gait.paper.entry import Paper
 from gait.progress import progress
 from gait.reproducible import one_thread
 
 ORMONEIT = "Ormoneit and others 2000", "Learning and tracking human motion using functional analysis"
+
+LEVENTON = "Leventon and Freeman 1998", "Bayesian estimation of 3-D human motion from an image sequence"
 
 
 @dataclass(frozen=True)
@@ -33,7 +35,10 @@ def run(request: Request) -> dict[str, Any]:
         with progress("learning both ways", 4, request.quiet) as update:
             learning = ormoneit.learn(found.walks, update)
         first = list(ormoneit_figures.entries(learning))
-    papers = [Paper(*ORMONEIT, first)]
+        with progress("leaving motions out", len(found.motions), request.quiet) as update:
+            held = leventon.hold_out(found.motions, update)
+        second = list(leventon_figures.entries(leventon_figures.study(found.motions, held)))
+    papers = [Paper(*ORMONEIT, first), Paper(*LEVENTON, second)]
     text = entry.page("Both papers, figure by figure", _about(found), papers)
     with replacing(request.output) as path:
         path.write_text(text, encoding="utf-8")
