@@ -1,9 +1,9 @@
 """Find people in a picture by their shape, without a network and without the empty scene.
 
-The HOG detector of OpenCV (Dalal and Triggs, CVPR 2005) lets gradients of a window vote for a person.  Many
-windows do, among them smaller ones about the upper half of a body, so the picture is searched first at a size
-at which only whole people fill a window.  Windows count if a person on the ground between their ends would
-have a plausible stature; the votes of windows about one place are averaged.
+The HOG detector of OpenCV (Dalal and Triggs, CVPR 2005) lets gradients of a window vote for a person.
+Windows count if a person on the ground between their ends would have a plausible stature.  A coarse search of
+the whole picture proposes people; about each of them the picture is searched once more at a size at which the
+person is larger than the smallest window, because windows about a smaller one show feet and head too far apart.
 """
 
 from __future__ import annotations
@@ -22,12 +22,17 @@ Array = NDArray[np.float64]
 Stature = Callable[[Box], float]
 """Stature of the person in a box, metres; NaN where there is no floor."""
 
-SIDES = (420, 570, 760)  # pixels, the larger side of the pictures looked at, in this order
+SIDES = (420, 760)  # pixels, the larger side of the pictures searched, in this order
 LEAST = 96  # pixels that a person must be tall in the largest
+_BORDER = 0.2  # of the picture's height added above and below: a window is larger than the person
+_MOST = 4  # people proposed
+_TALL = 120  # pixels of a person in the second search
+_ROOM = (0.75, 0.95)  # heights searched about a person's middle: to each side, up and down
 _THRESHOLD = -0.5  # of a window's vote: weak ones count in numbers
-_MARGIN = 0.125  # of the window above the head and below the feet, as the detector was trained
+_SHARP = 3.0  # nats per unit of a vote
+_HEAD, _FOOT = 0.125, 0.86  # of the window: crown of the head, soles of the feet
 _STATURE, _STATURE_SD = 1.68, 0.12  # metres
-_ENOUGH = 3.0  # votes in all for a person
+_ENOUGH = 0.5  # least vote of the best window about a person
 _SAME = 0.3  # heights between the feet of windows about one person
 _WINDOW_SD = 0.015  # of a mean of windows, heights, from frame to frame
 PLAUSIBLE = (1.2, 2.4)  #: metres: apparent statures of people, which shadows lengthen
@@ -56,48 +61,82 @@ def find_people(image: Image, stature: Stature) -> list[Box]:
     """
     if image[::8, ::8].std() < _FLAT:
         return []
+    larger = max(image.shape[:2])
     for side in SIDES:
-        found = _find_at_scale(image, min(1.0, side / max(image.shape[:2])), stature)
-        if found or side >= max(image.shape[:2]):
-            return found
+        proposed = _groups(_search(image, np.zeros(2), image.shape[1::-1], min(1.0, side / larger), stature))
+        near = (_nearby(image, box, stature) for _, box in proposed[:_MOST])
+        found = sorted((one for one in near if one is not None), key=lambda one: -one[0])
+        if found or side >= larger:
+            return [box for n, (_, box) in enumerate(found) if not _known(box, found[:n])]
     return []
 
 
-def _find_at_scale(image: Image, scale: float, stature: Stature) -> list[Box]:
-    """People about as large as the detector's window in a picture at a scale, the most certain first."""
-    small = cv2.resize(image, None, fx=scale, fy=scale, interpolation=cv2.INTER_AREA) if scale < 1 else image
+def _known(box: Box, found: list[tuple[float, Box]]) -> bool:
+    """Whether a person is among those found."""
+    return any(np.hypot(*(box.foot - other.foot)) < _SAME * box.tall for _, other in found)
+
+
+def _nearby(image: Image, box: Box, stature: Stature) -> tuple[float, Box] | None:
+    """Search the picture about a box once more: the vote for the person there and their box, or None."""
+    middle, room = (box.foot + box.head) / 2, np.array(_ROOM) * box.tall
+    corner = middle - room
+    groups = _groups(_search(image, corner, tuple(2 * room), _TALL / box.tall, stature))
+    return groups[0] if groups and groups[0][0] >= _ENOUGH else None
+
+
+def _search(
+    image: Image, corner: Array, size: tuple[float, ...], scale: float, stature: Stature
+) -> list[tuple[float, float, Box]]:
+    """Windows about people in a part of the picture at a scale: vote, weight, person."""
+    part, offset = _part(image, corner, size, scale)
     windows, votes = _detector().detectMultiScale(
-        small, hitThreshold=_THRESHOLD, winStride=(4, 4), padding=(16, 16), scale=1.025, groupThreshold=0
+        part, hitThreshold=_THRESHOLD, winStride=(8, 8), scale=1.06, groupThreshold=0
     )
-    pairs = zip(windows, np.ravel(votes), strict=True)
-    each = [_box(np.array(window) / scale, float(vote), stature) for window, vote in pairs]
-    left = sorted(((vote, box) for vote, box in each if vote > 0), key=lambda item: -item[0])
+    found = []
+    for window, vote in zip(windows, np.ravel(votes).tolist(), strict=True):
+        place = np.array(window) / scale
+        box = _box(place[0] + offset[0], place[1] + offset[1], place[2], place[3])
+        tall = stature(box)
+        if PLAUSIBLE[0] <= tall <= PLAUSIBLE[1]:
+            off = (tall - _STATURE) / _STATURE_SD
+            found.append((vote, float(np.exp(_SHARP * vote - 0.5 * off * off)), box))
+    return found
+
+
+def _part(image: Image, corner: Array, size: tuple[float, ...], scale: float) -> tuple[Image, Array]:
+    """Part of a picture at a scale, with a border of repeated pixels above and below; and its corner."""
+    height, width = image.shape[:2]
+    x0, y0 = (max(0, int(c)) for c in corner)
+    x1, y1 = min(width, int(corner[0] + size[0]) + 1), min(height, int(corner[1] + size[1]) + 1)
+    how = cv2.INTER_AREA if scale < 1 else cv2.INTER_LINEAR
+    small = cv2.resize(image[y0:y1, x0:x1], None, fx=scale, fy=scale, interpolation=how)
+    border = round(_BORDER * small.shape[0])
+    small = cv2.copyMakeBorder(small, border, border, 16, 16, cv2.BORDER_REPLICATE)
+    return small, np.array([x0 - 16 / scale, y0 - border / scale])
+
+
+def _box(x: float, y: float, width: float, height: float) -> Box:
+    """Person in a window."""
+    middle = x + width / 2
+    foot, head = np.array([middle, y + _FOOT * height]), np.array([middle, y + _HEAD * height])
+    return Box(foot, head, _WINDOW_SD * height)
+
+
+def _groups(windows: list[tuple[float, float, Box]]) -> list[tuple[float, Box]]:
+    """One box for the windows about one place, and the largest vote; the greatest weights first."""
+    left = sorted(windows, key=lambda window: -window[1])
     found = []
     while left:
-        first = left[0][1]
-        near = [item for item in left if np.hypot(*(item[1].foot - first.foot)) < _SAME * first.tall]
-        left = [item for item in left if np.hypot(*(item[1].foot - first.foot)) > first.tall]
-        found.append(_mean(near))
-    sure = sorted((item for item in found if item[0] >= _ENOUGH), key=lambda item: -item[0])
-    return [box for _, box in sure]
+        first = left[0][2]
+        near = [one for one in left if np.hypot(*(one[2].foot - first.foot)) < _SAME * first.tall]
+        left = [one for one in left if np.hypot(*(one[2].foot - first.foot)) > first.tall]
+        found.append((max(vote for vote, _, _ in near), _mean(near)))
+    return found
 
 
-def _box(window: Array, vote: float, stature: Stature) -> tuple[float, Box]:
-    """Person in a window (x, y, width, height), and the vote for them, weighted by a plausible stature."""
-    x, y, width, height = window
-    foot = np.array([x + width / 2, y + (1 - _MARGIN) * height])
-    head = np.array([x + width / 2, y + (_MARGIN - 0.02) * height])
-    box = Box(foot, head, _WINDOW_SD * height)
-    tall = stature(box)
-    if not PLAUSIBLE[0] <= tall <= PLAUSIBLE[1]:
-        return 0.0, box
-    off = (tall - _STATURE) / _STATURE_SD
-    return float(np.exp(min(vote, 3.0) - 0.5 * off * off)), box
-
-
-def _mean(near: list[tuple[float, Box]]) -> tuple[float, Box]:
-    """Mean of the boxes about one person, weighted by their votes, and the votes in all."""
-    share = np.array([vote for vote, _ in near])
-    foot = np.average([box.foot for _, box in near], axis=0, weights=share)
-    head = np.average([box.head for _, box in near], axis=0, weights=share)
-    return float(share.sum()), Box(foot, head, _WINDOW_SD * float(np.hypot(*(foot - head))))
+def _mean(near: list[tuple[float, float, Box]]) -> Box:
+    """Weighted mean of the boxes of windows."""
+    weights = np.array([weight for _, weight, _ in near])
+    foot = np.average([box.foot for _, _, box in near], axis=0, weights=weights)
+    head = np.average([box.head for _, _, box in near], axis=0, weights=weights)
+    return Box(foot, head, _WINDOW_SD * float(np.hypot(*(foot - head))))
