@@ -153,11 +153,12 @@ def found(shift=0.0, joints=JOINTS[-1]):
 def test_keypoints_of_another_person_are_left_out(estimate):
     us, them, away = found(0.03), found(0.9), replace(estimate, status=TrackStatus.LOST)
     people = PersonKeypoints(camera(), {1: {0: them, 1: them}, 2: {0: us}}, 1)
-    assert people.choose(0, estimate) is us and people.choose(1, estimate) is None
-    assert people.choose(1, None) is them and people.choose(1, away) is them
-    assert people.agree(0, estimate) is True and people.agree(1, estimate) is False
-    assert people.agree(2, estimate) is None and not people.contradict(2, estimate)
-    assert people.contradict(1, estimate) and not people.contradict(0, estimate)
+    zero, one, two = (Frame(i, i / 30, FRAMES[-1]) for i in range(3))
+    assert people.choose(zero, estimate) is us and people.choose(one, estimate) is None
+    assert people.choose(one, None) is them and people.choose(one, away) is them
+    assert people.agree(zero, estimate) is True and people.agree(one, estimate) is False
+    assert people.agree(two, estimate) is None and not people.contradict(two, estimate)
+    assert people.contradict(one, estimate) and not people.contradict(zero, estimate)
 
 
 def test_legs_that_keypoints_show_elsewhere_are_no_agreement(estimate):
@@ -165,7 +166,8 @@ def test_legs_that_keypoints_show_elsewhere_are_no_agreement(estimate):
     astride = JOINTS[-1].copy()
     astride[legs, 0] += [0.25 * (-1) ** i for i in range(len(legs))]
     people = PersonKeypoints(camera(), {0: {0: found(joints=astride)}}, 0)
-    assert people.choose(0, estimate) is not None and people.agree(0, estimate) is False
+    frame = Frame(0, 0.0, FRAMES[-1])
+    assert people.choose(frame, estimate) is not None and people.agree(frame, estimate) is False
 
 
 @pytest.mark.parametrize(

@@ -1,9 +1,10 @@
 """Find people in a picture by their shape, without a network and without the empty scene.
 
 The HOG detector of OpenCV (Dalal and Triggs, CVPR 2005) lets gradients of a window vote for a person.
-Windows count if a person on the ground between their ends would have a plausible stature.  A coarse search of
-the whole picture proposes people; about each of them the picture is searched once more at a size at which the
-person is larger than the smallest window, because windows about a smaller one show feet and head too far apart.
+Windows count if a person on the ground between their ends would have a plausible stature.  A coarse search
+of the whole picture proposes people; about each of them the picture is searched once more at a size at which
+the person is larger than the smallest window, because windows about a smaller one show feet and head too far
+apart.
 """
 
 from __future__ import annotations
@@ -25,6 +26,7 @@ Stature = Callable[[Box], float]
 SIDES = (420, 760)  # pixels, the larger side of the pictures searched, in this order
 LEAST = 96  # pixels that a person must be tall in the largest
 _BORDER = 0.2  # of the picture's height added above and below: a window is larger than the person
+_SIDES = 16  # pixels added at the sides
 _MOST = 4  # people proposed
 _TALL = 120  # pixels of a person in the second search
 _ROOM = (0.75, 0.95)  # heights searched about a person's middle: to each side, up and down
@@ -33,6 +35,7 @@ _SHARP = 3.0  # nats per unit of a vote
 _HEAD, _FOOT = 0.125, 0.86  # of the window: crown of the head, soles of the feet
 _STATURE, _STATURE_SD = 1.68, 0.12  # metres
 _ENOUGH = 0.5  # least vote of the best window about a person
+_ENOUGH_NEAR = 0.0  # the same of a person who is expected there
 _SAME = 0.3  # heights between the feet of windows about one person
 _WINDOW_SD = 0.015  # of a mean of windows, heights, from frame to frame
 PLAUSIBLE = (1.2, 2.4)  #: metres: apparent statures of people, which shadows lengthen
@@ -64,7 +67,7 @@ def find_people(image: Image, stature: Stature) -> list[Box]:
     larger = max(image.shape[:2])
     for side in SIDES:
         proposed = _groups(_search(image, np.zeros(2), image.shape[1::-1], min(1.0, side / larger), stature))
-        near = (_nearby(image, box, stature) for _, box in proposed[:_MOST])
+        near = (_nearby(image, box, stature, _ENOUGH) for _, box in proposed[:_MOST])
         found = sorted((one for one in near if one is not None), key=lambda one: -one[0])
         if found or side >= larger:
             return [box for n, (_, box) in enumerate(found) if not _known(box, found[:n])]
@@ -76,12 +79,18 @@ def _known(box: Box, found: list[tuple[float, Box]]) -> bool:
     return any(np.hypot(*(box.foot - other.foot)) < _SAME * box.tall for _, other in found)
 
 
-def _nearby(image: Image, box: Box, stature: Stature) -> tuple[float, Box] | None:
+def find_near(image: Image, box: Box, stature: Stature) -> Box | None:
+    """Find the person whose box in a picture is about this one; None if nobody stands there."""
+    found = _nearby(image, box, stature, _ENOUGH_NEAR)
+    return None if found is None else found[1]
+
+
+def _nearby(image: Image, box: Box, stature: Stature, least: float) -> tuple[float, Box] | None:
     """Search the picture about a box once more: the vote for the person there and their box, or None."""
     middle, room = (box.foot + box.head) / 2, np.array(_ROOM) * box.tall
     corner = middle - room
     groups = _groups(_search(image, corner, tuple(2 * room), _TALL / box.tall, stature))
-    return groups[0] if groups and groups[0][0] >= _ENOUGH else None
+    return groups[0] if groups and groups[0][0] >= least else None
 
 
 def _search(
@@ -89,6 +98,8 @@ def _search(
 ) -> list[tuple[float, float, Box]]:
     """Windows about people in a part of the picture at a scale: vote, weight, person."""
     part, offset = _part(image, corner, size, scale)
+    if np.any(np.array(part.shape[1::-1]) < _detector().winSize):  # OpenCV would read beyond it
+        return []
     windows, votes = _detector().detectMultiScale(
         part, hitThreshold=_THRESHOLD, winStride=(8, 8), scale=1.06, groupThreshold=0
     )
@@ -108,11 +119,14 @@ def _part(image: Image, corner: Array, size: tuple[float, ...], scale: float) ->
     height, width = image.shape[:2]
     x0, y0 = (max(0, int(c)) for c in corner)
     x1, y1 = min(width, int(corner[0] + size[0]) + 1), min(height, int(corner[1] + size[1]) + 1)
+    offset = np.array([x0 - _SIDES / scale, y0])
+    if min(scale * (x1 - x0), scale * (y1 - y0)) < 1:
+        return image[:0, :0], offset
     how = cv2.INTER_AREA if scale < 1 else cv2.INTER_LINEAR
     small = cv2.resize(image[y0:y1, x0:x1], None, fx=scale, fy=scale, interpolation=how)
     border = round(_BORDER * small.shape[0])
-    small = cv2.copyMakeBorder(small, border, border, 16, 16, cv2.BORDER_REPLICATE)
-    return small, np.array([x0 - 16 / scale, y0 - border / scale])
+    small = cv2.copyMakeBorder(small, border, border, _SIDES, _SIDES, cv2.BORDER_REPLICATE)
+    return np.asarray(small, np.uint8), offset - np.array([0, border / scale])
 
 
 def _box(x: float, y: float, width: float, height: float) -> Box:

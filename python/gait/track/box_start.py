@@ -6,7 +6,7 @@ walk to a second of their boxes (`gait.bindings.start_fit`).
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
 
 import numpy as np
 
@@ -25,6 +25,7 @@ _WINDOW = 1.0  # seconds of boxes that are fitted
 _LEAST_WINDOW = 0.3  # the same in a short clip, at least
 _PROBES = 6  # frames of a clip, of which one must show a person
 _STEP = 0.1  # seconds from one fit to the next
+_LOOK_ON = 1.5  # seconds after a first window in which a person walks, who may only have begun to
 _STATURE_SD = 0.03  # metres, of one that the user gives
 _BEYOND = 4.0  # standard deviations by which an apparent stature contradicts the one expected
 
@@ -89,8 +90,8 @@ class BoxStart:
         return any(self._boxes(frame.image) for frame in shown)
 
     def best(self, frame: Frame, *, latest: bool = False) -> tuple[Start, Hypothesis] | None:
-        """Most probable start, at the time of a frame (`latest`) or a window earlier; None: there is none."""
-        back = 0.0 if latest else self._window
+        """Most probable start, at a frame (`latest`) or half a window earlier; None: there is none."""
+        back = 0.0 if latest else self._window / 2
         at = next((item for item in self._times if item[1] >= frame.time - back - 1e-6), None)
         if at is None:
             return None
@@ -146,6 +147,7 @@ def find_start(
     stop: int | None = None,
     height: float | None = None,
     shapes: bool = True,
+    shapes_first: bool = False,
 ) -> Start:
     """Find the first state of the first person who walks in a clip.
 
@@ -161,6 +163,8 @@ def find_start(
         Known stature, metres.
     shapes : bool
         Also find people by their shape, which is slow, where none stands out against the empty scene.
+    shapes_first : bool
+        Find them by their shape before the scene is looked at, which may not be empty.
 
     Raises
     ------
@@ -171,34 +175,61 @@ def find_start(
     few = min(video.count, video.count if stop is None else stop) - first
     window = float(np.clip(0.8 * few / video.fps, _LEAST_WINDOW, _WINDOW))
     standing: Start | None = None
-    for finder in _finders(camera, plate, model, height, window, shapes):
-        last_fit = -np.inf
+    for finder in _finders(camera, plate, model, height, window, shapes, shapes_first):
         if not finder.worth(video, first, first + few):
             continue
-        for frame in video.frames(first, stop):
-            finder.observe(frame)
-            if frame.time - last_fit < _STEP:
-                continue
-            last_fit = frame.time
-            found = finder.best(frame)
-            if found is not None and found[1].walks:
-                return found[0]
-            if found is not None and plate is not None and standing is None:
-                standing = found[0]
+        walking, stands = _search(finder, video.frames(first, stop))
+        if walking is not None:
+            return walking
+        standing = standing or (None if plate is None else stands)
         misplaced += finder.misplaced
     if standing is not None:
         return standing
     raise UserError(f"{video.path}: {_no_person(few, misplaced)}")
 
 
+def _search(finder: BoxStart, frames: Iterable[Frame]) -> tuple[Start | None, Start | None]:
+    """Search frames for a person who walks: the start; and the first of a person who fits, walking or not.
+
+    Of the windows after the first in which a person walks the one with the surest speed is taken: people who
+    have only begun to walk are not yet as fast, and their direction is not sure.
+    """
+    first: Start | None = None
+    best: tuple[float, Start] | None = None
+    last_fit, until = -np.inf, np.inf
+    for frame in frames:
+        finder.observe(frame)
+        if frame.time - last_fit < _STEP:
+            continue
+        last_fit = frame.time
+        found = finder.best(frame)
+        if found is not None:
+            start, one = found
+            first = first or start
+            sure = one.probability * one.speed / one.speed_sd
+            if one.walks and (best is None or sure > best[0]):
+                best = sure, start
+        if best is not None:
+            until = min(until, frame.time + _LOOK_ON)
+        if frame.time >= until:
+            break
+    return (None if best is None else best[1]), first
+
+
 def _finders(
-    camera: Camera, plate: Image | None, model: Model, height: float | None, window: float, shapes: bool
+    camera: Camera,
+    plate: Image | None,
+    model: Model,
+    height: float | None,
+    window: float,
+    shapes: bool,
+    shapes_first: bool,
 ) -> Iterator[BoxStart]:
-    """Yield the ways to find a person: by the empty scene first, as it gives the place better."""
-    if plate is not None:
-        yield BoxStart(camera, plate, model, height, window)
-    if shapes:
-        yield BoxStart(camera, None, model, height, window)
+    """Yield the ways to find a person: by an empty scene first, as it gives the place better."""
+    by_plate = None if plate is None else BoxStart(camera, plate, model, height, window)
+    by_shape = BoxStart(camera, None, model, height, window) if shapes else None
+    order = (by_shape, by_plate) if shapes_first else (by_plate, by_shape)
+    yield from (finder for finder in order if finder is not None)
 
 
 def _no_person(few: int, misplaced: list[float]) -> str:

@@ -10,6 +10,7 @@ import numpy as np
 from gait.bindings.abi import Term
 from gait.bindings.config import TrackerConfig
 from gait.bindings.initial import Start, set_height
+from gait.bindings.start_fit import StartFit
 from gait.io.trc import write_trc
 from gait.progress import note
 from gait.track.box_start import BoxStart
@@ -18,8 +19,9 @@ from gait.track.follow import Follower
 from gait.track.keypoint_start import find_keypoint_start
 from gait.track.options import KEYPOINTS_SD, ClipOptions
 from gait.track.person_keypoints import PersonKeypoints
+from gait.track.person_shapes import PersonShapes
 from gait.track.plausible import Plausibility
-from gait.track.scene import Scene, first_state
+from gait.track.scene import Scene, finds_shapes, first_state
 from gait.track.tracker import Tracker
 
 __all__ = ["KEYPOINTS_SD", "ClipOptions", "track_clip"]
@@ -42,10 +44,15 @@ def track_clip(options: ClipOptions) -> dict[str, Any]:
     config = TrackerConfig.default(options.mode, seed=options.seed, belt=float(start.in_place))
     if options.particles is not None:
         config = config.replace(particles=options.particles)
-    if scene.people:
+    shapes = finds_shapes(options)
+    if scene.people or shapes:
         config = config.replace(terms=config.terms | Term.KEYPOINTS)
     tracker = Tracker(scene.model, scene.camera, config, background=scene.plate, tasks=options.threads)
-    keypoints = PersonKeypoints(scene.camera, scene.keypoints, scene.person)
+    keypoints: PersonKeypoints | PersonShapes
+    if shapes:
+        keypoints = PersonShapes(scene.camera, StartFit(scene.model, scene.camera).stature)
+    else:
+        keypoints = PersonKeypoints(scene.camera, scene.keypoints, scene.person)
     plausibility = Plausibility(keypoints, *_stature(options, scene, start), config.belt)
     follower = _follower(options, scene, tracker, keypoints, plausibility)
     found = follower.follow(start, scene.frames)
@@ -76,7 +83,7 @@ def _follower(
     options: ClipOptions,
     scene: Scene,
     tracker: Tracker,
-    keypoints: PersonKeypoints,
+    keypoints: PersonKeypoints | PersonShapes,
     plausibility: Plausibility,
 ) -> Follower:
     """Make a follower that finds a lost person by keypoints or, without any, in the pictures."""
@@ -90,7 +97,8 @@ def _follower(
 
     auto_start = None
     if not options.smooth and not scene.people:
-        auto_start = BoxStart(scene.camera, scene.plate, scene.model, options.height)
+        plate = None if finds_shapes(options) else scene.plate
+        auto_start = BoxStart(scene.camera, plate, scene.model, options.height)
     return Follower(
         tracker, scene.video, keypoints, plausibility, find_start, auto_start, one_pass=options.smooth
     )

@@ -13,12 +13,16 @@ from gait.bindings.initial import DEFAULT_SD, Start
 from gait.io.video import Frame, Video
 from gait.track.box_start import BoxStart
 from gait.track.person_keypoints import PersonKeypoints
+from gait.track.person_shapes import PersonShapes
 from gait.track.plausible import Plausibility
 from gait.track.tracker import Tracker
 
 _LONGEST_GAP = 1.0  # seconds for which a lost person is tracked on backwards
 _LEAST_BEFORE = 1.0  # seconds before a track in which an earlier start is worth a search
 _CONTRADICTED = 0.5  # seconds of keypoints elsewhere after which the person is lost
+_OPEN_PHASE = 0.2  # strides: sd of the phase from which a start leaves left and right open
+_SETTLED = 0.2  # seconds of `tracking` after which they are known
+_SETTLES = 4.0  # seconds from a start in which that is waited for
 
 FindStart = Callable[[int, int, float], Start | None]
 """First start in the frames first <= number < stop, of a person of a stature [m]; None: there is none."""
@@ -32,7 +36,7 @@ class Follower:
     tracker : Tracker
     video : Video
         Of the tracker's only camera.
-    keypoints : PersonKeypoints
+    keypoints : PersonKeypoints or PersonShapes
     plausibility : Plausibility
         Of its estimates.
     find_start : FindStart
@@ -48,7 +52,7 @@ class Follower:
         self,
         tracker: Tracker,
         video: Video,
-        keypoints: PersonKeypoints,
+        keypoints: PersonKeypoints | PersonShapes,
         plausibility: Plausibility,
         find_start: FindStart,
         auto_start: BoxStart | None = None,
@@ -64,6 +68,7 @@ class Follower:
 
         Frames before a start have the estimates of the tracker that ran backwards from it.
         """
+        start = self._settled(start, frames)
         given, before = self._earlier(start, frames.start)
         first, before = self._first(given, before, frames.start)
         following: Start | None = first
@@ -79,7 +84,7 @@ class Follower:
                 yield frame, before[frame.number]
                 continue
             now = self._step(self._tracker, frame, frame.utime, now)
-            if not self._keypoints.contradict(frame.number, now):
+            if not self._keypoints.contradict(frame, now):
                 supported = frame.time
             was_lost, lost = lost, now.status == TrackStatus.LOST or frame.time - supported > _CONTRADICTED
             if lost and not was_lost:
@@ -94,6 +99,38 @@ class Follower:
             if anew is not None:
                 self._start(self._tracker, anew, frame.utime)
                 now, lost, supported = None, False, frame.time
+
+    def _settled(self, start: Start, frames: range) -> Start:
+        """Move a start that leaves left and right open to where the images decide, later or else earlier."""
+        if start.sd.phase < _OPEN_PHASE:
+            return start
+        config = self._tracker.config
+        later = ((frame, frame.utime) for frame in self._video.frames(start.frame, frames.stop))
+        earlier = ((frame, -frame.utime) for frame in self._video.backwards(start.frame + 1, frames.start))
+        found = self._decided(self._tracker.like(config), start, later)
+        if found is None and start.frame > frames.start:
+            found = self._decided(self._tracker.like(config.replace(reverse=1.0)), start, earlier)
+        return found or start
+
+    def _decided(self, tracker: Tracker, start: Start, frames: Iterator[tuple[Frame, int]]) -> Start | None:
+        """Start where a tracker has said `tracking` for a while; None if it does not soon.
+
+        `frames` are given with the tracker's time of each, microseconds.
+        """
+        now: Estimate | None = None
+        since = begun = 0.0
+        for frame, utime in frames:
+            if now is None:
+                self._start(tracker, start, utime)
+                since = begun = frame.time
+            now = self._step(tracker, frame, utime, now)
+            if now.status != TrackStatus.TRACKING:
+                since = frame.time
+            if abs(frame.time - since) >= _SETTLED:
+                return _start_from(now, frame.number, start)
+            if abs(frame.time - begun) > _SETTLES:
+                break
+        return None
 
     def _first(
         self, start: Start, before: dict[int, Estimate], first: int
@@ -113,7 +150,7 @@ class Follower:
 
     def _step(self, tracker: Tracker, frame: Frame, utime: int, last: Estimate | None) -> Estimate:
         """Step with the person's keypoints; judge the estimate."""
-        joints = self._keypoints.choose(frame.number, last)
+        joints = self._keypoints.choose(frame, last)
         return self._plausibility.judged(frame, tracker.step(frame.image, utime, joints))
 
     def _start(self, tracker: Tracker, start: Start, utime: int) -> None:

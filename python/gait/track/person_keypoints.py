@@ -15,6 +15,7 @@ from gait.bindings.abi import TrackStatus
 from gait.bindings.estimate import Estimate
 from gait.bindings.frame import FrameKeypoints
 from gait.camera.camera import Camera
+from gait.io.video import Frame
 
 _GATE = 0.25  # person's heights: keypoints whose median distance from the estimate is larger are not theirs
 _AGREE = 0.08  # person's heights up to which knees and ankles agree with the estimate, on average
@@ -38,26 +39,29 @@ class PersonKeypoints:
     ) -> None:
         self._camera, self._keypoints, self._person = camera, keypoints, person
 
-    def choose(self, frame: int, last: Estimate | None) -> FrameKeypoints | None:
+    def restart(self) -> None:
+        """Nothing is remembered from frame to frame."""
+
+    def choose(self, frame: Frame, last: Estimate | None) -> FrameKeypoints | None:
         """Keypoints of the person in a frame after the last estimate; None if there are none.
 
         Without an estimate, or with one of a lost person, they are those of the person to track.
         """
         if last is None or last.status == TrackStatus.LOST:
-            return self._own(frame)
-        near = [(self._distance(last, keypoints), keypoints) for keypoints in self._found(frame)]
+            return self._own(frame.number)
+        near = [(self._distance(last, keypoints), keypoints) for keypoints in self._found(frame.number)]
         distance, keypoints = min(near, key=lambda pair: pair[0], default=(np.inf, None))
         return keypoints if distance < _GATE else None
 
-    def contradict(self, frame: int, estimate: Estimate) -> bool:
+    def contradict(self, frame: Frame, estimate: Estimate) -> bool:
         """Whether the person to track was found in a frame, and no person where the estimate is."""
-        return self._own(frame) is not None and all(
-            self._distance(estimate, keypoints) > _GATE for keypoints in self._found(frame)
+        return self._own(frame.number) is not None and all(
+            self._distance(estimate, keypoints) > _GATE for keypoints in self._found(frame.number)
         )
 
-    def agree(self, frame: int, estimate: Estimate) -> bool | None:
+    def agree(self, frame: Frame, estimate: Estimate) -> bool | None:
         """Whether the keypoints in a frame agree with the estimate, legs included; None if there are none."""
-        if not self._found(frame):
+        if not self._found(frame.number):
             return None
         keypoints = self.choose(frame, estimate)
         if keypoints is None:

@@ -12,6 +12,7 @@ from gait.bindings.abi import Flag, TrackStatus
 from gait.bindings.estimate import Estimate
 from gait.io.video import Frame
 from gait.track.person_keypoints import PersonKeypoints
+from gait.track.person_shapes import PersonShapes
 
 _DEPARTURE = 0.6  # metres in a second by which the pelvis may leave the path of strides and heading
 _BEYOND = 4.0  # standard deviations from which a stature is implausible
@@ -23,14 +24,16 @@ class Plausibility:
 
     Parameters
     ----------
-    keypoints : PersonKeypoints
+    keypoints : PersonKeypoints or PersonShapes
     stature, stature_sd : float
         Expected of the person, metres.
     belt : float
         Share of each stride that a belt takes back.
     """
 
-    def __init__(self, keypoints: PersonKeypoints, stature: float, stature_sd: float, belt: float) -> None:
+    def __init__(
+        self, keypoints: PersonKeypoints | PersonShapes, stature: float, stature_sd: float, belt: float
+    ) -> None:
         self._keypoints = keypoints
         self._stature, self._stature_sd = stature, max(stature_sd, _LEAST_SD)
         self._travel = 1.0 - belt
@@ -39,11 +42,12 @@ class Plausibility:
     def restart(self) -> None:
         """Forget the path: the track starts anew elsewhere."""
         self._path.clear()
+        self._keypoints.restart()
 
     def judged(self, frame: Frame, estimate: Estimate) -> Estimate:
         """Change `tracking` to `ambiguous` unless keypoints or, without any, image and walk support it."""
         walks = self._walks(frame.time, estimate)
-        agree = self._keypoints.agree(frame.number, estimate)
+        agree = self._keypoints.agree(frame, estimate)
         supported = not estimate.flags & Flag.UNSUPPORTED
         if estimate.status != TrackStatus.TRACKING or agree or (agree is None and walks and supported):
             return estimate

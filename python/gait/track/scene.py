@@ -262,6 +262,7 @@ def _find_first_state(options: ClipOptions, scene: Scene) -> Start:
         stop=options.stop,
         height=height,
         shapes=not _detects(options),  # slow, and needless where the detector found no person
+        shapes_first=finds_shapes(options),  # a median may show people
     )
 
 
@@ -328,6 +329,12 @@ def _detects(options: ClipOptions) -> bool:
     if options.keypoints or options.detector == "none" or options.mode == Mode.PAPER:
         return False
     return options.detector != "auto" or _has_detector(options)
+
+
+def finds_shapes(options: ClipOptions) -> bool:
+    """Whether people's shapes are searched: for want of keypoints, and of an empty scene that was given."""
+    given = options.keypoints or options.background not in ("auto", "none")
+    return not (given or options.mode == Mode.PAPER or _detects(options))
 
 
 def _has_detector(options: ClipOptions) -> bool:
