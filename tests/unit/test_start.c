@@ -1,14 +1,10 @@
 /* The automatic start: walks of known place, heading, phase, rate and stature are found from their keypoints. */
 #include "base/hash.h"
 #include "base/rng.h"
-#include "check.h"
 #include "filter/particles.h"
-#include "gait_start.h"
-#include "golden.h"
 #include "image/camera.h"
-#include "toy_model.h"
+#include "toy_start.h"
 
-#include <stdlib.h>
 #include <string.h>
 
 enum { FRAMES = 26, JOINTS = TOY_POINTS };
@@ -25,17 +21,9 @@ static walk usual(void)
     return (walk){.heading = 0.4f, .speed = 1.3f, .rate = 0.95f, .stature = 1.75f, .phase = 0.2f, .y = 5.0f};
 }
 
-/* A camera at 1.5 m that looks along +y. */
 static gait_camera camera(void)
 {
-    return (gait_camera){.width = 1280,
-                         .height = 720,
-                         .fx = 1000.0f,
-                         .fy = 1000.0f,
-                         .cx = 639.5f,
-                         .cy = 359.5f,
-                         .R = {1, 0, 0, 0, 0, -1, 0, 1, 0},
-                         .t = {0.0f, 1.5f, 0.0f}};
+    return level_camera(1280, 720, 1000.0f);
 }
 
 static gait_state state_at(const walk *w, float t)
@@ -73,20 +61,6 @@ static void detect(const walk *w, float t, uint32_t n, gait_keypoint *out)
     }
 }
 
-static gait_start *start_new(uint32_t cpu_mask)
-{
-    gait_start_config cfg;
-    gait_start *s = NULL;
-    size_t bytes = 0;
-    gait_start_default(&cfg);
-    cfg.camera = camera();
-    cfg.cpu_mask = cpu_mask;
-    CHECK(gait_start_bytes(toy_model(), &cfg, &bytes, NULL) == GAIT_OK);
-    void *const mem = aligned_alloc(GAIT_ALIGN, (bytes + GAIT_ALIGN - 1) / GAIT_ALIGN * GAIT_ALIGN);
-    CHECK(gait_start_init(mem, bytes, toy_model(), &cfg, &s, NULL) == GAIT_OK);
-    return s; /* at the beginning of mem */
-}
-
 static void show(gait_start *s, const walk *w, int frames)
 {
     gait_keypoint k[JOINTS];
@@ -98,7 +72,7 @@ static void show(gait_start *s, const walk *w, int frames)
 
 static gait_hypothesis find(const walk *w)
 {
-    gait_start *const s = start_new(~0u);
+    gait_start *const s = toy_start_new(camera(), ~0u);
     gait_hypothesis h[GAIT_START_MAX_HYPOTHESES];
     int32_t count = 0;
     show(s, w, FRAMES);
@@ -202,7 +176,7 @@ static void test_coverage(void)
 
 static void test_refused(void)
 {
-    gait_start *const s = start_new(~0u);
+    gait_start *const s = toy_start_new(camera(), ~0u);
     gait_hypothesis h;
     gait_keypoint k[JOINTS] = {{0}};
     gait_error err = {0};
@@ -264,7 +238,7 @@ static void test_config(void)
 /* Later frames replace the first ones; the hypotheses of what is kept are the same as without them. */
 static void test_old_frames_are_dropped(void)
 {
-    gait_start *const s = start_new(~0u);
+    gait_start *const s = toy_start_new(camera(), ~0u);
     gait_hypothesis a, b;
     gait_keypoint k[JOINTS];
     int32_t count;
@@ -285,7 +259,7 @@ static void test_old_frames_are_dropped(void)
 
 static uint64_t digest(uint32_t cpu_mask)
 {
-    gait_start *const s = start_new(cpu_mask);
+    gait_start *const s = toy_start_new(camera(), cpu_mask);
     gait_hypothesis h[GAIT_START_MAX_HYPOTHESES];
     int32_t count = 0;
     walk w = usual();

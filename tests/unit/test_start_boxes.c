@@ -3,13 +3,9 @@
  * With the argument `digest` it only prints those of a start (golden.h). */
 #include "base/hash.h"
 #include "base/rng.h"
-#include "check.h"
-#include "gait_start.h"
-#include "golden.h"
 #include "image/camera.h"
-#include "toy_model.h"
+#include "toy_start.h"
 
-#include <stdlib.h>
 #include <string.h>
 
 enum { FRAMES = 30, WIDTH = 320, HEIGHT = 180 };
@@ -18,31 +14,9 @@ typedef struct walk {
     float heading, speed, stature, x, y, noise; /* noise: pixels */
 } walk;
 
-/* A camera at 1.5 m that looks along +y. */
 static gait_camera camera(void)
 {
-    return (gait_camera){.width = WIDTH,
-                         .height = HEIGHT,
-                         .fx = 250.0f,
-                         .fy = 250.0f,
-                         .cx = 159.5f,
-                         .cy = 89.5f,
-                         .R = {1, 0, 0, 0, 0, -1, 0, 1, 0},
-                         .t = {0.0f, 1.5f, 0.0f}};
-}
-
-static gait_start *start_new(uint32_t cpu_mask)
-{
-    gait_start_config cfg;
-    gait_start *s = NULL;
-    size_t bytes = 0;
-    gait_start_default(&cfg);
-    cfg.camera = camera();
-    cfg.cpu_mask = cpu_mask;
-    CHECK(gait_start_bytes(toy_model(), &cfg, &bytes, NULL) == GAIT_OK);
-    void *const mem = aligned_alloc(GAIT_ALIGN, (bytes + GAIT_ALIGN - 1) / GAIT_ALIGN * GAIT_ALIGN);
-    CHECK(gait_start_init(mem, bytes, toy_model(), &cfg, &s, NULL) == GAIT_OK);
-    return s; /* at the beginning of mem */
+    return level_camera(WIDTH, HEIGHT, 250.0f);
 }
 
 static gait_box box_of(const walk *w, float t, uint32_t n)
@@ -66,7 +40,7 @@ static gait_box box_of(const walk *w, float t, uint32_t n)
 static int32_t find_by(uint32_t cpu_mask, const walk *w, int people,
                        gait_hypothesis h[GAIT_START_MAX_HYPOTHESES])
 {
-    gait_start *const s = start_new(cpu_mask);
+    gait_start *const s = toy_start_new(camera(), cpu_mask);
     int32_t count = 0;
     for (int n = 0; n < FRAMES; n++) {
         gait_box b[2];
@@ -137,7 +111,7 @@ static void draw(int x0, int x1, int y0, int y1, uint8_t value)
 
 static void test_blobs(void)
 {
-    gait_start *const s = start_new(~0u);
+    gait_start *const s = toy_start_new(camera(), ~0u);
     gait_image const scene = image_of(plate), frame = image_of(picture);
     gait_box b[3];
     int32_t count = -1, other = -1;
@@ -170,7 +144,7 @@ static void test_blobs(void)
 /* White where the plate is black, in a picture that has become darker: the change exceeds 255. */
 static void test_largest_change(void)
 {
-    gait_start *const s = start_new(~0u);
+    gait_start *const s = toy_start_new(camera(), ~0u);
     gait_image const scene = image_of(plate), frame = image_of(picture);
     gait_box b;
     int32_t count = -1;
@@ -186,7 +160,7 @@ static void test_largest_change(void)
 
 static void test_refused(void)
 {
-    gait_start *const s = start_new(~0u);
+    gait_start *const s = toy_start_new(camera(), ~0u);
     gait_image small = image_of(picture), scene = image_of(plate);
     gait_box b = {.sd = NAN};
     gait_hypothesis h;

@@ -1,0 +1,37 @@
+/* toy_start.h - an automatic start for the toy person, with a level camera 1.5 m over the floor. */
+#ifndef TOY_START_H
+#define TOY_START_H
+#include "check.h"
+#include "gait_start.h"
+#include "golden.h"
+#include "toy_model.h"
+
+#include <stdlib.h>
+
+/* Looks along +y. */
+static gait_camera level_camera(int32_t width, int32_t height, float f)
+{
+    return (gait_camera){.width = width,
+                         .height = height,
+                         .fx = f,
+                         .fy = f,
+                         .cx = 0.5f * (float)(width - 1),
+                         .cy = 0.5f * (float)(height - 1),
+                         .R = {1, 0, 0, 0, 0, -1, 0, 1, 0},
+                         .t = {0.0f, 1.5f, 0.0f}};
+}
+
+static gait_start *toy_start_new(gait_camera camera, uint32_t cpu_mask)
+{
+    gait_start_config cfg;
+    gait_start *s = NULL;
+    size_t bytes = 0;
+    gait_start_default(&cfg);
+    cfg.camera = camera;
+    cfg.cpu_mask = cpu_mask;
+    CHECK(gait_start_bytes(toy_model(), &cfg, &bytes, NULL) == GAIT_OK);
+    void *const mem = aligned_alloc(GAIT_ALIGN, (bytes + GAIT_ALIGN - 1) / GAIT_ALIGN * GAIT_ALIGN);
+    CHECK(gait_start_init(mem, bytes, toy_model(), &cfg, &s, NULL) == GAIT_OK);
+    return s; /* at the beginning of mem */
+}
+#endif
