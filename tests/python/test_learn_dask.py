@@ -20,6 +20,7 @@ from gait.learn.corpus import cluster, load, sources
 from gait.learn.options import LearnOptions
 
 distributed = pytest.importorskip("distributed", reason="Dask is not installed: make setup")
+dask = pytest.importorskip("dask")
 pytestmark = pytest.mark.filterwarnings("ignore")  # those of distributed are not ours to mend
 
 
@@ -121,6 +122,7 @@ def test_a_file_that_kills_its_workers_is_named(walks, tmp_path, monkeypatch):
         "_run",
         lambda task, wanted: os._exit(9) if task.path.name == "05_01.amc" else true(task, wanted),
     )
+    monkeypatch.setitem(dask.config.config["distributed"]["scheduler"], "allowed-failures", 0)  # 3 take 16 s
     with _two_workers() as address:  # of their own: they are gone for a while
         files = [(walks / "01_01.amc", True), (bad, True)]
         refused = load.load_all(files, LearnOptions(dask=address)).refused
