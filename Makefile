@@ -229,9 +229,11 @@ $(B)/unit/%: tests/unit/%.c $(OBJ) Makefile $(MADE) | $(B)/unit/
 	    $(LDFLAGS) -o $@ $< $(OBJ) -lm
 
 # A process for each processor; the tests of a file stay together, they share what is slow to make.
+# What their many processes import is compiled once, whatever the caller's environment says.
+COMPILED_ONCE := PYTHONDONTWRITEBYTECODE= PYTHONPYCACHEPREFIX='$(abspath build/pycache)'
 PYTEST_AT_ONCE := -n logical --maxprocesses 8 --dist loadfile
 python-test: setup lib tools ## Python tests (ARGS='-k blob' to choose)
-	@$(PY) -m pytest -q -c python/pyproject.toml --rootdir . $(PYTEST_AT_ONCE) tests/python $(ARGS)
+	@$(COMPILED_ONCE) $(PY) -m pytest -q -c python/pyproject.toml --rootdir . $(PYTEST_AT_ONCE) tests/python $(ARGS)
 
 asan: ## C tests under the address and undefined-behaviour sanitizers
 	@LIMIT=1200 $(MAKE) --no-print-directory config=sanitize unit
