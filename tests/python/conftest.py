@@ -1,9 +1,13 @@
 """What all Python tests share."""
 
 import os
+import resource
 import signal
 import sys
+from collections import Counter
 from pathlib import Path
+
+import pytest
 
 if "PYTEST_XDIST_WORKER" in os.environ:
     # Before numpy is loaded: threads of processes side by side would only wait for each other's processors.
@@ -21,8 +25,39 @@ sys.path.insert(
 os.environ["GAIT_WEIGHTS"] = str(Path(__file__).parent)  # a folder without weights
 
 
+def _cpu():
+    """Processor time of this process and of its children that ended, seconds."""
+    used = [resource.getrusage(who) for who in (resource.RUSAGE_SELF, resource.RUSAGE_CHILDREN)]
+    return sum(u.ru_utime + u.ru_stime for u in used)
+
+
+_before = _cpu()
+
+
+@pytest.hookimpl(wrapper=True)
+def pytest_runtest_makereport():
+    """Keep with each part of a test the processor time since the one before: other programs do not count."""
+    global _before
+    report = yield
+    now = _cpu()
+    report.user_properties.append(("cpu", now - _before))
+    _before = now
+    return report
+
+
+SLOW = 60.0  # seconds of processor time from which it is shown what took it
+
+
 def pytest_terminal_summary(terminalreporter):
-    """Print the counts in the form of the C tests: an error outside a test counts as a failed one."""
+    """Print what took longest, and the counts in the form of the C tests: errors count as failed."""
+    cpu = Counter()
+    for report in (r for reports in terminalreporter.stats.values() for r in reports):
+        if isinstance(report, pytest.TestReport):
+            cpu[report.nodeid.removeprefix("tests/python/")] += dict(report.user_properties)["cpu"]
+    if cpu.total() > SLOW:
+        terminalreporter.write_line(f"{cpu.total():.0f} s of processor time, most of it in")
+        for name, seconds in cpu.most_common(12):
+            terminalreporter.write_line(f"{seconds:6.1f} s {name}")
     count = {k: len(terminalreporter.getreports(k)) for k in ("passed", "failed", "error", "skipped")}
     failed = count["failed"] + count["error"]
     terminalreporter.write_line(
