@@ -72,10 +72,7 @@ def main() -> int:
         return 1
     rows: list[Row] = []
     digests = set()
-    with (
-        tempfile.TemporaryDirectory() as folder,
-        progress("learning", RUNS * len(JOBS), False) as update,
-    ):
+    with tempfile.TemporaryDirectory() as folder, progress("learning", RUNS * len(JOBS), False) as update:
         model = Path(folder) / "walk.gait"
         for k, jobs in enumerate(JOBS):
             found = []

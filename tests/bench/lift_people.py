@@ -102,11 +102,7 @@ def _walks(clip: Clip, model: Path, rng: np.random.Generator) -> Iterator[Walk]:
         for _ in range(TIMES):
             stature = prior.stature + STATURE_SD * rng.normal()
             yield Walk(
-                clip.name,
-                stature * turned + [*middle[:2], FLOOR_SD * rng.normal()],
-                camera,
-                model,
-                prior,
+                clip.name, stature * turned + [*middle[:2], FLOOR_SD * rng.normal()], camera, model, prior
             )
 
 

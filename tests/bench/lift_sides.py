@@ -119,9 +119,7 @@ def undo_swaps(walk: lift_people.Walk, tracks: Keypoints) -> Keypoints:
     """Keypoints with sides put back as by gait lift."""
     view, options = Perspective(walk.camera), Options(pixel_sd=lift_tracks.NOISE)
     return swaps.undo_swaps(
-        tracks,
-        options.pixel_sd,
-        lambda part: motion.evidence(walk.prior, part, view, options),
+        tracks, options.pixel_sd, lambda part: motion.evidence(walk.prior, part, view, options)
     )[0]
 
 

@@ -65,8 +65,7 @@ def test_a_bench_that_fails_leaves_no_record(tmp_path, monkeypatch, capsys):
     table, page = tmp_path / "new/a.csv", tmp_path / "bench.md"
     monkeypatch.chdir(tmp_path)
     monkeypatch.setattr(
-        "sys.argv",
-        ["bench.py", "--page", str(page), "--csv", str(table), "sh", "-c", "echo on; exit 3"],
+        "sys.argv", ["bench.py", "--page", str(page), "--csv", str(table), "sh", "-c", "echo on; exit 3"]
     )
     with pytest.raises(SystemExit) as stop:
         bench.main()

@@ -168,12 +168,7 @@ def test_half_a_size_is_not_completed_by_the_video(tmp_path):
         Camera.read(opencv(tmp_path / "a.yaml", sized="image_height: 960\n"), (640, 480))
     with pytest.raises(UserError, match="calibrated for 800x480"):
         Camera.read(
-            opencv(
-                tmp_path / "a.yaml",
-                sized="imageSize: [ 800, 480 ]\n",
-                centre=(399, 239),
-            ),
-            (640, 480),
+            opencv(tmp_path / "a.yaml", sized="imageSize: [ 800, 480 ]\n", centre=(399, 239)), (640, 480)
         )
 
 

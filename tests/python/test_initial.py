@@ -26,13 +26,7 @@ FULL = {
     "phase": 0.108,
     "stride_hz": 0.816,
     "stature_m": 1.65,
-    "sd": {
-        "pelvis": 0.1,
-        "heading_rad": 0.2,
-        "phase": 0.06,
-        "stride_hz": 0.07,
-        "stature_m": 0.02,
-    },
+    "sd": {"pelvis": 0.1, "heading_rad": 0.2, "phase": 0.06, "stride_hz": 0.07, "stature_m": 0.02},
 }
 
 
@@ -51,12 +45,7 @@ def test_a_full_file_is_taken_as_it_is(init):
     mean, sd = start.mean, start.sd
     assert start.frame == 64
     np.testing.assert_array_equal(mean.pelvis, FULL["pelvis"])
-    assert (mean.heading, mean.phase, mean.stride_hz, mean.stature) == (
-        -1.5708,
-        0.108,
-        0.816,
-        1.65,
-    )
+    assert (mean.heading, mean.phase, mean.stride_hz, mean.stature) == (-1.5708, 0.108, 0.816, 1.65)
     np.testing.assert_array_equal(sd.pelvis, [0.1, 0.1, 0.1])
     assert (sd.heading, sd.phase, sd.stride_hz, sd.stature) == (0.2, 0.06, 0.07, 0.02)
 
@@ -150,10 +139,7 @@ FAULTS = [
     ({"heading": 0.1}, "heading is not a known key; use frame pelvis heading_rad"),
     ("{'phase': 1}", "not valid JSON"),
     ("3", "holds no JSON object"),
-    (
-        "[" * 100_000,
-        r"not valid JSON \(brackets within brackets, too deep to read\); mend it",
-    ),
+    ("[" * 100_000, r"not valid JSON \(brackets within brackets, too deep to read\); mend it"),
     ('{"frame": ' + "1" * 5000 + "}", "not valid JSON .*; mend it"),
 ]
 
@@ -216,23 +202,16 @@ def test_a_standing_person_has_no_heading(tmp_path):
 def test_too_few_frames_to_find_a_person_are_reported(tmp_path, count, words):
     write(tmp_path / "few.mp4", [wall()] * count)
     with pytest.raises(
-        UserError,
-        match=f"few.mp4: only {words} track, --init auto needs 8; give --init FILE",
+        UserError, match=f"few.mp4: only {words} track, --init auto needs 8; give --init FILE"
     ):
         find_start(Video(tmp_path / "few.mp4"), camera(), wall(), MODEL)
 
 
 def test_an_empty_picture_is_reported(tmp_path):
     write(tmp_path / "empty.mp4", [wall()] * 12)
-    with pytest.raises(
-        UserError,
-        match="empty.mp4: --init auto found no person .*give --init FILE.json",
-    ):
+    with pytest.raises(UserError, match="empty.mp4: --init auto found no person .*give --init FILE.json"):
         find_start(Video(tmp_path / "empty.mp4"), camera(), wall(), MODEL)
-    with pytest.raises(
-        UserError,
-        match="empty.mp4: --init auto found no person .*give --init FILE.json",
-    ):
+    with pytest.raises(UserError, match="empty.mp4: --init auto found no person .*give --init FILE.json"):
         find_start(Video(tmp_path / "empty.mp4"), camera(), None, MODEL)
 
 
@@ -242,10 +221,7 @@ CLIPS = DATA / "eval" / "dev"
 @pytest.mark.skipif(not CLIPS.is_dir(), reason="../shared/data is absent")
 @pytest.mark.parametrize("name", ["side_rl_16", "oblique45_pole_05", "toward300_08"])
 def test_a_person_is_found_without_a_background(name):
-    video, truth = (
-        Video(CLIPS / name / "video.mp4"),
-        read_truth(CLIPS / name / "truth.csv"),
-    )
+    video, truth = (Video(CLIPS / name / "video.mp4"), read_truth(CLIPS / name / "truth.csv"))
     found = find_start(video, Camera.read(str(CLIPS / name / "camera.json"), video.size), None, MODEL)
     path = truth.places["pelvis"][found.frame : found.frame + 31]
     off = found.mean.pelvis - path[0]
@@ -359,8 +335,7 @@ def test_a_camera_whose_height_is_wrong_is_reported(tmp_path):
     true = camera()
     low = replace(true, t=-true.R @ (true.centre * [1, 1, 0.4]))
     with pytest.raises(
-        UserError,
-        match=r"found a person in \d+ frames that the camera makes 0\.\d+ m tall; check the",
+        UserError, match=r"found a person in \d+ frames that the camera makes 0\.\d+ m tall; check the"
     ):
         find_start(Video(tmp_path / "walk.mp4"), low, wall(), MODEL)
 
@@ -371,7 +346,6 @@ def test_a_wrong_camera_is_reported_from_most_frames(tmp_path):
     up = np.array([[1, 0, 0], [0, 0.5, -0.866], [0, 0.866, 0.5]])
     upward = replace(camera(), R=up, t=-up @ camera().centre)
     with pytest.raises(
-        UserError,
-        match=r"found a person in \d+ frames that the camera puts above the horizon",
+        UserError, match=r"found a person in \d+ frames that the camera puts above the horizon"
     ):
         find_start(Video(tmp_path / "walk.mp4"), upward, wall(), MODEL)

@@ -66,10 +66,7 @@ HEAD = "frame,time,pelvis_u,pelvis_v"
         (f"{HEAD}\n0,0,1,two\n", "line 2: pelvis_v is 'two'"),
         (f"{HEAD}\n0,0,1,2\n0,1,1,2\n", "line 3: frame is 0; it must be whole"),
         (f"{HEAD}\n0,0,1,2\n1.5,1,1,2\n", "line 3: frame is 1.5; it must be whole"),
-        (
-            f"{HEAD}\n0,0,1,2\n1e30,1,1,2\n",
-            "frame is 1e+30; it must be whole numbers that increase, at most",
-        ),
+        (f"{HEAD}\n0,0,1,2\n1e30,1,1,2\n", "frame is 1e+30; it must be whole numbers that increase, at most"),
         (f"{HEAD}\n0,0,1,-2e6\n", "line 2: pelvis_v is '-2e6'; give a number of at most 1e+06"),
         (f"{HEAD}\n0,0,1,2\n1,1e-9,1,2\n", "time goes on by 1e-09 from frame to frame; give seconds"),
         (f"{HEAD}\n0,0,1,2\n1,33.3,1,2\n", "time goes on by 33.3 from frame to frame; give seconds"),

@@ -49,15 +49,7 @@ def run(*words):
 
 @pytest.mark.parametrize(
     ("cycles", "wanted", "count"),
-    [
-        (3, None, 1),
-        (6, None, 4),
-        (10, None, 8),
-        (90, None, 8),
-        (6, 4, 4),
-        (90, 16, 16),
-        (6, "auto", 4),
-    ],
+    [(3, None, 1), (6, None, 4), (10, None, 8), (90, None, 8), (6, 4, 4), (90, 16, 16), (6, "auto", 4)],
 )
 def test_components_are_no_more_than_cycles_allow(cycles, wanted, count):
     assert fit.most_components(cycles, wanted) == count
@@ -66,21 +58,9 @@ def test_components_are_no_more_than_cycles_allow(cycles, wanted, count):
 @pytest.mark.parametrize(
     ("cycles", "wanted", "message"),
     [
-        (
-            6,
-            5,
-            "6 cycles are too few for 5 components; add recordings or ask for 4 at most",
-        ),
-        (
-            2,
-            None,
-            "2 cycles are too few for 1 component; add recordings, 3 cycles at least",
-        ),
-        (
-            0,
-            "auto",
-            "0 cycles are too few for 1 component; add recordings, 3 cycles at least",
-        ),
+        (6, 5, "6 cycles are too few for 5 components; add recordings or ask for 4 at most"),
+        (2, None, "2 cycles are too few for 1 component; add recordings, 3 cycles at least"),
+        (0, "auto", "0 cycles are too few for 1 component; add recordings, 3 cycles at least"),
     ],
 )
 def test_more_components_than_cycles_allow_are_an_error(cycles, wanted, message):
@@ -162,10 +142,7 @@ def test_the_iterated_svd_recovers_planted_components_and_its_error_falls():
     coded = np.zeros((rows, len(basis) * channels))
     coded[:, : 9 * channels] = 5 * rng.normal(size=(rows, count)) @ planted.T
     truth = decode(coded, basis, channels)
-    values, mask = (
-        truth + 0.01 * rng.normal(size=truth.shape),
-        np.ones(truth.shape, bool),
-    )
+    values, mask = (truth + 0.01 * rng.normal(size=truth.shape), np.ones(truth.shape, bool))
     for row in mask:
         row[(int(rng.integers(samples)) + np.arange(12)) % samples, :] = False
     found = components.fit(np.where(mask, values, 0.0), mask, count, fill=iterated_svd.complete)

@@ -142,13 +142,7 @@ def test_slow_pictures_and_few_frames_are_left_alone():
     spoilt = swapped(walking(8), 30, 40)
     assert undo_swaps(spoilt, NOISE, model) == (spoilt, [])
     few = swapped(walking(), 1, 1)
-    few = replace(
-        few,
-        frame=few.frame[:2],
-        time=few.time[:2],
-        uv=few.uv[:2],
-        confidence=few.confidence[:2],
-    )
+    few = replace(few, frame=few.frame[:2], time=few.time[:2], uv=few.uv[:2], confidence=few.confidence[:2])
     assert undo_swaps(few, NOISE, model) == (few, [])
     alone = replace(walking(), names=("pelvis", "l_knee", "r_hip", "neck", "r_ankle"))
     assert undo_swaps(alone, NOISE, model)[1] == []

@@ -49,14 +49,7 @@ def folder(tmp_path):
 
 
 def track(folder, *options):
-    words = [
-        "track",
-        folder / "walk.mp4",
-        "--camera",
-        folder / "camera.json",
-        "-o",
-        folder / "o.csv",
-    ]
+    words = ["track", folder / "walk.mp4", "--camera", folder / "camera.json", "-o", folder / "o.csv"]
     words += ["--init", folder / "init.json", "--particles", 400, "--detector", "none"]
     if "--background" not in options:
         words += ["--background", folder / "plate.png"]
@@ -66,10 +59,7 @@ def track(folder, *options):
 def errors(folder):
     """Frames of the track, and their errors as far as they show the walk, metres."""
     rows = read_track(folder / "o.csv")
-    mine = np.stack(
-        [rows.places[name] for name in ("l_knee", "r_knee", "l_ankle", "r_ankle")],
-        axis=1,
-    )
+    mine = np.stack([rows.places[name] for name in ("l_knee", "r_knee", "l_ankle", "r_ankle")], axis=1)
     order = [MODEL.joint_names.index(name) for name in ("l_knee", "r_knee", "l_ankle", "r_ankle")]
     return rows, mine, order
 
@@ -171,8 +161,7 @@ def test_legs_that_keypoints_show_elsewhere_are_no_agreement(estimate):
 
 
 @pytest.mark.parametrize(
-    "spike, grown, status",
-    [(0.0, 0.0, "TRACKING"), (1.0, 0.0, "AMBIGUOUS"), (0.0, 0.5, "AMBIGUOUS")],
+    "spike, grown, status", [(0.0, 0.0, "TRACKING"), (1.0, 0.0, "AMBIGUOUS"), (0.0, 0.5, "AMBIGUOUS")]
 )
 def test_without_keypoints_a_walk_must_be_plausible(estimate, spike, grown, status):
     plausible = Plausibility(PersonKeypoints(camera(), {}, -1), 1.75, 0.05, 0.0)

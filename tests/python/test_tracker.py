@@ -11,17 +11,7 @@ import numpy as np
 import pytest
 from drawn_person import FPS, camera, clip, wall
 
-from gait import (
-    Flag,
-    GaitArgumentError,
-    GaitError,
-    Mode,
-    Model,
-    State,
-    Tracker,
-    TrackerConfig,
-    UserError,
-)
+from gait import Flag, GaitArgumentError, GaitError, Mode, Model, State, Tracker, TrackerConfig, UserError
 from gait.bindings import abi
 from gait.bindings.config import LiftConfig, reference
 from gait.bindings.library import library

@@ -122,10 +122,7 @@ def test_the_wheel_makes_a_clip_and_tracks_it(tmp_path):
     subprocess.run([sys.executable, "-m", "venv", "--without-pip", venv], check=True)
     pins = ["--no-compile", "--constraint", ROOT / "python/constraints.txt"]
     subprocess.run([*PIP, "--python", venv / "bin/python", "install", *pins, f"{WHEEL}[all]"], check=True)
-    for command in (
-        "gait simulate -o walk",
-        "gait track walk/video.mp4 --camera walk/camera.json -o t.csv",
-    ):
+    for command in ("gait simulate -o walk", "gait track walk/video.mp4 --camera walk/camera.json -o t.csv"):
         name, *words = command.split()
         done = run([venv / "bin" / name, *words], tmp_path, PATH=str(venv / "bin"))
         assert done.returncode == 0, done.stderr

@@ -11,10 +11,7 @@ from gait.track.walk_start import make_camera
 MODEL = Model()
 SIZE = (1280, 720)
 NAMES = tuple(name for name in MODEL.joint_names if name not in ("pelvis", "neck", "head_top"))
-TOWARDS, ACROSS = (
-    (-1.3, (0.3, 7.5)),
-    (0.0, (-1.8, 5.0)),
-)  # heading from -y to the right, and first place
+TOWARDS, ACROSS = ((-1.3, (0.3, 7.5)), (0.0, (-1.8, 5.0)))  # heading from -y to the right, and first place
 
 
 def walk_at(time, walk=TOWARDS, *, speed=1.25, stature=1.75, standing=False, belt=0.0):

@@ -331,11 +331,7 @@ FUNCTIONS: tuple[tuple[str, list[Any], Any], ...] = (
     ("gait_start_box_stature", [_HANDLE, POINTER(BoxC), POINTER(c_float), _ERR], _RESULT),
     ("gait_start_reset", [_HANDLE], None),
     ("gait_hypothesis_walks", [POINTER(HypothesisC)], c_int32),
-    (
-        "gait_tracker_start_hypotheses",
-        [_HANDLE, POINTER(HypothesisC), c_int32, c_int64, _ERR],
-        _RESULT,
-    ),
+    ("gait_tracker_start_hypotheses", [_HANDLE, POINTER(HypothesisC), c_int32, c_int64, _ERR], _RESULT),
     ("gait_start_solve", [_HANDLE, c_int64, POINTER(HypothesisC), c_int32, POINTER(c_int32), _ERR], _RESULT),
     ("gait_lift_remove_spikes", [c_int32, c_int32, _ARRAY, _ARRAY, _ARRAY, _ARRAY], c_int32),
     ("gait_lift_weight_outliers", [c_int32, _ARRAY, _ARRAY, _ARRAY], c_int32),

@@ -175,13 +175,7 @@ def _start(args: argparse.Namespace, source: FileSource | DeviceSource, setup: S
     from gait.track.box_start import find_start  # slow to load, and only needed here
 
     return find_start(
-        source.video,
-        setup.camera,
-        setup.plate,
-        model,
-        first=args.start,
-        stop=args.stop,
-        height=args.height,
+        source.video, setup.camera, setup.plate, model, first=args.start, stop=args.stop, height=args.height
     )
 
 

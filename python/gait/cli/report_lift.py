@@ -60,9 +60,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         "--camera", metavar="CAM", help="the clip's calibration (default: seen level and from far away)"
     )
     parser.add_argument(
-        "--method",
-        choices=METHODS,
-        help=f"how the clip is lifted, as in gait lift (default: {METHODS[0]})",
+        "--method", choices=METHODS, help=f"how the clip is lifted, as in gait lift (default: {METHODS[0]})"
     )
     values.add_seed(parser, "noise and draws")
 

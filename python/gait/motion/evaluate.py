@@ -151,12 +151,7 @@ LIMBS = [i for i, name in enumerate(EVAL15) if name not in ("pelvis", "neck", "h
 
 
 def evaluate(
-    track: Track,
-    truth: Joints,
-    *,
-    strikes: Strikes,
-    model: dict[str, Any],
-    camera: Camera | None = None,
+    track: Track, truth: Joints, *, strikes: Strikes, model: dict[str, Any], camera: Camera | None = None
 ) -> Measures:
     """Compare the frames that both have.
 

@@ -59,10 +59,7 @@ def drawings(learned: Learned) -> Iterator[Drawing]:
         alignment(learned),
     )
     yield Drawing(
-        "cycles",
-        "Cycles",
-        "What the components are learnt from; black: mean of the model.",
-        cycles(learned),
+        "cycles", "Cycles", "What the components are learnt from; black: mean of the model.", cycles(learned)
     )
     yield from _model(learned)
     yield Drawing(

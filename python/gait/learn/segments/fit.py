@@ -284,11 +284,7 @@ class Mixture:
 
 
 def choose_mixture(
-    basis: Basis,
-    model: Fitted,
-    folds: Sequence[Mask],
-    real: Mask,
-    components: int | None,
+    basis: Basis, model: Fitted, folds: Sequence[Mask], real: Mask, components: int | None
 ) -> Mixture:
     """Fit a mixture of so many components, or (None) of as many as predict the people left out best.
 
