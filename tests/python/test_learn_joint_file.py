@@ -159,7 +159,7 @@ def test_positions_in_other_units_are_named(person, tmp_path, scale):
 
 def test_left_and_right_swapped_are_refused(person, tmp_path):
     path = write_csv(tmp_path / "a.csv", turned(person, np.diag([1.0, -1, 1])))
-    with pytest.raises(UserError, match=r"goes backwards, or left and right are swapped \(ahead -1, "):
+    with pytest.raises(UserError, match="axes are left-handed, or left and right are swapped"):
         load(path)
 
 

@@ -16,14 +16,16 @@ Array = NDArray[np.float64]
 
 METRES = {"m": 1.0, "mm": 0.001, "cm": 0.01}  #: one unit of a file
 NAMED = {"DataRate", "NumMarkers", "Units"}  #: fields that a header must name
+_RATE_OFF, _JUMP = 0.02, 1.7  # relative difference of rates; steps of a frame that are a gap
 HEAD = 5  # lines of the header; an empty one may follow
 
 
-def read_trc(path: Path) -> tuple[list[str], Array, float]:
+def read_trc(path: Path, fps: float | None = None) -> tuple[list[str], Array, float]:
     """Read the points of a .trc.
 
     Returns M labels, points (T, M, 3) in metres and the axes of the file, NaN where cells are empty, and
-    frames per second.  UserError names file, line and remedy.
+    frames per second: `fps`, or DataRate, which the times must then confirm.  UserError names file, line and
+    remedy.
     """
     lines = text_lines(path)
     if len(lines) < HEAD or not set(lines[1].split()) >= NAMED:
@@ -38,8 +40,11 @@ def read_trc(path: Path) -> tuple[list[str], Array, float]:
     rows = [_row(line, 2 + 3 * count, f"{path}:{i}") for i, line in numbered]
     if len(rows) < 3:
         raise UserError(f"{path}: too few frames ({len(rows)}); a recording of a few seconds is needed")
-    _require_consistent(path, head, labels, [(i, row[1]) for (i, _), row in zip(numbered, rows, strict=True)])
-    return labels, np.array(rows)[:, 2:].reshape(len(rows), count, 3) * scale, rate
+    times = [(i, row[1]) for (i, _), row in zip(numbered, rows, strict=True)]
+    _require_consistent(path, head, labels, times)
+    if fps is None:
+        _require_rate(path, rate, times)
+    return labels, np.array(rows)[:, 2:].reshape(len(rows), count, 3) * scale, fps or rate
 
 
 def _rate_and_scale(path: Path, head: dict[str, str]) -> tuple[float, float]:
@@ -68,6 +73,26 @@ def _require_consistent(
     late = next((k for k in range(1, len(times)) if times[k][1] <= times[k - 1][1]), None)
     if late is not None:
         raise UserError(f"{path}:{times[late][0]}: the times do not increase; correct column Time")
+
+
+def _require_rate(path: Path, rate: float, times: list[tuple[int, float]]) -> None:
+    """Refuse times that contradict the rate, or that jump because rows are missing."""
+    seconds = np.array([time for _, time in times])
+    if np.isnan(seconds).any():  # the column may be empty
+        return
+    steps = np.diff(seconds)
+    measured = len(steps) / float(seconds[-1] - seconds[0])  # the mean, as times are rounded
+    jump = int(np.argmax(steps))
+    if steps[jump] > _JUMP / rate and steps[jump] > _JUMP * np.median(steps):
+        raise UserError(
+            f"{path}:{times[jump + 1][0]}: {steps[jump]:.3g} s after the row before, at {rate:g} per second; "
+            "add rows with empty cells for frames that are missing, or cut the file there"
+        )
+    if abs(measured / rate - 1) > _RATE_OFF:
+        raise UserError(
+            f"{path}: DataRate is {rate:g} per second, but column Time goes on by {1 / measured:.4g} s, "
+            f"{measured:.4g} per second; correct one of them, or give --fps"
+        )
 
 
 def _row(line: str, width: int, where: str) -> list[float]:

@@ -112,9 +112,18 @@ def _hints(options: LearnOptions, notes: RunNotes) -> Iterator[str]:
             names = ", ".join(absent[:MOST_NAMES]) + (" ..." if len(absent) > MOST_NAMES else "")
             yield f"--markers {options.markers.path}: no file has a marker {names}; check the spelling"
     if notes.zeros:
-        (path, zeros), others = notes.zeros[0], len(notes.zeros) - 1
-        more = f" (and similar in {others} more file{'s' * (others > 1)})" if others else ""
-        yield f"{path}: exactly 0: {zeros}{more}; if that is missing data, give --zeros-missing"
+        path, zeros = notes.zeros[0]
+        yield f"{path}: exactly 0: {zeros}{_more(notes.zeros)}; if that is missing data, give --zeros-missing"
+    if notes.lacking:
+        path, parts = notes.lacking[0]
+        names = ", ".join(parts[:MOST_NAMES]) + (" ..." if len(parts) > MOST_NAMES else "")
+        yield f"{path}: has no {names}{_more(notes.lacking)}: learnt without; rename them if they are there"
+
+
+def _more(files: list[Any]) -> str:
+    """Words about the files after the first."""
+    others = len(files) - 1
+    return f" (and similar in {others} more file{'s' * (others > 1)})" if others else ""
 
 
 def _segment_prior(options: LearnOptions, corpus: Corpus, note: Note) -> SegmentPrior | None:

@@ -55,12 +55,15 @@ class RunNotes:
 
     labels: set[str] = field(default_factory=set)
     zeros: list[tuple[Path, str]] = field(default_factory=list)
+    lacking: list[tuple[Path, tuple[str, ...]]] = field(default_factory=list)
 
     def add(self, path: Path, notes: FileNotes) -> None:
         """Add those of a file."""
         self.labels |= notes.labels
         if notes.zeros:
             self.zeros.append((path, notes.zeros))
+        if notes.lacking:
+            self.lacking.append((path, notes.lacking))
 
 
 @dataclass(frozen=True)

@@ -25,6 +25,7 @@ DIVISOR_SCORE = 0.5  # share of its best score that an accepting angle keeps at 
 #: and their periods still agree with autocorrelation (tests/python/test_learn_cmu.py).
 CYCLES = 1.5
 SECONDS = (0.4, 2.1)
+LONGER = 4.0  # times the longest period, up to which `find_longer` looks
 LITERAL_SECONDS = (50 / 120, 250 / 120)  # the paper's 50 to 250 frames, taken as of 120 per second
 
 
@@ -152,9 +153,24 @@ def find(signals: Floats, fps: float, mode: str = "refined") -> Period:
     return Period(best, candidates, scores, sharpness)
 
 
+def find_longer(signals: Floats, fps: float, mode: str = "refined") -> float:
+    """Find the best period, frames, among those too long for `find`; NaN if the signals are too short."""
+    moving, longest = signals[:, _moving(signals)], _bounds(fps, mode)[1]
+    candidates = np.arange(longest + 1, min(LONGER * longest, len(signals) / CYCLES), 0.5)
+    if not moving.size or not len(candidates):
+        return float("nan")
+    scores = np.array([_total(row) for row in Folder(moving).binned(candidates, BINS)])
+    return _refine(moving, float(candidates[np.nanargmax(scores)])) if np.isfinite(scores).any() else np.nan
+
+
+def seconds(mode: str) -> tuple[float, float]:
+    """Return the shortest and longest period that is looked for, seconds."""
+    return LITERAL_SECONDS if mode == "literal" else SECONDS
+
+
 def _bounds(fps: float, mode: str) -> tuple[float, float]:
     """Return the shortest and longest candidate, frames."""
-    low, high = LITERAL_SECONDS if mode == "literal" else SECONDS
+    low, high = seconds(mode)
     return low * fps, high * fps
 
 

@@ -73,14 +73,16 @@ def prepare(path: Path, read: Body | AngleTable, options: LearnOptions = DEFAULT
     if options.trim:
         kept, found = steady.steady_part(motion.angles, read.fps, mode, motion.path)
         if not kept.stop - kept.start >= period.CYCLES * found.frames:
-            raise _refused(path, activity, _unsteady(kept, found, read.fps))
+            reason = _too_long(motion.angles, read.fps, options) or _unsteady(kept, found, read.fps)
+            raise _refused(path, activity, reason)
     if found is None or kept.stop - kept.start < read.frames:
         motion = _motion(read.part(kept.start, kept.stop))
         found = period.find(motion.angles, read.fps, mode)
     judged, channels, heading = _judge(motion, found, activity)
     if not judged.accepted:
         other = judged.activity if {judged.activity, activity} == {"walk", "run"} else ""
-        raise _refused(path, activity, judged.reason, other)
+        too_long = "" if judged.cyclic else _too_long(motion.angles, read.fps, options)
+        raise _refused(path, activity, too_long or judged.reason, other)
     if not cutting.fewest_cycles(channels, found.frames, PHASES):
         raise _refused(path, activity, "too little of each cycle is observed")
     return Sequence(
@@ -96,6 +98,22 @@ def prepare(path: Path, read: Body | AngleTable, options: LearnOptions = DEFAULT
         kept=(kept.start, kept.stop),
         cut=(kept.before, kept.after),
         verdict=judged,
+    )
+
+
+def _too_long(angles: Floats, fps: float, options: LearnOptions) -> str:
+    """Return why no cycle was found if there is one longer than those that are looked for, or ''."""
+    frames, longest = (
+        period.find_longer(angles, fps, options.period_mode),
+        period.seconds(options.period_mode)[1],
+    )
+    if not (np.isfinite(frames) and verdict.repeats(angles, frames) >= verdict.REPEATS):
+        return ""
+    if not verdict.legs(angles, frames) >= verdict.LEGS:
+        return ""
+    return (
+        f"strides of {frames / fps:.2f} s are longer than {longest:.3g} s, which are not looked for (see "
+        f"--fps unless it is {fps:g} frames per second)"
     )
 
 

@@ -30,6 +30,7 @@ LEGS = 0.7  # legs that alternate to within an eighth of a cycle; the walks of C
 LIFT = 0.02  # statures
 STEPS = 0.03  # statures
 AHEAD = 0.5  # the walks of CMU reach 0.98 and more, with left and right swapped -0.98 and less
+CYCLIC = ("cycles", "sharpness", "repeats")  # names of evidence
 SWING = ("hip_flexion", "knee_flexion")
 
 
@@ -65,6 +66,11 @@ class Verdict:
     def accepted(self) -> bool:
         """Whether all evidence is accepted."""
         return all(e.accepted for e in self.evidence)
+
+    @property
+    def cyclic(self) -> bool:
+        """Whether the evidence for cycles of any kind is accepted."""
+        return all(e.accepted for e in self.evidence if e.name in CYCLIC)
 
     @property
     def reason(self) -> str:

@@ -27,7 +27,7 @@ from gait.learn.rotations import from_angles
 
 AXES = "XYZ"
 #: Metres per unit: metre, inch, CMU's unit (inch / 0.45), centimetre, millimetre.  Files do not name their
-#: unit; the one that brings the rest pose nearest to an adult's height is taken.
+#: unit; the one that brings the body nearest to an adult's height is taken.
 UNITS = (1.0, 0.0254, 0.0254 / 0.45, 0.01, 0.001)
 HEIGHT = 1.7
 
@@ -150,7 +150,7 @@ def _motion(words: _Words, lines: list[str], width: int) -> tuple[Floats, float]
     if interval <= 0:
         raise UserError(f"{words.path}:{words.line}: the frame time is {interval} s; restore the file")
     rows = [(i, line.split()) for i, line in enumerate(lines[words.line :], words.line + 1) if line.strip()]
-    if len(rows) < count:
+    if len(rows) < count or (len(rows) > count and len(rows[count][1]) == width):
         raise UserError(
             f"{words.path}: {len(rows)} rows for {count} frames; correct 'Frames:' to {len(rows)}"
         )
@@ -169,9 +169,8 @@ def assemble(
     path: Path, joints: list[Joint], values: Floats, fps: float, zeros_missing: bool = False
 ) -> Recording:
     """Compute the forward kinematics of the file's own skeleton in metres, z up."""
+    _require_ranges(path, joints, values, "rotation", DEGREES)
     rest = _rest(joints)
-    turn_up, metres = _upright(rest)
-    _require_ranges(path, joints, values, metres)
     start, end = np.empty((2, len(values), len(joints), 3))
     rotation = np.empty((len(values), len(joints), 3, 3))
     column, heirs, parts = 0, _ends(joints), {}
@@ -186,6 +185,8 @@ def assemble(
             place if parent < 0 else start[:, parent] + np.einsum("tij,tj->ti", rotation[:, parent], place)
         )
         end[:, i] = start[:, i] + rotation[:, i] @ heirs[i]
+    turn_up, metres = _upright(start)
+    _require_ranges(path, joints, metres * values, "position", FARTHEST)
     return Recording(
         name=path.stem,
         source=path,
@@ -210,15 +211,13 @@ def _rest(joints: list[Joint]) -> Floats:
     return rest
 
 
-def _require_ranges(path: Path, joints: list[Joint], values: Floats, metres: float) -> None:
-    """Refuse positions and angles that no person reaches."""
+def _require_ranges(path: Path, joints: list[Joint], values: Floats, kind: str, limit: float) -> None:
+    """Refuse channels of a `kind`, "position" or "rotation", that no person reaches."""
     named = [(joint.name, channel) for joint in joints for channel in joint.channels]
     for k, (name, channel) in enumerate(named):
-        column, what = values[:, k : k + 1], f"{name} {channel}"
-        if channel.endswith("rotation"):
-            require_range(path, what, column, DEGREES, "degrees")
-        else:
-            require_range(path, what, metres * column, FARTHEST, "metres")
+        if channel.endswith(kind):
+            unit = "degrees" if kind == "rotation" else "metres"
+            require_range(path, f"{name} {channel}", values[:, k : k + 1], limit, unit)
 
 
 def _ends(joints: list[Joint]) -> Floats:
@@ -246,13 +245,18 @@ def _split(joint: Joint, values: Floats) -> tuple[Floats, Floats]:
     return place, from_angles(angles, [axis for _, axis in turns])
 
 
-def _upright(rest: Floats) -> tuple[Floats, float]:
-    """Find the rotation to z up and the metres per unit from the rest pose.
+def _upright(start: Floats) -> tuple[Floats, float]:
+    """Find the rotation to z up and the metres per unit from where bones begin in the frames, (T, B, 3).
 
-    Up is y or z, whichever is less symmetric about the root; the extent along it gives the unit.
+    Up is y or z, along which the body is longer; its length gives the unit.  The rest pose shows neither: in
+    some files all bones lie along one axis in it.
     """
-    points = np.sort(rest.reshape(-1, 3) - rest[0, 0], axis=0)
-    lopsided = np.abs(points + points[::-1]).mean(axis=0)
-    up = 1 if lopsided[1] >= lopsided[2] else 2
-    scales = np.array(UNITS) * max(float(np.ptp(points[:, up])), 1e-9)
-    return Y_UP if up == 1 else np.eye(3), UNITS[int(np.argmin(np.abs(np.log(scales / HEIGHT))))]
+    extents = np.ptp(start[np.isfinite(start).all(axis=(1, 2))], axis=1)
+    posed = np.median(extents, axis=0) if len(extents) else np.ones(3)
+    up = 1 if posed[1] >= posed[2] else 2
+    return Y_UP if up == 1 else np.eye(3), _unit(float(posed[up]))
+
+
+def _unit(height: float) -> float:
+    """Metres per unit of a body of this height."""
+    return UNITS[int(np.argmin(np.abs(np.log(np.array(UNITS) * max(height, 1e-9) / HEIGHT))))]

@@ -1,11 +1,12 @@
 """Reads one .c3d with ezc3d in its own process, because damaged files can crash that library.
 
-Run by path with the name of the file.  Writes labels, points (M, T, 3), rate and units as .npz to stdout; an
-error is one line on stderr and exit code 1.
+Run by path with the name of the file.  Writes labels, points (M, T, 3), rate, units and the parameters that
+the header states too as .npz to stdout; an error is one line on stderr and exit code 1.
 """
 
 import io
 import sys
+from typing import Any
 
 import ezc3d
 import numpy as np
@@ -17,6 +18,10 @@ def main(path: str) -> None:
     parameters, points = c3d["parameters"]["POINT"], c3d["data"]["points"]
     units = parameters["UNITS"]["value"] if "UNITS" in parameters else []
     labels = [label for k in ("", *range(2, 100)) for label in _labels(parameters, f"LABELS{k}")]
+    stated: dict[str, Any] = {
+        f"{group}:{name}": _number(c3d["parameters"], group, name)
+        for group, name in (("POINT", "USED"), ("POINT", "RATE"), ("ANALOG", "USED"), ("ANALOG", "RATE"))
+    }
     buffer = io.BytesIO()
     np.savez(
         buffer,
@@ -24,12 +29,19 @@ def main(path: str) -> None:
         points=np.moveaxis(points[:3], 0, 2),
         rate=float(c3d["header"]["points"]["frame_rate"]),
         units=units[0] if len(units) else "mm",
+        **stated,
     )
     sys.stdout.buffer.write(buffer.getvalue())
 
 
 def _labels(parameters: dict, key: str) -> list:  # type: ignore[type-arg]
     return list(parameters[key]["value"]) if key in parameters else []
+
+
+def _number(parameters: dict, group: str, name: str) -> float:  # type: ignore[type-arg]
+    """First value of a parameter; 0 if it is not there."""
+    value = parameters[group][name]["value"] if name in parameters.get(group, {}) else []
+    return float(value[0]) if len(value) else 0.0
 
 
 if __name__ == "__main__":

@@ -3,9 +3,12 @@
 from __future__ import annotations
 
 import io
+import struct
 import subprocess
 import sys
+from collections.abc import Mapping
 from pathlib import Path
+from typing import NamedTuple
 
 import numpy as np
 
@@ -18,17 +21,19 @@ SUFFIXES = (".c3d", ".trc")
 CHILD = Path(__file__).with_name("c3d_child.py")
 PATIENCE = 120.0  # seconds for one file
 BLOCK = 512  # bytes; the first is the header, and its first byte is the block in which the parameters begin
-BIG_ENDIAN = 86  # kind of processor, fourth byte of the parameters
+BIG_ENDIAN, DEC = 86, 85  # kinds of processor, fourth byte of the parameters
+RATE_OFF = 1e-3  # relative: rates that differ by more are two
 MANY = 65535  # frames: more do not fit into the header
 
 
-def read(path: Path) -> tuple[list[str], Floats, float]:
+def read(path: Path, fps: float | None = None) -> tuple[list[str], Floats, float]:
     """Read M labels, points (T, M, 3) in metres and the axes of the file, and the frame rate.
 
     Points are NaN where missing; a point at exactly (0, 0, 0) is missing, because these formats write gaps
-    so. UserError names the file and the remedy.
+    so.  `fps` is the rate if the user gives it.  UserError names the file and the remedy, also where the file
+    states a rate or a number twice, and differently.
     """
-    labels, points, rate = (read_trc if path.suffix.lower() == ".trc" else read_c3d)(path)
+    labels, points, rate = (read_trc if path.suffix.lower() == ".trc" else read_c3d)(path, fps)
     require_frames(path, len(points))
     for k, label in enumerate(labels):
         require_range(path, f"a coordinate of point {label!r}", points[:, k], FARTHEST, "metres")
@@ -36,7 +41,7 @@ def read(path: Path) -> tuple[list[str], Floats, float]:
     return labels, points, rate
 
 
-def read_c3d(path: Path) -> tuple[list[str], Floats, float]:
+def read_c3d(path: Path, fps: float | None = None) -> tuple[list[str], Floats, float]:
     """Read labels, points (T, M, 3) in metres, NaN where the file marks them as missing, and the rate."""
     if not path.is_file():
         raise UserError(f"{path}: no such file; check the name")
@@ -57,24 +62,60 @@ def read_c3d(path: Path) -> tuple[list[str], Floats, float]:
         )
     with np.load(io.BytesIO(child.stdout)) as data:
         labels, points = [str(label).strip() for label in data["labels"]], data["points"]
-        rate, units = float(data["rate"]), str(data["units"]).strip()
+        rate, units = fps or float(data["rate"]), str(data["units"]).strip()
+        stated = {name: float(data[name]) for name in data.files if ":" in name}
+    header = _header(path)
+    _require_agreement(path, header, stated, fps is None)
     if len(labels) < len(points):
         raise UserError(f"{path}: {len(points)} points but {len(labels)} labels; export it again with labels")
     if units.lower() not in METRES:
         raise UserError(f"{path}: points in {units!r}; set POINT:UNITS to one of {' '.join(METRES)}")
     if not (np.isfinite(rate) and rate > 0):
         raise UserError(f"{path}: {rate} frames per second; set POINT:RATE")
-    expected = _frames_in_header(path)
-    if points.shape[1] < expected:
-        raise UserError(f"{path}: {points.shape[1]} of {expected} frames are there; fetch it again")
+    if points.shape[1] < header.frames:
+        raise UserError(f"{path}: {points.shape[1]} of {header.frames} frames are there; fetch it again")
     return labels, np.swapaxes(points, 0, 1) * METRES[units.lower()], rate
 
 
-def _frames_in_header(path: Path) -> int:
-    """Read the number of frames from the header, which ezc3d corrects silently; 0 if it does not fit."""
+class Header(NamedTuple):
+    """What the header states; ezc3d corrects it silently by the parameters."""
+
+    points: int
+    analog: int  #: values per frame of points
+    frames: int  #: 0 if their number does not fit
+    rate: float  #: frames per second; NaN if written by a DEC
+
+
+def _header(path: Path) -> Header:
     with path.open("rb") as file:
         header = file.read(BLOCK)
         file.seek((header[0] - 1) * BLOCK)
-        big = file.read(4)[3:] == bytes([BIG_ENDIAN])
-    first, last = (int.from_bytes(header[k : k + 2], "big" if big else "little") for k in (6, 8))
-    return 0 if last >= MANY else max(0, last - first + 1)
+        kind = file.read(4)[3]
+    order = ">" if kind == BIG_ENDIAN else "<"
+    points, analog, first, last = struct.unpack_from(f"{order}4H", header, 2)
+    (rate,) = struct.unpack_from(f"{order}f", header, 20)
+    frames = 0 if last >= MANY else max(0, last - first + 1)
+    return Header(points, analog, frames, float("nan") if kind == DEC else rate)
+
+
+def _require_agreement(path: Path, header: Header, stated: Mapping[str, float], rated: bool) -> None:
+    """Refuse a header that differs from the parameters: one of them misplaces all values behind it.
+
+    `rated`: whether the rate counts.
+    """
+    point_rate, analog_rate = stated["POINT:RATE"], stated["ANALOG:RATE"]
+    samples = analog_rate / point_rate if point_rate > 0 else 0.0
+    analog = round(stated["ANALOG:USED"] * samples)
+    fault = ""
+    if header.points != round(stated["POINT:USED"]):
+        fault = f"{header.points} points, POINT:USED {stated['POINT:USED']:g}"
+    elif header.analog != analog:
+        fault = (
+            f"{header.analog} analog values per frame, ANALOG:USED and ANALOG:RATE {analog} "
+            f"({stated['ANALOG:USED']:g} channels at {analog_rate:g} Hz)"
+        )
+    elif rated and point_rate > 0 and abs(header.rate / point_rate - 1) > RATE_OFF:
+        fault = f"{header.rate:g} frames per second, POINT:RATE {point_rate:g}"
+    if fault:
+        remedy = "export it again" + ", or give --fps" * ("per second" in fault)
+        raise UserError(f"{path}: header and parameters differ: the header states {fault}; {remedy}")

@@ -32,6 +32,8 @@ class FileNotes:
     labels: frozenset[str] = frozenset()
     #: Which part is exactly 0, and in which frames, as if it were missing; empty if none is.
     zeros: str = ""
+    #: Bones or joints that the file lacks and that learning can do without.
+    lacking: tuple[str, ...] = ()
 
 
 NO_NOTES = FileNotes()

@@ -39,9 +39,10 @@ LIMITS = dict.fromkeys(("_x", "_y", "_z"), (FARTHEST, "metres"))
 LIMITS |= {"_deg": (DEGREES, "degrees"), "_rad": (float(np.radians(DEGREES)), "radians")}
 QUANTITIES = {"time", "stature_m", *ANGLES, *ROOTS}  # other columns of numbers that are used
 
-#: Joints that a file of positions must have.
+#: Joints that a file of positions may have, and those that it must have.
 PARTS = ("shoulder", "elbow", "wrist", "hip", "knee", "ankle", "toe")
 JOINTS = ["neck", "head", *(f"{s}_{part}" for s in SIDES for part in PARTS)]
+NEEDED = [f"{s}_{part}" for s in SIDES for part in ("hip", "knee", "ankle")]
 #: Other names of joints in files, compared without case, '_' and blanks.
 JOINT_ALIASES = {"head": ("headtop",), "l_toe": ("lbigtoe",), "r_toe": ("rbigtoe",)}
 
@@ -91,10 +92,10 @@ class AngleTable:
 
 
 def holds_angles(path: Path) -> bool:
-    """Whether a .csv has columns of angles, and not the positions of all joints."""
+    """Whether a .csv has columns of angles, and not the positions of the legs' joints."""
     names = [name.strip() for name in _lines(path)[0][1]]
     joints = find_joints([name[:-2] for name in names if name.endswith("_x")])
-    return set(JOINTS) > set(joints) and bool(_columns(names, ANGLES))
+    return not set(NEEDED) <= set(joints) and bool(_columns(names, ANGLES))
 
 
 def find_joints(names: list[str]) -> dict[str, str]:

@@ -11,7 +11,7 @@ from gait.body.skeleton import SIDES
 from gait.errors import UserError
 from gait.learn.arrays import Floats
 from gait.learn.mocap.recording import NO_NOTES, FileNotes, Recording
-from gait.learn.rotations import rotation_vectors, unit
+from gait.learn.rotations import frame_from, rotation_vectors, unit
 
 #: Names of bones in files; {S} = left/right, {s} = l/r.  Compared without case, punctuation and any prefix up
 #: to ':' (Mixamo) or of a biped (3ds Max).  From CMU's ASF; cgspeed and Mixamo; Poser; 3ds Max; and bones
@@ -36,7 +36,14 @@ ALIASES = {
     ),
     "{s}_hand": ("{s}hand", "{S}hand", "{S}wrist"),
 }
+REQUIRED = ("pelvis", "{s}_thigh", "{s}_shank", "{s}_foot")  #: without these there is no gait
+#: Why a body is refused that no rotation makes one.
+MIRRORED = (
+    "axes are left-handed, or left and right are swapped: a mirror image fits a body; negate one axis, or "
+    "exchange the names"
+)
 RECORDED = "marker "  # prefix of names in `Body.joints` that are markers of the file
+UPRIGHT = 0.8  # of the leg's length by which the hips of a rest pose that stands are above the ankles
 BIPED = re.compile(r"^bip0*\d*")
 
 
@@ -70,69 +77,128 @@ class Body:
 
 
 def from_bones(recording: Recording) -> Body:
-    """Return the body of a recorded skeleton; UserError if a bone is missing under all its known names."""
-    bones = _find_bones(recording)
+    """Return the body of a recorded skeleton; UserError if the pelvis or a bone of the legs is missing.
+
+    A neck that is missing begins where the head does; other parts are NaN.
+    """
+    bones, lacking = _find_bones(recording)
     joints = _joints(recording, bones)
-    rest = {s: recording.rest_start[bones[f"{s}_thigh"]] for s in SIDES}
-    axes = _rest_axes(rest["l"] - rest["r"])
-    lateral = {"head": recording.rotation[:, bones["head"]] @ axes[:, 1]}
+    stands = _rest_stands(recording, bones)
+    axes, head = (_rest_axes if stands else _posed_axes)(recording, bones, joints)
+    missing = np.full((len(recording.start), 3), np.nan)
+    lateral = {"head": recording.rotation[:, bones["head"]] @ head if "head" in bones else missing}
     for s in SIDES:
         for joint, upper, lower in (("knee", "thigh", "shank"), ("elbow", "upper_arm", "forearm")):
-            hinge = _hinge(recording, bones[f"{s}_{upper}"], bones[f"{s}_{lower}"])
+            if not {f"{s}_{upper}", f"{s}_{lower}"} <= set(bones):
+                lateral[f"{s}_{joint}"] = missing
+                continue
+            hinge = _hinge(recording, bones[f"{s}_{upper}"], bones[f"{s}_{lower}"], stands)
             lateral[f"{s}_{joint}"] = recording.rotation[:, bones[f"{s}_{upper}"]] @ hinge
             lateral[f"{s}_{joint}"] *= _left_sign(joint, s, joints, lateral[f"{s}_{joint}"])
     pelvis = recording.rotation[:, bones["pelvis"]] @ axes
-    return Body(recording.name, recording.fps, joints, pelvis, lateral, notes=recording.notes)
+    notes = replace(recording.notes, lacking=lacking)
+    return Body(recording.name, recording.fps, joints, pelvis, lateral, notes=notes)
+
+
+def level_pelvis(hips: Floats) -> Floats:
+    """Return the pelvis's axes (T, 3, 3) where only the vectors (T, 3) from right to left hip are known."""
+    return frame_from(np.broadcast_to([0.0, 0, 1], hips.shape), hips, exact="y")
 
 
 def _plain(name: str) -> str:
     return BIPED.sub("", "".join(c for c in name.rsplit(":", 1)[-1].lower() if c.isalnum()))
 
 
-def _find_bones(recording: Recording) -> dict[str, int]:
-    """Return the bone of each key of ALIASES."""
+def _find_bones(recording: Recording) -> tuple[dict[str, int], tuple[str, ...]]:
+    """Return the bone of each key of ALIASES that is there, and the keys of bones that are not."""
     known = {_plain(name): i for i, name in reversed(list(enumerate(recording.bones)))}
-    found = {}
+    found, lacking = dict[str, int](), list[str]()
     for role, names in ALIASES.items():
         for s, side in zip(SIDES, ("left", "right"), strict=True) if "{s}" in role else [("", "")]:
-            wanted = [name.format(s=s, S=side) for name in names]
+            wanted, part = [name.format(s=s, S=side) for name in names], role.format(s=s)
             index = next((known[name] for name in wanted if name in known), None)
-            if index is None and role != "{s}_hand":
-                raise UserError(
-                    f"{recording.source}: no bone for {role.format(s=s)!r}; name it one of {wanted}"
-                )
             if index is not None:
-                found[role.format(s=s)] = index
-    return found
+                found[part] = index
+            elif role in REQUIRED:
+                raise UserError(f"{recording.source}: no bone for {part!r}; name it one of {wanted}")
+            elif role != "{s}_hand":
+                lacking.append(part)
+    if "head" in found and "neck" not in found:
+        found["neck"] = found["head"]
+        lacking.remove("neck")
+    return found, tuple(lacking)
 
 
 def _joints(recording: Recording, bones: dict[str, int]) -> dict[str, Floats]:
-    start, end = recording.start, recording.end
-    joints = {"neck": start[:, bones["neck"]], "head": end[:, bones["head"]]}
+    missing = np.full((len(recording.start), 3), np.nan)
+
+    def start(part: str) -> Floats:
+        return recording.start[:, bones[part]] if part in bones else missing
+
+    def end(part: str) -> Floats:
+        return recording.end[:, bones[part]] if part in bones else missing
+
+    joints = {"neck": start("neck"), "head": end("head")}
     for s in SIDES:
         starts = {"shoulder": "upper_arm", "elbow": "forearm", "hip": "thigh", "knee": "shank"}
         for joint, bone in starts.items():
-            joints[f"{s}_{joint}"] = start[:, bones[f"{s}_{bone}"]]
-        hand = bones.get(f"{s}_hand")
-        joints[f"{s}_wrist"] = end[:, bones[f"{s}_forearm"]] if hand is None else start[:, hand]
-        joints[f"{s}_ankle"], joints[f"{s}_toe"] = start[:, bones[f"{s}_foot"]], end[:, bones[f"{s}_foot"]]
+            joints[f"{s}_{joint}"] = start(f"{s}_{bone}")
+        hand = f"{s}_hand"
+        joints[f"{s}_wrist"] = start(hand) if hand in bones else end(f"{s}_forearm")
+        joints[f"{s}_ankle"], joints[f"{s}_toe"] = start(f"{s}_foot"), end(f"{s}_foot")
     joints["pelvis"] = (joints["l_hip"] + joints["r_hip"]) / 2
     return joints
 
 
-def _rest_axes(left: Floats) -> Floats:
-    """Return the body axes of the rest pose as columns, from the direction between the hips."""
-    y = unit(np.array([left[0], left[1], 0.0]))
-    return np.stack([np.cross(y, [0.0, 0, 1]), y, [0.0, 0, 1]], axis=-1)
+def _rest_stands(recording: Recording, bones: dict[str, int]) -> bool:
+    """Whether the rest pose is upright: the legs hang, and the head is above the hips."""
+    start = recording.rest_start
+    for s in SIDES:
+        hip, knee, ankle = (start[bones[f"{s}_{part}"]] for part in ("thigh", "shank", "foot"))
+        leg = np.linalg.norm(knee - hip) + np.linalg.norm(ankle - knee)
+        if not hip[2] - ankle[2] > UPRIGHT * leg:
+            return False
+    return "neck" not in bones or bool(start[bones["neck"]][2] > max(hip[2], knee[2]))
 
 
-def _hinge(recording: Recording, upper: int, lower: int) -> Floats:
-    """Return the axis of a hinge in the rest pose: the file's own, else the main axis of its rotations."""
+def _rest_axes(
+    recording: Recording, bones: dict[str, int], joints: dict[str, Floats]
+) -> tuple[Floats, Floats]:
+    """Return the pelvis's axes as columns and the head's left, in the rest pose, which stands."""
+    left, right = (recording.rest_start[bones[f"{s}_thigh"]] for s in SIDES)
+    y = unit(np.array([left[0] - right[0], left[1] - right[1], 0.0]))
+    return np.stack([np.cross(y, [0.0, 0, 1]), y, [0.0, 0, 1]], axis=-1), y
+
+
+def _posed_axes(
+    recording: Recording, bones: dict[str, int], joints: dict[str, Floats]
+) -> tuple[Floats, Floats]:
+    """Return the same without a rest pose: on average the pelvis is level, and the head looks ahead."""
+    pelvis, head = (recording.rotation[:, bones.get(part, 0)] for part in ("pelvis", "head"))
+    hips = joints["l_hip"] - joints["r_hip"]
+    axes = frame_from(_mean_in(pelvis, np.broadcast_to([0.0, 0, 1], hips.shape)), _mean_in(pelvis, hips), "y")
+    return axes, unit(_mean_in(head, pelvis @ axes[:, 1]))
+
+
+def _mean_in(frames: Floats, vectors: Floats) -> Floats:
+    """Return the mean of vectors (T, 3) in the axes of frames (T, 3, 3)."""
+    return np.asarray(np.nanmean(np.einsum("tji,tj->ti", frames, vectors), axis=0))
+
+
+def _hinge(recording: Recording, upper: int, lower: int, stands: bool) -> Floats:
+    """Return the axis of a hinge in the rest pose: the file's own, else the main axis of its rotations.
+
+    Rotations are from the rest pose if it stands, where limbs are straight; else from the mean.
+    """
     name = recording.bones[lower]
     if name in recording.hinges:
         return recording.hinges[name]
     relative = np.swapaxes(recording.rotation[:, upper], -1, -2) @ recording.rotation[:, lower]
-    vectors = rotation_vectors(relative[np.isfinite(relative).all(axis=(1, 2))])
+    relative = relative[np.isfinite(relative).all(axis=(1, 2))]
+    if not stands:
+        u, _, vt = np.linalg.svd(relative.mean(axis=0))
+        relative = relative @ (u @ vt).T
+    vectors = rotation_vectors(relative)
     _, axes = np.linalg.eigh(vectors.T @ vectors)
     return axes[:, -1]
 

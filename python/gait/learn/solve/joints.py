@@ -19,10 +19,10 @@ from gait.body.skeleton import JOINTS as POINTS
 from gait.errors import UserError
 from gait.learn.arrays import Floats
 from gait.learn.mocap.recording import Y_UP, FileNotes, mask_zero_runs
-from gait.learn.mocap.tables import JOINTS, find_joints, read_joints
-from gait.learn.rotations import frame_from, unit
+from gait.learn.mocap.tables import JOINTS, NEEDED, find_joints, read_joints
+from gait.learn.rotations import unit
 from gait.learn.solve import skeleton_fit
-from gait.learn.solve.body import Body
+from gait.learn.solve.body import Body, level_pelvis
 from gait.learn.solve.kinematics import HINGES, ORIGINS, SEGMENTS, Pose, pose_skeleton
 
 STRAIGHT = 0.25  # sine of the bend at which limb and body count alike for the direction of the hinge
@@ -48,7 +48,8 @@ def from_table(path: Path, fps: float | None = None, zeros_missing: bool = False
     """
     table, places, masked, zeros = read_joints(path, fps, zeros_missing)
     require_whole(masked, lambda frame: f"{path}:{table.lines[frame]}")
-    body = replace(from_joints(path, _z_up(path, places), table.fps), notes=FileNotes(zeros=zeros))
+    body = from_joints(path, _z_up(path, places), table.fps)
+    body = replace(body, notes=replace(body.notes, zeros=zeros))
     columns = [f"{name}_deg" for name in ANGLES]
     if not set(columns) <= set(table.names):
         return body
@@ -59,15 +60,17 @@ def from_table(path: Path, fps: float | None = None, zeros_missing: bool = False
 def from_joints(path: Path, places: dict[str, Floats], fps: float) -> Body:
     """Return the body of named joint positions (T, 3), z up, metres, with short gaps bridged.
 
-    UserError if a joint is missing, or one of the legs is never seen.
+    UserError if a joint of the legs is missing or never seen; others that are missing are NaN.
     """
     columns = find_joints(list(places))
-    lacking = next((joint for joint in JOINTS if joint not in columns), None)
-    if lacking is not None:
-        raise UserError(f"{path}: no joint {lacking!r}; name one of its columns so, or leave the file out")
-    joints = {joint: bridged(places[columns[joint]], fps) for joint in JOINTS}
-    legs = [joint for joint in JOINTS if joint.split("_")[-1] in ("hip", "knee", "ankle")]
-    empty = next((joint for joint in legs if not np.isfinite(joints[joint]).any()), None)
+    lacking = tuple(joint for joint in JOINTS if joint not in columns)
+    needed = next((joint for joint in NEEDED if joint in lacking), None)
+    if needed is not None:
+        raise UserError(f"{path}: no joint {needed!r}; name one of its columns so, or leave the file out")
+    frames = len(next(iter(places.values())))
+    joints = {joint: bridged(places[columns[joint]], fps) for joint in columns}
+    joints |= {joint: np.full((frames, 3), np.nan) for joint in lacking}
+    empty = next((joint for joint in NEEDED if not np.isfinite(joints[joint]).any()), None)
     if empty is not None:
         raise UserError(f"{path}: no values for joint {empty!r}; leave the file out")
     hips, shoulders = (joints[f"l_{part}"] - joints[f"r_{part}"] for part in ("hip", "shoulder"))
@@ -78,8 +81,8 @@ def from_joints(path: Path, places: dict[str, Floats], fps: float) -> Body:
         elbow = _hinge(joints, s, ("shoulder", "elbow", "wrist"))
         lateral[f"{s}_knee"] = unit(knee + STRAIGHT * unit(hips))
         lateral[f"{s}_elbow"] = unit(-elbow + STRAIGHT * unit(shoulders))
-    up = np.broadcast_to([0.0, 0, 1], hips.shape)
-    return Body(path.stem, fps, joints, frame_from(up, hips, exact="y"), lateral)
+    notes = FileNotes(lacking=lacking)
+    return Body(path.stem, fps, joints, level_pelvis(hips), lateral, notes=notes)
 
 
 def _hinge(joints: dict[str, Floats], s: str, chain: tuple[str, str, str]) -> Floats:
@@ -89,13 +92,16 @@ def _hinge(joints: dict[str, Floats], s: str, chain: tuple[str, str, str]) -> Fl
 
 
 def _z_up(path: Path, places: dict[str, Floats]) -> dict[str, Floats]:
-    """Turn positions with y up to z up; up is from the ankles to the neck."""
+    """Turn positions with y up to z up; up is from the ankles to the neck or, without one, to the hips."""
     found = find_joints(list(places))
-    ends = [found.get(joint) for joint in ("neck", "l_ankle", "r_ankle")]
-    if None in ends:
+    tops = ("neck",) if "neck" in found else ("l_hip", "r_hip")
+    if not {*tops, "l_ankle", "r_ankle"} <= set(found):
         return places  # `from_joints` names the joint
-    neck, *ankles = (places[name] for name in ends if name is not None)
-    rise = neck - sum(ankles) / 2
+    top, ankles = (
+        np.mean([places[found[joint]] for joint in joints], axis=0)
+        for joints in (tops, ("l_ankle", "r_ankle"))
+    )
+    rise = top - ankles
     if not np.isfinite(rise).all(axis=1).any():
         return places
     up = np.nanmean(rise, axis=0)

@@ -16,7 +16,7 @@ from gait.errors import UserError
 from gait.learn.arrays import Floats
 from gait.learn.mocap.markers import Landmark, MarkerMap, known_landmarks, plain
 from gait.learn.solve import skeleton_fit
-from gait.learn.solve.body import RECORDED, Body
+from gait.learn.solve.body import MIRRORED, RECORDED, Body, level_pelvis
 from gait.learn.solve.kinematics import HINGES, SEGMENTS, pose_skeleton, segment_origins, segment_scales
 from gait.learn.solve.skeleton_fit import LengthInformation
 
@@ -24,6 +24,8 @@ FEWEST_LABELS = 6
 JOINT_SD = 0.03  # metres beyond which a joint is not known
 AXIS_SD = np.radians(15)  # beyond which a direction is not known
 WORST_RMS = 0.05  # metres: with a larger one, markers are not where their labels place them
+USUAL_RMS = 0.01  # metres: those of right-handed recordings are below
+BETTER = 0.6  # of the rms: with a mirror image that fits so well the axes are left-handed
 CHUNK = 512  # frames processed at once
 LEGS = [f"{s}_{joint}" for s in SIDES for joint in ("hip", "knee", "ankle")]
 
@@ -45,6 +47,7 @@ def from_markers(
     points = np.where(np.isfinite(points).all(axis=2, keepdims=True), points, np.nan)
     columns, places = _placed(path, labels, points, marker_map)
     fit = skeleton_fit.fit(points[:, columns], places, log_scales)
+    _require_right_handed(path, points[:, columns], places, float(np.sqrt(np.nanmean(fit.residual**2))))
     own = {labels[k].rsplit(":", 1)[-1]: points[:, k] for k in columns}
     body = from_fit(path.stem, fps, fit, own)
     if not body.residual or not body.residual < WORST_RMS:
@@ -60,6 +63,15 @@ def from_markers(
             f"{path}: the known markers do not determine {unknown[0]!r}; name more in a --markers file"
         )
     return body
+
+
+def _require_right_handed(path: Path, observed: Floats, places: skeleton_fit.Points, rms: float) -> None:
+    """Refuse markers (T, K, 3) whose mirror image fits far better than they do, with `rms` metres."""
+    if rms < USUAL_RMS:
+        return
+    _, mirrored = skeleton_fit.length_information(observed * [1.0, 1.0, -1.0], places)
+    if mirrored < BETTER * rms:
+        raise UserError(f"{path}: {MIRRORED}")
 
 
 def length_information(
@@ -127,13 +139,16 @@ def from_fit(
     joints["head"] = joints.pop("head_top")
     joints |= {RECORDED + label: places for label, places in (markers or {}).items()}
     rotation_sd = np.sqrt(np.trace(fit.covariance[:, 3:6, 3:6], axis1=1, axis2=2))
-    pelvis = np.where((rotation_sd < AXIS_SD)[:, None, None], fit.pose.rotation, np.nan)
-    up = _z_up(fit.pose.rotation[np.isfinite(pelvis[:, 0, 0])])
+    known = rotation_sd < AXIS_SD
+    legs = joints["l_hip"] + joints["r_hip"] - joints["l_ankle"] - joints["r_ankle"]
+    up = _z_up(fit.pose.rotation[known, :, 2] if known.any() else legs[np.isfinite(legs[:, 0])])
+    joints = {joint: place @ up.T for joint, place in joints.items()}
+    pelvis = np.where(known[:, None, None], up @ fit.pose.rotation, np.nan)
     return Body(
         name,
         fps,
-        {joint: place @ up.T for joint, place in joints.items()},
-        up @ pelvis,
+        joints,
+        pelvis if known.any() else level_pelvis(joints["l_hip"] - joints["r_hip"]),
         {hinge: axes[:, k] @ up.T for k, hinge in enumerate(HINGES)},
         residual=float(np.sqrt(np.nanmean(fit.residual**2))),
     )
@@ -164,9 +179,9 @@ def _sd(slopes: Floats, covariance: Floats) -> Floats:
     return np.sqrt(((rows @ covariance) * rows).sum(axis=2).reshape(frames, count, 3).sum(axis=2))
 
 
-def _z_up(pelvis: Floats) -> Floats:
-    """Rotation to z up; up is the axis of the file that is nearest to the pelvis's own."""
-    up = pelvis[:, :, 2].mean(axis=0) if len(pelvis) else np.array([0.0, 0, 1])
+def _z_up(axes: Floats) -> Floats:
+    """Rotation to z up; up is the axis of the file that is nearest to the body's own, (T, 3)."""
+    up = axes.mean(axis=0) if len(axes) else np.array([0.0, 0, 1])
     k = int(np.argmax(np.abs(up)))
     z = np.eye(3)[k] * np.sign(up[k])
     x = np.eye(3)[(k + 1) % 3]

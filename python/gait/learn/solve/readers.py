@@ -15,13 +15,15 @@ from gait.learn.mocap.markers import plain
 from gait.learn.mocap.recording import Y_UP, FileNotes
 from gait.learn.mocap.tables import AngleTable
 from gait.learn.options import DEFAULT, LearnOptions
+from gait.learn.rotations import unit
 from gait.learn.solve import joints, markers
-from gait.learn.solve.body import Body, from_bones
-from gait.learn.solve.retarget import overground
+from gait.learn.solve.body import MIRRORED, Body, from_bones
+from gait.learn.solve.retarget import mean, median, overground
 from gait.learn.solve.skeleton_fit import LengthInformation
 
 RECORDINGS = {".amc": acclaim.read, ".bvh": bvh.read}
 LEG = 0.25, 1.5  #: metres from hip over knee to ankle: small children to more than the tallest man
+TOES, KNEES = 0.3, 0.05  #: cosine of toes and sine of knees that point back by more than noise
 #: Suffixes of the files that can be read.
 SUFFIXES = (*RECORDINGS, *points.SUFFIXES, ".csv")
 
@@ -42,6 +44,7 @@ def read(path: Path, options: LearnOptions = DEFAULT, log_scales: Floats | None 
     else:
         body = _from_points(path, options, log_scales)
     _require_size(path, body)
+    _require_anatomy(path, body)
     return overground(body)
 
 
@@ -50,7 +53,7 @@ def length_information(path: Path, options: LearnOptions = DEFAULT) -> LengthInf
 
     UserError if the file is malformed, or its markers are not known.
     """
-    labels, places, _ = points.read(path)
+    labels, places, _ = points.read(path, options.fps)
     if _are_joints(labels, options):
         return None
     return markers.length_information(path, labels, places, options.markers)
@@ -58,8 +61,7 @@ def length_information(path: Path, options: LearnOptions = DEFAULT) -> LengthInf
 
 def _from_points(path: Path, options: LearnOptions, log_scales: Floats | None) -> Body:
     """Read labelled points: centres of all joints (y up, as `gait track --trc` writes them), or markers."""
-    labels, places, rate = points.read(path)
-    fps = options.fps or rate
+    labels, places, fps = points.read(path, options.fps)
     if _are_joints(labels, options):
         upright = places @ Y_UP.T
         by_name = {name: upright[:, k] for k, name in enumerate(labels)}
@@ -86,4 +88,24 @@ def _require_size(path: Path, body: Body) -> None:
     if not least <= leg <= most:
         raise UserError(
             f"{path}: legs of {leg:.3g} m; {least:g} to {most:g} m are plausible; correct the file's units"
+        )
+
+
+def _require_anatomy(path: Path, body: Body) -> None:
+    """Refuse a body that is mirrored or upside down: toes are ahead, and knees bend back in any motion."""
+    ahead, left = body.pelvis[:, :, 0], body.pelvis[:, :, 1]
+    toes, knees, legs = list[Floats](), list[Floats](), list[Floats]()
+    for s in SIDES:
+        hip, knee, ankle, toe = (body.joints[f"{s}_{joint}"] for joint in ("hip", "knee", "ankle", "toe"))
+        toes.append(np.einsum("ti,ti->t", unit(toe - ankle), ahead))
+        knees.append(np.einsum("ti,ti->t", np.cross(unit(knee - hip), unit(ankle - knee)), left))
+        legs.append((hip - ankle)[:, 2])
+    backwards = median(np.array(toes)) < -TOES or (
+        not np.isfinite(toes).any() and mean(np.array(knees)) < -KNEES
+    )
+    if backwards:
+        raise UserError(f"{path}: {MIRRORED}")
+    if median(np.array(legs)) < -LEG[0]:
+        raise UserError(
+            f"{path}: the body is upside down: z, or y of .bvh and .trc, must point up; rotate the data"
         )
