@@ -16,7 +16,7 @@ Array = NDArray[np.float64]
 
 METRES = {"m": 1.0, "mm": 0.001, "cm": 0.01}  #: one unit of a file
 NAMED = {"DataRate", "NumMarkers", "Units"}  #: fields that a header must name
-_RATE_OFF, _JUMP = 0.02, 1.7  # relative difference of rates; steps of a frame that are a gap
+_RATE_OFF, _GAP = 0.02, 1.7  # relative difference of rates; steps of a frame that are a gap
 HEAD = 5  # lines of the header; an empty one may follow
 
 
@@ -76,16 +76,16 @@ def _require_consistent(
 
 
 def _require_rate(path: Path, rate: float, times: list[tuple[int, float]]) -> None:
-    """Refuse times that contradict the rate, or that jump because rows are missing."""
+    """Refuse times that contradict the rate, or that have gaps because rows are missing."""
     seconds = np.array([time for _, time in times])
     if np.isnan(seconds).any():  # the column may be empty
         return
     steps = np.diff(seconds)
     measured = len(steps) / float(seconds[-1] - seconds[0])  # the mean, as times are rounded
-    jump = int(np.argmax(steps))
-    if steps[jump] > _JUMP / rate and steps[jump] > _JUMP * np.median(steps):
+    gap = int(np.argmax(steps))
+    if steps[gap] > _GAP / rate and steps[gap] > _GAP * np.median(steps):
         raise UserError(
-            f"{path}:{times[jump + 1][0]}: {steps[jump]:.3g} s after the row before, at {rate:g} per second; "
+            f"{path}:{times[gap + 1][0]}: {steps[gap]:.3g} s after the row before, at {rate:g} per second; "
             "add rows with empty cells for frames that are missing, or cut the file there"
         )
     if abs(measured / rate - 1) > _RATE_OFF:
