@@ -26,7 +26,7 @@ class Stage:
     def __init__(self, monkeypatch):
         self.places = {}
         monkeypatch.setattr(
-            people, "PersonNetwork", lambda: lambda image, known: list(map(self.crop, self.visible()))
+            people, "PersonNetwork", lambda: lambda image, small: [list(map(self.crop, self.visible()))]
         )
         monkeypatch.setattr(people, "LandmarkNetwork", lambda name: self.landmarks)
         self.detector = people.PeopleDetector()
@@ -113,6 +113,12 @@ def test_people_at_one_place_are_one(stage):
     for n in range(1, 30):
         found = stage.step(n, red=min(200 + 8 * n, 396), blue=400)
         assert len(found) == len({round(x, 3) for x in found.values()})
+
+
+def test_a_thing_taken_for_a_person_hides_nobody_small(stage):
+    """The whole picture shows a thing, parts of it the person."""
+    stage.detector._find = lambda image, small: iter([[stage.crop(600)], [stage.crop(200)]])
+    assert stage.step(0, red=200) == {1: pytest.approx(200)}
 
 
 def test_a_crop_follows_at_the_persons_speed(stage):

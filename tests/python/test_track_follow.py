@@ -10,11 +10,14 @@ from drawn_person import camera, clip, wall, write
 
 from gait import Model, Tracker, TrackerConfig, TrackStatus, Video
 from gait.bindings.frame import FrameKeypoints
+from gait.bindings.initial import Start
 from gait.bindings.model import read_blob
 from gait.cli import main
 from gait.io import blob, keypoints_file, video
 from gait.io.track_file import read_track
 from gait.io.video import Frame
+from gait.track import scene
+from gait.track.follow import Follower
 from gait.track.person_keypoints import PersonKeypoints
 from gait.track.plausible import Plausibility
 
@@ -93,8 +96,12 @@ def test_frames_from_the_last_to_the_first(folder, monkeypatch):
 
 
 @pytest.mark.parametrize("at", [0, len(FRAMES) + GAP + START])
-def test_a_person_who_comes_back_is_found_by_keypoints(at, folder, capsys):
-    """The person walks, is away, and walks again from the first place; the start is in either walk."""
+@pytest.mark.parametrize("ids", [(1,), (1, 2)])
+def test_a_person_who_comes_back_is_found_by_keypoints(ids, at, folder, capsys, monkeypatch):
+    """The person walks, is away, and walks again from the first place; the start is in either walk.
+
+    With the keypoints of a file, or of a detector that gives the person another id.
+    """
     write(folder / "walk.mp4", [*FRAMES, *[wall()] * GAP, *FRAMES])
     again = len(FRAMES) + GAP
     init(folder, at % again, at)
@@ -103,8 +110,22 @@ def test_a_person_who_comes_back_is_found_by_keypoints(at, folder, capsys):
     uv[: len(FRAMES)] = uv[-len(FRAMES) :] = camera().project(JOINTS)
     frame = np.arange(count)
     found = keypoints_file.Keypoints(frame, frame / 30, MODEL.joint_names, uv, np.ones(uv.shape[:2]))
-    keypoints_file.write(folder / "k.csv", found)
-    assert track(folder, "--keypoints", folder / "k.csv") == 0
+    if len(ids) == 1:
+        keypoints_file.write(folder / "k.csv", found)
+        assert track(folder, "--keypoints", folder / "k.csv") == 0
+    else:
+        people = {
+            id: replace(
+                found,
+                frame=frame[part],
+                time=found.time[part],
+                uv=uv[part],
+                confidence=found.confidence[part],
+            )
+            for id, part in ((1, slice(0, again)), (2, slice(again, count)))
+        }
+        monkeypatch.setattr(scene, "_detect", lambda *_: (people, 1 if at == 0 else 2))
+        assert track(folder) == 0
     rows, mine, order = errors(folder)
     assert rows.frame.tolist() == frame.tolist()
     assert "lost" in rows.status[len(FRAMES) : again]
@@ -147,8 +168,92 @@ def test_keypoints_of_another_person_are_left_out(estimate):
     assert people.choose(zero, estimate) is us and people.choose(one, estimate) is None
     assert people.choose(one, None) is them and people.choose(one, away) is them
     assert people.agree(zero, estimate) is True and people.agree(one, estimate) is False
-    assert people.agree(two, estimate) is None and not people.contradict(two, estimate)
-    assert people.contradict(one, estimate) and not people.contradict(zero, estimate)
+    assert people.agree(two, estimate) is None and people.near(two, estimate) is None
+    assert people.near(one, estimate) is False and people.near(zero, estimate) is True
+
+
+def test_a_figure_of_another_size_is_not_near(estimate):
+    """Scaled about the feet, so that the ankles agree."""
+    feet = JOINTS[-1].min(axis=0)
+    for size, near in ((1.05, True), (1.8, False), (0.55, False)):
+        people = PersonKeypoints(camera(), {1: {0: found(joints=feet + size * (JOINTS[-1] - feet))}}, 1)
+        assert people.near(Frame(0, 0.0, FRAMES[-1]), estimate) is near
+
+
+class Script:
+    """A tracker that stays on the person, or beside them from a frame on, until it is started anew."""
+
+    def __init__(self, estimate, leaves, starts):
+        self.estimate, self.leaves, self.starts = estimate, leaves, starts
+        self.config = TrackerConfig.default()
+        self.gone = False
+
+    def like(self, config):
+        return Script(self.estimate, self.leaves, self.starts)
+
+    def start(self, mean, sd, utime):
+        self.starts.append(round(utime * 30 / 1e6))
+        self.gone = False
+
+    def step(self, image, utime, keypoints):
+        self.gone |= round(abs(utime) * 30 / 1e6) == self.leaves
+        return replace(self.estimate, joints=JOINTS[-1] + [self.gone * 1.0, 0, 0])
+
+
+class Film:
+    """Frames that nobody looks at."""
+
+    fps = 30.0
+
+    def frames(self, first, stop):
+        return (Frame(n, n / 30, FRAMES[0]) for n in range(first, stop))
+
+    def backwards(self, stop, first):
+        return reversed(list(self.frames(first, stop)))
+
+
+@pytest.fixture
+def astray(estimate):
+    """Follow a track, from a start on, that goes astray at frame 20 or, backwards, at 79.
+
+    The person is found in frames 0 to 19 and 80 to 99; between them are ghosts for a second, then nothing,
+    then the person.  Returns the times of the starts in frames, the spans searched for a start, and the rows.
+    """
+
+    def run(start, ghosts, nothing, again):
+        joints = {n: found() for n in range(100)}
+        joints |= {n: found(-2.0) for n in ghosts} | {n: found(np.nan) for n in nothing}
+        people = PersonKeypoints(camera(), {1: joints}, 1)
+        starts, asked = [], []
+
+        def find(first, stop, stature):
+            asked.append((first, stop))
+            return Start(again, estimate.mean, estimate.sd) if first <= again < stop else None
+
+        follower = Follower(
+            Script(estimate, ghosts[0], starts), Film(), people, Plausibility(people, 1.75, 0.05, 0.0), find
+        )
+        rows = list(follower.follow(Start(start, estimate.mean, estimate.sd), range(100)))
+        assert [frame.number for frame, _ in rows] == list(range(100))
+        near = [bool(people.near(frame, now)) for frame, now in rows]
+        return starts, asked, near, [now.status.name for _, now in rows]
+
+    return run
+
+
+def test_a_person_hidden_for_long_is_taken_up_again(astray):
+    """Frames without keypoints do not hide that the track went astray."""
+    starts, asked, near, statuses = astray(0, range(20, 50), range(50, 65), 65)
+    assert starts == [0, -65, 65]  # a negative one is backwards
+    assert len(asked) == 1 and 35 <= asked[0][0] <= 37
+    assert all(near[65:]) and "LOST" not in statuses[65:]
+
+
+def test_a_track_that_goes_astray_backwards_is_cut_and_the_person_searched_earlier(astray):
+    starts, asked, near, _ = astray(99, range(79, 49, -1), range(49, 34, -1), 5)
+    assert asked[0] == (0, 80)
+    assert starts == [-99, -5, 5, 99]
+    assert all(near[:35])
 
 
 def test_legs_that_keypoints_show_elsewhere_are_no_agreement(estimate):

@@ -8,7 +8,7 @@ OpenCV cannot read.
 from __future__ import annotations
 
 import os
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from typing import NamedTuple
 
 import cv2
@@ -83,19 +83,16 @@ class PersonNetwork:
         self._network = network
         self._anchors = _anchors()
 
-    def __call__(self, image: Image, known: Sequence[Crop] = ()) -> list[Crop]:
-        """Find people, the surest first; search parts of the picture if the whole shows only people known."""
+    def __call__(self, image: Image, small: bool = True) -> Iterator[list[Crop]]:
+        """Search the whole picture, then smaller parts: yield the people of each size, the surest first.
+
+        `small`: search parts of half its shorter side, too.
+        """
         height, width = image.shape[:2]
         side = min(height, width)
-        people: list[Crop] = []
-        for part in dict.fromkeys(
-            (max(height, width), side) if known else (max(height, width), side, side // 2)
-        ):
+        for part in dict.fromkeys((max(height, width), side, *([side // 2] if small else []))):
             found = [crop for box in _tiles(width, height, part) for crop in self._find_in(image, box)]
-            people = [crop for _, crop in _apart(sorted(found, key=lambda f: -f[0]))]
-            if any(not _near(crop, known) for crop in people):
-                break
-        return people
+            yield [crop for _, crop in _apart(sorted(found, key=lambda f: -f[0]))]
 
     def _find_in(self, image: Image, box: tuple[int, int, int, int]) -> list[tuple[float, Crop]]:
         x, y, right, bottom = box

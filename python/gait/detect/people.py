@@ -140,7 +140,7 @@ class PeopleDetector:
                 self._add(one, frame, person, near[one.id])
                 found.append((one, person))
         since = frame.time - self._scanned
-        missing = not found or any(p.lost and frame.time - p.times[-1] < _SCAN_PERIOD for p in self.people)
+        missing = not found or any(self._just_lost(p, frame.time) for p in self.people)
         if since >= (_RETRY if missing else _SCAN_PERIOD):
             self._scanned = frame.time
             self._scan(frame, found)
@@ -170,12 +170,21 @@ class PeopleDetector:
         return own < _ALIKE
 
     def _scan(self, frame: Frame, found: list[tuple[Followed, Person]]) -> None:
-        """Search the whole picture, and where people were hidden, for people who are not followed."""
+        """Search where people were hidden, and the picture, for people who are not followed.
+
+        Parts of the picture are searched, and all of it as one crop, until landmarks confirm a person.
+        """
         time = frame.time
-        crops = [p.expected(time) for p in self.people if p.lost and time - p.times[-1] < _SCAN_PERIOD]
-        crops += self._find(frame.image, [p.crop for _, p in found]) or (
-            [] if found else [whole_picture(frame.image)]
-        )
+        self._add_new(frame, found, [p.expected(time) for p in self.people if self._just_lost(p, time)])
+        for crops in self._find(frame.image, small=not found):
+            if self._add_new(frame, found, crops):
+                return
+        if not found:
+            self._add_new(frame, found, [whole_picture(frame.image)])
+
+    def _add_new(self, frame: Frame, found: list[tuple[Followed, Person]], crops: list[Crop]) -> bool:
+        """Add the people in crops who are not found yet; return whether there is one."""
+        count = len(found)
         for crop in crops:
             if len(found) >= self._most or any(_apart(crop, p.crop) < _SAME / 2 for _, p in found):
                 continue
@@ -187,6 +196,11 @@ class PeopleDetector:
                 one = self._who(frame, person)
                 self._add(one, frame, person, [])
                 found.append((one, person))
+        return len(found) > count
+
+    @staticmethod
+    def _just_lost(one: Followed, time: float) -> bool:
+        return one.lost and time - one.times[-1] < _SCAN_PERIOD
 
     def _who(self, frame: Frame, person: Person) -> Followed:
         """Match a lost person by place and colours, or start a new one."""

@@ -89,11 +89,9 @@ def _follower(
     """Make a follower that finds a lost person by keypoints or, without any, in the pictures."""
 
     def find_start(first: int, stop: int, stature: float) -> Start | None:
-        if not scene.people:
+        if not scene.people or not isinstance(keypoints, PersonKeypoints):
             return None
-        return find_keypoint_start(
-            scene.people[scene.person], scene.camera, scene.model, first=first, stop=stop, height=stature
-        )
+        return _find_start(scene, keypoints, first, stop, stature)
 
     auto_start = None
     if not options.smooth and not scene.people:
@@ -102,3 +100,26 @@ def _follower(
     return Follower(
         tracker, scene.video, keypoints, plausibility, find_start, auto_start, one_pass=options.smooth
     )
+
+
+def _find_start(
+    scene: Scene, keypoints: PersonKeypoints, first: int, stop: int, stature: float
+) -> Start | None:
+    """Find the person by their keypoints or, if these show no walk, of a person who may be the same."""
+    for ids in keypoints.ids, scene.others():
+        found = {
+            id: find_keypoint_start(
+                scene.people[id], scene.camera, scene.model, first=first, stop=stop, height=stature
+            )
+            for id in ids
+        }
+        walks = {
+            id: start
+            for id, start in found.items()
+            if start is not None and (id in keypoints.ids or start.hypotheses[0].walks)
+        }
+        if walks:
+            id, start = min(walks.items(), key=lambda one: one[1].frame)
+            keypoints.add(id)
+            return start
+    return None

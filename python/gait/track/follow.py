@@ -18,7 +18,7 @@ from gait.track.plausible import Plausibility
 from gait.track.tracker import Tracker
 
 _LONGEST_GAP = 1.0  # seconds for which a lost person is tracked on backwards
-_LEAST_BEFORE = 1.0  # seconds before a track in which an earlier start is worth a search
+_LEAST_BEFORE = 0.5  # seconds before a track in which an earlier start is worth a search
 _CONTRADICTED = 0.5  # seconds of keypoints elsewhere after which the person is lost
 _OPEN_PHASE = 0.2  # strides: sd of the phase from which a start leaves left and right open
 _SETTLED = 0.2  # seconds of `tracking` after which they are known
@@ -26,6 +26,23 @@ _SETTLES = 4.0  # seconds from a start in which that is waited for
 
 FindStart = Callable[[int, int, float], Start | None]
 """First start in the frames first <= number < stop, of a person of a stature [m]; None: there is none."""
+
+
+class _Support:
+    """The last frame in which keypoints did not contradict a track, from its start on.
+
+    Frames without keypoints support a track that is not contradicted, as the images decide there.  After a
+    contradiction that lasted, only keypoints near the estimate do.
+    """
+
+    def __init__(self, frame: Frame) -> None:
+        self.frame, self._time = frame.number, frame.time
+
+    def contradicted(self, frame: Frame, near: bool | None) -> bool:
+        """Take in whether there are keypoints near the estimate; return whether there were none for long."""
+        if near or (near is None and abs(frame.time - self._time) <= _CONTRADICTED):
+            self.frame, self._time = frame.number, frame.time
+        return abs(frame.time - self._time) > _CONTRADICTED
 
 
 class Follower:
@@ -73,20 +90,19 @@ class Follower:
         first, before = self._first(given, before, frames.start)
         following: Start | None = first
         now: Estimate | None = None
-        lost, supported = True, 0.0
+        lost = True
         for frame in self._video.frames(min([first.frame, *before]), frames.stop):
             if following is not None and frame.number == following.frame:
-                if lost or following is given:
+                if now is None or lost or following is given or not self._keypoints.near(frame, now):
                     self._start(self._tracker, following, frame.utime)
-                    now, lost, supported = None, False, frame.time
+                    now, lost, support = None, False, _Support(frame)
                 following = given if frame.number < given.frame else None
             elif now is None and lost:
                 yield frame, before[frame.number]
                 continue
             now = self._step(self._tracker, frame, frame.utime, now)
-            if not self._keypoints.contradict(frame, now):
-                supported = frame.time
-            was_lost, lost = lost, now.status == TrackStatus.LOST or frame.time - supported > _CONTRADICTED
+            contradicted = support.contradicted(frame, self._keypoints.near(frame, now))
+            was_lost, lost = lost, contradicted or now.status == TrackStatus.LOST
             if lost and not was_lost:
                 stop = frames.stop if following is None else following.frame
                 found = self._find_start(frame.number + 1, stop, now.mean.stature)
@@ -98,7 +114,7 @@ class Follower:
             anew = self._auto_start.find_lost(frame, estimate.status) if self._auto_start else None
             if anew is not None:
                 self._start(self._tracker, anew, frame.utime)
-                now, lost, supported = None, False, frame.time
+                now, lost, support = None, False, _Support(frame)
 
     def _settled(self, start: Start, frames: range) -> Start:
         """Move a start that leaves left and right open to where the images decide, later or else earlier."""
@@ -173,12 +189,17 @@ class Follower:
         config = self._tracker.config.replace(reverse=1.0)
         tracker = self._tracker.like(config)
         found: dict[int, Estimate] = {}
+        keypoints = self._keypoints if isinstance(self._keypoints, PersonKeypoints) else None
         last, visible, earliest = None, np.inf, start.frame
         for frame in self._video.backwards(start.frame + 1, first):
             if last is None:
                 self._start(tracker, start, -frame.utime)
+                support = _Support(frame)
             last = self._step(tracker, frame, -frame.utime, last)
             found[frame.number] = replace(last, utime=frame.utime, frame=frame.number - start.frame)
+            if keypoints is not None and support.contradicted(frame, keypoints.near(frame, last)):
+                earliest = max(earliest, support.frame)  # the person is elsewhere from here on
+                break
             if last.status != TrackStatus.LOST and not last.flags & Flag.UNSUPPORTED:
                 visible, earliest = frame.time, frame.number
             elif visible - frame.time > _LONGEST_GAP:

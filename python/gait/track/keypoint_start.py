@@ -75,6 +75,7 @@ def find_keypoint_start(
     fit = StartFit(model, camera, **known)
     by_frame = keypoint_noise(keypoints)
     chosen = (keypoints.frame >= first) & (keypoints.frame < (np.inf if stop is None else stop))
+    chosen &= keypoints.visible.any(axis=1)
     frames, times = keypoints.frame[chosen], keypoints.time[chosen]
     best: tuple[Start, Hypothesis] | None = None
     begin = -np.inf

@@ -18,6 +18,7 @@ from gait.camera.camera import Camera
 from gait.io.video import Frame
 
 _GATE = 0.25  # person's heights: keypoints whose median distance from the estimate is larger are not theirs
+_NEAR = 0.15  # person's heights up to which this distance supports the estimate
 _AGREE = 0.08  # person's heights up to which knees and ankles agree with the estimate, on average
 _LEGS = ("l_knee", "r_knee", "l_ankle", "r_ankle")
 
@@ -32,12 +33,22 @@ class PersonKeypoints:
         By id of the person and number of the frame.
     person : int
         Id of the person to track.
+
+    Attributes
+    ----------
+    ids : list of int
+        Of this person: the one given, and those under which the person came back.
     """
 
     def __init__(
         self, camera: Camera, keypoints: Mapping[int, Mapping[int, FrameKeypoints]], person: int
     ) -> None:
-        self._camera, self._keypoints, self._person = camera, keypoints, person
+        self._camera, self._keypoints, self.ids = camera, keypoints, [person]
+
+    def add(self, id: int) -> None:
+        """Take an id for another one of this person."""
+        if id not in self.ids:
+            self.ids.append(id)
 
     def restart(self) -> None:
         """Nothing is remembered from frame to frame."""
@@ -53,11 +64,11 @@ class PersonKeypoints:
         distance, keypoints = min(near, key=lambda pair: pair[0], default=(np.inf, None))
         return keypoints if distance < _GATE else None
 
-    def contradict(self, frame: Frame, estimate: Estimate) -> bool:
-        """Whether the person to track was found in a frame, and no person where the estimate is."""
-        return self._own(frame.number) is not None and all(
-            self._distance(estimate, keypoints) > _GATE for keypoints in self._found(frame.number)
-        )
+    def near(self, frame: Frame, estimate: Estimate) -> bool | None:
+        """Whether a person was found near the estimate; None if the person to track was not found at all."""
+        if any(self._distance(estimate, keypoints) < _NEAR for keypoints in self._found(frame.number)):
+            return True
+        return None if self._own(frame.number) is None else False
 
     def agree(self, frame: Frame, estimate: Estimate) -> bool | None:
         """Whether the keypoints in a frame agree with the estimate, legs included; None if there are none."""
@@ -71,8 +82,11 @@ class PersonKeypoints:
 
     def _own(self, frame: int) -> FrameKeypoints | None:
         """Keypoints of the person to track in a frame."""
-        keypoints = self._keypoints.get(self._person, {}).get(frame)
-        return keypoints if keypoints is not None and np.isfinite(keypoints.uv).any() else None
+        for id in self.ids:
+            keypoints = self._keypoints.get(id, {}).get(frame)
+            if keypoints is not None and np.isfinite(keypoints.uv).any():
+                return keypoints
+        return None
 
     def _found(self, frame: int) -> list[FrameKeypoints]:
         """Keypoints of everyone in a frame."""
@@ -94,5 +108,11 @@ class PersonKeypoints:
         common = [name for name in names if name in keypoints.names and name in estimate.joint_names]
         ours = expected[[estimate.joint_names.index(name) for name in common]]
         theirs = np.asarray(keypoints.uv, float)[[list(keypoints.names).index(name) for name in common]]
-        off = np.hypot(*(ours - theirs).T) / np.ptp(expected[:, 1])
-        return np.asarray(off[np.isfinite(off)])
+        found = np.isfinite(theirs).all(axis=1)
+        if not found.any():
+            return np.empty(0)
+        ours, theirs = ours[found], theirs[found]
+        extent = [np.hypot(*np.ptp(joints, axis=0)) for joints in (ours, theirs)]
+        # A figure that is too large is as far off as one of the right size.
+        height = np.ptp(expected[:, 1]) * min(extent[1] / max(extent[0], 1e-9), 1.0)
+        return np.asarray(np.hypot(*(ours - theirs).T) / max(height, 1.0))

@@ -83,9 +83,9 @@ class PersonShapes:
         unseen = self._seen is not None and abs(frame.time - self._seen) > _PATIENCE
         return False if not self._fits() or unseen else None
 
-    def contradict(self, frame: Frame, estimate: Estimate) -> bool:
-        """Whether the person is seen elsewhere than in the estimate just judged."""
-        return self.agree(frame, estimate) is False
+    def near(self, frame: Frame, estimate: Estimate) -> bool:
+        """Whether the person is not seen elsewhere than in the estimate just judged."""
+        return self.agree(frame, estimate) is not False
 
     def _box(self, estimate: Estimate) -> Box | None:
         """Box of the estimated body; None if part of it is behind the camera."""

@@ -76,6 +76,13 @@ class Scene:
         """Camera of a frame as captured."""
         return self.camera if self.steady is None else self.steady.camera_at(number, self.camera)
 
+    def others(self) -> list[int]:
+        """Ids of those who are never in view together with the person: they may be the same one."""
+        if not self.people:
+            return []
+        own = self.people[self.person].seen()
+        return [id for id, one in self.people.items() if id != self.person and own.isdisjoint(one.seen())]
+
     @staticmethod
     def read(options: ClipOptions) -> Scene:
         """Read the files, run the detector if there is one, and find the camera if none is given.
