@@ -1,0 +1,127 @@
+"""People in made films: in portrait, filling the picture, small; and films in which nobody can be found."""
+
+import json
+import sys
+from pathlib import Path
+
+import cv2
+import numpy as np
+import pytest
+
+from gait import Video, VideoWriter, cli
+from gait.detect import weights
+from gait.detect.networks import JOINTS
+from gait.detect.people import detect
+from gait.io.keypoints_file import read
+from gait.io.track_file import read_track, read_truth
+
+FETCHED = Path(sys.prefix) / "share/gait/weights"
+FRAMES, SIZE = 12, (640, 480)
+MATRIX = 44  # bytes from the name of an MP4 file's track header to its matrix
+TURNS = {0: (1, 0, 0, 1), 90: (0, 1, -1, 0), 180: (-1, 0, 0, -1), 270: (0, -1, 1, 0)}
+"""Entries a, b, c, d of the matrix by the degrees that players turn the picture clockwise."""
+
+
+@pytest.fixture(autouse=True)
+def fetched(monkeypatch):
+    """Let the detector find the weights that `make setup` fetched."""
+    if not all((FETCHED / w.file).is_file() for w in (weights.PERSON, weights.LANDMARKS["lite"])):
+        pytest.skip("the detector's weights are absent: gait detect --fetch")
+    monkeypatch.setenv("GAIT_WEIGHTS", str(FETCHED))
+
+
+@pytest.fixture(scope="module")
+def walk(tmp_path_factory):
+    """A simulated walk: its folder, its pictures, and its joints (T, 16, 2) in them."""
+    folder = tmp_path_factory.mktemp("walk")
+    size = "x".join(map(str, SIZE))
+    words = ["simulate", "-o", str(folder), "--frames", str(FRAMES), "--size", size, "--quiet"]
+    assert cli.main(words) == 0
+    true, _ = read(folder / "truth.csv", tuple(JOINTS), ignore_unknown=True)
+    joints = true.uv[:, [true.names.index(name) for name in JOINTS]]
+    return folder, [frame.image for frame in Video(folder / "video.mp4").frames()], joints
+
+
+def film(path, pictures, turned=0):
+    """Write pictures as a camera does that was held turned clockwise: sideways, and a matrix that says so."""
+    with VideoWriter(path, 30, crf=10) as video:
+        for picture in pictures:
+            video.write(np.ascontiguousarray(np.rot90(picture, turned // 90)))
+    data = bytearray(path.read_bytes())
+    at = data.index(b"tkhd") + MATRIX
+    a, b, c, d = (65536 * value for value in TURNS[turned])
+    data[at : at + 36] = np.array([a, b, 0, c, d, 0, 0, 0, 1 << 30], ">i4").tobytes()
+    path.write_bytes(data)
+    return Video(path)
+
+
+def off(found, true):
+    """Median distance of the joints found from the true ones, heights of the person."""
+    assert list(found) == [1]
+    rows = found[1].frame
+    assert len(rows) >= FRAMES - 2
+    distance = np.median(np.hypot(*(found[1].uv - true[rows]).T))
+    return float(distance / np.median(np.ptp(true[..., 1], axis=1)))
+
+
+@pytest.mark.parametrize("turned", TURNS)
+def test_the_matrix_of_a_film_is_honoured(turned, walk, tmp_path):
+    picture = walk[1][0][:, 100:460]
+    video = film(tmp_path / "film.mp4", [picture] * 3, turned)
+    assert video.size == (360, 480)
+    frame = next(video.frames()).image
+    assert np.abs(frame.astype(float) - picture).mean() < 4
+
+
+def test_a_person_in_portrait_video_is_found_and_tracked(walk, tmp_path):
+    folder, pictures, true = walk
+    left = 100
+    video = film(tmp_path / "film.mp4", [p[:, left : left + 360] for p in pictures], 90)
+    assert off(detect(video, "lite"), true - [left, 0]) < 0.05
+    camera = json.loads((folder / "camera.json").read_text())
+    camera |= {"width": 360, "cx": camera["cx"] - left}
+    (tmp_path / "camera.json").write_text(json.dumps(camera))
+    words = ["track", video.path, "--camera", tmp_path / "camera.json", "--init", folder / "init.json"]
+    plate = cv2.imread(str(folder / "background.png"))[:, left : left + 360]
+    cv2.imwrite(str(tmp_path / "plate.png"), plate)
+    words += [
+        "--background",
+        tmp_path / "plate.png",
+        "-o",
+        tmp_path / "track.csv",
+        "--detector",
+        "lite",
+        "--particles",
+        500,
+        "--quiet",
+    ]
+    assert cli.main([str(word) for word in words]) == 0
+    track, truth = read_track(tmp_path / "track.csv"), read_truth(folder / "truth.csv")
+    assert track.frame.tolist() == truth.frame.tolist() and "lost" not in track.status
+    errors = np.linalg.norm(track.eval15() - truth.eval15(), axis=2)
+    assert np.median(errors) < 0.1
+
+
+def test_a_person_who_fills_the_picture_is_found(walk, tmp_path):
+    """The camera pans with them."""
+    _, pictures, true = walk
+    lefts = np.rint(true[:, :, 0].mean(axis=1) - 110).astype(int)
+    tops = np.rint(true[:, :, 1].min(axis=1) - 85).astype(int)
+    views = [p[t : t + 400, x : x + 220] for p, x, t in zip(pictures, lefts, tops, strict=True)]
+    found = detect(film(tmp_path / "film.mp4", views), "lite")
+    assert off(found, true - np.stack([lefts, tops], axis=1)[:, None]) < 0.05
+
+
+def test_a_person_of_80_pixels_is_found(walk, tmp_path):
+    folder, pictures, true = walk
+    scale = 80 / 390  # from head to foot
+    scene = cv2.resize(cv2.imread(str(folder / "background.png")), (640, 360))
+    x, y = 400, 180
+    views = []
+    for picture in pictures:
+        small = cv2.resize(picture, None, fx=scale, fy=scale, interpolation=cv2.INTER_AREA)
+        view = scene.copy()
+        view[y : y + small.shape[0], x : x + small.shape[1]] = small
+        views.append(view)
+    found = detect(film(tmp_path / "film.mp4", views), "lite")
+    assert off(found, true * scale + [x, y]) < 0.06
