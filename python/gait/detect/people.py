@@ -44,6 +44,7 @@ _ALIKE = 0.6  # overlap of the colours of one person; 5 % of the frames of a fil
 _CLEARLY = 0.1  # by which the overlap with another's colours must be larger
 _MOST = 8  # people
 _LEAST_FRAMES = 3  # in which a person must be found
+_LEAST_FEET = 0.3  # seconds for which both ankles must be in view where feet are needed
 _BINS = (6, 12, 12)  # of L, a and b
 _RANGES = (0, 256, 80, 176, 80, 176)
 _BLUR = [0.5 * np.eye(n) + 0.25 * (np.eye(n, k=1) + np.eye(n, k=-1)) for n in _BINS]
@@ -314,6 +315,16 @@ def require_person(people: dict[int, Keypoints], video: Video) -> None:
     if not people:
         raise UserError(
             f"{video.path}: no person found; the whole body should be in view, 80 pixels or taller"
+        )
+
+
+def require_feet(keypoints: Keypoints, video: Video) -> None:
+    """Refuse a person whose feet are not in the picture long enough for a start or a camera."""
+    ankles = keypoints.uv[:, [j for j, name in enumerate(keypoints.names) if name.endswith("_ankle")]]
+    inside = ((ankles >= 0) & (ankles <= np.array(video.size) - 1)).all(axis=(1, 2))
+    if inside.sum() < _LEAST_FEET * video.fps:
+        raise UserError(
+            f"{video.path}: the person's feet are not in view; film the whole person, feet included"
         )
 
 

@@ -101,6 +101,8 @@ class Scene:
                 _read_start(options, video, camera, model)  # refused before the work on the whole clip
         frames = video.span(options.start or 0, options.stop)
         _require_detector(options)
+        if camera is None:
+            _require_length(video)
         given = None if options.background in ("auto", "none") else background(options.background, video)
         with ThreadPoolExecutor(1) as pool:
             # The median of the clip is computed on another core while the detector runs.
@@ -313,15 +315,27 @@ def one_is_grey(image: Image, plate: Image) -> bool:
     return min(colour) == 0 and max(colour) > _COLOUR
 
 
+def _require_length(video: Video) -> None:
+    """Refuse a video too short to find a camera in, before the detector runs."""
+    from gait.detect.people import require_length  # loads OpenCV, as below
+
+    require_length(video)
+
+
 def _detect(options: ClipOptions, video: Video, frames: range) -> tuple[dict[int, Keypoints], int]:
     """Keypoints of everyone that the detector finds, and the main person; none without a detector."""
     if not _detects(options):
         return {}, -1
-    from gait.detect.people import detect, main_person  # here, as they load the networks' runtime
+    from gait.detect.people import detect, main_person, require_feet  # loads the networks' runtime
 
     with progress("detecting", len(frames), options.quiet) as update:
         people = detect(video, options.network, first=frames.start, stop=frames.stop, update=update)
-    return people, main_person(people) if people else -1
+    if not people:
+        return {}, -1
+    person = main_person(people)
+    if options.init == "auto":
+        require_feet(people[person], video)
+    return people, person
 
 
 def _require_detector(options: ClipOptions) -> None:

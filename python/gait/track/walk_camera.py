@@ -87,8 +87,11 @@ def calibrate_film(
     Raises
     ------
     UserError
-        As `calibrate`; it names the file.
+        As `calibrate`, or if the feet are not in view; it names the file.
     """
+    from gait.detect.people import require_feet  # as above
+
+    require_feet(keypoints, video)
     fov, sd = expected_fov(video, fov, quiet)
     return calibrate(keypoints, video.size, model, height, fov=fov, fov_sd=sd, where=str(video.path))
 
