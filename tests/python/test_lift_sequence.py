@@ -283,9 +283,9 @@ def lifted_by(monkeypatch, outcomes):
     """Lift with a smoother whose attempts end as set, one by one: an error, or chi2 per observation."""
     prior, pending = toy_prior(6, 4, 3), list(outcomes)
 
-    def attempt(prior, keypoints, view, options, grid, update):
+    def attempt(of):
         nothing = np.zeros((9, 4, 3))
-        if options.method == "blend":
+        if of.options.method == "blend":
             return motion.Motion(
                 prior.names, nothing, nothing, nothing, nothing[..., 0], 1.8, 0, True, 0.0, LEFT
             )

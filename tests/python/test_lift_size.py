@@ -10,7 +10,7 @@ from gait.bindings.segment_prior import SegmentPrior
 from gait.body.skeleton import EVAL15, JOINTS
 from gait.camera.camera import Camera
 from gait.io.keypoints_file import Keypoints
-from gait.lift.keypoints.observations import Observations
+from gait.lift.keypoints.observations import Grid, Observations
 from gait.lift.segment.view import Perspective
 from gait.lift.smooth import chain, motion, size
 from gait.lift.smooth.chain import Around, Freedom, overlapping
@@ -213,8 +213,7 @@ def test_one_who_fits_but_floats_is_as_large_as_the_bones(walk, floats):
     keypoints = Keypoints(np.arange(len(small)), time, prior.names, camera.project(small), observed)
     sd = np.full_like(small, 0.01)
     options = Options(stature=STATURE, floor_sd=0.02)
-    found = motion._sized(
-        prior, keypoints, Perspective(camera), options, size.Resized(small, sd, sd), chi2=0.5
-    )
+    sequence = motion._Sequence(prior, keypoints, Perspective(camera), options, Grid.over(time, prior))
+    found = motion._sized(sequence, size.Resized(small, sd, sd), chi2=0.5)
     ratio = size.bones_ratio(prior, small, STATURE)
     assert found.factor == (pytest.approx(1 / ratio) if floats else 1)

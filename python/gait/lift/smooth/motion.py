@@ -123,10 +123,8 @@ class Unlike(UserError):
     """The keypoints show a motion unlike the prior's: a wider prior may do."""
 
 
-HIGH = (
-    # times the distance that follows from the person's size in the picture: no lens that sees feet is so high
-    4.0
-)
+# Times the distance that follows from the person's size in the picture: no lens that sees feet is so high.
+HIGH = 4.0
 SIZES = (0.6, 1.6)  # of the usual extent: no person is smaller or larger
 
 
@@ -184,12 +182,8 @@ def _extent(places: Floats) -> float:
 
 KNOWN_SD, PEOPLE_SD = 0.04, 0.09  # metres, of a stature that is given, and among people
 ANY_HEIGHT = 10.0  # metres, standard deviation of the floor's height without a camera
-WIDER = (
-    1.0,
-    2.0,
-    4.0,
-    8.0,
-)  # factors of the prior's standard deviations, tried in turn while the keypoints ask for it
+# Factors of the prior's standard deviations, tried in turn while the keypoints ask for it.
+WIDER = (1.0, 2.0, 4.0, 8.0)
 FLOATS = 4.0  # standard deviations of the floor's height from which a person does not stand on it
 POOR_FIT = 1.3  # squared standard deviations per number seen from which a wider prior is tried
 
@@ -202,6 +196,23 @@ def output_names(prior: SegmentPrior, keypoints: Keypoints, everything: bool = F
 def segments_of(prior: SegmentPrior, keypoints: Keypoints) -> int:
     """Count the overlapping segments of keypoints."""
     return Grid.over(keypoints.time, prior).blocks - 1
+
+
+@dataclass(frozen=True)
+class _Sequence:
+    """Keypoints, what they are lifted with, and the grid of times."""
+
+    prior: SegmentPrior
+    keypoints: Keypoints
+    view: View
+    options: Options
+    grid: Grid
+    update: Callable[[int], None] = lambda done: None
+
+    @property
+    def markers(self) -> npt.NDArray[np.intp]:
+        """Which marker of the prior each keypoint is."""
+        return self.prior.index(self.keypoints.names)
 
 
 def lift(
@@ -221,13 +232,11 @@ def lift(
     """
     require(prior, keypoints, view, options)
     prior = prior.restricted(names)
-    grid = Grid.over(keypoints.time, prior)
+    of = _Sequence(prior, keypoints, view, options, Grid.over(keypoints.time, prior), update)
     if options.method != "smooth":
-        return _lift(prior, keypoints, view, options, grid, update)
-    best = _widest_needed(prior, keypoints, view, options, grid, update)
-    if best.wider > 1 or not best.settled:
-        return _unlike(prior, keypoints, view, options, grid, best)
-    return best
+        return _lift(of)
+    best = _widest_needed(of)
+    return _unlike(of, best) if best.wider > 1 or not best.settled else best
 
 
 def require(prior: SegmentPrior, keypoints: Keypoints, view: View, options: Options) -> None:
@@ -246,25 +255,19 @@ def evidence(prior: SegmentPrior, keypoints: Keypoints, view: View, options: Opt
     names = tuple(name for name in prior.names if name in {*keypoints.names, *smoother.HIPS})
     smooth = replace(options, method="smooth")
     try:
-        return _evidence(prior.restricted(names), keypoints, view, smooth)
+        prior = prior.restricted(names)
+        return _evidence(_Sequence(prior, keypoints, view, smooth, Grid.over(keypoints.time, prior)))
     except UserError:
         return -np.inf, np.full_like(keypoints.uv, np.nan)
 
 
-def _widest_needed(
-    prior: SegmentPrior,
-    keypoints: Keypoints,
-    view: View,
-    options: Options,
-    grid: Grid,
-    update: Callable[[int], None],
-) -> Motion:
+def _widest_needed(of: _Sequence) -> Motion:
     """Estimate by the prior, or by a wider one if the keypoints ask for it."""
     best: Motion | None = None
     refused: Unlike | None = None
     for wider in WIDER:
         try:
-            found = _lift(prior.widened(wider), keypoints, view, options, grid, update)
+            found = _lift(replace(of, prior=of.prior.widened(wider)))
         except Unlike as error:
             refused = refused or error
             if best is None:
@@ -281,20 +284,18 @@ def _widest_needed(
     return best
 
 
-def _unlike(
-    prior: SegmentPrior, keypoints: Keypoints, view: View, options: Options, grid: Grid, found: Motion
-) -> Motion:
+def _unlike(of: _Sequence, found: Motion) -> Motion:
     """Estimate a motion that the prior does not know by its segments alone: a chain of them goes astray.
 
     Size and standard deviations are by the bones and by the chi2 of the whole, which the segments do not
     know.
     """
     try:
-        alone = _lift(prior, keypoints, view, replace(options, method="blend"), grid, lambda done: None)
+        alone = _lift(replace(of, options=replace(of.options, method="blend"), update=lambda done: None))
     except UserError:  # segments in which next to nothing is seen
         return found
     chi2 = max(found.chi2_per_observation, 1.0) * found.wider**2
-    sized = _sized(prior, keypoints, view, options, alone, chi2)
+    sized = _sized(of, alone, chi2)
     return replace(
         alone,
         places=sized.places,
@@ -342,19 +343,11 @@ class _Task:
         )
 
 
-def _task(
-    prior: SegmentPrior,
-    keypoints: Keypoints,
-    view: View,
-    options: Options,
-    grid: Grid,
-    update: Callable[[int], None],
-    displacements: bool = True,
-) -> _Task:
+def _task(of: _Sequence, displacements: bool = True) -> _Task:
     """Estimate each segment alone."""
-    markers = prior.index(keypoints.names)
+    prior, keypoints, view, options, grid = of.prior, of.keypoints, of.view, of.options, of.grid
     points = Observations(keypoints.uv, keypoints.errors(options.pixel_sd))
-    sampled = resampled(points, keypoints.time, grid.time).among(markers, len(prior.names))
+    sampled = resampled(points, keypoints.time, grid.time).among(of.markers, len(prior.names))
     stature, stature_sd = believed_stature(options, prior.stature)
     lengths = np.ones(len(grid.time))
     if isinstance(view, Parallel):
@@ -363,7 +356,7 @@ def _task(
     # a start must not shrink a motion that does not fit: its noise in the picture would grow
     start_sd = 0.0 if options.method == "smooth" else stature_sd
     lifter = SegmentLifter(prior, view, stature, start_sd)
-    found = explain.explanations(lifter, prior, sampled, update)
+    found = explain.explanations(lifter, prior, sampled, of.update)
     require_visible(found, grid, keypoints, alone=options.method != "smooth")
     course = explain.course(found)
     if options.method == "likelihood":
@@ -371,62 +364,48 @@ def _task(
     else:
         fits = [lifter.solve(each, displacements) for each in course]
     freedom = Freedom(stature, stature_sd, options.floor_sd if view.grounded else ANY_HEIGHT)
-    return _Task(Observed(keypoints.time, points, markers), freedom, stature, lengths, fits)
+    return _Task(Observed(keypoints.time, points, of.markers), freedom, stature, lengths, fits)
 
 
 @_numbers_in_range()
-def _evidence(
-    prior: SegmentPrior, keypoints: Keypoints, view: View, options: Options
-) -> tuple[float, Floats]:
+def _evidence(of: _Sequence) -> tuple[float, Floats]:
     """Log density of keypoints by all markers of a prior, and where they are expected."""
-    grid = Grid.over(keypoints.time, prior)
-    task = _task(prior, keypoints, view, options, grid, lambda done: None, displacements=False)
-    return smoother.evidence(prior, task.observed, view, task.freedom, task.start(grid.frames))
+    task = _task(of, displacements=False)
+    return smoother.evidence(of.prior, task.observed, of.view, task.freedom, task.start(of.grid.frames))
 
 
 @_numbers_in_range()
-def _lift(
-    prior: SegmentPrior,
-    keypoints: Keypoints,
-    view: View,
-    options: Options,
-    grid: Grid,
-    update: Callable[[int], None],
-) -> Motion:
+def _lift(of: _Sequence) -> Motion:
     """Estimate all markers of a prior."""
-    task = _task(prior, keypoints, view, options, grid, update)
-    markers, stature, fits = task.observed.markers, task.stature, task.fits
-    if options.method != "smooth":
-        join = options.method != "segment"
-        return _alone(prior, fits, keypoints, view, grid, task.lengths, stature, join)
-    found_motion = smoother.smooth(
-        prior,
+    task = _task(of)
+    if of.options.method != "smooth":
+        return _alone(of, task)
+    found = smoother.smooth(
+        of.prior,
         task.observed,
-        view,
+        of.view,
         task.freedom,
-        task.start(grid.frames),
-        contact=options.contact,
-        bones=options.bones,
+        task.start(of.grid.frames),
+        contact=of.options.contact,
+        bones=of.options.bones,
     )
-    sized = _sized(prior, keypoints, view, options, found_motion, found_motion.chi2_per_observation)
-    places = sized.places
-    require_size(places, prior, stature)
-    error = _error(view, places[:, markers], found_motion.lengths, keypoints.uv)
+    sized = _sized(of, found, found.chi2_per_observation)
+    require_size(sized.places, of.prior, task.stature)
     return Motion(
-        prior.names,
-        places if view.grounded else _on_floor(places, prior),
+        of.prior.names,
+        _placed(of, sized.places),
         sized.sd,
         sized.rooted_sd,
-        error,
-        found_motion.stature,
-        found_motion.steps,
-        found_motion.settled,
-        found_motion.log_volume_ratio,
-        explain.summarise(fits, view),
-        found_motion.evidence,
-        found_motion.chi2_per_observation,
+        _error(of, sized.places, found.lengths),
+        found.stature,
+        found.steps,
+        found.settled,
+        found.log_volume_ratio,
+        explain.summarise(task.fits, of.view),
+        found.evidence,
+        found.chi2_per_observation,
         resized=sized.factor,
-        outliers=found_motion.outliers,
+        outliers=found.outliers,
     )
 
 
@@ -435,19 +414,13 @@ def believed_stature(options: Options, usual: float) -> tuple[float, float]:
     return options.stature or usual, KNOWN_SD if options.stature else PEOPLE_SD
 
 
-def _sized(
-    prior: SegmentPrior,
-    keypoints: Keypoints,
-    view: View,
-    options: Options,
-    found: Lifted | Motion,
-    chi2: float,
-) -> size.Resized:
+def _sized(of: _Sequence, found: Lifted | Motion | size.Resized, chi2: float) -> size.Resized:
     """Give the estimate a person's size if it has none; only a lens leaves it open.
 
     One that fits and stands on the floor is of its prior's kind, and prior and floor know more of its size
     than the bones do, unless joints that no person sees were put there by the prior to suit them.
     """
+    prior, view, options = of.prior, of.view, of.options
     fitted = size.Resized(found.places, found.sd, found.rooted_sd)
     if isinstance(view, Parallel) or not options.bones:
         return size.widened(fitted, chi2)
@@ -457,27 +430,18 @@ def _sized(
     floats = abs(_height(found.places, prior)) > FLOATS * options.floor_sd
     limit = size.UNLIKELY if chi2 > POOR_FIT or floats else size.IMPOSSIBLE
     sized = size.resized(fitted, view.camera, ratio, own, chi2, limit)
-    if sized.factor != 1 or size.shows_distance(keypoints):
+    if sized.factor != 1 or size.shows_distance(of.keypoints):
         return sized
     return size.of_any_size(sized, view.camera, own)
 
 
-def _alone(
-    prior: SegmentPrior,
-    fits: list[SegmentFit],
-    keypoints: Keypoints,
-    view: View,
-    grid: Grid,
-    lengths: Floats,
-    stature: float,
-    blend: bool,
-) -> Motion:
+def _alone(of: _Sequence, task: _Task) -> Motion:
     """Segments estimated alone, mixed or one after another."""
+    prior, grid, fits = of.prior, of.grid, task.fits
     places, sds = np.stack([fit.places for fit in fits]), np.stack([fit.sd for fit in fits])
-    join = blended if blend else in_turn
-    at = grid.between(keypoints.time)
-    placed, scale = interpolated(join(places, grid.frames), *at), interpolated(lengths, *at)
-    markers = prior.index(keypoints.names)
+    join = in_turn if of.options.method == "segment" else blended
+    at = grid.between(of.keypoints.time)
+    placed, scale = interpolated(join(places, grid.frames), *at), interpolated(task.lengths, *at)
     rooted, about_hips = places, sds
     if set(smoother.HIPS) <= set(prior.names):
         hips = prior.index(smoother.HIPS)
@@ -489,15 +453,15 @@ def _alone(
     )
     return Motion(
         names=prior.names,
-        places=placed if view.grounded else _on_floor(placed, prior),
+        places=_placed(of, placed),
         sd=sd,
         rooted_sd=rooted_sd,
-        error=_error(view, placed[:, markers], scale, keypoints.uv),
-        stature=stature,
+        error=_error(of, placed, scale),
+        stature=task.stature,
         steps=0,
         settled=True,
         log_volume_ratio=float(np.mean([fit.log10_volume for fit in fits])),
-        uncertain=explain.summarise(fits, view),
+        uncertain=explain.summarise(fits, of.view),
     )
 
 
@@ -510,19 +474,19 @@ def _mixed(places: Floats, sd: Floats, join: Callable[[Floats, int], Floats], ha
     return np.asarray(np.sqrt(join(sd, half) ** 2 + np.maximum(apart, 0.0)))
 
 
-def _error(view: View, places: Floats, lengths: Floats, uv: Floats) -> Floats:
-    """Distance of places (T, P, 3) in the picture from uv (T, P, 2); without a camera but for a shift."""
-    miss = view.project(places, lengths) - uv
-    if not view.grounded:
+def _error(of: _Sequence, places: Floats, lengths: Floats) -> Floats:
+    """Distance (T, P) of markers in the picture from what was observed; without a camera but for a shift."""
+    miss = of.view.project(places[:, of.markers], lengths) - of.keypoints.uv
+    if not of.view.grounded:
         observed = np.isfinite(miss).all(axis=2, keepdims=True)
         total = np.where(observed, miss, 0).sum(axis=1, keepdims=True)
         miss = miss - total / np.maximum(observed.sum(axis=1, keepdims=True), 1)
     return np.asarray(np.linalg.norm(miss, axis=2))
 
 
-def _on_floor(places: Floats, prior: SegmentPrior) -> Floats:
-    """Shift a motion of unknown height so that its lowest feet are on the floor."""
-    return places - np.array([0.0, 0.0, _height(places, prior)])
+def _placed(of: _Sequence, places: Floats) -> Floats:
+    """Places; a motion of unknown height is shifted so that its lowest feet are on the floor."""
+    return places if of.view.grounded else places - np.array([0.0, 0.0, _height(places, of.prior)])
 
 
 def _height(places: Floats, prior: SegmentPrior) -> float:

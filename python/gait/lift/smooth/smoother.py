@@ -124,8 +124,8 @@ def smooth(
     bones: bool = True,
 ) -> Lifted:
     """Estimate the motion of all markers of a prior (`chain.restricted`) over a sequence."""
-    problem, state = _begin(prior, observed, view, freedom, start, contact, bones)
-    settled = False
+    problem = _Problem(prior, observed, view, freedom, start, contact, bones)
+    state, settled = problem.first(start), False
     while not settled and state.steps < MOST_STEPS:
         problem.weight(state)
         before, state = state, problem.step(state, constrained=state.steps >= FREE_STEPS)
@@ -144,28 +144,14 @@ def evidence(
     predicted : (T, P, 2)
         Where the points are then expected in the picture.
     """
-    problem, state = _begin(prior, observed, view, freedom, start)
+    problem = _Problem(prior, observed, view, freedom, start)
+    state = problem.first(start)
     for _ in range(FREE_STEPS):
         problem.weight(state)
         state = problem.step(state, constrained=False)
     problem.weight(state)
     system = problem.system(state, problem.chain(state), constrained=False)
     return problem.evidence(system), problem.predicted(state)
-
-
-def _begin(
-    prior: SegmentPrior,
-    observed: Observed,
-    view: View,
-    freedom: Freedom,
-    start: Start,
-    contact: bool = False,
-    bones: bool = False,
-) -> tuple[_Problem, _State]:
-    unit = float(np.mean(start.lengths)) if view.scaled else None
-    problem = _Problem(prior, observed, view, freedom, unit, contact, bones)
-    around = problem.around(start.heading, start.component, start.stature, start.places)
-    return problem, _State(around, start.places, start.lengths, 0)
 
 
 @dataclass(frozen=True)
@@ -223,9 +209,9 @@ class _Problem:
         observed: Observed,
         view: View,
         freedom: Freedom,
-        unit: float | None,
-        contact: bool,
-        bones: bool,
+        start: Start,
+        contact: bool = False,
+        bones: bool = False,
     ) -> None:
         self.prior, self.visible, self.view, self.freedom = prior, observed, view, freedom
         self._chained = Prior(prior)
@@ -233,12 +219,14 @@ class _Problem:
         self.points = observed.points
         self.grid = Grid.over(observed.time, prior)
         self.at = self.grid.between(observed.time)
+        unit = float(np.mean(start.lengths)) if view.scaled else None
         self.layout = Layout(self.grid.blocks, self.grid.frames, len(prior.names), unit)
 
-    def around(self, heading: Floats, component: Ints, stature: float, places: Floats) -> Around:
-        """Describe what the chain is linearised around."""
-        around = overlapping(places, self.grid.frames)
-        return Around(heading, component, stature, around, around)
+    def first(self, start: Start) -> _State:
+        """Linearise the chain around the first guess."""
+        shape = overlapping(start.places, self.grid.frames)
+        around = Around(start.heading, start.component, start.stature, shape, shape)
+        return _State(around, start.places, start.lengths, 0)
 
     def weight(self, state: _State) -> None:
         """Down-weight points that are far from an estimate."""
