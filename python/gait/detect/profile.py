@@ -101,9 +101,23 @@ def frame_sd(keypoints: Keypoints, network: str = "full") -> Array:
     A detector whose profile is unknown is taken to err as `full` does, and a joint that is in no profile as
     an elbow.
     """
-    profile = load(network)
-    joints = [profile.get(name.partition("_")[2], profile["elbow"]) for name in keypoints.names]
+    joints = _joints(keypoints, network)
     return _pixels(keypoints, [float(np.hypot(joint.bias, joint.sd)) for joint in joints])
+
+
+def changing_sd(keypoints: Keypoints, network: str = "full") -> tuple[Array, Array]:
+    """Give the errors that change within a walk: their sd (T, J), pixels, and correlation (J,), seconds.
+
+    Unknown detectors and joints are as in `frame_sd`.
+    """
+    joints = _joints(keypoints, network)
+    return _pixels(keypoints, [joint.sd for joint in joints]), np.array([j.correlation_s for j in joints])
+
+
+def _joints(keypoints: Keypoints, network: str) -> list[JointProfile]:
+    """Profile of each joint (J,)."""
+    profile = load(network)
+    return [profile.get(name.partition("_")[2], profile["elbow"]) for name in keypoints.names]
 
 
 def _pixels(keypoints: Keypoints, share: list[float]) -> Array:

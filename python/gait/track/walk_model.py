@@ -16,16 +16,25 @@ from numpy.typing import NDArray
 
 from gait.bindings.model import Model
 from gait.bindings.state import State
+from gait.detect.profile import changing_sd, picture_height
 from gait.io.keypoints_file import Keypoints
 from gait.track.walk_start import STATURE_SD, CameraPrior, make_camera
 
 Array = NDArray[np.float64]
 
-_ERROR_TIME = 0.5  # seconds for which errors of a detector last
 _KNOTS = 0.5  # seconds between knots
-_MISS = 0.012  # of the person's height, noise of a joint at full confidence
-_SHARE = {"elbow": 2.0, "wrist": 4.0, "toe": 2.5, "heel": 2.0}  # noise of these joints, in units of _MISS
-_OFFSET_SD = 0.015  # of the stature, constant difference between the detector's joints and the model's
+_PIXEL = 0.5  # pixels, noise of any keypoint
+#: Errors that repeat with every stride, of the model's curves and of the detector at a phase: shares of the
+#: person's height, measured on rendered walks, and seconds in which they count as one observation.
+_REPEATING = {
+    "shoulder": 0.006, "elbow": 0.008, "wrist": 0.015, "hip": 0.008, "knee": 0.010, "ankle": 0.007,
+    "heel": 0.010,
+}  # fmt: skip
+_REPEATING_ELSEWHERE = 0.007
+_REPEATING_TIME = 0.25
+_OFFSET_SD = 0.008  # of the stature, constant difference between the detector's joints and the model's
+_LEAN_SD, _SIDE_LEAN_SD, _TRUNK_SD = 0.021, 0.013, 0.040  # radians, as recorded people and walks differ
+_CARRIES = {"elbow": "shoulder", "wrist": "elbow", "knee": "hip", "heel": "ankle", "toe": "ankle"}
 _SLIDE_SD = 0.05  # metres per second, of feet on the floor, along the heading
 _SIDEWAYS_SD = 0.05  # metres per second, of the walk across the heading
 _STILL_SD = 0.03  # metres per second on a treadmill
@@ -39,6 +48,12 @@ def _heavy_tailed(residual: Array) -> Array:
     """Residuals whose squares are Student-t costs: unusual cameras are not pulled to the usual one."""
     root = np.sqrt(_DEGREES * np.log1p(residual**2 / _DEGREES))
     return np.asarray(np.sign(residual) * root)
+
+
+def _limb_above(name: str) -> str:
+    """Joint whose offset a joint shares, empty if none."""
+    side, _, joint = name.partition("_")
+    return f"{side}_{_CARRIES[joint]}" if joint in _CARRIES else ""
 
 
 class WalkingBody:
@@ -67,12 +82,21 @@ class WalkingBody:
         backwards = velocity[..., 0].mean(axis=1)
         way = np.cumsum(velocity - velocity.mean(axis=1, keepdims=True), axis=1) / self.PHASES
         table[..., :2] += (way - way.mean(axis=1, keepdims=True))[:, :, None]
-        self.table = table[:, :, rows]
-        self.parts = len(states) - 2  # scores and proportions
-        self.rate, self.rate_sd = model.info.stride_hz, model.info.stride_hz_sd
         # The ankle rolls forward over the foot, so it goes back more slowly than the floor.
-        self.stride = backwards * model.info.stride_length / backwards[0]
+        stride = backwards * model.info.stride_length / backwards[0]
+        leans = self._leans(table[0], model.joint_names)
+        self.table = np.concatenate([table[:-1], leans, table[-1:]])[:, :, rows]
+        self.stride = np.concatenate([stride[:-1], np.zeros(len(leans)), stride[-1:]])
+        self.parts = len(self.table) - 2  # scores, proportions, leans
+        self.rate, self.rate_sd = model.info.stride_hz, model.info.stride_hz_sd
         self.offsets = 3 * len(self.names)  # of the detector's joints: forward, left, up
+        #: (J, J): which offsets (columns) move a joint (row).
+        self.carried = np.eye(len(self.names))
+        for j, name in enumerate(self.names):
+            above = name
+            while above := _limb_above(above):
+                if above in self.names:
+                    self.carried[j, self.names.index(above)] = 1.0
 
     def _cycle(self, model: Model, state: State) -> Array:
         out = np.empty((self.PHASES, model.info.joints, 3))
@@ -101,6 +125,19 @@ class WalkingBody:
         ]
         return np.reshape(columns, (len(table), 2, -1)).swapaxes(1, 2)
 
+    @staticmethod
+    def _leans(cycle: Array, names: tuple[str, ...]) -> Array:
+        """Changes (3, PHASES, joints, 3) of a `cycle` by leans of one standard deviation.
+
+        The body leans forward and to the side about the feet, the trunk forward about the hips.
+        """
+        up = cycle[..., 2]
+        hips = [names.index("l_hip"), names.index("r_hip")]
+        trunk = np.maximum(up - up[:, hips].mean(axis=1, keepdims=True), 0.0)
+        out = np.zeros((3, *cycle.shape))
+        out[0, ..., 0], out[1, ..., 1], out[2, ..., 0] = up * _LEAN_SD, up * _SIDE_LEAN_SD, trunk * _TRUNK_SD
+        return out
+
     def weights(self, parts: Array, rate: Array) -> Array:
         """Weights (T, parts + 2) of the table's rows: mean, scores and proportions, stride rate."""
         faster = np.clip((rate - self.rate) / self.rate_sd, -2.0, 2.0)
@@ -118,7 +155,7 @@ class WalkingBody:
         cycle = np.tensordot(weights[:1, :-1], self.table[:-1], axes=(1, 0))[0]  # parts are constant
         out = cycle[left] * (1 - share) + cycle[(left + 1) % self.PHASES] * share
         out = out + weights[:, -1, None, None] * self.table[-1, left]
-        return np.asarray(out + offsets.reshape(-1, 3))
+        return np.asarray(out + self.carried @ offsets.reshape(-1, 3))
 
     def strides(self, rate: Array, parts: Array) -> Array:
         """Stride lengths, statures."""
@@ -166,17 +203,18 @@ class WalkModel:
         self.knot_time = np.linspace(t[0], t[-1], count)
         self.time = t
         uv, names = keypoints.uv[rows][:, self.body.columns], self.body.names
-        legs = [keypoints.names.index(f"{side}_{joint}") for side in "lr" for joint in ("hip", "ankle")]
-        ends = keypoints.uv[rows][:, legs]
-        tall = np.hypot(*(ends[:, 0::2].mean(axis=1) - ends[:, 1::2].mean(axis=1)).T) / 0.45
-        tall = np.maximum(tall, 0.5 * np.median(tall))
-        share = np.array([_SHARE.get(name.partition("_")[2], 1.0) for name in names])
-        sure = np.maximum(keypoints.confidence[rows][:, self.body.columns], 0.1)
-        sd = _MISS * tall[:, None] * share / sure + 0.5
-        self._inverse = np.where(np.isfinite(uv).all(axis=2), 1.0 / sd, 0.0)
+        jitter, lasts = changing_sd(keypoints)
+        tall = np.maximum(picture_height(keypoints), 1.0)[rows, None]
+        kinds = [name.partition("_")[2] for name in names]
+        repeats = tall * [_REPEATING.get(kind, _REPEATING_ELSEWHERE) for kind in kinds]
+        jitter = np.hypot(jitter[rows][:, self.body.columns], _PIXEL)
+        self._inverse = np.where(np.isfinite(uv).all(axis=2), 1.0 / np.hypot(jitter, repeats), 0.0)
         self._uv = np.nan_to_num(uv)
-        step = float(np.median(np.diff(t)))
-        self._thin = min(1.0, step / _ERROR_TIME)  # errors last
+        # Further strides show the repeating errors again, so frames count less the more strides there are.
+        strides = max(1.0, body.rate * (t[-1] - t[0]))
+        lasting = jitter**2 * lasts[self.body.columns] + repeats**2 * _REPEATING_TIME * strides
+        single = lasting * self._inverse**2  # seconds that count as one observation
+        self._thin = np.minimum(1.0, float(np.median(np.diff(t))) / np.maximum(single, 1e-9))
 
     def over(self, low: float, high: float) -> WalkModel:
         """Make the same model of another interval, seconds."""
@@ -252,7 +290,7 @@ class WalkModel:
 
     def cost(self, q: Array) -> float:
         """Minus twice the log posterior, up to a constant."""
-        return float(self._thin * self.robust(q).sum() + (self.expected(q) ** 2).sum())
+        return float((self._thin * self.robust(q)).sum() + (self.expected(q) ** 2).sum())
 
     def robust(self, q: Array) -> Array:
         """Student-t costs of the keypoints (T, J)."""
@@ -264,7 +302,8 @@ class WalkModel:
         plain = self.fixed - self.body.offsets
         for k in range(plain):
             yield np.array([k]), np.ones(1)
-        joints = np.eye(len(self.body.names))[:, None]
+        # All offsets move at once, so a joint's change is shared out among those that move it.
+        joints = (self.body.carried / self.body.carried.sum(axis=1, keepdims=True))[:, None]
         for axis in range(3):
             yield np.arange(plain + axis, self.fixed, 3), joints
         knots = np.arange(len(self.knot_time))
@@ -283,7 +322,7 @@ class WalkModel:
     def normal(self, q: Array) -> tuple[Array, Array]:
         """Form the normal equations: matrix and gradient."""
         errors, expected = self.errors(q), self.expected(q)
-        weight = np.sqrt(self._thin / (1.0 + (errors**2).sum(axis=2, keepdims=True) / _DEGREES))
+        weight = np.sqrt(self._thin[..., None] / (1.0 + (errors**2).sum(axis=2, keepdims=True) / _DEGREES))
         data = np.zeros((*errors.shape, len(q)))
         prior = np.empty((len(expected), len(q)))
         h = 1e-5
