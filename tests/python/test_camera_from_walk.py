@@ -18,6 +18,7 @@ from gait.track.from_walk import calibrate
 from gait.track.keypoint_start import find_keypoint_start
 from gait.track.walk_camera import contradiction
 from gait.track.walk_model import WalkingBody
+from gait.track.walk_start import exchange_sides
 
 
 @pytest.mark.parametrize(
@@ -95,7 +96,8 @@ def test_a_treadmill_is_in_place():
     found = calibrate(keypoints(camera, (0.4, (0.0, 3.5)), belt=1.25), SIZE, MODEL, 1.75)
     assert found.in_place and found.sd[0] > 0.1
     assert np.ptp(found.path[:, :2], axis=0).max() < 0.1
-    assert "a walk in place determines the focal length poorly" in found.describe()[1] or found.sd[0] < 0.2
+    assert found.sd[0] < 0.2 or "a walk in place determines the focal length poorly" in found.describe()[1]
+    assert abs(np.log(found.camera.fx / camera.fx)) < 2 * found.sd[0]
 
 
 @pytest.mark.parametrize(
@@ -127,6 +129,16 @@ def test_a_camera_that_contradicts_the_walk_is_reported(change, words):
     assert (
         words_found is None if words is None else re.search(words, words_found) and "height 1." in words_found
     )
+
+
+@pytest.mark.parametrize("share", [0.3, 1.0], ids=["some frames", "all frames"])
+def test_sides_that_a_detector_exchanges_are_put_right(share):
+    camera = view()
+    away = keypoints(camera, (1.8, (0.3, 3.6)))
+    wrong = np.random.default_rng(3).uniform(size=len(away.time)) < share
+    right, found = (calibrate(k, SIZE, MODEL, 1.75) for k in (away, exchange_sides(away, wrong)))
+    assert found.camera.fx == pytest.approx(right.camera.fx, rel=0.02)
+    assert found.sd == pytest.approx(right.sd, rel=0.1)
 
 
 def test_noise_is_refused():

@@ -23,13 +23,23 @@ from gait.io.keypoints_file import Keypoints
 from gait.reproducible import one_thread
 from gait.track.walk_fit import WalkFit
 from gait.track.walk_model import WalkingBody, WalkModel
-from gait.track.walk_start import GIVEN_FOV_SD, WINDOW, CameraPrior, choose_frames, find_starts, make_camera
+from gait.track.walk_start import (
+    GIVEN_FOV_SD,
+    WINDOW,
+    CameraPrior,
+    choose_frames,
+    exchange_sides,
+    find_starts,
+    make_camera,
+)
 
 Array = NDArray[np.float64]
 
 _WORST = 6.0  # squared robust error per coordinate up to which the result is accepted
+_DOUBTFUL = 1.2  # the same, above which left and right may be exchanged
 _LEAST_RATE = 0.4  # strides per second of a person who walks
-_UNKNOWN = 0.2  # relative standard deviation from which the focal length counts as not determined
+_UNKNOWN = 0.2  # relative standard deviation from which the focal length counts as poorly determined
+_OPEN = 1.0  # and from which the camera is refused
 
 
 @dataclass(frozen=True)
@@ -171,7 +181,7 @@ def calibrate(
     ------
     UserError
         If a joint is missing, the whole person is visible for less than a second, no second of the keypoints
-        fits a walk, or the person stands.
+        fits a walk, the person stands, or the walk leaves the focal length open.
     """
     needed = {"l_hip", "r_hip", "l_ankle", "r_ankle", "l_shoulder", "r_shoulder"}
     if missing := needed - set(keypoints.names):
@@ -192,6 +202,37 @@ def _calibrate(
     chosen: Keypoints, size: tuple[int, int], model: Model, height: float, prior: CameraPrior, where: str
 ) -> Calibration:
     body = WalkingBody(model, chosen.names)
+    best = _first_fit(chosen, size, model, body, height, prior)
+    if best is None or best.chi2_per_observation > _DOUBTFUL:
+        # A detector may take a back for a front.
+        other = _first_fit(exchange_sides(chosen), size, model, body, height, prior)
+        if best is None or (other is not None and other.cost_per_frame < best.cost_per_frame):
+            best = other
+    if best is None or best.chi2_per_observation > _WORST:
+        raise UserError(
+            f"{where}: no second of it fits a person who walks; film a walk in full view, or give --camera"
+        )
+    best.grow()
+    if best.rate < _LEAST_RATE:
+        raise UserError(f"{where}: the person stands; film a walk in full view, or give --camera")
+    found = _result(best, size)
+    if found.sd[0] > _OPEN:
+        raise UserError(
+            f"{where}: its walk leaves the focal length open; film a walk towards or away from the camera, "
+            "or give --camera"
+        )
+    return found
+
+
+def _first_fit(
+    chosen: Keypoints,
+    size: tuple[int, int],
+    model: Model,
+    body: WalkingBody,
+    height: float,
+    prior: CameraPrior,
+) -> WalkFit | None:
+    """Best fit of a part of the clip; None if none begins."""
     best: WalkFit | None = None
     for start in find_starts(chosen, size, model, height, prior):
         near = start.time - WINDOW / 2, start.time + WINDOW / 2
@@ -200,14 +241,7 @@ def _calibrate(
         fit.refine(6)
         if best is None or fit.cost_per_frame < best.cost_per_frame:
             best = fit
-    if best is None or best.chi2_per_observation > _WORST:
-        raise UserError(
-            f"{where}: no second of it fits a person who walks; film a walk in full view, or give --camera"
-        )
-    best.grow()
-    if best.rate < _LEAST_RATE:
-        raise UserError(f"{where}: the person stands; film a walk in full view, or give --camera")
-    return _result(best, size)
+    return best
 
 
 def _result(fit: WalkFit, size: tuple[int, int]) -> Calibration:

@@ -82,6 +82,7 @@ class WalkFit:
             high = min(last, high + _GROWTH) if 1 in open_ else high
             self._extend(low, high, *before)
             self.refine(4)
+            self._exchange_sides()
             chi2 = self.model.frame_chi2(self.q)
             early, late = self.model.time < ends[0] - 1e-9, self.model.time > ends[1] + 1e-9
             bad = {
@@ -92,6 +93,7 @@ class WalkFit:
                 low, high = (ends[0] if bad[-1] else low), (ends[1] if bad[1] else high)
                 self._extend(low, high, *before)
                 self.refine(4)
+                self._exchange_sides()
                 open_ -= {side for side, wrong in bad.items() if wrong}
             if low <= first:
                 open_ -= {-1}
@@ -99,6 +101,12 @@ class WalkFit:
                 open_ -= {1}
         self.refine(15)
         return self
+
+    def _exchange_sides(self) -> None:
+        """Exchange left and right in frames that the detector took for the other way round."""
+        if (model := self.model.exchanged(self.q)) is not None:
+            self.model = model
+            self.refine(4)
 
     def _extend(self, low: float, high: float, q: Array, time: Array) -> None:
         """Use another interval; beyond the old knots the walk goes straight on."""

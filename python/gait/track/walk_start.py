@@ -6,7 +6,7 @@ start is fitted with that camera to a second of the walk.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -88,6 +88,19 @@ def choose_frames(keypoints: Keypoints) -> Keypoints:
         keypoints.frame[rows], keypoints.time[rows], keypoints.names, keypoints.uv[rows],
         keypoints.confidence[rows],
     )  # fmt: skip
+
+
+def exchange_sides(keypoints: Keypoints, rows: NDArray[np.bool_] | None = None) -> Keypoints:
+    """Exchange left and right, in all frames or in those of `rows` (T,)."""
+    names = keypoints.names
+    other = {name: {"l_": "r_", "r_": "l_"}.get(name[:2], name[:2]) + name[2:] for name in names}
+    columns = [names.index(other[name]) if other[name] in names else k for k, name in enumerate(names)]
+    chosen = np.ones(len(keypoints.time), bool) if rows is None else rows
+    return replace(
+        keypoints,
+        uv=np.where(chosen[:, None, None], keypoints.uv[:, columns], keypoints.uv),
+        confidence=np.where(chosen[:, None], keypoints.confidence[:, columns], keypoints.confidence),
+    )
 
 
 @dataclass
