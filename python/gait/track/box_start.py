@@ -15,6 +15,7 @@ from gait.bindings.initial import Start
 from gait.bindings.model import Model
 from gait.bindings.start_fit import Box, Hypothesis, StartFit
 from gait.camera.camera import Camera
+from gait.detect import weights
 from gait.detect.shapes import PLAUSIBLE, find_people
 from gait.errors import GaitError, UserError
 from gait.io.video import Frame, Image, Video
@@ -25,7 +26,11 @@ _WINDOW = 1.0  # seconds of boxes that are fitted
 _LEAST_WINDOW = 0.3  # the same in a short clip, at least
 _PROBES = 6  # frames of a clip, of which one must show a person
 _STEP = 0.1  # seconds from one fit to the next
-_LOOK_ON = 1.5  # seconds after a first window in which a person walks, who may only have begun to
+_GOES_ON = 1.5  # seconds after a first window in which a person walks, who may only have begun to
+_STAYS = (
+    "--init auto found a person who stays in place and none who walks along the floor; give --init FILE.json "
+    f"or use the detector ({weights.FETCH})"
+)
 _STATURE_SD = 0.03  # metres, of one that the user gives
 _BEYOND = 4.0  # standard deviations by which an apparent stature contradicts the one expected
 
@@ -151,7 +156,8 @@ def find_start(
 ) -> Start:
     """Find the first state of the first person who walks in a clip.
 
-    If no person walks, a person who stands out against the empty scene is taken, with an unknown heading.
+    If no person walks, a person who stands out against the empty scene is taken, with an unknown heading, unless
+    the scene may not be empty (`shapes_first`).
 
     Parameters
     ----------
@@ -181,11 +187,12 @@ def find_start(
         walking, stands = _search(finder, video.frames(first, stop))
         if walking is not None:
             return walking
-        standing = standing or (None if plate is None else stands)
+        standing = standing or stands
         misplaced += finder.misplaced
-    if standing is not None:
+    if standing is not None and plate is not None and not shapes_first:
         return standing
-    raise UserError(f"{video.path}: {_no_person(few, misplaced)}")
+    words = _no_person(few, misplaced) if standing is None else _STAYS
+    raise UserError(f"{video.path}: {words}")
 
 
 def _search(finder: BoxStart, frames: Iterable[Frame]) -> tuple[Start | None, Start | None]:
@@ -210,7 +217,7 @@ def _search(finder: BoxStart, frames: Iterable[Frame]) -> tuple[Start | None, St
             if one.walks and (best is None or sure > best[0]):
                 best = sure, start
         if best is not None:
-            until = min(until, frame.time + _LOOK_ON)
+            until = min(until, frame.time + _GOES_ON)
         if frame.time >= until:
             break
     return (None if best is None else best[1]), first

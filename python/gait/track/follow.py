@@ -23,6 +23,7 @@ _CONTRADICTED = 0.5  # seconds of keypoints elsewhere after which the person is 
 _OPEN_PHASE = 0.2  # strides: sd of the phase from which a start leaves left and right open
 _SETTLED = 0.2  # seconds of `tracking` after which they are known
 _SETTLES = 4.0  # seconds from a start in which that is waited for
+_DRAWS = 3  # of particles, after which a start is taken as it is
 
 FindStart = Callable[[int, int, float], Start | None]
 """First start in the frames first <= number < stop, of a person of a stature [m]; None: there is none."""
@@ -120,16 +121,20 @@ class Follower:
         """Move a start that leaves left and right open to where the images decide, later or else earlier."""
         if start.sd.phase < _OPEN_PHASE:
             return start
-        config = self._tracker.config
-        later = ((frame, frame.utime) for frame in self._video.frames(start.frame, frames.stop))
-        earlier = ((frame, -frame.utime) for frame in self._video.backwards(start.frame + 1, frames.start))
-        found = self._decided(self._tracker.like(config), start, later)
-        if found is None and start.frame > frames.start:
-            found = self._decided(self._tracker.like(config.replace(reverse=1.0)), start, earlier)
-        return found or start
+        for draw in range(_DRAWS):
+            config = self._tracker.config.replace(seed=self._tracker.config.seed ^ draw)
+            later = ((frame, frame.utime) for frame in self._video.frames(start.frame, frames.stop))
+            found = self._decided(self._tracker.like(config), start, later)
+            if found is None and start.frame > frames.start:
+                back = self._video.backwards(start.frame + 1, frames.start)
+                earlier = ((frame, -frame.utime) for frame in back)
+                found = self._decided(self._tracker.like(config.replace(reverse=1.0)), start, earlier)
+            if found is not None:
+                return found
+        return start
 
     def _decided(self, tracker: Tracker, start: Start, frames: Iterator[tuple[Frame, int]]) -> Start | None:
-        """Start where a tracker has said `tracking` for a while; None if it does not soon.
+        """Start where a tracker has been `tracking` for a while; None if it is not soon.
 
         `frames` are given with the tracker's time of each, microseconds.
         """

@@ -27,7 +27,7 @@ _PATIENCE = 0.5  # seconds without the person's shape after which they are not s
 _PELVIS = 0.48  # height of the pelvis in a box, of the box's
 _SD = (0.03, 0.04, 0.04)  # person's heights, of crown, pelvis and lowest point: build, clothes, shadows
 _LOW = 0.01  # heights by which the soles of a shape are too low
-_LOOKS = 5  # searches whose median is judged
+_MEDIAN_OF = 5  # searches whose median is judged
 _HEAD = 0.07  # heights by which the crown may be off
 _SOLES = (-0.085, 0.035)  # the same of the soles, downwards
 
@@ -50,8 +50,8 @@ class PersonShapes:
         """Forget what was seen: the track starts anew."""
         self._searched: Frame | None = None
         self._found: Box | None = None
-        self._seen: float | None = None  # seconds, when a shape was found
-        self._off: deque[Array] = deque(maxlen=_LOOKS)
+        self._last: float | None = None  # seconds, when a shape was found
+        self._off: deque[Array] = deque(maxlen=_MEDIAN_OF)
 
     def choose(self, frame: Frame, last: Estimate | None) -> FrameKeypoints | None:
         """Crown, pelvis and lowest point of the shape near the last estimate; None if unseen, or too soon.
@@ -62,13 +62,13 @@ class PersonShapes:
             return None
         if self._searched is not None and abs(frame.time - self._searched.time) < _SELDOM:
             return None
-        self._seen = frame.time if self._seen is None else self._seen
+        self._last = frame.time if self._last is None else self._last
         box = self._box(last)
         self._searched = frame
         self._found = None if box is None else find_near(frame.image, box, self._stature)
         if self._found is None:
             return None
-        self._seen = frame.time
+        self._last = frame.time
         head, foot, tall = self._found.head, self._found.foot, self._found.tall
         expected = self._camera.project(last.joints)
         lowest = int(np.argmax(expected[:, 1]))  # it hardly moves, as the person stands on it
@@ -77,11 +77,11 @@ class PersonShapes:
         return FrameKeypoints(("head_top", "pelvis", last.joint_names[lowest]), uv, np.array(_SD) * tall)
 
     def agree(self, frame: Frame, estimate: Estimate) -> bool | None:
-        """Whether shapes object to an estimate (False); a shape says nothing of the legs, so never True."""
+        """Whether shapes object to an estimate (False); a shape does not show the legs, so never True."""
         if self._searched is frame and self._found is not None:
             self._off.append(_difference(self._box(estimate), self._found))
-        unseen = self._seen is not None and abs(frame.time - self._seen) > _PATIENCE
-        return False if not self._fits() or unseen else None
+        missing = self._last is not None and abs(frame.time - self._last) > _PATIENCE
+        return False if not self._fits() or missing else None
 
     def near(self, frame: Frame, estimate: Estimate) -> bool:
         """Whether the person is not seen elsewhere than in the estimate just judged."""
@@ -105,8 +105,8 @@ class PersonShapes:
         return bool(np.hypot(x, crown) < _HEAD and _SOLES[0] < soles < _SOLES[1])
 
 
-def _difference(box: Box | None, seen: Box) -> Array:
+def _difference(box: Box | None, shape: Box) -> Array:
     """Crown (x, y) and soles (y) of an estimate less those of the shape, the shape's heights."""
     if box is None:
         return np.full(3, np.inf)
-    return np.array([*(box.head - seen.head), box.foot[1] - seen.foot[1]]) / seen.tall
+    return np.array([*(box.head - shape.head), box.foot[1] - shape.foot[1]]) / shape.tall

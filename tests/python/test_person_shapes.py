@@ -1,0 +1,112 @@
+"""Without a detector a person's shape confirms the track, which starts where the person surely walks."""
+
+from types import SimpleNamespace
+
+import numpy as np
+import pytest
+from drawn_person import DATA, camera, clip, wall, write
+
+from gait import Camera, Model, TrackStatus, Video
+from gait.bindings.model import read_blob
+from gait.bindings.start_fit import Box, StartFit
+from gait.detect.shapes import find_near
+from gait.errors import UserError
+from gait.io import blob
+from gait.io.video import Frame
+from gait.track import person_shapes
+from gait.track.box_start import find_start
+from gait.track.person_shapes import PersonShapes
+
+MODEL = Model()
+SECTIONS = blob.decode(read_blob(None))
+FRAMES, TRUE = clip(MODEL, SECTIONS, 24)
+JOINTS = MODEL.pose(TRUE[0])[0]
+UV = camera().project(JOINTS)
+CROWN, FOOT = UV[MODEL.joint_names.index("head_top")], UV[np.argmax(UV[:, 1])]
+ESTIMATE = SimpleNamespace(joints=JOINTS, joint_names=MODEL.joint_names, status=TrackStatus.TRACKING)
+
+
+def box(head=0.0, foot=0.0, aside=0.0):
+    """Box of the person, with head and feet so many heights lower."""
+    tall = FOOT[1] - CROWN[1]
+    return Box(
+        np.array([CROWN[0] + aside * tall, FOOT[1] + foot * tall]),
+        np.array([CROWN[0] + aside * tall, CROWN[1] + head * tall]),
+        1.0,
+    )
+
+
+def verdict(monkeypatch, shape, seconds=1.0):
+    """Verdict on the estimate after frames that show a shape, and the keypoints of each frame."""
+    monkeypatch.setattr(person_shapes, "find_near", lambda *_: shape)
+    shapes, keypoints = PersonShapes(camera(), lambda _: 1.7), []
+    for i in range(round(30 * seconds)):
+        frame = Frame(i, i / 30, FRAMES[0])
+        keypoints.append(shapes.choose(frame, ESTIMATE))
+        agree = shapes.agree(frame, ESTIMATE)
+    return agree, keypoints
+
+
+@pytest.mark.parametrize(
+    "shape, agree",
+    [
+        (box(), None),
+        (box(head=0.02, foot=0.02), None),
+        (box(foot=-0.1), False),
+        (box(foot=0.12), False),
+        (box(head=0.1), False),
+        (box(aside=0.15), False),
+        (None, False),
+    ],
+)
+def test_a_shape_elsewhere_or_none_objects(monkeypatch, shape, agree):
+    assert verdict(monkeypatch, shape)[0] is agree
+
+
+def test_one_frame_without_a_shape_is_no_objection(monkeypatch):
+    assert verdict(monkeypatch, None, seconds=0.3)[0] is None
+
+
+def test_a_shape_is_three_keypoints_ten_times_a_second(monkeypatch):
+    _, keypoints = verdict(monkeypatch, box())
+    found = [one for one in keypoints if one is not None]
+    assert 9 <= len(found) <= 11
+    assert found[0].names[:2] == ("head_top", "pelvis") and found[0].names[2][2:] in ("heel", "toe")
+    tall = FOOT[1] - CROWN[1]
+    pelvis = UV[MODEL.joint_names.index("pelvis")]
+    assert np.abs(np.asarray(found[0].uv)[:2] - [CROWN, pelvis]).max() < 0.08 * tall
+
+
+def test_a_lost_person_is_not_searched_where_they_were(monkeypatch):
+    monkeypatch.setattr(person_shapes, "find_near", lambda *_: box())
+    lost = SimpleNamespace(**{**vars(ESTIMATE), "status": TrackStatus.LOST})
+    assert PersonShapes(camera(), lambda _: 1.7).choose(Frame(0, 0.0, FRAMES[0]), lost) is None
+
+
+@pytest.mark.parametrize("corner", [(0, 0), (319, 239), (-500, 100), (160, 120)])
+@pytest.mark.parametrize("tall", [2.0, 60.0, 4000.0])
+def test_boxes_at_the_edge_and_of_any_size_are_searched(corner, tall):
+    fit = StartFit(MODEL, camera())
+    at = np.array(corner, float)
+    assert find_near(wall(), Box(at + [0, tall], at, 1.0), fit.stature) is None
+
+
+def test_who_stands_first_is_started_while_walking(tmp_path):
+    standing = 24
+    pictures, states = clip(MODEL, SECTIONS, 45)
+    write(tmp_path / "film.mp4", [FRAMES[0]] * standing + pictures)
+    found = find_start(Video(tmp_path / "film.mp4"), camera(), wall(), MODEL)
+    assert found.frame > standing and found.hypotheses[0].speed > 0.7 * states[0].stride_hz
+    truth = states[found.frame - standing]
+    assert abs(found.mean.heading - truth.heading) < 0.35
+
+
+FILM = DATA / "real" / "treadmill"
+
+
+@pytest.mark.skipif(not FILM.is_dir(), reason="../shared/data is absent")
+def test_a_person_on_a_treadmill_is_refused_with_the_remedy():
+    video = Video(next(FILM.glob("video.*")))
+    view = Camera.read(str(FILM / "camera.json"), video.size)
+    with pytest.raises(UserError, match="stays in place .*give --init FILE.json or use the detector"):
+        find_start(video, view, None, MODEL, shapes_first=True)
