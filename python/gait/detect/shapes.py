@@ -29,7 +29,7 @@ _BORDER = 0.2  # of the picture's height added above and below: a window is larg
 _SIDES = 16  # pixels added at the sides
 _MOST = 4  # people proposed
 _TALL = 120  # pixels of a person in the second search
-_ROOM = (0.75, 0.95)  # heights searched about a person's middle: to each side, up and down
+_REACH = (0.75, 0.95)  # heights searched about a person's middle: to each side, up and down
 _THRESHOLD = -0.5  # of a window's vote: weak ones count in numbers
 _SHARP = 3.0  # nats per unit of a vote
 _HEAD, _FOOT = 0.125, 0.86  # of the window: crown of the head, soles of the feet
@@ -80,16 +80,16 @@ def _known(box: Box, found: list[tuple[float, Box]]) -> bool:
 
 
 def find_near(image: Image, box: Box, stature: Stature) -> Box | None:
-    """Find the person whose box in a picture is about this one; None if nobody stands there."""
+    """Find the person whose box in a picture is about this one; None if no person stands there."""
     found = _nearby(image, box, stature, _ENOUGH_NEAR)
     return None if found is None else found[1]
 
 
 def _nearby(image: Image, box: Box, stature: Stature, least: float) -> tuple[float, Box] | None:
     """Search the picture about a box once more: the vote for the person there and their box, or None."""
-    middle, room = (box.foot + box.head) / 2, np.array(_ROOM) * box.tall
-    corner = middle - room
-    groups = _groups(_search(image, corner, tuple(2 * room), _TALL / box.tall, stature))
+    middle, reach = (box.foot + box.head) / 2, np.array(_REACH) * box.tall
+    corner = middle - reach
+    groups = _groups(_search(image, corner, tuple(2 * reach), _TALL / box.tall, stature))
     return groups[0] if groups and groups[0][0] >= least else None
 
 

@@ -156,8 +156,8 @@ def find_start(
 ) -> Start:
     """Find the first state of the first person who walks in a clip.
 
-    If no person walks, a person who stands out against the empty scene is taken, with an unknown heading, unless
-    the scene may not be empty (`shapes_first`).
+    If no person walks, a person who stands out against the empty scene is taken, with an unknown heading,
+    unless the scene may not be empty (`shapes_first`).
 
     Parameters
     ----------
