@@ -89,7 +89,7 @@ UNIT := $(patsubst tests/unit/%.c,$(B)/unit/%,$(sort $(wildcard tests/unit/test_
 TOOLS := $(BIN)/gait-trackd
 LIBS := $(B)/libgait.so $(B)/libgait.a
 
-.PHONY: help setup lib tools test built check unit python-test demo model bench bench-lift detector-profile eval eval-real eval-learn eval-lift mutants asan tsan unit-threads fuzz fuzz-run golden-check \
+.PHONY: help setup lib tools test built check unit python-test demo model paper bench bench-lift detector-profile eval eval-real eval-learn eval-lift mutants asan tsan unit-threads fuzz fuzz-run golden-check \
         docs lint format wheel sdist wheel-check install uninstall clean
 
 help: ## list the targets
@@ -271,6 +271,17 @@ demo: ## clip -> LCM -> gait-trackd -> report (VIDEO CAMERA INIT BACKGROUND HEIG
 MOCAP ?= ../shared/data/mocap/cmu_walk
 model: setup lib ## learn the default model from MOCAP= *
 	$(VENV)/bin/gait learn $(MOCAP) -o python/gait/data/walk.gait $(ARGS)
+
+PAPER_MOCAP ?= $(MOCAP) ../shared/data/mocap/cmu_misc
+PAPER_CLIP := $(wildcard ../shared/data/video/outdoor)
+paper: setup lib ## every figure of both papers, theirs, literal and ours: build/paper/paper.html (PAPER_MOCAP=) *
+	@mkdir -p build/paper
+ifneq ($(PAPER_CLIP),)
+	@$(PY) tests/bench/paper_clicks.py $(PAPER_CLIP)/reference2d.json build/paper/clicks.json
+endif
+	$(VENV)/bin/gait paper --mocap $(PAPER_MOCAP) $(if $(PAPER_CLIP),--video $(PAPER_CLIP)/demo.mp4 --camera \
+	    $(PAPER_CLIP)/Calib_demo.toml --init $(PAPER_CLIP)/init.json --background $(PAPER_CLIP)/background_median.png \
+	    --corrections build/paper/clicks.json) -o build/paper/paper.html $(ARGS)
 
 # The bench calls internal functions, and the linker puts its clocks round those that __wrap_ names.
 BENCH_ISA := $(foreach isa,$(KERNEL_ISAS),$(B)/bench/bench_limit_kernel.$(isa).o)

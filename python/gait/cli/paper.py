@@ -2,23 +2,29 @@
 
 The papers are Ormoneit and others (2000), whose model of walking gait learn and gait track follow, and
 Leventon and Freeman (1998), whose prior over segments gait lift follows.  Each figure is made by the paper's
-own algorithm (literal) and by the package (ours), with what the paper states (theirs) and a verdict.  The
-page needs no other file.
+own algorithm (literal) and by the package (ours), with what the paper states (theirs), a verdict, and what
+the paper leaves open.  The page needs no other file.
 
-Motion capture is as for gait learn: the first paper needs walks, of which three have to show two strides; the
-second takes up to ten motions of all kinds, first those that are no walks.
+Motion capture is as for gait learn: the first paper needs three walks of two strides; the second takes up to
+ten motions, first those that are no walks.  Figures 6 and 7 need a clip of a person who walks for 51 frames
+from the frame of --init, better 100.  Without one a walk is rendered.  --corrections are joints marked by
+hand, as for gait lift; the second paper has about one a frame.
 """
 
 from __future__ import annotations
 
 import argparse
 import json
+from pathlib import Path
 
 from gait.errors import UsageError
+from gait.io.files import require_outputs
 
 EXAMPLES = """\
 gait paper --mocap recordings/ -o paper.html
+gait paper --mocap recordings/ --video walk.mp4 --camera camera.json --init init.json -o paper.html
 """
+CLIP = ("camera", "init", "background", "corrections")
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
@@ -27,21 +33,32 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     add("--mocap", nargs="+", action="extend", default=[], metavar="SRC",
         help="motion files or folders of them, as for gait learn")  # fmt: skip
     add("-o", "--output", required=True, metavar="PAGE.html", help="the page")
+    add("--video", metavar="VIDEO", help="clip of figures 6 and 7")
+    add("--camera", metavar="CAM", help="its calibration")
+    add("--init", metavar="INIT.json", help="where the person is at first, as for gait track")
+    add("--background", metavar="IMAGE", help="the empty scene: a picture, auto (the default) or none")
+    add("--corrections", metavar="C.json", help="joints marked by hand, as for gait lift")
 
 
 def run(args: argparse.Namespace) -> int:
     """Make the page and print the verdicts."""
     if not args.mocap:
         raise UsageError("--mocap SRC is missing; give a folder of motion capture that holds walks")
+    given = {name: vars(args)[name] for name in CLIP if vars(args)[name] is not None}
+    if given and not args.video:
+        raise UsageError(f"--{next(iter(given))} is of a clip; give it with --video")
+    if args.video and not {"camera", "init"} <= given.keys():
+        raise UsageError("--video needs --camera and --init")
+    require_outputs((args.output,), (args.video, *(path for path in given.values() if path != "auto")))
     from gait.paper import run as paper  # Matplotlib and SciPy take a second
+    from gait.paper.clip import Clip
 
-    request = paper.Request(tuple(args.mocap), args.output, args.quiet)
-    verdicts = paper.run(request)
+    clip = Clip(Path(args.video).name, args.video, **given) if args.video else None
+    verdicts = paper.run(paper.Request(tuple(args.mocap), args.output, clip, args.quiet))
     print(json.dumps(verdicts) if args.json else _text(verdicts))
     return 0
 
 
 def _text(verdicts: dict[str, dict[str, str]]) -> str:
-    return "\n".join(
-        f"{paper}, {name}: {words}" for paper, each in verdicts.items() for name, words in each.items()
-    )
+    lines = [f"{paper}, {name}: {words}" for paper, each in verdicts.items() for name, words in each.items()]
+    return "\n".join(lines)

@@ -36,7 +36,7 @@ TRIED = NOISES[:3]  # in the table of errors
 MOST = 12  # segments tried of a sequence
 WITHIN = 1.645  # standard deviations that hold 90 %
 VIEW = looking_along("y")  # rows right, down, ahead
-SEEN = np.stack([VIEW[0], -VIEW[1]])  # right and up
+PICTURE = np.stack([VIEW[0], -VIEW[1]])  # right and up
 DEPTH = 1  # coordinate that is not seen
 PELVIS = MARKERS.index("pelvis")
 LN10 = float(np.log(10))
@@ -53,9 +53,9 @@ class Gaussian:
     segments: int  #: learnt from, without turned copies
 
     @property
-    def seen(self) -> Floats:
+    def visible(self) -> Floats:
         """Modes as the view shows them, (D * 2 / 3, k)."""
-        return _seen(self.modes.T.reshape(-1, FRAMES, len(MARKERS), 3)).T
+        return _visible(self.modes.T.reshape(-1, FRAMES, len(MARKERS), 3)).T
 
     def explained(self) -> Floats:
         """Share of the variance that the first modes explain."""
@@ -71,7 +71,7 @@ class Gaussian:
 
     def posterior(self, y: Floats, noise: float) -> Posterior:
         """Return the posterior (eqs. 5 and 6) given a view (F, J, 2) with noise of this sd."""
-        design = self.seen / noise
+        design = self.visible / noise
         precision = np.diag(1 / self.variance) + design.T @ design
         covariance = np.linalg.inv(precision)
         rest = (y - _view(self.segment(np.zeros(0)))).ravel() / noise
@@ -82,7 +82,7 @@ class Gaussian:
     def likelihood_only(self, y: Floats) -> Floats:
         """Return the segment (F, J, 3) of the view alone: least squares of minimum norm."""
         rest = (y - _view(self.segment(np.zeros(0)))).ravel()
-        return self.segment(np.asarray(np.linalg.lstsq(self.seen, rest, rcond=None)[0], float))
+        return self.segment(np.asarray(np.linalg.lstsq(self.visible, rest, rcond=None)[0], float))
 
 
 @dataclass(frozen=True)
@@ -96,10 +96,10 @@ class Posterior:
 
 def _view(x: Floats) -> Floats:
     """Return what is seen (..., 2) of places (..., 3)."""
-    return np.asarray(x @ SEEN.T)
+    return np.asarray(x @ PICTURE.T)
 
 
-def _seen(modes: Floats) -> Floats:
+def _visible(modes: Floats) -> Floats:
     return _view(modes).reshape(len(modes), -1)
 
 
@@ -109,12 +109,15 @@ def metres(recorded: Recorded) -> Floats:
     return np.asarray(stature * recorded.places)
 
 
-def cut(recorded: Recorded, frames: int = FRAMES, hop: int = HOP) -> Floats:
-    """Return the whole segments (n, frames, J, 3) of a recording, rooted."""
-    places = metres(recorded)
-    parts = [places[k : k + frames] for k in range(0, len(places) - frames + 1, hop)]
-    whole = [rooted(part) for part in parts if np.isfinite(part).all()]
-    return np.array(whole).reshape(-1, frames, len(MARKERS), 3)
+def cut(recorded: Recorded, frames: int = FRAMES, hop: int = HOP, heading: float | None = None) -> Floats:
+    """Return the whole segments (n, frames, J, 3) of a recording, rooted; turned to a heading, if given."""
+    places, found = metres(recorded), []
+    for k in range(0, len(places) - frames + 1, hop):
+        part, now = places[k : k + frames], recorded.root[k, 2]
+        if np.isfinite(part).all() and (heading is None or np.isfinite(now)):
+            turn = 0.0 if heading is None else heading - float(now)
+            found.append(rooted(part) @ axis_rotation(2, turn).T)
+    return np.array(found).reshape(-1, frames, len(MARKERS), 3)
 
 
 def rooted(x: Floats) -> Floats:
@@ -136,6 +139,25 @@ def learn(segments: Floats, turned: bool = True) -> Gaussian:
 def learn_all(motions: Sequence[Recorded], turned: bool = True) -> Gaussian:
     """Learn the Gaussian of all segments of some recordings."""
     return learn(np.concatenate([cut(m) for m in motions]), turned)
+
+
+def prior_of(gaussian: Gaussian, stature: float) -> SegmentPrior:
+    """Return a Gaussian as a prior for the package's energy: nothing lies outside its modes."""
+    sd, shape = np.sqrt(gaussian.variance) / stature, (FRAMES, len(MARKERS), 3)
+    return SegmentPrior(
+        names=MARKERS,
+        hop=HOP,
+        fps=FPS,
+        headings=2,
+        weights=np.ones(1),
+        mean=(gaussian.mean / stature).reshape(1, *shape),
+        modes=(gaussian.modes * sd).T.reshape(1, -1, *shape),
+        sd=sd[None],
+        residual=np.full((1, len(MARKERS)), segment_fit.LEAST_VARIANCE),
+        gamma=1.0,
+        stature=stature,
+        segments=gaussian.segments,
+    )
 
 
 @dataclass(frozen=True)
@@ -215,7 +237,7 @@ def _score(segments: Floats, gaussian: Gaussian, prior: SegmentPrior, stature: f
 def lifter_of(prior: SegmentPrior, stature: float) -> Lifter:
     """Return the package's lifter for a person whose place and stature, but not heading, are known."""
     config = LiftConfig.default(stature=stature, stature_sd=0.0, place_sd=(0.0, 0.0, 0.0))
-    return Lifter(blob.encode(segment_fit.sections(prior)), SEEN, config)
+    return Lifter(blob.encode(segment_fit.sections(prior)), PICTURE, config)
 
 
 def marker_sd(gaussian: Gaussian, found: Posterior) -> Floats:

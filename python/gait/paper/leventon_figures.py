@@ -60,7 +60,7 @@ def _strips(titles: Sequence[str]) -> Strips:
     return Strips(titles, MARKERS, TALL, leventon.FPS)
 
 
-def _facing(x: Floats) -> Floats:
+def _across(x: Floats) -> Floats:
     """Return the direction (3,) across the paper in which a motion is seen from its side."""
     left, right = (x[0, MARKERS.index(f"{s}_hip")] for s in "lr")
     ahead = np.array([right[1] - left[1], left[0] - right[0], 0.0]) * -1
@@ -73,7 +73,7 @@ def _training(found: Segments) -> Entry:
     for row, motion in enumerate(picked):
         x = leventon.metres(motion)
         x = x[np.isfinite(x).all(axis=(1, 2))]
-        strips.add(row, x, _facing(x), DARK)
+        strips.add(row, x, _across(x), DARK)
     frames = [len(m.table) for m in found.motions]
     caption = (
         "Some of the training motions, each over its whole length, seen from its side. Bold: right limbs."
@@ -180,7 +180,7 @@ def _draws(found: Segments) -> Entry:
     strips = _strips([f"draw {k + 1}" for k in range(DRAWS)])
     for row in range(DRAWS):
         x = gaussian.segment(rng.normal(size=len(gaussian.variance)) * np.sqrt(gaussian.variance))
-        strips.add(row, x, _facing(x), BLUE)
+        strips.add(row, x, _across(x), BLUE)
     return Entry(
         "Fig. 4: draws from the prior",
         "Random draws look like motions of people, not always plausible ones.",
@@ -231,7 +231,7 @@ def _estimates(found: Segments) -> Entry:
             f"Every one of {len(held)} sequences is left out in turn; shown is the one whose error is the "
             "median.",
             "Likelihood alone: least squares of minimum norm in the modes.",
-            "A segment stands where its pelvis is seen; in depth it continues the one before.",
+            "A segment stands where its pelvis shows; in depth it continues the one before.",
         ),
         (picture(Drawing("", "estimates", caption, strips.figure())),),
     )
@@ -285,7 +285,7 @@ def _volume(found: Segments) -> Entry:
     figure, (axes,) = grid(1, 1, 6, 3)
     axes.semilogx([1000 * n for n in leventon.NOISES], ratios, "o-", ms=4, color=DARK)
     axes.axhline(-SHARE, color=ORANGE, lw=1, ls="--", label=f"the paper's: 10^-{SHARE}")
-    axes.set(xlabel="noise of what is seen, mm", ylabel="log10 of posterior over prior volume")
+    axes.set(xlabel="noise of what is observed, mm", ylabel="log10 of posterior over prior volume")
     axes.legend(fontsize=8, frameon=False)
     words = ", ".join(f"{1000 * n:.0f} mm: 10^{r:.0f}" for n, r in zip(leventon.NOISES, ratios, strict=True))
     return Entry(

@@ -2,19 +2,32 @@
 
 from __future__ import annotations
 
+import tempfile
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
 from gait.io.files import replacing, require_writable
+from gait.learn.corpus.forkserver import cores
 from gait.learn.prior import model
-from gait.paper import entry, leventon, leventon_figures, ormoneit, ormoneit_figures, recordings
-from gait.paper.entry import Paper
+from gait.paper import (
+    clip,
+    entry,
+    leventon,
+    leventon_figures,
+    lifting,
+    ormoneit,
+    ormoneit_figures,
+    recordings,
+    tracking,
+)
+from gait.paper.clip import Clip
+from gait.paper.entry import Entry, Paper
 from gait.progress import progress
 from gait.reproducible import one_thread
+from gait.simulate.scenario import PRESETS
 
 ORMONEIT = "Ormoneit and others 2000", "Learning and tracking human motion using functional analysis"
-
 LEVENTON = "Leventon and Freeman 1998", "Bayesian estimation of 3-D human motion from an image sequence"
 
 
@@ -24,32 +37,57 @@ class Request:
 
     mocap: tuple[str, ...]
     output: str
+    clip: Clip | None = None  #: of figures 6 and 7; None: one is rendered
     quiet: bool = False
 
 
 def run(request: Request) -> dict[str, Any]:
     """Make the page; return verdicts by entry.  UserError with one line if it cannot be done."""
     require_writable(request.output)
-    with one_thread():
+    with one_thread(), tempfile.TemporaryDirectory(prefix="gait-") as folder:
+        if request.clip is not None:
+            tracking.require(request.clip)  # before the long work
         found = recordings.read(request.mocap, request.quiet)
-        with progress("learning both ways", 4, request.quiet) as update:
-            learning = ormoneit.learn(found.walks, update)
-        first = list(ormoneit_figures.entries(learning))
-        with progress("leaving motions out", len(found.motions), request.quiet) as update:
-            held = leventon.hold_out(found.motions, update)
-        second = list(leventon_figures.entries(leventon_figures.study(found.motions, held)))
-    papers = [Paper(*ORMONEIT, first), Paper(*LEVENTON, second)]
-    text = entry.page("Both papers, figure by figure", _about(found), papers)
+        used = request.clip or _rendered(Path(folder), request.quiet)
+        papers = [
+            Paper(*ORMONEIT, _ormoneit(found, used, request.quiet)),
+            Paper(*LEVENTON, _leventon(found, used, Path(folder), request.quiet)),
+        ]
+    text = entry.page("Both papers, figure by figure", _about(found, used), papers)
     with replacing(request.output) as path:
         path.write_text(text, encoding="utf-8")
     return {p.short: {e.heading: e.verdict for e in p.entries} for p in papers}
 
 
-def _about(found: recordings.Recordings) -> list[str]:
+def _rendered(folder: Path, quiet: bool) -> Clip:
+    with progress("rendering a clip", PRESETS[clip.PRESET].frames, quiet) as update:
+        return clip.rendered(folder, update)
+
+
+def _ormoneit(found: recordings.Recordings, used: Clip, quiet: bool) -> list[Entry]:
+    with progress("learning both ways", 4, quiet) as update:
+        learning = ormoneit.learn(found.walks, update)
+    with progress("tracking both ways", 2 * (tracking.FRAMES + 1), quiet) as update:
+        tracked = tracking.track(used, learning, cores(), update)
+    with progress("drawing", None, quiet):
+        return [*ormoneit_figures.entries(learning), tracking.entry(tracked)]
+
+
+def _leventon(found: recordings.Recordings, used: Clip, folder: Path, quiet: bool) -> list[Entry]:
+    with progress("leaving motions out", len(found.motions), quiet) as update:
+        held = leventon.hold_out(found.motions, update)
+    lifted = lifting.lift(used, found.motions, folder, quiet)
+    with progress("drawing", None, quiet):
+        study = leventon_figures.study(found.motions, held)
+        return [*leventon_figures.entries(study), lifting.entry(lifted)]
+
+
+def _about(found: recordings.Recordings, used: Clip) -> list[str]:
     people = len({walk.subject for walk in found.walks})
     lines = [
-        f"Made by gait paper from {len(found.walks)} walks of {people} people (first paper) and "
-        f"{len(found.motions)} motions (second paper): {', '.join(m.name for m in found.motions)}.",
+        f"Made by gait paper from {len(found.walks)} walks of {people} people (first paper), "
+        f"{len(found.motions)} motions (second paper: {', '.join(m.name for m in found.motions)}) and "
+        f"{used.name}.",
         "theirs: what the paper states. literal: its algorithm as printed, errors of print resolved. "
         "ours: what the package does by default, on the same data.",
     ]

@@ -273,6 +273,12 @@ class Energy:
             return np.zeros(0)
         return self.sensor_rows(self.reading, state)[0] * self.reading.sd
 
+    def correction_residuals(self, state: Floats) -> Floats:
+        """Differences (2 C,) of markers and corrections in standard deviations; empty without corrections."""
+        if self.corrections is None or not len(self.corrections.frame):
+            return np.zeros(0)
+        return self._correction_rows(self.corrections, state)[0]
+
     def sensor_rows(self, reading: Reading, state: Floats) -> tuple[Floats, Floats]:
         """Residuals (T * S,) of the sensors over their sd, and their slopes (T * S, k + 6) by the state."""
         places, by_state = self.shape.positions(state, self.weights, self.sticks.markers)

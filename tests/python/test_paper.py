@@ -1,0 +1,158 @@
+"""`gait paper`: the papers' own algorithms find what was planted, and the page holds all figures."""
+
+from __future__ import annotations
+
+import json
+import re
+from dataclasses import replace
+
+import mocap_files as files
+import numpy as np
+import pytest
+
+from gait.cli import main
+from gait.learn.corpus import load, sources
+from gait.learn.segments.virtual_markers import MARKERS
+from gait.paper import clip as clips
+from gait.paper import leventon, lifting, ormoneit, recordings, tracking
+from gait.reproducible import one_thread
+from gait.simulate.scenario import PRESETS
+
+
+@pytest.fixture(scope="module", autouse=True)
+def alone():
+    """BLAS in one thread, as the command has it."""
+    with one_thread():
+        yield
+
+
+@pytest.fixture(scope="module")
+def walks(tmp_path_factory):
+    """Folder of six toy walks of three people, two and a half strides each."""
+    return files.write_people(tmp_path_factory.mktemp("walks"))
+
+
+@pytest.fixture(scope="module")
+def learning(walks):
+    return ormoneit.learn(load.load_all(sources.find([str(walks)])[0]).sequences)
+
+
+def test_whole_periods_are_found_but_a_long_walk_of_a_broken_one_is_not(learning):
+    assert learning.agreeing == len(learning.walks)
+    for found, walk in zip(learning.literal_walks, learning.walks, strict=True):
+        assert found.period.frames == round(found.period.frames)
+        assert found.period.frames == pytest.approx(walk.period.frames, abs=1)
+    literal, refined = learning.long
+    assert refined == pytest.approx(ormoneit.LONG_PERIOD, abs=0.05)
+    assert abs(literal - ormoneit.LONG_PERIOD) > 1  # a multiple that is nearly whole
+
+
+def test_offsets_from_zero_end_where_ours_do_and_the_error_falls(learning):
+    course = np.array(learning.eight.found.objective)
+    assert np.all(np.diff(course) <= 1e-9 * course[0]) and course[-1] < course[0]
+    apart = np.angle(np.exp(2j * np.pi * (learning.eight.phases - learning.eight_ours.phases)))
+    assert np.abs(apart).max() / (2 * np.pi) < 0.02
+
+
+def test_removed_blocks_are_filled_better_than_by_the_mean(learning):
+    removal = learning.removal
+    assert np.all(np.diff(removal.passes) <= 1e-9)
+    assert removal.literal < 0.5 * removal.mean
+
+
+def planted(rng, count=60, size=6):
+    """Segments of a Gaussian of `size` modes about a body."""
+    shape = (leventon.FRAMES, len(MARKERS), 3)
+    body = rng.normal(size=shape) * 0.3
+    modes = np.linalg.qr(rng.normal(size=(body.size, size)))[0] * np.geomspace(3.0, 0.5, size)
+    return body + (rng.normal(size=(count, size)) @ modes.T).reshape(count, *shape)
+
+
+def test_the_gaussian_of_segments_has_their_modes_and_no_more():
+    gaussian = leventon.learn(planted(np.random.default_rng(1)), turned=False)
+    assert gaussian.modes.shape[1] == 6 and gaussian.explained()[5] == pytest.approx(1)
+    x = planted(np.random.default_rng(1))[3]
+    assert leventon.apart(gaussian.projected(x), x) < 1e-6  # millimetres
+    turned = leventon.learn(planted(np.random.default_rng(1)))
+    assert turned.modes.shape[1] > 6 and turned.segments == 60
+
+
+def test_the_posterior_holds_what_was_drawn_and_equals_the_papers_form():
+    """Equation 5 in its dual form; intervals hold 90 %; the volume is that of the singular values."""
+    rng, noise = np.random.default_rng(2), 0.05
+    gaussian = leventon.learn(planted(rng), turned=False)
+    sd = np.sqrt(gaussian.variance)
+    inside, squares = [], []
+    for _ in range(300):
+        alpha = sd * rng.normal(size=len(sd))
+        x = gaussian.segment(alpha)
+        y = x @ leventon.PICTURE.T + noise * rng.normal(size=(*x.shape[:2], 2))
+        found = gaussian.posterior(y, noise)
+        off = found.alpha - alpha
+        squares.append(off @ np.linalg.solve(found.covariance, off) / len(sd))
+        inside.append(np.abs(off) < leventon.WITHIN * np.sqrt(np.diag(found.covariance)))
+    assert np.mean(squares) == pytest.approx(1, abs=0.1)
+    assert np.mean(inside) == pytest.approx(0.9, abs=0.03)
+    design, prior = gaussian.visible, np.diag(gaussian.variance)
+    rest = (y - gaussian.segment(np.zeros(0)) @ leventon.PICTURE.T).ravel()
+    both = design @ prior @ design.T + noise**2 * np.eye(len(design))
+    assert found.alpha == pytest.approx(prior @ design.T @ np.linalg.solve(both, rest), abs=1e-8)
+    singular = np.linalg.svd(design * sd / noise, compute_uv=False)
+    assert found.log10_volume == pytest.approx(-0.5 * np.log10(1 + singular**2).sum())
+    assert leventon.noise_of(gaussian, found.log10_volume) == pytest.approx(noise, rel=1e-6)
+
+
+def test_joined_segments_continue_in_depth():
+    """Segments of one motion that differ in depth alone are joined to that motion."""
+    rng = np.random.default_rng(3)
+    x = rng.normal(size=(leventon.WINDOW, len(MARKERS), 3))
+    depth = np.eye(3)[leventon.DEPTH]
+    parts = [x[s : s + leventon.FRAMES] + k * depth for k, s in enumerate(leventon.STARTS)]
+    assert leventon.blended(np.array(parts)) == pytest.approx(x)
+
+
+def test_the_gaussian_serves_as_a_prior_of_the_package():
+    gaussian = leventon.learn(planted(np.random.default_rng(4)), turned=False)
+    prior = leventon.prior_of(gaussian, 1.7)
+    flat = 1.7 * prior.modes[0].reshape(prior.size, -1)
+    assert flat @ flat.T == pytest.approx(np.diag(gaussian.variance), abs=1e-9)
+    assert 1.7 * prior.mean[0].ravel() == pytest.approx(gaussian.mean)
+
+
+@pytest.mark.parametrize(
+    ("words", "expected"),
+    [
+        ([], "--mocap SRC is missing"),
+        (["--mocap", "{walks}", "--camera", "c.json"], "--camera is of a clip"),
+        (["--mocap", "{walks}", "--video", "v.mp4"], "--video needs --camera and --init"),
+        (["--mocap", "absent"], "absent: no such file or folder"),
+        (["--mocap", "{one}"], "the first paper needs 3"),
+    ],
+)
+def test_what_is_missing_is_one_line(words, expected, walks, tmp_path, capsys):
+    one = next(iter(sorted(walks.rglob("*.amc"))))
+    words = [word.format(walks=walks, one=one) for word in words]
+    assert main(["paper", *words, "-o", str(tmp_path / "p.html"), "--quiet"]) in (1, 2)
+    error = capsys.readouterr().err
+    assert expected in error and error.count("\n") == 1
+    assert not list(tmp_path.iterdir())
+
+
+def test_the_page_holds_every_figure_and_needs_no_other_file(walks, tmp_path, monkeypatch, capsys):
+    """A whole run on toy walks and a small rendered clip."""
+    small = replace(PRESETS[clips.PRESET], size=(320, 240), frames=24)
+    monkeypatch.setitem(PRESETS, clips.PRESET, small)
+    monkeypatch.setattr(tracking, "FRAMES", 12)
+    monkeypatch.setattr(tracking, "SHOWN", (0, 6, 12))
+    monkeypatch.setattr(tracking, "PARTICLES", 200)
+    monkeypatch.setattr(lifting, "FRAMES", 20)
+    monkeypatch.setattr(recordings, "ECLECTIC", 4)
+    page = tmp_path / "a.html"
+    assert main(["paper", "--mocap", str(walks), "-o", str(page), "--quiet", "--json"]) == 0
+    found = json.loads(capsys.readouterr().out)
+    assert [len(each) for each in found.values()] == [6, 8]
+    text = page.read_text(encoding="utf-8")
+    assert not re.search(r'(src|href)="(?!data:|#)', text)
+    for heading in (name for each in found.values() for name in each):
+        assert text.count(heading) >= 2  # in the table and over its pictures
+    assert text.count("<img") >= 15 and "<animate" in text
