@@ -13,7 +13,7 @@ from gait.learn.segments.virtual_markers import MARKERS
 from gait.lift.report.motion_figures import SIDE, Strips
 from gait.lift.segment.explain import share_along, share_rigid
 from gait.paper import leventon
-from gait.paper.entry import Entry, picture
+from gait.paper.entry import Entry, Picture, picture
 from gait.paper.leventon import Example, Gaussian, HeldOut
 from gait.report.colours import BLUE, DARK, GREY, ORANGE
 from gait.report.figures import Drawing, grid, line_legend
@@ -158,7 +158,7 @@ def _spectrum(found: Segments) -> Entry:
     axes.legend(fontsize=8, frameon=False)
     return Entry(
         "Fig. 3: variances before and after",
-        "The diagonal of the posterior covariance lies far below the prior's; some modes hardly shrink.",
+        "The diagonals of the prior's and the posterior's covariance: most variances shrink far.",
         f"With {1000 * leventon.NOISE:.0f} mm of noise the variances shrink to {ratio.min():.1g} to "
         f"{ratio.max():.2g} of the prior's, least in modes {', '.join(map(str, open_modes))}.",
         "The same equations in the library; beside the modes, place, heading and stature are unknowns.",
@@ -183,7 +183,7 @@ def _draws(found: Segments) -> Entry:
         strips.add(row, x, _across(x), BLUE)
     return Entry(
         "Fig. 4: draws from the prior",
-        "Random draws look like motions of people, not always plausible ones.",
+        "Segments drawn at random from the prior.",
         f"{DRAWS} draws of the Gaussian.",
         "The same kind of prior; segments all face one way.",
         "reproduced: see the picture",
@@ -204,6 +204,7 @@ def _estimates(found: Segments) -> Entry:
             strips.add(row, e.truth, ACROSS, DARK, ghost=True)
         strips.add(row, x, ACROSS, (DARK, BLUE, ORANGE, "#3a7d44")[row - 1], path=e.truth)
     means = [_mean(held, k) for k in range(len(leventon.TRIED))]
+    middle = means[len(means) // 2]
     better = all(m.bayes < m.likelihood for m in means)
     caption = (
         f"20 frames of {found.shown.name}, left out: three overlapping segments, joined by linear weights. "
@@ -214,27 +215,38 @@ def _estimates(found: Segments) -> Entry:
         "Fig. 5: estimates from one view",
         "20 frames of a sequence left out. Likelihood alone is wildly wrong in depth; Bayes is close to "
         "the original.",
-        "; ".join(
-            f"noise {1000 * m.noise:.0f} mm: likelihood {m.likelihood:.0f}, Bayes {m.bayes:.0f} mm "
-            f"(prior's mean {m.mean:.0f}, nearest in the modes {m.floor:.0f}), 90 % intervals of the depth "
-            f"hold {100 * m.covered:.0f} %"
-            for m in means
-        ),
-        "; ".join(
-            f"{1000 * m.noise:.0f} mm: {m.ours:.0f} mm, {100 * m.ours_covered:.0f} %, though the heading "
-            "is unknown"
-            for m in means
-        ),
+        f"Noise of {1000 * middle.noise:.0f} mm, mean of {len(held)} sequences: likelihood "
+        f"{middle.likelihood:.0f} mm, Bayes {middle.bayes:.0f} mm; 90 % intervals of the depth cover "
+        f"{100 * middle.covered:.0f} %.",
+        f"{middle.ours:.0f} mm, and the intervals cover {100 * middle.ours_covered:.0f} %, though the "
+        "heading is unknown.",
         ("reproduced: Bayes is better at every noise" if better else "Bayes is not better at every noise")
         + "; the paper's intervals are far too narrow",
         (
             f"Every one of {len(held)} sequences is left out in turn; shown is the one whose error is the "
-            "median.",
+            "median. Other sequences of the same person are learnt from.",
             "Likelihood alone: least squares of minimum norm in the modes.",
             "A segment stands where its pelvis shows; in depth it continues the one before.",
         ),
-        (picture(Drawing("", "estimates", caption, strips.figure())),),
+        (picture(Drawing("", "estimates", caption, strips.figure())), _table(means)),
     )
+
+
+def _table(scores: Sequence[leventon.Score]) -> Picture:
+    """Return the mean errors by noise as a table."""
+    errors = "noise", "prior's mean", "nearest in the modes", "likelihood alone", "Bayes"
+    head = (*errors, "90 % intervals cover", "ours", "90 % intervals cover")
+    rows = [
+        (
+            *(f"{1000 * s.noise:.0f} mm", f"{s.mean:.0f}", f"{s.floor:.0f}", f"{s.likelihood:.0f}"),
+            *(f"{s.bayes:.0f}", f"{100 * s.covered:.0f} %", f"{s.ours:.0f}", f"{100 * s.ours_covered:.0f} %"),
+        )
+        for s in scores
+    ]
+    top = "".join(f"<th>{name}</th>" for name in head)
+    body = "".join("<tr>" + "".join(f"<td>{cell}</td>" for cell in row) + "</tr>" for row in rows)
+    caption = "Errors of single segments, millimetres per marker, mean over all sequences left out in turn."
+    return Picture(caption, f"<table><tr>{top}</tr>{body}</table>")
 
 
 def _mean(held: Sequence[HeldOut], noise: int) -> leventon.Score:
@@ -261,10 +273,10 @@ def _uncertain(found: Segments) -> Entry:
     shares = ", ".join(f"{100 * s:.0f} %" for s in along)
     return Entry(
         "Fig. 6: modes of greatest posterior variance",
-        "Three modes that the view hardly restricts: translation and rotations in depth.",
+        "Modes that the view hardly restricts; the second is a translation in depth.",
         f"Shares of their energy along the depth: {shares}; as translation of the whole body: "
         + ", ".join(f"{100 * s:.0f} %" for s in rigid) + ".",
-        "gait lift --explain and gait report lift show the same of any clip.",
+        "gait lift reports and gait report lift draws the same of any clip.",
         "reproduced: they are motions in depth" if min(along) > 0.8 else "not only motions in depth",
         (
             "They are eigenvectors of the posterior covariance. The paper compares diagonal terms, which "

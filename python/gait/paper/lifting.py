@@ -34,7 +34,7 @@ FRAMES = 100
 SHOWN = 6
 TURN = np.radians(30.0)
 SIZE = 250  # pixels of a picture
-ROOM = 1.35  # statures, side of a picture
+CUT_OUT = 1.35  # statures, side of a picture
 PAPER = (248, 247, 246)
 
 
@@ -208,7 +208,7 @@ def _overlay(lifted: LiftedVideo, picture: Image, k: int, markers: Indices) -> I
             at = np.rint(correction.uv).astype(int).tolist()
             cv2.circle(canvas, at, 3 * width, (90, 240, 255), width, cv2.LINE_AA)
     middle = view.project(body.mean(axis=0)[None])[0][0]
-    zoom = SIZE / (ROOM * lifted.clip.placement.stature * scale)
+    zoom = SIZE / (CUT_OUT * lifted.clip.placement.stature * scale)
     matrix = np.array([[zoom, 0, SIZE / 2 - zoom * middle[0]], [0, zoom, SIZE / 2 - zoom * middle[1]]])
     return np.asarray(cv2.warpAffine(canvas, matrix, (SIZE, SIZE), flags=cv2.INTER_AREA), np.uint8)
 
@@ -227,7 +227,7 @@ def _blank() -> Image:
 def _dots(body: Floats, stature: float) -> Image:
     """Draw markers (J, 3) in the axes of a view."""
     canvas = _blank()
-    zoom = SIZE / (ROOM * stature)
+    zoom = SIZE / (CUT_OUT * stature)
     for x, _, z in body[np.argsort(-body[:, 1])]:
         at = round(SIZE / 2 + zoom * x), round(SIZE / 2 - zoom * z)
         cv2.circle(canvas, at, 3, (40, 40, 40), -1, cv2.LINE_AA)
@@ -236,5 +236,5 @@ def _dots(body: Floats, stature: float) -> Image:
 
 def _cylinders(surfaces: Floats, joints: Floats, stature: float) -> Image:
     """Draw the cylinder figure in the axes of a view."""
-    view = FlatView(SIZE / (ROOM * stature), (SIZE / 2, SIZE / 2))
+    view = FlatView(SIZE / (CUT_OUT * stature), (SIZE / 2, SIZE / 2))
     return draw_figure(_blank(), view, surfaces, joints)

@@ -33,7 +33,7 @@ FRAMES = 50  # of the paper's figure
 SHOWN = tuple(range(0, FRAMES + 1, 10))
 PARTICLES = 10_000
 HELD = 0.15  # statures (or metres by the truth) within which a person counts as followed
-ROOM = 1.35  # statures, side of a picture cut out about the person
+CUT_OUT = 1.35  # statures, side of a picture cut out about the person
 SIZE = 250  # pixels of a picture
 
 
@@ -201,7 +201,7 @@ def _overlays(both: Both, tracked: Tracked) -> Image:
         estimate, about = tracked.estimates[k], both.ours.estimates[k].mean
         canvas = cv2.cvtColor(picture, cv2.COLOR_GRAY2BGR) if picture.ndim == 2 else picture.copy()
         drawn = overlay.figure(np.asarray(canvas, np.uint8), estimate.mean)
-        side = ROOM * about.stature * both.camera.fy / float(both.camera.depth(about.pelvis))
+        side = CUT_OUT * about.stature * both.camera.fy / float(both.camera.depth(about.pelvis))
         cells.append(labelled(_cut(drawn, both.camera.project(about.pelvis), side), f"frame {k}"))
     return np.asarray(np.hstack(cells))
 

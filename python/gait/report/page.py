@@ -14,7 +14,7 @@ _STYLE = """
 body { font: 15px/1.5 system-ui, sans-serif; max-width: 60em; margin: 2em auto; padding: 0 1em; color: #222; }
 h1 { font-size: 1.5em; } h2 { font-size: 1.15em; margin-top: 2em; }
 table { border-collapse: collapse; } td, th { padding: .15em .9em .15em 0; text-align: left; }
-td + td { font-variant-numeric: tabular-nums; }
+td { vertical-align: top; } td + td { font-variant-numeric: tabular-nums; }
 svg { max-width: 100%; height: auto; } pre { background: #f5f5f3; padding: .8em; white-space: pre-wrap; }
 .film { display: flex; flex-wrap: wrap; gap: .4em; } .film img { width: calc(33.3% - .3em); }
 """
