@@ -29,7 +29,6 @@ from gait.cli import main as gait
 from gait.detect import profile
 from gait.detect.networks import JOINTS, Crop, LandmarkNetwork, crop_about
 from gait.detect.people import detect as detect_people
-from gait.detect.people import main_person
 from gait.io.keypoints_file import Keypoints, read
 from gait.io.track_file import Joints, read_track, read_truth
 
@@ -70,8 +69,8 @@ def _rows(clip: Path) -> list[list[object]]:
     hidden = (video.count / 2 + 0.5 * HIDDEN_S * video.fps * np.array([-1, 1])).astype(int).tolist()
     with tempfile.TemporaryDirectory() as tmp:
         painted = _painted(video, true, hidden, Path(tmp) / "painted.mp4")
-        plain = _searched(clip, video, Path(tmp))
-        behind = _searched(clip, painted, Path(tmp))
+        plain = _searched(clip, video, true, Path(tmp))
+        behind = _searched(clip, painted, true, Path(tmp))
     rows: list[list[object]] = []
     for source in plain:
         off = np.hypot(*(plain[source] - true.uv).T).T / height[:, None]
@@ -101,12 +100,19 @@ def _painted(video: Video, true: Keypoints, hidden: list[int], out: Path) -> Vid
     return Video(out)
 
 
-def _searched(clip: Path, video: Video, folder: Path) -> dict[str, Floats]:
+def _distance(uv: Floats, true: Floats) -> Floats:
+    """Median distance (T,) of joints (T, J, 2) from the true ones, pixels; infinite where none are found."""
+    return np.nan_to_num(np.median(np.hypot(*(uv - true).T), axis=0), nan=np.inf)
+
+
+def _searched(clip: Path, video: Video, true: Keypoints, folder: Path) -> dict[str, Floats]:
     """Joints (T, J, 2) by each source of crops, pixels, moved to the model's; NaN where none are found."""
-    people = detect_people(video, NETWORK)
-    own = people[main_person(people)]
     landmarks = np.full((video.count, len(JOINTS), 2), np.nan)
-    landmarks[own.frame] = own.uv
+    for person in detect_people(video, NETWORK).values():  # the one nearest to the truth in each frame
+        nearer = _distance(person.uv, true.uv[person.frame]) < _distance(
+            landmarks[person.frame], true.uv[person.frame]
+        )
+        landmarks[person.frame[nearer]] = person.uv[nearer]
     track = folder / "track.csv"
     words = ["track", str(video.path), "--camera", str(clip / "camera.json"), "-o", str(track), "--quiet"]
     with contextlib.redirect_stdout(io.StringIO()):
