@@ -127,3 +127,87 @@ def test_a_person_of_80_pixels_is_found(walk, tmp_path):
         views.append(view)
     found = detect(film(tmp_path / "film.mp4", views), "lite")
     assert off(found, true * scale + [x, y]) < 0.06
+
+
+def refused(capsys, folder, *words):
+    """Run a command that must end with one line and write nothing; the line."""
+    before = sorted(folder.iterdir())
+    assert cli.main([str(word) for word in (*words, "--quiet")]) == 1
+    out, err = capsys.readouterr()
+    assert out == "" and err.count("\n") == 1 and sorted(folder.iterdir()) == before
+    return err
+
+
+def commands(folder, name):
+    """Every command that finds people in a film by itself."""
+    path = folder / name
+    return {
+        "detect": ("detect", path, "--network", "lite", "-o", folder / "k.csv"),
+        "camera": ("camera", "--walk", path, "--height", 1.7, "-o", folder / "c.json"),
+        "lift": ("lift", path, "--height", 1.7, "-o", folder / "m.csv"),
+        "track": (
+            *("track", path, "--height", 1.7, "--detector", "lite", "-o", folder / "t.csv"),
+            *("--camera-out", folder / "c.json", "--overlay", folder / "o.mp4"),
+        ),
+    }
+
+
+COMMANDS = ["detect", "camera", "lift", "track"]
+FEET = "the person's feet are not in view; film the whole person, feet included"
+
+
+@pytest.mark.parametrize("command", COMMANDS[1:])
+def test_feet_that_are_never_in_view_are_named(command, walk, tmp_path, capsys):
+    film(tmp_path / "film.mp4", [picture[:330] for picture in walk[1]])
+    assert FEET in refused(capsys, tmp_path, *commands(tmp_path, "film.mp4")[command])
+
+
+@pytest.mark.parametrize("command", COMMANDS[1:])
+def test_a_person_larger_than_the_picture_is_refused(command, walk, tmp_path, capsys):
+    """Shoulders to knees fill it."""
+    views = [cv2.resize(picture[150:350, 180:400], (640, 580)) for picture in walk[1]]
+    film(tmp_path / "film.mp4", views)
+    line = refused(capsys, tmp_path, *commands(tmp_path, "film.mp4")[command])
+    assert any(words in line for words in (FEET, "no person found", "film a walk in full view"))
+
+
+@pytest.mark.parametrize("command", COMMANDS)
+@pytest.mark.parametrize("name", ["two.mp4", "picture.jpg", "picture.png"])
+def test_two_frames_and_a_picture_are_no_film(name, command, walk, tmp_path, capsys):
+    if name == "two.mp4":
+        film(tmp_path / name, walk[1][:2])
+    else:
+        cv2.imwrite(str(tmp_path / name), walk[1][0])
+    count = "2 frames" if name == "two.mp4" else "1 frame"
+    line = refused(capsys, tmp_path, *commands(tmp_path, name)[command])
+    assert f"{name}: has only {count}; give a video of a second or more" in line
+
+
+@pytest.mark.parametrize("command", COMMANDS)
+def test_a_film_of_noise_shows_no_person(command, tmp_path, capsys):
+    random = np.random.default_rng(2)
+    film(tmp_path / "film.mp4", random.integers(0, 255, (4, 240, 320, 3), np.uint8))
+    line = refused(capsys, tmp_path, *commands(tmp_path, "film.mp4")[command])
+    assert "no person found; the whole body should be in view" in line
+
+
+@pytest.mark.parametrize("command", COMMANDS)
+def test_an_empty_file_is_no_film(command, tmp_path, capsys):
+    (tmp_path / "film.mp4").write_bytes(b"")
+    line = refused(capsys, tmp_path, *commands(tmp_path, "film.mp4")[command])
+    assert "film.mp4: cannot be read as video" in line and "give a file that ffmpeg plays" in line
+
+
+@pytest.mark.parametrize("command", COMMANDS)
+@pytest.mark.parametrize("fault", ["cut off", "of the other network"])
+def test_wrong_weights_are_refused(fault, command, walk, tmp_path, tmp_path_factory, monkeypatch, capsys):
+    folder = tmp_path_factory.mktemp("weights")
+    full, lite = (weights.LANDMARKS[name].file for name in ("full", "lite"))
+    (folder / weights.PERSON.file).symlink_to(FETCHED / weights.PERSON.file)
+    for name, other in ((full, lite), (lite, full)):
+        data = (FETCHED / other).read_bytes() if fault != "cut off" else (FETCHED / name).read_bytes()[:-9]
+        (folder / name).write_bytes(data)
+    monkeypatch.setenv("GAIT_WEIGHTS", str(folder))
+    film(tmp_path / "film.mp4", walk[1][:4])
+    line = refused(capsys, tmp_path, *commands(tmp_path, "film.mp4")[command])
+    assert "is damaged or of another network; delete it" in line

@@ -101,8 +101,6 @@ class Scene:
                 _read_start(options, video, camera, model)  # refused before the work on the whole clip
         frames = video.span(options.start or 0, options.stop)
         _require_detector(options)
-        if camera is None:
-            _require_length(video)
         given = None if options.background in ("auto", "none") else background(options.background, video)
         with ThreadPoolExecutor(1) as pool:
             # The median of the clip is computed on another core while the detector runs.
@@ -188,7 +186,7 @@ def _in_reference(steady: SteadyVideo | None, keypoints: Keypoints | None) -> Ke
 def _calibrate(options: ClipOptions, video: Video, model: Model, keypoints: Keypoints | None) -> Calibration:
     """Find the camera from the walk of the person with these keypoints."""
     if keypoints is None:
-        remedy = "gait detect finds no person in it" if _has_detector(options) else weights.FETCH
+        remedy = "leave out --detector none, or give --camera" if _has_detector(options) else weights.FETCH
         raise UserError(f"{video.path}: without --camera keypoints of a walk are needed: {remedy}")
     assert options.height is not None
     found = calibrate_film(video, keypoints, model, options.height, options.fov, options.quiet)
@@ -315,26 +313,23 @@ def one_is_grey(image: Image, plate: Image) -> bool:
     return min(colour) == 0 and max(colour) > _COLOUR
 
 
-def _require_length(video: Video) -> None:
-    """Refuse a video too short to find a camera in, before the detector runs."""
-    from gait.detect.people import require_length  # loads OpenCV, as below
-
-    require_length(video)
-
-
 def _detect(options: ClipOptions, video: Video, frames: range) -> tuple[dict[int, Keypoints], int]:
     """Keypoints of everyone that the detector finds, and the main person; none without a detector."""
     if not _detects(options):
         return {}, -1
-    from gait.detect.people import detect, main_person, require_feet  # loads the networks' runtime
+    from gait.detect import people as detector  # here, as it loads the networks' runtime
 
+    if not options.camera:
+        detector.require_length(video)
     with progress("detecting", len(frames), options.quiet) as update:
-        people = detect(video, options.network, first=frames.start, stop=frames.stop, update=update)
+        people = detector.detect(video, options.network, first=frames.start, stop=frames.stop, update=update)
+    if not options.camera:
+        detector.require_person(people, video)
     if not people:
         return {}, -1
-    person = main_person(people)
+    person = detector.main_person(people)
     if options.init == "auto":
-        require_feet(people[person], video)
+        detector.require_feet(people[person], video)
     return people, person
 
 
