@@ -166,6 +166,49 @@ static void test_implausible(void)
     toy_tracker_free(t);
 }
 
+/* Times and counts whose differences would overflow, in the right order. */
+static void test_far_times(void)
+{
+    gait_tracker_config const cfg = small(1);
+    size_t bytes = 0;
+    target = film_tracker(&cfg, 7, 0.3f);
+    target_digest = gait_tracker_digest(target);
+    for (int k = 0; k < 7; k++) {
+        gait_tracker *const t = film_tracker(&cfg, 0, 1.0f);
+        gait_estimate e;
+        film_step(t, 1, 1, 0, &e);
+        generation_record *const record = &t->history.record[t->core->generation];
+        switch (k) {
+        case 0:
+            t->core->start_utime = INT64_MIN;
+            break;
+        case 1:
+            t->core->start_utime = INT64_MIN;
+            t->core->utime = INT64_MAX;
+            break;
+        case 2:
+            t->core->hypotheses.since = INT64_MIN;
+            break;
+        case 3:
+            record->age = INT64_MAX;
+            break;
+        case 4:
+            record->age = INT64_MIN;
+            break;
+        case 5:
+            record->status = 77;
+            break;
+        default:
+            t->core->frame = UINT64_MAX;
+        }
+        unsigned char *const kept = save(t, &bytes);
+        refuse(kept, bytes, GAIT_ERR_CORRUPT);
+        free(kept);
+        toy_tracker_free(t);
+    }
+    toy_tracker_free(target);
+}
+
 /* A snapshot of another configuration or model is refused. */
 static void test_other(void)
 {
@@ -229,6 +272,7 @@ int main(void)
     test_digest();
     test_damage();
     test_implausible();
+    test_far_times();
     test_other();
     return CHECK_DONE();
 }

@@ -1,7 +1,16 @@
 #include "base/arena.h"
 
-/* Under AddressSanitizer every block is followed by bytes that must not be touched. */
+/* Under AddressSanitizer every block is followed by bytes that must not be touched.  gcc defines a macro, clang has a
+ * feature. */
+#if defined(__has_feature)
+#if __has_feature(address_sanitizer)
+#define ARENA_RED_ZONES
+#endif
+#endif
 #if defined(__SANITIZE_ADDRESS__)
+#define ARENA_RED_ZONES
+#endif
+#if defined(ARENA_RED_ZONES)
 #include <sanitizer/asan_interface.h>
 enum { RED_ZONE = GAIT_ALIGN };
 #else

@@ -54,6 +54,9 @@ static const unsigned char *in_body(const gait_tracker *t, const unsigned char *
     return body + ((const unsigned char *)array - (const unsigned char *)t->core);
 }
 
+/* Microseconds since the start that no tracker reaches: differences of times below it cannot overflow. */
+static const uint64_t LONGEST_AGE = 1ull << 62;
+
 static bool core_plausible(const gait_tracker *t, const unsigned char *body)
 {
     tracker_core c;
@@ -63,9 +66,11 @@ static bool core_plausible(const gait_tracker *t, const unsigned char *body)
           c.below_capacity < t->capacity;
     ok &= c.below_config >= 0 && c.below_config <= t->config_particles - 16;
     const hypotheses_state *const h = &c.hypotheses;
-    ok &= h->stage >= HYPOTHESES_ONE && h->stage <= HYPOTHESES_TWO && h->since <= c.utime;
+    ok &= h->stage >= HYPOTHESES_ONE && h->stage <= HYPOTHESES_TWO && h->since <= c.utime &&
+          h->since >= c.start_utime;
     ok &= fabs(h->log_odds) < 1e6 && fabs(h->recent_log_ratio) < 1e12; /* false for NaN */
-    ok &= c.start_utime <= c.utime && c.support_utime <= c.utime && c.support_utime >= c.start_utime;
+    ok &= c.start_utime <= c.utime && (uint64_t)c.utime - (uint64_t)c.start_utime < LONGEST_AGE;
+    ok &= c.frame < LONGEST_AGE && c.support_utime <= c.utime && c.support_utime >= c.start_utime;
     ok &= c.rejuvenation_utime <= c.utime && c.rejuvenation_utime >= c.start_utime;
     ok &= c.usual_unexplained >= 0.0f && c.usual_unexplained < 1e9f && c.stature_sd_ratio >= 0.0f &&
           c.stature_sd_ratio < 1e9f;
@@ -94,6 +99,22 @@ static bool weights_plausible(const gait_tracker *t, const unsigned char *body)
         sum += weight;
     }
     return sum > 0.999 && sum < 1.001;
+}
+
+/* What the steps since the start have recorded; older slots are not read. */
+static bool records_plausible(const gait_tracker *t, const unsigned char *body)
+{
+    const particle_history *const h = &t->history;
+    tracker_core c;
+    memcpy(&c, body, sizeof c);
+    for (int32_t k = 0; k < h->depth && (uint64_t)k < c.frame; k++) {
+        generation_record r;
+        memcpy(&r, in_body(t, body, &h->record[history_slot(h, c.generation, k)]), sizeof r);
+        if (r.age < 0 || r.age > c.utime - c.start_utime || r.frame > c.frame ||
+            !(fabs(r.log_evidence) < 1e300) || r.status < GAIT_TRACK_INIT || r.status > GAIT_TRACK_LOST)
+            return false;
+    }
+    return true;
 }
 
 /* Slots of the history that no step has filled yet are zero. */
@@ -155,8 +176,8 @@ gait_result snapshot_restore(gait_tracker *t, const void *mem, size_t bytes, gai
     if (h.bytes != bytes || bytes != snapshot_bytes(t) || h.body != hash_state(body, state_bytes(t)))
         return base_fail(err, GAIT_ERR_CORRUPT, -1,
                          "snapshot is damaged: its length or checksum does not match");
-    if (!core_plausible(t, body) || !weights_plausible(t, body) || !history_plausible(t, body) ||
-        !template_plausible(t, body))
+    if (!core_plausible(t, body) || !weights_plausible(t, body) || !records_plausible(t, body) ||
+        !history_plausible(t, body) || !template_plausible(t, body))
         return base_fail(err, GAIT_ERR_CORRUPT, -1, "snapshot contains a number outside its range");
     memcpy(t->core, body, state_bytes(t));
     tracker_set_count(t, t->capacity - t->core->below_capacity);
