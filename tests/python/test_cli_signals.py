@@ -25,7 +25,7 @@ def clip(tmp_path_factory):
     return folder
 
 
-@pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM])
+@pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM, signal.SIGHUP])
 def test_track_leaves_no_temporary_files(clip, tmp_path, number):
     words = ["track", clip / "video.mp4", "--camera", clip / "camera.json", "--init", clip / "init.json"]
     words += ["--background", "none", "--particles", "2000"]

@@ -2,6 +2,8 @@
 
 import errno
 import os
+import subprocess
+import sys
 
 import pytest
 
@@ -95,3 +97,78 @@ def test_a_file_is_no_folder(tmp_path):
     for path in (tmp_path / "a", tmp_path / "a" / "b"):
         with pytest.raises(UserError, match="is a file; give the name of a folder"), filling(path):
             pass
+
+
+def test_two_writers_of_one_file_do_not_disturb_each_other(tmp_path):
+    path = tmp_path / "a.csv"
+    with replacing(path) as one:
+        one.write_text("one, begun first, ends last")
+        with replacing(path) as two:
+            assert two != one
+            two.write_text("two")
+        assert path.read_text() == "two"
+    assert path.read_text() == "one, begun first, ends last" and list(tmp_path.iterdir()) == [path]
+
+
+@pytest.mark.parametrize("mode", [0o600, 0o640, 0o664])
+def test_the_mode_of_the_old_file_is_kept(mode, tmp_path):
+    path = tmp_path / "a.csv"
+    path.write_text("old")
+    path.chmod(mode)
+    with replacing(path) as temporary:
+        assert temporary.stat().st_mode & 0o777 == mode  # also while it is written
+        temporary.write_text("new")
+    assert path.stat().st_mode & 0o777 == mode
+    umask = os.umask(0o027)
+    try:
+        with replacing(tmp_path / "b.csv") as temporary:
+            temporary.write_text("new")
+    finally:
+        os.umask(umask)
+    assert (tmp_path / "b.csv").stat().st_mode & 0o777 == 0o640
+
+
+def test_nothing_is_written_through_a_link_laid_in_the_way(tmp_path, monkeypatch):
+    victim = tmp_path / "victim"
+    victim.write_text("mine")
+    monkeypatch.setattr("secrets.token_hex", lambda count: "00" * count)
+    (tmp_path / f".a.{'00' * 8}.csv").symlink_to(victim)
+    with pytest.raises(UserError, match="File exists"), replacing(tmp_path / "a.csv") as temporary:
+        temporary.write_text("theirs")
+    assert victim.read_text() == "mine"
+
+
+def test_data_are_on_the_disk_before_the_name_and_the_name_before_the_end(tmp_path, monkeypatch):
+    calls = []
+    kinds = {True: "folder", False: "file"}
+    monkeypatch.setattr(os, "fsync", lambda fd: calls.append(kinds[os.path.isdir(f"/proc/self/fd/{fd}")]))
+    rename = os.replace
+    monkeypatch.setattr(os, "replace", lambda *names: (calls.append("rename"), rename(*names)))
+    with replacing(tmp_path / "a.csv") as temporary:
+        temporary.write_text("new")
+    assert calls == ["file", "rename", "folder"]
+
+
+def test_what_a_killed_command_left_is_named_and_kept(tmp_path, capsys):
+    program = (
+        "import os, sys; from gait.io.files import replacing\n"
+        "with replacing(sys.argv[1]) as path: path.write_text(sys.argv[2]); os.kill(os.getpid(), 9)"
+    )
+    path = tmp_path / "a.csv"
+    for text in ("an hour of work", ""):
+        subprocess.run([sys.executable, "-c", program, str(path), text], check=False)
+    left = [p for p in tmp_path.iterdir() if p.name.startswith(".a.")]
+    assert len(left) == 2
+    with replacing(path) as temporary:  # they may still be young, of a command that has just begun
+        temporary.write_text("new")
+    assert {p.name for p in tmp_path.iterdir()} == {"a.csv", *(p.name for p in left)}
+    for one in left:
+        os.utime(one, (0, 0))
+    with replacing(path) as open_now, replacing(path) as temporary:
+        os.utime(open_now, (0, 0))  # old, but its writer is alive
+        open_now.write_text("first")
+        temporary.write_text("second")
+    assert path.read_text() == "first"
+    assert (tmp_path / "a.unfinished.csv").read_text() == "an hour of work"
+    assert {p.name for p in tmp_path.iterdir()} == {"a.csv", "a.unfinished.csv"}
+    assert "was killed; what it had written is in a.unfinished.csv" in capsys.readouterr().err

@@ -156,7 +156,7 @@ def test_status_comes_every_second(url):
         assert listener.last.utime <= now() and listener.last.version == "0.1.0"
 
 
-@pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM])
+@pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM, signal.SIGHUP])
 def test_signals_end_it_in_good_order(url, number):
     process = subprocess.Popen(
         rig.command("--url", url), stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True

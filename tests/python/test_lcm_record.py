@@ -26,7 +26,7 @@ def estimates(tmp_path_factory):
     return rig.play(log).estimates
 
 
-@pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM])
+@pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM, signal.SIGHUP])
 @pytest.mark.parametrize("flowing", [False, True], ids=["quiet", "flowing"])
 def test_an_interrupted_recording_is_whole(estimates, tmp_path, number, flowing):
     """Estimates flow on, or have ceased so that the signal comes while it waits."""

@@ -23,14 +23,18 @@ static void on_signal(int number)
 /* Block the signals that end the program, also in threads that LCM starts; `unblocked` is the mask to wait with. */
 static void set_signals(sigset_t *unblocked)
 {
+    static const int ends[] = {SIGINT, SIGTERM, SIGHUP};
     struct sigaction const action = {.sa_handler = on_signal};
     sigset_t block;
     sigemptyset(&block);
-    sigaddset(&block, SIGINT);
-    sigaddset(&block, SIGTERM);
+    for (size_t i = 0; i < sizeof ends / sizeof *ends; i++) {
+        struct sigaction before;
+        if (ends[i] == SIGHUP && sigaction(SIGHUP, NULL, &before) == 0 && before.sa_handler == SIG_IGN)
+            continue; /* started by nohup */
+        sigaddset(&block, ends[i]);
+        sigaction(ends[i], &action, NULL);
+    }
     sigprocmask(SIG_BLOCK, &block, unblocked);
-    sigaction(SIGINT, &action, NULL);
-    sigaction(SIGTERM, &action, NULL);
     signal(SIGPIPE, SIG_IGN);
     signal(SIGXFSZ, SIG_IGN); /* too large a log is a write error */
 }

@@ -190,7 +190,8 @@ void settings_help(void)
         "(GAIT_ESTIMATE), smoothed estimates a few frames later (GAIT_ESTIMATE_LAG), the time, length and\n"
         "speed of each stride (GAIT_STRIDE), and GAIT_STATUS once a second.  Live, only the newest frame is\n"
         "tracked; the others are counted as dropped.\n"
-        "Accepts the commands START, STOP and RESET on GAIT_COMMAND.  SIGINT or SIGTERM end the program\n"
+        "Accepts the commands START, STOP and RESET on GAIT_COMMAND.  SIGINT, SIGTERM or SIGHUP end the "
+        "program\n"
         "with a summary.  Exit codes: 0 ok, 1 failed, 2 usage.\n\n");
     options_help(table, count);
 }

@@ -13,7 +13,6 @@ import argparse
 import contextlib
 import os
 import re
-import signal
 import sys
 from collections.abc import Iterator, Sequence
 from importlib import import_module
@@ -77,7 +76,7 @@ def main(argv: Sequence[str] | None = None) -> int:
         words[:2] = [" ".join(words[:2])]
     command = f" {words[0]}" if words and words[0] in COMMANDS else ""
     try:
-        with Interruptible(signal.SIGTERM):
+        with Interruptible(ignored=True):
             args = _parser(words).parse_args(list(_joined(words)))
             code = int(args.run(args))
             sys.stdout.flush()  # at exit Python would complain about a reader that has left

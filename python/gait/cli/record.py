@@ -1,8 +1,8 @@
 """Record the estimates of gait-trackd from LCM into a track file.
 
 Ends after --frames estimates, when none has come for --until-idle seconds, at the end of a log, when another
-stream begins (its frame numbers start again), or when interrupted (Ctrl-C, SIGTERM); the file is complete in
-every case.  It also ends, as a failure, when two trackers use one URL.
+stream begins (its frame numbers start again), or when interrupted (Ctrl-C, SIGTERM, SIGHUP); the file is
+complete in every case.  It also ends, as a failure, when two trackers use one URL.
 
 The figures are: frames written; frames the tracker dropped; estimates lost on the way here; the duration of a
 step; the latency from capture to arrival here.
@@ -19,6 +19,7 @@ import signal
 from typing import Any
 
 from gait.cli import values
+from gait.ending import ending_signals
 from gait.io.files import require_outputs
 from gait.lcm.link import is_log, lcm_url, log_of
 from gait.lcm.record import ESTIMATE, LAGGED, LISTENING, Recorder
@@ -52,7 +53,7 @@ def run(args: argparse.Namespace) -> int:
     def stop(number: int, frame: Any) -> None:
         recorder.stop = True
 
-    before = {number: signal.signal(number, stop) for number in (signal.SIGINT, signal.SIGTERM)}
+    before = {number: signal.signal(number, stop) for number in ending_signals()}
     try:
         note(f"{LISTENING} on {url}", args.quiet)
         recorder.run(args.frames, args.until_idle, args.patience)

@@ -1,4 +1,4 @@
-"""Signals: SIGTERM ends a command as Ctrl-C does, so that no temporary file stays behind."""
+"""Signals: SIGTERM and SIGHUP end a command as Ctrl-C does, so that no temporary file stays behind."""
 
 from __future__ import annotations
 
@@ -8,12 +8,17 @@ from collections.abc import Iterator
 from contextlib import contextmanager
 from types import FrameType, TracebackType
 
+from gait.ending import ending_signals
+
 
 class Interruptible:
-    """In this block SIGTERM and SIGINT, which background jobs of a shell ignore, raise KeyboardInterrupt."""
+    """In this block the signals that end a command raise KeyboardInterrupt.
 
-    def __init__(self, *numbers: signal.Signals) -> None:
-        self._numbers = numbers or (signal.SIGINT, signal.SIGTERM)
+    SIGINT does so anyway, unless the shell lets background jobs ignore it; `ignored` leaves it at that.
+    """
+
+    def __init__(self, *, ignored: bool = False) -> None:
+        self._numbers = [n for n in ending_signals() if not (ignored and n == signal.SIGINT)]
         self._held = self._asked = False
 
     def __enter__(self) -> Interruptible:

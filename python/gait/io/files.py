@@ -3,37 +3,100 @@
 from __future__ import annotations
 
 import errno
+import fcntl
 import os
+import re
+import secrets
+import stat
 import tempfile
+import time
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from pathlib import Path
 
 from gait.errors import UserError, unreadable
+from gait.progress import note
 
-FULL = (errno.ENOSPC, errno.EDQUOT, errno.EFBIG)  # disk full, or quota of the user, or limit of one file
+#: Disk full, or quota of the user, or limit of one file, or a disk that fails.
+FULL = (errno.ENOSPC, errno.EDQUOT, errno.EFBIG, errno.EIO)
+_SETTLED = 60.0  # seconds after which an unlocked temporary file is what a killed command left
 
 
 @contextmanager
 def replacing(path: str | os.PathLike[str]) -> Iterator[Path]:
-    """Yield a temporary path of the same folder and suffix; rename it to `path` if the block succeeds.
+    """Yield a temporary file of the same folder, suffix and mode; rename it to `path` if the block succeeds.
 
-    Through a symbolic link the file is written that it points to.
+    Through a symbolic link the file is written that it points to.  Two writers of one path do not disturb
+    each other; the last one to end wins.  What a killed command left is renamed to NAME.unfinished.SUFFIX.
+    When the block has succeeded, the file is on the disk under its name even if the power fails.
 
     UserError if a file cannot be put there, as by `require_writable`, or the disk is full.
     """
     require_writable(path)
     target = Path(os.path.realpath(path))
-    temporary = target.with_name(f".{target.stem}.{os.getpid()}{target.suffix}")
+    _recover(target)
+    temporary = target.with_name(f".{target.stem}.{secrets.token_hex(8)}{target.suffix}")
+    descriptor = -1
     try:
+        flags = os.O_RDWR | os.O_CREAT | os.O_EXCL | os.O_NOFOLLOW | os.O_CLOEXEC
+        descriptor = os.open(temporary, flags, 0o666)
+        fcntl.flock(descriptor, fcntl.LOCK_EX)  # until it is closed: a killed command holds no lock
+        if target.exists():
+            os.fchmod(descriptor, stat.S_IMODE(target.stat().st_mode))
         yield temporary
+        _flush(temporary)
         os.replace(temporary, target)
+        _flush(target.parent)
     except OSError as error:
         if error.errno not in FULL and error.filename != str(temporary):
             raise
         raise UserError(f"{path}: {error.strerror}; choose another place") from error
     finally:
         temporary.unlink(missing_ok=True)
+        if descriptor >= 0:
+            os.close(descriptor)
+
+
+def _flush(path: Path) -> None:
+    """Write a file or the names in a folder to the disk; some file systems cannot do the latter."""
+    descriptor = os.open(path, os.O_RDONLY)
+    try:
+        os.fsync(descriptor)
+    except OSError as error:
+        if error.errno != errno.EINVAL:
+            raise
+    finally:
+        os.close(descriptor)
+
+
+def _recover(target: Path) -> None:
+    """Rename what killed writers of `target` left, and report it; remove it if it is empty."""
+    pattern = re.compile(rf"\.{re.escape(target.stem)}\.[0-9a-f]{{16}}{re.escape(target.suffix)}")
+    for left in [entry for entry in target.parent.iterdir() if pattern.fullmatch(entry.name)]:
+        if not _is_left(left):
+            continue
+        if left.stat().st_size == 0:
+            left.unlink(missing_ok=True)
+            continue
+        kept = target.with_name(f"{target.stem}.unfinished{target.suffix}")
+        os.replace(left, kept)
+        note(f"{target}: a command that wrote it was killed; what it had written is in {kept.name}")
+
+
+def _is_left(temporary: Path) -> bool:
+    """Whether no process writes a temporary file any more."""
+    try:
+        descriptor = os.open(temporary, os.O_RDONLY | os.O_NOFOLLOW | os.O_CLOEXEC | os.O_NONBLOCK)
+    except OSError:
+        return False
+    try:
+        fcntl.flock(descriptor, fcntl.LOCK_EX | fcntl.LOCK_NB)
+        is_file = stat.S_ISREG(os.fstat(descriptor).st_mode)
+        return is_file and time.time() - os.fstat(descriptor).st_mtime > _SETTLED
+    except OSError:
+        return False
+    finally:
+        os.close(descriptor)
 
 
 def require_writable(path: str | os.PathLike[str]) -> None:
@@ -94,7 +157,10 @@ def filling(path: str | os.PathLike[str]) -> Iterator[Path]:
         yield Path(name)
         folder.mkdir(exist_ok=True)
         for file in sorted(Path(name).iterdir(), key=lambda p: (p.suffix == ".html", p.name)):
+            if file.is_file():
+                _flush(file)
             os.replace(file, folder / file.name)
+        _flush(folder)
 
 
 def require_folder(path: str | os.PathLike[str]) -> None:

@@ -12,6 +12,8 @@ from itertools import islice
 from multiprocessing import forkserver, resource_tracker
 from multiprocessing.context import BaseContext
 
+from gait.ending import ending_signals
+
 STAGE = "gait.learn.corpus.stage"  # what workers run; by name, to avoid importing it here
 WORTH = 4 << 20  # bytes of recordings that take longer to read than workers to start (0.6 s per MB)
 
@@ -64,8 +66,7 @@ def held_back() -> Iterator[None]:
     mask alone is not enough: another thread takes the signal, and Python still interrupts this one.
     """
     came: list[int] = []
-    numbers = (signal.SIGINT, signal.SIGTERM)
-    here = numbers if threading.current_thread() is threading.main_thread() else ()
+    here = ending_signals() if threading.current_thread() is threading.main_thread() else ()
     before = signal.pthread_sigmask(signal.SIG_BLOCK, {signal.SIGINT})
     handlers = {n: signal.signal(n, lambda number, _: came.append(number)) for n in here}
     try:

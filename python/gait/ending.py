@@ -1,0 +1,11 @@
+"""Signals that end a command: all of them leave files complete and nothing half-written behind."""
+
+from __future__ import annotations
+
+import signal
+
+
+def ending_signals() -> tuple[signal.Signals, ...]:
+    """SIGINT, SIGTERM and SIGHUP, which a closed terminal sends, unless it is ignored, as by nohup."""
+    ignored = signal.getsignal(signal.SIGHUP) == signal.SIG_IGN
+    return (signal.SIGINT, signal.SIGTERM) if ignored else (signal.SIGINT, signal.SIGTERM, signal.SIGHUP)
