@@ -14,6 +14,7 @@ from numpy.typing import NDArray
 from gait.bindings.model import Model
 from gait.bindings.start_fit import Hypothesis, StartFit
 from gait.camera.camera import Camera
+from gait.detect.profile import picture_height
 from gait.errors import GaitError
 from gait.io.keypoints_file import Keypoints
 from gait.track.keypoint_start import keypoint_noise
@@ -27,6 +28,7 @@ _FOV_SD = 0.45  # of the focal length's logarithm; of --fov:
 GIVEN_FOV_SD = 0.05
 _HEIGHT, _HEIGHT_SD = 1.3, 0.5  # metres; of the logarithm
 _TILT, _TILT_SD, _ROLL_SD = 0.05, 0.2, 0.02  # radians
+_STICK_SD = 0.025  # of the height, of hips over ankles as an upright stick
 _STARTS = (0.6, 0.85, 1.2, 2.2, 4.0)  # focal lengths to start from, longer sides of the picture
 _LONGEST = 12.0  # seconds of a walk that are used
 _RATE = 10.0  # frames per second that are used
@@ -78,7 +80,7 @@ def choose_frames(keypoints: Keypoints) -> Keypoints:
         rows = rows[::step]
         time = keypoints.time[rows]
         if time[-1] - time[0] > _LONGEST:
-            size = np.ptp(keypoints.uv[rows][:, legs, 1], axis=1)
+            size = picture_height(keypoints)[rows]
             begin = max(
                 time[time <= time[-1] - _LONGEST],
                 key=lambda t: np.ptp(np.log(np.maximum(size[(time >= t) & (time <= t + _LONGEST)], 1.0))),
@@ -151,16 +153,16 @@ def _level(q: Array, keypoints: Keypoints, size: tuple[int, int], height: float,
         np.mean([keypoints.uv[:, names.index(f"{side}_{joint}")] for side in "lr"], axis=0)
         for joint in ("hip", "ankle")
     )
-    q = q.copy()
+    q, tall = q.copy(), np.maximum(picture_height(keypoints), 1.0)
 
     def residuals(p: Array) -> Array:
         camera = make_camera(np.array([q[0], p[0], 0.0, p[1]]), size)
         foot = camera.on_plane(ankle, 0.06 * height)
         top = camera.project(foot + [0.0, 0.0, 0.46 * height])
-        off = (top - hip)[:, 1] / np.median(np.abs(hip - ankle)[:, 1])
-        off = np.where(np.isfinite(off), off, 3.0)
+        off = (top - hip)[:, 1] / tall
+        off = np.where(np.isfinite(off), off, 1.5)
         return np.concatenate(
-            [off / 0.05 / np.sqrt(len(off)) * 3, (p - prior.mean[[1, 3]]) / prior.sd[[1, 3]]]
+            [off / _STICK_SD / np.sqrt(len(off)) * 3, (p - prior.mean[[1, 3]]) / prior.sd[[1, 3]]]
         )
 
     from scipy.optimize import least_squares  # here, as it takes a second to load
