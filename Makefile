@@ -307,8 +307,9 @@ CPU_NAME = $(shell sed -n 's/^model name[^:]*: *//p' /proc/cpuinfo 2>/dev/null |
 BENCH_CSV = $(if $(filter --record,$(ARGS)),tests/bench/results,build/bench)/$(or $(CPU_NAME),$(MACHINE)).csv
 BENCH_PAGE = $(if $(filter --record,$(ARGS)),--page tests/bench/results/$(1).md)
 BENCH_RUN = $(PY) tests/bench/bench.py --cc '$(CC)'
-bench: $(B)/bench/step | $(READY) ## speed by particles, threads, instruction set and stage (ARGS='-s 40 --runs 7'; --record keeps it)
+bench: $(B)/bench/step | $(READY) ## speed by particles, threads, instruction set and stage; detector (ARGS='-s 40 --runs 7'; --record)
 	@$(BENCH_RUN) $(call BENCH_PAGE,bench) --csv $(BENCH_CSV) $< $(filter-out --record,$(ARGS))
+	@$(PY) tests/bench/detector_speed.py $(filter --record,$(ARGS))
 
 bench-lift: $(B)/bench/lift | $(READY) ## time lifting a frame, a segment, by instruction set (ARGS='-m MODEL.gait'; --record)
 	@$(BENCH_RUN) --target bench-lift --title 'Speed of lifting' $(call BENCH_PAGE,bench_lift) $< $(filter-out --record,$(ARGS))

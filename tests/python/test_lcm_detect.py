@@ -1,17 +1,24 @@
 """gait detect --lcm: frames come in over LCM, and the joints found in them go out."""
 
+import re
+import sys
+from pathlib import Path
+
+import cv2
 import lcm_rig as rig
 import numpy as np
 import pytest
 
-from gait.detect import profile
+from gait import Camera, Video, cli
+from gait.bindings.initial import Start
+from gait.detect import profile, weights
 from gait.detect.networks import JOINTS, Crop, Person
 from gait.detect.people import Followed
 from gait.errors import UserError
 from gait.io.keypoints_file import Keypoints
 from gait.lcm import detect
 from gait.lcm.link import gaitmsg, private_url
-from gait.lcm.messages import image_message
+from gait.lcm.messages import camera_message, command_message, image_message
 
 UV = np.random.default_rng(1).uniform(100, 300, (len(JOINTS), 2))
 CONFIDENCE = np.linspace(0.3, 1, len(JOINTS))
@@ -91,6 +98,50 @@ def test_joints_are_the_models_of_the_person_in_view_longest(rigged):
     assert [t.name for t in tracks] == list(JOINTS)
     np.testing.assert_allclose([(t.u, t.v) for t in tracks], profile.corrected(raw, "full").uv[0], atol=1e-3)
     np.testing.assert_allclose([t.confidence for t in tracks], CONFIDENCE, atol=1e-6)
+
+
+def test_the_tracker_uses_the_joints_of_every_second_frame(tmp_path, monkeypatch):
+    """A simulated walk through the networks, and both streams through gait-trackd."""
+    fetched = Path(sys.prefix) / "share/gait/weights"
+    if not all((fetched / w.file).is_file() for w in (weights.PERSON, weights.LANDMARKS["lite"])):
+        pytest.skip("the detector's weights are absent: gait detect --fetch")
+    monkeypatch.setenv("GAIT_WEIGHTS", str(fetched))
+    clip = tmp_path / "clip"
+    assert cli.main(["simulate", "-o", str(clip), "--frames", "8", "--size", "480x360", "--quiet"]) == 0
+    video = Video(clip / "video.mp4")
+    start = Start.read(str(clip / "init.json"), rig.model())
+    log = [
+        ("GAIT_CAMERA_0", camera_message(Camera.read(str(clip / "camera.json"), video.size), rig.utime(0))),
+        ("GAIT_BACKGROUND_0", image_message(cv2.imread(str(clip / "background.png")), rig.utime(0), -1)),
+        ("GAIT_COMMAND", command_message(gaitmsg.command_t.START, rig.utime(0), start.mean, start.sd)),
+    ]
+
+    class Link:
+        """Passes on what is published into the log."""
+
+        def subscribe(self, channel, handler):
+            self.handler = handler
+            return self
+
+        def set_queue_capacity(self, count):
+            pass
+
+        def publish(self, channel, data):
+            log.append((channel, data))
+
+    link = Link()
+    monkeypatch.setattr(detect, "open_lcm", lambda url: link)
+    live = detect.LiveDetector(private_url(), 0, "lite", 8)
+    for frame in video.frames():
+        message = image_message(frame.image, rig.utime(frame.number), frame.number)
+        log.append(("GAIT_IMAGE_0", message))
+        if frame.number % 2 == 0:
+            link.handler("GAIT_IMAGE_0", message.encode())
+    assert live.found == live.frames == 4
+    written = rig.write_log(tmp_path / "a.log", log)
+    with_joints, alone = rig.play(written, "--keypoints-term"), rig.play(written)
+    assert re.search(r"keypoint_messages 4 keypoints_used 4 keypoints_late 0", with_joints.printed)
+    assert with_joints.frames == alone.frames == 8 and with_joints.digest != alone.digest
 
 
 def test_a_log_cannot_be_answered(tmp_path):
