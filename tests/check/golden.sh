@@ -55,7 +55,7 @@ for cc in gcc clang; do
     done
     compare "$cc" "build/golden/$cc-release" "$release"
 done
-# Another instruction set, under emulation, in the folder of `make lib CC=$arm-gcc`: the tests of the example made it.
+# Another instruction set, under emulation, in the folder of `make lib CC=$arm-gcc`.
 arm=aarch64-linux-gnu
 if here $arm-gcc $arm-g++ qemu-aarch64; then
     LDFLAGS=-static && export LDFLAGS
