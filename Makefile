@@ -231,7 +231,7 @@ $(B)/unit/%: tests/unit/%.c $(OBJ) Makefile $(MADE) | $(B)/unit/
 # A process for each processor; the tests of a file stay together, they share what is slow to make.
 # What their many processes import is compiled once, also where the caller's environment forbids it.
 COMPILED_ONCE := PYTHONDONTWRITEBYTECODE= PYTHONPYCACHEPREFIX='$(abspath build/pycache)'
-PYTEST_AT_ONCE := -n logical --maxprocesses 8 --dist loadfile
+PYTEST_AT_ONCE := -n logical --maxprocesses 8 --dist loadfile --no-loadscope-reorder
 python-test: setup lib tools ## Python tests (ARGS='-k blob' to choose)
 	@$(COMPILED_ONCE) $(PY) -m pytest -q -c python/pyproject.toml --rootdir . $(PYTEST_AT_ONCE) tests/python $(ARGS)
 
