@@ -89,7 +89,7 @@ UNIT := $(patsubst tests/unit/%.c,$(B)/unit/%,$(sort $(wildcard tests/unit/test_
 TOOLS := $(BIN)/gait-trackd
 LIBS := $(B)/libgait.so $(B)/libgait.a
 
-.PHONY: help setup lib tools test built check unit python-test demo model paper bench bench-lift detector-profile eval eval-real eval-learn eval-lift mutants asan tsan unit-threads fuzz fuzz-run golden-check \
+.PHONY: help setup lib tools test built check unit python-test demo model paper bench bench-lift detector-profile eval eval-camera eval-real eval-learn eval-lift mutants asan tsan unit-threads fuzz fuzz-run golden-check \
         docs lint format wheel sdist wheel-check install uninstall clean
 
 help: ## list the targets
@@ -329,6 +329,9 @@ eval-learn: setup lib $(PEERS) ## learning beside other packages: tests/bench/re
 
 eval-real: setup lib ## tracks of real people's films beside joints checked by a person (ARGS='--arms auto --record')
 	@$(PY) tests/bench/eval_real.py $(ARGS)
+
+eval-camera: setup lib ## cameras found from walks, and tracks with them: tests/bench/results/camera_walk.md *
+	@$(PY) tests/bench/camera_walk.py $(ARGS)
 
 detector-profile: setup lib ## learn where the detector's joints lie beside the model's, on CLIPS= with known joints *
 	@$(PY) tests/bench/detector_profile.py $(or $(CLIPS),../shared/data/eval/dev)

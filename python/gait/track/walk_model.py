@@ -2,8 +2,8 @@
 
 `WalkingBody` has the joints of the cyclic model, linear in its scores and proportions; `WalkModel` places it
 on a path, projects it and compares it with keypoints.  The parameters are one vector: camera (log focal
-length, tilt, roll, log height), stature, scores and proportions, offsets of the detector's joints, and place,
-heading and phase at knots.
+length, tilt, roll, log height), stature, scores, proportions and leans, offsets of the detector's joints, and
+place, heading and phase at knots.
 """
 
 from __future__ import annotations
@@ -58,7 +58,7 @@ def _limb_above(name: str) -> str:
 
 
 class WalkingBody:
-    """Joints of the model over the stride, statures, linear in scores and proportions; pelvis at (0, 0)."""
+    """Joints over the stride, statures; linear in scores, proportions and leans; pelvis at (0, 0)."""
 
     PHASES = 60
 
