@@ -70,7 +70,7 @@ _DIRECTION = re.compile(r"-[xyz]|-[\d.][^,]*,[^,]+,[^,]+")
 def main(argv: Sequence[str] | None = None) -> int:
     """Run one command and return its exit code."""
     words = list(sys.argv[1:] if argv is None else argv)
-    if argv is None and words[:1] == ["learn"]:  # the process is ours, and numpy not yet loaded
+    if argv is None and words[:1] in (["learn"], ["paper"]):  # the process is ours, numpy not yet loaded
         reproducible.settle()
     if " ".join(words[:2]) in COMMANDS:  # a command of two words
         words[:2] = [" ".join(words[:2])]

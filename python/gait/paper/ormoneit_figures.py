@@ -152,7 +152,7 @@ def _periods(learning: Learning) -> Entry:
 
 def _whole_periods(flat: bool, failed: int, long_failed: bool) -> str:
     """Return the verdict of the search over whole periods."""
-    fails = [f"on {failed} short walks"] if failed else []
+    fails = [f"on {failed} walks"] if failed else []
     fails += ["where the cycle of a long walk is no whole number of frames"] if long_failed else []
     words = "reproduced" if flat else "reproduced but for the noise"
     return words + (f"; whole periods fail {' and '.join(fails)}" if fails else "")
