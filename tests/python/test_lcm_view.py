@@ -2,6 +2,7 @@
 
 import signal
 import subprocess
+import time
 import urllib.error
 import urllib.request
 from dataclasses import replace
@@ -13,8 +14,9 @@ import numpy as np
 import pytest
 
 from gait.errors import UserError
+from gait.lcm import viewer as viewer_module
 from gait.lcm.link import private_url
-from gait.lcm.messages import estimate_of
+from gait.lcm.messages import camera_message, estimate_of
 from gait.lcm.viewer import Screen, Viewer
 from gait.report.drawing import Overlay
 
@@ -167,3 +169,105 @@ def test_the_command_shows_a_live_stream(tmp_path):
     finally:
         process.kill()
         process.communicate()
+
+
+def test_the_newest_camera_counts(log, tmp_path):
+    path, estimates = log
+    wrong = camera_message(rig.CAMERA, 0)
+    wrong.width, wrong.height, wrong.cx, wrong.cy = 16000, 16000, 7999.5, 7999.5
+    events = [("GAIT_CAMERA_0", wrong), rig.frames(0, 1)[0], ("GAIT_ESTIMATE", estimates[0])]
+    events += [
+        ("GAIT_CAMERA_0", camera_message(rig.CAMERA, 0)),
+        rig.frames(0, 2)[1],
+        ("GAIT_ESTIMATE", estimates[1]),
+    ]
+    assert len(view(rig.write_log(tmp_path / "a.log", events))) == 1
+
+
+def spoilt(message, **changes):
+    """A message with other fields; a function gets the old value."""
+    other = type(message).decode(message.encode())
+    for name, value in changes.items():
+        setattr(other, name, value(getattr(other, name)) if callable(value) else value)
+    return other
+
+
+@pytest.mark.parametrize(
+    ("estimate", "image", "words"),
+    [
+        ({"joints": [], "njoints": 0}, {}, "other joints"),
+        ({"joints": lambda joints: joints[:10], "njoints": 10}, {}, "other joints"),
+        ({"status": 77}, {}, "status 77 is unknown"),
+        ({"speed": float("nan")}, {}, "not finite"),
+        ({"ess": float("inf")}, {}, "not finite"),
+        ({}, {"width": 0, "height": 0}, "0x0 pixels are no picture"),
+        ({}, {"width": -160}, "-160x120 pixels are no picture"),
+        ({}, {"height": -1}, "160x-1 pixels are no picture"),
+        ({}, {"width": 80}, "a picture of 80x120, the camera's is 160x120"),
+        ({}, {"height": 60}, "a picture of 160x60"),
+        ({}, {"row_stride": 0}, "row_stride or size too small"),
+        ({}, {"pixelformat": 5}, "pixelformat"),
+        ({}, {"pixelformat": 1196444237, "data": b"", "size": 0}, "JPEG frame cannot be decoded"),
+    ],
+)
+def test_one_odd_message_is_left_out(estimate, image, words, log, tmp_path):
+    estimates, frames = log[1], [message for _, message in rig.frames(0, 3)]
+    events = [*rig.opening()]
+    for i, (frame, found) in enumerate(zip(frames, estimates, strict=False)):
+        odd = i == 1
+        events.append(("GAIT_IMAGE_0", spoilt(frame, **image) if odd else frame))
+        events.append(("GAIT_ESTIMATE", spoilt(found, **estimate) if odd else found))
+    path, shown = rig.write_log(tmp_path / "odd.log", events), []
+    viewer = Viewer(f"file://{path}?speed=0", 0, rig.model(), None, shown.append)
+    while viewer.handle(1.0):
+        pass
+    assert len(shown) == 2 and words in viewer.damage
+
+
+@pytest.mark.parametrize(
+    "change",
+    [{"width": 0}, {"height": -3}, {"fx": 0.0}, {"cx": 3e38}, {"t": [float("nan")] * 3}, {"R": [1.0] * 9}],
+)
+def test_cameras_that_cannot_be_are_left_out(change, log, tmp_path):
+    events = [("GAIT_CAMERA_0", spoilt(camera_message(rig.CAMERA, 0), **change)), rig.frames(0, 1)[0]]
+    path = rig.write_log(tmp_path / "a.log", [*events, ("GAIT_ESTIMATE", log[1][0])])
+    assert view(path) == []
+
+
+@pytest.fixture
+def screen(monkeypatch):
+    monkeypatch.setattr(viewer_module, "_WAIT", 0.05)
+    found = Screen(0)
+    yield found
+    found.close()
+
+
+def test_without_a_picture_browsers_get_an_answer(screen):
+    with pytest.raises(urllib.error.HTTPError, match="503"):
+        urllib.request.urlopen(f"{screen.address}frame.jpg", timeout=rig.PATIENCE)
+
+
+@pytest.mark.parametrize("host", ["evil.example", "evil.example:80", ""])
+def test_other_hosts_are_refused(host, screen):
+    screen.show(rig.picture(0))
+    request = urllib.request.Request(f"{screen.address}frame.jpg", headers={"Host": host})
+    with pytest.raises(urllib.error.HTTPError, match="403"):
+        urllib.request.urlopen(request, timeout=rig.PATIENCE)
+    local = urllib.request.Request(screen.address.replace("127.0.0.1", "localhost"))
+    assert urllib.request.urlopen(local, timeout=rig.PATIENCE).status == 200
+
+
+def test_browsers_are_bounded_and_their_places_come_free(screen):
+    screen.show(rig.picture(0))
+    open_now = [urllib.request.urlopen(f"{screen.address}stream", timeout=rig.PATIENCE) for _ in range(16)]
+    with pytest.raises(urllib.error.HTTPError, match="503"):
+        urllib.request.urlopen(screen.address, timeout=rig.PATIENCE)
+    for stream in open_now:
+        stream.close()
+    deadline = time.monotonic() + rig.PATIENCE
+    while True:
+        try:
+            assert urllib.request.urlopen(screen.address, timeout=rig.PATIENCE).status == 200
+            break
+        except urllib.error.HTTPError:
+            assert time.monotonic() < deadline

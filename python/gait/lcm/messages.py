@@ -14,13 +14,15 @@ from numpy.typing import ArrayLike
 from gait.bindings.abi import MAX_ANGLES, MAX_COMPONENTS, Flag, TrackStatus
 from gait.bindings.estimate import Estimate
 from gait.bindings.state import POSE_SCALARS, State
-from gait.camera.camera import Camera
+from gait.camera.camera import MAX_PIXELS, Camera
 from gait.errors import UserError
 from gait.io.video import Image
 from gait.lcm.link import gaitmsg
 
 _FRAME_KEY = "frame"
 _UNKNOWN = math.nan
+_FURTHEST = 1e9  # of a camera's numbers
+_ROTATION = 3e-3  # by which the rows of a rotation in single precision may miss
 
 
 def decode(kind: Any, data: bytes, channel: str) -> Any:
@@ -144,10 +146,17 @@ def picture(message: Any) -> Image:
         If the format is not one of package ``gaitmsg`` or the data are short.
     """
     kind = type(message)
+    if not all(1 <= side <= MAX_PIXELS for side in (message.width, message.height)):
+        raise UserError(f"image: {message.width}x{message.height} pixels are no picture")
     if message.pixelformat == kind.PIXEL_FORMAT_MJPEG:
-        image = cv2.imdecode(np.frombuffer(message.data, np.uint8), cv2.IMREAD_UNCHANGED)
-        if image is None:
+        try:
+            image = cv2.imdecode(np.frombuffer(message.data, np.uint8), cv2.IMREAD_UNCHANGED)
+        except cv2.error:  # empty, or of more pixels than OpenCV takes
+            image = None
+        if image is None or image.dtype != np.uint8 or image.shape[2:] not in ((), (3,)):
             raise UserError("image: JPEG frame cannot be decoded")
+        if image.shape[:2] != (message.height, message.width):
+            raise UserError("image: JPEG frame of another size than its message states")
         return np.asarray(image, np.uint8)
     channels = {kind.PIXEL_FORMAT_GRAY: 1, kind.PIXEL_FORMAT_RGB: 3, kind.PIXEL_FORMAT_BGR: 3}
     depth = channels.get(message.pixelformat)
@@ -177,9 +186,21 @@ def camera_message(camera: Camera, utime: int) -> Any:
 
 
 def camera_of(message: Any) -> Camera:
-    """Read a ``camera_t``."""
+    """Read a ``camera_t``.
+
+    Raises
+    ------
+    UserError
+        If it is no camera: its size, focal lengths or rotation cannot be, or numbers are not finite.
+    """
     plain = {name: getattr(message, name) for name in ("width", "height", "fx", "fy", "cx", "cy")}
     turn = np.reshape(message.R, (3, 3)).astype(float)
+    numbers = np.array([*plain.values(), *message.R, *message.t, *message.distortion], float)
+    sized = all(1 <= plain[side] <= MAX_PIXELS for side in ("width", "height"))
+    if not (sized and (np.abs(numbers) < _FURTHEST).all() and min(plain["fx"], plain["fy"]) > 0):
+        raise UserError("camera: size, focal lengths or other numbers out of range")
+    if np.abs(turn @ turn.T - np.eye(3)).max() > _ROTATION or np.linalg.det(turn) < 0:
+        raise UserError("camera: R is not a rotation")
     return Camera(
         **plain, R=turn, t=np.array(message.t, float), distortion=np.array(message.distortion, float)
     )
@@ -230,7 +251,15 @@ def command_message(
 
 
 def estimate_of(message: Any) -> Estimate:
-    """Read an ``estimate_t``."""
+    """Read an ``estimate_t``.
+
+    Raises
+    ------
+    UserError
+        If its status is none.
+    """
+    if message.status not in list(TrackStatus):
+        raise UserError(f"estimate: status {message.status} is unknown")
     return Estimate(
         utime=message.utime,
         frame=message.step,

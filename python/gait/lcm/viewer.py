@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import contextlib
+import select
 import threading
 from collections.abc import Callable
 from dataclasses import replace
@@ -10,8 +12,11 @@ from http.server import BaseHTTPRequestHandler, ThreadingHTTPServer
 from typing import Any
 
 import cv2
+import numpy as np
 
+from gait.bindings.estimate import Estimate
 from gait.bindings.model import Model
+from gait.bindings.state import POSE_SCALARS
 from gait.camera.camera import Camera
 from gait.errors import UserError
 from gait.io.video import Image
@@ -20,6 +25,9 @@ from gait.lcm.messages import camera_of, decode, estimate_of, picture
 from gait.report.drawing import Overlay
 
 _KEPT = 64  # frames that wait for their estimate
+_FURTHEST = 1e6  # metres, or anything else that is drawn
+_MOST = 16  # browsers at a time
+_WAIT = 5.0  # seconds for a picture
 _PART = "gait-frame"
 _PAGE = b"""<!DOCTYPE html><html><head><meta charset="utf-8"><title>gait view</title></head>
 <body style="margin:0;background:#222;text-align:center">
@@ -52,7 +60,10 @@ class Viewer:
     ) -> None:
         self._lcm, self._log = listener(url), is_log(url)
         self._model, self._show = model, show
-        self._overlay = Overlay(model, camera) if camera is not None else None
+        self._overlay: Overlay | None = None
+        self._given = camera is not None
+        if camera is not None:
+            self._use(camera)
         self._frames: dict[int, Any] = {}
         self._origin: int | None = None
         self.damage: str | None = None
@@ -78,18 +89,39 @@ class Viewer:
             del self._frames[next(iter(self._frames))]
 
     def _on_camera(self, channel: str, data: bytes) -> None:
-        if self._overlay is None:
-            self._overlay = Overlay(self._model, camera_of(decode(gaitmsg.camera_t, data, channel)))
+        if not self._given:  # the newest counts: an earlier one may have been wrong
+            self._use(camera_of(decode(gaitmsg.camera_t, data, channel)))
+
+    def _use(self, camera: Camera) -> None:
+        self._overlay, self._size = Overlay(self._model, camera), camera.size
 
     def _on_estimate(self, channel: str, data: bytes) -> None:
         message = decode(gaitmsg.estimate_t, data, channel)
         image = self._frames.pop(message.utime, None)
         if image is None or self._overlay is None:
             return
+        estimate, pixels = estimate_of(message), picture(image)
+        if estimate.joint_names != self._model.joint_names:
+            raise UserError(
+                f"{channel}: an estimate of other joints than the model's; give the model tracked"
+            )
+        if not _plausible(estimate):
+            raise UserError(f"{channel}: an estimate with numbers that are not finite")
+        if pixels.shape[1::-1] != self._size:
+            size, own = ("{}x{}".format(*pair) for pair in (pixels.shape[1::-1], self._size))
+            raise UserError(f"{channel}: a picture of {size}, the camera's is {own}; give its --camera")
         self._origin = message.utime if self._origin is None else self._origin
         # The panel shows seconds since the first frame seen, not the time of the day.
-        estimate = replace(estimate_of(message), utime=message.utime - self._origin)
-        self._show(self._overlay.draw(picture(image), estimate, message.frame))
+        estimate = replace(estimate, utime=message.utime - self._origin)
+        self._show(self._overlay.draw(pixels, estimate, message.frame))
+
+
+def _plausible(estimate: Estimate) -> bool:
+    """Whether all numbers that are drawn are finite and on this planet."""
+    mean = [getattr(estimate.mean, name) for name in POSE_SCALARS]
+    numbers = np.concatenate([estimate.joints.ravel(), estimate.joint_sd.ravel(), estimate.mean.pelvis, mean])
+    drawn = np.array([*numbers, estimate.speed, estimate.ess])
+    return bool((np.abs(drawn) < _FURTHEST).all())  # False for NaN
 
 
 class Screen:
@@ -108,12 +140,12 @@ class Screen:
 
     def __init__(self, port: int) -> None:
         self._new = threading.Condition()
-        self._jpeg, self._count = b"", 0
+        self._jpeg, self._count, self._closed = b"", 0, False
         try:
-            self._server = ThreadingHTTPServer(("127.0.0.1", port), partial(_Request, self))
+            self._server = _Server(("127.0.0.1", port), partial(_Request, self))
         except (OSError, OverflowError) as exc:
             raise UserError(f"--port {port}: cannot be opened ({exc}); give another, or 0 for any") from None
-        self._server.daemon_threads = True
+        self.hosts = {f"{name}:{self._server.server_address[1]}" for name in ("127.0.0.1", "localhost")}
         self.address = f"http://127.0.0.1:{self._server.server_address[1]}/"
         threading.Thread(target=self._server.serve_forever, daemon=True).start()
 
@@ -125,15 +157,52 @@ class Screen:
             self._new.notify_all()
 
     def after(self, count: int) -> tuple[bytes, int]:
-        """Wait for a picture later than the one of this count; return it and its count."""
+        """Wait a few seconds for a later picture than that of this count; return the newest and its count."""
         with self._new:
-            self._new.wait_for(lambda: self._count > count)
+            self._new.wait_for(lambda: self._count > count or self._closed, _WAIT)
             return self._jpeg, self._count
+
+    @property
+    def closed(self) -> bool:
+        """Whether nothing more is shown."""
+        return self._closed
 
     def close(self) -> None:
         """Serve no more."""
+        with self._new:
+            self._closed = True
+            self._new.notify_all()
         self._server.shutdown()
         self._server.server_close()
+
+
+class _Server(ThreadingHTTPServer):
+    """A thread for each browser, but not more than `_MOST`; others are sent away."""
+
+    daemon_threads = True
+
+    def __init__(self, *words: Any) -> None:
+        self._free = threading.BoundedSemaphore(_MOST)
+        super().__init__(*words)
+
+    def process_request(self, request: Any, client_address: Any) -> None:
+        """Serve a browser in a thread, if there is one for it."""
+        if self._free.acquire(blocking=False):
+            super().process_request(request, client_address)
+        else:
+            with contextlib.suppress(OSError):
+                request.sendall(b"HTTP/1.0 503 Too many browsers\r\nContent-Length: 0\r\n\r\n")
+            self.shutdown_request(request)
+
+    def process_request_thread(self, request: Any, client_address: Any) -> None:
+        """Serve, and leave the thread to others."""
+        try:
+            super().process_request_thread(request, client_address)
+        finally:
+            self._free.release()
+
+    def handle_error(self, request: Any, client_address: Any) -> None:
+        """Report nothing: a browser that breaks off is no fault of ours."""
 
 
 class _Request(BaseHTTPRequestHandler):
@@ -143,12 +212,20 @@ class _Request(BaseHTTPRequestHandler):
         self._screen = screen
         super().__init__(*rest)
 
+    timeout = 3 * _WAIT  # seconds for a browser that sends or takes nothing
+
     def do_GET(self) -> None:
         """Answer, for as long as the browser stays."""
-        if self.path == "/":
+        if self.headers.get("Host") not in self._screen.hosts:  # a page elsewhere that leads here by its name
+            self.send_error(403)
+        elif self.path == "/":
             self._answer("text/html; charset=utf-8", _PAGE)
         elif self.path == "/frame.jpg":
-            self._answer("image/jpeg", self._screen.after(0)[0])
+            jpeg = self._screen.after(0)[0]
+            if jpeg:
+                self._answer("image/jpeg", jpeg)
+            else:
+                self.send_error(503, "No picture yet")
         elif self.path == "/stream":
             self._stream()
         else:
@@ -169,10 +246,13 @@ class _Request(BaseHTTPRequestHandler):
         self.send_header("Content-Type", f"multipart/x-mixed-replace; boundary={_PART}")
         self.end_headers()
         count = 0
-        try:
-            while True:
+        with contextlib.suppress(OSError):  # the browser has left
+            while not self._screen.closed and not self._left():
                 jpeg, count = self._screen.after(count)
-                head = f"--{_PART}\r\nContent-Type: image/jpeg\r\nContent-Length: {len(jpeg)}\r\n\r\n"
-                self.wfile.write(head.encode("ascii") + jpeg + b"\r\n")
-        except (BrokenPipeError, ConnectionResetError):
-            pass  # the browser has left
+                if jpeg:
+                    head = f"--{_PART}\r\nContent-Type: image/jpeg\r\nContent-Length: {len(jpeg)}\r\n\r\n"
+                    self.wfile.write(head.encode("ascii") + jpeg + b"\r\n")
+
+    def _left(self) -> bool:
+        """Whether the browser has closed the connection; it sends nothing after its request."""
+        return bool(select.select([self.connection], [], [], 0)[0])
