@@ -333,8 +333,8 @@ eval-real: setup lib ## tracks of real people's films beside joints checked by a
 eval-camera: setup lib ## cameras found from walks, and tracks with them: tests/bench/results/camera_walk.md *
 	@$(PY) tests/bench/camera_walk.py $(ARGS)
 
-detector-profile: setup lib ## learn where the detector's joints lie beside the model's, on CLIPS= with known joints *
-	@$(PY) tests/bench/detector_profile.py $(or $(CLIPS),../shared/data/eval/dev)
+detector-profile: setup lib ## learn how the detector's joints differ from the model's, on rendered walks (or CLIPS=) *
+	@$(PY) tests/bench/detector_profile.py $(CLIPS)
 
 mutants: setup ## change each equation of both papers once: a test about its meaning has to notice
 	@$(PY) tests/bench/mutants.py $(ARGS)

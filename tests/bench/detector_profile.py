@@ -1,9 +1,11 @@
 """Learn the profile of each landmark network: where its joints lie beside the model's, and how they err.
 
 Runs the networks on clips with known joints and writes python/gait/detect/profile.json.  Offsets are fitted
-on all clips; errors are those of each clip by offsets fitted on the others, who are other people.
+on all clips; errors are those of each clip by offsets fitted on the others, who are other people.  Without
+CLIPS, walks of `detector_clips` are made in build/detector-profile first: each the gait of another recorded
+person, nobody of the development clips.
 
-    python tests/bench/detector_profile.py CLIPS
+    python tests/bench/detector_profile.py [CLIPS]
 """
 
 from __future__ import annotations
@@ -20,21 +22,72 @@ from gait.detect.profile import FILE, picture_height, vectors
 from gait.detect.weights import LANDMARKS
 from gait.io.keypoints_file import read
 from gait.io.video import Video
+from gait.progress import progress
 
-MOST = 0.08  # person's heights; larger errors are outliers
+CLIPS = Path("build/detector-profile")
+MOST = 0.08  # person's heights; larger errors are outliers: swapped sides, another thing
 RIDGE = 2e-3  # pulls offsets to zero that the clips do not show
 LAGS = 15  # frames over which errors may be correlated
 QUIET = 0.05  # correlation that is none
 SPREAD = 1.4826  # median absolute deviation to standard deviation
+HELD, NORMAL = (
+    0.9,
+    1.645,
+)  # share of lasting errors in so many standard deviations; a few are far larger
+WINDOW = 0.8  # seconds whose mean error hardly holds what changes, which is measured in two of them
+DURATIONS = np.geomspace(0.5, 10.0, 60)  # seconds that an error may last; clips do not show more
 
 
 @dataclass
 class Joint:
-    """A joint in one clip, in person's heights: known less found (T, 2), and vectors (T, 2, 3)."""
+    """A joint in one clip, in person's heights: known less found (T, 2), and vectors (T, 2, 3).
+
+    `step` and `stride` are seconds.
+    """
 
     off: np.ndarray
     along: np.ndarray
     step: float
+    stride: float
+
+    @property
+    def good(self) -> np.ndarray:
+        """Frames (T,) that are no outliers; none if most are."""
+        good = (np.abs(self.off) < MOST).all(axis=1) & np.isfinite(self.along).all(axis=(1, 2))
+        return good & (good.mean() > 0.5)
+
+
+@dataclass
+class Errors:
+    """What offsets leave of a joint in one clip, person's heights.
+
+    Attributes
+    ----------
+    mean : (2,)
+        Error in the whole clip.
+    sd, correlation_s : float
+        Of its change, and seconds in which that counts as one observation.
+    seconds : float
+        Of the clip.
+    windows : (W, 2)
+        Mean errors in intervals of `WINDOW`; NaN where the joint is not known.
+    variance : float
+        Of its change, outliers cut off.
+    repeated : (N, 2)
+        Products of its change with that one stride later.
+    """
+
+    mean: np.ndarray
+    sd: float
+    correlation_s: float
+    seconds: float
+    windows: np.ndarray
+    variance: float
+    repeated: np.ndarray
+
+    def noise(self, seconds: float) -> float:
+        """Variance that the change of the error gives its mean over an interval."""
+        return self.sd**2 * min(self.correlation_s / seconds, 1.0)
 
 
 def clip_joints(folder: Path, network: str) -> dict[str, Joint]:
@@ -44,12 +97,12 @@ def clip_joints(folder: Path, network: str) -> dict[str, Joint]:
     known, _ = read(folder / "truth.csv", found.names, ignore_unknown=True)
     rows = np.searchsorted(known.frame, found.frame)
     height = np.median(picture_height(found))
+    step = float(np.median(np.diff(found.time)))
+    stride = json.loads((folder / "meta.json").read_text(encoding="utf-8"))["stride_period_s"]
     joints = {}
     for j, name in enumerate(found.names):
         off = known.uv[rows, known.names.index(name)] - found.uv[:, j]
-        joints[name] = Joint(
-            off / height, vectors(found, name) / height, float(np.median(np.diff(found.time)))
-        )
+        joints[name] = Joint(off / height, vectors(found, name) / height, step, stride)
     return joints
 
 
@@ -57,19 +110,24 @@ def fitted(joints: list[Joint]) -> np.ndarray:
     """Fit offsets by least squares, every walk of the same weight."""
     normal, right = RIDGE * np.eye(3), np.zeros(3)
     for joint in joints:
-        good = (np.abs(joint.off) < MOST).all(axis=1) & np.isfinite(joint.along).all(axis=(1, 2))
-        along, off = joint.along[good].reshape(-1, 3), joint.off[good].ravel()
-        normal += along.T @ along / max(good.sum(), 1)
-        right += along.T @ off / max(good.sum(), 1)
+        along, off = (
+            joint.along[joint.good].reshape(-1, 3),
+            joint.off[joint.good].ravel(),
+        )
+        normal += along.T @ along / max(joint.good.sum(), 1)
+        right += along.T @ off / max(joint.good.sum(), 1)
     return np.linalg.solve(normal, right)
 
 
-def errors(joint: Joint, offset: np.ndarray) -> tuple[float, float, float]:
-    """Measure the mean square of the lasting error; sd and correlation (seconds) of its change."""
-    left = joint.off - joint.along @ offset
-    left = left[np.isfinite(left).all(axis=1)]
-    middle = np.median(left, axis=0)
-    change = left - middle
+def errors(joint: Joint, offset: np.ndarray) -> Errors | None:
+    """Measure what offsets leave; None where most frames are outliers."""
+    good = joint.good
+    if not good.any():
+        return None
+    whole = np.where(good[:, None], joint.off - joint.along @ offset, np.nan)
+    parts = np.array_split(whole, max(int(len(whole) * joint.step / (2 * WINDOW)), 1))
+    moved = np.concatenate([part - np.nanmedian(part, axis=0) for part in parts if len(part)])
+    change = moved[good]
     sd = float(SPREAD * np.median(np.abs(change)))
     change = np.clip(change, -5 * sd, 5 * sd)
     total = 1.0
@@ -78,39 +136,96 @@ def errors(joint: Joint, offset: np.ndarray) -> tuple[float, float, float]:
         if share < QUIET:
             break
         total += 2 * share
-    return float(np.mean(middle**2)), sd, total * joint.step
+    later = round(joint.stride / joint.step)
+    repeated = np.clip(moved[:-later], -5 * sd, 5 * sd) * np.clip(moved[later:], -5 * sd, 5 * sd)
+    frames = round(WINDOW / joint.step)
+    parts = whole[: len(whole) // frames * frames].reshape(-1, frames, 2)
+    known = np.isfinite(parts).all(axis=2).mean(axis=1) > 0.5
+    parts = np.where(known[:, None, None], parts, 0.0)
+    windows = np.where(known[:, None], np.nanmean(parts, axis=1), np.nan)
+    mean, seconds = whole[good].mean(axis=0), len(good) * joint.step
+    repeated = repeated[np.isfinite(repeated).all(axis=1)]
+    return Errors(
+        mean,
+        sd,
+        total * joint.step,
+        seconds,
+        windows,
+        float(np.mean(change**2)),
+        repeated,
+    )
 
 
-def profile(folders: list[Path], network: str) -> dict[str, dict[str, object]]:
-    """Profile of a network."""
-    clips = [clip_joints(folder, network) for folder in folders]
+def duration(measured: list[Errors]) -> float:
+    """Seconds in which the correlation of lasting errors with themselves falls to 1/e, by mean windows."""
+    square = np.concatenate([(e.windows**2 - e.noise(WINDOW)).ravel() for e in measured])
+    longest = max(len(e.windows) for e in measured)
+    lags, shares, counts = [], [], []
+    for lag in range(1, longest):
+        both = np.concatenate([(e.windows[:-lag] * e.windows[lag:]).ravel() for e in measured])
+        if count := int(np.isfinite(both).sum()):
+            lags.append(lag * WINDOW)
+            shares.append(np.nanmean(both) / np.nanmean(square))
+            counts.append(count)
+    miss = np.exp(-np.array(lags) / DURATIONS[:, None]) - shares
+    return float(DURATIONS[np.argmin(miss**2 @ np.array(counts, float))])
+
+
+def again(measured: list[Errors]) -> float:
+    """Share of the variance of changing errors that comes again in every stride."""
+    products = np.concatenate([e.repeated for e in measured])
+    squares = np.concatenate([np.full(e.repeated.shape, e.variance) for e in measured])
+    return float(np.clip(products.mean() / squares.mean(), 0.0, 1.0)) if products.size else 0.0
+
+
+def learn(clips: list[dict[str, Joint]]) -> dict[str, object]:
+    """Profile of a network by the joints of its clips."""
     found: dict[str, dict[str, object]] = {}
+    every = []
     for name in sorted({name[2:] for name in clips[0]}):
         by_clip = [[clip[f"{side}_{name}"] for side in "lr"] for clip in clips]
-        left = []
+        measured = []
         for k, own in enumerate(by_clip):
             others = fitted([joint for i, pair in enumerate(by_clip) if i != k for joint in pair])
-            left += [errors(joint, others) for joint in own]
-        square, sd, correlation = np.array(left).T
-        offset = fitted([joint for pair in by_clip for joint in pair])
+            measured += [e for joint in own if (e := errors(joint, others)) is not None]
+        lasting = np.quantile([np.abs(e.mean) for e in measured], HELD) / NORMAL
+        noise = np.mean([e.noise(e.seconds) for e in measured])
         found[name] = {
-            "offset": offset.round(3).tolist(),
-            "bias": round(float(np.sqrt(square.mean())), 4),
-            "sd": round(float(np.sqrt((sd**2).mean())), 4),
-            "correlation_s": round(float(correlation.mean()), 3),
+            "offset": fitted([joint for pair in by_clip for joint in pair]).round(3).tolist(),
+            "lasting_sd": round(float(np.sqrt(max(lasting**2 - noise, 0.0))), 4),
+            "sd": round(float(np.sqrt(np.mean([e.sd**2 for e in measured]))), 4),
+            "correlation_s": round(float(np.mean([e.correlation_s for e in measured])), 3),
         }
-        print(network, name, found[name], flush=True)
-    return found
+        every += measured
+    return {
+        "lasting_s": round(duration(every), 1),
+        "repeated": round(again(every), 2),
+        "joints": found,
+    }
 
 
 def main() -> None:
     """Learn and write."""
-    folders = sorted(path.parent for path in Path(sys.argv[1]).glob("*/truth.csv"))
+    if len(sys.argv) > 1:
+        folder = Path(sys.argv[1])
+        folders = sorted(path.parent for path in folder.glob("*/truth.csv"))
+    else:
+        import detector_clips  # needs ../shared/data
+
+        folder = CLIPS
+        with progress("clips", len(detector_clips.recordings())) as update:
+            folders = detector_clips.make(folder, update)
     if len(folders) < 2:
-        sys.exit(f"{sys.argv[1]}: needs folders of two clips or more with video.mp4 and truth.csv")
-    networks = {network: profile(folders, network) for network in LANDMARKS}
+        sys.exit(f"{folder}: needs folders of two clips or more with video.mp4 and truth.csv")
+    networks = {}
+    for network in LANDMARKS:
+        networks[network] = learn([clip_joints(each, network) for each in folders])
+        print(network, json.dumps(networks[network]), flush=True)
     source = f"{len(folders)} rendered walks of as many people ({', '.join(f.name for f in folders)})"
-    text = json.dumps({"source": source, "command": "make detector-profile", "networks": networks}, indent=1)
+    text = json.dumps(
+        {"source": source, "command": "make detector-profile", "networks": networks},
+        indent=1,
+    )
     FILE.write_text(text + "\n", encoding="utf-8")
 
 

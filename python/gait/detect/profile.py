@@ -9,7 +9,7 @@ profile gives the difference of each joint as a sum of vectors between keypoints
     forwards   heel to toe; of hips and arms the mean of both feet
 
 Differences in space that are fixed to the body project to the same sums from every view, so that a profile
-holds for any camera.  What remains is split into an error that lasts for a walk and one that changes in it.
+holds for any camera.  What remains is split into an error that lasts for many seconds and one that changes.
 Profiles are learnt on clips with known joints (`make detector-profile`) and stored in `profile.json`.
 """
 
@@ -30,7 +30,6 @@ Array = NDArray[np.float64]
 FILE = Path(__file__).with_name("profile.json")
 LEG, TRUNK = 0.49, 0.28  # of a person's height: hip to ankle, shoulder to hip
 _ARMS = ("shoulder", "elbow", "wrist", "hip")
-_LASTS = 1.0  # seconds in which an error that lasts for a walk counts as one observation
 
 
 @dataclass(frozen=True)
@@ -41,30 +40,53 @@ class JointProfile:
     ----------
     offset : tuple of float
         Shares of the three `vectors` that lead from the detector's joint to the model's.
-    bias : float
-        Standard deviation of an error that lasts for a walk, along an axis, person's heights.
+    lasting_sd : float
+        Standard deviation of an error that lasts, along an axis, person's heights.
     sd : float
-        The same of an error that changes within a walk.
+        The same of an error that changes from frame to frame.
     correlation_s : float
         Seconds in which such errors count as one observation: twice the integral of their autocorrelation.
     """
 
     offset: tuple[float, ...]
-    bias: float
+    lasting_sd: float
     sd: float
     correlation_s: float
 
     def effective_sd(self, step: float) -> float:
-        """Give the sd, person's heights, with which frames `step` seconds apart count as independent."""
-        changes = max(self.correlation_s / step, 1.0)
-        return float(np.sqrt(self.sd**2 * changes + self.bias**2 * max(_LASTS / step, 1.0)))
+        """Give `sd` for frames `step` seconds apart so large that they count as independent."""
+        return float(self.sd * np.sqrt(max(self.correlation_s / step, 1.0)))
+
+
+@dataclass(frozen=True)
+class Profile:
+    """A landmark network.
+
+    Attributes
+    ----------
+    joints : dict of JointProfile
+        By joint without its side.
+    lasting_s : float
+        Seconds in which the correlation of a lasting error with itself falls to 1/e.
+    repeated : float
+        Share of the variance of changing errors that comes again in every stride.
+    """
+
+    joints: dict[str, JointProfile]
+    lasting_s: float
+    repeated: float
+
+    def joint(self, name: str) -> JointProfile:
+        """Profile of a joint with its side; of an elbow where the joint is unknown."""
+        return self.joints.get(name.partition("_")[2], self.joints["elbow"])
 
 
 @cache
-def load(network: str) -> dict[str, JointProfile]:
-    """Profile of a landmark network by joint, without its side."""
-    joints = json.loads(FILE.read_text(encoding="utf-8"))["networks"][network]
-    return {name: JointProfile(tuple(joint.pop("offset")), **joint) for name, joint in joints.items()}
+def load(network: str) -> Profile:
+    """Profile of a landmark network."""
+    found = json.loads(FILE.read_text(encoding="utf-8"))["networks"][network]
+    joints = {name: JointProfile(**joint) for name, joint in found["joints"].items()}
+    return Profile(joints, found["lasting_s"], found["repeated"])
 
 
 def vectors(keypoints: Keypoints, name: str) -> Array:
@@ -98,11 +120,10 @@ def picture_height(keypoints: Keypoints) -> Array:
 def frame_sd(keypoints: Keypoints, network: str = "full") -> Array:
     """Give the standard deviations (T, J) of the errors in one frame, what lasts and what changes, pixels.
 
-    A detector whose profile is unknown is taken to err as `full` does, and a joint that is in no profile as
-    an elbow.
+    A detector whose profile is unknown is taken to err as `full` does.
     """
     joints = _joints(keypoints, network)
-    return _pixels(keypoints, [float(np.hypot(joint.bias, joint.sd)) for joint in joints])
+    return _pixels(keypoints, [float(np.hypot(joint.lasting_sd, joint.sd)) for joint in joints])
 
 
 def changing_sd(keypoints: Keypoints, network: str = "full") -> tuple[Array, Array]:
@@ -116,8 +137,7 @@ def changing_sd(keypoints: Keypoints, network: str = "full") -> tuple[Array, Arr
 
 def _joints(keypoints: Keypoints, network: str) -> list[JointProfile]:
     """Profile of each joint (J,)."""
-    profile = load(network)
-    return [profile.get(name.partition("_")[2], profile["elbow"]) for name in keypoints.names]
+    return [load(network).joint(name) for name in keypoints.names]
 
 
 def _pixels(keypoints: Keypoints, share: list[float]) -> Array:
@@ -139,13 +159,20 @@ def corrected(keypoints: Keypoints, network: str) -> Keypoints:
     Returns
     -------
     Keypoints
-        With `frame_sd`, and with `sd` such that frames count as independent; pixels.
+        With `sd` (such that frames count as independent), `lasting_sd` and `frame_sd`, pixels.
     """
     profile = load(network)
-    step = float(np.median(np.diff(keypoints.time))) if len(keypoints.time) > 1 else _LASTS
-    joints = [profile[name.partition("_")[2]] for name in keypoints.names]
+    step = float(np.median(np.diff(keypoints.time))) if len(keypoints.time) > 1 else np.inf
+    joints = _joints(keypoints, network)
     uv = keypoints.uv.copy()
     for j, (name, joint) in enumerate(zip(keypoints.names, joints, strict=True)):
         uv[:, j] += vectors(keypoints, name) @ np.array(joint.offset)
-    sd = _pixels(keypoints, [joint.effective_sd(step) for joint in joints])
-    return replace(keypoints, uv=uv, sd=sd, frame_sd=frame_sd(keypoints, network))
+    return replace(
+        keypoints,
+        uv=uv,
+        sd=_pixels(keypoints, [joint.effective_sd(step) for joint in joints]),
+        lasting_sd=_pixels(keypoints, [joint.lasting_sd for joint in joints]),
+        lasting_s=profile.lasting_s,
+        repeated=profile.repeated,
+        frame_sd=frame_sd(keypoints, network),
+    )

@@ -1,4 +1,7 @@
-"""Files of 2-D joint keypoints: CSV ``frame,time,<joint>_u,<joint>_v[,<joint>_c[,<joint>_sd]]``.
+"""Files of 2-D joint keypoints: CSV ``frame,time,<joint>_u,<joint>_v[,<joint>_c]``.
+
+With a detector's errors ``<joint>_sd`` and ``<joint>_lasting_sd``, and in the first row ``lasting_s`` and
+``repeated``.
 
 Empty cells are not seen.
 Columns may also be separated by tabs, or by semicolons with decimal commas.
@@ -26,6 +29,8 @@ Array = NDArray[np.float64]
 
 LEAST_CONFIDENCE = 0.1  # points below it count as not seen
 
+LASTS = 1.0  # seconds in which a lasting error counts as one observation where it is no number of its own
+STRIDE = 1.1  # seconds, of most people
 LONGEST_STEP = 1.0  # seconds between frames; so long a step is a cycle of walking
 SHORTEST_STEP = 1e-5  # no camera is as fast
 LONGEST_GAP = 10.0  # seconds without a row that lifting bridges; nothing is known in the middle of it
@@ -44,9 +49,13 @@ class Keypoints:
     #: (T, J, 2) pixels (or metres of an orthographic view), u to the right, v down; NaN where not seen.
     uv: Array
     confidence: Array  #: (T, J) from 0 to 1; 1 where the file has none
-    #: (T, J) standard deviation along an axis of errors that last over frames, so large that frames may count
-    #: as independent: pixels, NaN where unknown.  None: keypoints are as good as they are steady.
+    #: (T, J) standard deviation along an axis of errors that last over some frames, so large that frames may
+    #: count as independent: pixels, NaN where unknown.  None: keypoints are as good as they are steady.
     sd: Array | None = None
+    #: (T, J) standard deviation along an axis of errors that last for many seconds.  None: there are none.
+    lasting_sd: Array | None = None
+    lasting_s: float = np.inf  #: seconds in which the correlation of a lasting error with itself falls to 1/e
+    repeated: float = 0.0  #: share of the variance of other errors that comes again in every stride
     #: (T, J) standard deviation along an axis of the errors in one frame, pixels.  None: unknown.
     frame_sd: Array | None = None
 
@@ -118,10 +127,26 @@ class Keypoints:
         """Give standard deviations (T, J), `sd` at full confidence; inf where not seen."""
         return np.where(self.visible, sd / np.maximum(self.confidence, LEAST_CONFIDENCE), np.inf)
 
-    def errors(self, sd: float) -> Array:
-        """Give standard deviations (T, J) with errors that last; `sd` as in `standard_deviations`."""
+    def changing(self, sd: float, whole: bool = False) -> Array:
+        """Give standard deviations (T, J) without `lasting_sd`; `sd` as in `standard_deviations`.
+
+        Of a `whole` sequence those errors that come again in every stride, as the pose does, count once.
+        """
         jitter = self.standard_deviations(sd)
-        return jitter if self.sd is None else np.hypot(jitter, np.nan_to_num(self.sd))
+        if self.sd is None:
+            return jitter
+        strides = max((self.time[-1] - self.time[0]) / STRIDE, 1.0) if whole else 1.0
+        return np.hypot(jitter, np.nan_to_num(self.sd) * np.sqrt(1 + self.repeated * (strides - 1)))
+
+    def errors(self, sd: float) -> Array:
+        """Give standard deviations (T, J) with all errors; `sd` as in `standard_deviations`.
+
+        Errors that last count as one observation in `LASTS`, so that frames may count as independent.
+        """
+        if self.lasting_sd is None:
+            return self.changing(sd)
+        step = float(np.median(np.diff(self.time))) if len(self.time) > 1 else LASTS
+        return np.hypot(self.changing(sd), np.nan_to_num(self.lasting_sd) * np.sqrt(max(LASTS / step, 1.0)))
 
     def by_frame(self, sd: float) -> dict[int, FrameKeypoints]:
         """Keypoints by frame, as the tracker takes them; `sd` as in `standard_deviations`."""
@@ -178,28 +203,41 @@ def read(
     if not np.isfinite(uv).any():
         raise UserError(f"{path}: no point is seen in any frame; fill _u and _v")
     refuse_sentinels(path, names, uv)
-    sd = None
-    if any(f"{name}_sd" in columns for name in names):
-        sd = np.stack([numbers.standard_deviation(f"{name}_sd") for name in names], axis=1)
-    return Keypoints(frame, time, tuple(names), uv, confidence, sd), ignored
+    sd, lasting_sd = (
+        np.stack([numbers.standard_deviation(f"{name}_{error}") for name in names], axis=1)
+        if any(f"{name}_{error}" in columns for name in names)
+        else None
+        for error in ("sd", "lasting_sd")
+    )
+    lasting_s, repeated = numbers.first("lasting_s", np.inf), numbers.first("repeated", 0.0)
+    if not lasting_s > 0:
+        raise UserError(f"{path}: line 2: lasting_s is {lasting_s:g}; give seconds above 0")
+    if not 0 <= repeated <= 1:
+        raise UserError(f"{path}: line 2: repeated is {repeated:g}; give a share from 0 to 1")
+    return Keypoints(frame, time, tuple(names), uv, confidence, sd, lasting_sd, lasting_s, repeated), ignored
 
 
 def write(path: str | os.PathLike[str], keypoints: Keypoints) -> None:
     """Write keypoints so that `read` gets them back (hundredths of a pixel)."""
-    values = ("u", "v", "c") if keypoints.sd is None else ("u", "v", "c", "sd")
-    head = ["frame", "time", *(f"{name}_{value}" for name in keypoints.names for value in values)]
+    errors = {"sd": keypoints.sd, "lasting_sd": keypoints.lasting_sd}
+    given = {name: values for name, values in errors.items() if values is not None}
+    columns = ("u", "v", "c", *given)
+    detector = {} if keypoints.lasting_sd is None else {"lasting_s": keypoints.lasting_s}
+    detector |= {"repeated": keypoints.repeated} if keypoints.repeated else {}
+    points = (f"{name}_{column}" for name in keypoints.names for column in columns)
+    head = ["frame", "time", *detector, *points]
     with replacing(path) as temporary, open(temporary, "w", newline="", encoding="utf-8") as file:
         table = csv.writer(file, lineterminator="\n")
         table.writerow(head)
         for t, frame in enumerate(keypoints.frame):
             row = [str(frame), f"{keypoints.time[t]:.6f}"]
+            row += [f"{value:g}" if t == 0 and np.isfinite(value) else "" for value in detector.values()]
             for j, (u, v) in enumerate(keypoints.uv[t]):
                 if not np.isfinite(u):
-                    row += [""] * len(values)
+                    row += [""] * len(columns)
                     continue
                 row += [f"{u:.4f}", f"{v:.4f}", f"{keypoints.confidence[t, j]:.3g}"]
-                if keypoints.sd is not None:
-                    row.append(f"{keypoints.sd[t, j]:.3f}")
+                row += [f"{values[t, j]:.3f}" for values in given.values()]
             table.writerow(row)
 
 
@@ -246,6 +284,11 @@ class _Numbers:
             i = int(np.argmax(wrong))
             raise UserError(f"{self._path}: line {i + 2}: {name} is {values[i]:g}; give it from 0 to 1")
         return np.nan_to_num(values)
+
+    def first(self, name: str, default: float) -> float:
+        """Give the first value of a column."""
+        value = self.column(name)[0] if name in self._columns else np.nan
+        return default if np.isnan(value) else float(value)
 
     def standard_deviation(self, name: str) -> Array:
         """Give standard deviations; NaN if there is no such column or the cell is empty."""

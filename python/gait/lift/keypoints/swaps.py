@@ -16,6 +16,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass, replace
+from typing import Any
 
 import numpy as np
 import numpy.typing as npt
@@ -306,8 +307,9 @@ def _around(keypoints: Keypoints, first: int, end: int) -> slice:
 
 def _rows(keypoints: Keypoints, part: slice) -> Keypoints:
     """Take some frames of keypoints."""
-    columns = {name: getattr(keypoints, name)[part] for name in ("frame", "time", "uv", "confidence")}
-    return replace(keypoints, **columns, sd=None if keypoints.sd is None else keypoints.sd[part])
+    names = ("frame", "time", "uv", "confidence", "sd", "lasting_sd", "frame_sd")
+    columns: dict[str, Any] = {name: getattr(keypoints, name) for name in names}
+    return replace(keypoints, **{name: x if x is None else x[part] for name, x in columns.items()})
 
 
 def _swapped(keypoints: Keypoints, pairs: Ints, wrong: Flags) -> Keypoints:

@@ -83,8 +83,10 @@ def factor(diagonal: Floats, below: Floats) -> Factor:
     # columns lie together, as LAPACK has them, so that nothing is copied
     lower, left = np.empty(diagonal.shape).transpose(0, 2, 1), np.empty(below.shape)
     for s, block in enumerate(diagonal):
-        rest = block if s == 0 else block - left[s - 1] @ left[s - 1].T
-        lower[s], wrong = lapack.dpotrf(rest.T, lower=1, clean=1)
+        rest = block.T
+        if s:  # of symmetric matrices only the lower triangle is computed and read
+            rest = blas.dsyrk(-1.0, left[s - 1].T, beta=1.0, c=rest, trans=1, lower=1)
+        lower[s], wrong = lapack.dpotrf(rest, lower=1, clean=1)
         if wrong:
             raise LinAlgError(f"block {s} of the information matrix is not positive definite")
         if s < len(below):

@@ -364,7 +364,10 @@ def _task(of: _Sequence, displacements: bool = True) -> _Task:
     else:
         fits = [lifter.solve(each, displacements) for each in course]
     freedom = Freedom(stature, stature_sd, options.floor_sd if view.grounded else ANY_HEIGHT)
-    return _Task(Observed(keypoints.time, points, of.markers), freedom, stature, lengths, fits)
+    changing = Observations(keypoints.uv, keypoints.changing(options.pixel_sd, whole=True))
+    lasting = keypoints.lasting_sd, keypoints.lasting_s
+    observed = Observed(keypoints.time, changing, of.markers, *lasting)
+    return _Task(observed, freedom, stature, lengths, fits)
 
 
 @_numbers_in_range()

@@ -13,6 +13,7 @@ from dataclasses import dataclass
 
 import numpy as np
 import numpy.typing as npt
+from scipy.linalg import block_diag
 
 from gait.bindings.lifter import weight_outliers
 from gait.bindings.segment_prior import SegmentPrior
@@ -21,6 +22,7 @@ from gait.lift.segment.view import Parallel, View
 from gait.lift.smooth import block_arrowhead, soft_constraints
 from gait.lift.smooth.block_arrowhead import Information
 from gait.lift.smooth.chain import Around, Chain, Freedom, Prior, blended, chain, moved, overlapping
+from gait.lift.smooth.lasting_errors import LastingErrors
 from gait.lift.smooth.rows import rows_of, scale_free
 from gait.lift.smooth.soft_constraints import Layout, Rows
 
@@ -29,7 +31,7 @@ Ints = npt.NDArray[np.intp]
 
 HIPS = ("l_hip", "r_hip")
 MOST_STEPS = 25
-SETTLED = 5e-4  # metres, rms change of the places at which the iteration stops
+SETTLED = 1e-3  # metres, rms change of the places at which the iteration stops
 FREE_STEPS = 3  # first steps, without constraints on feet and bones
 DRIFT = 5e-4  # relative change of the scale's change from one frame to the next
 
@@ -43,14 +45,20 @@ class Observed:
     time : (T,)
         Seconds.
     points : Observations
-        Of T frames and P points.
+        Of T frames and P points; their noise without what lasts.
     markers : (P,)
         Which marker of the prior each point is.
+    lasting_sd : (T, P) or None
+        Standard deviation along an axis of a detector's lasting errors, in the unit of the points.
+    lasting_s : float
+        Seconds in which their correlation with themselves falls to 1/e.
     """
 
     time: Floats
     points: Observations
     markers: Ints
+    lasting_sd: Floats | None = None
+    lasting_s: float = np.inf
 
 
 @dataclass(frozen=True)
@@ -161,6 +169,7 @@ class _State:
     around: Around
     places: Floats
     lengths: Floats
+    errors: Floats  #: numbers of `LastingErrors`
     steps: int
 
 
@@ -220,13 +229,18 @@ class _Problem:
         self.grid = Grid.over(observed.time, prior)
         self.at = self.grid.between(observed.time)
         unit = float(np.mean(start.lengths)) if view.scaled else None
-        self.layout = Layout(self.grid.blocks, self.grid.frames, len(prior.names), unit)
+        self.errors = LastingErrors(
+            observed.time,
+            np.zeros(observed.points.sd.shape) if observed.lasting_sd is None else observed.lasting_sd,
+            observed.lasting_s,
+        )
+        self.layout = Layout(self.grid.blocks, self.grid.frames, len(prior.names), unit, self.errors.count)
 
     def first(self, start: Start) -> _State:
         """Linearise the chain around the first guess."""
         shape = overlapping(start.places, self.grid.frames)
         around = Around(start.heading, start.component, start.stature, shape, shape)
-        return _State(around, start.places, start.lengths, 0)
+        return _State(around, start.places, start.lengths, np.zeros(self.errors.count), 0)
 
     def weight(self, state: _State) -> None:
         """Down-weight points that are far from an estimate."""
@@ -235,7 +249,8 @@ class _Problem:
     def predicted(self, state: _State) -> Floats:
         """Where points (T, P, 2) are expected in the picture."""
         places = self._at_video(state.places)[:, self.visible.markers]
-        return self.view.project(places, self._at_video(state.lengths))
+        errors = self.errors.in_picture(state.errors)
+        return self.view.project(places, self._at_video(state.lengths)) + errors
 
     def chain(self, state: _State) -> Chain:
         """Give the prior around an estimate."""
@@ -250,13 +265,20 @@ class _Problem:
             soft_constraints.contacts(rows, self.prior.names, shape, self.grid.rate)
         if constrained and self.bones:
             soft_constraints.bones(rows, self.prior.names, shape)
-        diagonal, below, vector, fit = rows.normal()
+        seen, fit = rows.normal()
         own, used = prior.information, prior.information.diagonal.shape[1]
-        diagonal[:, :used, :used] += own.diagonal
-        below[:, :used, :used] += own.below
-        vector[:, :used] += own.vector
-        border = np.pad(own.border, ((0, 0), (0, diagonal.shape[1] - used), (0, 0)))
-        information = Information(diagonal, below, border, own.corner, vector, own.edge)
+        seen.diagonal[:, :used, :used] += own.diagonal
+        seen.below[:, :used, :used] += own.below
+        seen.vector[:, :used] += own.vector
+        border = np.pad(own.border, ((0, 0), (0, self.layout.size - used), (0, 0)))
+        information = Information(
+            seen.diagonal,
+            seen.below,
+            np.concatenate([border, seen.border], axis=2),
+            block_diag(own.corner, np.eye(self.errors.count) + seen.corner),
+            seen.vector,
+            np.append(own.edge, seen.edge),
+        )
         return _System(block_arrowhead.solve(information), information, prior, fit)
 
     def _observe(self, rows: Rows, shape: Floats, state: _State) -> None:
@@ -269,7 +291,10 @@ class _Problem:
         if isinstance(self.view, Parallel) and self.view.scaled:
             observed, factors = scale_free(observed, near[:, self.visible.markers], scale)
             soft_constraints.steady_lengths(rows, state.lengths, None if self.view.steady else DRIFT)
-        soft_constraints.observe(rows, observed, self.visible.markers, self.at, factors)
+        numbers, pixels = self.errors.factors(observed.frame, observed.marker)
+        unit = np.sqrt(observed.variance) / self.points.sd[observed.frame, observed.marker, None]
+        lasting = numbers, unit[:, :, None] * pixels[:, None]
+        soft_constraints.observe(rows, observed, self.visible.markers, self.at, factors, lasting)
 
     def _at_video(self, values: Floats) -> Floats:
         """Interpolate values (grid, ...) at the frames of the video."""
@@ -280,8 +305,9 @@ class _Problem:
         found = self.system(state, self.chain(state), constrained).found
         places = self.layout.places(found.blocks)
         lengths = self.layout.lengths(found.blocks) if self.view.scaled else state.lengths
-        around = moved(self._chained, state.around, self.freedom, places, found.lasting)
-        return _State(around, places, lengths, state.steps + 1)
+        lasting, errors = np.split(found.lasting, [len(found.lasting) - self.errors.count])
+        around = moved(self._chained, state.around, self.freedom, places, lasting)
+        return _State(around, places, lengths, errors, state.steps + 1)
 
     def evidence(self, unconstrained: _System) -> float:
         """Logarithm of the density of what is seen, but for a constant."""

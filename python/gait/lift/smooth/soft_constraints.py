@@ -14,6 +14,7 @@ import numpy.typing as npt
 from scipy import sparse
 
 from gait.lift.smooth import rows as view_rows
+from gait.lift.smooth.block_arrowhead import Information
 
 Floats = npt.NDArray[np.float64]
 Ints = npt.NDArray[np.intp]
@@ -52,12 +53,15 @@ class Layout:
         B, b, J.
     unit : float or None
         Metres in which lengths of a unit of the picture count, one per frame; None: there are none.
+    errors : int
+        Numbers after all blocks, of the detector's lasting errors.
     """
 
     blocks: int
     frames: int
     markers: int
     unit: float | None
+    errors: int = 0
 
     @property
     def size(self) -> int:
@@ -79,6 +83,10 @@ class Layout:
         block, inside = np.divmod(frame, self.frames)
         return np.asarray(block * self.size + 3 * self.frames * self.markers + inside)
 
+    def error(self, number: Ints) -> Ints:
+        """Index of a number of the detector's lasting errors."""
+        return np.asarray(self.blocks * self.size + number)
+
     def places(self, values: Floats) -> Floats:
         """Places (grid, J, 3) out of values (B, size)."""
         used = 3 * self.frames * self.markers
@@ -91,7 +99,7 @@ class Layout:
 
 
 class Rows:
-    """Collects rows; `normal` gives A' W A and A' W y in blocks."""
+    """Collects rows; `normal` gives A' W A and A' W y in blocks, with the lasting errors as their border."""
 
     def __init__(self, layout: Layout) -> None:
         self.layout = layout
@@ -108,29 +116,38 @@ class Rows:
         self._weight.append(1 / sd**2)
         self._count += len(columns)
 
-    def normal(self) -> tuple[Floats, Floats, Floats, float]:
-        """Blocks of A' W A (B, n, n), those below (B - 1, n, n), A' W y (B, n), and y' W y."""
+    def normal(self) -> tuple[Information, float]:
+        """Give A' W A and A' W y in blocks, and y' W y."""
         layout = self.layout
-        total = layout.blocks * layout.size
-        diagonal = np.zeros((layout.blocks, layout.size, layout.size))
+        shape, total = (layout.blocks, layout.size), layout.blocks * layout.size
+        diagonal = np.zeros((*shape, layout.size))
         below = np.zeros((layout.blocks - 1, layout.size, layout.size))
         if not self._count:
-            return diagonal, below, np.zeros((layout.blocks, layout.size)), 0.0
+            border, corner = np.zeros((*shape, layout.errors)), np.zeros((layout.errors, layout.errors))
+            return Information(diagonal, below, border, corner, np.zeros(shape), np.zeros(layout.errors)), 0.0
         rows, columns, factors = (np.concatenate(part) for part in zip(*self._entries, strict=True))
         right, weight = np.concatenate(self._right), np.concatenate(self._weight)
-        matrix = sparse.csr_matrix((factors, (rows, columns)), shape=(self._count, total))
-        weighted = sparse.diags(weight) @ matrix
-        normal = sparse.coo_matrix(matrix.T @ weighted)
+        matrix = sparse.csr_matrix((factors, (rows, columns)), shape=(self._count, total + layout.errors))
+        inner, errors = matrix[:, :total], matrix[:, total:]
+        weighted = sparse.diags(weight) @ inner
+        normal = sparse.coo_matrix(inner.T @ weighted)
         (at, inside), (other, across) = (np.divmod(i, layout.size) for i in (normal.row, normal.col))
         same, next_ = at == other, at == other + 1
         diagonal[at[same], inside[same], across[same]] = normal.data[same]
         below[other[next_], inside[next_], across[next_]] = normal.data[next_]
-        vector = (weighted.T @ right).reshape(layout.blocks, layout.size)
-        return diagonal, below, vector, float(right @ (weight * right))
+        border = (weighted.T @ errors).toarray().reshape(*shape, layout.errors)
+        corner = (errors.T @ sparse.diags(weight) @ errors).toarray()
+        vector, edge = (weighted.T @ right).reshape(shape), errors.T @ (weight * right)
+        return Information(diagonal, below, border, corner, vector, edge), float(right @ (weight * right))
 
 
 def observe(
-    rows: Rows, observed: view_rows.Rows, markers: Ints, at: tuple[Ints, Floats], scale: Floats | None
+    rows: Rows,
+    observed: view_rows.Rows,
+    markers: Ints,
+    at: tuple[Ints, Floats],
+    scale: Floats | None,
+    lasting: tuple[Ints, Floats],
 ) -> None:
     """Add what is seen.
 
@@ -144,6 +161,8 @@ def observe(
         Frames of the grid and weights that give the places at the frames of the video.
     scale : (n, 2) or None
         Factors of the length of a unit of the picture, if that is unknown.
+    lasting : (n, K) and (n, 2, K)
+        Numbers of the detector's lasting errors along the first axis (those of the second follow), factors.
     """
     frames, weights = at[0][observed.frame], at[1][observed.frame]
     columns = rows.layout.place(frames, markers[observed.marker][:, None])[..., None] + np.arange(3)
@@ -154,7 +173,12 @@ def observe(
         factors = (weights[..., None] * observed.direction[:, k, None]).reshape(len(frames), -1)
         if scale is not None:
             factors = np.hstack([factors, weights * scale[:, k, None] * (rows.layout.unit or 1.0)])
-        rows.add(columns, factors, observed.value[:, k], np.sqrt(observed.variance[:, k]))
+        rows.add(
+            np.hstack([columns, rows.layout.error(lasting[0] + k)]),
+            np.hstack([factors, lasting[1][:, k]]),
+            observed.value[:, k],
+            np.sqrt(observed.variance[:, k]),
+        )
 
 
 def contacts(rows: Rows, names: Sequence[str], places: Floats, rate: float) -> Floats:

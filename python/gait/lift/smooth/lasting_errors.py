@@ -1,0 +1,58 @@
+"""Errors of a detector that last: numbers of their own beside the motion.
+
+A detector that takes a point for the ankle does so in the next frame too.  Such an error says nothing new in
+later frames; taken for noise of each frame it would have to be so large that the figure could hardly follow
+the points.  Each point has an error in the picture that runs straight between knots, which are as far apart
+as errors last; of a shorter sequence it is constant.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+import numpy.typing as npt
+
+Floats = npt.NDArray[np.float64]
+Ints = npt.NDArray[np.intp]
+
+
+class LastingErrors:
+    """Errors of P points in T frames by C numbers that are N(0, 1).
+
+    Parameters
+    ----------
+    time : (T,)
+        Seconds.
+    sd : (T, P)
+        Standard deviation along an axis, pixels; 0 or NaN of a point without such errors.
+    lasts : float
+        Seconds in which the correlation of an error with itself falls to 1/e.
+    """
+
+    def __init__(self, time: Floats, sd: Floats, lasts: float) -> None:
+        intervals = int((time[-1] - time[0]) / lasts)
+        at = np.linspace(time[0], time[-1], intervals + (2 if intervals else 1))
+        knots = len(at)
+        correlation = np.exp(-np.abs(at[:, None] - at) / lasts)
+        straight = np.stack([np.interp(time, at, own) for own in np.eye(knots)], axis=1)
+        self.sd, self._course = np.nan_to_num(sd), straight @ np.linalg.cholesky(correlation)
+        self._shape = knots, sd.shape[1], 2
+        self.count = int(np.prod(self._shape)) if self.sd.any() else 0
+
+    def in_picture(self, numbers: Floats) -> Floats:
+        """Errors (T, P, 2) in pixels."""
+        if not self.count:
+            return np.zeros((*self.sd.shape, 2))
+        return np.asarray(
+            np.einsum("tk,kpa->tpa", self._course, numbers.reshape(self._shape)) * self.sd[..., None]
+        )
+
+    def factors(self, frame: Ints, point: Ints) -> tuple[Ints, Floats]:
+        """Numbers (n, K) that make the error of points along the first axis, and their factors, pixels.
+
+        The numbers of the second axis follow.
+        """
+        knots, points, _ = self._shape
+        if not self.count:
+            return np.zeros((len(frame), 0), np.intp), np.zeros((len(frame), 0))
+        numbers = 2 * (np.arange(knots) * points + point[:, None])
+        return numbers, self._course[frame] * self.sd[frame, point, None]
