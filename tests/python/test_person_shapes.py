@@ -7,6 +7,7 @@ import pytest
 from drawn_person import DATA, camera, clip, wall, write
 
 from gait import Camera, Model, TrackStatus, Video
+from gait.bindings.initial import Start
 from gait.bindings.model import read_blob
 from gait.bindings.start_fit import Box, StartFit
 from gait.detect.shapes import find_near
@@ -15,6 +16,7 @@ from gait.io import blob
 from gait.io.video import Frame
 from gait.track import person_shapes
 from gait.track.box_start import find_start
+from gait.track.follow import Follower
 from gait.track.person_shapes import PersonShapes
 
 MODEL = Model()
@@ -99,6 +101,33 @@ def test_who_stands_first_is_started_while_walking(tmp_path):
     assert found.frame > standing and found.hypotheses[0].speed > 0.7 * states[0].stride_hz
     truth = states[found.frame - standing]
     assert abs(found.mean.heading - truth.heading) < 0.35
+
+
+def start(frame, phase, sd=0.05):
+    mean, deviation = MODEL.prior()
+    mean.phase, mean.stride_hz, deviation.phase = phase, 0.9, sd
+    return Start(frame, mean, deviation)
+
+
+A, LATER, OTHER = start(10, 0.2), start(40, 0.1), start(10, 0.7)
+
+
+@pytest.mark.parametrize(
+    "draws, first, uncertain",
+    [
+        ([A, LATER, A], A, False),
+        ([A, LATER, None], A, False),
+        ([OTHER, A, LATER], A, True),
+        ([None, A, None], A, True),
+        ([None, None, None], None, False),
+    ],
+)
+def test_left_and_right_are_known_only_if_all_draws_agree(monkeypatch, draws, first, uncertain):
+    open_start, left = start(20, 0.0, sd=0.5), iter(draws)
+    follower = Follower(None, SimpleNamespace(fps=30), None, None, None)
+    monkeypatch.setattr(follower, "_draw", lambda *_: next(left))
+    assert follower._settled(open_start, range(90)) is (first or open_start)
+    assert follower._uncertain is uncertain
 
 
 FILM = DATA / "real" / "treadmill"

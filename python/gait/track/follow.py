@@ -23,7 +23,8 @@ _CONTRADICTED = 0.5  # seconds of keypoints elsewhere after which the person is 
 _OPEN_PHASE = 0.2  # strides: sd of the phase from which a start leaves left and right open
 _SETTLED = 0.2  # seconds of `tracking` after which they are known
 _SETTLES = 4.0  # seconds from a start in which that is waited for
-_DRAWS = 3  # of particles, after which a start is taken as it is
+_DRAWS = 3  # of particles that must agree
+_SAME_SIDE = 0.2  # strides between the phases of draws that agree
 
 FindStart = Callable[[int, int, float], Start | None]
 """First start in the frames first <= number < stop, of a person of a stature [m]; None: there is none."""
@@ -80,6 +81,7 @@ class Follower:
         self._tracker, self._video, self._keypoints = tracker, video, keypoints
         self._plausibility = plausibility
         self._find_start, self._auto_start, self._one_pass = find_start, auto_start, one_pass
+        self._uncertain = False  # which leg is which
 
     def follow(self, start: Start, frames: range) -> Iterator[tuple[Frame, Estimate]]:
         """Yield the frames in order from the first in which the person is visible, each with its estimate.
@@ -118,20 +120,28 @@ class Follower:
                 now, lost, support = None, False, _Support(frame)
 
     def _settled(self, start: Start, frames: range) -> Start:
-        """Move a start that leaves left and right open to where the images decide, later or else earlier."""
+        """Move a start that leaves left and right open to where the images decide, later or else earlier.
+
+        Several draws of particles decide; unless they agree, left and right stay uncertain throughout.
+        """
         if start.sd.phase < _OPEN_PHASE:
             return start
-        for draw in range(_DRAWS):
-            config = self._tracker.config.replace(seed=self._tracker.config.seed ^ draw)
-            later = ((frame, frame.utime) for frame in self._video.frames(start.frame, frames.stop))
-            found = self._decided(self._tracker.like(config), start, later)
-            if found is None and start.frame > frames.start:
-                back = self._video.backwards(start.frame + 1, frames.start)
-                earlier = ((frame, -frame.utime) for frame in back)
-                found = self._decided(self._tracker.like(config.replace(reverse=1.0)), start, earlier)
-            if found is not None:
-                return found
-        return start
+        draws = [self._draw(start, frames, draw) for draw in range(_DRAWS)]
+        found = [one for one in draws if one is not None]
+        agreeing = [sum(_same_side(one, other, self._video.fps) for other in found) for one in found]
+        self._uncertain = bool(found) and (len(found) < 2 or min(agreeing) < len(found))
+        return found[int(np.argmax(agreeing))] if found else start
+
+    def _draw(self, start: Start, frames: range, draw: int) -> Start | None:
+        """Start where one draw of particles has decided; None if it does not soon."""
+        config = self._tracker.config.replace(seed=self._tracker.config.seed ^ draw)
+        later = ((frame, frame.utime) for frame in self._video.frames(start.frame, frames.stop))
+        found = self._decided(self._tracker.like(config), start, later)
+        if found is None and start.frame > frames.start:
+            back = self._video.backwards(start.frame + 1, frames.start)
+            earlier = ((frame, -frame.utime) for frame in back)
+            found = self._decided(self._tracker.like(config.replace(reverse=1.0)), start, earlier)
+        return found
 
     def _decided(self, tracker: Tracker, start: Start, frames: Iterator[tuple[Frame, int]]) -> Start | None:
         """Start where a tracker has been `tracking` for a while; None if it is not soon.
@@ -172,7 +182,9 @@ class Follower:
     def _step(self, tracker: Tracker, frame: Frame, utime: int, last: Estimate | None) -> Estimate:
         """Step with the person's keypoints; judge the estimate."""
         joints = self._keypoints.choose(frame, last)
-        return self._plausibility.judged(frame, tracker.step(frame.image, utime, joints))
+        now = self._plausibility.judged(frame, tracker.step(frame.image, utime, joints))
+        sure = now.status != TrackStatus.TRACKING or not self._uncertain
+        return now if sure else replace(now, status=TrackStatus.AMBIGUOUS)
 
     def _start(self, tracker: Tracker, start: Start, utime: int) -> None:
         if start.hypotheses:
@@ -210,6 +222,14 @@ class Follower:
             elif visible - frame.time > _LONGEST_GAP:
                 break
         return {n: now for n, now in sorted(found.items()) if earliest <= n < start.frame}
+
+
+def _same_side(one: Start, other: Start, fps: float) -> bool:
+    """Whether two starts of one walk agree in phase."""
+    seconds = (other.frame - one.frame) / fps
+    rate = (one.mean.stride_hz + other.mean.stride_hz) / 2
+    off = other.mean.phase - one.mean.phase - rate * seconds
+    return abs((off + 0.5) % 1 - 0.5) < _SAME_SIDE
 
 
 def _start_from(now: Estimate, frame: int, start: Start) -> Start:
