@@ -1,7 +1,6 @@
 """A camera is found from projected walks, with the uncertainty that the walk leaves."""
 
 import json
-import re
 from dataclasses import replace
 
 import numpy as np
@@ -15,8 +14,6 @@ from gait.io.keypoints_file import Keypoints, write
 from gait.simulate import Scenario
 from gait.simulate.stage import set_stage
 from gait.track.from_walk import calibrate
-from gait.track.keypoint_start import find_keypoint_start
-from gait.track.walk_camera import contradiction
 from gait.track.walk_model import WalkingBody
 from gait.track.walk_start import exchange_sides
 
@@ -111,24 +108,6 @@ def test_a_treadmill_is_in_place():
 def test_what_is_no_walk_is_refused(change, words):
     with pytest.raises(UserError, match=words):
         calibrate(keypoints(view(), **change), SIZE, MODEL, 1.75)
-
-
-@pytest.mark.parametrize(
-    ("change", "words"),
-    [
-        ({}, None),
-        ({"height": 1.4 * 4 / 3}, "m tall by it, --height is 1.75"),
-        ({"focal": 1500.0}, r"check its focal length \(1500 px\)"),
-    ],
-    ids=["right", "height", "focal"],
-)
-def test_a_camera_that_contradicts_the_walk_is_reported(change, words):
-    given, walk = view(**change), keypoints(view())
-    start = find_keypoint_start(walk, given, MODEL, height=1.75)
-    words_found = contradiction(given, start.mean.stature, walk, MODEL, 1.75)
-    assert (
-        words_found is None if words is None else re.search(words, words_found) and "height 1." in words_found
-    )
 
 
 @pytest.mark.parametrize("share", [0.3, 1.0], ids=["some frames", "all frames"])

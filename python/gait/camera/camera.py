@@ -163,6 +163,19 @@ class Camera:
             cy=self.cy * factor + shift,
         )
 
+    def up_axis(self) -> str:
+        """Axis of the world that is nearest to up in the picture: x, y, z, -x, -y or -z."""
+        up = -self.R[1]
+        k = int(np.abs(up).argmax())
+        return ("-" if up[k] < 0 else "") + "xyz"[k]
+
+    def with_up(self, axis: str) -> Camera:
+        """Camera in the world turned so that `axis`, as of `up_axis`, becomes z."""
+        k = "xyz".index(axis[-1])
+        up = (-1.0 if axis.startswith("-") else 1.0) * np.eye(3)[k]
+        first = np.eye(3)[k - 2]
+        return replace(self, R=self.R @ np.array([first, np.cross(up, first), up]).T)
+
     def check_size(self, where: str, size: tuple[int, int]) -> None:
         """Raise UserError unless the calibration is for frames of `size` (width, height)."""
         if self.size == tuple(size):
@@ -170,6 +183,8 @@ class Camera:
         width, height = size
         factor = width / self.width
         made = f"{where}: calibrated for {self.width}x{self.height}, the video is {width}x{height}"
+        if self.size == (height, width):
+            raise UserError(f"{made}, turned by 90 degrees; turn it back, or calibrate it as it is")
         if abs(self.height * factor - height) < 1:
             raise UserError(f"{made}; scale width, height, fx, fy, cx, cy by {factor:.6g}")
         raise UserError(f"{made}, another aspect; calibrate for this video or undo its crop")
@@ -183,6 +198,8 @@ class Camera:
             fault = f"its lens is {above:.4g} m above the floor; R and t are in metres, not millimetres"
         elif self.R[1, 2] > _UPSIDE_DOWN or not self._shows_person():
             fault = "no person standing on the floor would be upright in its picture"
+        if fault and (up := self.up_axis()) != "z":
+            fault += f", and {up} instead of z is up in its picture"
         if fault:
             raise UserError(
                 f"{where}: {fault}; give R and t from world to camera in metres, z up, the floor at z = 0 "

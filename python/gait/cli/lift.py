@@ -43,7 +43,9 @@ from gait.io.track_file import write_lifted
 from gait.io.trc import write_trc
 from gait.lift import run as lift_run
 from gait.lift.segment.explain import Uncertain
+from gait.lift.segment.view import Perspective
 from gait.lift.smooth import motion
+from gait.track.camera_check import contradiction
 
 if TYPE_CHECKING:
     from gait.bindings.segment_prior import SegmentPrior
@@ -244,6 +246,9 @@ def _lift_keypoints(args: argparse.Namespace, video: bool) -> tuple[dict[str, An
     _require_person(args, found)
     for words in lift_run.warnings_of(lifted, prior.stature):
         warn(words)
+    if isinstance(lifted.view, Perspective) and calibration is None:
+        fault = contradiction(lifted.view.camera, keypoints, _walking_model(args), args.height)
+        warn(f"{args.camera}: {fault}") if fault else None
     write_lifted(args.output, keypoints.frame, keypoints.time, found.names, found.places, found.sd)
     if args.trc:
         write_trc(args.trc, found.names, keypoints.time, found.places, _rate(keypoints))
@@ -272,11 +277,15 @@ def _calibrate(args: argparse.Namespace, video: Video, keypoints: Keypoints) -> 
     """Find the camera from the walk, and report it."""
     from gait.track.walk_camera import calibrate_film, note_camera
 
-    cyclic = args.model and "CURV" in decode(read_blob(args.model))  # a model may have a segment prior alone
-    model = Model(args.model if cyclic else None)
-    found = calibrate_film(video, keypoints, model, args.height, args.fov, args.quiet)
+    found = calibrate_film(video, keypoints, _walking_model(args), args.height, args.fov, args.quiet)
     note_camera(found, args.quiet)
     return found
+
+
+def _walking_model(args: argparse.Namespace) -> Model:
+    """Model with curves of walking: the model's own or, if it has a segment prior alone, the shipped ones."""
+    own = args.model and "CURV" in decode(read_blob(args.model))
+    return Model(args.model if own else None)
 
 
 def _write_camera(args: argparse.Namespace, calibration: Calibration | None) -> None:

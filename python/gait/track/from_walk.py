@@ -152,6 +152,7 @@ def calibrate(
     *,
     fov: float | None = None,
     fov_sd: float = GIVEN_FOV_SD,
+    near: CameraPrior | None = None,
     where: str = "keypoints",
 ) -> Calibration:
     """Find the camera from the keypoints of a walking person.
@@ -170,6 +171,8 @@ def calibrate(
         Horizontal field of view, degrees, as the camera's maker gives it.
     fov_sd : float
         Standard deviation of the logarithm of the focal length that follows from `fov`.
+    near : CameraPrior, optional
+        What is expected of the camera, instead of `fov`.
     where : str
         Name of the input in errors.
 
@@ -195,7 +198,8 @@ def calibrate(
             "--camera"
         )
     with one_thread():
-        return _calibrate(chosen, size, model, height, CameraPrior.of(size, fov, fov_sd), where)
+        prior = near or CameraPrior.of(size, fov, fov_sd)
+        return _calibrate(chosen, size, model, height, prior, where)
 
 
 def _calibrate(

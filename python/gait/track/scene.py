@@ -21,11 +21,12 @@ from gait.io.keypoints_file import Keypoints
 from gait.io.video import Frame, Image, Video, background, median, sample_frames
 from gait.progress import note, progress
 from gait.track.box_start import find_start
+from gait.track.camera_check import contradiction
 from gait.track.from_walk import Calibration
 from gait.track.keypoint_start import find_keypoint_start, keypoint_noise
 from gait.track.options import ClipOptions
 from gait.track.stabilise import SteadyVideo, find_motion, moves
-from gait.track.walk_camera import calibrate_film, contradiction, expected_fov, note_camera
+from gait.track.walk_camera import calibrate_film, expected_fov, note_camera
 from gait.track.walk_start import usual_camera
 
 _COLOUR = 4.0  # grey levels between the channels of half of a picture in colour, at least
@@ -200,6 +201,7 @@ def first_state(options: ClipOptions, scene: Scene) -> Start:
         start = _read_start(options, scene.video, scene.camera, scene.model)
         _require_scene(options, scene, start.frame)
         start = replace(start, in_place=_in_place(scene, start.frame))
+        _check_camera(options, scene)
     else:
         _require_scene(options, scene, scene.frames.start)
         start = _find_first_state(options, scene)
@@ -257,7 +259,7 @@ def _find_first_state(options: ClipOptions, scene: Scene) -> Start:
         found = find_keypoint_start(
             keypoints, camera, model, first=frames.start, stop=frames.stop, height=height
         )
-        _check_camera(options, scene, found)
+        _check_camera(options, scene)
         if found is not None:
             return found
     return find_start(
@@ -273,14 +275,12 @@ def _find_first_state(options: ClipOptions, scene: Scene) -> Start:
     )
 
 
-def _check_camera(options: ClipOptions, scene: Scene, start: Start | None) -> None:
-    """Report a camera file that contradicts the walk and the person's stature."""
-    if options.camera is None or options.height is None:
+def _check_camera(options: ClipOptions, scene: Scene) -> None:
+    """Report a camera file that contradicts the walk."""
+    keypoints = _in_reference(scene.steady, scene.people.get(scene.person))
+    if options.camera is None or keypoints is None:
         return
-    appears = None if start is None else start.mean.stature
-    keypoints = _in_reference(scene.steady, scene.people[scene.person])
-    assert keypoints is not None
-    if words := contradiction(scene.reference_camera, appears, keypoints, scene.model, options.height):
+    if words := contradiction(scene.reference_camera, keypoints, scene.model, options.height):
         note(f"{options.camera}: {words}", options.quiet)
 
 

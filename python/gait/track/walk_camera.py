@@ -1,13 +1,8 @@
-"""The camera of a film as its walk shows it: found if none is given, and compared with one that is.
-
-What `gait camera`, `gait track` and `gait lift` share.
-"""
+"""The camera of a film, found from the walk in it: what `gait camera`, `gait track` and `gait lift` share."""
 
 from __future__ import annotations
 
 from gait.bindings.model import Model
-from gait.camera.camera import Camera
-from gait.errors import UserError
 from gait.io.keypoints_file import Keypoints
 from gait.io.lens_tag import equivalent_mm, lens_tag, view_across
 from gait.io.video import Video
@@ -16,7 +11,6 @@ from gait.track.from_walk import Calibration, calibrate
 from gait.track.walk_start import GIVEN_FOV_SD
 
 _TAG_SD = 0.1  # of the focal length's logarithm; stabilised films are cropped by about as much
-_CONTRADICTS = 0.1  # of the stature, by which a person who appears taller or shorter contradicts a camera
 
 
 def find_person(video: Video, quiet: bool, first: int = 0, stop: int | None = None) -> Keypoints:
@@ -100,29 +94,3 @@ def note_camera(found: Calibration, quiet: bool) -> None:
     """Report the camera that was found."""
     for line in found.describe():
         note(line, quiet)
-
-
-def contradiction(
-    given: Camera, appears: float | None, keypoints: Keypoints, model: Model, height: float
-) -> str | None:
-    """Report how a given camera contradicts a walk, and which camera would fit; None: it does not.
-
-    Parameters
-    ----------
-    given : Camera
-    appears : float or None
-        Stature of the person by this camera, metres; None: no walk on the floor fits.
-    keypoints, model, height
-        As for `calibrate`.
-    """
-    if appears is not None and abs(appears / height - 1) < _CONTRADICTS:
-        return None
-    try:
-        fits = calibrate(keypoints, given.size, model, height)
-    except UserError:
-        return None
-    what = "no walk fits it" if appears is None else f"the person appears {appears:.2f} m tall by it"
-    return (
-        f"{what}, --height is {height:g}; check its focal length ({given.fx:.0f} px) and place "
-        f"({given.centre[2]:.2f} m high): {fits.describe()[0]}"
-    )

@@ -26,6 +26,7 @@ STATURE_SD = 0.015  # of the stature, with shoes
 _USUAL_FOV = 65.0  # degrees along the longer side of the picture, of a usual phone
 _FOV_SD = 0.45  # of the focal length's logarithm; of --fov:
 GIVEN_FOV_SD = 0.05
+_KNOWN_SD = 0.15  # of the focal length's logarithm, below which a fit starts from the expected one alone
 _HEIGHT, _HEIGHT_SD = 1.3, 0.5  # metres; of the logarithm
 _TILT, _TILT_SD, _ROLL_SD = 0.05, 0.2, 0.02  # radians
 _STICK_SD = 0.025  # of the height, of hips over ankles as an upright stick
@@ -117,14 +118,14 @@ class WalkStart:
 def find_starts(
     keypoints: Keypoints, size: tuple[int, int], model: Model, height: float, prior: CameraPrior
 ) -> list[WalkStart]:
-    """Fit windows of the clip with the camera at several focal lengths."""
+    """Fit windows of the clip with the camera at several focal lengths, or at the expected one if known."""
     noise = keypoint_noise(keypoints)
     found = []
     span = keypoints.time[-1] - keypoints.time[0]
     middles = np.unique(np.round(keypoints.time[0] + span * np.array([0.3, 0.5, 0.75]), 3))
     for share in _STARTS:
         q = prior.mean.copy()
-        if prior.sd[0] > GIVEN_FOV_SD:
+        if prior.sd[0] > _KNOWN_SD:
             q[0] = np.log(share * max(size))
         q = _level(q, keypoints, size, height, prior)
         best: WalkStart | None = None
@@ -141,7 +142,7 @@ def find_starts(
                 best = WalkStart(q, walk, middle)
         if best is not None:
             found.append(best)
-        if prior.sd[0] <= GIVEN_FOV_SD:
+        if prior.sd[0] <= _KNOWN_SD:
             break
     return found
 

@@ -1,0 +1,149 @@
+"""Whether a camera that is given fits the walk in the picture, and what would fit."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from gait.bindings.model import Model
+from gait.camera.camera import Camera
+from gait.errors import UserError
+from gait.io.keypoints_file import Keypoints
+from gait.track.from_walk import calibrate
+from gait.track.keypoint_start import find_keypoint_start
+from gait.track.walk_start import CameraPrior, choose_frames
+
+Array = NDArray[np.float64]
+
+_TALLER = 0.12  # of the stature, by which a person who appears taller or shorter contradicts a camera
+_PEOPLE = (1.4, 2.1)  # metres, of a person of unknown stature
+_PARTS = ("focal length", "tilt", "roll")
+_GIVEN_SD = np.array([0.1, np.radians(2.0), np.radians(1.5), 0.1])  # expected of a camera, as in CameraPrior
+_WRONG = np.array([0.25, np.radians(6.0), np.radians(5.0)])  # differences of `_PARTS` that are reported
+_CERTAIN = 2.0  # standard deviations of the estimate that a difference must exceed as well
+_UPRIGHT = 35.0  # degrees by which a walking body may lean in the picture
+
+
+def contradiction(given: Camera, keypoints: Keypoints, model: Model, height: float | None) -> str | None:
+    """Report how a given camera contradicts a walk, and what would fit; None if it does not.
+
+    A camera contradicts a walk if no walk on its floor fits, if the person appears too tall or too short, or
+    if an estimate of the camera that expects it to be right differs clearly from it.  A path straight across
+    the view leaves the focal length open, so that a wrong one is not noticed.
+
+    Parameters
+    ----------
+    given : Camera
+    keypoints : Keypoints
+        Of one person, pixels.
+    model : Model
+        Its cyclic part.
+    height : float or None
+        The person's stature, metres, if it is known.
+    """
+    walk = _walk(keypoints, model)
+    if walk is None:
+        return None
+    start = find_keypoint_start(walk, given, model)
+    if start is None:
+        if words := _other_way_up(given, walk, model):
+            return words
+        what: str | None = "no walk on its floor, z = 0, fits the picture"
+    else:
+        appears = start.mean.stature
+        what = _wrong_size(appears, height) or _wrong_part(given, walk, model, appears)
+    if what is None:
+        return None
+    try:
+        fits = calibrate(walk, given.size, model, model.prior()[0].stature if height is None else height)
+    except UserError:
+        return None
+    return (
+        f"{what}; check its focal length ({given.fx:.0f} px) and place ({given.centre[2]:.2f} m high): "
+        f"{fits.describe()[0]}"
+    )
+
+
+def _walk(keypoints: Keypoints, model: Model) -> Keypoints | None:
+    """Choose the model's joints in some seconds of a walk; None if shoulders, hips or ankles are missing."""
+    needed = {f"{side}_{joint}" for side in "lr" for joint in ("shoulder", "hip", "ankle")}
+    if not needed <= set(keypoints.names):
+        return None
+    known = [j for j, name in enumerate(keypoints.names) if name in model.joint_names]
+    names = tuple(keypoints.names[j] for j in known)
+    uv, confidence = keypoints.uv[:, known], keypoints.confidence[:, known]
+    chosen = choose_frames(Keypoints(keypoints.frame, keypoints.time, names, uv, confidence))
+    return chosen if len(chosen.frame) > 1 else None
+
+
+def _wrong_size(appears: float, height: float | None) -> str | None:
+    """Report a person who appears too tall or too short."""
+    low, high = _PEOPLE if height is None else (height * (1 - _TALLER), height * (1 + _TALLER))
+    if low < appears < high:
+        return None
+    known = "give --height if that is right" if height is None else f"--height is {height:g}"
+    return f"the person appears {appears:.2f} m tall by it, {known}"
+
+
+def _wrong_part(given: Camera, walk: Keypoints, model: Model, stature: float) -> str | None:
+    """Report focal length, tilt or roll that an estimate which expects the given ones moves away from."""
+    expected = _parameters(given)
+    try:
+        found = calibrate(walk, given.size, model, stature, near=CameraPrior(expected, _GIVEN_SD))
+    except UserError:
+        return None
+    off = np.abs(_parameters(found.camera) - expected)[:3]
+    wrong = (off > _WRONG) & (off > _CERTAIN * found.sd[:3])
+    return f"the walk contradicts its {_PARTS[int(wrong.argmax())]}" if wrong.any() else None
+
+
+def _parameters(camera: Camera) -> Array:
+    """Log focal length [px], tilt, roll [rad], log height [m] of a camera, in the middle of its picture."""
+    middle = (np.array(camera.size) - 1) / 2
+    ahead, right, left, down, up = camera.rays(middle + [[0, 0], [1, 0], [-1, 0], [0, 1], [0, -1]])
+    across, upwards = (right - left) / 2, (up - down) / 2
+    focal = 1 / np.sqrt(np.linalg.norm(across) * np.linalg.norm(upwards))
+    roll = np.arctan2(-across[2], upwards[2])
+    return np.array([np.log(focal), -np.arcsin(ahead[2]), roll, np.log(camera.centre[2])])
+
+
+def _other_way_up(given: Camera, walk: Keypoints, model: Model) -> str | None:
+    """Report frames that are turned against the camera, or a world whose z is not up, if the walk fits so."""
+    quarters = round(_lean(given, walk) / 90) % 4
+    if quarters and _fits(given, _turned(walk, given.size, -quarters), model):
+        turn = {1: "90 degrees clockwise", 2: "180 degrees", 3: "90 degrees counter-clockwise"}[quarters]
+        return f"the frames are turned by {turn} against it; turn the video back, or calibrate it as it is"
+    up = given.up_axis()
+    if up != "z" and _fits(given.with_up(up), walk, model):
+        return f"the walk fits with {up} of its world up; turn R and t so that z is up, the floor at z = 0"
+    return None
+
+
+def _fits(camera: Camera, walk: Keypoints, model: Model) -> bool:
+    """Whether bodies are upright and the walk of a person fits."""
+    if camera.centre[2] <= 0 or abs(_lean(camera, walk)) > _UPRIGHT:
+        return False
+    start = find_keypoint_start(walk, camera, model)
+    return start is not None and _PEOPLE[0] < start.mean.stature < _PEOPLE[1]
+
+
+def _lean(camera: Camera, walk: Keypoints) -> float:
+    """Angle between bodies and the vertical in the picture, degrees, clockwise."""
+    top, foot = (
+        np.mean([walk.uv[:, walk.names.index(f"{side}_{joint}")] for side in "lr"], axis=0)
+        for joint in ("shoulder", "ankle")
+    )
+    place = camera.centre + 5.0 * camera.rays(foot)  # any distance shows the same vertical
+    observed, vertical = foot - top, camera.project(place) - camera.project(place + [0.0, 0.0, 0.3])
+    ratio = (observed @ [1, 1j]) * np.conj(vertical @ [1, 1j])
+    ratio = ratio[np.isfinite(ratio) & (ratio != 0)]
+    return float(np.degrees(np.angle((ratio / np.abs(ratio)).sum())))
+
+
+def _turned(walk: Keypoints, size: tuple[int, int], quarters: int) -> Keypoints:
+    """Keypoints turned clockwise about the middle of the picture."""
+    middle = (np.array(size) - 1) / 2
+    turn = np.linalg.matrix_power(np.array([[0, 1], [-1, 0]]), quarters % 4)
+    return replace(walk, uv=(walk.uv - middle) @ turn + middle)

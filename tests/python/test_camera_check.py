@@ -1,0 +1,128 @@
+"""Camera files that contradict the walk are reported with what would fit; right ones are not."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from walking_keypoints import ACROSS, MODEL, TOWARDS, keypoints, view
+
+from gait.camera.camera import Camera, write_camera
+from gait.cli import main
+from gait.errors import UserError
+from gait.io.keypoints_file import write
+from gait.track.camera_check import _lean, _parameters, _turned, contradiction
+
+STATURE = 1.75
+Y_UP, Y_DOWN = (np.array([[1, 0, 0], [0, 0, s], [0, -s, 0]], float) for s in (1, -1))
+
+
+def found(given, walk=TOWARDS, height=STATURE):
+    return contradiction(given, keypoints(view(), walk), MODEL, height)
+
+
+@pytest.mark.parametrize("walk", [TOWARDS, ACROSS], ids=["towards", "across"])
+@pytest.mark.parametrize("height", [STATURE, None])
+def test_a_right_camera_is_not_reported(walk, height):
+    assert found(view(), walk, height) is None
+
+
+def test_a_guessed_camera_is_not_reported():
+    assert found(view(focal=1150.0, height=1.5)) is None
+
+
+@pytest.mark.parametrize(("change", "words"), [
+    ({"height": 1.4 * 4 / 3}, "m tall by it, --height is 1.75"),
+    ({"height": 1.4 * 3 / 4}, "m tall by it, --height is 1.75"),
+    ({"focal": 1500.0}, "check its focal length (1500 px)"),
+    ({"focal": 667.0}, "check its focal length (667 px)"),
+])  # fmt: skip
+def test_a_wrong_camera_is_reported_with_one_that_fits(change, words):
+    report = found(view(**change))
+    assert words in report and "camera from the walk: focal length" in report and "height 1.4" in report
+
+
+@pytest.mark.parametrize("share", [1.5, 1 / 1.5])
+def test_a_wrong_focal_length_of_a_level_camera_is_reported(share):
+    """It leaves the stature as it is."""
+    level = view(tilt=0.0)
+    walk = keypoints(level)
+    report = contradiction(replace(level, fx=share * level.fx, fy=share * level.fy), walk, MODEL, None)
+    assert report.startswith("the walk contradicts its focal length")
+    assert contradiction(level, walk, MODEL, None) is None
+
+
+def test_a_focal_length_that_the_path_leaves_open_is_not_reported():
+    walk = keypoints(view(tilt=0.0), ACROSS)
+    assert contradiction(view(tilt=0.0, focal=1500.0), walk, MODEL, STATURE) is None
+
+
+def test_an_unknown_stature_has_to_be_that_of_a_person():
+    report = found(view(height=1.4 * 4 / 3), height=None)
+    assert "m tall by it, give --height if that is right" in report
+
+
+def behind(axes=None):
+    """Camera 6 m from the origin of a world with other axes."""
+    camera = view()
+    turn = np.eye(3) if axes is None else axes
+    return replace(camera, R=camera.R @ turn.T, t=camera.t + camera.R @ [0.0, 6.0, 0.0])
+
+
+def test_a_world_in_which_another_axis_is_up():
+    walk = keypoints(view())
+    assert contradiction(behind(), walk, MODEL, STATURE) is None
+    wrong = behind(Y_UP)
+    wrong.check_place("c.json")  # nothing is wrong with it as long as no person is in view
+    assert "the walk fits with y of its world up" in contradiction(wrong, walk, MODEL, STATURE)
+
+
+@pytest.mark.parametrize(("axes", "up"), [(Y_UP, "y"), (Y_DOWN, "-y")])
+def test_another_axis_is_named_before_the_work(axes, up):
+    camera = replace(view(), R=view().R @ axes.T)
+    with pytest.raises(UserError, match=f"and {up} instead of z is up in its picture"):
+        camera.check_place("c.json")
+    assert camera.with_up(up).up_axis() == "z"
+
+
+@pytest.mark.parametrize(
+    ("quarters", "words"),
+    [(1, "90 degrees clockwise"), (2, "180 degrees"), (3, "90 degrees counter-clockwise")],
+)
+def test_turned_frames(quarters, words):
+    camera = Camera(720, 720, 700.0, 700.0, 359.5, 359.5, view().R, view().t)
+    walk = keypoints(camera)
+    turned = _turned(walk, camera.size, quarters)
+    assert _lean(camera, walk) == pytest.approx(0.0, abs=10)
+    assert f"the frames are turned by {words} against it" in contradiction(camera, turned, MODEL, STATURE)
+
+
+def test_a_video_turned_against_its_calibration_is_refused():
+    with pytest.raises(UserError, match="the video is 720x1280, turned by 90 degrees"):
+        view().check_size("c.json", (720, 1280))
+
+
+def test_parameters_are_those_of_the_camera():
+    camera = view(focal=1200.0, tilt=0.2, roll=0.05, height=2.0)
+    np.testing.assert_allclose(_parameters(camera), [np.log(1200.0), 0.2, 0.05, np.log(2.0)], atol=1e-5)
+
+
+def test_what_is_no_walk_is_no_contradiction():
+    walk = keypoints(view())
+    noise = np.random.default_rng(1).uniform(0, 700, walk.uv.shape)
+    assert contradiction(view(), replace(walk, uv=noise), MODEL, STATURE) is None
+    others = tuple(f"marker_{k}" for k in range(len(walk.names)))
+    assert contradiction(view(), replace(walk, names=others), MODEL, STATURE) is None
+
+
+def test_gait_lift_reports_it(tmp_path, capsys):
+    write(tmp_path / "k.csv", keypoints(view()))
+    write_camera(tmp_path / "right.json", view())
+    write_camera(tmp_path / "wrong.json", view(focal=1500.0))
+    reports = []
+    for name in ("right", "wrong"):
+        words = [tmp_path / "k.csv", "--camera", tmp_path / f"{name}.json", "--height", STATURE]
+        assert main(["lift", *map(str, words), "-o", str(tmp_path / "out.csv")]) == 0
+        reports.append(capsys.readouterr().err)
+    assert "camera from the walk" not in reports[0]
+    assert f"{tmp_path / 'wrong.json'}: the person appears" in reports[1]
+    assert "camera from the walk: focal length" in reports[1]
