@@ -12,9 +12,11 @@ import pytest
 
 from gait.cli import main
 from gait.learn.corpus import load, sources
+from gait.learn.report import figures_model
 from gait.learn.segments.virtual_markers import MARKERS
 from gait.paper import clip as clips
 from gait.paper import leventon, lifting, ormoneit, recordings, tracking
+from gait.report.figures import Drawing
 from gait.reproducible import one_thread
 from gait.simulate.scenario import PRESETS
 
@@ -58,6 +60,7 @@ def test_removed_blocks_are_filled_better_than_by_the_mean(learning):
     removal = learning.removal
     assert np.all(np.diff(removal.passes) <= 1e-9)
     assert removal.literal < 0.5 * removal.mean
+    assert len(figures_model.convergence(learning.literal).axes) == 2  # no likelihood to show
 
 
 def planted(rng, count=60, size=6):
@@ -147,6 +150,8 @@ def test_the_page_holds_every_figure_and_needs_no_other_file(walks, tmp_path, mo
     monkeypatch.setattr(tracking, "PARTICLES", 200)
     monkeypatch.setattr(lifting, "FRAMES", 20)
     monkeypatch.setattr(recordings, "ECLECTIC", 4)
+    monkeypatch.setattr(recordings, "cores", lambda: 1)
+    monkeypatch.setattr(Drawing, "png", lambda self: b"PNG")  # Matplotlib takes a second for each
     page = tmp_path / "a.html"
     assert main(["paper", "--mocap", str(walks), "-o", str(page), "--quiet", "--json"]) == 0
     found = json.loads(capsys.readouterr().out)

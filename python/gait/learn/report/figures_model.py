@@ -162,13 +162,15 @@ def residuals(learned: Learned) -> Figure:
 
 def convergence(learned: Learned) -> Figure:
     """Draw the objectives of the alignment and the filling of gaps, and its error, against their passes."""
-    figure, panels = grid(1, 3, 10, 3.2)
     filling = learned.components
     courses: list[tuple[str, str, list[float] | Floats]] = [
         ("alignment", "weighted sum of squares, rad²", learned.alignment.objective),
         ("filling of gaps: objective", "- log-likelihood per entry", filling.objective),
         ("filling of gaps: error", "on observed entries, degrees (rms)", np.degrees(filling.rmse)),
     ]
+    if learned.paper:  # the iterated SVD minimises the error itself
+        del courses[1]
+    figure, panels = grid(1, len(courses), 10, 3.2)
     for axes, (title, unit, values) in zip(panels, courses, strict=True):
         axes.plot(np.arange(1, len(values) + 1), values, "o-", ms=3, color=BLUE)
         axes.set(xlabel="pass", ylabel=unit)
