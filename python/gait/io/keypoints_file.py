@@ -15,6 +15,7 @@ import sys
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -63,6 +64,15 @@ class Keypoints:
     def visible(self) -> NDArray[np.bool_]:
         """Which points are seen, shape (T, J)."""
         return np.asarray(np.isfinite(self.uv).all(axis=2))
+
+    def part(self, rows: slice) -> Keypoints:
+        """Keypoints of some frames."""
+        names = ("frame", "time", "uv", "confidence", "sd", "lasting_sd", "frame_sd")
+        columns: dict[str, Any] = {}
+        for name in names:
+            values = getattr(self, name)
+            columns[name] = None if values is None else values[rows]
+        return replace(self, **columns)
 
     def certain(self) -> Keypoints:
         """Keypoints without those of little confidence, as a file of them is read."""

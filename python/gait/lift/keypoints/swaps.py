@@ -16,7 +16,6 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass, replace
-from typing import Any
 
 import numpy as np
 import numpy.typing as npt
@@ -246,7 +245,7 @@ def undo_swaps(keypoints: Keypoints, sd: float, evidence: Evidence) -> tuple[Key
     for first, end in list(_intervals(keypoints, wrong)):
         part = _around(keypoints, first, end)
         own = slice(first - part.start, end - part.start)
-        shown = _rows(steady, part), pairs, observed[part]
+        shown = steady.part(part), pairs, observed[part]
         wrong[first:end] = _judged(*shown, wrong[part], own, sd, evidence)[own]
     found = [
         Swapped(joint, _spans(keypoints.frame[observed[:, k]], wrong[observed[:, k], k]))
@@ -303,13 +302,6 @@ def _around(keypoints: Keypoints, first: int, end: int) -> slice:
     """Rows of an interval and its surroundings."""
     begin = np.searchsorted(keypoints.time, keypoints.time[first] - AROUND)
     return slice(int(begin), int(np.searchsorted(keypoints.time, keypoints.time[end - 1] + AROUND, "right")))
-
-
-def _rows(keypoints: Keypoints, part: slice) -> Keypoints:
-    """Take some frames of keypoints."""
-    names = ("frame", "time", "uv", "confidence", "sd", "lasting_sd", "frame_sd")
-    columns: dict[str, Any] = {name: getattr(keypoints, name) for name in names}
-    return replace(keypoints, **{name: x if x is None else x[part] for name, x in columns.items()})
 
 
 def _swapped(keypoints: Keypoints, pairs: Ints, wrong: Flags) -> Keypoints:
