@@ -88,6 +88,28 @@ def test_the_pelvis_sways_so_that_feet_stand_still():
     assert np.ptp(ankle) < 0.002
 
 
+def test_a_lean_grows_with_height_and_an_offset_goes_down_the_limb():
+    body = WalkingBody(MODEL, NAMES)
+    shoulder, wrist, hip, ankle = (
+        body.names.index(f"l_{joint}") for joint in ("shoulder", "wrist", "hip", "ankle")
+    )
+
+    def moved(parts, offsets):
+        plain = np.zeros(body.parts), np.zeros(body.offsets)
+        phase, rate = np.array([0.2]), np.array([body.rate])
+        return (body.joints(phase, rate, parts, offsets) - body.joints(phase, rate, *plain))[0]
+
+    lean = np.zeros(body.parts)
+    lean[-3] = 1.0
+    forward = moved(lean, np.zeros(body.offsets))[:, 0]
+    assert 0 < forward[ankle] < 0.3 * forward[hip] < 0.3 * forward[shoulder]
+    offset = np.zeros((len(body.names), 3))
+    offset[shoulder] = 0.01, 0.0, 0.02
+    change = moved(np.zeros(body.parts), offset.ravel())
+    assert change[[shoulder, wrist]] == pytest.approx(np.tile([0.01, 0.0, 0.02], (2, 1)))
+    assert not change[[hip, ankle]].any()
+
+
 def test_a_treadmill_is_in_place():
     camera = view()
     found = calibrate(keypoints(camera, (0.4, (0.0, 3.5)), belt=1.25), SIZE, MODEL, 1.75)
