@@ -115,7 +115,7 @@ def test_people_at_one_place_are_one(stage):
         assert len(found) == len({round(x, 3) for x in found.values()})
 
 
-def test_a_thing_taken_for_a_person_hides_nobody_small(stage):
+def test_a_thing_taken_for_a_person_hides_no_small_person(stage):
     """The whole picture shows a thing, parts of it the person."""
     stage.detector._find = lambda image, small: iter([[stage.crop(600)], [stage.crop(200)]])
     assert stage.step(0, red=200) == {1: pytest.approx(200)}

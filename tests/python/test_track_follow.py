@@ -201,7 +201,7 @@ class Script:
 
 
 class Film:
-    """Frames that nobody looks at."""
+    """Frames whose pictures are not used."""
 
     fps = 30.0
 

@@ -78,7 +78,7 @@ class Keypoints:
         """Keypoints without those of little confidence, as a file of them is read."""
         return replace(self, uv=np.where(self.confidence[..., None] < LEAST_CONFIDENCE, np.nan, self.uv))
 
-    def seen(self) -> set[int]:
+    def visible_frames(self) -> set[int]:
         """Return the numbers of the frames in which any point is seen."""
         return set(self.frame[self.visible.any(axis=1)].tolist())
 

@@ -81,8 +81,8 @@ class Scene:
         """Ids of those who are never in view together with the person: they may be the same one."""
         if not self.people:
             return []
-        own = self.people[self.person].seen()
-        return [id for id, one in self.people.items() if id != self.person and own.isdisjoint(one.seen())]
+        frames = {id: one.visible_frames() for id, one in self.people.items()}
+        return [id for id in frames if id != self.person and frames[id].isdisjoint(frames[self.person])]
 
     @staticmethod
     def read(options: ClipOptions) -> Scene:
