@@ -1,4 +1,4 @@
-"""People in made films: in portrait, filling the picture, small; and films in which no person can be found."""
+"""People in made films: in portrait, filling the picture, small; films without a person to be found."""
 
 import json
 import sys
@@ -43,7 +43,7 @@ def walk(tmp_path_factory):
 
 
 def film(path, pictures, turned=0):
-    """Write pictures as a camera does that was held turned clockwise: sideways, and a matrix that states it."""
+    """Write pictures as a camera does that was held turned clockwise: sideways, with a matrix."""
     with VideoWriter(path, 30, crf=10) as video:
         for picture in pictures:
             video.write(np.ascontiguousarray(np.rot90(picture, turned // 90)))
