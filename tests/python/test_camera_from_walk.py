@@ -15,7 +15,7 @@ from gait.simulate import Scenario
 from gait.simulate.stage import set_stage
 from gait.track.from_walk import calibrate
 from gait.track.walk_model import WalkingBody
-from gait.track.walk_start import exchange_sides
+from gait.track.walk_start import swap_sides
 
 
 @pytest.mark.parametrize(
@@ -133,11 +133,11 @@ def test_what_is_no_walk_is_refused(change, words):
 
 
 @pytest.mark.parametrize("share", [0.3, 1.0], ids=["some frames", "all frames"])
-def test_sides_that_a_detector_exchanges_are_put_right(share):
+def test_sides_that_a_detector_swaps_are_put_right(share):
     camera = view()
     away = keypoints(camera, (1.8, (0.3, 3.6)))
     wrong = np.random.default_rng(3).uniform(size=len(away.time)) < share
-    right, found = (calibrate(k, SIZE, MODEL, 1.75) for k in (away, exchange_sides(away, wrong)))
+    right, found = (calibrate(k, SIZE, MODEL, 1.75) for k in (away, swap_sides(away, wrong)))
     assert found.camera.fx == pytest.approx(right.camera.fx, rel=0.02)
     assert found.sd == pytest.approx(right.sd, rel=0.1)
 

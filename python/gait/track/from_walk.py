@@ -28,15 +28,15 @@ from gait.track.walk_start import (
     WINDOW,
     CameraPrior,
     choose_frames,
-    exchange_sides,
     find_starts,
     make_camera,
+    swap_sides,
 )
 
 Array = NDArray[np.float64]
 
 _WORST = 6.0  # squared robust error per coordinate up to which the result is accepted
-_DOUBTFUL = 1.2  # the same, above which left and right may be exchanged
+_POOR = 1.2  # the same, above which left and right may be swapped
 _LEAST_RATE = 0.4  # strides per second of a person who walks
 _UNKNOWN = 0.2  # relative standard deviation from which the focal length counts as poorly determined
 _OPEN = 1.0  # and from which the camera is refused
@@ -207,9 +207,9 @@ def _calibrate(
 ) -> Calibration:
     body = WalkingBody(model, chosen.names)
     best = _first_fit(chosen, size, model, body, height, prior)
-    if best is None or best.chi2_per_observation > _DOUBTFUL:
+    if best is None or best.chi2_per_observation > _POOR:
         # A detector may take a back for a front.
-        other = _first_fit(exchange_sides(chosen), size, model, body, height, prior)
+        other = _first_fit(swap_sides(chosen), size, model, body, height, prior)
         if best is None or (other is not None and other.cost_per_frame < best.cost_per_frame):
             best = other
     if best is None or best.chi2_per_observation > _WORST:

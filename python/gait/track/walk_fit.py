@@ -82,7 +82,7 @@ class WalkFit:
             high = min(last, high + _GROWTH) if 1 in open_ else high
             self._extend(low, high, *before)
             self.refine(4)
-            self._exchange_sides()
+            self._swap_sides()
             chi2 = self.model.frame_chi2(self.q)
             early, late = self.model.time < ends[0] - 1e-9, self.model.time > ends[1] + 1e-9
             bad = {
@@ -93,7 +93,7 @@ class WalkFit:
                 low, high = (ends[0] if bad[-1] else low), (ends[1] if bad[1] else high)
                 self._extend(low, high, *before)
                 self.refine(4)
-                self._exchange_sides()
+                self._swap_sides()
                 open_ -= {side for side, wrong in bad.items() if wrong}
             if low <= first:
                 open_ -= {-1}
@@ -102,9 +102,9 @@ class WalkFit:
         self.refine(15)
         return self
 
-    def _exchange_sides(self) -> None:
-        """Exchange left and right in frames that the detector took for the other way round."""
-        if (model := self.model.exchanged(self.q)) is not None:
+    def _swap_sides(self) -> None:
+        """Swap left and right in frames that the detector took for the other way round."""
+        if (model := self.model.swapped(self.q)) is not None:
             self.model = model
             self.refine(4)
 

@@ -18,7 +18,7 @@ from gait.bindings.model import Model
 from gait.bindings.state import State
 from gait.detect.profile import changing_sd, picture_height
 from gait.io.keypoints_file import Keypoints
-from gait.track.walk_start import STATURE_SD, CameraPrior, exchange_sides, make_camera
+from gait.track.walk_start import STATURE_SD, CameraPrior, make_camera, swap_sides
 
 Array = NDArray[np.float64]
 
@@ -41,7 +41,7 @@ _STILL_SD = 0.03  # metres per second on a treadmill
 _BEND_SD, _TURN_SD, _HURRY_SD = 0.05, 0.12, 0.02  # changes of slope at a knot: metres, radians, strides
 _CURVE_SD = 0.3  # radians per second, of the turn on average
 _SCORES = 5  # components of the model that are fitted
-_EXCHANGED = 16.0  # twice the logarithm of the odds from which the sides of a frame are exchanged
+_SWAPPED = 16.0  # twice the logarithm of the odds from which the sides of a frame are swapped
 _DEGREES = 4.0  # of freedom of Student's t
 
 
@@ -224,14 +224,14 @@ class WalkModel:
             in_place=self.in_place, interval=(low, high),
         )  # fmt: skip
 
-    def exchanged(self, q: Array) -> WalkModel | None:
-        """Make the model with sides exchanged in frames that fit much better so; None: there are none."""
-        swapped = self.over(self.time[0], self.time[-1], exchange_sides(self._all))
-        better = self.robust(q).sum(axis=1) > swapped.robust(q).sum(axis=1) + _EXCHANGED
+    def swapped(self, q: Array) -> WalkModel | None:
+        """Make the model with sides swapped in frames that fit much better so; None: there are none."""
+        swapped = self.over(self.time[0], self.time[-1], swap_sides(self._all))
+        better = self.robust(q).sum(axis=1) > swapped.robust(q).sum(axis=1) + _SWAPPED
         if not better.any():
             return None
         rows = np.isin(self._all.time, self.time[better])
-        return self.over(self.time[0], self.time[-1], exchange_sides(self._all, rows))
+        return self.over(self.time[0], self.time[-1], swap_sides(self._all, rows))
 
     def knots(self, q: Array) -> Array:
         """Knots (K, 4): x, y, metres; heading, radians; phase."""

@@ -93,8 +93,8 @@ def choose_frames(keypoints: Keypoints) -> Keypoints:
     )  # fmt: skip
 
 
-def exchange_sides(keypoints: Keypoints, rows: NDArray[np.bool_] | None = None) -> Keypoints:
-    """Exchange left and right, in all frames or in those of `rows` (T,)."""
+def swap_sides(keypoints: Keypoints, rows: NDArray[np.bool_] | None = None) -> Keypoints:
+    """Swap left and right, in all frames or in those of `rows` (T,)."""
     names = keypoints.names
     other = {name: {"l_": "r_", "r_": "l_"}.get(name[:2], name[:2]) + name[2:] for name in names}
     columns = [names.index(other[name]) if other[name] in names else k for k, name in enumerate(names)]
