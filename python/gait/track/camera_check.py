@@ -23,6 +23,7 @@ _PARTS = ("focal length", "tilt", "roll")
 _GIVEN_SD = np.array([0.1, np.radians(2.0), np.radians(1.5), 0.1])  # expected of a camera, as in CameraPrior
 _WRONG = np.array([0.25, np.radians(6.0), np.radians(5.0)])  # differences of `_PARTS` that are reported
 _CERTAIN = 2.0  # standard deviations of the estimate that a difference must exceed as well
+_FITS = 1.4  # squared robust error per coordinate; fits above it, as of moving cameras, contradict nothing
 _UPRIGHT = 35.0  # degrees by which a walking body may lean in the picture
 
 
@@ -93,6 +94,8 @@ def _wrong_part(given: Camera, walk: Keypoints, model: Model, stature: float) ->
     try:
         found = calibrate(walk, given.size, model, stature, near=CameraPrior(expected, _GIVEN_SD))
     except UserError:
+        return None
+    if found.chi2_per_observation > _FITS:
         return None
     off = np.abs(_parameters(found.camera) - expected)[:3]
     wrong = (off > _WRONG) & (off > _CERTAIN * found.sd[:3])
