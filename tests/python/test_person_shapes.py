@@ -104,9 +104,9 @@ def test_who_stands_first_is_started_while_walking(tmp_path):
 
 
 def start(frame, phase, sd=0.05):
-    mean, wide = MODEL.prior()
-    mean.phase, mean.stride_hz, wide.phase = phase, 0.9, sd
-    return Start(frame, mean, wide)
+    mean, sds = MODEL.prior()
+    mean.phase, mean.stride_hz, sds.phase = phase, 0.9, sd
+    return Start(frame, mean, sds)
 
 
 A, LATER, OTHER = start(10, 0.2), start(40, 0.1), start(10, 0.7)
