@@ -73,15 +73,16 @@ def track(clip: Clip, learning: Learning, tasks: int, update: Callable[[int], No
         model = Model(blob_of(learned, prior))
         start = Start.read(clip.init, model)
         first = start.frame
-        frames = list(video.frames(first, first + FRAMES + 1))
         config = TrackerConfig.default(mode, particles=PARTICLES)
         tracker = Tracker(model, camera, config, background=plate, tasks=tasks)
-        tracker.start(start.mean, start.sd, frames[0].utime)
-        estimates = []
-        for frame in frames:
+        estimates, images = list[Estimate](), list[Image]()
+        for frame in video.frames(first, first + FRAMES + 1):
+            if not estimates:
+                tracker.start(start.mean, start.sd, frame.utime)
+            if len(estimates) in SHOWN:
+                images.append(frame.image)
             estimates.append(tracker.step(frame.image, frame.utime))
             update(len(found) * (FRAMES + 1) + len(estimates))
-        images = [frames[k].image for k in SHOWN]
         found.append(Tracked(model, estimates, *_errors(clip, video, camera, first, estimates)))
     return Both(clip, camera, first, images, found[0], found[1])
 
