@@ -3,6 +3,7 @@
 import json
 import resource
 import signal
+import struct
 import subprocess
 import threading
 from copy import copy
@@ -236,3 +237,22 @@ def test_a_log_for_which_there_is_no_space_is_reported(estimates, tmp_path):
     )
     assert done.returncode == 1 and "e.log: the log cannot be written: File too large" in done.stderr
     assert not (tmp_path / "e.log").exists()
+
+
+@pytest.mark.parametrize("length", [2**31 - 1, 2**31 - 2, 1 << 30])
+@pytest.mark.parametrize("program", ["record", "view", "trackd"])
+def test_a_log_whose_event_states_more_than_the_file_holds_is_one_line(program, length, tmp_path):
+    path = rig.write_log(tmp_path / "in.log", [*rig.opening(), *rig.frames(0, 2)])
+    content = bytearray(path.read_bytes())
+    struct.pack_into(">i", content, 24, length)
+    path.write_bytes(content)
+    url = f"file://{path}?speed=0"
+    if program == "trackd":
+        done = rig.run("-m", rig.MODEL, "--url", url)
+        code, printed = done.code, done.words
+    else:
+        output = ["-o", tmp_path / "a.csv"] if program == "record" else ["--save", tmp_path / "a.png"]
+        done = rig.gait(program, "--url", url, *output)
+        code, printed = done.returncode, done.stderr
+    assert code == 1 and "damaged or" in printed and "Traceback" not in printed
+    assert [p.name for p in tmp_path.iterdir()] == ["in.log"]

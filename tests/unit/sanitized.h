@@ -19,4 +19,12 @@
 #ifndef THREADS_WATCHED
 #define THREADS_WATCHED 0
 #endif
+
+/* Take memory back from an object, whose red zones the sanitizer still guards. */
+#if SANITIZED
+#include <sanitizer/asan_interface.h>
+#define TAKE_BACK(memory, bytes) ASAN_UNPOISON_MEMORY_REGION(memory, bytes)
+#else
+#define TAKE_BACK(memory, bytes) ((void)0)
+#endif
 #endif

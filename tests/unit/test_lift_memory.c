@@ -4,6 +4,7 @@
 #include <stdbool.h>
 
 #include "base/hash.h"
+#include "sanitized.h"
 #include "toy_passer.h"
 
 enum { CANARY = 4 * GAIT_ALIGN, PUSHES = 1000 };
@@ -32,6 +33,7 @@ static uint64_t run(const gait_lift_config *c, unsigned char fill)
     gait_lift *l = NULL;
     gait_lift_frame f;
     CHECK(need <= TOY_LIFT_BYTES);
+    TAKE_BACK(outside, sizeof outside);
     memset(outside, fill, sizeof outside);
     CHECK(gait_lift_init(outside + CANARY, need, toy_lift_model, c, &l, NULL) == GAIT_OK);
     CHECK(passer_segment(l, c));
@@ -67,6 +69,7 @@ static void test_canaries_of_a_batch(void)
     c.lag = -1;
     size_t const need = bytes_of(&c);
     gait_lift *l = NULL;
+    TAKE_BACK(outside, sizeof outside);
     memset(outside, 0x5a, sizeof outside);
     CHECK(gait_lift_init(outside + CANARY, need, toy_lift_model, &c, &l, NULL) == GAIT_OK);
     for (int i = 0; i < TOY_SEGMENT; i++)

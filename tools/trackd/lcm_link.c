@@ -33,7 +33,8 @@ static int64_t event_bytes(FILE *f)
     return name <= 0 || name >= LONGEST || data < 0 ? 0 : HEAD + name + data;
 }
 
-int64_t log_scan(const char *path, message *why)
+/* `beyond`: bytes that the last event states, if they are more than the whole file has; else 0. */
+static int64_t scan(const char *path, int64_t *beyond, message *why)
 {
     struct stat is;
     int64_t at = 0, events = 0, size = 0;
@@ -50,6 +51,7 @@ int64_t log_scan(const char *path, message *why)
         fseeko(f, (off_t)at, SEEK_SET);
     }
     fclose(f);
+    *beyond = size > is.st_size ? size : 0;
     if (is.st_size == 0)
         message_set(why, "%.160s: this log is empty", path);
     else if (at != is.st_size)
@@ -57,6 +59,21 @@ int64_t log_scan(const char *path, message *why)
             why, "%.150s: this log is damaged or truncated at byte %" PRId64 ", after %" PRId64 " messages",
             path, at, events);
     return events;
+}
+
+int64_t log_scan(const char *path, message *why)
+{
+    int64_t beyond;
+    return scan(path, &beyond, why);
+}
+
+bool log_readable(const char *path, message *why)
+{
+    int64_t beyond = 0;
+    if (scan(path, &beyond, why) >= 0 && beyond > 0)
+        return false;
+    why->text[0] = '\0';
+    return true;
 }
 
 /* ---- connections ---- */
@@ -121,6 +138,8 @@ static bool not_multicast(const char *url, char address[INET_ADDRSTRLEN])
 lcm_t *link_open(const char *url, message *why)
 {
     char path[LINK_PATH], address[INET_ADDRSTRLEN];
+    if (link_is_log(url) && link_log(url, path) == 'r' && !log_readable(path, why))
+        return NULL;
     int const saved = mute();
     lcm_t *const lcm = lcm_create(url);
     unmute(saved);

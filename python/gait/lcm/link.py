@@ -70,7 +70,12 @@ def log_of(url: str) -> tuple[str, str]:
 
 def break_of(path: str | os.PathLike[str]) -> str | None:
     """Describe where an incomplete log breaks off; None if the log is complete."""
-    size, at, events = Path(path).stat().st_size, 0, 0
+    return _scan(path)[0]
+
+
+def _scan(path: str | os.PathLike[str]) -> tuple[str | None, bool]:
+    """Describe where an incomplete log breaks off, and whether by an event that states more than the file."""
+    size, at, events, beyond = Path(path).stat().st_size, 0, 0, False
     with open(path, "rb") as file:
         while at < size:
             head = file.read(_HEAD.size)
@@ -78,11 +83,16 @@ def break_of(path: str | os.PathLike[str]) -> str | None:
                 break
             sync, _, _, channel, data = _HEAD.unpack(head)
             end = at + _HEAD.size + channel + data
-            if sync != _SYNC or not 0 < channel < _LONGEST or data < 0 or end > size:
+            if sync != _SYNC or not 0 < channel < _LONGEST or data < 0:
+                break
+            if end > size:
+                beyond = end - at > size
                 break
             file.seek(end)
             at, events = end, events + 1
-    return None if at == size else f"the log is damaged or breaks off at byte {at}, messages before: {events}"
+    if at == size:
+        return None, False
+    return f"the log is damaged or breaks off at byte {at}, messages before: {events}", beyond
 
 
 class LogWriter:
@@ -170,6 +180,11 @@ def open_lcm(url: str | None = None) -> lcm.LCM:
     """
     generated()
     wanted = lcm_url(url)
+    path, mode = log_of(wanted)
+    if is_log(wanted) and mode == "r" and os.path.isfile(path):
+        damage, beyond = _scan(path)
+        if beyond:  # liblcm would take memory for what the event states
+            raise UserError(f"{wanted}: {damage}")
     try:
         with muted_stderr():
             return lcm.LCM(wanted)
