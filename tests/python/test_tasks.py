@@ -2,13 +2,15 @@
 
 import gc
 import os
+import threading
 from pathlib import Path
 
 import pytest
 
 from gait import GaitLimitError
 from gait.bindings import abi
-from gait.track.tasks import threads
+from gait.bindings.library import make
+from gait.track.tasks import PythonTasks, threads
 
 LISTING = Path("/proc/self/task")
 
@@ -55,3 +57,49 @@ def test_a_child_process_works_and_ends():
         gc.collect()
         os._exit(len(done))
     assert os.waitstatus_to_exitcode(os.waitpid(child, 0)[1]) == 5
+
+
+@pytest.mark.parametrize("early", ["running", "queued"])
+def test_a_runner_that_returns_early_leaves_no_late_calls(early):
+    """Its tasks belong to a C frame that ends with the call: running ones are waited for, later ones refused."""
+    called, late, refused = [], [], []
+    begun, go_on, queue_on = threading.Event(), threading.Event(), threading.Event()
+
+    def work(context, i):
+        begun.set()
+        if i == 0 and early == "running":
+            assert go_on.wait(60)
+        assert not over, "called after the frame"
+        called.append(i)
+
+    def runner(task, count):
+        def in_thread():
+            if early == "queued":
+                assert queue_on.wait(60)
+            try:
+                task(0)
+            except RuntimeError as error:
+                refused.append(str(error))
+
+        late.append(threading.Thread(target=in_thread))
+        late[0].start()
+        if early == "running":
+            assert begun.wait(60)
+            threading.Timer(0.05, go_on.set).start()
+
+    over: list[bool] = []
+    tasks, function = PythonTasks(runner), abi.TaskFn(work)
+    tasks.struct.run(tasks.struct.user, function, None, 3)
+    over.append(True)
+    queue_on.set()
+    late[0].join(60)
+    assert sorted(called) == [0, 1, 2]
+    assert len(refused) == (early == "queued")
+    with pytest.raises(RuntimeError, match="task runner returned with"):
+        tasks.reraise()
+
+
+@pytest.mark.parametrize("count", [2**32 + 2, -(2**31) - 1, 2**63])
+def test_whole_numbers_that_do_not_fit_are_refused(count):
+    with pytest.raises(ValueError, match=f"{count} does not fit 32 bits"):
+        make("pool", count)

@@ -18,6 +18,7 @@ from gait.bindings import abi
 from gait.errors import GaitArgumentError, GaitError, GaitLimitError, LibraryError
 
 _HERE = Path(__file__).resolve().parents[1]
+_WHOLE = tuple("bBhHiIlLqQ")  # codes of ctypes' whole numbers
 _RAISES = {abi.Status.ARG: GaitArgumentError, abi.Status.LIMIT: GaitLimitError}
 
 
@@ -105,9 +106,13 @@ def check(status: int, error: abi.Error | None = None) -> int:
 def call(name: str, *arguments: Any) -> int:
     """Call a function whose last argument is a ``gait_error *``; return what `check` does.
 
-    Structures are given as they are; ctypes passes pointers to them.
+    Structures are given as they are; ctypes passes pointers to them.  ValueError for a whole number that does
+    not fit its type, which ctypes would cut.
     """
     function = getattr(library(), name)  # first: it describes the structures
+    for kind, value in zip(function.argtypes, arguments, strict=False):
+        if isinstance(value, int) and getattr(kind, "_type_", "") in _WHOLE and kind(value).value != value:
+            raise ValueError(f"{name}: {value} does not fit {8 * ctypes.sizeof(kind)} bits; give less")
     error = abi.Error()
     return check(function(*arguments, error), error)
 

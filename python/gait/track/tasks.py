@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import ctypes
 import os
+import threading
 import weakref
 from collections.abc import Callable
 from typing import Any, Protocol
@@ -30,7 +31,8 @@ class PythonTasks:
     """Run the library's tasks through a Python callable.
 
     An exception in the callable is kept, the tasks it left undone are done in the calling thread (so the
-    tracker stays sound), and `reraise` raises it after the C call.
+    tracker stays sound), and `reraise` raises it after the C call.  Tasks that still run in other threads
+    when the callable returns are waited for; a task that is called later raises RuntimeError in its thread.
     """
 
     def __init__(self, runner: Runner) -> None:
@@ -47,20 +49,37 @@ class PythonTasks:
             raise failure
 
     def _run(self, user: int | None, function: Any, context: int | None, count: int) -> None:
-        left = set(range(count))
+        left, running, ended = set(range(count)), 0, False
+        changed = threading.Condition()
 
         def task(i: int) -> None:
-            left.remove(i)  # a second call for the same i is an error of the runner, and raises here
-            function(context, i)
+            nonlocal running
+            with changed:
+                if ended:  # the frame that the task belongs to is gone
+                    raise RuntimeError("a task was called after its runner had returned")
+                left.remove(i)  # a second call for the same i is an error of the runner, and raises here
+                running += 1
+            try:
+                function(context, i)
+            finally:
+                with changed:
+                    running -= 1
+                    changed.notify_all()
 
+        failure: BaseException | None = None
         try:
             self._runner(task, count)
-            if left:
-                raise RuntimeError(f"task runner returned with {len(left)} of {count} tasks not called")
         except BaseException as exc:  # nothing may pass through the C frames
-            self._failure = exc
-            for i in sorted(left):
-                function(context, i)
+            failure = exc
+        with changed:
+            ended = True
+            changed.wait_for(lambda: running == 0)
+        if left and failure is None:
+            failure = RuntimeError(f"task runner returned with {len(left)} of {count} tasks not called")
+        for i in sorted(left):
+            function(context, i)
+        if failure is not None:
+            self._failure = failure
 
 
 class PoolTasks:
