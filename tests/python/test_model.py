@@ -158,3 +158,19 @@ def test_truncated_blobs_are_refused(size):
 def test_missing_model_file_is_one_clear_line(tmp_path):
     with pytest.raises(UserError, match="none.gait: no such model file; make one with gait learn"):
         Model(tmp_path / "none.gait")
+
+
+def test_names_that_are_no_utf8_are_escaped(tmp_path):
+    sections = blob.decode(read_blob(None))
+    name = next(
+        key for key, rows in sections.items() if b"l_knee" in rows.tobytes() and rows.dtype == np.uint8
+    )
+    rows = sections[name].copy()
+    flat = rows.reshape(-1)
+    at = rows.tobytes().index(b"l_knee")
+    flat[at + 2] = 0xFF
+    path = tmp_path / "m.gait"
+    blob.write(path, sections | {name: rows})
+    model = Model(str(path))
+    names = (*model.joint_names, *model.angle_names, *model.limb_names)
+    assert any("l_\\xffnee" in one for one in names)

@@ -61,7 +61,7 @@ def test_a_child_process_works_and_ends():
 
 @pytest.mark.parametrize("early", ["running", "queued"])
 def test_a_runner_that_returns_early_leaves_no_late_calls(early):
-    """Its tasks belong to a C frame that ends with the call: running ones are waited for, later ones refused."""
+    """Its tasks belong to a C frame: those that run are waited for, later ones are refused."""
     called, late, refused = [], [], []
     begun, go_on, queue_on = threading.Event(), threading.Event(), threading.Event()
 

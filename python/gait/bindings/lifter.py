@@ -168,7 +168,9 @@ class Lifter:
         call("gait_lift_get_info", self._model.handle, info)
         self.info = LiftInfo(**{item.name: getattr(info, item.name) for item in fields(LiftInfo)})
         name_of = library().gait_lift_marker_name
-        self.names = tuple(name_of(self._handle, j).decode() for j in range(self.info.markers))
+        self.names = tuple(
+            name_of(self._handle, j).decode(errors="backslashreplace") for j in range(self.info.markers)
+        )
 
     def _call(self, name: str, *arguments: object) -> None:
         call(f"gait_lift_{name}", self._handle, *arguments)

@@ -128,10 +128,14 @@ class Model:
         self.info = info = self._read_info()
         if not info.cyclic:
             raise UserError(f"{name}: {NOT_CYCLIC}")
-        names, handle = self._lib, self.handle
-        self.joint_names = tuple(names.gait_model_joint_name(handle, i).decode() for i in range(info.joints))
-        self.angle_names = tuple(names.gait_model_angle_name(handle, i).decode() for i in range(info.angles))
-        self.limb_names = tuple(names.gait_model_limb_name(handle, i).decode() for i in range(info.limbs))
+        self.joint_names = self._names("joint", info.joints)
+        self.angle_names = self._names("angle", info.angles)
+        self.limb_names = self._names("limb", info.limbs)
+
+    def _names(self, kind: str, count: int) -> tuple[str, ...]:
+        """Names of joints, angles or limbs; bytes that are no UTF-8 are escaped."""
+        name = getattr(self._lib, f"gait_model_{kind}_name")
+        return tuple(name(self.handle, i).decode(errors="backslashreplace") for i in range(count))
 
     def __repr__(self) -> str:
         return f"<gait.Model of {self.info.components} components, digest {self.info.digest:016x}>"

@@ -122,7 +122,7 @@ def pack_names(names: list[str]) -> npt.NDArray[np.uint8]:
 
 def unpack_names(rows: Array) -> list[str]:
     """Names of a section as written by `pack_names`."""
-    return [row.tobytes().split(b"\0")[0].decode() for row in rows]
+    return [row.tobytes().split(b"\0")[0].decode(errors="backslashreplace") for row in rows]
 
 
 def _aligned(n: int) -> int:
