@@ -70,6 +70,22 @@ def one_thread_for_good() -> None:
     _algebra().limit(limits=1, user_api="blas")
 
 
+@contextlib.contextmanager
+def one_opencv_thread() -> Iterator[None]:
+    """Let OpenCV use one thread within the block.
+
+    Its HOG detector races with more: one search in hundreds gives some windows other votes.
+    """
+    import cv2
+
+    threads = cv2.getNumThreads()
+    cv2.setNumThreads(1)
+    try:
+        yield
+    finally:
+        cv2.setNumThreads(threads)
+
+
 @cache
 def _algebra() -> ThreadpoolController:
     from threadpoolctl import ThreadpoolController

@@ -2,6 +2,7 @@
 
 from types import SimpleNamespace
 
+import cv2
 import numpy as np
 import pytest
 from drawn_person import DATA, camera, clip, wall, write
@@ -10,6 +11,7 @@ from gait import Camera, Model, TrackStatus, Video
 from gait.bindings.initial import Start
 from gait.bindings.model import read_blob
 from gait.bindings.start_fit import Box, StartFit
+from gait.detect import shapes
 from gait.detect.shapes import find_near
 from gait.errors import UserError
 from gait.io import blob
@@ -91,6 +93,21 @@ def test_boxes_at_the_edge_and_of_any_size_are_searched(corner, tall):
     fit = StartFit(MODEL, camera())
     at = np.array(corner, float)
     assert find_near(wall(), Box(at + [0, tall], at, 1.0), fit.stature) is None
+
+
+def test_opencv_searches_in_one_thread_as_more_give_other_bits(monkeypatch):
+    threads = []
+
+    def search(*_, **__):
+        threads.append(cv2.getNumThreads())
+        raise KeyboardInterrupt
+
+    detector = SimpleNamespace(winSize=(64, 128), detectMultiScale=search)
+    monkeypatch.setattr(shapes, "_detector", lambda: detector)
+    cv2.setNumThreads(2)
+    with pytest.raises(KeyboardInterrupt):
+        find_near(FRAMES[0], box(), lambda _: 1.68)
+    assert threads == [1] and cv2.getNumThreads() == 2
 
 
 def test_who_stands_first_is_started_while_walking(tmp_path):

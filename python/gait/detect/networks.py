@@ -17,6 +17,7 @@ from numpy.typing import NDArray
 
 from gait.detect import weights
 from gait.io.video import Image
+from gait.reproducible import one_opencv_thread
 
 Array = NDArray[np.float64]
 Network = Callable[[NDArray[np.float32]], dict[str, NDArray[np.float32]]]
@@ -230,7 +231,8 @@ def _windows(image: Image) -> list[tuple[float, Crop]]:
     hog.setSVMDetector(np.array(cv2.HOGDescriptor.getDefaultPeopleDetector()))
     scale = min(1.0, 640 / max(image.shape[:2]))
     small = cv2.resize(image, None, fx=scale, fy=scale, interpolation=cv2.INTER_AREA)
-    boxes, votes = hog.detectMultiScale(small, winStride=(8, 8), padding=(16, 16), scale=1.05)
+    with one_opencv_thread():
+        boxes, votes = hog.detectMultiScale(small, winStride=(8, 8), padding=(16, 16), scale=1.05)
     found = []
     for (x, y, width, height), vote in zip(boxes, np.ravel(votes), strict=True):
         hips = np.array([x + 0.5 * width, y + 0.5 * height]) / scale

@@ -18,6 +18,7 @@ from numpy.typing import NDArray
 
 from gait.bindings.start_fit import Box
 from gait.io.video import Image
+from gait.reproducible import one_opencv_thread
 
 Array = NDArray[np.float64]
 Stature = Callable[[Box], float]
@@ -100,9 +101,10 @@ def _search(
     part, offset = _part(image, corner, size, scale)
     if np.any(np.array(part.shape[1::-1]) < _detector().winSize):  # OpenCV would read beyond it
         return []
-    windows, votes = _detector().detectMultiScale(
-        part, hitThreshold=_THRESHOLD, winStride=(8, 8), scale=1.06, groupThreshold=0
-    )
+    with one_opencv_thread():
+        windows, votes = _detector().detectMultiScale(
+            part, hitThreshold=_THRESHOLD, winStride=(8, 8), scale=1.06, groupThreshold=0
+        )
     found = []
     for window, vote in zip(windows, np.ravel(votes).tolist(), strict=True):
         place = np.array(window) / scale
