@@ -68,6 +68,7 @@ typedef struct given { /* what the detector does */
     uint32_t terms;
     float noise;
     bool keypoints, strange; /* strange: one joint is always somewhere else */
+    int swapped;             /* of ten frames in a row it swaps the sides of so many */
     int others;              /* frames, in the middle of the film, in which it finds another person instead */
     float aside;             /* metres of that person from this one, who is half a stride ahead */
 } given;
@@ -89,6 +90,8 @@ static error follow(const given *g, uint64_t *digest)
             found.pelvis[0] += g->aside;
             found.phase = m_wrap1(found.phase + 0.5f);
         }
+        if (n % 10 < g->swapped)
+            found.phase = m_wrap1(found.phase + 0.5f);
         f.image[0] = toy_image(film[0][n]);
         detect(&cfg.camera[0], &found, g->noise, (uint32_t)n, track);
         if (g->strange)
@@ -140,11 +143,28 @@ static void test_another_person(void)
     }
 }
 
+/* A detector that swaps the sides now and then is believed, one that does so half of the time is not. */
+static void test_swapped_sides(void)
+{
+    for (int swapped = 0; swapped <= 5; swapped++) {
+        uint64_t digest;
+        given const g = {.terms = GAIT_TERMS_DEFAULT | GAIT_TERM_KEYPOINTS,
+                         .noise = 1.0f,
+                         .keypoints = true,
+                         .swapped = swapped};
+        error const e = follow(&g, &digest);
+        CHECK(e.joint < 0.02 && e.status[GAIT_TRACK_LOST] == 0);
+        CHECK(swapped > 2 || e.status[GAIT_TRACK_TRACKING] == FRAMES);
+        CHECK(swapped < 4 || e.status[GAIT_TRACK_AMBIGUOUS] > FRAMES * 3 / 4);
+    }
+}
+
 int main(void)
 {
     film_make(1, FRAMES);
     test_cost();
     test_tracker();
     test_another_person();
+    test_swapped_sides();
     return CHECK_DONE();
 }

@@ -120,3 +120,16 @@ body_evidence likelihood_of_particle(gait_tracker *t, const particle_state *p)
     }
     return e;
 }
+
+float likelihood_of_keypoints(gait_tracker *t, const particle_state *p)
+{
+    likelihood_scratch *const w = &t->work[0];
+    float sum = 0.0f;
+    particle_body(&t->layout, p, &w->body);
+    kin_points(t->model, &w->body, w->points);
+    for (int32_t c = 0; c < t->cfg.cameras; c++) {
+        like_body const b = likelihood_body(t, c, 0, 0, w, NULL);
+        sum += like_keypoints.support(&b);
+    }
+    return sum;
+}

@@ -17,6 +17,9 @@ typedef struct body_evidence { /* of one body, over all cameras */
 /* Writes the body's surface samples to t->estimate_patch. */
 body_evidence likelihood_of_particle(gait_tracker *t, const particle_state *p);
 
+/* Support of one body by the keypoints of all cameras, in units of the term's cost; 0 without keypoints. */
+float likelihood_of_keypoints(gait_tracker *t, const particle_state *p);
+
 /* Project the block of bodies in w->body into camera c. */
 void likelihood_outline(const gait_tracker *t, int32_t c, likelihood_scratch *w);
 

@@ -6,6 +6,7 @@
 #include "tracker/features_step.h"
 #include "tracker/fixed_lag.h"
 #include "tracker/front_back.h"
+#include "tracker/left_right.h"
 #include "tracker/hypotheses.h"
 #include "tracker/likelihood_step.h"
 #include "tracker/track_loss.h"
@@ -198,6 +199,7 @@ static void update_track_loss(gait_tracker *t, float dt, bool lost, const partic
     if (lost && !(left_right && v.phase_as_predicted))
         hypotheses_acquire(t);
     core->front_back_margin = front_back_update(t, lost || !core->found, mean);
+    core->left_right_margin = left_right_update(t, lost || !core->found, mean);
     core->support_utime = core->utime;
     core->last_supported = *mean;
     core->found = proven;
@@ -215,7 +217,8 @@ static gait_track_status status_of(const gait_tracker *t, float dt, const gait_e
         return GAIT_TRACK_INIT;
     if (e->hypothesis_weight < DOMINANT_MASS)
         return seconds_since(t, core->start_utime) < SETTLE_TIME ? GAIT_TRACK_INIT : GAIT_TRACK_AMBIGUOUS;
-    bool const open = hypotheses_open(t) || core->front_back_margin < 0.0f || departs;
+    bool const open =
+        hypotheses_open(t) || core->front_back_margin < 0.0f || core->left_right_margin < 0.0f || departs;
     return open ? GAIT_TRACK_AMBIGUOUS : GAIT_TRACK_TRACKING;
 }
 

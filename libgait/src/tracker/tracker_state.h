@@ -36,6 +36,7 @@ typedef struct tracker_core {
     float stature_sd_ratio;  /* standard deviation of stature at the start, fraction of the stature */
     float usual_unexplained; /* foreground that the estimate usually leaves unexplained, nats */
     float front_back_margin; /* running mean of front_back_score() */
+    float left_right_margin; /* running mean of the keypoints' evidence against the mirror image */
     double ess;
     hypotheses_state hypotheses;
     particle_state last_supported;       /* the estimate when an image last supported it */

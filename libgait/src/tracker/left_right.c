@@ -1,0 +1,25 @@
+#include "tracker/left_right.h"
+#include "base/fmath.h"
+#include "tracker/likelihood_step.h"
+
+static const float AVERAGE_TIME = 1.5f; /* seconds over which the score is averaged */
+static const float FIRST_SCORE = 1.0f;  /* the average to begin with */
+static const float WORSE = 3.0f; /* weight of what is for the mirror image: it is open from a quarter on */
+
+/* How much better the keypoints fit the body than its mirror image half a stride later, in units of the term's cost. */
+static float left_right_score(gait_tracker *t, const particle_state *p)
+{
+    particle_state const mirrored = mirror_apply(t->mirror, &t->layout, p);
+    return likelihood_of_keypoints(t, p) - likelihood_of_keypoints(t, &mirrored);
+}
+
+float left_right_update(gait_tracker *t, bool restart, const particle_state *mean)
+{
+    float const before = t->core->left_right_margin;
+    if (restart)
+        return FIRST_SCORE;
+    if (!(t->cfg.terms & GAIT_TERM_KEYPOINTS))
+        return before;
+    float const score = left_right_score(t, mean), share = f_min(seconds_unsupported(t) / AVERAGE_TIME, 1.0f);
+    return before + (score == 0.0f ? 0.0f : share * ((score < 0.0f ? WORSE * score : score) - before));
+}
