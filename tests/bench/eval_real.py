@@ -126,6 +126,7 @@ def _run(clip: Clip, arm: str, extra: list[str]) -> Result:
     video = Video(clip.video)
     if done.returncode or not out.exists():
         why = (done.stderr.strip().splitlines() or ["no message"])[-1]
+        why = why.replace(f"{clip.folder}/", "")  # the page shows no paths of this machine
         return Result(name, arm, Score({kind: float(kind == "none") for kind in KINDS}), cpu, np.nan, why)
     camera, track = Camera.read(str(found if arm == "nocam" else given), video.size), read_estimates(out)
     cameras = read_cameras(turned, camera)
