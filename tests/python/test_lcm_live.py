@@ -4,6 +4,7 @@ import os
 import signal
 import subprocess
 import threading
+import time
 from pathlib import Path
 
 import lcm
@@ -181,6 +182,23 @@ def test_damaged_messages_do_not_stop_a_running_tracker(url):
                 raw.publish(channel, data)
         listener.until(lambda: listener.last.rejected == 8, "eight rejected images")
         assert finish().code == 0
+
+
+def test_junk_does_not_flood_the_log_and_the_status(url):
+    """Messages of two channels in turns, so that no line repeats the one before."""
+    with rig.daemon(url) as (listener, finish):
+        ready(listener)
+        listener.statuses.clear()
+        begun, raw = time.monotonic(), open_lcm(url)
+        for _ in range(200):
+            for channel in ("GAIT_CAMERA_0", "GAIT_COMMAND"):
+                raw.publish(channel, b"junk")
+                time.sleep(0.002)  # LCM's queues are finite
+        listener.until(lambda: bool(listener.statuses), "a status")
+        words, seconds = finish().words, time.monotonic() - begun
+        assert len(listener.statuses) <= 25 * seconds + 3
+        assert 0 < words.count("damaged message") <= 10 * (seconds + 2) < 200
+        assert "more lines, not written" in words or seconds < 1
 
 
 def test_two_streams_do_not_meet(url):

@@ -60,10 +60,10 @@ def other_camera(**changes):
 
 def test_a_calibration_of_another_size_is_reported(folder, capsys):
     reported = "of the points lie outside the camera's 320x240 picture: is other.json the calibration"
-    other_camera(width=320, height=240)
+    other_camera(width=320, height=240, cx=159.5, cy=119.5)
     assert reported in lift(capsys, "t.csv", "other.json")[1]
     assert reported not in lift(capsys, "t.csv", "other.json", "--quiet")[1]
-    other_camera(width=1920, height=1080)
+    other_camera(width=1920, height=1080, cx=959.5, cy=539.5)
     for camera in ("other.json", "cam.json"):
         assert "outside" not in lift(capsys, "t.csv", camera)[1]
 

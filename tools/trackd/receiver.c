@@ -11,7 +11,8 @@
 enum {
     FRAMES_WAITING = 64, /* two seconds of frames, of which the tracker takes the last */
     OTHERS_WAITING = 256,
-    STATUS_US = 1000000, /* between two messages of GAIT_STATUS */
+    STATUS_US = 1000000, /* between two messages of GAIT_STATUS, */
+    NEWS_US = 50000,     /* also if there is news */
 };
 
 #define DAMAGED "%.40s: damaged message or another version of its type"
@@ -171,16 +172,17 @@ static struct timespec until(int64_t deadline)
 
 bool receiver_run(receiver *r, const volatile sig_atomic_t *quit, const sigset_t *unblocked, message *why)
 {
-    int64_t due = 0;
+    int64_t due = 0, news = 0;
     struct pollfd fd[2] = {{.fd = lcm_get_fileno(r->images), .events = POLLIN},
                            {.fd = lcm_get_fileno(r->others), .events = POLLIN}};
     while (!*quit) {
         int64_t const now = clock_monotonic();
-        if (r->service->news || now >= due) {
+        if (now >= due || (r->service->news && (r->log || now >= news))) {
             service_send_status(r->service);
             due = now + STATUS_US;
+            news = now + NEWS_US;
         }
-        struct timespec const wait = until(due);
+        struct timespec const wait = until(r->service->news && news < due ? news : due);
         int const ready = ppoll(fd, r->log ? 1 : 2, &wait, unblocked);
         if (ready < 0 && errno != EINTR)
             return message_set(why, "cannot wait for messages: %s", strerror(errno));

@@ -20,6 +20,23 @@ void service_set_state(service *s, int8_t state, const char *text)
         message_set(&s->text, "%s", text);
 }
 
+/* Whether this second has room for a line of log; those that it had not are counted. */
+static bool may_log(service *s)
+{
+    enum { LINES_A_SECOND = 10, SECOND = 1000000 };
+    int64_t const now = clock_monotonic();
+    if (now - s->lines_since >= SECOND) {
+        if (s->lines_left_out > 0)
+            log_line("%d more lines, not written", s->lines_left_out);
+        s->lines_since = now;
+        s->lines = s->lines_left_out = 0;
+    }
+    if (s->lines < LINES_A_SECOND)
+        return ++s->lines > 0;
+    s->lines_left_out++;
+    return false;
+}
+
 void service_complain(service *s, const char *format, ...)
 {
     message line;
@@ -28,7 +45,7 @@ void service_complain(service *s, const char *format, ...)
     vsnprintf(line.text, sizeof line.text, format, args);
     va_end(args);
     s->news = true;
-    if (strcmp(s->complaint.text, line.text) != 0)
+    if (strcmp(s->complaint.text, line.text) != 0 && may_log(s))
         log_line("%s", line.text);
     s->text = s->complaint = line;
 }

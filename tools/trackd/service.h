@@ -65,6 +65,8 @@ typedef struct service {
     double max_gap;           /* longest pause that is bridged by prediction, seconds */
     int idle;                 /* SERVICE_IDLE_*: reported last */
     message text, complaint;  /* text of the status; last complaint on stderr */
+    int64_t lines_since;      /* monotonic microseconds; lines of log are counted from here for a second */
+    int32_t lines, lines_left_out;
     estimate_message estimate;
     past_frame past[SERVICE_PAST];
     stride_meter meter;
