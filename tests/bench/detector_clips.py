@@ -1,6 +1,6 @@
 """Walks with known joints for the detector's profile: the gait of each recorded person on a rendered body.
 
-Nobody of the development clips is among the people.  Bodies, clothes, scenes and light are drawn by the
+None of the people of the development clips is among them.  Bodies, clothes, scenes and light are drawn by the
 number of the clip; views, sizes and distances take turns.  What a folder has is kept.
 """
 

@@ -3,7 +3,7 @@
 Runs the networks on clips with known joints and writes python/gait/detect/profile.json.  Offsets are fitted
 on all clips; errors are those of each clip by offsets fitted on the others, who are other people.  Without
 CLIPS, walks of `detector_clips` are made in build/detector-profile first: each the gait of another recorded
-person, nobody of the development clips.
+person, none of those of the development clips.
 
     python tests/bench/detector_profile.py [CLIPS]
 """

@@ -100,7 +100,7 @@ def main() -> int:
             update(done)
     note = (
         "`gait lift` with the joints of `gait detect`, all defaults, stature unknown. Development "
-        "clips by all networks (nobody of them is in the detector's profile), then films of real "
+        "clips by all networks (none of their people is in the detector's profile), then films of real "
         "people: their cameras are guessed from an assumed stature, so the stature shows how well the "
         "lift agrees with the camera. Coverage: of coordinates in their 90 % intervals; wanted from "
         "0.8 to 0.95. CPU: of the whole command, also where other programs ran; wanted below 4 s for "

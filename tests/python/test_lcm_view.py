@@ -210,14 +210,14 @@ def spoilt(message, **changes):
         ({}, {"pixelformat": 1196444237, "data": b"", "size": 0}, "JPEG frame cannot be decoded"),
     ],
 )
-def test_one_odd_message_is_left_out(estimate, image, words, log, tmp_path):
+def test_one_wrong_message_is_left_out(estimate, image, words, log, tmp_path):
     estimates, frames = log[1], [message for _, message in rig.frames(0, 3)]
     events = [*rig.opening()]
     for i, (frame, found) in enumerate(zip(frames, estimates, strict=False)):
-        odd = i == 1
-        events.append(("GAIT_IMAGE_0", spoilt(frame, **image) if odd else frame))
-        events.append(("GAIT_ESTIMATE", spoilt(found, **estimate) if odd else found))
-    path, shown = rig.write_log(tmp_path / "odd.log", events), []
+        wrong = i == 1
+        events.append(("GAIT_IMAGE_0", spoilt(frame, **image) if wrong else frame))
+        events.append(("GAIT_ESTIMATE", spoilt(found, **estimate) if wrong else found))
+    path, shown = rig.write_log(tmp_path / "wrong.log", events), []
     viewer = Viewer(f"file://{path}?speed=0", 0, rig.model(), None, shown.append)
     while viewer.handle(1.0):
         pass

@@ -207,7 +207,7 @@ def test_mirrored_markers_are_refused_whatever_the_activity(axis, marked, tmp_pa
         readers.read(path, LearnOptions(activity="stairs"))
 
 
-def test_exchanged_labels_are_refused(marked, tmp_path):
+def test_swapped_labels_are_refused(marked, tmp_path):
     labels = [{"L": "R", "R": "L"}.get(k[0], k[0]) + k[1:] for k in mw.LOWER]
     with pytest.raises(UserError, match="left and right are swapped"):
         readers.read(write_trc(tmp_path / "a.trc", labels, marked[::8]))

@@ -42,14 +42,14 @@ def test_a_point_that_is_always_off_moves_the_motion_less_and_is_covered_if_that
     segments = toy_prior(6, MARKERS, 5, headings=2)
     view = Parallel(looking_along("y"), 1.0, np.zeros(2), steady=True)
     places = np.concatenate([1.7 * segments.mean[0], *[1.7 * segments.mean[0, 3:]] * (BLOCKS - 2)])
-    truth, seen = observed(segments, places, view, 0.003, np.random.default_rng(3), missing=0.0)
-    seen.points.uv[:, 2, 0] += 0.009  # as far as no point is an outlier
+    truth, film = observed(segments, places, view, 0.003, np.random.default_rng(3), missing=0.0)
+    film.points.uv[:, 2, 0] += 0.009  # as far as no point is an outlier
     start = Start(np.zeros(BLOCKS - 1), np.zeros(BLOCKS - 1, int), 1.7, places, np.ones(len(places)))
     off, covered = [], []
     for sd in (0.0, 0.009):
-        lasting = np.zeros(seen.points.sd.shape)
+        lasting = np.zeros(film.points.sd.shape)
         lasting[:, 2] = sd
-        given = Observed(seen.time, seen.points, seen.markers, lasting)
+        given = Observed(film.time, film.points, film.markers, lasting)
         found = smooth(segments, given, view, FREEDOM, start, contact=False, bones=False)
         off.append(abs(float((found.places - truth)[:, 2, 0].mean())))
         inside = np.abs(found.places - truth)[:, 2, 0] < 1.645 * found.sd[:, 2, 0]

@@ -224,9 +224,9 @@ def rows_of(prior):
 
 def residual(rows, places):
     """A x - y of collected rows, squared and summed, with x = places."""
-    seen, square = rows.normal()
+    normal, square = rows.normal()
     x = places.ravel()
-    return float(x @ dense(seen.diagonal, seen.below) @ x - 2 * x @ seen.vector.ravel() + square)
+    return float(x @ dense(normal.diagonal, normal.below) @ x - 2 * x @ normal.vector.ravel() + square)
 
 
 def test_bones_cost_nothing_to_a_rigid_or_resized_body():

@@ -1,8 +1,8 @@
 /* left_right.h - check that the keypoints show the left leg where the estimate has it.
  *
- * A person seen from the side and their mirror image half a stride later have the same outline, so images say little of
- * left and right.  A detector that swaps the sides now and then is weaker evidence than it seems: where many of its frames
- * fit the mirror image better, left and right are open. */
+ * A person seen from the side and their mirror image half a stride later have the same outline, so images hardly
+ * distinguish them.  A detector that swaps the sides now and then is weaker evidence than it seems: where many of its
+ * frames fit the mirror image better, left and right are open. */
 #ifndef GAIT_TRACKER_LEFT_RIGHT_H
 #define GAIT_TRACKER_LEFT_RIGHT_H
 #include "tracker/tracker_state.h"

@@ -40,7 +40,7 @@ REQUIRED = ("pelvis", "{s}_thigh", "{s}_shank", "{s}_foot")  #: without these th
 #: Why a body is refused that no rotation makes one.
 MIRRORED = (
     "axes are left-handed, or left and right are swapped: a mirror image fits a body; negate one axis, or "
-    "exchange the names"
+    "swap the names"
 )
 RECORDED = "marker "  # prefix of names in `Body.joints` that are markers of the file
 UPRIGHT = 0.8  # of the leg's length by which the hips of a rest pose that stands are above the ankles

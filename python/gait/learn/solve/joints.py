@@ -60,7 +60,7 @@ def from_table(path: Path, fps: float | None = None, zeros_missing: bool = False
 def from_joints(path: Path, places: dict[str, Floats], fps: float) -> Body:
     """Return the body of named joint positions (T, 3), z up, metres, with short gaps bridged.
 
-    UserError if a joint of the legs is missing or never seen; others that are missing are NaN.
+    UserError if a joint of the legs is missing or never visible; others that are missing are NaN.
     """
     columns = find_joints(list(places))
     lacking = tuple(joint for joint in JOINTS if joint not in columns)

@@ -265,19 +265,19 @@ class _Problem:
             soft_constraints.contacts(rows, self.prior.names, shape, self.grid.rate)
         if constrained and self.bones:
             soft_constraints.bones(rows, self.prior.names, shape)
-        seen, fit = rows.normal()
+        observed, fit = rows.normal()
         own, used = prior.information, prior.information.diagonal.shape[1]
-        seen.diagonal[:, :used, :used] += own.diagonal
-        seen.below[:, :used, :used] += own.below
-        seen.vector[:, :used] += own.vector
+        observed.diagonal[:, :used, :used] += own.diagonal
+        observed.below[:, :used, :used] += own.below
+        observed.vector[:, :used] += own.vector
         border = np.pad(own.border, ((0, 0), (0, self.layout.size - used), (0, 0)))
         information = Information(
-            seen.diagonal,
-            seen.below,
-            np.concatenate([border, seen.border], axis=2),
-            block_diag(own.corner, np.eye(self.errors.count) + seen.corner),
-            seen.vector,
-            np.append(own.edge, seen.edge),
+            observed.diagonal,
+            observed.below,
+            np.concatenate([border, observed.border], axis=2),
+            block_diag(own.corner, np.eye(self.errors.count) + observed.corner),
+            observed.vector,
+            np.append(own.edge, observed.edge),
         )
         return _System(block_arrowhead.solve(information), information, prior, fit)
 
