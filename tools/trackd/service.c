@@ -20,7 +20,7 @@ void service_set_state(service *s, int8_t state, const char *text)
         message_set(&s->text, "%s", text);
 }
 
-/* Whether this second has room for a line of log; those that it had not are counted. */
+/* Whether this second may have one more line of log; those that it may not are counted. */
 static bool may_log(service *s)
 {
     enum { LINES_A_SECOND = 10, SECOND = 1000000 };

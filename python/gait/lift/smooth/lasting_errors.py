@@ -1,9 +1,9 @@
 """Errors of a detector that last: numbers of their own beside the motion.
 
-A detector that takes a point for the ankle does so in the next frame too.  Such an error is no new evidence in
-later frames; taken for noise of each frame it would have to be so large that the figure could hardly follow
-the points.  Each point has an error in the picture that runs straight between knots, which are as far apart
-as errors last; of a shorter sequence it is constant.
+A detector that takes a point for the ankle does so in the next frame too.  Such an error is no new evidence
+in later frames; taken for noise of each frame it would have to be so large that the figure could hardly
+follow the points.  Each point has an error in the picture that runs straight between knots, which are as far
+apart as errors last; of a shorter sequence it is constant.
 """
 
 from __future__ import annotations
