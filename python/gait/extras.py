@@ -6,7 +6,7 @@ from collections.abc import Sequence
 from importlib.util import find_spec
 
 EXTRAS = {
-    "video": {"cv2": "OpenCV", "av": "PyAV", "scipy": "SciPy"},
+    "video": {"cv2": "OpenCV", "av": "PyAV", "scipy": "SciPy", "threadpoolctl": "threadpoolctl"},
     "lcm": {"lcm": "LCM"},
     "detect": {"ai_edge_litert": "LiteRT"},
     "report": {"matplotlib": "Matplotlib", "scipy": "SciPy"},

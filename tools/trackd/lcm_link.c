@@ -67,7 +67,8 @@ int64_t log_scan(const char *path, message *why)
     return scan(path, &beyond, why);
 }
 
-bool log_readable(const char *path, message *why)
+/* Whether liblcm can read a log: it takes memory for what an event states, which may be more than the file has. */
+static bool log_readable(const char *path, message *why)
 {
     int64_t beyond = 0;
     if (scan(path, &beyond, why) >= 0 && beyond > 0)

@@ -10,9 +10,6 @@
 /* ---- whether an LCM log is complete. */
 /* Number of complete messages, -1 if this is not a regular file.  `why` reports an empty or truncated log, or is empty. */
 int64_t log_scan(const char *path, message *why);
-/* Whether liblcm can read a log: it takes memory for what an event states, which may be more than the file has. */
-bool log_readable(const char *path, message *why);
-
 /* ---- the LCM connections of a program. */
 enum { LINK_PATH = 1024 }; /* bytes of a log's name, with its end */
 

@@ -128,7 +128,10 @@ float likelihood_of_keypoints(gait_tracker *t, const particle_state *p)
     particle_body(&t->layout, p, &w->body);
     kin_points(t->model, &w->body, w->points);
     for (int32_t c = 0; c < t->cfg.cameras; c++) {
-        like_body const b = likelihood_body(t, c, 0, 0, w, NULL);
+        like_body const b = {.setup = t->like,
+                             .features = &t->camera[c].features,
+                             .camera = &t->cfg.camera[c],
+                             .points = (const float (*)[3][BLOCK])w->points};
         sum += like_keypoints.support(&b);
     }
     return sum;

@@ -33,7 +33,7 @@ _SOLES = (-0.085, 0.035)  # the same of the soles, downwards
 
 
 class PersonShapes:
-    """Searches frames for a person about the last estimate; what it finds has the form of two keypoints.
+    """Searches frames for a person about the last estimate; what it finds becomes three keypoints.
 
     Parameters
     ----------
