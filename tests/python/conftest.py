@@ -16,6 +16,8 @@ if signal.getsignal(signal.SIGINT) == signal.SIG_IGN:
     # A shell that starts something in the background lets it, and all that it starts, ignore interruptions.
     signal.signal(signal.SIGINT, signal.default_int_handler)
 
+signal.signal(signal.SIGHUP, signal.SIG_DFL)  # the same of nohup and closed terminals
+
 sys.path.insert(
     0, str(Path(__file__).parents[1] / "reference")
 )  # numpy versions of what the C library computes

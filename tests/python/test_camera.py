@@ -310,9 +310,9 @@ ON_ITS_HEAD = [[1, 0, 0], [0, 0, 1], [0, -1, 0]]
 @pytest.mark.parametrize(
     "pose, words",
     [
-        ({"R": FACES_UP, "t": [0, 0, 0]}, "its lens is 0 m above the floor"),
+        ({"R": FACES_UP, "t": [0, 0, 0]}, "its lens is 0.00 m above the floor"),
         ({"t": [100, 1600, 5000]}, "1600 m above the floor; R and t are in metres, not millimetres"),
-        ({"R": FACES_UP, "t": [0, 1.6, 5.0]}, "its lens is -5 m above"),
+        ({"R": FACES_UP, "t": [0, 1.6, 5.0]}, "its lens is 5.00 m below the floor"),
         ({"R": FACES_UP, "t": [0, 1.6, -5.0]}, "no person standing on the floor would be upright"),
         ({"R": ON_ITS_HEAD, "t": [0, -1.6, 5.0]}, "no person standing on the floor would be upright"),
     ],

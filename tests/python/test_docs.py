@@ -254,6 +254,7 @@ def test_options_named_in_the_text_exist():
         "--static",
         "--strict",
         "--clips",
+        "--arms",
     }  # of others
     unknown = []
     for page in PAGES:

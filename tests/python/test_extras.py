@@ -50,7 +50,8 @@ def test_every_package_has_an_exact_version_for_development():
 def test_missing_packages_are_named_with_their_extras(monkeypatch):
     monkeypatch.setattr(extras, "find_spec", lambda module: None)
     assert extras.remedy("gait x", ["lcm"]) == "gait x needs LCM: pip install 'libgait[lcm]'"
-    assert extras.remedy("gait x", [], "cv2").endswith("OpenCV, PyAV, SciPy and threadpoolctl: pip install 'libgait[video]'")
+    lacking = "OpenCV, PyAV, SciPy and threadpoolctl: pip install 'libgait[video]'"
+    assert extras.remedy("gait x", [], "cv2").endswith(lacking)
     assert extras.remedy("gait x", [], "elsewhere") == ""
     monkeypatch.undo()
     assert extras.remedy("gait x", ["video"]) == ""

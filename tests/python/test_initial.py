@@ -2,6 +2,7 @@
 
 import json
 from dataclasses import replace
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -12,10 +13,11 @@ from gait.bindings.initial import DEFAULT_SD
 from gait.bindings.model import read_blob
 from gait.bindings.start_fit import Box, StartFit
 from gait.io import blob
+from gait.io.keypoints_file import Keypoints
 from gait.io.track_file import read_truth
 from gait.io.video import Frame
 from gait.track.box_start import BoxStart, find_start
-from gait.track.scene import one_is_grey
+from gait.track.scene import one_is_grey, stays
 
 MODEL = Model()
 SECTIONS = blob.decode(read_blob(None))
@@ -311,7 +313,9 @@ def test_a_standing_person_does_not_start_by_detections_alone(tmp_path):
     held = [np.clip(first + noise.normal(0, 2, first.shape), 0, 255).astype(np.uint8) for _ in range(26)]
     write(tmp_path / "held.mp4", held)
     video = Video(tmp_path / "held.mp4")
-    with pytest.raises(UserError, match="held.mp4: --init auto found no person .*give --init FILE.json"):
+    with pytest.raises(
+        UserError, match="held.mp4: --init auto found a person who stays .*give --init FILE.json"
+    ):
         find_start(video, Camera.read(str(folder / "camera.json"), video.size), None, MODEL)
 
 
@@ -349,3 +353,19 @@ def test_a_wrong_camera_is_reported_from_most_frames(tmp_path):
         UserError, match=r"found a person in \d+ frames that the camera puts above the horizon"
     ):
         find_start(Video(tmp_path / "walk.mp4"), upward, wall(), MODEL)
+
+
+@pytest.mark.parametrize(
+    "aside, nearer, shown, expected",
+    [(0.0, 1.0, 1.0, True), (0.0, 2.5, 1.0, True), (3.0, 1.0, 1.0, False), (0.0, 1.0, 0.3, False)],
+)
+def test_who_stays_in_one_place_of_the_picture_is_in_the_median(aside, nearer, shown, expected):
+    """In place, towards the camera, across the view; and for a third of the clip only."""
+    trunk = np.array([[-0.1, 0.0], [0.1, 0.0], [-0.08, 0.5], [0.08, 0.5]]) * 100 + 300
+    done = np.linspace(0, 1, 90)[:, None, None]
+    uv = (1 + (nearer - 1) * done) * (trunk - 300) + 300 + done * [100 * aside, 0.0]
+    names = ("l_shoulder", "r_shoulder", "l_hip", "r_hip")
+    frame = np.arange(90)
+    film = SimpleNamespace(count=round(90 / shown))
+    people = {0: Keypoints(frame, frame / 30, names, uv, np.ones(uv.shape[:2]))}
+    assert stays(SimpleNamespace(people=people, person=0, video=film)) == expected

@@ -240,7 +240,7 @@ def test_a_stopped_command_leaves_no_processes(walks, stuck, tmp_path, number):
 @pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM])
 def test_an_interruption_waits_while_a_worker_starts(number):
     ended = []
-    with pytest.raises(KeyboardInterrupt), Interruptible(signal.SIGTERM), forkserver.held_back():
+    with pytest.raises(KeyboardInterrupt), Interruptible(), forkserver.held_back():
         thread = threading.Thread(target=os.kill, args=(os.getpid(), number))
         unblocked = signal.pthread_sigmask(signal.SIG_UNBLOCK, {number})  # as in a thread of a library
         thread.start()

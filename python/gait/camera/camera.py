@@ -193,7 +193,7 @@ class Camera:
         """Raise UserError unless people who stand on the floor, z = 0, would be upright in the picture."""
         above, fault = float(self.centre[2]), ""
         if above < _LEAST_ABOVE:
-            fault = f"its lens is {above:.3g} m above the floor"
+            fault = f"its lens is {abs(above):.2f} m {'above' if above >= 0 else 'below'} the floor"
         elif above > _MOST_ABOVE:
             fault = f"its lens is {above:.4g} m above the floor; R and t are in metres, not millimetres"
         elif self.R[1, 2] > _UPSIDE_DOWN or not self._shows_person():

@@ -40,7 +40,9 @@ COMMANDS = {
     "detect": Command("detect", "find the 2-D keypoints of the people in a video", ("video",)),
     "lift": Command("lift", "lift a video, or 2-D keypoints, to 3-D motion", ("video", "mocap")),
     "render": Command("render", "draw a pose or a model", ("video",)),
-    "camera": Command("camera", "find where a camera stands, from points measured on the ground or from a walk", ("video",)),
+    "camera": Command(
+        "camera", "find where a camera stands, from points on the ground or a walk", ("video",)
+    ),
     "simulate": Command("simulate", "make a test clip of a walking person with exact truth", ("video",)),
     "capture": Command("capture", "send the frames of a video or a camera over LCM", ("video", "lcm")),
     "record": Command("record", "record the estimates of gait-trackd into a track file", ("video", "lcm")),

@@ -246,7 +246,8 @@ def _no_person(few: int, misplaced: list[float]) -> str:
         return f"only {few} {frames} to track, --init auto needs {_ENOUGH}; give --init FILE.json"
     if len(misplaced) < _ENOUGH:
         return f"--init auto found no person in full view for {_ENOUGH} frames; give --init FILE.json"
-    what = f"makes {np.nanmedian(misplaced):.2g} m tall" if np.isfinite(misplaced).any() else ""
+    tall = np.nanmedian(misplaced) if np.isfinite(misplaced).any() else np.nan
+    what = f"makes {tall:.2g} m tall" if tall > 0 else "puts upside down"
     if np.isnan(misplaced).mean() > 0.5:
         what = "puts above the horizon"
     return (

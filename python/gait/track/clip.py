@@ -21,7 +21,7 @@ from gait.track.options import KEYPOINTS_SD, ClipOptions
 from gait.track.person_keypoints import PersonKeypoints
 from gait.track.person_shapes import PersonShapes
 from gait.track.plausible import Plausibility
-from gait.track.scene import Scene, finds_shapes, first_state
+from gait.track.scene import Scene, finds_shapes, first_state, stays
 from gait.track.tracker import Tracker
 
 __all__ = ["KEYPOINTS_SD", "ClipOptions", "track_clip"]
@@ -39,8 +39,8 @@ def track_clip(options: ClipOptions) -> dict[str, Any]:
     """
     scene = Scene.read(options)
     start = first_state(options, scene)
-    if start.in_place and options.background == "auto":
-        scene = replace(scene, plate=None)  # a median shows those who stay in place
+    if options.background == "auto" and (start.in_place or stays(scene)):
+        scene = replace(scene, plate=None)  # the median shows the person
     config = TrackerConfig.default(options.mode, seed=options.seed, belt=float(start.in_place))
     if options.particles is not None:
         config = config.replace(particles=options.particles)

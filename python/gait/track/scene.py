@@ -30,6 +30,10 @@ from gait.track.walk_camera import calibrate_film, expected_fov, note_camera
 from gait.track.walk_start import usual_camera
 
 _COLOUR = 4.0  # grey levels between the channels of half of a picture in colour, at least
+_TRUNK = ("l_shoulder", "r_shoulder", "l_hip", "r_hip")
+_TRUNKS = 200  # compared, evenly spread over the clip
+_HALF_WIDTH = 0.2  # of a trunk seen from the side, shares of its height
+_STAYS = 0.45  # share of a clip's frames from which the median may show who is in them
 
 
 @dataclass(frozen=True)
@@ -187,7 +191,9 @@ def _in_reference(steady: SteadyVideo | None, keypoints: Keypoints | None) -> Ke
 def _calibrate(options: ClipOptions, video: Video, model: Model, keypoints: Keypoints | None) -> Calibration:
     """Find the camera from the walk of the person with these keypoints."""
     if keypoints is None:
-        remedy = "leave out --detector none, or give --camera" if _has_detector(options) else weights.FETCH
+        remedy = (
+            "leave out --detector none, or give --camera" if options.detector == "none" else weights.FETCH
+        )
         raise UserError(f"{video.path}: without --camera keypoints of a walk are needed: {remedy}")
     assert options.height is not None
     found = calibrate_film(video, keypoints, model, options.height, options.fov, options.quiet)
@@ -230,6 +236,25 @@ def _in_place(scene: Scene, frame: int) -> bool:
     keypoints = scene.people[scene.person]
     found = find_keypoint_start(keypoints, scene.camera, scene.model, first=frame, stop=stop)
     return found is not None and found.in_place
+
+
+def stays(scene: Scene) -> bool:
+    """Whether the trunk of the person covers one place of the picture in about half of the clip's frames.
+
+    So does the trunk of a person who walks in place, or towards the camera or away from it.
+    """
+    if not scene.people:
+        return False
+    keypoints = scene.people[scene.person]
+    trunk = keypoints.uv[:, [keypoints.names.index(name) for name in _TRUNK]]
+    trunk = trunk[np.isfinite(trunk).all(axis=(1, 2))]
+    trunk = trunk[:: len(trunk) // _TRUNKS + 1]
+    low, high = trunk.min(axis=1), trunk.max(axis=1)
+    reach = _HALF_WIDTH * (high - low)[:, 1:] * (1, 0)  # of a trunk seen from the side
+    middle = (low + high)[:, None] / 2
+    covered = ((middle > low - reach) & (middle < high + reach)).all(axis=2)  # middle of a frame by frame
+    shown = len(keypoints.frame) / scene.video.count
+    return bool(covered.mean(axis=1).max(initial=0.0) * shown > _STAYS)
 
 
 def _note_start(options: ClipOptions, scene: Scene, start: Start) -> None:
