@@ -23,8 +23,10 @@ SUMMARY = [
     "threads",
     "step_ms",
     "wall_fps",
-    "lost",
+    "init",
+    "tracking",
     "ambiguous",
+    "lost",
     "followed",
     "memory_bytes",
     "digest",
@@ -110,7 +112,7 @@ def test_start_and_stop_choose_the_rows(scene, capsys):
 def test_automatic_start_reports_what_it_found(scene, capsys):
     assert track(scene, "--init", "auto", "--height", 1.75) == 0
     out, err = capsys.readouterr()
-    assert re.match(r"start found at frame \d+: x ", err) and "20 frames, " in out and "digest " in out
+    assert re.match(r"start found at frame \d+: x ", err) and "20 frames: " in out and "digest " in out
 
 
 def test_a_stature_that_the_pictures_contradict_is_reported(scene, capsys):

@@ -33,7 +33,7 @@ import argparse
 import json
 from typing import Any
 
-from gait.bindings.abi import Mode
+from gait.bindings.abi import Mode, TrackStatus
 from gait.cli import values
 from gait.errors import UsageError
 from gait.io.files import require_outputs
@@ -132,8 +132,9 @@ def run(args: argparse.Namespace) -> int:
 
 def _text(summary: dict[str, Any]) -> str:
     step, threads = summary["step_ms"], summary["threads"]
+    statuses = [status.name.lower() for status in TrackStatus]
     return (
-        f"{summary['frames']} frames, {summary['lost']} of them lost, {summary['ambiguous']} ambiguous\n"
+        f"{summary['frames']} frames: {', '.join(f'{summary[status]} {status}' for status in statuses)}\n"
         f"{summary['particles']} particles, {threads} thread{'s' if threads > 1 else ''}, "
         f"{summary['memory_bytes']} bytes\n"
         f"step {step['median']:.1f} ms median, {step['p99']:.1f} ms p99, {step['max']:.1f} ms max; "

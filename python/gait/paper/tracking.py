@@ -134,9 +134,9 @@ def entry(both: Both) -> Entry:
         median = [float(np.median(t.errors)) for t in (both.literal, both.ours)]
         held = _held(both, both.literal)
         verdict = (
-            f"{'held for 50 frames' if held else 'lost within 50 frames'} by the paper's filter, "
-            f"{'held' if _held(both, both.ours) else 'lost'} by ours; {median[0] / median[1]:.1f} times "
-            "ours' error"
+            f"the paper's filter {'stays on the person' if held else 'leaves the person'} within 50 frames, "
+            f"ours {'stays' if _held(both, both.ours) else 'leaves'}; "
+            f"its error is {median[0] / median[1]:.1f} times ours"
         )
     what = "a real clip" if both.clip.real else "rendered, as no clip was given"
     rows = []
