@@ -95,7 +95,11 @@ def test_import_gait_needs_numpy_alone(numpy_alone, tmp_path):
 
 
 def test_a_missing_extra_is_one_line(numpy_alone, tmp_path):
-    words = {"learn": "learn walks -o model.gait", "detect": "detect walk.mp4 -o keypoints.csv"}
+    words = {
+        "learn": "learn walks -o model.gait",
+        "detect": "detect walk.mp4 -o keypoints.csv",
+        "paper": "paper --mocap walks -o paper.html",
+    }
     for name, command in COMMANDS.items():
         done = run([numpy_alone / "bin/gait", *words.get(name, name).split()], tmp_path)
         assert done.stderr.count("\n") == 1
