@@ -62,6 +62,5 @@ float front_back_update(gait_tracker *t, bool restart, const particle_state *mea
         return FIRST_SCORE;
     if (t->core->partly_hidden || !(t->cfg.terms & GAIT_TERM_EDGES))
         return before;
-    float const score = front_back_score(t, mean), share = f_min(seconds_unsupported(t) / AVERAGE_TIME, 1.0f);
-    return before + (score == 0.0f ? 0.0f : share * (score - before));
+    return running_mean(t, before, front_back_score(t, mean), AVERAGE_TIME);
 }

@@ -20,6 +20,6 @@ float left_right_update(gait_tracker *t, bool restart, const particle_state *mea
         return FIRST_SCORE;
     if (!(t->cfg.terms & GAIT_TERM_KEYPOINTS))
         return before;
-    float const score = left_right_score(t, mean), share = f_min(seconds_unsupported(t) / AVERAGE_TIME, 1.0f);
-    return before + (score == 0.0f ? 0.0f : share * ((score < 0.0f ? WORSE * score : score) - before));
+    float const score = left_right_score(t, mean);
+    return running_mean(t, before, score < 0.0f ? WORSE * score : score, AVERAGE_TIME);
 }

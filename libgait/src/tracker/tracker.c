@@ -6,8 +6,8 @@
 #include "tracker/features_step.h"
 #include "tracker/fixed_lag.h"
 #include "tracker/front_back.h"
-#include "tracker/left_right.h"
 #include "tracker/hypotheses.h"
+#include "tracker/left_right.h"
 #include "tracker/likelihood_step.h"
 #include "tracker/track_loss.h"
 

@@ -16,10 +16,10 @@ typedef struct hypotheses_state {
     int32_t stage;
     int32_t left_right_known; /* left and right have been decided before */
     int64_t since;            /* when the stage began, microseconds */
-    double
-        log_odds; /* until the person is found: of a person over no person, at most 0; HYPOTHESES_TWO: of the
-                                 second hypothesis over the first */
-    double recent_log_ratio; /* the same over the last few frames and for all terms, nats */
+    /* Until the person is found: of a person over no person, at most 0.  HYPOTHESES_TWO: of the second hypothesis over
+     * the first. */
+    double log_odds;
+    double recent_log_ratio; /* of the hypotheses over the last few frames and for all terms, nats */
 } hypotheses_state;
 
 /* Saved and hashed in this order, followed by the arrays of gait_tracker up to state_end. */
@@ -204,5 +204,12 @@ static inline float in_walking_time(const gait_tracker *t, float seconds)
 static inline float seconds_unsupported(const gait_tracker *t)
 {
     return seconds_since(t, t->core->support_utime);
+}
+
+/* Running mean over so many seconds after this frame's score; 0 is no score. */
+static inline float running_mean(const gait_tracker *t, float before, float score, float seconds)
+{
+    float const share = f_min(seconds_unsupported(t) / seconds, 1.0f);
+    return before + (score == 0.0f ? 0.0f : share * (score - before));
 }
 #endif
