@@ -52,6 +52,16 @@ def test_a_stop_by_a_pause_is_reported_once(tmp_path):
     assert words == [] and outcome.words.count("stopped; looking for a person again") == 1
 
 
+def test_another_daemon_on_the_same_url_is_reported():
+    rig.need_multicast()
+    url = private_url()
+    with rig.daemon(url) as (listener, finish), rig.daemon(url) as (_, finish_second):
+        listener.until(lambda: "another gait-trackd answers" in listener.last.text, "the report")
+        second = finish_second()
+        assert "another gait-trackd answers on this URL" in second.words
+        assert "another gait-trackd answers on this URL" in finish().words
+
+
 def test_live_it_reports_where_it_listens_and_what_it_lacks():
     rig.need_multicast()
     url = private_url()

@@ -173,6 +173,59 @@ def test_another_camera_during_the_run_is_refused(tmp_path):
     assert "a different camera" in outcome.words and outcome.digest == plain.digest
 
 
+def wrong_camera():
+    """Half the size of the camera of the frames."""
+    return camera_message(rig.CAMERA.scaled(0.5), 1)
+
+
+def announced(tmp_path, seconds, *options):
+    """A wrong camera first, then the right one again and again for that long, then the stream."""
+    right = [
+        ("GAIT_CAMERA_0", camera_message(rig.CAMERA, 1_000_000 + 2_000_000 * k))
+        for k in range(seconds // 2 + 1)
+    ]
+    events = [("GAIT_CAMERA_0", wrong_camera()), *right, *rig.opening()[1:], *rig.frames(0, 4)]
+    log = rig.write_log(tmp_path / "a.log", events)
+    return rig.play(log, "--init", "auto", *options)
+
+
+def test_a_camera_announced_alone_for_ten_seconds_replaces_the_first(tmp_path):
+    plain = track(tmp_path, [*rig.opening(), *rig.frames(0, 4)], "--init", "auto")
+    replaced = announced(tmp_path, 10)
+    assert replaced.digest == plain.digest and replaced.frames == 4
+    assert "camera 80x60" in replaced.words and "camera 160x120" in replaced.words
+    early = announced(tmp_path, 8)
+    assert early.frames == 0 and "after 10 seconds in which only it is announced" in early.words
+
+
+def test_a_camera_of_a_file_is_not_replaced(tmp_path):
+    file = tmp_path / "camera.json"
+    file.write_text(json.dumps(rig.CAMERA.scaled(0.5).to_dict()))
+    outcome = announced(tmp_path, 20, "--camera", file)
+    assert outcome.frames == 0 and "that of --camera was announced and is ignored" in outcome.words
+
+
+def test_a_camera_with_too_many_pixels_is_refused_before_it_takes_memory(tmp_path):
+    huge = camera_message(rig.CAMERA, 1)
+    huge.width = huge.height = 16000
+    plain = track(tmp_path, [*rig.opening(), *rig.frames(0, 2)])
+    outcome = track(tmp_path, [("GAIT_CAMERA_0", huge), *rig.opening(), *rig.frames(0, 2)])
+    assert "16000x16000 pixels, more than the 16777216 of --max-pixels" in outcome.words
+    assert outcome.digest == plain.digest
+    small = track(tmp_path, [*rig.opening(), *rig.frames(0, 2)], "--max-pixels", 160 * 120 - 1)
+    assert "160x120 pixels, more than the 19199 of --max-pixels" in small.words and small.frames == 0
+
+
+def test_a_frame_number_far_away_begins_another_count(tmp_path):
+    numbers = [0, 1, 2**63 - 1, 104, 105, 108, 109]
+    events = [
+        ("GAIT_IMAGE_0", image_message(rig.picture(i), rig.utime(i), number))
+        for i, number in enumerate(numbers)
+    ]
+    outcome = track(tmp_path, [*rig.opening(), *events])
+    assert outcome.dropped == 2  # 106 and 107
+
+
 def test_a_camera_that_differs_by_rounding_is_the_same(tmp_path):
     again = camera_message(rig.CAMERA, 1)
     again.R = [x + 3e-8 for x in again.R]

@@ -61,7 +61,7 @@ bool convert_same_camera(const gait_camera *a, const gait_camera *b)
     return same;
 }
 
-bool convert_camera_message(const gaitmsg_camera_t *in, gait_camera *out, message *why)
+bool convert_camera_message(const gaitmsg_camera_t *in, int32_t max_pixels, gait_camera *out, message *why)
 {
     gait_camera c = {.width = in->width,
                      .height = in->height,
@@ -78,6 +78,9 @@ bool convert_camera_message(const gaitmsg_camera_t *in, gait_camera *out, messag
     if (c.width < 1 || c.height < 1 || c.width > CAMERA_PIXELS || c.height > CAMERA_PIXELS)
         return message_set(why, "camera message with a size of %dx%d; send 1 to %d", c.width, c.height,
                            CAMERA_PIXELS);
+    if (c.width * c.height > max_pixels)
+        return message_set(why, "camera message with %dx%d pixels, more than the %d of --max-pixels", c.width,
+                           c.height, max_pixels);
     if (!(c.fx > 0) || !(c.fy > 0))
         return message_set(why, "camera message with focal lengths %g and %g; send pixels", in->fx, in->fy);
     if (!camera_rotation_ok(&c))

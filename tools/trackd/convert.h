@@ -18,9 +18,8 @@ void convert_state(const gait_state *in, const gait_model_info *info, gaitmsg_st
 /* Fields that are not numbers become those of `unknown`; components and offsets beyond the message's are 0. */
 bool convert_state_message(const gaitmsg_state_t *in, const gait_state *unknown, gait_state *out,
                            message *why);
-bool convert_camera_message(const gaitmsg_camera_t *in, gait_camera *out, message *why);
-#define CAMERA_CHANGED                                                                                       \
-    "a different camera from the one in use was announced and is ignored; restart to use it"
+/* Refused with more than `max_pixels` of width times height. */
+bool convert_camera_message(const gaitmsg_camera_t *in, int32_t max_pixels, gait_camera *out, message *why);
 /* Equal up to rounding, which differs between files and messages, and readers may orthogonalise R. */
 bool convert_same_camera(const gait_camera *a, const gait_camera *b);
 /* All but frame, step, dropped, receive_utime, step_us and tracker_digest, which are the caller's. */

@@ -95,6 +95,8 @@ static bool load(service *s, const settings *want, parts *p, workers *threads, s
         s->cue = &p->cue;
     }
     s->max_gap = (double)want->max_gap;
+    s->max_pixels = want->max_pixels;
+    s->camera_fixed = want->camera[0] != '\0';
     s->budget = (budget){.limit_us = (int64_t)(1e3f * want->budget_ms),
                          .low = want->adapt_particles,
                          .high = config.particles};
@@ -104,8 +106,7 @@ static bool load(service *s, const settings *want, parts *p, workers *threads, s
                       why))
         return false;
     if (want->camera[0] &&
-        (!camera_file_read(want->camera, &camera, why) || !service_set_camera(s, &camera, why) ||
-         (s->lift && !lift_service_camera(s->lift, &camera, why))))
+        (!camera_file_read(want->camera, &camera, why) || !service_set_camera(s, &camera, why)))
         return false;
     return read_background(s, want->background, why);
 }

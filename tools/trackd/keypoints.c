@@ -92,6 +92,8 @@ void keypoint_cue_forget(keypoint_cue *cue)
 
 bool keypoint_cue_allocate(keypoint_cue *cue, const gait_camera *camera, message *why)
 {
+    free(cue->held);
+    cue->held_bytes = 0;
     cue->capacity = (size_t)camera->width * (size_t)camera->height * 3 + BESIDE_PIXELS;
     cue->held = malloc(cue->capacity);
     return cue->held ||

@@ -222,11 +222,17 @@ bool sink_ended(const sink *s, message *why)
            !message_set(why, "--out: the log cannot be written: %.180s", s->fault.text);
 }
 
+/* Write all that is buffered to the disk; devices and pipes have none. */
+static bool flush(FILE *f)
+{
+    return fflush(f) == 0 && (fsync(fileno(f)) == 0 || errno == EINVAL || errno == EROFS);
+}
+
 bool sink_close(sink *s, message *why)
 {
     if (s->lcm)
         lcm_destroy(s->lcm);
-    if (s->log && fflush(s->log->f) != 0 && !s->failed)
+    if (s->log && !flush(s->log->f) && !s->failed)
         lost(s, strerror(errno));
     bool const ok = s->failed == 0 ||
                     message_set(why, "--out: %s %.180s",

@@ -44,13 +44,12 @@ void lift_service_close(lift_service *s)
 bool lift_service_camera(lift_service *s, const gait_camera *camera, message *why)
 {
     gait_error err = {.text = ""};
-    if (s->lift)
-        return convert_same_camera(camera, &s->config.camera) || message_set(why, CAMERA_CHANGED);
     gait_lift_config c = s->config;
     c.camera = *camera;
     if (gait_lift_init(s->memory, s->memory_bytes, s->file.model, &c, &s->lift, &err) != GAIT_OK)
         return message_set(why, "--lift: %s", err.text);
     s->config = c;
+    s->last = -1;
     return true;
 }
 

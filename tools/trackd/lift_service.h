@@ -43,7 +43,7 @@ typedef struct lift_service {
 /* Read the segment prior of a blob and take all memory; s is all zero before. */
 bool lift_service_open(lift_service *s, const char *model, const lift_settings *set, sink *out, message *why);
 void lift_service_close(lift_service *s);
-/* The first camera starts the service; another one later is an error. */
+/* The first camera starts the service; another one restarts it. */
 bool lift_service_camera(lift_service *s, const gait_camera *camera, message *why);
 /* Push one frame's keypoints, received at `receive_utime`, and publish the result on GAIT_LIFT.  Keypoints from more
  * than a second before the last ones restart the stream: a clock was set, or one stamp was wrong. */

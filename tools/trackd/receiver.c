@@ -85,26 +85,14 @@ static void on_keypoints(const lcm_recv_buf_t *buf, const char *channel, void *u
         flush_held(r);
 }
 
-/* Pass the camera on to the lifter. */
-static void lift_camera(receiver *r, const gaitmsg_camera_t *msg)
-{
-    gait_camera camera;
-    message why;
-    if (convert_camera_message(msg, &camera, &why) && !lift_service_camera(r->service->lift, &camera, &why))
-        service_complain(r->service, "%s", why.text);
-}
-
 static void on_camera(const lcm_recv_buf_t *buf, const char *channel, void *user)
 {
     receiver *const r = user;
     gaitmsg_camera_t msg;
     if (gaitmsg_camera_t_decode(buf->data, 0, (int)buf->data_size, &msg) < 0)
         service_complain(r->service, DAMAGED, channel);
-    else {
+    else
         service_camera(r->service, &msg);
-        if (r->service->lift)
-            lift_camera(r, &msg);
-    }
 }
 
 static void on_command(const lcm_recv_buf_t *buf, const char *channel, void *user)
@@ -115,6 +103,17 @@ static void on_command(const lcm_recv_buf_t *buf, const char *channel, void *use
         service_complain(r->service, DAMAGED, channel);
     else
         service_command(r->service, &msg);
+}
+
+static void on_status(const lcm_recv_buf_t *buf, const char *channel, void *user)
+{
+    receiver *const r = user;
+    gaitmsg_status_t msg;
+    (void)channel;
+    if (gaitmsg_status_t_decode(buf->data, 0, (int)buf->data_size, &msg) < 0)
+        return; /* of another version */
+    service_status(r->service, &msg);
+    gaitmsg_status_t_decode_cleanup(&msg);
 }
 
 static bool subscribe(receiver *r, message *why)
@@ -131,7 +130,8 @@ static bool subscribe(receiver *r, message *why)
             link_subscribe(r->others, name[3], on_keypoints, r, OTHERS_WAITING, why)) &&
            link_subscribe(r->others, name[1], on_camera, r, OTHERS_WAITING, why) &&
            link_subscribe(r->others, name[2], on_background, r, OTHERS_WAITING, why) &&
-           link_subscribe(r->others, "GAIT_COMMAND", on_command, r, OTHERS_WAITING, why);
+           link_subscribe(r->others, "GAIT_COMMAND", on_command, r, OTHERS_WAITING, why) &&
+           (r->log || link_subscribe(r->others, "GAIT_STATUS", on_status, r, OTHERS_WAITING, why));
 }
 
 bool receiver_open(receiver *r, service *s, const char *url, message *why)

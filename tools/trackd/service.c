@@ -116,6 +116,7 @@ bool service_open(service *s, sink *out, int stream, int threads, const init_sta
     s->has_init = init != NULL;
     if (init)
         s->init = *init;
+    s->other_since = -1;
     rearm(s);
     return !particles || open_particles(s, why);
 }
@@ -142,8 +143,10 @@ static bool start_usable(service *s, const gait_state *mean, const gait_state *s
 
 bool service_set_camera(service *s, const gait_camera *camera, message *why)
 {
+    s->track.memory_bytes -= s->cue ? s->cue->capacity : 0;
     if (!tracking_set_camera(&s->track, camera, why) ||
-        (s->cue && !keypoint_cue_allocate(s->cue, camera, why)))
+        (s->cue && !keypoint_cue_allocate(s->cue, camera, why)) ||
+        (s->lift && !lift_service_camera(s->lift, camera, why)))
         return false;
     s->track.memory_bytes += s->cue ? s->cue->capacity : 0;
     const tracking *const t = &s->track;
@@ -162,15 +165,42 @@ bool service_set_camera(service *s, const gait_camera *camera, message *why)
     return true;
 }
 
+/* Whether a camera that differs from the one in use has been announced alone for long enough to replace it. */
+static bool replaces(service *s, const gait_camera *camera, int64_t utime)
+{
+    if (s->other_since < 0 || utime < s->other_since || !convert_same_camera(camera, &s->other_camera)) {
+        s->other_camera = *camera;
+        s->other_since = utime;
+    }
+    return !s->camera_fixed && utime - s->other_since >= SERVICE_CAMERA_SILENT; /* both are 0 or more */
+}
+
 void service_camera(service *s, const gaitmsg_camera_t *msg)
 {
     gait_camera camera;
     message why;
-    if (!convert_camera_message(msg, &camera, &why) ||
-        (!s->track.tracker && !service_set_camera(s, &camera, &why)))
+    bool const known = s->track.tracker != NULL;
+    if (!convert_camera_message(msg, s->max_pixels, &camera, &why)) {
         service_complain(s, "%s", why.text);
-    else if (!convert_same_camera(&camera, &s->track.config.camera[0]))
-        service_complain(s, CAMERA_CHANGED);
+        return;
+    }
+    if (known && convert_same_camera(&camera, &s->track.config.camera[0])) {
+        s->other_since = -1;
+        return;
+    }
+    if (known && !replaces(s, &camera, msg->utime < 0 ? 0 : msg->utime)) {
+        service_complain(s, s->camera_fixed
+                                ? "a different camera from that of --camera was announced and is ignored"
+                                : "a different camera from the one in use was announced: it replaces that one "
+                                  "after 10 seconds in which only it is announced");
+        return;
+    }
+    s->other_since = -1;
+    bool const made = service_set_camera(s, &camera, &why);
+    if (known)
+        rearm(s);
+    if (!made)
+        service_complain(s, "%s", why.text);
 }
 
 bool service_pixels(service *s, const image_view *v, gait_image *out, message *why)
@@ -326,6 +356,14 @@ void service_send_estimate(service *s, const image_view *v, const gait_estimate 
         send_particles(s, v);
 }
 
+void service_status(service *s, const gaitmsg_status_t *msg)
+{
+    for (int i = 0; i < SERVICE_SENT; i++)
+        if (s->sent[i] == msg->utime)
+            return;
+    service_complain(s, "another gait-trackd answers on this URL; stop it, or give each its own --url");
+}
+
 void service_send_status(service *s)
 {
     char version[32];
@@ -354,6 +392,7 @@ void service_send_status(service *s)
         .memory_bytes = (int64_t)s->track.memory_bytes,
         .text = s->text.text,
     };
+    s->sent[s->statuses++ % SERVICE_SENT] = msg.utime;
     sink_publish(s->out, "GAIT_STATUS", encoded, gaitmsg_status_t_encode(encoded, 0, MESSAGE_BYTES, &msg));
     s->news = false;
 }

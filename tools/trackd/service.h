@@ -18,7 +18,11 @@ typedef struct service_counts {
     histogram step, latency; /* microseconds */
 } service_counts;
 
-enum { SERVICE_PAST = 65 }; /* more than the longest lag */
+enum {
+    SERVICE_PAST = 65,               /* more than the longest lag */
+    SERVICE_SENT = 64,               /* own statuses that are still recognised */
+    SERVICE_CAMERA_SILENT = 10000000 /* microseconds; cameras are announced every two seconds */
+};
 
 typedef struct past_frame { /* a frame that was tracked */
     uint64_t step;          /* of the tracker */
@@ -41,7 +45,11 @@ typedef struct service {
     keypoint_cue *cue;  /* a detector's keypoints for the tracker; NULL: not requested */
     sink *out;          /* where messages go */
     int threads;
-    int stream; /* number of the camera, [0, 30] */
+    int stream;               /* number of the camera, [0, 30] */
+    int32_t max_pixels;       /* of a camera that is announced */
+    bool camera_fixed;        /* by --camera */
+    gait_camera other_camera; /* announced, but not the one in use */
+    int64_t other_since;      /* time of its first message since the one in use was announced; -1: none */
     bool has_init;
     init_state init; /* of --init FILE */
     start_trigger start;
@@ -51,6 +59,8 @@ typedef struct service {
     int8_t state;   /* GAITMSG_STATUS_T_* */
     bool news;      /* the state has changed since the last status */
     int64_t command_id;
+    int64_t sent[SERVICE_SENT]; /* times of the last statuses, a ring by their number */
+    uint32_t statuses;
     service_counts counts;
     int64_t arrived, tracked; /* frames since the program started, unaffected by RESET */
     int64_t dropped_before;   /* value of counts.dropped at START */
@@ -83,6 +93,8 @@ bool service_open(service *s, sink *out, int stream, int threads, const init_sta
 void service_close(service *s);
 
 bool service_set_camera(service *s, const gait_camera *camera, message *why);
+/* One that differs from the camera in use replaces it after it has been announced for SERVICE_CAMERA_SILENT, by the times of
+ * its messages, while the other was not, unless that is of a file. */
 void service_camera(service *s, const gaitmsg_camera_t *msg);
 void service_background(service *s, const image_view *v);
 void service_command(service *s, const gaitmsg_command_t *msg);
@@ -100,5 +112,7 @@ void service_lack(const service *s, message *why);
 void service_send_estimate(service *s, const image_view *v, const gait_estimate *e, int64_t received,
                            int64_t step_us);
 void service_send_status(service *s);
+/* A status that was heard: one that this service did not send is another daemon's, which is reported. */
+void service_status(service *s, const gaitmsg_status_t *msg);
 uint64_t service_digest(const service *s); /* 0 before the camera is known */
 #endif

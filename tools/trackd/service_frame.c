@@ -5,14 +5,21 @@
 #include <math.h>
 #include <string.h>
 
-enum { FIT_PERIOD = 100000 }; /* microseconds between two fits of the automatic start */
+enum {
+    FIT_PERIOD = 100000,  /* microseconds between two fits of the automatic start */
+    LONGEST_GAP = 1 << 20 /* frames; a number further away begins another count */
+};
 
 /* Count the frames that never arrived, by the gap in their numbers. */
 static void count_gap(service *s, const image_view *v)
 {
-    if (s->state == GAITMSG_STATUS_T_RUNNING && s->last_frame >= 0 && v->frame > s->last_frame + 1)
+    if (v->frame < 0)
+        return;
+    bool const follows = s->last_frame >= 0 && v->frame - s->last_frame < LONGEST_GAP &&
+                         s->last_frame - v->frame < LONGEST_GAP;
+    if (follows && s->state == GAITMSG_STATUS_T_RUNNING && v->frame > s->last_frame + 1)
         s->counts.dropped += v->frame - s->last_frame - 1;
-    s->last_frame = v->frame > s->last_frame ? v->frame : s->last_frame;
+    s->last_frame = follows && v->frame < s->last_frame ? s->last_frame : v->frame;
 }
 
 /* Whether this frame has arrived before, or has been counted as one that never did. */

@@ -1,6 +1,7 @@
 #include "settings.h"
 
 #include "gait_pool.h"
+#include "input_files.h"
 #include "lcm_link.h"
 
 #include <math.h>
@@ -131,6 +132,10 @@ static int make_table(settings *s, option *table)
          "        dropped, and double them, up to --particles, when there is time to spare; results then\n"
          "        depend on timing; default: constant",
          INT(adapt_particles, 16, 1 << 20)},
+        {"max-pixels", 0, "N",
+         "most pixels of a picture: a camera message that announces more is refused, so that it cannot\n"
+         "        take the memory; default 16777216",
+         INT(max_pixels, 1, CAMERA_PIXELS *CAMERA_PIXELS)},
         {"threads", 't', "N",
          "threads, default 1, which is also the default of --tasks; results do not depend on it",
          INT(threads, 1, GAIT_POOL_MAX)},
@@ -176,7 +181,8 @@ static int make_table(settings *s, option *table)
 static void set_defaults(settings *s)
 {
     *s = (settings){
-        .mode = "default", .init = "auto", .threads = 1, .cpu_mask = -1, .max_gap = 2, .lift_lag = -1};
+        .mode = "default", .init = "auto", .threads = 1, .cpu_mask = -1,
+        .max_pixels = 1 << 24, .max_gap = 2, .lift_lag = -1};
 }
 
 void settings_help(void)

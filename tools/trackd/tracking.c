@@ -94,12 +94,25 @@ void tracking_close(tracking *t)
     *t = (tracking){0};
 }
 
+/* Free the tracker of the present camera. */
+static void drop_camera(tracking *t)
+{
+    t->memory_bytes -= t->tracker_bytes + t->picture_bytes;
+    t->tracker_bytes = t->picture_bytes = 0;
+    free(t->block);
+    t->block = t->plate = t->pixels = NULL;
+    t->tracker = NULL;
+    t->start = NULL;
+    t->background = (gait_image){0};
+}
+
 bool tracking_set_camera(tracking *t, const gait_camera *camera, message *why)
 {
     gait_error err = {.text = ""};
     gait_start_config start;
     size_t bytes = 0, start_bytes = 0;
     size_t const picture = padded((size_t)camera->width * (size_t)camera->height * 3);
+    drop_camera(t);
     t->config.camera[0] = *camera;
     gait_start_default(&start);
     start.camera = *camera;
@@ -116,8 +129,10 @@ bool tracking_set_camera(tracking *t, const gait_camera *camera, message *why)
     }
     if (status == GAIT_OK)
         status = gait_start_init(t->block + padded(bytes), start_bytes, t->model, &start, &t->start, &err);
-    if (status != GAIT_OK)
+    if (status != GAIT_OK) {
+        drop_camera(t);
         return message_set(why, "cannot make the tracker: %s (%s)", err.text, gait_result_name(status));
+    }
     t->plate = t->block + before;
     t->pixels = t->plate + picture;
     t->tracker_bytes = before;

@@ -29,7 +29,7 @@ void start_trigger_by_time(start_trigger *a, const gait_state *mean, const gait_
 start_trigger_answer start_trigger_reached(start_trigger *a, const image_view *frame, double max_gap,
                                            int64_t *utime, message *why);
 
-/* ---- one model, one camera, one tracker, in one block of memory that is allocated once. */
+/* ---- one model, one camera, one tracker, in one block of memory that is allocated once for a camera. */
 typedef struct tracking {
     model_file file;
     const gait_model *model;
@@ -49,7 +49,7 @@ typedef struct tracking {
 /* Load the model.  `config` is complete but for camera[0]. */
 bool tracking_open(tracking *t, const char *model_path, const gait_tracker_config *config, message *why);
 void tracking_close(tracking *t);
-/* Allocate the block and make the tracker; only once. */
+/* Allocate the block and make the tracker, instead of that of another camera, if there is one. */
 bool tracking_set_camera(tracking *t, const gait_camera *camera, message *why);
 /* Copy the background, unless it is already in use.  It must have the camera's size. */
 bool tracking_set_background(tracking *t, const gait_image *plate, message *why);
