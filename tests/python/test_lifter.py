@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import replace
-from functools import cache
+from functools import cache, partial
 
 import numpy as np
 import pytest
@@ -373,3 +373,40 @@ def test_a_stream_follows_and_waits_as_set() -> None:
     assert 0.8 < np.mean(inside) < 1.0
     lifter.reset()
     assert lifter.estimate() is None
+
+
+EXTREMES = [(3.0, 1.0), (1e-12, 1.0), (1e-150, 1.0), (1e300, 1.0), (3.0, 1e5), (1e-9, 1e5), (1e-9, 1e300)]
+
+
+@pytest.mark.parametrize("camera", [{}, {"cx": 3e38}, {"fx": 1e-30}, {"fx": 3e38}, {"fx": 1e15, "fy": 1e15}])
+def test_results_are_finite_or_refused(camera):
+    """Whatever an input out of any range gives, it is not called a result."""
+    contents, _ = model(12)
+    lifter = Lifter(contents, replace(CAMERA, **camera), LiftConfig.default(lag=2))
+    rng = np.random.default_rng(0)
+    results = (lifter.positions, lifter.posterior, lifter.scale, lifter.least_squares, lifter.uncertain)
+    for sd, spread in EXTREMES:
+        uv = rng.normal(size=(FRAMES, MARKERS, 2)) * 60 * spread + [640, 350]
+        for fit in (partial(lifter.segment, uv, sd), *results, partial(streamed, lifter, uv, sd)):
+            try:
+                found = fit()
+            except GaitError:
+                assert camera or sd != 3.0 or spread > 1.0, "an ordinary segment is refused"
+            else:
+                assert all(np.isfinite(part).all() for part in numbers(found)), (sd, spread, fit)
+
+
+def streamed(lifter: Lifter, uv: np.ndarray, sd: float) -> object:
+    """Estimate of a stream; None: nothing was seen."""
+    lifter.reset()
+    for k in range(FRAMES + 4):
+        lifter.push(33_333 * k, uv[k % FRAMES], np.full(MARKERS, sd))
+    return lifter.estimate()
+
+
+def numbers(found: object) -> list[np.ndarray]:
+    """All numbers of a result."""
+    if found is None:
+        return []
+    values = vars(found).values() if hasattr(found, "__dict__") else found
+    return [np.asarray(value, float) for value in (values if np.iterable(values) else [values])]

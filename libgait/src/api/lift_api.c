@@ -7,6 +7,7 @@
 #include "lift/uncertainty.h"
 #include "lift/lifter.h"
 
+#include <float.h>
 #include <string.h>
 
 #define USUAL(meaning, type, name, array, unit, value, low, high) .name = value,
@@ -297,9 +298,13 @@ gait_result gait_lift_scale(gait_lift *l, double *scale, gait_error *err)
     if (!l || !scale)
         return base_null(err, "gait_lift_scale");
     gait_result const s = need_segment(l->windowed, "gait_lift_scale", err);
-    if (s == GAIT_OK)
-        *scale = sqrt(lift_scale(&l->table, &l->posterior, &l->spare));
-    return s;
+    if (s != GAIT_OK)
+        return s;
+    double const found = lift_scale(&l->table, &l->posterior, &l->spare);
+    if (!(found > 0.0 && found <= DBL_MAX))
+        return base_fail(err, GAIT_ERR_NUMERIC, -1, "gait_lift_scale: the last segment is out of range");
+    *scale = sqrt(found);
+    return GAIT_OK;
 }
 
 gait_result gait_lift_least_squares(gait_lift *l, double *mean, gait_error *err)
