@@ -95,3 +95,15 @@ def test_the_module_runs_and_passes_the_exit_code(tmp_path):
     done = subprocess.run(words, cwd=tmp_path, capture_output=True, text=True, check=False)
     assert (done.returncode, done.stdout) == (1, "")
     assert done.stderr == "gait eval: none.csv: no such truth file; check the name\n"
+
+
+def test_too_little_memory_is_one_line(tmp_path):
+    """As much memory as loading takes, and a picture more than that allows."""
+    limited = "import resource, gait.cli.simulate, gait.simulate, numpy as np\n" + (
+        "used = int(open('/proc/self/statm').read().split()[0]) * resource.getpagesize()\n"
+        "resource.setrlimit(resource.RLIMIT_AS, (used + (1 << 28),) * 2)\n"
+        f"raise SystemExit(gait.cli.main(['simulate', '--size', '4096x4096', '-o', {str(tmp_path / 'o')!r}]))"
+    )
+    done = subprocess.run([sys.executable, "-c", limited], capture_output=True, text=True, check=False)
+    assert done.returncode == 1, done.stderr
+    assert done.stderr.count("\n") == 1 and done.stderr.startswith("gait simulate: not enough memory")

@@ -99,6 +99,8 @@ def main(argv: Sequence[str] | None = None) -> int:
         with contextlib.suppress(OSError):
             os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
         return 1
+    except MemoryError as exc:
+        return _failed(command, f"not enough memory: {exc or 'close other programs or give less at a time'}")
     except OSError as exc:
         return _failed(command, f"{exc.filename or 'file'}: {exc.strerror or exc}")
     except KeyboardInterrupt:
