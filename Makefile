@@ -140,6 +140,8 @@ $(READY): python/constraints.txt python/pyproject.toml
 	@$(PY) -c 'import lcm' || { echo 'setup: LCM needs libglib-2.0.so.0: install libglib2.0-0' >&2; exit 1; }
 	@$(VENV)/bin/gait detect --fetch --quiet >/dev/null || echo 'setup: no weights, so gait detect does not work yet;' \
 	    'run `$(VENV)/bin/gait detect --fetch` later' >&2
+	@$(VENV)/bin/gait studio --fetch --quiet >/dev/null || echo 'setup: no parts of pages, so gait studio does not work yet;' \
+	    'run `$(VENV)/bin/gait studio --fetch` later' >&2
 	@pwd -P > $@
 
 # An environment does not survive being moved.

@@ -12,6 +12,7 @@ EXTRAS = {
     "report": {"matplotlib": "Matplotlib", "scipy": "SciPy"},
     "mocap": {"scipy": "SciPy", "ezc3d": "ezc3d", "threadpoolctl": "threadpoolctl"},
     "dask": {"distributed": "Dask"},
+    "studio": {"starlette": "Starlette", "uvicorn": "uvicorn"},
 }
 """Extra of pyproject.toml to what it brings: module to name of the package."""
 

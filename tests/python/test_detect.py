@@ -154,7 +154,7 @@ def test_absent_weights_name_the_remedy(tmp_path, monkeypatch):
 def test_damaged_weights_are_refused(tmp_path, monkeypatch):
     monkeypatch.setenv("GAIT_WEIGHTS", str(tmp_path))
     (tmp_path / weights.PERSON.file).write_bytes(b"another network")
-    with pytest.raises(UserError, match="is damaged or of another network; delete it"):
+    with pytest.raises(UserError, match="is damaged or of another version; delete it"):
         weights.load(weights.PERSON)
 
 

@@ -210,4 +210,4 @@ def test_wrong_weights_are_refused(fault, command, walk, tmp_path, tmp_path_fact
     monkeypatch.setenv("GAIT_WEIGHTS", str(folder))
     film(tmp_path / "film.mp4", walk[1][:4])
     line = refused(capsys, tmp_path, *commands(tmp_path, "film.mp4")[command])
-    assert "is damaged or of another network; delete it" in line
+    assert "is damaged or of another version; delete it" in line

@@ -39,6 +39,9 @@ COMMANDS = {
     "eval": Command("evaluate", "compare a track with the truth", ("video",)),
     "detect": Command("detect", "find the 2-D keypoints of the people in a video", ("video",)),
     "lift": Command("lift", "lift a video, or 2-D keypoints, to 3-D motion", ("video", "mocap")),
+    "studio": Command(
+        "studio", "correct the motion in a video by hand, on a page", ("video", "mocap", "studio")
+    ),
     "render": Command("render", "draw a pose or a model", ("video",)),
     "camera": Command(
         "camera", "find where a camera stands, from points on the ground or a walk", ("video",)

@@ -1,0 +1,7 @@
+"""What pages share: fetched parts, modules of our own, and serving them on this machine.
+
+- `parts`: three.js and ECharts, fetched once like the detector's weights.
+- `modules`: scene.js, film.js, curves.js and style.css; a page's head, with them served or written into it.
+- `motion_data`: the JSON object that the modules draw.
+- `serve`: a server for this machine alone.
+"""

@@ -1,0 +1,233 @@
+// The turning 3-D view: floor grid, trajectory, stick or cylinder figure, uncertainty ellipsoids.
+// The object that it draws is described in motion_data.py.
+import * as THREE from 'three';
+import { OrbitControls } from 'three/OrbitControls.js';
+
+const DEGREE = Math.PI / 180;
+const SPHERE = new THREE.SphereGeometry(1, 16, 12);
+const CYLINDER = new THREE.CylinderGeometry(1, 1, 1, 14, 1);
+const NINETY = 2.5003; // radius of the ellipsoid that holds 90 % of a Gaussian in three dimensions, sd
+const UP = new THREE.Vector3(0, 1, 0); // axis of CYLINDER
+
+export const sideOf = (joint) => (joint.startsWith('l_') ? 'left' : joint.startsWith('r_') ? 'right' : 'middle');
+
+/** Colour of a custom property of style.css. */
+export const colour = (name) => getComputedStyle(document.documentElement).getPropertyValue(`--${name}`).trim();
+
+export class Scene {
+  /**
+   * @param {HTMLElement} element  filled by the view
+   * @param {object} data          see motion_data.py
+   */
+  constructor(element, data) {
+    this.element = element;
+    element.classList.add('scene');
+    this.shown = { cylinders: true, ellipsoids: true, trajectory: true };
+    this.index = 0;
+    try {
+      this.renderer = new THREE.WebGLRenderer({ antialias: true });
+    } catch {
+      element.innerHTML = '<p class="none">This browser has no WebGL: the 3-D view is off.</p>';
+      this.setData(data);
+      return;
+    }
+    const canvas = this.renderer.domElement;
+    canvas.tabIndex = 0;
+    canvas.setAttribute('role', 'img');
+    canvas.setAttribute('aria-label', 'The figure in space. Drag turns it, the wheel zooms, the right button moves it.');
+    element.append(canvas);
+    this.scene = new THREE.Scene();
+    this.scene.add(new THREE.HemisphereLight(0xffffff, 0x777777, 2.4));
+    const sun = new THREE.DirectionalLight(0xffffff, 1.2);
+    sun.position.set(3, -4, 8);
+    this.scene.add(sun);
+    this.camera = new THREE.PerspectiveCamera(40, 1, 0.05, 500);
+    this.camera.up.set(0, 0, 1); // before the controls, which take it over
+    this.controls = new OrbitControls(this.camera, canvas);
+    this.controls.maxPolarAngle = 89 * DEGREE;
+    this.controls.addEventListener('change', () => this.#draw());
+    this.figure = new THREE.Group();
+    this.ground = new THREE.Group();
+    this.scene.add(this.figure, this.ground);
+    this.#buttons();
+    this.sized = new ResizeObserver(() => this.#resize());
+    this.sized.observe(element);
+    this.dark = matchMedia('(prefers-color-scheme: dark)');
+    this.dark.addEventListener('change', (this.recolour = () => this.setData(this.data)));
+    this.setData(data);
+    this.lookFrom(30);
+  }
+
+  /** Draw another motion, keeping the view and, if it exists, the frame. */
+  setData(data) {
+    this.data = data;
+    if (!this.renderer) return;
+    this.#clear(this.figure);
+    this.#clear(this.ground);
+    this.scene.background = new THREE.Color(colour('panel'));
+    const side = (joint) => new THREE.MeshStandardMaterial({ color: colour(sideOf(joint)), roughness: 0.7 });
+    this.parts = data.bones.map(([a, b]) => this.#add(CYLINDER, side(data.joints[sideOf(data.joints[a]) === 'middle' ? b : a])));
+    this.balls = data.joints.map((joint) => this.#add(SPHERE, side(joint)));
+    const glass = (joint) => new THREE.MeshStandardMaterial({
+      color: colour(sideOf(joint)), transparent: true, opacity: 0.22, depthWrite: false });
+    this.clouds = data.joints.map((joint) => this.#add(SPHERE, glass(joint)));
+    this.#floor();
+    this.show(Math.min(this.index, data.times.length - 1));
+  }
+
+  /** Append frames: an object with the keys by frame alone. */
+  append(more) {
+    for (const key of ['times', 'points', 'sd', 'uv', 'status']) if (more[key]) (this.data[key] ||= []).push(...more[key]);
+    if (!this.renderer) return;
+    this.#clear(this.ground);
+    this.#floor();
+  }
+
+  /** Draw a frame, by its index. */
+  show(index) {
+    this.index = Math.max(0, index);
+    if (!this.renderer) return;
+    const { points, sd, bones, radii } = this.data;
+    const body = points[this.index];
+    this.figure.visible = Boolean(body);
+    if (body) {
+      const at = body.map((p) => new THREE.Vector3(...p));
+      bones.forEach(([a, b], k) => {
+        const part = this.parts[k], along = at[b].clone().sub(at[a]);
+        const radius = this.shown.cylinders ? radii?.[k] ?? 0.04 : 0.012;
+        part.position.copy(at[a]).addScaledVector(along, 0.5);
+        part.scale.set(radius, Math.max(along.length(), 1e-6), radius);
+        part.quaternion.setFromUnitVectors(UP, along.normalize());
+      });
+      const spread = sd?.[this.index];
+      this.balls.forEach((ball, j) => {
+        ball.position.copy(at[j]);
+        ball.scale.setScalar(this.shown.cylinders ? (this.data.joints[j] === 'head' ? 0.1 : 0.04) : 0.022);
+      });
+      this.clouds.forEach((cloud, j) => {
+        cloud.visible = Boolean(this.shown.ellipsoids && spread);
+        cloud.position.copy(at[j]);
+        if (spread) cloud.scale.set(...spread[j].map((s) => Math.min(Math.max(NINETY * s, 1e-3), 5)));
+      });
+      this.#follow(at);
+    }
+    this.#draw();
+  }
+
+  /** Look at the figure from so many degrees above the floor, and about z from the camera (0) or the side (90). */
+  lookFrom(elevation, azimuth = 30) {
+    if (!this.renderer) return;
+    const middle = this.#middle(), camera = this.data.camera;
+    const seen = camera ? Math.atan2(camera[1] - middle.y, camera[0] - middle.x) : -Math.PI / 2;
+    const about = seen + azimuth * DEGREE, up = Math.min(elevation, 89) * DEGREE, far = 3.7;
+    this.controls.target.copy(middle);
+    this.camera.position.set(
+      middle.x + far * Math.cos(about) * Math.cos(up), middle.y + far * Math.sin(about) * Math.cos(up),
+      middle.z + far * Math.sin(up));
+    this.controls.update();
+    this.#draw();
+  }
+
+  /** Switch ``cylinders``, ``ellipsoids`` or ``trajectory``. */
+  set(name, on) {
+    this.shown[name] = on;
+    if (this.way) this.way.visible = this.shown.trajectory;
+    this.show(this.index);
+  }
+
+  dispose() {
+    this.sized?.disconnect();
+    this.dark?.removeEventListener('change', this.recolour);
+    this.controls?.dispose();
+    this.renderer?.dispose();
+  }
+
+  #middle() {
+    const body = this.data.points[this.index] ?? this.data.points.find(Boolean);
+    if (!body) return new THREE.Vector3(0, 0, 0.9);
+    return body.reduce((sum, p) => sum.add(new THREE.Vector3(...p)), new THREE.Vector3()).divideScalar(body.length);
+  }
+
+  /** Move the view with the person, so that they stay in it. */
+  #follow(at) {
+    const middle = at.reduce((sum, p) => sum.add(p), new THREE.Vector3()).divideScalar(at.length);
+    middle.z = this.controls.target.z;
+    const moved = middle.sub(this.controls.target);
+    this.controls.target.add(moved);
+    this.camera.position.add(moved);
+  }
+
+  /** Grid of the floor, a metre a cell, and the way over it. */
+  #floor() {
+    const seen = this.data.points.filter(Boolean), root = Math.max(0, this.data.joints.indexOf('pelvis'));
+    const xs = seen.map((p) => p[root][0]), ys = seen.map((p) => p[root][1]);
+    const [left, right] = xs.length ? [Math.min(...xs), Math.max(...xs)] : [0, 0];
+    const [near, far] = ys.length ? [Math.min(...ys), Math.max(...ys)] : [0, 0];
+    const cells = Math.min(200, Math.ceil(Math.max(right - left, far - near)) + 4);
+    const grid = new THREE.GridHelper(cells, cells, colour('line'), colour('grid'));
+    grid.rotation.x = Math.PI / 2;
+    grid.position.set(Math.round((left + right) / 2), Math.round((near + far) / 2), 0);
+    this.ground.add(grid);
+    const line = new THREE.BufferGeometry().setFromPoints(seen.map((p) => new THREE.Vector3(p[root][0], p[root][1], 0.005)));
+    this.way = new THREE.Line(line, new THREE.LineBasicMaterial({ color: colour('good') }));
+    this.way.visible = this.shown.trajectory;
+    this.ground.add(this.way);
+  }
+
+  #add(geometry, material) {
+    const mesh = new THREE.Mesh(geometry, material);
+    this.figure.add(mesh);
+    return mesh;
+  }
+
+  #clear(group) {
+    for (const child of [...group.children]) {
+      if (![SPHERE, CYLINDER].includes(child.geometry)) child.geometry.dispose();
+      child.material.dispose();
+      group.remove(child);
+    }
+  }
+
+  #buttons() {
+    const bar = document.createElement('div');
+    bar.className = 'views';
+    const add = (text, title, press) => {
+      const button = Object.assign(document.createElement('button'), { type: 'button', textContent: text, title });
+      button.addEventListener('click', () => press(button));
+      bar.append(button);
+      return button;
+    };
+    add('30°', 'View from 30 degrees above the floor', () => this.lookFrom(30));
+    add('Side', 'View from the camera’s side', () => this.lookFrom(5, 90));
+    add('Camera', 'View as the camera does', () => this.lookFrom(8, 0));
+    add('Top', 'View from above', () => this.lookFrom(88, 0));
+    for (const [name, text] of [['cylinders', 'Body'], ['ellipsoids', 'Uncertainty'], ['trajectory', 'Way']]) {
+      const button = add(text, `Show or hide: ${text.toLowerCase()}`, () => {
+        this.set(name, !this.shown[name]);
+        button.setAttribute('aria-pressed', this.shown[name]);
+      });
+      button.setAttribute('aria-pressed', this.shown[name]);
+    }
+    this.element.append(bar);
+  }
+
+  #resize() {
+    const { clientWidth: wide, clientHeight: high } = this.element;
+    if (!wide || !high) return;
+    this.renderer.setPixelRatio(Math.min(devicePixelRatio, 2));
+    this.renderer.setSize(wide, high, false);
+    this.camera.aspect = wide / high;
+    this.camera.updateProjectionMatrix();
+    this.#draw();
+  }
+
+  /** Draw at the next refresh of the screen, once however often it is asked. */
+  #draw() {
+    if (this.waiting) return;
+    this.waiting = true;
+    requestAnimationFrame(() => {
+      this.waiting = false;
+      this.renderer.render(this.scene, this.camera);
+    });
+  }
+}

@@ -1,0 +1,145 @@
+"""A server for this machine alone: loopback, Host and Origin checked, nothing outside the page's files."""
+
+from __future__ import annotations
+
+import contextlib
+import mimetypes
+import socket
+from collections.abc import Callable, Mapping, Sequence
+
+import uvicorn
+from starlette.applications import Starlette
+from starlette.requests import Request
+from starlette.responses import PlainTextResponse, Response
+from starlette.routing import BaseRoute, Route
+from starlette.types import ASGIApp, Message, Receive, Scope, Send
+
+from gait.errors import UserError
+from gait.web import modules
+
+HOST = "127.0.0.1"
+_NAMES = (HOST, "localhost", "[::1]")
+_POLICY = (
+    "default-src 'self'; script-src {scripts}; style-src 'self' 'unsafe-inline'; img-src 'self' blob: data:; "
+    "frame-ancestors 'none'; base-uri 'none'; form-action 'none'"
+)
+
+
+class Guard:
+    """Refuse requests that another site or machine caused.
+
+    A page of another site can make a browser send requests here, and a name that it owns can point to this
+    machine: the first carry its Origin, the second its Host.
+    """
+
+    def __init__(self, app: ASGIApp, port: int, scripts: str) -> None:
+        self._app, self._policy = app, _POLICY.format(scripts=scripts)
+        self._hosts = {f"{name}:{port}" for name in _NAMES}
+        self._origins = {f"http://{host}" for host in self._hosts}
+
+    async def __call__(self, scope: Scope, receive: Receive, send: Send) -> None:
+        """Answer a request, or hand it on."""
+        if scope["type"] == "lifespan":
+            await self._app(scope, receive, send)
+            return
+        headers = {name.decode("latin-1"): value.decode("latin-1") for name, value in scope["headers"]}
+        origin = headers.get("origin")
+        safe = scope.get("method") in ("GET", "HEAD")
+        if headers.get("host") not in self._hosts:
+            await PlainTextResponse("gait serves this machine alone\n", 403)(scope, receive, send)
+            return
+        if not (origin in self._origins or (origin is None and safe)):
+            await PlainTextResponse("gait answers its own page alone\n", 403)(scope, receive, send)
+            return
+
+        async def guarded(message: Message) -> None:
+            if message["type"] == "http.response.start":
+                message["headers"] = [
+                    *message["headers"],
+                    (b"content-security-policy", self._policy.encode()),
+                    (b"x-content-type-options", b"nosniff"),
+                    (b"referrer-policy", b"no-referrer"),
+                    (b"cross-origin-resource-policy", b"same-origin"),
+                ]
+            await send(message)
+
+        await self._app(scope, receive, guarded)
+
+
+def application(page: str, title: str, routes: Sequence[BaseRoute], port: int) -> ASGIApp:
+    """Application of one page.
+
+    Parameters
+    ----------
+    page : str
+        HTML of the body, which loads its own script from one of the routes.
+    title : str
+    routes : sequence of starlette.routing.Route
+        What else it serves; ``/`` and ``/web/NAME`` are taken.
+    port : int
+        Port that browsers have to name.
+
+    Raises
+    ------
+    UserError
+        If the parts of pages were not fetched.
+    """
+    files = modules.served()
+    head, scripts = modules.served_head()
+    text = (
+        '<!DOCTYPE html>\n<html lang="en"><head><meta charset="utf-8">\n'
+        '<meta name="viewport" content="width=device-width, initial-scale=1">\n'
+        f"<title>{title}</title>\n{head}\n</head>\n<body>\n{page}\n</body></html>\n"
+    )
+
+    async def index(request: Request) -> Response:
+        return Response(text, media_type="text/html", headers={"cache-control": "no-store"})
+
+    own = [Route("/", index), Route("/web/{name}", in_memory(files))]
+    return Guard(Starlette(routes=[*own, *routes]), port, scripts)
+
+
+def in_memory(files: Mapping[str, bytes]) -> Callable[[Request], Response]:
+    """Endpoint that serves files by their ``name`` in the path, and no others."""
+
+    def answer(request: Request) -> Response:
+        name = request.path_params["name"]
+        if name not in files:
+            return PlainTextResponse("not here\n", 404)
+        kind = mimetypes.guess_type(name)[0] or "application/octet-stream"
+        return Response(files[name], media_type=kind, headers={"cache-control": "no-cache"})
+
+    return answer
+
+
+def listen(port: int) -> socket.socket:
+    """Socket on this machine's loopback; port 0 takes any that is free.
+
+    Raises
+    ------
+    UserError
+        If the port is taken.
+    """
+    own = socket.socket(socket.AF_INET, socket.SOCK_STREAM)
+    own.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
+    try:
+        own.bind((HOST, port))
+        own.listen()  # browsers wait until the server is up
+    except OSError as error:
+        own.close()
+        raise UserError(f"port {port}: {error.strerror}; give another --port") from error
+    return own
+
+
+def address(own: socket.socket) -> str:
+    """URL of a server on a socket."""
+    return f"http://{HOST}:{own.getsockname()[1]}/"
+
+
+def run(app: ASGIApp, own: socket.socket) -> None:
+    """Serve until the process is interrupted."""
+    config = uvicorn.Config(
+        app, log_level="error", access_log=False, lifespan="off", timeout_graceful_shutdown=1
+    )
+    with contextlib.suppress(KeyboardInterrupt):
+        uvicorn.Server(config).run(sockets=[own])

@@ -1,0 +1,64 @@
+"""Pages in a real Chromium, driven by playwright; tests that use it are skipped where either is absent."""
+
+import contextlib
+import shutil
+import sys
+import threading
+from pathlib import Path
+
+import pytest
+
+FETCHED = Path(sys.prefix) / "share/gait/web"
+SERIOUS = ("serious", "critical")
+
+
+def chromium():
+    """Chromium and, if all is there, playwright's `sync_playwright`; else skip."""
+    path = shutil.which("chromium") or shutil.which("chromium-browser")
+    if path is None:
+        pytest.skip("no chromium (Debian: chromium)")
+    if not FETCHED.is_dir():
+        pytest.skip("the parts of pages are absent: gait studio --fetch")
+    return path, pytest.importorskip("playwright.sync_api", reason="no playwright").sync_playwright
+
+
+@contextlib.contextmanager
+def opened(width=1280, height=720, dark=False):
+    """A page of a headless Chromium; errors of its scripts and of its console fail the test."""
+    path, start = chromium()
+    options = ["--no-sandbox", "--use-angle=swiftshader", "--enable-unsafe-swiftshader"]
+    with start() as playwright:
+        browser = playwright.chromium.launch(executable_path=path, args=options)
+        page = browser.new_page(
+            viewport={"width": width, "height": height}, color_scheme="dark" if dark else "light"
+        )
+        faults = []
+        page.on("pageerror", lambda error: faults.append(str(error)))
+        page.on("console", lambda text: faults.append(text.text) if text.type == "error" else None)
+        page.set_default_timeout(20000)
+        try:
+            yield page
+        finally:
+            browser.close()
+        assert not faults, faults
+
+
+@contextlib.contextmanager
+def serving(make_app):
+    """Serve `make_app(port)` in a thread; gives the URL."""
+    import uvicorn
+
+    from gait.web import serve
+
+    own = serve.listen(0)
+    config = uvicorn.Config(
+        make_app(own.getsockname()[1]), log_level="error", access_log=False, lifespan="off"
+    )
+    server = uvicorn.Server(config)
+    thread = threading.Thread(target=server.run, kwargs={"sockets": [own]})
+    thread.start()
+    try:
+        yield serve.address(own)
+    finally:
+        server.should_exit = True
+        thread.join()
