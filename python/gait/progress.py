@@ -6,9 +6,10 @@ import sys
 import time
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
+from typing import TYPE_CHECKING
 
-import numpy as np
-from numpy.typing import ArrayLike
+if TYPE_CHECKING:
+    from numpy.typing import ArrayLike
 
 _PATIENCE = 2.0  # seconds of work before a bar appears
 _PERIOD = 0.1  # seconds between two drawings of the bar
@@ -66,5 +67,7 @@ def _bar(done: int, total: int | None, elapsed: float) -> str:
 
 def durations(values: ArrayLike) -> dict[str, float]:
     """Median, 99th percentile and maximum of at least one duration."""
+    import numpy as np  # here, so that --help answers at once
+
     median, p99, longest = np.percentile(np.asarray(values, float), [50, 99, 100])
     return {"median": float(median), "p99": float(p99), "max": float(longest)}

@@ -15,7 +15,8 @@ from eval_clips import DATA
 from gait.errors import UserError
 from gait.learn import run as learning
 from gait.learn.options import LearnOptions
-from gait.simulate import Scenario, simulate
+from gait.simulate.clip import simulate
+from gait.simulate.scenario import Scenario
 
 PEOPLE = ("cmu_walk/02", "cmu_walk/06", *(f"more/{lab}/*" for lab in (
     "btk", "gaitalytics", "bvhtoolbox", "opensim", "cmu_more", "mcgill"

@@ -21,7 +21,8 @@ import eval_edits
 from eval_clips import DATA
 
 from gait.errors import UserError
-from gait.simulate import Scenario, simulate
+from gait.simulate.clip import simulate
+from gait.simulate.scenario import Scenario
 
 RUNNER = DATA / "mocap" / "trc" / "motion_capture_run.trc"
 

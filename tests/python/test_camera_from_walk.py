@@ -11,7 +11,7 @@ from gait.camera.camera import read_camera
 from gait.cli import main
 from gait.errors import UserError
 from gait.io.keypoints_file import Keypoints, write
-from gait.simulate import Scenario
+from gait.simulate.scenario import Scenario
 from gait.simulate.stage import set_stage
 from gait.track.from_walk import calibrate
 from gait.track.walk_model import WalkingBody

@@ -18,7 +18,7 @@ from gait.io.trc import read_trc
 from gait.lift.keypoints import noise
 from gait.lift.segment.explain import Uncertain
 from gait.lift.smooth import motion, size
-from gait.lift.smooth.motion import METHODS
+from gait.lift.smooth.options import METHODS
 
 FRAMES, MARKERS = 6, 12
 VIEWS = {"camera": ["--camera", "cam.json"], "flat": ["--orthographic", "y"], "none": []}

@@ -1,9 +1,13 @@
 """The command line itself: help, versions, options out of their range, exit codes."""
 
+import json
 import os
 import re
+import resource
+import shlex
 import subprocess
 import sys
+from importlib import import_module
 from pathlib import Path
 
 import pytest
@@ -11,7 +15,7 @@ import pytest
 import gait
 from gait.bindings import abi
 from gait.bindings.config import TrackerConfig
-from gait.cli import COMMANDS, main, values
+from gait.cli import COMMANDS, _joined, _parser, main, values
 
 
 @pytest.mark.parametrize(
@@ -99,7 +103,7 @@ def test_the_module_runs_and_passes_the_exit_code(tmp_path):
 
 def test_too_little_memory_is_one_line(tmp_path):
     """As much memory as loading takes, and a picture more than that allows."""
-    limited = "import resource, gait.cli.simulate, gait.simulate, numpy as np\n" + (
+    limited = "import resource, gait.cli.simulate, gait.simulate.clip, numpy as np\n" + (
         "used = int(open('/proc/self/statm').read().split()[0]) * resource.getpagesize()\n"
         "resource.setrlimit(resource.RLIMIT_AS, (used + (1 << 28),) * 2)\n"
         f"raise SystemExit(gait.cli.main(['simulate', '--size', '4096x4096', '-o', {str(tmp_path / 'o')!r}]))"
@@ -107,3 +111,58 @@ def test_too_little_memory_is_one_line(tmp_path):
     done = subprocess.run([sys.executable, "-c", limited], capture_output=True, text=True, check=False)
     assert done.returncode == 1, done.stderr
     assert done.stderr.count("\n") == 1 and done.stderr.startswith("gait simulate: not enough memory")
+
+
+HELP = """
+import contextlib, io, json, sys
+from gait import extras
+from gait.cli import COMMANDS, main
+heavy = {"numpy", *(m for brought in extras.EXTRAS.values() for m in brought)} - {"lcm"}  # which is small
+found = {}
+for command in COMMANDS:
+    with contextlib.redirect_stdout(io.StringIO()), contextlib.suppress(SystemExit):
+        main([*command.split(), "--help"])
+    found[command] = sorted(heavy & set(sys.modules))
+    if found[command]:
+        break  # the others would be blamed for it too
+print(json.dumps(found))
+"""
+
+
+def test_help_loads_nothing_heavy():
+    done = subprocess.run([sys.executable, "-c", HELP], capture_output=True, text=True, check=True)
+    assert {command: modules for command, modules in json.loads(done.stdout).items() if modules} == {}
+
+
+@pytest.mark.parametrize("command", ["", "track", "lift", "report lift"])
+def test_help_answers_in_three_tenths_of_a_second(command):
+    """CPU time, as other work may keep this machine busy; the best of three."""
+
+    def spent():
+        used = resource.getrusage(resource.RUSAGE_CHILDREN)
+        return used.ru_utime + used.ru_stime
+
+    times = []
+    for _ in range(3):
+        before = spent()
+        words = [sys.executable, "-m", "gait", *command.split(), "--help"]
+        subprocess.run(words, capture_output=True, check=True)
+        times.append(spent() - before)
+    assert min(times) < 0.3, times
+
+
+def examples(command):
+    """Commands that the help of a command ends with, as words."""
+    text = getattr(import_module(f"gait.cli.{COMMANDS[command].module}"), "EXAMPLES", "")
+    lines = text.replace("\\\n", " ").splitlines()
+    return [shlex.split(line, comments=True) for line in lines if "gait " in line]
+
+
+@pytest.mark.parametrize("command", COMMANDS)
+def test_every_help_has_examples_that_parse(command):
+    found = examples(command)
+    assert len(found) >= 2 and found[0][: len(command.split()) + 1] == ["gait", *command.split()]
+    for _, *words in found:
+        if " ".join(words[:2]) in COMMANDS:
+            words[:2] = [" ".join(words[:2])]
+        assert _parser(words).parse_args(list(_joined(words))).command in COMMANDS

@@ -212,7 +212,8 @@ def test_noise_on_a_start_is_the_seeds_and_a_wrong_stature_is_believed(tmp_path)
 
 
 def test_an_edited_clip_has_the_truth_of_its_frames(tmp_path):
-    from gait.simulate import Scenario, simulate
+    from gait.simulate.clip import simulate
+    from gait.simulate.scenario import Scenario
 
     source, target = tmp_path / "walk", tmp_path / "back"
     simulate(Scenario(frames=12, size=(160, 120), seed=3), source)

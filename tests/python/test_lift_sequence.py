@@ -18,6 +18,7 @@ from gait.lift.segment.view import Parallel, Perspective, looking_along
 from gait.lift.smooth import block_arrowhead, chain, motion, smoother, soft_constraints
 from gait.lift.smooth.chain import Around, Freedom, Segment, overlapping
 from gait.lift.smooth.motion import Unlike
+from gait.lift.smooth.options import METHODS, Options
 from gait.lift.smooth.smoother import Observed, Start, smooth
 
 FRAMES, MARKERS, BLOCKS = 6, 5, 4
@@ -209,7 +210,7 @@ def test_scale_does_not_drift_with_noise():
         prior,
         keypoints,
         Perspective(camera),
-        motion.Options(contact=False, bones=False),
+        Options(contact=False, bones=False),
         prior.names,
     )
     size = np.linalg.norm(found.places - found.places.mean(axis=1, keepdims=True))
@@ -276,7 +277,7 @@ def test_lifting_needs_four_frames():
     )
     view = Parallel(looking_along("y"), 1.0, np.zeros(2))
     with pytest.raises(motion.UserError, match="4 or more"):
-        motion.lift(prior, keypoints, view, motion.Options(), prior.names)
+        motion.lift(prior, keypoints, view, Options(), prior.names)
 
 
 def lifted_by(monkeypatch, outcomes):
@@ -300,7 +301,7 @@ def lifted_by(monkeypatch, outcomes):
     monkeypatch.setattr(motion, "_lift", attempt)
     keypoints = Keypoints(np.arange(9), np.arange(9) / 20, prior.names, np.ones((9, 4, 2)), np.ones((9, 4)))
     view = Parallel(looking_along("y"), 1.0, np.zeros(2))
-    return motion.lift(prior, keypoints, view, motion.Options(), prior.names), pending
+    return motion.lift(prior, keypoints, view, Options(), prior.names), pending
 
 
 def test_a_wider_prior_is_tried_where_a_narrow_one_fails(monkeypatch):
@@ -333,7 +334,7 @@ def test_restricted_prior_is_its_marginal(prior):
     assert Grid.over(np.array([0.0, 1.0]), uneven.restricted(uneven.names)).blocks == 7
 
 
-@pytest.mark.parametrize("method", motion.METHODS)
+@pytest.mark.parametrize("method", METHODS)
 def test_without_a_camera_the_lowest_feet_are_on_the_floor(method):
     prior = toy_prior(FRAMES, 19, 4, seed=5)
     time = np.arange(FRAMES * 2) / 20
@@ -341,7 +342,7 @@ def test_without_a_camera_the_lowest_feet_are_on_the_floor(method):
     view = Parallel(looking_along("y"), 1.0, np.array([0.0, 3.0]))  # v begins anywhere
     uv = view.project(places, np.ones(len(time)))
     keypoints = Keypoints(np.arange(len(time)), time, prior.names, uv, np.ones(uv.shape[:2]))
-    options = motion.Options(method=method, stature=1.7, pixel_sd=0.01, contact=False, bones=False)
+    options = Options(method=method, stature=1.7, pixel_sd=0.01, contact=False, bones=False)
     view = replace(view, origin=np.nanmean(uv, axis=(0, 1)))
     found = motion.lift(prior, keypoints, view, options, prior.names)
     feet = [n for n, name in enumerate(prior.names) if name.endswith(("_toe", "_heel", "_ankle"))]
@@ -349,7 +350,7 @@ def test_without_a_camera_the_lowest_feet_are_on_the_floor(method):
     assert feet and np.quantile(found.places[:, feet, 2].min(axis=1), 0.1) == pytest.approx(floor)
 
 
-@pytest.mark.parametrize("method", motion.METHODS)
+@pytest.mark.parametrize("method", METHODS)
 def test_sd_about_the_hips_are_those_of_differences(method):
     """About the hips the common displacement, which a far view does not show, drops out."""
     prior = toy_prior(FRAMES, 12, 4, seed=5)
@@ -359,7 +360,7 @@ def test_sd_about_the_hips_are_those_of_differences(method):
     view = Parallel(looking_along("y"), 1.0, np.zeros(2))
     uv = view.project(places, np.ones(len(time)))
     keypoints = Keypoints(np.arange(len(time)), time, prior.names, uv, np.ones(uv.shape[:2]))
-    options = motion.Options(method=method, stature=1.7, pixel_sd=0.01, contact=False, bones=False)
+    options = Options(method=method, stature=1.7, pixel_sd=0.01, contact=False, bones=False)
     found = motion.lift(prior, keypoints, view, options, prior.names)
     assert found.sd[..., 1].min() > 5 and found.rooted_sd[..., 1].max() < 1  # metres
     hips = [prior.names.index(name) for name in smoother.HIPS]
@@ -380,7 +381,7 @@ def test_numbers_out_of_range_are_refused_in_one_line(monkeypatch):
     view = Perspective(Camera.looking((0, -4, 1.5), (0, 0, 0.9), (640, 480), 600))
     for method in ("smooth", "blend"):
         with pytest.raises(UserError, match="no motion that the model knows"):
-            motion.lift(prior, keypoints, view, motion.Options(method=method), prior.names)
+            motion.lift(prior, keypoints, view, Options(method=method), prior.names)
 
 
 def test_nothing_before_the_lens_is_refused_in_one_line(monkeypatch):
@@ -396,7 +397,7 @@ def test_nothing_before_the_lens_is_refused_in_one_line(monkeypatch):
     keypoints = Keypoints(np.arange(12), np.arange(12) / 20.0, prior.names, uv, np.ones((12, 19)))
     monkeypatch.setattr(smoother, "rows_of", none)
     with pytest.raises(UserError, match="v points down"):
-        motion.lift(prior, keypoints, Perspective(camera), motion.Options(), prior.names)
+        motion.lift(prior, keypoints, Perspective(camera), Options(), prior.names)
 
 
 def test_variances_below_zero_by_rounding_are_zero():

@@ -14,12 +14,11 @@ from gait.cli import main
 from gait.errors import UserError
 from gait.io import blob
 from gait.io.video import Video
-from gait.simulate import FILES, PRESETS, Scenario
 from gait.simulate.body import PARENTS, POINT_BONE, POINTS, Mesh
-from gait.simulate.clip import background, find_events, pictures, simulate
+from gait.simulate.clip import FILES, background, find_events, pictures, simulate
 from gait.simulate.curves import NAMES, fourier, normative
 from gait.simulate.render import rasterise
-from gait.simulate.scenario import VIEWS
+from gait.simulate.scenario import PRESETS, VIEWS, Scenario
 from gait.simulate.stage import Stage, build_set, set_stage
 
 TINY = Scenario(frames=5, size=(160, 120), seed=3)

@@ -28,6 +28,11 @@ ABI = 7
 ALIGN = 64
 MAX_JOINTS, MAX_ANGLES, MAX_COMPONENTS, MAX_PROPORTIONS, MAX_CAMERAS = 32, 32, 16, 8, 4
 MAX_HYPOTHESES, MAX_PEOPLE = 8, 4  # of a start
+SEGMENT_HEADINGS = (
+    0,
+    2,
+    8,
+)  # turned copies of training segments; 0: heading unknown when lifting
 
 
 class Status(IntEnum):

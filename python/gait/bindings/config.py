@@ -5,17 +5,18 @@ from __future__ import annotations
 import ctypes
 import math
 import operator
-from collections.abc import Iterator
+from collections.abc import Iterator, Sized
 from dataclasses import dataclass
-from typing import Any, ClassVar, TypeVar
-
-import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from typing import TYPE_CHECKING, Any, ClassVar, TypeVar
 
 from gait.bindings import abi
 from gait.bindings.library import library, struct_fields
-from gait.bindings.model import camera_c
-from gait.camera.camera import Camera
+
+if TYPE_CHECKING:
+    import numpy as np  # at run time where it is used: --help shows defaults
+    from numpy.typing import ArrayLike, NDArray
+
+    from gait.camera.camera import Camera
 
 _C = TypeVar("_C", bound="Config")
 
@@ -129,9 +130,9 @@ def _put(c: Any, name: str, value: Any) -> None:
     """Set a field; ctypes would cut a number that does not fit it."""
     old = getattr(c, name)
     if isinstance(old, ctypes.Array):
-        if np.size(value) != len(old):
+        if not isinstance(value, Sized) or len(value) != len(old):
             raise ValueError(f"config {name}: give {len(old)} numbers")
-        old[:] = value
+        old[:] = value  # type: ignore[call-overload]
         return
     whole = isinstance(old, int)
     try:
@@ -195,6 +196,9 @@ class LiftConfig(Config):
 
     def to_c(self, view: Camera | ArrayLike) -> Any:
         """Make a ``gait_lift_config`` for a camera, or for the directions (2, 3) of u and v in the world."""
+        from gait.bindings.model import camera_c
+        from gait.camera.camera import Camera
+
         c = self._filled(0)
         self._fill(c)
         if isinstance(view, Camera):
@@ -208,6 +212,8 @@ class LiftConfig(Config):
 
 def _axes(view: ArrayLike) -> NDArray[np.float64]:
     """Directions (2, 3) of u and v."""
+    import numpy as np
+
     try:
         return np.asarray(view, np.float64).reshape(2, 3)
     except (TypeError, ValueError):

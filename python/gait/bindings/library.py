@@ -8,14 +8,15 @@ import functools
 import os
 from collections.abc import Iterator
 from pathlib import Path
-from typing import Any
-
-import numpy as np
-from numpy.typing import NDArray
+from typing import TYPE_CHECKING, Any
 
 from gait._version import __version__
 from gait.bindings import abi
 from gait.errors import GaitArgumentError, GaitError, GaitLimitError, LibraryError
+
+if TYPE_CHECKING:
+    import numpy as np  # at run time where it is used, so that --help answers at once
+    from numpy.typing import NDArray
 
 _HERE = Path(__file__).resolve().parents[1]
 _WHOLE = tuple("bBhHiIlLqQ")  # codes of ctypes' whole numbers
@@ -128,6 +129,8 @@ def make(kind: str, *arguments: Any) -> tuple[ctypes.c_void_p, NDArray[np.uint8]
 
 def aligned(size: int) -> NDArray[np.uint8]:
     """Memory of `size` bytes at an address that is a multiple of GAIT_ALIGN."""
+    import numpy as np
+
     space = np.zeros(size + abi.ALIGN, np.uint8)
     skip = -space.ctypes.data % abi.ALIGN
     return space[skip : skip + size]

@@ -23,7 +23,6 @@ Floats = npt.NDArray[np.float64]
 
 #: Sections of a blob that hold the prior: all of them, or none.
 TAGS = ("SGNM", "SGIN", "SGRT", "SGWT", "SGMN", "SGMD", "SGSD", "SGPS")
-HEADINGS = (0, 2, 8)  # turned copies of every training segment; 0: the heading is unknown when lifting
 
 
 @dataclass(frozen=True)

@@ -1,7 +1,9 @@
 """The ``gait`` command.
 
 Each command is a row of ``COMMANDS`` and a module here with ``add_arguments(parser)`` and
-``run(args) -> int``.  The module's docstring is the text of ``--help``; its ``EXAMPLES``, if any, come last.
+``run(args) -> int``.  The module's docstring is the text of ``--help``; its ``EXAMPLES`` come last.  It
+imports what its options need; everything heavier, NumPy included, is imported in the functions that use it,
+so that ``--help`` and wrong usage answer at once.
 Every command gets ``--quiet``, and ``--json`` unless the module has ``JSON = False``.  Figures go to stdout,
 notes and progress to stderr.
 Exit codes are 0 for success, 1 for a failure, 2 for wrong usage.

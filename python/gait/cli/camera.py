@@ -16,20 +16,17 @@ from __future__ import annotations
 import argparse
 import json
 from pathlib import Path
+from typing import TYPE_CHECKING
 
-import numpy as np
-
-from gait.bindings.model import Model
-from gait.camera.camera import MAX_PIXELS, Camera, read_camera, write_camera
-from gait.camera.placing import place, read_points
 from gait.cli import values
 from gait.errors import UsageError
-from gait.io import keypoints_file
 from gait.io.files import replacing, require_outputs
-from gait.io.video import Video
 from gait.progress import note
-from gait.track.from_walk import Calibration, calibrate
-from gait.track.walk_camera import calibrate_film, find_person
+
+if TYPE_CHECKING:
+    from gait.bindings.model import Model
+    from gait.camera.camera import Camera
+    from gait.track.from_walk import Calibration
 
 _LARGE = 3.0  # pixels, rms, above which the points should be checked
 
@@ -59,6 +56,11 @@ def run(args: argparse.Namespace) -> int:
 
 
 def _from_points(args: argparse.Namespace) -> int:
+    import numpy as np
+
+    from gait.camera.camera import read_camera
+    from gait.camera.placing import place, read_points
+
     if not args.points or not args.lens:
         raise UsageError("give POINTS.csv and --lens FILE, or --walk VIDEO and --height M")
     if args.height or args.size or args.fov:
@@ -83,6 +85,8 @@ def _from_points(args: argparse.Namespace) -> int:
 
 
 def _from_walk(args: argparse.Namespace) -> int:
+    from gait.bindings.model import Model
+
     if args.points or args.lens:
         raise UsageError("--walk finds the camera by itself; leave out POINTS.csv and --lens")
     if args.height is None:
@@ -97,6 +101,11 @@ def _from_walk(args: argparse.Namespace) -> int:
 
 def _calibrate(args: argparse.Namespace, model: Model) -> Calibration:
     """Find the camera of a film, or of a file of keypoints."""
+    from gait.io import keypoints_file
+    from gait.io.video import Video
+    from gait.track.from_walk import calibrate
+    from gait.track.walk_camera import calibrate_film, find_person
+
     if Path(args.walk).suffix.lower() == ".csv":
         if args.size is None:
             raise UsageError(f"{args.walk}: give the size of the picture in pixels, as --size 1280x720")
@@ -111,6 +120,8 @@ def _calibrate(args: argparse.Namespace, model: Model) -> Calibration:
 
 def _size(text: str) -> tuple[int, int]:
     """Width and height as 1280x720."""
+    from gait.camera.camera import MAX_PIXELS
+
     width, cross, height = text.lower().partition("x")
     if not cross or not (width.isdigit() and height.isdigit()):
         raise argparse.ArgumentTypeError(f"{text}: give width and height in pixels, as 1280x720")
@@ -121,5 +132,7 @@ def _size(text: str) -> tuple[int, int]:
 
 
 def _write(path: str, camera: Camera) -> None:
+    from gait.camera.camera import write_camera
+
     with replacing(path) as temporary:
         write_camera(temporary, camera)

@@ -19,21 +19,19 @@ import json
 from collections.abc import Iterator
 from contextlib import closing, suppress
 from itertools import chain
+from typing import TYPE_CHECKING
 
-import cv2
-import numpy as np
-
-from gait.bindings.initial import OUTSIDE, Start
-from gait.bindings.model import Model
-from gait.camera.camera import Camera
 from gait.cli import values
 from gait.cli.signals import Interruptible
 from gait.errors import UsageError, UserError
 from gait.io.files import require_unread
-from gait.io.video import Frame, background, read_plate
-from gait.lcm.capture import DeviceSource, FileSource, Pacer, Publisher, Setup, is_device, parse_rate
 from gait.lcm.link import buffer_warning, is_log, lcm_url, log_of
 from gait.progress import note, progress
+
+if TYPE_CHECKING:
+    from gait.bindings.initial import Start
+    from gait.io.video import Frame
+    from gait.lcm.capture import DeviceSource, FileSource, Pacer, Publisher, Setup
 
 EXAMPLES = """\
 examples:
@@ -74,6 +72,8 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 def run(args: argparse.Namespace) -> int:
     """Send and report."""
+    from gait.lcm.capture import Publisher, parse_rate
+
     url, rate = lcm_url(args.url), parse_rate(args.rate)
     _require_sense(args, url)
     with Interruptible() as signals:
@@ -109,6 +109,8 @@ def _send(
     signals: Interruptible,
 ) -> Pacer:
     """Send all frames, or until an interrupt, which is the way to end a camera or a loop."""
+    from gait.lcm.capture import DeviceSource
+
     if args.wait > 0:
         publisher.meet(args.wait)
     frames = _primed(source)
@@ -121,6 +123,8 @@ def _send(
 
 def _primed(source: FileSource | DeviceSource) -> Iterator[Frame]:
     """Frames of the source; the first of a file is already decoded, as it may take long to find."""
+    from gait.lcm.capture import DeviceSource
+
     frames = source.frames()
     if isinstance(source, DeviceSource):
         return frames
@@ -128,6 +132,8 @@ def _primed(source: FileSource | DeviceSource) -> Iterator[Frame]:
 
 
 def _source(args: argparse.Namespace) -> FileSource | DeviceSource:
+    from gait.lcm.capture import DeviceSource, FileSource, is_device
+
     if not is_device(args.source):
         return FileSource(args.source, args.start, args.stop, grey=args.grey, loop=args.loop)
     if args.start or args.stop is not None or args.loop or args.rate != "true" or args.background == "auto":
@@ -138,6 +144,13 @@ def _source(args: argparse.Namespace) -> FileSource | DeviceSource:
 
 
 def _setup(args: argparse.Namespace, source: FileSource | DeviceSource) -> Setup:
+    import cv2
+    import numpy as np
+
+    from gait.camera.camera import Camera
+    from gait.io.video import background, read_plate
+    from gait.lcm.capture import DeviceSource, FileSource, Setup
+
     setup = Setup(stream=args.stream, jpeg=args.jpeg)
     if args.camera:
         setup.camera = Camera.read(args.camera, source.size)
@@ -164,6 +177,10 @@ def _setup(args: argparse.Namespace, source: FileSource | DeviceSource) -> Setup
 
 
 def _start(args: argparse.Namespace, source: FileSource | DeviceSource, setup: Setup) -> Start:
+    from gait.bindings.initial import OUTSIDE, Start
+    from gait.bindings.model import Model
+    from gait.lcm.capture import DeviceSource
+
     model = Model(args.model)
     if args.init != "auto":
         start = Start.read(args.init, model, height=args.height)

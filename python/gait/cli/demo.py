@@ -19,8 +19,6 @@ from pathlib import Path
 
 from gait.cli import values
 from gait.cli.record import text as recording_text
-from gait.lcm.demo import RESULTS, Demo
-from gait.motion.evaluate import as_text
 
 _ROOT = Path(__file__).resolve().parents[3]
 _TRACKD = _ROOT / "build" / "bin" / "gait-trackd"
@@ -70,6 +68,9 @@ def _threads() -> int:
 
 def run(args: argparse.Namespace) -> int:
     """Run the demo and print its figures."""
+    from gait.lcm.demo import RESULTS, Demo
+    from gait.motion.evaluate import as_text
+
     given = {name: getattr(args, name) for name in Demo.__dataclass_fields__} | {"output": Path(args.output)}
     recording, measures = Demo(**given).run()
     if args.json:

@@ -19,8 +19,6 @@ from gait.cli.signals import Interruptible
 from gait.detect import weights
 from gait.errors import UsageError, UserError
 from gait.io.files import require_outputs
-from gait.io.keypoints_file import write
-from gait.io.video import Video
 from gait.progress import note, progress
 
 _TURN = 0.1  # seconds that one call waits for a message
@@ -84,6 +82,9 @@ def _live(args: argparse.Namespace) -> int:
 
 def run(args: argparse.Namespace) -> int:
     """Fetch, answer, or detect and write."""
+    from gait.io.keypoints_file import write
+    from gait.io.video import Video
+
     if args.fetch:
         folder = weights.fetch(lambda line: args.quiet or print(line, file=sys.stderr))
         print(json.dumps({"folder": str(folder)}) if args.json else f"weights in {folder}")

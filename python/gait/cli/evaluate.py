@@ -19,17 +19,14 @@ import argparse
 import json
 import os
 from pathlib import Path
+from typing import TYPE_CHECKING
 
-import numpy as np
-
-from gait.bindings.model import read_cyclic
-from gait.camera.camera import Camera
 from gait.cli import values
 from gait.errors import UserError
-from gait.io.track_file import Joints, read_estimates, read_truth
-from gait.motion.evaluate import as_text, evaluate
-from gait.motion.footfalls import strikes_of
 from gait.progress import note
+
+if TYPE_CHECKING:
+    from gait.io.track_file import Joints
 
 DRIFT = 0.1  # seconds by which times of paired frames may run apart
 
@@ -50,6 +47,12 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 def run(args: argparse.Namespace) -> int:
     """Read, compare, print."""
+    from gait.bindings.model import read_cyclic
+    from gait.camera.camera import Camera
+    from gait.io.track_file import read_estimates, read_truth
+    from gait.motion.evaluate import as_text, evaluate
+    from gait.motion.footfalls import strikes_of
+
     if os.path.realpath(args.track) == os.path.realpath(args.truth):
         raise UserError(f"{args.track}: is given as the track and as its truth; give two files")
     truth = read_truth(args.truth)
@@ -76,5 +79,7 @@ def run(args: argparse.Namespace) -> int:
 
 def _drift(track: Joints, truth: Joints) -> float:
     """Seconds by which the times of frames of the same numbers run apart, wherever both count from."""
+    import numpy as np
+
     _, ours, theirs = np.intersect1d(track.frame, truth.frame, return_indices=True)
     return float(np.ptp(track.time[ours] - truth.time[theirs])) if ours.size else 0.0

@@ -8,14 +8,6 @@ import os
 from collections.abc import Mapping
 from typing import Any
 
-import numpy as np
-
-from gait.bindings.segment_prior import TAGS, SegmentPrior
-from gait.body.model_curves import slope_of
-from gait.io import blob
-from gait.io.fields import json_of
-from gait.learn.segments import summary as segment_summary
-
 GAIT = (
     "stride_hz", "stride_hz_sd", "stride_time_cv", "stride_length", "stride_length_sd", "fps", "stature_m",
     "stature_sd_m",
@@ -36,6 +28,8 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 def run(args: argparse.Namespace) -> int:
     """Read and print."""
+    from gait.io import blob
+
     sections = blob.read(args.model)
     summary = describe(sections, os.path.getsize(args.model), blob.stored_checksum(args.model), args.model)
     print(json.dumps(summary) if args.json else text(args.model, summary))
@@ -44,6 +38,14 @@ def run(args: argparse.Namespace) -> int:
 
 def describe(sections: Mapping[str, Any], size: int, crc: int, name: str = "blob") -> dict[str, Any]:
     """Figures of a model, called `name` in errors; a section that is absent gives no entry."""
+    import numpy as np
+
+    from gait.bindings.segment_prior import TAGS, SegmentPrior
+    from gait.body.model_curves import slope_of
+    from gait.io import blob
+    from gait.io.fields import json_of
+    from gait.learn.segments import summary as segment_summary
+
     result: dict[str, Any] = {
         "bytes": size,
         "crc32": f"{crc:08x}",
@@ -69,6 +71,8 @@ def describe(sections: Mapping[str, Any], size: int, crc: int, name: str = "blob
 
 def text(name: str, s: Mapping[str, Any]) -> str:
     """Lay the figures out for people."""
+    from gait.learn.segments import summary as segment_summary
+
     meta, gait = s.get("meta", {}), s.get("gait", {})
     lines = [f"{name}: {s['bytes']} bytes, checksum {s['crc32']}"]
     if "generator" in meta:

@@ -25,7 +25,6 @@ from pathlib import Path
 from gait.cli import values
 from gait.errors import UsageError
 from gait.learn.corpus import forkserver
-from gait.learn.mocap import markers
 from gait.learn.options import (
     DEFAULT_COMPONENTS,
     MOST_COMPONENTS,
@@ -41,9 +40,10 @@ from gait.learn.options import (
 )
 
 EXAMPLES = """\
-gait learn recordings/ -o M.gait --report report
-gait learn walk_01.trc walk_02.trc -o M.gait --markers map.json
-gait learn ../shared/data/mocap/cmu_walk -o python/gait/data/walk.gait    # the model in the package
+examples:
+  gait learn recordings/ -o model.gait --report report
+  gait learn walk_01.trc walk_02.trc -o model.gait --markers map.json
+  gait learn ../shared/data/mocap/cmu_walk -o python/gait/data/walk.gait    # the model in the package
 """
 
 AUTO = "auto"
@@ -178,6 +178,8 @@ def run(args: argparse.Namespace) -> int:
 
 def _options(args: argparse.Namespace) -> LearnOptions:
     """Collect the options of a run."""
+    from gait.learn.mocap import markers
+
     if args.dask and args.jobs:
         raise UsageError("--jobs is for this machine and --dask for a cluster; give one of them")
     given = {field.name: vars(args)[field.name] for field in fields(LearnOptions) if field.name in vars(args)}

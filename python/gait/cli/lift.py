@@ -27,29 +27,18 @@ from collections.abc import Callable
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-import numpy as np
-
-from gait.bindings.model import Model, read_blob
-from gait.bindings.state import state_range
-from gait.body.skeleton import JOINTS
-from gait.camera.camera import Camera, read_camera, write_camera
 from gait.cli import values
 from gait.errors import UsageError, UserError
-from gait.io.blob import decode
-from gait.io.detector_formats import foreign_format
 from gait.io.files import replacing, require_outputs
-from gait.io.keypoints_file import FURTHEST, Keypoints
-from gait.io.track_file import write_lifted
-from gait.io.trc import write_trc
-from gait.lift import run as lift_run
-from gait.lift.segment.explain import Uncertain
-from gait.lift.segment.view import Perspective
-from gait.lift.smooth import motion
-from gait.track.camera_check import contradiction
+from gait.lift.smooth.options import METHODS, Options
 
 if TYPE_CHECKING:
+    from gait.bindings.model import Model
     from gait.bindings.segment_prior import SegmentPrior
+    from gait.io.keypoints_file import Keypoints
     from gait.io.video import Video
+    from gait.lift.segment.explain import Uncertain
+    from gait.lift.smooth.motion import Motion
     from gait.track.from_walk import Calibration
 
 EXAMPLES = """\
@@ -77,7 +66,7 @@ _ONLY_KEYPOINTS = (
 )
 _ONLY_PICTURES = ("corrections", "background", "alone", "overlay", "suggest")
 _ONLY_VIDEO = ("placement", *_ONLY_PICTURES, "start", "stop", "fov", "camera_out")
-PIXEL_SD, FLOOR_SD = motion.Options.pixel_sd, motion.Options.floor_sd  # pixels, metres
+PIXEL_SD, FLOOR_SD = Options.pixel_sd, Options.floor_sd  # pixels, metres
 MOVED = 3  # joints named that a displacement moves most
 WHOLE = 0.5  # share of a displacement's energy from which it moves the whole body
 UNKNOWN_MM = 1000.0  # a displacement less certain than that is the distance, in a view without perspective
@@ -118,7 +107,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     )
     add(
         "--pixel-sd",
-        type=values.between(1e-6, FURTHEST, "a standard deviation"),
+        type=values.between(1e-6, 1e6, "a standard deviation"),
         metavar="SD",
         help="standard deviation of u and v at full confidence, in their unit (default: how much the points "
         f"jitter from frame to frame, at least {PIXEL_SD:g})",
@@ -132,7 +121,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     )
     add(
         "--method",
-        choices=motion.METHODS,
+        choices=METHODS,
         help="smooth (default): one Gaussian over the whole sequence; blend: overlapping segments, each "
         "estimated alone and blended as in the paper; segment: one after another; likelihood: like blend, "
         "but without the prior of the modes (least squares), for comparison",
@@ -197,6 +186,8 @@ def _add_video_arguments(parser: argparse.ArgumentParser) -> None:
 
 def run(args: argparse.Namespace) -> int:
     """Lift keypoints or a video."""
+    from gait.io.detector_formats import foreign_format
+
     suffix = Path(args.input).suffix.lower()
     video = suffix not in (".csv", ".tsv", ".txt") and bool(suffix or args.placement)
     if video and not set("%:") & set(args.input) and not Path(args.input).exists():
@@ -222,6 +213,12 @@ def warner(quiet: bool) -> Callable[[str], None]:
 
 def _lift_keypoints(args: argparse.Namespace, video: bool) -> tuple[dict[str, Any], str]:
     """Lift keypoints of a file, or found in a video; the summary, and in words."""
+    from gait.io.track_file import write_lifted
+    from gait.io.trc import write_trc
+    from gait.lift import run as lift_run
+    from gait.lift.segment.view import Perspective
+    from gait.track.camera_check import contradiction
+
     _check(args, video)
     warn = warner(args.quiet)
     prior = lift_run.load_prior(args.model, warn)
@@ -260,6 +257,7 @@ def _lift_keypoints(args: argparse.Namespace, video: bool) -> tuple[dict[str, An
 
 def _find_keypoints(args: argparse.Namespace, prior: SegmentPrior) -> tuple[Keypoints, Calibration | None]:
     """Find the keypoints of the person in a video and, unless the view is given, the camera."""
+    from gait.camera.camera import Camera
     from gait.io.video import Video  # PyAV, and below OpenCV, which files of keypoints do not need
     from gait.track.walk_camera import find_person
 
@@ -284,12 +282,17 @@ def _calibrate(args: argparse.Namespace, video: Video, keypoints: Keypoints) -> 
 
 def _walking_model(args: argparse.Namespace) -> Model:
     """Model with curves of walking: the model's own or, if it has a segment prior alone, the shipped ones."""
+    from gait.bindings.model import Model, read_blob
+    from gait.io.blob import decode
+
     own = args.model and "CURV" in decode(read_blob(args.model))
     return Model(args.model if own else None)
 
 
 def _write_camera(args: argparse.Namespace, calibration: Calibration | None) -> None:
     """Write the camera, found or given, if asked to."""
+    from gait.camera.camera import read_camera, write_camera
+
     if args.camera_out:
         with replacing(args.camera_out) as temporary:
             write_camera(temporary, read_camera(args.camera) if calibration is None else calibration.camera)
@@ -297,7 +300,10 @@ def _write_camera(args: argparse.Namespace, calibration: Calibration | None) -> 
 
 def _lift_pictures(args: argparse.Namespace) -> tuple[dict[str, Any], str]:
     """Lift the pictures of a video; the summary, and in words."""
+    from gait.body.skeleton import JOINTS
+    from gait.io.track_file import write_lifted
     from gait.io.video import Video, require_video_name  # OpenCV and PyAV, which keypoints do not need
+    from gait.lift import run as lift_run
     from gait.lift.video import run as video_run
     from gait.track.walk_camera import find_person
 
@@ -335,9 +341,9 @@ def _lift_pictures(args: argparse.Namespace) -> tuple[dict[str, Any], str]:
     return summary, _video_text(summary)
 
 
-def _options(args: argparse.Namespace) -> motion.Options:
-    return motion.Options(
-        args.method or motion.METHODS[0],
+def _options(args: argparse.Namespace) -> Options:
+    return Options(
+        args.method or METHODS[0],
         args.height,
         args.pixel_sd or PIXEL_SD,
         args.floor_sd or FLOOR_SD,
@@ -371,8 +377,12 @@ def _require_own(args: argparse.Namespace, video: bool) -> None:
         raise UsageError("--camera-out: there is no camera; give --camera, or --height for one from the walk")
 
 
-def _require_person(args: argparse.Namespace, found: motion.Motion) -> None:
+def _require_person(args: argparse.Namespace, found: Motion) -> None:
     """Refuse an estimate that no person can be."""
+    import numpy as np
+
+    from gait.bindings.state import state_range
+
     if not np.isfinite(found.error).any():
         raise UserError(f"{args.input}: the estimate lies behind the camera; check the camera and the names")
     low, high = state_range("stature")
@@ -403,11 +413,13 @@ def _rate(keypoints: Keypoints) -> float:
     return float((len(time) - 1) / (time[-1] - time[0])) if len(time) > 1 else 1.0
 
 
-def _summary(args: argparse.Namespace, keypoints: Keypoints, found: motion.Motion) -> dict[str, Any]:
+def _summary(args: argparse.Namespace, keypoints: Keypoints, found: Motion) -> dict[str, Any]:
     """Figures of ``--json``."""
+    import numpy as np
+
     return {
         "frames": len(keypoints.frame),
-        "method": args.method or motion.METHODS[0],
+        "method": args.method or METHODS[0],
         "markers": {"visible": list(keypoints.names), "estimated": list(found.names)},
         "visible_share": float(keypoints.visible.mean()),
         "reprojection_px": float(np.nanmedian(found.error)),
@@ -427,6 +439,8 @@ def _summary(args: argparse.Namespace, keypoints: Keypoints, found: motion.Motio
 
 def _segments(left: Uncertain, names: tuple[str, ...]) -> dict[str, Any]:
     """Medians over segments, each alone: volume, the displacements least certain and what they move most."""
+    import numpy as np
+
     most = np.argsort(-left.shares, axis=1, kind="stable")[:, :MOVED]
     figures = {
         "sd_mm": (1000 * left.sd).tolist(),

@@ -21,8 +21,9 @@ from gait.errors import UsageError
 from gait.io.files import require_outputs
 
 EXAMPLES = """\
-gait paper --mocap recordings/ -o paper.html
-gait paper --mocap recordings/ --video walk.mp4 --camera camera.json --init init.json -o paper.html
+examples:
+  gait paper --mocap recordings/ -o paper.html
+  gait paper --mocap recordings/ --video walk.mp4 --camera camera.json --init init.json -o paper.html
 """
 CLIP = ("camera", "init", "background", "corrections")
 

@@ -22,7 +22,6 @@ from gait.cli import values
 from gait.ending import ending_signals
 from gait.io.files import require_outputs
 from gait.lcm.link import is_log, lcm_url, log_of
-from gait.lcm.record import ESTIMATE, LAGGED, LISTENING, Recorder
 from gait.progress import note
 
 EXAMPLES = """\
@@ -46,6 +45,8 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 def run(args: argparse.Namespace) -> int:
     """Record and report."""
+    from gait.lcm.record import ESTIMATE, LAGGED, LISTENING, Recorder
+
     url = lcm_url(args.url)
     require_outputs((args.output, args.log), (log_of(url)[0] if is_log(url) else None,))
     recorder = Recorder(url, args.output, args.log, LAGGED if args.lagged else ESTIMATE)

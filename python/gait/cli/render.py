@@ -11,17 +11,15 @@ coef [c1, c2, ...].  The rest is that of the average person, standing on the gro
 from __future__ import annotations
 
 import argparse
+from typing import TYPE_CHECKING
 
-import cv2
-
-from gait.bindings.model import Model
-from gait.bindings.state import POSE_SCALARS, State
-from gait.camera.camera import Camera
 from gait.cli import values
 from gait.errors import UserError
-from gait.io.fields import Fields, read_json
 from gait.io.files import replacing, require_outputs
-from gait.report.drawing import default_view, draw_sheet, draw_standing
+
+if TYPE_CHECKING:
+    from gait.bindings.model import Model
+    from gait.bindings.state import State
 
 JSON = False
 
@@ -48,6 +46,12 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 def run(args: argparse.Namespace) -> int:
     """Draw and write."""
+    import cv2
+
+    from gait.bindings.model import Model
+    from gait.camera.camera import Camera
+    from gait.report.drawing import default_view, draw_sheet, draw_standing
+
     require_outputs((args.output,), (args.model, args.camera, args.state))
     model = Model(args.model)
     if args.strip:
@@ -68,6 +72,9 @@ def run(args: argparse.Namespace) -> int:
 
 def _state(args: argparse.Namespace, model: Model) -> State:
     """State of --phase or --state; on the ground at the origin unless placed."""
+    from gait.bindings.state import POSE_SCALARS, State
+    from gait.io.fields import Fields, read_json
+
     state = State(stride_hz=model.info.stride_hz)
     if args.phase is not None:
         state.phase = args.phase % 1.0

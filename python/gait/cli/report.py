@@ -13,13 +13,12 @@ from gait.cli import values
 from gait.errors import UserError
 from gait.io.files import require_outputs
 from gait.lcm.link import break_of
-from gait.lcm.report import write_report
-from gait.motion.evaluate import as_text
 
 EXAMPLES = """\
 examples:
   gait report estimates.log --track track.csv --video walk.mp4 --camera camera.json -o report.html \\
       --overlay overlay.mp4
+  gait report all.log --track track.csv --video walk.mp4 --camera camera.json -o report.html --replayed
 """
 
 
@@ -38,6 +37,9 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 def run(args: argparse.Namespace) -> int:
     """Draw, write, print."""
+    from gait.lcm.report import write_report
+    from gait.motion.evaluate import as_text
+
     require_outputs(
         (args.output, args.overlay), (args.log, args.track, args.video, args.camera, args.truth, args.model)
     )

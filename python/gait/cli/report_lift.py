@@ -14,32 +14,35 @@ import html
 import json
 from collections.abc import Iterator
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
-import numpy as np
-import numpy.typing as npt
-
-from gait.bindings.segment_prior import SegmentPrior
 from gait.cli import values
 from gait.cli.lift import warner
 from gait.errors import UsageError, UserError
 from gait.io.files import filling, require_folder
-from gait.io.keypoints_file import Keypoints
 from gait.learn.options import SegmentOptions
-from gait.learn.segments import corpus as segment_corpus
-from gait.learn.segments import motion as segment_motion
-from gait.learn.segments.corpus import Corpus
-from gait.learn.solve import readers
-from gait.lift import run as lift_run
-from gait.lift.report import motion_figures
-from gait.lift.report.segment_figures import Case, case, drawings
-from gait.lift.segment.view import View
-from gait.lift.smooth.motion import METHODS, Motion, Options
+from gait.lift.smooth.options import METHODS, Options
 from gait.progress import progress
-from gait.report.figures import Drawing
-from gait.report.page import Page
 
-Floats = npt.NDArray[np.float64]
+if TYPE_CHECKING:
+    import numpy as np
+    import numpy.typing as npt
+
+    from gait.bindings.segment_prior import SegmentPrior
+    from gait.io.keypoints_file import Keypoints
+    from gait.learn.segments import motion as segment_motion
+    from gait.lift.report.segment_figures import Case
+    from gait.lift.segment.view import View
+    from gait.lift.smooth.motion import Motion
+    from gait.report.figures import Drawing
+
+    Floats = npt.NDArray[np.float64]
+
+EXAMPLES = """\
+examples:
+  gait report lift -o figures
+  gait report lift --mocap walk_01.bvh --clip keypoints.csv --camera camera.json -o figures
+"""
 
 FIGURES = 5  # besides that of a clip
 
@@ -67,6 +70,10 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 def run(args: argparse.Namespace) -> int:
     """Draw, write, print."""
+    from gait.bindings.segment_prior import SegmentPrior
+    from gait.lift.report.segment_figures import case
+    from gait.report.page import Page
+
     if args.camera and not args.clip:
         raise UsageError("--camera is of a clip; give its keypoints with --clip")
     if args.method and not args.clip:
@@ -92,6 +99,8 @@ def run(args: argparse.Namespace) -> int:
 
 def _clip(args: argparse.Namespace, prior: SegmentPrior) -> tuple[Keypoints, Motion, View]:
     """Lift the keypoints of the clip as `gait lift` does."""
+    from gait.lift import run as lift_run
+
     request = lift_run.Request(
         Options(args.method or METHODS[0]), camera=args.camera, ignore_unknown=True, hints=False
     )
@@ -102,6 +111,9 @@ def _clip(args: argparse.Namespace, prior: SegmentPrior) -> tuple[Keypoints, Mot
 def _drawings(
     args: argparse.Namespace, shown: Case, lifted: tuple[Keypoints, Motion, View] | None
 ) -> Iterator[Drawing]:
+    from gait.lift.report import motion_figures
+    from gait.lift.report.segment_figures import drawings
+
     yield from drawings(shown, args.seed)
     if lifted:
         yield motion_figures.clip(*lifted, Path(args.clip).name)
@@ -109,6 +121,13 @@ def _drawings(
 
 def _segment(path: str, prior: SegmentPrior) -> tuple[Floats, float]:
     """Segment (F, J, 3) of a recording with the most motion, and the stature; metres."""
+    import numpy as np
+
+    from gait.learn.segments import corpus as segment_corpus
+    from gait.learn.segments import motion as segment_motion
+    from gait.learn.segments.corpus import Corpus
+    from gait.learn.solve import readers
+
     wanted = SegmentOptions(source="only", frames=prior.frames, hop=prior.hop, fps=prior.fps, people=False)
     read = segment_motion.of(Path(path), readers.read(Path(path)), wanted)
     unknown = [name for name in prior.names if name not in read.names]
@@ -128,6 +147,8 @@ def _segment(path: str, prior: SegmentPrior) -> tuple[Floats, float]:
 
 def _why_no_segment(read: segment_motion.Motion, prior: SegmentPrior) -> str:
     """Explain why a recording has no segment with all markers of a prior."""
+    import numpy as np
+
     wanted = prior.frames / prior.fps
     if len(read.places) < prior.frames:
         return f"lasts {len(read.places) / prior.fps:.2g} s, a segment of the model {wanted:g} s"
@@ -157,6 +178,7 @@ def _facts(prior: SegmentPrior) -> dict[str, str]:
 
 def _figures(c: Case) -> dict[str, Any]:
     """Figures of ``--json``: errors in mm per marker."""
+    import numpy as np
 
     def apart(found: Floats) -> float:
         return 1000 * float(np.linalg.norm(found - c.truth, axis=2).mean())

@@ -14,16 +14,14 @@ from __future__ import annotations
 import argparse
 import json
 from pathlib import Path
+from typing import TYPE_CHECKING
 
-from gait.bindings.model import read_cyclic
-from gait.body.model_curves import ModelCurves
 from gait.cli import values
 from gait.errors import UserError
 from gait.io.files import filling, require_folder
-from gait.io.track_file import read_track
-from gait.motion.footfalls import Draws
-from gait.motion.parameters import Parameters, angle_cycles, as_json, measure, write_tables
-from gait.report.parameter_page import HEAD, parameter_page, parameter_rows
+
+if TYPE_CHECKING:
+    from gait.motion.parameters import Parameters
 
 EXAMPLES = """\
 examples:
@@ -44,6 +42,13 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 def run(args: argparse.Namespace) -> int:
     """Measure, write, print."""
+    from gait.bindings.model import read_cyclic
+    from gait.body.model_curves import ModelCurves
+    from gait.io.track_file import read_track
+    from gait.motion.footfalls import Draws
+    from gait.motion.parameters import angle_cycles, as_json, measure, write_tables
+    from gait.report.parameter_page import parameter_page
+
     source = Path(args.track)
     output = args.output or source.with_name(source.stem + "_gait")
     require_folder(output)
@@ -65,6 +70,8 @@ def run(args: argparse.Namespace) -> int:
 
 def _text(parameters: Parameters) -> str:
     """Table for the terminal."""
+    from gait.report.parameter_page import HEAD, parameter_rows
+
     rows = [list(HEAD), *parameter_rows(parameters)]
     widths = [max(len(row[k]) for row in rows) for k in range(len(HEAD))]
     lines = ["  ".join(cell.ljust(width) for cell, width in zip(row, widths, strict=True)) for row in rows]

@@ -21,8 +21,7 @@ from dataclasses import fields, replace
 from typing import Any
 
 from gait.progress import progress
-from gait.simulate import FILES, PRESETS, Scenario, simulate
-from gait.simulate.scenario import DIRECTIONS, GENERATOR, VIEWS
+from gait.simulate.scenario import DIRECTIONS, GENERATOR, PRESETS, VIEWS, Scenario
 
 EXAMPLES = """\
 examples:
@@ -66,6 +65,8 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 def run(args: argparse.Namespace) -> int:
     """Make the clip and print what is in it."""
+    from gait.simulate.clip import FILES, simulate
+
     scenario = replace(PRESETS[args.preset], **_given(args))
     begun = time.perf_counter()
     with progress("rendering", scenario.frames, args.quiet) as update:

@@ -37,7 +37,7 @@ from gait.bindings.abi import Mode, TrackStatus
 from gait.cli import values
 from gait.errors import UsageError
 from gait.io.files import require_outputs
-from gait.track.clip import KEYPOINTS_SD, ClipOptions, track_clip
+from gait.track.options import KEYPOINTS_SD
 
 EXAMPLES = """\
 examples:
@@ -107,6 +107,8 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 def run(args: argparse.Namespace) -> int:
     """Track and report."""
+    from gait.track.clip import ClipOptions, track_clip
+
     if args.stop is not None:
         values.require_order(args.start or 0, args.stop)
     if args.draws and not args.smooth:

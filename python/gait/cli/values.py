@@ -7,7 +7,6 @@ from collections.abc import Callable
 
 from gait.bindings.abi import Mode
 from gait.bindings.config import TrackerConfig
-from gait.bindings.state import state_range
 from gait.errors import LibraryError, UsageError
 
 PARTICLES = (16, 1 << 20)  # as in gait.h and gait-trackd, like those below
@@ -47,6 +46,8 @@ def between(low: float, high: float, unit: str) -> Callable[[str], float]:
 
 def stature(text: str) -> float:
     """Height of a person in metres."""
+    from gait.bindings.state import state_range  # here, as it loads NumPy
+
     low, high = state_range("stature")
     metres = _number(text)
     if not low <= metres <= high:

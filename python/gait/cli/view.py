@@ -9,19 +9,19 @@ from __future__ import annotations
 import argparse
 import contextlib
 import time
+from typing import TYPE_CHECKING
 
-import cv2
-
-from gait.bindings.model import Model
-from gait.camera.camera import Camera
 from gait.cli import values
 from gait.cli.signals import Interruptible
 from gait.errors import UserError
 from gait.io.files import replacing
-from gait.io.video import Image
 from gait.lcm.link import lcm_url
-from gait.lcm.viewer import Screen, Viewer
 from gait.progress import note
+
+if TYPE_CHECKING:
+    from gait.bindings.model import Model
+    from gait.camera.camera import Camera
+    from gait.io.video import Image
 
 JSON = False
 _TURN = 0.1  # seconds
@@ -53,6 +53,10 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 def run(args: argparse.Namespace) -> int:
     """Show or save."""
+    from gait.bindings.model import Model
+    from gait.camera.camera import Camera
+    from gait.lcm.viewer import Screen, Viewer
+
     camera = Camera.read(args.camera) if args.camera else None
     model, url = Model(args.model), lcm_url(args.url)
     if args.save:
@@ -71,6 +75,10 @@ def run(args: argparse.Namespace) -> int:
 
 
 def _save(args: argparse.Namespace, url: str, model: Model, camera: Camera | None) -> None:
+    import cv2
+
+    from gait.lcm.viewer import Viewer
+
     pictures: list[Image] = []
     with replacing(args.save) as path:
         viewer = Viewer(url, args.stream, model, camera, pictures.append)

@@ -3,9 +3,12 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import TYPE_CHECKING
 
-from gait.bindings.segment_prior import HEADINGS
-from gait.learn.mocap.markers import MarkerMap
+from gait.bindings import abi
+
+if TYPE_CHECKING:
+    from gait.learn.mocap.markers import MarkerMap
 
 DEFAULT_COMPONENTS = 8
 PAPER_COMPONENTS = 5
@@ -17,7 +20,7 @@ SUBJECT_RULES = ("auto", "prefix", "folder", "file")
 SEGMENT_SOURCES = ("learnt", "all", "none", "only")
 SEGMENT_MARKERS = ("virtual", "recorded")
 #: Turned copies of each segment as the command names them, and as the blob stores them.
-SEGMENT_HEADINGS = {"free" if count == 0 else str(count): count for count in HEADINGS}
+SEGMENT_HEADINGS = {"free" if count == 0 else str(count): count for count in abi.SEGMENT_HEADINGS}
 
 
 @dataclass(frozen=True)

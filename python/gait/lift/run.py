@@ -17,7 +17,8 @@ from gait.io.keypoints_file import Keypoints
 from gait.lift.keypoints import noise, swaps
 from gait.lift.segment.view import Parallel, Perspective, View, looking_along
 from gait.lift.smooth import motion, size
-from gait.lift.smooth.motion import Motion, Options
+from gait.lift.smooth.motion import Motion
+from gait.lift.smooth.options import Options
 from gait.progress import progress
 from gait.reproducible import one_thread
 from gait.track.from_walk import Calibration

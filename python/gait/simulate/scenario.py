@@ -3,10 +3,12 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-
-import numpy as np
+from typing import TYPE_CHECKING
 
 from gait.errors import UsageError
+
+if TYPE_CHECKING:
+    import numpy as np
 
 GENERATOR = "generator"
 VIEWS = ("side", "oblique", "toward", "away", "above", "circle")
@@ -66,6 +68,8 @@ class Scenario:
 
     def stream(self, name: str, *more: int) -> np.random.Generator:
         """Return random numbers for one purpose, so that one option does not change the others."""
+        import numpy as np  # here, so that --help answers at once
+
         return np.random.default_rng([self.seed, *name.encode(), *more])
 
 

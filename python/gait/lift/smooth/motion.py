@@ -1,4 +1,4 @@
-"""How keypoints are lifted, and what comes of it.
+"""What comes of lifting keypoints.
 
 What lifting refuses: keypoints that show too little, and estimates that are no person.
 
@@ -29,37 +29,10 @@ from gait.lift.segment.explain import FEWEST, Explanation, SegmentFit, SegmentLi
 from gait.lift.segment.view import Parallel, Perspective, View
 from gait.lift.smooth import size, smoother
 from gait.lift.smooth.chain import Freedom, blended, in_turn
+from gait.lift.smooth.options import Options
 from gait.lift.smooth.smoother import Lifted, Observed, Start
 
 Floats = npt.NDArray[np.float64]
-
-FLOOR_SD = 0.03  # metres, of the floor's height
-METHODS = ("smooth", "blend", "segment", "likelihood")
-
-
-@dataclass(frozen=True)
-class Options:
-    """How to lift.
-
-    Attributes
-    ----------
-    method : one of METHODS
-    stature : float or None
-        Metres; None: unknown.
-    pixel_sd : float
-        Noise of points seen with full confidence.
-    floor_sd : float
-        How well the ground of the camera's world is where the person stands, metres.
-    contact, bones : bool
-        Feet stay put; bones keep their length.
-    """
-
-    method: str = "smooth"
-    stature: float | None = None
-    pixel_sd: float = 3.0
-    floor_sd: float = FLOOR_SD
-    contact: bool = True
-    bones: bool = True
 
 
 @dataclass(frozen=True)
