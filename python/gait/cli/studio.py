@@ -9,6 +9,12 @@ import sys
 from gait.errors import UsageError
 from gait.web import parts
 
+EXAMPLES = """\
+examples:
+  gait studio --fetch
+  gait studio --fetch --json
+"""
+
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Add the command's options."""
