@@ -1,6 +1,7 @@
 """Processes on one machine over UDP multicast: readiness by messages, loss and latency measured."""
 
 import os
+import re
 import signal
 import subprocess
 import threading
@@ -190,15 +191,15 @@ def test_junk_does_not_flood_the_log_and_the_status(url):
         ready(listener)
         listener.statuses.clear()
         begun, raw = time.monotonic(), open_lcm(url)
-        for _ in range(200):
+        while time.monotonic() < begun + 1.5:  # past the second after which the lines left out are counted
             for channel in ("GAIT_CAMERA_0", "GAIT_COMMAND"):
                 raw.publish(channel, b"junk")
                 time.sleep(0.002)  # LCM's queues are finite
         listener.until(lambda: bool(listener.statuses), "a status")
         words, seconds = finish().words, time.monotonic() - begun
         assert len(listener.statuses) <= 25 * seconds + 3
-        assert 0 < words.count("damaged message") <= 10 * (seconds + 2) < 200
-        assert "more lines, not written" in words or seconds < 1
+        assert 10 <= words.count("damaged message") <= 10 * (seconds + 2)
+        assert sum(map(int, re.findall(r"(\d+) more lines, not written", words))) > 50
 
 
 def test_two_streams_do_not_meet(url):

@@ -11,7 +11,7 @@ from gait import Camera, Model, TrackStatus, Video
 from gait.bindings.initial import Start
 from gait.bindings.model import read_blob
 from gait.bindings.start_fit import Box, StartFit
-from gait.detect import shapes
+from gait.detect import networks, shapes
 from gait.detect.shapes import find_near
 from gait.errors import UserError
 from gait.io import blob
@@ -87,12 +87,46 @@ def test_a_lost_person_is_not_searched_where_they_were(monkeypatch):
     assert PersonShapes(camera(), lambda _: 1.7).choose(Frame(0, 0.0, FRAMES[0]), lost) is None
 
 
-@pytest.mark.parametrize("corner", [(0, 0), (319, 239), (-500, 100), (160, 120)])
+UPRIGHT = 23  # frame in which the drawn person looks most like the detector's people
+
+
+def box_in(frame):
+    """Box of the drawn person in a frame."""
+    uv = camera().project(MODEL.pose(TRUE[frame])[0])
+    crown = uv[MODEL.joint_names.index("head_top")]
+    return Box(np.array([crown[0], uv[:, 1].max()]), crown, 1.0)
+
+
+@pytest.mark.parametrize("edge", ["none", "left", "right", "top", "bottom"])
+@pytest.mark.parametrize("scale", [0.5, 1.0, 4.0])
+def test_a_person_of_any_size_is_found_also_at_the_edge_of_the_picture(scale, edge):
+    true, picture, corner = box_in(UPRIGHT), FRAMES[UPRIGHT], np.zeros(2)
+    if edge != "none":  # cut the picture where the person ends
+        aside = 0.22 * true.tall
+        left, top = (true.head - (aside, 2)).astype(int)
+        right, bottom = (true.foot + (aside, 3)).astype(int)
+        corner = np.array([left * (edge == "left"), top * (edge == "top")])
+        stop = bottom if edge == "bottom" else None, right if edge == "right" else None
+        picture = picture[corner[1] : stop[0], corner[0] : stop[1]]
+    large = cv2.resize(picture, None, fx=scale, fy=scale)
+    foot, head = ((end - corner) * scale for end in (true.foot, true.head))
+    found = find_near(large, Box(foot, head, 1.0), lambda _: 1.7)
+    assert found is not None
+    assert max(np.hypot(*(found.foot - foot)), np.hypot(*(found.head - head))) < 0.12 * scale * true.tall
+
+
+@pytest.mark.parametrize("corner", [(0, 0), (319, 239), (-500, 100), (1000, 20)])
 @pytest.mark.parametrize("tall", [2.0, 60.0, 4000.0])
-def test_boxes_at_the_edge_and_of_any_size_are_searched(corner, tall):
-    fit = StartFit(MODEL, camera())
-    at = np.array(corner, float)
-    assert find_near(wall(), Box(at + [0, tall], at, 1.0), fit.stature) is None
+def test_only_the_picture_about_a_box_is_searched(corner, tall):
+    at, stature = np.array(corner, float), StartFit(MODEL, camera()).stature
+    assert find_near(FRAMES[UPRIGHT], Box(at + [0, tall], at, 1.0), stature) is None
+
+
+def test_one_descriptor_serves_all_searches(monkeypatch):
+    shapes.hog_detector()
+    monkeypatch.setattr(cv2, "HOGDescriptor", None)
+    assert find_near(FRAMES[UPRIGHT], box_in(UPRIGHT), lambda _: 1.7) is not None
+    networks._windows(FRAMES[UPRIGHT])
 
 
 def test_opencv_searches_in_one_thread_as_more_give_other_bits(monkeypatch):
@@ -103,7 +137,7 @@ def test_opencv_searches_in_one_thread_as_more_give_other_bits(monkeypatch):
         raise KeyboardInterrupt
 
     detector = SimpleNamespace(winSize=(64, 128), detectMultiScale=search)
-    monkeypatch.setattr(shapes, "_detector", lambda: detector)
+    monkeypatch.setattr(shapes, "hog_detector", lambda: detector)
     cv2.setNumThreads(2)
     with pytest.raises(KeyboardInterrupt):
         find_near(FRAMES[0], box(), lambda _: 1.68)

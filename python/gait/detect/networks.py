@@ -16,6 +16,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from gait.detect import weights
+from gait.detect.shapes import hog_detector
 from gait.io.video import Image
 from gait.reproducible import one_opencv_thread
 
@@ -227,12 +228,10 @@ def _tiles(width: int, height: int, side: int) -> list[tuple[int, int, int, int]
 
 def _windows(image: Image) -> list[tuple[float, Crop]]:
     """Upright people by OpenCV's detector (Dalal and Triggs 2005), where the person network cannot run."""
-    hog = cv2.HOGDescriptor()
-    hog.setSVMDetector(np.array(cv2.HOGDescriptor.getDefaultPeopleDetector()))
     scale = min(1.0, 640 / max(image.shape[:2]))
     small = cv2.resize(image, None, fx=scale, fy=scale, interpolation=cv2.INTER_AREA)
     with one_opencv_thread():
-        boxes, votes = hog.detectMultiScale(small, winStride=(8, 8), padding=(16, 16), scale=1.05)
+        boxes, votes = hog_detector().detectMultiScale(small, winStride=(8, 8), padding=(16, 16), scale=1.05)
     found = []
     for (x, y, width, height), vote in zip(boxes, np.ravel(votes), strict=True):
         hips = np.array([x + 0.5 * width, y + 0.5 * height]) / scale

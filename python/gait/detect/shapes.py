@@ -44,7 +44,8 @@ _FLAT = 2.0  # grey levels: standard deviation of a picture that shows nothing
 
 
 @functools.cache
-def _detector() -> cv2.HOGDescriptor:
+def hog_detector() -> cv2.HOGDescriptor:
+    """Detector of upright people, made once."""
     hog = cv2.HOGDescriptor()
     hog.setSVMDetector(np.array(cv2.HOGDescriptor.getDefaultPeopleDetector()))
     return hog
@@ -99,10 +100,10 @@ def _search(
 ) -> list[tuple[float, float, Box]]:
     """Windows about people in a part of the picture at a scale: vote, weight, person."""
     part, offset = _part(image, corner, size, scale)
-    if np.any(np.array(part.shape[1::-1]) < _detector().winSize):  # OpenCV would read beyond it
+    if np.any(np.array(part.shape[1::-1]) < hog_detector().winSize):  # OpenCV would read beyond it
         return []
     with one_opencv_thread():
-        windows, votes = _detector().detectMultiScale(
+        windows, votes = hog_detector().detectMultiScale(
             part, hitThreshold=_THRESHOLD, winStride=(8, 8), scale=1.06, groupThreshold=0
         )
     found = []
