@@ -10,7 +10,9 @@ from gait.camera.camera import Camera, write_camera
 from gait.cli import main
 from gait.errors import UserError
 from gait.io.keypoints_file import write
+from gait.track import camera_check
 from gait.track.camera_check import _lean, _parameters, _turned, contradiction
+from gait.track.keypoint_start import find_keypoint_start
 
 STATURE = 1.75
 Y_UP, Y_DOWN = (np.array([[1, 0, 0], [0, 0, s], [0, -s, 0]], float) for s in (1, -1))
@@ -112,6 +114,58 @@ def test_what_is_no_walk_is_no_contradiction():
     assert contradiction(view(), replace(walk, uv=noise), MODEL, STATURE) is None
     others = tuple(f"marker_{k}" for k in range(len(walk.names)))
     assert contradiction(view(), replace(walk, names=others), MODEL, STATURE) is None
+
+
+@pytest.mark.parametrize("height", [1.5, 1.9])
+def test_a_person_an_eighth_too_tall_or_too_short_is_reported(height):
+    for share in (0.89, 1.11):
+        assert camera_check._wrong_size(share * height, height) is None
+    for share in (0.87, 1.13):
+        report = camera_check._wrong_size(share * height, height)
+        assert report == f"the person appears {share * height:.2f} m tall by it, --height is {height:g}"
+
+
+def test_a_person_of_unknown_stature_is_of_any_usual_one():
+    for stature in (1.41, 2.09):
+        assert camera_check._wrong_size(stature, None) is None
+    for stature in (1.39, 2.11):
+        assert "give --height if that is right" in camera_check._wrong_size(stature, None)
+
+
+@pytest.mark.parametrize(
+    ("change", "words"),
+    [
+        ({"tilt": 0.08 + np.radians(2.5)}, None),
+        ({"roll": np.radians(2.5)}, None),
+        ({"focal": 1150.0}, None),
+        ({"tilt": 0.08 + np.radians(10)}, "tilt"),
+        ({"roll": np.radians(8)}, "roll"),
+        ({"focal": 1500.0}, "focal length"),
+    ],
+)
+def test_a_part_is_named_from_its_threshold_on(change, words):
+    """The person appears as tall as they are, so that only the parts of the camera can differ."""
+    walk = keypoints(view())
+    given = view(**change)
+    appears = find_keypoint_start(walk, given, MODEL)
+    stature = STATURE if appears is None else appears.mean.stature
+    named = camera_check._wrong_part(given, walk, MODEL, stature)
+    assert named == (words and f"the walk contradicts its {words}")
+
+
+def test_a_difference_within_the_doubt_of_the_estimate_is_not_reported(monkeypatch):
+    """A path across the view leaves the focal length open: only its standard deviation keeps it silent."""
+    walk, given = keypoints(view(tilt=0.0), ACROSS), view(tilt=0.0, focal=1500.0)
+    assert camera_check._wrong_part(given, walk, MODEL, STATURE) is None
+    calibrate = camera_check.calibrate
+
+    def differs(*arguments, **options):
+        found = calibrate(*arguments, **options)
+        return replace(found, camera=view(tilt=0.0), sd=np.full_like(found.sd, sd))
+
+    monkeypatch.setattr(camera_check, "calibrate", differs)
+    for sd, words in ((0.15, "the walk contradicts its focal length"), (0.25, None)):  # log(1.5) is 0.405
+        assert camera_check._wrong_part(given, walk, MODEL, STATURE) == words
 
 
 def test_gait_lift_reports_it(tmp_path, capsys):

@@ -13,6 +13,7 @@ from gait import Camera, TrackerConfig
 from gait.io.track_file import Joints
 
 sys.path.insert(0, str(Path(__file__).resolve().parents[1] / "bench"))
+import camera_walk
 import eval_ablate
 import eval_clips
 import eval_edits
@@ -272,3 +273,29 @@ def test_bounds_of_learning_are_counted_by_measure(tmp_path):
 def test_every_mutant_changes_a_line_that_is_there():
     assert not list(mutants.stale())
     assert list(mutants.stale((mutants.MUTANTS[0]._replace(before="no such line"),)))
+
+
+@pytest.mark.parametrize(
+    "place, value, name",
+    [
+        (1, -16.0, "focal"),
+        (3, 1.6, "tilt"),
+        (6, -9.0, "height"),
+        (8, 24.0, "joints"),
+        (10, 8.5, "speed"),
+        (12, 79.0, "pelvis"),
+        (12, 100.0, "pelvis"),
+    ],
+)
+def test_a_camera_from_a_walk_that_misses_a_bound_fails(place, value, name, tmp_path, monkeypatch):
+    good = ["clip", -14.0, 9.0, 1.4, 0.7, 0.0, 7.0, 6.0, 22.0, 20.0, -7.0, 0.0, 90.0]
+    row = [*good[:place], value, *good[place + 1 :]]
+    assert camera_walk.missed(good) == [] and camera_walk.missed(row) == [name]
+    (tmp_path / "eval" / "dev" / "clip").mkdir(parents=True)
+    monkeypatch.setattr(camera_walk.eval_clips, "DATA", tmp_path)
+    monkeypatch.setattr(camera_walk.table, "RESULTS", tmp_path)
+    monkeypatch.setattr(sys, "argv", ["camera_walk.py"])
+    for figures, held, code in ((good, 9, 0), (row, 9, 1), (good, 7, 1), (good, 10, 1)):
+        found = figures, [True] * held + [False] * (10 - held)
+        monkeypatch.setattr(camera_walk, "_clip", lambda _, found=found: found)
+        assert camera_walk.main() == code
