@@ -1,17 +1,23 @@
 """Camera files that contradict the walk are reported with what would fit; right ones are not."""
 
+import re
 from dataclasses import replace
 
+import drawn_person
 import numpy as np
 import pytest
-from walking_keypoints import ACROSS, MODEL, TOWARDS, keypoints, view
+from drawn_person import camera, clip
+from walking_keypoints import ACROSS, MODEL, SIZE, TOWARDS, keypoints, view
 
+from gait.bindings.model import read_blob
 from gait.camera.camera import Camera, write_camera
 from gait.cli import main
 from gait.errors import UserError
-from gait.io.keypoints_file import write
+from gait.io.blob import decode
+from gait.io.keypoints_file import Keypoints, write
 from gait.track import camera_check
 from gait.track.camera_check import _lean, _parameters, _turned, contradiction
+from gait.track.from_walk import calibrate
 from gait.track.keypoint_start import find_keypoint_start
 
 STATURE = 1.75
@@ -157,14 +163,10 @@ def test_a_difference_within_the_doubt_of_the_estimate_is_not_reported(monkeypat
     """A path across the view leaves the focal length open: only its standard deviation keeps it silent."""
     walk, given = keypoints(view(tilt=0.0), ACROSS), view(tilt=0.0, focal=1500.0)
     assert camera_check._wrong_part(given, walk, MODEL, STATURE) is None
-    calibrate = camera_check.calibrate
-
-    def differs(*arguments, **options):
-        found = calibrate(*arguments, **options)
-        return replace(found, camera=view(tilt=0.0), sd=np.full_like(found.sd, sd))
-
-    monkeypatch.setattr(camera_check, "calibrate", differs)
+    found = calibrate(walk, SIZE, MODEL, STATURE)
     for sd, words in ((0.15, "the walk contradicts its focal length"), (0.25, None)):  # log(1.5) is 0.405
+        differs = replace(found, camera=view(tilt=0.0), sd=np.full_like(found.sd, sd))
+        monkeypatch.setattr(camera_check, "calibrate", lambda *_, differs=differs, **options: differs)
         assert camera_check._wrong_part(given, walk, MODEL, STATURE) == words
 
 
@@ -180,3 +182,24 @@ def test_gait_lift_reports_it(tmp_path, capsys):
     assert "camera from the walk" not in reports[0]
     assert f"{tmp_path / 'wrong.json'}: the person appears" in reports[1]
     assert "camera from the walk: focal length" in reports[1]
+
+
+def test_gait_track_reports_it(tmp_path, monkeypatch, capsys):
+    seen = camera()
+    pictures, states = clip(MODEL, decode(read_blob(None)), 30, view=seen, heading=-1.2, start=(-0.5, 0.8))
+    drawn_person.write(tmp_path / "walk.mp4", pictures)
+    uv, frame = np.array([seen.project(MODEL.pose(state)[0]) for state in states]), np.arange(30)
+    write(tmp_path / "k.csv", Keypoints(frame, frame / 30, MODEL.joint_names, uv, np.ones(uv.shape[:2])))
+    write_camera(tmp_path / "right.json", seen)
+    write_camera(tmp_path / "wrong.json", camera(focal=1.5 * seen.fx))
+    words = ["track", "walk.mp4", "--keypoints", "k.csv", "--height", "1.75", "--background", "none"]
+    words += ["--particles", "60", "-o", "o.csv", "--camera"]
+    monkeypatch.chdir(tmp_path)
+    reports = []
+    for name in ("right", "wrong"):
+        assert main([*words, f"{name}.json"]) == 0
+        reports.append(capsys.readouterr().err)
+    assert "camera from the walk" not in reports[0]
+    assert reports[1].startswith("wrong.json: the person appears")
+    focal = float(re.search(r"camera from the walk: focal length (\d+) ", reports[1])[1])
+    assert abs(focal / seen.fx - 1) < 0.15

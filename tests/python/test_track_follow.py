@@ -22,14 +22,14 @@ from gait.track.person_keypoints import PersonKeypoints
 from gait.track.plausible import Plausibility
 
 MODEL = Model()
-FRAMES, TRUE = clip(MODEL, blob.decode(read_blob(None)), 30)
+SECTIONS = blob.decode(read_blob(None))
+FRAMES, TRUE = clip(MODEL, SECTIONS, 30)
 JOINTS = np.array([MODEL.pose(state)[0] for state in TRUE])
 START = 15
 GAP = 45
 
 
-def init(folder, frame, number):
-    state = TRUE[frame]
+def init(folder, state, number):
     start = {
         "frame": number,
         "pelvis": state.pelvis.tolist(),
@@ -47,7 +47,7 @@ def folder(tmp_path):
     write(tmp_path / "walk.mp4", FRAMES)
     cv2.imwrite(str(tmp_path / "plate.png"), wall())
     (tmp_path / "camera.json").write_text(json.dumps(camera().to_dict()))
-    init(tmp_path, START, START)
+    init(tmp_path, TRUE[START], START)
     return tmp_path
 
 
@@ -104,7 +104,7 @@ def test_a_person_who_comes_back_is_found_by_keypoints(ids, at, folder, capsys, 
     """
     write(folder / "walk.mp4", [*FRAMES, *[wall()] * GAP, *FRAMES])
     again = len(FRAMES) + GAP
-    init(folder, at % again, at)
+    init(folder, TRUE[at % again], at)
     count = 2 * len(FRAMES) + GAP
     uv = np.full((count, len(MODEL.joint_names), 2), np.nan)
     uv[: len(FRAMES)] = uv[-len(FRAMES) :] = camera().project(JOINTS)
@@ -133,6 +133,32 @@ def test_a_person_who_comes_back_is_found_by_keypoints(ids, at, folder, capsys, 
         off = np.linalg.norm(mine[walk] - JOINTS[:, order], axis=2).mean(axis=1)
         assert off.max() < 0.15 and "lost" not in rows.status[walk]
     assert "back at frame" in capsys.readouterr().err
+
+
+@pytest.mark.parametrize("known", [True, False], ids=["keypoints", "pictures"])
+def test_a_lost_person_is_found_again_within_a_second_in_full_view(known, folder):
+    """Hidden for 1.5 s behind a wall, then walking on.
+
+    Pictures alone take longer to tell left from right, and the distance from the camera.
+    """
+    back, count = START + 45, START + 90
+    pictures, states = clip(MODEL, SECTIONS, count, start=(-2.3, 0.0))
+    pictures[START:back] = [wall()] * (back - START)
+    write(folder / "walk.mp4", pictures)
+    init(folder, states[0], 0)
+    joints = np.array([MODEL.pose(state)[0] for state in states])
+    if known:
+        uv, frame = camera().project(joints.reshape(-1, 3)).reshape(*joints.shape[:2], 2), np.arange(count)
+        uv[START:back] = np.nan
+        found = keypoints_file.Keypoints(frame, frame / 30, MODEL.joint_names, uv, np.ones(uv.shape[:2]))
+        keypoints_file.write(folder / "k.csv", found)
+    assert track(folder, *(["--keypoints", folder / "k.csv"] if known else ["--particles", 1000])) == 0
+    rows, mine, order = errors(folder)
+    off = mine - joints[rows.frame][:, order]
+    off = np.linalg.norm(off, axis=2).mean(axis=1) if known else np.abs(off.mean(axis=1)[:, 0])
+    again = rows.frame >= back + 30
+    assert "lost" in rows.status[:back] and again.sum() == count - back - 30
+    assert off[again].max() < 0.15 and "lost" not in np.array(rows.status)[again]
 
 
 def test_a_film_of_noise_ends_with_a_warning(folder, capsys):
