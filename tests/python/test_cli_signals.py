@@ -1,4 +1,4 @@
-"""Commands that are ended from outside leave nothing behind."""
+"""Commands that are ended from outside leave nothing half-written behind."""
 
 import json
 import os
@@ -10,6 +10,9 @@ from importlib import resources
 
 import pytest
 from drawn_person import camera, wall, write
+
+from gait import Video
+from gait.io.track_file import read_track
 
 PATIENCE = 120.0  # seconds for what takes a few, on a machine busy with other things
 MODEL = resources.files("gait") / "data" / "walk.gait"
@@ -26,7 +29,7 @@ def clip(tmp_path_factory):
 
 
 @pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM, signal.SIGHUP])
-def test_track_leaves_no_temporary_files(clip, tmp_path, number):
+def test_track_keeps_the_rows_that_are_finished(clip, tmp_path, number):
     words = ["track", clip / "video.mp4", "--camera", clip / "camera.json", "--init", clip / "init.json"]
     words += ["--background", "none", "--particles", "2000"]
     words += ["-o", tmp_path / "t.csv", "--overlay", tmp_path / "o.mp4"]
@@ -35,7 +38,7 @@ def test_track_leaves_no_temporary_files(clip, tmp_path, number):
     )
     try:
         deadline = time.monotonic() + PATIENCE
-        while len(list(tmp_path.iterdir())) < 2:  # both outputs have been begun
+        while sum(path.stat().st_size > 0 for path in tmp_path.iterdir()) < 2:  # both have been begun
             assert process.poll() is None and time.monotonic() < deadline
             time.sleep(0.01)
         process.send_signal(number)
@@ -43,8 +46,13 @@ def test_track_leaves_no_temporary_files(clip, tmp_path, number):
     finally:
         process.kill()
         process.communicate()
-    assert (process.returncode, printed) == (1, "gait track: interrupted\n")
-    assert list(tmp_path.iterdir()) == []
+    assert process.returncode == 1 and printed.endswith("gait track: interrupted\n")
+    left = sorted(path.name for path in tmp_path.iterdir())
+    assert left == ["o.unfinished.mp4", "t.unfinished.csv"]
+    for name in left:
+        assert f"; what had been written is in {name}\n" in printed
+    rows = len(read_track(tmp_path / "t.unfinished.csv").frame)
+    assert 1 <= rows < 900 and abs(Video(tmp_path / "o.unfinished.mp4").count - rows) <= 1
 
 
 def test_a_reader_that_leaves_is_no_error_of_ours():

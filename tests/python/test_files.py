@@ -41,6 +41,26 @@ def test_a_full_disk_is_named_with_its_file(tmp_path, number):
     assert not list(tmp_path.iterdir())
 
 
+@pytest.mark.parametrize(
+    "end", [KeyboardInterrupt(), OSError(errno.ENOSPC, "full"), UserError("b.mp4: full"), ValueError()]
+)
+def test_what_is_worth_keeping_is_kept_if_the_command_is_ended(tmp_path, capsys, end):
+    path = tmp_path / "a.csv"
+    path.write_text("old")
+    if isinstance(end, UserError):  # the disk was full for another file
+        end.__cause__ = OSError(errno.ENOSPC, "full")
+    for worth in (False, True):
+        with (
+            pytest.raises((type(end), UserError)),
+            replacing(path, partial=lambda _, w=worth: w) as temporary,
+        ):
+            temporary.write_text("half")
+            raise end
+        kept = [] if not worth or isinstance(end, ValueError) else ["a.unfinished.csv"]
+        assert sorted(p.name for p in tmp_path.iterdir()) == ["a.csv", *kept] and path.read_text() == "old"
+        assert ("not finished; what had been written is in" in capsys.readouterr().err) == bool(kept)
+
+
 def test_what_else_fails_beside_a_file_keeps_its_name(tmp_path):
     with pytest.raises(FileNotFoundError, match="other"), replacing(tmp_path / "out.gait"):
         (tmp_path / "other").read_text()

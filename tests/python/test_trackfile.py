@@ -1,5 +1,8 @@
 """Track, truth and TRC files."""
 
+import resource
+import signal
+
 import numpy as np
 import pytest
 
@@ -47,6 +50,36 @@ def write(path, count=4):
     with TrackWriter(path, 5, MODEL.joint_names, MODEL.angle_names) as rows:
         for i in range(count):
             rows.write(Frame(10 + i, (10 + i) / 30, None), estimate(i))
+
+
+@pytest.mark.parametrize("count", [0, 3])
+def test_rows_of_an_interrupted_track_are_kept(tmp_path, count):
+    with (
+        pytest.raises(KeyboardInterrupt),
+        TrackWriter(tmp_path / "t.csv", 5, MODEL.joint_names, MODEL.angle_names) as rows,
+    ):
+        for i in range(count):
+            rows.write(Frame(i, i / 30, None), estimate(i))
+        raise KeyboardInterrupt
+    assert [p.name for p in tmp_path.iterdir()] == ["t.unfinished.csv"][: bool(count)]
+    assert not count or read_track(tmp_path / "t.unfinished.csv").frame.tolist() == [0, 1, 2]
+
+
+def test_a_full_disk_keeps_whole_rows(tmp_path):
+    write(tmp_path / "t.csv")
+    whole = (tmp_path / "t.csv").stat().st_size
+    (tmp_path / "t.csv").unlink()
+    limits = resource.getrlimit(resource.RLIMIT_FSIZE)
+    handler = signal.signal(signal.SIGXFSZ, signal.SIG_IGN)
+    try:
+        resource.setrlimit(resource.RLIMIT_FSIZE, (whole - 100, limits[1]))
+        with pytest.raises(UserError, match="t.csv: File too large; choose another place"):
+            write(tmp_path / "t.csv")
+    finally:
+        resource.setrlimit(resource.RLIMIT_FSIZE, limits)
+        signal.signal(signal.SIGXFSZ, handler)
+    assert [p.name for p in tmp_path.iterdir()] == ["t.unfinished.csv"]
+    assert read_track(tmp_path / "t.unfinished.csv").frame.tolist() == [10, 11, 12]
 
 
 def test_header_is_that_of_the_interface(tmp_path):

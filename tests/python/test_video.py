@@ -1,5 +1,6 @@
 """Video in and out, plates, and files that are not what they should be."""
 
+import errno
 import json
 import struct
 import wave
@@ -80,6 +81,28 @@ def test_an_error_leaves_no_file_and_not_the_old_one_changed(tmp_path):
         writer.write(pattern(0))
         raise RuntimeError
     assert path.read_bytes() == b"old" and list(tmp_path.iterdir()) == [path]
+
+
+def test_an_interrupt_keeps_a_film_of_the_frames_so_far(tmp_path):
+    with pytest.raises(KeyboardInterrupt), VideoWriter(tmp_path / "out.mp4", 30) as writer:
+        for i in range(7):
+            writer.write(pattern(i))
+        raise KeyboardInterrupt
+    assert Video(tmp_path / "out.unfinished.mp4").count == 7 and len(list(tmp_path.iterdir())) == 1
+
+
+def test_what_fails_in_the_encoder_is_raised(tmp_path, monkeypatch):
+    def fail(self, image):
+        raise OSError(errno.ENOSPC, "No space left on device")
+
+    monkeypatch.setattr(VideoWriter, "_encode", fail)
+    with (
+        pytest.raises(UserError, match="out.mp4: No space left on device; choose another place"),
+        VideoWriter(tmp_path / "out.mp4", 30) as writer,
+    ):
+        for i in range(20):
+            writer.write(pattern(i))
+    assert not list(tmp_path.iterdir())
 
 
 def test_frames_of_another_size_are_refused(tmp_path):

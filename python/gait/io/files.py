@@ -10,7 +10,7 @@ import secrets
 import stat
 import tempfile
 import time
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
 from pathlib import Path
 
@@ -23,12 +23,15 @@ _SETTLED = 60.0  # seconds after which an unlocked temporary file is what a kill
 
 
 @contextmanager
-def replacing(path: str | os.PathLike[str]) -> Iterator[Path]:
+def replacing(path: str | os.PathLike[str], partial: Callable[[Path], bool] | None = None) -> Iterator[Path]:
     """Yield a temporary file of the same folder, suffix and mode; rename it to `path` if the block succeeds.
 
     Through a symbolic link the file is written that it points to.  Two writers of one path do not disturb
     each other; the last one to end wins.  What a killed command left is renamed to NAME.unfinished.SUFFIX.
     When the block has succeeded, the file is on the disk under its name even if the power fails.
+
+    `partial` is called with the temporary file if the block is interrupted or a disk is full.  If it returns
+    True, the file is worth keeping as it then is, and gets that name too.
 
     UserError if a file cannot be put there, as by `require_writable`, or the disk is full.
     """
@@ -47,7 +50,11 @@ def replacing(path: str | os.PathLike[str]) -> Iterator[Path]:
         _flush(temporary)
         os.replace(temporary, target)
         _flush(target.parent)
-    except OSError as error:
+    except BaseException as error:
+        if partial is not None and _ends_early(error) and partial(temporary):
+            _keep(temporary, target, "not finished; what had been written")
+        if not isinstance(error, OSError):
+            raise
         if error.errno not in FULL and error.filename != str(temporary):
             raise
         raise UserError(f"{path}: {error.strerror}; choose another place") from error
@@ -78,9 +85,20 @@ def _recover(target: Path) -> None:
         if left.stat().st_size == 0:
             left.unlink(missing_ok=True)
             continue
-        kept = target.with_name(f"{target.stem}.unfinished{target.suffix}")
-        os.replace(left, kept)
-        note(f"{target}: a command that wrote it was killed; what it had written is in {kept.name}")
+        _keep(left, target, "a command that wrote it was killed; what it had written")
+
+
+def _keep(left: Path, target: Path, what: str) -> None:
+    """Rename what was written of `target` to NAME.unfinished.SUFFIX, and report it."""
+    kept = target.with_name(f"{target.stem}.unfinished{target.suffix}")
+    os.replace(left, kept)
+    note(f"{target}: {what} is in {kept.name}")
+
+
+def _ends_early(error: BaseException) -> bool:
+    """Whether a command is interrupted or a disk is full, so that what is done is worth keeping."""
+    cause = error.__cause__ if isinstance(error, UserError) else error
+    return isinstance(cause, KeyboardInterrupt) or (isinstance(cause, OSError) and cause.errno in FULL)
 
 
 def _is_left(temporary: Path) -> bool:

@@ -43,6 +43,8 @@ def header(components: int, angle_names: tuple[str, ...]) -> list[str]:
 class TrackWriter:
     """Write a track file row by row; it appears under its name when the ``with`` block ends without error.
 
+    If the block is interrupted or a disk is full, the rows written so far are kept as NAME.unfinished.csv.
+
     `components`: scores per row; `joint_names`, `angle_names`: of the model.
     """
 
@@ -63,7 +65,7 @@ class TrackWriter:
         self._stack = ExitStack()
 
     def __enter__(self) -> TrackWriter:
-        temporary = self._stack.enter_context(replacing(self.path))
+        temporary = self._stack.enter_context(replacing(self.path, partial=_end_at_a_row))
         file = self._stack.enter_context(open(temporary, "w", newline="", encoding="utf-8"))
         self._csv = csv.writer(file, lineterminator="\n")
         self._csv.writerow(self._header)
@@ -93,6 +95,15 @@ class TrackWriter:
     def _scores(self, coef: Array) -> Array:
         """One value for each score column; a state may hold fewer, which are 0."""
         return np.pad(np.asarray(coef, float)[: self._components], (0, max(0, self._components - len(coef))))
+
+
+def _end_at_a_row(path: Path) -> bool:
+    """Cut off a row that was not written to its end; return whether there are rows under the header."""
+    with path.open("r+b") as file:
+        whole = file.read()
+        whole = whole[: whole.rfind(b"\n") + 1]
+        file.truncate(len(whole))
+    return whole.count(b"\n") > 1
 
 
 @dataclass(frozen=True)

@@ -15,7 +15,7 @@ from gait.bindings.model import Model, read_cyclic
 from gait.camera.camera import Camera
 from gait.io.files import replacing
 from gait.io.track_file import Joints, Track, read_track, read_truth
-from gait.io.video import Image, Video, VideoWriter
+from gait.io.video import FAST, Image, Video, VideoWriter
 from gait.lcm.record import Run, read_run
 from gait.motion.evaluate import Measures, as_text, evaluate, root_errors
 from gait.motion.footfalls import Strikes, strikes_of
@@ -259,7 +259,7 @@ def _film(path: str | None, video: Video, overlay: Overlay, run: Run, quiet: boo
     wanted = set(run.frame[np.linspace(0, len(run.frame) - 1, _PICTURES).round().astype(int)].tolist())
     kept = []
     with ExitStack() as stack:
-        film = stack.enter_context(VideoWriter(path, video.fps)) if path else None
+        film = stack.enter_context(VideoWriter(path, video.fps, preset=FAST)) if path else None
         update = stack.enter_context(progress("overlay", last + 1, quiet))
         for frame in video.frames(int(run.frame[0]), last + 1):
             estimate = known.get(frame.number)

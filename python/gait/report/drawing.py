@@ -156,15 +156,21 @@ class Overlay:
 
 def tinted(canvas: Image, ids: NDArray[np.uint8], limbs: Sequence[str], width: int) -> Image:
     """Return `canvas` (h, w, 3) with limbs tinted and outlined; `ids` (h, w) holds limb index + 1, or 0."""
+    rows, columns = (np.flatnonzero(ids.any(axis=axis)) for axis in (1, 0))
+    out = canvas.copy()
+    if not len(rows):
+        return out
+    y, x = max(rows[0] - width, 0), max(columns[0] - width, 0)  # of the part that is drawn into
+    part, ids = (one[y : rows[-1] + width + 1, x : columns[-1] + width + 1] for one in (out, ids))
     colours = [side_colour(name) for name in limbs]
     table = np.array([(0, 0, 0), *colours], np.float32)
     inside = ids > 0
-    out = canvas.copy()
-    out[inside] = np.rint((1 - _FILL) * canvas[inside] + _FILL * table[ids[inside]]).astype(np.uint8)
+    part[inside] = np.rint((1 - _FILL) * part[inside] + _FILL * table[ids[inside]]).astype(np.uint8)
+    lines = np.ascontiguousarray(part)
     for limb, colour in enumerate(colours, 1):
-        mask = (ids == limb).astype(np.uint8)
-        contours, _ = cv2.findContours(mask, cv2.RETR_EXTERNAL, cv2.CHAIN_APPROX_NONE)
-        cv2.drawContours(out, contours, -1, colour, width, cv2.LINE_AA)
+        contours, _ = cv2.findContours((ids == limb).view(np.uint8), cv2.RETR_EXTERNAL, cv2.CHAIN_APPROX_NONE)
+        cv2.drawContours(lines, contours, -1, colour, width, cv2.LINE_AA)
+    part[:] = lines
     return out
 
 

@@ -18,7 +18,7 @@ from gait.bindings.model import Model
 from gait.camera.camera import write_camera
 from gait.io.files import replacing
 from gait.io.track_file import TrackWriter
-from gait.io.video import Frame, Image, Video, VideoWriter
+from gait.io.video import FAST, Frame, Image, Video, VideoWriter
 from gait.progress import durations, progress
 from gait.report.drawing import Overlay
 from gait.track.from_walk import Calibration
@@ -123,7 +123,7 @@ def write(
             _write_cameras(stack.enter_context(replacing(options.cameras_out)), scene)
         sinks: list[Sink] = [results.add, _widened(stack.enter_context(rows).write, scene.calibration)]
         if options.overlay:
-            film = stack.enter_context(VideoWriter(options.overlay, video.fps))
+            film = stack.enter_context(VideoWriter(options.overlay, video.fps, preset=FAST))
             draw = _drawing(model, scene)
             sinks.append(lambda frame, estimate: film.write(draw(frame, estimate)))
         smoother = None

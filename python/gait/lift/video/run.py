@@ -16,7 +16,7 @@ from gait.body.skeleton import JOINTS
 from gait.camera.camera import Camera
 from gait.errors import UserError
 from gait.io.blob import decode
-from gait.io.video import Video, VideoWriter, background
+from gait.io.video import FAST, Video, VideoWriter, background
 from gait.lift.video.clip_segments import ClipSegments, Settings
 from gait.lift.video.corrections import Correction, PhasePrior, Placement, read_corrections, read_placement
 from gait.lift.video.figure import Figure, draw_figure
@@ -245,7 +245,10 @@ def draw_overlay(path: str, lifted: LiftedVideo, quiet: bool) -> None:
     """Write the video with the cylinder figure and the corrections drawn into it."""
     video, clip, fit, figure = lifted.video, lifted.clip, lifted.fit, lifted.figure
     surfaces, joints, first = figure.surfaces(), figure.joints(), clip.film.first
-    with VideoWriter(path, video.fps) as film, progress("drawing", len(fit.frame), quiet) as update:
+    with (
+        VideoWriter(path, video.fps, preset=FAST) as film,
+        progress("drawing", len(fit.frame), quiet) as update,
+    ):
         for k, frame in enumerate(video.frames(first, first + len(fit.frame))):
             corrections = [(c, _marker(clip, fit, c)) for c in clip.corrections if c.frame == frame.number]
             film.write(draw_figure(frame.image, clip.view, surfaces[k], joints[k], corrections))
