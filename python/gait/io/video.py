@@ -207,8 +207,8 @@ class VideoWriter:
     """H.264 file that every player and browser shows; appears under its name when closed without error.
 
     Use as a context manager and call `write` with equal-sized images.  An odd width or height is extended by
-    one repeated pixel, because 4:2:0 video has even sizes.  If the block is interrupted or a disk is full, the
-    pictures encoded so far are kept as NAME.unfinished.SUFFIX.
+    one repeated pixel, because 4:2:0 video has even sizes.  If the block is interrupted or a disk is full,
+    the pictures encoded so far are kept as NAME.unfinished.SUFFIX.
 
     Parameters
     ----------
