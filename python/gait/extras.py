@@ -11,6 +11,7 @@ EXTRAS = {
     "detect": {"ai_edge_litert": "LiteRT"},
     "report": {"matplotlib": "Matplotlib", "scipy": "SciPy"},
     "mocap": {"scipy": "SciPy", "ezc3d": "ezc3d", "threadpoolctl": "threadpoolctl"},
+    "h5": {"h5py": "h5py"},
     "dask": {"distributed": "Dask"},
     "studio": {"starlette": "Starlette", "uvicorn": "uvicorn"},
 }

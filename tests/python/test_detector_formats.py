@@ -1,55 +1,59 @@
-"""Keypoint files of other tools are named by their content, whatever their suffix."""
+"""Keypoint files of other tools are recognised by their content, whatever their suffix: read, or refused."""
 
 import json
-import re
 from pathlib import Path
 
 import numpy as np
 import pytest
 
 import gait.cli
-from gait.io.detector_formats import foreign_format
+from gait.errors import UserError
+from gait.io import keypoints_file
+from gait.io.detections import Clip
+from gait.io.detector_formats import reader_of
 
 FAULTS = Path(__file__).resolve().parents[2] / "../shared/data/faults/detector_formats"
 PERSON = {"keypoints": [1, 2, 0.5, 3, 4, 0.6], "score": 2.5}
 POINT = {"x": 0.5, "y": 0.4, "z": 0.0, "visibility": 0.9}
 
-FILES = {
-    "alphapose": (
-        json.dumps([{"image_id": "0.jpg", "category_id": 1, **PERSON}]),
-        "JSON of AlphaPose or COCO",
-    ),
-    "coco": (json.dumps({"images": [], "annotations": [PERSON], "categories": []}), "JSON of COCO"),
+READ = {
+    "alphapose": (json.dumps([{"image_id": "0.jpg", "category_id": 1, **PERSON}]), "read_json_file"),
+    "coco": (json.dumps({"images": [], "annotations": [PERSON], "categories": []}), "read_json_file"),
     "openpose": (
         json.dumps({"version": 1.3, "people": [{"pose_keypoints_2d": [1, 2, 0.5]}]}),
-        "JSON of OpenPose",
+        "read_json_file",
     ),
     "mmpose": (
         json.dumps({"meta_info": {}, "instance_info": [{"frame_id": 1, "instances": [PERSON]}]}),
-        "MMPose",
+        "read_json_file",
     ),
+    "mediapipe": (json.dumps({"frames": [{"landmarks": [POINT]}]}), "read_json_file"),
+    "lines": ("\ufeff" + json.dumps({"frame": 0, "keypoints": [[1, 2]]}) + "\n{}", "read_json_file"),
+    "dlc": (
+        "scorer,D,D,D\nbodyparts,l_knee,l_knee,l_knee\ncoords,x,y,likelihood\n0,1,2,0.9\n",
+        "read_dlc_csv",
+    ),
+    "dlc_crlf": ("scorer,D,D\r\nbodyparts,nose,nose\r\ncoords,x,y\r\n0,1,2\r\n", "read_dlc_csv"),
+    "dlc_many": ("scorer,D,D\nindividuals,a,a\nbodyparts,nose,nose\ncoords,x,y\n0,1,2\n", "read_dlc_csv"),
+    "sleap": ("track,frame_idx,instance.score,nose.x,nose.y,nose.score\n,0,0.9,1,2,0.9\n", "read_sleap_csv"),
+    "h5": ("\x89HDF", "read_h5"),
+    "trc": ("PathFileType\t4\nDataRate\tNumMarkers\tUnits\n30\t2\tm\n", "read_pixel_trc"),
+}
+REFUSED = {
     "yolo": (
         json.dumps([{"name": "person", "class": 0, "keypoints": {"x": [1], "y": [2]}}]),
         "JSON of Ultralytics",
     ),
-    "mediapipe": (json.dumps({"frames": [{"landmarks": [POINT]}]}), "JSON of MediaPipe"),
-    "lines": ("\ufeff" + json.dumps({"frame": 0, "keypoints": [[1, 2]]}) + "\n{}", "JSON of a pose detector"),
-    "other": (json.dumps([[1, 2], [3, 4]]), "is JSON; keypoints are CSV"),
-    "dlc": (
-        "scorer,D,D,D\nbodyparts,l_knee,l_knee,l_knee\ncoords,x,y,likelihood\n0,1,2,0.9\n",
-        "three lines",
-    ),
-    "dlc_crlf": ("scorer,D,D\r\nbodyparts,nose,nose\r\ncoords,x,y\r\n0,1,2\r\n", "DeepLabCut.* three lines"),
-    "dlc_many": ("scorer,D,D\nindividuals,a,a\nbodyparts,nose,nose\ncoords,x,y\n0,1,2\n", "four lines"),
-    "sleap": ("track,frame_idx,instance.score,nose.x,nose.y,nose.score\n,0,0.9,1,2,0.9\n", "SLEAP"),
+    "sleap": ("track,frame_idx,score\n0,1,2\n", "SLEAP without columns"),
+    "dlc": ("scorer,D,D\nbodyparts,nose,nose\n0,1,2\n", "DeepLabCut without its line coords"),
     "long": ("frame,keypoint,x,y,score\n0,nose,1,2,0.9\n", "one row per point"),
+    "mediapipe": ("frame,landmark_id,x,y,visibility\n0,1,0.2,0.3,0.9\n", "MediaPipe, one row per point"),
     "numbered": ("frame,x1,y1,c1,x2,y2,c2\n0,1,2,0.9,3,4,0.9\n", "numbered points"),
     "wide": ("frame,time,nose_x,nose_y,knee_x,knee_y\n0,0,1,2,3,4\n", "columns <joint>_x,<joint>_y"),
     "track": ("frame,time,neck_x,neck_y,neck_z\n0,0,1,2,3\n", "3-D positions"),
     "labels": ("0 0.5 0.5 0.2 0.6 " + " ".join(["0.4 0.5 0.9"] * 17) + "\n", "YOLO labels"),
 }
 BINARY = {
-    "h5": (b"\x89HDF\r\n\x1a\n", "HDF5"),
     "pkl": (b"\x80\x04\x95", "pickle"),
     "npz": (b"PK\x03\x04\x14", "archive"),
     "npy": (b"\x93NUMPY\x01", "numpy"),
@@ -57,27 +61,36 @@ BINARY = {
 
 
 @pytest.mark.parametrize("suffix", [".json", ".csv", ".txt", ".dat"])
-@pytest.mark.parametrize("kind", FILES)
-def test_text_of_other_tools_is_named_whatever_its_suffix(kind, suffix, tmp_path):
-    text, words = FILES[kind]
+@pytest.mark.parametrize("kind", READ)
+def test_files_of_other_tools_are_recognised_whatever_their_suffix(kind, suffix, tmp_path):
+    text, reader = READ[kind]
+    path = tmp_path / f"file{suffix}"
+    path.write_text(text, newline="", encoding="latin-1" if kind == "h5" else "utf-8")
+    assert reader_of(path).__name__ == reader
+
+
+@pytest.mark.parametrize("suffix", [".json", ".csv"])
+@pytest.mark.parametrize("kind", REFUSED)
+def test_those_that_are_not_read_are_named(kind, suffix, tmp_path):
+    text, words = REFUSED[kind]
     path = tmp_path / f"file{suffix}"
     path.write_text(text, newline="")
-    found = foreign_format(path)
-    assert "keypoints are CSV with one row per frame" in found
-    assert re.search(words, found)
+    with pytest.raises(UserError, match=f"(?s){words}.*keypoints are CSV with one row per frame"):
+        reader_of(path)
 
 
 @pytest.mark.parametrize("kind", BINARY)
 def test_other_files_are_named_by_their_first_bytes(kind, tmp_path):
     (tmp_path / "a.bin").write_bytes(BINARY[kind][0] + bytes(100))
-    assert BINARY[kind][1] in foreign_format(tmp_path / "a.bin")
+    with pytest.raises(UserError, match=BINARY[kind][1]):
+        reader_of(tmp_path / "a.bin")
 
 
-@pytest.mark.parametrize("kind", ["alphapose", "dlc", "sleap"])
+@pytest.mark.parametrize("kind", ["yolo", "long", "track"])
 @pytest.mark.parametrize("suffix", [".json", ".csv"])
 def test_lift_refuses_them_in_one_line(kind, suffix, tmp_path, capsys):
     path = tmp_path / f"file{suffix}"
-    path.write_text(FILES[kind][0])
+    path.write_text(REFUSED[kind][0])
     assert gait.cli.main(["lift", str(path), "-o", str(tmp_path / "a.csv")]) == 1
     printed = capsys.readouterr().err
     assert printed.count("\n") == 1 and f"{path}: is " in printed and "--placement" not in printed
@@ -97,17 +110,19 @@ def test_lift_refuses_them_in_one_line(kind, suffix, tmp_path, capsys):
 )
 def test_own_files_and_unknown_ones_are_left_to_the_reader(text, tmp_path):
     (tmp_path / "a.csv").write_text(text)
-    assert foreign_format(tmp_path / "a.csv") == ""
+    assert reader_of(tmp_path / "a.csv") is None
 
 
 def test_videos_are_not_taken_for_tables(tmp_path):
     rng = np.random.default_rng(1)
     for seed in range(20):
         (tmp_path / "a.mp4").write_bytes(b"\0\0\0\x20ftypisom" + rng.bytes(70000))
-        assert foreign_format(tmp_path / "a.mp4") == "", seed
+        assert reader_of(tmp_path / "a.mp4") is None, seed
 
 
 @pytest.mark.skipif(not FAULTS.is_dir(), reason="../shared/data/faults is absent")
 def test_public_files():
-    assert "JSON of AlphaPose" in foreign_format(FAULTS / "alphapose.json")
-    assert "three lines" in foreign_format(FAULTS / "dlc.csv")
+    with pytest.raises(UserError, match="has 2 points without names"):
+        keypoints_file.read(FAULTS / "alphapose.json", ["l_knee"])
+    found, _ = keypoints_file.read(FAULTS / "dlc.csv", ["l_knee"], clip=Clip(fps=30))
+    assert found.uv[:, 0].tolist() == [[310.2, 220.1], [311.2, 220.4], [312.0, 220.9]]

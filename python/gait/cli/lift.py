@@ -5,6 +5,10 @@ right, v down, pixel centres at integers) and a confidence from 0 to 1, which di
 Empty cells mean "not seen".  Joints are those of the model's segment prior (gait info M.gait).  The prior
 over short segments of motion supplies the depth and the joints that are not seen (Leventon and Freeman 1998).
 
+Keypoints of other tools are recognised by their content: a folder of OpenPose, JSON of COCO, AlphaPose,
+MMPose or MediaPipe, CSV or HDF5 of DeepLabCut or SLEAP, TRC in pixels of Sports2D or Pose2Sim.  Times come
+from --video or --fps where the file has none.
+
 A VIDEO instead of keypoints is searched for a person who walks (see gait detect).  Without --camera the
 camera is found from the walk, given the person's stature (see gait camera --walk); the standard deviations in
 OUT.csv include its uncertainty.  With --placement the pictures themselves are lifted, without a detector: see
@@ -35,6 +39,7 @@ from gait.lift.smooth.options import METHODS, Options
 if TYPE_CHECKING:
     from gait.bindings.model import Model
     from gait.bindings.segment_prior import SegmentPrior
+    from gait.io.detections import Clip
     from gait.io.keypoints_file import Keypoints
     from gait.io.video import Video
     from gait.lift.segment.explain import Uncertain
@@ -62,7 +67,7 @@ C.json gives positions of joints (or other markers of the model) and optionally 
 
 _ONLY_KEYPOINTS = (
     *("orthographic", "metres_per_unit", "pixel_sd", "floor_sd", "method", "no_contact"),
-    *("no_bones", "ignore_unknown", "keep_sides", "keep_spikes", "trc"),
+    *("no_bones", "ignore_unknown", "keep_sides", "keep_spikes", "trc", "person", "fps", "video"),
 )
 _ONLY_PICTURES = ("corrections", "background", "alone", "overlay", "suggest")
 _ONLY_VIDEO = ("placement", *_ONLY_PICTURES, "start", "stop", "fov", "camera_out")
@@ -75,7 +80,7 @@ UNKNOWN_MM = 1000.0  # a displacement less certain than that is the distance, in
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Add the command's options."""
     parser.add_argument(
-        "input", metavar="KEYPOINTS.csv|VIDEO", help="2-D keypoints, or a video in which they are found"
+        "input", metavar="KEYPOINTS|VIDEO", help="2-D keypoints, or a video in which they are found"
     )
     parser.add_argument(
         "-o", "--output", required=True, metavar="OUT.csv", help="positions and standard deviations, metres"
@@ -93,7 +98,8 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "--all-markers", action="store_true", help="write all markers of the prior, not its joints alone"
     )
-    add = parser.add_argument_group("from keypoints").add_argument
+    group = parser.add_argument_group("from keypoints")
+    add = group.add_argument
     add(
         "--orthographic",
         metavar="AXIS",
@@ -140,6 +146,18 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         help="keep spikes: points far from where they were a frame before and after",
     )
     add("--trc", metavar="O.trc", help="also write the positions for OpenSim")
+    values.add_person(group)
+    add(
+        "--fps",
+        type=values.between(1, 1e5, "frames per second"),
+        metavar="HZ",
+        help="frames per second of another tool's keypoints, which number frames from 0",
+    )
+    add(
+        "--video",
+        metavar="VIDEO",
+        help="video in which another tool found the keypoints: gives the times of its frames and its size",
+    )
     _add_video_arguments(parser)
 
 
@@ -186,20 +204,20 @@ def _add_video_arguments(parser: argparse.ArgumentParser) -> None:
 
 def run(args: argparse.Namespace) -> int:
     """Lift keypoints or a video."""
-    from gait.io.detector_formats import foreign_format
+    from gait.io.detector_formats import reader_of
 
     suffix = Path(args.input).suffix.lower()
     video = suffix not in (".csv", ".tsv", ".txt") and bool(suffix or args.placement)
     if video and not set("%:") & set(args.input) and not Path(args.input).exists():
         raise UserError(f"{args.input}: no such file; check the name")
-    if Path(args.input).is_file() and (foreign := foreign_format(args.input)):
-        raise UserError(f"{args.input}: {foreign}")
+    if Path(args.input).exists() and reader_of(args.input) is not None:
+        video = False
     _require_own(args, video)
     if args.stop is not None:
         values.require_order(args.start or 0, args.stop)
     require_outputs(
         (args.output, args.trc, args.overlay, args.camera_out),
-        (args.input, args.model, args.camera, args.placement, args.corrections, args.background),
+        (args.input, args.model, args.camera, args.placement, args.corrections, args.background, args.video),
     )
     summary, text = _lift_pictures(args) if args.placement else _lift_keypoints(args, video)
     print(json.dumps(summary) if args.json else text)
@@ -234,6 +252,7 @@ def _lift_keypoints(args: argparse.Namespace, video: bool) -> tuple[dict[str, An
         keep_sides=args.keep_sides,
         keep_spikes=args.keep_spikes,
         all_markers=args.all_markers,
+        clip=_clip(args),
     )
     if keypoints is None:
         lifted = lift_run.lift_file(args.input, prior, request, warn, args.quiet)
@@ -253,6 +272,24 @@ def _lift_keypoints(args: argparse.Namespace, video: bool) -> tuple[dict[str, An
     summary = _summary(args, keypoints, found) | lifted.repairs | {"pixel_sd": lifted.options.pixel_sd}
     summary |= {} if calibration is None else {"camera": calibration.figures()}
     return summary, _text(summary)
+
+
+def _clip(args: argparse.Namespace) -> Clip:
+    """Collect what a file of another tool may lack: who, when, and the size of the picture."""
+    from gait.camera.camera import Camera
+    from gait.io.detections import Clip
+
+    if args.fps and args.video:
+        raise UsageError("--fps and --video exclude each other; give one of them")
+    size = times = None
+    if args.video:
+        from gait.io.video import Video  # PyAV, which a file that has times does not need
+
+        film = Video(args.video)
+        size, times = film.size, film.times
+    elif args.camera:
+        size = Camera.read(args.camera).size
+    return Clip(args.person, args.fps, times, size, args.quiet)
 
 
 def _find_keypoints(args: argparse.Namespace, prior: SegmentPrior) -> tuple[Keypoints, Calibration | None]:

@@ -18,7 +18,7 @@ The person is tracked backwards from the start as well.  A lost person is search
 With keypoints the track continues from the next second in which the same person walks; without them it starts
 anew with a person who walks in full view for a second (not with --smooth).
 
---keypoints adds joints that a detector has found in the frames, in the format that gait lift reads.  Joints
+--keypoints adds joints that a detector has found in the frames, in the formats that gait lift reads.  Joints
 that the model does not have are left out; frames may be missing.
 
 OUT.csv has one row per frame: frame, time (s), status (init, tracking, ambiguous or lost), phase of the
@@ -77,9 +77,10 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     add(
         "--keypoints",
         "--tracks",
-        metavar="KEYPOINTS.csv",
+        metavar="KEYPOINTS",
         help="2-D joints found in the frames, used beside the images",
     )
+    values.add_person(parser)
     add(
         "--keypoints-sd",
         "--tracks-sd",
@@ -115,6 +116,8 @@ def run(args: argparse.Namespace) -> int:
         raise UsageError("--draws: needs --smooth")
     if args.keypoints_sd and not args.keypoints:
         raise UsageError("--keypoints-sd: needs --keypoints")
+    if args.person and not args.keypoints:
+        raise UsageError("--person: needs --keypoints")
     if not args.camera and args.height is None:
         raise UsageError("give --camera CAM, or --height M for a camera that is found from the walk")
     if not args.camera and args.init != "auto":

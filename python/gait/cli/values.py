@@ -129,6 +129,16 @@ def add_clip(parser: ArgumentParser, use: str, init: str = "auto", background: s
     parser.add_argument("--stop", type=whole(0), metavar="F", help=f"first frame not to {use}")
 
 
+def add_person(parser: _ActionsContainer) -> None:
+    """Add ``--person``."""
+    parser.add_argument(
+        "--person",
+        metavar="ID",
+        help="who of several people in a file of another tool: a track, individual or number, as the note "
+        "that lists them names it (default: the one who is seen most)",
+    )
+
+
 def add_filter(parser: ArgumentParser, threads: int) -> None:
     """Add ``--particles --threads``."""
     usual, paper = _particles(Mode.DEFAULT), _particles(Mode.PAPER)

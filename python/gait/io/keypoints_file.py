@@ -22,7 +22,8 @@ from numpy.typing import NDArray
 
 from gait.bindings.frame import FrameKeypoints
 from gait.errors import UserError
-from gait.io.detector_formats import foreign_format
+from gait.io.detections import Clip, one_person
+from gait.io.detector_formats import Reader, reader_of
 from gait.io.fields import frame_numbers, table_rows
 from gait.io.files import replacing
 
@@ -165,13 +166,24 @@ class Keypoints:
 
 
 def read(
-    path: str | os.PathLike[str], known: Sequence[str], ignore_unknown: bool = False
+    path: str | os.PathLike[str],
+    known: Sequence[str],
+    ignore_unknown: bool = False,
+    clip: Clip | None = None,
 ) -> tuple[Keypoints, list[str]]:
-    """Read keypoints of points named in `known`.
+    """Read keypoints of points named in `known`, from the package's CSV or a file or folder of another tool.
 
-    Returns `ignored`: points that are not in `known`. UserError if the file is malformed, holds no point, or
-    one that is not known unless `ignore_unknown`.
+    `clip`: what other tools' files may lack.  Returns `ignored`: points that are not in `known`.  UserError
+    if the file is malformed, holds no point, or one that is not known unless `ignore_unknown`; files of other
+    tools may always have such points.
     """
+    clip = clip or Clip()
+    if not Path(path).exists():
+        raise UserError(f"{path}: no such file of keypoints; check the name")
+    if (reader := reader_of(path)) is not None:
+        return _read_foreign(path, reader, known, clip)
+    if clip.given:
+        raise UserError(f"{path}: is of one person and has times; leave out --person and --fps")
     head, rows = _table(path)
     columns = {name: i for i, name in enumerate(head)}
     for name in ("frame", "time"):
@@ -195,13 +207,7 @@ def read(
         raise UserError(f"{path}: no point of the model; rename them to {' '.join(known)}")
     numbers = _Numbers(path, columns, rows)
     frame, time = frame_numbers(path, numbers.required("frame")), numbers.required("time")
-    if (np.diff(time) <= 0).any():
-        line = int(np.argmax(np.diff(time) <= 0)) + 3
-        raise UserError(f"{path}: line {line}: time does not increase; give seconds")
-    step = float(np.median(np.diff(time))) if len(time) > 1 else SHORTEST_STEP
-    if not SHORTEST_STEP <= step < LONGEST_STEP:
-        what = f"time goes on by {step:g} from frame to frame"
-        raise UserError(f"{path}: {what}; give seconds, not milliseconds or frames")
+    _require_seconds(path, time)
     both = [[numbers.column(f"{name}_{axis}", FURTHEST) for axis in "uv"] for name in names]
     uv = np.moveaxis(np.array(both), 2, 0).copy()
     half = np.isfinite(uv[..., 0]) != np.isfinite(uv[..., 1])
@@ -225,6 +231,36 @@ def read(
     if not 0 <= repeated <= 1:
         raise UserError(f"{path}: line 2: repeated is {repeated:g}; give a share from 0 to 1")
     return Keypoints(frame, time, tuple(names), uv, confidence, sd, lasting_sd, lasting_s, repeated), ignored
+
+
+def _require_seconds(path: str | os.PathLike[str], time: Array) -> None:
+    """Raise UserError unless times increase as those of a camera in seconds do."""
+    if (np.diff(time) <= 0).any():
+        line = int(np.argmax(np.diff(time) <= 0)) + 3
+        raise UserError(f"{path}: line {line}: time does not increase; give seconds")
+    step = float(np.median(np.diff(time))) if len(time) > 1 else SHORTEST_STEP
+    if not SHORTEST_STEP <= step < LONGEST_STEP:
+        what = f"time goes on by {step:g} from frame to frame"
+        raise UserError(f"{path}: {what}; give seconds, not milliseconds or frames")
+
+
+def _read_foreign(
+    path: str | os.PathLike[str], reader: Reader, known: Sequence[str], clip: Clip
+) -> tuple[Keypoints, list[str]]:
+    """Read one person of another tool's file, as `read` does."""
+    frame, time, names, uv, confidence, ignored = one_person(path, reader(path), clip)
+    _require_seconds(path, time)
+    kept = [i for i, name in enumerate(names) if name in known]
+    if not kept:
+        raise UserError(f"{path}: no point of the model; its points are {' '.join(names)}")
+    uv, confidence = uv[:, kept], confidence[:, kept]
+    if not (np.abs(uv[np.isfinite(uv)]) <= FURTHEST).all():
+        raise UserError(f"{path}: a point is more than {FURTHEST:g} pixels off; write the file anew")
+    uv[confidence < LEAST_CONFIDENCE] = np.nan
+    if not np.isfinite(uv).any():
+        raise UserError(f"{path}: no point has a confidence of {LEAST_CONFIDENCE:g} or more")
+    ignored += [name for name in names if name not in known]
+    return Keypoints(frame, time, tuple(names[i] for i in kept), uv, confidence), ignored
 
 
 def write(path: str | os.PathLike[str], keypoints: Keypoints) -> None:
@@ -313,10 +349,6 @@ class _Numbers:
 
 def _table(path: str | os.PathLike[str]) -> tuple[list[str], list[list[str]]]:
     """Header and rows of a CSV, all of one width."""
-    if not Path(path).is_file():
-        raise UserError(f"{path}: no such file of keypoints; check the name")
-    if foreign := foreign_format(path):
-        raise UserError(f"{path}: {foreign}")
     try:
         text = Path(path).read_text(encoding="utf-8-sig")
         lines = [row for _, row in table_rows(text) if row]

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import os
 import re
+from collections.abc import Mapping
 from pathlib import Path
 
 import numpy as np
@@ -27,12 +28,22 @@ def read_trc(path: Path, fps: float | None = None) -> tuple[list[str], Array, fl
     frames per second: `fps`, or DataRate, which the times must then confirm.  UserError names file, line and
     remedy.
     """
+    labels, points, rate, times = read_trc_table(path, METRES)
+    if fps is None:
+        _require_rate(path, rate, times)
+    return labels, points, fps or rate
+
+
+def read_trc_table(
+    path: Path, scales: Mapping[str, float]
+) -> tuple[list[str], Array, float, list[tuple[int, float]]]:
+    """Read labels, points (T, M, 3) times the factor of their unit in `scales`, DataRate, lines and times."""
     lines = text_lines(path)
     if len(lines) < HEAD or not set(lines[1].split()) >= NAMED:
         raise UserError(f"{path}: not a .trc header of five lines; export the file again")
     head = dict(zip(lines[1].split(), lines[2].split(), strict=False))
     labels = [cell.strip() for cell in lines[3].split("\t")[2:] if cell.strip()]
-    rate, scale, count = *_rate_and_scale(path, head), len(labels)
+    rate, scale, count = *_rate_and_scale(path, head, scales), len(labels)
     if head.get("NumMarkers") != str(count):
         promised = quoted(head.get("NumMarkers", ""))
         raise UserError(f"{path}:4: {count} labels where NumMarkers is {promised}; correct it")
@@ -42,19 +53,17 @@ def read_trc(path: Path, fps: float | None = None) -> tuple[list[str], Array, fl
         raise UserError(f"{path}: too few frames ({len(rows)}); a recording of a few seconds is needed")
     times = [(i, row[1]) for (i, _), row in zip(numbered, rows, strict=True)]
     _require_consistent(path, head, labels, times)
-    if fps is None:
-        _require_rate(path, rate, times)
-    return labels, np.array(rows)[:, 2:].reshape(len(rows), count, 3) * scale, fps or rate
+    return labels, np.array(rows)[:, 2:].reshape(len(rows), count, 3) * scale, rate, times
 
 
-def _rate_and_scale(path: Path, head: dict[str, str]) -> tuple[float, float]:
-    """Frames per second and metres per unit as the header has them."""
+def _rate_and_scale(path: Path, head: dict[str, str], scales: Mapping[str, float]) -> tuple[float, float]:
+    """Frames per second and the unit's factor as the header has them."""
     rate, units = head.get("DataRate", ""), head.get("Units", "")
     if not _NUMBER.fullmatch(rate) or not 0 < float(rate) < np.inf:
         raise UserError(f"{path}:3: DataRate is {quoted(rate)}; write the frames per second")
-    if units.lower() not in METRES:
-        raise UserError(f"{path}:3: Units is {quoted(units)}; write one of {' '.join(METRES)}")
-    return float(rate), METRES[units.lower()]
+    if units.lower() not in scales:
+        raise UserError(f"{path}:3: Units is {quoted(units)}; write one of {' '.join(scales)}")
+    return float(rate), scales[units.lower()]
 
 
 def _require_consistent(

@@ -13,6 +13,7 @@ from gait.bindings.segment_prior import SegmentPrior
 from gait.camera.camera import Camera
 from gait.errors import UserError
 from gait.io import keypoints_file
+from gait.io.detections import Clip
 from gait.io.keypoints_file import Keypoints
 from gait.lift.keypoints import noise, swaps
 from gait.lift.segment.view import Parallel, Perspective, View, looking_along
@@ -60,6 +61,8 @@ class Request:
         Estimate all markers of the prior.
     hints : bool
         Name the options of `gait lift` in warnings.
+    clip : Clip
+        What a keypoint file of another tool may lack: who of several people, times, the size of the picture.
     """
 
     options: Options
@@ -73,6 +76,7 @@ class Request:
     keep_spikes: bool = False
     all_markers: bool = False
     hints: bool = True
+    clip: Clip = Clip()
 
 
 @dataclass(frozen=True)
@@ -118,7 +122,7 @@ def lift_file(path: str, prior: SegmentPrior, request: Request, warn: Warn, quie
     UserError
         One line that names the file.
     """
-    keypoints, ignored = keypoints_file.read(path, prior.names, request.ignore_unknown)
+    keypoints, ignored = keypoints_file.read(path, prior.names, request.ignore_unknown, request.clip)
     if ignored:
         warn(f"left out, unknown to the model: {' '.join(ignored)}")
     return lift_keypoints(path, keypoints, prior, request, warn, quiet)

@@ -41,6 +41,8 @@ class ClipOptions:
         ``auto``: ``full`` if its weights are on this machine.  It is not used in paper mode.
     keypoints : str, optional
         File of 2-D keypoints found in the frames, instead of a detector.
+    person : str, optional
+        Who of several people in a keypoint file of another tool; the one who is seen most if left out.
     keypoints_sd : float
         Their standard deviation at full confidence, pixels.
     stabilize : str
@@ -71,6 +73,7 @@ class ClipOptions:
     stop: int | None = None
     detector: str = "auto"
     keypoints: str | None = None
+    person: str | None = None
     keypoints_sd: float = KEYPOINTS_SD
     stabilize: str = "off"
     overlay: str | None = None

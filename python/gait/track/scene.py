@@ -17,6 +17,7 @@ from gait.camera.camera import Camera
 from gait.detect import weights
 from gait.errors import UserError
 from gait.io import keypoints_file
+from gait.io.detections import Clip
 from gait.io.keypoints_file import Keypoints
 from gait.io.video import Frame, Image, Video, background, median, sample_frames
 from gait.progress import note, progress
@@ -387,7 +388,8 @@ def _has_detector(options: ClipOptions) -> bool:
 def _read_keypoints(options: ClipOptions, video: Video, model: Model, frames: range) -> Keypoints:
     """Keypoints of the model's joints from a file; they must be of frames to track."""
     assert options.keypoints is not None
-    read, ignored = keypoints_file.read(options.keypoints, model.joint_names, ignore_unknown=True)
+    clip = Clip(options.person, times=video.times, size=video.size, quiet=options.quiet)
+    read, ignored = keypoints_file.read(options.keypoints, model.joint_names, ignore_unknown=True, clip=clip)
     if ignored:
         note(f"left out: {' '.join(ignored)}", options.quiet)
     read.require_extent(options.keypoints, options.keypoints_sd)

@@ -1,0 +1,202 @@
+"""Detections of other tools: people in frames, linked over time, and one of them chosen as keypoints."""
+
+from __future__ import annotations
+
+import os
+from collections import Counter
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from gait.errors import UserError
+from gait.io.layouts import LAYOUTS, joint_named, points_of
+from gait.progress import note
+
+Array = NDArray[np.float64]
+
+_LONGEST_BREAK = 30  # frames without a person who is then still the same
+_MOVED = 0.6  # of a person's extent: as far as their points may move from one detection to the next
+_NAMED = 6  # people that a note lists
+
+
+@dataclass(frozen=True)
+class Clip:
+    """What files of other tools may lack: who of several people, and the frames that they were found in."""
+
+    person: str | None = None  #: id of a person; None: the one who is seen most
+    fps: float | None = None  #: frames per second
+    times: Array | None = None  #: (n,) seconds of the video's frames
+    size: tuple[int, int] | None = None  #: width and height of the picture, pixels
+    quiet: bool = False  #: make no notes
+
+    @property
+    def given(self) -> bool:
+        """Whether the user stated any of it by options."""
+        return self.person is not None or self.fps is not None
+
+
+class Detection(NamedTuple):
+    """One person in one frame."""
+
+    frame: int
+    person: str | None
+    """Id of the person; None where the tool does not follow people."""
+    points: Array
+    """(P, 3): u, v in pixels and a confidence, about 0 to 1; NaN where not seen."""
+
+
+@dataclass(frozen=True)
+class Detections:
+    """Content of a file: P points of people in frames."""
+
+    names: tuple[str, ...]  #: P names
+    found: Sequence[Detection]
+    own: bool = False  #: whether the user chose the names
+    shares: bool = False  #: whether u and v are shares of the picture's width and height
+    fps: float | None = None  #: frames per second, if the file has them
+    times: Mapping[int, float] = field(default_factory=dict)  #: seconds of frames, if the file has them
+
+
+def names_of(where: str, count: int, given: Sequence[str] = ()) -> tuple[str, ...]:
+    """Names of `count` points: those that the file has, or the layout's of so many points.
+
+    UserError if the file has none and the layout is unknown.
+    """
+    names = tuple(given) if len(given) == count else points_of(count)
+    if not names:
+        known = ", ".join(f"{n} ({name})" for n, (name, _) in LAYOUTS.items())
+        raise UserError(f"{where}: has {count} points without names, an unknown layout; known: {known}")
+    return names
+
+
+def one_person(
+    path: str | os.PathLike[str], detected: Detections, clip: Clip
+) -> tuple[NDArray[np.int64], Array, tuple[str, ...], Array, Array, list[str]]:
+    """Choose a person's joints.
+
+    Returns frames (T,), their times (T,) in seconds, J joints of the model, u and v (T, J, 2) in pixels, NaN
+    where not seen, confidences (T, J) from 0 to 1, and the names of points that are no joints.  UserError in
+    one line names the file.
+    """
+    joints = [joint_named(name, detected.own) for name in detected.names]
+    used = [i for i, joint in enumerate(joints) if joint and joints.index(joint) == i]
+    if not used:
+        shown = " ".join(name for name in detected.names[:8] if name)
+        raise UserError(
+            f"{path}: none of its points is a joint of the model ({shown or 'they have no names'}); "
+            "name them as l_knee, left_knee or LKnee"
+        )
+    chain = _choose(path, _people(detected.found), clip)
+    frame = np.array([detection.frame for detection in chain], np.int64)
+    points = np.stack([detection.points[used] for detection in chain])
+    uv = points[..., :2].copy()
+    confidence = np.clip(np.nan_to_num(points[..., 2]), 0.0, 1.0)
+    unseen = (confidence <= 0) | (uv == 0).all(axis=2) | (uv == -1).all(axis=2) | ~np.isfinite(uv).all(axis=2)
+    uv[unseen], confidence[unseen] = np.nan, 0.0
+    if detected.shares:
+        if clip.size is None:
+            raise UserError(
+                f"{path}: has shares of the picture's width and height; give --video or --camera for its size"
+            )
+        uv = uv * clip.size - 0.5  # pixel centres at integers
+    names = tuple(joints[i] for i in used)
+    ignored = [name for i, name in enumerate(detected.names) if name and i not in used]
+    return frame, _times(path, frame, detected, clip), names, uv, confidence, ignored
+
+
+def _people(found: Sequence[Detection]) -> dict[str, list[Detection]]:
+    """Return the detections of each person by id, in the order of frames."""
+    ordered = sorted(found, key=lambda detection: detection.frame)
+    ids = Counter((detection.frame, detection.person) for detection in ordered)
+    people: dict[str, list[Detection]] = {}
+    if all(person is not None for _, person in ids) and max(ids.values(), default=0) == 1:
+        for detection in ordered:
+            people.setdefault(str(detection.person), []).append(detection)
+        return people
+    open_chains: list[list[Detection]] = []
+    frames: dict[int, list[Detection]] = {}
+    for detection in ordered:
+        frames.setdefault(detection.frame, []).append(detection)
+    for number, present in frames.items():
+        open_chains = [chain for chain in open_chains if number - chain[-1].frame <= _LONGEST_BREAK]
+        for detection, chain in _linked(present, open_chains):
+            if chain is None:
+                people[str(len(people))] = chain = []
+                open_chains.append(chain)
+            chain.append(detection)
+    return people
+
+
+def _linked(
+    present: list[Detection], chains: list[list[Detection]]
+) -> list[tuple[Detection, list[Detection] | None]]:
+    """Each detection of a frame with the chain that it continues, nearest first; None for a new person."""
+    pairs = [
+        (moved, i, k)
+        for i, detection in enumerate(present)
+        for k, chain in enumerate(chains)
+        if (moved := _moved(chain[-1].points, detection.points)) <= _MOVED
+    ]
+    continued: dict[int, list[Detection]] = {}
+    taken: set[int] = set()
+    for _, i, k in sorted(pairs):
+        if i not in continued and k not in taken:
+            continued[i] = chains[k]
+            taken.add(k)
+    return [(detection, continued.get(i)) for i, detection in enumerate(present)]
+
+
+def _moved(before: Array, after: Array) -> float:
+    """Median distance of the points that both have, over the person's extent; inf if they share none."""
+    both = _seen(before) & _seen(after)
+    if not both.any():
+        return np.inf
+    extent = max(float(np.ptp(points[_seen(points), :2], axis=0).max()) for points in (before, after))
+    return float(np.median(np.linalg.norm(after[both, :2] - before[both, :2], axis=1))) / max(extent, 1e-9)
+
+
+def _seen(points: Array) -> NDArray[np.bool_]:
+    return np.isfinite(points).all(axis=1) & (points[:, 2] > 0)
+
+
+def _choose(path: str | os.PathLike[str], people: dict[str, list[Detection]], clip: Clip) -> list[Detection]:
+    """Return the detections of the person asked for, or of the one who is seen most: frames times extent."""
+    seen = {name: [d for d in chain if _seen(d.points).any()] for name, chain in people.items()}
+    weight = {name: sum(_extent(d.points) for d in chain) for name, chain in seen.items() if chain}
+    if not weight:
+        raise UserError(f"{path}: no point of a person is seen in any frame")
+    ranked = sorted(weight, key=lambda name: -weight[name])
+    listed = ", ".join(f"{name} ({len(seen[name])} frames)" for name in ranked[:_NAMED])
+    listed += f" and {len(ranked) - _NAMED} more" * (len(ranked) > _NAMED)
+    if clip.person is not None:
+        if clip.person not in weight:
+            raise UserError(f"{path}: has no person {clip.person}; --person is one of {listed}")
+        return seen[clip.person]
+    if len(ranked) > 1:
+        note(f"{path}: has {len(ranked)} people: {listed}; took {ranked[0]} (--person)", clip.quiet)
+    return seen[ranked[0]]
+
+
+def _extent(points: Array) -> float:
+    """How tall or wide a person is, in the unit of the points; 1e-9 at least."""
+    return max(float(np.ptp(points[_seen(points), :2], axis=0).max()), 1e-9)
+
+
+def _times(path: str | os.PathLike[str], frame: NDArray[np.int64], detected: Detections, clip: Clip) -> Array:
+    """Seconds of frames: of the video, or by --fps, or as the file has them."""
+    if clip.times is not None:
+        if frame[0] < 0 or frame[-1] >= len(clip.times):
+            raise UserError(
+                f"{path}: has frames {frame[0]} to {frame[-1]}, the video 0 to {len(clip.times) - 1}; "
+                "are they of this video?"
+            )
+        return np.asarray(clip.times, float)[frame]
+    if clip.fps is None and detected.times:
+        return np.array([detected.times[number] for number in frame.tolist()])
+    fps = clip.fps or detected.fps
+    if fps is None:
+        raise UserError(f"{path}: has no times; give --fps HZ, or --video VIDEO that the points are from")
+    return frame / fps
