@@ -7,10 +7,14 @@ from dataclasses import replace
 import cv2
 import numpy as np
 import pytest
+from walking_keypoints import MODEL, walk_at
 
 from gait import Camera, Video
+from gait.camera.camera import write_camera
+from gait.cli import main
 from gait.io.keypoints_file import Keypoints
 from gait.io.video import VideoWriter, sample_frames
+from gait.track import walk_camera
 from gait.track.camera_motion import View, map_pixels
 from gait.track.stabilise import SteadyVideo, find_motion, moves
 
@@ -28,10 +32,10 @@ def scene(texture: float) -> np.ndarray:
     return np.repeat(np.clip(picture, 0, 255).astype(np.uint8)[..., None], 3, axis=2)
 
 
-def views(pan: float, shake: float) -> list[View]:
+def views(pan: float, shake: float, count: int = FRAMES) -> list[View]:
     """Views of a camera that pans and shakes, radians, and zooms a little."""
-    turns = [(shake * np.sin(2 * k), pan * k / (FRAMES - 1), shake * np.cos(3 * k)) for k in range(FRAMES)]
-    zooms = [1 + 0.002 * np.sin(k) * (shake > 0) for k in range(FRAMES)]
+    turns = [(shake * np.sin(2 * k), pan * k / (count - 1), shake * np.cos(3 * k)) for k in range(count)]
+    zooms = [1 + 0.002 * np.sin(k) * (shake > 0) for k in range(count)]
     return [View(cv2.Rodrigues(np.array(turn))[0], zoom) for turn, zoom in zip(turns, zooms, strict=True)]
 
 
@@ -42,7 +46,7 @@ def film(path, turned: list[View], texture: float = 25.0) -> Video:
         for k, view in enumerate(turned):
             places = map_pixels(grid, view.camera(CAMERA), PANORAMA).astype(np.float32)
             picture = cv2.remap(still, *cv2.split(places), cv2.INTER_LINEAR)
-            picture[80:200, 20 * k : 20 * k + PERSON] = 30 + 10 * k
+            picture[80:200, 20 * (k % FRAMES) :][:, :PERSON] = 30 + 10 * (k % FRAMES)
             out.write(picture)
     return Video(path)
 
@@ -90,3 +94,36 @@ def test_a_scene_without_texture_is_reported(tmp_path):
     video = film(tmp_path / "v.mp4", views(0.1, 0.01), texture=0.0)
     motion, why = find_motion(video, CAMERA, sample_frames(video), people())
     assert motion is None and "too little texture" in why
+
+
+def test_gait_lift_undoes_the_turns_too(tmp_path, monkeypatch, capsys):
+    """A person who walks 1.2 m/s before a camera that follows them, as a detector finds them."""
+    count = 30
+    turned = views(0.3, 0.003, count)
+    video = film(tmp_path / "walk.mp4", turned)
+    places = np.array([walk_at(k / 30, (0.0, (-0.6, 0.0))) for k in range(count)])
+    uv = np.array([view.camera(CAMERA).project(now) for view, now in zip(turned, places, strict=True)])
+    rng, frame = np.random.default_rng(5), np.arange(count)
+    uv += 0.5 * rng.standard_normal(uv.shape)
+    known = Keypoints(frame, video.times[frame], MODEL.joint_names, uv, np.ones(uv.shape[:2]))
+    monkeypatch.setattr(walk_camera, "find_person", lambda *_: known)
+    # the camera file is that of the reference frame, which the command names
+    motion, _ = find_motion(video, CAMERA, sample_frames(video), {0: known})
+    assert motion is not None
+    write_camera(tmp_path / "c.json", turned[motion.reference].camera(CAMERA))
+    errors = []
+    for choice in ("auto", "off"):
+        words = ["lift", video.path, "--camera", tmp_path / "c.json", "-o", tmp_path / "o.csv"]
+        assert main([*map(str, words), "--stabilize", choice]) == 0
+        found = np.genfromtxt(tmp_path / "o.csv", delimiter=",", names=True)
+        off = found["l_hip_x"] - places[:, MODEL.joint_names.index("l_hip"), 0]
+        errors.append(np.abs(off).max())
+    assert f"frames are stabilised on frame {motion.reference}" in capsys.readouterr().err
+    assert errors[0] < 0.1 < 0.5 < errors[1]
+
+
+def test_stabilising_is_for_videos(tmp_path, capsys):
+    (tmp_path / "k.csv").write_text("frame,time\n")
+    words = ["lift", str(tmp_path / "k.csv"), "-o", str(tmp_path / "o.csv"), "--stabilize", "auto"]
+    assert main(words) == 2
+    assert "--stabilize is for a video" in capsys.readouterr().err

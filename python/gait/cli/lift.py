@@ -68,9 +68,10 @@ C.json gives positions of joints (or other markers of the model) and optionally 
 _ONLY_KEYPOINTS = (
     *("orthographic", "metres_per_unit", "pixel_sd", "floor_sd", "method", "no_contact"),
     *("no_bones", "ignore_unknown", "keep_sides", "keep_spikes", "trc", "person", "fps", "video"),
+    "stabilize",
 )
 _ONLY_PICTURES = ("corrections", "background", "alone", "overlay", "suggest")
-_ONLY_VIDEO = ("placement", *_ONLY_PICTURES, "start", "stop", "fov", "camera_out")
+_ONLY_VIDEO = ("placement", *_ONLY_PICTURES, "start", "stop", "fov", "camera_out", "stabilize")
 PIXEL_SD, FLOOR_SD = Options.pixel_sd, Options.floor_sd  # pixels, metres
 MOVED = 3  # joints named that a displacement moves most
 WHOLE = 0.5  # share of a displacement's energy from which it moves the whole body
@@ -166,6 +167,7 @@ def _add_video_arguments(parser: argparse.ArgumentParser) -> None:
     group = parser.add_argument_group("from a video")
     values.add_fov(group)
     group.add_argument("--camera-out", metavar="CAM.json", help="also write the camera, found or given")
+    values.add_stabilize(group, default=None)
     group.add_argument(
         "--start",
         type=values.whole(0),
@@ -253,6 +255,7 @@ def _lift_keypoints(args: argparse.Namespace, video: bool) -> tuple[dict[str, An
         keep_spikes=args.keep_spikes,
         all_markers=args.all_markers,
         clip=_clip(args),
+        stabilised=args.stabilize == "auto",
     )
     if keypoints is None:
         lifted = lift_run.lift_file(args.input, prior, request, warn, args.quiet)
@@ -304,8 +307,22 @@ def _find_keypoints(args: argparse.Namespace, prior: SegmentPrior) -> tuple[Keyp
     if args.camera:
         Camera.read(args.camera, video.size).check_place(args.camera)
     keypoints = find_person(video, args.quiet, args.start or 0, args.stop)
+    if args.stabilize == "auto":
+        keypoints = _stabilised(args, video, keypoints)
     calibration = None if args.camera or args.orthographic else _calibrate(args, video, keypoints)
     return keypoints.certain(), calibration
+
+
+def _stabilised(args: argparse.Namespace, video: Video, keypoints: Keypoints) -> Keypoints:
+    """Move keypoints to where the camera of one frame would see them, if the camera turns."""
+    from gait.camera.camera import Camera
+    from gait.io.video import sample_frames
+    from gait.track.stabilise import stabilised
+    from gait.track.walk_camera import expected_camera
+
+    camera = Camera.read(args.camera, video.size) if args.camera else expected_camera(video, args.fov)
+    steady = stabilised(video, camera, sample_frames(video), {0: keypoints}, None, args.quiet)
+    return keypoints if steady is None else steady.of_reference(steady.keypoints(keypoints))
 
 
 def _calibrate(args: argparse.Namespace, video: Video, keypoints: Keypoints) -> Calibration:

@@ -89,13 +89,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         help=f"their standard deviation at full confidence, the difference between the detector's joints and "
         f"the model's included (default: {KEYPOINTS_SD:g})",
     )
-    add(
-        "--stabilize",
-        choices=["auto", "off"],
-        default="off",
-        help="auto: undo the motion of a camera that turns; joints are then in the scene's frame, the given "
-        "camera is that of the frame that is named (default: off)",
-    )
+    values.add_stabilize(parser, default="off")
     add("--overlay", metavar="O.mp4", help="also draw the estimates into the video")
     add(
         "--smooth", action="store_true", help="estimate each frame from the whole clip, later frames included"

@@ -93,6 +93,17 @@ def add_fov(parser: _ActionsContainer) -> None:
     )
 
 
+def add_stabilize(parser: _ActionsContainer, default: str | None) -> None:
+    """Add ``--stabilize``."""
+    parser.add_argument(
+        "--stabilize",
+        choices=["auto", "off"],
+        default=default,
+        help="auto: undo the motion of a camera that turns; joints are then in the scene's frame, the given "
+        "camera is that of the frame that is named (default: off)",
+    )
+
+
 def add_model(parser: ArgumentParser, what: str = "walking model") -> None:
     """Add ``--model``; None stands for the model of the package."""
     parser.add_argument("-m", "--model", metavar="M.gait", help=f"{what} (default: the shipped one)")

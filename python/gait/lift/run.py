@@ -59,6 +59,8 @@ class Request:
         Leave swaps of left and right, and spikes, as they are.
     all_markers : bool
         Estimate all markers of the prior.
+    stabilised : bool
+        The keypoints are those of a stabilised clip, which shows more than the camera's picture.
     hints : bool
         Name the options of `gait lift` in warnings.
     clip : Clip
@@ -75,6 +77,7 @@ class Request:
     keep_sides: bool = False
     keep_spikes: bool = False
     all_markers: bool = False
+    stabilised: bool = False
     hints: bool = True
     clip: Clip = Clip()
 
@@ -198,7 +201,7 @@ def _view(keypoints: Keypoints, request: Request, warn: Warn) -> View:
     if request.camera:
         camera = Camera.read(request.camera)
         outside = keypoints.outside(camera.size)
-        if outside > OUTSIDE:
+        if outside > OUTSIDE and not request.stabilised:
             picture = "{}x{}".format(*camera.size)
             warn(
                 f"{outside:.0%} of the points lie outside the camera's {picture} picture: is "

@@ -26,9 +26,8 @@ from gait.track.camera_check import contradiction
 from gait.track.from_walk import Calibration
 from gait.track.keypoint_start import find_keypoint_start, keypoint_noise
 from gait.track.options import ClipOptions
-from gait.track.stabilise import SteadyVideo, find_motion, moves
-from gait.track.walk_camera import calibrate_film, expected_fov, note_camera
-from gait.track.walk_start import usual_camera
+from gait.track.stabilise import SteadyVideo, moves, stabilised
+from gait.track.walk_camera import calibrate_film, expected_camera, note_camera
 
 _COLOUR = 4.0  # grey levels between the channels of half of a picture in colour, at least
 _TRUNK = ("l_shoulder", "r_shoulder", "l_hip", "r_hip")
@@ -157,24 +156,12 @@ def _stabilise(
     given: Image | None,
 ) -> SteadyVideo | None:
     """Undo the turns of the camera, if asked to; None if it stands still or they cannot be undone."""
-    camera = camera or usual_camera(video.size, expected_fov(video, options.fov, quiet=True)[0])
+    camera = camera or expected_camera(video, options.fov)
     if options.stabilize == "off":
         if samples and moves(camera, samples, people, given):
             note("the camera moves during the clip; --stabilize auto undoes its turns", options.quiet)
         return None
-    with progress("camera's motion", video.count, options.quiet) as update:
-        motion, why = find_motion(video, camera, samples, people, given, update)
-    if why:
-        note(f"{why}; frames are not stabilised", options.quiet)
-    if motion is None:
-        return None
-    place = "the background" if given is not None else f"frame {motion.reference}"
-    note(
-        f"the camera turned by up to {motion.furthest():.0f} px: frames are stabilised on {place}, for which "
-        "camera and places hold",
-        options.quiet,
-    )
-    return SteadyVideo(video, motion, samples)
+    return stabilised(video, camera, samples, people, given, options.quiet)
 
 
 def _steady_plate(options: ClipOptions, steady: SteadyVideo, plate: Image | None) -> Image | None:

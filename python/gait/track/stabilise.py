@@ -16,6 +16,7 @@ from numpy.typing import NDArray
 from gait.camera.camera import Camera
 from gait.io.keypoints_file import Keypoints
 from gait.io.video import Frame, Image, Video
+from gait.progress import note, progress
 from gait.track.camera_motion import Box, CameraMotion, View, fit_view, map_pixels
 
 Array = NDArray[np.float64]
@@ -58,7 +59,7 @@ def find_motion(
     samples: Sequence[Frame],
     people: Mapping[int, Keypoints],
     plate: Image | None = None,
-    progress: Callable[[int], None] | None = None,
+    update: Callable[[int], None] | None = None,
 ) -> tuple[Motion | None, str]:
     """Measure how the camera turns.
 
@@ -88,8 +89,8 @@ def find_motion(
     views = []
     for frame in video.frames(grey=True):
         views.append(motion.step(frame.image, boxes.get(frame.number, ())))
-        if progress is not None:
-            progress(frame.number)
+        if update is not None:
+            update(frame.number)
     found = np.isfinite([view.residual for view in views])
     if found.mean() < _MOSTLY or motion.scale * np.median([v.residual for v in views]) > _TRAVELS:
         return None, "the camera moves along, or the scene has too little texture to show how it turns"
@@ -98,6 +99,33 @@ def find_motion(
         back = views[reference].inverse()
         views = [view.after(back) for view in views]
     return Motion(camera, views, reference), ""
+
+
+def stabilised(
+    video: Video,
+    camera: Camera,
+    samples: Sequence[Frame],
+    people: Mapping[int, Keypoints],
+    plate: Image | None,
+    quiet: bool,
+) -> SteadyVideo | None:
+    """Undo the turns of a clip's camera, and report it; None if it stands still or they cannot be undone.
+
+    Parameters are as for `find_motion`.
+    """
+    with progress("camera's motion", video.count, quiet) as update:
+        motion, why = find_motion(video, camera, samples, people, plate, update)
+    if why:
+        note(f"{why}; frames are not stabilised", quiet)
+    if motion is None:
+        return None
+    place = "the background" if plate is not None else f"frame {motion.reference}"
+    note(
+        f"the camera turned by up to {motion.furthest():.0f} px: frames are stabilised on {place}, for which "
+        "camera and places hold",
+        quiet,
+    )
+    return SteadyVideo(video, motion, samples)
 
 
 def moves(

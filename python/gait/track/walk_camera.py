@@ -3,12 +3,13 @@
 from __future__ import annotations
 
 from gait.bindings.model import Model
+from gait.camera.camera import Camera
 from gait.io.keypoints_file import Keypoints
 from gait.io.lens_tag import equivalent_mm, lens_tag, view_across
 from gait.io.video import Video
 from gait.progress import note, progress
 from gait.track.from_walk import Calibration, calibrate
-from gait.track.walk_start import GIVEN_FOV_SD
+from gait.track.walk_start import GIVEN_FOV_SD, usual_camera
 
 _TAG_SD = 0.1  # of the focal length's logarithm; stabilised films are cropped by about as much
 
@@ -63,6 +64,11 @@ def expected_fov(video: Video, fov: float | None, quiet: bool) -> tuple[float | 
         quiet,
     )
     return fov, _TAG_SD
+
+
+def expected_camera(video: Video, fov: float | None) -> Camera:
+    """Camera that is expected before the walk is looked at; parameters as for `expected_fov`."""
+    return usual_camera(video.size, expected_fov(video, fov, quiet=True)[0])
 
 
 def calibrate_film(
