@@ -138,9 +138,9 @@ $(READY): python/constraints.txt python/pyproject.toml
 	@ln -sfn "$$(cd $(VENV) && echo lib/python3.*/site-packages)" $(SITE)
 	@printf '%s\n' "$$(pwd -P)/python" > $(SITE)/_editable_skbc_libgait.pth # starts 30 ms faster than the hook in it
 	@$(PY) -c 'import lcm' || { echo 'setup: LCM needs libglib-2.0.so.0: install libglib2.0-0' >&2; exit 1; }
-	@$(VENV)/bin/gait detect --fetch --quiet >/dev/null || echo 'setup: no weights, so gait detect does not work yet;' \
+	@env -u GAIT_WEIGHTS $(VENV)/bin/gait detect --fetch --quiet >/dev/null || echo 'setup: no weights, so gait detect does not work yet;' \
 	    'run `$(VENV)/bin/gait detect --fetch` later' >&2
-	@$(VENV)/bin/gait studio --fetch --quiet >/dev/null || echo 'setup: no parts of pages, so gait studio does not work yet;' \
+	@env -u GAIT_WEB $(VENV)/bin/gait studio --fetch --quiet >/dev/null || echo 'setup: no parts of pages, so gait studio does not work yet;' \
 	    'run `$(VENV)/bin/gait studio --fetch` later' >&2
 	@pwd -P > $@
 
