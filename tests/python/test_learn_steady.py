@@ -12,7 +12,8 @@ import gait
 from gait.body.model_curves import curves
 from gait.body.skeleton import ANGLES
 from gait.io import blob
-from gait.learn.cycles import period, steady, verdict
+from gait.learn.cycles import period, sequence, steady, stride, verdict
+from gait.learn.solve import readers
 from gait.reproducible import one_thread
 
 FPS = 120.0
@@ -416,3 +417,52 @@ def test_the_shipped_walk_is_a_walk_by_its_angles_and_root():
     curve = curves(sections, np.arange(400) / 128, np.zeros((400, 1)))
     footing = verdict.footing(verdict.feet_of_channels(curve), 128)
     assert not footing.running and footing.bob < -0.5 and 0.05 < footing.lift < 0.15 and footing.steps < 0.01
+
+
+# ---- strides: the period at which the legs take turns ----
+
+
+def swaying(multiple, noise, frames=400):
+    """A walk whose trunk and neck sway once in `multiple` strides, 6 degrees."""
+    rng, angles = np.random.default_rng(1), gait(frames, noise)
+    for k in np.flatnonzero(np.isnan(angles[0])):
+        turn = 2 * np.pi * np.arange(frames) / (multiple * VERDICT_PERIOD)
+        angles[:, k] = np.radians(6 * np.sin(turn + rng.uniform(0, 6)) + rng.normal(scale=0.1, size=frames))
+    return angles
+
+
+@pytest.mark.parametrize(("multiple", "noise"), [(2.0, 4.0), (0.5, 4.0)])
+def test_a_stride_is_the_period_at_which_the_legs_take_turns(multiple, noise):
+    angles = swaying(multiple, noise)
+    longest = period.SECONDS[1] * VERDICT_FPS  # 2.1 s, where the search ends
+    wrong = min(multiple * VERDICT_PERIOD, longest)
+    assert period.find(angles, VERDICT_FPS).frames == pytest.approx(wrong, rel=0.02)
+    assert stride.find(angles, VERDICT_FPS).frames == pytest.approx(VERDICT_PERIOD, rel=0.01)
+    still = steady.RootPath(np.zeros((400, 2)), np.zeros(400))
+    assert steady.steady_part(angles, VERDICT_FPS, "refined", still)[1].frames == pytest.approx(110, rel=0.01)
+
+
+def test_alternation_is_of_the_legs_and_of_one_period():
+    angles = gait()
+    assert stride.alternation(angles, VERDICT_PERIOD) > 0.6
+    assert max(abs(stride.alternation(angles, m * VERDICT_PERIOD)) for m in (2, 3)) < 0.1
+    assert stride.alternation(angles, VERDICT_PERIOD / 2) < 0
+    assert stride.alternation(gait(lag=0.0), VERDICT_PERIOD) < -0.6
+    assert stride.alternation(np.full((400, len(ANGLES)), np.nan), VERDICT_PERIOD) == 0
+
+
+def test_legs_that_move_together_keep_their_period():
+    """Jumps and squats: no multiple has legs that take turns."""
+    angles = gait(lag=0.0)
+    assert stride.find(angles, VERDICT_FPS).frames == period.find(angles, VERDICT_FPS).frames
+
+
+MORE = Path(__file__).resolve().parents[2] / "../shared/data/mocap/more"
+
+
+@pytest.mark.skipif(not MORE.is_dir(), reason="needs recordings of further people beside the repository")
+@pytest.mark.parametrize(("start", "stop"), [(22, 347), (45, 370)])
+def test_a_turning_walk_has_its_own_period(start, stop):
+    path = MORE / "mcgill/m05/m05_02.trc"
+    part = readers.read(path).part(start, stop)
+    assert sequence.prepare(path, part).period.frames / part.fps == pytest.approx(0.91, abs=0.06)

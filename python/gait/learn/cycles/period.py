@@ -163,6 +163,11 @@ def find_longer(signals: Floats, fps: float, mode: str = "refined") -> float:
     return _refine(moving, float(candidates[np.nanargmax(scores)])) if np.isfinite(scores).any() else np.nan
 
 
+def refined(signals: Floats, frames: float) -> float:
+    """Return the best period, frames, near one that is nearly right."""
+    return _refine(signals[:, _moving(signals)], frames)
+
+
 def seconds(mode: str) -> tuple[float, float]:
     """Return the shortest and longest period that is looked for, seconds."""
     return LITERAL_SECONDS if mode == "literal" else SECONDS

@@ -10,7 +10,7 @@ import numpy as np
 from gait.body.skeleton import ANGLES, ROOTS, SIDES
 from gait.errors import UserError
 from gait.learn.arrays import Floats
-from gait.learn.cycles import cutting, period, steady, verdict
+from gait.learn.cycles import cutting, period, steady, stride, verdict
 from gait.learn.mocap.tables import AngleTable
 from gait.learn.options import DEFAULT, LearnOptions
 from gait.learn.rotations import unwrap
@@ -77,7 +77,7 @@ def prepare(path: Path, read: Body | AngleTable, options: LearnOptions = DEFAULT
             raise _refused(path, activity, reason)
     if found is None or kept.stop - kept.start < read.frames:
         motion = _motion(read.part(kept.start, kept.stop))
-        found = period.find(motion.angles, read.fps, mode)
+        found = stride.find(motion.angles, read.fps, mode)
     judged, channels, heading = _judge(motion, found, activity)
     if not judged.accepted:
         other = judged.activity if {judged.activity, activity} == {"walk", "run"} else ""

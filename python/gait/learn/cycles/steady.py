@@ -12,7 +12,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from gait.learn.arrays import Floats, Mask
-from gait.learn.cycles import period
+from gait.learn.cycles import period, stride
 
 QUIET = 0.3  # of the 90th percentile of the joints' speed: slower ends are not the motion
 WINDOW = 0.5  # seconds over which that speed is averaged
@@ -55,14 +55,14 @@ def steady_part(angles: Floats, fps: float, mode: str, path: RootPath) -> tuple[
     """Find the steady part of angles (T, A), radians with NaN where missing, and its period."""
     moving = active_part(angles, fps)
     angles, path = angles[moving.start : moving.stop], path.part(moving.start, moving.stop)
-    found, kept = period.find(angles, fps, mode), Kept(0, len(angles))
+    found, kept = stride.find(angles, fps, mode), Kept(0, len(angles))
     for _ in range(PERIODS):
         if not np.isfinite(found.frames):
             break
         before, kept = kept, longest_steady(angles, fps, found.frames, path)
         if kept == before or kept.stop - kept.start < period.CYCLES * found.frames:
             break
-        found = period.find(angles[kept.start : kept.stop], fps, mode)
+        found = stride.find(angles[kept.start : kept.stop], fps, mode)
     why = _words(moving.before, kept.before), _words(moving.after, kept.after)
     return Kept(moving.start + kept.start, moving.start + kept.stop, *why), found
 
