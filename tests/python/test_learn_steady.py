@@ -11,8 +11,10 @@ from scipy import stats
 import gait
 from gait.body.model_curves import curves
 from gait.body.skeleton import ANGLES
+from gait.errors import UserError
 from gait.io import blob
 from gait.learn.cycles import period, sequence, steady, stride, verdict
+from gait.learn.options import LearnOptions
 from gait.learn.solve import readers
 from gait.reproducible import one_thread
 
@@ -344,9 +346,13 @@ def test_who_flies_runs(duty):
     assert "this is running" in judge(gait(), footing).reason
 
 
-def test_a_slow_run_is_known_by_the_pelvis():
-    slow, lame = (verdict.footing(feet(0.4, bob), VERDICT_PERIOD) for bob in (0.02, -0.01))
-    assert 0.01 < slow.flight < 0.05 and slow.running and not lame.running
+@pytest.mark.parametrize("duty", [0.4, 0.55])
+def test_a_slow_run_is_known_by_the_pelvis(duty):
+    slow, lame = (verdict.footing(feet(duty, bob), VERDICT_PERIOD) for bob in (0.02, -0.01))
+    assert slow.flight < 0.05 and slow.running and not lame.running
+    assert judge(gait(), slow, "run").activity == "run" and judge(gait(), slow, "run").accepted
+    assert "this is running: the body is lowest over the standing leg (bob" in judge(gait(), slow).reason
+    assert judge(gait(), lame).accepted and "not running" in judge(gait(), lame, "run").reason
 
 
 def test_uneven_ground_and_feet_that_stay_are_no_walk():
@@ -458,6 +464,15 @@ def test_legs_that_move_together_keep_their_period():
 
 
 MORE = Path(__file__).resolve().parents[2] / "../shared/data/mocap/more"
+
+
+@pytest.mark.skipif(not MORE.is_dir(), reason="needs recordings of further people beside the repository")
+def test_a_run_of_two_metres_per_second_is_no_walk():
+    path = MORE / "run_nimble/h2/h2_01.trc"
+    body = readers.read(path)
+    assert sequence.prepare(path, body, LearnOptions(activity="run")).verdict.activity == "run"
+    with pytest.raises(UserError, match=r"this is running: the body is lowest .*give --activity run"):
+        sequence.prepare(path, body)
 
 
 @pytest.mark.skipif(not MORE.is_dir(), reason="needs recordings of further people beside the repository")

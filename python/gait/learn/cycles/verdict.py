@@ -1,6 +1,7 @@
 """Whether a recording is cyclic and shows the activity to be learnt: the evidence, and the reasons in words.
 
-Walking and running differ in the feet: a runner has both off the ground at times.
+A runner has both feet off the ground at times, or the pelvis is lowest where a walker's is highest: over the
+standing leg.
 """
 
 from __future__ import annotations
@@ -23,7 +24,10 @@ NAMES = {
 STANCE = 15  # percentile of a joint's height that is its height in stance; a runner's foot stands for 30 %
 CLEAR = 0.018  # statures above that from which ankle and ball of a foot are both off the ground
 FLIGHT = 0.05  # share of the time in flight above which a person runs
-SOME_FLIGHT, BOB = 0.01, 0.3  # a slow run: less flight, but the pelvis is highest while the feet are apart
+#: Correlation of the pelvis's height with the distance of the feet above which a person runs, with or without
+#: flight: the body is lowest over the standing leg, as on a spring.  Recorded walks have -1 to -0.1, runs 0.5
+#: to 0.9; slow runs, with a foot on the ground throughout, differ from walks in nothing else.
+BOB = 0.3
 SHARPNESS = 3.0
 REPEATS = 0.75  # the walks of CMU reach 0.88 to 0.99; punching 0.69, dances and climbing less or nothing
 LEGS = 0.7  # legs that alternate to within an eighth of a cycle; the walks of CMU reach 0.96 and more
@@ -121,10 +125,18 @@ def _footing(feet: Footing, kind: str) -> list[Evidence]:
         Evidence("steps", feet.steps, most=STEPS, words="the ground is not level"),
     ]
     if kind == "walk":
-        limits, words = (-np.inf, feet.limit), "this is running: both feet leave the ground"
-    else:
-        limits, words = (feet.limit, np.inf), "this is not running: there is a foot on the ground"
-    return [*result, Evidence("flight", feet.flight, *limits, words)]
+        bob, flight = (
+            "this is running: the body is lowest over the standing leg",
+            "both feet leave the ground",
+        )
+        return [
+            *result,
+            Evidence("bob", feet.bob, most=BOB, words=f"this is running: {bob}"),
+            Evidence("flight", feet.flight, most=FLIGHT, words=f"this is running: {flight}"),
+        ]
+    words = "this is not running: there is a foot on the ground, and the body is highest over it"
+    least = -np.inf if feet.bob > BOB else FLIGHT
+    return [*result, Evidence("bob", feet.bob), Evidence("flight", feet.flight, least, words=words)]
 
 
 def repeats(angles: Floats, period: float) -> float:
@@ -189,14 +201,9 @@ class Footing:
     steps: float  #: range of the ground under a foot, statures, the larger of both
 
     @property
-    def limit(self) -> float:
-        """Share of flight above which this is a run; smaller where the pelvis moves as in running."""
-        return SOME_FLIGHT if self.bob >= BOB else FLIGHT
-
-    @property
     def running(self) -> bool:
         """Whether this is a run and not a walk."""
-        return self.flight > self.limit
+        return self.flight > FLIGHT or self.bob > BOB
 
 
 def feet_of_body(body: Body, stature: float) -> Feet:
