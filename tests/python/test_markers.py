@@ -9,6 +9,7 @@ from scipy.spatial.transform import Rotation
 
 from gait.body.skeleton import ANGLES, Proportions
 from gait.errors import UserError
+from gait.learn.mocap.markers import LANDMARKS, SETS, known_landmarks, segment_axes
 from gait.learn.mocap.recording import Y_UP
 from gait.learn.solve import kinematics, markers, readers, retarget, skeleton_fit
 from gait.learn.solve.body import Body
@@ -225,3 +226,43 @@ def test_the_core_needs_three_points():
     points = skeleton_fit.Points(np.zeros(2, np.intp), np.zeros((2, 3)), np.ones(2))
     with pytest.raises(ValueError, match="three points"):
         skeleton_fit.fit(np.zeros((4, 2, 3)), points)
+
+
+# ---- labels ----
+
+
+def with_axes(points, ends, at=0):
+    """Points (T, M, 3) and four more: a turning segment's origin on the clavicle, and points on its axes."""
+    turn = Rotation.from_rotvec(np.linspace(0, 1, len(points))[:, None] * [0.0, 0, 1]).as_matrix()
+    origin = points[:, mw.FULL.index("LSHO")] + [0.0, 0.0, -0.1]
+    four = [origin, *(origin + 0.15 * turn[:, :, k] for k in range(3))]
+    return np.concatenate([points, np.stack(four, axis=1)], axis=1), [f"LCL{end}" for end in ends]
+
+
+@pytest.mark.parametrize("ends", ["OALP", "OXYZ", "0123"])
+def test_axes_of_segments_are_no_markers(ends):
+    points, axes = with_axes(mw.person(mw.FULL, frames=60)[0], ends)
+    labels = [*mw.FULL, *axes]
+    assert segment_axes(labels, points) == set(range(len(mw.FULL), len(labels)))
+    assert set(markers.assign(FILE, labels, points, None)) == set(range(len(mw.FULL)))
+
+
+def test_a_marker_named_like_an_axis_is_a_marker():
+    """LCLA alone is a marker on the clavicle; so are four of such names that do not stand at right angles."""
+    points = mw.person(mw.FULL, frames=60)[0]
+    four = [mw.FULL.index(name) for name in ("LSHO", "CLAV", "STRN", "C7")]
+    labels = [*mw.FULL, "LCLO", "LCLA", "LCLL", "LCLP"]
+    assert segment_axes(labels, np.concatenate([points, points[:, four]], axis=1)) == set()
+    assert segment_axes([*mw.FULL, "LCLA"], points[:, [*range(len(mw.FULL)), four[0]]]) == set()
+
+
+def test_anatomical_abbreviations_are_known():
+    pig = {
+        "ASI": "IAS", "PSI": "IPS", "KNE": "FLE", "TIB": "FAX", "ANK": "FAL", "HEE": "FCC", "TOE": "FM2",
+    }  # fmt: skip
+    labels = [f"{s}_{name}" for s in "LR" for name in pig.values()]
+    places = known_landmarks([*labels, "CV7", "SJN", "L_FME", "R_TAM"])
+    for s in "LR":
+        for old, new in pig.items():
+            assert places[f"{s}{new}".lower()] == LANDMARKS[SETS["plug-in-gait"][f"{s}{old}".lower()]]
+    assert places["cv7"] == LANDMARKS["c7"] and places["rtam"] == LANDMARKS["r_ankle_medial"]

@@ -33,9 +33,12 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, NamedTuple
 
+import numpy as np
+
 from gait.body.skeleton import SIDES, Proportions, default_skeleton
 from gait.errors import UserError
 from gait.io.fields import json_object
+from gait.learn.arrays import Floats
 
 _P = Proportions()
 SEGMENTS = default_skeleton().frames
@@ -57,6 +60,10 @@ class MarkerMap:
     landmarks: dict[str, Landmark]  #: by label, as `plain` gives it
     named: tuple[str, ...]  #: the labels that the file itself names, as written
 
+
+#: Last letters of the points that stand for a segment: its origin, then one on each axis.
+AXES = ("OALP", "OXYZ", "0123")
+SQUARE = 0.02  # cosine of axes at right angles; markers on skin are never so near
 
 BONE = 0.008  # palpable under the skin
 FLESH = 0.012  # beside a joint, but not at one bony point
@@ -176,11 +183,26 @@ _OPENSIM_SHORT = {
     **{f"{{s}}th{i}": "thigh_side" for i in range(1, 5)},
     **{f"{{s}}tb{i}": "shank_side" for i in range(1, 5)},
 }  # fmt: skip
+#: Landmarks of the skeleton by their anatomical abbreviations (Van Sint Jan 2007), as Qualisys and AnyBody
+#: users write them: L_IAS, L_FLE, CV7.
+_ANATOMICAL = {
+    "{s}ias": "asis", "{s}ips": "psis", "{s}ict": "iliac_crest", "{s}ftc": "trochanter",
+    "{s}ftl": "trochanter", "{s}fle": "knee_lateral", "{s}fme": "knee_medial", "{s}fax": "shank_side",
+    "{s}tta": "shank_front", "{s}ttc": "shank_front", "{s}fal": "ankle_lateral", "{s}tam": "ankle_medial",
+    "{s}fcc": "heel", "{s}fm1": "mt1", "{s}fm2": "mt2", "{s}fm5": "mt5", "{s}hlx": "toe_tip",
+    "{s}dp1": "toe_tip", "cv7": "c7", "tv10": "t10", "sjn": "suprasternale", "sxs": "xiphoid",
+    "{s}sae": "acromion", "{s}saj": "acromion", "{s}sia": "back",
+    "{s}hle": "elbow_lateral", "{s}hme": "elbow_medial", "{s}rsp": "wrist_radial", "{s}usp": "wrist_ulnar",
+    "sgl": "forehead",
+    **{f"{{s}}th{i}": "thigh_side" for i in range(1, 5)},
+    **{f"{{s}}sk{i}": "shank_side" for i in range(1, 5)},
+}  # fmt: skip
 _PATTERNS = {
     "plug-in-gait": _PLUG_IN_GAIT,
     "helen-hayes": _HELEN_HAYES,
     "opensim": _OPENSIM,
     "opensim-short": _OPENSIM_SHORT,
+    "anatomical": _ANATOMICAL,
 }
 
 
@@ -199,6 +221,34 @@ def _both_sides(patterns: dict[str, str]) -> dict[str, str]:
 
 #: Set to its labels (as `plain` gives them) and the names of their landmarks.
 SETS = {name: _both_sides(patterns) for name, patterns in _PATTERNS.items()}
+
+
+def segment_axes(labels: list[str], points: Floats) -> set[int]:
+    """Return the columns of points (T, M, 3) that are no markers but axes of segments.
+
+    Models of labs write four points a segment, the origin and one on each axis (Plug-in-Gait: PELO PELA PELL
+    PELP, LCLO LCLA ...; Oxford foot: LFOF0 to LFOF3).  Such points stand at right angles about the origin.
+    """
+    columns = {label.rsplit(":", 1)[-1].upper(): k for k, label in enumerate(labels)}
+    found: set[int] = set()
+    for name in columns:
+        for ends in AXES:
+            four = [columns.get(name[:-1] + end) for end in ends] if name[-1:] == ends[0] else []
+            known = [k for k in four if k is not None]
+            if len(known) == len(ends) and _are_axes(points[:, known]):
+                found |= set(known)
+    return found
+
+
+def _are_axes(points: Floats) -> bool:
+    """Whether the last three of four points (T, 4, 3) are on perpendicular axes about the first."""
+    away = points[:, 1:] - points[:, :1]
+    away = away[np.isfinite(away).all(axis=(1, 2))]
+    length = np.linalg.norm(away, axis=2, keepdims=True)
+    if not len(away) or not (length > 0).all():
+        return False
+    cosines = np.einsum("tix,tjx->tij", away / length, away / length)
+    return bool(np.abs(cosines - np.eye(3)).mean(axis=0).max() < SQUARE)
 
 
 def plain(label: str) -> str:

@@ -14,7 +14,7 @@ import numpy as np
 from gait.body.skeleton import JOINTS, SIDES, default_skeleton
 from gait.errors import UserError
 from gait.learn.arrays import Floats
-from gait.learn.mocap.markers import Landmark, MarkerMap, known_landmarks, plain
+from gait.learn.mocap.markers import Landmark, MarkerMap, known_landmarks, plain, segment_axes
 from gait.learn.solve import skeleton_fit
 from gait.learn.solve.body import MIRRORED, RECORDED, Body, level_pelvis
 from gait.learn.solve.kinematics import HINGES, SEGMENTS, pose_skeleton, segment_origins, segment_scales
@@ -108,7 +108,9 @@ def assign(
 
     In a file of several subjects ("Anna:LASI") the one with most known markers is taken.
     """
-    visible = [k for k in range(len(labels)) if np.isfinite(points[:, k]).all(axis=1).any()]
+    axes = segment_axes(labels, points)
+    seen = np.isfinite(points).all(axis=2).any(axis=0)
+    visible = [k for k in range(len(labels)) if seen[k] and k not in axes]
     best: dict[int, Landmark] = {}
     for subject in sorted({_subject(labels[k]) for k in visible}):
         own = [k for k in visible if _subject(labels[k]) == subject]
