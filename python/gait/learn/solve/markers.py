@@ -7,6 +7,7 @@ standard deviation by the fit's covariance is too large.  Nothing is interpolate
 from __future__ import annotations
 
 from collections.abc import Mapping
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -26,6 +27,7 @@ AXIS_SD = np.radians(15)  # beyond which a direction is not known
 WORST_RMS = 0.05  # metres: with a larger one, markers are not where their labels place them
 USUAL_RMS = 0.01  # metres: those of right-handed recordings are below
 BETTER = 0.6  # of the rms: with a mirror image that fits so well the axes are left-handed
+UNKNOWN = 1e6  # variance, square metres or radians, of what a frame does not show
 CHUNK = 512  # frames processed at once
 LEGS = [f"{s}_{joint}" for s in SIDES for joint in ("hip", "knee", "ankle")]
 
@@ -47,22 +49,34 @@ def from_markers(
     points = np.where(np.isfinite(points).all(axis=2, keepdims=True), points, np.nan)
     columns, places = _placed(path, labels, points, marker_map)
     fit = skeleton_fit.fit(points[:, columns], places, log_scales)
-    _require_right_handed(path, points[:, columns], places, float(np.sqrt(np.nanmean(fit.residual**2))))
-    own = {labels[k].rsplit(":", 1)[-1]: points[:, k] for k in columns}
-    body = from_fit(path.stem, fps, fit, own)
-    if not body.residual or not body.residual < WORST_RMS:
+    rms = skeleton_fit.usual_rms(fit.residual)
+    _require_right_handed(path, points[:, columns], places, rms)
+    if not rms < WORST_RMS:
         worst = labels[columns[int(np.nanargmax(np.nanmedian(fit.residual, axis=0)))]]
-        rms = 1000 * (body.residual or 0)
         raise UserError(
-            f"{path}: the markers do not fit a body (rms {rms:.0f} mm, worst {worst!r})"
+            f"{path}: the markers do not fit a body (rms {1000 * rms:.0f} mm, worst {worst!r})"
             "; check labels and units, or give a --markers file"
         )
+    own = {labels[k].rsplit(":", 1)[-1]: points[:, k] for k in columns}
+    body = from_fit(path.stem, fps, _without_misfits(fit), own)
     unknown = [name for name in LEGS if not np.isfinite(body.joints[name]).any()]
     if unknown:
         raise UserError(
             f"{path}: the known markers do not determine {unknown[0]!r}; name more in a --markers file"
         )
     return body
+
+
+def _without_misfits(fit: skeleton_fit.Fit) -> skeleton_fit.Fit:
+    """Return the fit without the frames in which half of the markers are far from the body.
+
+    Nothing is known there.  Such frames are few; most show few markers, or somebody else's.
+    """
+    seen = np.flatnonzero(np.isfinite(fit.residual).any(axis=1))
+    misfits = seen[np.nanmedian(fit.residual[seen], axis=1) > WORST_RMS]
+    covariance, residual = fit.covariance.copy(), fit.residual.copy()
+    covariance[misfits], residual[misfits] = UNKNOWN * np.eye(covariance.shape[1]), np.nan
+    return replace(fit, covariance=covariance, residual=residual)
 
 
 def _require_right_handed(path: Path, observed: Floats, places: skeleton_fit.Points, rms: float) -> None:

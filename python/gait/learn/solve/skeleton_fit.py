@@ -125,7 +125,7 @@ def fit(observed: Floats, points: Points, log_scales: Floats | None = None) -> F
 
 
 def length_information(observed: Floats, points: Points) -> tuple[LengthInformation, float]:
-    """Return what points show of their subject's length scales, and their rms distance from its body, metres.
+    """Return what points show of their subject's length scales, and `usual_rms` of its body, metres.
 
     Parameters and errors are those of `fit`.
     """
@@ -134,8 +134,17 @@ def length_information(observed: Floats, points: Points) -> tuple[LengthInformat
     subject = _fit_subject(few, points, None)
     body = pose_skeleton(subject.pose, segment_origins(subject.log_scales))
     apart = np.linalg.norm(body.points(subject.local, few.segment) - few.observed, axis=2)
-    rms = float(np.sqrt(np.mean(apart[few.weight > 0] ** 2)))
-    return _information(subject), rms
+    return _information(subject), usual_rms(np.where(few.weight > 0, apart, np.nan))
+
+
+def usual_rms(residual: Floats) -> float:
+    """Return the median over frames of the rms distance of their points (T, M), metres; NaN without any.
+
+    A few frames in which points are mistaken do not count against all others.
+    """
+    squares, count = np.nansum(residual**2, axis=1), np.isfinite(residual).sum(axis=1)
+    seen = count > 0
+    return float(np.median(np.sqrt(squares[seen] / count[seen]))) if seen.any() else float("nan")
 
 
 def pelvis_rotations(angles: Floats, points: Points, observed: Floats) -> Floats:
