@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
+from scipy.spatial.transform import Rotation
 
 from gait.body import skeleton
 from gait.body.skeleton import ANGLES, CHANNELS, SIDES
@@ -16,6 +17,7 @@ from gait.learn.solve import readers, retarget
 from gait.learn.solve.body import Body
 
 WALKS = Path(__file__).parents[2] / "../shared/data/mocap/cmu_walk"
+MORE = Path(__file__).resolve().parents[2] / "../shared/data/mocap/more"
 MODEL = skeleton.default_skeleton().sections() | {"CHNM": None}
 
 
@@ -187,3 +189,49 @@ def test_real_walks_are_reproduced_to_8_mm():
         distance = np.linalg.norm(found[:, [skeleton.JOINTS.index(n) for n in names]] - truth, axis=2)
         errors.append(distance.mean())
     assert np.mean(errors) < 0.0105 and max(errors) < 0.013
+
+
+# ---- straight limbs ----
+
+
+@pytest.mark.parametrize("turn", [0.0, 0.5, 0.97])
+def test_arms_that_stay_straight_do_not_show_their_rotation(turn):
+    """The hinge of a file is `turn` half turns off; knees bend, elbows by 5 degrees at most."""
+    channels = 0.3 * np.sin(np.arange(40)[:, None] / 6 + np.arange(len(CHANNELS)))
+    channels[:, len(ANGLES) :] = 0
+    for s in SIDES:
+        channels[:, column(f"{s}_elbow_flexion")] = 0.04 + 0.04 * np.sin(np.arange(40) / 6)
+        channels[:, column(f"{s}_shoulder_rotation")] = 0.1
+        channels[:, column(f"{s}_knee_flexion")] = 0.5 + 0.4 * np.sin(np.arange(40) / 6)
+    person = body_of(channels)
+    for s in SIDES:
+        arm = rotations.unit(person.joints[f"{s}_shoulder"] - person.joints[f"{s}_elbow"])
+        about = Rotation.from_rotvec(np.pi * turn * arm).as_matrix()
+        person.lateral[f"{s}_elbow"] = np.einsum("tij,tj->ti", about, person.lateral[f"{s}_elbow"])
+    found = retarget.observed_angles(person, retarget.measure(person))
+    rotated = [column(f"{s}_shoulder_rotation") for s in SIDES]
+    assert np.isnan(found[:, rotated]).all()
+    filled = retarget.observed_angles(person, retarget.measure(person), unknown=0.0)
+    assert (filled[:, rotated] == 0).all() and np.isfinite(filled).all()
+    rest = [k for k, name in enumerate(ANGLES) if "shoulder" in name and k not in rotated]
+    assert found[:, rest] == pytest.approx(channels[:, rest], abs=0.01)
+    assert np.abs(found[:, [column(f"{s}_elbow_flexion") for s in SIDES]]).max() < np.radians(6)
+
+
+def test_limbs_that_bend_keep_their_rotation():
+    channels = 0.3 * np.sin(np.arange(40)[:, None] / 6 + np.arange(len(CHANNELS)))
+    person = body_of(channels)
+    measures = retarget.measure(person)
+    assert np.array_equal(retarget.observed_angles(person, measures), retarget.angles(person, measures))
+
+
+@pytest.mark.skipif(not MORE.is_dir(), reason="needs recordings of further people beside the repository")
+@pytest.mark.parametrize(
+    "name", ["gaittoolbox/x1/x1_01.bvh", "mcgill/m10/m10_01.trc", "mcgill/m07/m07_01.trc"]
+)
+def test_straight_arms_of_recordings_do_not_turn_round(name):
+    body = retarget.levelled(readers.read(MORE / name))
+    found = np.degrees(retarget.observed_angles(body, retarget.measure(body)))
+    visible = found[:, [column(f"{s}_shoulder_rotation") for s in SIDES]]
+    visible = visible[np.isfinite(visible)]
+    assert not len(visible) or np.abs(np.mean(visible)) < 60

@@ -142,7 +142,7 @@ def _motion(read: Body | AngleTable) -> _Motion:
     measures = retarget.measure(body)
     yaw = np.arctan2(body.pelvis[:, 1, 0], body.pelvis[:, 0, 0])
     path = steady.RootPath(body.joints["pelvis"][:, :2], unwrap(yaw[:, None])[:, 0])
-    return _Motion(retarget.angles(body, measures), path, body, measures)
+    return _Motion(retarget.observed_angles(body, measures), path, body, measures)
 
 
 def _judge(motion: _Motion, found: period.Period, wanted: str) -> tuple[verdict.Verdict, Floats, Floats]:

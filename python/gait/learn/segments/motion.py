@@ -119,7 +119,7 @@ def _recorded(body: Body) -> tuple[tuple[str, ...], Floats]:
 def _pose_of_body(body: Body, measures: retarget.Measures) -> BodyPose:
     """Return the pose of the default skeleton with the lengths of the body."""
     channels = np.zeros((body.frames, len(CHANNELS)))
-    channels[:, : len(ANGLES)] = retarget.angles(body, measures)
+    channels[:, : len(ANGLES)] = retarget.observed_angles(body, measures, unknown=0.0)
     channels[:, TURNS] = decompose(body.pelvis, "zyx")
     return BodyPose(retarget.generic_proportions([measures]), channels)
 

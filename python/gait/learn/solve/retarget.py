@@ -28,6 +28,9 @@ ANATOMICAL: dict[str, Any] = {
     "head": (0.027, 0.0, 0.130),
     "upper_arm": 0.161,
 }
+#: Sine of the bend that a straight limb stays below in this share of the frames; elbows that bend in recorded
+#: walks reach 20 degrees at least.
+STRAIGHT, MOSTLY = np.sin(np.radians(15)), 0.9
 BALL = 0.0235  # height of the ball of the foot in stance, statures
 #: Share of the height of a standing body of the parts that may be unknown, statures.
 SHARES = {"rise": Proportions().sole - BALL, "neck": Proportions().neck}
@@ -157,6 +160,35 @@ def angles(body: Body, measures: Measures) -> Floats:
         result[f"{s}_ankle_flexion"] = np.pi / 2 - sole + measures.slope[i]
     table = np.stack([result[name] for name in ANGLES], axis=1)
     return _centred(table)
+
+
+def observed_angles(body: Body, measures: Measures, unknown: float = np.nan) -> Floats:
+    """Return `angles` with `unknown` rotations of limbs that stay straight: nothing shows these.
+
+    Their hinges have no direction, and a file's may be any; other angles are as if they were across the body.
+    """
+    straight = _straight_limbs(body)
+    across = {"elbow": torso_frames(body)[..., 1], "knee": body.pelvis[..., 1]}
+    hinges = {f"{s}_{joint}": across[joint] for s, joint in straight}
+    table = angles(replace(body, lateral=body.lateral | hinges), measures)
+    for s, joint in straight:
+        upper = "shoulder" if joint == "elbow" else "hip"
+        table[:, ANGLES.index(f"{s}_{upper}_rotation")] = unknown
+    return table
+
+
+def _straight_limbs(body: Body) -> list[tuple[str, str]]:
+    """Return sides and joints of limbs that hardly bend in any frame."""
+    found = []
+    for s in SIDES:
+        for joint, (upper, lower) in {"elbow": ("shoulder", "wrist"), "knee": ("hip", "ankle")}.items():
+            middle = body.joints[f"{s}_{joint}"]
+            ends = unit(middle - body.joints[f"{s}_{upper}"]), unit(body.joints[f"{s}_{lower}"] - middle)
+            bend = np.linalg.norm(np.cross(*ends), axis=1)
+            bend = bend[np.isfinite(bend)]
+            if len(bend) and np.quantile(bend, MOSTLY) < STRAIGHT:
+                found.append((s, joint))
+    return found
 
 
 def _about_y(frames: Floats, vectors: Floats) -> Floats:
