@@ -74,7 +74,29 @@ BIPED = {
         ("humerus", "UpperArm"), ("radius", "Forearm"), ("hand", "Hand"),
     )},
 }  # fmt: skip
+PARTS = {
+    "femur": "UpperLeg", "tibia": "LowerLeg", "foot": "Foot", "clavicle": "Shoulder",
+    "humerus": "UpperArm", "radius": "LowerArm", "hand": "Hand",
+}  # fmt: skip
+TRUNK = {"root": "Hips", "lowerback": "Spine", "lowerneck": "Chest", "upperneck": "Neck", "head": "Head"}
+
+
+def named(side, form="{}"):
+    """Names by a form, those of limbs by another with {side} and {part}, such as "{part}_{side}"."""
+    limbs = {
+        f"{s}{old}": side.format(side=word, s=s.upper(), part=part)
+        for s, word in (("l", "Left"), ("r", "Right"))
+        for old, part in PARTS.items()
+    }
+    return {bone: form.format(name) for bone, name in (TRUNK | limbs).items()}
+
+
 NAMES = {
+    "suffix": named("{part}_{s}"),
+    "suffix word": named("{part}{side}"),
+    "prefix": {bone: f"Character1_{name}" for bone, name in CGSPEED.items()},
+    "prefix and suffix": named("{part}.{s}", "DEF-{}"),
+    "ending": named("{side}{part}", "{}_jnt"),
     "cmu": None,
     "cgspeed": CGSPEED,
     "mixamo": MIXAMO,
@@ -93,6 +115,27 @@ def test_bvh_gives_the_angles_of_the_amc_it_was_made_from(amc, rename):
     thigh = second.bones.index((rename or {}).get("lfemur", "lfemur"))
     assert second.start[:, thigh] == pytest.approx(first.start[:, first.bones.index("lfemur")], abs=1e-4)
     assert np.degrees(angles(second)) == pytest.approx(np.degrees(angles(first)), abs=0.02)
+
+
+def test_a_node_that_only_places_the_body_does_not_show_which_axis_is_up(amc):
+    """It stays at the origin, 90 m from the person."""
+    path = amc.with_suffix(".bvh")
+    lines = files.bvh_from_amc(amc, named("{part}_{s}"), unit=0.01).splitlines()
+    cut = lines.index("MOTION")
+    lines[1] = "  JOINT Hips"
+    head = [
+        "HIERARCHY",
+        "ROOT Reference",
+        "{",
+        "  OFFSET 0 0 0",
+        "  CHANNELS 3 Zrotation Yrotation Xrotation",
+    ]
+    rows = [[0, 0, 0, *map(float, row.split())] for row in lines[cut + 3 :]]
+    rows = [" ".join(f"{v:.6f}" for v in [*row[:5], row[5] + 9000, *row[6:]]) for row in rows]
+    path.write_text("\n".join([*head, *lines[1:cut], "}", *lines[cut : cut + 3], *rows]) + "\n")
+    assert np.degrees(angles(bvh.read(path))) == pytest.approx(
+        np.degrees(angles(acclaim.read(amc))), abs=0.02
+    )
 
 
 def test_bvh_of_a_real_walk(tmp_path):

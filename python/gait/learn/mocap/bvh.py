@@ -185,7 +185,7 @@ def assemble(
             place if parent < 0 else start[:, parent] + np.einsum("tij,tj->ti", rotation[:, parent], place)
         )
         end[:, i] = start[:, i] + rotation[:, i] @ heirs[i]
-    turn_up, metres = _upright(start)
+    turn_up, metres = _upright(start[:, _trunk(joints) :])
     _require_ranges(path, joints, metres * values, "position", FARTHEST)
     return Recording(
         name=path.stem,
@@ -255,6 +255,12 @@ def _upright(start: Floats) -> tuple[Floats, float]:
     posed = np.median(extents, axis=0) if len(extents) else np.ones(3)
     up = 1 if posed[1] >= posed[2] else 2
     return Y_UP if up == 1 else np.eye(3), _unit(float(posed[up]))
+
+
+def _trunk(joints: list[Joint]) -> int:
+    """Return the first joint that branches: those above it only place the body, which may be far away."""
+    children = [sum(other.parent == i for other in joints) for i in range(len(joints))]
+    return next((i for i, count in enumerate(children) if count > 1), 0)
 
 
 def _unit(height: float) -> float:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import re
+from collections import Counter
 from dataclasses import dataclass, field, replace
 
 import numpy as np
@@ -13,12 +14,13 @@ from gait.learn.arrays import Floats
 from gait.learn.mocap.recording import NO_NOTES, FileNotes, Recording
 from gait.learn.rotations import frame_from, rotation_vectors, unit
 
-#: Names of bones in files; {S} = left/right, {s} = l/r.  Compared without case, punctuation and any prefix up
-#: to ':' (Mixamo) or of a biped (3ds Max).  From CMU's ASF; cgspeed and Mixamo; Poser; 3ds Max; and bones
-#: named by the joint where they begin (Biovision, Xsens, SMPL).
+#: Names of bones in files; {S} = left/right, {s} = l/r.  Compared without case, punctuation and words that
+#: most bones begin or end with (Character1_, mixamorig:, Bip01, _jnt); the side may stand before or after the
+#: rest.  From CMU's ASF; cgspeed and Mixamo; Poser; 3ds Max; and bones named by the joint where they begin
+#: (Biovision, Xsens, SMPL).
 ALIASES = {
-    "pelvis": ("root", "hips", "hip", "pelvis"),
-    "neck": ("upperneck", "neck1", "neck", "lowerneck"),
+    "pelvis": ("hips", "pelvis", "hip", "root"),
+    "neck": ("upperneck", "neck1", "neck01", "neck", "lowerneck"),
     "head": ("head",),
     "{s}_thigh": ("{s}femur", "{S}upleg", "{S}upperleg", "{S}thigh", "{s}thigh", "{S}hip", "{s}hip"),
     "{s}_shank": (
@@ -44,6 +46,9 @@ MIRRORED = (
 )
 RECORDED = "marker "  # prefix of names in `Body.joints` that are markers of the file
 UPRIGHT = 0.8  # of the leg's length by which the hips of a rest pose that stands are above the ankles
+WORD = re.compile(r"[A-Z]+(?![a-z])|[A-Z]?[a-z]+|[0-9]+")
+SIDE_WORDS = {"l": "left", "left": "left", "r": "right", "right": "right"}
+MOST = 0.7  # share of the bones whose names begin or end with a word that says nothing
 BIPED = re.compile(r"^bip0*\d*")
 
 
@@ -109,9 +114,41 @@ def _plain(name: str) -> str:
     return BIPED.sub("", "".join(c for c in name.rsplit(":", 1)[-1].lower() if c.isalnum()))
 
 
+def _known_as(names: list[str]) -> dict[str, int]:
+    """Return the bone of each name that is looked for: of two the first, and a name as it is written."""
+    known = {_plain(name): i for i, name in reversed(list(enumerate(names)))}
+    for i, words in enumerate(_own_words([_words(name) for name in names])):
+        stem = "".join(word for word in words if word not in SIDE_WORDS)
+        sides = {SIDE_WORDS[word] for word in words if word in SIDE_WORDS}
+        for side in sides if len(sides) == 1 else {""}:
+            for before in {side, side[:1]}:
+                known.setdefault(before + stem, i)
+    return known
+
+
+def _words(name: str) -> list[str]:
+    """Split a name at punctuation, blanks and capitals: UpperLeg_L to upper, leg, l."""
+    return [word.lower() for word in WORD.findall(name)]
+
+
+def _own_words(names: list[list[str]]) -> list[list[str]]:
+    """Remove from names words with which most of them begin or end, such as that of the character."""
+    for at in (0, -1):
+        while True:
+            first = [words[at] for words in names if len(words) > 1 and words[at] not in SIDE_WORDS]
+            word, count = Counter(first).most_common(1)[0] if first else ("", 0)
+            if count < MOST * len(names):
+                break
+            names = [
+                words[1 + at : len(words) + at] if len(words) > 1 and words[at] == word else words
+                for words in names
+            ]
+    return names
+
+
 def _find_bones(recording: Recording) -> tuple[dict[str, int], tuple[str, ...]]:
     """Return the bone of each key of ALIASES that is there, and the keys of bones that are not."""
-    known = {_plain(name): i for i, name in reversed(list(enumerate(recording.bones)))}
+    known = _known_as(recording.bones)
     found, lacking = dict[str, int](), list[str]()
     for role, names in ALIASES.items():
         for s, side in zip(SIDES, ("left", "right"), strict=True) if "{s}" in role else [("", "")]:
