@@ -16,15 +16,15 @@ from test_marker_files import write_c3d
 
 import gait.cli
 from gait import Model
-from gait.body.skeleton import CHANNELS, Proportions
+from gait.body.skeleton import ANGLES, CHANNELS, Proportions
 from gait.io import blob
 from gait.learn.corpus import sources
 from gait.learn.corpus.sources import names, subjects
 from gait.learn.mocap import acclaim, recording
 from gait.learn.options import LearnOptions
-from gait.learn.prior import fit, lengths, model, people
+from gait.learn.prior import fit, imputation, lengths, model, people
 from gait.learn.report import page
-from gait.learn.solve import body, readers
+from gait.learn.solve import body, readers, retarget
 
 SHIPPED = Path(gait.__file__).parent / "data/walk.gait"
 
@@ -417,3 +417,21 @@ def test_machines_that_calculate_otherwise_write_the_same_bytes(tmp_path):
         name: machines.learn(played[name], tmp_path / "m.gait", tmp_path / "walks") for name in (least, most)
     }
     assert len(set(found.values())) == 1, found
+
+
+def test_gaps_that_are_still_changing_are_an_error_with_a_remedy(walks, tmp_path, capsys, monkeypatch):
+    """Nothing is written, and the people whose parts are missing are named; it ends when it converges."""
+    monkeypatch.setattr(imputation.climb, "__defaults__", (imputation.TOLERANCE, 2))
+    options = ("-o", tmp_path / "m.gait", "--segments", "none")
+    legs = tmp_path / "03_01.csv"
+    angles = readers.read(walks / "01/01_01.amc")
+    table = np.degrees(retarget.angles(angles, retarget.measure(angles)))
+    wanted = [f"{s}_{joint}_flexion" for s in "lr" for joint in ("hip", "knee")]
+    rows = [",".join(f"{v:.4f}" for v in row) for row in table[:, [ANGLES.index(n) for n in wanted]]]
+    header = ",".join(["time", *(f"{name}_deg" for name in wanted)])
+    times = [f"{t / 120:.5f},{row}" for t, row in enumerate(rows)]
+    legs.write_text("\n".join([header, *times]) + "\n")
+    assert run("learn", walks, legs, *options) == 1
+    error = capsys.readouterr().err.splitlines()[-1]
+    assert re.search(r"filling of gaps did not converge in 2 passes: 1 of 3 people \(03\) never show", error)
+    assert "leave some of them out with --exclude" in error and not (tmp_path / "m.gait").exists()

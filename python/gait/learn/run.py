@@ -44,6 +44,7 @@ def run(options: LearnOptions, note: Note = lambda line: None) -> dict[str, Any]
         if options.segments.source == "only":
             return _segments_alone(options, corpus, loaded.refused)
         learned = fit.fit(loaded.sequences, options, loaded.others)
+        summary.require_filled(learned)
         _note_all(summary.notes(learned, options), note)
         prior = _segment_prior(options, corpus, note)
         sections = model.sections(learned, options)

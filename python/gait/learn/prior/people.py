@@ -216,9 +216,21 @@ def never_shown(mask: Mask, subject: Indices) -> tuple[int, Mask]:
 
     `mask` (R, T, M) is what was recorded, `subject` (R,) the person of each cycle.
     """
+    lacks = _lacking(mask, subject)
+    return int(lacks.any(axis=1).sum()), np.asarray(lacks.any(axis=0))
+
+
+def lacking(mask: Mask, subject: Indices) -> list[int]:
+    """Return the people who never show channels that others show, those who lack most first."""
+    lacks = _lacking(mask, subject).sum(axis=1)
+    order = np.argsort(-lacks, kind="stable")
+    return [int(np.unique(subject)[k]) for k in order if lacks[k]]
+
+
+def _lacking(mask: Mask, subject: Indices) -> Mask:
+    """Return which channels (people, M) a person never shows that others show."""
     shown = np.array([mask[subject == who].any(axis=(0, 1)) for who in np.unique(subject)])
-    lacking = ~shown & shown.any(axis=0)
-    return int(lacking.any(axis=1).sum()), np.asarray(lacking.any(axis=0))
+    return np.asarray(~shown & shown.any(axis=0))
 
 
 def bounded(filled: Floats, mask: Mask, subject: Indices) -> Floats:

@@ -9,6 +9,7 @@ import numpy as np
 
 from gait.bindings.segment_prior import SegmentPrior
 from gait.body.skeleton import ANGLES
+from gait.errors import UserError
 from gait.io import blob
 from gait.learn.arrays import Floats
 from gait.learn.cycles.sequence import Sequence
@@ -124,19 +125,34 @@ def notes(learned: Learned, options: LearnOptions) -> Iterator[str]:
         yield f"{cycles} cycles allow {_count(kept, 'component')} instead of {usual}"
     if parts := model.unobserved(learned):
         yield f"no recording shows {_words(parts)}: these stay in the rest pose"
-    stages = (
-        ("alignment", learned.alignment, "leave out recordings unlike the others"),
-        ("filling of gaps", learned.components, "add recordings or ask for fewer --components"),
-    )
-    for name, part, remedy in stages:
-        if not part.converged:
-            yield f"the {name} did not converge in {len(part.objective)} passes; {remedy}"
+    if not learned.alignment.converged:
+        passes = len(learned.alignment.objective)
+        yield f"the alignment did not converge in {passes} passes; leave out recordings unlike the others"
     count, channels = people.never_shown(learned.cycles.mask, learned.row_subject)
     if names := model.parts(channels):
         shows = "person never shows" if count == 1 else "people never show"
         yield f"{count} {shows} {_words(names)}: filled in from the others"
     if made_up := made_up_channels(learned.cycles.visible):
         yield f"no recording shows {' or '.join(made_up)}: taken from the motion of the legs"
+
+
+def require_filled(learned: Learned) -> None:
+    """Refuse a model whose gaps were still changing when the filling ended; UserError with the remedy."""
+    if learned.components.converged:
+        return
+    count, channels = people.never_shown(learned.cycles.mask, learned.row_subject)
+    passes, kept = len(learned.components.objective), len(learned.components.sd)
+    if names := model.parts(channels):
+        lacking = people.lacking(learned.cycles.mask, learned.row_subject)
+        who = _listed([learned.subjects[k] for k in lacking])
+        what = f"{count} of {len(learned.subjects)} people ({who}) never show {_words(names)}"
+        remedy = "leave some of them out with --exclude, add people who do"
+    else:
+        what, remedy = "too little is observed of the cycles", "add recordings"
+    raise UserError(
+        f"the filling of gaps did not converge in {passes} passes: {what}; {remedy}, or ask for fewer than "
+        f"{kept} --components"
+    )
 
 
 def _words(names: list[str]) -> str:
