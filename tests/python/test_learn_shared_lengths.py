@@ -10,7 +10,7 @@ from test_marker_files import real, write_c3d, write_trc
 
 from gait import cli
 from gait.learn.corpus import load, sources
-from gait.learn.corpus.stage import Prepared
+from gait.learn.corpus.stage import Prepared, Task
 from gait.learn.options import DEFAULT, LearnOptions
 from gait.learn.prior import fit
 from gait.learn.solve import kinematics, markers, retarget, skeleton_fit
@@ -262,3 +262,27 @@ def test_real_strangers_in_one_folder_are_reported():
     lines = []
     assert load.shared_lengths(files, LearnOptions(subjects="folder"), warn=lines.append) == [None] * 3
     assert len(lines) == 2 and all("ADemo1_rewrite_c3d_pc_float.c3d, which" in line for line in lines)
+
+
+def test_a_file_refused_with_the_lengths_of_the_others_has_its_own(tmp_path):
+    """Lengths that are 30 % off, as from weak recordings, do not fit the markers."""
+    points = mw.person(mw.FULL, seed=2)[0]
+    path = write_trc(tmp_path / "Anna_01.trc", mw.FULL, points)
+    wrong = mw.own_lengths(np.random.default_rng(2)) + 0.3
+    options = LearnOptions(activity="any")
+    together, alone = Task(path, options, wrong).run(), Task(path, options).run()
+    assert together.alone and together.refused is None and not alone.alone
+    assert np.array_equal(together.sequence.channels, alone.sequence.channels, equal_nan=True)
+    shared = [load.SharedLengths(wrong, 3)]
+    assert load.load_all([(path, True)], options, shared=shared).sequences[0].recordings == 1
+
+
+MORE = Path(__file__).resolve().parents[2] / "../shared/data/mocap/more/c3dorg"
+
+
+@pytest.mark.skipif(not MORE.is_dir(), reason="needs recordings of further people beside the repository")
+def test_recordings_accepted_alone_are_accepted_together():
+    files, _ = sources.find([str(MORE / "o11")])
+    options = LearnOptions(jobs=1)
+    loaded = load.load_all(files, options, shared=load.shared_lengths(files, options))
+    assert len(loaded.sequences) == 2 and not loaded.refused

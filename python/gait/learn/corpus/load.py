@@ -117,7 +117,7 @@ def load_all(
                 used = True
             if found is not None:
                 signals.put(found.channels)
-                one = shared[i]
+                one = None if outcome.alone else shared[i]
                 count = one.recordings if one else found.recordings
                 sequences.append(
                     replace(found, name=names[i], subject=persons[i], channels=NOT_YET, recordings=count)

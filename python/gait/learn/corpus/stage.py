@@ -5,7 +5,7 @@ Before that, files of markers are measured whose person has several (`gait.learn
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 from gait.errors import UserError
@@ -48,6 +48,8 @@ class Prepared:
     motion: Motion | None = None  #: markers for the segment prior
     body: Measures | None = None  #: of a file whose motion is refused
     lengths: LengthInformation | None = None  #: of a file that was only measured
+    #: Whether the lengths are its own, because it was refused with those of the person's other recordings.
+    alone: bool = False
     notes: FileNotes = NO_NOTES
 
 
@@ -60,7 +62,16 @@ def _measured(task: Task) -> Prepared:
 
 
 def _prepared(task: Task) -> Prepared:
-    """Read and prepare one file."""
+    """Read and prepare one file, with its own lengths if it cannot be used with those of the person."""
+    together = _prepared_as(task)
+    if together.sequence is not None or task.log_scales is None or task.options.segments.source == "only":
+        return together
+    alone = _prepared_as(replace(task, log_scales=None))
+    return together if alone.sequence is None else replace(alone, alone=True)
+
+
+def _prepared_as(task: Task) -> Prepared:
+    """Read and prepare one file as the task states."""
     path, options = task.path, task.options
     try:
         read = readers.read(path, options, task.log_scales)

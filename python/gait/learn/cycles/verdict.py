@@ -126,7 +126,7 @@ def _footing(feet: Footing, kind: str) -> list[Evidence]:
     ]
     if kind == "walk":
         bob, flight = (
-            "this is running: the body is lowest over the standing leg",
+            "the body is lowest over the standing leg",
             "both feet leave the ground",
         )
         return [
