@@ -61,18 +61,18 @@ def alternation(angles: Floats, frames: float) -> float:
         left, right = (first_harmonic(side, frames) for side in sides)
         apart = float(np.angle(left * np.conj(right)))
         swing -= np.cos(apart) * float(np.prod([_swing(side, frames) for side in sides]))
-        whole += float(np.prod([_spread(side) for side in sides]))
+        whole += float(np.prod([_sd(side) for side in sides]))
     return swing / whole if whole > 0 else 0.0
 
 
 def _swing(signal: Floats, frames: float) -> float:
-    """Return the standard deviation of the first harmonic of a period over the frames that are seen."""
+    """Return the standard deviation of the first harmonic of a period over the visible frames."""
     phase = 2 * np.pi * np.flatnonzero(np.isfinite(signal)) / frames
     wave = first_harmonic(signal, frames) * np.exp(1j * phase)
     return float(np.std(wave.real)) if len(phase) else 0.0
 
 
-def _spread(signal: Floats) -> float:
-    """Return the standard deviation of what is seen; 0 if nothing is."""
+def _sd(signal: Floats) -> float:
+    """Return the standard deviation of what is visible; 0 if nothing is."""
     visible = signal[np.isfinite(signal)]
     return float(np.std(visible)) if len(visible) else 0.0

@@ -1,7 +1,7 @@
 """Whether a recording is cyclic and shows the activity to be learnt: the evidence, and the reasons in words.
 
-A runner has both feet off the ground at times, or the pelvis is lowest where a walker's is highest: over the
-standing leg.
+A runner has both feet off the ground at times, or the pelvis is lowest where that of a walk is highest: over
+the standing leg.
 """
 
 from __future__ import annotations
@@ -25,7 +25,7 @@ STANCE = 15  # percentile of a joint's height that is its height in stance; a ru
 CLEAR = 0.018  # statures above that from which ankle and ball of a foot are both off the ground
 FLIGHT = 0.05  # share of the time in flight above which a person runs
 #: Correlation of the pelvis's height with the distance of the feet above which a person runs, with or without
-#: flight: the body is lowest over the standing leg, as on a spring.  Recorded walks have -1 to -0.1, runs 0.5
+#: flight: the body is lowest over the standing leg.  Recorded walks have -1 to -0.1, runs 0.5
 #: to 0.9; slow runs, with a foot on the ground throughout, differ from walks in nothing else.
 BOB = 0.3
 SHARPNESS = 3.0

@@ -58,7 +58,7 @@ def from_markers(
             "; check labels and units, or give a --markers file"
         )
     own = {labels[k].rsplit(":", 1)[-1]: points[:, k] for k in columns}
-    body = from_fit(path.stem, fps, _without_misfits(fit), own)
+    body = from_fit(path.stem, fps, _without_bad_frames(fit), own)
     unknown = [name for name in LEGS if not np.isfinite(body.joints[name]).any()]
     if unknown:
         raise UserError(
@@ -67,15 +67,15 @@ def from_markers(
     return body
 
 
-def _without_misfits(fit: skeleton_fit.Fit) -> skeleton_fit.Fit:
+def _without_bad_frames(fit: skeleton_fit.Fit) -> skeleton_fit.Fit:
     """Return the fit without the frames in which half of the markers are far from the body.
 
-    Nothing is known there.  Such frames are few; most show few markers, or somebody else's.
+    Nothing is known there.  Such frames are few; most show few markers, or another person's.
     """
-    seen = np.flatnonzero(np.isfinite(fit.residual).any(axis=1))
-    misfits = seen[np.nanmedian(fit.residual[seen], axis=1) > WORST_RMS]
+    shown = np.flatnonzero(np.isfinite(fit.residual).any(axis=1))
+    bad = shown[np.nanmedian(fit.residual[shown], axis=1) > WORST_RMS]
     covariance, residual = fit.covariance.copy(), fit.residual.copy()
-    covariance[misfits], residual[misfits] = UNKNOWN * np.eye(covariance.shape[1]), np.nan
+    covariance[bad], residual[bad] = UNKNOWN * np.eye(covariance.shape[1]), np.nan
     return replace(fit, covariance=covariance, residual=residual)
 
 
@@ -123,8 +123,8 @@ def assign(
     In a file of several subjects ("Anna:LASI") the one with most known markers is taken.
     """
     axes = segment_axes(labels, points)
-    seen = np.isfinite(points).all(axis=2).any(axis=0)
-    visible = [k for k in range(len(labels)) if seen[k] and k not in axes]
+    ever = np.isfinite(points).all(axis=2).any(axis=0)
+    visible = [k for k in range(len(labels)) if ever[k] and k not in axes]
     best: dict[int, Landmark] = {}
     for subject in sorted({_subject(labels[k]) for k in visible}):
         own = [k for k in visible if _subject(labels[k]) == subject]

@@ -143,8 +143,8 @@ def usual_rms(residual: Floats) -> float:
     A few frames in which points are mistaken do not count against all others.
     """
     squares, count = np.nansum(residual**2, axis=1), np.isfinite(residual).sum(axis=1)
-    seen = count > 0
-    return float(np.median(np.sqrt(squares[seen] / count[seen]))) if seen.any() else float("nan")
+    known = count > 0
+    return float(np.median(np.sqrt(squares[known] / count[known]))) if known.any() else float("nan")
 
 
 def pelvis_rotations(angles: Floats, points: Points, observed: Floats) -> Floats:
