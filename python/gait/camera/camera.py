@@ -318,6 +318,12 @@ def write_camera(path: Path, camera: Camera) -> None:
     path.write_text(json.dumps(camera.to_dict(), indent=1) + "\n")
 
 
+def write_lens(path: Path, camera: Camera, note: str) -> None:
+    """Write a JSON camera file of the lens alone, without its place, and a note."""
+    lens = {key: value for key, value in camera.to_dict().items() if key not in ("R", "t")}
+    path.write_text(json.dumps(lens | {"note": note}, indent=1) + "\n")
+
+
 def _split(path: str) -> tuple[str, str | None]:
     """Separate FILE.toml:name."""
     file, colon, name = path.rpartition(":")
@@ -385,8 +391,10 @@ def _size(fields: Fields, key: str, remedy: str) -> tuple[int, int]:
 
 def _pose(fields: Fields, placed: bool) -> tuple[Array, Array]:
     """Return rotation and translation; none, where they need not be there and are not."""
-    if not placed and not any(key in fields for key in ("R", "rvec", "t")):
-        return np.eye(3), np.zeros(3)
+    if not any(key in fields for key in ("R", "rvec", "t")):
+        if not placed:
+            return np.eye(3), np.zeros(3)
+        raise fields.fail("R", "and t are missing", f"place the camera: gait camera --lens {fields.where}")
     turn = _rodrigues(fields, "rvec") if "rvec" in fields and "R" not in fields else _rotation(fields, "R")
     return turn, _translation(fields, "t")
 

@@ -45,6 +45,7 @@ COMMANDS = {
         "studio", "correct the motion in a video by hand, on a page", ("video", "mocap", "studio")
     ),
     "render": Command("render", "draw a pose or a model", ("video",)),
+    "calibrate": Command("calibrate", "calibrate the lens of a camera with a printed board", ("video",)),
     "camera": Command(
         "camera", "find where a camera stands, from points on the ground or a walk", ("video",)
     ),
