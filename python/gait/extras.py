@@ -6,7 +6,13 @@ from collections.abc import Sequence
 from importlib.util import find_spec
 
 EXTRAS = {
-    "video": {"cv2": "OpenCV", "av": "PyAV", "scipy": "SciPy", "threadpoolctl": "threadpoolctl"},
+    "video": {
+        "cv2": "OpenCV",
+        "av": "PyAV",
+        "scipy": "SciPy",
+        "threadpoolctl": "threadpoolctl",
+        "yaml": "PyYAML",
+    },
     "lcm": {"lcm": "LCM"},
     "detect": {"ai_edge_litert": "LiteRT"},
     "report": {"matplotlib": "Matplotlib", "scipy": "SciPy"},

@@ -232,7 +232,7 @@ def test_missing_toml_keys_name_the_camera(line, words, tmp_path):
 @pytest.mark.parametrize(
     "old, new, words",
     [
-        ("fisheye = false", "fisheye = true", "fisheye lenses are not supported"),
+        ("fisheye = false", "fisheye = true\nxi = 1.2", "xi describes a lens"),
         ("[ 640, 480]", "[ 640.5, 480]", "size is .*whole"),
         ("700.0, 0.0, 321.0", "700.0, 3.0, 321.0", "matrix has skew"),
         ("700.0, 0.0, 321.0", "-700.0, 0.0, 321.0", "matrix has a focal length that is not positive"),
@@ -252,8 +252,9 @@ def test_unusable_toml_cameras_are_refused(old, new, words, tmp_path):
     [
         ("cam.json", "{", "not valid JSON"),
         ("cam.json", "[1]", "holds no JSON object"),
-        ("cam.yaml", "{{{{", "not an OpenCV FileStorage file"),
-        ("cam.txt", "", "unknown camera suffix; use .json"),
+        ("cam.yaml", "{{{{", "not a YAML file"),
+        ("cam.txt", "", "neither cameras.txt of COLMAP nor"),
+        ("cam.ini", "", "unknown camera suffix; use .json"),
         ("none.json", None, "no such camera file"),
     ],
 )

@@ -299,7 +299,7 @@ def test_points_that_are_not_seen_are_left_out(tmp_path):
 
 UNKNOWN = {
     "hand": ([{"image_id": "1.jpg", "keypoints": [1.0, 2.0, 0.5] * 21}], "has 21 points without names"),
-    "nobody": ({"version": 1.3, "people": []}, "has no number|holds no person"),
+    "no_person": ({"version": 1.3, "people": []}, "has no number|holds no person"),
     "no_list": ({"people": 3}, "people is no list|no number"),
     "numbers": ([[1, 2], [3, 4]], "holds no person"),
     "landmark": ([{"landmarks": [{"x": "a", "y": 1}]}], "no numbers x and y"),
@@ -315,7 +315,7 @@ UNKNOWN = {
         [{"image_id": 1, "keypoints": [1.0] * 51}, {"image_id": 2, "keypoints": [1.0] * 78}],
         "17 points and 26",
     ),
-    "odd": ({"images": 5, "annotations": []}, "in no known layout"),
+    "unlike": ({"images": 5, "annotations": []}, "in no known layout"),
 }
 
 
@@ -376,7 +376,7 @@ def test_names_of_joints(name, joint):
     assert joint_named(name) == joint
 
 
-def test_lift_takes_a_folder_and_the_command_says_what_it_left_out(tmp_path, capsys):
+def test_lift_takes_a_folder_and_the_command_reports_whom_it_took(tmp_path, capsys):
     camera = tmp_path / "cam.json"
     write_camera(camera, CAMERA)
     folder, out = openpose(tmp_path / "json", 26), tmp_path / "out.csv"

@@ -19,6 +19,7 @@ PROJECT = tomllib.loads((PYTHON / "pyproject.toml").read_text(encoding="utf-8"))
 OPTIONAL = PROJECT["optional-dependencies"]
 IMPORTED = {
     "opencv-python-headless": "cv2",
+    "PyYAML": "yaml",
     "ai-edge-litert": "ai_edge_litert",
 }  # by another name than installed
 
@@ -50,7 +51,7 @@ def test_every_package_has_an_exact_version_for_development():
 def test_missing_packages_are_named_with_their_extras(monkeypatch):
     monkeypatch.setattr(extras, "find_spec", lambda module: None)
     assert extras.remedy("gait x", ["lcm"]) == "gait x needs LCM: pip install 'libgait[lcm]'"
-    lacking = "OpenCV, PyAV, SciPy and threadpoolctl: pip install 'libgait[video]'"
+    lacking = "OpenCV, PyAV, SciPy, threadpoolctl and PyYAML: pip install 'libgait[video]'"
     assert extras.remedy("gait x", [], "cv2").endswith(lacking)
     assert extras.remedy("gait x", [], "elsewhere") == ""
     monkeypatch.undo()

@@ -1,6 +1,7 @@
 """Calibrated camera: where a point of the world falls in the picture, and which ray a pixel looks along.
 
-Files: the project's JSON, OpenCV FileStorage YAML/XML, and the TOML of Pose2Sim and anipose.
+Files: the project's JSON, OpenCV FileStorage YAML/XML, the TOML of Pose2Sim, anipose and FreeMoCap, and those
+of `gait.camera.other_files`.
 """
 
 from __future__ import annotations
@@ -16,6 +17,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from gait.camera import other_files
+from gait.camera.lens import AGREE, agreeing
 from gait.errors import UserError
 from gait.io.fields import Fields, parsing, read_json
 from gait.io.opencv_file import read_storage
@@ -27,6 +30,7 @@ else:
 
 
 Array = NDArray[np.float64]
+Intrinsics = tuple[float, float, float, float]  # fx fy cx cy
 _LEAST_ABOVE, _MOST_ABOVE = 0.05, 200.0  # metres of a lens over the floor
 _UPSIDE_DOWN = 0.3  # upward part of the picture's downward direction
 _PERSON, _LEAST_TALL = 1.7, 20.0  # metres; pixels
@@ -65,7 +69,7 @@ class Camera:
 
     @staticmethod
     def read(path: str, size: tuple[int, int] | None = None) -> Camera:
-        """Read JSON, OpenCV YAML/XML or Pose2Sim TOML; see `read_camera`."""
+        """Read a camera file of any supported kind; see `read_camera`."""
         return read_camera(path, size)
 
     @staticmethod
@@ -268,17 +272,22 @@ _FOREIGN = re.compile(
     r"fisheye|equidist|equisolid|stereographic|kannala|^kb\d|omni|^mei$|e?ucm|unified|doublesphere|^ds$|^fov$"
     r"|division|ocam|scaramuzza|prism|spline|spheric|panoram"
 )
+_MODEL_KEYS = ("distortionmodel", "cameramodel", "lensmodel", "projectionmodel", "model", "cameratype")
+#: Names of OpenCV's fisheye lens, of four coefficients.
+_FISHEYES = ("fisheye", "opencvfisheye", "equidistant", "equi", "kannalabrandt", "kannalabrandt4", "kb4")
+_MORE_TERMS = (8, 12, 14)  # numbers of OpenCV's lenses with rational terms, thin prisms, and tilt
 #: How much larger or smaller than the picture the one may be of which a principal point is the middle.
 _CROPPED, _RESIZED, _ALIKE = 0.7, 0.2, 0.05
 
 
 def read_camera(path: str, size: tuple[int, int] | None = None, *, placed: bool = True) -> Camera:
-    """Read a camera file of any supported kind, chosen by its suffix.
+    """Read a camera file of any supported kind, chosen by its suffix and content.
 
     Parameters
     ----------
     path : str
-        ``.json``, ``.yaml``, ``.yml``, ``.xml``, or ``.toml`` with ``:name`` after it to choose a camera.
+        ``.json``, ``.yaml``, ``.yml``, ``.xml``, ``.toml``, ``.txt`` (COLMAP, Qualisys) or ``.pickle``
+        (OpenCap), where there are several cameras with ``:name`` after it.
     size : (int, int), optional
         Width and height of the video, pixels: checked, and used by OpenCV files, which may lack it.
     placed : bool
@@ -295,12 +304,14 @@ def read_camera(path: str, size: tuple[int, int] | None = None, *, placed: bool 
     suffix, stated = Path(file).suffix.lower(), True
     if suffix == ".json":
         camera = _from_json(file, placed)
-    elif suffix in (".yaml", ".yml", ".xml"):
-        camera, stated = _from_opencv(file, size, placed)
+    elif suffix in (".yaml", ".yml", ".xml", ".txt", ".pickle", ".pkl"):
+        camera, stated = _from_entries(file, _entries(file, suffix, name), size, placed)
     elif suffix == ".toml":
         camera = _from_toml(file, name)
     else:
-        raise UserError(f"{file}: unknown camera suffix; use .json, .yaml, .yml, .xml or .toml")
+        raise UserError(
+            f"{file}: unknown camera suffix; use .json, .yaml, .yml, .xml, .toml, .txt or .pickle"
+        )
     _check_middle(str(path), camera, stated)
     focal = max(camera.fx, camera.fy)
     if focal > LONGEST_LENS * camera.width:
@@ -327,7 +338,8 @@ def write_lens(path: Path, camera: Camera, note: str) -> None:
 def _split(path: str) -> tuple[str, str | None]:
     """Separate FILE.toml:name."""
     file, colon, name = path.rpartition(":")
-    return (file, name) if colon and file.lower().endswith(".toml") else (path, None)
+    several = file.lower().endswith((".toml", ".txt", ".yaml", ".yml", ".xml"))
+    return (file, name) if colon and several else (path, None)
 
 
 def _from_json(path: str, placed: bool) -> Camera:
@@ -361,13 +373,28 @@ def _check_middle(path: str, camera: Camera, stated: bool) -> None:
         )
 
 
-def _from_opencv(path: str, size: tuple[int, int] | None, placed: bool) -> tuple[Camera, bool]:
+def _entries(path: str, suffix: str, name: str | None) -> dict[str, Any]:
+    """Entries of a file, as OpenCV names them."""
+    start = Path(path).read_bytes()[:4096]
+    if suffix == ".txt" or b"<calibration" in start:
+        return other_files.read_text(path, name)
+    if suffix in (".pickle", ".pkl"):
+        return other_files.read_opencap(path)
+    if suffix in (".yaml", ".yml") and b"%YAML" not in start:
+        return other_files.read_plain_yaml(path, name)
+    return read_storage(path)
+
+
+def _from_entries(
+    path: str, content: dict[str, Any], size: tuple[int, int] | None, placed: bool
+) -> tuple[Camera, bool]:
     """Return the camera, and whether the file has its size."""
-    fields = _opencv_fields(path)
+    fields, fisheye = _opencv_fields(path, content)
     stated = any(key in fields for key in ("image_width", "image_height", "image_size"))
     if stated or size is None:
         size = _image_size(fields)
-    intrinsics, lens = _intrinsics(fields, "camera_matrix"), _distortion(fields, "distortion_coefficients")
+    given = _intrinsics(fields, "camera_matrix")
+    intrinsics, lens = _lens(fields, "distortion_coefficients", given, size, fisheye)
     return Camera(*size, *intrinsics, *_pose(fields, placed), lens), stated
 
 
@@ -403,9 +430,9 @@ def _plain(name: str) -> str:
     return "".join(c for c in name.lower() if c.isalnum())
 
 
-def _opencv_fields(path: str) -> Fields:
-    """Read the entries of an OpenCV file that describe a camera, under their documented names."""
-    content, data, others = read_storage(path), dict[str, Any](), dict[str, Any]()
+def _opencv_fields(path: str, content: dict[str, Any]) -> tuple[Fields, bool]:
+    """Return the entries of a camera under their documented names, and whether it is a fisheye."""
+    data, others = dict[str, Any](), dict[str, Any]()
     documented = {other: name for name, others in _OPENCV_NAMES.items() for other in others}
     source: dict[str, str] = {}
     for key, value in content.items():
@@ -417,6 +444,8 @@ def _opencv_fields(path: str) -> Fields:
         else:
             data[name], source[name] = value, key
     fields = Fields(path, data)
+    fisheye = [key for key, value in others.items() if _is_fisheye(key, value)]
+    others = {key: value for key, value in others.items() if key not in fisheye}
     _refuse_other_lenses(Fields(path, others), others)
     if (
         "R" in fields
@@ -424,7 +453,14 @@ def _opencv_fields(path: str) -> Fields:
         and np.abs(_rotation(fields, "R") - _rodrigues(fields, "rvec")).max() > 1e-3
     ):
         raise UserError(f"{path}: {source['R']} and {source['rvec']} differ; remove one")
-    return fields
+    return fields, bool(fisheye)
+
+
+def _is_fisheye(key: str, value: Any) -> bool:
+    """Whether an entry names OpenCV's fisheye lens."""
+    if isinstance(value, str):
+        return _plain(key) in _MODEL_KEYS and _plain(value) in _FISHEYES
+    return _plain(key) in ("fisheye", "fisheyemodel") and value == 1
 
 
 def _refuse_other_lenses(fields: Fields, others: Mapping[str, Any]) -> None:
@@ -457,18 +493,23 @@ def _from_toml(path: str, name: str | None) -> Camera:
         asked = f"no camera {name}" if name else "several cameras or none"
         raise UserError(f"{path}: {asked}; choose one as {Path(path).name}:NAME, found: {found}")
     fields = Fields(f"{path}: [{name}]", cameras[name])
-    if cameras[name].get("fisheye"):
-        raise fields.fail("fisheye", "lenses are not supported", "undistort the video first")
     _refuse_other_lenses(
         fields, {key: value for key, value in cameras[name].items() if key not in _TOML_KEYS}
     )
     size = _size(fields, "size", "give [width, height] in pixels")
-    lens = _distortion(fields, "distortions")
-    intrinsics, turn = _intrinsics(fields, "matrix"), _rodrigues(fields, "rotation")
-    return Camera(*size, *intrinsics, turn, _translation(fields, "translation"), lens)
+    given, turn = _intrinsics(fields, "matrix"), _rodrigues(fields, "rotation")
+    intrinsics, lens = _lens(fields, "distortions", given, size, bool(cameras[name].get("fisheye")))
+    metres = 0.001 if _in_millimetres(data.get("metadata")) else 1.0
+    return Camera(*size, *intrinsics, turn, metres * _translation(fields, "translation"), lens)
 
 
-def _intrinsics(fields: Fields, key: str) -> tuple[float, float, float, float]:
+def _in_millimetres(metadata: Any) -> bool:
+    """Whether a calibration is one of FreeMoCap, whose unit is that of its board."""
+    side = metadata.get("charuco_square_size") if isinstance(metadata, Mapping) else None
+    return isinstance(side, int | float) and side > 1  # no square is a metre wide
+
+
+def _intrinsics(fields: Fields, key: str) -> Intrinsics:
     """Return fx fy cx cy of a 3x3 matrix without skew."""
     m = fields.array(key, (3, 3), "give [[fx, 0, cx], [0, fy, cy], [0, 0, 1]] in pixels")
     if m[0, 0] <= 0 or m[1, 1] <= 0:
@@ -499,6 +540,32 @@ def _rodrigues(fields: Fields, key: str) -> Array:
 
 def _translation(fields: Fields, key: str) -> Array:
     return fields.array(key, (3,), "give the translation from world to camera, 3 numbers in metres")
+
+
+def _lens(
+    fields: Fields,
+    key: str,
+    intrinsics: Intrinsics,
+    size: tuple[int, int],
+    fisheye: bool,
+) -> tuple[Intrinsics, Array]:
+    """Return fx fy cx cy and k1 k2 p1 p2 k3; of a fisheye, or a lens of more terms, those that agree."""
+    remedy = "give k1 k2 p1 p2 [k3]"
+    count = fields.count(key, remedy) if key in fields else 0
+    if not (fisheye or count in _MORE_TERMS):
+        return intrinsics, _distortion(fields, key)
+    if fisheye and count not in (0, 4):
+        raise fields.fail(key, f"has {count} numbers", "a fisheye lens has k1 k2 k3 k4")
+    given = fields.array(key, (count,), remedy) if count else np.zeros(4)
+    fx, fy, cx, cy = intrinsics
+    matrix = np.array([[fx, 0, cx], [0, fy, cy], [0, 0, 1.0]])
+    found = agreeing("fisheye" if fisheye else "opencv", given, matrix, size)
+    if found is None or found[2] > AGREE:
+        best = "none" if found is None else f"{found[2]:.2g} px off at best"
+        kind = f"describes a {'fisheye ' * fisheye}lens"
+        what = f"{kind} that k1 k2 p1 p2 k3 cannot replace within {AGREE:g} px ({best})"
+        raise fields.fail(key, what, "undistort the video, or calibrate with k1 k2 p1 p2 [k3]")
+    return (fx * found[1], fy * found[1], cx, cy), found[0]
 
 
 def _distortion(fields: Fields, key: str) -> Array:

@@ -6,16 +6,16 @@ import csv
 import io
 import json
 import os
-import pickle
 import re
 from collections.abc import Sequence
 from pathlib import Path
-from typing import Any, NoReturn
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from gait.errors import UserError, unreadable
+from gait.io import plain_pickle
 from gait.io.detections import Detection, Detections
 from gait.io.trc import METRES, NAMED, read_trc_table
 
@@ -196,7 +196,7 @@ def _pandas(path: str | os.PathLike[str], group: Any) -> Detections:
     kind = _text(group.attrs["pandas_type"])
     if kind == "frame_table":
         table = group["table"][:]
-        columns = _plain_pickle(group.attrs["non_index_axes"])[0][1]
+        columns = plain_pickle.load(group.attrs["non_index_axes"])[0][1]
         values, frames = table["values_block_0"], table["index"]
     elif kind == "frame" and int(group.attrs["nblocks"]) == 1:
         levels = int(group.attrs["axis0_nlevels"])
@@ -213,17 +213,3 @@ def _pandas(path: str | os.PathLike[str], group: Any) -> Detections:
         raise UserError(f"{path}: a table of pandas that is not DeepLabCut's; export CSV")
     triples = [(str(c[-3]) if len(c) == 4 else "0", str(c[-2]), str(c[-1])) for c in columns]
     return _from_columns(path, triples, np.asarray(frames), np.asarray(values, np.float64))
-
-
-class _Plain(pickle.Unpickler):
-    """Unpickler of lists, tuples and strings alone: nothing of a file is run."""
-
-    def find_class(self, module: str, name: str) -> NoReturn:
-        raise ValueError(f"holds an object {module}.{name}")
-
-
-def _plain_pickle(value: Any) -> Any:
-    try:
-        return _Plain(io.BytesIO(bytes(value))).load()
-    except (pickle.UnpicklingError, EOFError, AttributeError) as error:
-        raise ValueError(str(error)) from None

@@ -1,0 +1,274 @@
+"""Camera files of other tools: Kalibr, ROS camera_info, COLMAP, Qualisys, OpenCap.
+
+Each reader returns the entries of an OpenCV file by their documented names (``camera_matrix``,
+``distortion_coefficients``, ``image_width``, ``image_height``, ``R``, ``t``), and of a lens that is none of
+OpenCV's usual ones ``distortion_model``.  A camera whose file does not place it in the world has no R and t.
+"""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Any
+from xml.etree import ElementTree
+
+import numpy as np
+from numpy.typing import NDArray
+
+from gait.errors import UserError
+from gait.io import plain_pickle
+from gait.io.files import text_lines
+
+Array = NDArray[np.float64]
+Entries = dict[str, Any]
+
+_UNDISTORT = "undistort the video, or calibrate with k1 k2 p1 p2 k3"
+#: COLMAP's models: their parameters; f stands for both focal lengths.
+_COLMAP = {
+    "SIMPLE_PINHOLE": "f cx cy",
+    "PINHOLE": "fx fy cx cy",
+    "SIMPLE_RADIAL": "f cx cy k1",
+    "RADIAL": "f cx cy k1 k2",
+    "OPENCV": "fx fy cx cy k1 k2 p1 p2",
+    "FULL_OPENCV": "fx fy cx cy k1 k2 p1 p2 k3 k4 k5 k6",
+    "OPENCV_FISHEYE": "fx fy cx cy k1 k2 k3 k4",
+    "SIMPLE_RADIAL_FISHEYE": "f cx cy k1",
+    "RADIAL_FISHEYE": "f cx cy k1 k2",
+}
+_OPENCV_ORDER = ("k1", "k2", "p1", "p2", "k3", "k4", "k5", "k6")
+_KALIBR = {"radtan": "", "none": "", "equidistant": "fisheye", "equi": "fisheye"}
+
+
+def read_plain_yaml(path: str, name: str | None) -> Entries:
+    """Read YAML without OpenCV's header: Kalibr's camchain, ROS's camera_info, or OpenCV's entries.
+
+    ModuleNotFoundError if PyYAML, of extra ``video``, is missing.
+    """
+    import yaml
+
+    try:
+        data = yaml.safe_load(Path(path).read_text(encoding="utf-8-sig"))
+    except (yaml.YAMLError, UnicodeDecodeError, ValueError, RecursionError) as error:
+        raise UserError(
+            f"{path}: not a YAML file ({' '.join(str(error).split())[:80]}); write it anew"
+        ) from None
+    if not isinstance(data, dict) or not data:
+        raise UserError(f"{path}: holds no camera; use YAML of OpenCV, Kalibr or ROS")
+    chain = {
+        str(key): value for key, value in data.items() if isinstance(value, Mapping) and "intrinsics" in value
+    }
+    if chain:
+        return _kalibr(path, chain, name)
+    if name is not None:
+        raise UserError(f"{path}: holds one camera, not {name}; leave the name out")
+    ros = "distortion_model" in data and ("k" in data or "K" in data)
+    return _ros(path, data) if ros else {str(key): _matrix(value) for key, value in data.items()}
+
+
+def _choose(path: str, found: Mapping[str, Any], name: str | None) -> Any:
+    """Choose the camera asked for, or the only one."""
+    if name is None and len(found) == 1:
+        return next(iter(found.values()))
+    if name is None or name not in found:
+        asked = f"no camera {name}" if name else f"{len(found)} cameras"
+        raise UserError(
+            f"{path}: {asked}; choose one as {Path(path).name}:NAME, found: {' '.join(found) or 'none'}"
+        )
+    return found[name]
+
+
+def _matrix(value: Any) -> Any:
+    """Rows of a matrix that is written as rows, cols and data."""
+    if not isinstance(value, Mapping) or not {"rows", "cols", "data"} <= set(value):
+        return value
+    try:
+        return np.asarray(value["data"], float).reshape(int(value["rows"]), int(value["cols"])).tolist()
+    except (TypeError, ValueError):
+        return value["data"]
+
+
+def _kalibr(path: str, chain: Mapping[str, Any], name: str | None) -> Entries:
+    camera = _choose(path, chain, name)
+    model, lens = camera.get("camera_model", "pinhole"), camera.get("distortion_model", "none")
+    if model != "pinhole" or lens not in _KALIBR:
+        raise UserError(f"{path}: lens {model}-{lens} is not supported; {_UNDISTORT}")
+    try:
+        fx, fy, cx, cy = (float(value) for value in camera["intrinsics"])
+        width, height = camera["resolution"]
+    except (KeyError, TypeError, ValueError):
+        raise UserError(
+            f"{path}: intrinsics are fu fv pu pv and resolution is [width, height]; correct them"
+        ) from None
+    entries = _pinhole(fx, fy, cx, cy, width, height)
+    entries["distortion_coefficients"] = camera.get("distortion_coeffs", []) if lens != "none" else []
+    return entries | ({"distortion_model": _KALIBR[lens]} if _KALIBR[lens] else {})
+
+
+def _pinhole(fx: float, fy: float, cx: float, cy: float, width: Any, height: Any) -> Entries:
+    matrix = [[fx, 0.0, cx], [0.0, fy, cy], [0.0, 0.0, 1.0]]
+    return {"camera_matrix": matrix, "image_width": width, "image_height": height}
+
+
+def _ros(path: str, data: Mapping[str, Any]) -> Entries:
+    """Read a message sensor_msgs/CameraInfo: its R rectifies stereo pictures and is no place in the world."""
+    plain = {str(key).lower(): value for key, value in data.items()}
+    cut = plain.get("roi") or {}
+    if any(plain.get(f"binning_{axis}", 0) not in (0, 1) for axis in "xy") or any(
+        cut.get(key, 0) for key in ("x_offset", "y_offset", "width", "height")
+    ):
+        raise UserError(f"{path}: binning or roi is set; give the camera_info of full pictures")
+    values = np.asarray(plain["k"], float)
+    if values.size != 9:
+        raise UserError(f"{path}: k has {values.size} numbers, not 9; write the message anew")
+    return {
+        "camera_matrix": values.reshape(3, 3).tolist(),
+        "image_width": plain.get("width"),
+        "image_height": plain.get("height"),
+        "distortion_model": plain["distortion_model"],
+        "distortion_coefficients": plain.get("d", []),
+    }
+
+
+def read_text(path: str, name: str | None) -> Entries:
+    """Read a text file: Qualisys's .qca.txt, or COLMAP's cameras.txt with images.txt beside it."""
+    lines = text_lines(Path(path))
+    if any("<calibration" in line for line in lines[:5]):
+        return read_qualisys(path, name)
+    rows = [line.split() for line in lines if line.strip() and not line.startswith("#")]
+    if not rows or not all(len(row) > 4 and row[1] in {*_COLMAP, *_COLMAP_OTHERS} for row in rows):
+        raise UserError(
+            f"{path}: neither cameras.txt of COLMAP nor a calibration of Qualisys; use one of these"
+        )
+    return _colmap(path, rows, name)
+
+
+_COLMAP_OTHERS = ("FOV", "THIN_PRISM_FISHEYE", "RAD_TAN_THIN_PRISM_FISHEYE", "SIMPLE_DIVISION", "DIVISION")
+
+
+def _colmap(path: str, rows: list[list[str]], name: str | None) -> Entries:
+    """Camera of COLMAP by its id, or by the name of a picture, which then places it."""
+    cameras = {row[0]: row for row in rows}
+    pictures = _colmap_pictures(Path(path).with_name("images.txt"))
+    picture = pictures.get(name or "")
+    row = _choose(path, cameras, picture[8] if picture else name)
+    if row[1] not in _COLMAP:
+        raise UserError(f"{path}: lens {row[1]} is not supported; {_UNDISTORT}")
+    try:
+        names = _COLMAP[row[1]].split()
+        values = dict(zip(names, map(float, row[4:]), strict=True))
+        pose = [float(value) for value in picture[1:8]] if picture else []
+    except ValueError:
+        raise UserError(
+            f"{path}: camera {row[0]} has not {len(_COLMAP[row[1]].split())} parameters"
+        ) from None
+    fx, fy = values.get("fx", values.get("f", 0.0)), values.get("fy", values.get("f", 0.0))
+    entries = _pinhole(
+        fx, fy, values["cx"] - 0.5, values["cy"] - 0.5, int(row[2]), int(row[3])
+    )  # from corners
+    if row[1].endswith("FISHEYE"):
+        lens = [values.get(f"k{i}", 0.0) for i in range(1, 5)]
+        entries |= {"distortion_model": "fisheye", "distortion_coefficients": lens}
+    else:
+        lens = [values.get(key, 0.0) for key in _OPENCV_ORDER]
+        entries["distortion_coefficients"] = lens if any(lens[4:]) else lens[:4]
+    if pose:
+        entries |= {"R": _quaternion(pose[:4]).tolist(), "t": pose[4:]}
+    return entries
+
+
+def _colmap_pictures(path: Path) -> dict[str, list[str]]:
+    """Rows of images.txt by the picture's name; every second line has points."""
+    if not path.is_file():
+        return {}
+    lines = [line for line in text_lines(path) if not line.startswith("#")]
+    rows = [line.split(maxsplit=9) for line in lines[::2] if line.strip()]
+    return {row[9].strip(): row for row in rows if len(row) == 10}
+
+
+def _quaternion(q: list[float]) -> Array:
+    """Rotation of a quaternion w x y z."""
+    w, x, y, z = np.asarray(q) / np.linalg.norm(q)
+    return np.array(
+        [
+            [1 - 2 * (y * y + z * z), 2 * (x * y - w * z), 2 * (x * z + w * y)],
+            [2 * (x * y + w * z), 1 - 2 * (x * x + z * z), 2 * (y * z - w * x)],
+            [2 * (x * z - w * y), 2 * (y * z + w * x), 1 - 2 * (x * x + y * y)],
+        ]
+    )
+
+
+def read_qualisys(path: str, name: str | None) -> Entries:
+    """Read a camera of Qualisys's calibration by its serial number.
+
+    Lengths are millimetres, z up; the rows of its rotation are right, up and backwards; intrinsics are
+    counted in parts of a pixel.
+    """
+    try:
+        root = ElementTree.fromstring(Path(path).read_bytes())
+    except ElementTree.ParseError as error:
+        raise UserError(f"{path}: not an XML file ({error}); export the calibration anew") from None
+    found = {
+        str(camera.get("serial")): camera
+        for camera in root.iter("camera")
+        if camera.find("intrinsic") is not None
+    }
+    camera = _choose(path, found, name)
+    if camera.get("viewrotation", "0") not in ("0", ""):
+        turned = camera.get("viewrotation")
+        raise UserError(f"{path}: viewrotation is {turned}; export it with pictures that are not turned")
+    place, lens = _attributes(path, camera, "transform"), _attributes(path, camera, "intrinsic")
+    view, most = _attributes(path, camera, "fov_video"), _attributes(path, camera, "fov_video_max")
+    try:
+        left, top = view["left"], view["top"]
+        part_u = (lens["sensorMaxU"] - lens["sensorMinU"]) / (most["right"] - most["left"])
+        part_v = (lens["sensorMaxV"] - lens["sensorMinV"]) / (most["bottom"] - most["top"])
+        if lens.get("skew"):
+            raise UserError(
+                f"{path}: skew is {lens['skew']:g}, which is not supported; calibrate with zero skew"
+            )
+        entries = _pinhole(
+            lens["focalLengthU"] / part_u,
+            lens["focalLengthV"] / part_v,
+            (lens["centerPointU"] - lens["sensorMinU"]) / part_u - left + most["left"],
+            (lens["centerPointV"] - lens["sensorMinV"]) / part_v - top + most["top"],
+            int(view["right"] - left + 1),
+            int(view["bottom"] - top + 1),
+        )
+        radial = [lens[f"radialDistortion{i}"] for i in (1, 2, 3)]
+        tangential = [lens[f"tangentalDistortion{i}"] for i in (1, 2)]
+        gl = np.array([[place[f"r{i}{j}"] for j in (1, 2, 3)] for i in (1, 2, 3)])
+        centre = np.array([place[axis] for axis in "xyz"]) / 1000
+    except (KeyError, ZeroDivisionError) as error:
+        raise UserError(
+            f"{path}: camera {camera.get('serial')} lacks {error}; export the calibration anew"
+        ) from None
+    turn = np.diag([1.0, -1.0, -1.0]) @ gl
+    entries["distortion_coefficients"] = [*radial[:2], *tangential, radial[2]]
+    return entries | {"R": turn.tolist(), "t": (-turn @ centre).tolist()}
+
+
+def _attributes(path: str, camera: ElementTree.Element, name: str) -> dict[str, float]:
+    """Numbers of an element of a camera."""
+    element = camera.find(name)
+    if element is None:
+        raise UserError(f"{path}: camera {camera.get('serial')} lacks {name}; export the calibration anew")
+    return {key: float(value) for key, value in element.items() if re.fullmatch(r"[-+\d.eE]+", value)}
+
+
+def read_opencap(path: str) -> Entries:
+    """Read OpenCap's cameraIntrinsicsExtrinsics.pickle without R and t, which are in the board's world."""
+    try:
+        data = plain_pickle.load(Path(path).read_bytes())
+        matrix, lens = np.asarray(data["intrinsicMat"], float), np.ravel(data["distortion"]).astype(float)
+        height, width = np.ravel(data["imageSize"]).astype(float).tolist()
+    except (ValueError, KeyError, TypeError, AttributeError) as error:
+        raise UserError(
+            f"{path}: not a camera of OpenCap ({str(error)[:80]}); use its cameraIntrinsicsExtrinsics.pickle"
+        ) from None
+    return {
+        "camera_matrix": matrix.tolist(),
+        "distortion_coefficients": lens.tolist(),
+        "image_width": width,
+        "image_height": height,
+    }
