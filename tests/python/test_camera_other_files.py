@@ -116,10 +116,10 @@ def test_every_point_is_where_the_tools_equations_put_it(case, tmp_path):
     assert np.abs(rays - truth).max() < 2e-4
 
 
-WIDE = (-0.01, 0.001, 0.0, 0.0)
+BROAD = (-0.01, 0.001, 0.0, 0.0)
 REFUSED = {
-    "fisheye_too_wide": (
-        lambda p: wide(p / "a.yaml"),
+    "fisheye_too_large": (
+        lambda p: broad(p / "a.yaml"),
         "fisheye lens that k1 k2 p1 p2 k3 cannot replace within 0.5 px",
     ),
     "kalibr_omni": (
@@ -150,12 +150,12 @@ REFUSED = {
 }
 
 
-def wide(path):
+def broad(path):
     """A fisheye that shows 70 degrees from its axis."""
     matrix = [[300, 0, 639.5], [0, 300, 359.5], [0, 0, 1]]
     path.write_text(
         f"image_width: 1280\nimage_height: 720\ncamera_matrix: {matrix}\ndistortion_model: equidistant\n"
-        f"distortion_coefficients: {list(WIDE)}\n"
+        f"distortion_coefficients: {list(BROAD)}\n"
     )
     return str(path)
 

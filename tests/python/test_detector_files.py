@@ -17,7 +17,7 @@ from gait.io.layouts import LAYOUTS, joint_named, points_of
 FPS = 15.0
 CAMERA = view()
 WALK = keypoints(CAMERA, seconds=1.6)
-OTHER = WALK.uv + (300.0, 5.0)  # somebody beside, who is seen in fewer frames
+OTHER = WALK.uv + (300.0, 5.0)  # another person beside, in fewer frames
 FEWER = 10
 JOINTS = keypoints_file.read  # the function under test, with the model's names
 NAMES = WALK.names
@@ -283,7 +283,7 @@ def test_people_without_ids_are_followed_through_each_others_places_in_the_list(
     assert np.allclose(found.uv, expected, atol=1e-5)
 
 
-def test_points_that_are_not_seen_are_left_out(tmp_path):
+def test_points_that_are_not_visible_are_left_out(tmp_path):
     def gone(count, t):
         points = layout(count, WALK.uv[t])
         points[points_of(count).index("l_knee")] = 0, 0, 0
@@ -376,7 +376,7 @@ def test_names_of_joints(name, joint):
     assert joint_named(name) == joint
 
 
-def test_lift_takes_a_folder_and_the_command_reports_whom_it_took(tmp_path, capsys):
+def test_lift_takes_a_folder_and_the_command_names_the_person(tmp_path, capsys):
     camera = tmp_path / "cam.json"
     write_camera(camera, CAMERA)
     folder, out = openpose(tmp_path / "json", 26), tmp_path / "out.csv"
