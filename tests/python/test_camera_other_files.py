@@ -192,7 +192,7 @@ def test_files_that_do_not_place_the_camera_are_lenses_alone(tmp_path):
         ros_message(tmp_path / "a.yaml"),
         opencap(tmp_path / "a.pickle"),
     ):
-        with pytest.raises(UserError, match="R is missing"):
+        with pytest.raises(UserError, match="R and t are missing; place the camera"):
             Camera.read(path)
 
 

@@ -26,15 +26,15 @@ def agreeing(
     step = max(size) / _CELLS
     u, v = (np.linspace(-0.5, n - 0.5, max(2, round(n / step)) + 1) for n in size)
     pixels = np.stack(np.meshgrid(u, v), axis=-1).reshape(-1, 1, 2)
-    eye = np.eye(3)
+    same = np.eye(3)
     stop = (cv2.TERM_CRITERIA_COUNT | cv2.TERM_CRITERIA_EPS, 200, 1e-12)
     if model == "fisheye":
-        rays = cv2.fisheye.undistortPoints(pixels, matrix, coefficients, R=eye, P=eye, criteria=stop)
+        rays = cv2.fisheye.undistortPoints(pixels, matrix, coefficients, R=same, P=same, criteria=stop)
         if np.abs(rays).max() > 1e3:  # OpenCV's mark for what it does not find
             return None
         back = cv2.fisheye.distortPoints(rays, matrix, coefficients)
     else:
-        rays = cv2.undistortPointsIter(pixels, matrix, coefficients, eye, eye, stop)
+        rays = cv2.undistortPointsIter(pixels, matrix, coefficients, same, same, stop)
         world = np.concatenate([rays, np.ones((len(rays), 1, 1))], axis=2)
         back = cv2.projectPoints(world, np.zeros(3), np.zeros(3), matrix, coefficients)[0]
     if not np.abs(back - pixels).max() <= _RETURNS:
@@ -50,6 +50,6 @@ def agreeing(
     larger, lens = float(found[0]), found[1:] / found[0]
     new = np.diag([larger, larger, 1.0]) @ matrix
     new[:2, 2] = matrix[:2, 2]
-    again = cv2.undistortPointsIter(pixels, new, lens, eye, eye, stop)[:, 0]
+    again = cv2.undistortPointsIter(pixels, new, lens, same, same, stop)[:, 0]
     inverse = np.abs((again - rays[:, 0]) * np.diag(new)[:2]).max()  # rays are found from pixels, too
     return lens, larger, float(max(np.abs(terms @ found - wanted).max(), inverse))

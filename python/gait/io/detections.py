@@ -151,38 +151,38 @@ def _linked(
 
 def _moved(before: Array, after: Array) -> float:
     """Median distance of the points that both have, over the person's extent; inf if they share none."""
-    both = _seen(before) & _seen(after)
+    both = _visible(before) & _visible(after)
     if not both.any():
         return np.inf
-    extent = max(float(np.ptp(points[_seen(points), :2], axis=0).max()) for points in (before, after))
+    extent = max(float(np.ptp(points[_visible(points), :2], axis=0).max()) for points in (before, after))
     return float(np.median(np.linalg.norm(after[both, :2] - before[both, :2], axis=1))) / max(extent, 1e-9)
 
 
-def _seen(points: Array) -> NDArray[np.bool_]:
+def _visible(points: Array) -> NDArray[np.bool_]:
     return np.isfinite(points).all(axis=1) & (points[:, 2] > 0)
 
 
 def _choose(path: str | os.PathLike[str], people: dict[str, list[Detection]], clip: Clip) -> list[Detection]:
     """Return the detections of the person asked for, or of the one who is seen most: frames times extent."""
-    seen = {name: [d for d in chain if _seen(d.points).any()] for name, chain in people.items()}
-    weight = {name: sum(_extent(d.points) for d in chain) for name, chain in seen.items() if chain}
+    visible = {name: [d for d in chain if _visible(d.points).any()] for name, chain in people.items()}
+    weight = {name: sum(_extent(d.points) for d in chain) for name, chain in visible.items() if chain}
     if not weight:
         raise UserError(f"{path}: no point of a person is seen in any frame")
     ranked = sorted(weight, key=lambda name: -weight[name])
-    listed = ", ".join(f"{name} ({len(seen[name])} frames)" for name in ranked[:_NAMED])
+    listed = ", ".join(f"{name} ({len(visible[name])} frames)" for name in ranked[:_NAMED])
     listed += f" and {len(ranked) - _NAMED} more" * (len(ranked) > _NAMED)
     if clip.person is not None:
         if clip.person not in weight:
             raise UserError(f"{path}: has no person {clip.person}; --person is one of {listed}")
-        return seen[clip.person]
+        return visible[clip.person]
     if len(ranked) > 1:
         note(f"{path}: has {len(ranked)} people: {listed}; took {ranked[0]} (--person)", clip.quiet)
-    return seen[ranked[0]]
+    return visible[ranked[0]]
 
 
 def _extent(points: Array) -> float:
     """How tall or wide a person is, in the unit of the points; 1e-9 at least."""
-    return max(float(np.ptp(points[_seen(points), :2], axis=0).max()), 1e-9)
+    return max(float(np.ptp(points[_visible(points), :2], axis=0).max()), 1e-9)
 
 
 def _times(path: str | os.PathLike[str], frame: NDArray[np.int64], detected: Detections, clip: Clip) -> Array:

@@ -248,7 +248,7 @@ def _people(where: str, entry: Any) -> Iterator[tuple[str | None, Array, bool]]:
 
 
 def _holds_landmarks(value: Any) -> bool:
-    """Whether a value holds landmarks, one person's or several people's; null and empty are nobody."""
+    """Whether a value holds landmarks, one person's or several people's; null and empty are no person."""
     return isinstance(value, list) and bool(value) and isinstance(value[0], list | Mapping)
 
 

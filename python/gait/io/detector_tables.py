@@ -99,15 +99,15 @@ def read_pixel_trc(path: str | os.PathLike[str]) -> Detections:
     if not np.isfinite(times).all():
         raise UserError(f"{path}: column Time is not filled; export the file again")
     flat = points[..., 2]
-    seen = np.isfinite(points[..., :2]).all(axis=2) & (points[..., :2] != 0).any(axis=2)
-    if not seen.any():
+    visible = np.isfinite(points[..., :2]).all(axis=2) & (points[..., :2] != 0).any(axis=2)
+    if not visible.any():
         raise UserError(f"{path}: no point is seen in any frame")
-    span = float(np.ptp(points[..., :2][seen], axis=0).max())
+    span = float(np.ptp(points[..., :2][visible], axis=0).max())
     if np.nan_to_num(flat).any() or span <= _PIXELS:
         raise UserError(f"{path}: holds 3-D positions; keypoints are pixels without depth, as of Sports2D")
     frame = np.round(times * rate).astype(int)
     found = [Detection(int(k), "0", np.column_stack([uv[:, :2], ok]))
-             for k, uv, ok in zip(frame, points, seen, strict=True)]  # fmt: skip
+             for k, uv, ok in zip(frame, points, visible, strict=True)]  # fmt: skip
     return Detections(tuple(labels), found, times=dict(zip(frame.tolist(), times.tolist(), strict=True)))
 
 

@@ -5,27 +5,27 @@ from __future__ import annotations
 import re
 
 _COCO = (
-    "nose l_eye r_eye l_ear r_ear l_shoulder r_shoulder l_elbow r_elbow l_wrist r_wrist "
+    "- - - - - l_shoulder r_shoulder l_elbow r_elbow l_wrist r_wrist "
     "l_hip r_hip l_knee r_knee l_ankle r_ankle"
 )
-_HALPE = f"{_COCO} head neck hip l_big_toe r_big_toe l_small_toe r_small_toe l_heel r_heel"
+_HALPE = f"{_COCO} head - hip l_big_toe r_big_toe - - l_heel r_heel"
 _ARMS = "r_shoulder r_elbow r_wrist l_shoulder l_elbow l_wrist"
 _LEGS = "r_hip r_knee r_ankle l_hip l_knee l_ankle"
-_FEET = "l_big_toe l_small_toe l_heel r_big_toe r_small_toe r_heel"
-_FACE = "nose l_eye_inner l_eye l_eye_outer r_eye_inner r_eye r_eye_outer l_ear r_ear mouth_l mouth_r"
+_FEET = "l_big_toe - l_heel r_big_toe - r_heel"
+_FACE = "- " * 11
 _BOTH = "l_{0} r_{0}"
 
-#: Layouts by their number of points: name and points; those after the last one named are no joints.
+#: Layouts by their number of points: name and points; - and those after the last one are no joints.
 LAYOUTS = {
-    15: ("MPI of OpenPose", f"head neck {_ARMS} {_LEGS} chest"),
-    16: ("MPII", "r_ankle r_knee r_hip l_hip l_knee l_ankle pelvis thorax upper_neck head_top "
+    15: ("MPI of OpenPose", f"head - {_ARMS} {_LEGS} -"),
+    16: ("MPII", "r_ankle r_knee r_hip l_hip l_knee l_ankle pelvis - - head_top "
          "r_wrist r_elbow r_shoulder l_shoulder l_elbow l_wrist"),
     17: ("COCO-17", _COCO),
-    18: ("COCO-18 of OpenPose", f"nose neck {_ARMS} {_LEGS} r_eye l_eye r_ear l_ear"),
-    25: ("BODY_25 of OpenPose", f"nose neck {_ARMS} mid_hip {_LEGS} r_eye l_eye r_ear l_ear {_FEET}"),
+    18: ("COCO-18 of OpenPose", f"- - {_ARMS} {_LEGS} - - - -"),
+    25: ("BODY_25 of OpenPose", f"- - {_ARMS} mid_hip {_LEGS} - - - - {_FEET}"),
     26: ("HALPE-26", _HALPE),
-    33: ("BlazePose of MediaPipe", " ".join([_FACE, *(_BOTH.format(part) for part in (
-        "shoulder", "elbow", "wrist", "pinky", "index", "thumb", "hip", "knee", "ankle", "heel", "foot_index"
+    33: ("BlazePose of MediaPipe", " ".join([_FACE.strip(), *(_BOTH.format(part) if part != "-" else "- -" for part in (
+        "shoulder", "elbow", "wrist", "-", "-", "-", "hip", "knee", "ankle", "heel", "foot_index"
     ))])),
     133: ("COCO-WholeBody", f"{_COCO} {_FEET}"),
     136: ("HALPE-136", _HALPE),
@@ -42,7 +42,7 @@ _SIDES = {"l": "l", "left": "l", "r": "r", "right": "r"}
 def points_of(count: int) -> tuple[str, ...]:
     """Names of a layout's points, '' for those that are no joints; empty if no layout has so many points."""
     names = LAYOUTS.get(count, ("", ""))[1].split()
-    return tuple(names + [""] * (count - len(names))) if names else ()
+    return tuple([name.strip("-") for name in names] + [""] * (count - len(names))) if names else ()
 
 
 def joint_named(name: str, own: bool = False) -> str:
