@@ -90,7 +90,7 @@ TOOLS := $(BIN)/gait-trackd
 LIBS := $(B)/libgait.so $(B)/libgait.a
 
 .PHONY: help setup lib tools test built check unit python-test demo model paper bench bench-lift detector-profile eval eval-camera eval-real eval-learn eval-lift mutants asan tsan unit-threads fuzz fuzz-run golden-check \
-        docs lint format wheel sdist wheel-check install uninstall clean
+        docs lint format wheel sdist wheel-check install install-daemon uninstall clean
 
 help: ## list the targets
 	@echo 'make demo     track a walking clip end to end, results in build/demo (VIDEO= CAMERA= for your own)'
@@ -189,7 +189,8 @@ LCM_TYPES := $(sort $(wildcard lcm_types/*.lcm))
 JPEG_LIBS := $(shell pkg-config --libs libjpeg 2>/dev/null)
 JPEG_CFLAGS := $(if $(JPEG_LIBS),-DHAVE_LIBJPEG $(shell pkg-config --cflags libjpeg))
 LCM_CFLAGS := -isystem $(SITE)/include -isystem build/lcm
-LCM_LIBS = -L$(SITE)/lib -llcm -Wl,-rpath,'$$ORIGIN/$(shell realpath -ms --relative-to=$(BIN) $(SITE)/lib)'
+LCM_LIBS = -L$(SITE)/lib -llcm \
+           -Wl,-rpath,'$$ORIGIN/$(shell realpath -ms --relative-to=$(BIN) $(SITE)/lib):$$ORIGIN/../lib/gait'
 
 tools: $(TOOLS) build/lcm/.stamp ## LCM programs in build/bin, LCM types in build/lcm
 
@@ -397,7 +398,7 @@ format: setup ## rewrite in the house style
 	@$(VENV)/bin/ruff format --config python/pyproject.toml python tests
 
 # ---- installation --------------------------------------------------------------------------------------------
-install: lib ## DESTDIR= PREFIX= LIBDIR= INCLUDEDIR=
+install: lib ## the library and, after `make tools`, the daemon as a service (DESTDIR= PREFIX= LIBDIR= INCLUDEDIR=)
 	@for d in '$(PREFIX)' '$(LIBDIR)' '$(INCLUDEDIR)'; do case "$$d" in /*) ;; *) echo "install: '$$d' does not begin with /:" \
 	    'give PREFIX, LIBDIR and INCLUDEDIR from the root' >&2; exit 1;; esac; done
 	install -d '$(DESTDIR)$(LIBDIR)/pkgconfig' '$(DESTDIR)$(LIBDIR)/cmake/gait' '$(DESTDIR)$(INCLUDEDIR)'
@@ -410,9 +411,27 @@ install: lib ## DESTDIR= PREFIX= LIBDIR= INCLUDEDIR=
 	        -e "s|@INCLUDES@|$$(realpath -ms --relative-to='$(LIBDIR)/cmake/gait' '$(INCLUDEDIR)')|; s|@ABI@|$(ABI)|" \
 	        libgait/cmake/$${f##*/}.in > '$(DESTDIR)$(LIBDIR)'/$$f || exit 1; done
 
+	@if [ -x $(BIN)/gait-trackd ]; then $(MAKE) --no-print-directory install-daemon; \
+	else echo 'install: without the daemon; build it by `make tools` first'; fi
+
+# Its LCM, which no Debian package has, lies beside it in lib/gait.
+install-daemon: tools
+	install -d '$(DESTDIR)$(PREFIX)/bin' '$(DESTDIR)$(PREFIX)/lib/gait' '$(DESTDIR)$(PREFIX)/lib/systemd/system' \
+	    '$(DESTDIR)$(PREFIX)/share/man/man1' '$(DESTDIR)$(PREFIX)/share/gait/lcm_types'
+	install -m 755 $(BIN)/gait-trackd '$(DESTDIR)$(PREFIX)/bin/'
+	install -m 755 $(SITE)/lib/liblcm.so.1 '$(DESTDIR)$(PREFIX)/lib/gait/'
+	install -m 644 $(LCM_TYPES) '$(DESTDIR)$(PREFIX)/share/gait/lcm_types/'
+	install -m 644 python/gait/data/walk.gait '$(DESTDIR)$(PREFIX)/share/gait/'
+	sed 's|/usr/local|$(PREFIX)|' tools/trackd/trackd.toml > '$(DESTDIR)$(PREFIX)/share/gait/trackd.toml'
+	sed 's|@PREFIX@|$(PREFIX)|' tools/trackd/gait-trackd.service.in \
+	    > '$(DESTDIR)$(PREFIX)/lib/systemd/system/gait-trackd.service'
+	$(PY) tools/trackd/man.py $(BIN)/gait-trackd $(VERSION) > '$(DESTDIR)$(PREFIX)/share/man/man1/gait-trackd.1'
+
 uninstall: ## remove what install put there
 	cd '$(DESTDIR)$(LIBDIR)' && rm -rf libgait.so.$(ABI) libgait.so libgait.a pkgconfig/gait.pc cmake/gait
 	cd '$(DESTDIR)$(INCLUDEDIR)' && rm -f $(notdir $(HEADERS))
+	test ! -d '$(DESTDIR)$(PREFIX)/share/gait' || { cd '$(DESTDIR)$(PREFIX)' && rm -rf bin/gait-trackd lib/gait share/gait \
+	    lib/systemd/system/gait-trackd.service share/man/man1/gait-trackd.1; }
 
 clean: ## remove build/ (not .venv)
 	rm -rf build

@@ -39,9 +39,48 @@ def test_install_puts_everything_and_uninstall_removes_it(installed):
         *(f"lib/cmake/gait/gaitConfig{kind}.cmake" for kind in ("", "Version")),
     }
     headers = {f"include/{header.name}" for header in (ROOT / "libgait/include").glob("*.h")}
-    assert names == libraries | described | headers
+    types = {f"share/gait/lcm_types/{t.name}" for t in (ROOT / "lcm_types").glob("*.lcm")}
+    daemon = {"bin/gait-trackd", "lib/gait/liblcm.so.1", "share/gait/walk.gait", "share/gait/trackd.toml"}
+    service = {"lib/systemd/system/gait-trackd.service", "share/man/man1/gait-trackd.1"}
+    assert names == libraries | described | headers | types | daemon | service
     assert make("uninstall", f"DESTDIR={installed}", "PREFIX=/opt/gait").returncode == 0
     assert not [p for p in installed.rglob("*") if not p.is_dir()]
+
+
+def test_the_installed_daemon_runs_by_itself(installed):
+    prefix = installed / "opt/gait"
+    config = (prefix / "share/gait/trackd.toml").read_text().replace("/opt/gait", str(prefix))
+    (installed / "trackd.toml").write_text(config)
+    daemon = [prefix / "bin/gait-trackd"]
+    done = subprocess.run([*daemon, "--version"], capture_output=True, text=True, check=True, env={})
+    assert done.stdout.startswith("gait-trackd ")
+    log = ["--config", installed / "trackd.toml", "--url", "file:///nothing?speed=0"]
+    done = subprocess.run([*daemon, *log], capture_output=True, text=True, env={}, check=False)
+    assert "cannot open this log" in done.stderr  # model and options are fine
+
+
+def test_the_unit_is_one_that_systemd_accepts(installed):
+    if not shutil.which("systemd-analyze"):
+        pytest.skip("systemd-analyze is not installed")
+    unit = installed / "opt/gait/lib/systemd/system/gait-trackd.service"
+    text = unit.read_text().replace("/opt/gait", str(installed / "opt/gait"))
+    unit.write_text(re.sub(r"^Documentation=.*\n", "", text, flags=re.M))
+    done = subprocess.run(["systemd-analyze", "verify", unit], capture_output=True, text=True, check=False)
+    assert done.returncode == 0 and not done.stderr, done.stderr
+
+
+def test_the_manual_page_has_every_option(installed):
+    page = (installed / "opt/gait/share/man/man1/gait-trackd.1").read_text().replace("\\-", "-")
+    trackd = ROOT / "build/bin/gait-trackd"
+    shown = subprocess.run([trackd, "--help"], capture_output=True, text=True, check=True).stdout
+    options = re.findall(r"^  ((?:-\w, )?--[a-z-]+.*)$", shown, re.M)
+    assert len(options) > 30 and all(f"\n.B {option}\n" in page for option in options)
+    if shutil.which("groff"):
+        page = installed / "opt/gait/share/man/man1/gait-trackd.1"
+        done = subprocess.run(
+            ["groff", "-man", "-ww", "-z", page], capture_output=True, text=True, check=True
+        )
+        assert not done.stderr
 
 
 @pytest.mark.parametrize("linked", [[], ["-static-libgcc", "-Wl,-Bstatic", "-lgait", "-Wl,-Bdynamic", "-lm"]])

@@ -155,7 +155,7 @@ def test_a_wrong_camera_message_is_named(tmp_path):
     for change, words in (
         ({"fx": 0.0}, "focal"),
         ({"R": [0.0] * 9}, "not a rotation"),
-        ({"width": 16001}, "camera message with a size of 16001x120; send 1 to 16000"),
+        ({"width": 16001}, "camera with a size of 16001x120; send 1 to 16000"),
     ):
         message = camera_message(rig.CAMERA, 1)
         for name, value in change.items():

@@ -61,6 +61,21 @@ bool convert_same_camera(const gait_camera *a, const gait_camera *b)
     return same;
 }
 
+bool camera_check(const gait_camera *c, int32_t max_pixels, message *why)
+{
+    if (c->width < 1 || c->height < 1 || c->width > CAMERA_PIXELS || c->height > CAMERA_PIXELS)
+        return message_set(why, "camera with a size of %dx%d; send 1 to %d", c->width, c->height,
+                           CAMERA_PIXELS);
+    if (c->width * c->height > max_pixels)
+        return message_set(why, "camera with %dx%d pixels, more than the %d of --max-pixels", c->width,
+                           c->height, max_pixels);
+    if (!(c->fx > 0) || !(c->fy > 0))
+        return message_set(why, "camera with focal lengths %g and %g; send pixels", (double)c->fx,
+                           (double)c->fy);
+    return camera_rotation_ok(c) ||
+           message_set(why, "camera whose R is not a rotation; send orthogonal rows of length 1");
+}
+
 bool convert_camera_message(const gaitmsg_camera_t *in, int32_t max_pixels, gait_camera *out, message *why)
 {
     gait_camera c = {.width = in->width,
@@ -75,16 +90,8 @@ bool convert_camera_message(const gaitmsg_camera_t *in, int32_t max_pixels, gait
         c.t[i] = (float)in->t[i];
     for (int i = 0; i < 5; i++)
         c.distortion[i] = (float)in->distortion[i];
-    if (c.width < 1 || c.height < 1 || c.width > CAMERA_PIXELS || c.height > CAMERA_PIXELS)
-        return message_set(why, "camera message with a size of %dx%d; send 1 to %d", c.width, c.height,
-                           CAMERA_PIXELS);
-    if (c.width * c.height > max_pixels)
-        return message_set(why, "camera message with %dx%d pixels, more than the %d of --max-pixels", c.width,
-                           c.height, max_pixels);
-    if (!(c.fx > 0) || !(c.fy > 0))
-        return message_set(why, "camera message with focal lengths %g and %g; send pixels", in->fx, in->fy);
-    if (!camera_rotation_ok(&c))
-        return message_set(why, "camera message whose R is not a rotation; send orthogonal rows of length 1");
+    if (!camera_check(&c, max_pixels, why))
+        return false;
     *out = c;
     return true;
 }

@@ -18,7 +18,8 @@ void convert_state(const gait_state *in, const gait_model_info *info, gaitmsg_st
 /* Fields that are not numbers become those of `unknown`; components and offsets beyond the message's are 0. */
 bool convert_state_message(const gaitmsg_state_t *in, const gait_state *unknown, gait_state *out,
                            message *why);
-/* Refused with more than `max_pixels` of width times height. */
+/* Whether a camera that was sent or saved can be used; not with more than `max_pixels` of width times height. */
+bool camera_check(const gait_camera *camera, int32_t max_pixels, message *why);
 bool convert_camera_message(const gaitmsg_camera_t *in, int32_t max_pixels, gait_camera *out, message *why);
 /* Equal up to rounding, which differs between files and messages, and readers may orthogonalise R. */
 bool convert_same_camera(const gait_camera *a, const gait_camera *b);

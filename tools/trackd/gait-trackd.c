@@ -2,22 +2,26 @@
 #include "trackd/input_files.h"
 #include "trackd/image_view.h"
 #include "trackd/lcm_link.h"
+#include "trackd/manager.h"
 #include "trackd/receiver.h"
 #include "trackd/settings.h"
 #include "trackd/common.h"
 
+#include <errno.h>
 #include <inttypes.h>
 #include <signal.h>
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
+#include <unistd.h>
 
-static volatile sig_atomic_t quit;
+enum { QUIT = 1, RELOAD = 2 };
+static volatile sig_atomic_t quit;    /* one of these after a signal */
+static sig_atomic_t on_hangup = QUIT; /* a closed terminal; RELOAD: a service manager asks for it */
 
 static void on_signal(int number)
 {
-    (void)number;
-    quit = 1;
+    quit = number == SIGHUP ? on_hangup : QUIT;
 }
 
 /* Block the signals that end the program, also in threads that LCM starts; `unblocked` is the mask to wait with. */
@@ -26,6 +30,7 @@ static void set_signals(sigset_t *unblocked)
     static const int ends[] = {SIGINT, SIGTERM, SIGHUP};
     struct sigaction const action = {.sa_handler = on_signal};
     sigset_t block;
+    on_hangup = manager_listens() ? RELOAD : QUIT;
     sigemptyset(&block);
     for (size_t i = 0; i < sizeof ends / sizeof *ends; i++) {
         struct sigaction before;
@@ -163,22 +168,51 @@ static bool check_log(const char *url, const service *s, message *why)
     return !why->text[0] && check_result(path, s, why);
 }
 
+typedef struct invocation { /* of the program */
+    int argc;
+    char **argv;
+    sigset_t unblocked; /* signal mask to wait with, and to begin with */
+} invocation;
+
+/* Run until a signal ends the program; it goes on where settings that should be read again cannot be used. */
+static bool run(receiver *r, const invocation *call, message *why)
+{
+    static settings again;
+    message bad;
+    while (receiver_run(r, &quit, &call->unblocked, why)) {
+        if (quit != RELOAD || settings_read(&again, call->argc, call->argv, &bad) == OPTION_OK)
+            return true;
+        log_line("settings are not read again: %s", bad.text);
+        quit = 0;
+    }
+    return false;
+}
+
 /* Everything between the settings and the exit code. */
-static bool serve(service *s, const settings *want, parts *p, workers *threads, const sigset_t *unblocked,
+static bool serve(service *s, const settings *want, parts *p, workers *threads, const invocation *call,
                   message *why)
 {
     const char *const url = link_url(want->url);
     bool const log = link_is_log(url);
+    snapshot_file snapshot = {.path = want->snapshot[0] ? want->snapshot : NULL,
+                              .period =
+                                  (int64_t)(1e6 * (want->snapshot_s > 0 ? (double)want->snapshot_s : 1))};
     const char *const to = want->out[0] ? want->out : log ? NULL : url;
     receiver r = {0};
     sink out = {0};
     message lost;
     bool const ready = (!to || sink_open(&out, to, why)) && load(s, want, p, threads, &out, why) &&
-                       receiver_open(&r, s, url, why);
+                       receiver_open(&r, s, &snapshot, url, why);
+    if (ready)
+        snapshot_file_resume(&snapshot, s);
     if (ready && !log && !want->quiet)
         log_line("listening on %s", url);
-    bool ok = ready && receiver_run(&r, &quit, unblocked, why);
+    if (ready)
+        manager_tell("READY=1");
+    bool ok = ready && run(&r, call, why);
     if (ok) {
+        manager_tell(quit == RELOAD ? "RELOADING=1" : "STOPPING=1");
+        snapshot_file_write(&snapshot, s, true);
         service_send_status(s);
         if (!want->quiet)
             print_summary(s, !log);
@@ -197,7 +231,7 @@ int main(int argc, char **argv)
     static service s;
     static parts extra;
     static workers threads;
-    sigset_t unblocked;
+    invocation call = {.argc = argc, .argv = argv};
     message why;
     option_result const result = settings_read(&want, argc, argv, &why);
     if (result == OPTION_HELP)
@@ -212,14 +246,19 @@ int main(int argc, char **argv)
                jpeg_supported() ? "yes" : "no");
         return 0;
     }
-    set_signals(&unblocked);
+    set_signals(&call.unblocked);
     bool ok = workers_start(&threads, want.threads, &why);
     if (ok) {
-        ok = serve(&s, &want, &extra, &threads, &unblocked, &why);
+        ok = serve(&s, &want, &extra, &threads, &call, &why);
         workers_stop(&threads);
         service_close(&s);
         lift_service_close(&extra.lift);
         keypoint_cue_close(&extra.cue);
+    }
+    if (ok && quit == RELOAD) {
+        sigprocmask(SIG_SETMASK, &call.unblocked, NULL);
+        execvp(argv[0], argv);
+        ok = message_set(&why, "%.200s: cannot be started again: %s", argv[0], strerror(errno));
     }
     if (!ok)
         log_line("%s", why.text);

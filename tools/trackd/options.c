@@ -41,9 +41,9 @@ static bool set_u64(const option *o, const char *text, message *why)
 
 static bool set_flag(const option *o, const char *text, message *why)
 {
-    bool const yes = !text || strcmp(text, "yes") == 0;
-    if (!yes && strcmp(text, "no") != 0)
-        return message_set(why, "--%s %s: give yes or no", o->name, text);
+    bool const yes = !text || strcmp(text, "true") == 0 || strcmp(text, "yes") == 0;
+    if (!yes && strcmp(text, "false") != 0 && strcmp(text, "no") != 0)
+        return message_set(why, "--%s %s: give true or false", o->name, text);
     *(bool *)o->value = yes;
     return true;
 }
@@ -139,10 +139,38 @@ static bool claim(options_source *file, const option *o, int *given, message *wh
     return true;
 }
 
+/* End the line where a comment begins, which is not between quotes. */
+static void cut_comment(char *line)
+{
+    char quote = '\0';
+    for (char *c = line; *c; c++) {
+        if (*c == '#' && !quote)
+            *c = '\0';
+        else if (quote ? *c == quote : *c == '"' || *c == '\'')
+            quote = quote ? '\0' : *c;
+        if (!*c)
+            return;
+    }
+}
+
+/* The text of a TOML string, or the value as it stands if it is none; NULL: escapes, or quotes that do not close. */
+static const char *unquote(char *value)
+{
+    size_t const n = strlen(value);
+    char const quote = value[0];
+    if (quote != '"' && quote != '\'')
+        return value;
+    if (n < 2 || value[n - 1] != quote || memchr(value + 1, quote, n - 2) ||
+        (quote == '"' && strchr(value, '\\')))
+        return NULL;
+    value[n - 1] = '\0';
+    return value + 1;
+}
+
 /* Apply one line of the file; modifies the line. */
 static bool apply_line(const option *table, int count, options_source *file, char *line, message *why)
 {
-    line[strcspn(line, "#")] = '\0';
+    cut_comment(line);
     line = trim(line);
     if (!*line)
         return true;
@@ -154,7 +182,10 @@ static bool apply_line(const option *table, int count, options_source *file, cha
     const option *const o = find(table, count, name, strlen(name));
     if (!o)
         return message_set(why, "unknown option %s; --help lists them", name);
-    return claim(file, o, &file->given[o - table], why) && set(o, trim(equals + 1), why);
+    const char *const value = unquote(trim(equals + 1));
+    if (!value)
+        return message_set(why, "%s: give a string in plain quotes, without escapes", o->name);
+    return claim(file, o, &file->given[o - table], why) && set(o, value, why);
 }
 
 /* Control characters are refused, because error messages would pass them on to the terminal. */

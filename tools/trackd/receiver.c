@@ -2,6 +2,7 @@
 #include "receiver.h"
 
 #include "lcm_link.h"
+#include "manager.h"
 
 #include <errno.h>
 #include <poll.h>
@@ -134,9 +135,9 @@ static bool subscribe(receiver *r, message *why)
            (r->log || link_subscribe(r->others, "GAIT_STATUS", on_status, r, OTHERS_WAITING, why));
 }
 
-bool receiver_open(receiver *r, service *s, const char *url, message *why)
+bool receiver_open(receiver *r, service *s, snapshot_file *snapshot, const char *url, message *why)
 {
-    *r = (receiver){.service = s, .log = link_is_log(url)};
+    *r = (receiver){.service = s, .log = link_is_log(url), .snapshot = snapshot};
     r->images = link_open(url, why);
     if (!r->images)
         return false;
@@ -177,8 +178,10 @@ bool receiver_run(receiver *r, const volatile sig_atomic_t *quit, const sigset_t
                            {.fd = lcm_get_fileno(r->others), .events = POLLIN}};
     while (!*quit) {
         int64_t const now = clock_monotonic();
+        snapshot_file_write(r->snapshot, r->service, false);
         if (now >= due || (r->service->news && (r->log || now >= news))) {
             service_send_status(r->service);
+            manager_tell("WATCHDOG=1");
             due = now + STATUS_US;
             news = now + NEWS_US;
         }

@@ -2,6 +2,7 @@
 #ifndef TRACKD_RECEIVER_H
 #define TRACKD_RECEIVER_H
 #include "service.h"
+#include "snapshot_file.h"
 
 #include <signal.h>
 
@@ -12,10 +13,11 @@ typedef struct receiver {
     lcm_t *images, *others; /* the same for a log */
     lcm_subscription_t *frames;
     bool log;
+    snapshot_file *snapshot;
 } receiver;
 
 /* Connect to `url` and subscribe. */
-bool receiver_open(receiver *r, service *s, const char *url, message *why);
+bool receiver_open(receiver *r, service *s, snapshot_file *snapshot, const char *url, message *why);
 void receiver_close(receiver *r);
 /* Serve until *quit is set by a signal, or the log ends.  Signals must be blocked; `unblocked` is the mask to wait
  * with. */

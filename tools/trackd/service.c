@@ -189,10 +189,10 @@ void service_camera(service *s, const gaitmsg_camera_t *msg)
         return;
     }
     if (known && !replaces(s, &camera, msg->utime < 0 ? 0 : msg->utime)) {
-        service_complain(s, s->camera_fixed
-                                ? "a different camera from that of --camera was announced and is ignored"
-                                : "a different camera from the one in use was announced: it replaces that one "
-                                  "after 10 seconds in which only it is announced");
+        service_complain(
+            s, s->camera_fixed ? "a different camera from that of --camera was announced and is ignored"
+                               : "a different camera from the one in use was announced: it replaces that one "
+                                 "after 10 seconds in which only it is announced");
         return;
     }
     s->other_since = -1;

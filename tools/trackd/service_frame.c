@@ -53,6 +53,12 @@ static void run(service *s, const image_view *v, int64_t utime)
     service_set_state(s, GAITMSG_STATUS_T_RUNNING, "tracking");
 }
 
+void service_resume(service *s, int64_t utime, int64_t frame)
+{
+    image_view const last = {.utime = utime, .frame = frame};
+    run(s, &last, utime);
+}
+
 /* Begin to track if the frame of the start has arrived; true when the tracker runs. */
 static bool begin(service *s, const image_view *v)
 {

@@ -118,8 +118,15 @@ static int make_table(settings *s, option *table)
          "        ?mode=a to append",
          TEXT(out)},
         {"config", 0, "FILE",
-         "lines `name = value` with the long names of these options; the command line takes precedence",
+         "TOML: lines `name = value` with the long names of these options; the command line takes\n"
+         "        precedence",
          TEXT(config)},
+        {"snapshot", 0, "FILE",
+         "live, with --init auto: keep the state of the tracker in FILE while a person is followed, and go\n"
+         "        on with it at the next start; a folder in memory, such as /run, spares the disk",
+         TEXT(snapshot)},
+        {"snapshot-s", 0, "S", "seconds between two snapshots, default 1", OPTION_FLOAT, &s->snapshot_s, 0.1,
+         3600},
         {"stream", 0, "I", "number of the camera, default 0", INT(stream, 0, 30)},
         {"mode", 0, "default|paper", "all likelihood terms, or those of Ormoneit et al. 2000", TEXT(mode)},
         {"budget-ms", 0, "MS",
@@ -135,7 +142,7 @@ static int make_table(settings *s, option *table)
         {"max-pixels", 0, "N",
          "most pixels of a picture: a camera message that announces more is refused, so that it cannot\n"
          "        take the memory; default 16777216",
-         INT(max_pixels, 1, CAMERA_PIXELS *CAMERA_PIXELS)},
+         INT(max_pixels, 1, CAMERA_PIXELS * CAMERA_PIXELS)},
         {"threads", 't', "N",
          "threads, default 1, which is also the default of --tasks; results do not depend on it",
          INT(threads, 1, GAIT_POOL_MAX)},
@@ -180,9 +187,13 @@ static int make_table(settings *s, option *table)
 
 static void set_defaults(settings *s)
 {
-    *s = (settings){
-        .mode = "default", .init = "auto", .threads = 1, .cpu_mask = -1,
-        .max_pixels = 1 << 24, .max_gap = 2, .lift_lag = -1};
+    *s = (settings){.mode = "default",
+                    .init = "auto",
+                    .threads = 1,
+                    .cpu_mask = -1,
+                    .max_pixels = 1 << 24,
+                    .max_gap = 2,
+                    .lift_lag = -1};
 }
 
 void settings_help(void)
@@ -198,7 +209,8 @@ void settings_help(void)
         "tracked; the others are counted as dropped.\n"
         "Accepts the commands START, STOP and RESET on GAIT_COMMAND.  SIGINT, SIGTERM or SIGHUP end the "
         "program\n"
-        "with a summary.  Exit codes: 0 ok, 1 failed, 2 usage.\n\n");
+        "with a summary; under a service manager SIGHUP reads --config again.  Exit codes: 0 ok, 1 failed,\n"
+        "2 usage.\n\n");
     options_help(table, count);
 }
 
@@ -220,6 +232,8 @@ static bool check_dependencies(const settings *s, message *why)
         {"lift-stature", "lift", s->lift_stature > 0, s->lift},
         {"lift-sd", "lift", s->lift_sd > 0, s->lift},
         {"lift-lag", "lift", s->lift_lag >= 0, s->lift},
+        {"snapshot-s", "snapshot", s->snapshot_s > 0, s->snapshot[0]},
+        {"snapshot", "init auto", s->snapshot[0], strcmp(s->init, "auto") == 0},
         {"keypoints-sd", "keypoints-term", s->keypoints_sd > 0, s->keypoints_term},
     };
     for (size_t i = 0; i < sizeof pair / sizeof *pair; i++)
@@ -286,6 +300,8 @@ option_result settings_read(settings *s, int argc, char **argv, message *why)
          message_set(why, "--url memq://: works only within one process; give udpm:// or file://")) &&
         (s->budget_ms == 0 || !link_is_log(link_url(s->url)) ||
          message_set(why, "--budget-ms: a log is played without dropping frames; leave it out")) &&
+        (!s->snapshot[0] || !link_is_log(link_url(s->url)) ||
+         message_set(why, "--snapshot: a log is played from its beginning; leave it out")) &&
         check_dependencies(s, why) && check_logs(s, why) &&
         (s->adapt_particles <= s->tracker.particles ||
          message_set(why, "--adapt-particles %d: at most the %d of --particles", (int)s->adapt_particles,

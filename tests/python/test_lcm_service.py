@@ -1,0 +1,158 @@
+"""gait-trackd as a service that stays up: snapshots, a service manager, settings that are read again."""
+
+import json
+import os
+import signal
+import socket
+import threading
+from queue import SimpleQueue
+
+import lcm_rig as rig
+import pytest
+
+from gait.lcm.link import private_url
+
+COUNT, KILLED = 10, 6
+
+
+@pytest.fixture(autouse=True)
+def multicast():
+    rig.need_multicast()
+
+
+def feed(listener, first, stop):
+    """Send frames one by one, each after the estimate of the one before."""
+    for i in range(first, stop):
+        listener.estimates.clear()
+        listener.send(rig.frames(i, i + 1))
+        listener.until(lambda i=i: any(e.frame == i for e in listener.estimates), f"an estimate of frame {i}")
+    return listener.estimates[-1]
+
+
+def begin(listener):
+    listener.ask(rig.opening()[:2], lambda s: s.background_mask, "camera and background")
+    listener.ask(rig.opening()[2:], lambda s: s.state == s.ARMED, "a start")
+
+
+def options(tmp_path, *more):
+    return ["--init", "auto", "--snapshot", tmp_path / "state", "--snapshot-s", 0.1, *more]
+
+
+def followed(tmp_path, *more):
+    """A daemon that followed a person and was killed."""
+    url = private_url()
+    with rig.daemon(url, *options(tmp_path, *more)) as (listener, _):
+        begin(listener)
+        feed(listener, 0, KILLED)
+        before = len(listener.statuses)
+        listener.until(lambda: len(listener.statuses) > before + 2, "a second without frames")
+        os.kill(listener.pid, signal.SIGKILL)
+    return url
+
+
+def test_a_daemon_that_was_killed_goes_on_bit_for_bit(tmp_path):
+    url = followed(tmp_path)
+    with rig.daemon(url, *options(tmp_path)) as (listener, finish):
+        listener.ask(rig.opening()[1:2], lambda s: s.background_mask, "the background")
+        resumed = feed(listener, KILLED, COUNT)
+        assert f"following the person of frame {KILLED - 1}" in finish().words
+    whole = rig.play(rig.write_log(tmp_path / "a.log", [*rig.opening(), *rig.frames(0, COUNT)]))
+    assert resumed.tracker_digest == whole.estimates[-1].tracker_digest
+    assert (tmp_path / "state").exists()  # written once more at the end
+    assert [p.name for p in tmp_path.iterdir() if p.name.startswith("state")] == ["state"]
+
+
+def test_a_snapshot_that_does_not_fit_is_not_used(tmp_path):
+    url = followed(tmp_path)
+    good = (tmp_path / "state").read_bytes()
+    torn = [good[:n] for n in (0, 7, 100, len(good) // 2, len(good) - 1)]
+    flipped = [good[:k] + bytes([good[k] ^ 1]) + good[k + 1 :] for k in (0, 9, 200, len(good) - 9)]
+    cases = [((), b, "") for b in (*torn, *flipped)]
+    cases += [
+        (("--seed", 9), good, "snapshot of a tracker with another model or configuration"),
+        (("--stream", 1), good, "of --stream 0"),
+    ]
+    for more, content, why in cases:
+        (tmp_path / "state").write_bytes(content)
+        with rig.daemon(url, *options(tmp_path, *more)) as (listener, finish):
+            assert listener.last.state != listener.last.RUNNING
+            words = finish().words
+        assert words.count("is not used: " + why) == 1 and "following" not in words, (more, len(content))
+        assert not (tmp_path / "state").exists()  # nobody is followed
+
+
+def test_a_snapshot_of_another_camera_is_not_used(tmp_path):
+    url = followed(tmp_path)
+    (tmp_path / "camera.json").write_text(json.dumps(rig.CAMERA.scaled(0.5).to_dict()))
+    with rig.daemon(url, *options(tmp_path, "--camera", tmp_path / "camera.json")) as (_, finish):
+        assert "of another camera than --camera" in finish().words
+
+
+def test_a_folder_that_cannot_be_written_is_reported_once(tmp_path):
+    url = private_url()
+    with rig.daemon(url, *options(tmp_path)[:3], tmp_path / "no" / "state") as (listener, finish):
+        begin(listener)
+        feed(listener, 0, KILLED)
+        before = len(listener.statuses)
+        listener.until(lambda: len(listener.statuses) > before + 2, "more statuses")
+        outcome = finish()
+    assert outcome.code == 0 and outcome.words.count("cannot be written: No such file") == 1
+
+
+@pytest.fixture
+def manager(tmp_path, monkeypatch):
+    """What a service manager is told, in order: call for the next line that is not WATCHDOG=1."""
+    sock, lines = socket.socket(socket.AF_UNIX, socket.SOCK_DGRAM), SimpleQueue()
+    sock.bind(str(tmp_path / "notify"))
+    monkeypatch.setenv("NOTIFY_SOCKET", str(tmp_path / "notify"))
+
+    def listen():
+        while said := sock.recv(256):
+            lines.put(said.decode())
+
+    thread = threading.Thread(target=listen)
+    thread.start()
+
+    def told(beside="WATCHDOG=1"):
+        while (said := lines.get(timeout=rig.PATIENCE)) == beside:
+            pass
+        return said
+
+    yield told
+    with socket.socket(socket.AF_UNIX, socket.SOCK_DGRAM) as end:
+        end.sendto(b"", str(tmp_path / "notify"))
+    thread.join()
+    sock.close()
+
+
+def test_a_service_manager_is_told_and_settings_are_read_again(tmp_path, manager):
+    config = tmp_path / "trackd.toml"
+    config.write_text("particles = 64\n")
+    with rig.daemon(private_url(), "--config", config, *options(tmp_path)) as (listener, finish):
+        assert manager() == "READY=1" and manager(None) == "WATCHDOG=1"
+        begin(listener)
+        feed(listener, 0, 3)
+        os.kill(listener.pid, signal.SIGHUP)
+        assert manager() == "RELOADING=1" and manager() == "READY=1"
+        listener.ask(rig.opening()[1:2], lambda s: s.background_mask, "the background")
+        feed(listener, 3, 5)  # the same person, without a start
+        config.write_text("particles = many\n")
+        os.kill(listener.pid, signal.SIGHUP)
+        feed(listener, 5, 7)
+        outcome = finish()
+        assert manager() == "STOPPING=1"
+    assert outcome.code == 0 and "settings are not read again" in outcome.words
+    assert "--particles many: give a whole number" in outcome.words
+
+
+def test_a_configuration_is_toml(tmp_path):
+    config = tmp_path / "trackd.toml"
+    good = f'model = "{rig.MODEL}"  # the # of a comment\nquiet = true\nparticles-channel = false\nseed = 3\n'
+    log = rig.write_log(tmp_path / "a.log", [*rig.opening(), *rig.frames(0, 2)])
+    config.write_text(good)
+    outcome = rig.run("--config", config, "--particles", 64, "--url", f"file://{log}?speed=0")
+    assert outcome.code == 0, outcome.words
+    for value in ('"open', '"a\\tb"', '"a" "b"'):
+        config.write_text(f"model = {value}\n")
+        outcome = rig.run("--config", config)
+        assert outcome.code == 2 and "line 1: model: give a string in plain quotes" in outcome.words
