@@ -86,6 +86,7 @@ def main() -> int:
             stream.run(time.monotonic() + chance.uniform(1.2, 3.0))
             daemon.send_signal(signal.SIGKILL)
             daemon.wait()
+            before = log.read_text()
             known, began = max(stream.answered), time.monotonic()
             daemon = start(words, log)
             while not any(f > known for f in stream.answered) and time.monotonic() < began + 10.0:
@@ -93,7 +94,7 @@ def main() -> int:
             first = min((f for f in stream.answered if f > known), default=None)
             resumed = RESUMED.search(log.read_text())
             if first is None or resumed is None:
-                print(f"daemon_kills: it did not go on: {log.read_text()}", file=sys.stderr)
+                print(f"daemon_kills: it did not go on:\n{before}--\n{log.read_text()}", file=sys.stderr)
                 old += 1
                 begin(stream)
                 continue
@@ -134,9 +135,10 @@ def begin(stream: Stream) -> None:
     listener = stream.listener
     listener.until(lambda: bool(listener.statuses), "a first status")
     listener.ask(rig.opening()[:2], lambda s: s.background_mask, "camera and background")
-    listener.ask(rig.opening()[2:], lambda s: s.state == s.ARMED, "a start")
-    stream.began = time.monotonic()
-    while not stream.answered:
+    start_now = rig.start(stream.sent % SHOWN, at=rig.utime(stream.sent))
+    listener.ask([("GAIT_COMMAND", start_now)], lambda s: s.state == s.ARMED, "a start")
+    stream.began = time.monotonic() - stream.sent / RATE
+    while not any(f >= stream.sent - 1 for f in stream.answered):
         stream.run(time.monotonic() + 0.05)
 
 
