@@ -5,7 +5,7 @@
 
 A stream of 30 frames a second of a drawn person, at any time a SIGKILL, at once another daemon on the same
 snapshot.  A daemon has gone on when it reports to follow the person of a frame and estimates follow without a
-START; a frame is lost if it was sent and no daemon estimated it.  Nobody else may be publishing on the URL.
+START; a frame is lost if it was sent and no daemon estimated it.  No other program may publish on the URL.
 """
 
 from __future__ import annotations
@@ -113,8 +113,8 @@ def main() -> int:
     title = "A daemon that is killed"
     note = (
         f"{facts('tests/bench/daemon_kills.py --record')}\n\nSIGKILL at random moments of a stream of "
-        f"{RATE:.0f} frames a second, snapshots every {PERIOD_S:.0f} s, {rig.PARTICLES} particles, 160 x 120.  "
-        "Milliseconds from the start of the next daemon to its first estimate, wanted below "
+        f"{RATE:.0f} frames a second, snapshots every {PERIOD_S:.0f} s, {rig.PARTICLES} particles, "
+        "160 x 120.  Milliseconds from the start of the next daemon to its first estimate, wanted below "
         f"{WANTED_MS:.0f}; frames sent in between are lost."
     )
     if args.record:

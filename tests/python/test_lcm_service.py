@@ -78,7 +78,7 @@ def test_a_snapshot_that_does_not_fit_is_not_used(tmp_path):
             assert listener.last.state != listener.last.RUNNING
             words = finish().words
         assert words.count("is not used: " + why) == 1 and "following" not in words, (more, len(content))
-        assert not (tmp_path / "state").exists()  # nobody is followed
+        assert not (tmp_path / "state").exists()  # no person is followed
 
 
 def test_a_snapshot_of_another_camera_is_not_used(tmp_path):
@@ -101,31 +101,31 @@ def test_a_folder_that_cannot_be_written_is_reported_once(tmp_path):
 
 @pytest.fixture
 def manager(tmp_path, monkeypatch):
-    """What a service manager is told, in order: call for the next line that is not WATCHDOG=1."""
+    """What is reported to a service manager, in order: call for the next line that is not WATCHDOG=1."""
     sock, lines = socket.socket(socket.AF_UNIX, socket.SOCK_DGRAM), SimpleQueue()
     sock.bind(str(tmp_path / "notify"))
     monkeypatch.setenv("NOTIFY_SOCKET", str(tmp_path / "notify"))
 
     def listen():
-        while said := sock.recv(256):
-            lines.put(said.decode())
+        while line := sock.recv(256):
+            lines.put(line.decode())
 
     thread = threading.Thread(target=listen)
     thread.start()
 
-    def told(beside="WATCHDOG=1"):
-        while (said := lines.get(timeout=rig.PATIENCE)) == beside:
+    def reported(beside="WATCHDOG=1"):
+        while (line := lines.get(timeout=rig.PATIENCE)) == beside:
             pass
-        return said
+        return line
 
-    yield told
+    yield reported
     with socket.socket(socket.AF_UNIX, socket.SOCK_DGRAM) as end:
         end.sendto(b"", str(tmp_path / "notify"))
     thread.join()
     sock.close()
 
 
-def test_a_service_manager_is_told_and_settings_are_read_again(tmp_path, manager):
+def test_a_service_manager_is_reported_and_settings_are_read_again(tmp_path, manager):
     config = tmp_path / "trackd.toml"
     config.write_text("particles = 64\n")
     with rig.daemon(private_url(), "--config", config, *options(tmp_path)) as (listener, finish):

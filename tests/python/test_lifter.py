@@ -385,15 +385,15 @@ def test_results_are_finite_or_refused(camera):
     lifter = Lifter(contents, replace(CAMERA, **camera), LiftConfig.default(lag=2))
     rng = np.random.default_rng(0)
     results = (lifter.positions, lifter.posterior, lifter.scale, lifter.least_squares, lifter.uncertain)
-    for sd, spread in EXTREMES:
-        uv = rng.normal(size=(FRAMES, MARKERS, 2)) * 60 * spread + [640, 350]
+    for sd, scatter in EXTREMES:
+        uv = rng.normal(size=(FRAMES, MARKERS, 2)) * 60 * scatter + [640, 350]
         for fit in (partial(lifter.segment, uv, sd), *results, partial(streamed, lifter, uv, sd)):
             try:
                 found = fit()
             except GaitError:
-                assert camera or sd != 3.0 or spread > 1.0, "an ordinary segment is refused"
+                assert camera or sd != 3.0 or scatter > 1.0, "an ordinary segment is refused"
             else:
-                assert all(np.isfinite(part).all() for part in numbers(found)), (sd, spread, fit)
+                assert all(np.isfinite(part).all() for part in numbers(found)), (sd, scatter, fit)
 
 
 def streamed(lifter: Lifter, uv: np.ndarray, sd: float) -> object:

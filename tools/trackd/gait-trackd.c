@@ -208,10 +208,10 @@ static bool serve(service *s, const settings *want, parts *p, workers *threads, 
     if (ready && !log && !want->quiet)
         log_line("listening on %s", url);
     if (ready)
-        manager_tell("READY=1");
+        manager_report("READY=1");
     bool ok = ready && run(&r, call, why);
     if (ok) {
-        manager_tell(quit == RELOAD ? "RELOADING=1" : "STOPPING=1");
+        manager_report(quit == RELOAD ? "RELOADING=1" : "STOPPING=1");
         snapshot_file_write(&snapshot, s, true);
         service_send_status(s);
         if (!want->quiet)

@@ -13,7 +13,7 @@ bool manager_listens(void)
     return path && (path[0] == '/' || path[0] == '@');
 }
 
-void manager_tell(const char *state)
+void manager_report(const char *state)
 {
     const char *const path = getenv("NOTIFY_SOCKET");
     struct sockaddr_un to = {.sun_family = AF_UNIX};

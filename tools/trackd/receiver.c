@@ -181,7 +181,7 @@ bool receiver_run(receiver *r, const volatile sig_atomic_t *quit, const sigset_t
         snapshot_file_write(r->snapshot, r->service, false);
         if (now >= due || (r->service->news && (r->log || now >= news))) {
             service_send_status(r->service);
-            manager_tell("WATCHDOG=1");
+            manager_report("WATCHDOG=1");
             due = now + STATUS_US;
             news = now + NEWS_US;
         }

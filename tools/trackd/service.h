@@ -111,7 +111,7 @@ void service_lack(const service *s, message *why);
 /* GAIT_ESTIMATE, GAIT_ESTIMATE_LAG, GAIT_STRIDE and GAIT_PARTICLES of a frame that was tracked. */
 void service_send_estimate(service *s, const image_view *v, const gait_estimate *e, int64_t received,
                            int64_t step_us);
-/* Go on with the person whom a restored tracker followed until such a frame. */
+/* Go on with the person of a restored tracker, which followed them until such a frame. */
 void service_resume(service *s, int64_t utime, int64_t frame);
 void service_send_status(service *s);
 /* A status that was heard: one that this service did not send is another daemon's, which is reported. */

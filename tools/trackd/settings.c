@@ -301,7 +301,7 @@ option_result settings_read(settings *s, int argc, char **argv, message *why)
         (s->budget_ms == 0 || !link_is_log(link_url(s->url)) ||
          message_set(why, "--budget-ms: a log is played without dropping frames; leave it out")) &&
         (!s->snapshot[0] || !link_is_log(link_url(s->url)) ||
-         message_set(why, "--snapshot: a log is played from its beginning; leave it out")) &&
+         message_set(why, "--snapshot: a log is played from its start; leave it out")) &&
         check_dependencies(s, why) && check_logs(s, why) &&
         (s->adapt_particles <= s->tracker.particles ||
          message_set(why, "--adapt-particles %d: at most the %d of --particles", (int)s->adapt_particles,

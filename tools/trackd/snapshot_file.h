@@ -10,11 +10,11 @@ typedef struct snapshot_file { /* all zero: not requested */
     bool failed;    /* writing has been reported as failed */
 } snapshot_file;
 
-/* Go on with the person whom the file's tracker followed, at the camera that it knew.  Without the file, or if it is of
+/* Go on with the person that the tracker of the file followed, at the camera that it knew.  Without the file, or if it is of
  * another model, configuration, camera or number of the stream, the service starts as without it and one line on stderr
  * gives the reason. */
 void snapshot_file_resume(const snapshot_file *f, service *s);
-/* Replace the file if a snapshot is due, or at once: completely or not at all.  While nobody is tracked there is no
+/* Replace the file if a snapshot is due, or at once: completely or not at all.  While no person is tracked there is no
  * file.  A failure is reported once. */
 void snapshot_file_write(snapshot_file *f, const service *s, bool at_once);
 #endif
