@@ -61,7 +61,7 @@ class Lens:
         Distance of corners from where the calibration puts them, pixels rms, of each view.
     left_out : tuple of str
         Views that did not fit the others.
-    looked_at, blurred : int
+    tried, blurred : int
         Pictures searched for the board; of those, the ones in which it was blurred.
     missing : tuple of str
         Poses that would make the calibration more certain, in words.
@@ -72,7 +72,7 @@ class Lens:
     views: tuple[View, ...]
     error: Array
     left_out: tuple[str, ...] = ()
-    looked_at: int = 0
+    tried: int = 0
     blurred: int = 0
     missing: tuple[str, ...] = ()
 
@@ -143,12 +143,12 @@ def read_picture(path: str) -> Grey:
 
 
 def _calibrate(where: str, pictures: Iterator[tuple[str, Grey]], board: Board, size: tuple[int, int]) -> Lens:
-    sharp, blurred, looked_at, others = list[View](), 0, 0, list[str]()
+    sharp, blurred, tried, others = list[View](), 0, 0, list[str]()
     for name, grey in pictures:
-        looked_at += 1
+        tried += 1
         found = board.find(grey)
         if found is None:
-            if not sharp and not blurred and looked_at <= _TRIED and (other := other_board(grey, board)):
+            if not sharp and not blurred and tried <= _TRIED and (other := other_board(grey, board)):
                 others.append(f"{name} {other}")
             continue
         number, uv = found
@@ -156,25 +156,25 @@ def _calibrate(where: str, pictures: Iterator[tuple[str, Grey]], board: Board, s
         if width > _BLURRED * max(1.0, max(size) / _WIDTH):
             blurred += 1
         else:
-            sharp.append(View(looked_at, name, number, uv, width, _pose(board, number, uv, size)))
+            sharp.append(View(tried, name, number, uv, width, _pose(board, number, uv, size)))
     views = sorted(different(sharp), key=lambda view: view.order)
     if len(views) < LEAST:
-        raise UserError(f"{where}: {_too_few(board, len(sharp), len(views), blurred, looked_at, others)}")
+        raise UserError(f"{where}: {_too_few(board, len(sharp), len(views), blurred, tried, others)}")
     lens = _without_wrong(board, views, size)
     _require_good(where, board, lens)
     _require_one_focal(where, board, lens)
-    return replace(lens, looked_at=looked_at, blurred=blurred, missing=tuple(missing(board, lens)))
+    return replace(lens, tried=tried, blurred=blurred, missing=tuple(missing(board, lens)))
 
 
 def _too_few(
-    board: Board, sharp: int, different: int, blurred: int, looked_at: int, others: Sequence[str]
+    board: Board, sharp: int, different: int, blurred: int, tried: int, others: Sequence[str]
 ) -> str:
     """Describe what is wrong with too few pictures, and the remedy."""
     if sharp + blurred == 0:
         return (
             others[0]
             if others
-            else (f"no {board} in {looked_at} pictures; show all of it, flat and evenly lit, or give --board")
+            else (f"no {board} in {tried} pictures; show all of it, flat and evenly lit, or give --board")
         )
     if sharp < LEAST and blurred > sharp:
         return (

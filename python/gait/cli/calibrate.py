@@ -17,6 +17,7 @@ import json
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from gait.cli import values
 from gait.errors import UsageError, UserError
 from gait.io.files import replacing, require_outputs
 from gait.progress import progress
@@ -24,7 +25,6 @@ from gait.progress import progress
 if TYPE_CHECKING:
     from gait.camera.calibrating import Lens
 
-_PICTURES = (".jpg", ".jpeg", ".png", ".bmp", ".tif", ".tiff", ".webp")
 _BOARDS = (".pdf", ".png")
 PAPERS = ("a4", "letter", "a3")
 
@@ -94,7 +94,7 @@ def _calibrate(args: argparse.Namespace, board: Any) -> Lens:
     from gait.camera.calibrating import calibrate_film, calibrate_pictures
     from gait.io.video import Video
 
-    kinds = {Path(path).suffix.lower() in _PICTURES for path in args.input}
+    kinds = {Path(path).suffix.lower() in values.PICTURES for path in args.input}
     if kinds == {True}:
         with progress("searching for the board", len(args.input), args.quiet) as update:
             return calibrate_pictures(args.input, board, update)
@@ -117,7 +117,7 @@ def _summary(lens: Lens) -> dict[str, Any]:
     """Figures of ``--json``."""
     camera = lens.camera
     return {
-        "pictures": lens.looked_at,
+        "pictures": lens.tried,
         "used": len(lens.views),
         "blurred": lens.blurred,
         "left_out": list(lens.left_out),

@@ -1,5 +1,9 @@
 """Find where a camera stands, from a person who walks or from measured points.
 
+--page shows a frame of the film on a page of this machine, on which you click marks of the floor and type the
+distances that you measured between them (or their x and y); the floor's grid is drawn over the picture as you
+go.  Without --lens, --fov and a focal length in the file it is found from the marks too.
+
 --walk finds the whole camera, focal length included, from a person of known stature who walks on a level
 floor in full view: a VIDEO, in which gait detect finds the joints, or its KEYPOINTS.csv with --size.  The
 world has the origin on the floor below the camera, z up, and the camera looks along y.  A walk towards or
@@ -15,11 +19,13 @@ from __future__ import annotations
 
 import argparse
 import json
+import math
+from collections.abc import Callable
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 from gait.cli import values
-from gait.errors import UsageError
+from gait.errors import UsageError, UserError
 from gait.io.files import replacing, require_outputs
 from gait.progress import note
 
@@ -34,7 +40,8 @@ EXAMPLES = """\
 examples:
   gait camera --walk walk.mp4 --height 1.75 -o camera.json
   gait camera --walk keypoints.csv --size 1280x720 --height 1.75 -o camera.json
-  gait camera points.csv --lens lens.yaml -o camera.json
+  gait camera --page walk.mp4 --lens lens.json -o camera.json
+  gait camera points.csv --lens lens.json -o camera.json
 """
 
 
@@ -43,6 +50,11 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("points", nargs="?", metavar="POINTS.csv", help="u,v,x,y[,z] of each point")
     parser.add_argument("--lens", metavar="FILE", help=values.CAMERA)
     parser.add_argument("-o", "--output", required=True, metavar="CAMERA.json", help="the camera")
+    add = parser.add_argument_group("by clicking on the floor").add_argument
+    add("--page", metavar="VIDEO|PICTURE", help="open a page on which marks of the floor are clicked")
+    add("--frame", type=values.whole(0), metavar="F", help="frame shown at first (default: 0)")
+    add("--port", type=values.whole(0, 65535), default=8040, metavar="P",
+        help="port of the page on this machine (default: 8040; 0: any)")  # fmt: skip
     add = parser.add_argument_group("from a walk").add_argument
     add("--walk", metavar="VIDEO|KEYPOINTS.csv", help="a person who walks")
     add("--height", type=values.stature, metavar="M", help="the person's stature in metres")
@@ -52,7 +64,67 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 def run(args: argparse.Namespace) -> int:
     """Find the camera and write it."""
+    if args.page:
+        return _on_page(args)
+    if args.frame is not None:
+        raise UsageError("--frame: is for --page")
     return _from_walk(args) if args.walk else _from_points(args)
+
+
+def _on_page(args: argparse.Namespace) -> int:
+    """Serve the page until interrupted."""
+    from gait.camera.camera import read_camera
+    from gait.camera.marks import lens_of
+    from gait.web import serve
+    from gait.web.camera_page import Scene, application
+
+    if args.points or args.walk or args.height or args.size:
+        raise UsageError("--page: leave out POINTS.csv, --walk, --height and --size")
+    if args.lens and args.fov:
+        raise UsageError("--fov: the lens has its focal length; leave out --lens or --fov")
+    require_outputs((args.output,), (args.page, args.lens))
+    picture, size, frames, fov = _pictures(args)
+    first = args.frame or 0
+    if first >= frames:
+        raise UserError(f"{args.page}: no frame {first}; it has {frames}")
+    if args.lens:
+        lens, words = read_camera(args.lens, size, placed=False), f"Lens of {args.lens}."
+    elif fov is not None:
+        lens = lens_of(size, 0.5 * size[0] / math.tan(math.radians(0.5 * fov)))
+        words = f"A lens without distortion that shows {fov:.0f} degrees; gait calibrate makes it exact."
+    else:
+        lens, words = None, "The focal length is found from five marks or more; --lens makes it exact."
+    scene = Scene(Path(args.page).name, size, frames, picture, lens, words, args.output, first)
+    own = serve.listen(args.port)
+    note(f"gait camera: open {serve.address(own)} (Ctrl-C ends it)", args.quiet)
+    written: list[str] = []
+
+    def tell(line: str) -> None:
+        written.append(line)
+        print(json.dumps({"written": args.output}) if args.json else line, flush=True)
+
+    serve.run(application(scene, own.getsockname()[1], tell), own)
+    return 0 if written else 1
+
+
+def _pictures(args: argparse.Namespace) -> tuple[Callable[[int], Any], tuple[int, int], int, float | None]:
+    """Give a frame by its number; size; number of frames; the horizontal view if it is known."""
+    import cv2
+
+    from gait.io.lens_tag import equivalent_mm, lens_tag, view_across
+    from gait.io.video import Video
+
+    if Path(args.page).suffix.lower() in values.PICTURES:
+        image = cv2.imread(args.page) if Path(args.page).is_file() else None
+        if image is None:
+            raise UserError(f"{args.page}: is no picture that can be read; check the name")
+        size = image.shape[1], image.shape[0]
+        return lambda number: image, size, 1, args.fov
+    video = Video(args.page)
+    tag = None if args.fov else lens_tag(video.path)
+    mm = equivalent_mm(tag) if tag else None
+    fov = args.fov if mm is None else view_across(mm, video.size)
+    return lambda number: next(iter(video.pick([number]))).image, video.size, video.count, fov
 
 
 def _from_points(args: argparse.Namespace) -> int:
@@ -62,7 +134,7 @@ def _from_points(args: argparse.Namespace) -> int:
     from gait.camera.placing import place, read_points
 
     if not args.points or not args.lens:
-        raise UsageError("give POINTS.csv and --lens FILE, or --walk VIDEO and --height M")
+        raise UsageError("give POINTS.csv and --lens FILE, or --walk VIDEO and --height M, or --page VIDEO")
     if args.height or args.size or args.fov:
         raise UsageError("--height, --size and --fov go with --walk")
     require_outputs((args.output,), (args.points, args.lens))

@@ -13,6 +13,7 @@ PARTICLES = (16, 1 << 20)  # as in gait.h and gait-trackd, like those below
 THREADS = (1, 256)  # GAIT_POOL_MAX
 SEED = (0, (1 << 64) - 1)
 STREAM = (0, 30)
+PICTURES = (".jpg", ".jpeg", ".png", ".bmp", ".tif", ".tiff", ".webp")
 CAMERA = "camera file: JSON, OpenCV YAML or XML, FILE.toml:NAME, or of another tool"
 
 

@@ -24,19 +24,20 @@ def own(name: str) -> str:
     return (_HERE / name).read_text(encoding="utf-8")
 
 
-def served() -> dict[str, bytes]:
+def served(drawing: bool = True) -> dict[str, bytes]:
     """Files to serve below ``/web/`` for a page with `served_head`, by name.
 
     Raises
     ------
     UserError
-        If the parts were not fetched.
+        If the parts were not fetched and are needed, for `drawing` figures or curves.
     """
-    fetched = {part.file: parts.load(part) for part in (*_BARE.values(), parts.ECHARTS)}
+    needed = (*_BARE.values(), parts.ECHARTS) if drawing else ()
+    fetched = {part.file: parts.load(part) for part in needed}
     return fetched | {name: own(name).encode() for name in (*OWN, "style.css")}
 
 
-def served_head() -> tuple[str, str]:
+def served_head(drawing: bool = True) -> tuple[str, str]:
     """Head of a page whose server has `served()`, and the sources of its scripts for a security policy.
 
     Returns
@@ -50,11 +51,9 @@ def served_head() -> tuple[str, str]:
     imports |= {f"gait/{name}": f"/web/{name}" for name in OWN}
     text = json.dumps({"imports": imports})
     digest = base64.b64encode(hashlib.sha256(text.encode()).digest()).decode()
-    head = (
-        '<link rel="stylesheet" href="/web/style.css">\n'
-        f'<script type="importmap">{text}</script>\n'
-        f'<script src="/web/{parts.ECHARTS.file}"></script>'
-    )
+    head = f'<link rel="stylesheet" href="/web/style.css">\n<script type="importmap">{text}</script>'
+    if drawing:
+        head += f'\n<script src="/web/{parts.ECHARTS.file}"></script>'
     return head, f"'self' 'sha256-{digest}'"
 
 

@@ -66,7 +66,9 @@ class Guard:
         await self._app(scope, receive, guarded)
 
 
-def application(page: str, title: str, routes: Sequence[BaseRoute], port: int) -> ASGIApp:
+def application(
+    page: str, title: str, routes: Sequence[BaseRoute], port: int, drawing: bool = True
+) -> ASGIApp:
     """Application of one page.
 
     Parameters
@@ -78,18 +80,21 @@ def application(page: str, title: str, routes: Sequence[BaseRoute], port: int) -
         What else it serves; ``/`` and ``/web/NAME`` are taken.
     port : int
         Port that browsers have to name.
+    drawing : bool
+        Whether the page draws figures or curves, which need the fetched parts.
 
     Raises
     ------
     UserError
-        If the parts of pages were not fetched.
+        If the parts of pages were not fetched and it does.
     """
-    files = modules.served()
-    head, scripts = modules.served_head()
+    files = modules.served(drawing)
+    head, scripts = modules.served_head(drawing)
     text = (
         '<!DOCTYPE html>\n<html lang="en"><head><meta charset="utf-8">\n'
         '<meta name="viewport" content="width=device-width, initial-scale=1">\n'
-        f"<title>{title}</title>\n{head}\n</head>\n<body>\n{page}\n</body></html>\n"
+        f'<title>{title}</title>\n<link rel="icon" href="data:,">\n{head}\n</head>\n'
+        f"<body>\n{page}\n</body></html>\n"
     )
 
     async def index(request: Request) -> Response:

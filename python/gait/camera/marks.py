@@ -1,0 +1,208 @@
+"""Marks on the floor whose distances were measured: their coordinates, and a camera that sees them."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+
+import numpy as np
+from numpy.typing import NDArray
+
+from gait.camera.camera import Camera
+from gait.camera.placing import Points, place
+from gait.errors import UserError
+
+Array = NDArray[np.float64]
+
+_STARTS = 40  # of the search for coordinates
+_VIEWS = (20.0, 120.0)  # degrees along the longer side, of a lens that is not known
+_CLICK = 1.0  # pixels by which a click is off, at least
+_UNSURE = 0.1  # of the focal length
+_FEWEST = 5  # points that determine a focal length too
+
+
+def coordinates(count: int, distances: Mapping[tuple[int, int], float]) -> tuple[Array, Array]:
+    """Place marks by least squares: the first at the origin, the second on the x axis.
+
+    Parameters
+    ----------
+    count : int
+        Of marks.
+    distances : mapping
+        Metres between the marks of a pair (i, j).
+
+    Returns
+    -------
+    xy : ndarray of shape (count, 2)
+        Metres; turned so or mirrored, which distances do not tell.
+    off : ndarray of shape (len(distances),)
+        Metres by which each distance is missed.
+
+    Raises
+    ------
+    UserError
+        If there are too few distances, or they contradict each other.
+    """
+    from scipy.optimize import least_squares
+
+    needed = 2 * count - 3
+    if len(distances) < needed:
+        lacking = needed - len(distances)
+        more = f"{lacking} more distance{'s' if lacking > 1 else ''}"
+        raise UserError(f"marks: give {more} between {count} marks")
+    pairs, lengths = np.array(list(distances)), np.array(list(distances.values()), float)
+    few = [k for k in range(count) if (pairs == k).sum() < 2]
+    if few:
+        raise UserError(f"marks: give two distances or more to mark {few[0] + 1}")
+
+    def missed(flat: Array) -> Array:
+        at = flat.reshape(count, 2)
+        return np.asarray(np.linalg.norm(at[pairs[:, 0]] - at[pairs[:, 1]], axis=1) - lengths)
+
+    rng = np.random.default_rng(1)
+    found = [least_squares(missed, rng.normal(0, lengths.max(), 2 * count)) for _ in range(_STARTS)]
+    best = min(found, key=lambda one: float(one.cost))
+    off = missed(best.x)
+    worst = int(np.abs(off).argmax())
+    if abs(off[worst]) > 0.05 * lengths[worst] + 0.02:
+        i, j = pairs[worst] + 1
+        raise UserError(
+            f"marks: the distances contradict each other by {abs(off[worst]):.2f} m, most that of marks {i} "
+            f"and {j}; measure again"
+        )
+    xy = best.x.reshape(count, 2) - best.x[:2]
+    angle = np.arctan2(xy[1, 1], xy[1, 0])
+    turn = np.array([[np.cos(angle), -np.sin(angle)], [np.sin(angle), np.cos(angle)]])
+    return xy @ turn, off
+
+
+def place_marks(lens: Camera, uv: Array, xy: Array, mirrored: bool = False) -> tuple[Camera, Array, Array]:
+    """Place a camera whose lens is known.
+
+    Parameters
+    ----------
+    lens : Camera
+    uv : ndarray of shape (n, 2)
+        Pixels of the marks.
+    xy : ndarray of shape (n, 2) or (n, 3)
+        Metres.
+    mirrored : bool
+        Whether `xy` may be mirrored: then the side that the picture shows is taken.
+
+    Returns
+    -------
+    camera : Camera
+    off : ndarray of shape (n,)
+        Pixels by which each mark is missed.
+    xy : ndarray of shape (n, 2) or (n, 3)
+        As used.
+
+    Raises
+    ------
+    UserError
+        If no place above the floor fits.
+    """
+    found, fault = list[tuple[Camera, Array, Array]](), None
+    for sign in (1.0, -1.0) if mirrored else (1.0,):
+        used = xy * ([1.0, sign] if xy.shape[1] == 2 else [1.0, sign, 1.0])
+        world = np.pad(used, ((0, 0), (0, 3 - used.shape[1])))
+        try:
+            camera, off = place(lens, Points("marks", np.arange(1, len(uv) + 1), uv, world))
+        except UserError as error:
+            fault = error
+            continue
+        found.append((camera, off, used))
+    if not found:
+        assert fault is not None
+        raise fault
+    return min(found, key=lambda one: float((one[1] ** 2).sum()))
+
+
+def place_unknown(
+    size: tuple[int, int], uv: Array, xy: Array, mirrored: bool = False
+) -> tuple[Camera, Array, Array, float]:
+    """Find the focal length too, of a lens without distortion whose axis is in the middle of the picture.
+
+    Returns
+    -------
+    camera, off, xy
+        As of `place_marks`.
+    sd : float
+        Standard deviation of the focal length as a share of it.
+
+    Raises
+    ------
+    UserError
+        If the marks do not determine it.
+    """
+    from scipy.optimize import minimize_scalar
+
+    if len(uv) < _FEWEST:
+        raise UserError(
+            f"marks: {len(uv)} do not determine the focal length; give {_FEWEST} or more, --lens or --fov"
+        )
+
+    def lens(log_focal: float) -> Camera:
+        return lens_of(size, float(np.exp(log_focal)))
+
+    def cost(log_focal: float) -> float:
+        try:
+            return float((place_marks(lens(log_focal), uv, xy, mirrored)[1] ** 2).sum())
+        except UserError:
+            return 1e12
+
+    longest, shortest = (float(np.log(0.5 * max(size) / np.tan(np.radians(0.5 * view)))) for view in _VIEWS)
+    tried = np.linspace(shortest, longest, 30)
+    k = int(np.argmin([cost(at) for at in tried]))
+    around = tried[max(0, k - 1)], tried[min(len(tried) - 1, k + 1)]
+    best = float(minimize_scalar(cost, bounds=around, method="bounded", options={"xatol": 1e-5}).x)
+    camera, off, used = place_marks(lens(best), uv, xy, mirrored)
+    step = 0.02
+    rise = 0.5 * (cost(best + step) + cost(best - step)) - cost(best)
+    noise = max(_CLICK**2, float((off**2).sum()) / max(1, 2 * len(uv) - 7))
+    sd = step * float(np.sqrt(noise / max(rise, 1e-12)))
+    if sd > _UNSURE or k in (0, len(tried) - 1):
+        raise UserError(
+            "marks: do not determine the focal length; give --lens (gait calibrate) or --fov, or add marks "
+            "far nearer and farther"
+        )
+    return camera, off, used, sd
+
+
+def lens_of(size: tuple[int, int], focal: float) -> Camera:
+    """Lens without distortion whose axis is in the middle of the picture; at the origin."""
+    width, height = size
+    return Camera(width, height, focal, focal, (width - 1) / 2, (height - 1) / 2, np.eye(3), np.zeros(3))
+
+
+def floor_lines(camera: Camera, xy: Array, step: float = 1.0, beyond: float = 3.0) -> list[list[list[float]]]:
+    """Lines of a grid on the floor round the marks, as they appear in the picture.
+
+    Parameters
+    ----------
+    camera : Camera
+    xy : ndarray of shape (n, 2)
+    step, beyond : float
+        Metres between lines, and of floor beyond the marks.
+
+    Returns
+    -------
+    list
+        Lines of [u, v], pixels.
+    """
+    low = np.floor((xy.min(axis=0) - beyond) / step) * step
+    high = np.ceil((xy.max(axis=0) + beyond) / step) * step
+    while ((high - low) / step).max() > 60:
+        step *= 2
+    found = []
+    for k in (0, 1):
+        along = np.arange(low[1 - k], high[1 - k] + 0.125, 0.25)
+        for at in np.arange(low[k], high[k] + 0.5 * step, step):
+            line = np.zeros((len(along), 3))
+            line[:, k], line[:, 1 - k] = at, along
+            deep = camera.depth(line) > 0.3
+            uv = camera.project(line)
+            seen = deep & (np.abs(uv - np.array(camera.size) / 2) < np.array(camera.size)).all(axis=1)
+            for run in np.split(np.arange(len(along)), np.flatnonzero(np.diff(seen)) + 1):
+                if len(run) > 1 and seen[run[0]]:
+                    found.append(np.round(uv[run], 1).tolist())
+    return found

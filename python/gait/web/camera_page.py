@@ -1,0 +1,210 @@
+"""A page on which the marks of a floor are clicked and their distances typed: where the camera stands."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Callable
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import cv2
+import numpy as np
+from starlette.concurrency import run_in_threadpool
+from starlette.requests import Request
+from starlette.responses import JSONResponse, PlainTextResponse, Response
+from starlette.routing import Route
+from starlette.types import ASGIApp
+
+from gait.camera.camera import Camera, write_camera
+from gait.camera.marks import coordinates, floor_lines, place_marks, place_unknown
+from gait.camera.placing import LEAST
+from gait.errors import UserError
+from gait.io.files import replacing
+from gait.web import serve
+
+_MOST = 60  # marks
+_FURTHEST = 1e4  # metres, pixels
+_POLE = 1.75  # metres
+_BYTES = 1 << 16  # of a request
+_HERE = Path(__file__).parent
+
+
+@dataclass(frozen=True)
+class Scene:
+    """What is shown, and what comes of it.
+
+    Attributes
+    ----------
+    name : str
+        Of the film or picture.
+    size : (int, int)
+    frames : int
+    picture : callable
+        Gives a frame by its number.
+    lens : Camera or None
+        None: the focal length is found from the marks too.
+    lens_words : str
+        Where the lens is from.
+    output : str
+        Camera file to write.
+    first : int
+        Frame shown at first.
+    """
+
+    name: str
+    size: tuple[int, int]
+    frames: int
+    picture: Callable[[int], np.ndarray[Any, Any]]
+    lens: Camera | None
+    lens_words: str
+    output: str
+    first: int = 0
+
+
+def application(scene: Scene, port: int, written: Callable[[str], None] = lambda words: None) -> ASGIApp:
+    """Application of the page; `written` is called with a line when the camera file was written."""
+
+    async def script(request: Request) -> Response:
+        return Response((_HERE / "camera_page.js").read_bytes(), media_type="text/javascript")
+
+    async def style(request: Request) -> Response:
+        return Response((_HERE / "camera_page.css").read_bytes(), media_type="text/css")
+
+    async def about(request: Request) -> Response:
+        return JSONResponse(
+            {
+                "name": scene.name,
+                "size": list(scene.size),
+                "frames": scene.frames,
+                "first": scene.first,
+                "lens": scene.lens_words,
+                "least": LEAST,
+                "output": Path(scene.output).name,
+            }
+        )
+
+    async def frame(request: Request) -> Response:
+        number = int(request.path_params["number"])
+        if number >= scene.frames:
+            return PlainTextResponse("not here\n", 404)
+        image = await run_in_threadpool(scene.picture, number)
+        data = cv2.imencode(".jpg", image, [cv2.IMWRITE_JPEG_QUALITY, 92])[1].tobytes()
+        return Response(data, media_type="image/jpeg")
+
+    async def answer(request: Request) -> Response:
+        try:
+            marks = await _read(request)
+            found = await run_in_threadpool(solve, scene, marks)
+        except UserError as error:
+            return JSONResponse({"fault": str(error).removeprefix("marks: ")})
+        if request.url.path == "/save":
+            with replacing(scene.output) as temporary:
+                write_camera(temporary, found.pop("camera"))
+            written(f"{scene.output}: written, {found['rms']:.2f} px rms from {len(found['off'])} marks")
+        found.pop("camera", None)
+        return JSONResponse(found)
+
+    routes = [
+        Route("/camera_page.js", script),
+        Route("/camera_page.css", style),
+        Route("/about.json", about),
+        Route("/frame/{number:int}.jpg", frame),
+        Route("/place", answer, methods=["POST"]),
+        Route("/save", answer, methods=["POST"]),
+    ]
+    body = '<main id="page"></main><script type="module" src="/camera_page.js"></script>'
+    return serve.application(body, f"gait camera: {scene.name}", routes, port, drawing=False)
+
+
+async def _read(request: Request) -> dict[str, Any]:
+    data = b""
+    async for part in request.stream():
+        data += part
+        if len(data) > _BYTES:
+            raise UserError("marks: too many; leave some out")
+    try:
+        marks = json.loads(data)
+    except ValueError:
+        marks = None
+    if not isinstance(marks, dict):
+        raise UserError("marks: cannot be read; reload the page")
+    return marks
+
+
+def solve(scene: Scene, marks: dict[str, Any]) -> dict[str, Any]:
+    """Place the camera by marks as the page sends them.
+
+    Parameters
+    ----------
+    scene : Scene
+    marks : dict
+        ``uv``: pixels of each mark; and ``xy``: their metres, or ``distances``: [i, j, metres] of pairs.
+
+    Returns
+    -------
+    dict
+        ``camera``, its ``place``, ``focal`` length and that one's ``sd`` as a share; ``xy`` of the marks,
+        where they are ``shown``, ``off`` and ``rms`` in pixels, ``missed_m`` of each distance; in pixels lines
+        of the floor's ``grid`` and a ``pole`` as high as a person.
+
+    Raises
+    ------
+    UserError
+        With what is missing or contradicts itself.
+    """
+    uv = _numbers(marks.get("uv"), "pixels")
+    if len(uv) < LEAST:
+        lacking = LEAST - len(uv)
+        raise UserError(f"marks: click {lacking} more mark{'s' if lacking > 1 else ''} on the floor")
+    missed: list[float] = []
+    if mirrored := "distances" in marks:
+        distances = _distances(marks["distances"], len(uv))
+        xy, far = coordinates(len(uv), distances)
+        missed = far.tolist()
+    else:
+        xy = _numbers(marks.get("xy"), "metres")
+        if len(xy) != len(uv):
+            raise UserError("marks: give x and y of every mark")
+    sd = 0.0
+    if scene.lens is not None:
+        camera, off, xy = place_marks(scene.lens, uv, xy, mirrored)
+    else:
+        camera, off, xy, sd = place_unknown(scene.size, uv, xy, mirrored)
+    foot = np.array([*xy.mean(axis=0), 0.0])
+    return {
+        "camera": camera,
+        "off": off.tolist(),
+        "rms": float(np.sqrt((off**2).mean())),
+        "missed_m": missed,
+        "xy": xy.tolist(),
+        "place": camera.centre.tolist(),
+        "shown": camera.project(np.pad(xy, ((0, 0), (0, 1)))).tolist(),
+        "grid": floor_lines(camera, xy),
+        "pole": np.nan_to_num(camera.project([foot, foot + [0, 0, _POLE]])).tolist(),
+        "focal": camera.fx,
+        "sd": sd,
+    }
+
+
+def _numbers(rows: Any, unit: str) -> np.ndarray[Any, np.dtype[np.float64]]:
+    try:
+        found = np.asarray(rows, np.float64).reshape(-1, 2)
+    except (TypeError, ValueError):
+        found = np.full((1, 2), np.nan)
+    if len(found) > _MOST or not (np.abs(found) <= _FURTHEST).all():
+        raise UserError(f"marks: give numbers of {unit} for every mark")
+    return found
+
+
+def _distances(rows: Any, count: int) -> dict[tuple[int, int], float]:
+    found = {}
+    try:
+        for i, j, metres in rows:
+            pair, length = (int(min(i, j)), int(max(i, j))), float(metres)
+            if not (0 <= pair[0] < pair[1] < count and 0 < length <= _FURTHEST):
+                raise ValueError
+            found[pair] = length
+    except (TypeError, ValueError):
+        raise UserError("marks: give distances in metres, above 0") from None
+    return found
