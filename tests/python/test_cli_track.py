@@ -30,6 +30,12 @@ SUMMARY = [
     "followed",
     "memory_bytes",
     "digest",
+    "verdict",
+    "statuses",
+    "warning",
+    "used",
+    "files",
+    "notes",
 ]
 needs_data = pytest.mark.skipif(not DATA.is_dir(), reason="../shared/data is absent")
 
@@ -69,6 +75,13 @@ def test_track_evaluate_and_every_output(scene, capsys):
     assert track(scene, "--json", "--overlay", scene / "o.mp4", "--trc", scene / "o.trc") == 0
     summary = json.loads(capsys.readouterr().out)
     assert list(summary) == SUMMARY and list(summary["step_ms"]) == ["median", "p99", "max"]
+    assert summary["verdict"].startswith("Tracked 20 of 20 frames, no whole stride, ")
+    assert summary["files"] == {
+        "track": str(scene / "out.csv"),
+        "overlay": str(scene / "o.mp4"),
+        "joints for OpenSim": str(scene / "o.trc"),
+    }
+    assert summary["used"]["start"] == f"{scene / 'init.json'}, frame 0" and not summary["notes"]
     assert (summary["frames"], summary["particles"], summary["threads"], summary["lost"]) == (20, 300, 1, 0)
     assert 0 < summary["step_ms"]["median"] <= summary["step_ms"]["p99"] <= summary["step_ms"]["max"]
     assert summary["memory_bytes"] > 1e5 and len(summary["digest"]) == 16
@@ -112,7 +125,15 @@ def test_start_and_stop_choose_the_rows(scene, capsys):
 def test_automatic_start_reports_what_it_found(scene, capsys):
     assert track(scene, "--init", "auto", "--height", 1.75) == 0
     out, err = capsys.readouterr()
-    assert re.match(r"start found at frame \d+: x ", err) and "20 frames: " in out and "digest " in out
+    assert re.match(r"start found at frame \d+: x ", err) and "digest " in out
+    assert re.match(r"Tracked \d+ of 20 frames, no whole stride, \d\.\d\d m/s", out)
+    counted = re.search(r"^(\d+) frames: (\d+) init, (\d+) tracking, (\d+) ambiguous, (\d+) lost", out, re.M)
+    total, *each = map(int, counted.groups())
+    assert sum(each) == total <= 20
+    assert "start: found at frame" in out and f"written: track {scene / 'out.csv'}" in out
+    assert f"init.json lies beside the film and was not used; to use it: --init {scene / 'init.json'}" in out
+    assert ("warning: no frame has status tracking" in out) == (each[1] == 0)
+    assert "step 0.0 ms median" not in out
 
 
 def test_a_stature_that_the_pictures_contradict_is_reported(scene, capsys):

@@ -14,7 +14,7 @@ from gait.cli import main
 from gait.motion.parameters import QUANTITIES, measure
 from gait.report.colours import BLUE, ORANGE
 from gait.report.drawing import side_colour
-from gait.report.parameter_page import path_plot
+from gait.report.gait_parts import footfall_plot
 
 
 @pytest.fixture(scope="module")
@@ -51,7 +51,8 @@ def test_files_state_the_same_as_the_library(folder, capsys):
     assert set(QUANTITIES) <= set(strides[0]) and float(strides[0]["stride_time_s_sd"]) > 0
     curves = table(out / "curves.csv")
     assert len(curves) == 101 and float(curves[50]["l_hip_flexion_norm_sd_deg"]) > 1
-    assert set(printed["angles"]) == {"r_hip_flexion", "l_hip_flexion", "torso_x"}
+    pelvis = {"root_pitch", "root_roll", "root_yaw"}
+    assert set(printed["angles"]) == {"r_hip_flexion", "l_hip_flexion", "torso_x"} | pelvis
 
 
 def test_the_page_needs_nothing_else_and_its_drawings_are_sound(folder, capsys):
@@ -61,20 +62,20 @@ def test_the_page_needs_nothing_else_and_its_drawings_are_sound(folder, capsys):
     page = (folder / "page/report.html").read_text(encoding="utf-8")
     assert not re.search(r'(src|href)="(?!data:|#)', page)
     drawings = re.findall(r"<svg.*?</svg>", page, re.DOTALL)
-    assert len(drawings) == 6
+    assert len(drawings) == 6 + 5 + 2 * 7  # strides and angles; what has a form for telephones too
     for drawing in drawings:
         ElementTree.fromstring(drawing.replace("xlink:href", "href"))
-    for heading in ("Parameters", "Foot contacts", "Strides", "Departure from the norm"):
+    for heading in ("Gait", "Footfalls", "Stride by stride", "Departure from the norm", "Conventions"):
         assert f"<h2>{heading}</h2>" in page
+    assert '<p class="lead">Tracked 150 of 150 frames, 4 whole strides, 1.17 m/s.</p>' in page
+    assert "Trunk side lean" in page and not re.search("torso_|hip_flexion|_percent|root_", page)
 
 
 def test_left_is_blue_and_right_orange_as_in_pictures():
     track = walking_track()
-    legend = path_plot(track, measure(track)).split('id="legend_1"')[1]
-    drawn_in = dict(
-        zip(re.findall(r"(\w+) heel</text>", legend), re.findall(r"fill: (#\w+)", legend)[-2:], strict=True)
-    )
-    assert drawn_in == {"left": BLUE, "right": ORANGE}
+    drawing = footfall_plot(track, measure(track))
+    assert "fill: var(--left)" in drawing and "fill: var(--right)" in drawing
+    assert BLUE not in drawing and ORANGE not in drawing  # the page's style has them, light and dark
     blue, _, red = side_colour("l_knee")
     assert blue > red
     blue, _, red = side_colour("r_knee")

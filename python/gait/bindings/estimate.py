@@ -44,6 +44,8 @@ class Estimate:
         Radians, of the dominant mode.
     joint_names : tuple of str
         Names of the P joints.
+    reason : str
+        Why a clip's rules made this estimate ambiguous, in words; empty where the tracker itself decided.
     """
 
     utime: int
@@ -62,6 +64,7 @@ class Estimate:
     joint_sd: Array
     angles: Array
     joint_names: tuple[str, ...]
+    reason: str = ""
 
     def joint(self, name: str) -> Array:
         """Place of one joint in the world, shape (3,), metres."""

@@ -43,6 +43,8 @@ class Start:
         The person walks in place, as on a treadmill.
     hypotheses : tuple of Hypothesis
         Between which the images are to choose, the most probable first; empty for a start that a user gives.
+    source : str
+        What it was found from, in words; empty for a start that a user gives.
     """
 
     frame: int
@@ -51,6 +53,7 @@ class Start:
     apparent_stature: float | None = None
     in_place: bool = False
     hypotheses: tuple[Hypothesis, ...] = ()
+    source: str = ""
 
     @staticmethod
     def read(

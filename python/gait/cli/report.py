@@ -1,6 +1,8 @@
-"""Show how a stream was tracked: an overlay video, and an HTML page with figures and plots.
+"""Make one page of a run: verdict, film with the figure drawn into it, turning figure, gait, angles, errors.
 
-Reads the log that gait record --log wrote beside the track (or one of lcm-logger), and the clip.  With
+RUN is a track of gait track, or the log that gait record --log (or lcm-logger) wrote; with a log, --track
+names the track recorded beside it, and the page also shows dropped frames and latency.  The camera is
+--camera, or camera.json beside the track or the film; without one the film is shown without the figure.  With
 --truth the errors of gait eval are printed as well.  The page is one file that needs nothing else.
 """
 
@@ -8,56 +10,76 @@ from __future__ import annotations
 
 import argparse
 import json
+from pathlib import Path
 
 from gait.cli import values
-from gait.errors import UserError
+from gait.errors import UsageError, UserError
 from gait.io.files import require_outputs
-from gait.lcm.link import break_of
 
 EXAMPLES = """\
 examples:
-  gait report estimates.log --track track.csv --video walk.mp4 --camera camera.json -o report.html \\
-      --overlay overlay.mp4
+  gait report run.csv --video walk.mp4 -o run.html
+  gait report run.csv --video walk.mp4 --camera camera.json --truth truth.csv --overlay overlay.mp4
+  gait report estimates.log --track track.csv --video walk.mp4 --camera camera.json -o report.html
   gait report all.log --track track.csv --video walk.mp4 --camera camera.json -o report.html --replayed
 """
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Add the command's options."""
-    parser.add_argument("log", metavar="E.log", help="estimates, from gait record --log or lcm-logger")
-    parser.add_argument("--track", required=True, metavar="OUT.csv", help="the track, from gait record")
-    parser.add_argument("--video", required=True, metavar="VIDEO", help="the clip that was tracked")
-    values.add_camera(parser, required=True)
-    parser.add_argument("-o", "--output", required=True, metavar="R.html", help="the page")
-    parser.add_argument("--overlay", metavar="O.mp4", help="also draw the estimates into the video")
-    parser.add_argument("--truth", metavar="TRUTH.csv", help="true motion, to report errors against")
+    add = parser.add_argument
+    add(
+        "source", metavar="RUN", help="OUT.csv from gait track, or E.log from gait record --log or lcm-logger"
+    )
+    add("--track", metavar="OUT.csv", help="with a log: the track, from gait record")
+    add("--video", required=True, metavar="VIDEO", help="the clip that was tracked")
+    values.add_camera(parser, " (default: camera.json beside the track or the film)")
+    add("-o", "--output", metavar="R.html", help="the page (default: RUN.html)")
+    add("--overlay", metavar="O.mp4", help="also draw the estimates into the video")
+    add("--truth", metavar="TRUTH.csv", help="true motion, to report errors against")
+    add("--draws", metavar="D.npz", help="motions from gait track --smooth --draws")
     values.add_model(parser, "model that was tracked")
-    parser.add_argument("--replayed", action="store_true", help="not tracked live: show no latency")
+    add("--replayed", action="store_true", help="of a log: not tracked live, show no latency")
 
 
 def run(args: argparse.Namespace) -> int:
     """Draw, write, print."""
-    from gait.lcm.report import write_report
     from gait.motion.evaluate import as_text
+    from gait.report.run_files import RunFiles, write_report
 
-    require_outputs(
-        (args.output, args.overlay), (args.log, args.track, args.video, args.camera, args.truth, args.model)
-    )
-    measures = write_report(
-        args.log,
-        args.track,
-        args.video,
-        args.camera,
-        args.output,
+    is_track = Path(args.source).suffix.lower() == ".csv"
+    if is_track and args.track:
+        raise UsageError("--track: goes with a log; RUN is a track already")
+    if not is_track and not args.track:
+        raise UsageError(f"{args.source}: is no track OUT.csv; with a log, give --track as well")
+    output = args.output or str(Path(args.source).with_suffix(".html"))
+    inputs = (args.source, args.track, args.video, args.camera, args.truth, args.draws, args.model)
+    require_outputs((output, args.overlay), inputs)
+    files = RunFiles(
+        track=args.source if is_track else args.track,
+        video=args.video,
+        page=output,
+        camera=args.camera,
         overlay=args.overlay,
         truth=args.truth,
+        draws=args.draws,
         model=args.model,
-        live=not args.replayed,
         quiet=args.quiet,
     )
-    if measures is not None:
-        print(json.dumps(measures) if args.json else as_text(measures))
-    damage = break_of(args.log)
+    damage = None
+    if is_track:
+        verdict, measures = write_report(files)
+    else:
+        from gait.lcm import link, report  # here, as tracks need no LCM
+
+        verdict, measures = report.write_report(args.source, files, live=not args.replayed)
+        damage = link.break_of(args.source)
+    if args.json:
+        print(json.dumps({"verdict": verdict.sentence()} | (measures or {})))
+    else:
+        lines = [f"{verdict.sentence()}.", verdict.statuses(), f"written: page {output}"]
+        lines += [f"warning: {verdict.warning()}"] if verdict.warning() else []
+        print("\n".join(lines + ([as_text(measures)] if measures is not None else [])))
     if damage:
-        raise UserError(f"{args.log}: {damage}; {args.output} shows what came before")
+        raise UserError(f"{args.source}: {damage}; {output} shows what came before")
     return 0

@@ -1,8 +1,8 @@
 """Measure the gait parameters of a track, with their uncertainty, against the norm of a model.
 
-Writes into DIR: report.html (one file that needs nothing else), parameters.json, strides.csv, events.csv
-and curves.csv.  Heel strikes are where the heel is furthest ahead of the pelvis, toe-offs where the toe is
-furthest behind it.
+Writes into DIR: report.html (one file that needs nothing else: the page of gait report without the film),
+parameters.json, strides.csv, events.csv and curves.csv.  Heel strikes are where the heel is furthest ahead of
+the pelvis, toe-offs where the toe is furthest behind it.
 
 With the draws of gait track --smooth --draws the standard deviations come from whole motions.  They
 describe how certain the tracker is given the model and the camera.  Errors of the model and the camera,
@@ -47,7 +47,8 @@ def run(args: argparse.Namespace) -> int:
     from gait.io.track_file import read_track
     from gait.motion.footfalls import Draws
     from gait.motion.parameters import angle_cycles, as_json, measure, write_tables
-    from gait.report.parameter_page import parameter_page
+    from gait.motion.verdict import verdict_of
+    from gait.report.run_page import Run, run_page
 
     source = Path(args.track)
     output = args.output or source.with_name(source.stem + "_gait")
@@ -59,18 +60,18 @@ def run(args: argparse.Namespace) -> int:
     except UserError as exc:
         raise UserError(f"{args.track}: {exc}") from None
     cycles = angle_cycles(track, parameters, ModelCurves(read_cyclic(args.model)), draws)
-    found = as_json(track, parameters, cycles)
+    found, verdict = as_json(track, parameters, cycles), verdict_of(track, parameters=parameters)
     with filling(output) as folder:
         write_tables(folder, found, parameters, cycles)
-        page = parameter_page(source.name, track, parameters, cycles)
+        page = run_page(Run(source.name, track, verdict, parameters, cycles))
         (folder / "report.html").write_text(page, encoding="utf-8")
-    print(json.dumps(found, allow_nan=False) if args.json else _text(parameters))
+    print(json.dumps(found, allow_nan=False) if args.json else f"{verdict.sentence()}.\n{_text(parameters)}")
     return 0
 
 
 def _text(parameters: Parameters) -> str:
     """Table for the terminal."""
-    from gait.report.parameter_page import HEAD, parameter_rows
+    from gait.report.gait_parts import HEAD, parameter_rows
 
     rows = [list(HEAD), *parameter_rows(parameters)]
     widths = [max(len(row[k]) for row in rows) for k in range(len(HEAD))]

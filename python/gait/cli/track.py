@@ -33,7 +33,7 @@ import argparse
 import json
 from typing import Any
 
-from gait.bindings.abi import Mode, TrackStatus
+from gait.bindings.abi import Mode
 from gait.cli import values
 from gait.errors import UsageError
 from gait.io.files import require_outputs
@@ -45,6 +45,7 @@ examples:
   gait track walk.mp4 --camera camera.json -o track.csv
   gait track walk.mp4 --camera camera.json --init init.json --background empty.png --height 1.75 \\
       -o track.csv --overlay overlay.mp4
+  gait track walk.mp4 --camera camera.json -o track.csv --report run.html
   gait track walk.mp4 --camera camera.json -o track.csv --smooth --draws draws.npz
 """
 
@@ -97,6 +98,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     add(
         "--draws", metavar="D.npz", help="with --smooth: also write the sampled motions for gait report track"
     )
+    add("--report", metavar="R.html", help="also write a page with verdict, film, figure, gait and angles")
     add("--trc", metavar="O.trc", help="also write the joints for OpenSim (y up)")
 
 
@@ -119,9 +121,12 @@ def run(args: argparse.Namespace) -> int:
     if args.camera and args.fov:
         raise UsageError("--fov: is for a camera that is found; leave out --camera or --fov")
     require_outputs(
-        (args.output, args.camera_out, args.cameras_out, args.overlay, args.trc, args.draws),
+        (args.output, args.camera_out, args.cameras_out, args.overlay, args.trc, args.draws, args.report),
         (args.video, args.camera, args.model, args.init, args.background, args.keypoints),
     )
+    if args.report:
+        import gait.report.run_page  # noqa: F401  a package that it needs is missed before the long work
+
     given = {name: getattr(args, name) for name in ClipOptions.__dataclass_fields__}
     given |= {"mode": Mode[args.mode.upper()], "keypoints_sd": args.keypoints_sd or KEYPOINTS_SD}
     summary = track_clip(ClipOptions(**given))
@@ -131,10 +136,14 @@ def run(args: argparse.Namespace) -> int:
 
 def _text(summary: dict[str, Any]) -> str:
     step, threads = summary["step_ms"], summary["threads"]
-    statuses = [status.name.lower() for status in TrackStatus]
-    return (
-        f"{summary['frames']} frames: {', '.join(f'{summary[status]} {status}' for status in statuses)}\n"
-        f"{summary['particles']} particles, {threads} thread{'s' if threads > 1 else ''}, "
+    lines = [f"{summary['verdict']}.", summary["statuses"]]
+    lines += [f"{name}: {words}" for name, words in summary["used"].items()]
+    lines += [f"written: {', '.join(f'{what} {path}' for what, path in summary['files'].items())}"]
+    lines += [f"note: {words}" for words in summary["notes"]]
+    if summary["warning"]:
+        lines.append(f"warning: {summary['warning']}")
+    return "\n".join(lines) + (
+        f"\n{summary['particles']} particles, {threads} thread{'s' if threads > 1 else ''}, "
         f"{summary['memory_bytes']} bytes\n"
         f"step {step['median']:.1f} ms median, {step['p99']:.1f} ms p99, {step['max']:.1f} ms max; "
         f"{summary['wall_fps']:.1f} frames/s in all\ndigest {summary['digest']}"

@@ -219,15 +219,29 @@ class VideoWriter:
         Quality of x264, 0 (lossless) to 51; 18 is visually clean.
     preset : str
         Speed of x264: ``medium``, or `FAST` for pictures that are drawn while something else runs.
+    bits_per_second : int, optional
+        Most of it over two seconds, whatever the quality.
+    keep : bool
+        Keep what was written before an interrupt.
     """
 
     def __init__(
-        self, path: str | os.PathLike[str], fps: float, *, crf: int = 18, preset: str = "medium"
+        self,
+        path: str | os.PathLike[str],
+        fps: float,
+        *,
+        crf: int = 18,
+        preset: str = "medium",
+        bits_per_second: int | None = None,
+        keep: bool = True,
     ) -> None:
         self.path = Path(path)
         require_video_name(path)
         self._rate = Fraction(fps).limit_denominator(1001)
         self._options = {"crf": str(crf), "preset": preset}
+        if bits_per_second is not None:
+            self._options |= {"maxrate": str(bits_per_second), "bufsize": str(2 * bits_per_second)}
+        self._keep = keep
         self._stack = ExitStack()
         self._stream: av.VideoStream | None = None
         self._size: tuple[int, int] | None = None
@@ -239,7 +253,9 @@ class VideoWriter:
     def __enter__(self) -> VideoWriter:
         import av
 
-        temporary = self._stack.enter_context(replacing(self.path, partial=lambda _: self._finished))
+        temporary = self._stack.enter_context(
+            replacing(self.path, partial=lambda _: self._keep and self._finished)
+        )
         self._container = self._stack.enter_context(av.open(str(temporary), "w"))
         self._thread.start()
         return self

@@ -30,6 +30,7 @@ from gait.lcm.record import LISTENING
 from gait.lcm.report import write_report
 from gait.motion.evaluate import Measures
 from gait.progress import note
+from gait.report.run_files import RunFiles
 
 _GRACE = 5.0  # seconds that a process may take to end when asked
 _TURN = 0.05  # seconds between two looks
@@ -232,18 +233,17 @@ class Demo:
                 note(f"gait demo: no latency will be measured: {ROUTE_REMEDY}; using a log file")
                 recording = clip._run_through_log(session)
             assert clip.video is not None and clip.camera is not None
-            measures = write_report(
-                str(self.output / "estimates.log"),
-                str(self.output / "track.csv"),
-                clip.video,
-                clip.camera,
-                str(self.output / "report.html"),
+            files = RunFiles(
+                track=str(self.output / "track.csv"),
+                video=clip.video,
+                page=str(self.output / "report.html"),
+                camera=clip.camera,
                 overlay=str(self.output / "overlay.mp4"),
                 truth=clip.truth,
                 model=self.model,
-                live=live,
                 quiet=self.quiet,
             )
+            _, measures = write_report(str(self.output / "estimates.log"), files, live=live)
         return recording, measures
 
     def _check_inputs(self) -> None:

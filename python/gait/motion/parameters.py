@@ -46,6 +46,7 @@ QUANTITIES = {
 }
 """Names in files, with the words for people."""
 
+_UNSURE = {"lost", "ambiguous"}
 MIRRORED = ("step_time_s", "step_length_m", "stance_percent")
 """Quantities whose left and right are compared."""
 
@@ -62,7 +63,8 @@ class Strides:
     values: dict[str, Array]
     sd: dict[str, Array]
     draws: dict[str, Array]  #: (D, k) the same of every draw
-    sure: NDArray[np.bool_]  #: (k,) no frame of the stride was lost or ambiguous
+    #: (k,) no frame of the stride was lost or ambiguous; if no stride is so, none was lost
+    sure: NDArray[np.bool_]
 
 
 @dataclass(frozen=True)
@@ -74,6 +76,7 @@ class Parameters:
     event_sd: Events
     strides: dict[str, Strides]  #: by side
     source: str  #: where the uncertainty comes from, in words
+    all_unsure: bool = False  #: every stride has ambiguous frames; those that were not lost count as sure
 
     def summary(self) -> dict[str, dict[str, Any]]:
         """Means over the sure strides: by quantity, for right, left and both feet.
@@ -146,9 +149,21 @@ def measure(track: Track, draws: Draws | None = None) -> Parameters:
             {name: value[whole] for name, value in values.items()},
             {name: _sd(value[:, whole]) for name, value in many.items()},
             {name: value[:, whole] for name, value in many.items()},
-            np.array([_is_sure(track, *ends) for ends in zip(start, end, strict=True)], bool)[whole],
+            np.array([_is_free(track, _UNSURE, *ends) for ends in zip(start, end, strict=True)], bool)[whole],
         )
-    return Parameters(events, event_sd, strides, source)
+    some = any(s.sure.any() for s in strides.values())
+    if not some:  # better than nothing: left and right seldom swap for some frames only
+        for s in strides.values():
+            s.sure[:] = [_is_free(track, {"lost"}, *ends) for ends in zip(s.start, s.end, strict=True)]
+    return Parameters(events, event_sd, strides, source, all_unsure=not some)
+
+
+def measured(track: Track, draws: Draws | None = None) -> Parameters | None:
+    """Gait parameters of a track, as by `measure`; None if it has no whole stride."""
+    try:
+        return measure(track, draws)
+    except UserError:
+        return None
 
 
 def stride_quantities(foot: Contacts, other: Contacts, between: NDArray[np.int64]) -> dict[str, Array]:
@@ -196,9 +211,10 @@ def _between(strike: Array, other: Array) -> NDArray[np.int64]:
     return np.where(inside, first, -1)
 
 
-def _is_sure(track: Track, start: float, end: float) -> bool:
+def _is_free(track: Track, statuses: set[str], start: float, end: float) -> bool:
+    """Whether no frame of a stride has one of these statuses."""
     inside = (track.time >= start) & (track.time <= end)
-    return not {"lost", "ambiguous"} & {track.status[i] for i in np.flatnonzero(inside)}
+    return not statuses & {track.status[i] for i in np.flatnonzero(inside)}
 
 
 def _mean(values: Array, axis: int) -> Array:
@@ -260,6 +276,7 @@ def angle_cycles(
     `draws`: motions drawn from the posterior.
     """
     angles = {name[: -len("_deg")]: v for name, v in track.numbers.items() if name.endswith("_deg")}
+    angles |= _pelvis_angles(track, curves)
     out = {}
     for name in (n for n in curves.names if n in angles):
         left = name.startswith("l_")
@@ -269,9 +286,36 @@ def angle_cycles(
         strides = np.interp(when, track.time, angles[name])
         rate = 1 / float(np.median(when[:, -1] - when[:, 0]))
         norm_mean, norm_sd = curves.norm(name, PERCENT / 100 + (0.5 if left else 0.0), rate)
-        sd = _drawn_sd(draws, name, when) if draws else _linear_sd(track, name, curves, when)
+        drawn = draws is not None and name in draws.angle_names
+        sd = _drawn_sd(draws, name, when) if draws and drawn else _linear_sd(track, name, curves, when)
         out[name] = AngleCycle(strides, strides.mean(axis=0), sd, np.degrees(norm_mean), np.degrees(norm_sd))
     return out
+
+
+def _pelvis_angles(track: Track, curves: ModelCurves) -> dict[str, Array]:
+    """Angles of the pelvis, degrees: of the line through both hips, and the model's tilt at this phase."""
+    if "heading_rad" not in track.numbers:
+        return {}
+    x, y, up = (track.places["l_hip"] - track.places["r_hip"]).T
+    turn = np.arctan2(-x, y) - track.numbers["heading_rad"]
+    scores = _scores(track, curves)
+    found = {
+        "root_roll": np.arctan2(up, np.hypot(x, y)),
+        "root_yaw": (turn + np.pi) % (2 * np.pi) - np.pi,
+        "root_pitch": curves.channel(
+            "root_pitch",
+            track.phase,
+            np.stack([track.numbers[name] for name in scores], axis=1),
+            track.numbers["stride_hz"],
+        ),
+    }
+    return {name: np.degrees(values) for name, values in found.items()}
+
+
+def _scores(track: Track, curves: ModelCurves) -> list[str]:
+    """Columns of a track with the scores that the model has."""
+    scores = sorted((n for n in track.numbers if n.startswith("c_") and not n.endswith("_sd")), key=_number)
+    return scores[: len(curves.samples) - 1]
 
 
 def _times(parameters: Parameters, side: str) -> Array:
@@ -293,8 +337,7 @@ def _linear_sd(track: Track, name: str, curves: ModelCurves, when: Array) -> Arr
     numbers = track.numbers
     if "phase_sd" not in numbers:
         return np.full(len(PERCENT), np.nan)
-    scores = sorted((n for n in numbers if n.startswith("c_") and not n.endswith("_sd")), key=_number)
-    scores = scores[: len(curves.samples) - 1]
+    scores = _scores(track, curves)
     phase, coef = numbers["phase"], np.stack([numbers[n] for n in scores], axis=1)
     rate = numbers["stride_hz"]
     here = curves.channel(name, phase, coef, rate)

@@ -27,24 +27,71 @@ _STATUS = {
     TrackStatus.AMBIGUOUS: (60, 200, 250),
     TrackStatus.LOST: (70, 70, 240),
 }
+_WORDS = {
+    TrackStatus.INIT: "settling",
+    TrackStatus.TRACKING: "tracking",
+    TrackStatus.AMBIGUOUS: "left/right?",
+    TrackStatus.LOST: "lost",
+}
+_LEGEND = (
+    ("Dial: phase of the stride, top: right heel strike", None),
+    ("Its coloured arc: where the phase is with 95 %", None),
+    ("Ellipses: where wrists and ankles are with 90 %", None),
+    ("Left side of the body", "left"),
+    ("Right side of the body", "right"),
+)
+LEGEND_SECONDS = 3.0
+"""How long a film shows what dial, ellipses and colours mean."""
 _FONT = cv2.FONT_HERSHEY_DUPLEX
 
 
 def draw_panel(canvas: Image, estimate: Estimate, frame: int, scale: float) -> None:
     """Draw into the top left corner of a BGR picture, in place; `scale` 1 suits 540 lines."""
+    region = _panel(canvas, scale)
+    lost = estimate.status == TrackStatus.LOST
+    _dial(region, estimate, (round(46 * scale), round(46 * scale)), 32 * scale, scale)
+    words = ("figure: last guess", "") if lost else _figures(estimate)
+    time = f"frame {frame}   {estimate.utime / 1e6:.2f} s"
+    _lines(region, (_WORDS[estimate.status], *words, time), _STATUS[estimate.status], scale)
+
+
+def _figures(estimate: Estimate) -> tuple[str, str]:
+    return f"{120 * estimate.mean.stride_hz:5.1f} steps/min", f"{estimate.speed:5.2f} m/s"
+
+
+def _panel(canvas: Image, scale: float) -> Image:
+    """Darken the top left corner; return that part of the picture."""
     width, height = (round(side * scale) for side in _PANEL_SIZE)
     edge = round(8 * scale)
-    region = canvas[edge : edge + height, edge : edge + width]
-    region[:] = np.rint(0.35 * region + 0.65 * np.array([32, 28, 26])).astype(np.uint8)
-    _dial(region, estimate, (round(46 * scale), round(46 * scale)), 32 * scale, scale)
-    colour = _STATUS[estimate.status]
+    return _darkened(canvas[edge : edge + height, edge : edge + width])
+
+
+def _darkened(region: Image) -> Image:
+    """Darken a part of a picture, so that words in it are readable whatever is behind them."""
+    region[:] = np.rint(0.2 * region + 0.8 * np.array([32, 28, 26])).astype(np.uint8)
+    return region
+
+
+def _lines(region: Image, words: tuple[str, ...], colour: tuple[int, int, int], scale: float) -> None:
+    """Write the four lines of the panel, the first in a colour."""
     left = round(96 * scale)
-    strides = estimate.mean.stride_hz
-    _write(region, estimate.status.name.lower(), (left, round(22 * scale)), 0.52 * scale, colour)
-    _write(region, f"{120 * strides:5.1f} steps/min", (left, round(43 * scale)), 0.4 * scale, _INK)
-    _write(region, f"{estimate.speed:5.2f} m/s", (left, round(61 * scale)), 0.4 * scale, _INK)
-    words = f"frame {frame}   {estimate.utime / 1e6:.2f} s"
-    _write(region, words, (left, round(80 * scale)), 0.34 * scale, _DIM)
+    rows = ((22, 0.52, colour), (43, 0.4, _INK), (61, 0.4, _INK), (80, 0.36, _DIM))
+    for line, (row, size, ink) in zip(words, rows, strict=True):
+        _write(region, line, (left, round(row * scale)), size * scale, ink)
+
+
+def _draw_legend(canvas: Image, scale: float) -> None:
+    """Explain dial, ellipses and colours in the bottom left corner, if they take half the picture at most."""
+    size, edge, row = 0.4 * scale, round(8 * scale), 19 * scale
+    width = max(cv2.getTextSize(words, _FONT, size, 1)[0][0] for words, _ in _LEGEND) + round(16 * scale)
+    height = round(row * len(_LEGEND) + 8 * scale)
+    if height + 2 * edge > canvas.shape[0] / 2 or width + 2 * edge > canvas.shape[1]:
+        return
+    top = canvas.shape[0] - edge - height
+    region = _darkened(canvas[top : top + height, edge : edge + width])
+    for k, (words, side) in enumerate(_LEGEND):
+        colour = OVER_PICTURES[side] if side else _INK
+        _write(region, words, (round(8 * scale), round(row * (k + 0.8))), size, colour)
 
 
 def _dial(region: Image, estimate: Estimate, at: tuple[int, int], radius: float, scale: float) -> None:
@@ -75,6 +122,7 @@ Colour = tuple[int, int, int]
 ENDS = ("l_wrist", "r_wrist", "l_ankle", "r_ankle")
 _DARK: Colour = (30, 30, 30)
 _FILL = 0.28  # opacity of the body
+_FADED = 0.45  # opacity of the figure of a lost person
 _ELLIPSE = 2.146  # standard deviations of the 90 % ellipse of a normal in the plane
 _SUBPIXEL = 4  # bits of fraction in OpenCV's drawing coordinates
 
@@ -92,13 +140,32 @@ class Overlay:
         self._scale = max(0.6, min(camera.width, camera.height) / 540)
         self._lens = _lens_map(camera) if camera.distortion.any() else None
 
-    def draw(self, image: Image, estimate: Estimate, frame: int) -> Image:
-        """Return a BGR picture: frame, body of the dominant mode, mean joints, 90 % ellipses, panel."""
-        canvas = cv2.cvtColor(image, cv2.COLOR_GRAY2BGR) if image.ndim == 2 else image.copy()
-        canvas = self.body(np.asarray(canvas, np.uint8), estimate.mean)
-        self.skeleton(canvas, estimate.joints)
-        self._ellipses(canvas, estimate)
+    def draw(self, image: Image, estimate: Estimate, frame: int, *, legend: bool = False) -> Image:
+        """Return a BGR picture: frame, body of the dominant mode, mean joints, 90 % ellipses, panel.
+
+        The figure of a lost person is faded and has no body.  `legend`: explain what is drawn.
+        """
+        picture = _in_colour(image)
+        if estimate.status == TrackStatus.LOST:
+            canvas = picture.copy()
+            self.skeleton(canvas, estimate.joints)
+            canvas = np.asarray(cv2.addWeighted(canvas, _FADED, picture, 1 - _FADED, 0), np.uint8)
+        else:
+            canvas = self.body(picture, estimate.mean)
+            self.skeleton(canvas, estimate.joints)
+            self._ellipses(canvas, estimate)
         draw_panel(canvas, estimate, frame, self._scale)
+        if legend:
+            _draw_legend(canvas, self._scale)
+        return canvas
+
+    def draw_absent(self, image: Image, time: float, frame: int, *, legend: bool = False) -> Image:
+        """Return a BGR picture of a frame without an estimate, which states so; `time` in seconds."""
+        canvas = _in_colour(image).copy()
+        words = ("no estimate", "person not found", "in this frame", f"frame {frame}   {time:.2f} s")
+        _lines(_panel(canvas, self._scale), words, _DIM, self._scale)
+        if legend:
+            _draw_legend(canvas, self._scale)
         return canvas
 
     def figure(self, canvas: Image, state: State) -> Image:
@@ -152,6 +219,11 @@ class Overlay:
         """Scale of lines for a person at `place`: 1 where 1.7 m are 400 pixels."""
         depth = max(float(self.camera.depth(place)), 0.1)
         return float(np.clip(1.7 * self.camera.fy / depth / 400, 0.3, 4.0))
+
+
+def _in_colour(image: Image) -> Image:
+    """Return a picture as BGR; it may be the same array."""
+    return np.asarray(cv2.cvtColor(image, cv2.COLOR_GRAY2BGR), np.uint8) if image.ndim == 2 else image
 
 
 def tinted(canvas: Image, ids: NDArray[np.uint8], limbs: Sequence[str], width: int) -> Image:

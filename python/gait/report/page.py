@@ -1,4 +1,4 @@
-"""The report: one HTML file that needs nothing else."""
+"""The frame of all reports: one HTML file that needs nothing else, readable on a telephone and on paper."""
 
 from __future__ import annotations
 
@@ -9,57 +9,106 @@ from html import escape
 import cv2
 
 from gait.io.video import Image
+from gait.web import modules
 
-_STYLE = """
-body { font: 15px/1.5 system-ui, sans-serif; max-width: 60em; margin: 2em auto; padding: 0 1em; color: #222; }
-h1 { font-size: 1.5em; } h2 { font-size: 1.15em; margin-top: 2em; }
-table { border-collapse: collapse; } td, th { padding: .15em .9em .15em 0; text-align: left; }
-td { vertical-align: top; } td + td { font-variant-numeric: tabular-nums; }
-svg { max-width: 100%; height: auto; } pre { background: #f5f5f3; padding: .8em; white-space: pre-wrap; }
-.film { display: flex; flex-wrap: wrap; gap: .4em; } .film img { width: calc(33.3% - .3em); }
-"""
+Tips = Mapping[str, str]
+"""Explanations by the words that they explain."""
 
 
 class Page:
-    """Collects parts, then gives the whole text."""
+    """Collects parts, then gives the whole text.
 
-    def __init__(self, title: str) -> None:
+    Parameters
+    ----------
+    title : str
+    lead : str
+        What the page states first, in a sentence or two.
+    """
+
+    def __init__(self, title: str, lead: str = "") -> None:
         self._title, self._parts = title, [f"<h1>{escape(title)}</h1>"]
+        self.head = f"<style>\n{modules.own('style.css')}</style>"
+        if lead:
+            self._parts.append(f'<p class="lead">{escape(lead)}</p>')
 
-    def words(self, text: str) -> None:
-        """Add a paragraph."""
-        self._parts.append(f"<p>{escape(text)}</p>")
+    def heading(self, text: str) -> None:
+        """Begin a section."""
+        self._parts.append(f"<h2>{escape(text)}</h2>")
 
-    def table(self, heading: str, rows: Mapping[str, str]) -> None:
-        """Add a heading and rows of name and value."""
-        cells = "".join(f"<tr><td>{escape(k)}</td><td>{escape(v)}</td></tr>" for k, v in rows.items())
-        self._parts.append(f"<h2>{escape(heading)}</h2><table>{cells}</table>")
+    def words(self, text: str, kind: str = "") -> None:
+        """Add a paragraph; `kind`: ``warning`` or ``faint``."""
+        self._parts.append(f'<p class="{kind}">{escape(text)}</p>' if kind else f"<p>{escape(text)}</p>")
 
-    def grid(self, heading: str, head: Sequence[str], rows: Sequence[Sequence[str]]) -> None:
-        """Add a heading and a table of several columns."""
-        top = "".join(f"<th>{escape(cell)}</th>" for cell in head)
-        body = "".join("<tr>" + "".join(f"<td>{escape(c)}</td>" for c in row) + "</tr>" for row in rows)
-        self._parts.append(f"<h2>{escape(heading)}</h2><table><tr>{top}</tr>{body}</table>")
+    def points(self, lines: Sequence[str]) -> None:
+        """Add a list."""
+        self._parts.append("<ul>" + "".join(f"<li>{escape(line)}</li>" for line in lines) + "</ul>")
 
-    def block(self, heading: str, text: str) -> None:
-        """Add text as it stands."""
-        self._parts.append(f"<h2>{escape(heading)}</h2><pre>{escape(text)}</pre>")
+    def table(self, heading: str, rows: Mapping[str, str], tips: Tips | None = None) -> None:
+        """Add a heading and rows of name and value; names that have a tip show it."""
+        cells = "".join(
+            f"<tr><th scope=row>{_explained(k, tips)}</th><td>{escape(v)}</td></tr>" for k, v in rows.items()
+        )
+        self._parts.append(f"<h2>{escape(heading)}</h2>{_movable(f'<table class=pairs>{cells}</table>')}")
+        self._explain(tips)
 
-    def figure(self, heading: str, svg: str) -> None:
-        """Add a drawing."""
-        self._parts.append(f"<h2>{escape(heading)}</h2>{svg}")
+    def grid(
+        self, heading: str, head: Sequence[str], rows: Sequence[Sequence[str]], tips: Tips | None = None
+    ) -> None:
+        """Add a heading and a table of several columns, the first of which names the rows."""
+        top = "".join(
+            f"<th scope=col>{_explained(cell, tips)}</th>" if cell else "<td></td>" for cell in head
+        )
+        body = "".join(
+            f"<tr><th scope=row>{_explained(row[0], tips)}</th>"
+            + "".join(f"<td>{escape(cell)}</td>" for cell in row[1:])
+            + "</tr>"
+            for row in rows
+        )
+        table = f"<table><thead><tr>{top}</tr></thead><tbody>{body}</tbody></table>"
+        self._parts.append(f"<h2>{escape(heading)}</h2>{_movable(table)}")
+        self._explain(tips)
 
-    def film(self, heading: str, pictures: Sequence[tuple[int, Image]]) -> None:
+    def figure(self, heading: str, drawing: str) -> None:
+        """Add a heading and a drawing, HTML."""
+        self._parts.append(f"<h2>{escape(heading)}</h2>{drawing}")
+
+    def html(self, text: str) -> None:
+        """Add HTML as it stands."""
+        self._parts.append(text)
+
+    def pictures(self, pictures: Sequence[tuple[int, Image]], kind: str = "") -> None:
         """Add a strip of frames with their numbers."""
-        cells = "".join(f'<img alt="frame {number}" src="{_data(image)}">' for number, image in pictures)
-        self._parts.append(f'<h2>{escape(heading)}</h2><div class="film">{cells}</div>')
+        cells = "".join(f'<img alt="frame {number}" src="{jpeg(image)}">' for number, image in pictures)
+        self._parts.append(f'<div class="strip {kind}">{cells}</div>')
 
     def text(self) -> str:
         """Return the file's text."""
-        head = f'<meta charset="utf-8"><title>{escape(self._title)}</title><style>{_STYLE}</style>'
-        return f"<!DOCTYPE html>\n<html><head>{head}</head><body>{''.join(self._parts)}</body></html>\n"
+        view = '<meta name="viewport" content="width=device-width, initial-scale=1">'
+        style = f"<style>\n{modules.own('report.css')}</style>"
+        head = f'<meta charset="utf-8">{view}<title>{escape(self._title)}</title>{self.head}{style}'
+        body = f"<main>{''.join(self._parts)}</main>"
+        return f'<!DOCTYPE html>\n<html lang="en"><head>{head}</head><body>{body}</body></html>\n'
+
+    def _explain(self, tips: Tips | None) -> None:
+        """Add the explanations as text, for those who cannot hover: on a telephone or on paper."""
+        if tips:
+            terms = "".join(f"<dt>{escape(k)}</dt><dd>{escape(v)}</dd>" for k, v in tips.items())
+            self._parts.append(
+                f'<details class="terms"><summary>What these words mean</summary><dl>{terms}</dl></details>'
+            )
 
 
-def _data(image: Image) -> str:
-    jpeg = cv2.imencode(".jpg", image, [cv2.IMWRITE_JPEG_QUALITY, 85])[1].tobytes()
-    return "data:image/jpeg;base64," + base64.b64encode(jpeg).decode("ascii")
+def _explained(words: str, tips: Tips | None) -> str:
+    tip = (tips or {}).get(words)
+    return f'<abbr title="{escape(tip)}">{escape(words)}</abbr>' if tip else escape(words)
+
+
+def _movable(table: str) -> str:
+    """Let a table that is larger than the page be moved sideways, by keyboard too."""
+    return f'<div class="movable" tabindex="0" role="group" aria-label="table">{table}</div>'
+
+
+def jpeg(image: Image) -> str:
+    """Return a picture as an address that a page can hold."""
+    data = cv2.imencode(".jpg", image, [cv2.IMWRITE_JPEG_QUALITY, 85])[1].tobytes()
+    return "data:image/jpeg;base64," + base64.b64encode(data).decode("ascii")

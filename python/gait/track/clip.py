@@ -21,7 +21,9 @@ from gait.track.options import KEYPOINTS_SD, ClipOptions
 from gait.track.person_keypoints import PersonKeypoints
 from gait.track.person_shapes import PersonShapes
 from gait.track.plausible import Plausibility
+from gait.track.run_report import RunReport
 from gait.track.scene import Scene, finds_shapes, first_state, stays
+from gait.track.setup import setup
 from gait.track.tracker import Tracker
 
 __all__ = ["KEYPOINTS_SD", "ClipOptions", "track_clip"]
@@ -41,6 +43,7 @@ def track_clip(options: ClipOptions) -> dict[str, Any]:
     start = first_state(options, scene)
     if options.background == "auto" and (start.in_place or stays(scene)):
         scene = replace(scene, plate=None)  # the median shows the person
+    used = setup(options, scene, start, scene.plate is not None)
     config = TrackerConfig.default(options.mode, seed=options.seed, belt=float(start.in_place))
     if options.particles is not None:
         config = config.replace(particles=options.particles)
@@ -57,6 +60,7 @@ def track_clip(options: ClipOptions) -> dict[str, Any]:
     follower = _follower(options, scene, tracker, keypoints, plausibility)
     found = follower.follow(start, scene.frames)
     results = write(options, scene, tracker, found, plausibility)
+    report = RunReport(options, scene, results.reasons, used, tracker.config.particles)
     for frame, x, y in results.starts[1:]:
         note(f"lost, and a person found at frame {frame}: x {x:.2f} y {y:.2f} m", options.quiet)
     note("; ".join(results.coverage()), options.quiet)
@@ -65,8 +69,11 @@ def track_clip(options: ClipOptions) -> dict[str, Any]:
     if options.trc:
         times, joints = np.array(results.times), np.array(results.joints)
         write_trc(options.trc, scene.model.joint_names, times, joints, scene.video.fps)
+    if options.report:
+        assert results.film is not None
+        report.write(options.report, results.film)
     camera = {} if scene.calibration is None else {"camera": scene.calibration.figures()}
-    return results.summary(options.threads) | camera
+    return results.summary(options.threads, follower.step_seconds) | camera | report.figures()
 
 
 def _stature(options: ClipOptions, scene: Scene, start: Start) -> tuple[float, float]:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import csv
 import time
-from collections.abc import Callable, Iterable
+from collections.abc import Callable, Iterable, Sequence
 from contextlib import ExitStack
 from itertools import groupby
 from pathlib import Path
@@ -18,9 +18,10 @@ from gait.bindings.model import Model
 from gait.camera.camera import write_camera
 from gait.io.files import replacing
 from gait.io.track_file import TrackWriter
-from gait.io.video import FAST, Frame, Image, Video, VideoWriter
+from gait.io.video import Frame, Video
 from gait.progress import durations, progress
-from gait.report.drawing import Overlay
+from gait.report.drawing import LEGEND_SECONDS, Overlay
+from gait.report.film import Films, PageFilm
 from gait.track.from_walk import Calibration
 from gait.track.options import ClipOptions
 from gait.track.plausible import Plausibility
@@ -44,28 +45,36 @@ class Results:
         Their joints, metres.
     starts : list of (int, float, float)
         Frame of each start of the tracker, and the place there, metres.
+    reasons : dict of int to str
+        Why frames are ambiguous, by their numbers, where it was not the tracker itself that left them open.
+    film : PageFilm or None
+        For the report.
     """
 
     def __init__(self, tracker: Tracker) -> None:
         self._tracker = tracker
-        self._steps: list[float] = []
+        self._count = 0
         self._statuses: list[TrackStatus] = []
         self._begun = time.perf_counter()
         self.times: list[float] = []
         self.joints: list[np.ndarray[Any, Any]] = []
         self._frames: list[tuple[int, bool, bool]] = []  # number, lost, in the picture
         self.starts: list[tuple[int, float, float]] = []
+        self.reasons: dict[int, str] = {}
+        self.film: PageFilm | None = None
 
     def step(self, frame: Frame, estimate: Estimate) -> None:
         """Count a step of the tracker."""
         if estimate.frame == 0:
             self.starts.append((frame.number, *estimate.mean.pelvis[:2]))
-        self._steps.append(1000 * self._tracker.step_seconds)
+        self._count += 1
         self._wall = time.perf_counter() - self._begun
 
     def add(self, frame: Frame, estimate: Estimate) -> None:
         """Add an estimate that is written."""
         self._statuses.append(estimate.status)
+        if estimate.reason and estimate.status == TrackStatus.AMBIGUOUS:
+            self.reasons[frame.number] = estimate.reason
         self.times.append(frame.time)
         self.joints.append(estimate.joints)
         shown = self._tracker.cameras[0].shows(estimate.joints[:1])
@@ -90,15 +99,15 @@ class Results:
         followed = sum(status in found for status in self._statuses)
         return self._statuses.count(TrackStatus.LOST) > count / 2 and followed < _HARDLY * count
 
-    def summary(self, threads: int) -> dict[str, Any]:
+    def summary(self, threads: int, step_seconds: Sequence[float]) -> dict[str, Any]:
         """Return the figures of ``--json``; step_ms is the time inside gait_tracker_step alone."""
         tracker = self._tracker
         return {
-            "frames": len(self._steps),
+            "frames": self._count,
             "particles": tracker.config.particles,
             "threads": threads,
-            "step_ms": durations(self._steps),
-            "wall_fps": len(self._steps) / self._wall,
+            "step_ms": durations(1000 * np.asarray(step_seconds)),
+            "wall_fps": self._count / self._wall,
             **{status.name.lower(): self._statuses.count(status) for status in TrackStatus},
             "followed": not self.hardly_followed(),
             "memory_bytes": tracker.memory_bytes,
@@ -122,10 +131,10 @@ def write(
         if options.cameras_out:
             _write_cameras(stack.enter_context(replacing(options.cameras_out)), scene)
         sinks: list[Sink] = [results.add, _widened(stack.enter_context(rows).write, scene.calibration)]
-        if options.overlay:
-            film = stack.enter_context(VideoWriter(options.overlay, video.fps, preset=FAST))
-            draw = _drawing(model, scene)
-            sinks.append(lambda frame, estimate: film.write(draw(frame, estimate)))
+        size = (scene.reference_camera.width, scene.reference_camera.height)
+        films = stack.enter_context(Films(options.overlay, span if options.report else None, size, video.fps))
+        if films.wanted:
+            sinks.append(_drawing(model, scene, films))
         smoother = None
         if options.smooth:
             smoother = stack.enter_context(Smoother(tracker))
@@ -139,6 +148,7 @@ def write(
             _smooth(options, video, smoother, sinks, plausibility)
         if not results.times:
             raise video.no_frame(span.start)
+    results.film = films.page
     return results
 
 
@@ -154,16 +164,31 @@ def _write_cameras(path: Path, scene: Scene) -> None:
             rows.writerow([number, *(f"{value:.9g}" for value in values)])
 
 
-def _drawing(model: Model, scene: Scene) -> Callable[[Frame, Estimate], Image]:
-    """Return a function that draws an estimate into a frame as captured."""
-    overlay = Overlay(model, scene.camera)
+def _drawing(model: Model, scene: Scene, films: Films) -> Sink:
+    """Return a sink that draws every frame as captured, those before the first estimate too."""
+    still = Overlay(model, scene.camera)
+    first = scene.video.times[scene.frames.start]
+    begun = False
 
-    def draw(frame: Frame, estimate: Estimate) -> Image:
-        if frame.captured is None:
-            return overlay.draw(frame.image, estimate, frame.number)
-        return Overlay(model, scene.camera_at(frame.number)).draw(frame.captured, estimate, frame.number)
+    def draw(frame: Frame, estimate: Estimate | None) -> None:
+        moved = frame.captured is not None
+        overlay = Overlay(model, scene.camera_at(frame.number)) if moved else still
+        picture = frame.image if frame.captured is None else frame.captured
+        legend = frame.time - first < LEGEND_SECONDS
+        if estimate is None:
+            films.write(overlay.draw_absent(picture, frame.time, frame.number, legend=legend), frame.number)
+        else:
+            films.write(overlay.draw(picture, estimate, frame.number, legend=legend), frame.number)
 
-    return draw
+    def sink(frame: Frame, estimate: Estimate) -> None:
+        nonlocal begun
+        if not begun and frame.number > scene.frames.start:
+            for before in scene.video.frames(scene.frames.start, frame.number):
+                draw(before, None)
+        begun = True
+        draw(frame, estimate)
+
+    return sink
 
 
 def _widened(sink: Sink, calibration: Calibration | None) -> Sink:
@@ -182,7 +207,7 @@ def _smooth(
     if options.draws:
         draws.write(options.draws)
     frames: Iterable[Frame] = (frame for frame, _ in rows)
-    if options.overlay:  # decode the pictures once more
+    if options.overlay or options.report:  # decode the pictures once more
         frames = video.frames(rows[0][0].number, rows[-1][0].number + 1)
     plausibility.restart()
     for frame, (_, estimate) in zip(frames, rows, strict=True):

@@ -25,6 +25,7 @@ _SETTLED = 0.2  # seconds of `tracking` after which they are known
 _SETTLES = 4.0  # seconds from a start in which that is waited for
 _DRAWS = 3  # of particles that must agree
 _SAME_SIDE = 0.2  # strides between the phases of draws that agree
+_DISAGREE = "repeated starts do not agree on it"
 
 FindStart = Callable[[int, int, float], Start | None]
 """First start in the frames first <= number < stop, of a person of a stature [m]; None: there is none."""
@@ -65,6 +66,11 @@ class Follower:
     one_pass : bool
         All estimates come from one forward pass, which the smoother needs; tracking backwards only finds an
         earlier start.
+
+    Attributes
+    ----------
+    step_seconds : list of float
+        Time that each step spent in the C library, those of searches and backwards included.
     """
 
     def __init__(
@@ -82,6 +88,7 @@ class Follower:
         self._plausibility = plausibility
         self._find_start, self._auto_start, self._one_pass = find_start, auto_start, one_pass
         self._uncertain = False  # which leg is which
+        self.step_seconds: list[float] = []
 
     def follow(self, start: Start, frames: range) -> Iterator[tuple[Frame, Estimate]]:
         """Yield the frames in order from the first in which the person is visible, each with its estimate.
@@ -183,8 +190,9 @@ class Follower:
         """Step with the person's keypoints; judge the estimate."""
         joints = self._keypoints.choose(frame, last)
         now = self._plausibility.judged(frame, tracker.step(frame.image, utime, joints))
+        self.step_seconds.append(tracker.step_seconds)
         sure = now.status != TrackStatus.TRACKING or not self._uncertain
-        return now if sure else replace(now, status=TrackStatus.AMBIGUOUS)
+        return now if sure else replace(now, status=TrackStatus.AMBIGUOUS, reason=_DISAGREE)
 
     def _start(self, tracker: Tracker, start: Start, utime: int) -> None:
         if start.hypotheses:

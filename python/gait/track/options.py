@@ -47,7 +47,7 @@ class ClipOptions:
         Their standard deviation at full confidence, pixels.
     stabilize : str
         ``auto``: undo the turns of the camera; ``off``: take it for one that stands still.
-    overlay, draws, trc : str, optional
+    overlay, draws, trc, report : str, optional
         Further files to write.
     smooth : bool
         Estimate every frame from the whole clip.
@@ -80,6 +80,7 @@ class ClipOptions:
     smooth: bool = False
     draws: str | None = None
     trc: str | None = None
+    report: str | None = None
     quiet: bool = False
 
     @property

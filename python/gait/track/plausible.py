@@ -17,6 +17,9 @@ from gait.track.person_shapes import PersonShapes
 _DEPARTURE = 0.6  # metres in a second by which the pelvis may leave the path of strides and heading
 _BEYOND = 4.0  # standard deviations from which a stature is implausible
 _LEAST_SD = 0.05  # metres, of a stature
+_ELSEWHERE = "the joints found in the picture are elsewhere"
+_NO_WALK = "the way does not follow from the strides, or the stature is unusual"
+_UNSEEN = "the pictures hardly show the person"
 
 
 class Plausibility:
@@ -51,7 +54,8 @@ class Plausibility:
         supported = not estimate.flags & Flag.UNSUPPORTED
         if estimate.status != TrackStatus.TRACKING or agree or (agree is None and walks and supported):
             return estimate
-        return replace(estimate, status=TrackStatus.AMBIGUOUS)
+        reason = _ELSEWHERE if agree is not None else _NO_WALK if supported else _UNSEEN
+        return replace(estimate, status=TrackStatus.AMBIGUOUS, reason=reason)
 
     def _walks(self, time: float, estimate: Estimate) -> bool:
         """Whether the stature is plausible and the last second's path follows from strides and heading.

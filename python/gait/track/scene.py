@@ -274,8 +274,8 @@ def _find_first_state(options: ClipOptions, scene: Scene) -> Start:
         )
         _check_camera(options, scene)
         if found is not None:
-            return found
-    return find_start(
+            return replace(found, source="the joints found in the pictures")
+    found = find_start(
         scene.video,
         camera,
         scene.plate,
@@ -286,6 +286,7 @@ def _find_first_state(options: ClipOptions, scene: Scene) -> Start:
         shapes=not _detects(options),  # slow, and needless where the detector found no person
         shapes_first=finds_shapes(options),  # a median may show people
     )
+    return replace(found, source="where the pictures show a person")
 
 
 def _check_camera(options: ClipOptions, scene: Scene) -> None:

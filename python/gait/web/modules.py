@@ -57,26 +57,33 @@ def served_head(drawing: bool = True) -> tuple[str, str]:
     return head, f"'self' 'sha256-{digest}'"
 
 
-def inlined_head() -> str:
+def inlined_head(parts_too: bool = True) -> str:
     """Head of a page that needs no other file (2.9 MB): style, import map and ECharts written into it.
+
+    Parameters
+    ----------
+    parts_too : bool
+        False leaves out the parts and what needs them: of our modules film.js is left.
 
     Raises
     ------
     UserError
         If the parts were not fetched.
     """
-    modules = {name: parts.load(part) for name, part in _BARE.items()}
-    modules |= {f"gait/{name}": own(name).encode() for name in OWN}
+    modules = {name: parts.load(part) for name, part in _BARE.items() if parts_too}
+    modules |= {f"gait/{name}": own(name).encode() for name in (OWN if parts_too else ("film.js",))}
     imports = {
         name: "data:text/javascript;base64," + base64.b64encode(data).decode()
         for name, data in modules.items()
     }
-    echarts = parts.load(parts.ECHARTS).decode().replace("</script", "<\\/script")
-    return (
+    head = (
         f"<style>\n{own('style.css')}</style>\n"
         f'<script type="importmap">{json.dumps({"imports": imports})}</script>\n'
-        f"<script>{echarts}</script>"
     )
+    if not parts_too:
+        return head
+    echarts = parts.load(parts.ECHARTS).decode().replace("</script", "<\\/script")
+    return f"{head}<script>{echarts}</script>"
 
 
 def inlined_json(name: str, data: object) -> str:

@@ -1,0 +1,144 @@
+"""The verdict on a track in plain words, the same on the terminal and on the page of a run."""
+
+from __future__ import annotations
+
+from collections import Counter
+from collections.abc import Mapping
+from dataclasses import dataclass
+
+import numpy as np
+
+from gait.io.track_file import STATUSES, Track
+from gait.motion.parameters import Parameters, measured
+
+LEGS = "either leg may be the right one by the pictures"
+"""Why the tracker itself leaves left and right open."""
+_MOVES = 0.25  # share of the strides' speed that the pelvis moves at least, unless the person walks in place
+_SECONDS = 0.5  # of a track from which places tell a speed
+
+
+@dataclass(frozen=True)
+class Verdict:
+    """What a track is worth.
+
+    Attributes
+    ----------
+    total : int
+        Frames that were to be tracked.
+    counts : dict of str to int
+        Frames by status.
+    strides : int
+        Whole strides of the foot that has more of them.
+    speed : float or None
+        Metres per second along the ground; of a person who walks in place, of the strides.
+    in_place : bool
+        The person walks in place, as on a treadmill.
+    why : dict of str to int
+        Why left and right are unsure: frames by reason, most first; empty if that is not known.
+    """
+
+    total: int
+    counts: dict[str, int]
+    strides: int
+    speed: float | None
+    in_place: bool
+    why: dict[str, int]
+
+    @property
+    def tracked(self) -> int:
+        """Frames with an estimate of the person, left and right sure or not."""
+        return self.counts["tracking"] + self.counts["ambiguous"]
+
+    @property
+    def absent(self) -> int:
+        """Frames without a row in the track."""
+        return self.total - sum(self.counts.values())
+
+    def sentence(self) -> str:
+        """State in one sentence what was tracked, how the person walked, and what is unsure."""
+        parts = [f"Tracked {self.tracked} of {count_of(self.total, 'frame')}"]
+        parts.append(count_of(self.strides, "whole stride") if self.strides else "no whole stride")
+        if self.speed is not None:
+            parts.append(f"{self.speed:.2f} m/s" + (" in place" if self.in_place else ""))
+        text = ", ".join(parts)
+        if self.counts["ambiguous"]:
+            text += f"; left and right unsure in {count_of(self.counts['ambiguous'], 'frame')}"
+            why = [f"{reason} ({count})" for reason, count in self.why.items()]
+            text += f": {', '.join(why if len(why) > 1 else self.why)}" if why else ""
+        rest = {"lost": self.counts["lost"], "still settling": self.counts["init"], "not found": self.absent}
+        return "; ".join([text, *(f"{what} in {count_of(n, 'frame')}" for what, n in rest.items() if n)])
+
+    def statuses(self) -> str:
+        """Count the frames by status, all of them."""
+        text = f"{sum(self.counts.values())} frames: "
+        text += ", ".join(f"{self.counts[status]} {status}" for status in STATUSES)
+        return text + (f"; {self.absent} more without an estimate" if self.absent else "")
+
+    def warning(self) -> str | None:
+        """Return what to do if no frame can be relied on; None if some can."""
+        if self.counts["tracking"]:
+            return None
+        return (
+            "no frame has status tracking, so do not rely on this track: look at it with --overlay, check "
+            "--camera and --init, or let the detector help (gait detect --fetch)"
+        )
+
+
+def verdict_of(
+    track: Track,
+    total: int | None = None,
+    why: Mapping[int, str] | None = None,
+    parameters: Parameters | None = None,
+) -> Verdict:
+    """Judge a track.
+
+    Parameters
+    ----------
+    track : Track
+    total : int, optional
+        Frames that were to be tracked; those of the track if left out.
+    why : mapping of int to str, optional
+        Why a frame is ambiguous, by its number, where it was not the tracker itself that left it open.  A
+        track alone does not tell.
+    parameters : Parameters, optional
+        Of the track, if they are known already.
+    """
+    counts = {status: track.status.count(status) for status in STATUSES}
+    if parameters is None:
+        parameters = measured(track)
+    frames = [int(n) for n, s in zip(track.frame, track.status, strict=True) if s == "ambiguous"]
+    reasons: Counter[str] = Counter()
+    if why is not None:
+        reasons.update(why.get(number, LEGS) for number in frames)
+    speed, in_place = _speed(track)
+    return Verdict(
+        total=max(len(track.frame), total or 0),
+        counts=counts,
+        strides=0 if parameters is None else max(len(s.start) for s in parameters.strides.values()),
+        speed=speed,
+        in_place=in_place,
+        why=dict(reasons.most_common()),
+    )
+
+
+def _speed(track: Track) -> tuple[float | None, bool]:
+    """Speed over the frames with an estimate, metres per second, and whether the person walks in place."""
+    followed = np.isin(track.status, ("tracking", "ambiguous"))
+    if not followed.any() or "speed_m_s" not in track.numbers:
+        return None, False
+    of_strides = float(np.median(track.numbers["speed_m_s"][followed]))
+    time, place = track.time[followed], track.places["pelvis"][followed, :2]
+    if time[-1] - time[0] < _SECONDS:
+        return of_strides, False
+    # Sway to the sides is no way: the path is measured between places half a second apart or more.
+    steps = int((time[-1] - time[0]) / _SECONDS)
+    knots = np.searchsorted(time, np.linspace(time[0], time[-1], steps + 1))
+    way = float(np.linalg.norm(np.diff(place[knots], axis=0), axis=1).sum())
+    moved = way / float(time[knots[-1]] - time[knots[0]])
+    in_place = moved < _MOVES * of_strides
+    return (of_strides if in_place else moved), in_place
+
+
+def count_of(count: int, what: str) -> str:
+    """Return a count with its noun, plural where it has to be."""
+    return f"{count} {what}{'' if count == 1 else 's'}"

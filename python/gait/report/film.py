@@ -1,0 +1,149 @@
+"""Films of a tracked clip: the overlay video, and the smaller one that a report has inside."""
+
+from __future__ import annotations
+
+import base64
+import tempfile
+from collections.abc import Iterator
+from contextlib import ExitStack
+from dataclasses import dataclass
+from pathlib import Path
+from types import TracebackType
+
+import cv2
+import numpy as np
+
+from gait.io.video import FAST, Image, VideoWriter
+
+_BYTES = 5_000_000  # of a film in a page, at most about
+_PIXELS = 1280 * 720  # of its pictures, at most
+_BITS = 0.07  # per pixel and frame that x264 needs
+_LEAST = 320  # pixels across, however long the film
+_CRF = 24
+_SHOWN = 6  # pictures for paper
+
+
+@dataclass(frozen=True)
+class PageFilm:
+    """The film of a page.
+
+    Attributes
+    ----------
+    data : str
+        The file, base64.
+    size : (int, int)
+        Pixels.
+    captured : (int, int)
+        Pixels of the film that was tracked.
+    frames : range
+        Numbers of its frames in that film.
+    rate : float
+        Frames per second.
+    pictures : list of (int, image)
+        A few frames by their numbers.
+    """
+
+    data: str
+    size: tuple[int, int]
+    captured: tuple[int, int]
+    frames: range
+    rate: float
+    pictures: list[tuple[int, Image]]
+
+    def note(self) -> str:
+        """Say whether the film was scaled down."""
+        (w, h), (a, b) = self.captured, self.size
+        megabytes = f"{3 * len(self.data) / 4e6:.1f} MB"
+        if (a, b) == (w + w % 2, h + h % 2):
+            return f"The film in this page is as large as the one tracked, {w} × {h} pixels ({megabytes})."
+        return f"The film in this page was scaled down from {w} × {h} to {a} × {b} pixels ({megabytes})."
+
+
+class Films:
+    """Writes drawn frames into the overlay video and the film of a page, whichever are wanted.
+
+    Use as a context manager; `page` is the page's film after it ended without error.
+
+    Parameters
+    ----------
+    overlay : str or None
+        The overlay video.
+    frames : range or None
+        Numbers of the frames that the page's film will have; None for no such film.
+    size : (int, int)
+        Pixels of the frames.
+    rate : float
+        Frames per second.
+    """
+
+    def __init__(self, overlay: str | None, frames: range | None, size: tuple[int, int], rate: float) -> None:
+        self._overlay, self._frames, self._size, self._rate = overlay, frames, size, rate
+        self._writers: list[VideoWriter] = []
+        self._stack = ExitStack()
+        self._pictures: list[tuple[int, Image]] = []
+        self.page: PageFilm | None = None
+
+    @property
+    def wanted(self) -> bool:
+        """Whether any film is to be written."""
+        return self._overlay is not None or self._frames is not None
+
+    def __enter__(self) -> Films:
+        if self._overlay is not None:
+            writer = VideoWriter(self._overlay, self._rate, preset=FAST)
+            self._writers.append(self._stack.enter_context(writer))
+        if self._frames is not None:
+            self._folder = Path(self._stack.enter_context(tempfile.TemporaryDirectory()))
+            self._seen: list[int] = []
+            self._small, bits = page_size(self._size, len(self._frames), self._rate)
+            self._inside = VideoWriter(
+                self._folder / "film.mp4", self._rate, crf=_CRF, preset=FAST, bits_per_second=bits, keep=False
+            )
+            self._inside.__enter__()
+            shown = np.linspace(0, len(self._frames) - 1, min(_SHOWN, len(self._frames))).round()
+            self._shown = {self._frames[int(k)] for k in shown}
+        return self
+
+    def write(self, picture: Image, number: int) -> None:
+        """Append a drawn frame with its number."""
+        for writer in self._writers:
+            writer.write(picture)
+        if self._frames is None:
+            return
+        small = picture
+        if self._small != self._size:
+            small = np.asarray(cv2.resize(picture, self._small, interpolation=cv2.INTER_AREA), np.uint8)
+        self._inside.write(small)
+        self._seen.append(number)
+        if number in self._shown:
+            self._pictures.append((number, small))
+
+    def __exit__(
+        self, kind: type[BaseException] | None, exc: BaseException | None, trace: TracebackType | None
+    ) -> bool | None:
+        if self._frames is not None:
+            self._inside.__exit__(kind, exc, trace)
+            if kind is None and self._seen:
+                data = base64.b64encode((self._folder / "film.mp4").read_bytes()).decode("ascii")
+                frames = range(self._seen[0], self._seen[0] + len(self._seen))
+                size = self._small[0] + self._small[0] % 2, self._small[1] + self._small[1] % 2
+                self.page = PageFilm(data, size, self._size, frames, self._rate, self._pictures)
+        return self._stack.__exit__(kind, exc, trace)
+
+
+def page_size(size: tuple[int, int], frames: int, rate: float) -> tuple[tuple[int, int], int]:
+    """Size in pixels of a page's film, and the bits per second that keep it to some megabytes."""
+    width, height = size
+    bits = 8 * _BYTES * rate / max(frames, 1)
+    pixels = min(bits / (rate * _BITS), _PIXELS)
+    scale = min(1.0, max(float(np.sqrt(pixels / (width * height))), _LEAST / max(width, height)))
+    if scale == 1.0:
+        return size, round(bits)
+    return (2 * round(scale * width / 2), 2 * round(scale * height / 2)), round(bits)
+
+
+def runs(status: list[str]) -> Iterator[tuple[str, int, int]]:
+    """Yield runs of equal statuses: word, first index, index after the last."""
+    edges = [0, *(k for k in range(1, len(status)) if status[k] != status[k - 1])]
+    for first, after in zip(edges, [*edges[1:], len(status)], strict=True):
+        yield status[first], first, after

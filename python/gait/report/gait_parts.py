@@ -1,0 +1,213 @@
+"""Parts of a report about how a person walks: parameters, footfalls, strides, angles over the norm."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import Any
+
+import numpy as np
+from matplotlib.axes import Axes
+
+from gait.io.track_file import Track
+from gait.motion.footfalls import SIDES, contacts, stride_time
+from gait.motion.parameters import PERCENT, QUANTITIES, AngleCycle, Parameters
+from gait.report import terms
+from gait.report.colours import DARK, GREY, ON_PAPER, STATUS_TINTS
+from gait.report.film import runs
+from gait.report.page import Page
+from gait.report.plots import Painter, for_screen_and_telephone, panels, time_plot
+
+_GROUPS = {
+    "Pelvis and trunk": ("root_pitch", "root_roll", "root_yaw", "torso_y", "torso_x", "torso_z"),
+    "Legs": ("hip_flexion", "knee_flexion", "ankle_flexion", "hip_abduction", "hip_rotation"),
+    "Arms": ("shoulder_flexion", "elbow_flexion", "shoulder_abduction", "shoulder_rotation"),
+    "Head": ("neck_y", "neck_x", "neck_z"),
+}
+_BY_STRIDE = (
+    *("stride_time_s", "stride_length_m", "speed_m_s", "step_length_m", "step_width_m", "stance_percent"),
+)
+
+
+def add_gait(page: Page, track: Track, parameters: Parameters, cycles: Mapping[str, AngleCycle]) -> None:
+    """Add all parts that a track with whole strides has."""
+    tips = {QUANTITIES[name]: words for name, words in terms.QUANTITIES.items()} | terms.COLUMNS
+    page.grid("Gait", HEAD, parameter_rows(parameters), tips)
+    if parameters.all_unsure:
+        page.words(
+            "In every stride there are frames in which left and right are unsure. The values are means over "
+            "these strides all the same: right and left may be swapped.",
+            "warning",
+        )
+    page.words(
+        "Mean over the strides without unsure frames ± its standard deviation; in brackets the "
+        f"standard deviation between strides. Source of the uncertainty: {parameters.source}.",
+        "faint",
+    )
+    page.figure("Footfalls", footfall_plot(track, parameters))
+    page.words(
+        "Bars: the foot is on the floor. Ticks: heel strikes (above) and toe-offs (below), two sd to each "
+        "side. Tinted: left and right unsure (yellow) or lost (red).",
+        "faint",
+    )
+    page.figure("Stride by stride", stride_plot(track, parameters))
+    page.words("Bars span two standard deviations each way. Hollow: strides with unsure frames.", "faint")
+    add_angles(page, cycles)
+
+
+def add_angles(page: Page, cycles: Mapping[str, AngleCycle]) -> None:
+    """Add the angles over the stride and their departure from the norm."""
+    if not cycles:
+        return
+    page.heading("Angles over the stride")
+    page.html(_KEY)
+    for heading, names in _GROUPS.items():
+        known = [n for n in names if {n, f"r_{n}", f"l_{n}"} & cycles.keys()]
+        if known:
+            drawing = panels([angle_painter(name, cycles) for name in known], f"Angles: {heading.lower()}")
+            page.html(f"<h3>{heading}</h3>{drawing}")
+            page.html(_meaning(known))
+    page.figure("Departure from the norm", departure_plot(cycles))
+    page.words("Blue: less, red: more than the mean of the norm, in its standard deviations.", "faint")
+
+
+_KEY = (
+    '<ul class="key"><li><i style="background: var(--right)"></i>right</li>'
+    '<li><i style="background: var(--left)"></i>left</li>'
+    '<li><i style="background: var(--middle)"></i>middle</li>'
+    '<li><i style="background: var(--line)"></i>norm, two standard deviations</li>'
+    "<li>thin: single strides; band: two standard deviations of the mean</li></ul>"
+)
+
+
+def _meaning(names: list[str]) -> str:
+    rows = [terms.angle(name) for name in names]
+    items = "".join(f"<dt>{name} ({positive})</dt><dd>{words}</dd>" for name, positive, words in rows)
+    return f'<details class="terms"><summary>What is measured</summary><dl>{items}</dl></details>'
+
+
+def footfall_plot(track: Track, parameters: Parameters) -> str:
+    """Draw the contacts of both feet over time; ticks: strikes and toe-offs with two standard deviations."""
+    stride = stride_time(parameters.events)
+
+    def paint(axes: Axes) -> None:
+        tint(axes, track)
+        for row, side in enumerate(SIDES):
+            foot = contacts(track, parameters.events, side, stride)
+            begin, ends = foot.strike, np.where(np.isfinite(foot.off), foot.off, track.time[-1])
+            first = parameters.events.off[side][:1]
+            if len(first) and (not len(begin) or first[0] < begin[0]):  # on the ground from the start
+                begin, ends = np.append(track.time[0], begin), np.append(first, ends)
+            axes.barh(np.full(len(ends), row), ends - begin, left=begin, height=0.5, color=ON_PAPER[side])
+            for times, sds, bottom in (
+                (parameters.events.strike[side], parameters.event_sd.strike[side], 0.32),
+                (parameters.events.off[side], parameters.event_sd.off[side], -0.32),
+            ):
+                at = np.full(len(times), row + bottom)
+                axes.errorbar(times, at, xerr=2 * sds, fmt="|", color=DARK, capsize=2, lw=1)
+        axes.set(yticks=[0, 1], yticklabels=SIDES, ylim=(-0.6, 1.6))
+        axes.grid(axis="y", visible=False)
+
+    return time_plot(paint, time_span(track), 1.9, "Feet on the floor")
+
+
+def stride_plot(track: Track, parameters: Parameters) -> str:
+    """Draw quantities stride by stride with two standard deviations; uncertain strides are hollow."""
+
+    def painter(name: str) -> Painter:
+        def paint(axes: Axes) -> None:
+            for side in SIDES:
+                s = parameters.strides[side]
+                middle = (s.start + s.end) / 2
+                seen = np.isfinite(s.values[name])
+                for sure in (True, False):
+                    use = seen & (s.sure == sure)
+                    axes.errorbar(
+                        middle[use], s.values[name][use], yerr=2 * s.sd[name][use],
+                        fmt="o" if side == "right" else "s", ms=4, lw=1, color=ON_PAPER[side],
+                        mfc=ON_PAPER[side] if sure else "none",
+                    )  # fmt: skip
+            axes.set(title=QUANTITIES[name], xlabel="time, s")
+            axes.set_xlim(*time_span(track))
+            axes.margins(y=0.25)
+
+        return paint
+
+    return panels([painter(name) for name in _BY_STRIDE], "Quantities stride by stride")
+
+
+def angle_painter(name: str, cycles: Mapping[str, AngleCycle]) -> Painter:
+    """Paint an angle, of both sides where it has two, over the stride, with bands over the norm in grey."""
+
+    def paint(axes: Axes) -> None:
+        first = cycles.get(f"r_{name}") or cycles.get(f"l_{name}") or cycles[name]
+        low, high = first.norm_mean - 2 * first.norm_sd, first.norm_mean + 2 * first.norm_sd
+        axes.fill_between(PERCENT, low, high, color=GREY, alpha=0.25, lw=0)
+        for side, key in (("right", f"r_{name}"), ("left", f"l_{name}"), ("middle", name)):
+            if key not in cycles:
+                continue
+            c, colour = cycles[key], ON_PAPER[side]
+            axes.plot(PERCENT, c.strides.T, color=colour, lw=0.5, alpha=0.5)
+            axes.fill_between(PERCENT, c.mean - 2 * c.sd, c.mean + 2 * c.sd, color=colour, alpha=0.25, lw=0)
+            axes.plot(PERCENT, c.mean, color=colour, ls="--" if side == "right" else "-")
+        words, positive, _ = terms.angle(name)
+        axes.set(title=f"{words}, ° ({positive})" if positive else f"{words}, °", xlim=(0, 100))
+        axes.set_xlabel("% of the stride")
+
+    return paint
+
+
+def departure_plot(cycles: Mapping[str, AngleCycle]) -> str:
+    """Draw the departure of every angle from the norm over the cycle."""
+    order = [n for group in _GROUPS.values() for name in group for n in (f"r_{name}", f"l_{name}", name)]
+    names = [name for name in order if name in cycles] + [name for name in cycles if name not in order]
+
+    def paint(axes: Axes) -> None:
+        values = np.array([cycles[name].z for name in names])
+        edges = np.arange(len(names) + 1) - 0.5
+        percent = np.linspace(0, 100, len(PERCENT) + 1)
+        image = axes.pcolormesh(percent, edges, values, cmap="RdBu_r", vmin=-3, vmax=3, rasterized=True)
+        axes.invert_yaxis()
+        axes.set(yticks=range(len(names)), xlabel="% of the stride")
+        axes.set_yticklabels([terms.sided(name) for name in names], fontsize=8)
+        axes.grid(visible=False)
+        axes.figure.colorbar(image, ax=axes, label="sd of the norm", extend="both")
+
+    return for_screen_and_telephone(paint, 0.8 + 0.19 * len(names), "Departure of every angle from the norm")
+
+
+def time_span(track: Track) -> tuple[float, float]:
+    """First and last second of a track."""
+    return float(track.time[0]), float(track.time[-1])
+
+
+def tint(axes: Axes, track: Track) -> None:
+    """Tint the background of frames that are lost or ambiguous, run by run."""
+    half = 0.5 * float(np.median(np.diff(track.time))) if len(track.time) > 1 else 0.0
+    for status, first, after in runs(track.status):
+        if status in ("lost", "ambiguous"):
+            span = track.time[first] - half, track.time[after - 1] + half
+            axes.axvspan(*span, color=STATUS_TINTS[status], alpha=0.5, lw=0)
+
+
+HEAD = ("", "right", "left", "both", "asymmetry, %")
+"""Columns of `parameter_rows`."""
+
+
+def parameter_rows(parameters: Parameters) -> list[list[str]]:
+    """Return the cells of the table of parameters, under `HEAD`."""
+    rows = []
+    for name, row in parameters.summary().items():
+        cells = [_cell(row[side], name) for side in ("right", "left", "both")]
+        rows.append([QUANTITIES[name], *cells, _cell(row.get("asymmetry_percent"), "percent")])
+    return rows
+
+
+def _cell(value: dict[str, Any] | None, name: str) -> str:
+    if value is None:
+        return ""
+    digits = 1 if name.endswith(("percent", "spm")) else 3 if name.endswith("_s") else 2
+    text = f"{value['mean']:.{digits}f}"
+    if np.isfinite(value["sd"]):
+        text += f"\N{NO-BREAK SPACE}±\N{NO-BREAK SPACE}{value['sd']:.{digits}f}"
+    between = value.get("between", np.nan)
+    return text + (f" ({between:.{digits}f})" if np.isfinite(between) else "")

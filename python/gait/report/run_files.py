@@ -1,0 +1,204 @@
+"""The page of a run from its files: the track, the film, and what else there is of camera and truth."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+
+from gait.bindings.abi import Flag, TrackStatus
+from gait.bindings.estimate import Estimate
+from gait.bindings.model import Model, read_cyclic
+from gait.bindings.state import State
+from gait.body.model_curves import ModelCurves
+from gait.body.skeleton import JOINTS
+from gait.camera.camera import Camera
+from gait.errors import UserError
+from gait.io.files import replacing
+from gait.io.track_file import Track, read_track
+from gait.io.video import Video
+from gait.motion.evaluate import Measures
+from gait.motion.footfalls import Draws
+from gait.motion.parameters import measured
+from gait.motion.verdict import Verdict, verdict_of
+from gait.progress import note, progress
+from gait.report.camera_words import camera_facts
+from gait.report.comparison import compare
+from gait.report.drawing import LEGEND_SECONDS, Overlay
+from gait.report.film import Films, PageFilm
+from gait.report.run_page import Run, cycles_of, run_page
+
+
+@dataclass(frozen=True)
+class RunFiles:
+    """What to report on, and what to write.
+
+    Attributes
+    ----------
+    track, video, page : str
+        The track, the clip that was tracked, the HTML file to write.
+    camera : str, optional
+        The clip's camera; ``camera.json`` beside the track or the clip if left out.
+    overlay : str, optional
+        Video to write.
+    truth, draws : str, optional
+        True motion; motions of ``gait track --smooth --draws``.
+    model : str, optional
+        The model of the package if left out.
+    quiet : bool
+        Print no notes and no progress.
+    """
+
+    track: str
+    video: str
+    page: str
+    camera: str | None = None
+    overlay: str | None = None
+    truth: str | None = None
+    draws: str | None = None
+    model: str | None = None
+    quiet: bool = False
+
+
+def write_report(
+    files: RunFiles,
+    estimates: Mapping[int, Estimate] | None = None,
+    facts: Mapping[str, dict[str, str]] | None = None,
+    drawings: Mapping[str, str] | None = None,
+) -> tuple[Verdict, Measures | None]:
+    """Write the page and the overlay video; return the verdict, and the errors if there is a truth.
+
+    Parameters
+    ----------
+    files : RunFiles
+    estimates : mapping of int to Estimate, optional
+        By frame, if more is known of them than the track has.
+    facts, drawings : mapping, optional
+        Further tables and drawings for the page, by heading.
+
+    Raises
+    ------
+    UserError
+        If a file cannot be read or written, or the track has frames that the clip does not have.
+    """
+    video, model, track = Video(files.video), Model(files.model), read_track(files.track)
+    if track.frame[-1] >= video.count:
+        raise UserError(
+            f"{files.track}: has frame {track.frame[-1]}, {files.video} ends at {video.count - 1}; give the "
+            "film that was tracked"
+        )
+    path = files.camera or _camera_beside(files)
+    camera = None if path is None else Camera.read(path, video.size)
+    if path is None:
+        note("no camera is known, so the film is shown without the figure; give --camera", files.quiet)
+    elif files.camera is None:
+        note(f"camera: {path}, found beside it; --camera gives another", files.quiet)
+    draws = Draws.read(files.draws, track) if files.draws else None
+    errors = compare(track, files.truth, files.model, camera) if files.truth else None
+    parameters = measured(track, draws)
+    overlay = None if camera is None else Overlay(model, camera)
+    film = _draw(files, video, estimates or estimates_of(track, model), overlay)
+    run = Run(
+        title=video.path.name,
+        track=track,
+        verdict=verdict_of(track, video.count, parameters=parameters),
+        parameters=parameters,
+        cycles=cycles_of(track, parameters, ModelCurves(read_cyclic(files.model)), draws),
+        film=film,
+        times=video.times[film.frames.start : film.frames.stop],
+        camera=camera,
+        errors=errors,
+        facts={**(facts or {}), "Camera and files": _facts(files, video, path, camera)},
+        drawings=dict(drawings or {}),
+    )
+    with replacing(files.page) as temporary:
+        temporary.write_text(run_page(run), encoding="utf-8")
+    return run.verdict, None if errors is None else errors.measures
+
+
+def estimates_of(track: Track, model: Model) -> dict[int, Estimate]:
+    """Estimates as far as a track has them, by frame, to be drawn.
+
+    Posture and proportions of the body are not in the file: they are those of the model.
+    """
+    numbers, components = track.numbers, model.info.components
+    joints = np.stack([track.places[name] for name in JOINTS], axis=1)
+    sd = np.stack([track.sd[name] for name in JOINTS], axis=1)
+    order = [JOINTS.index(name) for name in model.joint_names]
+
+    def column(name: str, k: int) -> float:
+        return float(numbers[name][k]) if name in numbers else 0.0
+
+    found = {}
+    for k, number in enumerate(track.frame.tolist()):
+        mean = State(
+            phase=float(track.phase[k]),
+            stride_hz=column("stride_hz", k),
+            stature=column("stature_m", k),
+            heading=column("heading_rad", k),
+            pelvis=track.places["pelvis"][k],
+            coef=np.array([column(f"c_{c + 1}", k) for c in range(components)]),
+        )
+        found[number] = Estimate(
+            utime=round(1e6 * float(track.time[k])),
+            frame=k,
+            status=TrackStatus[track.status[k].upper()],
+            flags=Flag(0),
+            log_evidence=column("log_evidence", k),
+            ess=column("ess", k),
+            phase_r=1.0,
+            hypothesis_weight=1.0,
+            speed=column("speed_m_s", k),
+            mean=mean,
+            sd=State(phase=column("phase_sd", k)),
+            best=mean,
+            joints=joints[k, order],
+            joint_sd=sd[k, order],
+            angles=np.zeros(0),
+            joint_names=model.joint_names,
+        )
+    return found
+
+
+def _draw(
+    files: RunFiles, video: Video, estimates: Mapping[int, Estimate], overlay: Overlay | None
+) -> PageFilm:
+    """Draw every frame of the clip into the films."""
+    frames = range(video.count)
+    with (
+        Films(files.overlay, frames, video.size, video.fps) as films,
+        progress("film", video.count, files.quiet) as update,
+    ):
+        for frame in video.frames():
+            estimate, legend = estimates.get(frame.number), frame.time < LEGEND_SECONDS
+            picture = frame.image
+            if overlay is not None and estimate is None:
+                picture = overlay.draw_absent(picture, frame.time, frame.number, legend=legend)
+            elif overlay is not None and estimate is not None:
+                picture = overlay.draw(picture, estimate, frame.number, legend=legend)
+            films.write(picture, frame.number)
+            update(frame.number)
+    if films.page is None:
+        raise video.no_frame(0)
+    return films.page
+
+
+def _camera_beside(files: RunFiles) -> str | None:
+    """Camera file beside the track or the clip."""
+    beside = [Path(name).with_name("camera.json") for name in (files.track, files.video)]
+    return next((str(path) for path in beside if path.is_file()), None)
+
+
+def _facts(files: RunFiles, video: Video, path: str | None, camera: Camera | None) -> dict[str, str]:
+    rows = {
+        "track": files.track,
+        "film": f"{files.video}, {video.width} × {video.height} px, {video.count} frames, "
+        f"{video.fps:.4g} per second",
+        "camera": "not given" if path is None else path,
+    }
+    if camera is not None:
+        rows |= camera_facts(camera)
+    named = {"overlay": files.overlay, "truth": files.truth, "draws": files.draws, "model": files.model}
+    return rows | {what: name for what, name in named.items() if name}

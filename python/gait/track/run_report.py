@@ -1,0 +1,82 @@
+"""What `gait track` reports at its end: the verdict, what was used, and the page of the run."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Any
+
+from gait.bindings.model import read_cyclic
+from gait.body.model_curves import ModelCurves
+from gait.io.files import replacing
+from gait.io.track_file import read_track
+from gait.motion.footfalls import Draws
+from gait.motion.parameters import measured
+from gait.motion.verdict import verdict_of
+from gait.report.film import PageFilm
+from gait.track.options import ClipOptions
+from gait.track.scene import Scene
+from gait.track.setup import beside, files, settings
+
+
+class RunReport:
+    """Report of a tracked clip, from the track that was written.
+
+    Parameters
+    ----------
+    options, scene
+    reasons : mapping of int to str
+        Why frames are ambiguous, by their numbers.
+    used : mapping of str to str
+        Start, background, camera and joints that were used, in words.
+    particles : int
+    """
+
+    def __init__(
+        self,
+        options: ClipOptions,
+        scene: Scene,
+        reasons: Mapping[int, str],
+        used: Mapping[str, str],
+        particles: int,
+    ) -> None:
+        self._options, self._scene, self._used, self._particles = options, scene, dict(used), particles
+        self._track = read_track(options.output)
+        self._parameters = measured(self._track)
+        self._verdict = verdict_of(self._track, len(scene.frames), reasons, self._parameters)
+
+    def figures(self) -> dict[str, Any]:
+        """Return the verdict in words, a warning or null, what was used, where files went, and remarks."""
+        return {
+            "verdict": self._verdict.sentence(),
+            "statuses": self._verdict.statuses(),
+            "warning": self._verdict.warning(),
+            "used": self._used,
+            "files": files(self._options),
+            "notes": beside(self._options),
+        }
+
+    def write(self, path: str, film: PageFilm) -> None:
+        """Write the page."""
+        from gait.report.run_page import Run, cycles_of, run_page  # Matplotlib is slow to import
+
+        options, scene, track = self._options, self._scene, self._track
+        draws = Draws.read(options.draws, track) if options.draws else None
+        curves = ModelCurves(read_cyclic(options.model))
+        run = Run(
+            title=Path(options.video).name,
+            track=track,
+            verdict=self._verdict,
+            parameters=self._parameters,
+            cycles=cycles_of(track, self._parameters, curves, draws),
+            film=film,
+            times=scene.video.times[film.frames.start : film.frames.stop],
+            camera=scene.reference_camera,
+            notes=beside(options),
+            facts={
+                "Camera and settings": self._used | settings(options, scene, self._particles),
+                "Files": files(options),
+            },
+        )
+        with replacing(path) as temporary:
+            temporary.write_text(run_page(run), encoding="utf-8")

@@ -1,0 +1,96 @@
+"""What a clip was tracked with and where the results went, in words: start, background, camera, files."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+
+from gait.bindings.abi import Mode
+from gait.bindings.initial import Start
+from gait.io.video import SAMPLES
+from gait.report.camera_words import camera_facts
+from gait.track.options import ClipOptions
+from gait.track.scene import Scene
+
+_BESIDE = {"init": "init.json", "camera": "camera.json"}
+
+
+def setup(options: ClipOptions, scene: Scene, start: Start, used: bool) -> dict[str, str]:
+    """Describe what was used, by name, each in words; `used`: whether the background was."""
+    return {
+        "start": _start(options, start),
+        "background": _background(options, used),
+        "camera": _camera(options, scene),
+        "joints found": _keypoints(options, scene),
+    }
+
+
+def settings(options: ClipOptions, scene: Scene, particles: int) -> dict[str, str]:
+    """Further settings in words, by name."""
+    return camera_facts(scene.reference_camera) | {
+        "picture": f"{scene.video.width} × {scene.video.height} px, {scene.video.fps:.4g} frames per second",
+        "stature given": "not given" if options.height is None else f"{options.height:.2f} m",
+        "model": "the package's" if options.model is None else options.model,
+        "settings": "of the paper" if options.mode == Mode.PAPER else "default",
+        "estimates": "from the whole film (smoothed)" if options.smooth else "from the frames up to each",
+        "particles": f"{particles}, random numbers from seed {options.seed}",
+    }
+
+
+def files(options: ClipOptions) -> dict[str, str]:
+    """Name the outputs by what they hold."""
+    named = {
+        "track": options.output,
+        "camera": options.camera_out,
+        "camera of each frame": options.cameras_out,
+        "overlay": options.overlay,
+        "draws": options.draws,
+        "joints for OpenSim": options.trc,
+        "report": options.report,
+    }
+    return {what: path for what, path in named.items() if path}
+
+
+def beside(options: ClipOptions) -> list[str]:
+    """Report files beside the film that might have been meant to be used."""
+    given = {"init": options.init != "auto", "camera": options.camera is not None}
+    found = {option: Path(options.video).with_name(name) for option, name in _BESIDE.items()}
+    return [
+        f"{path.name} lies beside the film and was not used; to use it: --{option} {path}"
+        for option, path in found.items()
+        if not given[option] and path.is_file()
+    ]
+
+
+def _start(options: ClipOptions, start: Start) -> str:
+    if options.init != "auto":
+        return f"{options.init}, frame {start.frame}"
+    turn, sd = np.degrees(start.mean.heading), np.degrees(start.sd.heading)
+    return (
+        f"found at frame {start.frame} from {start.source}: x {start.mean.pelvis[0]:.2f} y "
+        f"{start.mean.pelvis[1]:.2f} m, stature {start.mean.stature:.2f} m, heading {turn:.0f} ± {sd:.0f}°"
+    )
+
+
+def _background(options: ClipOptions, used: bool) -> str:
+    if options.background == "none":
+        return "none, as asked"
+    if options.background != "auto":
+        return options.background
+    median = f"the median of {SAMPLES} frames of the film"
+    return median if used else f"none: {median} shows the person"
+
+
+def _camera(options: ClipOptions, scene: Scene) -> str:
+    if scene.calibration is None:
+        return str(options.camera)
+    return f"found from the walk and the stature of {options.height:.2f} m"
+
+
+def _keypoints(options: ClipOptions, scene: Scene) -> str:
+    if options.keypoints:
+        return f"from {options.keypoints}"
+    if not scene.people:
+        return "none: without the detector"
+    return f"by the detector, network {options.network}"
