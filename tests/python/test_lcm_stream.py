@@ -1,6 +1,7 @@
 """The Python side: links, pacing, capture, recorder and report."""
 
 import json
+import re
 import threading
 
 import cv2
@@ -309,8 +310,8 @@ def test_a_report_stands_alone(folder, recorded, tmp_path):
     done = rig.gait("report", folder / "e.log", *files, "-o", page, "--overlay", film, "--replayed")
     assert done.returncode == 0, done.stderr
     text = page.read_text()
-    assert recorded["digest"] in text and text.count("<svg") == 4 and text.count("data:image/jpeg") == 6
-    assert "http://" not in text.replace("http://www.w3.org", "") and "<script" not in text
+    assert recorded["digest"] in text and "<h2>Times</h2>" in text and text.count("data:image/jpeg") == 6
+    assert not re.search(r'(src|href)="(?!data:|#)', text)
     assert "latency" not in text
     capture = cv2.VideoCapture(str(film))
-    assert capture.get(cv2.CAP_PROP_FRAME_COUNT) == COUNT - 2
+    assert capture.get(cv2.CAP_PROP_FRAME_COUNT) == COUNT  # frames without an estimate too

@@ -209,6 +209,8 @@ def test_a_figure_of_another_size_is_not_near(estimate):
 class Script:
     """A tracker that stays on the person, or beside them from a frame on, until it is started anew."""
 
+    step_seconds = 0.0
+
     def __init__(self, estimate, leaves, starts):
         self.estimate, self.leaves, self.starts = estimate, leaves, starts
         self.config = TrackerConfig.default()

@@ -205,7 +205,7 @@ def parameter_rows(parameters: Parameters) -> list[list[str]]:
 def _cell(value: dict[str, Any] | None, name: str) -> str:
     if value is None:
         return ""
-    digits = 1 if name.endswith(("percent", "spm")) else 3 if name.endswith("_s") else 2
+    digits = 1 if name.endswith(("percent", "spm")) else 3 if name.endswith("time_s") else 2
     text = f"{value['mean']:.{digits}f}"
     if np.isfinite(value["sd"]):
         text += f"\N{NO-BREAK SPACE}±\N{NO-BREAK SPACE}{value['sd']:.{digits}f}"

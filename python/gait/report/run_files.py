@@ -91,12 +91,12 @@ def write_report(
         )
     path = files.camera or _camera_beside(files)
     camera = None if path is None else Camera.read(path, video.size)
+    draws = Draws.read(files.draws, track) if files.draws else None
+    errors = compare(track, files.truth, files.model, camera) if files.truth else None
     if path is None:
         note("no camera is known, so the film is shown without the figure; give --camera", files.quiet)
     elif files.camera is None:
         note(f"camera: {path}, found beside it; --camera gives another", files.quiet)
-    draws = Draws.read(files.draws, track) if files.draws else None
-    errors = compare(track, files.truth, files.model, camera) if files.truth else None
     parameters = measured(track, draws)
     overlay = None if camera is None else Overlay(model, camera)
     film = _draw(files, video, estimates or estimates_of(track, model), overlay)

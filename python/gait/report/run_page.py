@@ -153,7 +153,8 @@ def _add_film(page: Page, run: Run, film: PageFilm) -> None:
 _LEGEND = (
     "In the film: the dial is the phase of the stride, with the right heel strike at the top and a coloured "
     "arc where the phase is with 95 %; ellipses hold wrists and ankles with 90 %; left is blue, right "
-    "orange; the figure is faded where the person was lost. Drag the figure to turn it; space plays, arrows step."
+    "orange; the figure is faded where the person was lost. Drag the figure to turn it; space plays, "
+    "arrow keys step."
 )
 
 

@@ -1,0 +1,217 @@
+"""The page of a run: what it states, and that it opens, plays and fits in a real Chromium."""
+
+import csv
+import json
+import re
+from dataclasses import replace
+
+import browser
+import numpy as np
+import pytest
+from drawn_person import FPS, camera, clip, write
+from walking_track import walking_track
+
+from gait import Estimate, Flag, Frame, Model, State, TrackStatus, Video
+from gait.bindings.model import read_blob
+from gait.cli import main
+from gait.io import blob
+from gait.io.track_file import TrackWriter, read_track
+from gait.motion.verdict import LEGS, verdict_of
+from gait.report.film import page_size
+
+MODEL = Model()
+FRAMES, FIRST = 90, 6  # of the film; the first with an estimate
+STATUS = {
+    **dict.fromkeys(range(6, 9), TrackStatus.INIT),
+    **dict.fromkeys(range(40, 44), TrackStatus.AMBIGUOUS),
+    **dict.fromkeys(range(86, 90), TrackStatus.LOST),
+}
+
+
+def estimate(number, state):
+    joints, angles = MODEL.pose(state)
+    return Estimate(
+        utime=round(1e6 * number / FPS), frame=number, status=STATUS.get(number, TrackStatus.TRACKING),
+        flags=Flag(0), log_evidence=0.0, ess=1.0, phase_r=1.0, hypothesis_weight=1.0, speed=1.2, mean=state,
+        sd=State(phase=0.01, stride_hz=0.02, coef=np.full(5, 0.3)), best=state, joints=joints + 0.01,
+        joint_sd=np.full(joints.shape, 0.02), angles=angles, joint_names=MODEL.joint_names,
+    )  # fmt: skip
+
+
+@pytest.fixture(scope="module")
+def folder(tmp_path_factory):
+    """A film of three seconds, its camera, its truth, and a track with frames of every status."""
+    here = tmp_path_factory.mktemp("run")
+    pictures, states = clip(MODEL, blob.decode(read_blob(None)), FRAMES, start=(-1.5, 0.0))
+    write(here / "walk.mp4", pictures)
+    (here / "camera.json").write_text(json.dumps(camera().to_dict()))
+    with TrackWriter(here / "run.csv", 5, MODEL.joint_names, MODEL.angle_names) as rows:
+        for number in range(FIRST, FRAMES):
+            rows.write(Frame(number, number / FPS, None), estimate(number, states[number]))
+    with open(here / "truth.csv", "w", newline="") as file:
+        rows = csv.writer(file)
+        rows.writerow(["frame", "time", *(f"{j}_{a}" for j in MODEL.joint_names for a in "xyz")])
+        for i, state in enumerate(states):
+            rows.writerow([i, i / FPS, *MODEL.pose(state)[0].ravel()])
+    return here
+
+
+def report(folder, *options, out="run.html"):
+    words = ["report", folder / "run.csv", "--video", folder / "walk.mp4", "-o", folder / out, "--quiet"]
+    assert main([str(word) for word in (*words, *options)]) == 0
+    return (folder / out).read_text(encoding="utf-8")
+
+
+def test_the_verdict_counts_what_is_tracked_unsure_and_missing(folder):
+    track = read_track(folder / "run.csv")
+    found = verdict_of(track, FRAMES, {40: "legs cross", 41: "legs cross"})
+    assert found.counts == {"init": 3, "tracking": 73, "ambiguous": 4, "lost": 4}
+    assert re.fullmatch(
+        r"Tracked 77 of 90 frames, [12] whole strides?, 1\.\d\d m/s; left and right unsure in 4 frames: legs "
+        rf"cross \(2\), {LEGS} \(2\); lost in 4 frames; still settling in 3 frames; not found in 6 frames",
+        found.sentence(),
+    )
+    assert found.statuses() == (
+        "84 frames: 3 init, 73 tracking, 4 ambiguous, 4 lost; 6 more without an estimate"
+    )
+    assert found.warning() is None
+    assert "unsure in 4 frames;" in verdict_of(track).sentence()  # the file does not tell why
+
+
+def test_a_track_without_any_sure_frame_is_warned_of():
+    track = walking_track()
+    track.status[:] = ["ambiguous"] * len(track.status)
+    assert "do not rely on this track" in verdict_of(track).warning()
+    track.status[:] = ["lost"] * len(track.status)
+    assert verdict_of(track).sentence() == ("Tracked 0 of 150 frames, 3 whole strides; lost in 150 frames")
+
+
+def test_walking_in_place_is_stated():
+    track = walking_track()
+    numbers = track.numbers | {"speed_m_s": np.full(150, 1.2)}
+    still = {name: place - track.places["pelvis"] * (1, 1, 0) for name, place in track.places.items()}
+    assert "1.20 m/s in place" in verdict_of(replace(track, places=still, numbers=numbers)).sentence()
+
+
+@pytest.mark.parametrize(
+    ("size", "frames", "least", "most"),
+    [((640, 480), 120, 640, 640), ((3840, 2160), 120, 1280, 1280), ((1280, 720), 20000, 320, 320),
+     ((1080, 1920), 900, 400, 720)],
+)  # fmt: skip
+def test_the_film_in_a_page_is_some_megabytes(size, frames, least, most):
+    (width, height), bits = page_size(size, frames, 30.0)
+    assert least <= width <= most and width / height == pytest.approx(size[0] / size[1], rel=0.02)
+    assert width % 2 == height % 2 == 0
+    assert bits * frames / 30 / 8 == pytest.approx(5e6, rel=0.01)
+
+
+def test_the_page_states_the_verdict_first_and_no_raw_names(folder, capsys):
+    page = report(folder, "--truth", folder / "truth.csv", "--overlay", folder / "o.mp4")
+    printed = capsys.readouterr().out
+    assert f'<p class="lead">{printed.splitlines()[0]}</p>' in page
+    body = re.sub(r"<script.*?</script>|<style.*?</style>|<svg.*?</svg>", "", page, flags=re.S).replace(
+        str(folder), ""
+    )
+    for heading in ("Gait", "Footfalls", "Angles over the stride", "Way over the floor", "Uncertainty",
+                    "Error against the truth", "Camera and files", "Conventions"):  # fmt: skip
+        assert f"<h2>{heading}</h2>" in body
+    assert not re.search(r"\b(abs|root\w*|proc|static|free|\w+_mm|torso_\w|\w+_deg)\b", body)
+    assert 'abbr title="Mean distance of 15 joints' in body
+    assert "as large as the one tracked, 320 × 240 pixels" in body
+    film = Video(folder / "o.mp4")
+    assert (film.size, film.count) == ((320, 240), FRAMES)  # frames without an estimate too
+
+
+def test_without_a_camera_the_film_is_shown_as_it_is(folder, tmp_path, capsys):
+    for name in ("run.csv", "walk.mp4"):
+        (tmp_path / name).write_bytes((folder / name).read_bytes())
+    words = ["report", tmp_path / "run.csv", "--video", tmp_path / "walk.mp4"]
+    assert main([str(word) for word in words]) == 0
+    assert "no camera is known, so the film is shown without the figure; give" in capsys.readouterr().err
+    assert (tmp_path / "run.html").is_file()
+
+
+def test_without_the_parts_the_page_says_how_to_get_the_figure(folder, tmp_path, monkeypatch):
+    monkeypatch.setenv("GAIT_WEB", str(tmp_path))
+    page = report(folder, out="plain.html")
+    assert "The figure that turns is not in this page: run gait studio --fetch" in page
+    assert 'id="run-figure"' not in page and "echarts" not in page and len(page) < 2e6
+
+
+@pytest.mark.parametrize(
+    ("options", "words"),
+    [
+        (["run.csv", "--track", "run.csv"], "--track: goes with a log"),
+        (["camera.json"], "camera.json: is no track OUT.csv; with a log, give --track as well"),
+        (["run.csv", "--camera", "none.json"], "none.json: no such camera file"),
+        (["run.csv", "--truth", "none.csv"], "none.csv: no such truth file"),
+        (["run.csv", "-o", "walk.mp4"], "walk.mp4: is read by this command"),
+        (["long.csv"], "long.csv: has frame 189, walk.mp4 ends at 89; give the film that was tracked"),
+    ],
+)
+def test_what_does_not_fit_is_one_line(folder, options, words, monkeypatch, capsys):
+    monkeypatch.chdir(folder)
+    head, *rows = (folder / "run.csv").read_text().splitlines()
+    (folder / "long.csv").write_text("\n".join([head, *(re.sub(r"^(\d+)", r"1\1", r) for r in rows[-80:])]))
+    before = sorted(folder.iterdir())
+    assert main(["report", *options, "--video", "walk.mp4"]) in (1, 2)
+    printed = capsys.readouterr().err
+    assert words in printed and printed.count("\n") == 1 and sorted(folder.iterdir()) == before
+
+
+@pytest.fixture(scope="module")
+def page_file(folder):
+    """A page with everything."""
+    browser.chromium()
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setenv("GAIT_WEB", str(browser.FETCHED))
+        report(folder, "--truth", folder / "truth.csv", out="whole.html")
+    return folder / "whole.html"
+
+
+def overflow(page):
+    return page.evaluate("document.documentElement.scrollWidth - innerWidth")
+
+
+@pytest.mark.parametrize(("width", "dark"), [(390, True), (1920, False)])
+def test_the_page_fits_screens(page_file, width, dark):
+    with browser.opened(width=width, height=844, dark=dark) as page:
+        page.goto(page_file.as_uri())
+        page.wait_for_function("window.run")
+        assert overflow(page) <= 0
+        shown = page.evaluate("getComputedStyle(document.querySelector('.plot-narrow')).display")
+        assert (shown == "none") == (width > 760)
+
+
+def test_the_page_plays_and_turns_and_fetches_nothing(page_file):
+    with browser.opened() as page:
+        asked = []
+        page.on("request", lambda request: asked.append(request.url))
+        page.goto(page_file.as_uri())
+        page.wait_for_function("window.run && run.film.video.readyState > 1 && run.film.index >= 6")
+        assert overflow(page) <= 0
+        assert page.evaluate("run.film.index") == FIRST  # where the track begins
+        page.evaluate("run.film.seek(2)")
+        assert not page.evaluate("run.scene.figure.visible")  # no estimate yet
+        page.evaluate("run.film.seek(30)")
+        assert page.evaluate("run.scene.index") == 30 and page.evaluate("run.scene.figure.visible")
+        before = page.evaluate("run.scene.camera.position.x")
+        box = page.locator("#run-figure canvas").bounding_box()
+        page.mouse.move(box["x"] + 200, box["y"] + 200)
+        page.mouse.down()
+        page.mouse.move(box["x"] + 260, box["y"] + 210, steps=3)
+        page.mouse.up()
+        assert abs(page.evaluate("run.scene.camera.position.x") - before) > 0.1
+        cursor = "parseFloat(document.querySelector('.over-time .cursor').style.left)"
+        left = page.evaluate(cursor)
+        page.keyboard.press("Space")
+        page.wait_for_function("run.film.index > 35")
+        assert page.evaluate("run.scene.index") > 35 and page.evaluate(cursor) > left
+        page.keyboard.press("Space")
+        assert not page.evaluate("run.film.playing")
+        plot = page.locator(".over-time .plot-large").first
+        plot.scroll_into_view_if_needed()
+        box = plot.bounding_box()
+        page.mouse.click(box["x"] + 0.75 * box["width"], box["y"] + 60)
+        assert 55 < page.evaluate("run.film.index") < 80
+        assert [url for url in asked if not url.startswith(("file:", "data:", "blob:"))] == []
