@@ -272,8 +272,9 @@ demo: ## clip -> LCM -> gait-trackd -> report (VIDEO CAMERA INIT BACKGROUND HEIG
 	@$(VENV)/bin/gait demo $(pass) $(ARGS)
 
 MOCAP ?= ../shared/data/mocap/cmu_walk
-model: setup lib ## learn the default model from MOCAP= *
+model: setup lib ## learn the models of the package, of people and the paper's, from MOCAP= *
 	$(VENV)/bin/gait learn $(MOCAP) -o python/gait/data/walk.gait $(ARGS)
+	$(VENV)/bin/gait learn $(MOCAP) --prior paper --segments none -o python/gait/data/paper.gait $(ARGS)
 
 PAPER_MOCAP ?= $(MOCAP) ../shared/data/mocap/cmu_misc
 PAPER_CLIP := $(wildcard ../shared/data/video/outdoor)

@@ -342,7 +342,20 @@ typedef struct gait_tasks { GAIT_TASKS_FIELDS(GAIT_DECLARE) } gait_tasks;
     SETTING("Share of each stride that a belt takes back: 0 on the floor, 1 on a treadmill.",                         \
           double, belt, , "", 0, 0, 1)                                                                                \
     SETTING("1: frames come in reverse order, as from a file; utime still increases from frame to frame.",            \
-          double, reverse, , "", 0, 0, 1)
+          double, reverse, , "", 0, 0, 1)                                                                             \
+    /* ---- paper mode: what eqs. 10-12 leave to be determined ---- */                                                \
+    SETTING("Paper mode: density of the image of a hidden limb, p_occluded of eq. 12.",                               \
+          float, occluded_density, , "1 per grey level", 0.0018, 0x1p-20, 1)                                          \
+    SETTING("Paper mode: by how much the surface of a limb changes from frame to frame (eq. 11).",                    \
+          float, surface_sd, , "grey levels", 8, 0, 255)                                                              \
+    SETTING("Paper mode: growth of the variance of surface_sd with the squared tangent of the angle to the image.",   \
+          float, surface_tilt, , "", 1, 0, 1e3)                                                                       \
+    SETTING("Paper mode: surface points compared on a limb that faces the camera, n_s of eq. 10.",                    \
+          int32_t, limb_points, , "", 16, 2, 16)                                                                      \
+    SETTING("Paper mode: lost where the picture under the body stayed rather than moved, by so much more; 0: never.", \
+          float, stayed_nats, , "nats", 10, 0, 1e6)                                                                   \
+    PAPER("Share of a start's standard deviation of the scores with which they are drawn.",                           \
+          float, coef_start, , "", 1, 1, 0, 1)
 
 typedef struct gait_tracker_config {
     GAIT_TRACKER_CONFIG_FIELDS(GAIT_DECLARE, GAIT_DECLARE, GAIT_DECLARE)

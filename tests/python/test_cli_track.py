@@ -169,6 +169,18 @@ def test_paper_mode_and_no_background(scene, capsys):
     assert json.loads(capsys.readouterr().out)["frames"] == 20
 
 
+def test_each_mode_has_its_model(scene, capsys):
+    for words, components in (
+        (["--mode", "paper"], 5),
+        (["--mode", "default"], 8),
+        (["--mode", "paper", "--model", "walk"], 8),
+    ):
+        assert track(scene, *words, "--background", "none", "--json") == 0
+        head = (scene / "out.csv").read_text().splitlines()[0].split(",")
+        assert sum(re.fullmatch(r"c_\d+", name) is not None for name in head) == components, head
+    capsys.readouterr()
+
+
 @pytest.fixture(scope="module")
 def tracks(scene):
     """What a detector finds in the clip: 2 px of noise, one joint in five missing, and a point of its own."""

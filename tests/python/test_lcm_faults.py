@@ -63,7 +63,8 @@ def test_a_damaged_model(tmp_path):
 def test_files_that_are_not_there(tmp_path):
     nothing = tmp_path / "nothing"
     fails(["-m", nothing], nothing, "model", "No such file")
-    fails(["-m", tmp_path], tmp_path, "not a regular file", "; give the name of a model file")
+    fails(["-m", tmp_path], tmp_path / "walk.gait", "model", "No such file")
+    fails(["-m", tmp_path, "--mode", "paper"], tmp_path / "paper.gait", "model", "No such file")
     for option, what in (("--camera", "camera"), ("--init", "init")):
         fails(options(tmp_path, option, nothing), nothing, what, "No such file")
     fails(rig.command("--config", nothing)[1:], nothing, "configuration", code=2)
@@ -149,6 +150,15 @@ def test_the_cameras_of_the_python_side_are_accepted(tmp_path):
         assert "camera 160x120" in accepted(tmp_path, "--camera", file)
     file.write_text(json.dumps({k: v for k, v in CAMERA.items() if k != "distortion"}))
     accepted(tmp_path, "--camera", file)
+
+
+def test_of_a_folder_of_models_the_mode_takes_its_own(tmp_path):
+    camera, folder = tmp_path / "camera.json", rig.MODEL.parent
+    camera.write_text(json.dumps(CAMERA))
+    for words, name in (([], "walk"), (["--mode", "paper"], "paper")):
+        found = accepted(tmp_path, "--camera", camera, "-m", folder, *words)
+        assert f"model {Model(name).info.digest:016x}" in found
+    accepted(tmp_path, "--camera", camera, "-m", folder, "--mode", "paper", "--lift")  # by walk.gait
 
 
 @pytest.mark.parametrize(

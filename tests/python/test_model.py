@@ -53,6 +53,22 @@ def twin(state):
     return joints[0], angles[0]
 
 
+def test_the_paper_model_has_19_angles_and_5_components(tmp_path, monkeypatch):
+    paper, sections = Model("paper"), blob.decode(read_blob("paper"))
+    assert (
+        paper.info.components == 5 and paper.info.proportions == 0 and paper.joint_names == MODEL.joint_names
+    )
+    angles = sections["CURV"].reshape(6, paper.info.phases, -1)[:, :, : paper.info.angles]
+    moving = np.ptp(angles, axis=1).max(axis=0) > 1e-6
+    assert moving.sum() == len(skeleton.PAPER_ANGLES) == 19
+    assert Model("walk").info.digest == MODEL.info.digest != paper.info.digest
+    with pytest.raises(UserError, match="papers: no such model file"):
+        Model("papers")
+    monkeypatch.chdir(tmp_path)
+    (tmp_path / "paper").write_bytes(read_blob(None))  # a file of the user's goes before a name
+    assert Model("paper").info.digest == MODEL.info.digest
+
+
 def test_names_and_sizes_are_those_of_the_blob():
     assert MODEL.joint_names == tuple(blob.unpack_names(SECTIONS["PTNM"])) == tuple(skeleton.JOINTS)
     assert MODEL.angle_names == tuple(skeleton.ANGLES)

@@ -12,7 +12,7 @@
 
 /* To refresh after a deliberate change of the tracker's numbers: run this test, read the lines it prints. */
 #define GOLDEN        UINT64_C(0xab1c44506b053741)
-#define GOLDEN_PAPER  UINT64_C(0x5127d55394d2c45b)
+#define GOLDEN_PAPER  UINT64_C(0xe0eee00bb8f43ed7)
 #define GOLDEN_GIVEN  UINT64_C(0x4fcf9b46eccefafd)
 #define GOLDEN_SEARCH UINT64_C(0xdcc2da5e8a2e32a6)
 

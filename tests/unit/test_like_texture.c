@@ -82,6 +82,59 @@ static void test_paper(void)
     CHECK(limb(GAIT_MODE_PAPER, 0.99, 16, 120) > (float)log(0.0018 * 0.01) - 0.01f);
 }
 
+/* The settings of eqs. 10-12: each enters where the equation has it. */
+static void test_paper_settings(void)
+{
+    gait_tracker_config cfg;
+    gait_tracker_default(&cfg, GAIT_MODE_PAPER);
+    cfg.occluded_density = 1e-4f;
+    cfg.surface_sd = 12.0f;
+    cfg.surface_tilt = 0.5f;
+    cfg.limb_points = 8;
+    (void)limb(GAIT_MODE_PAPER, 0.8, 16, 10);
+    like_setup_init(&v->setup, toy_model(), &cfg, v->setup.run);
+    v->setup.limbs = 1;
+    like_body const b = {.setup = &v->setup,
+                         .features = &v->f,
+                         .outline = &v->outline,
+                         .lane = LANE,
+                         .samples = now,
+                         .terms = &v->terms,
+                         .ancestor = then};
+    double const var = 2.0 * 9.0 + 144.0 * (1.0 + 0.5 * 0.36 / 0.64);
+    double const log_p = -0.5 * log(2.0 * 3.14159265358979 * var) - 100.0 / (2.0 * var);
+    CHECK_NEAR(like_texture.log_likelihood(&b), mixture(0.8, log_p, log(1e-4)), 0.01);
+    for (int i = 0; i < LIKE_HALF; i++)
+        if (i >= 5)
+            now[0].value[i] = TEXTURE_HIDDEN;
+    CHECK_NEAR(like_texture.log_likelihood(&b), mixture(0.8 * 5.0 / 6.4, log_p, log(1e-4)), 0.01);
+    now[0].value[3] = now[0].value[4] = TEXTURE_HIDDEN; /* three of eight are too few */
+    CHECK_NEAR(like_texture.log_likelihood(&b), log(1e-4), 0.01);
+}
+
+/* n_s points of every half of a limb are compared, on all sides and at all heights. */
+static void test_points(void)
+{
+    for (int n = 2; n <= LIKE_HALF; n += n < 4 ? 2 : 4) {
+        gait_tracker_config cfg;
+        gait_tracker_default(&cfg, GAIT_MODE_PAPER);
+        cfg.limb_points = n;
+        v = toy_body_new(0, GAIT_MODE_PAPER);
+        like_setup_init(&v->setup, toy_model(), &cfg, v->setup.run);
+        const like_surface *const s = &v->setup.surface[0];
+        for (int from = 0; from < LIKE_SAMPLES; from += 2) {
+            int count = 0, rows = 0, sides = 0;
+            for (int i = from; i < from + LIKE_HALF; i++)
+                if (s->outward[i] < INFINITY) {
+                    count++;
+                    rows |= 1 << ((i / 2 % 2) + 2 * (i % 2));
+                    sides |= i - from < LIKE_HALF / 2 ? 1 : 2;
+                }
+            CHECK(count == n && sides == 3 && (n < 8 || rows == 15));
+        }
+    }
+}
+
 /* A limb that has turned since: points of the same number are compared, those that came into view are not. */
 static void test_turned(void)
 {
@@ -127,13 +180,16 @@ static void test_limbs(void)
     CHECK_NEAR(like_texture.log_likelihood(&b), 2.0f * one - 1.6f, 1e-4);
     b.ancestor = NULL;
     CHECK(like_texture.log_likelihood(&b) == 0.0f);
-    CHECK(like_texture.flag == GAIT_TERM_TEXTURE && like_texture.support);
+    CHECK(like_texture.flag == GAIT_TERM_TEXTURE &&
+          !like_texture.support); /* a wall predicts itself too well */
 }
 
 int main(void)
 {
     test_robust();
     test_paper();
+    test_paper_settings();
+    test_points();
     test_turned();
     test_limbs();
     return CHECK_DONE();

@@ -50,6 +50,12 @@ static inline gait_tracker_config toy_config(int32_t cameras)
     c.offset_angles = 0;
     c.proportions = -1; /* so that they are tested */
     c.joint_sd_model = 0.0f;
+    c.occluded_density = 0.0018f;
+    c.surface_sd = 8.0f;
+    c.surface_tilt = 1.0f;
+    c.limb_points = 16;
+    c.stayed_nats = 10.0f;
+    c.coef_start = 1.0f;
     for (int k = 0; k < GAIT_MAX_CAMERAS; k++)
         c.camera[k] = toy_camera(k);
     return c;

@@ -97,7 +97,10 @@ static int tracker_options(gait_tracker_config *config, option *table)
 static int make_table(settings *s, option *table)
 {
     const option own[] = {
-        {"model", 'm', "FILE", "model (.gait) made by `gait learn`; required", TEXT(model)},
+        {"model", 'm', "FILE",
+         "model (.gait) made by `gait learn`, or a folder: its walk.gait, in paper mode its paper.gait;\n"
+         "        required",
+         TEXT(model)},
         {"camera", 0, "FILE",
          "camera JSON; without it the camera arrives on GAIT_CAMERA_<i> from `gait capture`, which\n"
          "        also reads OpenCV YAML/XML and TOML",
@@ -278,6 +281,24 @@ static option_result parse(settings *s, const option *table, int count, int argc
     return options_parse(table, count, argc, argv, why);
 }
 
+/* In place of a folder of models, the mode's. */
+static bool choose_model(settings *s, message *why)
+{
+    char folder[OPTION_TEXT];
+    struct stat x;
+    if (!s->model[0] || stat(s->model, &x) != 0 || !S_ISDIR(x.st_mode))
+        return true;
+    memcpy(folder, s->model, sizeof folder);
+    if (strlen(folder) + sizeof "/paper.gait" > sizeof s->model)
+        return message_set(why, "--model %.100s: the name is too long", folder);
+    snprintf(s->model, sizeof s->model, "%.*s/%s.gait", (int)(sizeof s->model - sizeof "/paper.gait"), folder,
+             mode(s) == GAIT_MODE_PAPER ? "paper" : "walk");
+    if (s->lift && !s->lift_model[0]) /* the paper's model has no segment prior */
+        snprintf(s->lift_model, sizeof s->lift_model, "%.*s/walk.gait",
+                 (int)(sizeof s->model - sizeof "/paper.gait"), folder);
+    return true;
+}
+
 option_result settings_read(settings *s, int argc, char **argv, message *why)
 {
     option table[OPTIONS_MOST];
@@ -302,7 +323,7 @@ option_result settings_read(settings *s, int argc, char **argv, message *why)
          message_set(why, "--budget-ms: a log is played without dropping frames; leave it out")) &&
         (!s->snapshot[0] || !link_is_log(link_url(s->url)) ||
          message_set(why, "--snapshot: a log is played from its start; leave it out")) &&
-        check_dependencies(s, why) && check_logs(s, why) &&
+        check_dependencies(s, why) && choose_model(s, why) && check_logs(s, why) &&
         (s->adapt_particles <= s->tracker.particles ||
          message_set(why, "--adapt-particles %d: at most the %d of --particles", (int)s->adapt_particles,
                      (int)s->tracker.particles));

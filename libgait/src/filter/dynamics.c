@@ -28,7 +28,7 @@ particle_state dynamics_draw(const dynamics *d, const gait_state *mean, const ga
     s.pelvis[1] += sd->pelvis[1] * n[7];
     s.turn_rate += sd->turn_rate * n[F_TURN];
     for (int32_t k = 0; k < q; k++)
-        s.coef[k] += sd->coef[k] * n[F_COEF + k];
+        s.coef[k] += d->cfg->coef_start * sd->coef[k] * n[F_COEF + k];
     for (int32_t k = 0; k < d->rule.proportions; k++)
         s.proportion[k] += sd->proportion[k] * n[state_layout_proportion(&d->rule) + k];
     for (int32_t k = 0; k < d->rule.offsets; k++) {

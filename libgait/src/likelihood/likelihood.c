@@ -27,8 +27,17 @@ static void surface_point(const limb_geometry *g, float z, float angle, float po
         normal[k] /= __builtin_sqrtf(norm);
 }
 
-/* Points on rings at the middles of equal parts of the limb. */
-static void surface_init(const limb_geometry *g, like_surface *out)
+/* Whether a point is among those compared: `points` of the LIKE_HALF that face the camera, wherever these begin, on
+ * every side and at every height. */
+static bool compared(int32_t i, int32_t points)
+{
+    int32_t const at = i ^ (i >> 2 & 1); /* neighbouring directions take different rows */
+    int32_t const order = (at & 1) << 3 | (at & 2) << 1 | (at & 4) >> 1 | (at & 8) >> 3;
+    return order < points;
+}
+
+/* Points on rings at the middles of equal parts of the limb.  Those that are not compared never face the camera. */
+static void surface_init(const limb_geometry *g, int32_t points, like_surface *out)
 {
     for (int32_t i = 0; i < LIKE_RING; i++) {
         int32_t const direction = i / 2 % LIKE_DIRECTIONS, row = (direction & 1) + 2 * (i & 1);
@@ -39,7 +48,7 @@ static void surface_init(const limb_geometry *g, like_surface *out)
             out->point[k][i] = p[k];
             out->normal[k][i] = n[k];
         }
-        out->outward[i] = p[0] * n[0] + p[1] * n[1] + p[2] * n[2];
+        out->outward[i] = compared(i, points) ? p[0] * n[0] + p[1] * n[1] + p[2] * n[2] : INFINITY;
     }
     for (int32_t k = 0; k < 3; k++) {
         out->middle[k] = 0.5f * (g->start[k] + g->end[k]);
@@ -72,6 +81,13 @@ void like_setup_init(like_setup *s, const gait_model *m, const gait_tracker_conf
     s->run = run;
     s->limbs = m->limbs;
     s->paper = cfg->mode == GAIT_MODE_PAPER;
+    int32_t const points = s->paper ? cfg->limb_points : LIKE_HALF;
+    s->few = points / 2;
+    s->all = 0.8f * (float)points; /* some are always too close to the outline */
+    s->log_occluded =
+        s->paper ? m_log(cfg->occluded_density) : -1.6f; /* robust: as bad as a typical mismatch */
+    s->surface_var = cfg->surface_sd * cfg->surface_sd;
+    s->tilt = cfg->surface_tilt;
     s->terms = cfg->terms;
     s->missed_weight = cfg->missed_weight;
     s->weight[LIKE_TEXTURE] = cfg->texture_weight;
@@ -81,7 +97,7 @@ void like_setup_init(like_setup *s, const gait_model *m, const gait_tracker_conf
     s->weight[LIKE_KEYPOINTS] = cfg->keypoints_weight;
     limb_geometry_init(m, cfg->girth, s->geometry);
     for (int32_t l = 0; l < m->limbs; l++)
-        surface_init(&s->geometry[l], &s->surface[l]);
+        surface_init(&s->geometry[l], points, &s->surface[l]);
     costs_init(s);
 }
 

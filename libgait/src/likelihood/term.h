@@ -19,15 +19,13 @@ enum {
         2 * LIKE_AZIMUTHS,        /* of normals; rings are staggered by half a step: two points share each */
     LIKE_HALF = LIKE_SAMPLES / 2, /* surface points on the half of a limb that faces the camera */
     LIKE_RING = LIKE_SAMPLES + LIKE_HALF, /* once around and half again, so that every half is contiguous */
-    LIKE_FEW = 8,            /* points visible in both frames below which a limb counts as occluded */
-    LIKE_COSTS = 256,        /* entries of a cost table */
-    LIKE_COST_ONE = 256,     /* 1 nat in the robust cost table */
+    LIKE_COSTS = 256,                     /* entries of a cost table */
+    LIKE_COST_ONE = 256,                  /* 1 nat in the robust cost table */
     LIKE_COUNT_ONE = 1 << 24 /* added to every entry, so that a sum of costs also counts the points */
 };
 
 /* The visibility of a point of an outline is read this far on the way to the limb's middle. */
-#define LIKE_INWARD         0.3f
-#define LIKE_PAPER_OCCLUDED (-6.3200f) /* log 0.0018 per grey level: N(0, 10^2) at 2.5 sd */
+#define LIKE_INWARD 0.3f
 
 /* Fixed points on one limb, statures, the same for every particle. The normals of points 2 d and 2 d + 1
  * have direction d; direction d + LIKE_AZIMUTHS is the opposite one. */
@@ -98,8 +96,12 @@ typedef struct like_costs {
 typedef struct like_setup { /* constant while a tracker lives */
     const kernels *run;
     int32_t limbs;
-    bool paper;     /* use eqs. 10-13 literally */
-    uint32_t terms; /* GAIT_TERM_* */
+    bool paper;  /* use eqs. 10-13 literally */
+    int32_t few; /* points visible in both frames below which a limb counts as occluded */
+    float all;   /* and from which all of it is visible */
+    float log_occluded;
+    float surface_var, tilt; /* eq. 11: of the difference of two frames; grey levels squared */
+    uint32_t terms;          /* GAIT_TERM_* */
     float weight[LIKE_TERMS];
     float missed_weight;
     limb_geometry geometry[MODEL_MAX_LIMBS];

@@ -16,14 +16,4 @@ static float log_likelihood(const like_body *b)
     return log[b->lane];
 }
 
-/* Without a person every limb is as good as occluded. Only the paper's mode uses this, because it has no
- * other evidence; in the default mode a static background predicts itself too well to be compared with
- * silhouette and edges. */
-static float support(const like_body *b)
-{
-    if (!b->setup->paper || !b->ancestor)
-        return 0.0f;
-    return log_likelihood(b) - (float)b->setup->limbs * LIKE_PAPER_OCCLUDED;
-}
-
-const like_term like_texture = {"texture", GAIT_TERM_TEXTURE, log_likelihood, support};
+const like_term like_texture = {"texture", GAIT_TERM_TEXTURE, log_likelihood, NULL};

@@ -67,12 +67,6 @@ static void compare_limbs(const like_patch *now, const like_patch *then, int32_t
     compare_all(&r, limbs, cost, sum);
 }
 
-/* Share of the about LIKE_SAMPLES / 2 points facing the camera that are visible in both frames. */
-static inline float visible_share(int32_t both)
-{
-    return f_min((float)both / (0.4f * (float)LIKE_SAMPLES), 1.0f);
-}
-
 /* Log of the mixture of "visible and constant" and "occluded" for one limb (eq. 12). */
 static inline float mixture(float q, float log_visible, float log_occluded)
 {
@@ -89,11 +83,11 @@ static inline float robust(int32_t both, int32_t cost)
 
 /* In the form of the paper: mean squared grey-level difference, normal density, sigma growing with the viewing
  * angle. */
-static inline float literal(int32_t both, int32_t squares, float cos_tilt)
+static inline float literal(const like_setup *s, int32_t both, int32_t squares, float cos_tilt)
 {
-    float const image_var = 9.0f, model_var = 64.0f; /* grey levels squared */
+    float const pixel_var = 9.0f; /* grey levels squared, in either frame */
     float const tan2 = f_min((1.0f - cos_tilt * cos_tilt) / f_max(cos_tilt * cos_tilt, 1e-3f), 9.0f);
-    float const var = 2.0f * image_var + model_var * (1.0f + tan2);
+    float const var = 2.0f * pixel_var + s->surface_var * (1.0f + s->tilt * tan2);
     return -0.5f * m_log(TWO_PI_F * var) - (float)squares / (2.0f * var * (float)i_max(both, 1));
 }
 
@@ -112,21 +106,22 @@ void KERNEL(texture_logs)(const like_setup *s, const outline_block *outline, con
 {
     for (int32_t i = 0; i < BLOCK; i++)
         log[i] = 0.0f;
-    float const log_occluded =
-        s->paper ? LIKE_PAPER_OCCLUDED : -1.6f; /* robust: as bad as a typical mismatch */
+    float const log_occluded = s->log_occluded;
     for (int32_t l = 0; l < s->limbs; l++) {
         const float *const cos_tilt = outline->limb[l].cos_tilt;
         float visible[BLOCK];
         if (s->paper)
             for (int32_t i = 0; i < BLOCK; i++)
-                visible[i] = literal(cost[l][i] / LIKE_COUNT_ONE, cost[l][i] % LIKE_COUNT_ONE, cos_tilt[i]);
+                visible[i] =
+                    literal(s, cost[l][i] / LIKE_COUNT_ONE, cost[l][i] % LIKE_COUNT_ONE, cos_tilt[i]);
         else
             for (int32_t i = 0; i < BLOCK; i++)
                 visible[i] = robust(cost[l][i] / LIKE_COUNT_ONE, cost[l][i] % LIKE_COUNT_ONE);
         for (int32_t i = 0; i < BLOCK; i++) {
             int32_t const both = cost[l][i] / LIKE_COUNT_ONE;
-            float const mixed = mixture(cos_tilt[i] * visible_share(both), visible[i], log_occluded);
-            log[i] += both < LIKE_FEW ? log_occluded : mixed;
+            float const share = f_min((float)both / s->all, 1.0f);
+            float const mixed = mixture(cos_tilt[i] * share, visible[i], log_occluded);
+            log[i] += both < s->few ? log_occluded : mixed;
         }
     }
 }

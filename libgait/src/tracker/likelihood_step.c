@@ -121,6 +121,38 @@ body_evidence likelihood_of_particle(gait_tracker *t, const particle_state *p)
     return e;
 }
 
+uint32_t likelihood_sample(gait_tracker *t, const particle_state *p, like_patch *samples)
+{
+    likelihood_scratch *const w = &t->work[0];
+    uint32_t cameras = 0;
+    particle_body(&t->layout, p, &w->body);
+    for (int32_t c = 0; c < t->cfg.cameras; c++) {
+        if (!t->camera[c].features.has_image)
+            continue;
+        likelihood_outline(t, c, w);
+        likelihood_body(t, c, 0, 0, w, samples + c * t->like->limbs);
+        cameras |= 1u << c;
+    }
+    return cameras;
+}
+
+float likelihood_since(gait_tracker *t, const particle_state *p, uint32_t cameras, const like_patch *then)
+{
+    likelihood_scratch *const w = &t->work[0];
+    like_patch samples[MODEL_MAX_LIMBS];
+    float sum = 0.0f;
+    particle_body(&t->layout, p, &w->body);
+    for (int32_t c = 0; c < t->cfg.cameras; c++) {
+        if (!t->camera[c].features.has_image || !(cameras >> c & 1u))
+            continue;
+        likelihood_outline(t, c, w);
+        like_body b = likelihood_body(t, c, 0, 0, w, samples);
+        b.ancestor = then + c * t->like->limbs;
+        sum += like_texture.log_likelihood(&b);
+    }
+    return sum;
+}
+
 float likelihood_of_keypoints(gait_tracker *t, const particle_state *p)
 {
     likelihood_scratch *const w = &t->work[0];

@@ -17,6 +17,12 @@ typedef struct body_evidence { /* of one body, over all cameras */
 /* Writes the body's surface samples to t->estimate_patch. */
 body_evidence likelihood_of_particle(gait_tracker *t, const particle_state *p);
 
+/* Surface samples of a body, cameras x limbs; returns the cameras that have an image, as bits. */
+uint32_t likelihood_sample(gait_tracker *t, const particle_state *p, like_patch *samples);
+
+/* Texture log-likelihood of a body, if its surface was `then` in an earlier frame of these cameras. */
+float likelihood_since(gait_tracker *t, const particle_state *p, uint32_t cameras, const like_patch *then);
+
 /* Support of one body by the keypoints of all cameras, in units of the term's cost; 0 without keypoints. */
 float likelihood_of_keypoints(gait_tracker *t, const particle_state *p);
 

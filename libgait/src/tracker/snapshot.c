@@ -157,6 +157,16 @@ static bool template_plausible(const gait_tracker *t, const unsigned char *body)
     return true;
 }
 
+static bool walk_check_plausible(const gait_tracker *t, const unsigned char *body)
+{
+    walk_check w;
+    if (!t->walk_check)
+        return true;
+    memcpy(&w, in_body(t, body, t->walk_check), sizeof w);
+    return w.age >= 0 && (uint64_t)w.age < LONGEST_AGE && w.cameras >> t->cfg.cameras == 0 &&
+           f_finite(&w.nats, 1) && f_finite(w.body.f, F_MAX);
+}
+
 gait_result snapshot_restore(gait_tracker *t, const void *mem, size_t bytes, gait_error *err)
 {
     const unsigned char *const body = (const unsigned char *)mem + sizeof(snapshot_header);
@@ -177,7 +187,7 @@ gait_result snapshot_restore(gait_tracker *t, const void *mem, size_t bytes, gai
         return base_fail(err, GAIT_ERR_CORRUPT, -1,
                          "snapshot is damaged: its length or checksum does not match");
     if (!core_plausible(t, body) || !weights_plausible(t, body) || !records_plausible(t, body) ||
-        !history_plausible(t, body) || !template_plausible(t, body))
+        !history_plausible(t, body) || !template_plausible(t, body) || !walk_check_plausible(t, body))
         return base_fail(err, GAIT_ERR_CORRUPT, -1, "snapshot contains a number outside its range");
     memcpy(t->core, body, state_bytes(t));
     tracker_set_count(t, t->capacity - t->core->below_capacity);

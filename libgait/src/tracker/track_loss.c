@@ -1,6 +1,7 @@
 #include "tracker/track_loss.h"
 #include "base/fmath.h"
 #include "tracker/likelihood_step.h"
+#include "tracker/walk_check.h"
 #include <string.h>
 
 static const float PATIENCE = 0.33f;     /* seconds without support after which the person is lost */
@@ -116,7 +117,7 @@ track_loss_verdict track_loss_check(gait_tracker *t, bool lost, const particle_s
     float const gap = seconds_unsupported(t);
     body_evidence const e = likelihood_of_particle(t, mean);
     float const unusual = e.parts.missed - core->usual_unexplained;
-    bool const whole = e.support >= 0.0f; /* also if no term applies */
+    bool const whole = e.support >= 0.0f && walk_check_passes(t); /* also if no term applies */
     bool const part = !whole && !lost && core->found &&
                       parts_evidence(e.parts.explained - e.chance, unusual) > PARTS_ENOUGH;
     track_loss_verdict v = {.support = whole  ? SUPPORT_WHOLE

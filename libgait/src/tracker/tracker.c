@@ -10,6 +10,7 @@
 #include "tracker/left_right.h"
 #include "tracker/likelihood_step.h"
 #include "tracker/track_loss.h"
+#include "tracker/walk_check.h"
 
 static const float KNOWN_PHASE_SD = 0.2f; /* strides: a start with less determines which leg is which */
 static const float SETTLE_TIME = 1.0f;    /* seconds after a start in which several modes are normal */
@@ -250,8 +251,8 @@ void tracker_step(gait_tracker *t, const gait_frame *frame, gait_estimate *out)
     /* Rejuvenate and predict.  Particles that are split or redrawn have no samples of their ancestors' surface. */
     bool const modes_known = h->stage != HYPOTHESES_ACQUISITION && !lost;
     bool const split = hypotheses_acquired(t);
-    bool const redraw =
-        lost && h->stage != HYPOTHESES_TWO && !split; /* two hypotheses go on as predicted for a while */
+    /* Two hypotheses go on as predicted for a while, and the paper's filter always. */
+    bool const redraw = lost && h->stage != HYPOTHESES_TWO && !split && t->cfg.mode != GAIT_MODE_PAPER;
     if (split || redraw)
         core->sampled_cameras = 0;
     rejuvenation const r = rejuvenation_of(t, resampled, modes_known, counter);
@@ -276,8 +277,10 @@ void tracker_step(gait_tracker *t, const gait_frame *frame, gait_estimate *out)
 
     /* Estimate and track loss. */
     particle_state const mean = estimate_particles(t, s.best, &e);
-    if (has_image)
+    if (has_image) {
+        walk_check_update(t, &mean);
         update_track_loss(t, dt, lost, &mean);
+    }
     if (hypotheses_agree(t, e.hypothesis_weight))
         hypotheses_settle(t);
     bool const degenerate = s.degenerate || s.ess < DEGENERATE_ESS;

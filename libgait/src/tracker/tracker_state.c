@@ -28,6 +28,10 @@ static void layout_state(arena *a, gait_tracker *t)
     for (int32_t c = 0; c < 2 * cameras && uses_texture(&t->cfg); c++)
         t->template[c / cameras][c % cameras] = TAKE(a, int16_t, samples);
     layout_history(&t->history, a, t->cfg.lag, n, state_layout_fields(&t->layout));
+    if (t->cfg.mode == GAIT_MODE_PAPER && uses_texture(&t->cfg)) {
+        t->walk_check = TAKE(a, walk_check, 1);
+        t->walk_check_patch = TAKE(a, like_patch, (size_t)cameras * (size_t)t->model->limbs);
+    }
     t->state_end = TAKE(a, unsigned char, 1);
 }
 

@@ -46,6 +46,16 @@ typedef struct tracker_core {
     int32_t below_config; /* particles wanted outside acquisition: gait_tracker.config_particles less this */
 } tracker_core;
 
+/* Paper mode: an estimate of the last fifth of a second (walk_check.h). */
+typedef struct walk_check {
+    int64_t age;      /* its time since the start, microseconds */
+    uint32_t cameras; /* bit c: camera c has surface samples of it; 0: there is none yet */
+    int32_t judged;   /* whether nats is known */
+    float
+        nats; /* log-likelihood ratio of its surface having walked on over having stayed, mean of the last two */
+    particle_state body;
+} walk_check;
+
 typedef struct camera_state {
     features features;
     view_planes plate;     /* background resampled to the region of interest */
@@ -105,6 +115,8 @@ struct gait_tracker {
     int16_t *template
         [2][GAIT_MAX_CAMERAS]; /* appearance under each hypothesis; with one hypothesis only the first */
     particle_history history;
+    walk_check *walk_check;       /* NULL: not in paper mode */
+    like_patch *walk_check_patch; /* cameras x limbs: the surface of its body */
     unsigned char *state_end;
     particle_set particles; /* the current generation */
     /* Recomputed in every step. */

@@ -22,6 +22,8 @@ from gait.io.blob import decode
 
 Array = NDArray[np.float64]
 
+#: Models of the package by name: of people, the default; of Ormoneit and others (2000), for paper mode.
+SHIPPED = ("walk", "paper")
 NOT_CYCLIC = "holds no cyclic model; learn it without --segments only"
 
 
@@ -35,7 +37,7 @@ class LoadedModel:
 
 
 def load(source: str | os.PathLike[str] | bytes | None) -> LoadedModel:
-    """Check and take in a blob: a file, its contents, or the package's own (None).
+    """Check and take in a blob: a file, its contents, or one of the package (its name; None: ``walk``).
 
     Raises
     ------
@@ -105,7 +107,9 @@ class Model:
     Parameters
     ----------
     source : path or bytes, optional
-        File or contents of a blob; the walking model of the package if left out.
+        File or contents of a blob, or the name of a model of the package where there is no such file:
+        ``walk`` (the default), or ``paper``, of 19 angles and 5 components, which `gait track` takes in
+        paper mode.
 
     Attributes
     ----------
@@ -207,11 +211,12 @@ def camera_c(camera: Camera) -> abi.CameraC:
 
 
 def read_blob(path: str | os.PathLike[str] | None) -> bytes:
-    """Bytes of a blob file, or of the package's own, whose container is sound."""
-    if path is None:
-        shipped = resources.files("gait") / "data" / "walk.gait"
+    """Bytes of a blob file, or of one of the package's own by its name, whose container is sound."""
+    name = SHIPPED[0] if path is None else str(path)
+    if path is None or (name in SHIPPED and not Path(path).is_file()):
+        shipped = resources.files("gait") / "data" / f"{name}.gait"
         if not shipped.is_file():
-            raise UserError("gait/data/walk.gait: the package was built without its model; run make model")
+            raise UserError(f"gait/data/{name}.gait: the package was built without its model; run make model")
         return shipped.read_bytes()
     if not Path(path).is_file():
         raise UserError(f"{path}: no such model file; make one with gait learn")

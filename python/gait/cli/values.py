@@ -107,7 +107,12 @@ def add_stabilize(parser: _ActionsContainer, default: str | None) -> None:
 
 def add_model(parser: ArgumentParser, what: str = "walking model") -> None:
     """Add ``--model``; None stands for the model of the package."""
-    parser.add_argument("-m", "--model", metavar="M.gait", help=f"{what} (default: the shipped one)")
+    parser.add_argument(
+        "-m",
+        "--model",
+        metavar="M.gait",
+        help=f"{what}: a file, or one of the package by its name, walk (default; paper mode: paper) or paper",
+    )
 
 
 def add_seed(parser: ArgumentParser, of: str) -> None:

@@ -26,7 +26,7 @@ class ClipOptions:
     fov : float, optional
         Horizontal field of view, degrees, for a camera that is found.
     model : str, optional
-        The model of the package if left out.
+        The model of the package if left out: that of people, in paper mode the paper's.
     init, background : str
         A file, ``auto``, or for the background ``none``.
     height : float, optional

@@ -99,7 +99,7 @@ class Scene:
         """
         video = Video(options.video)
         camera = Camera.read(options.camera, video.size) if options.camera else None
-        model = Model(options.model)
+        model = Model(options.model or ("paper" if options.mode == Mode.PAPER else "walk"))
         if camera is not None and options.camera:
             camera.check_place(options.camera)
             if options.init != "auto":

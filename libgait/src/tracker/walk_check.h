@@ -1,0 +1,16 @@
+/* walk_check.h - paper mode: whether the picture under the body walks with it.
+ *
+ * Eqs. 10-13 compare a limb only with what it covered in the frame before, and a static background predicts itself better
+ * than any person does: no value of the likelihood shows that a body has slid onto the wall.  What shows it is the surface
+ * that the body had a fifth of a second ago.  Of a person it is found again where the body has walked to since; of a wall
+ * it is found where the body was. */
+#ifndef GAIT_TRACKER_WALK_CHECK_H
+#define GAIT_TRACKER_WALK_CHECK_H
+#include "tracker/tracker_state.h"
+
+/* After the estimate: compare, or wait until there is something to compare with. */
+void walk_check_update(gait_tracker *t, const particle_state *mean);
+
+/* False while what the body covers stays behind (config stayed_nats).  True outside paper mode. */
+bool walk_check_passes(const gait_tracker *t);
+#endif
