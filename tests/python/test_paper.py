@@ -13,9 +13,8 @@ import pytest
 from gait.cli import main
 from gait.learn.corpus import load, sources
 from gait.learn.report import figures_model
-from gait.learn.segments.virtual_markers import MARKERS
 from gait.paper import clip as clips
-from gait.paper import leventon, lifting, ormoneit, recordings, tracking
+from gait.paper import lifting, ormoneit, recordings, tracking
 from gait.report.figures import Drawing
 from gait.reproducible import one_thread
 from gait.simulate.scenario import PRESETS
@@ -61,65 +60,6 @@ def test_removed_blocks_are_filled_better_than_by_the_mean(learning):
     assert np.all(np.diff(removal.passes) <= 1e-9)
     assert removal.literal < 0.5 * removal.mean
     assert len(figures_model.convergence(learning.literal).axes) == 2  # no likelihood to show
-
-
-def planted(rng, count=60, size=6):
-    """Segments of a Gaussian of `size` modes about a body."""
-    shape = (leventon.FRAMES, len(MARKERS), 3)
-    body = rng.normal(size=shape) * 0.3
-    modes = np.linalg.qr(rng.normal(size=(body.size, size)))[0] * np.geomspace(3.0, 0.5, size)
-    return body + (rng.normal(size=(count, size)) @ modes.T).reshape(count, *shape)
-
-
-def test_the_gaussian_of_segments_has_their_modes_and_no_more():
-    gaussian = leventon.learn(planted(np.random.default_rng(1)), turned=False)
-    assert gaussian.modes.shape[1] == 6 and gaussian.explained()[5] == pytest.approx(1)
-    x = planted(np.random.default_rng(1))[3]
-    assert leventon.apart(gaussian.projected(x), x) < 1e-6  # millimetres
-    turned = leventon.learn(planted(np.random.default_rng(1)))
-    assert turned.modes.shape[1] > 6 and turned.segments == 60
-
-
-def test_the_posterior_holds_what_was_drawn_and_equals_the_papers_form():
-    """Equation 5 in its dual form; intervals hold 90 %; the volume is that of the singular values."""
-    rng, noise = np.random.default_rng(2), 0.05
-    gaussian = leventon.learn(planted(rng), turned=False)
-    sd = np.sqrt(gaussian.variance)
-    inside, squares = [], []
-    for _ in range(300):
-        alpha = sd * rng.normal(size=len(sd))
-        x = gaussian.segment(alpha)
-        y = x @ leventon.PICTURE.T + noise * rng.normal(size=(*x.shape[:2], 2))
-        found = gaussian.posterior(y, noise)
-        off = found.alpha - alpha
-        squares.append(off @ np.linalg.solve(found.covariance, off) / len(sd))
-        inside.append(np.abs(off) < leventon.WITHIN * np.sqrt(np.diag(found.covariance)))
-    assert np.mean(squares) == pytest.approx(1, abs=0.1)
-    assert np.mean(inside) == pytest.approx(0.9, abs=0.03)
-    design, prior = gaussian.visible, np.diag(gaussian.variance)
-    rest = (y - gaussian.segment(np.zeros(0)) @ leventon.PICTURE.T).ravel()
-    both = design @ prior @ design.T + noise**2 * np.eye(len(design))
-    assert found.alpha == pytest.approx(prior @ design.T @ np.linalg.solve(both, rest), abs=1e-8)
-    singular = np.linalg.svd(design * sd / noise, compute_uv=False)
-    assert found.log10_volume == pytest.approx(-0.5 * np.log10(1 + singular**2).sum())
-    assert leventon.noise_of(gaussian, found.log10_volume) == pytest.approx(noise, rel=1e-6)
-
-
-def test_joined_segments_continue_in_depth():
-    """Segments of one motion that differ in depth alone are joined to that motion."""
-    rng = np.random.default_rng(3)
-    x = rng.normal(size=(leventon.WINDOW, len(MARKERS), 3))
-    depth = np.eye(3)[leventon.DEPTH]
-    parts = [x[s : s + leventon.FRAMES] + k * depth for k, s in enumerate(leventon.STARTS)]
-    assert leventon.blended(np.array(parts)) == pytest.approx(x)
-
-
-def test_the_gaussian_serves_as_a_prior_of_the_package():
-    gaussian = leventon.learn(planted(np.random.default_rng(4)), turned=False)
-    prior = leventon.prior_of(gaussian, 1.7)
-    flat = 1.7 * prior.modes[0].reshape(prior.size, -1)
-    assert flat @ flat.T == pytest.approx(np.diag(gaussian.variance), abs=1e-9)
-    assert 1.7 * prior.mean[0].ravel() == pytest.approx(gaussian.mean)
 
 
 @pytest.mark.parametrize(
