@@ -263,6 +263,30 @@ def test_a_part_run_alone_is_joined_with_the_last_tables_of_the_others(tmp_path,
     assert places == sorted(places) and "| size | 2 | 0 |" in page
 
 
+def test_only_one_part_is_run_and_the_heads_of_the_others_stay(tmp_path, monkeypatch):
+    """The page names the commit of each part, and what the last run of each missed."""
+    monkeypatch.setattr(parts.table, "RESULTS", tmp_path)
+    monkeypatch.setattr(parts, "HERE", tmp_path)
+    evaluation = parts.Evaluation("eval-lift", "lift", "Lifting", {"one.py": (), "two.py": ()})
+
+    def run(commit, only, code=0):
+        for name in ("one", "two"):
+            text = f"from pathlib import Path\nat = Path(__file__).parent / '{name}_table.md'\n"
+            text += f"at.write_text('## {name} {commit}')\n"
+            text += f"at.with_suffix('.csv').write_text('measure,met')\nraise SystemExit({code})\n"
+            (tmp_path / f"{name}.py").write_text(text)
+        monkeypatch.setattr(parts, "facts", lambda _: f"at commit {commit};")
+        return evaluation.main(only), (tmp_path / "lift.md").read_text()
+
+    assert run("aaa", None)[0] == 0
+    code, page = run("bbb", ["two.py"], 1)
+    assert code == 1 and page.index("at commit aaa; Took: one.py") < page.index("at commit bbb; Took: two.py")
+    assert "## one aaa" in page and "## two bbb" in page and "Failed: two.py (a bound is missed)" in page
+    code, page = run("ccc", ["one.py"])
+    assert code == 0 and "at commit ccc; Took: one.py" in page and "at commit bbb; Took: two.py" in page
+    assert "aaa" not in page and "Failed: two.py" in page
+
+
 def test_bounds_of_learning_are_counted_by_measure(tmp_path):
     rows = ["measure,met", "auto,yes", "L10,yes", "L5,yes", "L5,NO", "L5 by style,NO", "L6,"]
     (tmp_path / "learn_a.csv").write_text("\n".join(rows) + "\n")
