@@ -22,6 +22,7 @@ PARTS = (
     "lift_sides.py",
     "lift_stream.py",
     "lift_people.py",
+    "lift_balance.py",
     "lift_detector.py",
     "lift_images.py",
     "tracks_term.py",

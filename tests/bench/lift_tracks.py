@@ -143,13 +143,13 @@ def _clips() -> list[list[object]]:
             spoilt = lifted(prior, steady, camera, NOISE)
             order = [found.names.index(name) for name in EVAL15]
             error = root_error(found.places[:, order], truth, HIPS)
-            share, rooted_share = _coverage(found, truth, order)
+            share, rooted_share = coverage(found, truth, order)
             rows.append(
                 [
                     *("tracks", clip.name, error, root_error(blend.places[:, order], truth, HIPS)),
                     *(_blind(prior, tracks, camera, truth), _static(prior, tuple(EVAL15), truth, HIPS)),
                     *(_absolute(found, truth, order), share, rooted_share),
-                    *(_absolute(known, truth, order), _coverage(known, truth, order)[0]),
+                    *(_absolute(known, truth, order), coverage(known, truth, order)[0]),
                     *judged(spoilt, truth),
                     "yes" if error < TARGET else "NO",
                 ]
@@ -207,10 +207,10 @@ def judged(found: motion.Motion, truth: Floats) -> list[float]:
     """Root-aligned and absolute median error, mm, and the share of coordinates in their 90 % intervals."""
     order = [found.names.index(name) for name in EVAL15]
     root = root_error(found.places[:, order], truth, HIPS)
-    return [root, _absolute(found, truth, order), _coverage(found, truth, order)[0]]
+    return [root, _absolute(found, truth, order), coverage(found, truth, order)[0]]
 
 
-def _coverage(found: motion.Motion, truth: Floats, order: list[int]) -> tuple[float, float]:
+def coverage(found: motion.Motion, truth: Floats, order: list[int]) -> tuple[float, float]:
     """Shares of coordinates in their 90 % intervals: in the world, and about the hips."""
     places, sd = found.places[:, order], found.sd[:, order]
     hips = [order.index(found.names.index(name)) for name in ("l_hip", "r_hip")]
@@ -260,7 +260,7 @@ def _balancing() -> None:
                         root_error(blend.places[:, order], truth, hips),
                         _static(prior, tracks.names, truth, hips),
                         *(1000 * float(np.median(apart)), 1000 * float(np.median(smooth.sd[:, order]))),
-                        *(*_coverage(smooth, truth, order), smooth.resized),
+                        *(*coverage(smooth, truth, order), smooth.resized),
                     ]
                 )
                 update(len(rows))

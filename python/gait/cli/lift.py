@@ -68,7 +68,7 @@ C.json gives positions of joints (or other markers of the model) and optionally 
 _ONLY_KEYPOINTS = (
     *("orthographic", "metres_per_unit", "pixel_sd", "floor_sd", "method", "no_contact"),
     *("no_bones", "ignore_unknown", "keep_sides", "keep_spikes", "trc", "person", "fps", "video"),
-    "stabilize",
+    *("stabilize", "balance"),
 )
 _ONLY_PICTURES = ("corrections", "background", "alone", "overlay", "suggest")
 _ONLY_VIDEO = ("placement", *_ONLY_PICTURES, "start", "stop", "fov", "camera_out", "stabilize")
@@ -135,6 +135,11 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     )
     add("--no-contact", action="store_true", help="smooth: do not keep feet on the ground in place")
     add("--no-bones", action="store_true", help="smooth: do not keep the lengths of bones constant")
+    add(
+        "--balance",
+        action="store_true",
+        help="smooth: draw the place where the ground pushes into the polygon of the standing feet",
+    )
     add("--ignore-unknown", action="store_true", help="leave out points that the model does not know")
     add(
         "--keep-sides",
@@ -403,6 +408,7 @@ def _options(args: argparse.Namespace) -> Options:
         args.floor_sd or FLOOR_SD,
         not args.no_contact,
         not args.no_bones,
+        args.balance,
     )
 
 
@@ -454,8 +460,10 @@ def _check(args: argparse.Namespace, video: bool) -> None:
         raise UsageError("--camera and --orthographic exclude each other; give one of them")
     if args.metres_per_unit and not args.orthographic:
         raise UsageError("--metres-per-unit goes with --orthographic")
-    if not smooth and (args.no_contact or args.no_bones):
-        raise UsageError("--no-contact and --no-bones go with --method smooth")
+    if not smooth and (args.no_contact or args.no_bones or args.balance):
+        raise UsageError("--no-contact, --no-bones and --balance go with --method smooth")
+    if args.balance and args.no_contact:
+        raise UsageError("--balance needs feet that stand: leave out --no-contact")
     camera = args.camera or (args.height and video and not args.orthographic)
     if args.floor_sd and not (smooth and camera):
         raise UsageError("--floor-sd goes with --camera and --method smooth")

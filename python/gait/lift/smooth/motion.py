@@ -364,6 +364,7 @@ def _lift(of: _Sequence) -> Motion:
         task.start(of.grid.frames),
         contact=of.options.contact,
         bones=of.options.bones,
+        balance=of.options.balance,
     )
     sized = _sized(of, found, found.chi2_per_observation)
     require_size(sized.places, of.prior, task.stature)

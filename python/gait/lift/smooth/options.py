@@ -23,6 +23,8 @@ class Options:
         How well the ground of the camera's world is where the person stands, metres.
     contact, bones : bool
         Feet stay put; bones keep their length.
+    balance : bool
+        The ground pushes where feet stand; needs `contact`.
     """
 
     method: str = "smooth"
@@ -31,3 +33,4 @@ class Options:
     floor_sd: float = FLOOR_SD
     contact: bool = True
     bones: bool = True
+    balance: bool = False

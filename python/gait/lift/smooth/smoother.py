@@ -20,6 +20,7 @@ from gait.bindings.segment_prior import SegmentPrior
 from gait.lift.keypoints.observations import Grid, Observations, interpolated
 from gait.lift.segment.view import Parallel, View
 from gait.lift.smooth import block_arrowhead, soft_constraints
+from gait.lift.smooth.balance import balance as keep_balance
 from gait.lift.smooth.block_arrowhead import Information
 from gait.lift.smooth.chain import Around, Chain, Freedom, Prior, blended, chain, moved, overlapping
 from gait.lift.smooth.lasting_errors import LastingErrors
@@ -130,9 +131,10 @@ def smooth(
     *,
     contact: bool = True,
     bones: bool = True,
+    balance: bool = False,
 ) -> Lifted:
     """Estimate the motion of all markers of a prior (`chain.restricted`) over a sequence."""
-    problem = _Problem(prior, observed, view, freedom, start, contact, bones)
+    problem = _Problem(prior, observed, view, freedom, start, contact, bones, balance)
     state, settled = problem.first(start), False
     while not settled and state.steps < MOST_STEPS:
         problem.weight(state)
@@ -221,10 +223,11 @@ class _Problem:
         start: Start,
         contact: bool = False,
         bones: bool = False,
+        balance: bool = False,
     ) -> None:
         self.prior, self.visible, self.view, self.freedom = prior, observed, view, freedom
         self._chained = Prior(prior)
-        self.contact, self.bones = contact, bones
+        self.contact, self.bones, self.balance = contact, bones, balance
         self.points = observed.points
         self.grid = Grid.over(observed.time, prior)
         self.at = self.grid.between(observed.time)
@@ -262,7 +265,9 @@ class _Problem:
         rows = Rows(self.layout)
         self._observe(rows, shape, state)
         if constrained and self.contact:
-            soft_constraints.contacts(rows, self.prior.names, shape, self.grid.rate)
+            sure = soft_constraints.contacts(rows, self.prior.names, shape, self.grid.rate)
+            if self.balance:
+                keep_balance(rows, self.prior.names, shape, sure, self.grid.rate)
         if constrained and self.bones:
             soft_constraints.bones(rows, self.prior.names, shape)
         observed, fit = rows.normal()

@@ -201,7 +201,7 @@ def contacts(rows: Rows, names: Sequence[str], places: Floats, rate: float) -> F
     then = rows.layout.place(frame + 1, feet[foot])
     sd = CONTACT_SD / rate / np.sqrt(sure[frame, foot])
     moved = places[frame + 1, feet[foot]] - places[frame, feet[foot]]
-    size, across = _trunk(rows.layout, names, places, frame)
+    size, across = trunk(rows.layout, names, places, frame)
     for axis in range(3):
         columns = np.column_stack([first + axis, then + axis, size])
         factors = np.column_stack([np.tile([-1.0, 1.0], (len(frame), 1)), -moved[:, [axis]] * across])
@@ -217,7 +217,7 @@ def _contact(feet: Floats, rate: float) -> Floats:
     return np.asarray(1 / (1 + (speed / CONTACT_SPEED) ** 4) / (1 + (rise / CONTACT_RISE) ** 4))
 
 
-def _trunk(layout: Layout, names: Sequence[str], places: Floats, frame: Ints) -> tuple[Ints, Floats]:
+def trunk(layout: Layout, names: Sequence[str], places: Floats, frame: Ints) -> tuple[Ints, Floats]:
     """Columns and factors (n, 6) of the trunk's length over its present one; none if it is not known."""
     if not set(TRUNK) <= set(names):
         return np.zeros((len(frame), 0), np.intp), np.zeros((len(frame), 0))

@@ -1,0 +1,110 @@
+"""Balance as a soft constraint: the ground pushes where feet stand.
+
+The force of the ground acts within the polygon of the standing feet.  For an inverted pendulum it acts at
+z = c - h / g c'', of the body's centre of mass c, which is h above the feet; while a person stands still it
+is below the centre of mass.  Where an estimate has z outside the polygon, a row draws it back.
+
+Masses and centres of the body's segments: de Leva, "Adjustments to Zatsiorsky-Seluyanov's segment inertia
+parameters", Journal of Biomechanics 29 (1996), table 4, mean of women and men.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from itertools import combinations
+
+import numpy as np
+import numpy.typing as npt
+
+from gait.lift.smooth.soft_constraints import FEET, Rows, trunk
+
+Floats = npt.NDArray[np.float64]
+
+GRAVITY = 9.81  # m/s^2
+STANDS = 0.5  # from which a foot is sure enough to stand to bear weight
+BALANCE_SD = 0.05  # metres out of the polygon; in recorded walks it is 0.1, as feet are lines here
+EDGE = 0.03  # metres out of the polygon below which a row fades, so that rows do not come and go
+LEAST = 1e-3  # metres out of the polygon that count
+FLAT = 1e-6  # square metres of a triangle that has no inside
+_LIMBS = (  # from, to, share of the mass, place of its centre between them
+    ("shoulder", "elbow", 0.0263, 0.576),
+    ("elbow", "wrist", 0.0208, 0.61),  # with the hand, 0.6 % of the mass, beyond the wrist
+    ("hip", "knee", 0.1447, 0.385),
+    ("knee", "ankle", 0.0457, 0.444),
+    ("heel", "toe", 0.0133, 0.421),
+)
+SEGMENTS = (
+    ("head_top", "neck", 0.0681, 0.594),
+    ("neck", "pelvis", 0.4302, 0.432),
+    *((f"{s}_{upper}", f"{s}_{lower}", mass, at) for s in "lr" for upper, lower, mass, at in _LIMBS),
+)
+
+
+def masses(names: Sequence[str]) -> Floats | None:
+    """Share of the body's mass (J,) that each marker stands for; None if an end of a segment is missing."""
+    if not {name for *ends, _, _ in SEGMENTS for name in ends} <= set(names):
+        return None
+    share = np.zeros(len(names))
+    for first, second, mass, at in SEGMENTS:
+        share[names.index(first)] += (1 - at) * mass
+        share[names.index(second)] += at * mass
+    return np.asarray(share / share.sum())
+
+
+def balance(rows: Rows, names: Sequence[str], places: Floats, sure: Floats, rate: float) -> None:
+    """Draw the force into the polygon of the standing feet where places (grid, J, 3) have it outside.
+
+    Distances count in lengths of the trunk, as in `contacts`.
+
+    Parameters
+    ----------
+    sure : (grid - 1, feet)
+        How sure feet stand from each frame to the next, by `contacts`.
+    """
+    share, every = masses(names), np.arange(len(names))
+    if share is None:
+        return
+    feet, middle = np.array([names.index(name) for name in FEET]), places.swapaxes(1, 2) @ share
+    for t in range(1, len(places) - 1):
+        on = feet[np.maximum(sure[t - 1], sure[t]) > STANDS]
+        if not on.size:
+            continue
+        lag = (middle[t, 2] - places[t, on, 2].mean()) / GRAVITY * rate**2
+        parts = np.array([-lag, 1 + 2 * lag, -lag])
+        force = parts @ middle[t - 1 : t + 2, :2]
+        corners = nearest(places[t, on, :2], force)
+        out = force - corners @ places[t, on, :2]
+        away = float(np.hypot(*out))
+        if away < LEAST:
+            continue
+        size, across = trunk(rows.layout, names, places, np.array([t]))
+        columns, factors = [size[0]], [-away * across[0]]
+        for axis, normal in enumerate(out / away):
+            for step, part in zip((-1, 0, 1), parts, strict=True):
+                columns.append(rows.layout.place(np.full_like(every, t + step), every) + axis)
+                factors.append(normal * part * share)
+            columns.append(rows.layout.place(np.full_like(on, t), on) + axis)
+            factors.append(-normal * corners)
+        sd = BALANCE_SD * np.hypot(1.0, EDGE / away)
+        # linear part of away / trunk's length, in present lengths
+        rows.add(
+            np.concatenate(columns)[None], np.concatenate(factors)[None], np.array([-away]), np.array([sd])
+        )
+
+
+def nearest(corners: Floats, point: Floats) -> Floats:
+    """Weights (n,) of the corners (n, 2) of a convex polygon that give its place nearest to a point."""
+    count, every = len(corners), np.eye(len(corners))
+    for triangle in map(list, combinations(range(count), 3)):
+        system = np.vstack([corners[triangle].T, np.ones(3)])
+        if abs(np.linalg.det(system)) > FLAT:
+            inside = np.linalg.solve(system, np.append(point, 1.0))
+            if (inside >= 0).all():
+                return np.asarray(inside @ every[triangle])
+    edges = list(combinations(range(count), 2)) or [(0, 0)]
+    found = []
+    for first, last in edges:
+        along = corners[last] - corners[first]
+        part = np.clip((point - corners[first]) @ along / max(float(along @ along), FLAT), 0.0, 1.0)
+        found.append((1 - part) * every[first] + part * every[last])
+    return min(found, key=lambda weights: float(np.hypot(*(weights @ corners - point))))
