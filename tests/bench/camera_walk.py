@@ -58,10 +58,11 @@ def main() -> int:
         f"{facts('tests/bench/camera_walk.py')}\n\nErrors of focal length, tilt, roll and height of the "
         "camera, with their reported standard deviations; root-aligned error of the 15 joints and error of "
         "the speed, without a camera and with the true one; share of frames whose pelvis is in the 90 % "
-        f"interval (x and y). {sum(held)} of {len(held)} camera parameters are in theirs. Wanted: "
-        f"focal length within {FOCAL:g} %, tilt {TILT:g} degrees, height {HEIGHT:g} %, speed {SPEED:g} %, joints within "
-        f"{100 * (WORSE - 1):.0f} % of those with the camera, {COVERAGE[0]:.0%} to {COVERAGE[1]:.0%} of the "
-        f"pelvis and of the parameters ({'' if honest else 'not '}met) in their intervals."
+        f"interval (x and y). {sum(held)} of {len(held)} camera parameters are in theirs. "
+        f"Wanted: focal length within {FOCAL:g} %, tilt {TILT:g} degrees, height {HEIGHT:g} %, speed "
+        f"{SPEED:g} %, joints within {100 * (WORSE - 1):.0f} % of those with the camera, "
+        f"{COVERAGE[0]:.0%} to {COVERAGE[1]:.0%} of the pelvis and of the parameters "
+        f"({'' if honest else 'not '}met) in their intervals."
     )
     table.publish("camera_walk", "A camera found from the walk", head, rows, note)
     return int(not honest or any(row[-1] != "-" for row in rows))
