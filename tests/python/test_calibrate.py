@@ -38,13 +38,13 @@ def run(words, capsys):
 
 
 @pytest.fixture(scope="module")
-def seen(tmp_path_factory):
+def shown(tmp_path_factory):
     """Twelve pictures of the printed board."""
-    return pictures(tmp_path_factory.mktemp("seen"), 12)
+    return pictures(tmp_path_factory.mktemp("shown"), 12)
 
 
-def test_a_known_lens_comes_back(seen, tmp_path, capsys):
-    code, out, _ = run([*seen, "-o", tmp_path / "lens.json", "--json"], capsys)
+def test_a_known_lens_comes_back(shown, tmp_path, capsys):
+    code, out, _ = run([*shown, "-o", tmp_path / "lens.json", "--json"], capsys)
     found, lens, figures = read_camera(str(tmp_path / "lens.json"), placed=False), camera(), json.loads(out)
     assert code == 0 and found.size == SIZE
     assert found.fx == pytest.approx(lens.fx, rel=0.01) and found.fy == pytest.approx(lens.fy, rel=0.01)
@@ -104,8 +104,8 @@ def fault(words, capsys, output):
     return err
 
 
-def test_one_picture_is_not_enough(seen, tmp_path, capsys):
-    err = fault(seen[:1], capsys, tmp_path / "l.json")
+def test_one_picture_is_not_enough(shown, tmp_path, capsys):
+    err = fault(shown[:1], capsys, tmp_path / "l.json")
     assert "in 1 pose, 6 are needed; show it in 10 or more" in err
 
 
@@ -128,31 +128,31 @@ def test_blurred_pictures_are_refused(tmp_path, capsys):
     assert "blurred in" in (err := fault(names, capsys, tmp_path / "l.json")) and "move it slowly" in err
 
 
-def test_another_board_is_named(seen, tmp_path, capsys):
+def test_another_board_is_named(shown, tmp_path, capsys):
     other = pictures(tmp_path, 2, board=Board(7, 5, False), far=(2.2, 2.4))
     for given, board, words in (
         (other, "9x6", r"shows a chessboard of 7x5 inner corners; give --board 7x5"),
         (other, "charuco", r"shows a chessboard of 7x5 inner corners; give --board 7x5"),
-        (seen[:2], "9x6", "shows the ChArUco board of 7x5 squares .*; leave out --board"),
+        (shown[:2], "9x6", "shows the ChArUco board of 7x5 squares .*; leave out --board"),
     ):
         err = fault([*given, "--board", board], capsys, tmp_path / "l.json")
         assert re.search(words, err), err
 
 
-def test_pictures_of_mixed_sizes(seen, tmp_path, capsys):
+def test_pictures_of_mixed_sizes(shown, tmp_path, capsys):
     turned, small = str(tmp_path / "turned.png"), str(tmp_path / "small.png")
-    grey = cv2.imread(seen[0], 0)
+    grey = cv2.imread(shown[0], 0)
     cv2.imwrite(turned, cv2.rotate(grey, cv2.ROTATE_90_CLOCKWISE))
     cv2.imwrite(small, cv2.resize(grey, (320, 240)))
-    err = fault([*seen[:2], turned], capsys, tmp_path / "l.json")
+    err = fault([*shown[:2], turned], capsys, tmp_path / "l.json")
     assert "turned.png: is 480x640, turned by 90 degrees" in err
-    assert "small.png: is 320x240, " in fault([*seen[:2], small], capsys, tmp_path / "l.json")
+    assert "small.png: is 320x240, " in fault([*shown[:2], small], capsys, tmp_path / "l.json")
 
 
-def test_a_lens_that_changes_is_refused(seen, tmp_path, capsys):
+def test_a_lens_that_changes_is_refused(shown, tmp_path, capsys):
     """Half of the pictures with another zoom."""
     names = pictures(tmp_path, 12, camera(focal=700.0), seed=2)
-    err = fault([*seen[:6], *names[6:]], capsys, tmp_path / "l.json")
+    err = fault([*shown[:6], *names[6:]], capsys, tmp_path / "l.json")
     assert re.search(
         r"focal length changes from 5[4-8]. px in the earlier pictures to (6[89]|7[012]). px", err
     )
@@ -163,15 +163,15 @@ def test_flat_poses_leave_the_focal_length_open(tmp_path, capsys):
     assert "leave the focal length open" in fault(names, capsys, tmp_path / "l.json")
 
 
-def test_a_picture_that_does_not_fit_is_left_out(seen, tmp_path, capsys):
-    squeezed = cv2.warpAffine(cv2.imread(seen[3], 0), np.array([[0.9, 0.05, 20.0], [0, 1, 0]]), SIZE)
+def test_a_picture_that_does_not_fit_is_left_out(shown, tmp_path, capsys):
+    squeezed = cv2.warpAffine(cv2.imread(shown[3], 0), np.array([[0.9, 0.05, 20.0], [0, 1, 0]]), SIZE)
     cv2.imwrite(str(tmp_path / "squeezed.png"), squeezed)
-    code, out, _ = run([*seen, tmp_path / "squeezed.png", "-o", tmp_path / "l.json", "--json"], capsys)
+    code, out, _ = run([*shown, tmp_path / "squeezed.png", "-o", tmp_path / "l.json", "--json"], capsys)
     assert code == 0 and json.loads(out)["left_out"] == [str(tmp_path / "squeezed.png")]
 
 
-def test_a_lens_is_no_camera_yet(seen, tmp_path, capsys):
-    assert run([*seen, "-o", tmp_path / "lens.json"], capsys)[0] == 0
+def test_a_lens_is_no_camera_yet(shown, tmp_path, capsys):
+    assert run([*shown, "-o", tmp_path / "lens.json"], capsys)[0] == 0
     assert main(["track", "v.mp4", "--camera", str(tmp_path / "lens.json"), "-o", "o.csv"]) == 1
     lens = str(tmp_path / "lens.json")
     with pytest.raises(Exception, match="R and t are missing; place the camera: gait camera --lens"):

@@ -267,7 +267,7 @@ def test_files_that_are_no_cameras(name, text, words, tmp_path):
 
 def test_size_of_the_video_is_checked(tmp_path):
     path = write_json(tmp_path / "cam.json")
-    with pytest.raises(UserError, match="640x480, the video is 320x240; scale .* by 0.5"):
+    with pytest.raises(UserError, match="640x480, the video is 320x240, resized by 0.5; give --scale-camera"):
         Camera.read(path, (320, 240))
     with pytest.raises(UserError, match="640x480, the video is 640x360, another aspect"):
         Camera.read(path, (640, 360))

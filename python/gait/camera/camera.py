@@ -68,9 +68,9 @@ class Camera:
     distortion: Array = field(default_factory=lambda: np.zeros(5))
 
     @staticmethod
-    def read(path: str, size: tuple[int, int] | None = None) -> Camera:
+    def read(path: str, size: tuple[int, int] | None = None, scale: bool = False) -> Camera:
         """Read a camera file of any supported kind; see `read_camera`."""
-        return read_camera(path, size)
+        return read_camera(path, size, scale=scale)
 
     @staticmethod
     def looking(place: ArrayLike, target: ArrayLike, size: tuple[int, int], focal: float) -> Camera:
@@ -185,13 +185,30 @@ class Camera:
         if self.size == tuple(size):
             return
         width, height = size
-        factor = width / self.width
         made = f"{where}: calibrated for {self.width}x{self.height}, the video is {width}x{height}"
-        if self.size == (height, width):
-            raise UserError(f"{made}, turned by 90 degrees; turn it back, or calibrate it as it is")
-        if abs(self.height * factor - height) < 1:
-            raise UserError(f"{made}; scale width, height, fx, fy, cx, cy by {factor:.6g}")
-        raise UserError(f"{made}, another aspect; calibrate for this video or undo its crop")
+        if self.same_aspect(size):
+            factor = width / self.width
+            raise UserError(
+                f"{made}, resized by {factor:.4g}; give --scale-camera if it shows the same, or scale width, "
+                "height, fx, fy, cx, cy"
+            )
+        if self.same_aspect((height, width)):
+            resized = "" if self.size == (height, width) else " and resized"
+            raise UserError(f"{made}, turned by 90 degrees{resized}; turn it back, or calibrate it as it is")
+        cut = ""
+        if width == self.width and height < self.height:
+            cut = f": {self.height - height} rows are cut off"
+        elif height == self.height and width < self.width:
+            cut = f": {self.width - width} columns are cut off"
+        raise UserError(f"{made}, another aspect{cut}; calibrate for this video or undo its crop")
+
+    def same_aspect(self, size: tuple[int, int]) -> bool:
+        """Whether pictures of `size` may show the same as this camera's, resized; to a pixel."""
+        return abs(self.height * size[0] / self.width - size[1]) < 1
+
+    def for_size(self, size: tuple[int, int]) -> Camera:
+        """Camera of the same picture resized to `size`, whose aspect is the same (`same_aspect`)."""
+        return replace(self.scaled(size[0] / self.width), width=size[0], height=size[1])
 
     def check_place(self, where: str) -> None:
         """Raise UserError unless people who stand on the floor, z = 0, would be upright in the picture."""
@@ -280,7 +297,9 @@ _MORE_TERMS = (8, 12, 14)  # numbers of OpenCV's lenses with rational terms, thi
 _CROPPED, _RESIZED, _ALIKE = 0.7, 0.2, 0.05
 
 
-def read_camera(path: str, size: tuple[int, int] | None = None, *, placed: bool = True) -> Camera:
+def read_camera(
+    path: str, size: tuple[int, int] | None = None, *, placed: bool = True, scale: bool = False
+) -> Camera:
     """Read a camera file of any supported kind, chosen by its suffix and content.
 
     Parameters
@@ -292,6 +311,8 @@ def read_camera(path: str, size: tuple[int, int] | None = None, *, placed: bool 
         Width and height of the video, pixels: checked, and used by OpenCV files, which may lack it.
     placed : bool
         Whether rotation and translation must be there; without them the camera is at the origin.
+    scale : bool
+        Whether a camera of pictures of the same aspect and another size is resized to `size`.
 
     Raises
     ------
@@ -319,6 +340,8 @@ def read_camera(path: str, size: tuple[int, int] | None = None, *, placed: bool 
             f"{path}: focal length of {focal:.6g} pixels is over {LONGEST_LENS} times the picture's width; "
             "give it in pixels"
         )
+    if size is not None and scale and camera.same_aspect(size):
+        return camera.for_size(size)
     if size is not None:
         camera.check_size(str(path), size)
     return camera

@@ -33,7 +33,7 @@ def coordinates(count: int, distances: Mapping[tuple[int, int], float]) -> tuple
     Returns
     -------
     xy : ndarray of shape (count, 2)
-        Metres; turned so or mirrored, which distances do not tell.
+        Metres; turned so or mirrored, which distances do not determine.
     off : ndarray of shape (len(distances),)
         Metres by which each distance is missed.
 
@@ -201,8 +201,8 @@ def floor_lines(camera: Camera, xy: Array, step: float = 1.0, beyond: float = 3.
             line[:, k], line[:, 1 - k] = at, along
             deep = camera.depth(line) > 0.3
             uv = camera.project(line)
-            seen = deep & (np.abs(uv - np.array(camera.size) / 2) < np.array(camera.size)).all(axis=1)
-            for run in np.split(np.arange(len(along)), np.flatnonzero(np.diff(seen)) + 1):
-                if len(run) > 1 and seen[run[0]]:
+            visible = deep & (np.abs(uv - np.array(camera.size) / 2) < np.array(camera.size)).all(axis=1)
+            for run in np.split(np.arange(len(along)), np.flatnonzero(np.diff(visible)) + 1):
+                if len(run) > 1 and visible[run[0]]:
                     found.append(np.round(uv[run], 1).tolist())
     return found

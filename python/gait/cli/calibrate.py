@@ -142,10 +142,10 @@ def _text(path: str, s: dict[str, Any]) -> str:
         + (f"; left out, as they do not fit the others: {', '.join(s['left_out'])}" if s["left_out"] else "")
     ]
     names = [f"{Path(name).name} {error:.2f} px" for name, error in s["error_px"].items()]
-    wide = max(map(len, names)) + 2
-    columns = max(1, 100 // wide)
+    cell = max(map(len, names)) + 2
+    columns = max(1, 100 // cell)
     for k in range(0, len(names), columns):
-        lines.append("  " + "".join(f"{name:<{wide}}" for name in names[k : k + columns]).rstrip())
+        lines.append("  " + "".join(f"{name:<{cell}}" for name in names[k : k + columns]).rstrip())
     lines += [
         f"{s['rms_px']:.2f} px rms in all",
         f"focal length {fx:.1f} x {fy:.1f} +- {s['focal_sd_px']:.1f} px, view {s['fov_deg'][0]:.1f} x "

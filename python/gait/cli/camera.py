@@ -32,8 +32,10 @@ from gait.progress import note
 if TYPE_CHECKING:
     from gait.bindings.model import Model
     from gait.camera.camera import Camera
+    from gait.io.keypoints_file import Keypoints
     from gait.track.from_walk import Calibration
 
+_OUTSIDE, _FILLED = 0.05, 0.72  # shares of points, and of the picture's sides
 _LARGE = 3.0  # pixels, rms, above which the points should be checked
 
 EXAMPLES = """\
@@ -52,6 +54,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("-o", "--output", required=True, metavar="CAMERA.json", help="the camera")
     add = parser.add_argument_group("by clicking on the floor").add_argument
     add("--page", metavar="VIDEO|PICTURE", help="open a page on which marks of the floor are clicked")
+    add("--scale-camera", action="store_true", help="the film is resized: scale a lens of another resolution")
     add("--frame", type=values.whole(0), metavar="F", help="frame shown at first (default: 0)")
     add("--port", type=values.whole(0, 65535), default=8040, metavar="P",
         help="port of the page on this machine (default: 8040; 0: any)")  # fmt: skip
@@ -66,8 +69,8 @@ def run(args: argparse.Namespace) -> int:
     """Find the camera and write it."""
     if args.page:
         return _on_page(args)
-    if args.frame is not None:
-        raise UsageError("--frame: is for --page")
+    if args.frame is not None or args.scale_camera:
+        raise UsageError(f"--{'scale-camera' if args.scale_camera else 'frame'}: is for --page")
     return _from_walk(args) if args.walk else _from_points(args)
 
 
@@ -88,7 +91,10 @@ def _on_page(args: argparse.Namespace) -> int:
     if first >= frames:
         raise UserError(f"{args.page}: no frame {first}; it has {frames}")
     if args.lens:
-        lens, words = read_camera(args.lens, size, placed=False), f"Lens of {args.lens}."
+        lens, words = (
+            read_camera(args.lens, size, placed=False, scale=args.scale_camera),
+            f"Lens of {args.lens}.",
+        )
     elif fov is not None:
         lens = lens_of(size, 0.5 * size[0] / math.tan(math.radians(0.5 * fov)))
         words = f"A lens without distortion that shows {fov:.0f} degrees; gait calibrate makes it exact."
@@ -99,11 +105,11 @@ def _on_page(args: argparse.Namespace) -> int:
     note(f"gait camera: open {serve.address(own)} (Ctrl-C ends it)", args.quiet)
     written: list[str] = []
 
-    def tell(line: str) -> None:
+    def report(line: str) -> None:
         written.append(line)
         print(json.dumps({"written": args.output}) if args.json else line, flush=True)
 
-    serve.run(application(scene, own.getsockname()[1], tell), own)
+    serve.run(application(scene, own.getsockname()[1], report), own)
     return 0 if written else 1
 
 
@@ -182,12 +188,33 @@ def _calibrate(args: argparse.Namespace, model: Model) -> Calibration:
         if args.size is None:
             raise UsageError(f"{args.walk}: give the size of the picture in pixels, as --size 1280x720")
         keypoints, _ = keypoints_file.read(args.walk, model.joint_names, ignore_unknown=True)
+        _check_size(args, keypoints)
         return calibrate(keypoints, args.size, model, args.height, fov=args.fov, where=args.walk)
     if args.size:
         raise UsageError("--size: is for KEYPOINTS.csv; a video has its own")
     video = Video(args.walk)
     keypoints = find_person(video, args.quiet)
     return calibrate_film(video, keypoints, model, args.height, args.fov, args.quiet)
+
+
+def _check_size(args: argparse.Namespace, keypoints: Keypoints) -> None:
+    """Refuse a size that points lie outside of; note one that they fill in part only."""
+    import numpy as np
+
+    width, height = args.size
+    outside = keypoints.outside(args.size)
+    if outside > _OUTSIDE:
+        raise UserError(
+            f"{args.walk}: {outside:.0%} of the points lie outside of --size {width}x{height}; give the "
+            "size of the video in which they were found"
+        )
+    u, v = np.nanquantile(keypoints.uv, 0.999, axis=(0, 1))
+    if u < _FILLED * width and v < _FILLED * height:
+        note(
+            f"{args.walk}: all points lie in the upper left {u:.0f}x{v:.0f} of --size {width}x{height}: is "
+            "that the size of the video in which they were found?",
+            args.quiet,
+        )
 
 
 def _size(text: str) -> tuple[int, int]:

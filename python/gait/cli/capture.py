@@ -45,7 +45,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Add the command's options."""
     add = parser.add_argument
     add("source", metavar="VIDEO|DEVICE", help="file that FFmpeg reads, or camera: 0, /dev/video0")
-    values.add_camera(parser, ", to announce")
+    values.add_camera(parser, ", to announce", scale=True)
     values.add_clip(parser, "send", init="none", background="none")
     parser.set_defaults(init=None, start=0)
     values.add_model(parser, "model whose prior fills in what --init leaves open")
@@ -153,7 +153,7 @@ def _setup(args: argparse.Namespace, source: FileSource | DeviceSource) -> Setup
 
     setup = Setup(stream=args.stream, jpeg=args.jpeg)
     if args.camera:
-        setup.camera = Camera.read(args.camera, source.size)
+        setup.camera = Camera.read(args.camera, source.size, args.scale_camera)
     if isinstance(source, DeviceSource):
         setup.plate = None if args.background == "none" else read_plate(args.background, source.size)
     else:

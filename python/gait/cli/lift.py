@@ -89,7 +89,9 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "-m", "--model", metavar="M.gait", help="model with a segment prior (default: the shipped one)"
     )
-    values.add_camera(parser, "; without it the camera of a VIDEO is found from the walk, given --height")
+    values.add_camera(
+        parser, "; without it the camera of a VIDEO is found from the walk, given --height", scale=True
+    )
     parser.add_argument(
         "--height",
         type=values.stature,
@@ -252,6 +254,7 @@ def _lift_keypoints(args: argparse.Namespace, video: bool) -> tuple[dict[str, An
         options=_options(args),
         pixel_sd_given=args.pixel_sd is not None,
         camera=args.camera,
+        size=_scaled(args),
         calibration=calibration,
         axis=args.orthographic,
         metres=args.metres_per_unit,
@@ -310,7 +313,7 @@ def _find_keypoints(args: argparse.Namespace, prior: SegmentPrior) -> tuple[Keyp
         raise UsageError("give --camera CAM, or --height M for a camera that is found from the walk")
     video = Video(args.input)
     if args.camera:
-        Camera.read(args.camera, video.size).check_place(args.camera)
+        Camera.read(args.camera, video.size, args.scale_camera).check_place(args.camera)
     keypoints = find_person(video, args.quiet, args.start or 0, args.stop)
     if args.stabilize == "auto":
         keypoints = _stabilised(args, video, keypoints)
@@ -325,7 +328,8 @@ def _stabilised(args: argparse.Namespace, video: Video, keypoints: Keypoints) ->
     from gait.track.stabilise import stabilised
     from gait.track.walk_camera import expected_camera
 
-    camera = Camera.read(args.camera, video.size) if args.camera else expected_camera(video, args.fov)
+    given = Camera.read(args.camera, video.size, args.scale_camera) if args.camera else None
+    camera = given or expected_camera(video, args.fov)
     steady = stabilised(video, camera, sample_frames(video), {0: keypoints}, None, args.quiet)
     return keypoints if steady is None else steady.of_reference(steady.keypoints(keypoints))
 
@@ -354,7 +358,17 @@ def _write_camera(args: argparse.Namespace, calibration: Calibration | None) -> 
 
     if args.camera_out:
         with replacing(args.camera_out) as temporary:
-            write_camera(temporary, read_camera(args.camera) if calibration is None else calibration.camera)
+            if calibration is None:
+                write_camera(temporary, read_camera(args.camera, _scaled(args), scale=True))
+            else:
+                write_camera(temporary, calibration.camera)
+
+
+def _scaled(args: argparse.Namespace) -> tuple[int, int] | None:
+    """Size to which --scale-camera resizes the camera: that of the video."""
+    from gait.io.video import Video
+
+    return Video(args.input).size if args.scale_camera else None
 
 
 def _lift_pictures(args: argparse.Namespace) -> tuple[dict[str, Any], str]:
@@ -378,6 +392,7 @@ def _lift_pictures(args: argparse.Namespace) -> tuple[dict[str, Any], str]:
         placement=args.placement,
         model=args.model,
         camera=args.camera,
+        scale_camera=args.scale_camera,
         calibration=calibration,
         height=args.height,
         corrections=args.corrections,
@@ -431,6 +446,8 @@ def _require_own(args: argparse.Namespace, video: bool) -> None:
             raise UsageError(f"--{option.replace('_', '-')} {why}")
     if video and args.placement and args.camera and args.height:
         raise UsageError("--height: the placement has the stature; leave it out, or --camera")
+    if args.scale_camera and not (video and args.camera):
+        raise UsageError("--scale-camera: is for the --camera of a VIDEO, whose size it takes")
     if args.fov and (given or not args.height):
         raise UsageError("--fov: is for a camera that is found from the walk, with --height and no --camera")
     if args.camera_out and not (args.camera or (args.height and not given)):

@@ -54,7 +54,9 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Add the command's options."""
     add = parser.add_argument
     add("video", metavar="VIDEO", help="any file that FFmpeg reads")
-    values.add_camera(parser, "; without it the camera is found from the walk, which needs --height")
+    values.add_camera(
+        parser, "; without it the camera is found from the walk, which needs --height", scale=True
+    )
     values.add_fov(parser)
     add("--camera-out", metavar="CAM.json", help="also write the camera, found or given")
     add("--cameras-out", metavar="CAMERAS.csv", help="also write each frame's camera, for one that turns")
@@ -118,6 +120,8 @@ def run(args: argparse.Namespace) -> int:
         raise UsageError("give --camera CAM, or --height M for a camera that is found from the walk")
     if not args.camera and args.init != "auto":
         raise UsageError("--init: needs --camera, in whose world it is")
+    if args.scale_camera and not args.camera:
+        raise UsageError("--scale-camera: needs --camera")
     if args.camera and args.fov:
         raise UsageError("--fov: is for a camera that is found; leave out --camera or --fov")
     require_outputs(

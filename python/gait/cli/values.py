@@ -78,9 +78,15 @@ def require_order(start: int, stop: int) -> None:
         raise UsageError(f"--stop {stop}: must be greater than --start {start}")
 
 
-def add_camera(parser: ArgumentParser, note: str = "", required: bool = False) -> None:
-    """Add ``--camera``."""
+def add_camera(parser: ArgumentParser, note: str = "", required: bool = False, scale: bool = False) -> None:
+    """Add ``--camera`` and, with `scale`, ``--scale-camera``."""
     parser.add_argument("--camera", required=required, metavar="CAM", help=CAMERA + note)
+    if scale:
+        parser.add_argument(
+            "--scale-camera",
+            action="store_true",
+            help="the video is resized: scale a camera that was calibrated at another resolution",
+        )
 
 
 def add_fov(parser: _ActionsContainer) -> None:

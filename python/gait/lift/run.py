@@ -47,6 +47,8 @@ class Request:
         Of the method; `pixel_sd` counts only if `pixel_sd_given`, else the points' jitter is measured.
     camera : str, optional
         File of the calibration; without one the view is from far away.
+    size : (int, int), optional
+        Of the video: a camera of another resolution is resized to it.
     calibration : Calibration, optional
         Camera found from the walk instead; its uncertainty is added to the standard deviations.
     axis : str, optional
@@ -70,6 +72,7 @@ class Request:
     options: Options
     pixel_sd_given: bool = False
     camera: str | None = None
+    size: tuple[int, int] | None = None
     calibration: Calibration | None = None
     axis: str | None = None
     metres: float | None = None
@@ -199,7 +202,8 @@ def _view(keypoints: Keypoints, request: Request, warn: Warn) -> View:
     if request.calibration is not None:
         return Perspective(request.calibration.camera)
     if request.camera:
-        camera = Camera.read(request.camera)
+        camera = Camera.read(request.camera, request.size, scale=True)
+        camera.check_place(request.camera)
         outside = keypoints.outside(camera.size)
         if outside > OUTSIDE and not request.stabilised:
             picture = "{}x{}".format(*camera.size)

@@ -19,6 +19,8 @@ class ClipOptions:
         The clip and the track to write.
     camera : str, optional
         Its camera file; the camera is found from the walk if left out, which needs `height` and keypoints.
+    scale_camera : bool
+        Whether a camera of pictures of another size and the same aspect is resized to the clip's.
     camera_out : str, optional
         File to write the camera to.
     cameras_out : str, optional
@@ -62,6 +64,7 @@ class ClipOptions:
     init: str = "auto"
     background: str = "auto"
     height: float | None = None
+    scale_camera: bool = False
     camera_out: str | None = None
     cameras_out: str | None = None
     fov: float | None = None

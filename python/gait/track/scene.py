@@ -98,7 +98,7 @@ class Scene:
             If a file cannot be read or does not fit the others.
         """
         video = Video(options.video)
-        camera = Camera.read(options.camera, video.size) if options.camera else None
+        camera = Camera.read(options.camera, video.size, options.scale_camera) if options.camera else None
         model = Model(options.model or ("paper" if options.mode == Mode.PAPER else "walk"))
         if camera is not None and options.camera:
             camera.check_place(options.camera)

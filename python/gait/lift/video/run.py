@@ -44,6 +44,8 @@ class Request:
         Files.
     model, camera, corrections : str, optional
         Files; the shipped model, a view without a camera and no corrections if left out.
+    scale_camera : bool
+        Whether a camera of another resolution is resized to the video's.
     calibration : Calibration, optional
         Camera found from the walk instead; its uncertainty is added to the standard deviations.
     height : float, optional
@@ -60,6 +62,7 @@ class Request:
     placement: str
     model: str | None = None
     camera: str | None = None
+    scale_camera: bool = False
     calibration: Calibration | None = None
     height: float | None = None
     corrections: str | None = None
@@ -94,7 +97,7 @@ def lift_video(request: Request, prior: SegmentPrior, warn: Warn, quiet: bool) -
         One line that names the file at fault.
     """
     video = Video(request.video)
-    camera = Camera.read(request.camera, video.size) if request.camera else None
+    camera = Camera.read(request.camera, video.size, request.scale_camera) if request.camera else None
     placement = read_placement(request.placement, prior, camera is not None)
     if request.calibration is not None:
         camera = request.calibration.camera
