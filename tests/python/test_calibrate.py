@@ -179,7 +179,7 @@ def test_a_lens_is_no_camera_yet(shown, tmp_path, capsys):
 
 
 @pytest.mark.parametrize(
-    ("words", "said"),
+    ("words", "expected"),
     [
         ([], "give a film or pictures and -o LENS.json"),
         (["a.png"], "give a film or pictures and -o LENS.json"),
@@ -189,23 +189,23 @@ def test_a_lens_is_no_camera_yet(shown, tmp_path, capsys):
         (["a.png", "--print-board", "b.pdf"], "leave out the film"),
     ],
 )
-def test_wrong_usage(words, said, capsys):
+def test_wrong_usage(words, expected, capsys):
     code, _, err = run(words, capsys)
-    assert code == 2 and said in err
+    assert code == 2 and expected in err
 
 
 @pytest.mark.parametrize(
-    ("words", "said"),
+    ("words", "expected"),
     [
         (["absent.png", "-o", "l.json"], "absent.png: no such picture"),
         (["absent.mp4", "-o", "l.json"], "absent.mp4: no such video file"),
         (["--print-board", "board.svg"], "board.svg: unknown kind of board; use .pdf or .png"),
     ],
 )
-def test_files_that_are_not_there(words, said, capsys, tmp_path, monkeypatch):
+def test_files_that_are_not_there(words, expected, capsys, tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
     code, _, err = run(words, capsys)
-    assert code == 1 and said in err and err.count("\n") == 1
+    assert code == 1 and expected in err and err.count("\n") == 1
 
 
 def test_a_file_that_is_no_picture(tmp_path, capsys):

@@ -33,7 +33,7 @@ def test_distances_give_coordinates():
     assert xy[1, 1] == pytest.approx(0, abs=1e-9) and xy[1, 0] > 0
 
 
-def test_the_picture_tells_which_side_marks_are_on():
+def test_the_picture_shows_which_side_marks_are_on():
     xy, _ = coordinates(5, FAR)
     for given in (xy, xy * [1, -1]):
         camera, off, used = place_marks(lens_of(SIZE, 1000.0), UV, given, mirrored=True)
@@ -90,7 +90,7 @@ def scene(folder, lens=TRUE):
     for x, y in np.rint(UV).astype(int):
         cv2.circle(picture, (x, y), 4, (20, 20, 200), -1)
     return camera_page.Scene(
-        "room.png", SIZE, 1, lambda number: picture, lens, "a lens", str(folder / "camera.json")
+        "hall.png", SIZE, 1, lambda number: picture, lens, "a lens", str(folder / "camera.json")
     )
 
 
@@ -169,7 +169,7 @@ def test_a_mark_is_moved_by_keys_and_removed(tmp_path):
 
 
 @pytest.mark.parametrize(
-    ("words", "code", "said"),
+    ("words", "code", "expected"),
     [
         (["--page", "a.mp4", "p.csv"], 2, "leave out POINTS.csv"),
         (["--page", "a.mp4", "--lens", "l.json", "--fov", "60"], 2, "leave out --lens or --fov"),
@@ -178,10 +178,10 @@ def test_a_mark_is_moved_by_keys_and_removed(tmp_path):
         (["--page", "absent.mp4"], 1, "absent.mp4: no such video file"),
     ],
 )
-def test_wrong_usage(words, code, said, tmp_path, monkeypatch, capsys):
+def test_wrong_usage(words, code, expected, tmp_path, monkeypatch, capsys):
     monkeypatch.chdir(tmp_path)
     assert main(["camera", *words, "-o", "c.json"]) == code
-    assert said in capsys.readouterr().err
+    assert expected in capsys.readouterr().err
 
 
 def test_a_lens_of_another_size_is_refused(tmp_path, capsys):

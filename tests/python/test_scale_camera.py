@@ -1,4 +1,4 @@
-"""Cameras of another resolution are resized when told; what else differs is named; upright floors are refused."""
+"""Cameras of another resolution are resized when told; what else differs is named; so are wrong worlds."""
 
 import json
 
@@ -49,7 +49,7 @@ def test_what_no_scale_can_mend_is_named(camera, size, words):
 
 
 @pytest.mark.parametrize(
-    ("words", "said"),
+    ("words", "expected"),
     [
         (["track", "v.mp4", "--height", "1.7", "-o", "o.csv"], "--scale-camera: needs --camera"),
         (
@@ -63,11 +63,11 @@ def test_what_no_scale_can_mend_is_named(camera, size, words):
         (["camera", "p.csv", "--lens", "l.json", "-o", "c.json"], "--scale-camera: is for --page"),
     ],
 )
-def test_where_it_means_nothing_it_is_refused(words, said, capsys, tmp_path, monkeypatch):
+def test_where_it_means_nothing_it_is_refused(words, expected, capsys, tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
     (tmp_path / "v.mp4").touch()
     assert main([*words, "--scale-camera"]) == 2
-    assert said in capsys.readouterr().err
+    assert expected in capsys.readouterr().err
 
 
 def keypoints(path, uv):

@@ -145,8 +145,8 @@ def solve(scene: Scene, marks: dict[str, Any]) -> dict[str, Any]:
     -------
     dict
         ``camera``, its ``place``, ``focal`` length and that one's ``sd`` as a share; ``xy`` of the marks,
-        where they are ``shown``, ``off`` and ``rms`` in pixels, ``missed_m`` of each distance; in pixels lines
-        of the floor's ``grid`` and a ``pole`` as high as a person.
+        where they are ``shown``, ``off`` and ``rms`` in pixels; ``missed_m`` of each distance; lines of the
+        floor's ``grid`` and a ``pole`` as high as a person, in pixels.
 
     Raises
     ------
