@@ -131,7 +131,8 @@ def test_automatic_start_reports_what_it_found(scene, capsys):
     total, *each = map(int, counted.groups())
     assert sum(each) == total <= 20
     assert "start: found at frame" in out and f"written: track {scene / 'out.csv'}" in out
-    assert f"init.json lies beside the film and was not used; to use it: --init {scene / 'init.json'}" in out
+    init = scene / "init.json"
+    assert f"note: not used: {init} beside the film; to use it: --init {init}\n" in out
     assert ("warning: no frame has status tracking" in out) == (each[1] == 0)
     assert "step 0.0 ms median" not in out
 

@@ -81,14 +81,14 @@ def _lines(region: Image, words: tuple[str, ...], colour: tuple[int, int, int], 
 
 
 def _draw_legend(canvas: Image, scale: float) -> None:
-    """Explain dial, ellipses and colours in the bottom left corner, if they take half the picture at most."""
+    """Explain dial, ellipses and colours in the top right corner, if that is free of the panel."""
     size, edge, row = 0.4 * scale, round(8 * scale), 19 * scale
     width = max(cv2.getTextSize(words, _FONT, size, 1)[0][0] for words, _ in _LEGEND) + round(16 * scale)
     height = round(row * len(_LEGEND) + 8 * scale)
-    if height + 2 * edge > canvas.shape[0] / 2 or width + 2 * edge > canvas.shape[1]:
+    left = canvas.shape[1] - edge - width
+    if left < round(_PANEL_SIZE[0] * scale) + 2 * edge or height + 2 * edge > canvas.shape[0] / 2:
         return
-    top = canvas.shape[0] - edge - height
-    region = _darkened(canvas[top : top + height, edge : edge + width])
+    region = _darkened(canvas[edge : edge + height, left : left + width])
     for k, (words, side) in enumerate(_LEGEND):
         colour = OVER_PICTURES[side] if side else _INK
         _write(region, words, (round(8 * scale), round(row * (k + 0.8))), size, colour)

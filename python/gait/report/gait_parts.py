@@ -28,8 +28,10 @@ _BY_STRIDE = (
 )
 
 
-def add_gait(page: Page, track: Track, parameters: Parameters, cycles: Mapping[str, AngleCycle]) -> None:
-    """Add all parts that a track with whole strides has."""
+def add_gait(
+    page: Page, track: Track, parameters: Parameters, cycles: Mapping[str, AngleCycle], remark: str = ""
+) -> None:
+    """Add all parts that a track with whole strides has; `remark`: on the uncertainty."""
     tips = {QUANTITIES[name]: words for name, words in terms.QUANTITIES.items()} | terms.COLUMNS
     page.grid("Gait", HEAD, parameter_rows(parameters), tips)
     if parameters.all_unsure:
@@ -40,7 +42,7 @@ def add_gait(page: Page, track: Track, parameters: Parameters, cycles: Mapping[s
         )
     page.words(
         "Mean over the strides without unsure frames ± its standard deviation; in brackets the "
-        f"standard deviation between strides. Source of the uncertainty: {parameters.source}.",
+        f"standard deviation between strides. Source of the uncertainty: {parameters.source}.{remark}",
         "faint",
     )
     page.figure("Footfalls", footfall_plot(track, parameters))
@@ -189,6 +191,7 @@ def tint(axes: Axes, track: Track) -> None:
             axes.axvspan(*span, color=STATUS_TINTS[status], alpha=0.5, lw=0)
 
 
+_OPEN = 100.0  # standard deviation from which an asymmetry, which is at most 200, means nothing
 HEAD = ("", "right", "left", "both", "asymmetry, %")
 """Columns of `parameter_rows`."""
 
@@ -206,6 +209,8 @@ def _cell(value: dict[str, Any] | None, name: str) -> str:
     if value is None:
         return ""
     digits = 1 if name.endswith(("percent", "spm")) else 3 if name.endswith("time_s") else 2
+    if name == "percent" and value["sd"] > _OPEN:
+        return "not determined"
     text = f"{value['mean']:.{digits}f}"
     if np.isfinite(value["sd"]):
         text += f"\N{NO-BREAK SPACE}±\N{NO-BREAK SPACE}{value['sd']:.{digits}f}"

@@ -36,7 +36,7 @@ class Page:
         self._parts.append(f"<h2>{escape(text)}</h2>")
 
     def words(self, text: str, kind: str = "") -> None:
-        """Add a paragraph; `kind`: ``warning`` or ``faint``."""
+        """Add a paragraph; `kind`: ``warning``, ``faint``, ``screen-only``, or several of them."""
         self._parts.append(f'<p class="{kind}">{escape(text)}</p>' if kind else f"<p>{escape(text)}</p>")
 
     def points(self, lines: Sequence[str]) -> None:

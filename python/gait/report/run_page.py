@@ -57,7 +57,7 @@ class Run:
     errors : Comparison or None
         Against a truth.
     notes : list of str
-        Warnings and remarks, shown under the verdict.
+        Remarks on what was used.
     facts : dict of str to dict of str to str
         Tables of names and values by heading: camera and settings, files, figures of a live run.
     drawings : dict of str to str
@@ -89,9 +89,8 @@ def run_page(run: Run) -> str:
     """Return the text of the page."""
     page = Page(run.title, run.verdict.sentence() + ".")
     page.words(run.verdict.statuses() + ".", "faint")
-    for note in [run.verdict.warning(), *run.notes]:
-        if note:
-            page.words(note[0].upper() + note[1:] + ("" if note.endswith(".") else "."), "warning")
+    if warning := run.verdict.warning():
+        page.words(f"{warning[0].upper()}{warning[1:]}.", "warning")
     if run.film is not None:
         _add_film(page, run, run.film)
     if run.parameters is None:
@@ -100,7 +99,7 @@ def run_page(run: Run) -> str:
             "No whole stride was tracked, so there are no gait parameters and no curves over the stride."
         )
     else:
-        add_gait(page, run.track, run.parameters, run.cycles)
+        add_gait(page, run.track, run.parameters, run.cycles, _COMMON if _is_vague(run.track) else "")
     if run.film is not None and _has_parts():
         page.figure("Angles over time", '<div id="run-curves" class="screen-only"></div>')
     page.figure("Way over the floor", way_plot(run.track, run.parameters, run.errors))
@@ -119,6 +118,8 @@ def run_page(run: Run) -> str:
         page.figure(heading, drawing)
     for heading, rows in run.facts.items():
         page.table(heading, rows)
+    if run.notes:
+        page.points([f"{note[0].upper()}{note[1:]}." for note in run.notes])
     page.heading("Conventions")
     page.points(terms.CONVENTIONS)
     return page.text()
@@ -140,7 +141,10 @@ def _add_film(page: Page, run: Run, film: PageFilm) -> None:
     page.pictures(film.pictures, "print-only")
     statuses = _statuses(run.track, film)
     page.html(_strip(statuses))
-    page.words(_LEGEND + " " + film.note(), "faint")
+    page.words(_LEGEND, "faint")
+    page.words(
+        f"Drag the figure to turn it; space plays, arrow keys step. {film.note()}", "faint screen-only"
+    )
     if not whole:
         page.words(
             f"The figure that turns is not in this page: {parts.FETCH}, then make the page again", "faint"
@@ -153,8 +157,13 @@ def _add_film(page: Page, run: Run, film: PageFilm) -> None:
 _LEGEND = (
     "In the film: the dial is the phase of the stride, with the right heel strike at the top and a coloured "
     "arc where the phase is with 95 %; ellipses hold wrists and ankles with 90 %; left is blue, right "
-    "orange; the figure is faded where the person was lost. Drag the figure to turn it; space plays, "
-    "arrow keys step."
+    "orange; the figure is faded where the person was lost."
+)
+
+
+_COMMON = (
+    " Most of the uncertainty of the places is that of the camera, which is common to all frames: lengths and "
+    "speed are less uncertain than stated, and alike in all strides."
 )
 
 
@@ -217,8 +226,14 @@ def _data(run: Run, film: PageFilm, statuses: list[str], whole: bool) -> dict[st
         curves=curves,
         events=_events(run.parameters),
         parts=whole,
-        vague=bool(np.nanmedian(sd) > _VAGUE) if len(rows) else False,
+        vague=_is_vague(track),
     )
+
+
+def _is_vague(track: Track) -> bool:
+    """Whether the places are uncertain by more than a hand, as where the camera was found from the walk."""
+    sd = np.stack(list(track.sd.values()))
+    return bool(np.median(sd.max(axis=2)) > _VAGUE)
 
 
 def _events(parameters: Parameters | None) -> list[dict[str, object]]:

@@ -57,7 +57,7 @@ def beside(options: ClipOptions) -> list[str]:
     given = {"init": options.init != "auto", "camera": options.camera is not None}
     found = {option: Path(options.video).with_name(name) for option, name in _BESIDE.items()}
     return [
-        f"{path.name} lies beside the film and was not used; to use it: --{option} {path}"
+        f"not used: {path} beside the film; to use it: --{option} {path}"
         for option, path in found.items()
         if not given[option] and path.is_file()
     ]
