@@ -21,7 +21,7 @@
 #define GAIT_VERSION_MINOR 1
 #define GAIT_VERSION_PATCH 0
 #define GAIT_VERSION (GAIT_VERSION_MAJOR * 10000 + GAIT_VERSION_MINOR * 100 + GAIT_VERSION_PATCH)
-#define GAIT_ABI 7          /* SONAME; raised by any incompatible change below, struct layout included */
+#define GAIT_ABI 8          /* SONAME; raised by any incompatible change below, struct layout included */
 #define GAIT_FORMAT_MAJOR 1 /* model blob: another major is refused, */
 #define GAIT_FORMAT_MINOR 0 /* sections added by a newer minor are skipped */
 
@@ -30,6 +30,7 @@
 #define GAIT_MAX_ANGLES 32     /* joint angles */
 #define GAIT_MAX_COMPONENTS 16 /* principal components of the cyclic model */
 #define GAIT_MAX_PROPORTIONS 8 /* ways in which limbs differ in length */
+#define GAIT_MAX_CLASSES 8     /* classes of motion in a model */
 #define GAIT_MAX_CAMERAS 4
 
 #if defined(__GNUC__)
@@ -150,7 +151,9 @@ typedef struct gait_camera { GAIT_CAMERA_FIELDS(GAIT_DECLARE) } gait_camera;
     RANGE("Posture: added to the model's joint angles; unused ones are 0.",                                           \
           float, offset, [GAIT_MAX_ANGLES], "radians", -10, 10)                                                       \
     RANGE("Scores of the limbs' proportions; unused ones are 0.",                                                     \
-          float, proportion, [GAIT_MAX_PROPORTIONS], "standard deviations", -10, 10)
+          float, proportion, [GAIT_MAX_PROPORTIONS], "standard deviations", -10, 10)                                  \
+    RANGE("Class of motion, index of gait_model_class_name(); not used in standard deviations.",                      \
+          int32_t, motion_class, , "", 0, GAIT_MAX_CLASSES - 1)
 
 typedef struct gait_state { GAIT_STATE_FIELDS(GAIT_DECLARE) } gait_state;
 
@@ -194,6 +197,10 @@ typedef struct gait_model gait_model;
           int32_t, cyclic, , "")                                                                                      \
     FIELD("Bit i: angle i is of the trunk or an arm, where posture differs most between people.",                     \
           uint32_t, posture_angles, , "mask")                                                                         \
+    FIELD("Classes of motion.",                                                                                       \
+          int32_t, classes, , "")                                                                                     \
+    FIELD("Way of the phase: 1 forwards, -1 backwards, 0 standing still.",                                            \
+          int32_t, direction, , "")                                                                                   \
     FIELD("Hash of the blob; snapshots carry it.",                                                                    \
           uint64_t, digest, , "")
 
@@ -207,6 +214,10 @@ GAIT_API gait_result gait_model_get_info(const gait_model *m, gait_model_info *o
 GAIT_API const char *gait_model_joint_name(const gait_model *m, int32_t joint); /* NULL: out of range */
 GAIT_API const char *gait_model_angle_name(const gait_model *m, int32_t angle); /* NULL: out of range */
 GAIT_API const char *gait_model_limb_name(const gait_model *m, int32_t limb);   /* NULL: out of range */
+/* Name of a class of motion; of a blob without names "walk".  NULL: out of range. */
+GAIT_API const char *gait_model_class_name(const gait_model *m, int32_t motion_class);
+/* The same model with the statistics of one of its classes, for gait_model_get_info(); NULL: out of range. */
+GAIT_API const gait_model *gait_model_of_class(const gait_model *m, int32_t motion_class);
 /* Mask with bit i set for each angle i among `names`, which are separated by spaces. */
 GAIT_API gait_result gait_model_angle_mask(const gait_model *m, const char *names, uint32_t *mask, gait_error *err);
 /* Pose of a state: curves (Ormoneit et al. 2000, eq. 3), then forward kinematics. */
@@ -423,7 +434,11 @@ typedef GAIT_ENUM(gait_track_status) {
     FIELD("State of the track.",                                                                                      \
           gait_track_status, status, , "")                                                                            \
     FIELD("Events of this step, GAIT_EST_*.",                                                                         \
-          uint32_t, flags, , "mask")
+          uint32_t, flags, , "mask")                                                                                  \
+    FIELD("Most probable class of motion, that of the mean.",                                                         \
+          int32_t, motion_class, , "")                                                                                \
+    FIELD("Probability of each class of motion; unused ones are 0.",                                                  \
+          float, class_probability, [GAIT_MAX_CLASSES], "")
 
 typedef struct gait_estimate { GAIT_ESTIMATE_FIELDS(GAIT_DECLARE) } gait_estimate;
 

@@ -300,17 +300,19 @@ WRAP(particle_state, estimate_particles, (gait_tracker * t, int32_t best, gait_e
     return p;
 }
 
-WRAP(track_loss_verdict, track_loss_check, (gait_tracker * t, bool lost, const particle_state *mean))
+WRAP(track_loss_verdict, track_loss_check,
+     (gait_tracker * t, bool lost, const state_layout *of, const particle_state *mean))
 {
     track_loss_verdict v;
-    WHOLE(STAGE_ESTIMATE, v = __real_track_loss_check(t, lost, mean));
+    WHOLE(STAGE_ESTIMATE, v = __real_track_loss_check(t, lost, of, mean));
     return v;
 }
 
-WRAP(float, front_back_update, (gait_tracker * t, bool restart, const particle_state *mean))
+WRAP(float, front_back_update,
+     (gait_tracker * t, bool restart, const state_layout *of, const particle_state *mean))
 {
     float margin;
-    WHOLE(STAGE_ESTIMATE, margin = __real_front_back_update(t, restart, mean));
+    WHOLE(STAGE_ESTIMATE, margin = __real_front_back_update(t, restart, of, mean));
     return margin;
 }
 

@@ -189,9 +189,9 @@ static void test_support(void)
     gait_estimate e;
     toy_tracker_step(t, 20, see, &e);
     particle_state w = particle_from_state(&t->layout, &s);
-    float const there = likelihood_of_particle(t, &w).support;
+    float const there = likelihood_of_particle(t, &t->layout, &w).support;
     w.f[F_X] += 0.5f;
-    CHECK(there > 1.0f && likelihood_of_particle(t, &w).support < -1.0f);
+    CHECK(there > 1.0f && likelihood_of_particle(t, &t->layout, &w).support < -1.0f);
     toy_tracker_free(t);
 }
 

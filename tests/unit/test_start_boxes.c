@@ -189,7 +189,7 @@ static uint64_t digest(uint32_t cpu_mask)
     gait_hypothesis h[GAIT_START_MAX_HYPOTHESES];
     memset(h, 0, sizeof h);
     (void)find_by(cpu_mask, w, 2, h);
-    return hash_fnv1a(HASH_INIT, h, sizeof h);
+    return toy_hash_hypotheses(h);
 }
 
 #define GOLDEN UINT64_C(0x2f6e457b3dbd64db)

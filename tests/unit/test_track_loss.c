@@ -174,8 +174,9 @@ static void test_front_back(void)
     particle_state turned = right, away = right;
     turned.f[F_HEADING] = m_wrap_pi(turned.f[F_HEADING] + PI_F);
     away.f[F_HEADING] = 0.5f * PI_F;
-    CHECK(front_back_score(t, &right) > 0.01f && front_back_score(t, &turned) < -0.01f);
-    CHECK(front_back_score(t, &away) == 0.0f);
+    CHECK(front_back_score(t, &t->layout, &right) > 0.01f &&
+          front_back_score(t, &t->layout, &turned) < -0.01f);
+    CHECK(front_back_score(t, &t->layout, &away) == 0.0f);
     t->core->front_back_margin = -0.02f;
     show(t, 30, 30, &e);
     CHECK(t->core->front_back_margin < 0.0f && e.status == GAIT_TRACK_AMBIGUOUS);

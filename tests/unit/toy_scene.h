@@ -81,11 +81,11 @@ static inline uint8_t toy_skin(int32_t limb, const float from[2], const float to
     return (uint8_t)(level + toy_hash(band, (uint32_t)limb, across > 0.0f) % 40);
 }
 
-/* Draw the person over an image; stops the test if the library refuses it. */
-static inline void toy_paint(const gait_camera *cam, const gait_state *s, uint8_t *grey)
+/* Draw a person of a model over an image; stops the test if the library refuses it. */
+static inline void toy_paint_of(const gait_model *m, const gait_camera *cam, const gait_state *s,
+                                uint8_t *grey)
 {
     static uint8_t ids[SCENE_PIXELS];
-    const gait_model *const m = toy_model();
     float end[TOY_LIMBS][2][2] = {{{0}}};
     kin_frames at;
     if (model_place_state(m, s, &at) != GAIT_OK || gait_render(m, cam, s, ids, SCENE_W, NULL) != GAIT_OK)
@@ -106,6 +106,11 @@ static inline void toy_paint(const gait_camera *cam, const gait_state *s, uint8_
             int32_t const l = ids[i] - 1;
             grey[i] = toy_skin(l, end[l][0], end[l][1], (float)(i % SCENE_W), (float)(i / SCENE_W));
         }
+}
+
+static inline void toy_paint(const gait_camera *cam, const gait_state *s, uint8_t *grey)
+{
+    toy_paint_of(toy_model(), cam, s, grey);
 }
 
 /* Sensor noise of +-3 grey levels. */

@@ -3,9 +3,11 @@
 #define TOY_START_H
 #include "check.h"
 #include "gait_start.h"
+#include "base/hash.h"
 #include "golden.h"
 #include "toy_model.h"
 
+#include <stddef.h>
 #include <stdlib.h>
 
 /* Looks along +y. */
@@ -33,5 +35,20 @@ static gait_start *toy_start_new(gait_camera camera, uint32_t cpu_mask)
     void *const mem = aligned_alloc(GAIT_ALIGN, (bytes + GAIT_ALIGN - 1) / GAIT_ALIGN * GAIT_ALIGN);
     CHECK(gait_start_init(mem, bytes, toy_model(), &cfg, &s, NULL) == GAIT_OK);
     return s; /* at the beginning of mem */
+}
+
+/* Hash of all hypotheses but their classes of motion, which are 0. */
+static uint64_t toy_hash_hypotheses(const gait_hypothesis h[GAIT_START_MAX_HYPOTHESES])
+{
+    size_t const state = offsetof(gait_state, motion_class);
+    uint64_t hash = HASH_INIT;
+    for (int k = 0; k < GAIT_START_MAX_HYPOTHESES; k++) {
+        const char *const end = (const char *)&h[k].speed;
+        CHECK(h[k].mean.motion_class == 0 && h[k].sd.motion_class == 0);
+        hash = hash_fnv1a(hash, &h[k].mean, state);
+        hash = hash_fnv1a(hash, &h[k].sd, state);
+        hash = hash_fnv1a(hash, end, sizeof *h - offsetof(gait_hypothesis, speed));
+    }
+    return hash;
 }
 #endif

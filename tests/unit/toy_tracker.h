@@ -67,19 +67,24 @@ static inline void toy_stop(const char *what, const gait_error *err)
     abort();
 }
 
-static inline gait_tracker *toy_tracker_new(const gait_tracker_config *cfg)
+static inline gait_tracker *toy_tracker_of(const gait_model *m, const gait_tracker_config *cfg)
 {
     size_t bytes = 0;
     void *memory = NULL;
     gait_tracker *t = NULL;
     gait_error err = {0};
-    if (gait_tracker_bytes(toy_model(), cfg, &bytes, &err) != GAIT_OK)
+    if (gait_tracker_bytes(m, cfg, &bytes, &err) != GAIT_OK)
         toy_stop("configuration", &err);
     if (posix_memalign(&memory, GAIT_ALIGN, bytes))
         abort();
-    if (gait_tracker_init(memory, bytes, toy_model(), cfg, &t, &err) != GAIT_OK || (void *)t != memory)
+    if (gait_tracker_init(memory, bytes, m, cfg, &t, &err) != GAIT_OK || (void *)t != memory)
         toy_stop("memory", &err);
     return t;
+}
+
+static inline gait_tracker *toy_tracker_new(const gait_tracker_config *cfg)
+{
+    return toy_tracker_of(toy_model(), cfg);
 }
 
 static inline void toy_tracker_free(gait_tracker *t)

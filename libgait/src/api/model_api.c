@@ -40,12 +40,12 @@ gait_result gait_model_bytes(const void *data, size_t data_bytes, size_t *bytes,
 {
     if (!data || !bytes)
         return base_null(err, "gait_model_bytes");
-    gait_model m;
-    gait_result const s = model_open(data, data_bytes, &m, err);
+    gait_model m[GAIT_MAX_CLASSES];
+    gait_result const s = model_open(data, data_bytes, m, err);
     if (s != GAIT_OK)
         return s;
     arena a = {.base = NULL};
-    (void)model_layout(&a, &m);
+    (void)model_layout(&a, m);
     *bytes = a.used;
     return GAIT_OK;
 }
@@ -55,15 +55,15 @@ gait_result gait_model_init(void *mem, size_t mem_bytes, const void *data, size_
 {
     if (!mem || !data || !out)
         return base_null(err, "gait_model_init");
-    gait_model m;
-    gait_result s = model_open(data, data_bytes, &m, err);
+    gait_model m[GAIT_MAX_CLASSES];
+    gait_result s = model_open(data, data_bytes, m, err);
     if (s != GAIT_OK)
         return s;
     arena a = {.base = NULL};
-    (void)model_layout(&a, &m);
+    (void)model_layout(&a, m);
     s = arena_place(&a, mem, mem_bytes, err);
     if (s == GAIT_OK)
-        *out = model_layout(&a, &m);
+        *out = model_layout(&a, m);
     return s;
 }
 
@@ -83,6 +83,8 @@ gait_result gait_model_get_info(const gait_model *m, gait_model_info *out, gait_
                              .stride_length_sd = m->stride_length_sd,
                              .cyclic = m->cyclic,
                              .posture_angles = model_posture_angles(m),
+                             .classes = m->classes,
+                             .direction = m->direction,
                              .digest = m->digest};
     return GAIT_OK;
 }
@@ -100,6 +102,17 @@ const char *gait_model_angle_name(const gait_model *m, int32_t angle)
 const char *gait_model_limb_name(const gait_model *m, int32_t limb)
 {
     return m && limb >= 0 && limb < m->limbs ? m->limb_name[limb] : NULL;
+}
+
+const char *gait_model_class_name(const gait_model *m, int32_t motion_class)
+{
+    bool const there = m && m->cyclic && motion_class >= 0 && motion_class < m->classes;
+    return !there ? NULL : m->class_name ? m->class_name[motion_class] : "walk";
+}
+
+const gait_model *gait_model_of_class(const gait_model *m, int32_t motion_class)
+{
+    return m && motion_class >= 0 && motion_class < m->classes ? m->of_class[motion_class] : NULL;
 }
 
 gait_result gait_model_angle_mask(const gait_model *m, const char *names, uint32_t *mask, gait_error *err)

@@ -155,9 +155,13 @@ gait_result gait_tracker_prior(const gait_model *m, gait_state *mean, gait_state
     return gait_model_pelvis_height(m, mean, &mean->pelvis[2], err);
 }
 
-static gait_result check_start(const gait_state *mean, const gait_state *sd, gait_error *err)
+static gait_result check_start(const gait_model *m, const gait_state *mean, const gait_state *sd,
+                               gait_error *err)
 {
     gait_result const s = fields_check("gait_state", mean, "start mean.", err);
+    if (s == GAIT_OK && mean->motion_class >= m->classes)
+        return base_fail(err, GAIT_ERR_ARG, -1, "start mean.motion_class = %d, the model has %d",
+                         (int)mean->motion_class, (int)m->classes);
     return s == GAIT_OK ? fields_check_sd("gait_state", sd, MOST_SD, "start sd.", err) : s;
 }
 
@@ -166,7 +170,7 @@ gait_result gait_tracker_start(gait_tracker *t, const gait_state *mean, const ga
 {
     if (!t || !mean || !sd)
         return base_fail(err, GAIT_ERR_ARG, -1, "tracker, mean or sd is NULL");
-    gait_result const s = check_start(mean, sd, err);
+    gait_result const s = check_start(t->model, mean, sd, err);
     gait_hypothesis const only = {.mean = *mean, .sd = *sd, .probability = 1.0f};
     if (s == GAIT_OK)
         tracker_start(t, &only, 1, true, utime);
@@ -182,7 +186,7 @@ gait_result gait_tracker_start_hypotheses(gait_tracker *t, const gait_hypothesis
         return base_fail(err, GAIT_ERR_ARG, -1, "count = %d is outside [1, %d]", (int)count,
                          GAIT_START_MAX_HYPOTHESES);
     for (int32_t k = 0; k < count; k++) {
-        gait_result const s = check_start(&h[k].mean, &h[k].sd, err);
+        gait_result const s = check_start(t->model, &h[k].mean, &h[k].sd, err);
         if (s != GAIT_OK)
             return s;
         if (!(h[k].probability >= 0.0f && h[k].probability <= 1.0f))
@@ -263,7 +267,7 @@ int32_t gait_tracker_particles(const gait_tracker *t, gait_state *s, float *weig
         return base_fail(err, GAIT_ERR_STATE, -1, "no particles before gait_tracker_start()");
     for (int32_t i = 0; i < i_min(cap, t->cfg.particles); i++) {
         particle_state const w = particle_get(&t->particles, i);
-        s[i] = particle_to_state(&t->layout, &w);
+        s[i] = particle_to_state(layout_at(t, i), &w);
         weight[i] = (float)t->filter.weight[i];
     }
     return t->cfg.particles;
@@ -277,7 +281,7 @@ gait_result gait_tracker_predict(const gait_tracker *t, gait_state *s, int32_t n
         return base_fail(err, GAIT_ERR_ARG, -1, "gait_tracker_predict: dt = %g is outside [0, %g]", dt,
                          (double)t->cfg.max_dt);
     for (int32_t i = 0; i < n; i++)
-        if (!kin_state_usable(&s[i]))
+        if (!kin_state_usable(t->model, &s[i]))
             return check_pose(GAIT_ERR_ARG, "gait_tracker_predict", err);
     tracker_predict(t, s, n, (float)dt);
     return GAIT_OK;

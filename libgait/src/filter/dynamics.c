@@ -19,6 +19,8 @@ particle_state dynamics_draw(const dynamics *d, const gait_state *mean, const ga
     normals(d, STREAM_START, 0, i, state_layout_fields(&d->rule), n);
     rng_uniform4(d->seed, STREAM_START, 1, (uint32_t)i, 0, u);
     s.phase = sd->phase >= 0.5f ? u[0] : m_wrap1(mean->phase + sd->phase * n[0]);
+    if (d->rule.model->direction == 0)
+        s.phase = 0.0f;
     s.heading = sd->heading >= PI_F ? TWO_PI_F * u[1] : mean->heading + sd->heading * n[1];
     s.stride_hz = dynamics_reflect_rate(mean->stride_hz + sd->stride_hz * n[2]);
     s.stature = f_max(mean->stature + sd->stature * n[3], LEAST_STATURE);
@@ -72,6 +74,7 @@ dynamics_step dynamics_step_init(const dynamics *d, float dt, float age, uint32_
 {
     const gait_tracker_config *const c = d->cfg;
     float const root_dt = __builtin_sqrtf(dt), mean_rate = d->rule.model->stride_hz;
+    float const direction = (float)d->rule.model->direction;
     bool const settling = age < c->settle_time;
     dynamics_step s = {
         .model = d->rule.model,
@@ -79,13 +82,14 @@ dynamics_step dynamics_step_init(const dynamics *d, float dt, float age, uint32_
         .frame = frame,
         .plain_root = d->rule.plain_root,
         .fields = state_layout_fields(&d->rule),
-        .components = d->rule.components,
+        .components = d->rule.curve_components,
         .proportion = state_layout_proportion(&d->rule),
         .offset = state_layout_offset(&d->rule),
         .dt = c->reverse > 0.0 ? -dt : dt,
+        .phase_dt = direction * (c->reverse > 0.0 ? -dt : dt),
         .mean_rate = mean_rate,
         .travel = 1.0f - (float)c->belt,
-        .phase_noise = c->phase_noise * root_dt,
+        .phase_noise = fabsf(direction) * c->phase_noise * root_dt,
         .forward_noise = c->forward_noise * root_dt,
         .lateral_noise = c->lateral_noise * root_dt,
         .heading_noise = c->heading_noise * root_dt,

@@ -6,7 +6,14 @@
 #include "filter/particles.h"
 
 /* Streams of random numbers, one per purpose, so that none depends on how many numbers another has used. */
-enum { STREAM_START = 1, STREAM_MOVE = 2, STREAM_RESAMPLE = 3, STREAM_SPLIT = 4, STREAM_REJUVENATION = 5 };
+enum {
+    STREAM_START = 1,
+    STREAM_MOVE = 2,
+    STREAM_RESAMPLE = 3,
+    STREAM_SPLIT = 4,
+    STREAM_REJUVENATION = 5,
+    STREAM_CLASS = 6
+};
 
 typedef struct dynamics {
     const gait_tracker_config *cfg;
@@ -29,7 +36,9 @@ typedef struct dynamics_step { /* constants of one interval; noise: standard dev
     bool plain_root;
     int32_t fields, components; /* how many */
     int32_t proportion, offset; /* first field of each */
-    float dt, mean_rate;        /* seconds, negative if frames come in reverse order; strides per second */
+    float dt;                   /* seconds, negative if frames come in reverse order */
+    float phase_dt;             /* seconds by which the cycle advances: -dt backwards, 0 standing still */
+    float mean_rate;            /* strides per second */
     float travel;               /* share of a stride that the person travels */
     float phase_noise, forward_noise, lateral_noise, heading_noise, stature_noise;
     float turn_beyond; /* squared normal beyond which a particle draws a new turn rate */

@@ -45,7 +45,7 @@ KERNEL_ROW void advance(const dynamics_step *s, const particle_block *restrict f
 {
     for (int32_t lane = 0; lane < BLOCK; lane++) {
         float const rate = from->f[F_RATE][lane];
-        turn[lane] = rate * s->dt + s->phase_noise * n[0][lane];
+        turn[lane] = rate * s->phase_dt + s->phase_noise * n[0][lane];
         to->f[F_PHASE][lane] = m_wrap1(from->f[F_PHASE][lane] + turn[lane]);
         float const off = s->rate.keep * (rate - s->mean_rate) + s->rate.noise * n[1][lane];
         to->f[F_RATE][lane] = dynamics_reflect_rate(s->mean_rate + off);
@@ -132,7 +132,7 @@ void KERNEL(dynamics_move)(const dynamics_step *s, int32_t first, const particle
     if (s->plain_root)
         for (int32_t lane = 0; lane < BLOCK; lane++) {
             speed[lane] = s->model->stride_length;
-            turn[lane] = from->f[F_RATE][lane] * s->dt;
+            turn[lane] = from->f[F_RATE][lane] * s->phase_dt;
         }
     else
         speeds(s, from, turn, speed);

@@ -64,13 +64,13 @@ static void project(const mirror *x, const gait_model *m, int32_t i, int32_t k, 
 void mirror_init(mirror *x, const state_layout *r)
 {
     const gait_model *const m = r->model;
-    x->components = r->components;
+    x->components = r->curve_components;
     for (int32_t c = 0; c < m->channels; c++) {
         x->partner[c] = partner_of(m, c);
         x->sign[c] = mirror_sign(m, c, x->partner[c]);
     }
-    for (int32_t i = 0; i < r->components; i++)
-        for (int32_t k = 0; k <= r->components; k++) {
+    for (int32_t i = 0; i < x->components; i++)
+        for (int32_t k = 0; k <= x->components; k++) {
             double with, own;
             project(x, m, i, k, &with, &own);
             float const share = own > 0.0 ? (float)(with / own) : 0.0f;

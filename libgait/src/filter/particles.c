@@ -19,10 +19,13 @@ float particle_speed(const state_layout *r, const particle_state *p)
     const gait_model *const m = r->model;
     float const pace = state_layout_pace(r, p->f[F_RATE]);
     float sum = 0.0f;
+    if (m->direction == 0)
+        return 0.0f;
     if (r->plain_root)
         return p->f[F_STATURE] * p->f[F_RATE] * m->stride_length;
     for (int32_t j = 0; j < m->phases; j++)
-        sum += root_channel(m, ROOT_FORWARD, (float)j / (float)m->phases, pace, p->f + F_COEF, r->components);
+        sum += root_channel(m, ROOT_FORWARD, (float)j / (float)m->phases, pace, p->f + F_COEF,
+                            r->curve_components);
     return p->f[F_STATURE] * p->f[F_RATE] * sum / (float)m->phases;
 }
 
@@ -38,6 +41,14 @@ static int32_t components_used(const gait_model *m, const gait_tracker_config *c
                                                                               : DEFAULT_COMPONENTS;
 }
 
+static float mean_height(const gait_model *m)
+{
+    float sum = 0.0f;
+    for (int32_t j = 0; j < m->phases; j++)
+        sum += m->curves[j * m->channels + m->root_channel + ROOT_HEIGHT] / (float)m->phases;
+    return sum;
+}
+
 COLD state_layout state_layout_init(const gait_model *m, const gait_tracker_config *cfg, const kernels *run)
 {
     state_layout r = {.model = m,
@@ -45,12 +56,21 @@ COLD state_layout state_layout_init(const gait_model *m, const gait_tracker_conf
                       .components = components_used(m, cfg),
                       .proportions = cfg->proportions < 0 ? m->proportions : cfg->proportions,
                       .plain_root = cfg->mode == GAIT_MODE_PAPER};
-    for (int32_t j = 0; j < m->phases; j++)
-        r.mean_height += m->curves[j * m->channels + m->root_channel + ROOT_HEIGHT] / (float)m->phases;
+    r.curve_components = r.components;
+    r.mean_height = mean_height(m);
     uint32_t const offsets = cfg->offset_angles < 0 ? model_posture_angles(m) : (uint32_t)cfg->offset_angles;
     for (int32_t a = 0; a < m->angles; a++)
         if (offsets >> a & 1u)
             r.angle[r.offsets++] = a;
+    return r;
+}
+
+COLD state_layout state_layout_of_class(const state_layout *first, int32_t motion_class)
+{
+    state_layout r = *first;
+    r.model = first->model->of_class[motion_class];
+    r.curve_components = i_min(r.components, r.model->components);
+    r.mean_height = mean_height(r.model);
     return r;
 }
 
@@ -87,12 +107,13 @@ void particle_block_put(particle_set *p, int32_t first, int32_t lanes, const par
 static void pelvis_offset(const state_layout *r, const particle_state *w, float *sway, float *height)
 {
     float const H = w->f[F_STATURE], phase = w->f[F_PHASE], pace = state_layout_pace(r, w->f[F_RATE]);
-    *sway = r->plain_root ? 0.0f
-                          : H * root_channel(r->model, ROOT_SWAY, phase, pace, w->f + F_COEF, r->components);
-    *height =
-        H * (1.0f + kin_height_change(r->model, w->f + state_layout_proportion(r), r->proportions)) *
-        (r->plain_root ? r->mean_height
-                       : root_channel(r->model, ROOT_HEIGHT, phase, pace, w->f + F_COEF, r->components));
+    *sway = r->plain_root
+                ? 0.0f
+                : H * root_channel(r->model, ROOT_SWAY, phase, pace, w->f + F_COEF, r->curve_components);
+    *height = H * (1.0f + kin_height_change(r->model, w->f + state_layout_proportion(r), r->proportions)) *
+              (r->plain_root
+                   ? r->mean_height
+                   : root_channel(r->model, ROOT_HEIGHT, phase, pace, w->f + F_COEF, r->curve_components));
 }
 
 COLD gait_state particle_to_state(const state_layout *r, const particle_state *w)
@@ -103,7 +124,8 @@ COLD gait_state particle_to_state(const state_layout *r, const particle_state *w
                     .heading = w->f[F_HEADING],
                     .pitch = w->f[F_PITCH],
                     .roll = w->f[F_ROLL],
-                    .turn_rate = w->f[F_TURN]};
+                    .turn_rate = w->f[F_TURN],
+                    .motion_class = r->model->motion_class};
     float sway, height, sn, cs;
     pelvis_offset(r, w, &sway, &height);
     m_sincos_one(s.heading, &sn, &cs);
@@ -177,7 +199,7 @@ static void block_bodies(const state_layout *r, block *b, kin_body *out)
     kin_input *const in = &b->in;
     for (int32_t i = 0; i < BLOCK; i++)
         in->pace[i] = state_layout_pace(r, in->pace[i]);
-    r->run->kin_curves(r->model, in, r->components, &ch);
+    r->run->kin_curves(r->model, in, r->curve_components, &ch);
     float (*const root)[BLOCK] = ch.v + r->model->root_channel;
     for (int32_t k = 0; k < r->offsets; k++)
         for (int32_t i = 0; i < BLOCK; i++)

@@ -36,16 +36,21 @@ static inline float *field(const particle_set *p, int32_t f)
 
 /* Constants that map fields to bodies. */
 typedef struct state_layout {
-    const gait_model *model;
+    const gait_model *model; /* of one class of motion */
     const kernels *run;
-    int32_t components, proportions;
-    int32_t offsets;                /* number of angles with a posture offset, */
-    int32_t angle[GAIT_MAX_ANGLES]; /* and their indices */
+    int32_t components, proportions; /* scores of a particle, */
+    int32_t curve_components;        /* and those that the curves of this class have: the first */
+    int32_t offsets;                 /* number of angles with a posture offset, */
+    int32_t angle[GAIT_MAX_ANGLES];  /* and their indices */
     bool plain_root;   /* paper mode: no root motion within the stride, pelvis at its mean height */
     float mean_height; /* statures */
 } state_layout;
 
+/* Of the first class. */
 state_layout state_layout_init(const gait_model *m, const gait_tracker_config *cfg, const kernels *run);
+
+/* The same fields with the curves of another class. */
+state_layout state_layout_of_class(const state_layout *first, int32_t motion_class);
 
 /* First field of the limbs' proportions, and of the posture offsets. */
 static inline int32_t state_layout_proportion(const state_layout *r)

@@ -85,32 +85,39 @@ pf_summary pf_update(pf *p, const float *loglik)
 }
 
 /* Cumulative weights in integers, so that sums are exact in any order. Returns their total. */
-static uint64_t make_cumulative(pf *p)
+static uint64_t make_cumulative(const double *weight, int32_t n, uint64_t *cumulative)
 {
     double top = 0.0;
     uint64_t total = 0;
-    for (int32_t i = 0; i < p->n; i++)
-        top = p->weight[i] > top ? p->weight[i] : top;
-    for (int32_t i = 0; i < p->n; i++) {
-        total += (uint64_t)(int64_t)(p->weight[i] / top * 2147483648.0);
-        p->cumulative[i] = total;
+    for (int32_t i = 0; i < n; i++)
+        top = weight[i] > top ? weight[i] : top;
+    for (int32_t i = 0; i < n; i++) {
+        total += (uint64_t)(int64_t)(weight[i] / top * 2147483648.0);
+        cumulative[i] = total;
     }
     return total;
 }
 
+void pf_draw(const double *weight, int32_t n, uint64_t *cumulative, int32_t count, uint32_t u,
+             int32_t *parent)
+{
+    uint64_t const draws = (uint64_t)count, total = make_cumulative(weight, n, cumulative);
+    uint64_t const step = total / draws, rest = total % draws;
+    uint64_t at = (uint64_t)u * step >> 32, over = 0; /* offset + floor(i total / draws), in 64 bits */
+    int32_t from = 0;
+    for (uint64_t i = 0; i < draws; i++) {
+        while (from < n - 1 && cumulative[from] <= at)
+            from++;
+        parent[i] = from;
+        over += rest;
+        at += step + (over >= draws);
+        over -= over >= draws ? draws : 0;
+    }
+}
+
 void pf_resize(pf *p, int32_t count, uint32_t u)
 {
-    uint64_t const n = (uint64_t)count, total = make_cumulative(p), step = total / n, rest = total % n;
-    uint64_t at = (uint64_t)u * step >> 32, over = 0; /* offset + floor(i total / n), in 64 bits */
-    int32_t from = 0;
-    for (uint64_t i = 0; i < n; i++) {
-        while (from < p->n - 1 && p->cumulative[from] <= at)
-            from++;
-        p->parent[i] = from;
-        over += rest;
-        at += step + (over >= n);
-        over -= over >= n ? n : 0;
-    }
+    pf_draw(p->weight, p->n, p->cumulative, count, u, p->parent);
     p->n = count;
     pf_uniform(p);
 }
@@ -122,7 +129,7 @@ void pf_resample_systematic(pf *p, uint32_t u)
 
 void pf_resample_multinomial(pf *p, uint64_t seed, uint32_t stream, uint32_t frame)
 {
-    uint64_t const total = make_cumulative(p);
+    uint64_t const total = make_cumulative(p->weight, p->n, p->cumulative);
     for (int32_t i = 0; i < p->n; i++) {
         uint32_t r[4];
         rng_bits(seed, stream, frame, (uint32_t)i, 0, r);

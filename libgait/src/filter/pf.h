@@ -29,6 +29,10 @@ double pf_ess(const pf *p);
 /* First particle of the largest weight. */
 int32_t pf_heaviest(const pf *p);
 
+/* `count` ancestor indices of n weights, not all 0, by systematic resampling; cumulative: scratch of n. */
+void pf_draw(const double *weight, int32_t n, uint64_t *cumulative, int32_t count, uint32_t u,
+             int32_t *parent);
+
 /* Ancestor indices by systematic resampling: |children - n w| < 1. u is the common offset in 2^-32 of a
  * step. */
 void pf_resample_systematic(pf *p, uint32_t u);

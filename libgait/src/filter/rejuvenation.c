@@ -29,9 +29,15 @@ static drawn draw(const rejuvenation *m, int32_t i)
     uint32_t r[4];
     size_t at[3];
     rng_bits(m->seed, STREAM_REJUVENATION, m->frame, (uint32_t)i, 0, r);
-    int32_t const first = i < m->split ? 0 : m->split, count = (i < m->split ? m->split : m->n) - first;
-    for (int32_t k = 0; k < 3; k++)
-        at[k] = (size_t)m->parent[first + (int32_t)((uint64_t)r[k] * (uint32_t)count >> 32)];
+    bool const second = !m->origin && i >= m->split;
+    int32_t const first = second ? m->split : m->begin,
+                  count = (second || m->origin ? m->n : m->split) - first;
+    for (int32_t k = 0; k < 3; k++) {
+        int32_t const other = first + (int32_t)((uint64_t)r[k] * (uint32_t)count >> 32);
+        bool const apart =
+            m->origin && (m->origin[i] != m->motion_class || m->origin[other] != m->motion_class);
+        at[k] = (size_t)m->parent[apart ? i : other];
+    }
     return (drawn){m->row + (size_t)m->parent[i] * stride,
                    m->row + at[0] * stride,
                    {m->row + at[1] * stride, m->row + at[2] * stride}};

@@ -17,6 +17,10 @@ typedef struct rejuvenation { /* parameters for one frame */
     const float *row;      /* rows of every particle that can be an ancestor: rejuvenation_rows() */
     const int32_t *parent; /* n: drawn by weight */
     int32_t n, split;      /* from `split` on particles are another hypothesis, rejuvenated separately */
+    const uint8_t
+        *origin; /* with several classes of motion: class of each particle's ancestor, else NULL; then only */
+    int32_t begin;        /* particles begin .. n - 1 are rejuvenated together, */
+    int32_t motion_class; /* those whose ancestors were of this class as they are now */
     uint64_t seed;
     uint32_t frame;      /* counter of the random numbers */
     float shrink, noise; /* a and sqrt(a (1 - a)); 0: no change */

@@ -4,8 +4,9 @@
 #include <string.h>
 
 /* Every channel of one body. */
-static COLD void curves_at(const gait_model *m, const gait_state *s, float channel[MODEL_MAX_CHANNELS])
+static COLD void curves_at(const gait_model *all, const gait_state *s, float channel[MODEL_MAX_CHANNELS])
 {
+    const gait_model *const m = s->motion_class == all->motion_class ? all : all->of_class[s->motion_class];
     curves_part(m, s->phase, kin_pace(m, s->stride_hz), s->coef, 1, m->components, 0, m->channels, channel);
 }
 
@@ -33,13 +34,13 @@ void kin_points(const gait_model *m, const kin_body *b, float (*xyz)[3][BLOCK])
     }
 }
 
-bool kin_state_usable(const gait_state *s)
+bool kin_state_usable(const gait_model *m, const gait_state *s)
 {
     const float place[10] = {s->phase, s->stride_hz, s->stature,   s->heading,   s->pitch,
                              s->roll,  s->pelvis[0], s->pelvis[1], s->pelvis[2], s->turn_rate};
     return f_finite(place, 10) && f_finite(s->coef, GAIT_MAX_COMPONENTS) &&
            f_finite(s->offset, GAIT_MAX_ANGLES) && f_finite(s->proportion, GAIT_MAX_PROPORTIONS) &&
-           s->stature > 0.0f;
+           s->stature > 0.0f && s->motion_class >= 0 && s->motion_class < m->classes;
 }
 
 /* Curves of one body into channel, then its frames. */
@@ -65,7 +66,7 @@ static COLD void place_state(const gait_model *m, const gait_state *s, float *ch
 gait_result model_place_state(const gait_model *m, const gait_state *s, kin_frames *out)
 {
     float channel[MODEL_MAX_CHANNELS];
-    if (!kin_state_usable(s))
+    if (!kin_state_usable(m, s))
         return GAIT_ERR_ARG;
     place_state(m, s, channel, out);
     return GAIT_OK;
@@ -75,7 +76,7 @@ gait_result model_pose_state(const gait_model *m, const gait_state *s, gait_pose
 {
     float channel[MODEL_MAX_CHANNELS];
     kin_frames at;
-    if (!kin_state_usable(s))
+    if (!kin_state_usable(m, s))
         return GAIT_ERR_ARG;
     place_state(m, s, channel, &at);
     memset(out, 0, sizeof *out);
@@ -89,7 +90,7 @@ gait_result model_pose_state(const gait_model *m, const gait_state *s, gait_pose
 
 gait_result model_pelvis_height(const gait_model *m, const gait_state *s, float *out)
 {
-    if (!kin_state_usable(s))
+    if (!kin_state_usable(m, s))
         return GAIT_ERR_ARG;
     float channel[MODEL_MAX_CHANNELS];
     curves_at(m, s, channel);

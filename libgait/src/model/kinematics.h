@@ -54,8 +54,8 @@ typedef struct kin_frames { /* the frames of one body in the world */
     float scale[KIN_MAX_FRAMES]; /* metres per model length */
 } kin_frames;
 
-/* Whether all numbers of a state are finite and the stature is positive. */
-bool kin_state_usable(const gait_state *s);
+/* Whether all numbers of a state are finite, the stature is positive and the model has its class. */
+bool kin_state_usable(const gait_model *m, const gait_state *s);
 
 /* Frames of one body. Errors are those of model_pose_state. */
 gait_result model_place_state(const gait_model *m, const gait_state *s, kin_frames *out);

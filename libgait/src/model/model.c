@@ -6,8 +6,15 @@
 
 #include <string.h>
 
-#define LARGEST_PACE       1.0f /* a channel's coefficients: radians or statures per unit of kin_pace */
-#define LARGEST_PROPORTION 0.1f /* per standard deviation; a shift: statures */
+#define LARGEST_PACE       1.0f   /* a channel's coefficients: radians or statures per unit of kin_pace */
+#define LARGEST_PROPORTION 0.1f   /* per standard deviation; a shift: statures */
+#define LARGEST_CHANGE     100.0f /* of a rate of change between classes, per second */
+#define LARGEST_FACTOR     50.0f  /* of its concentration and slope */
+
+enum { TAG = 5 };           /* a tag and its NUL */
+typedef struct class_tags { /* sections of one class */
+    char curves[TAG], channel_stat[TAG], score_stat[TAG], gait[TAG], pace[TAG];
+} class_tags;
 
 static const float *take_table(sections *r, const char *tag, int32_t rows, uint32_t columns)
 {
@@ -31,32 +38,33 @@ static void read_channels(sections *r, gait_model *m)
                          "does not end with the six root channels");
 }
 
-static void read_curves(sections *r, gait_model *m)
+static void read_curves(sections *r, const class_tags *tag, gait_model *m)
 {
     uint32_t dims[4] = {SECTION_ANY, SECTION_ANY, (uint32_t)m->channels};
-    m->curves = sections_floats(r, "CURV", 3, dims);
+    m->curves = sections_floats(r, tag->curves, 3, dims);
     if (!m->curves)
         return;
-    sections_require(r, dims[0] > 0 && dims[1] >= MODEL_MIN_PHASES, "CURV",
+    sections_require(r, dims[0] > 0 && dims[1] >= MODEL_MIN_PHASES, tag->curves,
                      "needs a mean and at least 8 phases");
     if (dims[0] > 1 + GAIT_MAX_COMPONENTS || dims[1] > MODEL_MAX_PHASES)
-        sections_refuse(r, GAIT_ERR_LIMIT, "CURV", "has more components or phases than this build can hold");
+        sections_refuse(r, GAIT_ERR_LIMIT, tag->curves,
+                        "has more components or phases than this build can hold");
     m->components = (int32_t)dims[0] - 1;
     m->phases = (int32_t)dims[1];
 }
 
-static void read_statistics(sections *r, gait_model *m)
+static void read_statistics(sections *r, const class_tags *tag, gait_model *m)
 {
-    m->channel_stat = take_table(r, "CHST", m->channels, 4);
-    m->score_stat = take_table(r, "SCST", m->components, 3);
-    const float *const g = sections_floats(r, "GAIT", 1, (uint32_t[4]){8});
+    m->channel_stat = take_table(r, tag->channel_stat, m->channels, 4);
+    m->score_stat = take_table(r, tag->score_stat, m->components, 3);
+    const float *const g = sections_floats(r, tag->gait, 1, (uint32_t[4]){8});
     for (int32_t i = 0; r->status == GAIT_OK && i < m->channels; i++) {
         const float *const s = m->channel_stat + 4 * i;
-        sections_require(r, s[0] >= 0.0f && s[1] <= s[2] && s[3] >= 0.0f, "CHST",
+        sections_require(r, s[0] >= 0.0f && s[1] <= s[2] && s[3] >= 0.0f, tag->channel_stat,
                          "negative sd or empty range");
     }
     for (int32_t i = 0; r->status == GAIT_OK && i < 3 * m->components; i++)
-        sections_require(r, m->score_stat[i] >= 0.0f, "SCST", "has a negative sd");
+        sections_require(r, m->score_stat[i] >= 0.0f, tag->score_stat, "has a negative sd");
     if (r->status != GAIT_OK)
         return;
     m->stride_hz = g[0];
@@ -66,27 +74,30 @@ static void read_statistics(sections *r, gait_model *m)
     m->stride_length_sd = g[4];
     m->stature_mean = g[6];
     m->stature_sd = g[7];
-    sections_require(r, g[0] > 0.0f && g[3] >= 0.0f && g[6] > 0.0f, "GAIT",
+    sections_require(r, g[0] > 0.0f && g[3] >= 0.0f && g[6] > 0.0f, tag->gait,
                      "stride rate or stature not positive");
-    sections_require(r, g[1] >= 0.0f && g[2] >= 0.0f && g[4] >= 0.0f && g[7] >= 0.0f, "GAIT",
+    sections_require(r, g[1] >= 0.0f && g[2] >= 0.0f && g[4] >= 0.0f && g[7] >= 0.0f, tag->gait,
                      "has a negative sd");
 }
 
 /* Optional: without it the curves do not depend on the stride rate. */
-static void read_pace(sections *r, gait_model *m)
+static void read_pace(sections *r, const class_tags *tags, gait_model *m)
 {
-    if (r->status != GAIT_OK || !blob_has(&r->b, "PACE"))
+    const char *const tag = tags->pace;
+    m->pace_series = NULL;
+    m->pace_terms = 0;
+    if (r->status != GAIT_OK || !blob_has(&r->b, tag))
         return;
     uint32_t dims[4] = {SECTION_ANY, (uint32_t)m->channels};
-    m->pace_series = sections_floats(r, "PACE", 2, dims);
-    sections_require(r, m->stride_hz_sd > 0.0f, "PACE", "needs an sd of the stride rate in GAIT");
-    sections_require(r, dims[0] % 2 == 1 && dims[0] < (uint32_t)m->phases, "PACE",
+    m->pace_series = sections_floats(r, tag, 2, dims);
+    sections_require(r, m->stride_hz_sd > 0.0f, tag, "needs an sd of the stride rate in GAIT");
+    sections_require(r, dims[0] % 2 == 1 && dims[0] < (uint32_t)m->phases, tag,
                      "its rows are no Fourier series");
     for (int32_t c = 0; r->status == GAIT_OK && c < m->channels; c++) {
         float sum = 0.0f;
         for (uint32_t i = 0; i < dims[0]; i++)
             sum += fabsf(m->pace_series[i * dims[1] + (uint32_t)c]);
-        sections_require(r, sum <= LARGEST_PACE, "PACE", "changes a channel by more than 1");
+        sections_require(r, sum <= LARGEST_PACE, tag, "changes a channel by more than 1");
     }
     m->pace_terms = r->status == GAIT_OK ? (int32_t)dims[0] : 0;
 }
@@ -193,12 +204,18 @@ static void read_limbs(sections *r, gait_model *m)
     }
 }
 
+static void read_motion(sections *r, const class_tags *tag, gait_model *m)
+{
+    read_curves(r, tag, m);
+    read_statistics(r, tag, m);
+    read_pace(r, tag, m);
+}
+
 static void read_cyclic(sections *r, gait_model *m)
 {
+    static const class_tags first = {"CURV", "CHST", "SCST", "GAIT", "PACE"};
     read_channels(r, m);
-    read_curves(r, m);
-    read_statistics(r, m);
-    read_pace(r, m);
+    read_motion(r, &first, m);
     read_frames(r, m);
     read_proportions(r, m);
     read_shifts(r, m);
@@ -206,21 +223,90 @@ static void read_cyclic(sections *r, gait_model *m)
     read_limbs(r, m);
 }
 
+/* ---- classes of motion ---- */
+/* Class k is like its source, or has sections of its own. */
+static void read_class(sections *r, gait_model *m, int32_t k)
+{
+    const int32_t *const info = m->class_info + CLASS_INFO * k;
+    int32_t const source = info[CLASS_SOURCE];
+    class_tags tag = {"CUR0", "CHS0", "SCS0", "GAI0", "PAC0"};
+    tag.curves[3] = tag.channel_stat[3] = tag.score_stat[3] = tag.gait[3] = tag.pace[3] = (char)('0' + k);
+    gait_model *const own = &m[k];
+    *own = m[0];
+    if (blob_has(&r->b, tag.curves)) {
+        sections_require(r, source == k, "CLIN", "a class with curves of its own has another source");
+        read_motion(r, &tag, own);
+    } else {
+        sections_require(r, source < k && m->class_info[CLASS_INFO * source + CLASS_SOURCE] == source, "CLIN",
+                         "a class has neither curves nor an earlier class that has them");
+        if (r->status == GAIT_OK)
+            *own = m[source];
+    }
+    own->motion_class = k;
+    own->direction = info[CLASS_DIRECTION];
+}
+
+static void read_changes(sections *r, gait_model *m)
+{
+    uint32_t const C = (uint32_t)m->classes;
+    m->class_change = sections_floats(r, "CLSW", 3, (uint32_t[4]){C, C, CLASS_CHANGE});
+    for (uint32_t i = 0; r->status == GAIT_OK && i < C * C; i++) {
+        const float *const s = m->class_change + CLASS_CHANGE * i;
+        bool const diagonal = i % (C + 1) == 0;
+        sections_require(r, s[CHANGE_RATE] >= 0.0f && s[CHANGE_RATE] <= (diagonal ? 0.0f : LARGEST_CHANGE),
+                         "CLSW", "a rate of change is negative, above 100 per second or on the diagonal");
+        sections_require(r,
+                         s[CHANGE_CONCENTRATION] >= 0.0f && s[CHANGE_CONCENTRATION] <= LARGEST_FACTOR &&
+                             fabsf(s[CHANGE_SLOPE]) <= LARGEST_FACTOR && s[CHANGE_PHASE] >= 0.0f &&
+                             s[CHANGE_PHASE] < 1.0f,
+                         "CLSW", "a concentration, phase or slope is outside its range");
+    }
+}
+
+/* Optional: without it there is one class. */
+static void read_classes(sections *r, gait_model *m)
+{
+    m->classes = m->direction = 1;
+    if (r->status != GAIT_OK || !blob_has(&r->b, "CLNM"))
+        return;
+    m->class_name = sections_names(r, "CLNM", GAIT_MAX_CLASSES, &m->classes);
+    m->class_info = take_ints(r, "CLIN", m->classes, CLASS_INFO);
+    for (int32_t k = 0; r->status == GAIT_OK && k < m->classes; k++) {
+        const int32_t *const info = m->class_info + CLASS_INFO * k;
+        sections_require(r, info[CLASS_DIRECTION] >= -1 && info[CLASS_DIRECTION] <= 1, "CLIN",
+                         "a direction is not -1, 0 or 1");
+        sections_require(r, info[CLASS_SOURCE] >= 0 && info[CLASS_SOURCE] < m->classes, "CLIN",
+                         "names a source that is no class");
+        sections_require(r, info[CLASS_CYCLES] >= 0 && info[CLASS_RECORDINGS] >= 0, "CLIN",
+                         "counts cycles or recordings below 0");
+    }
+    if (r->status == GAIT_OK)
+        sections_require(r, m->class_info[CLASS_DIRECTION] == 1 && m->class_info[CLASS_SOURCE] == 0, "CLIN",
+                         "the first class must be cyclic, forwards, with the curves of CURV");
+    if (r->status == GAIT_OK)
+        read_changes(r, m);
+    for (int32_t k = 1; r->status == GAIT_OK && k < m->classes; k++)
+        read_class(r, m, k);
+}
+
 gait_result model_open(const void *data, size_t bytes, gait_model *m, gait_error *err)
 {
     sections r = {.what = "model", .err = err};
-    gait_model t = {0};
+    gait_model t[GAIT_MAX_CLASSES] = {0};
     r.status = blob_open(data, bytes, &r.b, err);
     if (r.status == GAIT_OK && blob_has(&r.b, "SGNM"))
-        r.status = segment_open(&r.b, &t.segments, err);
-    t.cyclic = t.segments.markers == 0 || blob_has(&r.b, "CHNM");
-    if (t.cyclic)
-        read_cyclic(&r, &t);
-    if (r.status != GAIT_OK)
-        return r.status;
-    t.digest = hash_fnv1a(HASH_INIT, data, bytes);
-    *m = t;
-    return GAIT_OK;
+        r.status = segment_open(&r.b, &t->segments, err);
+    t->cyclic = t->segments.markers == 0 || blob_has(&r.b, "CHNM");
+    if (t->cyclic)
+        read_cyclic(&r, t);
+    t->digest = hash_fnv1a(HASH_INIT, data, bytes);
+    read_classes(&r, t);
+    for (int32_t k = 0; r.status == GAIT_OK && k < t->classes; k++) {
+        m[k] = t[k];
+        for (int32_t of = 0; of < t->classes; of++)
+            m[k].of_class[of] = &m[of];
+    }
+    return r.status;
 }
 
 gait_result model_need_cyclic(const gait_model *m, gait_error *err)
@@ -271,13 +357,19 @@ static void unfold_pace(const gait_model *m, float *curve)
 
 gait_model *model_layout(arena *a, const gait_model *m)
 {
-    gait_model *const self = TAKE(a, gait_model, 1);
-    float *const curve = m->pace_terms ? TAKE(a, float, m->phases * m->channels) : NULL;
+    gait_model *const self = TAKE(a, gait_model, m->classes);
+    float *curve[GAIT_MAX_CLASSES];
+    for (int32_t k = 0; k < m->classes; k++)
+        curve[k] = m[k].pace_terms ? TAKE(a, float, m[k].phases *m[k].channels) : NULL;
     if (!self || a->overflow)
         return NULL;
-    *self = *m;
-    self->pace_curve = curve;
-    if (curve)
-        unfold_pace(m, curve);
+    memcpy(self, m, (size_t)m->classes * sizeof *self);
+    for (int32_t k = 0; k < m->classes; k++) {
+        self[k].pace_curve = curve[k];
+        if (curve[k])
+            unfold_pace(&m[k], curve[k]);
+        for (int32_t of = 0; of < m->classes; of++)
+            self[k].of_class[of] = &self[of];
+    }
     return self;
 }

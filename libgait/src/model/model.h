@@ -57,7 +57,21 @@ struct gait_model {
     const char (*limb_name)[MODEL_NAME];    /* L */
 
     uint64_t digest; /* FNV-1a of the blob */
+
+    /* Classes of motion: walking, standing ... (doc/method.md).  Each has a view of its own, equal to this one but for
+     * curves, statistics and direction; the first is the model itself. */
+    int32_t classes;                                     /* at least 1 */
+    int32_t motion_class;                                /* of this view */
+    int32_t direction;                                   /* of the phase: 1, -1 or 0 */
+    const struct gait_model *of_class[GAIT_MAX_CLASSES]; /* all views */
+    const char (*class_name)[MODEL_NAME];                /* NULL: one class without a name */
+    const int32_t *class_info;                           /* C x CLASS_INFO */
+    const float *class_change;                           /* C x C x CLASS_CHANGE; NULL with one class */
 };
+
+/* Columns of class_info and class_change. */
+enum { CLASS_DIRECTION, CLASS_SOURCE, CLASS_CYCLES, CLASS_RECORDINGS, CLASS_INFO };
+enum { CHANGE_RATE, CHANGE_CONCENTRATION, CHANGE_PHASE, CHANGE_SLOPE, CLASS_CHANGE };
 
 /* Standard deviation between people of the posture of angle a, radians. */
 static inline float model_posture_sd(const gait_model *m, int32_t a)
@@ -66,7 +80,8 @@ static inline float model_posture_sd(const gait_model *m, int32_t a)
     return learnt > 0.0f ? learnt : 0.035f; /* 2 degrees, where too few people were recorded to estimate it */
 }
 
-/* Check a blob and fill m with views into it (without pace_curve); err names the section at fault. */
+/* Check a blob and fill m, one view for each class of motion, at most GAIT_MAX_CLASSES, without pace_curve; err names
+ * the section at fault. */
 gait_result model_open(const void *data, size_t bytes, gait_model *m, gait_error *err);
 
 /* GAIT_ERR_ARG: the model has no cyclic part. */
@@ -78,6 +93,6 @@ int32_t model_find_angle(const gait_model *m, const char *name, size_t length);
 /* Mask of the angles of trunk and arms whose posture differs most between people. */
 uint32_t model_posture_angles(const gait_model *m);
 
-/* Place a copy of m in the arena, and its pace_curve. NULL when counting or on overflow. */
+/* Place a copy of the views m in the arena, and their pace_curve. NULL when counting or on overflow. */
 gait_model *model_layout(arena *a, const gait_model *m);
 #endif

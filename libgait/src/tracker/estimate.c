@@ -3,6 +3,7 @@
 #include "base/fmath.h"
 #include "base/linalg.h"
 #include "image/camera.h"
+#include "tracker/class_strata.h"
 #include <string.h>
 
 /* Standard deviation of a stature from one camera, as a fraction: soles, hair and clothes are the same in all frames,
@@ -171,20 +172,50 @@ static particle_state mode_mean(const sums *s)
     return mean;
 }
 
+/* The particles of the class that are near the best one. */
+static void mark_mode(sums *s, int32_t motion_class)
+{
+    const weighted_particles *const p = s->of;
+    uint8_t *const in_mode = s->t->in_mode;
+    const float *const phase = column(s, F_PHASE, 0), *const heading = column(s, F_HEADING, 1);
+    if (!p->strata) {
+        s->mass = s->run->estimate_mode(phase, heading, p->weight, p->n, s->best, in_mode);
+        return;
+    }
+    memset(in_mode, 0, (size_t)p->n);
+    for (int32_t k = 0; k < p->strata->count; k++) {
+        int32_t const first = p->strata->first[k], count = p->strata->first[k + 1] - first;
+        if (p->strata->motion_class[k] == motion_class && count > 0)
+            s->mass += s->run->estimate_mode(phase + first, heading + first, p->weight + first, count,
+                                             s->best - first, in_mode + first);
+    }
+}
+
+static void report_classes(const weighted_particles *p, int32_t motion_class, gait_estimate *out)
+{
+    double probability[GAIT_MAX_CLASSES] = {1.0};
+    if (p->strata)
+        class_strata_probability(p->strata, p->weight, probability);
+    for (int32_t c = 0; c < GAIT_MAX_CLASSES; c++)
+        out->class_probability[c] = (float)probability[c];
+    out->motion_class = motion_class;
+}
+
 particle_state estimate_weighted(const gait_tracker *t, const weighted_particles *p, int32_t best,
                                  gait_estimate *out)
 {
     sums s = {.t = t, .run = t->like->run, .of = p, .best = best};
     gait_pose pose;
-    s.mass = s.run->estimate_mode(column(&s, F_PHASE, 0), column(&s, F_HEADING, 1), p->weight, p->n, best,
-                                  t->in_mode);
+    int32_t const motion_class = p->strata ? p->strata->motion_class[stratum_at(p->strata, best)] : 0;
+    const state_layout *const layout = &t->layouts[motion_class];
+    mark_mode(&s, motion_class);
     sum_up(&s);
     particle_state const mean = mode_mean(&s);
     particle_state const heaviest = particle_get(&p->all, p->index ? p->index[best] : best);
     report_joints(&s, mean.f[F_STATURE], out);
     report_sd(&s, mean.f[F_STATURE], out);
-    out->mean = particle_to_state(&t->layout, &mean);
-    out->best = particle_to_state(&t->layout, &heaviest);
+    out->mean = particle_to_state(layout, &mean);
+    out->best = particle_to_state(layout, &heaviest);
     gait_state posed = out->mean;
     if (t->layout.plain_root)
         posed.stride_hz = 0.0f; /* in paper mode the gait does not depend on its rate */
@@ -192,12 +223,16 @@ particle_state estimate_weighted(const gait_tracker *t, const weighted_particles
         memcpy(out->pose.angle, pose.angle, sizeof pose.angle);
     out->phase_r = resultant_length(s.phase);
     out->hypothesis_weight = (float)s.mass;
-    out->speed = particle_speed(&t->layout, &mean);
+    out->speed = particle_speed(layout, &mean);
+    report_classes(p, motion_class, out);
     return mean;
 }
 
 particle_state estimate_particles(const gait_tracker *t, int32_t best, gait_estimate *out)
 {
-    weighted_particles const p = {.all = t->particles, .n = t->particles.n, .weight = t->filter.weight};
+    weighted_particles const p = {.all = t->particles,
+                                  .n = t->particles.n,
+                                  .weight = t->filter.weight,
+                                  .strata = t->classes ? tracker_strata(t) : NULL};
     return estimate_weighted(t, &p, best, out);
 }

@@ -10,9 +10,11 @@ typedef struct weighted_particles { /* their joints are in t->joint */
     const int32_t *index; /* n: which of all; NULL: every one.  Their fields are gathered in t->lag.column */
     int32_t n;
     const double *weight; /* n */
+    const strata *strata; /* of these n; NULL: one class */
 } weighted_particles;
 
-/* Means, standard deviations, dominant mode and joints; best: the heaviest particle.  Returns the mean of the dominant
+/* Means, standard deviations, dominant mode and joints; best: the heaviest particle, with several classes that of the most
+ * probable one.  Returns the mean of the dominant
  * mode, which t->in_mode marks. */
 particle_state estimate_weighted(const gait_tracker *t, const weighted_particles *p, int32_t best,
                                  gait_estimate *out);

@@ -1,4 +1,5 @@
 #include "tracker/fixed_lag.h"
+#include "tracker/class_strata.h"
 #include "tracker/estimate.h"
 #include "tracker/hypotheses.h"
 #include <string.h>
@@ -47,16 +48,29 @@ static int32_t gather(lag_scratch *s, int32_t n)
     return count;
 }
 
-/* Joints of the gathered ancestors. */
-static void place_joints(gait_tracker *t, const weighted_particles *p)
+/* Ranges of the gathered ancestors, from those of all. */
+static strata gathered_strata(const strata *all, const int32_t *ancestor, int32_t n)
+{
+    strata s = *all;
+    for (int32_t k = 0, i = 0; k <= all->count; k++) {
+        while (i < n && ancestor[i] < all->first[k])
+            i++;
+        s.first[k] = i;
+    }
+    return s;
+}
+
+/* Joints of gathered ancestors first .. end - 1, of one class. */
+static void place_joints(gait_tracker *t, const weighted_particles *p, const state_layout *of, int32_t first,
+                         int32_t end)
 {
     likelihood_scratch *const w = &t->work[0];
     size_t const n = (size_t)p->n;
-    for (int32_t begin = 0; begin < p->n; begin += BLOCK) {
-        int32_t const lanes = i_min(BLOCK, p->n - begin);
+    for (int32_t begin = first; begin < end; begin += BLOCK) {
+        int32_t const lanes = i_min(BLOCK, end - begin);
         particle_block block;
         particle_block_get(&p->all, p->index + begin, lanes, &block);
-        particle_block_bodies(&t->layout, &block, &w->body);
+        particle_block_bodies(of, &block, &w->body);
         kin_points(t->model, &w->body, w->points);
         for (size_t j = 0; j < (size_t)t->model->points; j++)
             for (size_t k = 0; k < 3; k++)
@@ -87,8 +101,17 @@ void fixed_lag_estimate(gait_tracker *t, int32_t back, gait_estimate *out)
     sum_descendants(t, back, s->weight);
     p.n = gather(s, p.all.n);
     pf const weights = {.n = p.n, .weight = s->weight};
-    place_joints(t, &p);
-    estimate_weighted(t, &p, pf_heaviest(&weights), &e);
+    int32_t best = pf_heaviest(&weights);
+    strata of;
+    if (t->classes) {
+        of = gathered_strata(&t->history.strata[slot], s->ancestor, p.n);
+        p.strata = &of;
+        (void)class_strata_best(&of, s->weight, &best);
+        for (int32_t k = 0; k < of.count; k++)
+            place_joints(t, &p, &t->layouts[of.motion_class[k]], of.first[k], of.first[k + 1]);
+    } else
+        place_joints(t, &p, &t->layout, 0, p.n);
+    estimate_weighted(t, &p, best, &e);
     e.ess = (float)pf_ess(&weights);
     e.flags = record.flags;
     e.status = lagged_status(t, (gait_track_status)record.status, e.hypothesis_weight);

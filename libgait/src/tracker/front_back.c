@@ -31,13 +31,13 @@ static void turned_bodies(const particle_state *p, particle_block *out)
     }
 }
 
-float front_back_score(gait_tracker *t, const particle_state *p)
+float front_back_score(gait_tracker *t, const state_layout *of, const particle_state *p)
 {
     likelihood_scratch *const w = &t->work[0];
     particle_block bodies;
     float sum = 0.0f, cameras = 0.0f;
     turned_bodies(p, &bodies);
-    particle_block_bodies(&t->layout, &bodies, &w->body);
+    particle_block_bodies(of, &bodies, &w->body);
     for (int32_t c = 0; c < t->cfg.cameras; c++) {
         float edges[BLOCK], chance[BLOCK], turned = 0.0f;
         if (!t->camera[c].features.has_image || !viewed_from_side(&t->cfg.camera[c], p))
@@ -55,12 +55,12 @@ float front_back_score(gait_tracker *t, const particle_state *p)
 }
 
 /* When only parts of the body are visible, the edges of the occluder are no evidence. */
-float front_back_update(gait_tracker *t, bool restart, const particle_state *mean)
+float front_back_update(gait_tracker *t, bool restart, const state_layout *of, const particle_state *mean)
 {
     float const before = t->core->front_back_margin;
     if (restart)
         return FIRST_SCORE;
     if (t->core->partly_hidden || !(t->cfg.terms & GAIT_TERM_EDGES))
         return before;
-    return running_mean(t, before, front_back_score(t, mean), AVERAGE_TIME);
+    return running_mean(t, before, front_back_score(t, of, mean), AVERAGE_TIME);
 }

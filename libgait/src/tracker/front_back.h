@@ -9,9 +9,9 @@
 
 /* Edge strength along the outline of the body, less that of the best turned body, less half of what exceeds chance:
  * negative if front and back cannot be distinguished.  Mean over cameras that see the person from a side; 0 if there are
- * none. */
-float front_back_score(gait_tracker *t, const particle_state *p);
+ * none.  of: the class of p. */
+float front_back_score(gait_tracker *t, const state_layout *of, const particle_state *p);
 
 /* The running mean of the score after this frame; restart: the person has just been found. */
-float front_back_update(gait_tracker *t, bool restart, const particle_state *mean);
+float front_back_update(gait_tracker *t, bool restart, const state_layout *of, const particle_state *mean);
 #endif

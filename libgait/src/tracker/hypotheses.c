@@ -3,6 +3,7 @@
 #include "base/rng.h"
 #include "filter/evidence.h"
 #include "image/camera.h"
+#include "tracker/class_strata.h"
 #include <string.h>
 
 static const float ACQUISITION_TIME = 0.5f; /* seconds until the phase is known modulo half a stride */
@@ -91,6 +92,8 @@ bool hypotheses_agree(const gait_tracker *t, float weight)
 bool hypotheses_acquired(const gait_tracker *t)
 {
     const hypotheses_state *const h = &t->core->hypotheses;
+    if (h->stage == HYPOTHESES_ONE)
+        return t->classes && t->classes->open_sides;
     return h->stage == HYPOTHESES_ACQUISITION && !h->left_right_known && h->log_odds >= 0.0 &&
            seconds_in_stage(t) >= ACQUISITION_TIME;
 }
@@ -196,11 +199,32 @@ static bool resample_all(gait_tracker *t, const uint32_t u, uint32_t counter)
     return true;
 }
 
+/* The same with several classes of motion. */
+static bool resample_classes(gait_tracker *t, const uint32_t u[2])
+{
+    int32_t const before = t->filter.n, count = tracker_count(t);
+    bool const two = t->core->hypotheses.stage == HYPOTHESES_TWO;
+    *t->next = *tracker_strata(t);
+    if ((two || count == before) && !hypotheses_acquired(t) && !class_strata_due(t))
+        return false;
+    t->next->count = 0;
+    for (int32_t h = 0; h < 1 + two; h++) {
+        int32_t const begin = two ? hypothesis_first(before, h) : 0;
+        int32_t const end = two ? hypothesis_first(before, h + 1) : before;
+        class_strata_resample(t, begin, end, two ? end - begin : count, u[h]);
+    }
+    t->filter.n = two ? before : count;
+    t->classes->resampled = t->core->utime - t->core->start_utime;
+    return true;
+}
+
 bool hypotheses_resample(gait_tracker *t, uint32_t counter)
 {
     uint32_t r[4];
     rng_bits(t->cfg.seed, STREAM_RESAMPLE, counter, 0, 0, r);
     pf_keep(&t->filter);
+    if (t->classes)
+        return resample_classes(t, r);
     if (t->core->hypotheses.stage != HYPOTHESES_TWO) {
         if (tracker_count(t) == t->filter.n)
             return resample_all(t, r[0], counter);
@@ -215,13 +239,21 @@ bool hypotheses_resample(gait_tracker *t, uint32_t counter)
 }
 
 /* ---- split ---- */
-/* Phase modulo half a stride that most particles agree on: the mean of the doubled angle. */
-static float half_phase(const particle_set *p)
+/* Who stands still has no phase. */
+static bool still(const gait_tracker *t, int32_t particle)
 {
-    const float *const phase = field(p, F_PHASE);
+    return layout_at(t, particle)->model->direction == 0;
+}
+
+/* Phase modulo half a stride that most particles agree on: the mean of the doubled angle. */
+static float half_phase(const gait_tracker *t)
+{
+    const float *const phase = field(&t->particles, F_PHASE);
     double c = 0.0, s = 0.0;
-    for (int32_t i = 0; i < p->n; i++) {
+    for (int32_t i = 0; i < t->particles.n; i++) {
         float sn, cs;
+        if (still(t, i))
+            continue;
         m_sincos_one(2.0f * TWO_PI_F * phase[i], &sn, &cs);
         c += (double)cs;
         s += (double)sn;
@@ -242,7 +274,8 @@ static float reflected_heading(const gait_tracker *t, const particle_state *p)
  * than 90 degrees: viewed from in front, the legs swap places without it. */
 static particle_state other_hypothesis(const gait_tracker *t, const particle_state *p, int32_t i)
 {
-    particle_state to = mirror_apply(t->mirror, &t->layout, p);
+    const state_layout *const of = layout_at(t, i);
+    particle_state to = mirror_apply(&t->mirror[of->model->motion_class], of, p);
     float const heading = reflected_heading(t, p);
     if ((i & 1) && fabsf(m_wrap_pi(heading - p->f[F_HEADING])) < 0.5f * PI_F)
         to.f[F_HEADING] = heading;
@@ -297,6 +330,8 @@ static void split_range(void *ctx, int32_t begin, int32_t end, int32_t task)
         bool const second = i >= hypothesis_first(j->particles.n, 1);
         particle_state p = particle_get(&j->particles, i);
         bool const far = fabsf(m_wrap_pi(TWO_PI_F * (p.f[F_PHASE] - j->phase))) > 0.5f * PI_F;
+        if (still(j->t, i))
+            continue;
         if (far != second)
             p = other_hypothesis(j->t, &p, i);
         jitter(j->t, i, &p);
@@ -307,14 +342,21 @@ static void split_range(void *ctx, int32_t begin, int32_t end, int32_t task)
 /* The odds begin even whatever the acquisition made of left and right. */
 void hypotheses_split(gait_tracker *t)
 {
-    split_job j = {.t = t, .particles = t->particles, .phase = half_phase(&t->particles)};
+    split_job j = {.t = t, .particles = t->particles, .phase = half_phase(t)};
     deal(t);
-    task_run(&t->cfg.exec, t->cfg.tasks, t->filter.n, BLOCK, split_range, &j);
     enter(t, HYPOTHESES_TWO);
+    if (t->classes) {
+        class_strata_split(t,
+                           (const double[2]){m_exp64(log_probability(t, 0)), m_exp64(log_probability(t, 1))});
+        t->classes->open_sides = 0;
+    }
+    task_run(&t->cfg.exec, t->cfg.tasks, t->filter.n, BLOCK, split_range, &j);
     for (int32_t h = 0; h < 2; h++) {
         pf f = filter_of(&t->filter, h);
-        pf_uniform(&f);
-        scale_weights(&f, log_probability(t, h));
+        if (!t->classes) {
+            pf_uniform(&f);
+            scale_weights(&f, log_probability(t, h));
+        }
         for (int32_t c = 0; c < t->cfg.cameras && t->template[h][c]; c++)
             template_clear(t->template[h][c], t->model->limbs);
     }

@@ -66,7 +66,7 @@ static void block_in_camera(gait_tracker *t, int32_t c, int32_t begin, int32_t l
 static void block_joints(gait_tracker *t, int32_t begin, int32_t lanes, likelihood_scratch *w)
 {
     size_t const n = (size_t)t->cfg.particles;
-    particle_set_bodies(&t->layout, &t->particles, begin, &w->body);
+    particle_set_bodies(layout_at(t, begin), &t->particles, begin, &w->body);
     kin_points(t->model, &w->body, w->points);
     for (size_t p = 0; p < (size_t)t->model->points; p++)
         for (size_t k = 0; k < 3; k++)
@@ -97,11 +97,11 @@ void likelihood_step(gait_tracker *t)
 }
 
 /* ---- any body ---- */
-body_evidence likelihood_of_particle(gait_tracker *t, const particle_state *p)
+body_evidence likelihood_of_particle(gait_tracker *t, const state_layout *of, const particle_state *p)
 {
     likelihood_scratch *const w = &t->work[0];
     body_evidence e = {.support = 0.0f};
-    particle_body(&t->layout, p, &w->body);
+    particle_body(of, p, &w->body);
     if (t->cfg.terms & GAIT_TERM_KEYPOINTS)
         kin_points(t->model, &w->body, w->points);
     for (int32_t c = 0; c < t->cfg.cameras; c++) {
@@ -153,11 +153,11 @@ float likelihood_since(gait_tracker *t, const particle_state *p, uint32_t camera
     return sum;
 }
 
-float likelihood_of_keypoints(gait_tracker *t, const particle_state *p)
+float likelihood_of_keypoints(gait_tracker *t, const state_layout *of, const particle_state *p)
 {
     likelihood_scratch *const w = &t->work[0];
     float sum = 0.0f;
-    particle_body(&t->layout, p, &w->body);
+    particle_body(of, p, &w->body);
     kin_points(t->model, &w->body, w->points);
     for (int32_t c = 0; c < t->cfg.cameras; c++) {
         like_body const b = {.setup = t->like,

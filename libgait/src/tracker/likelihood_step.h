@@ -14,8 +14,8 @@ typedef struct body_evidence { /* of one body, over all cameras */
     float chance;       /* foreground that a body explains by chance, nats */
 } body_evidence;
 
-/* Writes the body's surface samples to t->estimate_patch. */
-body_evidence likelihood_of_particle(gait_tracker *t, const particle_state *p);
+/* Of one body, of the class of layout `of`.  Writes its surface samples to t->estimate_patch. */
+body_evidence likelihood_of_particle(gait_tracker *t, const state_layout *of, const particle_state *p);
 
 /* Surface samples of a body, cameras x limbs; returns the cameras that have an image, as bits. */
 uint32_t likelihood_sample(gait_tracker *t, const particle_state *p, like_patch *samples);
@@ -24,7 +24,7 @@ uint32_t likelihood_sample(gait_tracker *t, const particle_state *p, like_patch 
 float likelihood_since(gait_tracker *t, const particle_state *p, uint32_t cameras, const like_patch *then);
 
 /* Support of one body by the keypoints of all cameras, in units of the term's cost; 0 without keypoints. */
-float likelihood_of_keypoints(gait_tracker *t, const particle_state *p);
+float likelihood_of_keypoints(gait_tracker *t, const state_layout *of, const particle_state *p);
 
 /* Project the block of bodies in w->body into camera c. */
 void likelihood_outline(const gait_tracker *t, int32_t c, likelihood_scratch *w);

@@ -143,6 +143,43 @@ static bool history_plausible(const gait_tracker *t, const unsigned char *body)
     return true;
 }
 
+/* Ranges cover all n particles, block by block, and name classes of the model. */
+static bool strata_plausible(const gait_tracker *t, const strata *s, int32_t n)
+{
+    bool ok = s->count > 0 && s->count <= MAX_STRATA && s->first[0] == 0;
+    for (int32_t k = 0; ok && k < s->count; k++)
+        ok = s->first[k + 1] > s->first[k] && s->first[k] % BLOCK == 0 && s->motion_class[k] >= 0 &&
+             s->motion_class[k] < t->model->classes;
+    return ok && s->first[s->count] == n;
+}
+
+/* Each class is there in each hypothesis, in order. */
+static bool classes_plausible(const gait_tracker *t, const unsigned char *body)
+{
+    const particle_history *const h = &t->history;
+    tracker_core c;
+    class_state s;
+    memcpy(&c, body, sizeof c);
+    if (!t->classes || !c.started)
+        return true;
+    memcpy(&s, in_body(t, body, t->classes), sizeof s);
+    bool ok = s.reported >= 0 && s.reported < t->model->classes && s.supported >= 0 &&
+              s.supported < t->model->classes && f_finite(s.score[0], GAIT_MAX_CLASSES * GAIT_MAX_COMPONENTS);
+    ok &= s.resampled >= 0 && s.resampled <= c.utime - c.start_utime && s.still >= 0 &&
+          s.still <= c.utime - c.start_utime;
+    for (int32_t k = 0; ok && k < h->depth && ((uint64_t)k < c.frame || k == 0); k++) {
+        int32_t const slot = history_slot(h, c.generation, k);
+        int32_t count;
+        strata of;
+        memcpy(&count, in_body(t, body, &h->count[slot]), sizeof count);
+        memcpy(&of, in_body(t, body, &h->strata[slot]), sizeof of);
+        ok = strata_plausible(t, &of, count) && of.count % t->model->classes == 0;
+        for (int32_t i = 0; ok && i < of.count; i++)
+            ok = of.motion_class[i] == i % t->model->classes;
+    }
+    return ok;
+}
+
 static bool template_plausible(const gait_tracker *t, const unsigned char *body)
 {
     for (int32_t k = 0; k < 2 * t->cfg.cameras; k++) {
@@ -187,7 +224,8 @@ gait_result snapshot_restore(gait_tracker *t, const void *mem, size_t bytes, gai
         return base_fail(err, GAIT_ERR_CORRUPT, -1,
                          "snapshot is damaged: its length or checksum does not match");
     if (!core_plausible(t, body) || !weights_plausible(t, body) || !records_plausible(t, body) ||
-        !history_plausible(t, body) || !template_plausible(t, body) || !walk_check_plausible(t, body))
+        !history_plausible(t, body) || !classes_plausible(t, body) || !template_plausible(t, body) ||
+        !walk_check_plausible(t, body))
         return base_fail(err, GAIT_ERR_CORRUPT, -1, "snapshot contains a number outside its range");
     memcpy(t->core, body, state_bytes(t));
     tracker_set_count(t, t->capacity - t->core->below_capacity);

@@ -20,13 +20,20 @@ bool track_loss_is_lost(const gait_tracker *t)
     return seconds_unsupported(t) > PATIENCE;
 }
 
+/* Class of the last supported estimate. */
+static const state_layout *last_layout(const gait_tracker *t)
+{
+    return &t->layouts[t->classes ? t->classes->supported : 0];
+}
+
 /* Where a person may be who was last seen `gap` seconds ago. */
 static void search_region(const gait_tracker *t, float gap, gait_state *mean, gait_state *sd)
 {
     const particle_state *const last = &t->core->last_supported;
+    const state_layout *const of = last_layout(t);
     float sn, cs;
-    *mean = particle_to_state(&t->layout, last);
-    float const way = in_walking_time(t, gap) * particle_speed(&t->layout, last),
+    *mean = particle_to_state(of, last);
+    float const way = in_walking_time(t, gap) * particle_speed(of, last) * (float)of->model->direction,
                 far = f_min(0.1f + 0.4f * gap, 1.5f);
     m_sincos_one(mean->heading, &sn, &cs);
     mean->pelvis[0] += way * cs;
@@ -43,15 +50,22 @@ static void search_region(const gait_tracker *t, float gap, gait_state *mean, ga
 void track_loss_redraw(gait_tracker *t, uint32_t counter)
 {
     gait_state mean, sd;
-    dynamics d = tracker_dynamics(t);
+    double share = 1.0;
+    int32_t of = -1;
+    dynamics d;
     search_region(t, seconds_unsupported(t), &mean, &sd);
-    d.seed += (uint64_t)(counter + 1) << 32; /* other draws in every frame */
     int32_t const n = t->cfg.particles, drawn = (n + REDRAWN - 1) / REDRAWN;
     double const follow = (1.0 - ELSEWHERE) / (double)(n - drawn), elsewhere = ELSEWHERE / (double)drawn;
     for (int32_t i = 0; i < n; i++) {
         bool const redrawn = i % REDRAWN == 0;
-        t->filter.weight[i] = redrawn ? elsewhere : follow;
-        t->filter.log_weight[i] = m_log64(t->filter.weight[i]);
+        if (class_at(t, i) != of) {
+            of = class_at(t, i);
+            share = t->classes ? t->filter.weight[i] * (double)n : 1.0; /* even within a class */
+            d = tracker_dynamics(t, of);
+            d.seed += (uint64_t)(counter + 1) << 32; /* other draws in every frame */
+        }
+        t->filter.weight[i] = share * (redrawn ? elsewhere : follow);
+        t->filter.log_weight[i] = t->filter.weight[i] > 0.0 ? m_log64(t->filter.weight[i]) : -1e300;
         if (redrawn) {
             particle_state const p = dynamics_draw(&d, &mean, &sd, i);
             particle_put(&t->particles, i, &p);
@@ -88,7 +102,7 @@ void track_loss_bound(gait_tracker *t)
     body_evidence e = {.support = 0.0f};
     if (t->cfg.mode != GAIT_MODE_PAPER && best >= 0) {
         particle_state const p = particle_get(&t->particles, best);
-        e = likelihood_of_particle(t, &p);
+        e = likelihood_of_particle(t, layout_at(t, best), &p);
     }
     if (e.support == 0.0f) { /* no term distinguishes a hidden person from a visible one */
         memcpy(t->loglik, t->loglik_raw, (size_t)n * sizeof *t->loglik);
@@ -103,19 +117,24 @@ void track_loss_bound(gait_tracker *t)
     t->like->run->track_loss_join(t->loglik_raw, t->loglik_raw[best] - e.support + LOG_HIDDEN, n, t->loglik);
 }
 
-static bool phase_as_predicted(const gait_tracker *t, float gap, const particle_state *mean)
+static bool phase_as_predicted(const gait_tracker *t, float gap, const state_layout *of,
+                               const particle_state *mean)
 {
     const particle_state *const last = &t->core->last_supported;
-    float const turn = in_walking_time(t, gap) * last->f[F_RATE];
+    int32_t const direction = last_layout(t)->model->direction;
+    float const turn = in_walking_time(t, gap) * last->f[F_RATE] * (float)direction;
+    if (direction != of->model->direction)
+        return false;
     float const off = m_wrap_pi(TWO_PI_F * (mean->f[F_PHASE] - last->f[F_PHASE] - turn)) / TWO_PI_F;
     return gap < PHASE_TIME && fabsf(off) < PHASE_WITHIN;
 }
 
-track_loss_verdict track_loss_check(gait_tracker *t, bool lost, const particle_state *mean)
+track_loss_verdict track_loss_check(gait_tracker *t, bool lost, const state_layout *of,
+                                    const particle_state *mean)
 {
     const tracker_core *const core = t->core;
     float const gap = seconds_unsupported(t);
-    body_evidence const e = likelihood_of_particle(t, mean);
+    body_evidence const e = likelihood_of_particle(t, of, mean);
     float const unusual = e.parts.missed - core->usual_unexplained;
     bool const whole = e.support >= 0.0f && walk_check_passes(t); /* also if no term applies */
     bool const part = !whole && !lost && core->found &&
@@ -125,7 +144,7 @@ track_loss_verdict track_loss_check(gait_tracker *t, bool lost, const particle_s
                                               : SUPPORT_NONE,
                             .by_images = e.support - e.by_keypoints,
                             .usual_unexplained = core->usual_unexplained,
-                            .phase_as_predicted = phase_as_predicted(t, gap, mean),
+                            .phase_as_predicted = phase_as_predicted(t, gap, of, mean),
                             .phase_expired = gap > PHASE_TIME};
     if (whole)
         v.usual_unexplained += core->found ? unusual / (unusual > 0.0f ? RISE : FALL) : unusual;

@@ -27,6 +27,7 @@ typedef struct track_loss_verdict {
     bool phase_expired;         /* that one is too old to predict from */
 } track_loss_verdict;
 
-/* Whether the frame supports the estimate.  Writes the estimate's surface samples to t->estimate_patch. */
-track_loss_verdict track_loss_check(gait_tracker *t, bool lost, const particle_state *mean);
+/* Whether the frame supports the estimate, of the class of layout `of`.  Writes the estimate's surface samples to t->estimate_patch. */
+track_loss_verdict track_loss_check(gait_tracker *t, bool lost, const state_layout *of,
+                                    const particle_state *mean);
 #endif

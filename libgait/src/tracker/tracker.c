@@ -2,6 +2,7 @@
 #include "base/fmath.h"
 #include "filter/rejuvenation.h"
 #include "image/camera.h"
+#include "tracker/class_strata.h"
 #include "tracker/estimate.h"
 #include "tracker/features_step.h"
 #include "tracker/fixed_lag.h"
@@ -18,6 +19,7 @@ static const float PHASE_DEPARTURE =
     0.2f; /* strides from the predicted phase above which the track is ambiguous */
 static const double DEGENERATE_ESS = 2.0;
 static const float IMPROBABLE = 0.01f; /* hypotheses so much less probable than the first are left out */
+static const float OTHER_CLASS = 0.1f; /* probability at a start of all classes together, alike */
 static const float BESIDE = 0.25f;     /* statures by which hypotheses that compete may stand side by side */
 
 /* Whether another hypothesis competes with the first: it is not improbable, walks on the floor or on a belt as that one
@@ -35,12 +37,58 @@ static bool competes(const gait_tracker *t, const gait_hypothesis *first, const 
     return same;
 }
 
+/* A state of another class that looks much the same: who walks backwards turns round, with the other leg ahead. */
+static gait_state as_class(const gait_tracker *t, const gait_state *s, int32_t motion_class)
+{
+    gait_state to = *s;
+    const gait_model *const was = t->layouts[s->motion_class].model, *const is =
+                                                                         t->layouts[motion_class].model;
+    if (was->direction * is->direction < 0) {
+        to.heading = m_wrap_pi(s->heading + PI_F);
+        to.phase = m_wrap1(0.5f - s->phase);
+    }
+    to.motion_class = motion_class;
+    return to;
+}
+
+/* Draw particles first .. end - 1, of one class, from the n hypotheses by probability. */
+static void draw_range(gait_tracker *t, const gait_hypothesis *const *from, int32_t n, float total,
+                       int32_t motion_class, int32_t first, int32_t end)
+{
+    dynamics const d = tracker_dynamics(t, motion_class);
+    float drawn = 0.0f; /* probability */
+    for (int32_t i = first, k = -1; i < end; i++) {
+        while (k + 1 < n && (k < 0 || ((float)(i - first) + 0.5f) * total > drawn * (float)(end - first)))
+            drawn += from[++k]->probability;
+        gait_state const mean = as_class(t, &from[k]->mean, motion_class);
+        particle_state const p = dynamics_draw(&d, &mean, &from[k]->sd, i);
+        particle_put(&t->particles, i, &p);
+    }
+}
+
+/* Every class is possible at a start, most of all those of the hypotheses. */
+static void draw_classes(gait_tracker *t, const gait_hypothesis *const *from, int32_t n, float total)
+{
+    int32_t const classes = t->model->classes;
+    double probability[GAIT_MAX_CLASSES] = {0.0};
+    for (int32_t c = 0; c < classes; c++)
+        probability[c] = (double)OTHER_CLASS / (double)classes;
+    for (int32_t k = 0; k < n; k++)
+        probability[from[k]->mean.motion_class] +=
+            (double)((1.0f - OTHER_CLASS) * from[k]->probability / total);
+    class_strata_begin(t, probability);
+    const strata *const s = tracker_strata(t);
+    for (int32_t k = 0; k < s->count; k++)
+        draw_range(t, from, n, total, s->motion_class[k], s->first[k], s->first[k + 1]);
+    t->classes->reported = t->classes->supported = from[0]->mean.motion_class;
+}
+
 void tracker_start(gait_tracker *t, const gait_hypothesis *h, int32_t count, bool sure, int64_t utime)
 {
     tracker_core *const core = t->core;
     const gait_hypothesis *from[GAIT_START_MAX_HYPOTHESES];
     int32_t n = 0;
-    float total = 0.0f, drawn = 0.0f; /* probability */
+    float total = 0.0f; /* probability */
     bool known = true;
     for (int32_t k = 0; k < count; k++)
         if (k == 0 || competes(t, h, &h[k])) {
@@ -62,16 +110,13 @@ void tracker_start(gait_tracker *t, const gait_hypothesis *h, int32_t count, boo
         hypotheses_settle(t);
     tracker_set_count(t, tracker_count(t));
     tracker_even_weights(t);
-    core->last_supported = particle_from_state(&t->layout, &h->mean);
+    core->last_supported = particle_from_state(&t->layouts[h->mean.motion_class], &h->mean);
     core->reported_phase = h->mean.phase;
     core->reported_rate = h->mean.stride_hz;
-    dynamics const d = tracker_dynamics(t);
-    for (int32_t i = 0, k = -1; i < t->cfg.particles; i++) {
-        while (k + 1 < n && (k < 0 || ((float)i + 0.5f) * total > drawn * (float)t->cfg.particles))
-            drawn += from[++k]->probability;
-        particle_state const p = dynamics_draw(&d, &from[k]->mean, &from[k]->sd, i);
-        particle_put(&t->particles, i, &p);
-    }
+    if (t->classes)
+        draw_classes(t, from, n, total);
+    else
+        draw_range(t, from, n, total, 0, 0, t->cfg.particles);
 }
 
 /* ---- rejuvenate and predict ---- */
@@ -79,7 +124,8 @@ typedef struct move_job {
     gait_tracker *t;
     particle_set from; /* the generation before */
     rejuvenation rejuvenation;
-    dynamics_step step;
+    uint32_t counter; /* of the random numbers */
+    dynamics_step step[GAIT_MAX_CLASSES];
 } move_job;
 
 /* Particles are rejuvenated after resampling, within their hypothesis; not while they have no single mode, because
@@ -91,6 +137,7 @@ static rejuvenation rejuvenation_of(const gait_tracker *t, bool resampled, bool 
                       .parent = t->filter.parent,
                       .n = t->filter.n,
                       .split = hypotheses_boundary(t),
+                      .origin = t->classes ? t->in_mode : NULL,
                       .seed = t->cfg.seed,
                       .frame = counter};
     if (modes_known && resampled)
@@ -111,17 +158,27 @@ static void move_range(void *ctx, int32_t begin, int32_t end, int32_t task)
     const move_job *const j = ctx;
     const gait_tracker *const t = j->t;
     particle_set to = t->particles;
+    rejuvenation r = j->rejuvenation;
     (void)task;
     for (int32_t i = begin; i < end; i += BLOCK) {
         int32_t const lanes = i_min(BLOCK, end - i);
+        const dynamics_step *const step = &j->step[class_at(t, i)];
         particle_block then, now;
-        if (j->rejuvenation.shrink > 0.0f)
-            rejuvenate_block(&j->rejuvenation, i, lanes, &then);
+        if (t->classes) {
+            int32_t const k = stratum_at(tracker_strata(t), i);
+            r.begin = tracker_strata(t)->first[k];
+            r.n = tracker_strata(t)->first[k + 1];
+            r.motion_class = tracker_strata(t)->motion_class[k];
+        }
+        if (r.shrink > 0.0f)
+            rejuvenate_block(&r, i, lanes, &then);
         else
             particle_block_get(&j->from, t->filter.parent + i, lanes, &then);
-        if (j->step.dt != 0.0f)
-            t->like->run->dynamics_move(&j->step, i, &then, &now);
-        particle_block_put(&to, i, lanes, j->step.dt != 0.0f ? &now : &then);
+        if (t->classes)
+            class_strata_enter(t, j->counter, i, lanes, &then);
+        if (step->dt != 0.0f)
+            t->like->run->dynamics_move(step, i, &then, &now);
+        particle_block_put(&to, i, lanes, step->dt != 0.0f ? &now : &then);
     }
 }
 
@@ -137,38 +194,57 @@ static void inherit_texture(void *ctx)
 /* Move every particle from its ancestor into the next generation, which becomes the current one. */
 static void predict(gait_tracker *t, float dt, const rejuvenation *r, uint32_t counter)
 {
-    dynamics const d = tracker_dynamics(t);
-    move_job j = {.t = t, .from = t->particles, .rejuvenation = *r};
+    move_job j = {.t = t, .from = t->particles, .rejuvenation = *r, .counter = counter};
     if (r->shrink > 0.0f)
         task_run(&t->cfg.exec, t->cfg.tasks, j.from.n, BLOCK, rows_range, &j);
-    j.step = dynamics_step_init(&d, dt, hypotheses_settled_time(t), counter);
+    for (int32_t c = 0; c < (t->classes ? t->model->classes : 1); c++) {
+        dynamics const d = tracker_dynamics(t, c);
+        j.step[c] = dynamics_step_init(&d, dt, hypotheses_settled_time(t), counter);
+    }
+    if (t->classes)
+        class_strata_origins(t, tracker_strata(t));
     t->core->generation = (t->core->generation + 1) % t->history.depth;
     tracker_set_count(t, t->filter.n);
+    if (t->classes)
+        *tracker_strata(t) = *t->next;
     task_run_beside(&t->cfg.exec, t->cfg.tasks, t->core->sampled_cameras ? inherit_texture : NULL,
                     t->cfg.particles, BLOCK, move_range, &j);
 }
 
-void tracker_predict(const gait_tracker *t, gait_state *s, int32_t n, float dt)
+/* Move those of the states that are of one class. */
+static void predict_class(const gait_tracker *t, gait_state *s, int32_t n, float dt, int32_t motion_class)
 {
-    dynamics d = tracker_dynamics(t);
+    dynamics d = tracker_dynamics(t, motion_class);
     d.seed = ~d.seed;
     dynamics_step const step =
         dynamics_step_init(&d, dt, hypotheses_settled_time(t), (uint32_t)t->core->frame);
-    for (int32_t first = 0; first < n && dt > 0.0f; first += BLOCK) {
+    for (int32_t first = 0; first < n; first += BLOCK) {
         int32_t const lanes = i_min(BLOCK, n - first);
+        bool any = false;
         particle_block from = {0}, to;
         particle_set then = {.n = BLOCK, .fields = step.fields, .value = from.f[0]};
         particle_set const now = {.n = BLOCK, .fields = step.fields, .value = to.f[0]};
         for (int32_t lane = 0; lane < lanes; lane++) {
-            particle_state const p = particle_from_state(&t->layout, &s[first + lane]);
+            if (s[first + lane].motion_class != motion_class)
+                continue;
+            particle_state const p = particle_from_state(&d.rule, &s[first + lane]);
             particle_put(&then, lane, &p);
+            any = true;
         }
-        t->like->run->dynamics_move(&step, first, &from, &to);
-        for (int32_t lane = 0; lane < lanes; lane++) {
+        if (any)
+            t->like->run->dynamics_move(&step, first, &from, &to);
+        for (int32_t lane = 0; any && lane < lanes; lane++) {
             particle_state const p = particle_get(&now, lane);
-            s[first + lane] = particle_to_state(&t->layout, &p);
+            if (s[first + lane].motion_class == motion_class)
+                s[first + lane] = particle_to_state(&d.rule, &p);
         }
     }
+}
+
+void tracker_predict(const gait_tracker *t, gait_state *s, int32_t n, float dt)
+{
+    for (int32_t c = 0; c < t->model->classes && dt > 0.0f; c++)
+        predict_class(t, s, n, dt, c);
 }
 
 /* ---- after the estimate ---- */
@@ -183,11 +259,12 @@ static uint32_t cameras_seeing(const gait_tracker *t)
 
 /* Record whether the frame supports the estimate.  When the person is found again, left and right are open unless the
  * phase is as predicted. */
-static void update_track_loss(gait_tracker *t, float dt, bool lost, const particle_state *mean)
+static void update_track_loss(gait_tracker *t, float dt, bool lost, const state_layout *of,
+                              const particle_state *mean)
 {
     tracker_core *const core = t->core;
     hypotheses_state *const h = &core->hypotheses;
-    track_loss_verdict const v = track_loss_check(t, lost, mean);
+    track_loss_verdict const v = track_loss_check(t, lost, of, mean);
     core->partly_hidden = v.support == SUPPORT_PART;
     core->usual_unexplained = v.usual_unexplained;
     bool const proven = core->found || hypotheses_prove(t, dt, v.by_images);
@@ -199,18 +276,22 @@ static void update_track_loss(gait_tracker *t, float dt, bool lost, const partic
     bool const left_right = h->left_right_known || h->stage == HYPOTHESES_TWO;
     if (lost && !(left_right && v.phase_as_predicted))
         hypotheses_acquire(t);
-    core->front_back_margin = front_back_update(t, lost || !core->found, mean);
-    core->left_right_margin = left_right_update(t, lost || !core->found, mean);
+    core->front_back_margin = front_back_update(t, lost || !core->found, of, mean);
+    core->left_right_margin = left_right_update(t, lost || !core->found, of, mean);
     core->support_utime = core->utime;
     core->last_supported = *mean;
+    if (t->classes)
+        t->classes->supported = of->model->motion_class;
     core->found = proven;
 }
 
 static gait_track_status status_of(const gait_tracker *t, float dt, const gait_estimate *e)
 {
     const tracker_core *const core = t->core;
+    bool const still = t->layouts[e->motion_class].model->direction == 0;
     float const predicted = core->reported_phase + in_walking_time(t, dt) * core->reported_rate;
     bool const departs =
+        !(t->classes && (e->motion_class != t->classes->reported || still)) &&
         fabsf(m_wrap_pi(TWO_PI_F * (e->mean.phase - predicted))) > TWO_PI_F * PHASE_DEPARTURE;
     if (track_loss_is_lost(t))
         return GAIT_TRACK_LOST;
@@ -218,8 +299,8 @@ static gait_track_status status_of(const gait_tracker *t, float dt, const gait_e
         return GAIT_TRACK_INIT;
     if (e->hypothesis_weight < DOMINANT_MASS)
         return seconds_since(t, core->start_utime) < SETTLE_TIME ? GAIT_TRACK_INIT : GAIT_TRACK_AMBIGUOUS;
-    bool const open =
-        hypotheses_open(t) || core->front_back_margin < 0.0f || core->left_right_margin < 0.0f || departs;
+    bool const sides_open = !still && (hypotheses_open(t) || core->left_right_margin < 0.0f);
+    bool const open = sides_open || core->front_back_margin < 0.0f || departs;
     return open ? GAIT_TRACK_AMBIGUOUS : GAIT_TRACK_TRACKING;
 }
 
@@ -270,8 +351,10 @@ void tracker_step(gait_tracker *t, const gait_frame *frame, gait_estimate *out)
     likelihood_step(t); /* without an image: only the joints */
     if (has_image)
         track_loss_bound(t);
-    pf_summary const s = has_image ? hypotheses_update(t, dt)
-                                   : (pf_summary){.best = pf_heaviest(&t->filter), .ess = pf_ess(&t->filter)};
+    pf_summary s = has_image ? hypotheses_update(t, dt)
+                             : (pf_summary){.best = pf_heaviest(&t->filter), .ess = pf_ess(&t->filter)};
+    if (t->classes)
+        (void)class_strata_best(tracker_strata(t), t->filter.weight, &s.best);
     core->ess = s.ess;
     core->sampled_cameras = uses_texture(&t->cfg) ? cameras_seeing(t) : 0;
 
@@ -279,7 +362,7 @@ void tracker_step(gait_tracker *t, const gait_frame *frame, gait_estimate *out)
     particle_state const mean = estimate_particles(t, s.best, &e);
     if (has_image) {
         walk_check_update(t, &mean);
-        update_track_loss(t, dt, lost, &mean);
+        update_track_loss(t, dt, lost, &t->layouts[e.motion_class], &mean);
     }
     if (hypotheses_agree(t, e.hypothesis_weight))
         hypotheses_settle(t);
@@ -293,9 +376,11 @@ void tracker_step(gait_tracker *t, const gait_frame *frame, gait_estimate *out)
     if (e.status == GAIT_TRACK_TRACKING && h->stage == HYPOTHESES_ONE && !core->partly_hidden)
         learn_appearance(t);
 
+    if (t->classes)
+        class_strata_report(t, &mean, &e);
     fixed_lag_record(t, &e);
     core->reported_phase = e.mean.phase;
-    core->reported_rate = e.mean.stride_hz;
+    core->reported_rate = e.mean.stride_hz * (float)t->layouts[e.motion_class].model->direction;
     core->frame++;
     *out = e;
 }

@@ -5,7 +5,8 @@
 #include <string.h>
 
 /* ---- layout ---- */
-static void layout_history(particle_history *h, arena *a, int32_t lag, int32_t n, int32_t fields)
+static void layout_history(particle_history *h, arena *a, int32_t lag, int32_t n, int32_t fields,
+                           bool classes)
 {
     h->depth = i_max(lag, 1) + 1;
     h->capacity = n;
@@ -14,6 +15,13 @@ static void layout_history(particle_history *h, arena *a, int32_t lag, int32_t n
     h->count = TAKE(a, int32_t, h->depth);
     h->value = TAKE(a, float, (size_t)h->depth *(size_t)fields *(size_t)n);
     h->parent = TAKE(a, int32_t, (size_t)h->depth *(size_t)n);
+    h->strata = classes ? TAKE(a, strata, h->depth) : NULL;
+}
+
+/* In paper mode the first class is the only one. */
+static bool several_classes(const gait_model *m, const gait_tracker_config *cfg)
+{
+    return m->classes > 1 && cfg->mode != GAIT_MODE_PAPER;
 }
 
 /* The mutable state, first and without gaps: it is saved, restored and hashed as one block. */
@@ -27,7 +35,9 @@ static void layout_state(arena *a, gait_tracker *t)
         t->texture = TAKE(a, like_patch, (size_t)n * (size_t)(cameras * t->model->limbs));
     for (int32_t c = 0; c < 2 * cameras && uses_texture(&t->cfg); c++)
         t->template[c / cameras][c % cameras] = TAKE(a, int16_t, samples);
-    layout_history(&t->history, a, t->cfg.lag, n, state_layout_fields(&t->layout));
+    bool const classes = several_classes(t->model, &t->cfg);
+    layout_history(&t->history, a, t->cfg.lag, n, state_layout_fields(&t->layout), classes);
+    t->classes = classes ? TAKE(a, class_state, 1) : NULL;
     if (t->cfg.mode == GAIT_MODE_PAPER && uses_texture(&t->cfg)) {
         t->walk_check = TAKE(a, walk_check, 1);
         t->walk_check_patch = TAKE(a, like_patch, (size_t)cameras * (size_t)t->model->limbs);
@@ -111,7 +121,9 @@ static void layout_work(arena *a, gait_tracker *t)
     t->like = TAKE(a, like_setup, 1);
     layout_logliks(a, t);
     layout_joints(a, t);
-    t->mirror = TAKE(a, mirror, 1);
+    t->layouts = TAKE(a, state_layout, t->model->classes);
+    t->mirror = TAKE(a, mirror, t->model->classes);
+    t->next = TAKE(a, strata, 1);
     t->in_mode = TAKE(a, uint8_t, t->cfg.particles);
     if (uses_texture(&t->cfg))
         t->estimate_patch = TAKE(a, like_patch, (size_t)cameras * limbs);
@@ -127,13 +139,22 @@ static int32_t acquisition_count(const gait_tracker *t)
     return i_max(target, i_min(twice, t->cfg.acquisition_particles));
 }
 
+/* Particles of all classes where one class has so many: whole blocks of each class in each of two hypotheses. */
+static int32_t of_all_classes(const gait_tracker *t, int32_t one)
+{
+    int32_t const classes = t->model->classes, unit = 2 * BLOCK;
+    if (!several_classes(t->model, &t->cfg))
+        return one;
+    return i_max((one + (classes - 1) * (one / CLASS_SHARE) + unit - 1) / unit, classes) * unit;
+}
+
 gait_tracker *tracker_layout(arena *a, const gait_model *m, const gait_tracker_config *cfg,
                              const kernels *run)
 {
     gait_tracker *const self = TAKE(a, gait_tracker, 1);
     gait_tracker t = {
         .model = m, .cfg = *cfg, .config_particles = cfg->particles, .target_particles = cfg->particles};
-    t.cfg.particles = t.capacity = acquisition_count(&t);
+    t.cfg.particles = t.capacity = of_all_classes(&t, acquisition_count(&t));
     t.layout = state_layout_init(m, &t.cfg, run);
     t.cfg.components = t.layout.components;
     t.cfg.proportions = t.layout.proportions;
@@ -144,7 +165,10 @@ gait_tracker *tracker_layout(arena *a, const gait_model *m, const gait_tracker_c
     if (!self || a->overflow)
         return NULL;
     like_setup_init(t.like, m, &t.cfg, run);
-    mirror_init(t.mirror, &t.layout);
+    for (int32_t c = 0; c < m->classes; c++) {
+        t.layouts[c] = c ? state_layout_of_class(&t.layout, c) : t.layout;
+        mirror_init(&t.mirror[c], &t.layouts[c]);
+    }
     *self = t;
     return self;
 }
@@ -159,7 +183,8 @@ particle_set history_particles(const particle_history *h, int32_t slot)
 
 int32_t tracker_count(const gait_tracker *t)
 {
-    return t->core->hypotheses.stage == HYPOTHESES_ACQUISITION ? acquisition_count(t) : t->target_particles;
+    bool const more = t->core->hypotheses.stage == HYPOTHESES_ACQUISITION;
+    return of_all_classes(t, more ? acquisition_count(t) : t->target_particles);
 }
 
 void tracker_set_count(gait_tracker *t, int32_t particles)
@@ -187,7 +212,7 @@ void tracker_clear(gait_tracker *t)
 {
     memset(t->core, 0, (size_t)(t->state_end - (unsigned char *)t->core));
     tracker_set_target(t, t->target_particles);
-    tracker_set_count(t, t->target_particles);
+    tracker_set_count(t, tracker_count(t));
     for (int32_t c = 0; c < t->cfg.cameras; c++) {
         t->camera[c].plate_stale = true;
         for (int32_t h = 0; h < 2 && t->template[h][c]; h++)
@@ -196,10 +221,10 @@ void tracker_clear(gait_tracker *t)
     tracker_even_weights(t);
 }
 
-dynamics tracker_dynamics(const gait_tracker *t)
+dynamics tracker_dynamics(const gait_tracker *t, int32_t motion_class)
 {
     return (dynamics){.cfg = &t->cfg,
-                      .rule = t->layout,
+                      .rule = t->layouts[motion_class],
                       .seed = t->cfg.seed,
                       .stature_sd_ratio = t->core->stature_sd_ratio};
 }

@@ -55,6 +55,25 @@ typedef struct walk_check {
         nats; /* log-likelihood ratio of its surface having walked on over having stayed, mean of the last two */
     particle_state body;
 } walk_check;
+/* Ranges of particles, each of one class of motion, those of the second hypothesis after those of the first. */
+enum { MAX_STRATA = 2 * GAIT_MAX_CLASSES };
+enum {
+    CLASS_SHARE = 8
+}; /* every class has at least one in so many of the particles that one class would have */
+typedef struct strata {
+    int32_t count;
+    int32_t first[MAX_STRATA + 1];
+    int32_t motion_class[MAX_STRATA];
+} strata;
+
+typedef struct class_state { /* of a model with several classes (class_strata.h) */
+    int64_t resampled,
+        still; /* microseconds since the start: last resampling; since when standing still is reported */
+    int32_t reported, supported; /* class of the last estimate, and of core.last_supported */
+    int32_t open_sides;          /* the person stood still: left and right are to be split */
+    uint32_t known;              /* bit c: there are scores of the person in class c */
+    float score[GAIT_MAX_CLASSES][GAIT_MAX_COMPONENTS];
+} class_state;
 
 typedef struct camera_state {
     features features;
@@ -88,6 +107,7 @@ typedef struct particle_history {
     int32_t capacity, fields;
     generation_record *record; /* depth */
     int32_t *count;            /* depth: particles of each generation */
+    strata *strata;            /* depth; NULL: one class */
     float *value;              /* depth x fields x capacity, of which fields x count are in use */
     int32_t *parent;           /* depth x capacity: indices into the generation before */
 } particle_history;
@@ -104,7 +124,7 @@ struct gait_tracker {
     int32_t config_particles; /* of the caller's config */
     int32_t target_particles; /* that the caller wants outside acquisition */
     int32_t capacity;         /* particles that fit into the memory */
-    state_layout layout;
+    state_layout layout;      /* of the first class */
     like_setup *like;
     /* Mutable state: one block of memory from core to state_end. */
     tracker_core *core;
@@ -117,6 +137,7 @@ struct gait_tracker {
     particle_history history;
     walk_check *walk_check;       /* NULL: not in paper mode */
     like_patch *walk_check_patch; /* cameras x limbs: the surface of its body */
+    class_state *classes; /* NULL: one class */
     unsigned char *state_end;
     particle_set particles; /* the current generation */
     /* Recomputed in every step. */
@@ -131,8 +152,11 @@ struct gait_tracker {
         joint; /* points x 3 x n, metres: of the particles, or of the ancestors that fixed_lag_estimate() gathers */
     float *rows;             /* until the particles have moved: rejuvenation_rows(); in the memory of joint */
     features_scratch planes; /* until the features are complete; in the memory of joint */
-    mirror *mirror;          /* constant */
-    uint8_t *in_mode;        /* n: 1 for particles of the dominant mode */
+    state_layout *layouts;   /* of every class; constant */
+    mirror *mirror;          /* the same */
+    strata *next;            /* with several classes: of the particles after resampling */
+    uint8_t *
+        in_mode; /* n: 1 for particles of the dominant mode; until they have moved: class of their ancestors */
     like_patch *estimate_patch; /* cameras x limbs: surface samples of the estimate */
     int8_t *template_ring
         [2][GAIT_MAX_CAMERAS]; /* limbs x LIKE_RING: the templates as this frame is compared with them */
@@ -157,7 +181,7 @@ int32_t tracker_count(const gait_tracker *t);
 /* Give all particles the same weight and no ancestors but themselves. */
 void tracker_even_weights(gait_tracker *t);
 
-dynamics tracker_dynamics(const gait_tracker *t);
+dynamics tracker_dynamics(const gait_tracker *t, int32_t motion_class);
 
 /* Particles in a slot of the history. */
 particle_set history_particles(const particle_history *h, int32_t slot);
@@ -170,6 +194,31 @@ static inline int32_t *history_parents(const particle_history *h, int32_t slot)
 static inline int32_t history_slot(const particle_history *h, int32_t slot, int32_t back)
 {
     return (slot + h->depth - back) % h->depth;
+}
+
+/* Ranges of the current particles by class; only with several classes. */
+static inline strata *tracker_strata(const gait_tracker *t)
+{
+    return &t->history.strata[t->core->generation];
+}
+
+static inline int32_t stratum_at(const strata *s, int32_t particle)
+{
+    int32_t k = 0;
+    while (particle >= s->first[k + 1])
+        k++;
+    return k;
+}
+
+/* Class of a current particle. */
+static inline int32_t class_at(const gait_tracker *t, int32_t particle)
+{
+    return t->classes ? tracker_strata(t)->motion_class[stratum_at(tracker_strata(t), particle)] : 0;
+}
+
+static inline const state_layout *layout_at(const gait_tracker *t, int32_t particle)
+{
+    return &t->layouts[class_at(t, particle)];
 }
 
 /* Surface samples of particle i in camera c by limb, or NULL. */

@@ -24,9 +24,10 @@ from ctypes import (
 from enum import IntEnum, IntFlag
 from typing import Any, NamedTuple
 
-ABI = 7
+ABI = 8
 ALIGN = 64
 MAX_JOINTS, MAX_ANGLES, MAX_COMPONENTS, MAX_PROPORTIONS, MAX_CAMERAS = 32, 32, 16, 8, 4
+MAX_CLASSES = 8
 MAX_HYPOTHESES, MAX_PEOPLE = 8, 4  # of a start
 SEGMENT_HEADINGS = (
     0,
@@ -285,6 +286,8 @@ FUNCTIONS: tuple[tuple[str, list[Any], Any], ...] = (
     ("gait_model_joint_name", [_HANDLE, c_int32], c_char_p),
     ("gait_model_angle_name", [_HANDLE, c_int32], c_char_p),
     ("gait_model_limb_name", [_HANDLE, c_int32], c_char_p),
+    ("gait_model_class_name", [_HANDLE, c_int32], c_char_p),
+    ("gait_model_of_class", [_HANDLE, c_int32], c_void_p),
     ("gait_model_pose", [_HANDLE, _STATE, POINTER(PoseC), _ERR], _RESULT),
     ("gait_model_angle_mask", [_HANDLE, c_char_p, POINTER(c_uint32), _ERR], _RESULT),
     ("gait_model_pelvis_height", [_HANDLE, _STATE, POINTER(c_float), _ERR], _RESULT),

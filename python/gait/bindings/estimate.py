@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 import numpy as np
 
@@ -46,6 +46,10 @@ class Estimate:
         Names of the P joints.
     reason : str
         Why a clip's rules made this estimate ambiguous, in words; empty where the tracker itself decided.
+    motion_class : str
+        Name of the most probable class of motion, that of `mean`.
+    class_probability : ndarray of shape (C,)
+        Probability of each of `Model.classes`.
     """
 
     utime: int
@@ -65,6 +69,8 @@ class Estimate:
     angles: Array
     joint_names: tuple[str, ...]
     reason: str = ""
+    motion_class: str = "walk"
+    class_probability: Array = field(default_factory=lambda: np.ones(1))
 
     def joint(self, name: str) -> Array:
         """Place of one joint in the world, shape (3,), metres."""
@@ -92,4 +98,6 @@ class Estimate:
             joint_sd=np.array(c.joint_sd, float)[: info.joints],
             angles=angles,
             joint_names=model.joint_names,
+            motion_class=model.classes[c.motion_class],
+            class_probability=np.array(c.class_probability, float)[: info.classes],
         )

@@ -82,6 +82,10 @@ class ModelInfo:
         1, or 0 for a blob that holds a segment prior alone.
     posture_angles : int
         Bit i: angle i is of trunk or arms, whose posture differs most between people.
+    classes : int
+        Classes of motion.
+    direction : int
+        Way of the phase: 1 forwards, -1 backwards, 0 standing still.
     digest : int
         Hash of the blob.
     """
@@ -98,6 +102,8 @@ class ModelInfo:
     stride_length_sd: float
     cyclic: int
     posture_angles: int
+    classes: int
+    direction: int
     digest: int
 
 
@@ -115,6 +121,8 @@ class Model:
     ----------
     info : ModelInfo
     joint_names, angle_names, limb_names : tuple of str
+    classes : tuple of str
+        Names of the classes of motion; "walk" alone if the blob names none.
 
     Raises
     ------
@@ -129,17 +137,25 @@ class Model:
         name = "the blob" if isinstance(source, bytes) else str(source or "walk.gait")
         self._loaded = load(source)
         self.handle = self._loaded.handle
-        self.info = info = self._read_info()
+        self.info = info = self._read_info(self.handle)
         if not info.cyclic:
             raise UserError(f"{name}: {NOT_CYCLIC}")
         self.joint_names = self._names("joint", info.joints)
         self.angle_names = self._names("angle", info.angles)
         self.limb_names = self._names("limb", info.limbs)
+        self.classes = self._names("class", info.classes)
 
     def _names(self, kind: str, count: int) -> tuple[str, ...]:
         """Names of joints, angles or limbs; bytes that are no UTF-8 are escaped."""
         name = getattr(self._lib, f"gait_model_{kind}_name")
         return tuple(name(self.handle, i).decode(errors="backslashreplace") for i in range(count))
+
+    def class_info(self, motion_class: int) -> ModelInfo:
+        """Return what the model holds of one of its classes of motion; IndexError if it has fewer."""
+        handle = self._lib.gait_model_of_class(self.handle, motion_class)
+        if not handle:
+            raise IndexError(f"class {motion_class}: the model has {self.info.classes}")
+        return self._read_info(handle)
 
     def __repr__(self) -> str:
         return f"<gait.Model of {self.info.components} components, digest {self.info.digest:016x}>"
@@ -190,9 +206,9 @@ class Model:
         call("gait_render", self.handle, camera_c(camera), state.to_c(), ids, camera.width)
         return ids
 
-    def _read_info(self) -> ModelInfo:
+    def _read_info(self, handle: object) -> ModelInfo:
         c = abi.ModelInfoC()
-        call("gait_model_get_info", self.handle, c)
+        call("gait_model_get_info", handle, c)
         return ModelInfo(**{name: getattr(c, name) for name, *_ in c._fields_ if name != "reserved"})
 
 

@@ -52,6 +52,8 @@ class State:
         Scores of the limbs' proportions in standard deviations; missing ones are 0.
     turn_rate : float
         Of the heading, radians per second, positive to the left.
+    motion_class : int
+        Index of the class of motion in `Model.classes`.
     """
 
     phase: float = 0.0
@@ -65,6 +67,7 @@ class State:
     offset: Array = field(default_factory=lambda: np.zeros(0))
     proportion: Array = field(default_factory=lambda: np.zeros(0))
     turn_rate: float = 0.0
+    motion_class: int = 0
 
     @staticmethod
     def from_c(c: abi.StateC, components: int, angles: int) -> State:
@@ -73,7 +76,7 @@ class State:
         arrays["proportion"] = c.proportion[:]
         values: dict[str, Any] = {name: float(getattr(c, name)) for name in SCALARS}
         values |= {name: np.array(numbers, float) for name, numbers in arrays.items()}
-        return State(**values)
+        return State(**values, motion_class=c.motion_class)
 
     def to_c(self) -> abi.StateC:
         """Make a ``gait_state``.
@@ -89,6 +92,7 @@ class State:
             raise ValueError(f"state: pelvis has 3 numbers, {limits}")
         library()  # describes the structures
         c = abi.StateC(**{name: float(getattr(self, name)) for name in SCALARS})
+        c.motion_class = self.motion_class
         c.pelvis[:] = pelvis
         for name in LIMITS:
             numbers: Sequence[float] = np.asarray(getattr(self, name), float).tolist()

@@ -32,12 +32,16 @@ SD_COLUMNS = ("phase_sd", "stride_hz_sd", "heading_sd_rad", "stature_sd_m")
 STATUSES = ("init", "tracking", "ambiguous", "lost")
 
 
-def header(components: int, angle_names: tuple[str, ...]) -> list[str]:
-    """Column names of a track file."""
+CLASS_COLUMN = "motion_class"
+
+
+def header(components: int, angle_names: tuple[str, ...], classes: tuple[str, ...] = ()) -> list[str]:
+    """Column names of a track file; those of classes of motion only where a model has several."""
     scores = [f"c_{k + 1}" for k in range(components)]
     joints = [f"{joint}_{axis}" for joint in JOINTS for axis in ("x", "y", "z", "sx", "sy", "sz")]
     sds = [*SD_COLUMNS, *(f"{score}_sd" for score in scores)]
-    return [*STATE_COLUMNS, *scores, *joints, *(f"{name}_deg" for name in angle_names), *sds]
+    of_classes = [CLASS_COLUMN, *(f"p_{name}" for name in classes)] if len(classes) > 1 else []
+    return [*STATE_COLUMNS, *scores, *joints, *(f"{name}_deg" for name in angle_names), *sds, *of_classes]
 
 
 class TrackWriter:
@@ -45,7 +49,7 @@ class TrackWriter:
 
     If the block is interrupted or a disk is full, the rows written so far are kept as NAME.unfinished.csv.
 
-    `components`: scores per row; `joint_names`, `angle_names`: of the model.
+    `components`: scores per row; `joint_names`, `angle_names`, `classes` of motion: of the model.
     """
 
     def __init__(
@@ -54,6 +58,7 @@ class TrackWriter:
         components: int,
         joint_names: tuple[str, ...],
         angle_names: tuple[str, ...],
+        classes: tuple[str, ...] = (),
     ) -> None:
         self.path = path
         missing = [name for name in JOINTS if name not in joint_names]
@@ -61,7 +66,8 @@ class TrackWriter:
             raise UserError(f"model: has no joint {' '.join(missing)}; learn it with the default skeleton")
         self._order = [joint_names.index(name) for name in JOINTS]
         self._components = components
-        self._header = header(components, angle_names)
+        self._classes = len(classes) if len(classes) > 1 else 0
+        self._header = header(components, angle_names, classes)
         self._stack = ExitStack()
 
     def __enter__(self) -> TrackWriter:
@@ -90,6 +96,8 @@ class TrackWriter:
             + [f"{value:.3f}" for value in np.degrees(estimate.angles)]
             + [f"{value:.6f}" for value in (sd.phase, sd.stride_hz, sd.heading, sd.stature)]
             + [f"{value:.4f}" for value in self._scores(sd.coef)]
+            + ([estimate.motion_class] if self._classes else [])
+            + [f"{value:.4f}" for value in estimate.class_probability[: self._classes]]
         )
 
     def _scores(self, coef: Array) -> Array:
@@ -128,6 +136,8 @@ class Track(Joints):
     sd: dict[str, Array]  #: (n, 3) posterior standard deviations, metres
     #: (n,) every other column of numbers by its name: state, scores, angles and their standard deviations.
     numbers: dict[str, Array] = field(default_factory=dict)
+    #: Class of motion of each frame; empty where the model has one.
+    motion_class: list[str] = field(default_factory=list)
 
     def eval15_sd(self) -> Array:
         """Return the standard deviations of EVAL15, shape (n, 15, 3)."""
@@ -179,13 +189,14 @@ def _track(table: _Table, status: list[str], phase: Array) -> Track:
         phase=phase,
         sd={name: table.standard_deviations(name) for name in JOINTS},
         numbers={name: table.numbers(name) for name in table.rows if _is_number(name)},
+        motion_class=table.column(CLASS_COLUMN) if CLASS_COLUMN in table.rows else [],
     )
 
 
 def _is_number(column: str) -> bool:
     """Whether `read_track` takes a column into `Track.numbers`."""
     known = column in STATE_COLUMNS[3:] or column in SD_COLUMNS or column.endswith("_deg")
-    return known or re.fullmatch(r"c_\d+(_sd)?", column) is not None
+    return known or column.startswith("p_") or re.fullmatch(r"c_\d+(_sd)?", column) is not None
 
 
 class _Table:

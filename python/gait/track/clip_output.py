@@ -125,7 +125,9 @@ def write(
     """Write the estimates into all outputs, which appear together at the end."""
     model, video, span, results = tracker.model, scene.video, scene.frames, Results(tracker)
     with ExitStack() as stack:
-        rows = TrackWriter(options.output, model.info.components, model.joint_names, model.angle_names)
+        rows = TrackWriter(
+            options.output, model.info.components, model.joint_names, model.angle_names, model.classes
+        )
         if options.camera_out:
             write_camera(stack.enter_context(replacing(options.camera_out)), scene.reference_camera)
         if options.cameras_out:

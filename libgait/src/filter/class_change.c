@@ -1,0 +1,59 @@
+#include "filter/class_change.h"
+#include "base/rng.h"
+
+static const float STEPS = 2.0f; /* both legs change class alike: phases count modulo half a stride */
+static const float JITTER_HEADING = 0.1f; /* sd, radians: who changes class often turns a little */
+static const float RATE_SD = 0.07f;       /* relative; at least that of the people learnt from */
+static const float POSTURE_SHARE = 0.3f;  /* of the posture's sd, by which it moves at once */
+
+float class_change_rate(const gait_model *m, int32_t to, float phase, float stride_hz)
+{
+    const float *const c = m->class_change + CLASS_CHANGE * (m->motion_class * m->classes + to);
+    if (m->direction == 0 || c[CHANGE_RATE] == 0.0f)
+        return c[CHANGE_RATE];
+    float sn, cs;
+    m_sincos_one(STEPS * TWO_PI_F * (phase - c[CHANGE_PHASE]), &sn, &cs);
+    return c[CHANGE_RATE] *
+           m_exp(c[CHANGE_CONCENTRATION] * (cs - 1.0f) + c[CHANGE_SLOPE] * kin_pace(m, stride_hz));
+}
+
+/* A phase at which people who stood still begin to move; u uniform, n normal. */
+static float first_phase(const float *change, float u, float n)
+{
+    float const concentration = change[CHANGE_CONCENTRATION];
+    if (!(concentration > 0.0f))
+        return u;
+    float const spread = n / (STEPS * TWO_PI_F * __builtin_sqrtf(concentration));
+    return m_wrap1(change[CHANGE_PHASE] + spread + (u < 0.5f ? 0.0f : 0.5f));
+}
+
+void class_change_enter(const class_entry *e, int32_t from, int32_t i, particle_state *p)
+{
+    const state_layout *const r = e->layout;
+    const gait_model *const m = r->model, *const before = m->of_class[from];
+    const float *const change = m->class_change + CLASS_CHANGE * (from * m->classes + m->motion_class);
+    bool const other_curves = m->curves != before->curves;
+    float n[4], u[4];
+    rng_normal4(e->seed, STREAM_CLASS, e->frame, (uint32_t)i, 0, n);
+    rng_uniform4(e->seed, STREAM_CLASS, e->frame, (uint32_t)i, 1, u);
+    p->f[F_HEADING] = m_wrap_pi(p->f[F_HEADING] + JITTER_HEADING * n[0]);
+    if (m->direction == 0)
+        p->f[F_PHASE] = 0.0f;
+    else if (before->direction == 0)
+        p->f[F_PHASE] = first_phase(change, u[0], n[1]);
+    if (m->direction != 0 && (before->direction == 0 || other_curves))
+        p->f[F_RATE] =
+            dynamics_reflect_rate(m->stride_hz + f_max(m->stride_hz_sd, RATE_SD * m->stride_hz) * n[2]);
+    for (int32_t k = 0; other_curves && k < r->curve_components; k++) {
+        if (k % 4 == 0)
+            rng_normal4(e->seed, STREAM_CLASS, e->frame, (uint32_t)i, (uint32_t)(2 + k / 4), n);
+        p->f[F_COEF + k] = e->score[k] + e->score_sd * n[k % 4];
+    }
+    for (int32_t k = 0; k < r->offsets; k++) {
+        int32_t const at = state_layout_offset(r) + k;
+        float const was = model_posture_sd(before, r->angle[k]), sd = model_posture_sd(m, r->angle[k]);
+        if (k % 4 == 0)
+            rng_normal4(e->seed, STREAM_CLASS, e->frame, (uint32_t)i, (uint32_t)(8 + k / 4), n);
+        p->f[at] = f_min(1.0f, sd / was) * p->f[at] + (sd > was ? POSTURE_SHARE * sd * n[k % 4] : 0.0f);
+    }
+}

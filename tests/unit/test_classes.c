@@ -1,0 +1,341 @@
+/* Classes of motion: the blob, poses, ranges of particles, and a person who stops, stands and walks on or backwards. */
+#include "filter/class_change.h"
+#include "golden.h"
+#include "sanitized.h"
+#include "toy_classes.h"
+#include "toy_film.h"
+#include "tracker/tracker.h"
+
+#include "check.h"
+
+static _Alignas(GAIT_ALIGN) unsigned char buf[TOY_BYTES], place[8192];
+
+/* ---- the blob ---- */
+static void test_views(void)
+{
+    const gait_model *const m = toy_classes_model();
+    gait_model_info info;
+    CHECK(gait_model_get_info(m, &info, NULL) == GAIT_OK && info.classes == TOY_CLASSES &&
+          info.direction == 1);
+    CHECK(strcmp(gait_model_class_name(m, TOY_BACK), "backwards") == 0);
+    CHECK(!gait_model_class_name(m, TOY_CLASSES) && !gait_model_class_name(m, -1));
+    CHECK(!gait_model_of_class(m, TOY_CLASSES) && !gait_model_of_class(NULL, 0));
+    CHECK(gait_model_of_class(m, 0) == m);
+    CHECK(gait_model_get_info(gait_model_of_class(m, TOY_STAND), &info, NULL) == GAIT_OK);
+    CHECK(info.direction == 0 && info.phases == TOY_STILL_PHASES && info.components == 1 &&
+          info.stride_length == 0.0f);
+    CHECK(m->of_class[TOY_BACK]->curves == m->curves && m->of_class[TOY_BACK]->direction == -1);
+    CHECK(m->of_class[TOY_STAND]->of_class[TOY_BACK] == m->of_class[TOY_BACK]);
+    CHECK(strcmp(gait_model_class_name(toy_model(), 0), "walk") == 0 && toy_model()->classes == 1);
+}
+
+/* Standing has one pose at all phases, backwards that of walking; a class that the model lacks is refused. */
+static void test_poses(void)
+{
+    const gait_model *const m = toy_classes_model();
+    gait_state s = toy_state(0.3f), still = s;
+    gait_pose walk, back, a, b;
+    s.motion_class = TOY_WALK;
+    CHECK(gait_model_pose(m, &s, &walk, NULL) == GAIT_OK);
+    s.motion_class = TOY_BACK;
+    CHECK(gait_model_pose(m, &s, &back, NULL) == GAIT_OK && memcmp(&walk, &back, sizeof walk) == 0);
+    still.motion_class = TOY_STAND;
+    CHECK(gait_model_pose(m, &still, &a, NULL) == GAIT_OK);
+    still.phase = 0.8f;
+    CHECK(gait_model_pose(m, &still, &b, NULL) == GAIT_OK && memcmp(&a, &b, sizeof a) == 0);
+    CHECK(memcmp(&a, &walk, sizeof a) != 0 && a.angle[TOY_KNEE] == 0.0f);
+    s.motion_class = TOY_CLASSES;
+    CHECK(gait_model_pose(m, &s, &a, NULL) == GAIT_ERR_ARG);
+    s.motion_class = -1;
+    CHECK(gait_model_pose(m, &s, &a, NULL) == GAIT_ERR_ARG);
+    s.motion_class = 1;
+    CHECK(gait_model_pose(toy_model(), &s, &a, NULL) == GAIT_ERR_ARG);
+}
+
+static gait_result open_spec(const toy_classes_spec *s, const char *tag)
+{
+    gait_model m[GAIT_MAX_CLASSES];
+    gait_error err = {0};
+    gait_result const result = model_open(buf, toy_classes_write(buf, s), m, &err);
+    CHECK(result == GAIT_OK || strstr(err.text, tag));
+    return result;
+}
+
+static void test_refused(void)
+{
+    toy_classes_spec const good = toy_classes_usual();
+    CHECK(open_spec(&good, "") == GAIT_OK);
+    static const struct {
+        int row, column, value;
+    } info[] = {
+        {1, 0, 2}, {1, 0, -2}, /* directions */
+        {2, 1, 3}, {2, 1, -1}, /* sources that are no class, */
+        {2, 1, 2},             /* without curves, */
+        {1, 1, 0},             /* and of another although it has curves */
+        {0, 0, 0}, {0, 0, -1}, /* the first is cyclic */
+        {0, 1, 1}, {1, 2, -1}, {2, 3, -5},
+    };
+    for (size_t k = 0; k < sizeof info / sizeof *info; k++) {
+        toy_classes_spec s = good;
+        s.info[info[k].row][info[k].column] = info[k].value;
+        CHECK(open_spec(&s, "CLIN") == GAIT_ERR_CORRUPT);
+    }
+    static const struct {
+        int from, to, column;
+        float value;
+    } change[] = {{0, 1, 0, -0.1f}, {0, 1, 0, 101.0f}, {1, 1, 0, 0.1f},  {0, 1, 0, NAN},  {0, 1, 1, -1.0f},
+                  {0, 1, 1, 51.0f}, {0, 1, 2, 1.0f},   {0, 1, 2, -0.1f}, {0, 1, 3, 51.0f}};
+    for (size_t k = 0; k < sizeof change / sizeof *change; k++) {
+        toy_classes_spec s = good;
+        s.change[change[k].from][change[k].to][change[k].column] = change[k].value;
+        CHECK(open_spec(&s, "CLSW") == GAIT_ERR_CORRUPT);
+    }
+    toy_classes_spec s = good;
+    s.info_rows = 2;
+    CHECK(open_spec(&s, "CLIN") == GAIT_ERR_CORRUPT);
+    s = good;
+    s.change_rows = 2;
+    CHECK(open_spec(&s, "CLSW") == GAIT_ERR_CORRUPT);
+    s = good;
+    memcpy(s.name[1], "walk", 5);
+    CHECK(open_spec(&s, "CLNM") == GAIT_ERR_CORRUPT);
+    s = good;
+    s.partial = 1;
+    CHECK(open_spec(&s, "SCS1") == GAIT_ERR_CORRUPT);
+    s = good;
+    s.curves = 0; /* a class that names itself as source, but has no curves */
+    CHECK(open_spec(&s, "CLIN") == GAIT_ERR_CORRUPT);
+}
+
+/* Other orders of the classes after the first are as good, and a class may be learnt from one cycle. */
+static void test_another_order(void)
+{
+    toy_classes_spec s = toy_classes_usual();
+    toy_classes_spec const usual = s;
+    memcpy(s.name[1], usual.name[2], 32);
+    memcpy(s.name[2], usual.name[1], 32);
+    memcpy(s.info[1], usual.info[2], sizeof s.info[1]);
+    memcpy(s.info[2], usual.info[1], sizeof s.info[2]);
+    s.info[2][1] = 2;
+    s.of = 2;
+    const gait_model *const m = toy_classes_make(&s, buf, place, sizeof place);
+    CHECK(m->of_class[1]->direction == -1 && m->of_class[2]->direction == 0 && m->of_class[2]->phases == 8);
+}
+
+/* ---- changes ---- */
+static void test_rates(void)
+{
+    const gait_model *const m = toy_classes_model(), *const still = m->of_class[TOY_STAND];
+    CHECK_NEAR(class_change_rate(m, TOY_STAND, 0.05f, 0.92f), 1.0, 1e-6);
+    CHECK_NEAR(class_change_rate(m, TOY_STAND, 0.55f, 0.92f), 1.0, 1e-5);
+    CHECK(class_change_rate(m, TOY_STAND, 0.3f, 0.92f) < 1e-4f); /* people do not stop in mid-swing */
+    CHECK(class_change_rate(still, TOY_WALK, 0.77f, 0.92f) == 0.7f);
+    CHECK(class_change_rate(m, TOY_WALK, 0.05f, 0.92f) == 0.0f);
+}
+
+/* ---- films ---- */
+enum { STOP = 30, GO = 75, END = 120 };
+
+static const gait_model *model(void)
+{
+    return toy_classes_model();
+}
+
+/* Who walks to frame STOP, stands to frame GO and walks on, forwards or backwards. */
+static gait_state truth(int n, int onwards)
+{
+    float const before = (float)(n < STOP ? n : STOP) / 30.0f, after = (float)(n > GO ? n - GO : 0) / 30.0f;
+    gait_state s = toy_walk(before + (float)onwards * after);
+    s.motion_class = n >= STOP && n <= GO ? TOY_STAND : onwards < 0 && n > GO ? TOY_BACK : TOY_WALK;
+    if (s.motion_class == TOY_STAND && gait_model_pelvis_height(model(), &s, &s.pelvis[2], NULL) != GAIT_OK)
+        abort();
+    return s;
+}
+
+typedef struct outcome {
+    int right[3], frames[3]; /* by true class: reported under `tracking`, and of the right class */
+    float far;               /* of the pelvis, metres */
+    uint64_t hash;
+} outcome;
+
+static bool ranges_sound(const gait_tracker *t)
+{
+    const strata *const s = &t->history.strata[t->core->generation];
+    int32_t const halves = t->core->hypotheses.stage == HYPOTHESES_TWO ? 2 : 1;
+    bool ok = s->count == halves * TOY_CLASSES && s->first[0] == 0 && s->first[s->count] == t->filter.n;
+    double sum = 0.0;
+    for (int32_t k = 0; k < s->count; k++)
+        ok &= s->first[k] % BLOCK == 0 && s->first[k + 1] - s->first[k] >= BLOCK;
+    for (int32_t i = 0; i < t->filter.n; i++)
+        sum += t->filter.weight[i];
+    return ok && sum > 0.999 && sum < 1.001;
+}
+
+static gait_tracker *begin(const gait_tracker_config *cfg, const uint8_t *wall)
+{
+    gait_tracker *const t = toy_tracker_of(model(), cfg);
+    gait_image const plate = toy_image(wall);
+    CHECK(gait_tracker_set_background(t, 0, &plate, NULL) == GAIT_OK);
+    toy_tracker_start(t, 0, 1.0f);
+    return t;
+}
+
+/* Follow the film; at frame `save`, if any, another tracker goes on from a snapshot. */
+static outcome follow(const gait_tracker_config *cfg, int onwards, int save, int end)
+{
+    static uint8_t wall[SCENE_PIXELS], shot[SCENE_PIXELS];
+    gait_camera const cam = toy_camera(0);
+    outcome result = {.hash = 0};
+    toy_wall(0, wall);
+    gait_tracker *t = begin(cfg, wall);
+    for (int n = 0; n < end; n++) {
+        gait_state const true_state = truth(n, onwards);
+        gait_estimate e;
+        memcpy(shot, wall, sizeof shot);
+        toy_paint_of(model(), &cam, &true_state, shot);
+        toy_noise((uint32_t)n, shot);
+        const uint8_t *const shots[SCENE_CAMERAS] = {shot};
+        if (n == save && n > 0) {
+            size_t bytes = 0;
+            CHECK(gait_tracker_save(t, NULL, 0, &bytes, NULL) == GAIT_OK);
+            unsigned char *const mem = malloc(bytes);
+            CHECK(mem && gait_tracker_save(t, mem, bytes, &bytes, NULL) == GAIT_OK);
+            toy_tracker_free(t);
+            t = begin(cfg, wall);
+            CHECK(gait_tracker_restore(t, mem, bytes, NULL) == GAIT_OK);
+            free(mem);
+        }
+        toy_tracker_step(t, n, shots, &e);
+        float sum = 0.0f;
+        for (int c = 0; c < GAIT_MAX_CLASSES; c++)
+            sum += e.class_probability[c];
+        CHECK(sum > 0.999f && sum < 1.001f && e.mean.motion_class == e.motion_class);
+        CHECK(ranges_sound(t));
+        float const dx = e.mean.pelvis[0] - true_state.pelvis[0];
+        int const c = true_state.motion_class;
+        if (e.status == GAIT_TRACK_TRACKING) {
+            result.frames[c]++;
+            result.right[c] += e.motion_class == c;
+            result.far = f_max(result.far, fabsf(dx));
+        }
+    }
+    gait_estimate old;
+    CHECK(cfg->lag == 0 || gait_tracker_lagged(t, cfg->lag, &old, NULL) == GAIT_OK);
+    result.hash = gait_tracker_digest(t);
+    toy_tracker_free(t);
+    return result;
+}
+
+static gait_tracker_config settings(void)
+{
+    gait_tracker_config cfg = toy_config(1);
+    cfg.particles = 600;
+    return cfg;
+}
+
+static void test_stops_and_walks_on(void)
+{
+    gait_tracker_config const cfg = settings();
+    for (int onwards = 1; onwards >= -1; onwards -= 2) {
+        outcome const s = follow(&cfg, onwards, 0, END);
+        int const last = onwards > 0 ? TOY_WALK : TOY_BACK, wrong[] = {0, 1, last};
+        CHECK(s.frames[TOY_WALK] > 20 && s.frames[TOY_STAND] > 20 && s.frames[last] > 5);
+        for (int k = 0; k < 3; k++)
+            CHECK(s.frames[wrong[k]] - s.right[wrong[k]] <= 12); /* until the change is noticed */
+        CHECK(s.far < 0.25f);
+    }
+}
+
+/* The same bits from every instruction set and number of tasks, and after a snapshot. */
+static uint64_t digest(uint32_t mask)
+{
+    gait_tracker_config cfg = settings();
+    cfg.particles = 150;
+    cfg.cpu_mask = mask;
+    return follow(&cfg, -1, 0, END).hash;
+}
+
+static void test_same_bits(void)
+{
+    gait_tracker_config cfg = settings();
+    cfg.particles = 150;
+    uint64_t const one = follow(&cfg, -1, 0, END).hash;
+    for (int save = 10; save < END; save += 40)
+        CHECK(follow(&cfg, -1, save, END).hash == one);
+    cfg.tasks = 3;
+    CHECK(follow(&cfg, -1, 0, END).hash == one);
+}
+
+/* A blob whose only class has a name is tracked with the bits of one without classes. */
+static void test_one_class(void)
+{
+    static _Alignas(GAIT_ALIGN) unsigned char data[TOY_BYTES], mem[2048];
+    toy_classes_spec s = toy_classes_usual();
+    s.classes = s.info_rows = s.change_rows = 1;
+    s.curves = 0;
+    gait_tracker_config const cfg = toy_config(1);
+    film_make(1, 20);
+    gait_tracker *const a = toy_tracker_new(&cfg);
+    gait_tracker *const b = toy_tracker_of(toy_classes_make(&s, data, mem, sizeof mem), &cfg);
+    toy_tracker_start(a, 0, 1.0f);
+    toy_tracker_start(b, 0, 1.0f);
+    for (int n = 0; n < 20; n++) {
+        gait_estimate e, f;
+        film_step(a, 1, n, 0, &e);
+        film_step(b, 1, n, 0, &f);
+        CHECK(memcmp(&e, &f, sizeof e) == 0);
+    }
+    CHECK(gait_tracker_digest(a) == gait_tracker_digest(b));
+    toy_tracker_free(a);
+    toy_tracker_free(b);
+}
+
+/* A start of a class that the model lacks is refused; paper mode has one class. */
+static void test_starts(void)
+{
+    gait_tracker_config cfg = toy_config(1);
+    gait_tracker *t = toy_tracker_of(model(), &cfg);
+    gait_state mean = toy_walk(0.0f);
+    gait_state const sd = toy_start_sd(1.0f);
+    gait_error err = {0};
+    mean.motion_class = TOY_CLASSES;
+    CHECK(gait_tracker_start(t, &mean, &sd, 0, &err) == GAIT_ERR_ARG && strstr(err.text, "motion_class"));
+    mean.motion_class = TOY_STAND;
+    CHECK(gait_tracker_start(t, &mean, &sd, 0, &err) == GAIT_OK);
+    static gait_state state[4096];
+    static float weight[4096];
+    int32_t const n = gait_tracker_particles(t, state, weight, 4096, NULL);
+    int32_t count[TOY_CLASSES] = {0};
+    for (int32_t i = 0; i < n; i++)
+        count[state[i].motion_class]++;
+    CHECK(count[TOY_STAND] > count[TOY_WALK] && count[TOY_WALK] >= cfg.particles / 16 && count[TOY_BACK] > 0);
+    CHECK(gait_tracker_predict(t, state, n, 0.1, NULL) == GAIT_OK && state[n - 1].motion_class == TOY_BACK);
+    toy_tracker_free(t);
+    gait_tracker_default(&cfg, GAIT_MODE_PAPER);
+    cfg.camera[0] = toy_camera(0);
+    cfg.particles = 50;
+    t = toy_tracker_of(model(), &cfg);
+    CHECK(!t->classes);
+    toy_tracker_free(t);
+}
+
+#define GOLDEN UINT64_C(0x8751acd6a300815b)
+
+static void all(void)
+{
+    test_views();
+    test_poses();
+    test_refused();
+    test_another_order();
+    test_rates();
+    test_starts();
+    test_one_class();
+    if (!SANITIZED)
+        test_stops_and_walks_on();
+    test_same_bits();
+}
+
+int main(int argc, char **argv)
+{
+    return golden_main(argc, argv, all, digest, GOLDEN, "classes");
+}
