@@ -10,6 +10,9 @@ presets (other options change them):
   oblique  at 45 degrees, coming nearer
   toward   5 s straight towards the camera
   pole     at 45 degrees, a pole hides the person for a while, strong background
+  stopping, standing, backwards, turning
+           at 45 degrees (turning: from the side): walks, stops and walks on; stands; walks backwards; goes
+           round a corner
 """
 
 from __future__ import annotations
@@ -21,7 +24,7 @@ from dataclasses import fields, replace
 from typing import Any
 
 from gait.progress import progress
-from gait.simulate.scenario import DIRECTIONS, GENERATOR, PRESETS, VIEWS, Scenario
+from gait.simulate.scenario import DIRECTIONS, GENERATOR, MOTIONS, PRESETS, VIEWS, Scenario
 
 EXAMPLES = """\
 examples:
@@ -38,6 +41,9 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     )
     parser.add_argument("--view", choices=VIEWS, help="where the camera is")
     parser.add_argument("--direction", choices=DIRECTIONS, help="to the right or to the left of the picture")
+    parser.add_argument(
+        "--motion", choices=MOTIONS, help="stop: walk, stop, stand and walk on; turn: go round a corner"
+    )
     parser.add_argument("--frames", type=int, metavar="N")
     parser.add_argument("--fps", type=float, metavar="HZ")
     parser.add_argument("--size", type=_size, metavar="WxH", help="pixels, even")

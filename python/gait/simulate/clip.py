@@ -22,9 +22,10 @@ from gait.simulate.geometry import Array, Ints, Picture
 from gait.simulate.render import DEFOCUS_PX, SHUTTER, Renderer, develop
 from gait.simulate.scenario import Scenario
 from gait.simulate.stage import Set, Stage, build_set, set_stage
-from gait.simulate.walk import Walk
+from gait.simulate.walk import TOE_OFF, Walk
 
 CRF = 14
+STEADY = "walk", "turn"  # motions throughout which a person walks forwards
 
 
 def find_events(stage: Stage) -> dict[str, Array]:
@@ -34,6 +35,8 @@ def find_events(stage: Stage) -> dict[str, Array]:
     (Zeni et al. 2008), found on the fine time grid.
     """
     walk = stage.walk
+    if stage.scenario.motion not in STEADY:
+        return _events_of_phase(stage)
     points = walk.points()
     ahead = np.column_stack([np.cos(walk.heading), np.sin(walk.heading)])
     per_frame, first = walk.timing.per_frame, stage.frames[0]
@@ -42,6 +45,24 @@ def find_events(stage: Stage) -> dict[str, Array]:
         for joint, event, sign in (("heel", "heel_strike", 1), ("toe", "toe_off", -1)):
             reach = sign * ((points[f"{side}_{joint}"] - points["pelvis"])[:, :2] * ahead).sum(1)
             out[f"{side}_{event}"] = (_peaks(reach, walk) - first) / per_frame
+    return out
+
+
+def _events_of_phase(stage: Stage) -> dict[str, Array]:
+    """Return the events of a walk that stops or goes backwards, as its feet are planned."""
+    timing, first = stage.walk.timing, stage.frames[0]
+    index = np.arange(len(timing.phase), dtype=float)
+    forwards = timing.phase[-1] > timing.phase[0]
+    out = {}
+    for side in SIDES:
+        phase = timing.of_side(side)
+        phase, at = (phase, index) if forwards else (phase[::-1], index[::-1])
+        moving = np.append(True, np.diff(phase) > 0)
+        for event, share in (("heel_strike", 0.0), ("toe_off", TOE_OFF)):
+            whole = np.arange(np.ceil(phase[0] - share), np.floor(phase[-1] - share) + 1) + share
+            out[f"{side}_{event}"] = np.sort(
+                (np.interp(whole, phase[moving], at[moving]) - first) / timing.per_frame
+            )
     return out
 
 
@@ -66,8 +87,9 @@ def write_truth(path: Path, stage: Stage, strikes: Array) -> None:
     walk, frames = stage.walk, stage.frames
     count = np.arange(len(frames), dtype=float)
     heading = _wrapped(walk.heading[frames])
+    steady = stage.scenario.motion in STEADY
     columns: dict[str, Array] = {
-        "phase": cycles_at(strikes, count) % 1.0,
+        "phase": (cycles_at(strikes, count) if steady else walk.timing.phase[frames]) % 1.0,
         "heading_rad": heading,
         "pelvis_yaw_rad": _wrapped(heading + walk.pelvis_yaw[frames]),
         "speed_m_s": walk.speed[frames],
@@ -79,10 +101,13 @@ def write_truth(path: Path, stage: Stage, strikes: Array) -> None:
     columns |= _angles(walk, frames)
     with replacing(path) as temporary, temporary.open("w", newline="", encoding="ascii") as file:
         writer = csv.writer(file)
-        writer.writerow(["frame", "time", *columns])
+        named = [] if steady else ["motion_class"]
+        writer.writerow(["frame", "time", *columns, *named])
         for i in range(len(frames)):
-            row = (f"{values[i]:.6f}" for values in columns.values())
-            writer.writerow([i, f"{i / stage.scenario.fps:.6f}", *row])
+            row = [f"{values[i]:.6f}" for values in columns.values()]
+            writer.writerow(
+                [i, f"{i / stage.scenario.fps:.6f}", *row, *([stage.classes[i]] if named else [])]
+            )
 
 
 def _wrapped(angle: Array) -> Array:
@@ -109,10 +134,12 @@ def first_state(stage: Stage, strikes: Array) -> dict[str, Any]:
     """Return the init file: the truth at frame 0 with an error drawn from its own standard deviations."""
     rng, walk, at = stage.scenario.stream("init"), stage.walk, stage.frames[0]
     cycles = cycles_at(strikes, np.array([0.0, 1.0]))
+    if stage.scenario.motion not in STEADY:
+        cycles = walk.timing.phase[at] + np.array([0.0, walk.timing.stride_hz / stage.scenario.fps])
     truth = {
         "heading_rad": float(_wrapped(walk.heading[at])),
         "phase": float(cycles[0] % 1),
-        "stride_hz": float((cycles[1] - cycles[0]) * stage.scenario.fps),
+        "stride_hz": float(abs(cycles[1] - cycles[0]) * stage.scenario.fps),
         "stature_m": stage.body.stature,
     }
     pelvis = walk.origins[at, 0] + DEFAULT_SD["pelvis"] * rng.standard_normal(3)
@@ -139,6 +166,7 @@ def describe(stage: Stage, made: Set, events: dict[str, Array]) -> dict[str, Any
         "width": stage.camera.width,
         "height": stage.camera.height,
         "motion": _source(scenario.gait),
+        "steady": scenario.motion in STEADY,
         "view": scenario.view,
         "direction": "left to right" if scenario.direction == "lr" else "right to left",
         "background": "procedural, clutter" if scenario.clutter else "procedural",

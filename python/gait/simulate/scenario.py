@@ -13,6 +13,7 @@ if TYPE_CHECKING:
 GENERATOR = "generator"
 VIEWS = ("side", "oblique", "toward", "away", "above", "circle")
 DIRECTIONS = ("lr", "rl")
+MOTIONS = ("walk", "stop", "stand", "backwards", "turn")
 
 # option: smallest and largest value
 _LIMITS = {
@@ -47,6 +48,8 @@ class Scenario:
     clutter: bool = False
     flicker: float = 0.0  #: standard deviation of the exposure, per cent
     noise: float = 2.0  #: standard deviation of the sensor noise, grey levels
+    #: One of `MOTIONS`: ``stop`` walks, stops, stands and walks on, ``turn`` goes round a corner.
+    motion: str = "walk"
     gait: str = GENERATOR  #: ``generator`` or the name of a ``.gait`` model whose curves are walked
 
     def __post_init__(self) -> None:
@@ -55,6 +58,8 @@ class Scenario:
             raise UsageError(f"--view {self.view}: unknown; use one of {' '.join(VIEWS)}")
         if self.direction not in DIRECTIONS:
             raise UsageError(f"--direction {self.direction}: unknown; use lr or rl")
+        if self.motion not in MOTIONS:
+            raise UsageError(f"--motion {self.motion}: unknown; use one of {' '.join(MOTIONS)}")
         for name, (low, high) in _LIMITS.items():
             value = getattr(self, name)
             if value is not None and not low <= value <= high:
@@ -79,14 +84,22 @@ PRESETS: dict[str, Scenario] = {
     "oblique": Scenario(view="oblique", frames=110, seed=30),
     "toward": Scenario(view="toward", frames=150, seed=37),
     "pole": Scenario(view="oblique", frames=120, seed=34, pole=True, clutter=True),
+    "stopping": Scenario(motion="stop", view="oblique", frames=150, seed=61),
+    "standing": Scenario(motion="stand", view="oblique", frames=100, seed=62),
+    "backwards": Scenario(motion="backwards", view="oblique", frames=120, seed=63),
+    "turning": Scenario(motion="turn", direction="rl", frames=120, seed=64),
 }
 """Scenarios for the demo and for evaluation.
 
-========  =============================================================
-demo      side view, left to right: what ``make demo`` shows
-side      side view, right to left, the exposure flickers by 1 %
-oblique   45 degrees, coming nearer
-toward    5 s straight towards the camera
-pole      45 degrees, a pole hides the person, strong background
-========  =============================================================
+=========  =============================================================
+demo       side view, left to right: what ``make demo`` shows
+side       side view, right to left, the exposure flickers by 1 %
+oblique    45 degrees, coming nearer
+toward     5 s straight towards the camera
+pole       45 degrees, a pole hides the person, strong background
+stopping   45 degrees, walks, stops, stands and walks on
+standing   45 degrees, stands
+backwards  45 degrees, walks backwards
+turning    side view, goes round a corner
+=========  =============================================================
 """

@@ -2,22 +2,25 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
+from functools import partial
 
 import numpy as np
 
 from gait.camera.camera import Camera
 from gait.errors import UsageError
+from gait.simulate import motion
 from gait.simulate.body import Anatomy, Mesh, draw_anatomy
 from gait.simulate.curves import curves_of_model, normative
 from gait.simulate.figure import build_figure
 from gait.simulate.geometry import Array, Ints
 from gait.simulate.scenario import GENERATOR, Scenario
 from gait.simulate.scene import Layout, Scene, build_scene, draw_layout
-from gait.simulate.walk import Path, Walk, draw_timing, make_walk
+from gait.simulate.walk import Path, Shaped, Walk, draw_timing, make_walk
 from gait.simulate.wardrobe import Appearance, draw_appearance
 
 CIRCLE_RADIUS = 2.5
+CORNER = np.radians(80.0)  # of a turn, to the far side of a camera at the side
 _CLOSEST = 2.2  # metres between lens and path
 # heading of the path for left to right, degrees from world x; the camera looks along +y
 _HEADING = {"side": 0, "oblique": -45, "toward": -90, "away": 90, "above": -30, "circle": 0}
@@ -95,6 +98,7 @@ class Stage:
     walk: Walk
     camera: Camera
     frames: Ints  #: (frames,) index of each frame on the walk's time grid
+    classes: list[str]  #: class of motion of each frame
 
 
 @dataclass(frozen=True)
@@ -118,13 +122,22 @@ def set_stage(scenario: Scenario) -> Stage:
     curves = normative(rng) if generated else curves_of_model(scenario.gait, rng, cadence)
     timing = draw_timing(cadence, scenario.fps, scenario.frames, len(curves.modes), rng)
     path = make_path(scenario.view, scenario.direction, float(scenario.stream("path").uniform(-1, 1)))
-    walk = make_walk(body, curves, timing, path, speed, rng)
+    if scenario.motion == "turn":
+        path = replace(path, corner=CORNER if scenario.direction == "lr" else -CORNER)
+    stop, shaped = motion.pause(timing, scenario.motion, scenario.frames), None
+    if stop is not None:
+        blend = partial(motion.posture, stop=stop, rng=scenario.stream("idle"))
+        shaped = Shaped(stop.timing, stop.clock, stop.amplitude, blend)
+    walk = make_walk(body, curves, timing, path, speed, rng, shaped)
+    if scenario.motion == motion.BACKWARDS:
+        walk = motion.reversed_in_time(walk)
+    names = motion.classes(scenario.motion, stop, len(timing.time))
     zero = int(np.argmin(np.abs(timing.time)))
     frames = zero + timing.per_frame * np.arange(scenario.frames)
     camera = make_camera(
         scenario.view, scenario.size, _envelope(walk, frames), scenario.distance, scenario.camera_height
     )
-    return Stage(scenario, body, walk, camera, frames)
+    return Stage(scenario, body, walk, camera, frames, [names[k] for k in frames.tolist()])
 
 
 def build_set(stage: Stage) -> Set:

@@ -7,6 +7,7 @@ nor sink.
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
@@ -30,10 +31,14 @@ class Path:
     heading: float  #: direction of travel at arc length 0, radians from world x towards world y
     #: Of the circle about the origin, metres, positive to the left (anticlockwise); 0 = straight.
     radius: float = 0.0
+    #: Angle of a corner in the middle of the path, radians, positive to the left.
+    corner: float = 0.0
 
     def direction(self, along: ArrayLike) -> Array:
         """Return the heading at arc lengths (...), radians, unwrapped."""
         along = np.asarray(along, np.float64)
+        if self.corner:
+            return self.heading + self.corner * (smoothstep(along, -CORNER, CORNER) - 0.5)
         return self.heading + (along / self.radius if self.radius else np.zeros_like(along))
 
     def point(self, along: ArrayLike, left: ArrayLike = 0.0) -> Array:
@@ -41,10 +46,26 @@ class Path:
         along, left = np.broadcast_arrays(np.asarray(along, np.float64), left)
         h = self.direction(along)
         ahead, aside = np.stack([np.cos(h), np.sin(h)], -1), np.stack([-np.sin(h), np.cos(h)], -1)
-        base = -self.radius * aside if self.radius else along[..., None] * ahead
+        if self.corner:
+            base = self._round_the_corner(along)
+        else:
+            base = -self.radius * aside if self.radius else along[..., None] * ahead
         return base + left[..., None] * aside
 
+    def _round_the_corner(self, along: Array) -> Array:
+        """World x, y (..., 2) at arc lengths (...), by the trapezoidal rule."""
+        grid = np.linspace(-CORNER, CORNER, 401)
+        h = self.direction(grid)
+        inside = np.clip(along, -CORNER, CORNER)
+        end = self.direction(along)
+        out = []
+        for turned, last in ((np.cos(h), np.cos(end)), (np.sin(h), np.sin(end))):
+            way = cumulative_trapezoid(turned, grid, initial=0)
+            out.append(np.interp(inside, grid, way - way[200]) + (along - inside) * last)
+        return np.stack(out, axis=-1)
 
+
+CORNER = 0.7  # metres of the path before and after its middle in which a corner turns
 STRIDE_TIME_CV = 0.02
 MARGIN_STRIDES = 2  # whole strides simulated before and after the clip, so that no foot is planned at an edge
 
@@ -58,6 +79,13 @@ class Timing:
     scores: Array  #: (T, modes) smooth stride-to-stride scores, unit variance
     #: Grid steps per frame, a multiple of 4 so that a half shutter opens and closes on the grid.
     per_frame: int
+    #: Strides per second of walking, where the person also stands; 0: as the phase has it on average.
+    usual_hz: float = 0.0
+
+    @property
+    def stride_hz(self) -> float:
+        """Strides per second while the person walks."""
+        return self.usual_hz or float(np.gradient(self.phase, self.step).mean())
 
     @property
     def step(self) -> float:
@@ -106,7 +134,7 @@ _PITCH = _periodic(_PITCH_PHASE, _PITCH_DEG)
 _BEND = _periodic(_BEND_PHASE, _BEND_SHARE)
 
 
-def foot_pitch(phase: Array, gain: float) -> Array:
+def foot_pitch(phase: Array, gain: float | Array) -> Array:
     """Return the pitch of the foot (toes up positive), radians, at phases of that foot (unwrapped)."""
     return np.radians(gain * _PITCH(phase % 1.0))
 
@@ -184,15 +212,20 @@ def _swing(ankle: Array, free: Array, first: int, last: int, step: float) -> Non
     ankle[inside] = free[inside] + bend(inside * step)
 
 
-def lift_swing(ankle: Array, pitch: Array, bend: Array, phase: Array, body: Anatomy) -> Array:
-    """Raise a swinging foot (T, 3) smoothly where its sole would come within 12 mm of the ground."""
+def lift_swing(
+    ankle: Array, pitch: Array, bend: Array, phase: Array, body: Anatomy, stride: float | None = None
+) -> Array:
+    """Raise a swinging foot (T, 3) smoothly where its sole would come within 12 mm of the ground.
+
+    `stride`: grid steps of a stride, by default those of the phase's average.
+    """
     sole = np.min(
         [point_height(ankle[:, 2], pitch, bend, name, body) for name in ("heel", "ball", "tip")], axis=0
     )
     p = phase % 1.0
     window = smoothstep(p, TOE_OFF, TOE_OFF + 0.10) * (1 - smoothstep(p, 0.92, 1.0))
     lack = np.maximum(0.012 - sole, 0) * window
-    stride = len(phase) / (phase[-1] - phase[0])
+    stride = stride or len(phase) / (phase[-1] - phase[0])
     broad = gaussian_filter1d(maximum_filter1d(lack, int(0.10 * stride)), 0.05 * stride)
     raised = ankle.copy()
     raised[:, 2] += broad * window
@@ -228,7 +261,7 @@ class Walk:
     turns: Array  #: (T, bones, 3, 3) bone to world
     heading: Array  #: (T,) direction of the path under the pelvis, radians
     pelvis_yaw: Array  #: (T,) turn of the pelvis against that direction, radians
-    speed: Array  #: (T,) forward speed along the path, m/s
+    speed: Array  #: (T,) forward speed along the path, m/s, negative backwards
 
     def points(self, index: Ints | slice = slice(None)) -> dict[str, Array]:
         """Return the reported points (n, 3) at grid indices, world, metres."""
@@ -246,15 +279,27 @@ def _joint_name(bone: int) -> str:
 
 
 def make_walk(
-    body: Anatomy, curves: Curves, timing: Timing, path: Path, speed: float, rng: np.random.Generator
+    body: Anatomy,
+    curves: Curves,
+    timing: Timing,
+    path: Path,
+    speed: float,
+    rng: np.random.Generator,
+    shaped: Shaped | None = None,
 ) -> Walk:
     """Compute a walk at `speed` m/s (mean over the grid) along `path`.
+
+    `shaped`: a stop; `timing` is then that of the walk without it, which gives the length of the steps.
 
     UsageError if no step length of this person and cadence gives that speed.
     """
     angles = curves.angles(timing.phase, timing.scores)
-    gain = _stride_gain(angles, timing, body, speed)
-    angles = _stretched(angles, gain)
+    usual = _stride_gain(angles, timing, body, speed)
+    gain: float | Array = usual
+    angles = _stretched(angles, usual)
+    if shaped is not None:
+        angles = shaped.posture({name: np.interp(shaped.clock, timing.time, v) for name, v in angles.items()})
+        timing, gain = shaped.timing, gain * shaped.amplitude
     forward = _forward_speed(angles, timing, body, gain)
     along = cumulative_trapezoid(forward, dx=timing.step, initial=0)
     along -= np.interp(0.5 * (timing.time[0] + timing.time[-1]), timing.time, along)  # the clip's middle
@@ -275,6 +320,16 @@ def make_walk(
 
 
 @dataclass(frozen=True)
+class Shaped:
+    """How a walk with a stop differs from one without."""
+
+    timing: Timing
+    clock: Array  #: (T,) time in the walk without a stop, seconds
+    amplitude: Array  #: (T,) of the steps
+    posture: Callable[[dict[str, Array]], dict[str, Array]]  #: of the joint angles
+
+
+@dataclass(frozen=True)
 class _Course:
     """What both feet have in common: the pelvis's progress along the path and the joint angles."""
 
@@ -282,7 +337,7 @@ class _Course:
     body: Anatomy
     path: Path
     angles: dict[str, Array]
-    gain: float
+    gain: float | Array
     along: Array
     heading: Array
 
@@ -324,7 +379,7 @@ def _ball_joint(angles: dict[str, Array], joint: str) -> Array:
     return limb(angles[f"{joint}_flexion"], angles[f"{joint}_abduction"], angles[f"{joint}_rotation"], sign)
 
 
-def _forward_speed(angles: dict[str, Array], timing: Timing, body: Anatomy, gain: float) -> Array:
+def _forward_speed(angles: dict[str, Array], timing: Timing, body: Anatomy, gain: float | Array) -> Array:
     """Return the speed at which the feet on the ground push the pelvis forward, smoothed, (T,) m/s."""
     total, weight = np.zeros(len(timing.time)), np.zeros(len(timing.time))
     for side in SIDES:
@@ -343,13 +398,13 @@ def _forward_speed(angles: dict[str, Array], timing: Timing, body: Anatomy, gain
 
 def _smoothed(value: Array, strides: float, timing: Timing) -> Array:
     """Return `value` (T,) filtered by a Gaussian whose standard deviation is a share of the stride."""
-    per_stride = 1 / (timing.step * np.gradient(timing.phase, timing.step).mean())
+    per_stride = 1 / (timing.step * timing.stride_hz)
     return gaussian_filter1d(value, strides * per_stride, mode="nearest")
 
 
-def _pitch_gain(gain: float) -> float:
-    """Return how much the foot rolls for a stretched step: a third of the step's share."""
-    return 1 + (gain - 1) / 3
+def _pitch_gain(gain: float | Array) -> float | Array:
+    """Return how much the foot rolls: a third of the step's share more, not at all without a step."""
+    return np.minimum(1 + (gain - 1) / 3, 3 * np.asarray(gain)) if np.ndim(gain) else 1 + (gain - 1) / 3
 
 
 def _stride_gain(angles: dict[str, Array], timing: Timing, body: Anatomy, speed: float) -> float:
@@ -383,7 +438,8 @@ def _plan_foot(side: str, course: _Course, rng: np.random.Generator) -> _FootPla
     height = rel[:, 2] - (rel[:, 2] - rolled[1])[stance].mean()
     free = np.column_stack([course.path.point(course.along, left) + rel[:, :1] * ahead, height])
     ankle, yaw = foot_track(phase, free, course.timing.step, falls, rolled)
-    return _FootPlan(lift_swing(ankle, pitch, bend, phase, course.body), yaw, pitch, bend, phase)
+    stride = 1 / (course.timing.step * course.timing.usual_hz) if course.timing.usual_hz else None
+    return _FootPlan(lift_swing(ankle, pitch, bend, phase, course.body, stride), yaw, pitch, bend, phase)
 
 
 def _footfalls(

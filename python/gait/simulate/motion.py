@@ -1,0 +1,102 @@
+"""What a person does in a clip beside walking on: stops, stands, walks backwards, turns.
+
+A stop slows the gait's clock until both feet are on the ground, while steps get shorter, so that the feet
+come together; a start is the same in reverse.  Backwards is a walk whose time runs backwards.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+from scipy.integrate import cumulative_trapezoid
+from scipy.ndimage import gaussian_filter1d
+
+from gait.simulate.geometry import Array
+from gait.simulate.walk import Timing, Walk, smoothstep
+
+WALK, STAND, BACKWARDS = "walk", "stand", "backwards"
+_RAMP = 0.8  # seconds from walking to standing
+_SHORTER = 0.3  # seconds before it in which steps begin to get shorter
+_BOTH_FEET = 0.06  # phase, modulo half a stride, with both feet on the ground
+_MOVES = 0.25  # share of the usual stride rate from which a person walks rather than stands
+# how far arms, trunk and head move while standing, degrees and seconds
+_IDLE = {"l_shoulder_flexion": 7, "r_shoulder_flexion": 7, "l_elbow_flexion": 10, "r_elbow_flexion": 10,
+         "torso_z": 4, "torso_y": 2, "neck_z": 12, "neck_y": 4}  # fmt: skip
+_IDLE_TIME = 0.6
+_LEGS = {"hip_flexion": 3.0, "knee_flexion": 5.0}  # standing, degrees
+#: When a person stops and walks on, as shares of the clip.
+_STOPS = {"stop": (0.35, 0.75), "stand": (-0.15, 1.15)}
+
+
+@dataclass(frozen=True)
+class Pause:
+    """A stop on the time grid."""
+
+    timing: Timing
+    clock: Array  #: (T,) time in the walk without it, seconds
+    share: Array  #: (T,) of the usual stride rate
+    amplitude: Array  #: (T,) of the steps: 1 walking, 0 feet together
+
+
+def pause(timing: Timing, motion: str, frames: int) -> Pause | None:
+    """Return the stop of a motion in a walk of this timing; None for motions without one."""
+    if motion not in _STOPS:
+        return None
+    length = frames * timing.per_frame * timing.step
+    stop, go = (share * length for share in _STOPS[motion])
+    phase = timing.phase
+    aligned = np.abs((phase - _BOTH_FEET + 0.25) % 0.5 - 0.25)  # walking time at which both feet are down
+    lowest = (aligned[1:-1] < aligned[:-2]) & (aligned[1:-1] <= aligned[2:])
+    best = timing.time[1:-1][lowest].tolist()
+    usable = [t for t in best if t - timing.time[0] > _RAMP + _SHORTER]
+    end = min(usable, key=lambda t: abs(t + 0.5 * _RAMP - stop)) + 0.5 * _RAMP  # the clock lags half a ramp
+    go = max(go, end + 0.2)
+    share = 1 - smoothstep(timing.time, end - _RAMP, end) + smoothstep(timing.time, go, go + _RAMP)
+    # before the ramp walking time is the clip's
+    at = int(np.searchsorted(timing.time, end - _RAMP))
+    clock = cumulative_trapezoid(share, timing.time, initial=0)
+    clock += timing.time[at] - clock[at]
+    amplitude = 1 - smoothstep(timing.time, end - _RAMP - _SHORTER, end)
+    amplitude += smoothstep(timing.time, go, go + _RAMP + _SHORTER)
+    warped = replace(
+        timing,
+        phase=np.interp(clock, timing.time, phase),
+        scores=np.stack([np.interp(clock, timing.time, row) for row in timing.scores.T], axis=1),
+        usual_hz=timing.stride_hz,
+    )
+    return Pause(warped, clock, share, amplitude)
+
+
+def posture(angles: dict[str, Array], stop: Pause, rng: np.random.Generator) -> dict[str, Array]:
+    """Blend the angles of the walk into standing: legs straight, arms, trunk and head move a little."""
+    still, out = 1 - stop.amplitude, {}
+    for name, walking in angles.items():
+        kind = name[2:] if name[1] == "_" else name
+        standing = np.radians(_LEGS[kind]) if kind in _LEGS else walking[stop.share == 1].mean()
+        if name in _IDLE:
+            drawn = gaussian_filter1d(rng.standard_normal(len(still)), _IDLE_TIME / stop.timing.step)
+            standing = standing + np.radians(_IDLE[name]) * drawn / drawn.std()
+        out[name] = walking + still * (standing - walking)
+    return out
+
+
+def reversed_in_time(walk: Walk) -> Walk:
+    """Return a walk played backwards: the body looks ahead and moves back."""
+    timing = replace(walk.timing, phase=walk.timing.phase[::-1], scores=walk.timing.scores[::-1])
+    return replace(
+        walk,
+        timing=timing,
+        origins=walk.origins[::-1],
+        turns=walk.turns[::-1],
+        heading=walk.heading[::-1],
+        pelvis_yaw=walk.pelvis_yaw[::-1],
+        speed=-walk.speed[::-1],
+    )
+
+
+def classes(motion: str, stop: Pause | None, count: int) -> list[str]:
+    """Class of motion at each of `count` steps of the time grid."""
+    if stop is None:
+        return [BACKWARDS if motion == BACKWARDS else WALK] * count
+    return [WALK if moving else STAND for moving in (stop.share > _MOVES).tolist()]
