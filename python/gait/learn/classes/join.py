@@ -1,0 +1,78 @@
+"""Several classes of motion in one blob (model-format.md, sections of classes)."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
+
+import numpy as np
+
+from gait.errors import UserError
+from gait.io import blob
+
+Sections = Mapping[str, blob.Array]
+MOST = 8  # classes in a blob, GAIT_MAX_CLASSES
+#: Sections of a class of its own, with the tag for class k.
+TAGS = {"CURV": "CUR{}", "CHST": "CHS{}", "SCST": "SCS{}", "GAIT": "GAI{}", "PACE": "PAC{}"}
+CYCLES, RECORDINGS = 2, 3  # columns of CLIN
+
+
+@dataclass(frozen=True)
+class Change:
+    """How often people change from one class to another, and where in the cycle."""
+
+    rate: float  #: per second, at the phase and pace where it is most likely
+    concentration: float = 0.0  #: of the phases; 0: any
+    phase: float = 0.0  #: where it is most likely, the same half a stride later
+    slope: float = 0.0  #: of the logarithm of the rate with the pace
+
+
+@dataclass(frozen=True)
+class MotionClass:
+    """One class: sections of its own, or the curves of another."""
+
+    name: str
+    direction: int = 1  #: of the phase: 1 forwards, -1 backwards, 0 standing still
+    own: Sections | None = None  #: of a model with the same channels
+    source: str = ""  #: without `own`: the class whose curves it has
+    cycles: int = 0  #: that it is learnt from
+    recordings: int = 0
+    changes: Mapping[str, Change] = field(default_factory=dict)  #: to other classes
+
+
+def join(first: Sections, classes: Sequence[MotionClass]) -> dict[str, blob.Array]:
+    """Return the sections of `first`, whose curves are those of classes[0], and of all classes.
+
+    UserError if a class does not fit: other channels, a name twice, no source.
+    """
+    names = [c.name for c in classes]
+    if len(set(names)) < len(names) or len(names) > MOST:
+        raise UserError(f"classes {' '.join(names)}: give each a name of its own, at most {MOST}")
+    out = {tag: array for tag, array in first.items() if tag[:2] != "CL" and not tag[3].isdigit()}
+    info = np.zeros((len(classes), 4), np.int32)
+    changes = np.zeros((len(classes), len(classes), 4), np.float32)
+    for k, one in enumerate(classes):
+        info[k] = (one.direction, _source(one, k, classes), one.cycles, one.recordings)
+        if k and one.own is not None:
+            _require_channels(first, one)
+            out |= {TAGS[tag].format(k): one.own[tag] for tag in TAGS if tag in one.own}
+        for to, change in one.changes.items():
+            if to in names:
+                changes[k, names.index(to)] = (change.rate, change.concentration, change.phase, change.slope)
+    out["CLNM"] = blob.pack_names(names)
+    out["CLIN"], out["CLSW"] = info, changes
+    return out
+
+
+def _source(one: MotionClass, k: int, classes: Sequence[MotionClass]) -> int:
+    if k == 0 or one.own is not None:
+        return k
+    earlier = [c.name for c in classes[:k]]
+    if one.source not in earlier:
+        raise UserError(f"class {one.name}: has no curves, and no class {one.source!r} before it has them")
+    return earlier.index(one.source)
+
+
+def _require_channels(first: Sections, one: MotionClass) -> None:
+    if one.own is not None and "CHNM" in one.own and one.own["CHNM"].tobytes() != first["CHNM"].tobytes():
+        raise UserError(f"class {one.name}: its model has other channels; learn it with this version")

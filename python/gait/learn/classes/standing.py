@@ -1,0 +1,123 @@
+"""Standing still, from the walk: the legs as in mid-stance but under the hips, everything else as on average.
+
+Few recordings show people who stand, but every walk shows where its skeleton has a straight leg, a level
+foot and hanging arms, whatever zeros its angles have.  How people stand differs: components, in units of
+their standard deviation, are one foot before the other, the width of the stance, bent knees and weight on one
+leg; the height of the pelvis follows from the legs.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+
+import numpy as np
+
+from gait.io import blob
+from gait.learn.arrays import Floats
+
+PHASES = 8  # the fewest that a model may have: nothing moves
+STANCE = 0.15, 0.45  # phases of the right foot: it carries the body and is flat
+COMPONENTS: tuple[dict[str, float], ...] = (
+    {"l_hip_flexion": 9.0, "r_hip_flexion": -9.0, "l_ankle_flexion": -9.0, "r_ankle_flexion": 9.0},
+    {"l_hip_abduction": 4.0, "r_hip_abduction": 4.0},
+    {
+        "l_hip_flexion": 7.0, "r_hip_flexion": 7.0, "l_knee_flexion": 14.0, "r_knee_flexion": 14.0,
+        "l_ankle_flexion": 7.0, "r_ankle_flexion": 7.0,
+    },
+    {"root_roll": 3.0, "l_hip_abduction": 4.0, "r_hip_abduction": -4.0, "torso_x": -3.0},
+)  # fmt: skip
+"""Degrees for one standard deviation."""
+#: Posture's standard deviations, degrees: arms hang, fold, point and carry.
+POSTURE = {"shoulder_flexion": 25.0, "shoulder_abduction": 12.0, "shoulder_rotation": 20.0,
+           "elbow_flexion": 35.0, "torso_y": 6.0, "torso_x": 4.0, "torso_z": 8.0}  # fmt: skip
+
+
+def sections(walk: Mapping[str, blob.Array]) -> dict[str, blob.Array]:
+    """Return CURV, CHST, SCST and GAIT of standing from those of a walk of the default skeleton."""
+    names = blob.unpack_names(walk["CHNM"])
+    mean = np.asarray(walk["CURV"], float)[0]
+    posture = _standing(walk, names, mean)
+    rows = [posture]
+    for component in COMPONENTS:
+        change = np.zeros(len(names))
+        for name, degrees in component.items():
+            change[names.index(name)] = np.radians(degrees)
+        height = 0.5 * (
+            _leg_height(walk, names, posture + change) + _leg_height(walk, names, posture - change)
+        )
+        change[names.index("root_height")] = min(height - _leg_height(walk, names, posture), 0.0) / 2
+        rows.append(change)
+    curves = np.repeat(np.array(rows)[:, None, :], PHASES, axis=1)
+    statistics = np.array(walk["CHST"], float)
+    for k, name in enumerate(names):
+        for part, degrees in POSTURE.items():
+            if name.endswith(part):
+                statistics[k, 3] = np.radians(degrees)
+    statistics[:, 1:3] = posture[:, None]
+    scores = np.zeros((len(COMPONENTS), 3))
+    scores[:, 1] = 1.0
+    gait = np.array(walk["GAIT"], float)
+    gait[3:5] = 0.0
+    return {
+        "CURV": _stored(curves),
+        "CHST": _stored(statistics),
+        "SCST": _stored(scores),
+        "GAIT": _stored(gait),
+    }
+
+
+def _stored(values: Floats) -> blob.Array:
+    return np.asarray(values, np.float32)
+
+
+def _standing(walk: Mapping[str, blob.Array], names: list[str], mean: Floats) -> Floats:
+    """Mean channels (M,) of who stands with feet together."""
+    at = {name: k for k, name in enumerate(names)}
+    posture = mean.mean(axis=0)
+    first, last = (int(phase * len(mean)) for phase in STANCE)
+    knee = float(mean[first:last, at["r_knee_flexion"]].min())  # of the straightest leg
+    ankle = [c[at["root_height"]] - _leg_height(walk, names, c, "r") for c in mean[first:last]]
+    flat = mean[first + int(np.argmin(ankle))]  # the sole is on the ground
+    pitch = flat[at["r_hip_flexion"]] - flat[at["r_knee_flexion"]] + flat[at["r_ankle_flexion"]]
+    thigh, shank = _lengths(walk)
+    hip = np.arctan2(shank * np.sin(knee), thigh + shank * np.cos(knee))
+    for side in "lr":
+        posture[at[f"{side}_knee_flexion"]] = knee
+        posture[at[f"{side}_hip_flexion"]] = hip
+        posture[at[f"{side}_ankle_flexion"]] = pitch - hip + knee
+        posture[at[f"{side}_hip_abduction"]] = 0.0
+    for name in (
+        "root_forward",
+        "root_sway",
+        "root_roll",
+        "root_yaw",
+        "torso_x",
+        "torso_z",
+        "neck_x",
+        "neck_z",
+    ):
+        posture[at[name]] = 0.0
+    posture[at["root_height"]] = min(ankle) + _leg_height(walk, names, posture)
+    return posture
+
+
+def _lengths(walk: Mapping[str, blob.Array]) -> tuple[float, float]:
+    """Lengths of thigh and shank, statures."""
+    frames = blob.unpack_names(walk["FRNM"])
+    origin = np.asarray(walk["FRMF"], float)
+    return -float(origin[frames.index("r_shank")][2]), -float(origin[frames.index("r_foot")][2])
+
+
+def _leg_height(
+    walk: Mapping[str, blob.Array], names: list[str], channels: Floats, sides: str = "lr"
+) -> float:
+    """Height of the hips over the ankles, statures: of the longer leg."""
+    thigh, shank = _lengths(walk)
+    at = {name: k for k, name in enumerate(names)}
+    heights = []
+    for side in sides:
+        hip = channels[at[f"{side}_hip_flexion"]]
+        lower = hip - channels[at[f"{side}_knee_flexion"]]
+        out = np.cos(channels[at[f"{side}_hip_abduction"]])
+        heights.append(float(out * (thigh * np.cos(hip) + shank * np.cos(lower))))
+    return max(heights)
