@@ -137,7 +137,7 @@ struct gait_tracker {
     particle_history history;
     walk_check *walk_check;       /* NULL: not in paper mode */
     like_patch *walk_check_patch; /* cameras x limbs: the surface of its body */
-    class_state *classes; /* NULL: one class */
+    class_state *classes;         /* NULL: one class */
     unsigned char *state_end;
     particle_set particles; /* the current generation */
     /* Recomputed in every step. */
