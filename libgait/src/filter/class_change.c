@@ -27,6 +27,12 @@ static float first_phase(const float *change, float u, float n)
     return m_wrap1(change[CHANGE_PHASE] + spread + (u < 0.5f ? 0.0f : 0.5f));
 }
 
+/* Draw four standard normal numbers of particle i. */
+static __attribute__((noinline)) void normals(const class_entry *e, int32_t i, int32_t draw, float n[4])
+{
+    rng_normal4(e->seed, STREAM_CLASS, e->frame, (uint32_t)i, (uint32_t)draw, n);
+}
+
 void class_change_enter(const class_entry *e, int32_t from, int32_t i, particle_state *p)
 {
     const state_layout *const r = e->layout;
@@ -34,7 +40,7 @@ void class_change_enter(const class_entry *e, int32_t from, int32_t i, particle_
     const float *const change = m->class_change + CLASS_CHANGE * (from * m->classes + m->motion_class);
     bool const other_curves = m->curves != before->curves;
     float n[4], u[4];
-    rng_normal4(e->seed, STREAM_CLASS, e->frame, (uint32_t)i, 0, n);
+    normals(e, i, 0, n);
     rng_uniform4(e->seed, STREAM_CLASS, e->frame, (uint32_t)i, 1, u);
     p->f[F_HEADING] = m_wrap_pi(p->f[F_HEADING] + JITTER_HEADING * n[0]);
     if (m->direction == 0)
@@ -46,14 +52,14 @@ void class_change_enter(const class_entry *e, int32_t from, int32_t i, particle_
             dynamics_reflect_rate(m->stride_hz + f_max(m->stride_hz_sd, RATE_SD * m->stride_hz) * n[2]);
     for (int32_t k = 0; other_curves && k < r->curve_components; k++) {
         if (k % 4 == 0)
-            rng_normal4(e->seed, STREAM_CLASS, e->frame, (uint32_t)i, (uint32_t)(2 + k / 4), n);
+            normals(e, i, 2 + k / 4, n);
         p->f[F_COEF + k] = e->score[k] + e->score_sd * n[k % 4];
     }
     for (int32_t k = 0; k < r->offsets; k++) {
         int32_t const at = state_layout_offset(r) + k;
         float const was = model_posture_sd(before, r->angle[k]), sd = model_posture_sd(m, r->angle[k]);
         if (k % 4 == 0)
-            rng_normal4(e->seed, STREAM_CLASS, e->frame, (uint32_t)i, (uint32_t)(8 + k / 4), n);
+            normals(e, i, 8 + k / 4, n);
         p->f[at] = f_min(1.0f, sd / was) * p->f[at] + (sd > was ? POSTURE_SHARE * sd * n[k % 4] : 0.0f);
     }
 }

@@ -174,6 +174,24 @@ gait_tracker *tracker_layout(arena *a, const gait_model *m, const gait_tracker_c
 }
 
 /* ---- particles in use ---- */
+int32_t stratum_at(const strata *s, int32_t particle)
+{
+    int32_t k = 0;
+    while (particle >= s->first[k + 1])
+        k++;
+    return k;
+}
+
+int32_t class_at(const gait_tracker *t, int32_t particle)
+{
+    return t->classes ? tracker_strata(t)->motion_class[stratum_at(tracker_strata(t), particle)] : 0;
+}
+
+const state_layout *layout_at(const gait_tracker *t, int32_t particle)
+{
+    return &t->layouts[class_at(t, particle)];
+}
+
 particle_set history_particles(const particle_history *h, int32_t slot)
 {
     return (particle_set){.n = h->count[slot],

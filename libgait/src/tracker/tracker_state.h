@@ -202,24 +202,11 @@ static inline strata *tracker_strata(const gait_tracker *t)
     return &t->history.strata[t->core->generation];
 }
 
-static inline int32_t stratum_at(const strata *s, int32_t particle)
-{
-    int32_t k = 0;
-    while (particle >= s->first[k + 1])
-        k++;
-    return k;
-}
+int32_t stratum_at(const strata *s, int32_t particle);
 
-/* Class of a current particle. */
-static inline int32_t class_at(const gait_tracker *t, int32_t particle)
-{
-    return t->classes ? tracker_strata(t)->motion_class[stratum_at(tracker_strata(t), particle)] : 0;
-}
-
-static inline const state_layout *layout_at(const gait_tracker *t, int32_t particle)
-{
-    return &t->layouts[class_at(t, particle)];
-}
+/* Class of a current particle, and its layout. */
+int32_t class_at(const gait_tracker *t, int32_t particle);
+const state_layout *layout_at(const gait_tracker *t, int32_t particle);
 
 /* Surface samples of particle i in camera c by limb, or NULL. */
 static inline like_patch *texture_of(const gait_tracker *t, int32_t i, int32_t c)
