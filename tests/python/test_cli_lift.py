@@ -77,14 +77,10 @@ def test_states_what_segments_leave_uncertain(folder, capsys, view):
     assert [first["sd_mm"] > other["sd_mm"] > 0 for other in others] == [True, True]
     assert main(command) == 0
     printed = capsys.readouterr().out.splitlines()[-1]
-    assert f"volume 1e{segments['log10_volume_ratio']:.0f} " in printed
-    assert (
-        f"least certain {first['sd_mm']:.0f}, " in printed and f"({100 * first['in_depth']:.0f}, " in printed
-    )
+    assert f"the whole body {first['sd_mm']:.0f} mm ({100 * first['in_depth']:.0f} % in depth), " in printed
     last = others[-1]["joints"]  # those it moves most, which are not the body as one
     assert len(set(last)) == 3 and set(last) <= set(JOINTS)
-    assert "% in depth; of the whole body; of " in printed
-    assert others[-1]["rigid"] > 0.5 or f"; of {' '.join(last)})" in printed
+    assert others[-1]["rigid"] > 0.5 or f", {' '.join(last)} {others[-1]['sd_mm']:.0f} mm (" in printed
     assert ("which the view does not determine" in printed) == (view == "flat")
 
 
@@ -392,3 +388,24 @@ def test_an_impossible_stature_is_refused(folder, capsys, monkeypatch, stature):
     assert main(["lift", "t.csv", "-m", "m.gait", "--camera", "cam.json", "-o", "out.csv"]) == 1
     assert f"t.csv: the person came out {stature:.3g} m tall; check the camera" in capsys.readouterr().err
     assert not (folder / "out.csv").exists()
+
+
+def test_keypoints_with_a_height_and_no_camera_get_a_hint(folder, capsys):
+    command = ["lift", "t.csv", "-m", "m.gait", "-o", "out.csv", "--height", "1.7"]
+    assert main(command) == 0
+    assert "gait camera --walk t.csv --size WxH --height 1.7 -o camera.json" in capsys.readouterr().err
+    assert main([*command[:-2]]) == 0
+    assert "gait camera --walk" not in capsys.readouterr().err
+
+
+def test_the_summary_is_in_plain_words():
+    mode = {"sd_mm": 81.2, "in_depth": 0.04, "rigid": 0.1, "joints": ["l_toe", "l_heel", "l_ankle"]}
+    figures = {
+        **{"frames": 30, "visible_share": 1.0, "reprojection_px": 0.5, "sd_mm": 74.0, "stature_m": 1.8},
+        **{"markers": {"visible": ["l_hip"], "estimated": ["l_hip", "l_knee"]}, "iterations": 6},
+        **{"settled": True, "log10_volume_ratio": -439.0},
+        "segments": {"log10_volume_ratio": -12.0, "least_certain": [mode]},
+    }
+    printed = lift._text(figures)
+    assert "1 point a frame" in printed and "1e-" not in printed and "converged after 6" in printed
+    assert "least certain in a segment seen alone: l_toe l_heel l_ankle 81 mm (4 % in depth)" in printed

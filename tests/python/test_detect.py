@@ -184,6 +184,11 @@ def test_a_package_that_cannot_be_had_is_one_line(tmp_path, monkeypatch):
     assert list(tmp_path.iterdir()) == []
 
 
+def test_weights_that_are_there_already_are_reported(fetched, capsys):
+    assert cli.main(["detect", "--fetch"]) == 0
+    assert "everything is there already: pose_detection.tflite" in capsys.readouterr().err
+
+
 @pytest.mark.parametrize("words", [[], ["VIDEO"], ["-o", "k.csv"]])
 def test_usage(words, capsys):
     assert cli.main(["detect", *words]) == 2

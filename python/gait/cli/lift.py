@@ -273,6 +273,11 @@ def _lift_keypoints(args: argparse.Namespace, video: bool) -> tuple[dict[str, An
     _require_person(args, found)
     for words in lift_run.warnings_of(lifted, prior.stature):
         warn(words)
+    if not video and args.height and not (args.camera or args.orthographic):
+        warn(
+            f"no camera: the way over the floor is unknown; gait camera --walk {args.input} --size WxH "
+            f"--height {args.height:g} -o camera.json finds it from the walk"
+        )
     if isinstance(lifted.view, Perspective) and calibration is None:
         fault = contradiction(lifted.view.camera, keypoints, _walking_model(args), args.height)
         warn(f"{args.camera}: {fault}") if fault else None
@@ -532,31 +537,27 @@ def _segments(left: Uncertain, names: tuple[str, ...]) -> dict[str, Any]:
 
 
 def _text(s: dict[str, Any]) -> str:
-    markers = s["markers"]
+    markers, count = s["markers"], len(s["markers"]["visible"])
+    points = f"{count} point{'s' if count != 1 else ''}"
     lines = [
-        f"{s['frames']} frames, {len(markers['visible'])} points seen in {s['visible_share']:.0%} of them, "
+        f"{s['frames']} frames; {points} a frame, visible in {s['visible_share']:.0%}; "
         f"{len(markers['estimated'])} markers estimated",
         f"{s['reprojection_px']:.2f} px from the keypoints, median sd {s['sd_mm']:.0f} mm"
         + (f", stature {s['stature_m']:.2f} m" if s["stature_m"] else ""),
     ]
     if s["iterations"]:
-        lines.append(
-            f"{s['iterations']} iterations; posterior volume 1e{s['log10_volume_ratio']:.0f} of the prior's"
-        )
+        lines.append(f"{'converged after' if s['settled'] else 'stopped after'} {s['iterations']} iterations")
     return "\n".join([*lines, _left(s["segments"])])
 
 
 def _left(segments: dict[str, Any]) -> str:
     """Describe what segments leave uncertain."""
     modes = segments["least_certain"]
-    sd = ", ".join(f"{mode['sd_mm']:.0f}" for mode in modes)
-    depth = ", ".join(f"{100 * mode['in_depth']:.0f}" for mode in modes)
-    volume = segments["log10_volume_ratio"]
-    moved = ["the whole body" if mode["rigid"] > WHOLE else " ".join(mode["joints"]) for mode in modes]
-    words = (
-        f"a single segment: volume 1e{volume:.0f} of the prior's, least certain {sd} mm ({depth} % in depth; "
-        f"of {'; of '.join(moved)})"
-    )
+    each = []
+    for mode in modes:
+        moved = "the whole body" if mode["rigid"] > WHOLE else " ".join(mode["joints"])
+        each.append(f"{moved} {mode['sd_mm']:.0f} mm ({100 * mode['in_depth']:.0f} % in depth)")
+    words = f"least certain in a segment seen alone: {', '.join(each)}"
     unknown = modes[0]["sd_mm"] > UNKNOWN_MM
     return words + "; the first is the person's distance, which the view does not determine" * bool(unknown)
 

@@ -241,9 +241,10 @@ def _finders(
 
 def _no_person(few: int, misplaced: list[float]) -> str:
     """Explain why there is no start, and what to do."""
+    if few == 1:
+        return "only 1 frame to track, and a walk takes more: give a film of a second or longer"
     if few < _ENOUGH:
-        frames = f"frame{'s'[: few != 1]}"
-        return f"only {few} {frames} to track, --init auto needs {_ENOUGH}; give --init FILE.json"
+        return f"only {few} frames to track, --init auto needs {_ENOUGH}; give --init FILE.json"
     if len(misplaced) < _ENOUGH:
         return f"--init auto found no person in full view for {_ENOUGH} frames; give --init FILE.json"
     tall = np.nanmedian(misplaced) if np.isfinite(misplaced).any() else np.nan
