@@ -9,8 +9,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from gait.body.skeleton import EVAL15
+from gait.lift.keypoints.corrections import Correction
 from gait.lift.video.clip_segments import ClipSegments
-from gait.lift.video.corrections import Correction
 from gait.lift.video.fit_clip import ClipFit, fit_clip
 from gait.motion.evaluate import root_errors
 

@@ -34,9 +34,10 @@ from gait.io.video import Video, read_plate
 from gait.learn.options import SegmentOptions
 from gait.learn.segments import motion as segment_motion
 from gait.learn.solve import readers
+from gait.lift.keypoints.corrections import Correction
 from gait.lift.video.clip_segments import ClipSegments, Settings
-from gait.lift.video.corrections import Correction, PhasePrior, Placement, read_placement
 from gait.lift.video.fit_clip import fit_clip
+from gait.lift.video.placement import PhasePrior, Placement, read_placement
 from gait.lift.video.sensors import CameraView, Film
 from gait.progress import progress
 

@@ -13,9 +13,9 @@ from gait.body.skeleton import BONES
 from gait.camera.camera import Camera
 from gait.io.video import Frame, Image
 from gait.lift.video.clip_segments import ClipSegments, Settings
-from gait.lift.video.corrections import Placement
 from gait.lift.video.energy import PLACE
 from gait.lift.video.fit_clip import ClipFit, Sequence
+from gait.lift.video.placement import Placement
 from gait.lift.video.sensors import CameraView, Film
 
 Array = NDArray[np.float64]

@@ -15,7 +15,7 @@ from gait.detect import people
 from gait.errors import UserError
 from gait.io.video import VideoWriter
 from gait.lift.video import run as video_run
-from gait.lift.video.corrections import Placement
+from gait.lift.video.placement import Placement
 from gait.track.from_walk import calibrate
 
 STATURE = 1.75

@@ -13,8 +13,8 @@ from gait.body.skeleton import JOINTS
 from gait.camera.camera import Camera
 from gait.errors import UserError
 from gait.io.video import Frame
+from gait.lift.keypoints.corrections import CLICK_SD, as_json, read_corrections
 from gait.lift.video import sensors
-from gait.lift.video.corrections import CLICK_SD, PhasePrior, as_json, read_corrections, read_placement
 from gait.lift.video.descent import Link, normal
 from gait.lift.video.energy import (
     GAIN,
@@ -28,6 +28,7 @@ from gait.lift.video.energy import (
     Sticks,
     stick_responses,
 )
+from gait.lift.video.placement import PhasePrior, read_placement
 from gait.lift.video.sensors import CameraView, FlatView
 
 CAMERA = replace(

@@ -16,22 +16,19 @@ from gait.cli import main
 from gait.errors import UserError
 from gait.io import blob
 from gait.io.video import Video, VideoWriter
+from gait.lift.keypoints.corrections import CLICK_SD, Correction, as_json, read_corrections
 from gait.lift.video import run as lift_video
 from gait.lift.video.clip_segments import Settings
-from gait.lift.video.corrections import (
-    CLICK_SD,
+from gait.lift.video.figure import LIMBS, Figure, draw_figure
+from gait.lift.video.fit_clip import _share, fit_clip, suggest
+from gait.lift.video.placement import (
     HEADING_SD,
     PHASE_SD,
     PLACE_SD,
     RATE_SD,
     STATURE_SD,
-    Correction,
-    as_json,
-    read_corrections,
     read_placement,
 )
-from gait.lift.video.figure import LIMBS, Figure, draw_figure
-from gait.lift.video.fit_clip import _share, fit_clip, suggest
 from gait.motion.evaluate import root_errors
 
 sys.path.insert(0, str(Path(__file__).resolve().parents[1] / "bench"))

@@ -70,7 +70,7 @@ _ONLY_KEYPOINTS = (
     *("no_bones", "ignore_unknown", "keep_sides", "keep_spikes", "trc", "person", "fps", "video"),
     *("stabilize", "balance"),
 )
-_ONLY_PICTURES = ("corrections", "background", "alone", "overlay", "suggest")
+_ONLY_PICTURES = ("background", "alone", "overlay", "suggest")
 _ONLY_VIDEO = ("placement", *_ONLY_PICTURES, "start", "stop", "fov", "camera_out", "stabilize")
 PIXEL_SD, FLOOR_SD = Options.pixel_sd, Options.floor_sd  # pixels, metres
 MOVED = 3  # joints named that a displacement moves most
@@ -184,12 +184,12 @@ def _add_video_arguments(parser: argparse.ArgumentParser) -> None:
     group.add_argument(
         "--stop", type=values.whole(0), metavar="F", help="first frame not to use (default: to the end)"
     )
+    parser.add_argument(
+        "--corrections", metavar="C.json", help="what was corrected by hand, as gait studio writes it"
+    )
     group = parser.add_argument_group("from a video's pictures", FILES)
     group.add_argument(
         "--placement", metavar="P.json", help="where the person roughly is in one frame; lifts the pictures"
-    )
-    group.add_argument(
-        "--corrections", metavar="C.json", help="positions of joints in any frames, given by hand"
     )
     group.add_argument(
         "--background",
@@ -264,6 +264,7 @@ def _lift_keypoints(args: argparse.Namespace, video: bool) -> tuple[dict[str, An
         all_markers=args.all_markers,
         clip=_clip(args),
         stabilised=args.stabilize == "auto",
+        corrections=args.corrections,
     )
     if keypoints is None:
         lifted = lift_run.lift_file(args.input, prior, request, warn, args.quiet)

@@ -60,6 +60,8 @@ class Keypoints:
     repeated: float = 0.0  #: share of the variance of other errors that comes again in every stride
     #: (T, J) standard deviation along an axis of the errors in one frame, pixels.  None: unknown.
     frame_sd: Array | None = None
+    #: (T, J) standard deviation along an axis of points given by hand, pixels; NaN elsewhere.  None: no such.
+    by_hand: Array | None = None
 
     @property
     def visible(self) -> NDArray[np.bool_]:
@@ -68,7 +70,7 @@ class Keypoints:
 
     def part(self, rows: slice) -> Keypoints:
         """Keypoints of some frames."""
-        names = ("frame", "time", "uv", "confidence", "sd", "lasting_sd", "frame_sd")
+        names = ("frame", "time", "uv", "confidence", "sd", "lasting_sd", "frame_sd", "by_hand")
         columns: dict[str, Any] = {}
         for name in names:
             values = getattr(self, name)
@@ -136,7 +138,12 @@ class Keypoints:
 
     def standard_deviations(self, sd: float) -> Array:
         """Give standard deviations (T, J), `sd` at full confidence; inf where not seen."""
-        return np.where(self.visible, sd / np.maximum(self.confidence, LEAST_CONFIDENCE), np.inf)
+        found = np.where(self.visible, sd / np.maximum(self.confidence, LEAST_CONFIDENCE), np.inf)
+        return self._with_hand(found)
+
+    def _with_hand(self, sd: Array) -> Array:
+        """Give standard deviations with those of points given by hand."""
+        return sd if self.by_hand is None else np.where(np.isfinite(self.by_hand), self.by_hand, sd)
 
     def changing(self, sd: float, whole: bool = False) -> Array:
         """Give standard deviations (T, J) without `lasting_sd`; `sd` as in `standard_deviations`.
@@ -147,7 +154,8 @@ class Keypoints:
         if self.sd is None:
             return jitter
         strides = max((self.time[-1] - self.time[0]) / STRIDE, 1.0) if whole else 1.0
-        return np.hypot(jitter, np.nan_to_num(self.sd) * np.sqrt(1 + self.repeated * (strides - 1)))
+        lasting = np.nan_to_num(self.sd) * np.sqrt(1 + self.repeated * (strides - 1))
+        return self._with_hand(np.hypot(jitter, lasting))
 
     def errors(self, sd: float) -> Array:
         """Give standard deviations (T, J) with all errors; `sd` as in `standard_deviations`.

@@ -16,6 +16,7 @@ from gait.io import keypoints_file
 from gait.io.detections import Clip
 from gait.io.keypoints_file import Keypoints
 from gait.lift.keypoints import noise, swaps
+from gait.lift.keypoints.corrections import Edits, corrected, pins, read_edits
 from gait.lift.segment.view import Parallel, Perspective, View, looking_along
 from gait.lift.smooth import motion, size
 from gait.lift.smooth.motion import Motion
@@ -67,6 +68,8 @@ class Request:
         Name the options of `gait lift` in warnings.
     clip : Clip
         What a keypoint file of another tool may lack: who of several people, times, the size of the picture.
+    corrections : str, optional
+        File of corrections by hand.
     """
 
     options: Options
@@ -83,6 +86,17 @@ class Request:
     stabilised: bool = False
     hints: bool = True
     clip: Clip = Clip()
+    corrections: str | None = None
+
+
+@dataclass(frozen=True)
+class Prepared:
+    """Keypoints as they are lifted, before any correction by hand; see `Lifted`."""
+
+    keypoints: Keypoints
+    view: View
+    options: Options
+    repairs: dict[str, Any]
 
 
 @dataclass(frozen=True)
@@ -138,6 +152,20 @@ def lift_keypoints(
     path: str, keypoints: Keypoints, prior: SegmentPrior, request: Request, warn: Warn, quiet: bool
 ) -> Lifted:
     """Lift keypoints of the prior's markers as `lift_file` does; errors name `path`, where they are from."""
+    prepared = prepare(path, keypoints, prior, request, warn, quiet)
+    edits = Edits()
+    if request.corrections:
+        frames = range(int(keypoints.frame[0]), int(keypoints.frame[-1]) + 1)
+        view = prepared.view
+        size = {"size": view.camera.size} if isinstance(view, Perspective) else {}
+        edits = read_edits(request.corrections, prior, frames, **size)
+    return lift_prepared(path, prepared, edits, prior, request, quiet)
+
+
+def prepare(
+    path: str, keypoints: Keypoints, prior: SegmentPrior, request: Request, warn: Warn, quiet: bool
+) -> Prepared:
+    """Repair keypoints before they are lifted: swaps of left and right, spikes."""
     options, hint = request.options, request.hints
     _check(path, keypoints, options.pixel_sd, warn)
     if not request.pixel_sd_given:
@@ -150,15 +178,27 @@ def lift_keypoints(
     if not request.keep_spikes:
         keypoints, found = _without_spikes(keypoints, options.pixel_sd, warn, hint)
         repairs |= found
+    return Prepared(keypoints, view, options, repairs)
+
+
+def lift_prepared(
+    path: str, prepared: Prepared, edits: Edits, prior: SegmentPrior, request: Request, quiet: bool
+) -> Lifted:
+    """Lift prepared keypoints with corrections by hand; errors name `path` or the file of corrections."""
+    options, view = prepared.options, prepared.view
+    with _naming(request.corrections or path):
+        keypoints = corrected(prepared.keypoints, edits, options.pixel_sd)
+        camera = view.camera if isinstance(view, Perspective) else None
+        pinned = pins(keypoints, edits, camera, prior)
     names = motion.output_names(prior, keypoints, request.all_markers)
     segments = motion.segments_of(prior, keypoints)
     # matrices are too small for several threads to gain
     with one_thread(), progress("segments", segments, quiet) as update, _naming(path):
-        lifted = motion.lift(prior, keypoints, view, options, names, update)
+        lifted = motion.lift(prior, keypoints, view, options, names, update, pinned)
     if request.calibration is not None:
         wider = request.calibration.joint_sd(keypoints.time, lifted.places, lifted.sd)
         lifted = replace(lifted, sd=wider)
-    return Lifted(keypoints, view, options, lifted, repairs)
+    return Lifted(keypoints, view, options, lifted, prepared.repairs)
 
 
 def _check(path: str, keypoints: Keypoints, sd: float, warn: Warn) -> None:

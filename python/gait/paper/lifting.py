@@ -16,9 +16,9 @@ from gait.camera.camera import Camera
 from gait.io.video import Image, Video
 from gait.learn.arrays import Floats, Indices
 from gait.learn.segments.corpus import Recorded
-from gait.lift.video.corrections import read_placement
 from gait.lift.video.energy import EXTRA
 from gait.lift.video.figure import draw_figure
+from gait.lift.video.placement import read_placement
 from gait.lift.video.run import LiftedVideo, Request, correction_errors, lift_video
 from gait.lift.video.sensors import FlatView
 from gait.motion.evaluate import root_errors

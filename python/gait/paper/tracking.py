@@ -19,7 +19,7 @@ from gait.camera.camera import Camera
 from gait.errors import UserError
 from gait.io.video import Image, Video, background
 from gait.learn.arrays import Floats
-from gait.lift.video.corrections import read_corrections
+from gait.lift.keypoints.corrections import read_corrections
 from gait.motion.evaluate import root_errors
 from gait.paper.clip import Clip
 from gait.paper.entry import Entry, Picture

@@ -143,7 +143,7 @@ export class Film {
   /** Show a frame, by its index. */
   seek(index) {
     const wanted = Math.min(this.count - 1, Math.max(0, Math.round(index)));
-    this.video.currentTime = (wanted + 0.5) / this.data.rate;
+    this.video.currentTime = (wanted + (this.data.offset ?? 0) + 0.5) / this.data.rate;
     this.#show(wanted);
   }
 
@@ -177,7 +177,9 @@ export class Film {
   /** Follow the video while it plays: one call for each frame that is shown. */
   #each() {
     this.video.requestVideoFrameCallback((_, { mediaTime }) => {
-      const index = Math.min(this.count - 1, Math.floor(mediaTime * this.data.rate + 0.5));
+      const shown = Math.round(mediaTime * this.data.rate) - (this.data.offset ?? 0);
+      const index = Math.max(0, Math.min(this.count - 1, shown));
+      if (shown >= this.count) this.pause();
       if (this.playing) {
         this.#show(index);
         this.#each();
@@ -218,7 +220,11 @@ export class Film {
       this.pause();
       this.seek(Number(this.slider.value));
     });
-    track.append(this.slider, this.marks);
+    this.strip = document.createElement('canvas');
+    this.strip.className = 'strip';
+    this.strip.height = 1;
+    this.strip.title = 'The darker, the less certain';
+    track.append(this.strip, this.slider, this.marks);
     bar.append(track);
     this.clock = document.createElement('span');
     this.clock.className = 'number faint';
@@ -233,7 +239,15 @@ export class Film {
     this.bar = bar;
   }
 
+  /** Marks of events, and the strip of how uncertain each frame is. */
   #marks() {
+    const { strip } = this.data, context = this.strip.getContext('2d');
+    this.strip.width = this.count;
+    if (strip) {
+      const most = Math.max(...strip.filter(Number.isFinite), 1e-9);
+      context.fillStyle = getComputedStyle(this.strip).color;
+      strip.forEach((value, k) => { context.globalAlpha = (value ?? 0) / most; context.fillRect(k, 0, 1, 1); });
+    }
     const [start, end] = [this.data.times[0], this.data.times.at(-1)];
     this.marks.replaceChildren(...(this.data.events ?? []).map((event) => {
       const mark = document.createElement('i');

@@ -8,6 +8,7 @@ key         shape                   meaning
 rate        number                  frames per second of the film
 first       integer                 number in the film of the first frame; a frame is an index from 0 below
 times       [frame]                 seconds of the film
+offset      integer                 frame of the video file that shows index 0 (0 if absent)
 joints      [joint]                 names; those that start with ``l_`` or ``r_`` are left or right
 bones       [bone][2]               indices of the two joints of a bone
 radii       [bone]                  radius of its cylinder, metres
@@ -24,6 +25,7 @@ curves      list of curves          plots under the film, each with these keys:
   values    [frame]                 null where not known
   low, high [frame] or null         bounds of the 90 % interval
 events      list of events          marks on the timeline: ``time`` in seconds, ``name``, ``side``
+strip       [frame]                 how uncertain a frame is, in any unit: a strip under the timeline
 =========== ======================= ==========================================================================
 
 Curves of the same `name` share one plot.  Everything but ``rate``, ``times``, ``joints``, ``bones`` and

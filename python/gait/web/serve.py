@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import contextlib
+import html
 import mimetypes
 import socket
 from collections.abc import Callable, Mapping, Sequence
@@ -93,7 +94,7 @@ def application(
     text = (
         '<!DOCTYPE html>\n<html lang="en"><head><meta charset="utf-8">\n'
         '<meta name="viewport" content="width=device-width, initial-scale=1">\n'
-        f'<title>{title}</title>\n<link rel="icon" href="data:,">\n{head}\n</head>\n'
+        f'<title>{html.escape(title)}</title>\n<link rel="icon" href="data:,">\n{head}\n</head>\n'
         f"<body>\n{page}\n</body></html>\n"
     )
 

@@ -8,6 +8,8 @@ apart as errors last; of a shorter sequence it is constant.
 
 from __future__ import annotations
 
+from copy import copy
+
 import numpy as np
 import numpy.typing as npt
 
@@ -37,6 +39,12 @@ class LastingErrors:
         self.sd, self._course = np.nan_to_num(sd), straight @ np.linalg.cholesky(correlation)
         self._shape = knots, sd.shape[1], 2
         self.count = int(np.prod(self._shape)) if self.sd.any() else 0
+
+    def part(self, rows: Ints) -> LastingErrors:
+        """Errors of some of the frames, by the same numbers."""
+        own = copy(self)
+        own.sd, own._course = self.sd[rows], self._course[rows]
+        return own
 
     def in_picture(self, numbers: Floats) -> Floats:
         """Errors (T, P, 2) in pixels."""

@@ -23,14 +23,15 @@ from gait.body.skeleton import JOINTS
 from gait.camera.camera import Camera
 from gait.errors import GaitError, UsageError, UserError
 from gait.io.keypoints_file import Keypoints
+from gait.lift.keypoints.corrections import Pins
 from gait.lift.keypoints.observations import LONGEST_GAP, Grid, Observations, interpolated, resampled
 from gait.lift.segment import explain
 from gait.lift.segment.explain import FEWEST, Explanation, SegmentFit, SegmentLifter, Uncertain
 from gait.lift.segment.view import Parallel, Perspective, View
-from gait.lift.smooth import size, smoother
+from gait.lift.smooth import size, smoother, soft_constraints
 from gait.lift.smooth.chain import Freedom, blended, in_turn
 from gait.lift.smooth.options import Options
-from gait.lift.smooth.smoother import Lifted, Observed, Start
+from gait.lift.smooth.smoother import Lifted, Observed, Start, State
 
 Floats = npt.NDArray[np.float64]
 
@@ -72,6 +73,10 @@ class Motion:
     outliers : (T, P)
         Points that were down-weighted because they are far from their predictions; None for segments
         alone.
+    uv : (T, J, 2)
+        Where the markers are in the picture.
+    state : State
+        Of the smoother, to go on from; None for segments alone.
     """
 
     names: tuple[str, ...]
@@ -90,6 +95,8 @@ class Motion:
     resized: float = 1.0
     alone: bool = False
     outliers: npt.NDArray[np.bool_] | None = None
+    uv: Floats | None = None
+    state: State | None = None
 
 
 class Unlike(UserError):
@@ -181,6 +188,7 @@ class _Sequence:
     options: Options
     grid: Grid
     update: Callable[[int], None] = lambda done: None
+    pins: Pins | None = None
 
     @property
     def markers(self) -> npt.NDArray[np.intp]:
@@ -195,8 +203,9 @@ def lift(
     options: Options,
     names: tuple[str, ...],
     update: Callable[[int], None] = lambda done: None,
+    pins: Pins | None = None,
 ) -> Motion:
-    """Estimate markers of a prior over all frames of keypoints.
+    """Estimate markers of a prior over all frames of keypoints; `pins` are feet at known places.
 
     Raises
     ------
@@ -205,11 +214,19 @@ def lift(
     """
     require(prior, keypoints, view, options)
     prior = prior.restricted(names)
-    of = _Sequence(prior, keypoints, view, options, Grid.over(keypoints.time, prior), update)
+    of = _Sequence(prior, keypoints, view, options, Grid.over(keypoints.time, prior), update, pins)
     if options.method != "smooth":
         return _lift(of)
     best = _widest_needed(of)
     return _unlike(of, best) if best.wider > 1 or not best.settled else best
+
+
+def problem_of(
+    prior: SegmentPrior, keypoints: Keypoints, view: View, options: Options, pins: Pins | None
+) -> tuple[Observed, Freedom]:
+    """Give what the smoother sees of keypoints, and what a sequence of a restricted prior may do."""
+    of = _Sequence(prior, keypoints, view, options, Grid.over(keypoints.time, prior), pins=pins)
+    return _observed(of), _freedom(of)
 
 
 def require(prior: SegmentPrior, keypoints: Keypoints, view: View, options: Options) -> None:
@@ -279,6 +296,7 @@ def _unlike(of: _Sequence, found: Motion) -> Motion:
         wider=found.wider,
         resized=sized.factor,
         outliers=found.outliers,
+        state=found.state,
         alone=True,
     )
 
@@ -336,11 +354,29 @@ def _task(of: _Sequence, displacements: bool = True) -> _Task:
         fits = explain.without_prior(prior, view, stature, start_sd, course)
     else:
         fits = [lifter.solve(each, displacements) for each in course]
-    freedom = Freedom(stature, stature_sd, options.floor_sd if view.grounded else ANY_HEIGHT)
-    changing = Observations(keypoints.uv, keypoints.changing(options.pixel_sd, whole=True))
-    lasting = keypoints.lasting_sd, keypoints.lasting_s
-    observed = Observed(keypoints.time, changing, of.markers, *lasting)
-    return _Task(observed, freedom, stature, lengths, fits)
+    return _Task(_observed(of), _freedom(of), stature, lengths, fits)
+
+
+def _freedom(of: _Sequence) -> Freedom:
+    """Give what the whole sequence may do beyond the prior's modes."""
+    stature, stature_sd = believed_stature(of.options, of.prior.stature)
+    return Freedom(stature, stature_sd, of.options.floor_sd if of.view.grounded else ANY_HEIGHT)
+
+
+def _observed(of: _Sequence) -> Observed:
+    """Give what the smoother sees."""
+    keypoints, pinned = of.keypoints, of.pins
+    return Observed(
+        keypoints.time,
+        Observations(keypoints.uv, keypoints.changing(of.options.pixel_sd, whole=True)),
+        of.markers,
+        keypoints.lasting_sd,
+        keypoints.lasting_s,
+        None if keypoints.by_hand is None else np.isfinite(keypoints.by_hand),
+        None
+        if pinned is None
+        else soft_constraints.Pins(pinned.row, of.prior.index(pinned.joint), pinned.place, pinned.sd),
+    )
 
 
 @_numbers_in_range()
@@ -383,6 +419,8 @@ def _lift(of: _Sequence) -> Motion:
         found.chi2_per_observation,
         resized=sized.factor,
         outliers=found.outliers,
+        uv=of.view.project(sized.places, found.lengths),
+        state=found.state,
     )
 
 
@@ -439,6 +477,7 @@ def _alone(of: _Sequence, task: _Task) -> Motion:
         settled=True,
         log_volume_ratio=float(np.mean([fit.log10_volume for fit in fits])),
         uncertain=explain.summarise(fits, of.view),
+        uv=of.view.project(placed, scale),
     )
 
 

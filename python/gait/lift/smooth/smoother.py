@@ -9,7 +9,8 @@ of the last linear problem.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from copy import copy
+from dataclasses import dataclass, replace
 
 import numpy as np
 import numpy.typing as npt
@@ -22,10 +23,10 @@ from gait.lift.segment.view import Parallel, View
 from gait.lift.smooth import block_arrowhead, soft_constraints
 from gait.lift.smooth.balance import balance as keep_balance
 from gait.lift.smooth.block_arrowhead import Information
-from gait.lift.smooth.chain import Around, Chain, Freedom, Prior, blended, chain, moved, overlapping
+from gait.lift.smooth.chain import WHOLE, Around, Chain, Freedom, Prior, blended, chain, moved, overlapping
 from gait.lift.smooth.lasting_errors import LastingErrors
 from gait.lift.smooth.rows import rows_of, scale_free
-from gait.lift.smooth.soft_constraints import Layout, Rows
+from gait.lift.smooth.soft_constraints import Layout, Pins, Rows
 
 Floats = npt.NDArray[np.float64]
 Ints = npt.NDArray[np.intp]
@@ -53,6 +54,10 @@ class Observed:
         Standard deviation along an axis of a detector's lasting errors, in the unit of the points.
     lasting_s : float
         Seconds in which their correlation with themselves falls to 1/e.
+    by_hand : (T, P) or None
+        Points given by hand, which are not outliers.
+    pins : Pins or None
+        Feet that stand at known places.
     """
 
     time: Floats
@@ -60,6 +65,18 @@ class Observed:
     markers: Ints
     lasting_sd: Floats | None = None
     lasting_s: float = np.inf
+    by_hand: npt.NDArray[np.bool_] | None = None
+    pins: Pins | None = None
+
+    def part(self, rows: Ints) -> Observed:
+        """Take some frames; what lasts is not cut."""
+        return replace(
+            self,
+            time=self.time[rows],
+            points=Observations(self.points.uv[rows], self.points.sd[rows]),
+            by_hand=None if self.by_hand is None else self.by_hand[rows],
+            pins=None if self.pins is None else self.pins.part(rows),
+        )
 
 
 @dataclass(frozen=True)
@@ -104,6 +121,8 @@ class Lifted:
         Outliers, which were down-weighted.
     chi2_per_observation : float
         Mean squared residual in standard deviations: about 1 if the motion is of the prior's kind.
+    state : State
+        Where the iteration came to rest, to go on from.
     """
 
     places: Floats
@@ -120,6 +139,7 @@ class Lifted:
     evidence: float
     outliers: npt.NDArray[np.bool_]
     chi2_per_observation: float
+    state: State
 
 
 def smooth(
@@ -134,7 +154,7 @@ def smooth(
     balance: bool = False,
 ) -> Lifted:
     """Estimate the motion of all markers of a prior (`chain.restricted`) over a sequence."""
-    problem = _Problem(prior, observed, view, freedom, start, contact, bones, balance)
+    problem = Problem(prior, observed, view, freedom, start, contact, bones, balance)
     state, settled = problem.first(start), False
     while not settled and state.steps < MOST_STEPS:
         problem.weight(state)
@@ -154,7 +174,7 @@ def evidence(
     predicted : (T, P, 2)
         Where the points are then expected in the picture.
     """
-    problem = _Problem(prior, observed, view, freedom, start)
+    problem = Problem(prior, observed, view, freedom, start)
     state = problem.first(start)
     for _ in range(FREE_STEPS):
         problem.weight(state)
@@ -165,12 +185,13 @@ def evidence(
 
 
 @dataclass(frozen=True)
-class _State:
+class State:
     """Estimate on the grid, and the steps that it took."""
 
     around: Around
     places: Floats
     lengths: Floats
+    lasting: Floats  #: numbers of the chain that last: stature, floor, offsets of markers
     errors: Floats  #: numbers of `LastingErrors`
     steps: int
 
@@ -211,7 +232,7 @@ class _System:
         return 0.5 * (self.chain.log_det - self.found.log_det - self.square)
 
 
-class _Problem:
+class Problem:
     """Prior, observations and constraints of one sequence."""
 
     def __init__(
@@ -239,28 +260,53 @@ class _Problem:
         )
         self.layout = Layout(self.grid.blocks, self.grid.frames, len(prior.names), unit, self.errors.count)
 
-    def first(self, start: Start) -> _State:
+    def part(self, first: int, end: int) -> Problem:
+        """Problem of the blocks `first` to before `end`; frames that reach beyond are left out."""
+        own, low, rows = copy(self), first * self.grid.frames, self.rows_of(first, end)
+        own.grid = replace(self.grid, begin=float(self.grid.time[low]), blocks=end - first)
+        own.at = self.at[0][rows] - low, self.at[1][rows]
+        own.visible = self.visible.part(rows)
+        own.points = Observations(self.points.uv[rows], self.points.sd[rows])
+        own.errors = self.errors.part(rows)
+        own.layout = replace(self.layout, blocks=end - first)
+        return own
+
+    def rows_of(self, first: int, end: int) -> Ints:
+        """Frames of the video that the blocks `first` to before `end` alone determine."""
+        block = self.at[0] // self.grid.frames
+        return np.flatnonzero(((block >= first) & (block < end)).all(axis=1))
+
+    def first(self, start: Start) -> State:
         """Linearise the chain around the first guess."""
         shape = overlapping(start.places, self.grid.frames)
         around = Around(start.heading, start.component, start.stature, shape, shape)
-        return _State(around, start.places, start.lengths, np.zeros(self.errors.count), 0)
+        lasting = np.zeros(WHOLE + 3 * len(self.prior.names))
+        return State(around, start.places, start.lengths, lasting, np.zeros(self.errors.count), 0)
 
-    def weight(self, state: _State) -> None:
+    def weight(self, state: State) -> None:
         """Down-weight points that are far from an estimate."""
-        self.points = weighted(self.visible.points, self.predicted(state))
+        points, by_hand = weighted(self.visible.points, self.predicted(state)), self.visible.by_hand
+        if by_hand is not None:
+            points = Observations(points.uv, np.where(by_hand, self.visible.points.sd, points.sd))
+        self.points = points
 
-    def predicted(self, state: _State) -> Floats:
+    def predicted(self, state: State) -> Floats:
         """Where points (T, P, 2) are expected in the picture."""
-        places = self._at_video(state.places)[:, self.visible.markers]
+        places = self.at_video(state.places)[:, self.visible.markers]
         errors = self.errors.in_picture(state.errors)
-        return self.view.project(places, self._at_video(state.lengths)) + errors
+        return self.view.project(places, self.at_video(state.lengths)) + errors
 
-    def chain(self, state: _State) -> Chain:
+    def chain(self, state: State) -> Chain:
         """Give the prior around an estimate."""
         return chain(self._chained, state.around, self.freedom)
 
-    def system(self, state: _State, prior: Chain, constrained: bool) -> _System:
-        """Linear problem around an estimate."""
+    def system(self, state: State, prior: Chain, constrained: bool) -> _System:
+        """Solve the linear problem around an estimate."""
+        information, fit = self.information(state, prior, constrained)
+        return _System(block_arrowhead.solve(information), information, prior, fit)
+
+    def information(self, state: State, prior: Chain, constrained: bool) -> tuple[Information, float]:
+        """Linear problem around an estimate, and y' W y of what is seen."""
         shape = blended(state.around.places, self.grid.frames)
         rows = Rows(self.layout)
         self._observe(rows, shape, state)
@@ -276,7 +322,7 @@ class _Problem:
         observed.below[:, :used, :used] += own.below
         observed.vector[:, :used] += own.vector
         border = np.pad(own.border, ((0, 0), (0, self.layout.size - used), (0, 0)))
-        information = Information(
+        both = Information(
             observed.diagonal,
             observed.below,
             np.concatenate([border, observed.border], axis=2),
@@ -284,11 +330,11 @@ class _Problem:
             observed.vector,
             np.append(own.edge, observed.edge),
         )
-        return _System(block_arrowhead.solve(information), information, prior, fit)
+        return both, fit
 
-    def _observe(self, rows: Rows, shape: Floats, state: _State) -> None:
-        near, scale = self._at_video(shape), self._at_video(state.lengths)
-        guess = self._at_video(state.places)[:, self.visible.markers]
+    def _observe(self, rows: Rows, shape: Floats, state: State) -> None:
+        near, scale = self.at_video(shape), self.at_video(state.lengths)
+        guess = self.at_video(state.places)[:, self.visible.markers]
         observed = rows_of(self.view, self.points, near[:, self.visible.markers], scale, guess)
         if not len(observed.frame):
             raise np.linalg.LinAlgError("no point is before the lens")
@@ -300,25 +346,44 @@ class _Problem:
         unit = np.sqrt(observed.variance) / self.points.sd[observed.frame, observed.marker, None]
         lasting = numbers, unit[:, :, None] * pixels[:, None]
         soft_constraints.observe(rows, observed, self.visible.markers, self.at, factors, lasting)
+        if self.visible.pins is not None:
+            soft_constraints.pin(rows, self.visible.pins, self.at)
 
-    def _at_video(self, values: Floats) -> Floats:
+    def inner_step(self, state: State, held: tuple[bool, bool]) -> State:
+        """Estimate a part as `step` does, given what lasts and its first and last block if they are held."""
+        found, _ = self.information(state, self.chain(state), constrained=True)
+        first, end = int(held[0]), self.layout.blocks - int(held[1])
+        values = self.layout.values(state.places, state.lengths)
+        right = found.vector - found.border @ np.concatenate([state.lasting, state.errors])
+        if held[0]:
+            right[1] -= found.below[0] @ values[0]
+        if held[1]:
+            right[-2] -= found.below[-1].T @ values[-1]
+        solved = block_arrowhead.factor(found.diagonal[first:end], found.below[first : end - 1])
+        values[first:end] = solved.solve(right[first:end, :, None])[..., 0]
+        places = self.layout.places(values)
+        lengths = self.layout.lengths(values) if self.view.scaled else state.lengths
+        around = moved(self._chained, state.around, self.freedom, places, state.lasting)
+        return replace(state, around=around, places=places, lengths=lengths, steps=state.steps + 1)
+
+    def at_video(self, values: Floats) -> Floats:
         """Interpolate values (grid, ...) at the frames of the video."""
         return interpolated(values, *self.at)
 
-    def step(self, state: _State, constrained: bool) -> _State:
+    def step(self, state: State, constrained: bool) -> State:
         """Estimate by the linear problem around another."""
         found = self.system(state, self.chain(state), constrained).found
         places = self.layout.places(found.blocks)
         lengths = self.layout.lengths(found.blocks) if self.view.scaled else state.lengths
         lasting, errors = np.split(found.lasting, [len(found.lasting) - self.errors.count])
         around = moved(self._chained, state.around, self.freedom, places, lasting)
-        return _State(around, places, lengths, errors, state.steps + 1)
+        return State(around, places, lengths, lasting, errors, state.steps + 1)
 
     def evidence(self, unconstrained: _System) -> float:
         """Logarithm of the density of what is seen, but for a constant."""
         return unconstrained.evidence - _cost(self.visible.points, self.points)
 
-    def result(self, state: _State, settled: bool) -> Lifted:
+    def result(self, state: State, settled: bool) -> Lifted:
         """Covariances and figures of the last estimate."""
         prior = self.chain(state)
         system = self.system(state, prior, constrained=True)
@@ -329,13 +394,13 @@ class _Problem:
         variances = self._covariances(*covariance, every, every)
         sure = soft_constraints.contacts(Rows(self.layout), self.prior.names, places, self.grid.rate)
         return Lifted(
-            places=self._at_video(places),
+            places=self.at_video(places),
             sd=_roots(variances),
             rooted_sd=_roots(self._rooted(variances, *covariance)),
             grid=places,
             heading=around.heading,
             stature=around.stature,
-            lengths=self._at_video(state.lengths),
+            lengths=self.at_video(state.lengths),
             contact=sure if self.contact else np.zeros_like(sure),
             steps=state.steps,
             settled=settled,
@@ -343,6 +408,7 @@ class _Problem:
             evidence=self.evidence(unconstrained),
             outliers=self.points.sd > self.visible.points.sd,
             chi2_per_observation=unconstrained.square / max(2 * int(self.visible.points.visible.sum()), 1),
+            state=state,
         )
 
     def _rooted(self, own: Floats, diagonal: Floats, across: Floats) -> Floats:

@@ -92,6 +92,13 @@ class Layout:
         used = 3 * self.frames * self.markers
         return values[:, :used].reshape(self.grid, self.markers, 3)
 
+    def values(self, places: Floats, lengths: Floats) -> Floats:
+        """Values (B, size) out of places (grid, J, 3) and lengths (grid,)."""
+        own = [places.reshape(self.blocks, -1)]
+        if self.unit is not None:
+            own.append(lengths.reshape(self.blocks, -1) / self.unit)
+        return np.concatenate(own, axis=1)
+
     def lengths(self, values: Floats) -> Floats:
         """Lengths (grid,) out of values (B, size), metres; `unit` must be known."""
         assert self.unit is not None
@@ -179,6 +186,29 @@ def observe(
             observed.value[:, k],
             np.sqrt(observed.variance[:, k]),
         )
+
+
+@dataclass(frozen=True)
+class Pins:
+    """Markers at known places in frames of the video: rows, markers (n,); places, their sd (n, 3), metres."""
+
+    row: Ints
+    marker: Ints
+    place: Floats
+    sd: Floats
+
+    def part(self, rows: Ints) -> Pins:
+        """Those in some frames, which are counted anew."""
+        own = np.flatnonzero(np.isin(self.row, rows))
+        return Pins(np.searchsorted(rows, self.row[own]), self.marker[own], self.place[own], self.sd[own])
+
+
+def pin(rows: Rows, pins: Pins, at: tuple[Ints, Floats]) -> None:
+    """Hold markers at known places; `at` as in `observe`."""
+    frames, weights = at[0][pins.row], at[1][pins.row]
+    columns = rows.layout.place(frames, pins.marker[:, None])
+    for axis in range(3):
+        rows.add(columns + axis, weights, pins.place[:, axis], pins.sd[:, axis])
 
 
 def contacts(rows: Rows, names: Sequence[str], places: Floats, rate: float) -> Floats:

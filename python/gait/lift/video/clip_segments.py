@@ -11,8 +11,8 @@ import numpy.typing as npt
 from scipy.interpolate import make_interp_spline
 
 from gait.bindings.segment_prior import SegmentPrior
+from gait.lift.keypoints.corrections import Correction
 from gait.lift.video import sensors
-from gait.lift.video.corrections import HEIGHT_SD, Correction, PhasePrior, Placement
 from gait.lift.video.energy import (
     EXTRA,
     GAIN,
@@ -26,6 +26,7 @@ from gait.lift.video.energy import (
     Shape,
     Sticks,
 )
+from gait.lift.video.placement import HEIGHT_SD, PhasePrior, Placement
 from gait.lift.video.sensors import Film, View
 
 Floats = npt.NDArray[np.float64]

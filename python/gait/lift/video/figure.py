@@ -21,7 +21,7 @@ from gait.io.video import Image
 from gait.learn.segments.virtual_markers import MARKERS, SKIN, marked_skeleton
 from gait.learn.solve import skeleton_fit
 from gait.learn.solve.kinematics import Pose, pose_skeleton, segment_origins, segment_scales
-from gait.lift.video.corrections import Correction
+from gait.lift.keypoints.corrections import Correction
 from gait.lift.video.sensors import View
 from gait.report.drawing import draw_bones, tinted
 

@@ -26,8 +26,8 @@ import numpy as np
 import numpy.typing as npt
 
 from gait.body.skeleton import JOINTS
+from gait.lift.keypoints.corrections import CLICK_SD
 from gait.lift.video.clip_segments import CORRELATED, ClipSegments
-from gait.lift.video.corrections import CLICK_SD
 from gait.lift.video.descent import Link, descend, information, moves
 from gait.lift.video.energy import HEADING, PLACE, Anchor, Energy
 

@@ -17,10 +17,11 @@ from gait.camera.camera import Camera
 from gait.errors import UserError
 from gait.io.blob import decode
 from gait.io.video import FAST, Video, VideoWriter, background
+from gait.lift.keypoints.corrections import Correction, read_corrections
 from gait.lift.video.clip_segments import ClipSegments, Settings
-from gait.lift.video.corrections import Correction, PhasePrior, Placement, read_corrections, read_placement
 from gait.lift.video.figure import Figure, draw_figure
 from gait.lift.video.fit_clip import ENOUGH, HELD, POOR_CORRELATION, ClipFit, fit_clip, suggest, work
+from gait.lift.video.placement import PhasePrior, Placement, read_placement
 from gait.lift.video.sensors import CameraView, Film, FlatView, View
 from gait.progress import progress
 from gait.reproducible import one_thread

@@ -1,4 +1,4 @@
-"""What the user gives for a clip: where the person is at first, and corrections in any frame.
+"""Where the person is in a clip at first, given by the user.
 
 Placement (JSON), with a camera, in the form of ``gait track --init``::
 
@@ -11,10 +11,6 @@ and without one, where heading 0 is to the right of the picture and +90 degrees 
 
 The phase of walking, from 0 (right heel strike) to 1, determines which leg is in front.
 
-Corrections (JSON): any marker of the prior in any frame; ``sd_px`` is how exactly it was pointed at::
-
-    {"corrections": [{"frame": 70, "joint": "l_knee", "uv": [1285.5, 812.0], "sd_px": 5}]}
-
 The modes of a clip's first segment where the phase of walking is known: which leg is ahead.
 
 Seen from the side both legs look alike, and a segment with left and right swapped fits as well.  The mean
@@ -24,7 +20,7 @@ cycle of a cyclic model at a phase, turned into modes of the segment prior, deci
 from __future__ import annotations
 
 import os
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from typing import Any
 
@@ -35,14 +31,11 @@ from gait.bindings.initial import SCALARS, frame_number, read_start
 from gait.bindings.segment_prior import SegmentPrior
 from gait.bindings.state import state_range
 from gait.body.skeleton import pose
-from gait.errors import UserError
 from gait.io import blob
-from gait.io.fields import Fields, read_json
+from gait.io.fields import Fields
 
 Floats = npt.NDArray[np.float64]
-Size = tuple[int, int]
 
-CLICK_SD = 4.0  # pixels, unless the correction gives it
 PLACE_SD = 0.3  # metres on the ground, and radians of heading, unless the placement gives it
 HEADING_SD = 0.3
 STATURE_SD = 0.03  # metres
@@ -52,27 +45,6 @@ HEIGHT_SD = 0.05  # metres of the body over the ground: the floor may not be at 
 FURTHEST = 1e6  # pixels or metres
 _SPACE, _PICTURE = ("pelvis",), ("pelvis_px", "height_px")  # where the person is, with and without a camera
 _KNOWN = ("frame", *_SPACE, *_PICTURE, "heading_rad", "stature_m", "phase", "stride_hz", "sd")
-
-
-@dataclass(frozen=True)
-class Correction:
-    """A marker pulled to a point of the picture.
-
-    Attributes
-    ----------
-    frame : int
-        Of the video, from 0.
-    joint : str
-    uv : (float, float)
-        Pixels.
-    sd_px : float
-        Standard deviation, pixels.
-    """
-
-    frame: int
-    joint: str
-    uv: tuple[float, float]
-    sd_px: float = CLICK_SD
 
 
 @dataclass(frozen=True)
@@ -180,67 +152,6 @@ def _sd_of(sds: Fields, key: str, usual: float) -> float:
     if len(wrong):
         raise sds.fail(key, f"is {wrong[0]:g}", remedy)
     return float(values.max())
-
-
-def read_corrections(
-    path: str | os.PathLike[str], prior: SegmentPrior, stop: int, first: int = 0, size: Size = (16384, 16384)
-) -> list[Correction]:
-    """Read a corrections file: of frames from `first` to before `stop`, each joint of one at most once.
-
-    Joints may lie outside the picture of `size` (width, height), but not further than it is large.
-
-    Raises
-    ------
-    UserError
-        One line naming file, correction, key and remedy.
-    """
-    fields = read_json(path, "corrections")
-    fields.only(("corrections",))
-    remedy = 'give {"corrections": [{"frame": 12, "joint": "l_knee", "uv": [x, y]}]}'
-    listed = fields.get("corrections", remedy)
-    if not isinstance(listed, list):
-        raise fields.fail("corrections", "is not a list", remedy)
-    found: list[Correction] = []
-    for number, entry in enumerate(listed, 1):
-        if not isinstance(entry, dict):
-            raise UserError(f"{path}: correction {number} is no object of keys; {remedy}")
-        fields = Fields(f"{path}: correction {number}", entry)
-        correction = _correction(fields, prior, range(first, stop), size)
-        twin = next(
-            (i for i, c in enumerate(found, 1) if (c.frame, c.joint) == (correction.frame, correction.joint)),
-            None,
-        )
-        if twin is not None:
-            what = f"points at {correction.joint} in frame {correction.frame}, as correction {twin} does"
-            raise UserError(f"{path}: correction {number} {what}; remove one of them")
-        found.append(correction)
-    return found
-
-
-def _correction(fields: Fields, prior: SegmentPrior, frames: range, size: Size) -> Correction:
-    fields.only(("frame", "joint", "uv", "sd_px"))
-    remedy = f"give a frame that is used, {frames[0]} to {frames[-1]}, or other --start and --stop"
-    frame = fields.integer("frame", frames[0], frames[-1], remedy)
-    joint = fields.get("joint", "name a joint")
-    if joint not in prior.names:
-        raise fields.fail("joint", f"is {joint!r}", f"use one of {' '.join(prior.names)}")
-    u, v = fields.array("uv", (2,), "give column and row, pixels")
-    if any(not -n <= x <= 2 * n for x, n in zip((u, v), size, strict=True)):
-        what = f"is ({u:g}, {v:g}), far outside a picture of {size[0]}x{size[1]}"
-        raise fields.fail("uv", what, "give column and row, pixels")
-    sd = CLICK_SD
-    if "sd_px" in fields:
-        sd = fields.number("sd_px", 1e-3, FURTHEST, "give a standard deviation in pixels")
-    return Correction(frame, str(joint), (float(u), float(v)), sd)
-
-
-def as_json(corrections: Sequence[Correction]) -> dict[str, list[dict[str, Any]]]:
-    """Contents of a corrections file."""
-    return {
-        "corrections": [
-            {"frame": c.frame, "joint": c.joint, "uv": list(c.uv), "sd_px": c.sd_px} for c in corrections
-        ]
-    }
 
 
 UNKNOWN_SD = 0.25  # strides: a phase less certain than that is useless

@@ -1,0 +1,89 @@
+"""The whole motion, solved in a process of its own so that the page is never kept waiting.
+
+The newest corrections win: while one is solved, those that arrive are kept until the last of them is taken.
+"""
+
+from __future__ import annotations
+
+import multiprocessing
+import threading
+import traceback
+from collections.abc import Callable
+from multiprocessing.connection import Connection
+
+from gait.bindings.segment_prior import SegmentPrior
+from gait.errors import UserError
+from gait.lift import run as lift_run
+from gait.lift.keypoints.corrections import Edits
+from gait.lift.run import Lifted, Prepared, Request
+
+Answer = Callable[[int, "Lifted | str"], None]
+
+
+def _serve(pipe: Connection, model: str | None, prepared: Prepared, request: Request, path: str) -> None:
+    """Solve the newest of what arrives, until the other end closes."""
+    prior = lift_run.load_prior(model, lambda words: None)
+    while True:
+        try:
+            number, edits = pipe.recv()
+            while pipe.poll():
+                number, edits = pipe.recv()
+        except (EOFError, OSError, KeyboardInterrupt):
+            return
+        try:
+            found: Lifted | str = lift_run.lift_prepared(path, prepared, edits, prior, request, quiet=True)
+        except UserError as error:
+            found = str(error)
+        except KeyboardInterrupt:
+            return
+        except Exception:
+            found = traceback.format_exc(limit=1).strip().splitlines()[-1]
+        try:
+            pipe.send((number, found))
+        except OSError:
+            return
+
+
+class Refiner:
+    """Process that lifts with the corrections that it was given last.
+
+    Parameters
+    ----------
+    model : str or None
+        File of the model.
+    prior : SegmentPrior
+        Of that model.
+    prepared, request, path :
+        As `gait.lift.run.lift_prepared` takes them.
+    answer : callable
+        Called in a thread with the number of a request, and the motion or what is wrong with it.
+    """
+
+    def __init__(
+        self, model: str | None, prepared: Prepared, request: Request, path: str, answer: Answer
+    ) -> None:
+        context = multiprocessing.get_context("spawn")  # a fork would share the threads of the server
+        self._pipe, other = context.Pipe()
+        arguments = (other, model, prepared, request, path)
+        self._process = context.Process(target=_serve, args=arguments, daemon=True)
+        self._process.start()
+        other.close()
+        self._answer = answer
+        threading.Thread(target=self._listen, daemon=True).start()
+
+    def ask(self, number: int, edits: Edits) -> None:
+        """Ask for the motion with corrections; the answer comes later."""
+        self._pipe.send((number, edits))
+
+    def close(self) -> None:
+        """End the process."""
+        self._process.terminate()
+        self._process.join()
+
+    def _listen(self) -> None:
+        while True:
+            try:
+                number, found = self._pipe.recv()
+            except (EOFError, OSError):
+                return
+            self._answer(number, found)

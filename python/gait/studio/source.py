@@ -1,0 +1,210 @@
+"""What the studio corrects: a film, the keypoints of a person in it, the view, and the folder beside the film.
+
+The folder ``walk.studio`` beside ``walk.mp4`` holds what takes long to make or must not be lost: keypoints.csv
+of the detector or of a track, film.mp4 that every browser plays frame by frame, and corrections.json.
+"""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Callable
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+import numpy.typing as npt
+
+from gait.bindings.model import Model
+from gait.bindings.segment_prior import SegmentPrior
+from gait.camera.camera import Camera
+from gait.errors import UserError
+from gait.io import keypoints_file
+from gait.io.files import replacing
+from gait.io.keypoints_file import Keypoints
+from gait.io.track_file import read_track
+from gait.io.video import Video, VideoWriter
+from gait.lift import run as lift_run
+from gait.lift.run import Prepared, Request, Warn
+from gait.progress import progress
+from gait.track.walk_camera import calibrate_film, find_person, note_camera
+
+Floats = npt.NDArray[np.float64]
+
+LARGEST = 1280  # pixels of the longer side of the film that browsers get
+LEAST_SD = 1.0  # pixels, of a track's joints
+NOT_SEEN = ("init", "lost")  # statuses of frames whose joints are not used
+
+
+@dataclass(frozen=True)
+class Wanted:
+    """What the command was given: files, None where they are left out, and the stature in metres."""
+
+    video: str
+    camera: str | None = None
+    height: float | None = None
+    keypoints: str | None = None
+    track: str | None = None
+    corrections: str | None = None
+    model: str | None = None
+
+
+@dataclass(frozen=True)
+class Source:
+    """What is corrected.
+
+    Attributes
+    ----------
+    video : Video
+    folder : Path
+        Beside the film.
+    film : Path
+        Video for browsers; its frame k is that of the film.
+    corrections : Path
+        File of the corrections; may not exist yet.
+    keypoints : str
+        File of the keypoints.
+    prior : SegmentPrior
+    request : Request
+        How it is lifted.
+    prepared : Prepared
+        Keypoints without the detector's swaps and spikes.
+    """
+
+    video: Video
+    folder: Path
+    film: Path
+    corrections: Path
+    keypoints: str
+    prior: SegmentPrior
+    request: Request
+    prepared: Prepared
+
+
+def open_source(wanted: Wanted, warn: Warn, quiet: bool) -> Source:
+    """Find or read everything; what takes long is kept in the folder beside the film.
+
+    Raises
+    ------
+    UserError
+        One line that names the file at fault.
+    """
+    video = Video(wanted.video)
+    camera = Camera.read(wanted.camera, video.size) if wanted.camera else None
+    if camera is not None and wanted.camera is not None:
+        camera.check_place(wanted.camera)
+    folder = _folder(video)
+    prior = lift_run.load_prior(wanted.model, warn)
+    path, keypoints = _keypoints(wanted, video, camera, folder, prior, quiet)
+    calibration = None
+    if camera is None and wanted.height:
+        calibration = calibrate_film(video, keypoints, Model(None), wanted.height, None, quiet)
+        note_camera(calibration, quiet)
+    request = Request(
+        options=lift_run.Options(stature=wanted.height),
+        camera=wanted.camera,
+        calibration=calibration,
+        hints=False,
+    )
+    prepared = lift_run.prepare(path, keypoints, prior, request, warn, quiet)
+    film = _kept(folder / "film.mp4", video, lambda target: _write_film(target, video, quiet))
+    corrections = Path(wanted.corrections) if wanted.corrections else folder / "corrections.json"
+    return Source(video, folder, film, corrections, path, prior, request, prepared)
+
+
+def _folder(video: Video) -> Path:
+    """Folder beside the film; it knows which film its files were made from."""
+    path = Path(video.path)
+    folder = path.with_name(f"{path.stem}.studio")
+    try:
+        folder.mkdir(exist_ok=True)
+    except OSError as error:
+        raise UserError(f"{folder}: {error.strerror}; copy the film to a folder that can be written") from error
+    return folder
+
+
+def _kept(path: Path, video: Video, make: Callable[[Path], None]) -> Path:
+    """Make a file unless it was made from this film before."""
+    mark = path.with_name(f".{path.name}.json")
+    state = Path(video.path).stat()
+    source = {"film": Path(video.path).name, "bytes": state.st_size, "changed": state.st_mtime_ns}
+    try:
+        known = json.loads(mark.read_text(encoding="utf-8"))
+    except (OSError, ValueError):
+        known = None
+    if known != source or not path.is_file():
+        make(path)
+        with replacing(mark) as temporary:
+            temporary.write_text(json.dumps(source), encoding="utf-8")
+    return path
+
+
+def _keypoints(
+    wanted: Wanted, video: Video, camera: Camera | None, folder: Path, prior: SegmentPrior, quiet: bool
+) -> tuple[str, Keypoints]:
+    """Keypoints given, of a track, or found by the detector; and the file that has them."""
+    if wanted.keypoints:
+        path = wanted.keypoints
+    elif wanted.track:
+        if camera is None:
+            raise UserError(f"{wanted.track}: give the --camera that it was tracked with")
+        path = str(folder / "track.csv")
+        keypoints_file.write(path, keypoints_of_track(wanted.track, camera))
+    else:
+
+        def detect(target: Path) -> None:
+            keypoints_file.write(target, find_person(video, quiet))
+
+        path = str(_kept(folder / "keypoints.csv", video, detect))
+    keypoints, _ = keypoints_file.read(path, prior.names, ignore_unknown=True)
+    if note := keypoints.compare_times(path, video.times):
+        raise UserError(f"{path}: {note}")
+    if keypoints.frame[-1] >= video.count:
+        raise UserError(f"{path}: has frame {keypoints.frame[-1]}, and {video.path} {video.count} frames")
+    return path, keypoints
+
+
+def keypoints_of_track(path: str, camera: Camera) -> Keypoints:
+    """Joints of a track in the picture, with its standard deviations.
+
+    Parameters
+    ----------
+    path : str
+        What ``gait track`` wrote.
+    camera : Camera
+        That it was tracked with.
+    """
+    track = read_track(path)
+    names = tuple(track.places)
+    places = np.stack([track.places[name] for name in names], axis=1)
+    sd = np.stack([track.sd[name] for name in names], axis=1)
+    seen = ~np.isin(track.status, NOT_SEEN)
+    uv = np.where(seen[:, None, None], camera.project(places), np.nan)
+    pixels = np.maximum(picture_sd(camera.project, places, sd), LEAST_SD)
+    return Keypoints(track.frame, track.time, names, uv, np.ones(uv.shape[:2]), np.nan_to_num(pixels, nan=LEAST_SD))
+
+
+def picture_sd(project: Callable[[Floats], Floats], places: Floats, sd: Floats) -> Floats:
+    """Standard deviations (T, J) along an axis of the picture, of places (T, J, 3) with sd (T, J, 3).
+
+    Parameters
+    ----------
+    project : callable
+        Pixels (T, J, 2) of places (T, J, 3).
+    """
+    here = project(places)
+    moved = [project(places + sd * axis) - here for axis in np.eye(3)]
+    return np.asarray(np.sqrt(sum((each**2).sum(axis=2) for each in moved) / 2))
+
+
+def _write_film(path: Path, video: Video, quiet: bool) -> None:
+    """Write the film as H.264 of constant rate, whose every frame a browser can show alone."""
+    import cv2
+
+    factor = min(1.0, LARGEST / max(video.size))
+    with VideoWriter(path, video.fps, crf=23, seekable=True) as film, progress("film", video.count, quiet) as update:
+        for frame in video.frames():
+            image = frame.image
+            if factor < 1:
+                image = cv2.resize(image, None, fx=factor, fy=factor, interpolation=cv2.INTER_AREA)
+            film.write(image)
+            update(frame.number + 1)

@@ -1,0 +1,456 @@
+// The studio: corrections by hand on the film, saved and solved by the server as they are made.
+import { Scene, colour, sideOf } from 'gait/scene.js';
+import { Film } from 'gait/film.js';
+import { Curves } from 'gait/curves.js';
+
+const NEAR = 14; // screen pixels within which the pointer takes a joint
+const CLICK = 3; // screen pixels that a click may be off
+const WAIT = 250; // milliseconds after the last key before a moved joint is sent
+const NINETY = 1.6449;
+const at = (id) => document.getElementById(id);
+
+let data, film, scene, curves;
+let tool = 'pull';
+let over = -1; // joint under the pointer
+let chosen = 0; // joint of the list
+let pulled = null; // { joint, uv } while it is dragged or moved by keys
+let panning = null;
+let range = [null, null];
+let proposal = -1;
+let sent = 0;
+let timer = 0;
+
+const frameOf = (index) => index + data.first;
+const indexOf = (frame) => frame - data.first;
+const words = (joint) => joint.replace(/^l_/, 'left ').replace(/^r_/, 'right ').replace('_', ' ');
+
+async function ask(path, body) {
+  const answer = await fetch(path, body === undefined ? {} : { method: 'POST', body: JSON.stringify(body) });
+  const found = await answer.json();
+  if (!answer.ok) throw new Error(found.error ?? answer.statusText);
+  return found;
+}
+
+function say(text, seconds = 5) {
+  at('message').textContent = text;
+  at('message').classList.add('shown');
+  clearTimeout(say.timer);
+  say.timer = setTimeout(() => at('message').classList.remove('shown'), 1000 * seconds);
+}
+
+// ---- what is shown
+
+async function load() {
+  const found = await ask('/state');
+  const first = !data;
+  data = found;
+  document.title = `gait studio: ${data.title}`;
+  at('title').textContent = data.title;
+  if (first) build();
+  else {
+    scene.setData(data);
+    film.setData(data);
+    curves.setData(data);
+  }
+  lists();
+  window.studio = { data, film, scene, curves }; // for tests and the curious
+}
+
+function build() {
+  film = new Film(at('film'), data, '/film.mp4', paint, moved);
+  scene = new Scene(at('scene'), data);
+  curves = new Curves(at('curves'), data, (index) => { film.pause(); film.seek(index); });
+  at('joint').replaceChildren(...data.joints.map((joint, j) => new Option(words(joint), j)));
+  at('tool-pin').hidden = !data.floor;
+  const { canvas } = film.picture;
+  canvas.addEventListener('pointermove', hover);
+  canvas.addEventListener('pointerdown', press);
+  canvas.addEventListener('pointerup', release);
+  canvas.addEventListener('pointercancel', () => { pulled = panning = null; film.redraw(); });
+  canvas.addEventListener('contextmenu', remove);
+  canvas.setAttribute('role', 'application');
+  canvas.setAttribute('aria-label', 'The figure over the film. Choose a joint and press Alt with an arrow key to move it.');
+  canvas.tabIndex = 0;
+}
+
+function moved(index) {
+  scene?.show(index);
+  curves?.show(index);
+  if (pulled && !timer) pulled = null;
+}
+
+function corrections() {
+  return data.edits.corrections ?? [];
+}
+
+/** Corrections of a frame, by joint. */
+function corrected(frame) {
+  return new Map(corrections().filter((c) => c.frame === frame).map((c) => [c.joint, c]));
+}
+
+function hidden(joint, frame) {
+  return (data.edits.hidden ?? []).some((h) => h.joint === joint && h.first <= frame && frame <= h.last);
+}
+
+function paint(context, picture, index) {
+  const uv = data?.uv?.[index];
+  if (!uv) return;
+  const places = uv.map((p, j) => picture.toScreen(pulled?.joint === j ? pulled.uv : p));
+  const fixed = corrected(frameOf(index)), spread = data.uv_sd?.[index];
+  context.lineCap = 'round';
+  for (const [wide, halo] of [[5, true], [2.5, false]]) {
+    for (const [a, b] of data.bones) {
+      const side = sideOf(data.joints[sideOf(data.joints[a]) === 'middle' ? b : a]);
+      context.strokeStyle = halo ? 'rgba(0,0,0,0.55)' : INK[side];
+      context.lineWidth = wide;
+      context.setLineDash(!halo && side === 'right' ? [7, 5] : []);
+      line(context, places[a], places[b]);
+    }
+  }
+  context.setLineDash([]);
+  data.joints.forEach((joint, j) => {
+    const [x, y] = places[j], side = sideOf(joint);
+    if (spread && scene.shown.ellipsoids) {
+      context.strokeStyle = 'rgba(255,255,255,0.45)';
+      context.lineWidth = 1;
+      ring(context, x, y, Math.min(NINETY * spread[j] * picture.scale, 400));
+    }
+    const big = j === over || j === chosen || pulled?.joint === j;
+    context.fillStyle = hidden(joint, frameOf(index)) ? 'rgba(0,0,0,0.2)' : INK[side];
+    context.strokeStyle = j === chosen ? '#ffffff' : '#000000';
+    context.lineWidth = j === chosen ? 2 : 1;
+    context.beginPath();
+    // A square on the right side, a disc on the left and in the middle: not by colour alone.
+    const r = big ? 6.5 : 4.5;
+    if (side === 'right') context.rect(x - r * 0.9, y - r * 0.9, 1.8 * r, 1.8 * r);
+    else context.arc(x, y, r, 0, 2 * Math.PI);
+    context.fill();
+    context.stroke();
+    const own = fixed.get(joint);
+    if (own) {
+      const [u, v] = picture.toScreen(own.uv);
+      context.strokeStyle = '#ffffff';
+      context.lineWidth = 2;
+      line(context, [x, y], [u, v]);
+      ring(context, u, v, 9);
+    }
+    if (j === over || pulled?.joint === j) label(context, words(joint), x, y);
+  });
+  for (const pin of (data.edits.floor ?? []).filter((p) => p.frame === frameOf(index))) {
+    const [u, v] = picture.toScreen(pin.uv);
+    context.strokeStyle = '#ffffff';
+    context.lineWidth = 2;
+    line(context, [u - 9, v], [u + 9, v]);
+    line(context, [u, v], [u, v - 9]);
+  }
+}
+
+const INK = { left: '#56b4e9', right: '#e69f00', middle: '#f0f0f0' }; // over any film, with a dark edge
+
+function line(context, a, b) {
+  context.beginPath();
+  context.moveTo(...a);
+  context.lineTo(...b);
+  context.stroke();
+}
+
+function ring(context, x, y, radius) {
+  context.beginPath();
+  context.arc(x, y, radius, 0, 2 * Math.PI);
+  context.stroke();
+}
+
+function label(context, text, x, y) {
+  context.font = '13px system-ui, sans-serif';
+  const wide = context.measureText(text).width;
+  context.fillStyle = 'rgba(0,0,0,0.75)';
+  context.fillRect(x + 10, y - 24, wide + 10, 20);
+  context.fillStyle = '#ffffff';
+  context.fillText(text, x + 15, y - 9);
+}
+
+function button(text, title, press) {
+  const found = Object.assign(document.createElement('button'), { type: 'button', textContent: text, title });
+  found.addEventListener('click', press);
+  return found;
+}
+
+function row(...buttons) {
+  const item = document.createElement('li');
+  item.append(...buttons);
+  return item;
+}
+
+function lists() {
+  at('saved').textContent = 'saved';
+  at('saved').title = data.file;
+  at('undo').disabled = !data.undo;
+  at('redo').disabled = !data.redo;
+  at('proposals').replaceChildren(...data.proposals.map((p, k) => row(
+    button(`${words(p.joint)}, frame ${p.frame} · ${p.px.toFixed(0)} px`, 'Go there and choose the joint', () => propose(k)))));
+  const entries = [];
+  const add = (list, index, text, frame, joint) => entries.push({ frame, item: row(
+    button(text, 'Go there', () => go(frame, joint)),
+    button('×', `Remove: ${text}`, () => change('/edit', { do: 'remove', list, index }))) });
+  corrections().forEach((c, k) => add('corrections', k, `${words(c.joint)} @ ${c.frame}`, c.frame, c.joint));
+  (data.edits.hidden ?? []).forEach((h, k) => add('hidden', k, `${words(h.joint)} not visible ${span(h)}`, h.first, h.joint));
+  (data.edits.swapped ?? []).forEach((s, k) => add('swapped', k, `left/right swapped ${span(s)}`, s.first));
+  (data.edits.floor ?? []).forEach((p, k) => add('floor', k, `${words(p.joint)} on floor @ ${p.frame}`, p.frame, p.joint));
+  entries.sort((a, b) => a.frame - b.frame);
+  at('edits').replaceChildren(...entries.map((entry) => entry.item));
+  for (const close of at('edits').querySelectorAll('li button + button')) close.setAttribute('aria-label', close.title);
+  at('count').textContent = entries.length ? `(${entries.length})` : '(none yet)';
+  at('command').textContent = data.command;
+  at('warnings').textContent = [data.fault, ...data.warnings].filter(Boolean).join('\n');
+  const { px, sd_mm: sd } = data.figures;
+  at('solved').textContent = `${sent ? `solved in ${sent} ms · ` : ''}${data.refining ? 'refining the whole…' : `${px} px from the points, ± ${sd.toFixed(0)} mm`}`;
+}
+
+const span = ({ first, last }) => (first === last ? `@ ${first}` : `${first}–${last}`);
+
+// ---- corrections
+
+async function change(path, body = {}) {
+  const begin = performance.now();
+  at('saved').textContent = 'saving…';
+  try {
+    const found = await ask(path, body);
+    if (found.rows) {
+      found.rows.forEach((index, k) => {
+        data.points[index] = found.points[k];
+        data.uv[index] = found.uv[k];
+      });
+    }
+    for (const key of ['version', 'edits', 'undo', 'redo', 'refining', 'fault']) data[key] = found[key];
+    pulled = null;
+    film.redraw();
+    scene.show(film.index);
+    sent = Math.round(performance.now() - begin); // from release to the new overlay
+    window.studio.sent = sent;
+    lists();
+  } catch (error) {
+    pulled = null;
+    film.redraw();
+    lists();
+    say(error.message);
+  }
+}
+
+/** A click is as exact as it can be pointed at on the screen. */
+const exact = () => Math.max(0.5, CLICK / film.picture.scale);
+
+function pull(joint, uv) {
+  return change('/edit', { do: 'pull', frame: frameOf(film.index), joint: data.joints[joint], uv, sd_px: exact() });
+}
+
+function nearestJoint(place, allowed = () => true) {
+  let best = -1, least = Infinity;
+  data.uv?.[film.index]?.forEach((uv, j) => {
+    const [x, y] = film.picture.toScreen(uv), off = Math.hypot(x - place[0], y - place[1]);
+    if (off < least && allowed(data.joints[j])) [best, least] = [j, off];
+  });
+  return [best, least];
+}
+
+function hover(event) {
+  const place = film.picture.at(event);
+  if (panning) {
+    film.picture.panBy(event.clientX - panning[0], event.clientY - panning[1]);
+    panning = [event.clientX, event.clientY];
+    return;
+  }
+  if (pulled && event.buttons & 1) {
+    pulled.uv = film.picture.toPicture(place);
+    pulled.moved = true;
+    film.redraw();
+    return;
+  }
+  const [joint, off] = nearestJoint(place);
+  const found = off < NEAR ? joint : -1;
+  if (found !== over) {
+    over = found;
+    film.picture.canvas.classList.toggle('over', over >= 0 && tool === 'pull');
+    film.redraw();
+  }
+}
+
+function press(event) {
+  if (event.button !== 0 && event.button !== 1) return;
+  film.pause();
+  const { canvas } = film.picture, place = film.picture.at(event);
+  const [joint, off] = nearestJoint(place);
+  if (tool === 'pin' && event.button === 0) {
+    const [foot] = nearestJoint(place, (name) => /(toe|heel|ankle)$/.test(name));
+    if (foot >= 0) {
+      change('/edit', { do: 'pin', frame: frameOf(film.index), joint: data.joints[foot], uv: film.picture.toPicture(place), sd_px: exact() });
+      choose('pull');
+    }
+    return;
+  }
+  canvas.setPointerCapture(event.pointerId);
+  if (event.button === 0 && off < NEAR) {
+    select(joint);
+    pulled = { joint, uv: data.uv[film.index][joint], moved: false };
+    canvas.classList.add('pulling');
+  } else {
+    panning = [event.clientX, event.clientY];
+  }
+  film.redraw();
+}
+
+function release() {
+  film.picture.canvas.classList.remove('pulling');
+  panning = null;
+  if (!pulled) return;
+  if (pulled.moved) pull(pulled.joint, pulled.uv);
+  else {
+    pulled = null;
+    film.redraw();
+  }
+}
+
+/** A right click removes the correction under it. */
+function remove(event) {
+  event.preventDefault();
+  const place = film.picture.at(event), frame = frameOf(film.index);
+  const near = (uv) => Math.hypot(...film.picture.toScreen(uv).map((x, k) => x - place[k])) < NEAR;
+  const [joint, off] = nearestJoint(place);
+  const name = off < NEAR ? data.joints[joint] : null;
+  for (const list of ['corrections', 'floor']) {
+    const index = (data.edits[list] ?? []).findIndex((c) => c.frame === frame && (c.joint === name || near(c.uv)));
+    if (index >= 0) return void change('/edit', { do: 'remove', list, index });
+  }
+  const index = (data.edits.hidden ?? []).findIndex((h) => h.joint === name && h.first <= frame && frame <= h.last);
+  if (index >= 0) change('/edit', { do: 'remove', list: 'hidden', index });
+  else say('There is no correction here.', 2);
+}
+
+function hide() {
+  const [first, last] = marked() ?? [frameOf(film.index), frameOf(film.index)];
+  change('/edit', { do: 'hide', joint: data.joints[chosen], first, last });
+}
+
+function swap() {
+  const found = marked();
+  if (!found) return say('Mark a range first: “Range from” (I) at its first frame, “to” (O) at its last.');
+  change('/edit', { do: 'swap', first: found[0], last: found[1] });
+  mark(null, null);
+}
+
+function marked() {
+  const [a, b] = range;
+  return a === null || b === null ? null : [Math.min(a, b), Math.max(a, b)];
+}
+
+function mark(first, last) {
+  range = [first, last];
+  at('range').textContent = first === null && last === null ? '' : `${first ?? '…'} – ${last ?? '…'}`;
+}
+
+/** Move the chosen joint by keys; it is sent when they rest. */
+function nudge(du, dv) {
+  const index = film.index;
+  const from = pulled?.joint === chosen ? pulled.uv : data.uv[index]?.[chosen];
+  if (!from) return;
+  pulled = { joint: chosen, uv: [from[0] + du, from[1] + dv], moved: true };
+  film.redraw();
+  clearTimeout(timer);
+  timer = setTimeout(() => { timer = 0; if (pulled) pull(pulled.joint, pulled.uv); }, WAIT);
+}
+
+// ---- getting about
+
+function select(joint) {
+  chosen = joint;
+  at('joint').value = joint;
+  film.redraw();
+}
+
+function go(frame, joint) {
+  film.pause();
+  film.seek(indexOf(frame));
+  if (joint) select(data.joints.indexOf(joint));
+}
+
+function propose(k) {
+  if (!data.proposals.length) return say('Nothing is left to propose.', 2);
+  proposal = k % data.proposals.length;
+  const { frame, joint } = data.proposals[proposal];
+  go(frame, joint);
+}
+
+function choose(name) {
+  tool = name;
+  for (const each of ['pull', 'pin']) at(`tool-${each}`).setAttribute('aria-pressed', each === name);
+  if (name === 'pin') say('Click the floor where a heel, toe or ankle stands.', 3);
+}
+
+const KEYS = {
+  ' ': () => film.toggle(),
+  n: () => propose(proposal + 1),
+  d: () => choose('pull'),
+  f: () => data.floor && choose('pin'),
+  h: hide,
+  i: () => mark(frameOf(film.index), range[1]),
+  o: () => mark(range[0], frameOf(film.index)),
+  s: swap,
+  '+': () => film.picture.zoomBy(1.25),
+  '=': () => film.picture.zoomBy(1.25),
+  '-': () => film.picture.zoomBy(0.8),
+  0: () => film.picture.fit(),
+  '?': () => at('helping').showModal(),
+  Escape: () => choose('pull'),
+};
+const ARROWS = { ArrowLeft: [-1, 0], ArrowRight: [1, 0], ArrowUp: [0, -1], ArrowDown: [0, 1] };
+
+document.addEventListener('keydown', (event) => {
+  if (!data || at('helping').open) return;
+  const key = event.key.length === 1 ? event.key.toLowerCase() : event.key;
+  const arrow = ARROWS[event.key];
+  if ((event.ctrlKey || event.metaKey) && (key === 'z' || key === 'y')) {
+    event.preventDefault();
+    change(key === 'y' || event.shiftKey ? '/redo' : '/undo');
+  } else if (arrow && event.altKey) {
+    event.preventDefault();
+    nudge(...arrow);
+  } else if (event.ctrlKey || event.metaKey || event.altKey || event.target.matches('select, input[type=number]')) {
+    return;
+  } else if (arrow && arrow[0] && !event.target.matches('.scene canvas')) {
+    event.preventDefault();
+    film.step(arrow[0] * (event.shiftKey ? 10 : 1));
+  } else if (KEYS[key] && !(key === ' ' && event.target.matches('button, summary'))) {
+    event.preventDefault();
+    KEYS[key]();
+  }
+});
+
+at('undo').addEventListener('click', () => change('/undo'));
+at('redo').addEventListener('click', () => change('/redo'));
+at('hide').addEventListener('click', hide);
+at('swap').addEventListener('click', swap);
+at('from').addEventListener('click', KEYS.i);
+at('to').addEventListener('click', KEYS.o);
+at('tool-pull').addEventListener('click', () => choose('pull'));
+at('tool-pin').addEventListener('click', () => choose('pin'));
+at('joint').addEventListener('change', () => select(Number(at('joint').value)));
+at('help').addEventListener('click', () => at('helping').showModal());
+at('helping').addEventListener('close', () => localStorage.setItem('gait studio: helped', 'yes'));
+at('export').addEventListener('change', async () => {
+  const kind = at('export').value;
+  at('export').value = '';
+  if (!kind) return;
+  const answer = await fetch(`/export/${kind}`);
+  if (!answer.ok) return say((await answer.json()).error);
+  const link = Object.assign(document.createElement('a'), { href: URL.createObjectURL(await answer.blob()) });
+  link.download = /filename="?([^"]+)"?/.exec(answer.headers.get('content-disposition') ?? '')?.[1] ?? `motion.${kind}`;
+  link.click();
+});
+
+// ---- begin
+
+await load();
+if (!localStorage.getItem('gait studio: helped')) at('helping').showModal();
+const changes = new EventSource('/changes');
+changes.addEventListener('message', (event) => { if (Number(event.data) > data.version || (data.refining && Number(event.data) !== data.version)) load(); });
+changes.addEventListener('error', () => { at('saved').textContent = 'no connection to gait studio; it goes on when that runs again'; });
+changes.addEventListener('open', () => { if (data) load(); });
