@@ -223,6 +223,8 @@ class VideoWriter:
         Most of it over two seconds, whatever the quality.
     keep : bool
         Keep what was written before an interrupt.
+    keyframes : int, optional
+        Most frames from one that can be shown alone to the next; few make seeking quick and the file large.
     """
 
     def __init__(
@@ -234,6 +236,7 @@ class VideoWriter:
         preset: str = "medium",
         bits_per_second: int | None = None,
         keep: bool = True,
+        keyframes: int | None = None,
     ) -> None:
         self.path = Path(path)
         require_video_name(path)
@@ -241,6 +244,8 @@ class VideoWriter:
         self._options = {"crf": str(crf), "preset": preset}
         if bits_per_second is not None:
             self._options |= {"maxrate": str(bits_per_second), "bufsize": str(2 * bits_per_second)}
+        if keyframes is not None:
+            self._options |= {"g": str(keyframes)}
         self._keep = keep
         self._stack = ExitStack()
         self._stream: av.VideoStream | None = None

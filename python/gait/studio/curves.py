@@ -68,7 +68,9 @@ def _angle(places: Floats, parts: list[list[int]]) -> Floats:
     return np.asarray(np.degrees(np.arctan2(cross, np.sum(one * two, axis=1))))
 
 
-def events_of(frame: npt.NDArray[np.int64], time: Floats, names: tuple[str, ...], places: Floats) -> Events | None:
+def events_of(
+    frame: npt.NDArray[np.int64], time: Floats, names: tuple[str, ...], places: Floats
+) -> Events | None:
     """Heel strikes and toe-offs; None if joints are missing or nobody walks."""
     by_name = {name: places[:, j] for j, name in enumerate(names)}
     try:
@@ -78,7 +80,7 @@ def events_of(frame: npt.NDArray[np.int64], time: Floats, names: tuple[str, ...]
 
 
 def phase_curve(time: Floats, events: Events | None) -> list[dict[str, Any]]:
-    """Phase of walking by the heel strikes of the right foot: 0 to 1, unknown before the first and after the last."""
+    """Phase of walking, 0 to 1 between the heel strikes of the right foot and unknown elsewhere."""
     strikes = np.sort(events.strike["right"]) if events else np.zeros(0)
     if len(strikes) < 2:
         return []
@@ -87,7 +89,7 @@ def phase_curve(time: Floats, events: Events | None) -> list[dict[str, Any]]:
 
 
 def event_marks(events: Events | None) -> list[dict[str, Any]]:
-    """Marks of heel strikes on the timeline."""
+    """Give marks of heel strikes on the timeline."""
     if events is None:
         return []
     return [

@@ -11,7 +11,6 @@ import traceback
 from collections.abc import Callable
 from multiprocessing.connection import Connection
 
-from gait.bindings.segment_prior import SegmentPrior
 from gait.errors import UserError
 from gait.lift import run as lift_run
 from gait.lift.keypoints.corrections import Edits

@@ -86,7 +86,9 @@ def application(session: Session, port: int) -> ASGIApp:
                 await asyncio.sleep(_LOOK)
                 quiet += _LOOK
 
-        return StreamingResponse(versions(), media_type="text/event-stream", headers={"cache-control": "no-store"})
+        return StreamingResponse(
+            versions(), media_type="text/event-stream", headers={"cache-control": "no-store"}
+        )
 
     routes = [
         Route("/state", state),

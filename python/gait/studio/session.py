@@ -85,7 +85,10 @@ class Session:
             first, names = int(keypoints.frame[0]), self._names
             number = np.arange(first, int(keypoints.frame[-1]) + 1)
             times = video.times[number]
-            spread = lambda values: _by_frame(values, keypoints.frame, number)  # noqa: E731
+
+            def spread(values: Floats) -> Floats:
+                return _by_frame(values, keypoints.frame, number)
+
             places, sd = self._places[:, self._shown], motion.sd[:, self._shown]
             events = curves.events_of(keypoints.frame, keypoints.time, names, places)
             plots = curves.angle_curves(names, places, motion.rooted_sd[:, self._shown])
@@ -116,18 +119,22 @@ class Session:
                 strip=rounded(spread(np.nan_to_num(px).mean(axis=1) / max(self._tall(), 1.0)), 4),
             )
             asked = curves.proposals(keypoints.frame, keypoints.time, names, px, self.edits)
-            return data | self._work() | {
-                "title": Path(video.path).name,
-                "tall": self._tall(),
-                "proposals": [{"frame": p.frame, "joint": p.joint, "px": round(p.px, 1)} for p in asked],
-                "command": self.command(),
-                "warnings": lift_run.warnings_of(self._lifted, self.source.prior.stature),
-                "figures": {
-                    "px": round(float(np.nanmedian(motion.error)), 2),
-                    "sd_mm": round(1000 * float(np.median(sd)), 1),
-                    "stature_m": round(float(motion.stature), 3),
-                },
-            }
+            return (
+                data
+                | self._work()
+                | {
+                    "title": Path(video.path).name,
+                    "tall": self._tall(),
+                    "proposals": [{"frame": p.frame, "joint": p.joint, "px": round(p.px, 1)} for p in asked],
+                    "command": self.command(),
+                    "warnings": lift_run.warnings_of(self._lifted, self.source.prior.stature),
+                    "figures": {
+                        "px": round(float(np.nanmedian(motion.error)), 2),
+                        "sd_mm": round(1000 * float(np.median(sd)), 1),
+                        "stature_m": round(float(motion.stature), 3),
+                    },
+                }
+            )
 
     def _work(self) -> dict[str, Any]:
         """Corrections and what can be done with them."""
@@ -148,7 +155,7 @@ class Session:
         words = ["gait lift", _quoted(source.keypoints if request.calibration is None else source.video.path)]
         words += ["--camera", _quoted(request.camera)] if request.camera else []
         words += ["--height", f"{request.options.stature:g}"] if request.options.stature else []
-        return " ".join([*words, "--corrections", _quoted(str(source.corrections)), "-o", "motion.csv"])
+        return " ".join([*words, "--corrections", _quoted(source.corrections), "-o", "motion.csv"])
 
     # ---- edits
 
@@ -186,11 +193,11 @@ class Session:
         """Edits with one more, or one less."""
         kind, edits = action.get("do"), self.edits
         if kind == "pull":
-            new = Correction(self._frame(action), self._joint(action), self._uv(action), self._sd(action))
+            new = Correction(self._frame(action), self._joint(action), self._pixel(action), self._sd(action))
             kept = tuple(c for c in edits.corrections if (c.frame, c.joint) != (new.frame, new.joint))
             return replace(edits, corrections=(*kept, new))
         if kind == "pin":
-            pin = FloorPin(self._frame(action), self._joint(action), self._uv(action), self._sd(action))
+            pin = FloorPin(self._frame(action), self._joint(action), self._pixel(action), self._sd(action))
             if not pin.joint.endswith(FEET):
                 raise UserError(f"{pin.joint}: only a toe, heel or ankle stands on the floor")
             others = tuple(p for p in edits.floor if (p.frame, p.joint) != (pin.frame, pin.joint))
@@ -226,10 +233,14 @@ class Session:
             raise UserError(f"{joint}: no such joint")
         return str(joint)
 
-    def _uv(self, action: dict[str, Any]) -> tuple[float, float]:
+    def _pixel(self, action: dict[str, Any]) -> tuple[float, float]:
         found = action.get("uv")
         size = self.source.video.size
-        if not isinstance(found, list) or len(found) != 2 or not all(isinstance(x, int | float) for x in found):
+        if (
+            not isinstance(found, list)
+            or len(found) != 2
+            or not all(isinstance(x, int | float) for x in found)
+        ):
             raise UserError("the place in the picture is missing")
         if any(not -n <= x <= 2 * n for x, n in zip(found, size, strict=True)):
             raise UserError("the place is far outside of the picture")
@@ -247,7 +258,11 @@ class Session:
         self.edits = wanted
         self.save()
         answer: dict[str, Any] = {}
-        if touched and self._interactive is not None and set(keypoints.names) <= set(self._lifted.motion.names):
+        if (
+            touched
+            and self._interactive is not None
+            and set(keypoints.names) <= set(self._lifted.motion.names)
+        ):
             try:
                 with one_thread():
                     near = self._interactive.solve(keypoints, pinned, touched)
@@ -299,7 +314,7 @@ class Session:
     # ---- how far joints may be off
 
     def _picture_sd(self) -> Floats:
-        """Standard deviations (T, J) in the picture, pixels."""
+        """Give standard deviations (T, J) in the picture, pixels."""
         motion, view = self._lifted.motion, self._lifted.view
         if isinstance(view, Perspective):
             return picture_sd(view.camera.project, motion.places, motion.sd)
@@ -376,8 +391,6 @@ def _by_frame(values: Floats, frame: npt.NDArray[np.int64], number: npt.NDArray[
     return found
 
 
-def _quoted(path: str | None) -> str:
-    text = path or ""
+def _quoted(path: str | Path) -> str:
+    text = str(path)
     return f"'{text}'" if set(text) & set(" '\"$&;()") else text
-
-

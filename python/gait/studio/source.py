@@ -1,6 +1,6 @@
-"""What the studio corrects: a film, the keypoints of a person in it, the view, and the folder beside the film.
+"""What the studio corrects: a film, the keypoints of a person in it, the view, and a folder beside the film.
 
-The folder ``walk.studio`` beside ``walk.mp4`` holds what takes long to make or must not be lost: keypoints.csv
+The folder ``walk.studio`` beside ``walk.mp4`` holds what takes long to make or must not be lost: the keypoints
 of the detector or of a track, film.mp4 that every browser plays frame by frame, and corrections.json.
 """
 
@@ -22,15 +22,17 @@ from gait.io import keypoints_file
 from gait.io.files import replacing
 from gait.io.keypoints_file import Keypoints
 from gait.io.track_file import read_track
-from gait.io.video import Video, VideoWriter
+from gait.io.video import FAST, Video, VideoWriter
 from gait.lift import run as lift_run
 from gait.lift.run import Prepared, Request, Warn
+from gait.lift.smooth.options import Options
 from gait.progress import progress
 from gait.track.walk_camera import calibrate_film, find_person, note_camera
 
 Floats = npt.NDArray[np.float64]
 
 LARGEST = 1280  # pixels of the longer side of the film that browsers get
+KEYFRAMES = 8  # frames from one that is shown alone to the next: seeking decodes no more
 LEAST_SD = 1.0  # pixels, of a track's joints
 NOT_SEEN = ("init", "lost")  # statuses of frames whose joints are not used
 
@@ -100,7 +102,7 @@ def open_source(wanted: Wanted, warn: Warn, quiet: bool) -> Source:
         calibration = calibrate_film(video, keypoints, Model(None), wanted.height, None, quiet)
         note_camera(calibration, quiet)
     request = Request(
-        options=lift_run.Options(stature=wanted.height),
+        options=Options(stature=wanted.height),
         camera=wanted.camera,
         calibration=calibration,
         hints=False,
@@ -118,7 +120,9 @@ def _folder(video: Video) -> Path:
     try:
         folder.mkdir(exist_ok=True)
     except OSError as error:
-        raise UserError(f"{folder}: {error.strerror}; copy the film to a folder that can be written") from error
+        raise UserError(
+            f"{folder}: {error.strerror}; copy the film to a folder that can be written"
+        ) from error
     return folder
 
 
@@ -180,11 +184,13 @@ def keypoints_of_track(path: str, camera: Camera) -> Keypoints:
     seen = ~np.isin(track.status, NOT_SEEN)
     uv = np.where(seen[:, None, None], camera.project(places), np.nan)
     pixels = np.maximum(picture_sd(camera.project, places, sd), LEAST_SD)
-    return Keypoints(track.frame, track.time, names, uv, np.ones(uv.shape[:2]), np.nan_to_num(pixels, nan=LEAST_SD))
+    return Keypoints(
+        track.frame, track.time, names, uv, np.ones(uv.shape[:2]), np.nan_to_num(pixels, nan=LEAST_SD)
+    )
 
 
 def picture_sd(project: Callable[[Floats], Floats], places: Floats, sd: Floats) -> Floats:
-    """Standard deviations (T, J) along an axis of the picture, of places (T, J, 3) with sd (T, J, 3).
+    """Give standard deviations (T, J) along an axis of the picture, of places (T, J, 3) with sd (T, J, 3).
 
     Parameters
     ----------
@@ -201,10 +207,9 @@ def _write_film(path: Path, video: Video, quiet: bool) -> None:
     import cv2
 
     factor = min(1.0, LARGEST / max(video.size))
-    with VideoWriter(path, video.fps, crf=23, seekable=True) as film, progress("film", video.count, quiet) as update:
+    writer = VideoWriter(path, video.fps, crf=23, preset=FAST, keyframes=KEYFRAMES)
+    with writer as film, progress("film", video.count, quiet) as update:
         for frame in video.frames():
-            image = frame.image
-            if factor < 1:
-                image = cv2.resize(image, None, fx=factor, fy=factor, interpolation=cv2.INTER_AREA)
-            film.write(image)
+            small = cv2.resize(frame.image, None, fx=factor, fy=factor, interpolation=cv2.INTER_AREA)
+            film.write(np.asarray(small, np.uint8))
             update(frame.number + 1)
