@@ -4,6 +4,7 @@ import contextlib
 import shutil
 import sys
 import threading
+import time
 from pathlib import Path
 
 import pytest
@@ -41,6 +42,14 @@ def opened(width=1280, height=720, dark=False):
         finally:
             browser.close()
         assert not faults, faults
+
+
+def until(page, expression, seconds=60):
+    """Wait until an expression is true in a page (whose security policy forbids playwright's own wait)."""
+    end = time.monotonic() + seconds
+    while not page.evaluate(expression):
+        assert time.monotonic() < end, f"never true: {expression}"
+        page.wait_for_timeout(30)
 
 
 @contextlib.contextmanager

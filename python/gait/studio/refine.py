@@ -6,6 +6,7 @@ The newest corrections win: while one is solved, those that arrive are kept unti
 from __future__ import annotations
 
 import multiprocessing
+import os
 import threading
 import traceback
 from collections.abc import Callable
@@ -21,6 +22,7 @@ Answer = Callable[[int, "Lifted | str"], None]
 
 def _serve(pipe: Connection, model: str | None, prepared: Prepared, request: Request, path: str) -> None:
     """Solve the newest of what arrives, until the other end closes."""
+    os.nice(10)  # what moves while the user looks on comes first
     prior = lift_run.load_prior(model, lambda words: None)
     while True:
         try:

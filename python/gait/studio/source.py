@@ -1,7 +1,7 @@
 """What the studio corrects: a film, the keypoints of a person in it, the view, and a folder beside the film.
 
-The folder ``walk.studio`` beside ``walk.mp4`` holds what takes long to make or must not be lost: the keypoints
-of the detector or of a track, film.mp4 that every browser plays frame by frame, and corrections.json.
+The folder ``walk.studio`` beside ``walk.mp4`` holds what takes long to make or must not be lost: keypoints
+of the detector or of a track, film.mp4, which every browser plays frame by frame, and corrections.json.
 """
 
 from __future__ import annotations

@@ -17,6 +17,7 @@ let pulled = null; // { joint, uv } while it is dragged or moved by keys
 let panning = null;
 let range = [null, null];
 let proposal = -1;
+let following = false;
 let sent = 0;
 let timer = 0;
 
@@ -53,7 +54,7 @@ async function load() {
     curves.setData(data);
   }
   lists();
-  window.studio = { data, film, scene, curves }; // for tests and the curious
+  window.studio = Object.assign(window.studio ?? {}, { data, film, scene, curves }); // for tests and the curious
 }
 
 function build() {
@@ -73,7 +74,29 @@ function build() {
   canvas.tabIndex = 0;
 }
 
+/** Keep the person in the middle, or show the whole picture. */
+function follow(on) {
+  following = on;
+  at('follow').setAttribute('aria-pressed', on);
+  if (!on) return film.picture.fit();
+  const stage = film.picture.element;
+  const whole = Math.min(stage.clientWidth / data.size[0], stage.clientHeight / data.size[1]);
+  film.picture.zoom = Math.max(1, (0.75 * stage.clientHeight) / (data.tall * whole));
+  track(film.index);
+}
+
+function track(index) {
+  const uv = data.uv?.[index];
+  if (!uv) return;
+  const middle = [0, 1].map((axis) => {
+    const values = uv.map((p) => p[axis]);
+    return (Math.min(...values) + Math.max(...values)) / 2;
+  });
+  film.picture.look(middle);
+}
+
 function moved(index) {
+  if (following && film) track(index);
   scene?.show(index);
   curves?.show(index);
   if (pulled && !timer) pulled = null;
@@ -98,7 +121,8 @@ function paint(context, picture, index) {
   const places = uv.map((p, j) => picture.toScreen(pulled?.joint === j ? pulled.uv : p));
   const fixed = corrected(frameOf(index)), spread = data.uv_sd?.[index];
   context.lineCap = 'round';
-  for (const [wide, halo] of [[5, true], [2.5, false]]) {
+  const thick = Math.min(2.5, Math.max(1.2, 0.007 * data.tall * picture.scale));
+  for (const [wide, halo] of [[2 * thick, true], [thick, false]]) {
     for (const [a, b] of data.bones) {
       const side = sideOf(data.joints[sideOf(data.joints[a]) === 'middle' ? b : a]);
       context.strokeStyle = halo ? 'rgba(0,0,0,0.55)' : INK[side];
@@ -110,7 +134,7 @@ function paint(context, picture, index) {
   context.setLineDash([]);
   data.joints.forEach((joint, j) => {
     const [x, y] = places[j], side = sideOf(joint);
-    if (spread && scene.shown.ellipsoids) {
+    if (spread && (scene?.shown.ellipsoids ?? true)) {
       context.strokeStyle = 'rgba(255,255,255,0.45)';
       context.lineWidth = 1;
       ring(context, x, y, Math.min(NINETY * spread[j] * picture.scale, 400));
@@ -121,7 +145,7 @@ function paint(context, picture, index) {
     context.lineWidth = j === chosen ? 2 : 1;
     context.beginPath();
     // A square on the right side, a disc on the left and in the middle: not by colour alone.
-    const r = big ? 6.5 : 4.5;
+    const r = (big ? 1.5 : 1) * Math.min(5, Math.max(2, 0.014 * data.tall * picture.scale));
     if (side === 'right') context.rect(x - r * 0.9, y - r * 0.9, 1.8 * r, 1.8 * r);
     else context.arc(x, y, r, 0, 2 * Math.PI);
     context.fill();
@@ -332,7 +356,7 @@ function hide() {
 
 function swap() {
   const found = marked();
-  if (!found) return say('Mark a range first: “Range from” (I) at its first frame, “to” (O) at its last.');
+  if (!found) return say('Mark a range first: “From” (I) at its first frame, “To” (O) at its last.');
   change('/edit', { do: 'swap', first: found[0], last: found[1] });
   mark(null, null);
 }
@@ -397,7 +421,8 @@ const KEYS = {
   '+': () => film.picture.zoomBy(1.25),
   '=': () => film.picture.zoomBy(1.25),
   '-': () => film.picture.zoomBy(0.8),
-  0: () => film.picture.fit(),
+  z: () => follow(!following),
+  0: () => follow(false),
   '?': () => at('helping').showModal(),
   Escape: () => choose('pull'),
 };
@@ -427,6 +452,7 @@ document.addEventListener('keydown', (event) => {
 at('undo').addEventListener('click', () => change('/undo'));
 at('redo').addEventListener('click', () => change('/redo'));
 at('hide').addEventListener('click', hide);
+at('follow').addEventListener('click', () => follow(!following));
 at('swap').addEventListener('click', swap);
 at('from').addEventListener('click', KEYS.i);
 at('to').addEventListener('click', KEYS.o);

@@ -63,8 +63,13 @@ export class Picture {
 
   /** Show the whole picture. */
   fit() {
-    this.zoom = 1;
-    this.#move([this.size[0] / 2, this.size[1] / 2]);
+    this.look([this.size[0] / 2, this.size[1] / 2], 1);
+  }
+
+  /** Show a pixel in the middle, at a zoom. */
+  look(middle, zoom = this.zoom) {
+    this.zoom = Math.min(20, Math.max(1, zoom));
+    this.#move(middle);
   }
 
   #move(middle) {

@@ -243,8 +243,8 @@ def read_corrections(
 def corrected(keypoints: Keypoints, edits: Edits, sd: float) -> Keypoints:
     """Keypoints with what was corrected by hand.
 
-    A correction tells how wrong the detector was there, and detectors err for a while: points of the same
-    joint around it get the variance of that error, less as time goes by.
+    A correction tells how wrong the detector was there.  Detectors err for a while, and about a foot as a
+    whole: points around it get the variance of that error, less as time goes by.
 
     Parameters
     ----------
@@ -275,7 +275,8 @@ def corrected(keypoints: Keypoints, edits: Edits, sd: float) -> Keypoints:
         if np.isfinite(off).all():
             since = np.abs(found.time - found.time[row])
             wrong = max(float(off @ off) / 2 - c.sd_px**2 - sd**2, 0.0)
-            errs[:, column] = np.maximum(errs[:, column], wrong * np.exp(-2 * since / ERRS_FOR))
+            for other in _found_alike(found.names, c.joint):
+                errs[:, other] = np.maximum(errs[:, other], wrong * np.exp(-2 * since / ERRS_FOR))
         by_hand[row, column] = c.sd_px
     for c in edits.corrections:  # all errors are known before the points move
         row, column = rows_of[c.frame], found.names.index(c.joint)
@@ -290,6 +291,13 @@ def corrected(keypoints: Keypoints, edits: Edits, sd: float) -> Keypoints:
         lasting_sd=None if lasting is None else np.where(np.isfinite(by_hand), 0.0, lasting),
         by_hand=by_hand,
     )
+
+
+def _found_alike(names: Sequence[str], joint: str) -> list[int]:
+    """Columns of points that a detector finds together: a joint alone, or all of its foot."""
+    if not joint.endswith(FEET):
+        return [names.index(joint)]
+    return [k for k, name in enumerate(names) if name[:2] == joint[:2] and name.endswith(FEET)]
 
 
 def _rows(keypoints: Keypoints, first: int, last: int) -> npt.NDArray[np.intp]:

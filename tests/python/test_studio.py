@@ -1,0 +1,277 @@
+"""gait studio in a real Chromium: a clip whose truth is known, corrected by the mouse."""
+
+import contextlib
+import csv
+import json
+import os
+import signal
+import subprocess
+import sys
+import urllib.request
+
+import browser
+import numpy as np
+import pytest
+
+from gait.body.skeleton import JOINTS
+from gait.cli import main
+from gait.io import keypoints_file
+from gait.io.keypoints_file import Keypoints
+from gait.io.track_file import read_estimates
+
+WRONG = range(24, 40)  # frames in which the detector has lost a foot
+FOOT = ("r_ankle", "r_toe", "r_heel")
+FRAMES, FPS = 75, 30.0
+PULLED = [(26, "r_ankle"), (30, "r_toe"), (30, "r_ankle"), (34, "r_heel"), (38, "r_ankle")]
+
+
+def table(path):
+    with open(path, newline="") as file:
+        return list(csv.DictReader(file))
+
+
+@pytest.fixture(scope="module")
+def clip(tmp_path_factory):
+    """A short clip, and keypoints that are right but for a foot in `WRONG`."""
+    browser.chromium()
+    folder = tmp_path_factory.mktemp("studio")
+    shown = ["--frames", str(FRAMES), "--fps", f"{FPS:g}", "--size", "480x270", "--view", "side", "--quiet"]
+    assert main(["simulate", "-o", str(folder / "clip"), *shown]) == 0
+    rows = table(folder / "clip/truth.csv")
+    uv = np.array([[[float(row[f"{j}_{a}"]) for a in "uv"] for j in JOINTS] for row in rows])
+    points = uv + np.random.default_rng(2).normal(0, 0.4, uv.shape)
+    for joint in FOOT:
+        points[WRONG.start : WRONG.stop, JOINTS.index(joint)] += [4.0, -13.0]
+    number = np.arange(FRAMES)
+    found = Keypoints(number, number / FPS, tuple(JOINTS), points, np.ones(points.shape[:2]))
+    keypoints_file.write(folder / "keypoints.csv", found)
+    return folder, uv
+
+
+class Server:
+    """The command as a user runs it."""
+
+    def __init__(self, folder):
+        command = [sys.executable, "-m", "gait", "studio", "clip/video.mp4", "--keypoints", "keypoints.csv"]
+        command += ["--camera", "clip/camera.json", "--port", "0", "--no-browser", "--json", "--quiet"]
+        environment = os.environ | {"GAIT_WEB": str(browser.FETCHED)}
+        self.process = subprocess.Popen(
+            command, cwd=folder, stdout=subprocess.PIPE, text=True, env=environment
+        )
+        line = self.process.stdout.readline()
+        assert line, "gait studio ended"
+        self.url = json.loads(line)["url"]
+
+    def end(self, number):
+        self.process.send_signal(number)
+        code = self.process.wait(60)
+        self.process.stdout.close()
+        return code
+
+
+@pytest.fixture
+def server(clip):
+    started = Server(clip[0])
+    yield started
+    if started.process.poll() is None:
+        started.end(signal.SIGTERM)
+    (clip[0] / "clip/video.studio/corrections.json").unlink(missing_ok=True)
+
+
+@contextlib.contextmanager
+def studio(url, **how):
+    with browser.opened(**how) as page:
+        show(page, url)
+        yield page
+
+
+def show(page, url):
+    page.goto(url)
+    browser.until(page, "window.studio?.film?.video?.readyState >= 2")
+    if page.locator("#helping").is_visible():
+        page.get_by_role("button", name="Start").click()
+
+
+def screen(page, frame, uv):
+    """Where a pixel of a frame is on the screen; shows the frame."""
+    page.evaluate(f"studio.film.seek({frame})")
+    box = page.locator("#film .stage canvas").bounding_box()
+    x, y = page.evaluate(f"studio.film.picture.toScreen([{uv[0]}, {uv[1]}])")
+    return box["x"] + x, box["y"] + y
+
+
+def drag(page, frame, joint, target):
+    """Drag a joint to a pixel, as a person does."""
+    shown = page.evaluate(f"studio.data.uv[{frame}][studio.data.joints.indexOf('{joint}')]")
+    version = page.evaluate("studio.data.version")
+    x, y = screen(page, frame, target)
+    page.mouse.move(*screen(page, frame, shown))
+    page.mouse.down()
+    page.mouse.move(x, y, steps=3)
+    page.mouse.up()
+    browser.until(page, f"studio.data.version > {version} && studio.sent > 0")
+
+
+def rest(page):
+    """Wait for the whole motion."""
+    browser.until(page, "!studio.data.refining")
+
+
+def misses(uv, truth, names):
+    """Distance in the picture, pixels, of the foot where the detector had lost it."""
+    rows = slice(WRONG.start, WRONG.stop)
+    return [
+        float(np.linalg.norm(uv[rows, names.index(j)] - truth[rows, JOINTS.index(j)], axis=1).mean())
+        for j in FOOT
+    ]
+
+
+def test_five_drags_bring_the_figure_to_the_person(clip, server):
+    folder, truth = clip
+    saved = folder / "clip/video.studio/corrections.json"
+    with studio(server.url) as page:
+        names = page.evaluate("studio.data.joints")
+        before = misses(np.array(page.evaluate("studio.data.uv")), truth, names)
+        for frame, joint in PULLED:
+            drag(page, frame, joint, truth[frame, JOINTS.index(joint)])
+        assert len(json.loads(saved.read_text())["corrections"]) == 5
+        near = misses(np.array(page.evaluate("studio.data.uv")), truth, names)
+        assert np.mean(near) < 0.5 * np.mean(before)  # at once
+        rest(page)
+        after = misses(np.array(page.evaluate("studio.data.uv")), truth, names)
+        assert np.mean(after) < 0.4 * np.mean(before) and np.mean(before) > 5
+        with page.expect_download() as download:
+            page.select_option("#export", "csv")
+        exported = (folder / "exported.csv", folder / "batch.csv", folder / "uncorrected.csv")
+        download.value.save_as(exported[0])
+
+        page.reload()
+        show(page, server.url)
+        assert page.evaluate("studio.data.edits.corrections.length") == 5
+        assert page.locator("#edits li").count() == 5
+
+    words = ["lift", str(folder / "keypoints.csv"), "--camera", str(folder / "clip/camera.json"), "--quiet"]
+    assert main([*words, "-o", str(exported[2])]) == 0
+    assert main([*words, "--corrections", str(saved), "-o", str(exported[1])]) == 0
+    assert exported[0].read_bytes() == exported[1].read_bytes()
+    true = {
+        j: np.array([[float(r[f"{j}_{a}"]) for a in "xyz"] for r in table(folder / "clip/truth.csv")])
+        for j in FOOT
+    }
+    rows = slice(WRONG.start, WRONG.stop)
+    errors = [
+        np.mean([np.linalg.norm(read_estimates(p).places[j][rows] - true[j][rows], axis=1) for j in FOOT])
+        for p in exported[1:]
+    ]
+    assert errors[0] < 0.6 * errors[1]
+
+    assert server.end(signal.SIGKILL) == -signal.SIGKILL
+    again = Server(folder)
+    try:
+        with studio(again.url) as page:
+            assert page.evaluate("studio.data.edits.corrections.length") == 5
+            uv = np.array(page.evaluate("studio.data.uv"))
+            assert misses(uv, truth, names) == pytest.approx(after, abs=0.02)
+    finally:
+        assert again.end(signal.SIGINT) == 0
+
+
+def test_plays_steps_undoes_and_removes(clip, server):
+    _, truth = clip
+    with studio(server.url) as page:
+        page.keyboard.press("ArrowRight")
+        assert page.evaluate("studio.film.index") == 1
+        page.keyboard.press("Space")
+        browser.until(page, "studio.film.index > 5")
+        page.keyboard.press("Space")
+        assert not page.evaluate("studio.film.playing")
+        assert page.evaluate("studio.scene.index") == page.evaluate("studio.film.index")
+        assert page.evaluate("studio.curves.index") == page.evaluate("studio.film.index")
+
+        drag(page, 30, "r_ankle", truth[30, JOINTS.index("r_ankle")])
+        for press, count in (("Control+z", 0), ("Control+Shift+z", 1)):
+            page.keyboard.press(press)
+            browser.until(page, f"studio.data.edits.corrections.length === {count}")
+        page.mouse.click(*screen(page, 30, truth[30, JOINTS.index("r_ankle")]), button="right")
+        browser.until(page, "studio.data.edits.corrections.length === 0")
+
+        page.evaluate("studio.film.seek(10)")
+        page.keyboard.press("i")
+        page.evaluate("studio.film.seek(14)")
+        page.keyboard.press("o")
+        page.keyboard.press("s")
+        browser.until(page, "studio.data.edits.swapped?.length === 1")
+        assert page.evaluate("studio.data.edits.swapped[0]") == {"first": 10, "last": 14}
+        page.keyboard.press("h")
+        browser.until(page, "studio.data.edits.hidden?.length === 1")
+        page.keyboard.press("f")
+        page.mouse.click(*screen(page, 50, truth[50, JOINTS.index("l_heel")]))
+        browser.until(page, "studio.data.edits.floor?.length === 1")
+        page.locator("#edits button", has_text="×").first.click()
+        browser.until(page, "!studio.data.edits.swapped")
+        rest(page)
+        assert page.evaluate("studio.data.fault") == ""
+
+
+def test_a_joint_is_moved_by_keys_and_proposals_are_visited(clip, server):
+    with studio(server.url) as page:
+        rest(page)
+        page.keyboard.press("n")
+        first = page.evaluate("studio.data.proposals[0]")
+        assert page.evaluate("studio.film.index") == first["frame"]
+        assert page.locator("#joint option:checked").inner_text() == first["joint"].replace("r_", "right ")
+        assert first["joint"] in FOOT and first["frame"] in WRONG
+        page.keyboard.press("Alt+ArrowDown")
+        browser.until(page, "studio.data.edits.corrections.length === 1")
+        assert page.evaluate("studio.data.edits.corrections[0].joint") == first["joint"]
+
+
+def post(url, path, body, origin=None):
+    """Status of a request of the page."""
+    head = {"Origin": url.rstrip("/") if origin is None else origin}
+    request = urllib.request.Request(url + path, json.dumps(body).encode(), head)
+    with contextlib.suppress(urllib.error.HTTPError), urllib.request.urlopen(request) as answer:
+        return answer.status, json.loads(answer.read())
+    with pytest.raises(urllib.error.HTTPError) as refused:
+        urllib.request.urlopen(request)
+    with refused.value as answer:
+        return answer.code, answer.read().decode()
+
+
+def test_the_film_comes_in_ranges_and_bad_requests_are_refused(clip, server):
+    request = urllib.request.Request(server.url + "film.mp4", headers={"Range": "bytes=10-19"})
+    with urllib.request.urlopen(request) as answer:
+        assert answer.status == 206 and len(answer.read()) == 10
+    pull = {"do": "pull", "frame": 3, "joint": "l_knee", "uv": [1, 2]}
+    for wrong, words in (
+        ({"frame": 99}, "frame 99"),
+        ({"joint": "tail"}, "no such joint"),
+        ({"uv": [1]}, "is missing"),
+        ({"uv": [1e9, 0]}, "far outside"),
+        ({"do": "fly"}, "unknown"),
+    ):
+        status, text = post(server.url, "edit", pull | wrong)
+        assert status == 409 and words in text
+    assert post(server.url, "edit", [1])[0] == 400
+    assert post(server.url, "edit", "x" * 20000)[0] == 413
+    assert post(server.url, "undo", {})[0] == 409
+    assert post(server.url, "edit", pull, origin="http://evil.example")[0] == 403
+    assert not (clip[0] / "clip/video.studio/corrections.json").exists()
+
+
+@pytest.mark.parametrize("width", [390, 1280, 1920])
+def test_fits_every_width(clip, server, width):
+    for dark in (False, True):
+        with studio(server.url, width=width, height=720 if width < 1900 else 1080, dark=dark) as page:
+            assert page.evaluate("document.documentElement.scrollWidth") <= width
+            for name in ("#film .stage", "#scene", "#curves", "#proposals"):
+                box = page.locator(name).bounding_box()
+                assert box["width"] > 200 and box["height"] > 60
+
+
+def test_usage_is_one_line(capsys, tmp_path, monkeypatch):
+    assert main(["studio"]) == 2
+    assert "give VIDEO, or --fetch" in capsys.readouterr().err
+    monkeypatch.setenv("GAIT_WEB", str(tmp_path))
+    assert main(["studio", "film.mp4"]) == 1
+    assert "run gait studio --fetch once" in capsys.readouterr().err
