@@ -98,7 +98,7 @@ def test_a_correction_is_a_point_of_its_own_noise():
     assert (points.uv[7, knee] != found.uv[7, knee]).any()  # the original stays as it was
 
 
-def test_points_around_a_correction_are_doubted_by_its_error():
+def test_points_around_a_correction_are_less_certain_by_its_error():
     points = keypoints()
     knee, off = NAMES.index("l_knee"), np.array([40.0, 30.0])
     edits = Edits((Correction(30, "l_knee", tuple(points.uv[30, knee] + off), 1.0),))
@@ -108,7 +108,7 @@ def test_points_around_a_correction_are_doubted_by_its_error():
     assert sd[31, NAMES.index("r_knee")] == 3.0
 
 
-def test_a_confirmed_point_casts_no_doubt():
+def test_a_confirmed_point_changes_nothing_around_it():
     points = keypoints()
     knee = NAMES.index("l_knee")
     edits = Edits((Correction(30, "l_knee", tuple(points.uv[30, knee] + 1.0), 1.0),))
@@ -124,7 +124,7 @@ def test_a_detector_errs_about_a_foot_as_a_whole():
     assert sd[31, names.index("r_toe")] == sd[31, names.index("l_knee")] == 3.0
 
 
-def test_hidden_points_are_not_seen_and_sides_are_exchanged():
+def test_hidden_points_are_left_out_and_sides_swapped():
     points = keypoints()
     left, right = NAMES.index("l_hip"), NAMES.index("r_hip")
     found = corrected(points, Edits(hidden=(Hidden(3, 5, "r_ankle"),), swapped=(Swap(20, 22),)), 3.0)

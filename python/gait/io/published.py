@@ -51,7 +51,7 @@ class Store:
     files : tuple of Published
         All that belongs there.
     source : str
-        What SOURCE.txt says of where they come from and their licences.
+        Content of SOURCE.txt: where they come from, and their licences.
     """
 
     folder: str

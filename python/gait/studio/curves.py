@@ -17,7 +17,7 @@ from gait.web.motion_data import curve
 Floats = npt.NDArray[np.float64]
 
 NUDGE = 1e-3  # metres, of numeric derivatives
-NEAR_S = 0.35  # seconds from a correction of the same joint within which another would say little new
+NEAR_S = 0.35  # seconds from a correction of the same joint within which another would add little
 PROPOSED = 8  # corrections that are named
 ANGLES = {
     "knee flexion": (("hip", "knee"), ("knee", "ankle")),
@@ -71,7 +71,7 @@ def _angle(places: Floats, parts: list[list[int]]) -> Floats:
 def events_of(
     frame: npt.NDArray[np.int64], time: Floats, names: tuple[str, ...], places: Floats
 ) -> Events | None:
-    """Heel strikes and toe-offs; None if joints are missing or nobody walks."""
+    """Heel strikes and toe-offs; None if joints are missing or no person walks."""
     by_name = {name: places[:, j] for j, name in enumerate(names)}
     try:
         return find_events(Joints(frame, time, by_name))
@@ -118,7 +118,7 @@ def proposals(
 ) -> list[Proposal]:
     """Corrections that would help most: where a joint may be furthest from where it is drawn.
 
-    A correction tells something of the same joint for a while, so none is proposed near another.
+    A correction informs about its joint for a while, so none is proposed near another.
 
     Parameters
     ----------

@@ -63,7 +63,7 @@ class Refiner:
     def __init__(
         self, model: str | None, prepared: Prepared, request: Request, path: str, answer: Answer
     ) -> None:
-        context = multiprocessing.get_context("spawn")  # a fork would share the threads of the server
+        context = multiprocessing.get_context("spawn")  # a copy would share the threads of the server
         self._pipe, other = context.Pipe()
         arguments = (other, model, prepared, request, path)
         self._process = context.Process(target=_serve, args=arguments, daemon=True)

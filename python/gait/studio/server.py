@@ -22,8 +22,8 @@ from gait.web import serve
 _HERE = Path(__file__).parent
 _FILES = ("studio.js", "studio.css")
 _LONGEST = 10_000  # bytes of a request
-_LOOK = 0.05  # seconds between two looks at the version
-_ALIVE = 10.0  # seconds after which a quiet stream says that it is there
+_PERIOD = 0.05  # seconds between two checks of the version
+_ALIVE = 10.0  # seconds after which a quiet stream shows that it is there
 
 
 def application(session: Session, port: int) -> ASGIApp:
@@ -75,16 +75,16 @@ def application(session: Session, port: int) -> ASGIApp:
 
     async def changes(request: Request) -> Response:
         async def versions() -> AsyncIterator[str]:
-            told, quiet = -1, 0.0
+            reported, quiet = -1, 0.0
             while not await request.is_disconnected():
-                if session.version != told:
-                    told, quiet = session.version, 0.0
-                    yield f"data: {told}\n\n"
+                if session.version != reported:
+                    reported, quiet = session.version, 0.0
+                    yield f"data: {reported}\n\n"
                 elif quiet >= _ALIVE:
                     quiet = 0.0
                     yield ": here\n\n"
-                await asyncio.sleep(_LOOK)
-                quiet += _LOOK
+                await asyncio.sleep(_PERIOD)
+                quiet += _PERIOD
 
         return StreamingResponse(
             versions(), media_type="text/event-stream", headers={"cache-control": "no-store"}

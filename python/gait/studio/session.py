@@ -86,7 +86,7 @@ class Session:
             number = np.arange(first, int(keypoints.frame[-1]) + 1)
             times = video.times[number]
 
-            def spread(values: Floats) -> Floats:
+            def placed(values: Floats) -> Floats:
                 return _by_frame(values, keypoints.frame, number)
 
             places, sd = self._places[:, self._shown], motion.sd[:, self._shown]
@@ -97,7 +97,7 @@ class Session:
                 for key in ("values", "low", "high"):
                     if plot[key] is not None:
                         values = np.array([np.nan if v is None else v for v in plot[key]])
-                        plot[key] = rounded(spread(values), 3)
+                        plot[key] = rounded(placed(values), 3)
             view = self._lifted.view
             px = self._off()
             data = motion_data(
@@ -105,18 +105,18 @@ class Session:
                 times,
                 names,
                 [(names.index(a), names.index(b)) for a, b in BONES if {a, b} <= set(names)],
-                spread(places),
-                spread(sd),
+                placed(places),
+                placed(sd),
                 first=first,
                 offset=first,
-                uv=[self._pixels(one) for one in spread(self._uv[:, self._shown])],
-                uv_sd=frames(spread(self._picture_sd()[:, self._shown]), 2),
+                uv=[self._pixels(one) for one in placed(self._uv[:, self._shown])],
+                uv_sd=frames(placed(self._picture_sd()[:, self._shown]), 2),
                 size=list(video.size),
                 camera=rounded(view.camera.centre, 3) if isinstance(view, Perspective) else None,
                 status=None,
                 curves=plots,
                 events=curves.event_marks(events),
-                strip=rounded(spread(np.nan_to_num(px).mean(axis=1) / max(self._tall(), 1.0)), 4),
+                strip=rounded(placed(np.nan_to_num(px).mean(axis=1) / max(self._tall(), 1.0)), 4),
             )
             asked = curves.proposals(keypoints.frame, keypoints.time, names, px, self.edits)
             return (

@@ -34,7 +34,7 @@ Floats = npt.NDArray[np.float64]
 LARGEST = 1280  # pixels of the longer side of the film that browsers get
 KEYFRAMES = 8  # frames from one that is shown alone to the next: seeking decodes no more
 LEAST_SD = 1.0  # pixels, of a track's joints
-NOT_SEEN = ("init", "lost")  # statuses of frames whose joints are not used
+WITHOUT_PERSON = ("init", "lost")  # statuses of frames whose joints are not used
 
 
 @dataclass(frozen=True)
@@ -181,8 +181,8 @@ def keypoints_of_track(path: str, camera: Camera) -> Keypoints:
     names = tuple(track.places)
     places = np.stack([track.places[name] for name in names], axis=1)
     sd = np.stack([track.sd[name] for name in names], axis=1)
-    seen = ~np.isin(track.status, NOT_SEEN)
-    uv = np.where(seen[:, None, None], camera.project(places), np.nan)
+    tracked = ~np.isin(track.status, WITHOUT_PERSON)
+    uv = np.where(tracked[:, None, None], camera.project(places), np.nan)
     pixels = np.maximum(picture_sd(camera.project, places, sd), LEAST_SD)
     return Keypoints(
         track.frame, track.time, names, uv, np.ones(uv.shape[:2]), np.nan_to_num(pixels, nan=LEAST_SD)

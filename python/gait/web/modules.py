@@ -1,7 +1,7 @@
 """Modules of our pages, and the head of a page: with them served beside it, or written into it.
 
-The modules import each other and their parts by bare names (``three``, ``gait/scene.js``), so the same files
-work in both kinds of page; an import map says where they are.  There is no bundler.
+The modules import each other and their parts by plain names (``three``, ``gait/scene.js``), so the same files
+work in both kinds of page; an import map has their places.  There is no bundler.
 """
 
 from __future__ import annotations
@@ -15,7 +15,7 @@ from gait.web import parts
 
 OWN = ("scene.js", "film.js", "curves.js")
 """Our modules, imported as ``gait/NAME``."""
-_BARE = {"three": parts.THREE, "three/OrbitControls.js": parts.ORBIT}
+_PLAIN = {"three": parts.THREE, "three/OrbitControls.js": parts.ORBIT}
 _HERE = Path(__file__).parent
 
 
@@ -32,7 +32,7 @@ def served(drawing: bool = True) -> dict[str, bytes]:
     UserError
         If the parts were not fetched and are needed, for `drawing` figures or curves.
     """
-    needed = (*_BARE.values(), parts.ECHARTS) if drawing else ()
+    needed = (*_PLAIN.values(), parts.ECHARTS) if drawing else ()
     fetched = {part.file: parts.load(part) for part in needed}
     return fetched | {name: own(name).encode() for name in (*OWN, "style.css")}
 
@@ -47,7 +47,7 @@ def served_head(drawing: bool = True) -> tuple[str, str]:
     script_src : str
         What ``Content-Security-Policy: script-src`` has to allow.
     """
-    imports = {name: f"/web/{part.file}" for name, part in _BARE.items()}
+    imports = {name: f"/web/{part.file}" for name, part in _PLAIN.items()}
     imports |= {f"gait/{name}": f"/web/{name}" for name in OWN}
     text = json.dumps({"imports": imports})
     digest = base64.b64encode(hashlib.sha256(text.encode()).digest()).decode()
@@ -70,7 +70,7 @@ def inlined_head(parts_too: bool = True) -> str:
     UserError
         If the parts were not fetched.
     """
-    modules = {name: parts.load(part) for name, part in _BARE.items() if parts_too}
+    modules = {name: parts.load(part) for name, part in _PLAIN.items() if parts_too}
     modules |= {f"gait/{name}": own(name).encode() for name in (OWN if parts_too else ("film.js",))}
     imports = {
         name: "data:text/javascript;base64," + base64.b64encode(data).decode()

@@ -8,8 +8,8 @@ The file (JSON), in which every list may be absent::
      "floor": [{"frame": 60, "joint": "l_heel", "uv": [1190.0, 940.0]}]}
 
 ``corrections`` pull a joint (or another marker of the prior) to a pixel; ``sd_px`` is how exactly it was
-pointed at.  ``hidden`` joints are not visible, whatever the detector found.  ``swapped`` exchanges left and
-right of all joints.  ``floor`` puts a foot on the floor of a calibrated camera, where the pixel shows it.
+pointed at.  ``hidden`` joints are not visible, whatever the detector found.  ``swapped`` swaps left and right
+of all joints.  ``floor`` puts a foot on the floor of a calibrated camera, where the pixel shows it.
 ``corrections`` serve the pictures of a video as well (`gait.lift.video`), the others keypoints alone.
 """
 
@@ -70,7 +70,7 @@ class Hidden:
 
 @dataclass(frozen=True)
 class Swap:
-    """Frames `first` to `last`, in which left and right are exchanged."""
+    """Frames `first` to `last`, in which left and right are swapped."""
 
     first: int
     last: int
@@ -138,7 +138,7 @@ class _Reader:
     def _range(self, fields: Fields) -> tuple[int, int]:
         first, last = self._frame(fields, "first"), self._frame(fields, "last")
         if last < first:
-            raise fields.fail("last", f"is {last}, before first ({first})", "exchange them")
+            raise fields.fail("last", f"is {last}, before first ({first})", "give the first frame as first")
         return first, last
 
     def _frame(self, fields: Fields, key: str) -> int:
@@ -243,7 +243,7 @@ def read_corrections(
 def corrected(keypoints: Keypoints, edits: Edits, sd: float) -> Keypoints:
     """Keypoints with what was corrected by hand.
 
-    A correction tells how wrong the detector was there.  Detectors err for a while, and about a foot as a
+    A correction shows how wrong the detector was there.  Detectors err for a while, and about a foot as a
     whole: points around it get the variance of that error, less as time goes by.
 
     Parameters
