@@ -56,7 +56,7 @@ COMMANDS = {
         "demo", "run capture, tracker and recorder on a clip and report", ("video", "lcm", "report")
     ),
     "report": Command(
-        "report", "make an overlay video and an HTML page of a tracked clip", ("video", "lcm", "report")
+        "report", "make one page of a run: verdict, film, figure, gait, angles", ("video", "report")
     ),
     "report track": Command(
         "report_track", "measure the gait parameters of a track, with plots", ("video", "report")
