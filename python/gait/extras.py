@@ -18,6 +18,9 @@ EXTRAS = {
     "report": {"matplotlib": "Matplotlib", "scipy": "SciPy"},
     "mocap": {"scipy": "SciPy", "ezc3d": "ezc3d", "threadpoolctl": "threadpoolctl"},
     "h5": {"h5py": "h5py"},
+    "parquet": {"pyarrow": "PyArrow"},
+    "rerun": {"rerun": "Rerun"},
+    "mcap": {"mcap": "mcap"},
     "dask": {"distributed": "Dask"},
     "studio": {"starlette": "Starlette", "uvicorn": "uvicorn"},
 }

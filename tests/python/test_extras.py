@@ -20,6 +20,7 @@ OPTIONAL = PROJECT["optional-dependencies"]
 IMPORTED = {
     "opencv-python-headless": "cv2",
     "PyYAML": "yaml",
+    "rerun-sdk": "rerun",
     "ai-edge-litert": "ai_edge_litert",
 }  # by another name than installed
 

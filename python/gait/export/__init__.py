@@ -1,0 +1,1 @@
+"""Motion in the formats of other tools: one module for each format, `motion` for what all of them need."""

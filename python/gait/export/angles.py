@@ -1,0 +1,191 @@
+"""Joint angles of a motion: a skeleton of constant lengths fitted to the joints by least squares.
+
+The skeleton is the package's (libgait/doc/model-format.md), with the person's own lengths.  Joints alone do
+not determine how far the pelvis is tilted forwards or the head turned: these two angles are 0.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from gait.body.skeleton import CHANNELS, JOINTS, axis_rotation, default_skeleton
+from gait.export.motion import Motion
+
+Array = NDArray[np.float64]
+
+FIXED = ("root_forward", "root_sway", "root_height", "root_pitch", "neck_z")
+"""Channels that are 0: those of the path are kept as the pelvis's place, the others are undetermined."""
+_ROUNDS, _STEPS = 6, 12  # of lengths and angles in turns; of Gauss and Newton within
+_RIDGE = 1e-8  # metres squared per radian squared: where an arm is straight, its rotation is 0
+_SETTLED = 1e-10  # radians
+
+
+@dataclass(frozen=True)
+class Fitted:
+    """A skeleton that follows a motion of T frames."""
+
+    frames: tuple[str, ...]  #: F names, parents first
+    parents: tuple[int, ...]  #: (F,) -1 for the first
+    #: For each frame the axes of its rotations, one after the other: (signed axis 1..3, channel).
+    rotations: tuple[tuple[tuple[int, int], ...], ...]
+    origins: Array  #: (F, 3) metres, in the parent; 0 for the first
+    point_frames: NDArray[np.int64]  #: (P,) frame of each joint
+    points: Array  #: (P, 3) metres, in its frame
+    angles: Array  #: (T, C) radians by channel; NaN in frames that the motion leaves out
+    pelvis: Array  #: (T, 3) metres, world
+    rms: float  #: distance of its joints from those of the motion, metres
+
+    def pose(
+        self, rows: slice | NDArray[np.bool_] = slice(None)
+    ) -> tuple[Array, Array, list[tuple[int, int, Array]]]:
+        """Rotations (T, F, 3, 3), origins (T, F, 3), and (channel, frame, axes (T, 3)), all in the world."""
+        angles, pelvis = self.angles[rows], self.pelvis[rows]
+        turns = np.empty((len(angles), len(self.frames), 3, 3))
+        origins = np.empty((len(angles), len(self.frames), 3))
+        axes: list[tuple[int, int, Array]] = []
+        for i, parent in enumerate(self.parents):
+            turn = np.broadcast_to(np.eye(3), (len(angles), 3, 3)) if parent < 0 else turns[:, parent]
+            origins[:, i] = pelvis if parent < 0 else origins[:, parent] + turn @ self.origins[i]
+            for axis, channel in self.rotations[i]:
+                axes.append((channel, i, np.sign(axis) * turn[:, :, abs(axis) - 1]))
+                turn = turn @ axis_rotation(abs(axis) - 1, np.sign(axis) * angles[:, channel])
+            turns[:, i] = turn
+        return turns, origins, axes
+
+    def joints(self) -> Array:
+        """Joints (T, P, 3) in the world, metres."""
+        turns, origins, _ = self.pose()
+        at = self.point_frames
+        return np.asarray(origins[:, at] + np.einsum("tpij,pj->tpi", turns[:, at], self.points))
+
+
+def fit(motion: Motion) -> Fitted:
+    """Fit lengths and angles to a motion, each in turns."""
+    skeleton = default_skeleton()
+    wanted = motion.places[motion.present]
+    stature = _stature(wanted)
+    links = [tuple(int(n) for n in row) for row in skeleton.links]
+    count = len(wanted)
+    fitted = Fitted(
+        frames=tuple(skeleton.frames),
+        parents=tuple(row[0] for row in links),
+        rotations=tuple(
+            tuple(zip(row[2 : 2 + 2 * row[1] : 2], row[3 : 3 + 2 * row[1] : 2], strict=True)) for row in links
+        ),
+        origins=skeleton.origins * stature,
+        point_frames=np.asarray(skeleton.point_frames, np.int64),
+        points=skeleton.point_positions * stature,
+        angles=np.zeros((count, len(CHANNELS))),
+        pelvis=wanted[:, JOINTS.index("pelvis")].copy(),
+        rms=np.inf,
+    )
+    fitted.angles[:, CHANNELS.index("root_yaw")] = _heading(wanted)
+    for _ in range(_ROUNDS):
+        fitted = _with_lengths(_with_angles(fitted, wanted), wanted)
+    fitted = _with_angles(fitted, wanted)
+    rms = float(np.sqrt(((fitted.joints() - wanted) ** 2).sum(axis=2).mean()))
+    angles, pelvis = (np.full((len(motion.places), n), np.nan) for n in (len(CHANNELS), 3))
+    angles[motion.present] = np.unwrap(fitted.angles, axis=0)
+    pelvis[motion.present] = fitted.pelvis
+    return replace(fitted, angles=angles, pelvis=pelvis, rms=rms)
+
+
+def _stature(joints: Array) -> float:
+    """Stature that the legs suggest, metres."""
+
+    def length(a: str, b: str) -> float:
+        return float(
+            np.median(np.linalg.norm(joints[:, JOINTS.index(a)] - joints[:, JOINTS.index(b)], axis=1))
+        )
+
+    legs = [length(f"{s}_hip", f"{s}_knee") + length(f"{s}_knee", f"{s}_ankle") for s in "lr"]
+    return max(sum(legs) / 2 / 0.49, 0.1)
+
+
+def _heading(joints: Array) -> Array:
+    """Heading (T,) of the pelvis, radians."""
+    left = joints[:, JOINTS.index("l_hip")] - joints[:, JOINTS.index("r_hip")]
+    return np.unwrap(np.arctan2(-left[:, 0], left[:, 1]))
+
+
+def _with_angles(fitted: Fitted, wanted: Array) -> Fitted:
+    """Angles and pelvis that bring the joints nearest to those wanted, by Gauss and Newton."""
+    free = [i for i, name in enumerate(CHANNELS) if name not in FIXED]
+    inside = _descendants(fitted.parents)
+    for _ in range(_STEPS):
+        turns, origins, axes = fitted.pose()
+        at = fitted.point_frames
+        joints = origins[:, at] + np.einsum("tpij,pj->tpi", turns[:, at], fitted.points)
+        slopes = np.zeros((len(wanted), joints.shape[1], 3, len(free) + 3))
+        for channel, frame, axis in axes:
+            if channel not in free:
+                continue
+            moved = inside[frame][at]
+            arm = joints[:, moved] - origins[:, None, frame]
+            slopes[..., free.index(channel)][:, moved] = np.cross(axis[:, None], arm)
+        slopes[..., len(free) :] = np.eye(3)
+        rows = slopes.reshape(len(wanted), -1, len(free) + 3)
+        missed = (wanted - joints).reshape(len(wanted), -1)
+        ridge = np.diag([_RIDGE] * len(free) + [0.0] * 3)
+        pull = np.zeros((len(wanted), len(free) + 3))
+        pull[:, : len(free)] = _RIDGE * fitted.angles[:, free]
+        normal = rows.transpose(0, 2, 1) @ rows + ridge
+        step = np.linalg.solve(normal, (np.einsum("tri,tr->ti", rows, missed) - pull)[..., None])[..., 0]
+        step[:, : len(free)] = np.clip(step[:, : len(free)], -0.5, 0.5)
+        angles = fitted.angles.copy()
+        angles[:, free] += step[:, : len(free)]
+        fitted = replace(fitted, angles=angles, pelvis=fitted.pelvis + step[:, len(free) :])
+        if np.abs(step).max() < _SETTLED:
+            break
+    return fitted
+
+
+def _descendants(parents: tuple[int, ...]) -> NDArray[np.bool_]:
+    """Which frames move with which: (F, F), row by the one that turns."""
+    inside = np.eye(len(parents), dtype=bool)
+    for i, parent in enumerate(parents):
+        if parent >= 0:
+            inside[:, i] |= inside[:, parent]
+    return inside
+
+
+def _with_lengths(fitted: Fitted, wanted: Array) -> Fitted:
+    """Lengths of the person: means over the motion, in the frames as they turn.
+
+    Where a frame's angles decide the direction, only the distance counts: arms, legs, the top of the head.
+    """
+    turns, origins, _ = fitted.pose()
+    place = dict(zip(JOINTS, np.moveaxis(wanted, 1, 0), strict=True))
+    starts = {"head": "neck"} | {
+        f"{s}_{part}": f"{s}_{joint}" for s in "lr" for part, joint in _STARTS.items()
+    }
+    new_origins, new_points = fitted.origins.copy(), fitted.points.copy()
+    for i, name in enumerate(fitted.frames):
+        if name in starts:
+            parent = fitted.parents[i]
+            new_origins[i] = _mean_in(
+                turns[:, parent], origins[:, parent], place[starts[name]], fitted.origins[i]
+            )
+    for p, joint in enumerate(JOINTS):
+        frame = int(fitted.point_frames[p])
+        if fitted.points[p].any():
+            new_points[p] = _mean_in(turns[:, frame], origins[:, frame], place[joint], fitted.points[p])
+    return replace(fitted, origins=new_origins, points=new_points)
+
+
+#: Joint at which each frame begins.
+_STARTS = {
+    **{"upper_arm": "shoulder", "forearm": "elbow", "thigh": "hip", "shank": "knee", "foot": "ankle"},
+}
+
+
+def _mean_in(turns: Array, origins: Array, places: Array, before: Array) -> Array:
+    """Mean place (3,) of a point in a frame; along `before` alone if that lies on an axis."""
+    local = np.einsum("tji,tj->ti", turns, places - origins)
+    if np.count_nonzero(before) == 1:
+        length = np.linalg.norm(places - origins, axis=1).mean()
+        return np.asarray(np.sign(before) * length)
+    return np.asarray(local.mean(axis=0))

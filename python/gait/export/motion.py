@@ -1,0 +1,66 @@
+"""A motion to be exported: joints at equal steps of time."""
+
+from __future__ import annotations
+
+import os
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from gait.body.skeleton import JOINTS
+from gait.errors import UserError
+from gait.io.track_file import Track, read_estimates
+from gait.motion.footfalls import Events, find_events
+
+Array = NDArray[np.float64]
+
+_OFF = 0.6  # of a step by which a time may miss its frame's at a constant rate
+
+
+@dataclass(frozen=True)
+class Motion:
+    """Joints of a person; world with z up."""
+
+    name: str  #: of the file, without suffix
+    names: tuple[str, ...]  #: P joints
+    rate: float  #: frames per second
+    first: float  #: time of the first frame, seconds
+    places: Array  #: (T, P, 3) metres; NaN in frames that the track leaves out
+    track: Track  #: as it was read: its rows only
+
+    @property
+    def time(self) -> Array:
+        """Times (T,) of the frames, seconds."""
+        return np.asarray(self.first + np.arange(len(self.places)) / self.rate)
+
+    @property
+    def present(self) -> NDArray[np.bool_]:
+        """Which frames the track has (T,)."""
+        return np.asarray(np.isfinite(self.places).all(axis=(1, 2)))
+
+    def events(self) -> Events | None:
+        """Heel strikes and toe-offs, seconds; None where too few frames are there."""
+        return find_events(self.track) if len(self.track.frame) > 2 else None
+
+
+def read(path: str | os.PathLike[str]) -> Motion:
+    """Read a track of ``gait track`` or a motion of ``gait lift``.
+
+    UserError if it is none, has fewer than two frames, or no constant rate.
+    """
+    track = read_estimates(path)
+    frame, time = track.frame, track.time
+    if len(frame) < 2:
+        raise UserError(f"{path}: has one frame; give a motion of two or more")
+    rate = round(float((frame[-1] - frame[0]) / (time[-1] - time[0])), 3)  # times are rounded, too
+    late = (time - time[0]) * rate - (frame - frame[0])
+    if not np.abs(late).max() < _OFF:
+        raise UserError(
+            f"{path}: frames have no constant rate: frame {frame[int(np.abs(late).argmax())]} is "
+            f"{np.abs(late).max():.1f} steps off; formats other than .parquet need equal steps"
+        )
+    places = np.full((int(frame[-1] - frame[0]) + 1, len(JOINTS), 3), np.nan)
+    places[frame - frame[0]] = np.stack([track.places[name] for name in JOINTS], axis=1)
+    name = os.path.splitext(os.path.basename(os.fspath(path)))[0]
+    return Motion(name, tuple(JOINTS), rate, float(time[0]), places, track)
