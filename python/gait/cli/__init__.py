@@ -37,6 +37,7 @@ class Command(NamedTuple):
 COMMANDS = {
     "learn": Command("learn", "learn a cyclic model from motion capture", ("mocap",)),
     "info": Command("info", "show what a model holds"),
+    "doctor": Command("doctor", "check this machine and name the remedy of every fault"),
     "track": Command("track", "track a walking person in a video file", ("video",)),
     "eval": Command("evaluate", "compare a track with the truth", ("video",)),
     "detect": Command("detect", "find the 2-D keypoints of the people in a video", ("video",)),

@@ -1,0 +1,233 @@
+"""Check what the package needs of this machine, and name the remedy of every fault.
+
+Checked are the C library and its ABI, the shipped model, the CPU, the detector's weights, optional packages,
+LCM's multicast route and receive buffer, the daemon, cameras, and the disk.  ok is fine, note is missing but
+not always needed, fault must be mended.  Ends with 1 if there is a fault.
+"""
+
+from __future__ import annotations
+
+import argparse
+import json
+import os
+import shutil
+from collections.abc import Callable, Iterator
+from pathlib import Path
+from typing import NamedTuple
+
+EXAMPLES = """\
+examples:
+  gait doctor
+  gait doctor --json
+"""
+
+_DEVICES = Path("/dev")
+_DAEMON = Path(__file__).resolve().parents[3] / "build" / "bin" / "gait-trackd"
+_LEAST_FREE = 1 << 30  # bytes: a track of an hour, or an overlay of some minutes
+_MESSAGE = b"gait doctor"
+_SECONDS = 1.0  # for a message to come back
+
+
+class Finding(NamedTuple):
+    """What one check found."""
+
+    name: str
+    state: str
+    """ok, note or fault."""
+    text: str
+    remedy: str = ""
+
+
+def add_arguments(parser: argparse.ArgumentParser) -> None:
+    """Add nothing: the command has the common options alone."""
+
+
+def run(args: argparse.Namespace) -> int:
+    """Check and report."""
+    found = [finding for check in CHECKS for finding in check()]
+    if args.json:
+        print(json.dumps([finding._asdict() for finding in found]))
+    else:
+        print("\n".join(_line(finding) for finding in found if not args.quiet or finding.state == "fault"))
+    return int(any(finding.state == "fault" for finding in found))
+
+
+def _line(finding: Finding) -> str:
+    remedy = f"; {finding.remedy}" * bool(finding.remedy)
+    return f"{finding.state:5} {finding.name}: {finding.text}{remedy}"
+
+
+def check_library() -> Iterator[Finding]:
+    """Check for a library of this version and layout, and the instruction set that it uses."""
+    from gait.bindings.library import library, version_text
+    from gait.errors import LibraryError
+
+    try:
+        loaded = library()
+    except LibraryError as error:
+        text, _, remedy = str(error).rpartition(" - ")
+        yield Finding("library", "fault", text, remedy)
+        return
+    yield Finding("library", "ok", f"libgait {version_text(loaded.gait_version())}, ABI {loaded.gait_abi()}")
+    kernels = loaded.gait_cpu_name(0xFFFFFFFF).decode()
+    text = f"{os.cpu_count()} cores, kernels {kernels}"
+    if kernels in ("scalar", "base"):
+        slow = "no AVX2: a step takes two to four times as long; give fewer --particles where frames are late"
+        yield Finding("cpu", "note", text, slow)
+    else:
+        yield Finding("cpu", "ok", text)
+
+
+def check_model() -> Iterator[Finding]:
+    """Check the model of the package."""
+    from gait.bindings.model import Model
+    from gait.errors import GaitError, UserError
+
+    try:
+        model = Model()
+    except (UserError, GaitError) as error:
+        yield Finding("model", "fault", " ".join(str(error).split()), "install the package again")
+        return
+    yield Finding("model", "ok", f"{len(model.joint_names)} joints")
+
+
+def check_extras() -> Iterator[Finding]:
+    """Check the packages of every extra."""
+    from gait import extras
+
+    for extra in extras.EXTRAS:
+        missing = extras.remedy("it", (extra,))
+        if missing:
+            text, _, remedy = missing.removeprefix("it needs ").partition(": ")
+            yield Finding(f"extra {extra}", "note", f"lacks {text}", remedy)
+        else:
+            yield Finding(f"extra {extra}", "ok", "installed")
+
+
+def check_weights() -> Iterator[Finding]:
+    """Check that the detector's weights are there and whole."""
+    from gait.detect import weights
+    from gait.errors import UserError
+
+    for name, file in {"people": weights.PERSON, **weights.LANDMARKS}.items():
+        optional = name in ("lite", "heavy")
+        if not weights.find(file):
+            state = "note" if optional else "fault"
+            yield Finding(f"weights {name}", state, "are not on this machine", weights.FETCH)
+            continue
+        try:
+            weights.load(file)
+        except UserError as error:
+            yield Finding(f"weights {name}", "fault", str(error), weights.FETCH)
+            continue
+        yield Finding(f"weights {name}", "ok", "there")
+
+
+def check_network() -> Iterator[Finding]:
+    """Check LCM's multicast on this host, and the receive buffer."""
+    from gait.errors import UserError
+
+    try:
+        from gait.lcm import link
+    except ModuleNotFoundError:
+        yield Finding("lcm", "note", "is not installed", "pip install 'libgait[video,lcm]'")
+        return
+    except UserError as error:  # liblcm lacks the system's GLib
+        text, _, remedy = str(error).partition("; ")
+        yield Finding("lcm", "fault", text, remedy)
+        return
+    if not _comes_back(link):
+        yield Finding("lcm route", "fault", "a multicast message does not come back", link.ROUTE_REMEDY)
+    else:
+        yield Finding("lcm route", "ok", "a multicast message comes back")
+    granted = link.receive_buffer()
+    if warning := link.buffer_warning(link.DEFAULT_URL):
+        text, _, remedy = warning.partition(": some will be lost; ")
+        yield Finding("lcm buffer", "fault", text, remedy)
+    else:
+        yield Finding("lcm buffer", "ok", f"{granted} bytes")
+
+
+def _comes_back(link: object) -> bool:
+    """Whether a message sent over LCM on a port of its own is received."""
+    from gait.errors import UserError
+
+    received: list[bytes] = []
+    try:
+        network = link.open_lcm(link.private_url())  # type: ignore[attr-defined]
+        network.subscribe("GAIT_DOCTOR", lambda _, data: received.append(data))
+        network.publish("GAIT_DOCTOR", _MESSAGE)
+        network.handle_timeout(int(1000 * _SECONDS))
+    except (UserError, OSError):
+        return False
+    return received == [_MESSAGE]
+
+
+def check_daemon() -> Iterator[Finding]:
+    """Check the daemon beside the sources or on the PATH, of this version."""
+    import subprocess
+
+    from gait._version import __version__
+
+    place = shutil.which("gait-trackd") or (str(_DAEMON) if _DAEMON.is_file() else None)
+    if place is None:
+        yield Finding(
+            "gait-trackd", "note", "is not here", "run make tools in the sources, for tracking live"
+        )
+        return
+    try:
+        done = subprocess.run([place, "--version"], capture_output=True, text=True, timeout=10, check=False)
+        text = done.stdout.strip()
+    except (OSError, subprocess.TimeoutExpired) as error:
+        text = str(error)
+    if __version__ in text:
+        yield Finding("gait-trackd", "ok", f"{place}: {text.splitlines()[0]}")
+    else:
+        yield Finding(
+            "gait-trackd",
+            "fault",
+            f"{place}: {text or 'no answer'} is not {__version__}",
+            "run make tools again",
+        )
+
+
+def check_cameras() -> Iterator[Finding]:
+    """Check cameras of this machine and the right to read them."""
+    cameras = sorted(_DEVICES.glob("video*"))
+    if not cameras:
+        yield Finding(
+            "camera", "note", "no camera at /dev/video*", "gait capture takes files and streams, too"
+        )
+    for camera in cameras:
+        if os.access(camera, os.R_OK | os.W_OK):
+            yield Finding("camera", "ok", str(camera))
+        else:
+            remedy = "add yourself to its group: sudo usermod -aG video $USER, then log in again"
+            yield Finding("camera", "fault", f"{camera} may not be read", remedy)
+
+
+def check_disk() -> Iterator[Finding]:
+    """Check room and rights where outputs and temporary files go."""
+    import tempfile
+
+    for what, folder in (("folder", Path.cwd()), ("temporary folder", Path(tempfile.gettempdir()))):
+        try:
+            with tempfile.TemporaryFile(dir=folder) as file:
+                file.write(b"1")
+        except OSError as error:
+            yield Finding(
+                "disk", "fault", f"{what} {folder}: {error.strerror}", "choose another, or set TMPDIR"
+            )
+            continue
+        free = shutil.disk_usage(folder).free
+        text = f"{what} {folder}: {free / 2**30:.1f} GB free"
+        if free < _LEAST_FREE:
+            yield Finding("disk", "fault", text, "make room: videos and logs need gigabytes")
+        else:
+            yield Finding("disk", "ok", text)
+
+
+CHECKS: tuple[Callable[[], Iterator[Finding]], ...] = (
+    *(check_library, check_model, check_extras, check_weights, check_network),
+    *(check_daemon, check_cameras, check_disk),
+)

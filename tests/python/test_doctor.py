@@ -1,0 +1,147 @@
+"""gait doctor names the remedy of each planted fault, and of nothing else."""
+
+import json
+from collections import namedtuple
+
+import pytest
+
+import gait.cli
+from gait.bindings import library as bindings
+from gait.cli import doctor
+
+
+def findings(capsys):
+    code = gait.cli.main(["doctor", "--json"])
+    return code, {row["name"]: row for row in json.loads(capsys.readouterr().out)}
+
+
+def lines(check):
+    return [doctor._line(finding) for finding in check()]
+
+
+def test_this_machine(capsys):
+    code, found = findings(capsys)
+    assert found["library"]["state"] == found["model"]["state"] == "ok"
+    assert code == int(any(row["state"] == "fault" for row in found.values()))
+    assert all(row["remedy"] for row in found.values() if row["state"] != "ok")
+    assert {row["state"] for row in found.values()} <= {"ok", "note", "fault"}
+
+
+def test_a_library_that_is_none(monkeypatch, tmp_path, capsys):
+    (tmp_path / "libgait.so").write_bytes(b"no library")
+    monkeypatch.setenv("GAIT_LIBRARY", str(tmp_path / "libgait.so"))
+    bindings.library.cache_clear()
+    try:
+        (line,) = lines(doctor.check_library)
+        assert line.startswith("fault library: cannot load") and "make lib, or set GAIT_LIBRARY" in line
+        (line,) = lines(doctor.check_model)
+        assert line.startswith("fault model: ")
+        assert gait.cli.main(["doctor", "--quiet"]) == 1
+        assert all(row.startswith("fault") for row in capsys.readouterr().out.splitlines())
+    finally:
+        bindings.library.cache_clear()
+
+
+def test_a_cpu_without_vectors(monkeypatch):
+    class Library:
+        gait_version = staticmethod(lambda: 0x010203)
+        gait_abi = staticmethod(lambda: 1)
+        gait_cpu_name = staticmethod(lambda mask: b"scalar")
+
+    monkeypatch.setattr(bindings, "library", lambda: Library)
+    assert (
+        "note  cpu: " in lines(doctor.check_library)[1]
+        and "fewer --particles" in lines(doctor.check_library)[1]
+    )
+
+
+def test_a_missing_package(monkeypatch):
+    from gait import extras
+
+    monkeypatch.setattr(extras, "find_spec", lambda module: None if module == "h5py" else object())
+    (line,) = [line for line in lines(doctor.check_extras) if not line.startswith("ok")]
+    assert line == "note  extra h5: lacks h5py; pip install 'libgait[h5]'"
+
+
+def test_weights_that_are_missing_or_damaged(monkeypatch, tmp_path):
+    monkeypatch.setenv("GAIT_WEIGHTS", str(tmp_path))
+    found = lines(doctor.check_weights)
+    assert (
+        found[0]
+        == "fault weights people: are not on this machine; run gait detect --fetch once, with a network"
+    )
+    assert [line.split()[0] for line in found] == ["fault", "fault", "note", "note"]
+    (tmp_path / "pose_detection.tflite").write_bytes(b"damaged")
+    first = lines(doctor.check_weights)[0]
+    assert first.startswith("fault weights people: ") and first.endswith(
+        "run gait detect --fetch once, with a network"
+    )
+
+
+def test_no_multicast_route_and_a_small_buffer(monkeypatch, tmp_path):
+    pytest.importorskip("lcm", reason="lcm is not installed: extra lcm")
+    from gait.errors import UserError
+    from gait.lcm import link
+
+    def refuse(url=None):
+        raise UserError("no route")
+
+    monkeypatch.setattr(link, "open_lcm", refuse)
+    (tmp_path / "rmem_max").write_text("212992\n")
+    monkeypatch.setattr(link, "_RMEM_MAX", tmp_path / "rmem_max")
+    route, buffer = lines(doctor.check_network)
+    assert route.startswith("fault lcm route: ") and "ip route add 224.0.0.0/4 dev lo" in route
+    assert (
+        buffer.startswith("fault lcm buffer: the kernel grants")
+        and "sysctl -w net.core.rmem_max=4194304" in buffer
+    )
+
+
+def test_a_message_that_is_lost(monkeypatch):
+    link = pytest.importorskip("gait.lcm.link", reason="lcm is not installed: extra lcm")
+
+    class Deaf:
+        subscribe = publish = staticmethod(lambda *_: None)
+        handle_timeout = staticmethod(lambda _: 0)
+
+    monkeypatch.setattr(link, "open_lcm", lambda url: Deaf)
+    assert lines(doctor.check_network)[0].startswith(
+        "fault lcm route: a multicast message does not come back"
+    )
+
+
+@pytest.mark.parametrize(
+    ("script", "state"), [("echo gait-trackd 0.0.1", "fault"), ("exit 3", "fault"), (None, "note")]
+)
+def test_a_daemon_that_is_old_broken_or_missing(script, state, monkeypatch, tmp_path):
+    monkeypatch.setattr(doctor, "_DAEMON", tmp_path / "gait-trackd")
+    monkeypatch.setenv("PATH", "/usr/bin:/bin")
+    if script:
+        (tmp_path / "gait-trackd").write_text(f"#!/bin/sh\n{script}\n")
+        (tmp_path / "gait-trackd").chmod(0o755)
+    (line,) = lines(doctor.check_daemon)
+    assert line.startswith(f"{state:5} gait-trackd: ") and "make tools" in line
+
+
+def test_a_camera_that_may_not_be_read(monkeypatch, tmp_path):
+    (tmp_path / "video0").write_bytes(b"")
+    monkeypatch.setattr(doctor, "_DEVICES", tmp_path)
+    assert lines(doctor.check_cameras) == [f"ok    camera: {tmp_path / 'video0'}"]
+    monkeypatch.setattr(doctor.os, "access", lambda *_: False)
+    (line,) = lines(doctor.check_cameras)
+    assert line.startswith("fault camera: ") and "usermod -aG video" in line
+    (tmp_path / "video0").unlink()
+    assert lines(doctor.check_cameras)[0].startswith("note  camera: no camera")
+
+
+def test_a_full_disk_and_a_folder_that_takes_no_files(monkeypatch, tmp_path):
+    import tempfile
+
+    usage = namedtuple("usage", "total used free")
+    monkeypatch.setattr(doctor.shutil, "disk_usage", lambda _: usage(10, 9, 1 << 20))
+    assert all("0.0 GB free; make room" in line for line in lines(doctor.check_disk))
+    monkeypatch.setattr(tempfile, "tempdir", str(tmp_path / "none"))
+    assert (
+        lines(doctor.check_disk)[1].startswith("fault disk: temporary folder ")
+        and "TMPDIR" in lines(doctor.check_disk)[1]
+    )
