@@ -16,6 +16,7 @@ from gait.learn.solve.body import Body
 from gait.learn.solve.kinematics import SEGMENTS
 
 WALKS = Path(__file__).parents[2] / "../shared/data/mocap/cmu_walk"
+MORE = Path(__file__).resolve().parents[2] / "../shared/data/mocap/more"
 FILE = Path("walk.c3d")
 LEGS = [n for n in ANGLES if "hip" in n or "knee" in n or "ankle" in n]
 
@@ -203,11 +204,53 @@ def test_a_treadmill_becomes_ground():
     still = body.joints["pelvis"][:, :2] - body.joints["pelvis"][:1, :2]
     on_the_spot = np.concatenate([still, np.zeros((360, 1))], axis=1)
     joints = {n: p - on_the_spot for n, p in body.joints.items()}
-    joints |= {f"{s}_ankle": sliding + 0.01 * np.abs(np.sin(np.arange(360) / 19))[:, None] for s in "lr"}
+    foot = sliding + [0.0, 0.0, 0.01] * np.abs(np.sin(np.arange(360) / 19))[:, None]
+    joints |= {f"{s}_{name}": foot for s in "lr" for name in ("ankle", "toe")}
     belt = retarget.overground(Body("belt", 120.0, joints, body.pelvis, body.lateral))
     travel = belt.joints["pelvis"][-1] - belt.joints["pelvis"][0]
     assert travel[:2] == pytest.approx([0, 1.5 * 359 / 120], abs=0.1)
     assert retarget.overground(body) is body
+
+
+def on_belt(speed, slope, stance, frames=480, fps=120.0, period=100.0):
+    """Joints of a person in place: feet go back with a sloping belt, then forward through the air."""
+    rng, joints = np.random.default_rng(3), {"pelvis": np.tile([0.0, 0.0, 1.0], (frames, 1))}
+    for s, lag in (("l", 0.0), ("r", 0.5)):
+        phase = np.mod(np.arange(frames) / period + lag, 1)
+        reach = speed * stance * period / fps
+        swing = np.clip((phase - stance) / (1 - stance), 0, 1)
+        ahead = reach * np.where(phase < stance, 0.5 - phase / stance, -0.5 * np.cos(np.pi * swing))
+        height = slope * ahead + 0.12 * np.sin(np.pi * swing)
+        for name, above in (("ankle", 0.09), ("toe", 0.02)):
+            place = np.stack([ahead, np.full(frames, 0.1 if s == "l" else -0.1), above + height], axis=1)
+            joints[f"{s}_{name}"] = place + rng.normal(scale=0.001, size=place.shape)
+    return Body("belt", fps, joints, np.tile(np.eye(3), (frames, 1, 1)))
+
+
+@pytest.mark.parametrize("slope", [-0.1, 0.0, 0.15])
+@pytest.mark.parametrize(("speed", "stance"), [(1.2, 0.62), (2.5, 0.36), (3.5, 0.28)])
+def test_belts_of_walks_and_runs_are_found_whatever_their_slope(speed, stance, slope):
+    body = on_belt(speed, slope, stance)
+    ground = retarget.overground(body)
+    assert ground.notes.belt == pytest.approx(speed, rel=0.02)
+    assert ground.joints["pelvis"][-1, 0] == pytest.approx(speed * 479 / 120, rel=0.02)
+
+
+def test_feet_that_do_not_slide_show_no_belt():
+    body = on_belt(0.0, 0.0, 0.6)
+    still = retarget.overground(body)
+    assert still.notes.belt == 0 and np.array_equal(still.joints["pelvis"], body.joints["pelvis"])
+    rng = np.random.default_rng(0)
+    for name in ("l_ankle", "r_ankle", "l_toe", "r_toe"):
+        body.joints[name] = np.cumsum(rng.normal(scale=0.01, size=(480, 3)), axis=0)
+    assert retarget.overground(body).notes.belt == 0
+
+
+@pytest.mark.skipif(not MORE.is_dir(), reason="needs recordings of further people beside the repository")
+@pytest.mark.parametrize(("name", "speed"), [("s02/s02_01", 2.5), ("s09/s09_02", 3.5)])
+def test_belts_of_recorded_runs(name, speed):
+    body = readers.read(MORE / f"run_rbds/{name}.trc")
+    assert body.notes.belt == pytest.approx(speed, rel=0.02)
 
 
 @pytest.mark.parametrize("name", ["02/02_01", "35/35_01"])

@@ -119,6 +119,13 @@ def _hints(options: LearnOptions, notes: RunNotes) -> Iterator[str]:
         path, parts = notes.lacking[0]
         names = ", ".join(parts[:MOST_NAMES]) + (" ..." if len(parts) > MOST_NAMES else "")
         yield f"{path}: has no {names}{_more(notes.lacking)}: learnt without; rename them if they are there"
+    belts = [(path, speed) for path, speed in notes.belts if speed]
+    if belts:
+        path, speed = belts[0]
+        yield f"{path}: on a treadmill{_more(belts)}: moved at the belt's {speed:.2f} m/s, by the feet"
+    if still := [path for path, speed in notes.belts if not speed]:
+        words = "stays in place, and the feet do not slide at one speed"
+        yield f"{still[0]}: {words}{_more(still)}: learnt without the speed of a belt"
 
 
 def _more(files: list[Any]) -> str:

@@ -56,9 +56,12 @@ class RunNotes:
     labels: set[str] = field(default_factory=set)
     zeros: list[tuple[Path, str]] = field(default_factory=list)
     lacking: list[tuple[Path, tuple[str, ...]]] = field(default_factory=list)
+    belts: list[tuple[Path, float]] = field(default_factory=list)  #: of recordings that are learnt from
 
-    def add(self, path: Path, notes: FileNotes) -> None:
-        """Add those of a file."""
+    def add(self, path: Path, notes: FileNotes, learnt: bool) -> None:
+        """Add those of a file, which may be learnt from."""
+        if learnt and notes.belt is not None:
+            self.belts.append((path, notes.belt))
         self.labels |= notes.labels
         if notes.zeros:
             self.zeros.append((path, notes.zeros))
@@ -111,7 +114,7 @@ def load_all(
             found, error = outcome.sequence, outcome.refused
             measures.append(outcome.body)
             if notes is not None:
-                notes.add(paths[i], outcome.notes)
+                notes.add(paths[i], outcome.notes, found is not None)
             if corpus is not None and outcome.motion is not None:
                 corpus.put(names[i], persons[i], paths[i], outcome.motion)
                 used = True

@@ -34,6 +34,8 @@ class FileNotes:
     zeros: str = ""
     #: Bones or joints that the file lacks and that learning can do without.
     lacking: tuple[str, ...] = ()
+    #: Speed of the treadmill by the feet, metres/s; 0 if the person stays in place without; None overground.
+    belt: float | None = None
 
 
 NO_NOTES = FileNotes()

@@ -36,9 +36,9 @@ BALL = 0.0235  # height of the ball of the foot in stance, statures
 SHARES = {"rise": Proportions().sole - BALL, "neck": Proportions().neck}
 HARMONICS = 4  # of the pelvis's path within a stride
 STANDING = 0.2  # m/s, mean speed below which the pelvis, not the path, gives the heading
-LOW = 0.15  # share of frames in which a foot is lowest: it is on the ground then
 BELT = 0.4  # m/s, least speed of the ground under a person who stays in place on a treadmill
-STEADY = 0.35  # share of the belt's speed by which half of the feet's velocities may differ from it
+STEADY = 0.4  # of the belt's speed: range of the velocities of feet that stand on it
+FEWEST = 20  # velocities of feet that show a belt
 STANCE_SHARE = 0.15  # share of frames in which a foot moves least: it is flat on the ground then
 
 
@@ -262,10 +262,9 @@ def mean_proportions(bodies: Sequence[Measures | None]) -> Proportions:
 
 
 def overground(body: Body) -> Body:
-    """Move a person on a treadmill, or an animation in place, over the ground.
+    """Move a person on a treadmill, or an animation in place, over the ground, and note the belt's speed.
 
-    The velocity of the feet while they are lowest is that of the belt.  Bodies that travel, and feet that do
-    not slide steadily, stay as they are.
+    Bodies that travel, and feet that do not slide at one speed, stay as they are.
     """
     path = body.joints["pelvis"]
     visible = np.flatnonzero(np.isfinite(path[:, 0]))
@@ -274,21 +273,45 @@ def overground(body: Body) -> Body:
         or np.linalg.norm(path[visible[-1], :2] - path[visible[0], :2]) / len(visible) * body.fps > STANDING
     ):
         return body
-    sliding = [np.zeros((0, 2))]
-    for s in SIDES:
-        foot = body.joints[f"{s}_ankle"]
-        velocity = np.gradient(foot[:, :2], axis=0) * body.fps
-        known = np.isfinite(velocity).all(axis=1)
-        if known.any():
-            sliding.append(velocity[known & (foot[:, 2] <= np.quantile(foot[known, 2], LOW))])
-    slides = np.concatenate(sliding)
-    belt = np.median(slides, axis=0) if len(slides) else np.zeros(2)
+    belt = _belt(body)
     speed = float(np.linalg.norm(belt))
-    if speed < BELT or np.median(np.linalg.norm(slides - belt, axis=1)) > STEADY * speed:
-        return body
+    if not speed >= BELT:
+        return replace(body, notes=replace(body.notes, belt=0.0))
     shift = np.zeros((body.frames, 3))
     shift[:, :2] = -belt * np.arange(body.frames)[:, None] / body.fps
-    return replace(body, joints={name: place + shift for name, place in body.joints.items()})
+    joints = {name: place + shift for name, place in body.joints.items()}
+    return replace(body, joints=joints, notes=replace(body.notes, belt=speed))
+
+
+def _belt(body: Body) -> Floats:
+    """Return the velocity (2,) of the ground under a person who stays in place, metres/s; 0 if none shows.
+
+    While a foot stands it moves with the belt, and at no other time at one velocity for long: the velocity is
+    where those of ankles or balls, whichever agree better, are densest.  Heights do not tell, because belts
+    may slope.
+    """
+    best, narrowest = np.zeros(2), STEADY
+    for joint in ("ankle", "toe"):
+        feet = [np.gradient(body.joints[f"{s}_{joint}"][:, :2], axis=0) * body.fps for s in SIDES]
+        velocity = np.concatenate([v[np.isfinite(v).all(axis=1)] for v in feet])
+        if len(velocity) < FEWEST:
+            continue
+        _, _, axes = np.linalg.svd(velocity - np.median(velocity, axis=0), full_matrices=False)
+        along = velocity @ axes[0]
+        inside = _densest(along, STANCE_SHARE)
+        middle = np.median(velocity[inside], axis=0)
+        width = float(np.ptp(along[inside])) / max(float(np.linalg.norm(middle)), 1e-9)
+        if width < narrowest:
+            best, narrowest = middle, width
+    return best
+
+
+def _densest(values: Floats, share: float) -> Indices:
+    """Return the indices of the share of the values that lies closest together."""
+    order = np.argsort(values, kind="stable")
+    count = max(3, int(share * len(values)))
+    width = values[order[count - 1 :]] - values[order[: len(order) - count + 1]]
+    return order[int(np.argmin(width)) :][:count]
 
 
 def level(body: Body) -> tuple[Body, float]:
