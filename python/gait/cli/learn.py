@@ -107,6 +107,16 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         help="frames per second (default: from the file; .amc: 120)")  # fmt: skip
     add("--markers", type=Path, metavar="MAP.json", help="where the markers of .c3d and .trc sit on the body")
     add(
+        "--static",
+        nargs="+",
+        action="extend",
+        default=[],
+        metavar="FILE",
+        help="static trials (.c3d, .trc): people standing with markers at knees and ankles that recordings "
+        "may lack. Each gives its person's (--subjects) limb lengths and the places of all markers, also of "
+        "clusters with unknown labels",
+    )
+    add(
         "--zeros-missing",
         action="store_true",
         help="three or more exact zeros in a row are missing data, for systems that write 0 for what they "
@@ -188,6 +198,7 @@ def _options(args: argparse.Namespace) -> LearnOptions:
         | {
             "sources": tuple(args.sources),
             "exclude": tuple(args.exclude),
+            "static": tuple(args.static),
             "markers": markers.read_map(args.markers) if args.markers else None,
             "trim": not args.no_trim,
             "segments": _segment_options(args),

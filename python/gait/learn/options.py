@@ -62,6 +62,7 @@ class LearnOptions:
     period_mode: str = PERIOD_MODES[0]
     fps: float | None = None  #: frames per second; None: from the file
     markers: MarkerMap | None = None  #: for marker sets that are not known by themselves
+    static: tuple[str, ...] = ()  #: static trials of the people (`gait.learn.solve.static_trial`)
     zeros_missing: bool = False  #: three or more exact zeros in a row are missing data
     trim: bool = True  #: cut starts, stops and turns off the ends of recordings
     seed: int = 1  #: of the choice of held-out data

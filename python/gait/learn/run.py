@@ -70,7 +70,7 @@ def check(options: LearnOptions, note: Note) -> None:
         raise UsageError(
             f"-o {options.output}: is named like a recording; name the model M.gait, and sources before -o"
         )
-    read = [*options.sources, *([str(options.markers.path)] if options.markers else [])]
+    read = [*options.sources, *options.static, *([str(options.markers.path)] if options.markers else [])]
     if any(os.path.realpath(path) == str(output) for path in read if path):
         raise UsageError(f"-o {options.output}: is also read; name the model otherwise")
     if report and output in ((folder := Path(os.path.realpath(report))), *folder.parents):
@@ -84,6 +84,10 @@ def check(options: LearnOptions, note: Note) -> None:
 def _load(options: LearnOptions, corpus: Corpus, note: Note) -> load.Loaded:
     """Find and prepare the files; report which were left out and what the readers noticed."""
     files, closed = sources.find(options.sources, options.exclude, note)
+    trials = {os.path.realpath(name) for name in options.static}
+    files = [file for file in files if os.path.realpath(file[0]) not in trials]
+    if not files:
+        raise UserError("--static: takes all files; name the recordings of motion as sources")
     markers, notes = options.markers, RunNotes()
     if markers and not any(path.suffix.lower() in points.SUFFIXES for path, _ in files):
         note(f"--markers {markers.path}: not used: no file is a {' or '.join(points.SUFFIXES)}")

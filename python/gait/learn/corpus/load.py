@@ -27,6 +27,7 @@ from gait.learn.mocap import points
 from gait.learn.mocap.recording import FileNotes
 from gait.learn.options import DEFAULT, LearnOptions
 from gait.learn.segments.corpus import Corpus
+from gait.learn.solve import static_trial
 from gait.learn.solve.retarget import Measures, known_parts
 from gait.learn.solve.skeleton_fit import NO_INFORMATION, PEOPLE, LengthInformation, log_bayes_factor
 
@@ -103,10 +104,8 @@ def load_all(
     """
     paths = [path for path, _ in files]
     shared = shared or [None] * len(paths)
-    tasks = [
-        Task(path, options, one.log_scales if one else None) for path, one in zip(paths, shared, strict=True)
-    ]
     names, persons = sources.names(paths), sources.subjects(paths, options.subjects)
+    tasks = _tasks(paths, options, shared)
     sequences, refused, used = list[Sequence](), list[str](), False
     measures: list[Measures | None] = []
     with closing(_outcomes(tasks, options)) as outcomes, ArrayFile() as signals:
@@ -137,6 +136,27 @@ def load_all(
     for sequence, channels in zip(sequences, views, strict=True):
         sequence.channels = channels
     return Loaded(sequences, refused, _other_bodies(persons, measures, {s.subject for s in sequences}))
+
+
+def _tasks(paths: list[Path], options: LearnOptions, shared: list[SharedLengths | None]) -> list[Task]:
+    """Return what to do with each file: with its person's static trial, else with the lengths of all."""
+    trials = static_trials(paths, options)
+    found = {path: static_trial.calibrate(path, options) for path in dict.fromkeys(filter(None, trials))}
+    tasks = []
+    for path, trial, one in zip(paths, trials, shared, strict=True):
+        if trial is not None:
+            own = found[trial]
+            tasks.append(Task(path, replace(options, markers=own.markers), own.log_scales))
+        else:
+            tasks.append(Task(path, replace(options, static=()), one.log_scales if one else None))
+    return tasks
+
+
+def static_trials(paths: list[Path], options: LearnOptions) -> list[Path | None]:
+    """Return the static trial that serves each file; None without one."""
+    statics = [Path(name) for name in options.static]
+    people = sources.subjects([*paths, *statics], options.subjects)
+    return static_trial.serving(paths, people[: len(paths)], statics, people[len(paths) :])
 
 
 def _outcomes(tasks: list[Task], options: LearnOptions) -> Generator[Prepared, None, None]:
@@ -181,7 +201,12 @@ def shared_lengths(
     paths = [path for path, _ in files]
     persons = sources.subjects(paths, options.subjects)
     result: list[SharedLengths | None] = [None] * len(paths)
-    marked = [i for i, path in enumerate(paths) if path.suffix.lower() in points.SUFFIXES]
+    trials = static_trials(paths, options)
+    marked = [
+        i
+        for i, (path, trial) in enumerate(zip(paths, trials, strict=True))
+        if path.suffix.lower() in points.SUFFIXES and trial is None
+    ]
     count = Counter(persons[i] for i in marked)
     order = [(persons[i], os.path.abspath(path)) for i, path in enumerate(paths)]
     several = sorted((i for i in marked if count[persons[i]] > 1), key=lambda i: order[i])

@@ -64,7 +64,8 @@ def _measured(task: Task) -> Prepared:
 def _prepared(task: Task) -> Prepared:
     """Read and prepare one file, with its own lengths if it cannot be used with those of the person."""
     together = _prepared_as(task)
-    if together.sequence is not None or task.log_scales is None or task.options.segments.source == "only":
+    own = task.log_scales is None or bool(task.options.static)
+    if together.sequence is not None or own or task.options.segments.source == "only":
         return together
     alone = _prepared_as(replace(task, log_scales=None))
     return together if alone.sequence is None else replace(alone, alone=True)

@@ -29,6 +29,8 @@ USUAL_RMS = 0.01  # metres: those of right-handed recordings are below
 BETTER = 0.6  # of the rms: with a mirror image that fits so well the axes are left-handed
 UNKNOWN = 1e6  # variance, square metres or radians, of what a frame does not show
 CHUNK = 512  # frames processed at once
+#: What else to do about labels that are not known.
+STATIC = ", or give the trial in which knees and ankles were marked as --static"
 LEGS = [f"{s}_{joint}" for s in SIDES for joint in ("hip", "knee", "ankle")]
 
 
@@ -62,7 +64,8 @@ def from_markers(
     unknown = [name for name in LEGS if not np.isfinite(body.joints[name]).any()]
     if unknown:
         raise UserError(
-            f"{path}: the known markers do not determine {unknown[0]!r}; name more in a --markers file"
+            f"{path}: the known markers do not determine {unknown[0]!r}; name more in a --markers "
+            f"file{STATIC}"
         )
     return body
 
@@ -105,13 +108,25 @@ def _placed(
 ) -> tuple[list[int], skeleton_fit.Points]:
     """Return the columns of the known markers and their places on the skeleton; some frames can be fitted."""
     places = assign(path, labels, points, marker_map)
-    columns = list(places)
+    columns, at = as_points(places)
     if not skeleton_fit.has_enough(points[:, columns]):
         raise UserError(f"{path}: fewer than three known markers in every frame; see --markers")
-    return columns, skeleton_fit.Points(
-        segment=np.array([SEGMENTS.index(places[k].segment) for k in columns], np.intp),
-        at=np.array([places[k].at for k in columns]),
-        sd=np.array([places[k].sd for k in columns]),
+    for side, word in zip(SIDES, ("left", "right"), strict=True):
+        if not {f"{side}_thigh", f"{side}_shank"} & {mark.segment for mark in places.values()}:
+            raise UserError(
+                f"{path}: no known marker is on the {word} thigh or shank; name those that are in a "
+                f"--markers file{STATIC}"
+            )
+    return columns, at
+
+
+def as_points(places: Mapping[int, Landmark]) -> tuple[list[int], skeleton_fit.Points]:
+    """Return the columns of markers and their places as the fit takes them."""
+    marks = list(places.values())
+    return list(places), skeleton_fit.Points(
+        segment=np.array([SEGMENTS.index(mark.segment) for mark in marks], np.intp),
+        at=np.array([mark.at for mark in marks]),
+        sd=np.array([mark.sd for mark in marks]),
     )
 
 
@@ -134,7 +149,7 @@ def assign(
         best = max(best, places, key=len)
     if len(best) < FEWEST_LABELS:
         examples = ", ".join(labels[k] for k in visible[:5])
-        remedy = 'name more in it, or its "set"' if marker_map else "name them in a --markers file"
+        remedy = 'name more in it, or its "set"' if marker_map else f"name them in a --markers file{STATIC}"
         where = f" with {marker_map.path}" if marker_map else ""
         raise UserError(
             f"{path}: {len(best)} of {len(visible)} marker labels are known{where} ({examples} ...); {remedy}"
