@@ -22,6 +22,7 @@ from gait.errors import UserError
 from gait.learn.arrays import ArrayFile, Floats
 from gait.learn.corpus import cluster, processes, sources
 from gait.learn.corpus.stage import Prepared, Task
+from gait.learn.cycles.period import CYCLES
 from gait.learn.cycles.sequence import Sequence
 from gait.learn.mocap import points
 from gait.learn.mocap.recording import FileNotes
@@ -131,11 +132,27 @@ def load_all(
                 raise error
             progress(i + 1)
         views = signals.views()
-    if not sequences and not (used and options.segments.source == "only"):
-        raise NothingLeft(refused)
     for sequence, channels in zip(sequences, views, strict=True):
         sequence.channels = channels
+    lonely = _lonely(sequences)
+    sequences = [s for s in sequences if s.name not in lonely]
+    refused += [words for name, words in lonely.items()]
+    if not sequences and not (used and options.segments.source == "only"):
+        raise NothingLeft(refused)
+    if named := [name for name in lonely if not files[names.index(name)][1]]:
+        raise UserError(lonely[named[0]])
     return Loaded(sequences, refused, _other_bodies(persons, measures, {s.subject for s in sequences}))
+
+
+def _lonely(sequences: list[Sequence]) -> dict[str, str]:
+    """Return names of trials too short to be learnt without others of the person, and a line about each."""
+    count = Counter(s.subject for s in sequences)
+    return {
+        s.name: f"{s.source}: the trial is too short alone: {s.cycles:.2f} cycles (at least {CYCLES}); add "
+        f"more trials of {s.subject!r} (see --subjects), or leave it out"
+        for s in sequences
+        if s.short and count[s.subject] == 1
+    }
 
 
 def _tasks(paths: list[Path], options: LearnOptions, shared: list[SharedLengths | None]) -> list[Task]:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 import numpy as np
@@ -39,6 +39,8 @@ class Sequence:
     kept: tuple[int, int]  #: start and stop of these frames in the file
     cut: tuple[str, str]  #: why frames before and after them were left out; '' if none were
     verdict: verdict.Verdict
+    #: Whether it has less than `period.CYCLES` cycles and needs others of the person beside it.
+    short: bool = False
     recordings: int = 1  #: how many recordings of the person the lengths of the limbs come from
 
     @property
@@ -66,8 +68,37 @@ def load(path: Path, options: LearnOptions = DEFAULT) -> Sequence:
 def prepare(path: Path, read: Body | AngleTable, options: LearnOptions = DEFAULT) -> Sequence:
     """Prepare what was read from a file.
 
-    UserError if the motion is not cyclic, too short or of another activity.
+    A trial of hardly more than a stride is prepared by its steps (`Sequence.short`).  UserError if the motion
+    is not cyclic, too short or of another activity.
     """
+    try:
+        return _long(path, read, options)
+    except UserError:
+        if (found := _short(path, read, options)) is not None:
+            return found
+        raise
+
+
+def _short(path: Path, read: Body | AngleTable, options: LearnOptions) -> Sequence | None:
+    """Prepare a trial too short to repeat; None if it is longer, or its steps do not show the activity."""
+    if options.period_mode == "literal" or options.activity.lower() not in verdict.NAMES:
+        return None
+    kept = steady.Kept(0, read.frames)
+    if options.trim:
+        kept = steady.active_part(_motion(read).angles, read.fps)
+    motion = _motion(read.part(kept.start, kept.stop))
+    found = stride.find_by_steps(motion.angles, read.fps)
+    if not kept.stop - kept.start < period.CYCLES * found.frames:
+        return None
+    judged, channels, heading = _judge(motion, found, options.activity, by_steps=True)
+    if not judged.accepted or not cutting.fewest_cycles(channels, found.frames, PHASES):
+        return None
+    made = _sequence(path, read.fps, motion, kept, (judged, channels, heading), found)
+    return replace(made, short=True)
+
+
+def _long(path: Path, read: Body | AngleTable, options: LearnOptions) -> Sequence:
+    """Prepare a recording whose cycles repeat."""
     motion = _motion(read)
     kept, found, mode, activity = steady.Kept(0, read.frames), None, options.period_mode, options.activity
     if options.trim:
@@ -85,19 +116,32 @@ def prepare(path: Path, read: Body | AngleTable, options: LearnOptions = DEFAULT
         raise _refused(path, activity, too_long or judged.reason, other)
     if not cutting.fewest_cycles(channels, found.frames, PHASES):
         raise _refused(path, activity, "too little of each cycle is observed")
+    return _sequence(path, read.fps, motion, kept, (judged, channels, heading), found)
+
+
+def _sequence(
+    path: Path,
+    fps: float,
+    motion: _Motion,
+    kept: steady.Kept,
+    judged: tuple[verdict.Verdict, Floats, Floats],
+    found: period.Period,
+) -> Sequence:
+    """Put together what was found; `judged` is what `_judge` returned."""
+    why, channels, heading = judged
     return Sequence(
         name=path.stem,
         subject=path.stem.split("_")[0],
         source=path,
-        fps=read.fps,
+        fps=fps,
         measures=motion.measures,
         channels=channels,
         heading=heading,
         period=found,
-        strides=_strides(motion, heading, found.frames) / read.fps,
+        strides=_strides(motion, heading, found.frames) / fps,
         kept=(kept.start, kept.stop),
         cut=(kept.before, kept.after),
-        verdict=judged,
+        verdict=why,
     )
 
 
@@ -129,7 +173,7 @@ def _unsteady(kept: steady.Kept, found: period.Period, fps: float) -> str:
         return "no cycle found"
     frames = kept.stop - kept.start
     return (
-        f"no steady motion: at most {frames / fps:.1f} s at a time, {frames / found.frames:.1f} cycles "
+        f"no steady motion: at most {frames / fps:.1f} s at a time, {frames / found.frames:.2f} cycles "
         f"(at least {period.CYCLES})"
     )
 
@@ -145,7 +189,9 @@ def _motion(read: Body | AngleTable) -> _Motion:
     return _Motion(retarget.observed_angles(body, measures), path, body, measures)
 
 
-def _judge(motion: _Motion, found: period.Period, wanted: str) -> tuple[verdict.Verdict, Floats, Floats]:
+def _judge(
+    motion: _Motion, found: period.Period, wanted: str, by_steps: bool = False
+) -> tuple[verdict.Verdict, Floats, Floats]:
     """Return the verdict, channels (T, 30) and heading (T,); the last two are valid only if accepted."""
     frames, feet = len(motion.angles), None
     moving, heading = np.full((frames, len(ROOTS)), np.nan), np.full(frames, np.nan)
@@ -156,7 +202,7 @@ def _judge(motion: _Motion, found: period.Period, wanted: str) -> tuple[verdict.
         moving = motion.root
         feet = verdict.feet_of_channels(np.concatenate([motion.angles, moving], axis=1))
     footing = verdict.footing(feet, found.frames) if feet is not None else None
-    judged = verdict.judge(motion.angles, found, footing, wanted, moving[:, YAW])
+    judged = verdict.judge(motion.angles, found, footing, wanted, moving[:, YAW], by_steps)
     return judged, np.concatenate([motion.angles, moving], axis=1), heading
 
 

@@ -3,6 +3,9 @@
 A cycle fitted to a recording hardly longer than itself scores well at twice the stride, because noise, turns
 and changes of speed are then part of it; and where the trunk outvotes the legs, at half of it.  What a stride
 is, the legs show: left and right move alike half a stride apart.
+
+That also gives the period of trials too short to repeat, as laboratories have many of: a step of one side
+repeats that of the other.
 """
 
 from __future__ import annotations
@@ -21,6 +24,12 @@ MULTIPLES = (1 / 3, 1 / 2, 2.0, 3.0)  # of the period found that may be the stri
 #: Alternation that a multiple needs, and by how much it has to exceed that of the period found.  Strides of
 #: recorded walks and runs have 0.4 to 0.95, twice and half the stride 0.15 at most.
 TURNS, MORE = 0.35, 0.25
+#: Angles whose left and right move alike half a stride apart, and harmonics of the stride in their difference
+#: and their sum.
+PAIRED = ("hip_flexion", "knee_flexion", "ankle_flexion", "shoulder_flexion", "elbow_flexion")
+ODD, EVEN = (1, 3, 5), (2, 4, 6)
+SHORTEST = 1.05  # strides of a trial whose steps repeat each other
+STEP = 0.005  # seconds between periods tried
 NEAR = 0.1  # of a multiple, within which the best period is taken
 
 
@@ -48,6 +57,68 @@ def _best_near(found: period.Period, frames: float) -> float:
     """
     near = np.isfinite(found.scores) & (np.abs(found.candidates / frames - 1) < NEAR)
     return float(found.candidates[near][np.argmax(found.scores[near])]) if near.any() else frames
+
+
+def find_by_steps(angles: Floats, fps: float) -> period.Period:
+    """Find the period of angles (T, 24) of hardly more than a stride, from what both sides have in common.
+
+    The difference of left and right has odd harmonics of the stride and their sum even ones.  Candidates are
+    periods of which SHORTEST are visible; their score is the mean log of total over remaining variance.
+    """
+    low, high = period.SECONDS
+    candidates = np.arange(low, min(high, len(angles) / SHORTEST / fps) + 1e-9, STEP) * fps
+    signals = _sums_and_differences(angles)
+    if not signals or not len(candidates):
+        return period.Period(float("nan"), candidates, np.full(len(candidates), np.nan), 0.0)
+    scores = np.array([np.mean([_explained(z, p, h) for z, h in signals]) for p in candidates])
+    sharpness = float(scores.max() / max(float(np.median(scores)), 1e-9))
+    return period.Period(float(candidates[np.argmax(scores)]), candidates, scores, sharpness)
+
+
+def step_repeats(angles: Floats, frames: float) -> float:
+    """Return the correlation of each side with the other half a period later; NaN if nothing overlaps."""
+    columns = [[ANGLES.index(f"{s}_{name}") for name in PAIRED] for s in SIDES]
+    left, right = (angles[:, k] - _mean(angles[:, k]) for k in columns)
+    time = np.arange(max(0, int(np.ceil(len(angles) - 1 - frames / 2))))
+    at = time + frames / 2
+    low = at.astype(int)
+    share = (at - low)[:, None]
+    product, squares = 0.0, np.zeros(2)
+    for one, other in ((left, right), (right, left)):
+        later = other[low] * (1 - share) + other[np.minimum(low + 1, len(other) - 1)] * share
+        both = np.isfinite(one[time] + later)
+        product += float(one[time][both] @ later[both])
+        squares += [np.sum(one[time][both] ** 2), np.sum(later[both] ** 2)]
+    scale = float(np.sqrt(np.prod(squares)))
+    return product / scale if scale > 0 else float("nan")
+
+
+def _mean(values: Floats) -> Floats:
+    """Return the mean of each column over its finite values; 0 without any."""
+    visible = np.isfinite(values)
+    return np.asarray(np.where(visible, values, 0).sum(axis=0) / np.maximum(visible.sum(axis=0), 1))
+
+
+def _sums_and_differences(angles: Floats) -> list[tuple[Floats, tuple[int, ...]]]:
+    """Return sums and differences (T,) of left and right that are mostly visible, with their harmonics."""
+    signals = []
+    for name in PAIRED:
+        left, right = (angles[:, ANGLES.index(f"{s}_{name}")] for s in SIDES)
+        if 2 * np.isfinite(left + right).sum() > len(angles):
+            signals += [(left - right, ODD), (left + right, EVEN)]
+    return signals
+
+
+def _explained(signal: Floats, frames: float, harmonics: tuple[int, ...]) -> float:
+    """Return the log of the variance of a signal over what harmonics of a period and a constant leave."""
+    visible = np.flatnonzero(np.isfinite(signal))
+    angle = 2 * np.pi * np.outer(visible / frames, harmonics)
+    design = np.concatenate([np.ones((len(visible), 1)), np.cos(angle), np.sin(angle)], axis=1)
+    values = signal[visible] - signal[visible].mean()
+    weights = np.linalg.lstsq(design, values, rcond=None)[0]
+    total = float(values @ values)
+    rest = float(np.sum((values - design @ weights) ** 2))
+    return float(np.log(max(total, 1e-30) / max(rest, 1e-6 * total, 1e-30)))
 
 
 def alternation(angles: Floats, frames: float) -> float:

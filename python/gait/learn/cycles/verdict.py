@@ -12,6 +12,7 @@ import numpy as np
 
 from gait.body.skeleton import ANGLES, JOINTS, SIDES, default_skeleton, points
 from gait.learn.arrays import Floats
+from gait.learn.cycles import stride
 from gait.learn.cycles.fourier import first_harmonic
 from gait.learn.cycles.period import CYCLES, Period
 from gait.learn.solve.body import Body
@@ -55,8 +56,10 @@ class Evidence:
 
     def __str__(self) -> str:
         """Words, value and limit, such as 'the cycles do not repeat (repeats 0.31, at least 0.75)'."""
-        limit = f"at least {self.least:.4g}" if self.value < self.least else f"at most {self.most:.4g}"
-        return f"{self.words} ({self.name} {self.value:.2g}, {limit})"
+        limit = self.least if self.value < self.least else self.most
+        which = "at least" if self.value < self.least else "at most"
+        digits = next((n for n in (2, 3, 4) if f"{self.value:.{n}g}" != f"{limit:.{n}g}"), 6)
+        return f"{self.words} ({self.name} {self.value:.{digits}g}, {which} {limit:.4g})"
 
 
 @dataclass(frozen=True)
@@ -83,16 +86,22 @@ class Verdict:
 
 
 def judge(
-    angles: Floats, found: Period, feet: Footing | None, wanted: str, yaw: Floats | None = None
+    angles: Floats,
+    found: Period,
+    feet: Footing | None,
+    wanted: str,
+    yaw: Floats | None = None,
+    by_steps: bool = False,
 ) -> Verdict:
     """Judge the steady part of a recording: angles (T, 24), NaN where missing, and its period.
 
     `feet` are None if they were not seen.  `wanted` is the activity to be learnt; names other than those of
     walking and running only require cycles.  `yaw` (T,) is of the pelvis from its direction of travel,
-    radians, NaN where missing.
+    radians, NaN where missing.  `by_steps`: the cycles need not repeat, but each side the other
+    (`stride.find_by_steps`).
     """
     kind = NAMES.get(wanted.lower(), "")
-    evidence = list(_cyclic(angles, found))
+    evidence = _repeating_steps(angles, found) if by_steps else _cyclic(angles, found)
     known = ""
     if kind and np.isfinite(found.frames):
         evidence.append(Evidence("legs", legs(angles, found.frames), LEGS, words="the legs do not alternate"))
@@ -115,6 +124,15 @@ def _cyclic(angles: Floats, found: Period) -> list[Evidence]:
         Evidence("cycles", len(angles) / found.frames, CYCLES, words="the steady part is too short"),
         Evidence("sharpness", found.sharpness, SHARPNESS, words="no period stands out"),
         Evidence("repeats", repeats(angles, found.frames), REPEATS, words="the cycles do not repeat"),
+    ]
+
+
+def _repeating_steps(angles: Floats, found: Period) -> list[Evidence]:
+    """Return the evidence for steps of left and right that are alike, in less than `CYCLES` cycles."""
+    cycles, alike = len(angles) / found.frames, stride.step_repeats(angles, found.frames)
+    return [
+        Evidence("cycles", cycles, stride.SHORTEST, words="the trial is too short"),
+        Evidence("repeats", alike, REPEATS, words="left and right do not repeat each other"),
     ]
 
 

@@ -422,7 +422,7 @@ def _smooth_path(path: Floats, period: float) -> tuple[Floats, Floats, Floats]:
     """Return a slow polynomial through the path (T, 2), its derivative, and polynomial plus stride."""
     frames = len(path)
     t = (np.arange(frames) - frames / 2) / period
-    degree = 2 if frames < 4 * period else 5
+    degree = 1 if frames < 1.5 * period else 2 if frames < 4 * period else 5
     angle = 2 * np.pi * np.outer(t, np.arange(1, HARMONICS + 1))
     powers = np.vander(t, degree + 1, increasing=True)
     design = np.concatenate([powers, np.cos(angle), np.sin(angle)], axis=1)
