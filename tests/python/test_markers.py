@@ -324,4 +324,8 @@ def test_anatomical_abbreviations_are_known():
     for s in "LR":
         for old, new in pig.items():
             assert places[f"{s}{new}".lower()] == LANDMARKS[SETS["plug-in-gait"][f"{s}{old}".lower()]]
+    clusters = known_landmarks(
+        [f"{s}_{part}_{k}" for s in "RL" for part in ("THIGH", "SHANK") for k in (1, 4)]
+    )
+    assert len(clusters) == 8 and clusters["rthigh1"] == LANDMARKS["r_thigh_side"]
     assert places["cv7"] == LANDMARKS["c7"] and places["rtam"] == LANDMARKS["r_ankle_medial"]

@@ -101,7 +101,7 @@ def _mean(values: Floats) -> Floats:
 
 def _sums_and_differences(angles: Floats) -> list[tuple[Floats, tuple[int, ...]]]:
     """Return sums and differences (T,) of left and right that are mostly visible, with their harmonics."""
-    signals = []
+    signals: list[tuple[Floats, tuple[int, ...]]] = []
     for name in PAIRED:
         left, right = (angles[:, ANGLES.index(f"{s}_{name}")] for s in SIDES)
         if 2 * np.isfinite(left + right).sum() > len(angles):

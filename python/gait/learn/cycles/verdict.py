@@ -149,8 +149,8 @@ def _footing(feet: Footing, kind: str) -> list[Evidence]:
         )
         return [
             *result,
-            Evidence("bob", feet.bob, most=BOB, words=f"this is running: {bob}"),
             Evidence("flight", feet.flight, most=FLIGHT, words=f"this is running: {flight}"),
+            Evidence("bob", feet.bob, most=BOB, words=f"this is running: {bob}"),
         ]
     words = "this is not running: there is a foot on the ground, and the body is highest over it"
     least = -np.inf if feet.bob > BOB else FLIGHT

@@ -168,6 +168,8 @@ _HELEN_HAYES = {
     "{s}wrist": "wrist", "{s}radius": "wrist_radial", "{s}ulna": "wrist_ulnar", "tophead": "head_top",
     "fronthead": "forehead", "rearhead": "occiput", "backhead": "occiput", "sternum": "xiphoid",
     "c7": "c7", "t10": "t10",
+    **{f"{{s}}thigh{i}": "thigh_side" for i in range(1, 7)},
+    **{f"{{s}}shank{i}": "shank_side" for i in range(1, 7)},
 }  # fmt: skip
 _OPENSIM = {
     **_HELEN_HAYES, "{s}toe": "toe_tip", "{s}biceps": "upper_arm_side",

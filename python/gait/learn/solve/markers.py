@@ -138,7 +138,7 @@ def assign(
     In a file of several subjects ("Anna:LASI") the one with most known markers is taken.
     """
     axes = segment_axes(labels, points)
-    ever = np.isfinite(points).all(axis=2).any(axis=0)
+    ever = np.asarray(np.isfinite(points).all(axis=2).any(axis=0))
     visible = [k for k in range(len(labels)) if ever[k] and k not in axes]
     best: dict[int, Landmark] = {}
     for subject in sorted({_subject(labels[k]) for k in visible}):
