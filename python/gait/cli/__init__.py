@@ -69,6 +69,7 @@ COMMANDS = {
     "paper": Command(
         "paper", "make every figure of the two papers from motion capture", ("video", "report", "mocap")
     ),
+    "completion": Command("completion", "print a script that completes words in a shell"),
     "view": Command("view", "watch the estimates of gait-trackd in a browser", ("video", "lcm")),
 }
 """Commands in the order of ``gait --help``."""
@@ -150,22 +151,29 @@ def _parser(words: Sequence[str]) -> argparse.ArgumentParser:
     commands = parser.add_subparsers(dest="command", required=True, metavar="COMMAND")
     chosen = words[0] if words and words[0] in COMMANDS else None
     for name, command in COMMANDS.items() if chosen is None else [(chosen, COMMANDS[chosen])]:
-        if chosen is None:
-            commands.add_parser(name, help=command.help)
-            continue
-        module = import_module(f"gait.cli.{command.module}")
-        sub = commands.add_parser(
-            name,
-            description=module.__doc__,
-            epilog=getattr(module, "EXAMPLES", None),
-            formatter_class=argparse.RawDescriptionHelpFormatter,
-        )
-        module.add_arguments(sub)
-        if getattr(module, "JSON", True):
-            _offer(sub, "--json", "print the figures as JSON")
-        _offer(sub, "--quiet", "print no notes and no progress")
-        sub.set_defaults(run=module.run)
+        sub = commands.add_parser(name, help=command.help)
+        if chosen is not None:
+            _fill(sub, command)
     return parser
+
+
+def parser_of(name: str) -> argparse.ArgumentParser:
+    """Make the parser of one command."""
+    parser = _Parser(prog=f"gait {name}")
+    _fill(parser, COMMANDS[name])
+    return parser
+
+
+def _fill(parser: argparse.ArgumentParser, command: Command) -> None:
+    """Add help and options of a command."""
+    module = import_module(f"gait.cli.{command.module}")
+    parser.description, parser.epilog = module.__doc__, getattr(module, "EXAMPLES", None)
+    parser.formatter_class = argparse.RawDescriptionHelpFormatter
+    module.add_arguments(parser)
+    if getattr(module, "JSON", True):
+        _offer(parser, "--json", "print the figures as JSON")
+    _offer(parser, "--quiet", "print no notes and no progress")
+    parser.set_defaults(run=module.run)
 
 
 def _joined(words: Sequence[str]) -> Iterator[str]:

@@ -1,4 +1,4 @@
-"""Send the frames of a video file or of a camera over LCM, as a camera in the field would.
+"""Send the frames of a video file, a camera or a network stream over LCM, as a camera in the field would.
 
 A file is sent at the rate at which it was recorded, stamped as if recorded from now on.
 Each frame carries its number, so that a receiver can count what it missed.  Calibration and empty scene are
@@ -8,6 +8,8 @@ announced at the start and every two seconds.  With --init the tracker gets a ST
 empty scene and START.  Without it the stream begins at once.
 
 --url file:///PATH.log?mode=w writes an LCM log instead, which gait-trackd plays without loss.
+
+A stream (RTSP, HTTP) that breaks off is connected again within seconds; frames are stamped as they arrive.
 
 The command ends after the last frame, or when interrupted (Ctrl-C, SIGTERM), never within a frame.
 """
@@ -37,6 +39,7 @@ EXAMPLES = """\
 examples:
   gait capture walk.mp4 --camera camera.json --background auto --init auto --wait 30
   gait capture /dev/video0 --camera camera.json --background empty.png
+  gait capture rtsp://10.0.0.5/live --camera camera.json --background empty.png --jpeg 90
   gait capture walk.mp4 --camera camera.json --init init.json --rate max --url file:///data/walk.log?mode=w
 """
 
@@ -44,7 +47,11 @@ examples:
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Add the command's options."""
     add = parser.add_argument
-    add("source", metavar="VIDEO|DEVICE", help="file that FFmpeg reads, or camera: 0, /dev/video0")
+    add(
+        "source",
+        metavar="VIDEO|DEVICE|URL",
+        help="file that FFmpeg reads, or camera: 0, /dev/video0, rtsp://..., http://...",
+    )
     values.add_camera(parser, ", to announce", scale=True)
     values.add_clip(parser, "send", init="none", background="none")
     parser.set_defaults(init=None, start=0)
@@ -133,13 +140,17 @@ def _primed(source: FileSource | DeviceSource) -> Iterator[Frame]:
 
 def _source(args: argparse.Namespace) -> FileSource | DeviceSource:
     from gait.lcm.capture import DeviceSource, FileSource, is_device
+    from gait.lcm.streams import StreamSource, is_stream
 
-    if not is_device(args.source):
+    stream = is_stream(args.source)
+    if not stream and not is_device(args.source):
         return FileSource(args.source, args.start, args.stop, grey=args.grey, loop=args.loop)
     if args.start or args.stop is not None or args.loop or args.rate != "true" or args.background == "auto":
         raise UsageError(
             f"{args.source}: is a camera: --start --stop --loop --rate and --background auto are for files"
         )
+    if stream:
+        return StreamSource(args.source, grey=args.grey, quiet=args.quiet)
     return DeviceSource(args.source, grey=args.grey)
 
 

@@ -1,0 +1,94 @@
+"""Print a script that completes the words of gait in a shell: commands, options and their choices.
+
+The script holds all words, so completing starts no Python.  Other words are completed as files.  Put it into
+~/.local/share/bash-completion/completions/gait, or source it in ~/.zshrc.
+"""
+
+from __future__ import annotations
+
+import argparse
+import shlex
+from collections.abc import Iterator
+
+JSON = False
+EXAMPLES = """\
+examples:
+  gait completion bash
+  gait completion zsh
+"""
+SHELLS = ("bash", "zsh")
+
+_SCRIPT = """\
+# Completion of gait {version} for bash and zsh, made by `gait completion`.
+_gait_words() {{
+  case "$1" in
+{words}
+  esac
+}}
+_gait_choices() {{
+  case "$1" in
+{choices}
+  esac
+}}
+_gait() {{
+  local word="${{COMP_WORDS[COMP_CWORD]}}" before="${{COMP_WORDS[COMP_CWORD-1]}}" command="" found
+  if (( COMP_CWORD > 1 )); then command="${{COMP_WORDS[1]}}"; fi
+  if (( COMP_CWORD > 2 )) && [ -n "$(_gait_words "$command ${{COMP_WORDS[2]}}")" ]; then
+    command="$command ${{COMP_WORDS[2]}}"
+  fi
+  found="$(_gait_choices "$command $before")"
+  if [ -z "$found" ]; then
+    found="$(_gait_words "$command")"
+    case "$word" in -*) ;; *) if (( COMP_CWORD > 1 )); then found="$(_gait_choices "$command")"; fi ;; esac
+  fi
+  COMPREPLY=($(compgen -W "$found" -- "$word"))
+  if (( COMP_CWORD > 1 )) && [ "${{#COMPREPLY[@]}}" = 0 ]; then COMPREPLY=($(compgen -f -- "$word")); fi
+}}
+complete -o filenames -F _gait gait
+"""
+_ZSH = "autoload -Uz compinit bashcompinit && compinit -u && bashcompinit\n"
+
+
+def add_arguments(parser: argparse.ArgumentParser) -> None:
+    """Add the command's options."""
+    parser.add_argument("shell", choices=SHELLS, help="the shell")
+
+
+def run(args: argparse.Namespace) -> int:
+    """Print the script."""
+    print((_ZSH if args.shell == "zsh" else "") + script(), end="")
+    return 0
+
+
+def script() -> str:
+    """Make the script for the commands of this version."""
+    from gait._version import __version__
+    from gait.cli import COMMANDS, parser_of
+
+    words = {"": ["--help", "--version", *dict.fromkeys(name.split()[0] for name in COMMANDS)]}
+    choices: dict[str, list[str]] = {}
+    for name in COMMANDS:
+        actions = list(_actions(parser_of(name)))
+        words[name] = [
+            option for action in actions for option in action.option_strings if option.startswith("--")
+        ]
+        choices[name] = [word.partition(" ")[2] for word in COMMANDS if word.startswith(f"{name} ")]
+        for action in actions:
+            if not action.choices:
+                continue
+            if not action.option_strings:
+                choices[name] += [str(choice) for choice in action.choices]
+            for option in action.option_strings:
+                choices[f"{name} {option}"] = [str(choice) for choice in action.choices]
+    return _SCRIPT.format(version=__version__, words=_cases(words), choices=_cases(choices))
+
+
+def _actions(parser: argparse.ArgumentParser) -> Iterator[argparse.Action]:
+    """Options and arguments of a command that its help shows."""
+    yield from (action for action in parser._actions if action.help != argparse.SUPPRESS)
+
+
+def _cases(table: dict[str, list[str]]) -> str:
+    return "\n".join(
+        f"    {shlex.quote(key)}) echo {shlex.quote(' '.join(v))} ;;" for key, v in table.items() if v
+    )

@@ -1,0 +1,93 @@
+"""Cameras that send a stream over the network: RTSP, HTTP and whatever else FFmpeg opens by a URL."""
+
+from __future__ import annotations
+
+import re
+import time
+from collections.abc import Iterator
+from contextlib import closing
+from itertools import chain
+
+import av
+import numpy as np
+
+from gait.errors import UserError
+from gait.io.video import Frame
+from gait.lcm.capture import DeviceSource
+from gait.progress import note
+
+_URL = re.compile(r"(rtsps?|rtmps?|https?|srt|tcp|udp)://", re.IGNORECASE)
+_LOGIN = re.compile(r"(?<=://)[^/@]*@")
+BROKEN: tuple[type[BaseException], ...] = (av.error.FFmpegError, OSError, ValueError)
+"""Errors of a stream that cannot be opened or breaks off."""
+STOPPED: tuple[type[BaseException], ...] = (*BROKEN, StopIteration)
+"""The same and the end of its frames."""
+_OPEN, _READ = 4.0, 2.0  # seconds that opening, and one read, may take
+_WAITS = (0.0, 0.25, 0.5, 1.0)  # seconds before each attempt to connect again; the last one for all others
+#: A second, in microseconds, is enough to see what the stream is; RTSP over TCP loses nothing on the way.
+_OPTIONS = {"analyzeduration": "1000000", "flags": "low_delay", "rtsp_transport": "tcp"}
+
+
+def is_stream(name: str) -> bool:
+    """Whether a source is a URL of a stream."""
+    return _URL.match(name) is not None
+
+
+class StreamSource(DeviceSource):
+    """A camera's stream, connected again whenever it breaks off.
+
+    A frame is stamped when it is decoded; video time counts from when the stream was opened.  UserError if it
+    cannot be opened at first, or comes back with pictures of another size.
+    """
+
+    def __init__(self, url: str, *, grey: bool = False, quiet: bool = False) -> None:
+        self._url, self._grey, self._quiet = url, grey, quiet
+        self._name = _LOGIN.sub("", url)  # no password in messages
+        self._opened = time.monotonic()
+        self._frames = self._connect()
+        try:
+            first = next(self._frames)
+        except STOPPED as error:
+            what = str(error).replace(url, self._name) or "it has no picture"
+            raise UserError(f"{self._name}: cannot be opened ({what}); check the URL in a player") from None
+        self.size = first.width, first.height
+        self._frames = chain([first], self._frames)
+
+    def frames(self) -> Iterator[Frame]:
+        """Yield frames for ever, as they arrive."""
+        number = 0
+        while True:
+            try:
+                for frame in self._frames:
+                    if (frame.width, frame.height) != self.size:
+                        now, before = (f"{w}x{h}" for w, h in ((frame.width, frame.height), self.size))
+                        raise UserError(
+                            f"{self._name}: came back with {now} pixels instead of {before}; begin anew"
+                        )
+                    image = np.asarray(frame.to_ndarray(format="gray" if self._grey else "bgr24"), np.uint8)
+                    yield Frame(number, time.monotonic() - self._opened, image)
+                    number += 1
+            except BROKEN:
+                pass
+            self._frames = self._again()
+
+    def _connect(self) -> Iterator[av.VideoFrame]:
+        """Open the stream and decode it; errors are those of `BROKEN`."""
+        with closing(av.open(self._url, options=_OPTIONS, timeout=(_OPEN, _READ))) as container:
+            if not container.streams.video:
+                raise ValueError("it has no video")
+            yield from container.decode(video=0)
+
+    def _again(self) -> Iterator[av.VideoFrame]:
+        """Connect until a frame arrives."""
+        note(f"{self._name}: broke off; connecting again", self._quiet)
+        lost, waits = time.monotonic(), chain(_WAITS, iter(lambda: _WAITS[-1], None))
+        while True:
+            time.sleep(next(waits))
+            frames = self._connect()
+            try:
+                first = next(frames)
+            except STOPPED:
+                continue
+            note(f"{self._name}: back after {time.monotonic() - lost:.1f} s", self._quiet)
+            return chain([first], frames)
