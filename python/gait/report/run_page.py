@@ -162,8 +162,8 @@ _LEGEND = (
 
 
 _COMMON = (
-    " Most of the uncertainty of the places is that of the camera, which is common to all frames: lengths and "
-    "speed are less uncertain than stated, and alike in all strides."
+    " Most of the uncertainty of the places is that of the camera, which is common to all frames: lengths "
+    "and speed are less uncertain than stated, and alike in all strides."
 )
 
 

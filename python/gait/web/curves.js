@@ -74,6 +74,7 @@ export class Curves {
     const figure = document.createElement('figure'), caption = document.createElement('figcaption');
     const place = document.createElement('div'), cursor = document.createElement('div');
     place.className = 'plot';
+    place.setAttribute('role', 'img'); // ECharts gives it its label
     cursor.className = 'cursor';
     figure.append(caption, place, cursor);
     this.element.append(figure);

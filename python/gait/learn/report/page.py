@@ -13,6 +13,7 @@ from gait.learn.options import LearnOptions
 from gait.learn.prior import model
 from gait.learn.prior.fit import Learned
 from gait.progress import progress
+from gait.web import modules
 
 if TYPE_CHECKING:
     from gait.report.figures import Drawing
@@ -21,14 +22,9 @@ PAGE = "index.html"
 MARK = ": gait learn</title>"  # end of the title of our pages
 HEAD = 4096  # bytes that include the title of our pages
 
-STYLE = """
-body { font: 15px/1.5 system-ui, sans-serif; max-width: 64em; margin: 2em auto; padding: 0 1em; color: #222; }
-h1 { font-size: 1.5em; } h2 { font-size: 1.15em; margin: 2em 0 .3em; } nav a { margin-right: 1em; }
-img { max-width: 100%; height: auto; } figure { margin: 0; } figcaption { color: #555; margin: 0 0 .5em; }
-table { border-collapse: collapse; } td, th { padding: .1em .9em .1em 0; text-align: left; }
-tr { border-bottom: 1px solid #e4e4e4; }
-td { vertical-align: top; font-variant-numeric: tabular-nums; } .n { text-align: right; }
-td.w { font-size: 85%; color: #555; } .wide { overflow-x: auto; }
+_STYLE = """
+figure { margin: 0; } figcaption { color: var(--faint); margin: 0 0 .5em; }
+.n { text-align: right; } td.w { font-size: 85%; color: var(--faint); }
 """
 RIGHT = ("period, ms", "cycles", "SNR", "sharpness", "residual, °")  # columns of numbers
 
@@ -87,8 +83,11 @@ def _write_all(folder: Path, learned: Learned, activity: str, refused: list[str]
         _left_out(refused),
         f"<p>{model.CMU}</p>" if model.from_cmu(s.source for s in learned.sequences) else "",
     ]
-    head = f"<meta charset=utf-8><title>{html.escape(activity)}{MARK}<style>{STYLE}</style>"
-    page = f"<!doctype html><html lang=en><head>{head}</head><body>{''.join(body)}</body></html>\n"
+    view = '<meta name="viewport" content="width=device-width, initial-scale=1">'
+    style = modules.own("style.css") + modules.own("report.css") + _STYLE
+    head = f"<meta charset=utf-8><title>{html.escape(activity)}{MARK}{view}<style>{style}</style>"
+    main = f"<body><main>{''.join(body)}</main></body>"
+    page = f"<!doctype html><html lang=en><head>{head}</head>{main}</html>\n"
     (folder / PAGE).write_text(page, encoding="utf-8")
     return stems
 
@@ -139,7 +138,8 @@ def _sequences(learned: Learned) -> str:
         "leg; flight: share of the time with both feet off the ground; lift and steps: rise of the feet and "
         "of the ground, statures; ahead: cosine of the angle between where the pelvis faces and where it "
         "goes.</p>"
-        f'<div class="wide"><table><tr>{head}</tr>{body}</table></div>'
+        '<div class="movable" tabindex="0" role="group" aria-label="table">'
+        f"<table><tr>{head}</tr>{body}</table></div>"
     )
 
 
