@@ -89,7 +89,7 @@ UNIT := $(patsubst tests/unit/%.c,$(B)/unit/%,$(sort $(wildcard tests/unit/test_
 TOOLS := $(BIN)/gait-trackd
 LIBS := $(B)/libgait.so $(B)/libgait.a
 
-.PHONY: help setup lib tools test built check unit python-test demo model paper bench bench-lift detector-profile eval eval-camera eval-real eval-learn eval-lift mutants asan tsan unit-threads fuzz fuzz-run golden-check \
+.PHONY: help setup lib tools test built check unit python-test demo model paper bench bench-lift detector-profile eval eval-camera eval-real eval-learn eval-lift eval-studio mutants asan tsan unit-threads fuzz fuzz-run golden-check \
         docs lint format wheel sdist wheel-check install install-daemon uninstall clean
 
 help: ## list the targets
@@ -345,6 +345,9 @@ mutants: setup ## change each equation of both papers once: a test about its mea
 
 eval-lift: setup lib ## lifting of held-out motion, clips and a real motion: tests/bench/results/lift.md *
 	@$(PY) tests/bench/eval_lift.py $(ARGS)
+
+eval-studio: setup lib ## corrections by hand, proposed and random, and the time each takes: tests/bench/results/studio.md *
+	@$(PY) tests/bench/studio_corrections.py
 
 # ---- packages ------------------------------------------------------------------------------------------------
 # The wheel runs on systems with glibc 2.28: thread functions are those of the oldest glibc for the CPU.

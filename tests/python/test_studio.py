@@ -69,13 +69,19 @@ class Server:
         return code
 
 
-@pytest.fixture
-def server(clip):
+@pytest.fixture(scope="module")
+def running(clip):
+    """A server for the tests that leave it running."""
     started = Server(clip[0])
     yield started
-    if started.process.poll() is None:
-        started.end(signal.SIGTERM)
-    (clip[0] / "clip/video.studio/corrections.json").unlink(missing_ok=True)
+    assert started.end(signal.SIGTERM) in (0, 1)
+
+
+@pytest.fixture
+def server(running):
+    """The server without corrections."""
+    assert post(running.url, "edit", {"do": "clear"})[0] == 200
+    return running
 
 
 @contextlib.contextmanager
@@ -126,8 +132,9 @@ def misses(uv, truth, names):
     ]
 
 
-def test_five_drags_bring_the_figure_to_the_person(clip, server):
+def test_five_drags_bring_the_figure_to_the_person(clip):
     folder, truth = clip
+    server = Server(folder)
     saved = folder / "clip/video.studio/corrections.json"
     with studio(server.url) as page:
         names = page.evaluate("studio.data.joints")
@@ -182,7 +189,7 @@ def test_plays_steps_undoes_and_removes(clip, server):
         page.keyboard.press("ArrowRight")
         assert page.evaluate("studio.film.index") == 1
         page.keyboard.press("Space")
-        browser.until(page, "studio.film.index > 5")
+        browser.until(page, "studio.film.index > 3")
         page.keyboard.press("Space")
         assert not page.evaluate("studio.film.playing")
         assert page.evaluate("studio.scene.index") == page.evaluate("studio.film.index")
@@ -213,14 +220,14 @@ def test_plays_steps_undoes_and_removes(clip, server):
         assert page.evaluate("studio.data.fault") == ""
 
 
-def test_a_joint_is_moved_by_keys_and_proposals_are_visited(clip, server):
+def test_a_joint_is_moved_by_keys_and_proposals_are_visited(server):
     with studio(server.url) as page:
         rest(page)
         page.keyboard.press("n")
         first = page.evaluate("studio.data.proposals[0]")
         assert page.evaluate("studio.film.index") == first["frame"]
         assert page.locator("#joint option:checked").inner_text() == first["joint"].replace("r_", "right ")
-        assert first["joint"] in FOOT and first["frame"] in WRONG
+        assert first["joint"] in FOOT and WRONG.start - 2 <= first["frame"] < WRONG.stop + 2
         page.keyboard.press("Alt+ArrowDown")
         browser.until(page, "studio.data.edits.corrections.length === 1")
         assert page.evaluate("studio.data.edits.corrections[0].joint") == first["joint"]
@@ -256,17 +263,19 @@ def test_the_film_comes_in_ranges_and_bad_requests_are_refused(clip, server):
     assert post(server.url, "edit", "x" * 20000)[0] == 413
     assert post(server.url, "undo", {})[0] == 409
     assert post(server.url, "edit", pull, origin="http://evil.example")[0] == 403
-    assert not (clip[0] / "clip/video.studio/corrections.json").exists()
+    assert json.loads((clip[0] / "clip/video.studio/corrections.json").read_text()) == {"corrections": []}
 
 
-@pytest.mark.parametrize("width", [390, 1280, 1920])
-def test_fits_every_width(clip, server, width):
-    for dark in (False, True):
-        with studio(server.url, width=width, height=720 if width < 1900 else 1080, dark=dark) as page:
-            assert page.evaluate("document.documentElement.scrollWidth") <= width
-            for name in ("#film .stage", "#scene", "#curves", "#proposals"):
-                box = page.locator(name).bounding_box()
-                assert box["width"] > 200 and box["height"] > 60
+def test_fits_every_width_light_and_dark(server):
+    with studio(server.url) as page:
+        for width, height in ((390, 844), (1280, 720), (1920, 1080)):
+            page.set_viewport_size({"width": width, "height": height})
+            for scheme in ("light", "dark"):
+                page.emulate_media(color_scheme=scheme)
+                assert page.evaluate("document.documentElement.scrollWidth") <= width
+                for name in ("#film .stage", "#scene", "#curves", "#proposals"):
+                    box = page.locator(name).bounding_box()
+                    assert box["width"] > 200 and box["height"] > 60
 
 
 def test_usage_is_one_line(capsys, tmp_path, monkeypatch):

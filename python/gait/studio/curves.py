@@ -11,6 +11,7 @@ import numpy.typing as npt
 from gait.errors import UserError
 from gait.io.track_file import Joints
 from gait.lift.keypoints.corrections import Edits
+from gait.lift.run import Lifted
 from gait.motion.footfalls import Events, find_events
 from gait.web.motion_data import curve
 
@@ -99,6 +100,28 @@ def event_marks(events: Events | None) -> list[dict[str, Any]]:
     ]
 
 
+def off_px(lifted: Lifted, names: tuple[str, ...], sd: Floats) -> Floats:
+    """How far joints (T, n) may be from where they are drawn, pixels.
+
+    What the posterior leaves open, and how far the detected point lies from a figure that does not follow it.
+
+    Parameters
+    ----------
+    lifted : Lifted
+    names : tuple of str
+        The n joints.
+    sd : (T, J)
+        Standard deviations of all markers in the picture, pixels.
+    """
+    motion, points = lifted.motion, lifted.keypoints
+    px = sd[:, [motion.names.index(name) for name in names]]
+    for column, name in enumerate(points.names):
+        if name in names:
+            joint = names.index(name)
+            px[:, joint] = np.hypot(px[:, joint], np.nan_to_num(motion.error[:, column]))
+    return px
+
+
 @dataclass(frozen=True)
 class Proposal:
     """A joint to correct, and how wrong it may be in the picture, pixels."""
@@ -123,8 +146,7 @@ def proposals(
     Parameters
     ----------
     px : (T, J)
-        How far joints may be off: what the posterior leaves open, and how far a detected point lies from the
-        figure that does not follow it.
+        Of `off_px`.
     """
     left = np.nan_to_num(px.copy())
     rows = {int(number): row for row, number in enumerate(frame)}

@@ -99,7 +99,7 @@ class Session:
                         values = np.array([np.nan if v is None else v for v in plot[key]])
                         plot[key] = rounded(placed(values), 3)
             view = self._lifted.view
-            px = self._off()
+            px = curves.off_px(self._lifted, self._names, self._picture_sd())
             data = motion_data(
                 video.fps,
                 times,
@@ -319,16 +319,6 @@ class Session:
         if isinstance(view, Perspective):
             return picture_sd(view.camera.project, motion.places, motion.sd)
         return np.asarray(motion.sd.mean(axis=2) * self._tall() / max(motion.stature, 0.1))
-
-    def _off(self) -> Floats:
-        """How far joints (T, J) may be from where they are drawn: not known, or detected elsewhere."""
-        lifted = self._lifted
-        px = self._picture_sd()[:, self._shown]
-        for column, name in enumerate(lifted.keypoints.names):
-            if name in self._names:
-                joint = self._names.index(name)
-                px[:, joint] = np.hypot(px[:, joint], np.nan_to_num(lifted.motion.error[:, column]))
-        return px
 
     def _tall(self) -> float:
         """Median height of the person in the picture, pixels."""

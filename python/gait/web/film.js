@@ -125,7 +125,12 @@ export class Film {
     this.#bar(element);
     this.video.addEventListener('seeked', () => this.#show(this.index));
     this.video.addEventListener('loadeddata', () => this.seek(this.index));
-    this.video.addEventListener('ended', () => this.pause());
+    // A busy browser may announce no single frame: then by its clock, four times a second.
+    this.video.addEventListener('timeupdate', () => { if (this.playing) this.#at(this.video.currentTime); });
+    this.video.addEventListener('ended', () => {
+      this.#at(this.video.currentTime);
+      this.pause();
+    });
     this.video.addEventListener('error', () => this.#broken());
     this.setData(data);
   }
@@ -182,14 +187,16 @@ export class Film {
   /** Follow the video while it plays: one call for each frame that is shown. */
   #each() {
     this.video.requestVideoFrameCallback((_, { mediaTime }) => {
-      const shown = Math.round(mediaTime * this.data.rate) - (this.data.offset ?? 0);
-      const index = Math.max(0, Math.min(this.count - 1, shown));
-      if (shown >= this.count) this.pause();
-      if (this.playing) {
-        this.#show(index);
-        this.#each();
-      }
+      this.#at(mediaTime);
+      if (this.playing) this.#each();
     });
+  }
+
+  /** Show the frame of a time of the video, which it reached by playing. */
+  #at(seconds) {
+    const shown = Math.floor(seconds * this.data.rate + 0.01) - (this.data.offset ?? 0);
+    if (shown >= this.count) this.pause();
+    this.#show(Math.max(0, Math.min(this.count - 1, shown)));
   }
 
   #show(index) {
