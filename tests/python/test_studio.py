@@ -261,7 +261,7 @@ def test_the_film_comes_in_ranges_and_bad_requests_are_refused(clip, server):
         assert status == 409 and words in text
     assert post(server.url, "edit", [1])[0] == 400
     assert post(server.url, "edit", "x" * 20000)[0] == 413
-    assert post(server.url, "undo", {})[0] == 409
+    assert post(server.url, "redo", {})[0] == 409
     assert post(server.url, "edit", pull, origin="http://evil.example")[0] == 403
     assert json.loads((clip[0] / "clip/video.studio/corrections.json").read_text()) == {"corrections": []}
 
