@@ -40,6 +40,8 @@ def test_figures_of_a_draw(folder, capsys):
     found = json.loads(capsys.readouterr().out)
     assert found["bayes_mm"] < found["likelihood_mm"]
     assert found["bayes_mm"] < found["mean_mm"]
+    page = (folder / "r/report.html").read_text(encoding="utf-8")
+    assert "error of the Bayesian estimate" in page and "bayes_mm" not in page
     assert {p.stem for p in (folder / "r").glob("*.png")} == FIGURES | {"clip"}
     page = (folder / "r" / "report.html").read_text()
     assert page.count("data:image/png;base64,") == len(FIGURES) + 1

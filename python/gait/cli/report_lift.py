@@ -45,6 +45,21 @@ examples:
 """
 
 FIGURES = 5  # besides that of a clip
+_FROM = "Mean distance of the markers from where they truly are"
+_WORDS = {
+    "mean_mm": ("error of the mean motion", " mm", f"{_FROM}, if the view is not looked at."),
+    "likelihood_mm": (
+        "error of the likelihood alone",
+        " mm",
+        f"{_FROM}, by least squares without the prior.",
+    ),
+    "bayes_mm": ("error of the Bayesian estimate", " mm", f"{_FROM}, by the view and the prior."),
+    "log10_volume_ratio": (
+        "volume of the posterior over the prior, log10",
+        "",
+        "How much the view narrows down the motion: -3 is to a thousandth.",
+    ),
+}
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
@@ -87,13 +102,17 @@ def run(args: argparse.Namespace) -> int:
     shown = case(args.model, truth, stature, what, args.seed)
     page = Page(f"{Path(args.model).name if args.model else 'Shipped model'}: segments of motion")
     page.table("Prior", _facts(prior))
+    figures = _figures(shown)
+    worded = {_WORDS[key][0]: f"{value:.4g}{_WORDS[key][1]}" for key, value in figures.items()}
+    page.table(
+        "Estimates of the segment from one view", worded, {_WORDS[k][0]: _WORDS[k][2] for k in figures}
+    )
     with filling(args.output) as folder, progress("figures", FIGURES + bool(lifted), args.quiet) as update:
         for done, drawing in enumerate(_drawings(args, shown, lifted), 1):
             page.figure(drawing.heading, _written(folder, drawing))
             update(done)
         (folder / "report.html").write_text(page.text(), encoding="utf-8")
-    figures = _figures(shown)
-    print(json.dumps(figures) if args.json else "\n".join(f"{k}: {v:.4g}" for k, v in figures.items()))
+    print(json.dumps(figures) if args.json else "\n".join(f"{k}: {v}" for k, v in worded.items()))
     return 0
 
 
