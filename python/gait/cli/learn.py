@@ -27,6 +27,7 @@ from gait.errors import UsageError
 from gait.learn.corpus import forkserver
 from gait.learn.options import (
     DEFAULT_COMPONENTS,
+    JOINT_CENTRES,
     MOST_COMPONENTS,
     PAPER_COMPONENTS,
     PERIOD_MODES,
@@ -106,6 +107,13 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     add("--fps", type=values.between(10, 2000, "frames per second"), metavar="F",
         help="frames per second (default: from the file; .amc: 120)")  # fmt: skip
     add("--markers", type=Path, metavar="MAP.json", help="where the markers of .c3d and .trc sit on the body")
+    add(
+        "--joints",
+        choices=JOINT_CENTRES,
+        default=JOINT_CENTRES[0],
+        help="joint centres of CMU's skeletons (.amc, .bvh made from them). recorded (default): as in the "
+        "file. anatomical: where markers put them, for models of CMU's and other people together",
+    )
     add(
         "--static",
         nargs="+",

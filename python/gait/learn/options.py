@@ -17,6 +17,8 @@ PRIORS = ("people", "paper")
 PERIOD_MODES = ("refined", "literal")
 #: Rules by which files belong to one person (`gait.learn.corpus.subjects`).
 SUBJECT_RULES = ("auto", "prefix", "folder", "file")
+#: Where joints of recorded skeletons are taken (`gait.learn.solve.anatomy`).
+JOINT_CENTRES = ("recorded", "anatomical")
 SEGMENT_SOURCES = ("learnt", "all", "none", "only")
 SEGMENT_MARKERS = ("virtual", "recorded")
 #: Turned copies of each segment as the command names them, and as the blob stores them.
@@ -62,6 +64,7 @@ class LearnOptions:
     period_mode: str = PERIOD_MODES[0]
     fps: float | None = None  #: frames per second; None: from the file
     markers: MarkerMap | None = None  #: for marker sets that are not known by themselves
+    joints: str = JOINT_CENTRES[0]  #: where the joints of CMU's skeletons are
     static: tuple[str, ...] = ()  #: static trials of the people (`gait.learn.solve.static_trial`)
     zeros_missing: bool = False  #: three or more exact zeros in a row are missing data
     trim: bool = True  #: cut starts, stops and turns off the ends of recordings

@@ -16,7 +16,7 @@ from gait.learn.mocap.recording import Y_UP, FileNotes
 from gait.learn.mocap.tables import AngleTable
 from gait.learn.options import DEFAULT, LearnOptions
 from gait.learn.rotations import unit
-from gait.learn.solve import joints, markers
+from gait.learn.solve import anatomy, joints, markers
 from gait.learn.solve.body import MIRRORED, Body, from_bones
 from gait.learn.solve.retarget import mean, median, overground
 from gait.learn.solve.skeleton_fit import LengthInformation
@@ -38,7 +38,10 @@ def read(path: Path, options: LearnOptions = DEFAULT, log_scales: Floats | None 
     if suffix == ".csv" and tables.holds_angles(path):
         return tables.read_angles(path, options.fps, options.zeros_missing)
     if suffix in RECORDINGS:
-        body = from_bones(RECORDINGS[suffix](path, options.fps, options.zeros_missing))
+        recording = RECORDINGS[suffix](path, options.fps, options.zeros_missing)
+        body = from_bones(recording)
+        if options.joints == "anatomical" and anatomy.is_acclaim(recording):
+            body = anatomy.anatomical(body)
     elif suffix == ".csv":
         body = joints.from_table(path, options.fps, options.zeros_missing)
     else:

@@ -1,0 +1,218 @@
+#!/usr/bin/env python3
+"""What joints mean in each source of walks, and how well models of several sources describe people left out.
+
+    .venv/bin/python tests/bench/learn_people.py ../shared/data/mocap
+
+Mean angles and proportions by source show where joint centres differ, before and after those of CMU's
+skeletons are moved to the anatomical ones.  Floors are those of
+learn_floor.py, as tracked, of the model of CMU's walkers alone and of all whose licence permits shipping.
+"""
+
+from __future__ import annotations
+
+import argparse
+import sys
+import warnings
+from collections.abc import Iterable
+from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import Any
+
+import floor_fit
+import numpy as np
+import numpy.typing as npt
+import table
+from floor_shapes import SHAPES, TRACKED
+
+from gait.body.model_curves import series
+from gait.body.skeleton import ANGLES, SIDES, default_skeleton
+from gait.errors import UserError
+from gait.learn.cycles import sequence
+from gait.learn.cycles.sequence import Sequence
+from gait.learn.options import JOINT_CENTRES, LearnOptions
+from gait.learn.prior import fit, model, people
+from gait.learn.rotations import unit
+from gait.learn.solve import readers, retarget
+from gait.learn.solve.body import Body
+from gait.progress import progress
+from gait.reproducible import one_thread_for_good
+
+Floats = npt.NDArray[np.float64]
+
+CMU = "cmu_walk"
+#: Sources whose licences permit a shipped model, and those that serve as people left out alone.
+FREE = ("btk", "gaitalytics", "bvhtoolbox", "opensim", "mcgill", "cmu_more")
+OTHERS = ("ammr", "nimble", "ezc3d", "gaittoolbox", "c3dorg")
+SCALED = ("cmu_more",)  # lengths of limbs are generic there
+ACCLAIM = (CMU, "cmu_more")  # skeletons of CMU
+FOLDS, EVERY = 4, 0.1  # groups of people left out, seconds between the frames compared
+HEAD = 0.2  # metres above the neck, for recordings without a head
+RECORDED, ANATOMICAL = JOINT_CENTRES
+SHOWN = ("hip_flexion", "knee_flexion", "ankle_flexion", "shoulder_flexion", "shoulder_rotation")
+NOTE = """\
+{walks} walks of {count} people; a source's people count alike.  Angles are means over whole cycles and both sides,
+degrees; lengths are shares of the stature, per cent.  *anatomical*: `gait learn --joints anatomical`, which
+moves knees, ankles, shoulders and wrists of CMU's skeletons to where the markers of other laboratories put
+them.  In published walks (Plug-in-Gait) a knee is flexed by 22 to 25 degrees on average.
+
+Floors, mm, median and mean over people: 14 joints after alignment of the pelvis, 5 components and offsets of
+trunk, shoulders and elbows, as the tracker has them, on the mean body of the learners ({folds} groups left
+out of every source at once).  People from elsewhere are the {new} whose whole body was recorded.
+
+{floors}
+"""
+
+
+@dataclass
+class Person:
+    """A walk with the body it was read from and its source."""
+
+    walk: Sequence
+    body: Body
+    source: str
+
+
+def load(folder: Path, joints: str, wanted: tuple[str, ...]) -> list[Person]:
+    """Read all walks of sources that can be learnt from."""
+    found: list[Person] = []
+    places = [(name, folder / name if name == CMU else folder / "more" / name) for name in wanted]
+    files = [
+        (name, path)
+        for name, place in places
+        for path in sorted(place.rglob("*"))
+        if path.suffix.lower() in readers.SUFFIXES
+    ]
+    with progress("reading motion", len(files), False) as update:
+        for done, (source, path) in enumerate(files, 1):
+            try:
+                body = readers.read(path, LearnOptions(joints=joints))
+                walk = sequence.prepare(path, body)
+            except UserError as error:
+                print(f"left out: {error}", file=sys.stderr)
+                continue
+            if source in SCALED:
+                walk = replace(walk, measures=None)
+            found.append(Person(walk, body, source))
+            update(done)
+    return found
+
+
+def row(name: str, some: list[Person]) -> list[Any]:
+    """Cells of the table of a source."""
+    by_person: dict[str, list[list[float]]] = {}
+    for one in some:
+        walk = one.walk
+        whole = walk.channels[: int(int(walk.cycles) * walk.period.frames)]
+        angles = [
+            float(np.degrees(np.nanmean(whole[:, [ANGLES.index(f"{s}_{angle}") for s in SIDES]])))
+            for angle in SHOWN
+        ]
+        m = walk.measures or retarget.measure(retarget.levelled(one.body.part(*walk.kept)))
+        parts = (m.thigh, m.shank, m.sole, m.shoulder[:, 2], m.upper_arm, m.forearm)
+        lengths = [100 * float(np.mean(part)) / m.stature for part in parts]
+        by_person.setdefault(walk.subject, []).append([*angles, *lengths])
+    means = np.nanmean([np.nanmean(rows, axis=0) for rows in by_person.values()], axis=0)
+    return [name, len(by_person), *(f"{value:.1f}" if np.isfinite(value) else None for value in means)]
+
+
+def walk_of(one: Person) -> floor_fit.Walk | None:
+    """Take frames in which all joints are known; None if hardly any are."""
+    s, body = one.walk, one.body.part(*one.walk.kept)
+    joints = dict(body.joints)
+    if not np.isfinite(joints["head"]).any():
+        joints["head"] = joints["neck"] + HEAD * unit(joints["neck"] - joints["pelvis"])
+    body = retarget.levelled(replace(body, joints=joints))
+    joints, stature = dict(body.joints), s.measures.stature
+    joints["head_top"] = joints["neck"] + unit(joints["head"] - joints["neck"]) * retarget.HEAD * stature
+    away = np.stack([joints[name] - joints["pelvis"] for name in floor_fit.COMPARED], axis=1)
+    local = np.einsum("tji,tpj->tpi", body.pelvis, away)[:: max(1, round(EVERY * s.fps))]
+    frames = np.arange(len(s.channels))[:: max(1, round(EVERY * s.fps))]
+    visible = np.isfinite(local).all(axis=(1, 2))
+    if visible.sum() < 4:
+        return None
+    at, channels = frames[visible] / s.period.frames, np.nan_to_num(s.channels[frames[visible]])
+    return floor_fit.Walk(s.subject, at, local[visible], channels, s.measures, s.fps / s.period.frames)
+
+
+def sections_of(learners: list[Person]) -> dict[str, Any]:
+    """Curves as tracked, on the mean body of the learners."""
+    learned = fit.fit([one.walk for one in learners])
+    bodies = {one.walk.subject: one.walk.measures for one in learners if one.walk.measures is not None}
+    follows = {"PACE": series(learned.pace_curve, people.TERMS), "GAIT": model.gait_statistics(learned)}
+    skeleton = default_skeleton(retarget.mean_proportions(list(bodies.values())))
+    return SHAPES[TRACKED].sections(learned) | follows | skeleton.sections()
+
+
+def floors(all_people: list[Person], sources: tuple[str, ...]) -> tuple[dict[str, float], dict[str, float]]:
+    """Floors of people of CMU and from elsewhere, each left out of the learners, by name."""
+    whole = [one for one in all_people if one.walk.measures is not None and walk_of(one) is not None]
+    found: tuple[dict[str, list[float]], ...] = ({}, {})
+    for k in range(FOLDS):
+        out = {
+            name
+            for source in {one.source for one in whole}
+            for name in sorted({one.walk.subject for one in whole if one.source == source})[k::FOLDS]
+        }
+        learners = [one for one in all_people if one.source in sources and one.walk.subject not in out]
+        made = sections_of(learners)
+        for one in whole:
+            if one.walk.subject in out:
+                kind = found[one.source != CMU]
+                mm = floor_fit.in_joints(walk_of(one), made).joints_mm
+                kind.setdefault(one.walk.subject, []).append(mm)
+    return tuple({who: float(np.mean(mm)) for who, mm in kind.items()} for kind in found)
+
+
+def floor_table(kinds: dict[str, list[Person]]) -> tuple[str, int]:
+    """Compare the models; Markdown and the number of people from elsewhere."""
+    rows: list[list[Any]] = []
+    new: dict[str, float] = {}
+    for kind, all_people in kinds.items():
+        for name, sources in (("CMU", (CMU,)), ("CMU and all free", (CMU, *FREE))):
+            cmu, new = floors(all_people, sources)
+            figures = (f"{f(list(x.values())):.1f}" for x in (cmu, new) for f in (np.median, np.mean))
+            rows.append([kind, name, *figures])
+            print(*rows[-1], {who: round(mm) for who, mm in (cmu | new).items()}, file=sys.stderr, flush=True)
+    head = ["joints", "learnt from", "CMU median", "CMU mean", "elsewhere median", "elsewhere mean"]
+    return table.markdown(head, [[str(c) for c in cells] for cells in rows], [False] * 2 + [True] * 4), len(
+        new
+    )
+
+
+def tables(kinds: dict[str, list[Person]]) -> Iterable[list[Any]]:
+    """Rows by source, as recorded and moved."""
+    for name in (CMU, *FREE, *OTHERS):
+        for kind, all_people in kinds.items():
+            some = [one for one in all_people if one.source == name]
+            if some and (kind == RECORDED or name in ACCLAIM):
+                yield row(f"{name}, {kind}" if name in ACCLAIM else name, some)
+
+
+def main() -> int:
+    parser = argparse.ArgumentParser(
+        description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
+    )
+    parser.add_argument("mocap", type=Path, help=f"folder with {CMU} and more")
+    folder = parser.parse_args().mocap
+    if not (folder / "more").is_dir():
+        print(f"learn_people: {folder}: no folder more; name the one of all recordings", file=sys.stderr)
+        return 1
+    one_thread_for_good()
+    warnings.simplefilter("ignore", RuntimeWarning)  # means of parts that no recording of a source shows
+    found = load(folder, RECORDED, (CMU, *FREE, *OTHERS))
+    others = [one for one in found if one.source not in ACCLAIM]
+    kinds = {RECORDED: found, ANATOMICAL: [*load(folder, ANATOMICAL, ACCLAIM), *others]}
+    written, new = floor_table(kinds)
+    count = len({one.walk.subject for one in found})
+    note = NOTE.format(walks=len(found), count=count, folds=FOLDS, new=new, floors=written)
+    lengths = ("thigh", "shank", "sole", "shoulder", "upper arm", "forearm")
+    columns = ["source", "people", *(name.replace("_", " ") for name in SHOWN), *lengths]
+    table.publish("learn_people", "People of several sources", columns, list(tables(kinds)), note)
+    return 0
+
+
+if __name__ == "__main__":
+    try:
+        sys.exit(main())
+    except UserError as error:
+        sys.exit(f"learn_people: {error}")
