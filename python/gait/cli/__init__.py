@@ -56,6 +56,7 @@ COMMANDS = {
     "demo": Command(
         "demo", "run capture, tracker and recorder on a clip and report", ("video", "lcm", "report")
     ),
+    "batch": Command("batch", "track or lift many clips by a project file", ("video",)),
     "export": Command("export", "write a track or a motion in the format of another tool"),
     "report": Command(
         "report", "make one page of a run: verdict, film, figure, gait, angles", ("video", "report")

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import ctypes
 import fcntl
 import json
 import os
@@ -20,6 +19,7 @@ from typing import Any
 from gait.bindings.initial import Start
 from gait.bindings.model import Model
 from gait.camera.camera import Camera
+from gait.ending import die_with_parent
 from gait.errors import UsageError, UserError
 from gait.io.fields import read_json
 from gait.io.files import require_folder
@@ -34,7 +34,6 @@ from gait.report.run_files import RunFiles
 
 _GRACE = 5.0  # seconds that a process may take to end when asked
 _TURN = 0.05  # seconds between two looks
-_PR_SET_PDEATHSIG = 1
 
 
 class Child:
@@ -123,7 +122,7 @@ class Session:
                 stderr=subprocess.PIPE if pipe_errors else None,
                 text=True,
                 start_new_session=True,
-                preexec_fn=_die_with_parent,
+                preexec_fn=die_with_parent,
             )
         except OSError as exc:
             raise UserError(f"{command[0]}: cannot be started ({exc.strerror}); run make tools") from None
@@ -149,11 +148,6 @@ def _end(process: subprocess.Popen[str], deadline: float) -> None:
     for stream in (process.stdout, process.stderr):
         if stream is not None:
             stream.close()
-
-
-def _die_with_parent() -> None:
-    """Ask Linux to end this process when its parent dies, however that happens."""
-    ctypes.CDLL(None, use_errno=True).prctl(_PR_SET_PDEATHSIG, signal.SIGTERM)
 
 
 RESULTS = ("track.csv", "overlay.mp4", "report.html")

@@ -1,0 +1,1 @@
+"""Many clips by one project file."""

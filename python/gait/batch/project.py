@@ -1,0 +1,186 @@
+"""A project file (TOML): clips, what is common to them, and what to make of each."""
+
+from __future__ import annotations
+
+import hashlib
+import json
+import os
+import re
+import sys
+from dataclasses import asdict, dataclass, replace
+from pathlib import Path
+from typing import Any
+
+from gait._version import __version__
+from gait.errors import UserError, unreadable
+from gait.io.fields import Fields, parsing
+
+if sys.version_info >= (3, 11):
+    import tomllib
+else:
+    import tomli as tomllib
+
+EXPORTS = ("trc", "c3d", "bvh", "mot", "parquet", "rrd", "mcap")
+MADE = ("track", "lift", "overlay", "report", *EXPORTS)
+_FILES = ("video", "keypoints", "camera")
+_KEYS = ("subject", "height", "person", "start", "stop", "make", "options", *_FILES)
+
+
+@dataclass(frozen=True)
+class Clip:
+    """One clip of a project; files are absolute."""
+
+    name: str
+    video: str | None = None
+    keypoints: str | None = None
+    camera: str | None = None
+    subject: str = ""  #: who walks, for the summary
+    height: float | None = None  #: metres
+    person: str | None = None  #: of several in `keypoints`
+    start: int | None = None
+    stop: int | None = None
+    make: tuple[str, ...] = ("track", "report")
+    options: tuple[str, ...] = ()  #: further words of gait track or gait lift
+
+    @property
+    def lifted(self) -> bool:
+        """Whether it is lifted, not tracked."""
+        return "lift" in self.make
+
+    @property
+    def result(self) -> str:
+        """Name of the file that all others are made of."""
+        return "motion.csv" if self.lifted else "track.csv"
+
+    def key(self) -> str:
+        """Hash of everything that the outputs depend on: settings, files by size and time, version."""
+        files = [os.stat(path) for path in (getattr(self, name) for name in _FILES) if path]
+        state = [asdict(self), [(file.st_size, file.st_mtime_ns) for file in files], __version__]
+        return hashlib.sha256(json.dumps(state).encode()).hexdigest()
+
+    def commands(self, folder: Path) -> list[list[str]]:
+        """Words of the gait commands that make its files in a folder, in their order."""
+        result = str(folder / self.result)
+        found = [self._lift(result) if self.lifted else self._track(result, folder)]
+        if "report" in self.make and not self.lifted:
+            found.append(["report", "track", result, "-o", str(folder / "report"), "--json"])
+        stem = self.result.partition(".")[0]
+        for suffix in EXPORTS:
+            if suffix in self.make:
+                found.append(["export", result, "-o", str(folder / f"{stem}.{suffix}"), "--json"])
+        return found
+
+    def _track(self, result: str, folder: Path) -> list[str]:
+        words = ["track", self.video or "", "-o", result, "--json", "--quiet", *self._common()]
+        if "overlay" in self.make:
+            words += ["--overlay", str(folder / "overlay.mp4")]
+        if self.keypoints:
+            words += ["--keypoints", self.keypoints]
+        return [*words, *self.options]
+
+    def _lift(self, result: str) -> list[str]:
+        words = [
+            "lift",
+            self.keypoints or self.video or "",
+            "-o",
+            result,
+            "--json",
+            "--quiet",
+            *self._common(),
+        ]
+        if self.keypoints and self.video:
+            words += ["--video", self.video]
+        return [*words, *self.options]
+
+    def _common(self) -> list[str]:
+        given = {name: getattr(self, name) for name in ("camera", "height", "person", "start", "stop")}
+        return [
+            word for name, value in given.items() if value is not None for word in (f"--{name}", str(value))
+        ]
+
+
+def read(path: str | os.PathLike[str]) -> list[Clip]:
+    """Read the clips of a project.
+
+    UserError if the file, or what is written of a clip, cannot be right; a file of a clip that is missing or
+    damaged is a failure of that clip alone.
+    """
+    try:
+        text = Path(path).read_bytes()
+    except OSError as error:
+        raise unreadable(path, error) from error
+    with parsing(str(path), "TOML", "mend it"):
+        data = tomllib.loads(text.decode("utf-8-sig"))
+    whole = Fields(str(path), data)
+    whole.only(("defaults", "clip"))
+    folder = Path(path).resolve().parent
+    common = _clip(whole.table("defaults", ""), Clip(""), folder)
+    entries = data.get("clip", [])
+    if not isinstance(entries, list) or not entries:
+        raise UserError(f"{path}: has no [[clip]]; give each a video")
+    clips = []
+    for i, entry in enumerate(entries, 1):
+        where = f"{path}: clip {i}"
+        if not isinstance(entry, dict):
+            raise UserError(f"{where}: is no table; begin it with [[clip]]")
+        fields = Fields(where, entry)
+        clip = _clip(fields, common, folder, named=True)
+        _require(fields, clip)
+        clips.append(clip)
+    twice = next((clip.name for clip in clips if sum(other.name == clip.name for other in clips) > 1), None)
+    if twice is not None:
+        raise UserError(f"{path}: two clips are named {twice}; give each a name of its own")
+    return clips
+
+
+def _clip(fields: Fields, common: Clip, folder: Path, named: bool = False) -> Clip:
+    """Clip of a table, with what is common to all where it has nothing."""
+    fields.only((*_KEYS, "name") if named else _KEYS)
+    given: dict[str, Any] = {}
+    for name in (*_FILES, "subject", "person"):
+        if name in fields:
+            given[name] = _text(fields, name)
+    given |= {name: str(folder / given[name]) for name in _FILES if name in given}
+    if "height" in fields:
+        given["height"] = fields.number("height", 0.3, 3.0, "give metres")
+    for name in ("start", "stop"):
+        if name in fields:
+            given[name] = fields.integer(name, 0, 1 << 31, "give a frame, from 0")
+    for name, known in (("make", MADE), ("options", None)):
+        if name in fields:
+            given[name] = _words(fields, name, known)
+    if named:
+        stem = Path(given.get("video") or given.get("keypoints") or "").stem
+        given["name"] = _text(fields, "name") if "name" in fields else stem
+    return replace(common, **given)
+
+
+def _require(fields: Fields, clip: Clip) -> None:
+    """Refuse a clip that no command can take."""
+    if not re.fullmatch(r"[\w][\w .+-]*", clip.name):
+        raise fields.fail("name", f"is {clip.name!r}", "give letters, digits, spaces and . _ + -")
+    if not clip.lifted and not clip.video:
+        raise fields.fail("video", "is missing", "give the file, or make lift of keypoints")
+    if not clip.video and not clip.keypoints:
+        raise fields.fail("video", "and keypoints are missing", "give one of them")
+    if clip.lifted and {"track", "overlay", "report"} & set(clip.make):
+        raise fields.fail("make", "has lift beside track, overlay or report", "make a clip of each")
+    if not clip.camera and clip.height is None and not (clip.lifted and clip.keypoints):
+        raise fields.fail("camera", "and height are missing", "give one of them, here or in [defaults]")
+
+
+def _text(fields: Fields, name: str) -> str:
+    value = fields.get(name, "give text")
+    if not isinstance(value, str) or not value:
+        raise fields.fail(name, "is no text", "give it in quotes")
+    return value
+
+
+def _words(fields: Fields, name: str, known: tuple[str, ...] | None) -> tuple[str, ...]:
+    value = fields.get(name, "give a list of words")
+    if not isinstance(value, list) or not all(isinstance(word, str) for word in value):
+        raise fields.fail(name, "is no list of words", 'give it as ["track", "report"]')
+    wrong = [word for word in value if known is not None and word not in known]
+    if wrong:
+        raise fields.fail(name, f"has {wrong[0]!r}", f"use {' '.join(known or ())}")
+    return tuple(value)

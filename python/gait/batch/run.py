@@ -1,0 +1,215 @@
+"""Run the clips of a project: each in processes of its own, several at a time, none of them twice."""
+
+from __future__ import annotations
+
+import csv
+import json
+import os
+import subprocess
+import sys
+import threading
+import time
+from collections.abc import Callable, Mapping, Sequence
+from concurrent.futures import ThreadPoolExecutor, as_completed
+from html import escape
+from importlib.util import find_spec
+from pathlib import Path
+from typing import Any
+
+from gait.batch.project import Clip
+from gait.ending import die_with_parent
+from gait.io.files import replacing
+
+DONE, FAILED = "done", "failed"
+RECORD = "done.json"  #: in the folder of a clip that is done
+GAIT = (sys.executable, "-m", "gait")
+_COUNTS = ("frames", "init", "tracking", "ambiguous", "lost")
+_GRACE = 5.0  # seconds that commands may take to end after an interrupt
+
+Row = dict[str, Any]
+
+
+class Runner:
+    """Runs clips in folders below `output`.
+
+    Attributes
+    ----------
+    output : Path
+    gait : sequence of str
+        Start of the command lines.
+    """
+
+    def __init__(self, output: Path, gait: Sequence[str] = GAIT) -> None:
+        self.output, self.gait = output, tuple(gait)
+        self._running: set[subprocess.Popen[str]] = set()
+        self._lock, self._ended = threading.Lock(), False
+
+    def run(self, clips: Sequence[Clip], jobs: int, report: Callable[[Row], None]) -> list[Row]:
+        """Run clips, at most `jobs` at a time; return their rows in the order of the project.
+
+        `report` gets each row when its clip has ended.  An interrupt ends the commands that run; what is done
+        stays done.
+        """
+        rows: dict[str, Row] = {}
+        with ThreadPoolExecutor(jobs) as pool:
+            waiting = {pool.submit(self._clip, clip): clip for clip in clips}
+            try:
+                for future in as_completed(waiting):
+                    row = future.result()
+                    rows[waiting[future].name] = row
+                    report(row)
+            except BaseException:
+                self._end()
+                pool.shutdown(wait=True, cancel_futures=True)
+                raise
+        return [rows[clip.name] for clip in clips]
+
+    def _clip(self, clip: Clip) -> Row:
+        """Run one clip unless it is done already; return its row of the summary."""
+        folder = self.output / clip.name
+        row: Row = {"name": clip.name, "subject": clip.subject, "input": clip.video or clip.keypoints}
+        try:
+            key = clip.key()
+            if (before := self._recorded(folder, key)) is not None:
+                return before
+            folder.mkdir(parents=True, exist_ok=True)
+            began = time.monotonic()
+            for command in clip.commands(folder):
+                row |= _figures(command[0], self._command(command))
+            row |= {"state": DONE, "error": "", "seconds": round(time.monotonic() - began, 1)}
+            with replacing(folder / RECORD) as file:
+                file.write_text(json.dumps({"key": key, "row": row}, indent=1) + "\n", encoding="utf-8")
+        except OSError as error:
+            row |= {"state": FAILED, "error": f"{error.filename}: {error.strerror}"}
+        except _Failed as error:
+            row |= {"state": FAILED, "error": str(error)}
+        return row
+
+    def _recorded(self, folder: Path, key: str) -> Row | None:
+        """Return the row of a clip that was done with the same settings, files and version."""
+        try:
+            record = json.loads((folder / RECORD).read_text(encoding="utf-8"))
+        except (OSError, ValueError):
+            return None
+        return record["row"] if isinstance(record, dict) and record.get("key") == key else None
+
+    def _command(self, words: Sequence[str]) -> Any:
+        """Run a command to its end; return the JSON that it prints.  _Failed with its last line."""
+        with self._lock:
+            if self._ended:
+                raise _Failed("interrupted")
+            process = subprocess.Popen(
+                [*self.gait, *words],
+                stdin=subprocess.DEVNULL,
+                stdout=subprocess.PIPE,
+                stderr=subprocess.PIPE,
+                text=True,
+                start_new_session=True,
+                preexec_fn=die_with_parent,
+            )
+            self._running.add(process)
+        out, err = process.communicate()
+        with self._lock:
+            self._running.discard(process)
+        if process.returncode:
+            last = next((line for line in reversed(err.splitlines()) if line.strip()), "")
+            raise _Failed(last or f"gait {words[0]} ended with {process.returncode}")
+        try:
+            return json.loads(out)
+        except ValueError:
+            raise _Failed(f"gait {words[0]} printed no figures") from None
+
+    def _end(self) -> None:
+        """End the commands that run, and start no more."""
+        with self._lock:
+            self._ended = True
+            running = list(self._running)
+        for process in running:
+            process.terminate()
+        for process in running:
+            try:
+                process.wait(_GRACE)
+            except subprocess.TimeoutExpired:
+                process.kill()
+
+
+class _Failed(Exception):
+    """A command of a clip failed; one line."""
+
+
+def _figures(command: str, found: Any) -> Row:
+    """Figures of a command for the summary."""
+    if command == "track":
+        return {name: found[name] for name in _COUNTS if name in found}
+    if command == "lift":
+        return {name: found[name] for name in ("frames", "sd_mm", "stature_m") if found.get(name) is not None}
+    if command == "report":
+        both = {name: values["both"] for name, values in found["summary"].items() if "both" in values}
+        return {f"{name}{end}": value[part] for name, value in both.items()
+                for end, part in (("", "mean"), ("_sd", "sd"))}  # fmt: skip
+    return {}
+
+
+def write_summary(output: Path, rows: Sequence[Row]) -> list[str]:
+    """Write summary.csv, summary.parquet if PyArrow is installed, and index.html; return their names."""
+    head = list(dict.fromkeys(name for row in rows for name in row))
+    table = output / "summary.csv"
+    with replacing(table) as temporary, open(temporary, "w", newline="", encoding="utf-8") as file:
+        writer = csv.DictWriter(file, head, lineterminator="\n")
+        writer.writeheader()
+        writer.writerows(rows)
+    names = [table.name]
+    if find_spec("pyarrow") is not None:
+        import pyarrow as pa
+        from pyarrow import parquet
+
+        columns = {name: pa.array([row.get(name) for row in rows]) for name in head}
+        with replacing(output / "summary.parquet") as temporary:
+            parquet.write_table(pa.table(columns), temporary)
+        names.append("summary.parquet")
+    with replacing(output / "index.html") as temporary:
+        temporary.write_text(_page(output, rows), encoding="utf-8")
+    return [*names, "index.html"]
+
+
+_SHOWN = {
+    **{"subject": "subject", "state": "state", "frames": "frames", "speed_m_s": "speed, m/s"},
+    **{"cadence_spm": "steps a minute", "stride_length_m": "stride, m"},
+}
+
+
+def _page(output: Path, rows: Sequence[Row]) -> str:
+    """Page with a row for each clip and links to its files."""
+    from gait.report.page import Page
+
+    failed = sum(row["state"] == FAILED for row in rows)
+    lead = f"{len(rows)} clips, {failed} failed." if failed else f"{len(rows)} clips, all done."
+    page = Page("Clips", lead)
+    head = "".join(f"<th scope=col>{escape(text)}</th>" for text in ("clip", *_SHOWN.values(), "files"))
+    body = "".join(
+        f"<tr><th scope=row>{escape(row['name'])}</th>"
+        + "".join(f"<td>{escape(_shown(row, name))}</td>" for name in _SHOWN)
+        + f"<td>{_links(output, row)}</td></tr>"
+        for row in rows
+    )
+    page.html(f"<table><thead><tr>{head}</tr></thead><tbody>{body}</tbody></table>")
+    for row in rows:
+        if row["state"] == FAILED:
+            page.words(f"{row['name']}: {row['error']}", "warning")
+    return page.text()
+
+
+def _shown(row: Mapping[str, Any], name: str) -> str:
+    value = row.get(name)
+    return "" if value is None else f"{value:.3g}" if isinstance(value, float) else str(value)
+
+
+def _links(output: Path, row: Mapping[str, Any]) -> str:
+    """Links to the files of a clip that is done."""
+    if row["state"] != DONE:
+        return ""
+    folder = output / row["name"]
+    files = [folder / "report" / "report.html", *sorted(folder.iterdir())]
+    shown = [file for file in files if file.is_file() and file.name != RECORD]
+    names = [os.path.relpath(file, output) for file in shown]
+    return " ".join(f'<a href="{escape(name)}">{escape(Path(name).name)}</a>' for name in names)

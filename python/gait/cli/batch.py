@@ -1,0 +1,77 @@
+"""Track or lift many clips by a project file, several at a time, and summarise them.
+
+PROJECT.toml names the clips and what to make of each; paths are relative to it:
+
+  [defaults]                    # for all clips; each may have its own
+  height = 1.75                 # metres; or camera = "camera.json"
+  make = ["track", "report", "c3d"]
+
+  [[clip]]
+  video = "anna.mp4"            # name = "anna" (default: the file's), subject, keypoints, person, start, stop
+  [[clip]]
+  keypoints = "ben.json"
+  make = ["lift", "mot"]
+  options = ["--fps", "30"]     # further words of gait track or gait lift
+
+make: track or lift; overlay and report of a track; trc c3d bvh mot parquet rrd mcap.
+
+Every clip has a folder in DIR, and processes of its own: one that is damaged or crashes is a failed row of
+the summary and ends nothing else.  The same command resumes: clips that are done with the same settings,
+files and version are not made again, failed ones are.  DIR/summary.csv (and .parquet, with PyArrow) has one
+row per clip, DIR/index.html links to all files.  Ends with 1 if a clip failed.
+"""
+
+from __future__ import annotations
+
+import argparse
+import json
+import os
+from pathlib import Path
+
+from gait.cli import values
+from gait.io.files import require_folder
+from gait.progress import note
+
+EXAMPLES = """\
+examples:
+  gait batch project.toml -o results
+  gait batch project.toml -o results --jobs 8
+"""
+
+
+def add_arguments(parser: argparse.ArgumentParser) -> None:
+    """Add the command's options."""
+    parser.add_argument("project", metavar="PROJECT.toml", help="the clips")
+    parser.add_argument("-o", "--output", required=True, metavar="DIR", help="folder for all results")
+    jobs = max(1, (os.cpu_count() or 1) // 2)
+    parser.add_argument(
+        "--jobs",
+        type=values.whole(1, 256),
+        default=jobs,
+        metavar="N",
+        help=f"clips at a time (default: {jobs})",
+    )
+
+
+def run(args: argparse.Namespace) -> int:
+    """Run all clips and summarise."""
+    from gait.batch import project
+    from gait.batch.run import FAILED, Runner, write_summary
+
+    clips = project.read(args.project)
+    require_folder(args.output)
+    output = Path(args.output)
+    output.mkdir(parents=True, exist_ok=True)
+
+    def report(row: dict[str, object]) -> None:
+        error = f": {row['error']}" if row["error"] else ""
+        note(f"{row['name']}: {row['state']}{error}", args.quiet)
+
+    rows = Runner(output).run(clips, args.jobs, report)
+    names = write_summary(output, rows)
+    failed = sum(row["state"] == FAILED for row in rows)
+    if args.json:
+        print(json.dumps({"clips": len(rows), "failed": failed, "rows": rows}))
+    else:
+        print(f"{len(rows)} clips, {failed} failed; {', '.join(str(output / name) for name in names)}")
+    return int(failed > 0)

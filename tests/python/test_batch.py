@@ -1,0 +1,218 @@
+"""gait batch: clips in processes of their own; resumed after a kill, damaged ones end nothing."""
+
+import csv
+import json
+import os
+import signal
+import subprocess
+import sys
+import threading
+from pathlib import Path
+
+import numpy as np
+import pytest
+from walking_keypoints import keypoints, view
+
+import gait.cli
+from gait.batch import project
+from gait.batch.run import DONE, FAILED, Runner, write_summary
+from gait.camera.camera import write_camera
+from gait.errors import UserError
+from gait.io.keypoints_file import write
+
+# A stand-in for gait: notes each call, crashes on "bad", waits on "slow" until the file GO is there.
+FAKE = """\
+import json, os, sys, time
+from pathlib import Path
+words = sys.argv[1:]
+log = Path(os.environ["FAKE_LOG"])
+with log.open("a") as file:
+    file.write(" ".join(words[:2]) + "\\n")
+if words[0] == "track":
+    if "bad" in words[1]:
+        print("gait track: bad.mp4: damaged", file=sys.stderr)
+        os.abort() if "crash" in words[1] else sys.exit(1)
+    while "slow" in words[1] and not log.with_name("GO").exists():
+        time.sleep(0.01)
+    Path(words[words.index("-o") + 1]).write_text("frame\\n")
+    print(json.dumps({"frames": 3, "tracking": 2, "digest": "x"}))
+elif words[:2] == ["report", "track"]:
+    folder = Path(words[words.index("-o") + 1])
+    folder.mkdir(exist_ok=True)
+    (folder / "report.html").write_text("page")
+    print(json.dumps({"summary": {"speed_m_s": {"both": {"mean": 1.25, "sd": 0.1, "between": None}}}}))
+else:
+    Path(words[words.index("-o") + 1]).write_text("made")
+    print(json.dumps({"frames": 3}))
+"""
+
+
+@pytest.fixture
+def place(tmp_path, monkeypatch):
+    """A folder with the stand-in and clips."""
+    (tmp_path / "fake.py").write_text(FAKE)
+    for name in ("a", "b", "slow", "bad", "badcrash"):
+        (tmp_path / f"{name}.mp4").write_bytes(name.encode())
+    monkeypatch.setenv("FAKE_LOG", str(tmp_path / "log"))
+    return tmp_path
+
+
+def clips_of(place, text):
+    (place / "p.toml").write_text(text)
+    return project.read(place / "p.toml")
+
+
+def runner(place):
+    return Runner(place / "out", (sys.executable, str(place / "fake.py")))
+
+
+def calls(place):
+    log = place / "log"
+    return sorted(log.read_text().splitlines()) if log.exists() else []
+
+
+PROJECT = """
+[defaults]
+height = 1.75
+make = ["track", "report", "c3d"]
+[[clip]]
+video = "a.mp4"
+subject = "Anna"
+[[clip]]
+video = "bad.mp4"
+[[clip]]
+video = "badcrash.mp4"
+[[clip]]
+video = "none.mp4"
+[[clip]]
+video = "b.mp4"
+name = "again b"
+height = 1.6
+make = ["track"]
+"""
+
+
+def test_one_damaged_clip_never_ends_the_rest(place):
+    clips, seen = clips_of(place, PROJECT), []
+    rows = runner(place).run(clips, 2, seen.append)
+    assert [row["state"] for row in rows] == [DONE, FAILED, FAILED, FAILED, DONE] and len(seen) == 5
+    assert rows[1]["error"] == "gait track: bad.mp4: damaged"
+    assert "none.mp4: No such file" in rows[3]["error"]
+    assert rows[0]["speed_m_s"] == 1.25 and rows[0]["tracking"] == 2 and rows[0]["subject"] == "Anna"
+    out = place / "out"
+    assert {file.name for file in (out / "a").iterdir()} == {"track.csv", "track.c3d", "report", "done.json"}
+    assert write_summary(out, rows)[0] == "summary.csv"
+    with open(out / "summary.csv", newline="") as file:
+        table = list(csv.DictReader(file))
+    assert [row["name"] for row in table] == ["a", "bad", "badcrash", "none", "again b"]
+    assert table[0]["speed_m_s_sd"] == "0.1" and table[1]["frames"] == ""
+    page = (out / "index.html").read_text()
+    assert (
+        'href="a/report/report.html"' in page
+        and "5 clips, 3 failed" in page
+        and "http" not in page.split("<body")[1]
+    )
+
+
+def test_what_is_done_is_not_made_again_and_what_changed_is(place):
+    clips = clips_of(place, PROJECT)
+    runner(place).run(clips, 2, lambda _: None)
+    (place / "log").unlink()
+    rows = runner(place).run(clips, 2, lambda _: None)
+    assert calls(place) == [f"track {place}/bad.mp4", f"track {place}/badcrash.mp4"]
+    assert rows[0]["state"] == DONE and rows[0]["speed_m_s"] == 1.25
+    (place / "log").unlink()
+    (place / "bad.mp4").rename(place / "mended.mp4")
+    (place / "a.mp4").write_bytes(b"another")
+    clips = clips_of(place, PROJECT.replace("bad.mp4", "mended.mp4").replace("1.6", "1.7"))
+    rows = runner(place).run(clips, 2, lambda _: None)
+    again = [f"track {place}/{name}.mp4" for name in ("a", "b", "badcrash", "mended")]
+    assert [call for call in calls(place) if call.startswith("track")] == again
+    assert [row["state"] for row in rows] == [DONE, DONE, FAILED, FAILED, DONE]
+
+
+def test_a_kill_ends_the_commands_and_the_rest_is_resumed(place):
+    text = '[defaults]\nheight = 1.7\nmake = ["track"]\n'
+    text += '[[clip]]\nvideo = "a.mp4"\n[[clip]]\nvideo = "slow.mp4"\n'
+    clips_of(place, text)
+    script = (
+        "import sys; from pathlib import Path\n"
+        "from gait.batch import project; from gait.batch.run import Runner\n"
+        "place = Path(sys.argv[1]); fake = (sys.executable, str(place / 'fake.py'))\n"
+        "clips = project.read(place / 'p.toml')\n"
+        "Runner(place / 'out', fake).run(clips, 1, lambda row: print(row['name'], flush=True))"
+    )
+    command = [sys.executable, "-c", script, str(place)]
+    process = subprocess.Popen(command, stdout=subprocess.PIPE, text=True)
+    assert process.stdout.readline() == "a\n"  # slow waits now, or will
+    while f"track {place}/slow.mp4" not in calls(place):
+        assert process.poll() is None
+    process.send_signal(signal.SIGKILL)
+    process.wait()
+    process.stdout.close()
+    (place / "log").unlink()
+    (place / "GO").touch()
+    rows = runner(place).run(project.read(place / "p.toml"), 1, lambda _: None)
+    assert [row["state"] for row in rows] == [DONE, DONE]
+    assert calls(place) == [f"track {place}/slow.mp4"]
+
+
+def test_an_interrupt_ends_the_commands(place):
+    clips = clips_of(place, '[[clip]]\nvideo = "slow.mp4"\nheight = 1.7\nmake = ["track"]\n')
+
+    def interrupt():
+        while not calls(place):
+            pass
+        os.kill(os.getpid(), signal.SIGINT)
+
+    thread = threading.Thread(target=interrupt)
+    thread.start()
+    with pytest.raises(KeyboardInterrupt):
+        runner(place).run(clips, 1, lambda _: None)
+    thread.join()
+    assert not (place / "out/slow/track.csv").exists() and not (place / "out/slow/done.json").exists()
+
+
+@pytest.mark.parametrize(
+    ("text", "words"),
+    [
+        ("", r"has no \[\[clip\]\]; give each a video"),
+        ("[[clip]]\nvideo = 'a.mp4'\n", "clip 1: camera and height are missing"),
+        ("[[clip]]\nheight = 1.7\n", "clip 1: name is ''"),
+        ("[[clip]]\nname = 'a'\nheight = 1.7\n", "clip 1: video is missing"),
+        ("[[clip]]\nvideo = 'a.mp4'\nhieght = 1.7\n", "hieght is not a known key"),
+        ("[[clip]]\nvideo = 'a.mp4'\nheight = 1.7\nmake = ['fbx']\n", "make has 'fbx'; use track lift"),
+        ("[[clip]]\nvideo = 'a.mp4'\nheight = 17\n", "height is 17, outside"),
+        ("[[clip]]\nvideo = 'a.mp4'\nheight = 1.7\nname = '../a'\n", "name is '../a'"),
+        (
+            "[[clip]]\nvideo = 'a.mp4'\nheight = 1.7\n[[clip]]\nvideo = 'a.avi'\nheight = 1.7\n",
+            "two clips are named a",
+        ),
+        (
+            "[[clip]]\nvideo = 'a.mp4'\nheight = 1.7\nmake = ['lift', 'report']\n",
+            "make has lift beside track",
+        ),
+        ("[[clip]\n", "not valid TOML"),
+    ],
+)
+def test_a_project_that_cannot_be_right_is_one_line(text, words, place):
+    with pytest.raises(UserError, match=words) as caught:
+        clips_of(place, text)
+    assert "\n" not in str(caught.value)
+
+
+def test_the_command_lifts_keypoints_and_exports_them(tmp_path, capsys):
+    camera = view()
+    write_camera(tmp_path / "cam.json", camera)
+    write(tmp_path / "k.csv", keypoints(camera, seconds=1.6))
+    (tmp_path / "empty.csv").write_text("")
+    (tmp_path / "p.toml").write_text(
+        'defaults = {camera = "cam.json", make = ["lift", "trc"], options = ["--method", "segment"]}\n'
+        '[[clip]]\nkeypoints = "k.csv"\n[[clip]]\nkeypoints = "empty.csv"\n'
+    )
+    assert gait.cli.main(["batch", str(tmp_path / "p.toml"), "-o", str(tmp_path / "out"), "--json"]) == 1
+    found = json.loads(capsys.readouterr().out)
+    assert found["clips"] == 2 and found["failed"] == 1
+    assert found["rows"][0]["frames"] == 24 and "empty.csv" in found["rows"][1]["error"]
+    assert {file.name for file in (tmp_path / "out/k").iterdir()} == {"motion.csv", "motion.trc", "done.json"}
+    assert Path(tmp_path / "out/index.html").is_file() and np.isfinite(found["rows"][0]["sd_mm"])
