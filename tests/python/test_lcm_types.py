@@ -29,6 +29,7 @@ from gait.lcm.messages import (
 FINGERPRINTS = {
     "angle_t": "70ec7fc36619a1e2",
     "camera_t": "be86d3ea284d3ddd",
+    "classes_t": "cfd0566cd3864129",
     "command_t": "915eeb6f0356b2b8",
     "estimate_t": "15758dc69cf3c5a3",
     "image_metadata_t": "9a4b634d0577fb8e",

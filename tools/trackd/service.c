@@ -1,5 +1,6 @@
 #include "service.h"
 
+#include "gaitmsg_classes_t.h"
 #include "gaitmsg_image_t.h"
 #include "gaitmsg_stride_t.h"
 #include "image_view.h"
@@ -339,6 +340,27 @@ static void send_lagged(service *s)
     send_stride(s, &e, p->frame);
 }
 
+/* Probabilities of the classes of motion, where the model has several. */
+static void send_classes(service *s, const image_view *v, const gait_estimate *e)
+{
+    uint8_t bytes[1024];
+    float probability[GAIT_MAX_CLASSES];
+    char *name[GAIT_MAX_CLASSES];
+    int32_t const n = s->track.info.classes;
+    if (n < 2)
+        return;
+    for (int32_t k = 0; k < n; k++)
+        name[k] = (char *)gait_model_class_name(s->track.model, k); /* LCM's strings lack const; read only */
+    memcpy(probability, e->class_probability, sizeof probability);
+    gaitmsg_classes_t const m = {.utime = e->utime,
+                                 .frame = v->frame,
+                                 .most_probable = e->motion_class,
+                                 .nclasses = n,
+                                 .name = name,
+                                 .probability = probability};
+    sink_publish(s->out, "GAIT_CLASSES", bytes, gaitmsg_classes_t_encode(bytes, 0, sizeof bytes, &m));
+}
+
 void service_send_estimate(service *s, const image_view *v, const gait_estimate *e, int64_t received,
                            int64_t step_us)
 {
@@ -348,6 +370,7 @@ void service_send_estimate(service *s, const image_view *v, const gait_estimate 
     *now = (past_frame){e->frame, v->frame, s->steps, received, (int32_t)step_us};
     set_counters(m, s, now);
     sink_publish(s->out, "GAIT_ESTIMATE", encoded, gaitmsg_estimate_t_encode(encoded, 0, MESSAGE_BYTES, m));
+    send_classes(s, v, e);
     if (s->track.config.lag > 0)
         send_lagged(s);
     else

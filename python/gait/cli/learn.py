@@ -65,6 +65,16 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         help="name of the motion; walk refuses runs and run refuses walks (default: walk)",
     )
     add(
+        "--class",
+        dest="classes",
+        action="append",
+        default=[],
+        metavar="NAME[=SRC]",
+        help="also hold this class of motion, so that gait track follows changes; may be repeated. stand and "
+        "backwards are made from the walk; run is learnt from the runs among the sources, or like any other "
+        "NAME from the recordings of SRC",
+    )
+    add(
         "--subjects",
         choices=SUBJECT_RULES,
         default=SUBJECT_RULES[0],
@@ -187,9 +197,15 @@ def run(args: argparse.Namespace) -> int:
     if options.jobs > 1 and not options.dask and forkserver.worth(options.sources):
         forkserver.start()  # its imports run beside ours
     from gait.learn import run as learning  # SciPy takes most of a second
+    from gait.learn.classes import run as classes
     from gait.learn.report import summary
 
-    figures = learning.run(options, lambda line: None if args.quiet else print(line, file=sys.stderr))
+    def note(line: str) -> None:
+        if not args.quiet:
+            print(line, file=sys.stderr)
+
+    one = learning.run
+    figures = classes.learn(options, note, one) if options.classes else one(options, note)
     print(json.dumps(figures) if args.json else summary.text(args.output, figures))
     return 0
 
@@ -207,6 +223,7 @@ def _options(args: argparse.Namespace) -> LearnOptions:
             "sources": tuple(args.sources),
             "exclude": tuple(args.exclude),
             "static": tuple(args.static),
+            "classes": tuple(args.classes),
             "markers": markers.read_map(args.markers) if args.markers else None,
             "trim": not args.no_trim,
             "segments": _segment_options(args),

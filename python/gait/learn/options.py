@@ -72,6 +72,7 @@ class LearnOptions:
     segments: SegmentOptions = SegmentOptions(source="none")
     jobs: int = 1  #: processes that read files
     dask: str | None = None  #: scheduler of a Dask cluster that reads them instead
+    classes: tuple[str, ...] = ()  #: further classes of motion, NAME or NAME=SOURCE
 
 
 DEFAULT = LearnOptions()

@@ -56,7 +56,9 @@ def draw_panel(canvas: Image, estimate: Estimate, frame: int, scale: float) -> N
 
 
 def _figures(estimate: Estimate) -> tuple[str, str]:
-    return f"{120 * estimate.mean.stride_hz:5.1f} steps/min", f"{estimate.speed:5.2f} m/s"
+    steps = 120 * estimate.mean.stride_hz if estimate.speed else 0.0
+    of_class = f" {estimate.motion_class}" if len(estimate.class_probability) > 1 else ""
+    return f"{steps:5.1f} steps/min", f"{estimate.speed:5.2f} m/s{of_class}"
 
 
 def _panel(canvas: Image, scale: float) -> Image:

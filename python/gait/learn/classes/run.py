@@ -1,0 +1,125 @@
+"""`gait learn --class`: one run for each class of motion, and all of them in one blob."""
+
+from __future__ import annotations
+
+import json
+import tempfile
+from collections.abc import Callable, Mapping
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+from gait.errors import UsageError, UserError
+from gait.io import blob
+from gait.learn.classes import standing
+from gait.learn.classes.join import Change, MotionClass, join
+from gait.learn.corpus.load import NothingLeft
+from gait.learn.options import LearnOptions, SegmentOptions
+
+Note = Callable[[str], None]
+Run = Callable[[LearnOptions, Note], dict[str, Any]]
+
+WALK, STAND, BACKWARDS, RUN = "walk", "stand", "backwards", "run"
+DERIVED = STAND, BACKWARDS  # made from the walk
+_STEP = 6.0  # concentration: within about a twentieth of a stride, one sd
+#: Changes, per second where they are most likely.  Recordings of changes are rare, so these are what people
+#: do in rooms and streets: a walk lasts some seconds to a minute, both feet are on the ground at its end.
+CHANGES: dict[str, dict[str, Change]] = {
+    WALK: {STAND: Change(1.0, _STEP, 0.05), BACKWARDS: Change(0.02), RUN: Change(0.3, slope=1.0)},
+    STAND: {WALK: Change(0.7, _STEP, 0.0), BACKWARDS: Change(0.3, _STEP, 0.0), RUN: Change(0.05)},
+    BACKWARDS: {STAND: Change(1.0, _STEP, 0.05), WALK: Change(0.02)},
+    RUN: {WALK: Change(0.5, slope=-1.0), STAND: Change(0.1)},
+}
+OTHER = Change(0.1)  # of a class of the user's, to and from the walk and standing
+
+
+def learn(options: LearnOptions, note: Note, run: Run) -> dict[str, Any]:
+    """Learn the walk by `run`, then each of ``options.classes``, and write one blob.
+
+    A class is ``stand`` or ``backwards``, made from the walk; or ``NAME=SRC``, learnt from those recordings;
+    or ``run``, learnt from the runs among the sources.  Returns the figures of the walk, with those of the
+    classes under ``classes``.  UsageError or UserError with one line if it cannot be done.
+    """
+    wanted = _parsed(options)
+    figures = run(replace(options, classes=()), note)
+    walk = blob.read(options.output)
+    classes = [_counted(MotionClass(options.activity), walk)]
+    for name, source in wanted.items():
+        if name in DERIVED and not source:
+            classes.append(_derived(name, walk, options.activity))
+        elif (learnt := _learnt(name, source, options, note, run)) is not None:
+            classes.append(learnt)
+    names = [one.name for one in classes]
+    classes = [replace(one, changes=_changes(one.name, names)) for one in classes]
+    data = blob.write(options.output, join(walk, classes))
+    figures |= {"bytes": len(data), "crc32": f"{blob.checksum(data):08x}"}
+    figures["classes"] = [
+        {"name": one.name, "direction": one.direction, "cycles": one.cycles, "recordings": one.recordings}
+        for one in classes
+    ]
+    return figures
+
+
+def _parsed(options: LearnOptions) -> dict[str, str]:
+    """Names of the classes and their sources."""
+    wanted: dict[str, str] = {}
+    for text in options.classes:
+        name, _, source = text.partition("=")
+        if not name or name in wanted or name == options.activity:
+            raise UsageError(f"--class {text}: give each class a name of its own, not {options.activity}")
+        if name == BACKWARDS and source:
+            raise UsageError(
+                f"--class {text}: backwards is made from the walk in reverse; leave out ={source}"
+            )
+        if name not in (*DERIVED, RUN) and not source:
+            raise UsageError(f"--class {text}: give recordings, --class {name}=FOLDER")
+        wanted[name] = source
+    if options.segments.source == "only":
+        raise UsageError("--class: not with --segments only, which makes no cyclic model")
+    return wanted
+
+
+def _derived(name: str, walk: Mapping[str, blob.Array], activity: str) -> MotionClass:
+    if name == STAND:
+        return MotionClass(STAND, 0, own=standing.sections(walk))
+    return MotionClass(BACKWARDS, -1, source=activity)
+
+
+def _learnt(name: str, source: str, options: LearnOptions, note: Note, run: Run) -> MotionClass | None:
+    """Learn a class from recordings; None if none of the sources is of it."""
+    with tempfile.TemporaryDirectory() as folder:
+        own = replace(
+            options,
+            sources=(source,) if source else options.sources,
+            output=str(Path(folder) / "class.gait"),
+            activity=name,
+            report=None,
+            segments=SegmentOptions(source="none"),
+            classes=(),
+        )
+        try:
+            run(own, lambda line: note(f"class {name}: {line}"))
+        except NothingLeft as exc:
+            if source:
+                raise
+            note(f"class {name}: left out, none of the recordings is a {name} ({exc})")
+            return None
+        except UserError as exc:
+            raise UserError(f"class {name}: {exc}") from None
+        return _counted(MotionClass(name, own=blob.read(own.output)), None)
+
+
+def _counted(one: MotionClass, walk: Mapping[str, blob.Array] | None) -> MotionClass:
+    """Return a class with the cycles and recordings that its META counts."""
+    sections = one.own if one.own is not None else walk or {}
+    meta = json.loads(sections["META"].tobytes()) if "META" in sections else {}
+    recordings = meta.get("sequences", {}).get("count", 0)
+    return replace(one, cycles=int(meta.get("cycles", 0)), recordings=int(recordings))
+
+
+def _changes(name: str, names: list[str]) -> dict[str, Change]:
+    known = CHANGES.get(name)
+    if known is None:
+        return {other: OTHER for other in (names[0], STAND) if other in names and other != name}
+    others = {other: OTHER for other in names if other not in CHANGES and name in (names[0], STAND)}
+    return {other: change for other, change in (known | others).items() if other in names}

@@ -1,0 +1,243 @@
+"""Classes of motion: people who stop, stand, turn, walk backwards or run, tracked with a walk alone and with classes.
+
+    make built && .venv/bin/python tests/bench/eval_classes.py [--seeds 3] [--record]
+    .venv/bin/python tests/bench/eval_classes.py --only stopping backwards
+
+The clips are presets of `gait simulate`, with further seeds of the person, and those of `eval_simulated` for slow walks
+and runs.  Models: the package's walk; and the walk, standing, backwards and a run learnt from recordings of
+../shared/data.  A start is the truth with the noise of `eval_clips`; it does not state the class.
+"""
+
+from __future__ import annotations
+
+import argparse
+import csv
+import json
+import subprocess
+import sys
+from collections.abc import Iterator
+from dataclasses import dataclass, replace
+from pathlib import Path
+
+import eval_clips
+import eval_simulated
+import numpy as np
+import table
+from eval_plan import Clip
+from facts import facts
+from gait import Camera, Model, Start, Tracker, TrackerConfig, Video
+from gait.bindings.abi import TrackStatus
+from gait.body.skeleton import EVAL15
+from gait.errors import UserError
+from gait.io.track_file import read_truth
+from gait.io.video import read_plate
+from gait.progress import progress
+from gait.simulate.clip import simulate
+from gait.simulate.scenario import PRESETS, Scenario
+
+ROOT = Path(__file__).resolve().parents[2]
+OUT = ROOT / "build" / "eval-classes"
+RUNS = eval_clips.DATA / "mocap" / "more"
+HIPS = [EVAL15.index("l_hip"), EVAL15.index("r_hip")]
+FAR = 0.15  # metres, root-aligned: a wrong frame
+DELAY = 0.5  # seconds for which the class before a change may be reported
+WANTED = {
+    "stopping": 50,
+    "standing": 60,
+    "backwards": 70,
+    "turning": 55,
+    "slow": 45,
+    "running": 60,
+}  # mm
+WRONG = 0.03  # of the frames under `tracking`: of another class, longer than DELAY after a change
+
+TITLE = "Classes of motion"
+COLUMNS = (
+    "clip",
+    "model",
+    "root mm",
+    "least-most",
+    "wanted",
+    "abs mm",
+    "tracking %",
+    "far %",
+    "wrong class %",
+)
+_READING = f"""\
+Clips of `gait simulate`; the start is the truth with noise and does not state the class, so people who stand or walk
+backwards are tracked as walking for the first frames.  root: error with the hips laid together, median over frames,
+then over seeds; abs: as it stands; far: of the frames under `tracking` those more than {1000 * FAR:.0f} mm off (root);
+wrong class: of the same frames those of another class, later than {DELAY} s after a change; - : the model has one."""
+
+CLIPS: dict[str, Scenario] = {
+    **{name: PRESETS[name] for name in ("stopping", "standing", "backwards", "turning")},
+    "stopping_side": Scenario(motion="stop", frames=150, seed=71),
+    "stopping_toward": Scenario(motion="stop", view="toward", frames=150, seed=72),
+    "standing_side": Scenario(motion="stand", frames=100, seed=73),
+    "backwards_side": Scenario(motion="backwards", direction="rl", frames=120, seed=74),
+    "backwards_away": Scenario(motion="backwards", view="away", frames=120, seed=75),
+    "slow": eval_simulated.CASES["slow"],
+    "circle": eval_simulated.CASES["turning"],
+    "walk": eval_simulated.CASES["walk"],
+}
+
+
+@dataclass(frozen=True)
+class Run:
+    """Errors of one clip with one model and seed."""
+
+    clip: str
+    model: str
+    seed: int
+    root: float  #: mm, median over frames, hips laid together
+    absolute: float  #: mm
+    tracking: float  #: share of the frames
+    far: float  #: share of the frames under `tracking` with more than FAR
+    wrong: float | None  #: share of the frames under `tracking` of a wrong class; None: the model has one
+
+
+def main() -> None:
+    """Make what is missing, track and print."""
+    parser = argparse.ArgumentParser(
+        description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
+    )
+    parser.add_argument("--seeds", type=int, default=3, help="runs of a clip (3)")
+    parser.add_argument("--only", nargs="+", metavar="NAME", help="names of clips")
+    parser.add_argument("--record", action="store_true", help="write results/eval_classes.md and .csv")
+    args = parser.parse_args()
+    clips = _clips(args.only)
+    models = _models()
+    runs: list[Run] = []
+    with progress("tracking", len(clips) * len(models) * args.seeds) as update:
+        for run in _runs(clips, models, args.seeds):
+            runs.append(run)
+            update(len(runs))
+    rows = list(_rows(runs))
+    if args.record:
+        note = facts(f"tests/bench/eval_classes.py --seeds {args.seeds} --record") + "\n\n" + _READING
+        table.publish("eval_classes", TITLE, COLUMNS, rows, note)
+    else:
+        table.show(TITLE, COLUMNS, rows)
+
+
+def _clips(only: list[str] | None) -> list[Clip]:
+    """Clips of the scenarios, made where they are missing, and the runner."""
+    wanted = {name: case for name, case in CLIPS.items() if not only or name in only}
+    if not only or "running" in only:
+        OUT.mkdir(parents=True, exist_ok=True)
+        wanted |= eval_simulated._running(OUT)
+    for name, scenario in wanted.items():
+        if not (OUT / name / "meta.json").is_file():
+            with progress(f"making {name}", scenario.frames) as update:
+                simulate(scenario, OUT / name, update)
+    return [replace(clip, steady=False) if clip.steady else clip
+            for clip in eval_clips.folder_clips(OUT) if clip.name in wanted]  # fmt: skip
+
+
+def _models() -> dict[str, Path | None]:
+    """The package's walk, and one with classes."""
+    path = OUT / "classes.gait"
+    if not path.is_file():
+        words = [
+            "learn",
+            eval_clips.MOCAP,
+            "-o",
+            path,
+            "--class",
+            "stand",
+            "--class",
+            "backwards",
+            "--quiet",
+        ]
+        if (RUNS / "run_cmu").is_dir():
+            words += ["--class", f"run={RUNS / 'run_cmu'}"]
+        done = subprocess.run(
+            [sys.executable, "-m", "gait", *map(str, words)],
+            capture_output=True,
+            text=True,
+        )
+        if done.returncode:
+            raise UserError(f"gait learn: {done.stderr.strip()}")
+    return {"walk": None, "classes": path}
+
+
+def _runs(clips: list[Clip], models: dict[str, Path | None], seeds: int) -> Iterator[Run]:
+    for clip in clips:
+        for name, path in models.items():
+            for seed in range(1, seeds + 1):
+                yield _run(clip, name, Model(path), seed)
+
+
+def _run(clip: Clip, name: str, model: Model, seed: int) -> Run:
+    """Track a clip from the truth with noise."""
+    video = Video(clip.video)
+    camera = Camera.read(str(clip.camera), video.size)
+    plate = read_plate(clip.plate, video.size) if clip.plate else None
+    tracker = Tracker(model, camera, TrackerConfig.default(seed=seed), background=plate)
+    init = OUT / "init.json"
+    init.write_text(json.dumps(eval_clips.noisy_start(clip, seed, 0.0)))
+    start, truth = Start.read(init, model), read_truth(clip.truth)
+    joints, classes = truth.eval15(), _classes(clip.truth, len(truth.frame))
+    changed = np.maximum.accumulate(
+        np.where(
+            np.append(True, np.array(classes[1:]) != np.array(classes[:-1])),
+            np.arange(len(classes)),
+            0,
+        )
+    )
+    root, absolute, tracked, wrong = [], [], [], []
+    for i, frame in enumerate(video.frames()):
+        if i == 0:
+            tracker.start(start.mean, start.sd, frame.utime)
+        estimate = tracker.step(frame.image, frame.utime)
+        found = np.array([estimate.joint(joint) for joint in EVAL15])
+        off = found - joints[i]
+        absolute.append(np.linalg.norm(off, axis=1).mean())
+        root.append(np.linalg.norm(off - off[HIPS].mean(axis=0), axis=1).mean())
+        tracked.append(estimate.status == TrackStatus.TRACKING)
+        late = changed[i] > 0 and i - changed[i] < DELAY * video.fps
+        wrong.append(estimate.motion_class != classes[i] and not late)
+    under = np.array(tracked)
+    count = max(int(under.sum()), 1)
+    return Run(
+        clip.name,
+        name,
+        seed,
+        1000 * float(np.median(root)),
+        1000 * float(np.median(absolute)),
+        float(under.mean()),
+        float((np.array(root) > FAR)[under].sum() / count),
+        float(np.array(wrong)[under].sum() / count) if len(model.classes) > 1 else None,
+    )
+
+
+def _classes(path: Path | None, count: int) -> list[str]:
+    """True class of every frame."""
+    assert path is not None
+    with path.open(newline="", encoding="utf-8") as file:
+        usual = "run" if path.parent.name == "running" else "walk"
+        return [row.get("motion_class", usual) for row in csv.DictReader(file)][:count]
+
+
+def _rows(runs: list[Run]) -> Iterator[tuple[object, ...]]:
+    """Medians over the seeds, both models side by side."""
+    for clip in dict.fromkeys(run.clip for run in runs):
+        for model in dict.fromkeys(run.model for run in runs):
+            these = [run for run in runs if run.clip == clip and run.model == model]
+            wrong = [run.wrong for run in these if run.wrong is not None]
+            roots = [run.root for run in these]
+            yield (
+                clip,
+                model,
+                round(float(np.median(roots)), 1),
+                f"{min(roots):.0f}-{max(roots):.0f}",
+                WANTED.get(clip.split("_")[0]),
+                round(float(np.median([run.absolute for run in these]))),
+                round(100 * float(np.mean([run.tracking for run in these]))),
+                round(100 * float(np.mean([run.far for run in these])), 1),
+                round(100 * float(np.mean(wrong)), 1) if wrong else None,
+            )
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,220 @@
+"""Classes of motion: standing out of a walk, blobs of several classes, their estimates, track files and simulated clips."""
+
+from __future__ import annotations
+
+import csv
+import json
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+import gait
+from gait.bindings.estimate import Estimate
+from gait.cli import main
+from gait.errors import GaitError, UserError
+from gait.io import blob, track_file
+from gait.learn.classes import standing
+from gait.learn.classes.join import Change, MotionClass, join
+from gait.simulate.clip import simulate
+from gait.simulate.scenario import PRESETS, Scenario
+from gait.simulate.stage import set_stage
+
+SHIPPED = Path(gait.__file__).parent / "data/walk.gait"
+ROOT = Path(__file__).resolve().parents[2]
+WALKS = ROOT.parent / "shared/data/mocap/cmu_walk/35"
+
+
+def classes() -> list[MotionClass]:
+    """Walk, stand and walk backwards."""
+    walk = blob.read(SHIPPED)
+    return [
+        MotionClass("walk", changes={"stand": Change(1.0, 6.0, 0.05)}),
+        MotionClass("stand", 0, own=standing.sections(walk), changes={"walk": Change(0.7, 6.0)}),
+        MotionClass("backwards", -1, source="walk", changes={"stand": Change(1.0, 6.0, 0.05)}),
+    ]
+
+
+@pytest.fixture(scope="module")
+def model(tmp_path_factory: pytest.TempPathFactory) -> gait.Model:
+    path = tmp_path_factory.mktemp("classes") / "m.gait"
+    blob.write(path, join(blob.read(SHIPPED), classes()))
+    return gait.Model(path)
+
+
+def test_who_stands_is_on_straight_legs_with_the_soles_on_the_ground(
+    model: gait.Model,
+) -> None:
+    walking, still = gait.State(phase=0.25), gait.State(motion_class=1)
+    lowest = []
+    for state in (walking, still):
+        joints, _ = model.pose(state)
+        lowest.append(joints[:, 2].min() + model.pelvis_height(state))
+    assert lowest[1] == pytest.approx(lowest[0], abs=0.015)
+    at = {name: joints[i] for i, name in enumerate(model.joint_names)}
+    for side in "lr":
+        assert abs(at[f"{side}_ankle"][0] - at[f"{side}_hip"][0]) < 0.01
+        assert at[f"{side}_wrist"][2] < 0
+    assert (
+        model.pelvis_height(still)
+        > max(model.pelvis_height(gait.State(phase=phase)) for phase in np.linspace(0, 1, 20)) - 0.005
+    )
+    other = replace(still, phase=0.6)
+    assert np.array_equal(model.pose(still)[0], model.pose(other)[0])
+
+
+def test_the_blob_names_its_classes(model: gait.Model) -> None:
+    assert model.classes == ("walk", "stand", "backwards")
+    assert [model.class_info(k).direction for k in range(3)] == [1, 0, -1]
+    assert model.class_info(2).components == model.info.components
+    with pytest.raises(IndexError, match="the model has 3"):
+        model.class_info(3)
+    with pytest.raises(GaitError):
+        model.pose(gait.State(motion_class=3))
+    assert gait.Model(SHIPPED).classes[0] == "walk"
+
+
+def test_classes_that_do_not_fit_are_refused() -> None:
+    walk, three = blob.read(SHIPPED), classes()
+    with pytest.raises(UserError, match="give each a name of its own"):
+        join(walk, [*three, three[1]])
+    with pytest.raises(UserError, match="class limp: has no curves, and no class 'trot'"):
+        join(walk, [*three, MotionClass("limp", source="trot")])
+    other = dict(three[1].own or {}) | {"CHNM": blob.pack_names(["a", "b"])}
+    with pytest.raises(UserError, match="class stand: its model has other channels"):
+        join(walk, [three[0], replace(three[1], own=other)])
+    assert join(join(walk, three), three).keys() == join(walk, three).keys()
+
+
+def test_learn_makes_classes_and_info_shows_them(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    if not WALKS.is_dir():
+        pytest.skip(f"{WALKS} is absent: the learning data are not part of the repository")
+    out = tmp_path / "m.gait"
+    words = [
+        "learn",
+        str(WALKS),
+        "-o",
+        str(out),
+        "--segments",
+        "none",
+        "--quiet",
+        "--json",
+        "--jobs",
+        "1",
+    ]
+    assert main([*words, "--class", "stand", "--class", "backwards", "--class", "run"]) == 0
+    figures = json.loads(capsys.readouterr().out)
+    assert [one["name"] for one in figures["classes"]] == [
+        "walk",
+        "stand",
+        "backwards",
+    ]  # no run among them
+    assert figures["bytes"] == out.stat().st_size and figures["classes"][0]["cycles"] > 10
+    assert main(["info", str(out)]) == 0
+    printed = capsys.readouterr().out
+    assert "class stand: made from the walk, stands still, 4 components" in printed
+    assert "class backwards: the curves of walk in reverse" in printed
+    assert gait.Model(out).classes == ("walk", "stand", "backwards")
+
+
+@pytest.mark.parametrize(
+    ("given", "words"),
+    [
+        (["limp"], "--class limp: give recordings"),
+        (["stand", "stand"], "--class stand: give each class a name of its own"),
+        (["walk"], "--class walk: give each class a name of its own, not walk"),
+        (
+            ["backwards=here"],
+            "--class backwards=here: backwards is made from the walk in reverse",
+        ),
+    ],
+)
+def test_bad_classes_are_one_line(
+    given: list[str], words: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    options = [word for name in given for word in ("--class", name)]
+    assert main(["learn", "nowhere", "-o", str(tmp_path / "m.gait"), *options]) == 2
+    assert words in capsys.readouterr().err
+
+
+def estimates(model: gait.Model) -> list[Estimate]:
+    """Of a small clip of a person who stands."""
+    camera = gait.Camera(
+        64,
+        48,
+        60,
+        60,
+        31.5,
+        23.5,
+        np.array([[1.0, 0, 0], [0, 0, -1], [0, 1, 0]]),
+        np.array([0, 1, 4.0]),
+    )
+    tracker = gait.Tracker(model, camera, gait.TrackerConfig.default(particles=64, seed=1))
+    mean, sd = model.prior()
+    mean.motion_class, mean.phase = 1, 0.3
+    sd.phase = sd.heading = 0.05
+    tracker.start(mean, sd, 0)
+    image = np.full((48, 64), 90, np.uint8)
+    return [tracker.step(image, 33_000 * n) for n in range(3)]
+
+
+def test_estimates_and_track_files_have_the_classes(model: gait.Model, tmp_path: Path) -> None:
+    found = estimates(model)
+    for one in found:
+        assert one.class_probability.sum() == pytest.approx(1, abs=1e-5)
+        assert one.motion_class == model.classes[int(one.class_probability.argmax())] == "stand"
+        assert one.speed == 0 and model.classes[one.mean.motion_class] == one.motion_class
+    path = tmp_path / "t.csv"
+    sizes = model.info.components, model.joint_names, model.angle_names
+    with track_file.TrackWriter(path, *sizes, model.classes) as rows:
+        for number, one in enumerate(found):
+            frame = gait.io.video.Frame(number, number / 30, 0, np.zeros((1, 1), np.uint8))
+            rows.write(frame, one)
+    track = track_file.read_track(path)
+    assert track.motion_class == ["stand"] * 3
+    assert np.allclose(track.numbers["p_stand"], [one.class_probability[1] for one in found], atol=1e-4)
+    assert track_file.header(2, (), ("walk",)) == track_file.header(2, ())
+
+
+TINY = {"size": (96, 72), "fps": 30.0, "noise": 0.0}
+
+
+def test_a_stop_brings_the_feet_together_without_a_slide(tmp_path: Path) -> None:
+    stage = set_stage(replace(PRESETS["stopping"], **TINY))
+    names, points = stage.classes, stage.walk.points(stage.frames)
+    still = [k for k, name in enumerate(names) if name == "stand"]
+    assert (
+        names[0] == names[-1] == "walk"
+        and 30 < len(still) < 100
+        and still == list(range(still[0], still[-1] + 1))
+    )
+    inner = slice(still[12], still[-12])
+    speed = np.linalg.norm(np.diff(points["pelvis"][inner], axis=0), axis=1) * 30
+    assert speed.max() < 0.05
+    assert np.linalg.norm(points["l_ankle"][inner] - points["r_ankle"][inner], axis=1).max() < 0.35
+    for side in "lr":
+        for part in ("heel", "toe"):  # who stands does not slide
+            assert np.ptp(points[f"{side}_{part}"][inner], axis=0).max() < 0.005
+    assert stage.walk.speed[stage.frames][:10].mean() > 0.9
+
+
+def test_backwards_moves_against_the_heading_and_turns_go_round() -> None:
+    back = set_stage(replace(PRESETS["backwards"], **TINY))
+    ahead = np.column_stack([np.cos(back.walk.heading[back.frames]), np.sin(back.walk.heading[back.frames])])
+    moved = np.diff(back.walk.points(back.frames)["pelvis"][:, :2], axis=0)
+    assert (moved * ahead[1:]).sum(1).max() < 0 and set(back.classes) == {"backwards"}
+    turn = set_stage(replace(PRESETS["turning"], **TINY))
+    heading = np.unwrap(turn.walk.heading[turn.frames])
+    assert 70 < abs(np.degrees(heading[-1] - heading[0])) < 85
+
+
+def test_the_truth_names_the_class_where_it_is_not_always_a_walk(
+    tmp_path: Path,
+) -> None:
+    for motion, classes_of in (("stand", {"stand"}), ("walk", {None})):
+        folder = tmp_path / motion
+        simulate(Scenario(motion=motion, frames=3, **TINY), folder)  # type: ignore[arg-type]
+        with (folder / "truth.csv").open(newline="") as file:
+            assert {row.get("motion_class") for row in csv.DictReader(file)} == classes_of
+        assert json.loads((folder / "meta.json").read_text())["steady"] == (motion == "walk")
