@@ -1,11 +1,11 @@
-"""Classes of motion: people who stop, stand, turn, walk backwards or run, tracked with a walk alone and with classes.
+"""Classes of motion: people who stop, stand, turn, walk backwards or run, with and without classes.
 
     make built && .venv/bin/python tests/bench/eval_classes.py [--seeds 3] [--record]
     .venv/bin/python tests/bench/eval_classes.py --only stopping backwards
 
-The clips are presets of `gait simulate`, with further seeds of the person, and those of `eval_simulated` for slow walks
-and runs.  Models: the package's walk; and the walk, standing, backwards and a run learnt from recordings of
-../shared/data.  A start is the truth with the noise of `eval_clips`; it does not state the class.
+The clips are presets of `gait simulate`, with further seeds of the person, and those of `eval_simulated` for
+slow walks and runs.  Models: the package's walk; and the walk, standing, backwards and a run learnt from
+recordings of ../shared/data.  A start is the truth with the noise of `eval_clips`, without the class.
 """
 
 from __future__ import annotations
@@ -25,6 +25,7 @@ import numpy as np
 import table
 from eval_plan import Clip
 from facts import facts
+
 from gait import Camera, Model, Start, Tracker, TrackerConfig, Video
 from gait.bindings.abi import TrackStatus
 from gait.body.skeleton import EVAL15
@@ -64,10 +65,11 @@ COLUMNS = (
     "wrong class %",
 )
 _READING = f"""\
-Clips of `gait simulate`; the start is the truth with noise and does not state the class, so people who stand or walk
-backwards are tracked as walking for the first frames.  root: error with the hips laid together, median over frames,
-then over seeds; abs: as it stands; far: of the frames under `tracking` those more than {1000 * FAR:.0f} mm off (root);
-wrong class: of the same frames those of another class, later than {DELAY} s after a change; - : the model has one."""
+Clips of `gait simulate`; the start is the truth with noise and does not state the class, so people who stand
+or walk backwards are tracked as walking for the first frames.  root: error with the hips laid together,
+median over frames, then over seeds; abs: as it stands; far: of the frames under `tracking` those more than
+{1000 * FAR:.0f} mm off (root); wrong class: of the same frames those of another class, later than {DELAY} s
+after a change; - : the model has one."""
 
 CLIPS: dict[str, Scenario] = {
     **{name: PRESETS[name] for name in ("stopping", "standing", "backwards", "turning")},
@@ -155,6 +157,7 @@ def _models() -> dict[str, Path | None]:
             [sys.executable, "-m", "gait", *map(str, words)],
             capture_output=True,
             text=True,
+            check=False,
         )
         if done.returncode:
             raise UserError(f"gait learn: {done.stderr.strip()}")

@@ -1,4 +1,4 @@
-"""Classes of motion: standing out of a walk, blobs of several classes, their estimates, track files and simulated clips."""
+"""Classes of motion: standing, blobs of several classes, their estimates, track files and simulated clips."""
 
 from __future__ import annotations
 
