@@ -90,7 +90,7 @@ TOOLS := $(BIN)/gait-trackd
 LIBS := $(B)/libgait.so $(B)/libgait.a
 
 .PHONY: help setup lib tools test built check unit python-test demo model paper bench bench-lift detector-profile eval eval-camera eval-real eval-learn eval-lift eval-studio mutants asan tsan unit-threads fuzz fuzz-run golden-check \
-        docs lint format wheel sdist wheel-check install install-daemon uninstall clean
+        docs screenshots lint format wheel sdist wheel-check install install-daemon uninstall clean
 
 help: ## list the targets
 	@echo 'make demo     track a walking clip end to end, results in build/demo (VIDEO= CAMERA= for your own)'
@@ -383,6 +383,10 @@ $(DOCS_READY): python/constraints.txt | $(READY)
 docs: setup lib tools $(DOCS_READY) ## these pages and the reference as a site, in build/docs
 	@NO_MKDOCS_2_WARNING=1 $(VENV)/bin/mkdocs build --strict --clean -f libgait/doc/site/mkdocs.yml
 	@echo build/docs/index.html
+
+screenshots: setup lib ## the figures of the pages and the tutorial's pictures, from a simulated walk
+	@$(VENV)/bin/python libgait/doc/site/figures.py
+	@$(VENV)/bin/python libgait/doc/site/screenshots.py
 
 # ---- style ---------------------------------------------------------------------------------------------------
 C_FILES := $(sort $(wildcard libgait/doc/*.c libgait/src/*/*.[ch] libgait/src/*/*.cpp tests/unit/*.[ch] tests/bench/*.[ch] tests/fuzz/*.[ch] \

@@ -18,7 +18,6 @@ import subprocess
 from dataclasses import dataclass
 from pathlib import Path
 
-import cv2
 import mocap_files
 import numpy as np
 import pytest
@@ -26,6 +25,7 @@ from example_scene import drawn_walk
 
 import gait
 import gait.cli
+from gait.camera.camera import write_lens
 from gait.cli import COMMANDS
 
 ROOT = Path(__file__).resolve().parents[2]
@@ -169,12 +169,7 @@ def stand_in(clip, folder):
     """The clip and its camera for the video, lens and tape marks of a reader of the tutorial."""
     shutil.copy(clip / "video.mp4", folder / "phone.mp4")
     camera = gait.Camera.read(clip / "camera.json")
-    lens = cv2.FileStorage(str(folder / "lens.yaml"), cv2.FILE_STORAGE_WRITE)
-    lens.write("image_width", camera.width)
-    lens.write("image_height", camera.height)
-    lens.write("camera_matrix", np.array([[camera.fx, 0, camera.cx], [0, camera.fy, camera.cy], [0, 0, 1]]))
-    lens.write("distortion_coefficients", np.zeros(5))
-    lens.release()
+    write_lens(folder / "lens.json", camera, "stands in")
     marks = np.array([[-1, -0.5, 0], [1, -0.5, 0], [-1.5, 1, 0], [1.5, 1, 0], [0, 0, 0]])
     at = (camera.R @ marks.T).T + camera.t
     u, v = camera.fx * at[:, 0] / at[:, 2] + camera.cx, camera.fy * at[:, 1] / at[:, 2] + camera.cy
@@ -358,3 +353,37 @@ def test_the_c_program_reports_a_wrong_argument(example, words, message):
     done = subprocess.run([example, *words], input=b"", capture_output=True, timeout=60)
     assert done.returncode == 1 and done.stdout.strip()
     assert not message or done.stdout.decode() == message
+
+
+def json_of(page, name):
+    """A JSON file that a page shows."""
+    (block,) = (b for b in ALL[DOC / page] if b.file == name)
+    return block.text
+
+
+def test_the_camera_and_the_start_of_the_camera_page_are_as_described(tmp_path):
+    (tmp_path / "camera.json").write_text(json_of("howto/camera.md", "by_hand.json"))
+    (tmp_path / "init.json").write_text(json_of("howto/camera.md", "by_hand_init.json"))
+    camera = gait.Camera.read(str(tmp_path / "camera.json"))
+    camera.check_place("camera.json")
+    np.testing.assert_allclose(camera.centre, [0, 0, 1.4], atol=1e-9)
+    assert 2 * np.degrees(np.arctan(960 / camera.fx)) == pytest.approx(65, abs=0.05)
+    np.testing.assert_allclose(camera.project([0, 7, 0]), [959.5, 840.9], atol=0.05)
+    start = gait.Start.read(tmp_path / "init.json", gait.Model())
+    assert start.frame == 30 and start.mean.pelvis[2] > 0.8 and start.mean.heading == 3.14
+    u, v = camera.project(start.mean.pelvis)
+    assert 960 < u < 1920 and 540 < v < 1080
+
+
+def test_the_page_of_commands_has_a_row_for_each_and_options_that_all_share():
+    text = (DOC / "reference/commands.md").read_text(encoding="utf-8")
+    rows = re.findall(r"^\| `(gait[^`]*)` \| (.+) \| (.+) \|$", text, re.M)
+    assert sorted(name for name, *_ in rows) == sorted(
+        ["gait-trackd", *(f"gait {name}" for name in COMMANDS)]
+    )
+    for name, *cells in rows:
+        if name != "gait-trackd":  # `--option` in a row is one of its command
+            wanted = re.findall(r"(?<![\w-])--[a-z][\w-]*", " ".join(cells))
+            assert [o for o in wanted if o not in helped(name.split())] == [], name
+    for option in ("--help", "--quiet"):
+        assert all(option in helped(["gait", *name.split()]) for name in COMMANDS)

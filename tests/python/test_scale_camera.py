@@ -1,4 +1,4 @@
-"""Cameras of another resolution are resized when told; what else differs is named; so are wrong worlds."""
+"""Cameras of another resolution: resized by --scale-camera, else named; upright floors are refused."""
 
 import json
 
