@@ -22,7 +22,7 @@ Floats = npt.NDArray[np.float64]
 
 GRAVITY = 9.81  # m/s^2
 STANDS = 0.5  # from which a foot is sure enough to stand to bear weight
-BALANCE_SD = 0.05  # metres out of the polygon; in recorded walks it is 0.1, as feet are lines here
+BALANCE_SD = 0.05  # metres out of the polygon, as feet are lines here and bodies no pendulums
 EDGE = 0.03  # metres out of the polygon below which a row fades, so that rows do not come and go
 LEAST = 1e-3  # metres out of the polygon that count
 FLAT = 1e-6  # square metres of a triangle that has no inside
