@@ -59,7 +59,7 @@ class Stream:
                     self.listener.send(rig.opening()[:2])
                 self.sent += 1
             else:
-                self.listener._lcm.handle_timeout(max(1, round(1000 * min(due - now, until - now))))
+                self.listener.listen(max(1, round(1000 * min(due - now, until - now))))
             for estimate in self.listener.estimates:
                 self.answered.setdefault(estimate.frame, time.monotonic())
             self.listener.estimates.clear()

@@ -226,6 +226,10 @@ class Listener:
         for channel, message in events:
             self._lcm.publish(channel, message.encode())
 
+    def listen(self, ms: int) -> None:
+        """Take in a message, waiting at most so long."""
+        self._lcm.handle_timeout(ms)
+
     def until(self, condition: Callable[[], bool], what: str, seconds: float = PATIENCE) -> None:
         """Take in messages until the condition holds; fail if it does not in time."""
         deadline = time.monotonic() + seconds

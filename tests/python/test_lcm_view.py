@@ -1,23 +1,27 @@
 """gait view: the right estimate in the right frame, in a file and in a browser."""
 
+import json
 import signal
 import subprocess
 import time
 import urllib.error
 import urllib.request
 from dataclasses import replace
+from pathlib import Path
 from types import SimpleNamespace
 
 import cv2
+import lcm
 import lcm_rig as rig
 import numpy as np
 import pytest
 
 from gait.errors import UserError
-from gait.lcm import viewer as viewer_module
 from gait.lcm.link import private_url
 from gait.lcm.messages import camera_message, estimate_of
-from gait.lcm.viewer import Screen, Viewer
+from gait.live import server
+from gait.live.feed import Drops, Feed
+from gait.live.server import Page
 from gait.report.drawing import Overlay
 
 
@@ -33,12 +37,25 @@ def log(tmp_path):
     return rig.write_log(tmp_path / "both.log", events), estimates
 
 
-def view(path, camera=None):
-    shown = []
-    viewer = Viewer(f"file://{path}?speed=0", 0, rig.model(), camera, shown.append)
-    while viewer.handle(1.0):
+def follow(path, camera=None):
+    """The pictures that a log gives, what is reported with them, and the feed itself."""
+    shown, reports = [], []
+    cameras = {} if camera is None else {0: camera}
+    feed = Feed(
+        f"file://{path}?speed=0",
+        [0],
+        rig.model(),
+        cameras,
+        lambda _, image: shown.append(image),
+        lambda topic, value: reports.append((topic, value)),
+    )
+    while feed.handle(1.0):
         pass
-    return shown
+    return shown, reports, feed
+
+
+def view(path, camera=None):
+    return follow(path, camera)[0]
 
 
 def test_each_estimate_is_drawn_into_its_own_frame(log):
@@ -59,10 +76,7 @@ def test_damaged_messages_are_passed_over(log, tmp_path):
         events += [(frame[0], cut), frame, ("GAIT_ESTIMATE", cut), ("GAIT_ESTIMATE", estimate)]
     path = rig.write_log(tmp_path / "spoilt.log", events)
     assert len(view(path)) == 3
-    viewer = Viewer(f"file://{path}?speed=0", 0, rig.model(), None, lambda picture: None)
-    while viewer.handle(1.0):
-        pass
-    assert "GAIT_IMAGE_0: not a gaitmsg.image_t" in viewer.damage
+    assert "GAIT_IMAGE_0: not a gaitmsg.image_t" in follow(path)[2].damage
 
 
 def test_without_a_camera_nothing_is_drawn(log, tmp_path):
@@ -86,29 +100,95 @@ def test_save_reports_when_nothing_came(tmp_path):
     assert [p.name for p in tmp_path.iterdir()] == ["empty.log"]
 
 
-def test_browsers_get_the_page_and_the_moving_picture():
-    screen = Screen(0)
-    try:
-        with urllib.request.urlopen(screen.address, timeout=rig.PATIENCE) as page:
-            assert b'src="/stream"' in page.read()
-        first, second = rig.picture(0), rig.picture(5)
-        screen.show(first)
-        with urllib.request.urlopen(f"{screen.address}stream", timeout=rig.PATIENCE) as stream:
-            for image in (first, second):
-                head = [stream.readline() for _ in range(4)]
-                jpeg = stream.read(int(head[2].split(b":")[1]))
-                assert stream.readline() == b"\r\n" and head[0] == b"--gait-frame\r\n"
-                viewed = cv2.imdecode(np.frombuffer(jpeg, np.uint8), cv2.IMREAD_COLOR)
-                assert np.abs(viewed.astype(int) - image).mean() < 12
-                screen.show(second)
-        with urllib.request.urlopen(f"{screen.address}frame.jpg", timeout=rig.PATIENCE) as frame:
-            assert frame.headers["Content-Type"] == "image/jpeg" and frame.read()[:2] == b"\xff\xd8"
+def test_a_page_gets_each_estimate_and_the_state_of_the_tracker(log):
+    path, estimates = log
+    reports = follow(path)[1]
+    samples = [value for topic, value in reports if topic == "sample"]
+    assert [one["frame"] for one in samples] == list(range(6))
+    for one, estimate in zip(samples, estimates, strict=True):
+        angles = {angle.name: angle.angle for angle in estimate.angles}
+        assert one["status"] == ("init", "tracking", "ambiguous", "lost")[estimate.status]
+        assert one["time"] == pytest.approx(1e-6 * (estimate.utime - estimates[0].utime))
+        np.testing.assert_allclose(one["points"], [j.position for j in estimate.joints], atol=1e-4)
+        assert one["values"][0] == pytest.approx(np.degrees(angles["l_knee_flexion"]), abs=1e-3)
+        assert one["cadence"] == pytest.approx(120 * estimate.mean.stride_hz, abs=0.1)
+
+
+def test_drops_are_counted_over_restarts():
+    drops = Drops()
+    assert [drops.add(reported) for reported in (1, 3, 3, 0, 2, 100, 1)] == [1, 3, 3, 3, 5, 103, 104]
+
+
+@pytest.fixture
+def page(monkeypatch, tmp_path):
+    monkeypatch.setattr(server, "_ALIVE", 0.05)
+    found = Page(0, [0], private_url(), tmp_path)
+    yield found
+    found.close()
+
+
+def get(page, path="", **headers):
+    request = urllib.request.Request(f"{page.address}{path}", headers=headers)
+    return urllib.request.urlopen(request, timeout=rig.PATIENCE)
+
+
+def test_browsers_get_the_page_and_the_moving_picture(page):
+    with get(page) as answer:
+        assert b"/live/live.js" in answer.read()
+    first, second = rig.picture(0), rig.picture(5)
+    page.show(0, first)
+    with get(page, "stream/0") as stream:
+        for image in (first, second):
+            while (line := stream.readline()) != b"--gait-frame\r\n":
+                assert line
+            head = [stream.readline() for _ in range(3)]
+            jpeg = stream.read(int(head[1].split(b":")[1]))
+            viewed = cv2.imdecode(np.frombuffer(jpeg, np.uint8), cv2.IMREAD_COLOR)
+            if np.abs(viewed.astype(int) - image).mean() < 12:
+                page.show(0, second)
+        assert np.abs(viewed.astype(int) - second).mean() < 12
+    with get(page, "frame/0.jpg") as frame:
+        assert frame.headers["Content-Type"] == "image/jpeg" and frame.read()[:2] == b"\xff\xd8"
+    for path in ("other", "stream/1", "live/server.py"):
         with pytest.raises(urllib.error.HTTPError, match="404"):
-            urllib.request.urlopen(f"{screen.address}other", timeout=rig.PATIENCE)
-        with pytest.raises(UserError, match="give another"):
-            Screen(int(screen.address.split(":")[2].rstrip("/")))
-    finally:
-        screen.close()
+            get(page, path)
+    with pytest.raises(UserError, match="give another"):
+        Page(int(page.address.split(":")[2].rstrip("/")), [0], private_url(), ".")
+
+
+def test_events_reach_a_browser(page):
+    page.report("health", {"text": "tracking"})
+    with get(page, "events") as events:
+        assert [events.readline() for _ in range(2)] == [b"event: health\n", b'data: {"text":"tracking"}\n']
+        page.report("sample", {"frame": 7})
+        while (line := events.readline()) != b"event: sample\n":
+            assert line in (b"\n", b": here\n")
+        assert events.readline() == b'data: {"frame":7}\n'
+
+
+def test_a_recording_holds_what_the_url_carries(page, tmp_path):
+    rig.need_multicast()
+    own = {"Origin": page.address.rstrip("/")}
+
+    def press(**headers):
+        request = urllib.request.Request(f"{page.address}record", method="POST", headers=headers)
+        return json.load(urllib.request.urlopen(request, timeout=rig.PATIENCE))
+
+    for headers in ({}, {"Origin": "http://evil.example"}):
+        with pytest.raises(urllib.error.HTTPError, match="403"):
+            press(**headers)
+    begun = press(**own)
+    assert begun["on"] and begun["path"].startswith(str(tmp_path))
+    sender, frames = rig.Listener(page._url), rig.frames(0, 3)
+    path, deadline = Path(begun["path"]), time.monotonic() + rig.PATIENCE
+    sender.send(frames)
+    while path.stat().st_size == 0 and time.monotonic() < deadline:
+        sender.listen(50)
+    ended = press(**own)
+    assert not ended["on"] and ended["fault"] is None
+    recorded = list(lcm.EventLog(str(path), "r"))
+    assert recorded and {e.channel for e in recorded} == {"GAIT_IMAGE_0"}
+    assert recorded[0].data in [message.encode() for _, message in frames]
 
 
 @pytest.mark.parametrize(
@@ -160,7 +240,7 @@ def test_the_command_shows_a_live_stream(tmp_path):
             for i, event in enumerate(rig.frames(0, 3)):
                 listener.send([event])
                 listener.until(lambda i=i: len(listener.estimates) > i, "an estimate")
-            with urllib.request.urlopen(f"{address}frame.jpg", timeout=rig.PATIENCE) as frame:
+            with urllib.request.urlopen(f"{address}frame/0.jpg", timeout=rig.PATIENCE) as frame:
                 assert cv2.imdecode(np.frombuffer(frame.read(), np.uint8), cv2.IMREAD_COLOR).shape == (
                     120,
                     160,
@@ -217,11 +297,8 @@ def test_one_wrong_message_is_left_out(estimate, image, words, log, tmp_path):
         wrong = i == 1
         events.append(("GAIT_IMAGE_0", spoilt(frame, **image) if wrong else frame))
         events.append(("GAIT_ESTIMATE", spoilt(found, **estimate) if wrong else found))
-    path, shown = rig.write_log(tmp_path / "wrong.log", events), []
-    viewer = Viewer(f"file://{path}?speed=0", 0, rig.model(), None, shown.append)
-    while viewer.handle(1.0):
-        pass
-    assert len(shown) == 2 and words in viewer.damage
+    shown, _, feed = follow(rig.write_log(tmp_path / "wrong.log", events))
+    assert len(shown) == 2 and words in feed.damage
 
 
 @pytest.mark.parametrize(
@@ -234,40 +311,35 @@ def test_cameras_that_cannot_be_are_left_out(change, log, tmp_path):
     assert view(path) == []
 
 
-@pytest.fixture
-def screen(monkeypatch):
-    monkeypatch.setattr(viewer_module, "_WAIT", 0.05)
-    found = Screen(0)
-    yield found
-    found.close()
-
-
-def test_without_a_picture_browsers_get_an_answer(screen):
+def test_without_a_picture_browsers_get_an_answer(page):
     with pytest.raises(urllib.error.HTTPError, match="503"):
-        urllib.request.urlopen(f"{screen.address}frame.jpg", timeout=rig.PATIENCE)
+        get(page, "frame/0.jpg")
 
 
 @pytest.mark.parametrize("host", ["evil.example", "evil.example:80", ""])
-def test_other_hosts_are_refused(host, screen):
-    screen.show(rig.picture(0))
-    request = urllib.request.Request(f"{screen.address}frame.jpg", headers={"Host": host})
+def test_other_hosts_are_refused(host, page):
+    page.show(0, rig.picture(0))
     with pytest.raises(urllib.error.HTTPError, match="403"):
-        urllib.request.urlopen(request, timeout=rig.PATIENCE)
-    local = urllib.request.Request(screen.address.replace("127.0.0.1", "localhost"))
+        get(page, "frame/0.jpg", Host=host)
+    local = urllib.request.Request(page.address.replace("127.0.0.1", "localhost"))
     assert urllib.request.urlopen(local, timeout=rig.PATIENCE).status == 200
 
 
-def test_browsers_are_bounded_and_their_places_come_free(screen):
-    screen.show(rig.picture(0))
-    open_now = [urllib.request.urlopen(f"{screen.address}stream", timeout=rig.PATIENCE) for _ in range(16)]
+def test_streams_are_bounded_and_their_places_come_free(page, monkeypatch):
+    monkeypatch.setattr(server, "_MOST", 3)
+    page.show(0, rig.picture(0))
+    open_now = [get(page, "stream/0") for _ in range(3)]
+    for stream in open_now:
+        stream.readline()
     with pytest.raises(urllib.error.HTTPError, match="503"):
-        urllib.request.urlopen(screen.address, timeout=rig.PATIENCE)
+        get(page, "events")
     for stream in open_now:
         stream.close()
     deadline = time.monotonic() + rig.PATIENCE
     while True:
+        page.show(0, rig.picture(0))  # a server finds out when it sends
         try:
-            assert urllib.request.urlopen(screen.address, timeout=rig.PATIENCE).status == 200
+            get(page, "events").close()
             break
         except urllib.error.HTTPError:
             assert time.monotonic() < deadline

@@ -71,7 +71,7 @@ COMMANDS = {
         "paper", "make every figure of the two papers from motion capture", ("video", "report", "mocap")
     ),
     "completion": Command("completion", "print a script that completes words in a shell"),
-    "view": Command("view", "watch the estimates of gait-trackd in a browser", ("video", "lcm")),
+    "view": Command("view", "watch the estimates of gait-trackd in a browser", ("video", "lcm", "studio")),
 }
 """Commands in the order of ``gait --help``."""
 

@@ -1,7 +1,9 @@
-"""Watch a tracker at work: each estimate of gait-trackd is drawn into its frame.
+"""Watch a tracker at work, in a browser on this machine.
 
-Serves a page on this machine that any browser shows, and prints its address.  With --save the first finished
-picture is written to a PNG file instead, and the command ends.
+Serves a page and prints its address: each estimate of gait-trackd drawn into its own frame, the figure in
+space, status, rate, latency and drops, and plots of the last 20 seconds.  The page can be held, a picture
+saved, and all messages recorded into an LCM log.  With --save the first finished picture is written to a PNG
+file instead, and the command ends.
 """
 
 from __future__ import annotations
@@ -46,8 +48,15 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         help="seconds that --save waits (default: 30)",
     )
     add("--port", type=port, default=0, metavar="N", help="port of the page (default: any free one)")
-    add("--stream", type=stream, default=0, metavar="I", help="number of the camera (default: 0)")
-    values.add_camera(parser, " (default: from GAIT_CAMERA_<i>)")
+    add(
+        "--stream",
+        type=stream,
+        action="append",
+        metavar="I",
+        help="number of a camera, once for each (default: 0)",
+    )
+    add("--record-to", default=".", metavar="FOLDER", help="folder of recordings (default: this one)")
+    values.add_camera(parser, " of the first --stream (default: from GAIT_CAMERA_<i>)")
     values.add_model(parser, "model that is tracked")
 
 
@@ -55,39 +64,53 @@ def run(args: argparse.Namespace) -> int:
     """Show or save."""
     from gait.bindings.model import Model
     from gait.camera.camera import Camera
-    from gait.lcm.viewer import Screen, Viewer
 
-    camera = Camera.read(args.camera) if args.camera else None
+    streams = tuple(dict.fromkeys(args.stream or [0]))
+    cameras = {streams[0]: Camera.read(args.camera)} if args.camera else {}
     model, url = Model(args.model), lcm_url(args.url)
     if args.save:
-        _save(args, url, model, camera)
-        return 0
-    screen = Screen(args.port)
-    viewer = Viewer(url, args.stream, model, camera, screen.show)
-    print(screen.address, flush=True)
-    with Interruptible(), contextlib.suppress(KeyboardInterrupt):  # the user ends it so
-        while viewer.handle(_TURN):
-            pass
-    screen.close()
-    if viewer.damage:
-        note(f"gait view: left out: {viewer.damage}", args.quiet)
+        _save(args, url, streams, model, cameras)
+    else:
+        _serve(args, url, streams, model, cameras)
     return 0
 
 
-def _save(args: argparse.Namespace, url: str, model: Model, camera: Camera | None) -> None:
+def _serve(
+    args: argparse.Namespace, url: str, streams: tuple[int, ...], model: Model, cameras: dict[int, Camera]
+) -> None:
+    from gait.live.feed import Feed
+    from gait.live.server import Page
+
+    page = Page(args.port, streams, url, args.record_to)
+    try:
+        feed = Feed(url, streams, model, cameras, page.show, page.report)
+        page.begin(feed.page_data)
+        print(page.address, flush=True)
+        with Interruptible(), contextlib.suppress(KeyboardInterrupt):  # the user ends it so
+            while feed.handle(_TURN):
+                pass
+    finally:
+        page.close()
+    if feed.damage:
+        note(f"gait view: left out: {feed.damage}", args.quiet)
+
+
+def _save(
+    args: argparse.Namespace, url: str, streams: tuple[int, ...], model: Model, cameras: dict[int, Camera]
+) -> None:
     import cv2
 
-    from gait.lcm.viewer import Viewer
+    from gait.live.feed import Feed
 
     pictures: list[Image] = []
     with replacing(args.save) as path:
-        viewer = Viewer(url, args.stream, model, camera, pictures.append)
+        feed = Feed(url, streams[:1], model, cameras, lambda stream, image: pictures.append(image))
         note(f"listening on {url}", args.quiet)
         deadline = time.monotonic() + args.patience
-        while not pictures and time.monotonic() < deadline and viewer.handle(_TURN):
+        while not pictures and time.monotonic() < deadline and feed.handle(_TURN):
             pass
         if not pictures:
-            why = viewer.damage or "is gait-trackd tracking on this URL?"
+            why = feed.damage or "is gait-trackd tracking on this URL?"
             raise UserError(f"no estimate with its frame and camera came; {why}")
         if not cv2.imwrite(str(path), pictures[0]):
             raise UserError(f"{args.save}: cannot be written as an image; give a name that ends in .png")

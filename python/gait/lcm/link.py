@@ -220,13 +220,18 @@ def publisher(url: str) -> lcm.LCM | LogWriter:
     return LogWriter(path, mode)
 
 
+def waiting(link: lcm.LCM, seconds: float = 0.0) -> bool:
+    """Whether a live link has a message, or gets one within so long."""
+    return bool(select.select([link.fileno()], [], [], seconds)[0])
+
+
 def handle(link: lcm.LCM, seconds: float, log: bool) -> bool:
     """Take in a message, waiting at most so long; False at the end of a `log`.
 
     A live link waits in `select`, which a signal interrupts without harm; liblcm's own wait fails then.
     """
     if not log:
-        if select.select([link.fileno()], [], [], seconds)[0]:
+        if waiting(link, seconds):
             link.handle()
         return True
     try:

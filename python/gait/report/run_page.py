@@ -100,7 +100,7 @@ def run_page(run: Run) -> str:
         )
     else:
         add_gait(page, run.track, run.parameters, run.cycles, _COMMON if _is_vague(run.track) else "")
-    if run.film is not None and _has_parts():
+    if run.film is not None and modules.available():
         page.figure("Angles over time", '<div id="run-curves" class="screen-only"></div>')
     page.figure("Way over the floor", way_plot(run.track, run.parameters, run.errors))
     page.heading("Pace")
@@ -125,14 +125,9 @@ def run_page(run: Run) -> str:
     return page.text()
 
 
-def _has_parts() -> bool:
-    """Whether three.js and ECharts are on this machine."""
-    return all(parts.find(part) is not None for part in (parts.THREE, parts.ORBIT, parts.ECHARTS))
-
-
 def _add_film(page: Page, run: Run, film: PageFilm) -> None:
     """Add film and figure with their data and script, and pictures for paper."""
-    whole = _has_parts()
+    whole = modules.available()
     page.head = modules.inlined_head(whole)
     shape = film.size[0] / film.size[1]
     figure = '<div id="run-figure"></div>' if whole else ""

@@ -19,6 +19,11 @@ _PLAIN = {"three": parts.THREE, "three/OrbitControls.js": parts.ORBIT}
 _HERE = Path(__file__).parent
 
 
+def available() -> bool:
+    """Whether the parts that draw figures and curves were fetched."""
+    return all(parts.find(part) is not None for part in (*_PLAIN.values(), parts.ECHARTS))
+
+
 def own(name: str) -> str:
     """Text of a module of ours or of style.css."""
     return (_HERE / name).read_text(encoding="utf-8")

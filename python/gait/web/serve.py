@@ -6,6 +6,7 @@ import contextlib
 import html
 import mimetypes
 import socket
+import threading
 from collections.abc import Callable, Mapping, Sequence
 
 import uvicorn
@@ -144,8 +145,19 @@ def address(own: socket.socket) -> str:
 
 def run(app: ASGIApp, own: socket.socket) -> None:
     """Serve until the process is interrupted."""
-    config = uvicorn.Config(
-        app, log_level="error", access_log=False, lifespan="off", timeout_graceful_shutdown=1
-    )
     with contextlib.suppress(KeyboardInterrupt):
-        uvicorn.Server(config).run(sockets=[own])
+        _server(app).run(sockets=[own])
+
+
+def background(app: ASGIApp, own: socket.socket) -> tuple[uvicorn.Server, threading.Thread]:
+    """Serve in a thread, until the server's ``should_exit`` is set."""
+    server = _server(app)
+    thread = threading.Thread(target=lambda: server.run(sockets=[own]), daemon=True)
+    thread.start()
+    return server, thread
+
+
+def _server(app: ASGIApp) -> uvicorn.Server:
+    return uvicorn.Server(
+        uvicorn.Config(app, log_level="error", access_log=False, lifespan="off", timeout_graceful_shutdown=1)
+    )

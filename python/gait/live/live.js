@@ -1,0 +1,156 @@
+// The live page: pictures, figure, numbers and plots of the tracker as it runs.
+const element = (id) => document.getElementById(id);
+const DRAW_MS = 200; // between two drawings of the plots
+const QUIET_MS = 3000; // without an estimate the page reports that there is none
+const TEXT = { tracking: 'tracking', ambiguous: 'ambiguous', lost: 'lost', init: 'settling' };
+
+const start = await (await fetch('/state')).json();
+let scene, curves, paused = false, last = 0, recording = Boolean(start.recording.path);
+
+// ---- figure and plots, where their parts were fetched ----
+if (start.parts) {
+  const [{ Scene }, { Curves }] = await Promise.all([import('gait/scene.js'), import('gait/curves.js')]);
+  scene = new Scene(element('scene'), { ...start, times: [], points: [], sd: [] });
+  curves = new Curves(element('curves'), { times: [...start.times], curves: start.curves });
+  curves.show(-1); // no cursor: the plots end now
+} else {
+  element('scene').innerHTML = '<p class="none">The figure and the plots need parts that were not fetched: run gait studio --fetch once, with a network.</p>';
+}
+
+let waiting = [];
+function draw() {
+  const found = waiting;
+  waiting = [];
+  if (paused || !curves || !found.length) return;
+  curves.append({
+    times: found.map((one) => one.time),
+    curves: start.curves.map((curve, k) => ({ id: curve.id, values: found.map((one) => one.values[k]) })),
+  }, Math.round(start.seconds * Math.max(5, found.at(-1).rate ?? 30)));
+  scene.append({});
+  const data = scene.data, extra = data.times.length - 1200;
+  if (extra > 0) for (const key of ['times', 'points', 'sd']) data[key].splice(0, extra);
+}
+setInterval(draw, DRAW_MS);
+
+// ---- numbers ----
+const numbers = {};
+function show(name, value) {
+  if (!numbers[name]) {
+    const box = document.createElement('div'), key = document.createElement('dt'), text = document.createElement('dd');
+    key.textContent = name;
+    box.append(key, text);
+    element('list').append(box);
+    numbers[name] = text;
+  }
+  numbers[name].textContent = value;
+}
+const unit = (value, digits, name) => (value === null || value === undefined ? '–' : `${value.toFixed(digits)} ${name}`);
+
+function setStatus(status, text) {
+  const pill = element('status');
+  if (pill.textContent !== text) pill.textContent = text;
+  pill.className = `status ${status}`;
+}
+
+function onSample(one) {
+  last = performance.now();
+  if (paused) return;
+  element('waiting').replaceChildren();
+  setStatus(one.status, TEXT[one.status] ?? one.status);
+  show('cadence', unit(one.cadence, 0, 'steps/min'));
+  show('speed', unit(one.speed, 2, 'm/s'));
+  show('rate', unit(one.rate, 1, 'Hz'));
+  show('latency', unit(one.latency_ms, 0, 'ms'));
+  show('step', unit(one.step_ms, 1, 'ms'));
+  show('left/right sure', `${Math.round(100 * one.sure)} %`);
+  show('frame', one.frame < 0 ? '–' : String(one.frame));
+  element('hand').setAttribute('transform', `rotate(${360 * one.phase})`);
+  waiting.push(one);
+  if (!scene) return;
+  const data = scene.data;
+  data.times.push(one.time);
+  data.points.push(one.points);
+  data.sd.push(one.sd);
+  scene.show(data.times.length - 1);
+}
+
+function onHealth(one) {
+  element('text').textContent = one.state === 'running' && one.text === 'tracking' ? '' : one.text;
+  show('dropped', `${one.dropped} of ${one.frames + one.dropped}`);
+  show('particles', String(one.particles));
+  if (performance.now() - last > QUIET_MS) explain(`The tracker is ${one.state}: ${one.text}.`);
+}
+
+// ---- what is missing ----
+function explain(text) {
+  if (paused) return;
+  setStatus('', 'waiting');
+  const lines = [text, `Listening for GAIT_ESTIMATE and GAIT_IMAGE_${start.streams.join(', GAIT_IMAGE_')} on ${start.url}.`,
+    'Start gait-trackd on the same URL (--url, or LCM_DEFAULT_URL), and gait capture for a film or camera.'];
+  element('waiting').replaceChildren(...lines.map((line) => Object.assign(document.createElement('p'), { textContent: line })));
+}
+setInterval(() => { if (performance.now() - last > QUIET_MS && !element('waiting').textContent) explain('No estimates come.'); }, 500);
+
+// ---- pictures ----
+for (const stream of start.streams) {
+  const figure = document.createElement('figure'), image = document.createElement('img');
+  image.alt = `Camera ${stream}, with the estimate drawn into its picture`;
+  image.src = `/stream/${stream}`;
+  image.addEventListener('error', () => setTimeout(() => { image.src = `/stream/${stream}?${Date.now()}`; }, 1000));
+  figure.append(image);
+  if (start.streams.length > 1) figure.append(Object.assign(document.createElement('figcaption'), { textContent: `camera ${stream}` }));
+  element('pictures').append(figure);
+}
+
+// ---- buttons ----
+function message(text) {
+  element('message').textContent = text;
+  element('message').classList.add('shown');
+  setTimeout(() => element('message').classList.remove('shown'), 6000);
+}
+
+async function pause() {
+  paused = !paused;
+  element('pause').setAttribute('aria-pressed', paused);
+  for (const [k, image] of document.querySelectorAll('#pictures img').entries()) {
+    image.src = `${paused ? `/frame/${start.streams[k]}.jpg` : `/stream/${start.streams[k]}`}?${Date.now()}`;
+  }
+}
+
+function snapshot() {
+  for (const stream of start.streams) {
+    const link = Object.assign(document.createElement('a'), { href: `/frame/${stream}.jpg`, download: `gait-camera-${stream}.jpg` });
+    link.click();
+  }
+}
+
+function showRecording(on) {
+  recording = on;
+  element('record').setAttribute('aria-pressed', on);
+  element('record').textContent = on ? 'Stop recording' : 'Record';
+}
+async function record() {
+  const answer = await (await fetch('/record', { method: 'POST' })).json();
+  if (answer.error) message(answer.error);
+  else message(`${answer.on ? 'Recording into' : 'Recorded in'} ${answer.path}${answer.fault ? `, not complete: ${answer.fault}` : ''}`);
+  showRecording(Boolean(answer.on));
+}
+showRecording(recording);
+element('pause').addEventListener('click', pause);
+element('snapshot').addEventListener('click', snapshot);
+element('record').addEventListener('click', record);
+document.addEventListener('keydown', (event) => {
+  if (event.ctrlKey || event.metaKey || event.altKey || event.target.closest('button, input, select')) return;
+  const press = { ' ': pause, s: snapshot, r: record }[event.key.toLowerCase?.() ?? event.key];
+  if (press) {
+    event.preventDefault();
+    press();
+  }
+});
+
+// ---- events; a browser connects again by itself ----
+const events = new EventSource('/events');
+events.addEventListener('sample', (event) => onSample(JSON.parse(event.data)));
+events.addEventListener('health', (event) => onHealth(JSON.parse(event.data)));
+events.addEventListener('error', () => setStatus('away', 'gait view is not there'));
+window.live = { get scene() { return scene; }, get curves() { return curves; }, start };

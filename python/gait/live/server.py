@@ -1,0 +1,210 @@
+"""Browsers get the newest of everything: pictures, estimates, the state of the tracker."""
+
+from __future__ import annotations
+
+import asyncio
+import contextlib
+import json
+import threading
+from collections.abc import AsyncIterator, Callable, Sequence
+from pathlib import Path
+from typing import Any
+
+import cv2
+from starlette.requests import Request
+from starlette.responses import JSONResponse, PlainTextResponse, Response, StreamingResponse
+from starlette.routing import Route
+from starlette.types import ASGIApp
+
+from gait.errors import UserError
+from gait.io.video import Image
+from gait.live.recording import Recording
+from gait.web import modules, serve
+
+_HERE = Path(__file__).parent
+_FILES = ("live.js", "live.css")
+_MOST = 32  # streams of pictures or events at a time
+_ALIVE = 5.0  # seconds after which a quiet stream shows that it is there
+_QUALITY = 80  # of JPEG pictures
+_PART = "gait-frame"
+
+
+class Hub:
+    """The newest value of each topic, for any number of browsers.
+
+    `put` may be called in any thread; `newer` runs in the server's.  A browser that is slow misses values and
+    delays nobody.
+    """
+
+    def __init__(self) -> None:
+        self._loop: asyncio.AbstractEventLoop | None = None
+        self._newest: dict[str, tuple[int, Any]] = {}
+        self._news: dict[str, asyncio.Event] = {}
+        self._lock = threading.Lock()
+        self.listeners: dict[str, int] = {}
+
+    def put(self, topic: str, value: Any) -> None:
+        """Make `value` the newest of its topic."""
+        with self._lock:
+            count, _ = self._newest.get(topic, (0, None))
+            self._newest[topic] = (count + 1, value)
+            loop = self._loop
+        if loop is not None and not loop.is_closed():
+            loop.call_soon_threadsafe(self._wake, topic)
+
+    def _wake(self, topic: str) -> None:
+        if (event := self._news.pop(topic, None)) is not None:
+            event.set()
+
+    def newest(self, topic: str) -> tuple[int, Any]:
+        """Count and value; 0 and None: there is none yet."""
+        with self._lock:
+            return self._newest.get(topic, (0, None))
+
+    async def newer(self, topic: str, than: int, seconds: float) -> tuple[int, Any]:
+        """Wait at most so long for a later value than that of the count; return the newest."""
+        self._loop = asyncio.get_running_loop()
+        event = self._news.setdefault(topic, asyncio.Event())
+        if (found := self.newest(topic))[0] > than:
+            return found
+        with contextlib.suppress(asyncio.TimeoutError):
+            await asyncio.wait_for(event.wait(), seconds)
+        return self.newest(topic)
+
+
+class Page:
+    """The live page, its server in a thread of its own.
+
+    Parameters
+    ----------
+    port : int
+        Of 127.0.0.1; 0: any that is free.
+    streams : sequence of int
+        Numbers of the cameras.
+    url : str
+        Of LCM, which a recording listens to.
+    folder : path
+        Gets the recordings.
+
+    Attributes
+    ----------
+    address : str
+        What to open in a browser.
+    """
+
+    def __init__(self, port: int, streams: Sequence[int], url: str, folder: str | Path) -> None:
+        self._streams, self._url, self._folder = tuple(streams), url, folder
+        self.hub = Hub()
+        self._data: Callable[[], dict[str, Any]] = dict
+        self._recording: Recording | None = None
+        self._open = 0
+        own = serve.listen(port)
+        self.address = serve.address(own)
+        self._server, self._thread = serve.background(self._application(own.getsockname()[1]), own)
+
+    def begin(self, data: Callable[[], dict[str, Any]]) -> None:
+        """State what the figure and the plots begin with."""
+        self._data = data
+
+    def show(self, stream: int, image: Image) -> None:
+        """Make a picture the newest of its camera."""
+        jpeg = cv2.imencode(".jpg", image, [cv2.IMWRITE_JPEG_QUALITY, _QUALITY])[1].tobytes()
+        self.hub.put(f"picture {stream}", jpeg)
+
+    def report(self, topic: str, value: dict[str, Any]) -> None:
+        """Make a sample or the tracker's health the newest."""
+        self.hub.put(topic, json.dumps(value, allow_nan=False, separators=(",", ":")))
+
+    def close(self) -> None:
+        """Serve no more, and end a recording."""
+        self._server.should_exit = True
+        self._thread.join()
+        if self._recording is not None:
+            self._recording.end()
+
+    def _application(self, port: int) -> ASGIApp:
+        own = {name: (_HERE / name).read_bytes() for name in _FILES}
+        routes = [
+            Route("/state", self._state),
+            Route("/frame/{stream:int}.jpg", self._frame),
+            Route("/stream/{stream:int}", self._pictures),
+            Route("/events", self._events),
+            Route("/record", self._record, methods=["POST"]),
+            Route("/live/{name}", serve.in_memory(own)),
+        ]
+        page = (_HERE / "page.html").read_text(encoding="utf-8")
+        return serve.application(page, "gait view", routes, port, drawing=modules.available())
+
+    def _state(self, request: Request) -> Response:
+        found = self._data() | {"parts": modules.available(), "recording": self._recorded()}
+        return JSONResponse(found)
+
+    def _recorded(self) -> dict[str, Any]:
+        one = self._recording
+        return {} if one is None else {"path": str(one.path), "fault": one.fault}
+
+    async def _record(self, request: Request) -> Response:
+        """Begin a recording, or end the one that runs."""
+        ended = self._recording
+        try:
+            if ended is None:
+                self._recording = Recording(self._url, self._folder)
+                return JSONResponse({"on": True} | self._recorded())
+        except UserError as error:
+            return JSONResponse({"error": str(error)}, 409)
+        self._recording = None
+        await asyncio.to_thread(ended.end)
+        return JSONResponse({"on": False, "path": str(ended.path), "fault": ended.fault})
+
+    def _frame(self, request: Request) -> Response:
+        jpeg = self.hub.newest(f"picture {request.path_params['stream']}")[1]
+        if jpeg is None:
+            return PlainTextResponse("no picture yet\n", 503)
+        return Response(jpeg, media_type="image/jpeg", headers={"cache-control": "no-store"})
+
+    def _pictures(self, request: Request) -> Response:
+        stream = request.path_params["stream"]
+        if stream not in self._streams:
+            return PlainTextResponse("not here\n", 404)
+
+        async def parts() -> AsyncIterator[bytes]:
+            count = 0
+            while True:
+                count, jpeg = await self.hub.newer(f"picture {stream}", count, _ALIVE)
+                if jpeg is not None:
+                    head = f"--{_PART}\r\nContent-Type: image/jpeg\r\nContent-Length: {len(jpeg)}\r\n\r\n"
+                    yield head.encode("ascii") + jpeg + b"\r\n"
+
+        return self._endless(parts(), f"multipart/x-mixed-replace; boundary={_PART}")
+
+    def _events(self, request: Request) -> Response:
+        async def lines() -> AsyncIterator[bytes]:
+            counts = {"sample": 0, "health": 0}
+            while True:
+                waits = [asyncio.ensure_future(self.hub.newer(name, counts[name], _ALIVE)) for name in counts]
+                await asyncio.wait(waits, return_when=asyncio.FIRST_COMPLETED)
+                for wait in waits:
+                    wait.cancel()
+                text = b""
+                for name, before in counts.items():
+                    counts[name], value = self.hub.newest(name)
+                    if counts[name] > before:
+                        text += f"event: {name}\ndata: {value}\n\n".encode()
+                yield text or b": here\n\n"
+
+        return self._endless(lines(), "text/event-stream")
+
+    def _endless(self, content: AsyncIterator[bytes], kind: str) -> Response:
+        """Stream, if there are not too many."""
+        if self._open >= _MOST:
+            return PlainTextResponse("too many browsers\n", 503)
+
+        async def counted() -> AsyncIterator[bytes]:
+            self._open += 1
+            try:
+                async for part in content:
+                    yield part
+            finally:
+                self._open -= 1
+
+        return StreamingResponse(counted(), media_type=kind, headers={"cache-control": "no-store"})

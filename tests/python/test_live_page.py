@@ -1,0 +1,121 @@
+"""The live page in a real Chromium: numbers, figure, plots, pause, what is missing, recording."""
+
+import time
+
+import browser
+import lcm_rig as rig
+import pytest
+
+from gait.lcm.link import private_url
+from gait.live.feed import Feed
+from gait.live.server import Page
+
+
+@pytest.fixture(scope="module")
+def reports(tmp_path_factory):
+    """Samples and pictures of six frames, and what the page begins with."""
+    folder = tmp_path_factory.mktemp("live")
+    opening, frames = rig.opening(), rig.frames(0, 6)
+    estimates = rig.play(rig.write_log(folder / "in.log", [*opening, *frames])).estimates
+    pairs = [
+        each for pair in zip(frames, [("GAIT_ESTIMATE", e) for e in estimates], strict=True) for each in pair
+    ]
+    log, pictures, samples = rig.write_log(folder / "both.log", [*opening, *pairs]), [], []
+    feed = Feed(
+        f"file://{log}?speed=0",
+        [0],
+        rig.model(),
+        {},
+        lambda _, image: pictures.append(image),
+        lambda _, value: samples.append(value),
+    )
+    while feed.handle(1.0):
+        pass
+    return samples, pictures, feed
+
+
+@pytest.fixture
+def live(reports, tmp_path, monkeypatch):
+    browser.chromium()
+    monkeypatch.setenv("GAIT_WEB", str(browser.FETCHED))
+    page = Page(0, [0], private_url(), tmp_path)
+    page.begin(reports[2].page_data)
+    yield page
+    page.close()
+
+
+def send(live, reports, which):
+    for k in which:
+        live.show(0, reports[1][k])
+        live.report("sample", reports[0][k])
+        time.sleep(0.05)  # as a camera's frames come; the newest alone would arrive
+
+
+def test_the_page_waits_and_then_shows_a_tracker(live, reports):
+    with browser.opened() as page:
+        page.goto(live.address)
+        browser.until(page, "document.querySelector('#waiting').textContent.includes('gait-trackd')")
+        assert reports[2].url in page.inner_text("#waiting")
+        live.report(
+            "health",
+            {"state": "waiting", "text": "waiting for a camera", "dropped": 2, "frames": 0, "particles": 9},
+        )
+        browser.until(page, "document.querySelector('#text').textContent === 'waiting for a camera'")
+        send(live, reports, range(6))
+        browser.until(page, "live.scene.data.times.length > 2 && live.curves.data.times.length > 2")
+        last = reports[0][5]
+        browser.until(page, f"live.scene.data.times.at(-1) === {last['time']}")
+        assert page.inner_text("#status") == {"init": "settling"}.get(last["status"], last["status"])
+        numbers = page.inner_text("#list")
+        assert (
+            f"{last['speed']:.2f} m/s" in numbers and "2 of 2" in numbers and not page.inner_text("#waiting")
+        )
+        browser.until(page, "document.querySelector('#pictures img').naturalWidth === 160")
+        for width in (390, 1280, 1920):
+            page.set_viewport_size({"width": width, "height": 800})
+            assert page.evaluate("document.documentElement.scrollWidth <= innerWidth")
+
+
+def test_pause_holds_the_page(live, reports):
+    with browser.opened() as page:
+        page.goto(live.address)
+        browser.until(page, "window.live !== undefined")
+        send(live, reports, [0, 1])
+        browser.until(page, "live.scene.data.times.length > 0")
+        page.keyboard.press("Space")
+        held = page.inner_text("#list")
+        send(live, reports, [4, 5])
+        page.wait_for_timeout(300)
+        assert page.inner_text("#list") == held
+        page.click("#pause")
+        send(live, reports, [5])
+        browser.until(page, f"live.scene.data.times.at(-1) === {reports[0][5]['time']}")
+
+
+def test_a_browser_connects_again(live, reports, tmp_path):
+    with browser.opened() as page:
+        page.goto(live.address)
+        browser.until(page, "window.live !== undefined")
+        send(live, reports, [0])
+        browser.until(page, "live.scene.data.times.length > 0")
+        page.context.set_offline(True)
+        page.context.set_offline(False)
+        send(live, reports, [1])
+        browser.until(page, f"live.scene.data.times.at(-1) === {reports[0][1]['time']}")
+
+
+def test_the_record_button_makes_a_log(live, tmp_path):
+    rig.need_multicast()
+    with browser.opened() as page:
+        page.goto(live.address)
+        browser.until(page, "window.live !== undefined")
+        page.click("#record")
+        browser.until(page, "document.querySelector('#record').textContent === 'Stop recording'")
+        page.reload()
+        browser.until(
+            page,
+            "window.live !== undefined && document.querySelector('#record').textContent === 'Stop recording'",
+        )
+        page.click("#record")
+        browser.until(page, "document.querySelector('#message').textContent.startsWith('Recorded in')")
+    assert len(list(tmp_path.glob("gait-*.log"))) == 1
