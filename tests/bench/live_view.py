@@ -3,9 +3,9 @@
 
     live_view.py [--seconds 20] [--browsers 10] [--record]
 
-gait-trackd follows a simulated walk that `gait capture` sends at its 30 frames a second, first by itself, then
-with `gait view`, then with browsers that read its pictures and events as fast as they come.  The clip is made once
-in build/bench.  A frame is dropped where the tracker answered none.
+gait-trackd follows a simulated walk that `gait capture` sends at its 30 frames a second, first by itself,
+then with `gait view`, then with browsers that read its pictures and events as fast as they come.  The clip is
+made once in build/bench.
 """
 
 from __future__ import annotations
@@ -48,7 +48,8 @@ def main() -> int:
     )
     rows = [[name, *measure(args.seconds, browsers)] for name, browsers in cases]
     head = ["case", "frames", "dropped", "step ms", "latency ms", "latency p99", "pictures/s a browser"]
-    note = f"{facts('tests/bench/live_view.py --record')}\n\n{args.seconds:.0f} s at 30 frames a second, 640 x 480."
+    note = f"{facts('tests/bench/live_view.py --record')}\n\n{args.seconds:.0f} s at 30 frames a second, "
+    note += "640 x 480; a frame is dropped where the tracker answered none."
     if args.record:
         table.publish("live_view", "The live page beside a tracker", head, rows, note)
     else:
