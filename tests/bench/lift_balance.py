@@ -56,7 +56,7 @@ ANKLES = [EVAL15.index("l_ankle"), EVAL15.index("r_ankle")]
 
 
 @dataclass(frozen=True)
-class Seen:
+class Case:
     """Joints EVAL15 (T, 15, 3) in the world, who sees them, and a prior without the subject."""
 
     name: str
@@ -72,8 +72,8 @@ def main() -> int:
         return 0
     found: dict[str, list[list[list[float]]]] = {}
     with tempfile.TemporaryDirectory() as folder, progress("motions", None) as update, one_thread():
-        for done, seen in enumerate([*_walks(), *_others(Path(folder))], 1):
-            found.setdefault(seen.name, []).append([_errors(seen, arm) for arm in ARMS.values()])
+        for done, case in enumerate([*_walks(), *_others(Path(folder))], 1):
+            found.setdefault(case.name, []).append([_errors(case, arm) for arm in ARMS.values()])
             update(done)
     rows = []
     for name, figures in found.items():
@@ -96,12 +96,12 @@ def main() -> int:
     return int(any(after >= before for before, after in zip(neither, no_slip, strict=True)))
 
 
-def _walks() -> Iterator[Seen]:
+def _walks() -> Iterator[Case]:
     for walk in lift_people.walks(np.random.default_rng(lift_people.SEED))[:: lift_people.TIMES]:
-        yield Seen(walk.clip, walk.places, walk.camera, walk.prior)
+        yield Case(walk.clip, walk.places, walk.camera, walk.prior)
 
 
-def _others(folder: Path) -> Iterator[Seen]:
+def _others(folder: Path) -> Iterator[Case]:
     camera = Camera.looking((0.0, -6.0, 1.5), (0.0, 0.0, 0.9), (1280, 720), 1000.0)
     for name, file in OTHERS.items():
         path, wanted = (
@@ -114,26 +114,26 @@ def _others(folder: Path) -> Iterator[Seen]:
         places = places[np.isfinite(places).all(axis=(1, 2))]
         middle = len(places) // 2
         places = places[max(middle - FRAMES // 2, 0) : middle + FRAMES // 2]
-        yield Seen(name, places - [*places[:, 0, :2].mean(axis=0), 0.0], camera, prior)
+        yield Case(name, places - [*places[:, 0, :2].mean(axis=0), 0.0], camera, prior)
 
 
-def _errors(seen: Seen, constraints: dict[str, bool]) -> list[float]:
+def _errors(case: Case, constraints: dict[str, bool]) -> list[float]:
     """Root and absolute error (mm), sliding (mm/s), coverage about the hips, whether segments are alone."""
-    frames = np.arange(len(seen.places))
+    frames = np.arange(len(case.places))
     joints = Joints(
-        frames, frames / lift_people.RATE, dict(zip(EVAL15, seen.places.swapaxes(0, 1), strict=True))
+        frames, frames / lift_people.RATE, dict(zip(EVAL15, case.places.swapaxes(0, 1), strict=True))
     )
-    tracks = lift_tracks.tracked(joints, seen.camera, lift_tracks.NOISE, lift_tracks.GAPS)
+    tracks = lift_tracks.tracked(joints, case.camera, lift_tracks.NOISE, lift_tracks.GAPS)
     options = Options(pixel_sd=lift_tracks.NOISE, **constraints)
     names = tuple(
-        name for name in seen.prior.names if name in JOINTS
+        name for name in case.prior.names if name in JOINTS
     )  # heels and toes, which are not seen, too
-    found = motion.lift(seen.prior, tracks, Perspective(seen.camera), options, names)
+    found = motion.lift(case.prior, tracks, Perspective(case.camera), options, names)
     order = [found.names.index(name) for name in EVAL15]
-    root, absolute, _ = lift_tracks.judged(found, seen.places)
-    standing = _speed(seen.places) < STANDS
+    root, absolute, _ = lift_tracks.judged(found, case.places)
+    standing = _speed(case.places) < STANDS
     slide = 1000 * float(np.median(_speed(found.places[:, order])[standing])) if standing.any() else np.nan
-    about = lift_tracks.coverage(found, seen.places, order)[1]
+    about = lift_tracks.coverage(found, case.places, order)[1]
     return [root, absolute, slide, about, float(found.alone)]
 
 

@@ -159,7 +159,7 @@ def test_a_part_is_named_from_its_threshold_on(change, words):
     assert named == (words and f"the walk contradicts its {words}")
 
 
-def test_a_difference_within_the_doubt_of_the_estimate_is_not_reported(monkeypatch):
+def test_a_difference_within_the_uncertainty_of_the_estimate_is_not_reported(monkeypatch):
     """A path across the view leaves the focal length open: only its standard deviation keeps it silent."""
     walk, given = keypoints(view(tilt=0.0), ACROSS), view(tilt=0.0, focal=1500.0)
     assert camera_check._wrong_part(given, walk, MODEL, STATURE) is None
@@ -185,13 +185,13 @@ def test_gait_lift_reports_it(tmp_path, capsys):
 
 
 def test_gait_track_reports_it(tmp_path, monkeypatch, capsys):
-    seen = camera()
-    pictures, states = clip(MODEL, decode(read_blob(None)), 30, view=seen, heading=-1.2, start=(-0.5, 0.8))
+    drawn = camera()
+    pictures, states = clip(MODEL, decode(read_blob(None)), 30, view=drawn, heading=-1.2, start=(-0.5, 0.8))
     drawn_person.write(tmp_path / "walk.mp4", pictures)
-    uv, frame = np.array([seen.project(MODEL.pose(state)[0]) for state in states]), np.arange(30)
+    uv, frame = np.array([drawn.project(MODEL.pose(state)[0]) for state in states]), np.arange(30)
     write(tmp_path / "k.csv", Keypoints(frame, frame / 30, MODEL.joint_names, uv, np.ones(uv.shape[:2])))
-    write_camera(tmp_path / "right.json", seen)
-    write_camera(tmp_path / "wrong.json", camera(focal=1.5 * seen.fx))
+    write_camera(tmp_path / "right.json", drawn)
+    write_camera(tmp_path / "wrong.json", camera(focal=1.5 * drawn.fx))
     words = ["track", "walk.mp4", "--keypoints", "k.csv", "--height", "1.75", "--background", "none"]
     words += ["--particles", "60", "-o", "o.csv", "--camera"]
     monkeypatch.chdir(tmp_path)
@@ -202,4 +202,4 @@ def test_gait_track_reports_it(tmp_path, monkeypatch, capsys):
     assert "camera from the walk" not in reports[0]
     assert reports[1].startswith("wrong.json: the person appears")
     focal = float(re.search(r"camera from the walk: focal length (\d+) ", reports[1])[1])
-    assert abs(focal / seen.fx - 1) < 0.15
+    assert abs(focal / drawn.fx - 1) < 0.15

@@ -42,14 +42,14 @@ def test_what_two_components_explain_is_filled_exactly():
     assert found.rmse[-1] < 1e-2 < found.rmse[0]
 
 
-def test_what_was_seen_stays_as_it_was():
+def test_what_was_observed_stays_as_it_was():
     values, mask = drawn(noise=0.5)
     found = complete(np.where(mask, values, 0.0), mask, KEPT, BASIS)
     assert np.array_equal(np.array(found.filled)[mask], values[mask])
 
 
-def test_the_error_is_that_of_what_was_seen():
-    """Noise is left where it was seen, and nothing is where it was filled."""
+def test_the_error_is_that_of_what_was_observed():
+    """Noise is left where it was observed, and nothing is where it was filled."""
     values, mask = drawn(noise=0.5)
     found = complete(np.where(mask, values, 0.0), mask, KEPT, BASIS)
     coded = encode(np.array(found.filled), BASIS)

@@ -139,7 +139,7 @@ def test_a_person_who_comes_back_is_found_by_keypoints(ids, at, folder, capsys, 
 def test_a_lost_person_is_found_again_within_a_second_in_full_view(known, folder):
     """Hidden for 1.5 s behind a wall, then walking on.
 
-    Pictures alone take longer to tell left from right, and the distance from the camera.
+    Pictures alone take longer to show left and right, and the distance from the camera.
     """
     back, count = START + 45, START + 90
     pictures, states = clip(MODEL, SECTIONS, count, start=(-2.3, 0.0))
