@@ -50,14 +50,15 @@ HEAD = 0.2  # metres above the neck, for recordings without a head
 RECORDED, ANATOMICAL = JOINT_CENTRES
 SHOWN = ("hip_flexion", "knee_flexion", "ankle_flexion", "shoulder_flexion", "shoulder_rotation")
 NOTE = """\
-{walks} walks of {count} people; a source's people count alike.  Angles are means over whole cycles and both sides,
-degrees; lengths are shares of the stature, per cent.  *anatomical*: `gait learn --joints anatomical`, which
-moves knees, ankles, shoulders and wrists of CMU's skeletons to where the markers of other laboratories put
-them.  In published walks (Plug-in-Gait) a knee is flexed by 22 to 25 degrees on average.
+{walks} walks of {count} people; a source's people count alike.  Angles are means over whole cycles and both
+sides, degrees; lengths are shares of the stature, per cent.  *anatomical*: `gait learn --joints anatomical`,
+which moves knees, ankles, shoulders and wrists of CMU's skeletons to where the markers of other laboratories
+put them.  In published walks (Plug-in-Gait) a knee is flexed by 22 to 25 degrees on average.
 
 Floors, mm, median and mean over people: 14 joints after alignment of the pelvis, 5 components and offsets of
 trunk, shoulders and elbows, as the tracker has them, on the mean body of the learners ({folds} groups left
-out of every source at once).  People from elsewhere are the {new} whose whole body was recorded.
+out of every source at once; people of whom legs alone were recorded are not among the learners).  People from
+elsewhere are the {new} whose whole body was recorded.
 
 {floors}
 """
@@ -143,6 +144,11 @@ def sections_of(learners: list[Person]) -> dict[str, Any]:
     return SHAPES[TRACKED].sections(learned) | follows | skeleton.sections()
 
 
+def _shows_arms(one: Person) -> bool:
+    """Whether a recording shows more than pelvis and legs."""
+    return bool(np.isfinite(one.walk.channels[:, ANGLES.index("l_shoulder_flexion")]).any())
+
+
 def floors(all_people: list[Person], sources: tuple[str, ...]) -> tuple[dict[str, float], dict[str, float]]:
     """Floors of people of CMU and from elsewhere, each left out of the learners, by name."""
     whole = [one for one in all_people if one.walk.measures is not None and walk_of(one) is not None]
@@ -153,7 +159,11 @@ def floors(all_people: list[Person], sources: tuple[str, ...]) -> tuple[dict[str
             for source in {one.source for one in whole}
             for name in sorted({one.walk.subject for one in whole if one.source == source})[k::FOLDS]
         }
-        learners = [one for one in all_people if one.source in sources and one.walk.subject not in out]
+        learners = [
+            one
+            for one in all_people
+            if one.source in sources and one.walk.subject not in out and _shows_arms(one)
+        ]
         made = sections_of(learners)
         for one in whole:
             if one.walk.subject in out:
