@@ -6,7 +6,7 @@ import ctypes
 import signal
 
 _PR_SET_PDEATHSIG = 1
-_LIBC = ctypes.CDLL(None)  # loaded before any fork
+_LIBC = ctypes.CDLL(None)  # loaded before a process splits
 
 
 def ending_signals() -> tuple[signal.Signals, ...]:

@@ -5,7 +5,7 @@
 
 Mean angles and proportions by source show where joint centres differ, before and after those of CMU's
 skeletons are moved to the anatomical ones.  Floors are those of
-learn_floor.py, as tracked, of the model of CMU's walkers alone and of all whose licence permits shipping.
+learn_floor.py, as tracked, of the model of CMU's people alone and of all whose licence permits shipping.
 """
 
 from __future__ import annotations
@@ -57,7 +57,7 @@ put them.  In published walks (Plug-in-Gait) a knee is flexed by 22 to 25 degree
 
 Floors, mm, median and mean over people: 14 joints after alignment of the pelvis, 5 components and offsets of
 trunk, shoulders and elbows, as the tracker has them, on the mean body of the learners ({folds} groups left
-out of every source at once; people of whom legs alone were recorded are not among the learners).  People from
+out of every source at once; people with recordings of the legs alone are not among the learners).  People from
 elsewhere are the {new} whose whole body was recorded.
 
 {floors}

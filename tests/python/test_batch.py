@@ -93,9 +93,9 @@ make = ["track"]
 
 
 def test_one_damaged_clip_never_ends_the_rest(place):
-    clips, seen = clips_of(place, PROJECT), []
-    rows = runner(place).run(clips, 2, seen.append)
-    assert [row["state"] for row in rows] == [DONE, FAILED, FAILED, FAILED, DONE] and len(seen) == 5
+    clips, reported = clips_of(place, PROJECT), []
+    rows = runner(place).run(clips, 2, reported.append)
+    assert [row["state"] for row in rows] == [DONE, FAILED, FAILED, FAILED, DONE] and len(reported) == 5
     assert rows[1]["error"] == "gait track: bad.mp4: damaged"
     assert "none.mp4: No such file" in rows[3]["error"]
     assert rows[0]["speed_m_s"] == 1.25 and rows[0]["tracking"] == 2 and rows[0]["subject"] == "Anna"

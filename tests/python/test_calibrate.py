@@ -254,8 +254,8 @@ def test_blur_is_the_width_of_edges(tmp_path):
     )
     number, uv = OURS.find(grey)
     for sd in (2.0, 3.0):
-        wide = blur(cv2.GaussianBlur(grey, (0, 0), sd), OURS, number, uv)
-        assert wide == pytest.approx(2.5 * sd, rel=0.3)  # an edge of sd s is s sqrt(2 pi) wide
+        across = blur(cv2.GaussianBlur(grey, (0, 0), sd), OURS, number, uv)
+        assert across == pytest.approx(2.5 * sd, rel=0.3)  # an edge of sd s is s sqrt(2 pi) wide
         smeared = cv2.GaussianBlur(grey, (0, 0), sd, sigmaY=0.1)
-        assert blur(smeared, OURS, number, uv) == pytest.approx(wide, rel=0.25)
+        assert blur(smeared, OURS, number, uv) == pytest.approx(across, rel=0.25)
     assert blur(grey, OURS, number, uv) < 3

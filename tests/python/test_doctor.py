@@ -139,7 +139,7 @@ def test_a_full_disk_and_a_folder_that_takes_no_files(monkeypatch, tmp_path):
 
     usage = namedtuple("usage", "total used free")
     monkeypatch.setattr(doctor.shutil, "disk_usage", lambda _: usage(10, 9, 1 << 20))
-    assert all("0.0 GB free; make room" in line for line in lines(doctor.check_disk))
+    assert all("0.0 GB free; free some space" in line for line in lines(doctor.check_disk))
     monkeypatch.setattr(tempfile, "tempdir", str(tmp_path / "none"))
     assert (
         lines(doctor.check_disk)[1].startswith("fault disk: temporary folder ")

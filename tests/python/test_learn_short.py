@@ -55,12 +55,12 @@ def test_nothing_visible_has_no_period():
 
 
 def test_sides_that_move_otherwise_are_refused():
-    odd = walking(1.2, unlike=40.0)
-    found = stride.find_by_steps(odd, FPS)
-    assert not verdict.judge(odd, found, None, "walk", by_steps=True).accepted
+    unlike = walking(1.2, unlike=40.0)
+    found = stride.find_by_steps(unlike, FPS)
+    assert not verdict.judge(unlike, found, None, "walk", by_steps=True).accepted
 
 
-def test_a_value_just_below_its_limit_does_not_look_like_it():
+def test_a_value_just_below_its_limit_is_not_rounded_to_it():
     assert str(verdict.Evidence("n", 1.496, 1.5, words="short")) == "short (n 1.496, at least 1.5)"
     assert str(verdict.Evidence("n", 1.31, 1.5, words="short")) == "short (n 1.3, at least 1.5)"
 

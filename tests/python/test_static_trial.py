@@ -18,7 +18,7 @@ from gait.learn.solve import kinematics, readers, retarget, static_trial
 from gait.learn.solve.kinematics import SEGMENTS
 from gait.reproducible import one_thread
 
-#: Markers while standing alone, and those that stay on: four a cluster, whose labels say nothing.
+#: Markers while standing alone, and those that stay on: four a cluster, whose labels have no meaning.
 STANDING = [
     f"{s}.{name}" for s in "LR" for name in ("Knee.Lat", "Knee.Med", "Ankle.Lat", "Ankle.Med", "MT1", "MT5")
 ]
@@ -116,7 +116,7 @@ def test_a_walk_with_clusters_has_the_angles_of_the_person(laboratory):
     assert np.abs(apart[:, knees].mean(axis=0)).max() < 4
 
 
-def test_the_command_needs_the_static_trial_and_says_so(laboratory, tmp_path, capsys):
+def test_the_command_needs_the_static_trial_and_reports_it(laboratory, tmp_path, capsys):
     folder, _ = laboratory
     words = ["learn", str(folder / "Eva_walk.trc"), "-o", str(tmp_path / "m.gait"), "--activity", "any"]
     words += ["--segments", "none", "--components", "1"]

@@ -207,7 +207,7 @@ def check_cameras() -> Iterator[Finding]:
 
 
 def check_disk() -> Iterator[Finding]:
-    """Check room and rights where outputs and temporary files go."""
+    """Check space and rights where outputs and temporary files go."""
     import tempfile
 
     for what, folder in (("folder", Path.cwd()), ("temporary folder", Path(tempfile.gettempdir()))):
@@ -222,7 +222,7 @@ def check_disk() -> Iterator[Finding]:
         free = shutil.disk_usage(folder).free
         text = f"{what} {folder}: {free / 2**30:.1f} GB free"
         if free < _LEAST_FREE:
-            yield Finding("disk", "fault", text, "make room: videos and logs need gigabytes")
+            yield Finding("disk", "fault", text, "free some space: videos and logs need gigabytes")
         else:
             yield Finding("disk", "ok", text)
 

@@ -52,7 +52,7 @@ def write(path: Path, motion: Motion, fitted: Fitted) -> int:
 
 
 def _hierarchy(fitted: Fitted, i: int, depth: int) -> Iterator[str]:
-    """Lines of a bone and those that hang on it, in the order of their frames."""
+    """Lines of a bone and its children, in the order of their frames."""
     gap, inner = "\t" * depth, "\t" * (depth + 1)
     frame = fitted.frames[i]
     place = "" if i else "Xposition Yposition Zposition "

@@ -1,4 +1,4 @@
-"""All messages of a URL into an LCM log, while it is told to."""
+"""All messages of a URL into an LCM log, from one press of a button to the next."""
 
 from __future__ import annotations
 

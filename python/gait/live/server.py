@@ -33,7 +33,7 @@ class Hub:
     """The newest value of each topic, for any number of browsers.
 
     `put` may be called in any thread; `newer` runs in the server's.  A browser that is slow misses values and
-    delays nobody.
+    delays no other.
     """
 
     def __init__(self) -> None:

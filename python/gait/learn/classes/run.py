@@ -23,7 +23,7 @@ WALK, STAND, BACKWARDS, RUN = "walk", "stand", "backwards", "run"
 DERIVED = STAND, BACKWARDS  # made from the walk
 _STEP = 6.0  # concentration: within about a twentieth of a stride, one sd
 #: Changes, per second where they are most likely.  Recordings of changes are rare, so these are what people
-#: do in rooms and streets: a walk lasts some seconds to a minute, both feet are on the ground at its end.
+#: do indoors and in streets: a walk lasts some seconds to a minute, both feet are on the ground at its end.
 CHANGES: dict[str, dict[str, Change]] = {
     WALK: {STAND: Change(1.0, _STEP, 0.05), BACKWARDS: Change(0.02), RUN: Change(0.3, slope=1.0)},
     STAND: {WALK: Change(0.7, _STEP, 0.0), BACKWARDS: Change(0.3, _STEP, 0.0), RUN: Change(0.05)},

@@ -27,7 +27,7 @@ TURNS, MORE = 0.35, 0.25
 #: Angles whose left and right move alike half a stride apart, and harmonics of the stride in their difference
 #: and their sum.
 PAIRED = ("hip_flexion", "knee_flexion", "ankle_flexion", "shoulder_flexion", "elbow_flexion")
-ODD, EVEN = (1, 3, 5), (2, 4, 6)
+UNEVEN, EVEN = (1, 3, 5), (2, 4, 6)
 SHORTEST = 1.05  # strides of a trial whose steps repeat each other
 STEP = 0.005  # seconds between periods tried
 NEAR = 0.1  # of a multiple, within which the best period is taken
@@ -105,7 +105,7 @@ def _sums_and_differences(angles: Floats) -> list[tuple[Floats, tuple[int, ...]]
     for name in PAIRED:
         left, right = (angles[:, ANGLES.index(f"{s}_{name}")] for s in SIDES)
         if 2 * np.isfinite(left + right).sum() > len(angles):
-            signals += [(left - right, ODD), (left + right, EVEN)]
+            signals += [(left - right, UNEVEN), (left + right, EVEN)]
     return signals
 
 

@@ -48,7 +48,7 @@ RECORDED = "marker "  # prefix of names in `Body.joints` that are markers of the
 UPRIGHT = 0.8  # of the leg's length by which the hips of a rest pose that stands are above the ankles
 WORD = re.compile(r"[A-Z]+(?![a-z])|[A-Z]?[a-z]+|[0-9]+")
 SIDE_WORDS = {"l": "left", "left": "left", "r": "right", "right": "right"}
-MOST = 0.7  # share of the bones whose names begin or end with a word that says nothing
+MOST = 0.7  # share of the bones whose names begin or end with a word without meaning
 BIPED = re.compile(r"^bip0*\d*")
 
 
