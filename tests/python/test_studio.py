@@ -13,7 +13,10 @@ import browser
 import numpy as np
 import pytest
 
+from gait.bindings.initial import Start
+from gait.bindings.model import Model
 from gait.body.skeleton import JOINTS
+from gait.camera.camera import Camera
 from gait.cli import main
 from gait.io import keypoints_file
 from gait.io.keypoints_file import Keypoints
@@ -243,6 +246,30 @@ def post(url, path, body, origin=None):
         urllib.request.urlopen(request)
     with refused.value as answer:
         return answer.code, answer.read().decode()
+
+
+def test_a_start_is_placed_on_the_floor(clip, server):
+    folder, _ = clip
+    rows = table(folder / "clip/truth.csv")
+    camera = Camera.read(str(folder / "clip/camera.json"))
+    here, ahead = (np.array([float(rows[k][f"pelvis_{axis}"]) for axis in "xy"] + [0.0]) for k in (30, 45))
+    with studio(server.url) as page:
+        begin = screen(page, 30, camera.project(here))
+        end = screen(page, 30, camera.project(ahead))
+        page.keyboard.press("b")
+        page.mouse.move(*begin)
+        page.mouse.down()
+        page.mouse.move(*end, steps=3)
+        page.mouse.up()
+        browser.until(page, "studio.data.start")
+        assert "gait track" in page.locator("#start").inner_text()
+    placed = Start.read(folder / "clip/video.studio/init.json", Model())
+    assert placed.frame == 30
+    assert placed.mean.pelvis[:2] == pytest.approx(here[:2], abs=0.05)
+    way = ahead - here
+    assert placed.mean.heading == pytest.approx(np.arctan2(way[1], way[0]), abs=0.1)
+    phase = float(rows[30]["phase"])
+    assert abs((placed.mean.phase - phase + 0.5) % 1 - 0.5) < 0.1
 
 
 def test_the_film_comes_in_ranges_and_bad_requests_are_refused(clip, server):

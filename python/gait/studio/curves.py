@@ -89,6 +89,17 @@ def phase_curve(time: Floats, events: Events | None) -> list[dict[str, Any]]:
     return [curve("phase", "", count % 1)]
 
 
+def phase_at(time: float, events: Events | None) -> dict[str, float]:
+    """Phase and rate at a time as a start of the tracker has them; empty where they are not known."""
+    strikes = np.sort(events.strike["right"]) if events else np.zeros(0)
+    after = int(np.searchsorted(strikes, time, "right"))
+    if not 0 < after < len(strikes):
+        return {}
+    stride = float(strikes[after] - strikes[after - 1])
+    phase = (time - float(strikes[after - 1])) / stride
+    return {"phase": round(phase, 3), "stride_hz": round(1 / stride, 3)}
+
+
 def event_marks(events: Events | None) -> list[dict[str, Any]]:
     """Give marks of heel strikes on the timeline."""
     if events is None:

@@ -40,6 +40,9 @@ def application(session: Session, port: int) -> ASGIApp:
         return answered(session.state)
 
     async def edit(request: Request) -> Response:
+        return await acted(request, session.edit)
+
+    async def acted(request: Request, act: Callable[[dict[str, Any]], Any]) -> Response:
         body = b""
         async for part in request.stream():
             body += part
@@ -51,7 +54,10 @@ def application(session: Session, port: int) -> ASGIApp:
             action = None
         if not isinstance(action, dict):
             return JSONResponse({"error": "the request is no object"}, 400)
-        return await run_in_threadpool(answered, lambda: session.edit(action))
+        return await run_in_threadpool(answered, lambda: act(action))
+
+    async def start(request: Request) -> Response:
+        return await acted(request, session.place_start)
 
     def undo(request: Request) -> Response:
         return answered(session.undo)
@@ -93,6 +99,7 @@ def application(session: Session, port: int) -> ASGIApp:
     routes = [
         Route("/state", state),
         Route("/edit", edit, methods=["POST"]),
+        Route("/start", start, methods=["POST"]),
         Route("/undo", undo, methods=["POST"]),
         Route("/redo", redo, methods=["POST"]),
         Route("/film.mp4", film),

@@ -45,6 +45,8 @@ from gait.web.motion_data import frames, motion_data, rounded
 Floats = npt.NDArray[np.float64]
 
 MOST_UNDONE = 500  # edits that can be undone
+LEAST_WAY = 0.05  # metres over the floor that show a direction
+ARROW = 0.7  # metres, of the arrow that shows it
 LEAST_SD, MOST_SD = 0.3, 50.0  # pixels, of a point given by hand
 
 
@@ -147,6 +149,7 @@ class Session:
             "refining": self.refining,
             "fault": self.fault,
             "floor": isinstance(self._lifted.view, Perspective),
+            "start": self._start(),
         }
 
     def command(self) -> str:
@@ -188,6 +191,53 @@ class Session:
                 raise UserError("there is nothing to redo")
             self._undo.append(self.edits)
             return self._change(self._redo.pop())
+
+    def place_start(self, action: dict[str, Any]) -> dict[str, Any]:
+        """Write where `gait track --init` may start: a point of the floor, and one ahead of it.
+
+        Raises
+        ------
+        UserError
+            If there is no camera, or the points are none of the floor.
+        """
+        with self._lock:
+            view = self._lifted.view
+            if not isinstance(view, Perspective):
+                raise UserError("a start is a place on the floor of a calibrated camera; give --camera")
+            frame, ends = self._frame(action), [self._pixel(action, key) for key in ("from", "to")]
+            here, ahead = view.camera.on_plane(np.array(ends), 0.0)
+            way = ahead - here
+            if not np.linalg.norm(way) > LEAST_WAY:
+                raise UserError("drag over the floor, from under the person to where they walk")
+            begin: dict[str, Any] = {
+                "frame": frame,
+                "pelvis": rounded(here[:2]),
+                "heading_rad": round(float(np.arctan2(way[1], way[0])), 4),
+                "stature_m": round(float(self._lifted.motion.stature), 3),
+            }
+            keypoints, places = self._lifted.keypoints, self._places[:, self._shown]
+            events = curves.events_of(keypoints.frame, keypoints.time, self._names, places)
+            begin |= curves.phase_at(float(self.source.video.times[frame]), events)
+            with replacing(self._start_file) as temporary:
+                temporary.write_text(json.dumps(begin, indent=1) + "\n", encoding="utf-8")
+            return {"start": self._start()}
+
+    @property
+    def _start_file(self) -> Path:
+        return self.source.folder / "init.json"
+
+    def _start(self) -> dict[str, Any] | None:
+        """Where the start is in the picture, and the command that takes it; None without one."""
+        view = self._lifted.view
+        if not self._start_file.exists() or not isinstance(view, Perspective):
+            return None
+        begin = json.loads(self._start_file.read_text(encoding="utf-8"))
+        here = np.array([*begin["pelvis"][:2], 0.0])
+        ahead = here + ARROW * np.array([np.cos(begin["heading_rad"]), np.sin(begin["heading_rad"]), 0.0])
+        words = ["gait track", _quoted(self.source.video.path), "--init", _quoted(self._start_file)]
+        words += ["--camera", _quoted(self.source.request.camera or "camera.json"), "-o track.csv"]
+        ends = rounded(view.camera.project(np.stack([here, ahead])), 2)
+        return {"frame": begin["frame"], "from": ends[0], "to": ends[1], "command": " ".join(words)}
 
     def _after(self, action: dict[str, Any]) -> Edits:
         """Edits with one more, or one less."""
@@ -233,8 +283,8 @@ class Session:
             raise UserError(f"{joint}: no such joint")
         return str(joint)
 
-    def _pixel(self, action: dict[str, Any]) -> tuple[float, float]:
-        found = action.get("uv")
+    def _pixel(self, action: dict[str, Any], key: str = "uv") -> tuple[float, float]:
+        found = action.get(key)
         size = self.source.video.size
         if (
             not isinstance(found, list)
@@ -317,7 +367,9 @@ class Session:
         """Give standard deviations (T, J) in the picture, pixels."""
         motion, view = self._lifted.motion, self._lifted.view
         if isinstance(view, Perspective):
-            return picture_sd(view.camera.project, motion.places, motion.sd)
+            # An uncertain camera moves the places in the world, and hardly where they are in its picture.
+            sd = motion.sd if self.source.request.calibration is None else motion.rooted_sd
+            return picture_sd(view.camera.project, motion.places, sd)
         return np.asarray(motion.sd.mean(axis=2) * self._tall() / max(motion.stature, 0.1))
 
     def _tall(self) -> float:

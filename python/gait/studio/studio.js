@@ -15,6 +15,7 @@ let over = -1; // joint under the pointer
 let chosen = 0; // joint of the list
 let pulled = null; // { joint, uv } while it is dragged or moved by keys
 let panning = null;
+let placing = null; // [from, to] while a start is dragged
 let range = [null, null];
 let proposal = -1;
 let following = false;
@@ -62,12 +63,12 @@ function build() {
   scene = new Scene(at('scene'), data);
   curves = new Curves(at('curves'), data, (index) => { film.pause(); film.seek(index); });
   at('joint').replaceChildren(...data.joints.map((joint, j) => new Option(words(joint), j)));
-  at('tool-pin').hidden = !data.floor;
+  at('tool-pin').hidden = at('tool-start').hidden = !data.floor;
   const { canvas } = film.picture;
   canvas.addEventListener('pointermove', hover);
   canvas.addEventListener('pointerdown', press);
   canvas.addEventListener('pointerup', release);
-  canvas.addEventListener('pointercancel', () => { pulled = panning = null; film.redraw(); });
+  canvas.addEventListener('pointercancel', () => { pulled = panning = placing = null; film.redraw(); });
   canvas.addEventListener('contextmenu', remove);
   canvas.setAttribute('role', 'application');
   canvas.setAttribute('aria-label', 'The figure over the film. Choose a joint and press Alt with an arrow key to move it.');
@@ -160,6 +161,8 @@ function paint(context, picture, index) {
     }
     if (j === over || pulled?.joint === j) label(context, words(joint), x, y);
   });
+  const arrow = placing ?? (data.start?.frame === frameOf(index) ? [data.start.from, data.start.to] : null);
+  if (arrow) drawArrow(context, ...arrow.map((end) => picture.toScreen(end)));
   for (const pin of (data.edits.floor ?? []).filter((p) => p.frame === frameOf(index))) {
     const [u, v] = picture.toScreen(pin.uv);
     context.strokeStyle = '#ffffff';
@@ -176,6 +179,17 @@ function line(context, a, b) {
   context.moveTo(...a);
   context.lineTo(...b);
   context.stroke();
+}
+
+function drawArrow(context, from, to) {
+  const about = Math.atan2(to[1] - from[1], to[0] - from[0]);
+  for (const [ink, wide] of [['#000000', 6], ['#f0e442', 3]]) {
+    context.strokeStyle = ink;
+    context.lineWidth = wide;
+    line(context, from, to);
+    for (const turn of [2.6, -2.6]) line(context, to, [to[0] + 12 * Math.cos(about + turn), to[1] + 12 * Math.sin(about + turn)]);
+    ring(context, ...from, 6);
+  }
 }
 
 function ring(context, x, y, radius) {
@@ -225,6 +239,7 @@ function lists() {
   for (const close of at('edits').querySelectorAll('li button + button')) close.setAttribute('aria-label', close.title);
   at('count').textContent = entries.length ? `(${entries.length})` : '(none yet)';
   at('command').textContent = data.command;
+  at('start').textContent = data.start ? `Start in frame ${data.start.frame}: ${data.start.command}` : '';
   at('warnings').textContent = [data.fault, ...data.warnings].filter(Boolean).join('\n');
   const { px, sd_mm: sd } = data.figures;
   at('solved').textContent = `${sent ? `solved in ${sent} ms · ` : ''}${data.refining ? 'refining the whole…' : `${px} px from the points, ± ${sd.toFixed(0)} mm`}`;
@@ -283,6 +298,11 @@ function hover(event) {
     panning = [event.clientX, event.clientY];
     return;
   }
+  if (placing) {
+    placing[1] = film.picture.toPicture(place);
+    film.redraw();
+    return;
+  }
   if (pulled && event.buttons & 1) {
     pulled.uv = film.picture.toPicture(place);
     pulled.moved = true;
@@ -312,7 +332,9 @@ function press(event) {
     return;
   }
   canvas.setPointerCapture(event.pointerId);
-  if (event.button === 0 && off < NEAR) {
+  if (tool === 'start' && event.button === 0) {
+    placing = [film.picture.toPicture(place), film.picture.toPicture(place)];
+  } else if (event.button === 0 && off < NEAR) {
     select(joint);
     pulled = { joint, uv: data.uv[film.index][joint], moved: false };
     canvas.classList.add('pulling');
@@ -325,6 +347,17 @@ function press(event) {
 function release() {
   film.picture.canvas.classList.remove('pulling');
   panning = null;
+  if (placing) {
+    const [from, to] = placing;
+    placing = null;
+    choose('pull');
+    ask('/start', { frame: frameOf(film.index), from, to }).then((found) => {
+      data.start = found.start;
+      lists();
+      film.redraw();
+    }, (error) => { film.redraw(); say(error.message); });
+    return;
+  }
   if (!pulled) return;
   if (pulled.moved) pull(pulled.joint, pulled.uv);
   else {
@@ -405,7 +438,8 @@ function propose(k) {
 
 function choose(name) {
   tool = name;
-  for (const each of ['pull', 'pin']) at(`tool-${each}`).setAttribute('aria-pressed', each === name);
+  for (const each of ['pull', 'pin', 'start']) at(`tool-${each}`).setAttribute('aria-pressed', each === name);
+  if (name === 'start') say('Drag over the floor, from under the person to where they walk.', 3);
   if (name === 'pin') say('Click the floor where a heel, toe or ankle stands.', 3);
 }
 
@@ -414,6 +448,7 @@ const KEYS = {
   n: () => propose(proposal + 1),
   d: () => choose('pull'),
   f: () => data.floor && choose('pin'),
+  b: () => data.floor && choose('start'),
   h: hide,
   i: () => mark(frameOf(film.index), range[1]),
   o: () => mark(range[0], frameOf(film.index)),
@@ -457,6 +492,7 @@ at('swap').addEventListener('click', swap);
 at('from').addEventListener('click', KEYS.i);
 at('to').addEventListener('click', KEYS.o);
 at('tool-pull').addEventListener('click', () => choose('pull'));
+at('tool-start').addEventListener('click', () => choose('start'));
 at('tool-pin').addEventListener('click', () => choose('pin'));
 at('joint').addEventListener('change', () => select(Number(at('joint').value)));
 at('help').addEventListener('click', () => at('helping').showModal());
