@@ -98,7 +98,7 @@ def show(page, url):
     page.goto(url)
     browser.until(page, "window.studio?.film?.video?.readyState >= 2")
     if page.locator("#helping").is_visible():
-        page.get_by_role("button", name="Start").click()
+        page.get_by_role("button", name="Begin").click()
 
 
 def screen(page, frame, uv):
