@@ -75,7 +75,7 @@ def test_the_verdict_counts_what_is_tracked_unsure_and_missing(folder):
         "84 frames: 3 init, 73 tracking, 4 ambiguous, 4 lost; 6 more without an estimate"
     )
     assert found.warning() is None
-    assert "unsure in 4 frames;" in verdict_of(track).sentence()  # the file does not tell why
+    assert "unsure in 4 frames;" in verdict_of(track).sentence()  # the file does not hold why
 
 
 def test_a_track_without_any_sure_frame_is_warned_of():
@@ -131,7 +131,7 @@ def test_without_a_camera_the_film_is_shown_as_it_is(folder, tmp_path, capsys):
     assert (tmp_path / "run.html").is_file()
 
 
-def test_without_the_parts_the_page_says_how_to_get_the_figure(folder, tmp_path, monkeypatch):
+def test_without_the_parts_the_page_names_how_to_get_the_figure(folder, tmp_path, monkeypatch):
     monkeypatch.setenv("GAIT_WEB", str(tmp_path))
     page = report(folder, out="plain.html")
     assert "The figure that turns is not in this page: run gait studio --fetch" in page

@@ -14,7 +14,7 @@ from gait.motion.parameters import Parameters, measured
 LEGS = "either leg may be the right one by the pictures"
 """Why the tracker itself leaves left and right open."""
 _MOVES = 0.25  # share of the strides' speed that the pelvis moves at least, unless the person walks in place
-_SECONDS = 0.5  # of a track from which places tell a speed
+_SECONDS = 0.5  # of a track from which places give a speed
 
 
 @dataclass(frozen=True)
@@ -99,7 +99,7 @@ def verdict_of(
         Frames that were to be tracked; those of the track if left out.
     why : mapping of int to str, optional
         Why a frame is ambiguous, by its number, where it was not the tracker itself that left it open.  A
-        track alone does not tell.
+        track alone does not hold it.
     parameters : Parameters, optional
         Of the track, if they are known already.
     """

@@ -51,7 +51,7 @@ class PageFilm:
     pictures: list[tuple[int, Image]]
 
     def note(self) -> str:
-        """Say whether the film was scaled down."""
+        """State whether the film was scaled down."""
         (w, h), (a, b) = self.captured, self.size
         megabytes = f"{3 * len(self.data) / 4e6:.1f} MB"
         if (a, b) == (w + w % 2, h + h % 2):
@@ -94,7 +94,7 @@ class Films:
             self._writers.append(self._stack.enter_context(writer))
         if self._frames is not None:
             self._folder = Path(self._stack.enter_context(tempfile.TemporaryDirectory()))
-            self._seen: list[int] = []
+            self._written: list[int] = []
             self._small, bits = page_size(self._size, len(self._frames), self._rate)
             self._inside = VideoWriter(
                 self._folder / "film.mp4", self._rate, crf=_CRF, preset=FAST, bits_per_second=bits, keep=False
@@ -114,7 +114,7 @@ class Films:
         if self._small != self._size:
             small = np.asarray(cv2.resize(picture, self._small, interpolation=cv2.INTER_AREA), np.uint8)
         self._inside.write(small)
-        self._seen.append(number)
+        self._written.append(number)
         if number in self._shown:
             self._pictures.append((number, small))
 
@@ -123,9 +123,9 @@ class Films:
     ) -> bool | None:
         if self._frames is not None:
             self._inside.__exit__(kind, exc, trace)
-            if kind is None and self._seen:
+            if kind is None and self._written:
                 data = base64.b64encode((self._folder / "film.mp4").read_bytes()).decode("ascii")
-                frames = range(self._seen[0], self._seen[0] + len(self._seen))
+                frames = range(self._written[0], self._written[0] + len(self._written))
                 size = self._small[0] + self._small[0] % 2, self._small[1] + self._small[1] % 2
                 self.page = PageFilm(data, size, self._size, frames, self._rate, self._pictures)
         return self._stack.__exit__(kind, exc, trace)
