@@ -192,6 +192,7 @@ def test_inverse_kinematics_of_opensim_find_the_same_angles(walk, tmp_path):
         tool.getIKTaskSet().cloneAndAppend(task)
     tool.setStartTime(walk.time[0])
     tool.setEndTime(walk.time[-1])
+    tool.set_accuracy(1e-9)  # at the default 1e-5 the rotation of nearly straight arms has not settled
     tool.run()
     ours, theirs = osim.TimeSeriesTable(str(mot)), osim.TimeSeriesTable(str(tmp_path / "ik.mot"))
     for name in ours.getColumnLabels():

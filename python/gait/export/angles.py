@@ -19,7 +19,7 @@ Array = NDArray[np.float64]
 FIXED = ("root_forward", "root_sway", "root_height", "root_pitch", "neck_z")
 """Channels that are 0: those of the path are kept as the pelvis's place, the others are undetermined."""
 _ROUNDS, _STEPS = 6, 12  # of lengths and angles in turns; of Gauss and Newton within
-_RIDGE = 1e-8  # metres squared per radian squared: where an arm is straight, its rotation is 0
+_RIDGE = 1e-8  # metres squared per radian squared: so small that it changes nothing that joints determine
 _SETTLED = 1e-10  # radians
 
 
@@ -86,6 +86,8 @@ def fit(motion: Motion) -> Fitted:
     for _ in range(_ROUNDS):
         fitted = _with_lengths(_with_angles(fitted, wanted), wanted)
     fitted = _with_angles(fitted, wanted)
+    for side in "lr":
+        _choose_branch(fitted.angles, f"{side}_shoulder_rotation", f"{side}_elbow_flexion")
     rms = float(np.sqrt(((fitted.joints() - wanted) ** 2).sum(axis=2).mean()))
     angles, pelvis = (np.full((len(motion.places), n), np.nan) for n in (len(CHANNELS), 3))
     angles[motion.present] = np.unwrap(fitted.angles, axis=0)
@@ -129,10 +131,9 @@ def _with_angles(fitted: Fitted, wanted: Array) -> Fitted:
         slopes[..., len(free) :] = np.eye(3)
         rows = slopes.reshape(len(wanted), -1, len(free) + 3)
         missed = (wanted - joints).reshape(len(wanted), -1)
-        ridge = np.diag([_RIDGE] * len(free) + [0.0] * 3)
         pull = np.zeros((len(wanted), len(free) + 3))
         pull[:, : len(free)] = _RIDGE * fitted.angles[:, free]
-        normal = rows.transpose(0, 2, 1) @ rows + ridge
+        normal = rows.transpose(0, 2, 1) @ rows + np.diag([_RIDGE] * len(free) + [0.0] * 3)
         step = np.linalg.solve(normal, (np.einsum("tri,tr->ti", rows, missed) - pull)[..., None])[..., 0]
         step[:, : len(free)] = np.clip(step[:, : len(free)], -0.5, 0.5)
         angles = fitted.angles.copy()
@@ -141,6 +142,28 @@ def _with_angles(fitted: Fitted, wanted: Array) -> Fitted:
         if np.abs(step).max() < _SETTLED:
             break
     return fitted
+
+
+def _choose_branch(angles: Array, rotation: str, flexion: str) -> None:
+    """Make an arm's angles continuous, in place: turned by half a turn and bent backwards it is the same arm.
+
+    Where the elbow is bent most it is bent forwards.
+    """
+    turn, bend = angles[:, CHANNELS.index(rotation)], angles[:, CHANNELS.index(flexion)]
+    start = int(np.abs(bend).argmax())
+    before = 0.0
+    for rows in (range(start, len(bend)), range(start, -1, -1)):
+        for k in rows:
+            if (k == start and bend[k] < 0) or (k != start and abs(_wrapped(turn[k] - before)) > np.pi / 2):
+                turn[k] += np.pi
+                bend[k] = -bend[k]
+            turn[k] = before + _wrapped(turn[k] - before) if k != start else _wrapped(turn[k])
+            before = float(turn[k])
+
+
+def _wrapped(angle: float) -> float:
+    """Return an angle in [-pi, pi)."""
+    return float((angle + np.pi) % (2 * np.pi) - np.pi)
 
 
 def _descendants(parents: tuple[int, ...]) -> NDArray[np.bool_]:
