@@ -72,7 +72,8 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         metavar="NAME[=SRC]",
         help="also hold this class of motion, so that gait track follows changes; may be repeated. stand and "
         "backwards are made from the walk; run is learnt from the runs among the sources, or like any other "
-        "NAME from the recordings of SRC",
+        "NAME from the recordings of SRC. With a model of walking as the only source, the classes are "
+        "added to it",
     )
     add(
         "--subjects",
@@ -206,6 +207,12 @@ def run(args: argparse.Namespace) -> int:
 
     one = learning.run
     figures = classes.learn(options, note, one) if options.classes else one(options, note)
+    if options.classes and classes.adds_to_a_model(options):
+        names = " ".join(each["name"] for each in figures["classes"])
+        print(
+            json.dumps(figures) if args.json else f"{args.output}: {figures['bytes']} bytes, classes {names}"
+        )
+        return 0
     print(json.dumps(figures) if args.json else summary.text(args.output, figures))
     return 0
 

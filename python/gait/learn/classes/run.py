@@ -9,6 +9,7 @@ from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
+from gait.bindings.model import read_cyclic
 from gait.errors import UsageError, UserError
 from gait.io import blob
 from gait.learn.classes import standing
@@ -41,8 +42,12 @@ def learn(options: LearnOptions, note: Note, run: Run) -> dict[str, Any]:
     classes under ``classes``.  UsageError or UserError with one line if it cannot be done.
     """
     wanted = _parsed(options)
-    figures = run(replace(options, classes=()), note)
-    walk = blob.read(options.output)
+    if adds_to_a_model(options):
+        walk: Mapping[str, blob.Array] = read_cyclic(options.sources[0])
+        figures: dict[str, Any] = {}
+    else:
+        figures = run(replace(options, classes=()), note)
+        walk = blob.read(options.output)
     classes = [_counted(MotionClass(options.activity), walk)]
     for name, source in wanted.items():
         if name in DERIVED and not source:
@@ -60,6 +65,11 @@ def learn(options: LearnOptions, note: Note, run: Run) -> dict[str, Any]:
     return figures
 
 
+def adds_to_a_model(options: LearnOptions) -> bool:
+    """Whether the walk is that of a model rather than learnt from recordings."""
+    return len(options.sources) == 1 and Path(options.sources[0]).suffix == ".gait"
+
+
 def _parsed(options: LearnOptions) -> dict[str, str]:
     """Names of the classes and their sources."""
     wanted: dict[str, str] = {}
@@ -71,7 +81,7 @@ def _parsed(options: LearnOptions) -> dict[str, str]:
             raise UsageError(
                 f"--class {text}: backwards is made from the walk in reverse; leave out ={source}"
             )
-        if name not in (*DERIVED, RUN) and not source:
+        if not source and (name not in (*DERIVED, RUN) or (name == RUN and adds_to_a_model(options))):
             raise UsageError(f"--class {text}: give recordings, --class {name}=FOLDER")
         wanted[name] = source
     if options.segments.source == "only":
