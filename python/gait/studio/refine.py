@@ -7,6 +7,7 @@ from __future__ import annotations
 
 import multiprocessing
 import os
+import signal
 import threading
 import traceback
 from collections.abc import Callable
@@ -22,6 +23,7 @@ Answer = Callable[[int, "Lifted | str"], None]
 
 def _serve(pipe: Connection, model: str | None, prepared: Prepared, request: Request, path: str) -> None:
     """Solve the newest of what arrives, until the other end closes."""
+    signal.signal(signal.SIGINT, signal.SIG_IGN)  # the server ends this process
     os.nice(10)  # what moves while the user looks on comes first
     prior = lift_run.load_prior(model, lambda words: None)
     while True:
@@ -29,14 +31,12 @@ def _serve(pipe: Connection, model: str | None, prepared: Prepared, request: Req
             number, edits = pipe.recv()
             while pipe.poll():
                 number, edits = pipe.recv()
-        except (EOFError, OSError, KeyboardInterrupt):
+        except (EOFError, OSError):
             return
         try:
             found: Lifted | str = lift_run.lift_prepared(path, prepared, edits, prior, request, quiet=True)
         except UserError as error:
             found = str(error)
-        except KeyboardInterrupt:
-            return
         except Exception:
             found = traceback.format_exc(limit=1).strip().splitlines()[-1]
         try:
@@ -73,8 +73,18 @@ class Refiner:
         threading.Thread(target=self._listen, daemon=True).start()
 
     def ask(self, number: int, edits: Edits) -> None:
-        """Ask for the motion with corrections; the answer comes later."""
-        self._pipe.send((number, edits))
+        """Ask for the motion with corrections; the answer comes later.
+
+        Raises
+        ------
+        UserError
+            If the process has ended.
+        """
+        try:
+            self._pipe.send((number, edits))
+        except OSError as error:
+            remedy = "the correction is saved; start gait studio again"
+            raise UserError(f"the process that solves the whole motion has ended: {remedy}") from error
 
     def close(self) -> None:
         """End the process."""
