@@ -89,7 +89,7 @@ UNIT := $(patsubst tests/unit/%.c,$(B)/unit/%,$(sort $(wildcard tests/unit/test_
 TOOLS := $(BIN)/gait-trackd
 LIBS := $(B)/libgait.so $(B)/libgait.a
 
-.PHONY: help setup lib tools test built check unit python-test demo model paper bench bench-lift detector-profile eval eval-camera eval-real eval-learn eval-lift eval-studio mutants asan tsan unit-threads fuzz fuzz-run golden-check \
+.PHONY: help setup lib tools test built check unit python-test demo model paper bench bench-lift detector-profile eval eval-camera eval-real eval-learn eval-lift eval-paper eval-studio mutants asan tsan unit-threads fuzz fuzz-run golden-check \
         docs screenshots lint format wheel sdist wheel-check install install-daemon uninstall clean
 
 help: ## list the targets
@@ -334,6 +334,9 @@ eval-learn: setup lib $(PEERS) ## learning beside other packages: tests/bench/re
 eval-real: setup lib ## tracks of real people's films beside joints checked by a person (ARGS='--arms auto --record')
 	@$(PY) tests/bench/eval_real.py $(ARGS)
 
+eval-paper: setup lib ## paper mode at its best, and what each addition to it buys: paper_mode.md, paper_ladder.md *
+	@$(PY) tests/bench/paper_ladder.py $(ARGS)
+
 eval-camera: setup lib ## cameras found from walks, and tracks with them: tests/bench/results/camera_walk.md *
 	@$(PY) tests/bench/camera_walk.py $(ARGS)
 
@@ -429,7 +432,7 @@ install-daemon: tools
 	install -m 755 $(BIN)/gait-trackd '$(DESTDIR)$(PREFIX)/bin/'
 	install -m 755 $(SITE)/lib/liblcm.so.1 '$(DESTDIR)$(PREFIX)/lib/gait/'
 	install -m 644 $(LCM_TYPES) '$(DESTDIR)$(PREFIX)/share/gait/lcm_types/'
-	install -m 644 python/gait/data/walk.gait '$(DESTDIR)$(PREFIX)/share/gait/'
+	install -m 644 python/gait/data/walk.gait python/gait/data/paper.gait '$(DESTDIR)$(PREFIX)/share/gait/'
 	sed 's|/usr/local|$(PREFIX)|' tools/trackd/trackd.toml > '$(DESTDIR)$(PREFIX)/share/gait/trackd.toml'
 	sed 's|@PREFIX@|$(PREFIX)|' tools/trackd/gait-trackd.service.in \
 	    > '$(DESTDIR)$(PREFIX)/lib/systemd/system/gait-trackd.service'

@@ -57,7 +57,7 @@ def make(folder: Path, update: Callable[[int], None]) -> list[Path]:
     for number, (name, source) in enumerate(recordings().items()):
         clip, model, making = folder / name, folder / f"{name}.gait", folder / ".making"
         if not (clip / "truth.csv").is_file():
-            if not model.is_file() and not _learnt(source, model):
+            if not model.is_file() and not learnt(source, model):
                 continue
             shutil.rmtree(making, ignore_errors=True)
             simulate(scenario(number, model), making)
@@ -67,7 +67,7 @@ def make(folder: Path, update: Callable[[int], None]) -> list[Path]:
     return clips
 
 
-def _learnt(source: Path, model: Path) -> bool:
+def learnt(source: Path, model: Path) -> bool:
     """Learn from one person; False if the recordings have too few cycles."""
     options = LearnOptions(sources=(str(source),), output=str(model), subjects="folder", quiet=True)
     try:

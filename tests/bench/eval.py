@@ -183,15 +183,22 @@ def record(name: str, rows: list[dict[str, Any]], parts: list[tuple[str, str]], 
         path.write_text("\n".join([*text, fill(eval_table.LEGEND, 110), ""]), encoding="utf-8")
 
 
+def _model(models: dict[str, dict[str, Path]], clip: Clip, arm: Arm) -> Path | str:
+    """Model without the clip's subject, of the arm's mode; else the shipped one."""
+    paper = arm.mode == "paper"
+    return models["paper" if paper else "people"].get(clip.subject or "", "paper" if paper else "walk")
+
+
 def evaluate(args: argparse.Namespace) -> list[dict[str, Any]]:
     """Run, write, and return the rows of figures."""
     clips, arms = clips_of(args), arms_of(args)
     tracks = args.html / "tracks"
     tracks.mkdir(parents=True, exist_ok=True)
     with progress("learning", len({clip.subject for clip in clips})) as update:
-        models = eval_clips.models(clips, OUT / "models", args.jobs, update)
+        priors = {"paper" if arm.mode == "paper" else "people" for arm in arms}
+        models = {p: eval_clips.models(clips, OUT / "models", args.jobs, update, p) for p in sorted(priors)}
     jobs = [
-        Job(clip, arm, seed, models.get(clip.subject or ""), tracks, pictures=not args.no_pictures)
+        Job(clip, arm, seed, _model(models, clip, arm), tracks, pictures=not args.no_pictures)
         for arm in arms
         for clip in clips
         for seed in range(1, arm.seeds + 1)

@@ -27,6 +27,7 @@ MOCAP = DATA / "mocap" / "cmu_walk"
 OUTDOOR = "outdoor"
 OUTDOOR_FRAMES = (64, 187)  # she is in full view
 OUTDOOR_HEIGHT = 1.65  # metres
+_PRIORS = {"people": "", "paper": "paper."}  # in the names of models
 SD = {"pelvis": 0.03, "heading_rad": 0.05, "phase": 0.03, "stride_hz": 0.03, "stature_m": 0.003}
 """Standard deviations of a start, and of its noise about the truth; the stature is known to 3 mm."""
 
@@ -101,15 +102,17 @@ def people() -> tuple[list[Clip], dict[str, Path]]:
         return clips, models(clips, ROOT / "build" / "eval" / "models", 1, update)
 
 
-def models(clips: list[Clip], folder: Path, jobs: int, update: Callable[[int], None]) -> dict[str, Path]:
+def models(
+    clips: list[Clip], folder: Path, jobs: int, update: Callable[[int], None], prior: str = "people"
+) -> dict[str, Path]:
     """Models without each clip's subject, learned once for a state of the learning code and the data."""
     folder.mkdir(parents=True, exist_ok=True)
     key = _learning_key()
     subjects = sorted({clip.subject for clip in clips if clip.subject})
-    paths = {subject: folder / f"without_{subject}.{key}.gait" for subject in subjects}
+    paths = {subject: folder / f"without_{subject}.{_PRIORS[prior]}{key}.gait" for subject in subjects}
     missing = [subject for subject in subjects if not paths[subject].is_file()]
     with ThreadPoolExecutor(jobs) as pool:
-        for done, _ in enumerate(pool.map(lambda s: _learn(s, paths[s]), missing), 1):
+        for done, _ in enumerate(pool.map(lambda s: _learn(s, paths[s], prior), missing), 1):
             update(done)
     return paths
 
@@ -126,8 +129,9 @@ def _learning_key() -> str:
     return digest.hexdigest()[:12]
 
 
-def _learn(subject: str, path: Path) -> None:
+def _learn(subject: str, path: Path, prior: str) -> None:
     words = ["learn", MOCAP, "-o", path, "--exclude", f"cmu_walk/{subject}/*", "--json", "--quiet"]
+    words += ["--prior", "paper", "--segments", "none"] if prior == "paper" else []
     done = subprocess.run(
         [sys.executable, "-m", "gait", *map(str, words)], capture_output=True, text=True, cwd=ROOT
     )

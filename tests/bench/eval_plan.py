@@ -88,12 +88,12 @@ class Arm:
 
 @dataclass(frozen=True)
 class Job:
-    """One run.  `model` None is the shipped model; `pictures` asks for overlays beside the track."""
+    """One run.  `model`: file or name of a shipped one; `pictures` asks for overlays beside the track."""
 
     clip: Clip
     arm: Arm
     seed: int
-    model: Path | None
+    model: Path | str | None
     folder: Path
     pictures: bool = False
 

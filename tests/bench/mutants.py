@@ -404,6 +404,22 @@ MUTANTS = (
         "test_like_texture",
     ),
     Mutant(
+        "O 12",
+        "p_occluded is not the setting's",
+        "libgait/src/likelihood/likelihood.c",
+        "s->paper ? m_log(cfg->occluded_density)",
+        "s->paper ? m_log(0.0018f)",
+        "test_like_texture",
+    ),
+    Mutant(
+        "O 10",
+        "fewer points are all at one height",
+        "libgait/src/likelihood/likelihood.c",
+        "int32_t const at = i ^ (i >> 2 & 1);",
+        "int32_t const at = i;",
+        "test_like_texture",
+    ),
+    Mutant(
         "O 13",
         "the product over limbs leaves out the last limb",
         "libgait/src/likelihood/texture_kernel.c",
@@ -418,6 +434,22 @@ MUTANTS = (
         "ra * c * g->lateral[k] + rb * s * g->sagittal[k];",
         "ra * c * g->lateral[k] - rb * s * g->sagittal[k];",
         "test_like_texture test_likelihood",
+    ),
+    Mutant(
+        "O 13, lost",
+        "where the surface stayed is compared with where it walked, the wrong way round",
+        "libgait/src/tracker/walk_check.c",
+        "w->nats >= -t->cfg.stayed_nats",
+        "w->nats <= t->cfg.stayed_nats",
+        "test_walk_check",
+    ),
+    Mutant(
+        "O 13, lost",
+        "the body does not walk on between the frames compared",
+        "libgait/src/tracker/walk_check.c",
+        "p.f[F_X] += way * cs;",
+        "p.f[F_X] -= way * cs;",
+        "test_walk_check",
     ),
     # ---- Leventon & Freeman 1998 ----
     Mutant(

@@ -2,22 +2,29 @@
 
 from __future__ import annotations
 
+import csv
+import itertools
 import json
 import re
 from dataclasses import replace
+from pathlib import Path
 
 import mocap_files as files
 import numpy as np
 import pytest
 
+from gait import Mode, TrackerConfig
+from gait.bindings.abi import Term
 from gait.cli import main
 from gait.learn.corpus import load, sources
 from gait.learn.report import figures_model
 from gait.paper import clip as clips
-from gait.paper import lifting, ormoneit, recordings, tracking
+from gait.paper import ladder, lifting, ormoneit, recordings, tracking
 from gait.report.figures import Drawing
 from gait.reproducible import one_thread
 from gait.simulate.scenario import PRESETS
+
+FROZEN = Path(__file__).resolve().parents[1] / "bench" / "results" / "search_paper.csv"
 
 
 @pytest.fixture(scope="module", autouse=True)
@@ -81,6 +88,29 @@ def test_what_is_missing_is_one_line(words, expected, walks, tmp_path, capsys):
     assert not list(tmp_path.iterdir())
 
 
+def test_paper_mode_has_the_values_that_the_search_froze():
+    paper = {item.name: item.paper for item in TrackerConfig.settings()}
+    with open(FROZEN, newline="", encoding="utf-8") as file:
+        frozen = {row["setting"]: float(row["frozen"]) for row in csv.DictReader(file)}
+    assert len(frozen) >= 12
+    assert {name: paper[name] for name in frozen} == pytest.approx(frozen, rel=1e-3)
+
+
+def test_the_ladder_goes_from_the_paper_to_the_default_and_adds_one_thing_a_rung():
+    unsearched, first, *rungs = ladder.RUNGS
+    assert first.mode == unsearched.mode == Mode.PAPER and not first.changes and not first.people
+    assert rungs[-1].mode == Mode.DEFAULT and not rungs[-1].changes and rungs[-1].people
+    off = [len(rung.changes) for rung in rungs if rung.mode == Mode.DEFAULT]
+    assert off == sorted(off, reverse=True)
+    terms = [TrackerConfig.default(rung.mode, **rung.changes).terms for rung in rungs]
+    assert terms[0] == Term.TEXTURE and terms[-1] == TrackerConfig.default().terms
+    assert all(a & b == a for a, b in itertools.pairwise(terms))
+    errors = {ladder.STATIC: 80.0, ladder.FREE: 40.0, "paper": 60.0}
+    axes = ladder.plot(errors, {"paper": (50.0, 70.0)}).axes[0]
+    assert [bar.get_width() for bar in axes.patches] == [80.0, 40.0, 60.0]
+    assert axes.lines[-1].get_xdata()[0] == 40.0  # without any image
+
+
 def test_the_page_holds_every_figure_and_needs_no_other_file(walks, tmp_path, monkeypatch, capsys):
     """A whole run on toy walks and a small rendered clip."""
     small = replace(PRESETS[clips.PRESET], size=(320, 240), frames=24)
@@ -95,9 +125,10 @@ def test_the_page_holds_every_figure_and_needs_no_other_file(walks, tmp_path, mo
     page = tmp_path / "a.html"
     assert main(["paper", "--mocap", str(walks), "-o", str(page), "--quiet", "--json"]) == 0
     found = json.loads(capsys.readouterr().out)
-    assert [len(each) for each in found.values()] == [6, 8]
+    assert [len(each) for each in found.values()] == [7, 8]
     text = page.read_text(encoding="utf-8")
     assert not re.search(r'(src|href)="(?!data:|#)', text)
+    assert re.search(r"without any image is \d+ mm off: .* likelihood (gains|loses) \d+ mm", text)
     for heading in (name for each in found.values() for name in each):
         assert text.count(heading) >= 2  # in the table and over its pictures
     assert text.count("<img") >= 15 and "<animate" in text

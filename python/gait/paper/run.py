@@ -13,6 +13,7 @@ from gait.learn.prior import model
 from gait.paper import (
     clip,
     entry,
+    ladder,
     leventon,
     leventon_figures,
     lifting,
@@ -69,8 +70,10 @@ def _ormoneit(found: recordings.Recordings, used: Clip, quiet: bool) -> list[Ent
         learning = ormoneit.learn(found.walks, update)
     with progress("tracking both ways", 2 * (tracking.FRAMES + 1), quiet) as update:
         tracked = tracking.track(used, learning, cores(), update)
+    with progress("ladder", len(ladder.RUNGS), quiet) as update:
+        climbed = ladder.entry(used, learning, update)
     with progress("drawing", None, quiet):
-        return [*ormoneit_figures.entries(learning), tracking.entry(tracked)]
+        return [*ormoneit_figures.entries(learning), tracking.entry(tracked), *([climbed] if climbed else [])]
 
 
 def _leventon(found: recordings.Recordings, used: Clip, folder: Path, quiet: bool) -> list[Entry]:
