@@ -35,6 +35,10 @@ static inline toy_body *toy_body_new(int camera, int32_t mode)
     static toy_body v;
     arena a = {.base = memory, .cap = sizeof memory};
     gait_tracker_default(&v.cfg, (gait_mode)mode);
+    v.cfg.occluded_density = 0.0018f; /* numbers of its own */
+    v.cfg.surface_sd = 8.0f;
+    v.cfg.surface_tilt = 1.0f;
+    v.cfg.limb_points = 16;
     v.cfg.components = TOY_COMPONENTS;
     v.cfg.offset_angles = 1u << (TOY_TORSO + 1);
     v.cfg.terms = 0xf;
