@@ -172,4 +172,4 @@ class Uncertainty:
 
 def _state(record: np.void) -> State:
     values = {item.name: record[item.name] for item in fields(State)}
-    return State(**{name: float(v) if v.ndim == 0 else np.array(v, float) for name, v in values.items()})
+    return State(**{name: v.item() if v.ndim == 0 else np.array(v, float) for name, v in values.items()})
