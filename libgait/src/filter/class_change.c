@@ -2,6 +2,7 @@
 #include "base/rng.h"
 
 static const float STEPS = 2.0f; /* both legs change class alike: phases count modulo half a stride */
+static const float ANY = 4.0f;   /* sd of a phase, strides: as good as uniform */
 static const float JITTER_HEADING = 0.1f; /* sd, radians: who changes class often turns a little */
 static const float RATE_SD = 0.07f;       /* relative; at least that of the people learnt from */
 static const float POSTURE_SHARE = 0.3f;  /* of the posture's sd, by which it moves at once */
@@ -17,14 +18,12 @@ float class_change_rate(const gait_model *m, int32_t to, float phase, float stri
            m_exp(c[CHANGE_CONCENTRATION] * (cs - 1.0f) + c[CHANGE_SLOPE] * kin_pace(m, stride_hz));
 }
 
-/* A phase at which people who stood still begin to move; u uniform, n normal. */
-static float first_phase(const float *change, float u, float n)
+/* A phase at which people who stood still begin to move, with either leg; n, other: normal. */
+static float first_phase(const float *change, float n, float other)
 {
     float const concentration = change[CHANGE_CONCENTRATION];
-    if (!(concentration > 0.0f))
-        return u;
-    float const spread = n / (STEPS * TWO_PI_F * __builtin_sqrtf(concentration));
-    return m_wrap1(change[CHANGE_PHASE] + spread + (u < 0.5f ? 0.0f : 0.5f));
+    float const sd = concentration > 0.0f ? 1.0f / (STEPS * TWO_PI_F * __builtin_sqrtf(concentration)) : ANY;
+    return m_wrap1(change[CHANGE_PHASE] + sd * n + (other < 0.0f ? 0.0f : 0.5f));
 }
 
 /* Draw four standard normal numbers of particle i. */
@@ -39,14 +38,13 @@ void class_change_enter(const class_entry *e, int32_t from, int32_t i, particle_
     const gait_model *const m = r->model, *const before = m->of_class[from];
     const float *const change = m->class_change + CLASS_CHANGE * (from * m->classes + m->motion_class);
     bool const other_curves = m->curves != before->curves;
-    float n[4], u[4];
+    float n[4];
     normals(e, i, 0, n);
-    rng_uniform4(e->seed, STREAM_CLASS, e->frame, (uint32_t)i, 1, u);
     p->f[F_HEADING] = m_wrap_pi(p->f[F_HEADING] + JITTER_HEADING * n[0]);
     if (m->direction == 0)
         p->f[F_PHASE] = 0.0f;
     else if (before->direction == 0)
-        p->f[F_PHASE] = first_phase(change, u[0], n[1]);
+        p->f[F_PHASE] = first_phase(change, n[1], n[3]);
     if (m->direction != 0 && (before->direction == 0 || other_curves))
         p->f[F_RATE] =
             dynamics_reflect_rate(m->stride_hz + f_max(m->stride_hz_sd, RATE_SD * m->stride_hz) * n[2]);

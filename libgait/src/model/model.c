@@ -234,11 +234,11 @@ static void read_class(sections *r, gait_model *m, int32_t k)
     gait_model *const own = &m[k];
     *own = m[0];
     if (blob_has(&r->b, tag.curves)) {
-        sections_require(r, source == k, "CLIN", "a class with curves of its own has another source");
+        sections_require(r, source == k, "CLIN", "a class has curves, but another source");
         read_motion(r, &tag, own);
     } else {
         sections_require(r, source < k && m->class_info[CLASS_INFO * source + CLASS_SOURCE] == source, "CLIN",
-                         "a class has neither curves nor an earlier class that has them");
+                         "a class has no curves, nor an earlier source");
         if (r->status == GAIT_OK)
             *own = m[source];
     }
@@ -253,13 +253,10 @@ static void read_changes(sections *r, gait_model *m)
     for (uint32_t i = 0; r->status == GAIT_OK && i < C * C; i++) {
         const float *const s = m->class_change + CLASS_CHANGE * i;
         bool const diagonal = i % (C + 1) == 0;
-        sections_require(r, s[CHANGE_RATE] >= 0.0f && s[CHANGE_RATE] <= (diagonal ? 0.0f : LARGEST_CHANGE),
-                         "CLSW", "a rate of change is negative, above 100 per second or on the diagonal");
-        sections_require(r,
-                         s[CHANGE_CONCENTRATION] >= 0.0f && s[CHANGE_CONCENTRATION] <= LARGEST_FACTOR &&
-                             fabsf(s[CHANGE_SLOPE]) <= LARGEST_FACTOR && s[CHANGE_PHASE] >= 0.0f &&
-                             s[CHANGE_PHASE] < 1.0f,
-                         "CLSW", "a concentration, phase or slope is outside its range");
+        bool ok = s[CHANGE_RATE] >= 0.0f && s[CHANGE_RATE] <= (diagonal ? 0.0f : LARGEST_CHANGE);
+        ok &= s[CHANGE_CONCENTRATION] >= 0.0f && s[CHANGE_CONCENTRATION] <= LARGEST_FACTOR;
+        ok &= s[CHANGE_PHASE] >= 0.0f && s[CHANGE_PHASE] < 1.0f && fabsf(s[CHANGE_SLOPE]) <= LARGEST_FACTOR;
+        sections_require(r, ok, "CLSW", "holds a number outside its range");
     }
 }
 
@@ -273,16 +270,13 @@ static void read_classes(sections *r, gait_model *m)
     m->class_info = take_ints(r, "CLIN", m->classes, CLASS_INFO);
     for (int32_t k = 0; r->status == GAIT_OK && k < m->classes; k++) {
         const int32_t *const info = m->class_info + CLASS_INFO * k;
-        sections_require(r, info[CLASS_DIRECTION] >= -1 && info[CLASS_DIRECTION] <= 1, "CLIN",
-                         "a direction is not -1, 0 or 1");
-        sections_require(r, info[CLASS_SOURCE] >= 0 && info[CLASS_SOURCE] < m->classes, "CLIN",
-                         "names a source that is no class");
-        sections_require(r, info[CLASS_CYCLES] >= 0 && info[CLASS_RECORDINGS] >= 0, "CLIN",
-                         "counts cycles or recordings below 0");
+        bool ok = info[CLASS_DIRECTION] >= -1 && info[CLASS_DIRECTION] <= 1 && info[CLASS_CYCLES] >= 0;
+        ok &= info[CLASS_SOURCE] >= 0 && info[CLASS_SOURCE] < m->classes && info[CLASS_RECORDINGS] >= 0;
+        sections_require(r, ok, "CLIN", "holds a number outside its range");
     }
     if (r->status == GAIT_OK)
         sections_require(r, m->class_info[CLASS_DIRECTION] == 1 && m->class_info[CLASS_SOURCE] == 0, "CLIN",
-                         "the first class must be cyclic, forwards, with the curves of CURV");
+                         "the first class must be forwards, with CURV");
     if (r->status == GAIT_OK)
         read_changes(r, m);
     for (int32_t k = 1; r->status == GAIT_OK && k < m->classes; k++)

@@ -19,6 +19,14 @@ static bool viewed_from_side(const gait_camera *c, const particle_state *p)
     return across * across > SIDE_VIEW * SIDE_VIEW * (to[0] * to[0] + to[1] * to[1]);
 }
 
+bool front_back_visible(const gait_tracker *t, const particle_state *p)
+{
+    bool any = false;
+    for (int32_t c = 0; c < t->cfg.cameras; c++)
+        any |= viewed_from_side(&t->cfg.camera[c], p);
+    return any;
+}
+
 /* The body in the first lane; in the others the body turned by 180 degrees, at evenly spaced phases. */
 static void turned_bodies(const particle_state *p, particle_block *out)
 {

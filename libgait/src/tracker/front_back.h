@@ -7,6 +7,9 @@
 #define GAIT_TRACKER_FRONT_BACK_H
 #include "tracker/tracker_state.h"
 
+/* Whether a camera sees the person from a side, so that images can distinguish front and back. */
+bool front_back_visible(const gait_tracker *t, const particle_state *p);
+
 /* Edge strength along the outline of the body, less that of the best turned body, less half of what exceeds chance:
  * negative if front and back cannot be distinguished.  Mean over cameras that see the person from a side; 0 if there are
  * none.  of: the class of p. */

@@ -143,39 +143,36 @@ static bool history_plausible(const gait_tracker *t, const unsigned char *body)
     return true;
 }
 
-/* Ranges cover all n particles, block by block, and name classes of the model. */
+/* Ranges cover all n particles, block by block: each class in each hypothesis, in order. */
 static bool strata_plausible(const gait_tracker *t, const strata *s, int32_t n)
 {
-    bool ok = s->count > 0 && s->count <= MAX_STRATA && s->first[0] == 0;
+    bool ok = s->count > 0 && s->count <= MAX_STRATA && s->count % t->model->classes == 0 && s->first[0] == 0;
     for (int32_t k = 0; ok && k < s->count; k++)
-        ok = s->first[k + 1] > s->first[k] && s->first[k] % BLOCK == 0 && s->motion_class[k] >= 0 &&
-             s->motion_class[k] < t->model->classes;
+        ok = s->first[k + 1] > s->first[k] && s->first[k] % BLOCK == 0 &&
+             s->motion_class[k] == k % t->model->classes;
     return ok && s->first[s->count] == n;
 }
 
-/* Each class is there in each hypothesis, in order. */
 static bool classes_plausible(const gait_tracker *t, const unsigned char *body)
 {
     const particle_history *const h = &t->history;
+    uint32_t const classes = (uint32_t)t->model->classes;
     tracker_core c;
     class_state s;
     memcpy(&c, body, sizeof c);
     if (!t->classes || !c.started)
         return true;
     memcpy(&s, in_body(t, body, t->classes), sizeof s);
-    bool ok = s.reported >= 0 && s.reported < t->model->classes && s.supported >= 0 &&
-              s.supported < t->model->classes && f_finite(s.score[0], GAIT_MAX_CLASSES * GAIT_MAX_COMPONENTS);
-    ok &= s.resampled >= 0 && s.resampled <= c.utime - c.start_utime && s.still >= 0 &&
-          s.still <= c.utime - c.start_utime;
+    bool ok = (uint32_t)s.reported < classes && (uint32_t)s.supported < classes && s.resampled >= 0 &&
+              s.resampled <= c.utime - c.start_utime &&
+              f_finite(s.score[0], GAIT_MAX_CLASSES * GAIT_MAX_COMPONENTS);
     for (int32_t k = 0; ok && k < h->depth && ((uint64_t)k < c.frame || k == 0); k++) {
         int32_t const slot = history_slot(h, c.generation, k);
         int32_t count;
         strata of;
         memcpy(&count, in_body(t, body, &h->count[slot]), sizeof count);
         memcpy(&of, in_body(t, body, &h->strata[slot]), sizeof of);
-        ok = strata_plausible(t, &of, count) && of.count % t->model->classes == 0;
-        for (int32_t i = 0; ok && i < of.count; i++)
-            ok = of.motion_class[i] == i % t->model->classes;
+        ok = strata_plausible(t, &of, count);
     }
     return ok;
 }

@@ -37,13 +37,15 @@ static bool competes(const gait_tracker *t, const gait_hypothesis *first, const 
     return same;
 }
 
-/* A state of another class that looks much the same: who walks backwards turns round, with the other leg ahead. */
+/* A state of another class that looks much the same: who walks backwards turns round, with the other leg ahead, but not
+ * where no image distinguishes front and back, since nearly all people walk forwards. */
 static gait_state as_class(const gait_tracker *t, const gait_state *s, int32_t motion_class)
 {
     gait_state to = *s;
     const gait_model *const was = t->layouts[s->motion_class].model, *const is =
                                                                          t->layouts[motion_class].model;
-    if (was->direction * is->direction < 0) {
+    particle_state const p = particle_from_state(&t->layouts[s->motion_class], s);
+    if (was->direction * is->direction < 0 && front_back_visible(t, &p)) {
         to.heading = m_wrap_pi(s->heading + PI_F);
         to.phase = m_wrap1(0.5f - s->phase);
     }
@@ -197,7 +199,7 @@ static void predict(gait_tracker *t, float dt, const rejuvenation *r, uint32_t c
     move_job j = {.t = t, .from = t->particles, .rejuvenation = *r, .counter = counter};
     if (r->shrink > 0.0f)
         task_run(&t->cfg.exec, t->cfg.tasks, j.from.n, BLOCK, rows_range, &j);
-    for (int32_t c = 0; c < (t->classes ? t->model->classes : 1); c++) {
+    for (int32_t c = 0; c < t->model->classes; c++) {
         dynamics const d = tracker_dynamics(t, c);
         j.step[c] = dynamics_step_init(&d, dt, hypotheses_settled_time(t), counter);
     }
