@@ -26,9 +26,9 @@ _STEP = 6.0  # concentration: within about a twentieth of a stride, one sd
 #: Changes, per second where they are most likely.  Recordings of changes are rare, so these are what people
 #: do indoors and in streets: a walk lasts some seconds to a minute, both feet are on the ground at its end.
 CHANGES: dict[str, dict[str, Change]] = {
-    WALK: {STAND: Change(1.0, _STEP, 0.05), BACKWARDS: Change(0.02), RUN: Change(0.3, slope=1.0)},
+    WALK: {STAND: Change(1.0, _STEP, 0.05), BACKWARDS: Change(0.002), RUN: Change(0.3, slope=1.0)},
     STAND: {WALK: Change(0.7, _STEP, 0.0), BACKWARDS: Change(0.3, _STEP, 0.0), RUN: Change(0.05)},
-    BACKWARDS: {STAND: Change(1.0, _STEP, 0.05), WALK: Change(0.02)},
+    BACKWARDS: {STAND: Change(1.0, _STEP, 0.05), WALK: Change(0.002)},
     RUN: {WALK: Change(0.5, slope=-1.0), STAND: Change(0.1)},
 }
 OTHER = Change(0.1)  # of a class of the user's, to and from the walk and standing
