@@ -10,6 +10,8 @@ import argparse
 import shlex
 from collections.abc import Iterator
 
+from gait.errors import UserError
+
 JSON = False
 EXAMPLES = """\
 examples:
@@ -68,7 +70,10 @@ def script() -> str:
     words = {"": ["--help", "--version", *dict.fromkeys(name.split()[0] for name in COMMANDS)]}
     choices: dict[str, list[str]] = {}
     for name in COMMANDS:
-        actions = list(_actions(parser_of(name)))
+        try:
+            actions = list(_actions(parser_of(name)))
+        except (ModuleNotFoundError, UserError):  # its extra is missing, and with it the command's use
+            actions = []
         words[name] = [
             option for action in actions for option in action.option_strings if option.startswith("--")
         ]
