@@ -16,6 +16,7 @@ from pathlib import Path
 from typing import Any
 
 import eval_clips
+import matplotlib
 import numpy as np
 import table
 from facts import facts
@@ -133,7 +134,8 @@ def draw(errors: dict[str, float], spread: dict[str, tuple[float, float]]) -> No
     """Write the plot beside the table."""
     text = io.StringIO()
     figure = ladder.plot(errors, spread)
-    figure.savefig(text, format="svg", metadata=dict.fromkeys(("Date", "Creator", "Format", "Type")))
+    with matplotlib.rc_context({"svg.fonttype": "none", "svg.hashsalt": "gait"}):
+        figure.savefig(text, format="svg", metadata=dict.fromkeys(("Date", "Creator", "Format", "Type")))
     with replacing(table.RESULTS / "paper_ladder.svg") as path:
         path.write_text("\n".join(line.rstrip() for line in text.getvalue().splitlines()) + "\n")
 

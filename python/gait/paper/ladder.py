@@ -174,7 +174,7 @@ def plot(errors: dict[str, float], spread: dict[str, tuple[float, float]] | None
 
     spread : smallest and largest error of each rung.
     """
-    with matplotlib.rc_context({"svg.fonttype": "none", "svg.hashsalt": "gait", "font.size": 9}):
+    with matplotlib.rc_context({"font.size": 9}):
         figure = Figure(figsize=(8.0, 0.32 * len(errors) + 1.0), layout="constrained")
         axes = figure.subplots()
         names = list(errors)
