@@ -496,7 +496,14 @@ at('tool-start').addEventListener('click', () => choose('start'));
 at('tool-pin').addEventListener('click', () => choose('pin'));
 at('joint').addEventListener('change', () => select(Number(at('joint').value)));
 at('help').addEventListener('click', () => at('helping').showModal());
-at('helping').addEventListener('close', () => localStorage.setItem('gait studio: helped', 'yes'));
+at('helping').addEventListener('close', () => {
+  localStorage.setItem('gait studio: helped', 'yes');
+  document.activeElement?.blur();
+});
+// After a click by mouse the space bar plays again; who presses buttons by keys keeps them.
+document.addEventListener('click', (event) => {
+  if (event.detail > 0) event.target.closest?.('button')?.blur();
+});
 at('export').addEventListener('change', async () => {
   const kind = at('export').value;
   at('export').value = '';
