@@ -19,6 +19,7 @@ from typing import Any
 from gait.batch.project import Clip
 from gait.ending import die_with_parent
 from gait.io.files import replacing
+from gait.report.page import Page
 
 DONE, FAILED = "done", "failed"
 RECORD = "done.json"  #: in the folder of a clip that is done
@@ -180,8 +181,6 @@ _SHOWN = {
 
 def _page(output: Path, rows: Sequence[Row]) -> str:
     """Page with a row for each clip and links to its files."""
-    from gait.report.page import Page
-
     failed = sum(row["state"] == FAILED for row in rows)
     lead = f"{len(rows)} clips, {failed} failed." if failed else f"{len(rows)} clips, all done."
     page = Page("Clips", lead)

@@ -56,7 +56,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 def run(args: argparse.Namespace) -> int:
     """Run all clips and summarise."""
     from gait.batch import project
-    from gait.batch.run import FAILED, Runner, write_summary
+    from gait.batch.run import FAILED, Runner, write_summary  # needs its extras before any clip is run
 
     clips = project.read(args.project)
     require_folder(args.output)
