@@ -54,7 +54,7 @@ def main() -> int:
             note=about(),
         )
     if args.rung_seeds:
-        rows, errors, spread = climbed(footage, paths, args.rung_seeds)
+        rows, errors, range_of = climbed(footage, paths, args.rung_seeds)
         names = [f.clip.name for f in footage if f.truth is not None]
         write(
             "paper_ladder",
@@ -64,7 +64,7 @@ def main() -> int:
             note=about_ladder(),
         )
         if args.record:
-            draw(errors, spread)
+            draw(errors, range_of)
     return 0
 
 
@@ -130,10 +130,10 @@ def climbed(
     )
 
 
-def draw(errors: dict[str, float], spread: dict[str, tuple[float, float]]) -> None:
+def draw(errors: dict[str, float], range_of: dict[str, tuple[float, float]]) -> None:
     """Write the plot beside the table."""
     text = io.StringIO()
-    figure = ladder.plot(errors, spread)
+    figure = ladder.plot(errors, range_of)
     with matplotlib.rc_context({"svg.fonttype": "none", "svg.hashsalt": "gait"}):
         figure.savefig(text, format="svg", metadata=dict.fromkeys(("Date", "Creator", "Format", "Type")))
     with replacing(table.RESULTS / "paper_ladder.svg") as path:
@@ -141,7 +141,7 @@ def draw(errors: dict[str, float], spread: dict[str, tuple[float, float]]) -> No
 
 
 def about() -> str:
-    """Say how the runs were made."""
+    """State how the runs were made."""
     return f"""{facts("paper_ladder.py --record")}
 
 Frames 0 to 50 (outdoor: from the first frame in full view), 10,000 particles, models of 19 angles and 5
@@ -155,7 +155,7 @@ image."""
 
 
 def about_ladder() -> str:
-    """Say how the ladder was made."""
+    """State how the ladder was made."""
     return f"""{facts("paper_ladder.py --record")}
 
 Root-aligned error, mm, of frames 0 to 50 from a true start with noise, median over the frames and then over

@@ -132,7 +132,7 @@ def draw(probe: Probe, path: Path) -> None:
 
 
 def about() -> str:
-    """Say what the table shows."""
+    """State what the table shows."""
     return f"""{facts("paper_maps.py --record")}
 
 Mean log-likelihood (eqs. 10-13) of a frame given the one before, over {len(FRAMES)} frames, for the mean

@@ -207,12 +207,12 @@ def publish(search: Search, best: Settings) -> None:
 
 
 def frozen_value(name: str, value: float) -> float:
-    """Two significant digits are all that so few runs tell."""
+    """Return a value with two significant digits: so few runs show no more."""
     return _whole(name, float(f"{value:.2g}"))
 
 
 def about(search: Search) -> str:
-    """Say how the search was made."""
+    """State how the search was made."""
     people = ", ".join(CLIPS)
     return f"""{facts("search_paper.py --record")}
 

@@ -154,8 +154,8 @@ def entry(both: Both) -> Entry:
         ours,
         verdict,
         (
-            "The noise of the dynamics, p_occluded, sigma(alpha), the number of points on a limb: the "
-            "package's paper mode; libgait/doc/method.md has its table.",
+            "The noise of the dynamics, epsilon, p_occluded, sigma(alpha), the number of points on a limb: "
+            "paper mode's, searched on simulated clips; tests/bench/results/search_paper.md has them.",
             "Limb sizes and camera: the package's, and the clip's.",
             "The start: the init file of the clip, by hand as in the paper.",
             "Both filters have a model learnt from the same walks.",
