@@ -4,9 +4,12 @@ import lcm_rig as rig
 import numpy as np
 import pytest
 
+from gait.io import blob
 from gait.io.track_file import read_track
 from gait.lcm.link import gaitmsg
 from gait.lcm.messages import estimate_of
+from gait.learn.classes import standing
+from gait.learn.classes.join import Change, MotionClass, join
 
 FRAMES = 76
 
@@ -29,6 +32,26 @@ def played(log, *options):
 def places(messages):
     """Joints (n, P, 3) of estimates."""
     return np.array([[joint.position for joint in m.joints] for m in messages])
+
+
+def test_classes_of_motion_follow_each_estimate(walk, tmp_path):
+    """A model with one class publishes none."""
+    learnt = blob.read(rig.MODEL)
+    classes = [
+        MotionClass("walk", changes={"stand": Change(0.5, 6.0, 0.05)}),
+        MotionClass("stand", 0, own=standing.sections(learnt), changes={"walk": Change(0.5, 6.0)}),
+    ]
+    blob.write(tmp_path / "m.gait", join(learnt, classes))
+    now, _, _ = played(walk, "-m", tmp_path / "m.gait")
+    found = rig.read_log(walk.with_suffix(".out"), "GAIT_CLASSES", gaitmsg.classes_t)
+    assert [(m.utime, m.frame) for m in found] == [(m.utime, m.frame) for m in now]
+    assert all(
+        m.name == ["walk", "stand"] and sum(m.probability) == pytest.approx(1, abs=1e-4) for m in found
+    )
+    assert all(m.most_probable == int(m.probability[1] > m.probability[0]) for m in found)
+    assert np.mean([m.most_probable == 0 for m in found]) > 0.9
+    played(walk)
+    assert rig.read_log(walk.with_suffix(".out"), "GAIT_CLASSES", gaitmsg.classes_t) == []
 
 
 def test_every_frame_comes_again_some_frames_later(walk):
