@@ -17,7 +17,7 @@ import numpy as np
 import pytest
 
 from gait.errors import UserError
-from gait.lcm.link import private_url
+from gait.lcm.link import LogWriter, private_url
 from gait.lcm.messages import camera_message, estimate_of
 from gait.live import server
 from gait.live.feed import Drops, Feed
@@ -132,24 +132,16 @@ def get(page, path="", **headers):
     return urllib.request.urlopen(request, timeout=rig.PATIENCE)
 
 
-def test_browsers_get_the_page_and_the_moving_picture(page):
+def test_browsers_get_the_page_and_the_newest_picture(page):
     with get(page) as answer:
         assert b"/live/live.js" in answer.read()
-    first, second = rig.picture(0), rig.picture(5)
-    page.show(0, first)
-    with get(page, "stream/0") as stream:
-        for image in (first, second):
-            while (line := stream.readline()) != b"--gait-frame\r\n":
-                assert line
-            head = [stream.readline() for _ in range(3)]
-            jpeg = stream.read(int(head[1].split(b":")[1]))
-            viewed = cv2.imdecode(np.frombuffer(jpeg, np.uint8), cv2.IMREAD_COLOR)
-            if np.abs(viewed.astype(int) - image).mean() < 12:
-                page.show(0, second)
-        assert np.abs(viewed.astype(int) - second).mean() < 12
-    with get(page, "frame/0.jpg") as frame:
-        assert frame.headers["Content-Type"] == "image/jpeg" and frame.read()[:2] == b"\xff\xd8"
-    for path in ("other", "stream/1", "live/server.py"):
+    for image in (rig.picture(0), rig.picture(5)):
+        page.show(0, image)
+        with get(page, "frame/0.jpg") as frame:
+            assert frame.headers["Content-Type"] == "image/jpeg"
+            viewed = cv2.imdecode(np.frombuffer(frame.read(), np.uint8), cv2.IMREAD_COLOR)
+        assert np.abs(viewed.astype(int) - image).mean() < 12
+    for path in ("other", "frame/1.jpg", "live/server.py"):
         with pytest.raises(urllib.error.HTTPError, match="404"):
             get(page, path)
     with pytest.raises(UserError, match="give another"):
@@ -161,31 +153,33 @@ def test_events_reach_a_browser(page):
     with get(page, "events") as events:
         assert [events.readline() for _ in range(2)] == [b"event: health\n", b'data: {"text":"tracking"}\n']
         page.report("sample", {"frame": 7})
-        while (line := events.readline()) != b"event: sample\n":
-            assert line in (b"\n", b": here\n")
-        assert events.readline() == b'data: {"frame":7}\n'
+        page.show(0, rig.picture(0))
+        lines = set()
+        while not {b"event: sample\n", b'data: {"frame":7}\n', b"event: picture\n"} <= lines:
+            lines.add(events.readline())
+            assert b"" not in lines
 
 
 def test_a_recording_holds_what_the_url_carries(page, tmp_path):
     rig.need_multicast()
     own = {"Origin": page.address.rstrip("/")}
 
-    def press(**headers):
-        request = urllib.request.Request(f"{page.address}record", method="POST", headers=headers)
+    def press(on, **headers):
+        request = urllib.request.Request(f"{page.address}record?on={on}", method="POST", headers=headers)
         return json.load(urllib.request.urlopen(request, timeout=rig.PATIENCE))
 
     for headers in ({}, {"Origin": "http://evil.example"}):
         with pytest.raises(urllib.error.HTTPError, match="403"):
-            press(**headers)
-    begun = press(**own)
-    assert begun["on"] and begun["path"].startswith(str(tmp_path))
+            press(1, **headers)
+    assert press(0, **own) == {}
+    begun = press(1, **own)
+    assert press(1, **own) == begun and begun["path"].startswith(str(tmp_path))
     sender, frames = rig.Listener(page._url), rig.frames(0, 3)
     path, deadline = Path(begun["path"]), time.monotonic() + rig.PATIENCE
     sender.send(frames)
     while path.stat().st_size == 0 and time.monotonic() < deadline:
         sender.listen(50)
-    ended = press(**own)
-    assert not ended["on"] and ended["fault"] is None
+    assert press(0, **own) == begun | {"fault": None} and press(0, **own) == {}
     recorded = list(lcm.EventLog(str(path), "r"))
     assert recorded and {e.channel for e in recorded} == {"GAIT_IMAGE_0"}
     assert recorded[0].data in [message.encode() for _, message in frames]
@@ -311,6 +305,24 @@ def test_cameras_that_cannot_be_are_left_out(change, log, tmp_path):
     assert view(path) == []
 
 
+def test_a_recording_that_fails_ends_and_is_reported(page, monkeypatch):
+    rig.need_multicast()
+
+    def full(*_):
+        raise UserError("the disk is full")
+
+    monkeypatch.setattr(LogWriter, "write", full)
+    own = {"Origin": page.address.rstrip("/")}
+    request = urllib.request.Request(f"{page.address}record?on=1", method="POST", headers=own)
+    urllib.request.urlopen(request, timeout=rig.PATIENCE).close()
+    sender, deadline = rig.Listener(page._url), time.monotonic() + rig.PATIENCE
+    with get(page, "events") as events:
+        while b"the disk is full" not in (line := events.readline()):
+            assert time.monotonic() < deadline
+            if line == b": here\n":
+                sender.send(rig.frames(0, 1))
+
+
 def test_without_a_picture_browsers_get_an_answer(page):
     with pytest.raises(urllib.error.HTTPError, match="503"):
         get(page, "frame/0.jpg")
@@ -325,10 +337,10 @@ def test_other_hosts_are_refused(host, page):
     assert urllib.request.urlopen(local, timeout=rig.PATIENCE).status == 200
 
 
-def test_streams_are_bounded_and_their_places_come_free(page, monkeypatch):
+def test_browsers_are_bounded_and_their_places_come_free(page, monkeypatch):
     monkeypatch.setattr(server, "_MOST", 3)
-    page.show(0, rig.picture(0))
-    open_now = [get(page, "stream/0") for _ in range(3)]
+    page.report("health", {})
+    open_now = [get(page, "events") for _ in range(3)]
     for stream in open_now:
         stream.readline()
     with pytest.raises(urllib.error.HTTPError, match="503"):
@@ -337,7 +349,7 @@ def test_streams_are_bounded_and_their_places_come_free(page, monkeypatch):
         stream.close()
     deadline = time.monotonic() + rig.PATIENCE
     while True:
-        page.show(0, rig.picture(0))  # a server finds out when it sends
+        page.report("health", {})  # a server finds out when it sends
         try:
             get(page, "events").close()
             break

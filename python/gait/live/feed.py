@@ -22,7 +22,9 @@ from gait.lcm.messages import camera_of, decode, estimate_of, picture
 from gait.report.drawing import Overlay
 from gait.web.motion_data import curve, motion_data, rounded
 
-_KEPT = 64  # frames that wait for their estimate
+_KEPT = 64  # frames that wait for their estimate, at most, and their bytes
+_KEPT_BYTES = 100_000_000
+_QUEUED = 8  # frames that wait in LCM
 _FURTHEST = 1e6  # metres, or anything else that is drawn
 _RATED = 2.0  # seconds over which estimates are counted
 KEPT_S = 20.0
@@ -89,7 +91,7 @@ class Feed:
         for stream, camera in cameras.items():
             self._views[stream].use(camera, model)
         for stream in streams:
-            self._subscribe(f"GAIT_IMAGE_{stream}", partial(self._on_image, stream), _KEPT)
+            self._subscribe(f"GAIT_IMAGE_{stream}", partial(self._on_image, stream), _QUEUED)
             self._subscribe(f"GAIT_CAMERA_{stream}", partial(self._on_camera, stream), 1)
         self._subscribe("GAIT_ESTIMATE", self._on_estimate, _KEPT)
         self._subscribe("GAIT_STATUS", self._on_status, _KEPT)
@@ -118,7 +120,7 @@ class Feed:
     def _on_image(self, stream: int, channel: str, data: bytes) -> None:
         message, frames = decode(gaitmsg.image_t, data, channel), self._views[stream].frames
         frames[message.utime] = message
-        while len(frames) > _KEPT:
+        while len(frames) > _KEPT or sum(len(one.data) for one in frames.values()) > _KEPT_BYTES:
             del frames[next(iter(frames))]
 
     def _on_camera(self, stream: int, channel: str, data: bytes) -> None:

@@ -76,7 +76,7 @@ function onSample(one) {
 
 function onHealth(one) {
   element('text').textContent = one.state === 'running' && one.text === 'tracking' ? '' : one.text;
-  show('dropped', `${one.dropped} of ${one.frames + one.dropped}`);
+  show('dropped here', String(one.dropped));
   show('particles', String(one.particles));
   if (performance.now() - last > QUIET_MS) explain(`The tracker is ${one.state}: ${one.text}.`);
 }
@@ -91,15 +91,32 @@ function explain(text) {
 }
 setInterval(() => { if (performance.now() - last > QUIET_MS && !element('waiting').textContent) explain('No estimates come.'); }, 500);
 
-// ---- pictures ----
+// ---- pictures: the newest is fetched when the one before is there ----
+const images = new Map();
 for (const stream of start.streams) {
   const figure = document.createElement('figure'), image = document.createElement('img');
   image.alt = `Camera ${stream}, with the estimate drawn into its picture`;
-  image.src = `/stream/${stream}`;
-  image.addEventListener('error', () => setTimeout(() => { image.src = `/stream/${stream}?${Date.now()}`; }, 1000));
+  const done = () => {
+    image.busy = false;
+    if (image.newer) onPicture(stream);
+  };
+  image.addEventListener('load', done);
+  image.addEventListener('error', done);
+  image.hidden = true;
   figure.append(image);
   if (start.streams.length > 1) figure.append(Object.assign(document.createElement('figcaption'), { textContent: `camera ${stream}` }));
   element('pictures').append(figure);
+  images.set(stream, image);
+}
+
+function onPicture(stream) {
+  const image = images.get(stream);
+  if (!image || paused) return;
+  image.newer = image.busy;
+  if (image.busy) return;
+  image.busy = true;
+  image.hidden = false;
+  image.src = `/frame/${stream}.jpg?${Date.now()}`;
 }
 
 // ---- buttons ----
@@ -109,18 +126,18 @@ function message(text) {
   setTimeout(() => element('message').classList.remove('shown'), 6000);
 }
 
-async function pause() {
+function pause() {
   paused = !paused;
   element('pause').setAttribute('aria-pressed', paused);
-  for (const [k, image] of document.querySelectorAll('#pictures img').entries()) {
-    image.src = `${paused ? `/frame/${start.streams[k]}.jpg` : `/stream/${start.streams[k]}`}?${Date.now()}`;
-  }
 }
 
+/** The pictures as they are shown. */
 function snapshot() {
-  for (const stream of start.streams) {
-    const link = Object.assign(document.createElement('a'), { href: `/frame/${stream}.jpg`, download: `gait-camera-${stream}.jpg` });
-    link.click();
+  for (const [stream, image] of images) {
+    if (!image.naturalWidth) continue;
+    const canvas = Object.assign(document.createElement('canvas'), { width: image.naturalWidth, height: image.naturalHeight });
+    canvas.getContext('2d').drawImage(image, 0, 0);
+    Object.assign(document.createElement('a'), { href: canvas.toDataURL('image/png'), download: `gait-camera-${stream}.png` }).click();
   }
 }
 
@@ -130,11 +147,17 @@ function showRecording(on) {
   element('record').textContent = on ? 'Stop recording' : 'Record';
 }
 async function record() {
-  const answer = await (await fetch('/record', { method: 'POST' })).json();
+  const answer = await (await fetch(`/record?on=${recording ? 0 : 1}`, { method: 'POST' })).json();
   if (answer.error) message(answer.error);
-  else message(`${answer.on ? 'Recording into' : 'Recorded in'} ${answer.path}${answer.fault ? `, not complete: ${answer.fault}` : ''}`);
-  showRecording(Boolean(answer.on));
 }
+function onRecording(one) {
+  if (one.fault) message(`${one.path} is not complete: ${one.fault}`);
+  else if (one.path && !recording) message(`Recording into ${one.path}`);
+  else if (!one.path && recording) message(`Recorded in ${recorded}`);
+  recorded = one.path ?? recorded;
+  showRecording(Boolean(one.path) && !one.fault);
+}
+let recorded = start.recording.path;
 showRecording(recording);
 element('pause').addEventListener('click', pause);
 element('snapshot').addEventListener('click', snapshot);
@@ -152,5 +175,7 @@ document.addEventListener('keydown', (event) => {
 const events = new EventSource('/events');
 events.addEventListener('sample', (event) => onSample(JSON.parse(event.data)));
 events.addEventListener('health', (event) => onHealth(JSON.parse(event.data)));
+events.addEventListener('picture', (event) => onPicture(Number(event.data)));
+events.addEventListener('recording', (event) => onRecording(JSON.parse(event.data)));
 events.addEventListener('error', () => setStatus('away', 'gait view is not there'));
 window.live = { get scene() { return scene; }, get curves() { return curves; }, start };

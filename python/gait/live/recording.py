@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import threading
 import time
+from collections.abc import Callable
 from pathlib import Path
 
 from gait.errors import UserError
@@ -22,6 +23,8 @@ class Recording:
     url : str
     folder : path
         Gets ``gait-DATE-TIME.log``; a file that exists is not touched.
+    failed : callable
+        Called in the recording's thread when the log cannot be written; it has ended then.
 
     Attributes
     ----------
@@ -35,9 +38,10 @@ class Recording:
         If the file cannot be made.
     """
 
-    def __init__(self, url: str, folder: str | Path) -> None:
+    def __init__(self, url: str, folder: str | Path, failed: Callable[[], None]) -> None:
         self.path = _unused(Path(folder))
         self.fault: str | None = None
+        self._failed = failed
         self._log = LogWriter(self.path, "w")
         self._lcm = open_lcm(url)
         self._lcm.subscribe(".*", self._write).set_queue_capacity(_WAITING)
@@ -48,6 +52,8 @@ class Recording:
     def _run(self) -> None:
         while not self._end.is_set() and self.fault is None:
             self._lcm.handle_timeout(_TURN_MS)
+        if self.fault is not None:
+            self._failed()
 
     def _write(self, channel: str, data: bytes) -> None:
         if channel == _OWN:

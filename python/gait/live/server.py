@@ -23,10 +23,18 @@ from gait.web import modules, serve
 
 _HERE = Path(__file__).parent
 _FILES = ("live.js", "live.css")
-_MOST = 32  # streams of pictures or events at a time
+_MOST = 16  # browsers at a time
 _ALIVE = 5.0  # seconds after which a quiet stream shows that it is there
 _QUALITY = 80  # of JPEG pictures
-_PART = "gait-frame"
+
+
+def _picture(stream: int) -> str:
+    """Topic of a camera's pictures."""
+    return f"picture {stream}"
+
+
+def _described(recording: Recording) -> dict[str, Any]:
+    return {"path": str(recording.path), "fault": recording.fault}
 
 
 class Hub:
@@ -97,6 +105,8 @@ class Page:
         self.hub = Hub()
         self._data: Callable[[], dict[str, Any]] = dict
         self._recording: Recording | None = None
+        self._pictures: dict[int, Image] = {}
+        self._jpeg: dict[int, tuple[int, bytes]] = {}
         self._open = 0
         own = serve.listen(port)
         self.address = serve.address(own)
@@ -107,9 +117,9 @@ class Page:
         self._data = data
 
     def show(self, stream: int, image: Image) -> None:
-        """Make a picture the newest of its camera."""
-        jpeg = cv2.imencode(".jpg", image, [cv2.IMWRITE_JPEG_QUALITY, _QUALITY])[1].tobytes()
-        self.hub.put(f"picture {stream}", jpeg)
+        """Make a picture the newest of its camera; browsers that are told so ask for it."""
+        self._pictures[stream] = image
+        self.hub.put(_picture(stream), stream)
 
     def report(self, topic: str, value: dict[str, Any]) -> None:
         """Make a sample or the tracker's health the newest."""
@@ -127,7 +137,6 @@ class Page:
         routes = [
             Route("/state", self._state),
             Route("/frame/{stream:int}.jpg", self._frame),
-            Route("/stream/{stream:int}", self._pictures),
             Route("/events", self._events),
             Route("/record", self._record, methods=["POST"]),
             Route("/live/{name}", serve.in_memory(own)),
@@ -140,46 +149,42 @@ class Page:
         return JSONResponse(found)
 
     def _recorded(self) -> dict[str, Any]:
-        one = self._recording
-        return {} if one is None else {"path": str(one.path), "fault": one.fault}
+        return {} if self._recording is None else _described(self._recording)
 
     async def _record(self, request: Request) -> Response:
-        """Begin a recording, or end the one that runs."""
+        """Begin a recording (``?on=1``) or end it (``?on=0``); what is so already stays."""
+        on = request.query_params.get("on") == "1"
         ended = self._recording
-        try:
-            if ended is None:
-                self._recording = Recording(self._url, self._folder)
-                return JSONResponse({"on": True} | self._recorded())
-        except UserError as error:
-            return JSONResponse({"error": str(error)}, 409)
-        self._recording = None
-        await asyncio.to_thread(ended.end)
-        return JSONResponse({"on": False, "path": str(ended.path), "fault": ended.fault})
+        if on and ended is None:
+            try:
+                self._recording = Recording(self._url, self._folder, self._report_recording)
+            except UserError as error:
+                return JSONResponse({"error": str(error)}, 409)
+        elif not on and ended is not None:
+            self._recording = None
+            await asyncio.to_thread(ended.end)
+        self._report_recording()
+        return JSONResponse(self._recorded() or ({} if ended is None else _described(ended)))
+
+    def _report_recording(self) -> None:
+        """Report to all browsers whether a recording runs."""
+        self.report("recording", self._recorded())
 
     def _frame(self, request: Request) -> Response:
-        jpeg = self.hub.newest(f"picture {request.path_params['stream']}")[1]
-        if jpeg is None:
-            return PlainTextResponse("no picture yet\n", 503)
-        return Response(jpeg, media_type="image/jpeg", headers={"cache-control": "no-store"})
-
-    def _pictures(self, request: Request) -> Response:
         stream = request.path_params["stream"]
-        if stream not in self._streams:
-            return PlainTextResponse("not here\n", 404)
-
-        async def parts() -> AsyncIterator[bytes]:
-            count = 0
-            while True:
-                count, jpeg = await self.hub.newer(f"picture {stream}", count, _ALIVE)
-                if jpeg is not None:
-                    head = f"--{_PART}\r\nContent-Type: image/jpeg\r\nContent-Length: {len(jpeg)}\r\n\r\n"
-                    yield head.encode("ascii") + jpeg + b"\r\n"
-
-        return self._endless(parts(), f"multipart/x-mixed-replace; boundary={_PART}")
+        count = self.hub.newest(_picture(stream))[0]
+        if count == 0:
+            return PlainTextResponse("no picture yet\n", 503 if stream in self._streams else 404)
+        made, jpeg = self._jpeg.get(stream, (0, b""))
+        if made != count:  # the first browser that asks; the others get the same
+            options = [cv2.IMWRITE_JPEG_QUALITY, _QUALITY]
+            jpeg = cv2.imencode(".jpg", self._pictures[stream], options)[1].tobytes()
+            self._jpeg[stream] = count, jpeg
+        return Response(jpeg, media_type="image/jpeg", headers={"cache-control": "no-store"})
 
     def _events(self, request: Request) -> Response:
         async def lines() -> AsyncIterator[bytes]:
-            counts = {"sample": 0, "health": 0}
+            counts = dict.fromkeys(["sample", "health", "recording", *map(_picture, self._streams)], 0)
             while True:
                 waits = [asyncio.ensure_future(self.hub.newer(name, counts[name], _ALIVE)) for name in counts]
                 await asyncio.wait(waits, return_when=asyncio.FIRST_COMPLETED)
@@ -189,22 +194,20 @@ class Page:
                 for name, before in counts.items():
                     counts[name], value = self.hub.newest(name)
                     if counts[name] > before:
-                        text += f"event: {name}\ndata: {value}\n\n".encode()
+                        text += f"event: {name.split()[0]}\ndata: {value}\n\n".encode()
                 yield text or b": here\n\n"
 
-        return self._endless(lines(), "text/event-stream")
-
-    def _endless(self, content: AsyncIterator[bytes], kind: str) -> Response:
-        """Stream, if there are not too many."""
         if self._open >= _MOST:
             return PlainTextResponse("too many browsers\n", 503)
 
         async def counted() -> AsyncIterator[bytes]:
             self._open += 1
             try:
-                async for part in content:
+                async for part in lines():
                     yield part
             finally:
                 self._open -= 1
 
-        return StreamingResponse(counted(), media_type=kind, headers={"cache-control": "no-store"})
+        return StreamingResponse(
+            counted(), media_type="text/event-stream", headers={"cache-control": "no-store"}
+        )
