@@ -152,5 +152,5 @@ def _text(path: str, s: dict[str, Any]) -> str:
         f"{s['fov_deg'][1]:.1f} degrees of {width}x{height}",
     ]
     lines += [f"more certain with: {words}" for words in s["missing"]]
-    lines.append(f"next, place the camera: gait camera points.csv --lens {path} -o camera.json")
+    lines.append(f"next, place the camera: gait camera --page VIDEO --lens {path} -o camera.json")
     return "\n".join(lines)

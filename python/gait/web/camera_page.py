@@ -96,11 +96,14 @@ def application(scene: Scene, port: int, written: Callable[[str], None] = lambda
         try:
             marks = await _read(request)
             found = await run_in_threadpool(solve, scene, marks)
+            if request.url.path == "/save":
+                with replacing(scene.output) as temporary:
+                    write_camera(temporary, found["camera"])
         except UserError as error:
             return JSONResponse({"fault": str(error).removeprefix("marks: ")})
+        except OSError as error:
+            return JSONResponse({"fault": f"{scene.output} is not written: {error.strerror}"})
         if request.url.path == "/save":
-            with replacing(scene.output) as temporary:
-                write_camera(temporary, found.pop("camera"))
             written(f"{scene.output}: written, {found['rms']:.2f} px rms from {len(found['off'])} marks")
         found.pop("camera", None)
         return JSONResponse(found)
