@@ -18,7 +18,7 @@ import scipy.linalg
 from gait.learn.arrays import Floats, Indices, Mask, by_rows, stored
 from gait.learn.cycles.fourier import decode, encode
 
-ITERATIONS = 2000  # 29 people of whom 10 show legs alone take 1216
+ITERATIONS = 2000  # 29 people, 10 of them recorded without arms and trunk, take 1216
 TOLERANCE = 1e-5  # rms change of the model between passes over the noise
 LEAST_CHANGE = 1e-7  # rms change that counts as none, in the data's units: a tenth of the last digit stored
 LEAST_GAIN = 2e-7  # of the bound in a pass, nats per observed entry
