@@ -57,8 +57,8 @@ put them.  In published walks (Plug-in-Gait) a knee is flexed by 22 to 25 degree
 
 Floors, mm, median and mean over people: 14 joints after alignment of the pelvis, 5 components and offsets of
 trunk, shoulders and elbows, as the tracker has them, on the mean body of the learners ({folds} groups left
-out of every source at once; people with recordings of the legs alone are not among the learners).  People from
-elsewhere are the {new} whose whole body was recorded.
+out of every source at once; people with recordings of the legs alone are not among the learners).  People
+from elsewhere are the {new} whose whole body was recorded.
 
 {floors}
 """

@@ -287,8 +287,8 @@ def _belt(body: Body) -> Floats:
     """Return the velocity (2,) of the ground under a person who stays in place, metres/s; 0 if none shows.
 
     While a foot stands it moves with the belt, and at no other time at one velocity for long: the velocity is
-    where those of ankles or balls, whichever agree better, are densest.  Heights decide nothing, because belts
-    may slope.
+    where those of ankles or balls, whichever agree better, are densest.  Heights decide nothing, as
+    belts may slope.
     """
     best, narrowest = np.zeros(2), STEADY
     for joint in ("ankle", "toe"):
