@@ -56,7 +56,7 @@ static void test_a_person_walks_with_the_body(void)
     int32_t status[FRAMES];
     float least, most;
     follow(&cfg, 0, status, &least, &most);
-    CHECK(least > 0.0f && lost(status, 0, FRAMES) == 0);
+    CHECK(least > 15.0f && lost(status, 0, FRAMES) == 0); /* elsewhere the surface is not found again */
 }
 
 /* On the wall the likelihood is as high as ever; the check ends the track within a second, and begins it again. */
