@@ -95,7 +95,7 @@ def test_the_text_names_what_is_missing_and_what_is_next(tmp_path, capsys):
     assert "the board in the upper left corner of the picture" in wanted
     assert "the board tilted by 30 degrees, its left edge nearer" in wanted
     assert any("nearer, so that it fills half" in words for words in wanted)
-    assert f"gait camera points.csv --lens {tmp_path / 'lens.json'}" in out
+    assert f"gait camera --page VIDEO --lens {tmp_path / 'lens.json'}" in out
 
 
 def fault(words, capsys, output):
