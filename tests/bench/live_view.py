@@ -4,7 +4,7 @@
     live_view.py [--seconds 20] [--browsers 10] [--record]
 
 gait-trackd follows a simulated walk that `gait capture` sends at its 30 frames a second, first by itself,
-then with `gait view`, then with browsers that read its pictures and events as fast as they come.  The clip is
+then with `gait view`, then with browsers that take every event and picture.  The clip is
 made once in build/bench.
 """
 
@@ -74,8 +74,7 @@ def measure(seconds: float, browsers: int | None) -> list[object]:
             others.append(view)
             address = view.stdout.readline().strip() if view.stdout else ""
             for k in range(browsers):
-                threading.Thread(target=read_pictures, args=(address, pictures, k, stop), daemon=True).start()
-                threading.Thread(target=read_events, args=(address, stop), daemon=True).start()
+                threading.Thread(target=browse, args=(address, pictures, k, stop), daemon=True).start()
         words = [
             f"--{name}={CLIP / file}" for name, file in (("camera", "camera.json"), ("init", "init.json"))
         ]
@@ -96,23 +95,14 @@ def measure(seconds: float, browsers: int | None) -> list[object]:
     return [int(found[1]), int(found[2]), float(found[3]), float(found[4]), float(found[5]), rate]
 
 
-def read_pictures(address: str, counts: list[int], mine: int, stop: threading.Event) -> None:
-    """Read the moving picture and count its parts."""
-    with urllib.request.urlopen(f"{address}stream/0", timeout=60) as stream:
-        while not stop.is_set():
-            line = stream.readline()
-            if not line:
-                return
-            if line.startswith(b"Content-Length: "):
-                stream.read(int(line.split(b":")[1]) + 2)
-                counts[mine] += 1
-
-
-def read_events(address: str, stop: threading.Event) -> None:
-    """Read estimates and statuses."""
+def browse(address: str, counts: list[int], mine: int, stop: threading.Event) -> None:
+    """Take in events as a page does, and each picture that they announce."""
     with urllib.request.urlopen(f"{address}events", timeout=60) as events:
-        while not stop.is_set() and events.readline():
-            pass
+        while not stop.is_set() and (line := events.readline()):
+            if line == b"event: picture\n":
+                with urllib.request.urlopen(f"{address}frame/0.jpg", timeout=60) as picture:
+                    picture.read()
+                counts[mine] += 1
 
 
 if __name__ == "__main__":
