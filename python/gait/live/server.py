@@ -117,7 +117,7 @@ class Page:
         self._data = data
 
     def show(self, stream: int, image: Image) -> None:
-        """Make a picture the newest of its camera; browsers that are told so ask for it."""
+        """Make a picture the newest of its camera; browsers that are informed ask for it."""
         self._pictures[stream] = image
         self.hub.put(_picture(stream), stream)
 
