@@ -17,7 +17,7 @@ VENV  := .venv
 READY := $(VENV)/.ready
 SITE  := $(VENV)/site
 PY    := $(VENV)/bin/python
-PIP_INSTALL := $(VENV)/bin/pip install --quiet --disable-pip-version-check --no-compile --constraint python/constraints.txt
+PIP_INSTALL := $(VENV)/bin/pip install --quiet --disable-pip-version-check --no-compile
 HEADER := libgait/include/gait.h
 HEADERS := $(sort $(wildcard libgait/include/*.h))
 define_of = $(shell awk '$$2 == "$(1)" { print $$3 }' $(HEADER))
@@ -89,7 +89,7 @@ UNIT := $(patsubst tests/unit/%.c,$(B)/unit/%,$(sort $(wildcard tests/unit/test_
 TOOLS := $(BIN)/gait-trackd
 LIBS := $(B)/libgait.so $(B)/libgait.a
 
-.PHONY: help setup lib tools test built check unit python-test demo model paper bench bench-lift detector-profile eval eval-camera eval-real eval-learn eval-lift eval-paper eval-studio mutants asan tsan unit-threads fuzz fuzz-run golden-check \
+.PHONY: help setup lock lib tools test built check unit python-test demo model paper bench bench-lift detector-profile eval eval-camera eval-real eval-learn eval-lift eval-paper eval-studio mutants asan tsan unit-threads fuzz fuzz-run golden-check \
         docs screenshots lint format wheel sdist wheel-check install install-daemon uninstall clean
 
 help: ## list the targets
@@ -122,10 +122,10 @@ $(error the LCM and libjpeg found here are not for $(MACHINE): on that machine r
 endif
 
 # ---- python environment --------------------------------------------------------------------------------------
-setup: $(READY) ## make .venv with the packages of python/constraints.txt (once; later builds work offline)
+setup: $(READY) ## make .venv with the packages of python/lock.txt (once; later builds work offline)
 
 # The stamp comes last: without it the environment is made anew, with an old one only changed packages are fetched.
-$(READY): python/constraints.txt python/pyproject.toml
+$(READY): python/lock.txt python/pyproject.toml
 	@command -v $(PYTHON) >/dev/null || { echo 'setup: no $(PYTHON): install it or set PYTHON= (the library alone' \
 	    'needs only Eigen: install libeigen3-dev or set EIGEN=)' >&2; exit 1; }
 	@$(PYTHON) -c 'import sys; sys.exit(sys.version_info < (3, 10) and "setup: needs Python >= 3.10: set PYTHON=")'
@@ -133,8 +133,8 @@ $(READY): python/constraints.txt python/pyproject.toml
 	    { echo 'setup: $(PYTHON) cannot make environments: install python3-venv or set PYTHON=' >&2; exit 1; }
 	@test ! -h $(VENV) || { echo 'setup: $(VENV) is a link, an environment belongs to one folder: remove the link' >&2; exit 1; }
 	$(PYTHON) -m venv $$(test -f $@ || echo --clear) $(VENV)
-	$(PIP_INSTALL) scikit-build-core
-	$(PIP_INSTALL) --no-build-isolation -e './python[dev]'
+	$(PIP_INSTALL) --require-hashes -r python/lock.txt
+	$(PIP_INSTALL) --no-deps --no-build-isolation -e ./python
 	@ln -sfn "$$(cd $(VENV) && echo lib/python3.*/site-packages)" $(SITE)
 	@printf '%s\n' "$$(pwd -P)/python" > $(SITE)/_editable_skbc_libgait.pth # starts 30 ms faster than the hook in it
 	@$(PY) -c 'import lcm' || { echo 'setup: LCM needs libglib-2.0.so.0: install libglib2.0-0' >&2; exit 1; }
@@ -143,6 +143,16 @@ $(READY): python/constraints.txt python/pyproject.toml
 	@env -u GAIT_WEB $(VENV)/bin/gait studio --fetch --quiet >/dev/null || echo 'setup: no parts of pages, so gait studio does not work yet;' \
 	    'run `$(VENV)/bin/gait studio --fetch` later' >&2
 	@pwd -P > $@
+
+# Exact versions with the hashes of their files, of everything that constraints.txt and what it needs bring, on every
+# Python and CPU.
+LOCK := $(VENV)/bin/uv pip compile --quiet --universal --generate-hashes --no-header --no-annotate \
+        --no-emit-package libgait --constraint python/constraints.txt
+lock: setup ## python/lock.txt and lock-docs.txt from constraints.txt, with a network
+	$(PIP_INSTALL) uv
+	$(LOCK) --python-version 3.10 python/pyproject.toml --extra dev --output-file python/lock.txt
+	printf '%s\n' mkdocs-material mkdocstrings-python latex2mathml | $(LOCK) \
+	    --python-version 3.11 - --output-file python/lock-docs.txt
 
 # An environment does not survive being moved.
 MOVED := $(shell test -h $(VENV) || test ! -f $(READY) || test "$$(cat $(READY))" = "$$(pwd -P)" || rm $(READY))
@@ -379,8 +389,8 @@ wheel-check: wheel sdist lib ## both packages in fresh environments without a co
 
 # ---- documentation -------------------------------------------------------------------------------------------
 DOCS_READY := $(VENV)/.docs
-$(DOCS_READY): python/constraints.txt | $(READY)
-	$(PIP_INSTALL) mkdocs-material mkdocstrings-python latex2mathml
+$(DOCS_READY): python/lock-docs.txt | $(READY)
+	$(PIP_INSTALL) --require-hashes -r python/lock-docs.txt
 	@touch $@
 
 docs: setup lib tools $(DOCS_READY) ## these pages and the reference as a site, in build/docs

@@ -15,7 +15,7 @@ TOOLS = "sh sed tr cat mkdir dirname uname printf test awk expr ls head cut real
 @pytest.fixture
 def checkout(tmp_path):
     """Copy of what the library is built from, and a folder of programs without Python and compilers."""
-    for name in ("Makefile", "libgait", "python/constraints.txt", "python/pyproject.toml"):
+    for name in ("Makefile", "libgait", "python/lock.txt", "python/pyproject.toml"):
         target = tmp_path / "gait" / name
         target.parent.mkdir(parents=True, exist_ok=True)
         (shutil.copytree if (ROOT / name).is_dir() else shutil.copy)(ROOT / name, target)

@@ -49,6 +49,20 @@ def test_every_package_has_an_exact_version_for_development():
     assert required <= exact
 
 
+def test_the_lock_has_these_versions_with_the_hashes_of_their_files():
+    """`make lock` was run after the last change of constraints.txt."""
+    locked = set()
+    for name in ("lock.txt", "lock-docs.txt"):
+        for entry in re.split(r"\n(?=\S)", (PYTHON / name).read_text(encoding="utf-8").strip()):
+            version, *hashes = re.split(r"\s*\\\n\s*", entry)
+            assert hashes and all(re.fullmatch(r"--hash=sha256:[0-9a-f]{64}", h) for h in hashes), version
+            locked.add(version.partition(" ;")[0].lower())
+    lines = (PYTHON / "constraints.txt").read_text(encoding="utf-8").splitlines()
+    exact = {line.partition(";")[0].strip().lower() for line in lines if "==" in line}
+    apart = tuple(name.lower() + "==" for name in packages(OPTIONAL["rerun"]))  # not among those of `dev`
+    assert {version for version in exact if not version.startswith(apart)} <= locked
+
+
 def test_missing_packages_are_named_with_their_extras(monkeypatch):
     monkeypatch.setattr(extras, "find_spec", lambda module: None)
     assert extras.remedy("gait x", ["lcm"]) == "gait x needs LCM: pip install 'libgait[lcm]'"
