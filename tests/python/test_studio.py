@@ -138,7 +138,7 @@ def misses(uv, truth, names):
 def test_five_drags_bring_the_figure_to_the_person(clip):
     folder, truth = clip
     server = Server(folder)
-    saved = folder / "clip/video.studio/corrections.json"
+    saved = folder / "clip/video.mp4.studio/corrections.json"
     with studio(server.url) as page:
         names = page.evaluate("studio.data.joints")
         before = misses(np.array(page.evaluate("studio.data.uv")), truth, names)
@@ -263,7 +263,7 @@ def test_a_start_is_placed_on_the_floor(clip, server):
         page.mouse.up()
         browser.until(page, "studio.data.start")
         assert "gait track" in page.locator("#start").inner_text()
-    placed = Start.read(folder / "clip/video.studio/init.json", Model())
+    placed = Start.read(folder / "clip/video.mp4.studio/init.json", Model())
     assert placed.frame == 30
     assert placed.mean.pelvis[:2] == pytest.approx(here[:2], abs=0.05)
     way = ahead - here
@@ -290,7 +290,7 @@ def test_the_film_comes_in_ranges_and_bad_requests_are_refused(clip, server):
     assert post(server.url, "edit", "x" * 20000)[0] == 413
     assert post(server.url, "redo", {})[0] == 409
     assert post(server.url, "edit", pull, origin="http://evil.example")[0] == 403
-    assert json.loads((clip[0] / "clip/video.studio/corrections.json").read_text()) == {"corrections": []}
+    assert json.loads((clip[0] / "clip/video.mp4.studio/corrections.json").read_text()) == {"corrections": []}
 
 
 def test_fits_every_width_light_and_dark(server):

@@ -12,8 +12,6 @@ _HALPE = f"{_COCO} head - hip l_big_toe r_big_toe - - l_heel r_heel"
 _ARMS = "r_shoulder r_elbow r_wrist l_shoulder l_elbow l_wrist"
 _LEGS = "r_hip r_knee r_ankle l_hip l_knee l_ankle"
 _FEET = "l_big_toe - l_heel r_big_toe - r_heel"
-_FACE = "- " * 11
-_BOTH = "l_{0} r_{0}"
 
 #: Layouts by their number of points: name and points; - and those after the last one are no joints.
 LAYOUTS = {
@@ -24,9 +22,8 @@ LAYOUTS = {
     18: ("COCO-18 of OpenPose", f"- - {_ARMS} {_LEGS} - - - -"),
     25: ("BODY_25 of OpenPose", f"- - {_ARMS} mid_hip {_LEGS} - - - - {_FEET}"),
     26: ("HALPE-26", _HALPE),
-    33: ("BlazePose of MediaPipe", " ".join([_FACE.strip(), *(_BOTH.format(part) if part != "-" else "- -" for part in (
-        "shoulder", "elbow", "wrist", "-", "-", "-", "hip", "knee", "ankle", "heel", "foot_index"
-    ))])),
+    33: ("BlazePose of MediaPipe", f"{'- ' * 11}l_shoulder r_shoulder l_elbow r_elbow l_wrist r_wrist "
+         f"{'- ' * 6}l_hip r_hip l_knee r_knee l_ankle r_ankle l_heel r_heel l_foot_index r_foot_index"),
     133: ("COCO-WholeBody", f"{_COCO} {_FEET}"),
     136: ("HALPE-136", _HALPE),
 }  # fmt: skip

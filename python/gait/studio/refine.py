@@ -19,6 +19,9 @@ from gait.lift.keypoints.corrections import Edits
 from gait.lift.run import Lifted, Prepared, Request
 
 Answer = Callable[[int, "Lifted | str"], None]
+LAST = -1
+"""Number of the answer that no other follows, because the process has ended."""
+ENDED = "the process that solves the whole motion has ended; corrections are saved, start gait studio again"
 
 
 def _serve(pipe: Connection, model: str | None, prepared: Prepared, request: Request, path: str) -> None:
@@ -72,19 +75,13 @@ class Refiner:
         self._answer = answer
         threading.Thread(target=self._listen, daemon=True).start()
 
-    def ask(self, number: int, edits: Edits) -> None:
-        """Ask for the motion with corrections; the answer comes later.
-
-        Raises
-        ------
-        UserError
-            If the process has ended.
-        """
+    def ask(self, number: int, edits: Edits) -> bool:
+        """Ask for the motion with corrections; the answer comes later. False: the process has ended."""
         try:
             self._pipe.send((number, edits))
-        except OSError as error:
-            remedy = "the correction is saved; start gait studio again"
-            raise UserError(f"the process that solves the whole motion has ended: {remedy}") from error
+        except OSError:
+            return False
+        return True
 
     def close(self) -> None:
         """End the process."""
@@ -96,5 +93,6 @@ class Refiner:
             try:
                 number, found = self._pipe.recv()
             except (EOFError, OSError):
+                self._answer(LAST, ENDED)
                 return
             self._answer(number, found)

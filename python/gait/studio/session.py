@@ -7,6 +7,7 @@ background (`refine`); when that comes, it replaces what was shown.
 from __future__ import annotations
 
 import json
+import shlex
 import threading
 import time
 from dataclasses import replace
@@ -38,7 +39,7 @@ from gait.lift.segment.view import Perspective
 from gait.lift.smooth.interactive import Interactive
 from gait.reproducible import one_thread
 from gait.studio import curves
-from gait.studio.refine import Refiner
+from gait.studio.refine import ENDED, LAST, Refiner
 from gait.studio.source import Source, picture_sd
 from gait.web.motion_data import frames, motion_data, rounded
 
@@ -61,7 +62,7 @@ class Session:
     """
 
     def __init__(self, source: Source, model: str | None) -> None:
-        self.source = source
+        self.source, self._model = source, model
         self._lock = threading.RLock()
         self.edits = self._read()
         self._undo: list[Edits] = []
@@ -158,6 +159,7 @@ class Session:
         words = ["gait lift", _quoted(source.keypoints if request.calibration is None else source.video.path)]
         words += ["--camera", _quoted(request.camera)] if request.camera else []
         words += ["--height", f"{request.options.stature:g}"] if request.options.stature else []
+        words += ["--model", _quoted(self._model)] if self._model else []
         return " ".join([*words, "--corrections", _quoted(source.corrections), "-o", "motion.csv"])
 
     # ---- edits
@@ -171,26 +173,21 @@ class Session:
             If it asks for what cannot be.
         """
         with self._lock:
-            wanted = self._after(action)
-            self._undo = [*self._undo, self.edits][-MOST_UNDONE:]
-            self._redo = []
-            return self._change(wanted)
+            return self._change(self._after(action), [*self._undo, self.edits][-MOST_UNDONE:], [])
 
     def undo(self) -> dict[str, Any]:
         """Take the last edit back."""
         with self._lock:
             if not self._undo:
                 raise UserError("there is nothing to undo")
-            self._redo.append(self.edits)
-            return self._change(self._undo.pop())
+            return self._change(self._undo[-1], self._undo[:-1], [*self._redo, self.edits])
 
     def redo(self) -> dict[str, Any]:
         """Do again what was taken back last."""
         with self._lock:
             if not self._redo:
                 raise UserError("there is nothing to redo")
-            self._undo.append(self.edits)
-            return self._change(self._redo.pop())
+            return self._change(self._redo[-1], [*self._undo, self.edits], self._redo[:-1])
 
     def place_start(self, action: dict[str, Any]) -> dict[str, Any]:
         """Write where `gait track --init` may start: a point of the floor, and one ahead of it.
@@ -235,7 +232,10 @@ class Session:
         here = np.array([*begin["pelvis"][:2], 0.0])
         ahead = here + ARROW * np.array([np.cos(begin["heading_rad"]), np.sin(begin["heading_rad"]), 0.0])
         words = ["gait track", _quoted(self.source.video.path), "--init", _quoted(self._start_file)]
-        words += ["--camera", _quoted(self.source.request.camera or "camera.json"), "-o track.csv"]
+        request = self.source.request
+        words += ["--camera", _quoted(request.camera)] if request.camera else []
+        words += ["--height", f"{request.options.stature:g}"] if request.options.stature else []
+        words += ["-o track.csv"]
         ends = rounded(view.camera.project(np.stack([here, ahead])), 2)
         return {"frame": begin["frame"], "from": ends[0], "to": ends[1], "command": " ".join(words)}
 
@@ -300,13 +300,13 @@ class Session:
         sd = action.get("sd_px")
         return round(min(max(float(sd), LEAST_SD), MOST_SD), 2) if isinstance(sd, int | float) else 1.0
 
-    def _change(self, wanted: Edits) -> dict[str, Any]:
-        """Save other edits, solve what they move, and ask for the whole."""
+    def _change(self, wanted: Edits, undo: list[Edits], redo: list[Edits]) -> dict[str, Any]:
+        """Save other edits, solve what they move, and ask for the whole; a refused edit changes nothing."""
         begin = time.perf_counter()
         touched = _touched(self.edits, wanted)
         keypoints, pinned = self._applied(wanted)  # refused before anything is saved
-        self.edits = wanted
-        self.save()
+        self._save(wanted)
+        self.edits, self._undo, self._redo = wanted, undo, redo
         answer: dict[str, Any] = {}
         if (
             touched
@@ -329,14 +329,15 @@ class Session:
         self.version += 1
         self._asked += 1
         self.refining = True
-        self._refiner.ask(self._asked, wanted)
+        if not self._refiner.ask(self._asked, wanted):
+            self.refining, self.fault = False, ENDED
         seconds = time.perf_counter() - begin
         return self._work() | answer | {"ms": round(1000 * seconds)}
 
     def _on_refined(self, number: int, found: Lifted | str) -> None:
         """Take the whole motion, unless there were more edits since."""
         with self._lock:
-            if number != self._asked:
+            if number not in (self._asked, LAST):
                 return
             self.refining, self.fault = False, found if isinstance(found, str) else ""
             if not isinstance(found, str):
@@ -391,8 +392,14 @@ class Session:
 
     def save(self) -> None:
         """Write the corrections; they appear whole or not at all."""
-        with replacing(self.source.corrections) as temporary:
-            temporary.write_text(json.dumps(self.edits.as_json(), indent=1) + "\n", encoding="utf-8")
+        self._save(self.edits)
+
+    def _save(self, edits: Edits) -> None:
+        try:
+            with replacing(self.source.corrections) as temporary:
+                temporary.write_text(json.dumps(edits.as_json(), indent=1) + "\n", encoding="utf-8")
+        except OSError as error:
+            raise UserError(f"{self.source.corrections}: not saved: {error.strerror}") from error
 
     def export(self, kind: str) -> Path:
         """Write the whole motion of the corrections as a batch command does; `csv` or `trc`.
@@ -407,6 +414,8 @@ class Session:
         with self._lock:
             if self.refining:
                 raise UserError("the whole motion is still being solved; wait a moment")
+            if self.fault:
+                raise UserError(f"the last corrections are not in the whole motion: {self.fault}")
             keypoints, motion = self._lifted.keypoints, self._lifted.motion
             path = self.source.folder / f"motion.{kind}"
             if kind == "csv":
@@ -434,5 +443,4 @@ def _by_frame(values: Floats, frame: npt.NDArray[np.int64], number: npt.NDArray[
 
 
 def _quoted(path: str | Path) -> str:
-    text = str(path)
-    return f"'{text}'" if set(text) & set(" '\"$&;()") else text
+    return shlex.quote(str(path))

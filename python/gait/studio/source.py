@@ -6,7 +6,9 @@ of the detector or of a track, film.mp4, which every browser plays frame by fram
 
 from __future__ import annotations
 
+import fcntl
 import json
+import os
 from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
@@ -114,11 +116,15 @@ def open_source(wanted: Wanted, warn: Warn, quiet: bool) -> Source:
 
 
 def _folder(video: Video) -> Path:
-    """Folder beside the film; it knows which film its files were made from."""
+    """Folder beside the film, of this process alone: two of them would write over each other."""
     path = Path(video.path)
-    folder = path.with_name(f"{path.stem}.studio")
+    folder = path.with_name(f"{path.name}.studio")
     try:
         folder.mkdir(exist_ok=True)
+        lock = os.open(folder / ".lock", os.O_RDWR | os.O_CREAT | os.O_CLOEXEC, 0o644)
+        fcntl.flock(lock, fcntl.LOCK_EX | fcntl.LOCK_NB)  # until the process ends
+    except BlockingIOError:
+        raise UserError(f"{folder}: another gait studio has this film open; use or end that one") from None
     except OSError as error:
         raise UserError(
             f"{folder}: {error.strerror}; copy the film to a folder that can be written"

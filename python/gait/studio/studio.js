@@ -6,7 +6,7 @@ import { Curves } from 'gait/curves.js';
 const NEAR = 14; // screen pixels within which the pointer takes a joint
 const CLICK = 3; // screen pixels that a click may be off
 const WAIT = 250; // milliseconds after the last key before a moved joint is sent
-const NINETY = 1.6449;
+const NINETY = 2.1460; // radius of the circle that holds 90 % of a Gaussian in two dimensions, sd
 const at = (id) => document.getElementById(id);
 
 let data, film, scene, curves;
@@ -100,7 +100,8 @@ function moved(index) {
   if (following && film) track(index);
   scene?.show(index);
   curves?.show(index);
-  if (pulled && !timer) pulled = null;
+  if (timer) send();
+  else pulled = null;
 }
 
 function corrections() {
@@ -119,7 +120,7 @@ function hidden(joint, frame) {
 function paint(context, picture, index) {
   const uv = data?.uv?.[index];
   if (!uv) return;
-  const places = uv.map((p, j) => picture.toScreen(pulled?.joint === j ? pulled.uv : p));
+  const places = uv.map((p, j) => picture.toScreen(pulled?.joint === j && (pulled.index ?? index) === index ? pulled.uv : p));
   const fixed = corrected(frameOf(index)), spread = data.uv_sd?.[index];
   context.lineCap = 'round';
   const thick = Math.min(2.5, Math.max(1.2, 0.007 * data.tall * picture.scale));
@@ -219,8 +220,8 @@ function row(...buttons) {
   return item;
 }
 
-function lists() {
-  at('saved').textContent = 'saved';
+function lists(saved = 'saved') {
+  at('saved').textContent = saved;
   at('saved').title = data.file;
   at('undo').disabled = !data.undo;
   at('redo').disabled = !data.redo;
@@ -270,7 +271,7 @@ async function change(path, body = {}) {
   } catch (error) {
     pulled = null;
     film.redraw();
-    lists();
+    lists('not saved');
     say(error.message);
   }
 }
@@ -278,8 +279,8 @@ async function change(path, body = {}) {
 /** A click is as exact as it can be pointed at on the screen. */
 const exact = () => Math.max(0.5, CLICK / film.picture.scale);
 
-function pull(joint, uv) {
-  return change('/edit', { do: 'pull', frame: frameOf(film.index), joint: data.joints[joint], uv, sd_px: exact() });
+function pull(joint, uv, index = film.index) {
+  return change('/edit', { do: 'pull', frame: frameOf(index), joint: data.joints[joint], uv, sd_px: exact() });
 }
 
 function nearestJoint(place, allowed = () => true) {
@@ -407,12 +408,20 @@ function mark(first, last) {
 /** Move the chosen joint by keys; it is sent when they rest. */
 function nudge(du, dv) {
   const index = film.index;
-  const from = pulled?.joint === chosen ? pulled.uv : data.uv[index]?.[chosen];
+  if (timer && (pulled?.joint !== chosen || pulled.index !== index)) send(); // of another joint or frame
+  const from = timer && pulled ? pulled.uv : data.uv[index]?.[chosen];
   if (!from) return;
-  pulled = { joint: chosen, uv: [from[0] + du, from[1] + dv], moved: true };
+  pulled = { joint: chosen, uv: [from[0] + du, from[1] + dv], moved: true, index };
   film.redraw();
   clearTimeout(timer);
-  timer = setTimeout(() => { timer = 0; if (pulled) pull(pulled.joint, pulled.uv); }, WAIT);
+  timer = setTimeout(send, WAIT);
+}
+
+/** Send what the keys moved, in the frame in which they moved it. */
+function send() {
+  clearTimeout(timer);
+  timer = 0;
+  if (pulled) pull(pulled.joint, pulled.uv, pulled.index);
 }
 
 // ---- getting about
