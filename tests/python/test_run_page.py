@@ -67,7 +67,7 @@ def test_the_verdict_counts_what_is_tracked_unsure_and_missing(folder):
     found = verdict_of(track, FRAMES, {40: "legs cross", 41: "legs cross"})
     assert found.counts == {"init": 3, "tracking": 73, "ambiguous": 4, "lost": 4}
     assert re.fullmatch(
-        r"Tracked 77 of 90 frames, [12] whole strides?, 1\.\d\d m/s; left and right unsure in 4 frames: legs "
+        r"Tracked 77 of 90 frames, [12] whole strides?, 1\.\d\d m/s; unsure in 4 frames: legs "
         rf"cross \(2\), {LEGS} \(2\); lost in 4 frames; still settling in 3 frames; not found in 6 frames",
         found.sentence(),
     )

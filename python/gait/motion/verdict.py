@@ -34,7 +34,7 @@ class Verdict:
     in_place : bool
         The person walks in place, as on a treadmill.
     why : dict of str to int
-        Why left and right are unsure: frames by reason, most first; empty if that is not known.
+        Why frames are ambiguous: frames by reason, most first; empty if that is not known.
     """
 
     total: int
@@ -46,7 +46,7 @@ class Verdict:
 
     @property
     def tracked(self) -> int:
-        """Frames with an estimate of the person, left and right sure or not."""
+        """Frames with an estimate of the person, sure or not."""
         return self.counts["tracking"] + self.counts["ambiguous"]
 
     @property
@@ -62,7 +62,8 @@ class Verdict:
             parts.append(f"{self.speed:.2f} m/s" + (" in place" if self.in_place else ""))
         text = ", ".join(parts)
         if self.counts["ambiguous"]:
-            text += f"; left and right unsure in {count_of(self.counts['ambiguous'], 'frame')}"
+            what = "left and right unsure" if set(self.why) == {LEGS} else "unsure"
+            text += f"; {what} in {count_of(self.counts['ambiguous'], 'frame')}"
             why = [f"{reason} ({count})" for reason, count in self.why.items()]
             text += f": {', '.join(why if len(why) > 1 else self.why)}" if why else ""
         rest = {"lost": self.counts["lost"], "still settling": self.counts["init"], "not found": self.absent}

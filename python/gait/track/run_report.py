@@ -42,7 +42,8 @@ class RunReport:
     ) -> None:
         self._options, self._scene, self._used, self._particles = options, scene, dict(used), particles
         self._track = read_track(options.output)
-        self._parameters = measured(self._track)
+        self._draws = Draws.read(options.draws, self._track) if options.draws else None
+        self._parameters = measured(self._track, self._draws)
         self._verdict = verdict_of(self._track, len(scene.frames), reasons, self._parameters)
 
     def figures(self) -> dict[str, Any]:
@@ -61,14 +62,13 @@ class RunReport:
         from gait.report.run_page import Run, cycles_of, run_page  # Matplotlib is slow to import
 
         options, scene, track = self._options, self._scene, self._track
-        draws = Draws.read(options.draws, track) if options.draws else None
         curves = ModelCurves(read_cyclic(options.model))
         run = Run(
             title=Path(options.video).name,
             track=track,
             verdict=self._verdict,
             parameters=self._parameters,
-            cycles=cycles_of(track, self._parameters, curves, draws),
+            cycles=cycles_of(track, self._parameters, curves, self._draws),
             film=film,
             times=scene.video.times[film.frames.start : film.frames.stop],
             camera=scene.reference_camera,
