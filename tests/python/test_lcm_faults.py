@@ -230,7 +230,7 @@ def test_a_background_with_comments_is_read(tmp_path):
         (["-m", "x", "--seed", "99999999999999999999"], "--seed 99999999999999999999"),
         (["-m", "x", "--girth", "nan"], "--girth nan"),
         (["-m", "x", "--mode", "fast"], "--mode fast: give default or paper"),
-        (["-m", "x", "--quiet=maybe"], "--quiet maybe: give yes or no"),
+        (["-m", "x", "--quiet=maybe"], "--quiet maybe: give true or false"),
         (["-m", "x", "--url", "memq://"], "--url memq://: works only within one process"),
         (["-m", "x", "--background", "p.ppm"], "--background needs --camera"),
         (["-m", "x", "--lift-model", "p.gait"], "--lift-model needs --lift"),

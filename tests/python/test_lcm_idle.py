@@ -57,6 +57,8 @@ def test_another_daemon_on_the_same_url_is_reported():
     url = private_url()
     with rig.daemon(url) as (listener, finish), rig.daemon(url) as (_, finish_second):
         listener.until(lambda: "another gait-trackd answers" in listener.last.text, "the report")
+        heard = len(listener.statuses)
+        listener.until(lambda: len(listener.statuses) > heard + 6, "statuses of both")
         second = finish_second()
         assert "another gait-trackd answers on this URL" in second.words
         assert "another gait-trackd answers on this URL" in finish().words

@@ -125,9 +125,7 @@ def test_a_camera_in_centimetres_or_millimetres_is_refused(folder, capsys, facto
     other_camera(t=[factor * value for value in camera["t"]])
     code, printed = lift(capsys, "t.csv", "other.json")
     assert code == 1 and printed.count("\n") == 1 and not (folder / "out.csv").exists()
-    assert (
-        f"t.csv: the camera stands {factor} m over the floor" in printed and "give its t in metres" in printed
-    )
+    assert "other.json: " in printed and "in metres" in printed
 
 
 def test_a_camera_on_a_mast_is_not_refused(folder, capsys):

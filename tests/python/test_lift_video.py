@@ -16,7 +16,7 @@ from gait.cli import main
 from gait.errors import UserError
 from gait.io import blob
 from gait.io.video import Video, VideoWriter
-from gait.lift.keypoints.corrections import CLICK_SD, Correction, as_json, read_corrections
+from gait.lift.keypoints.corrections import CLICK_SD, Correction, as_json, read_edits
 from gait.lift.video import run as lift_video
 from gait.lift.video.clip_segments import Settings
 from gait.lift.video.figure import LIMBS, Figure, draw_figure
@@ -299,8 +299,10 @@ def test_the_documented_files_are_read(prior, tmp_path):
     path.write_text(flat)
     assert read_placement(path, prior, False).height_px == 415
     path.write_text(corrections)
-    found = read_corrections(path, prior, 100)
-    assert [c.joint for c in found] == ["l_knee", "r_ankle"] and found[1].sd_px == CLICK_SD
+    found = read_edits(path, prior, range(100))
+    pulled = found.corrections
+    assert [c.joint for c in pulled] == ["l_knee", "r_ankle"] and pulled[1].sd_px == CLICK_SD
+    assert len(found.hidden) == len(found.swapped) == len(found.floor) == 1
     usual = f"{PLACE_SD:g} m, {HEADING_SD:g}, {STATURE_SD:g} m, {PHASE_SD:g}, {RATE_SD:g} |"
     assert usual in page and f"| {CLICK_SD:g} |" in page
 

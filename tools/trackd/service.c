@@ -379,12 +379,18 @@ void service_send_estimate(service *s, const image_view *v, const gait_estimate 
         send_particles(s, v);
 }
 
+#define ANOTHER_DAEMON "another gait-trackd answers on this URL; stop it, or give each its own --url"
+
 void service_status(service *s, const gaitmsg_status_t *msg)
 {
     for (int i = 0; i < SERVICE_SENT; i++)
         if (s->sent[i] == msg->utime)
             return;
-    service_complain(s, "another gait-trackd answers on this URL; stop it, or give each its own --url");
+    if (strcmp(s->complaint.text, ANOTHER_DAEMON) !=
+        0) /* else two daemons would answer each other without end */
+        service_complain(s, ANOTHER_DAEMON);
+    else
+        s->text = s->complaint;
 }
 
 void service_send_status(service *s)

@@ -135,6 +135,8 @@ def load_all(
     for sequence, channels in zip(sequences, views, strict=True):
         sequence.channels = channels
     lonely = _lonely(sequences)
+    for short in (s for s in sequences if s.name in lonely):
+        measures[names.index(short.name)] = short.measures
     sequences = [s for s in sequences if s.name not in lonely]
     refused += [words for name, words in lonely.items()]
     if not sequences and not (used and options.segments.source == "only"):
