@@ -168,7 +168,7 @@ def main() -> int:
         "error in the picture. proposed: those that the studio lists, asked again after each column; random: "
         f"any joint in any frame, mean of {SEEDS} runs. Leventon and Freeman gave about one a frame (last "
         f"column). One correction of the {len(long.true)} frames of {LONG} takes {np.median(cpu):.2f} s "
-        f"of one processor (longest {cpu.max():.2f}; by the clock of this machine, where other programs ran, "
+        f"of one processor (longest {cpu.max():.2f}; by the clock of this machine, "
         f"{np.median(clock):.2f} and {clock.max():.2f}); wanted {WANTED_S:g} s ({verdict} in processor time)."
     )
     head = ["clip", "frames", "corrections", "error", "0", *map(str, COUNTS)]
