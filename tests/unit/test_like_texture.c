@@ -8,6 +8,19 @@ enum { LANE = 5 };
 static toy_body *v;
 static like_patch now[TOY_LIMBS], then[TOY_LIMBS];
 
+/* Of the samples as they are. */
+static float log_likelihood(void)
+{
+    like_body const b = {.setup = &v->setup,
+                         .features = &v->f,
+                         .outline = &v->outline,
+                         .lane = LANE,
+                         .samples = now,
+                         .terms = &v->terms,
+                         .ancestor = then};
+    return like_texture.log_likelihood(&b);
+}
+
 /* One limb with this cosine to the image plane; n samples seen in both frames, differing by d; the rest in one. */
 static float limb(int32_t mode, double cos_tilt, int n, int d)
 {
@@ -19,14 +32,7 @@ static float limb(int32_t mode, double cos_tilt, int n, int d)
         now[0].value[i] = (int8_t)(i < n ? 20 : i % 2 ? TEXTURE_HIDDEN : 3);
         then[0].value[i] = (int8_t)(i < n ? 20 - d : i % 2 ? 100 : TEXTURE_HIDDEN);
     }
-    like_body const b = {.setup = &v->setup,
-                         .features = &v->f,
-                         .outline = &v->outline,
-                         .lane = LANE,
-                         .samples = now,
-                         .terms = &v->terms,
-                         .ancestor = then};
-    return like_texture.log_likelihood(&b);
+    return log_likelihood();
 }
 
 static double cost(int d)
@@ -94,22 +100,15 @@ static void test_paper_settings(void)
     (void)limb(GAIT_MODE_PAPER, 0.8, 16, 10);
     like_setup_init(&v->setup, toy_model(), &cfg, v->setup.run);
     v->setup.limbs = 1;
-    like_body const b = {.setup = &v->setup,
-                         .features = &v->f,
-                         .outline = &v->outline,
-                         .lane = LANE,
-                         .samples = now,
-                         .terms = &v->terms,
-                         .ancestor = then};
     double const var = 2.0 * 9.0 + 144.0 * (1.0 + 0.5 * 0.36 / 0.64);
     double const log_p = -0.5 * log(2.0 * 3.14159265358979 * var) - 100.0 / (2.0 * var);
-    CHECK_NEAR(like_texture.log_likelihood(&b), mixture(0.8, log_p, log(1e-4)), 0.01);
+    CHECK_NEAR(log_likelihood(), mixture(0.8, log_p, log(1e-4)), 0.01);
     for (int i = 0; i < LIKE_HALF; i++)
         if (i >= 5)
             now[0].value[i] = TEXTURE_HIDDEN;
-    CHECK_NEAR(like_texture.log_likelihood(&b), mixture(0.8 * 5.0 / 6.4, log_p, log(1e-4)), 0.01);
+    CHECK_NEAR(log_likelihood(), mixture(0.8 * 5.0 / 6.4, log_p, log(1e-4)), 0.01);
     now[0].value[3] = now[0].value[4] = TEXTURE_HIDDEN; /* three of eight are too few */
-    CHECK_NEAR(like_texture.log_likelihood(&b), log(1e-4), 0.01);
+    CHECK_NEAR(log_likelihood(), log(1e-4), 0.01);
 }
 
 /* n_s points of every half of a limb are compared, on all sides and at all heights. */
