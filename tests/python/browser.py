@@ -3,7 +3,6 @@
 import contextlib
 import shutil
 import sys
-import threading
 import time
 from pathlib import Path
 
@@ -55,17 +54,10 @@ def until(page, expression, seconds=60):
 @contextlib.contextmanager
 def serving(make_app):
     """Serve `make_app(port)` in a thread; gives the URL."""
-    import uvicorn
-
     from gait.web import serve
 
     own = serve.listen(0)
-    config = uvicorn.Config(
-        make_app(own.getsockname()[1]), log_level="error", access_log=False, lifespan="off"
-    )
-    server = uvicorn.Server(config)
-    thread = threading.Thread(target=server.run, kwargs={"sockets": [own]})
-    thread.start()
+    server, thread = serve.background(make_app(own.getsockname()[1]), own)
     try:
         yield serve.address(own)
     finally:

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import asyncio
-import json
 import socket
 from collections.abc import AsyncIterator, Callable
 from pathlib import Path
@@ -43,17 +42,10 @@ def application(session: Session, port: int) -> ASGIApp:
         return await acted(request, session.edit)
 
     async def acted(request: Request, act: Callable[[dict[str, Any]], Any]) -> Response:
-        body = b""
-        async for part in request.stream():
-            body += part
-            if len(body) > _LONGEST:
-                return JSONResponse({"error": "the request is too long"}, 413)
         try:
-            action = json.loads(body)
-        except ValueError:
-            action = None
-        if not isinstance(action, dict):
-            return JSONResponse({"error": "the request is no object"}, 400)
+            action = await serve.json_object(request, _LONGEST)
+        except serve.RequestError as error:
+            return JSONResponse({"error": str(error)}, error.status)
         return await run_in_threadpool(answered, lambda: act(action))
 
     async def start(request: Request) -> Response:

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
@@ -94,7 +93,7 @@ def application(scene: Scene, port: int, written: Callable[[str], None] = lambda
 
     async def answer(request: Request) -> Response:
         try:
-            marks = await _read(request)
+            marks = await serve.json_object(request, _BYTES)
             found = await run_in_threadpool(solve, scene, marks)
             if request.url.path == "/save":
                 with replacing(scene.output) as temporary:
@@ -118,21 +117,6 @@ def application(scene: Scene, port: int, written: Callable[[str], None] = lambda
     ]
     body = '<main id="page"></main><script type="module" src="/camera_page.js"></script>'
     return serve.application(body, f"gait camera: {scene.name}", routes, port, drawing=False)
-
-
-async def _read(request: Request) -> dict[str, Any]:
-    data = b""
-    async for part in request.stream():
-        data += part
-        if len(data) > _BYTES:
-            raise UserError("marks: too many; leave some out")
-    try:
-        marks = json.loads(data)
-    except ValueError:
-        marks = None
-    if not isinstance(marks, dict):
-        raise UserError("marks: cannot be read; reload the page")
-    return marks
 
 
 def solve(scene: Scene, marks: dict[str, Any]) -> dict[str, Any]:

@@ -4,10 +4,12 @@ from __future__ import annotations
 
 import contextlib
 import html
+import json
 import mimetypes
 import socket
 import threading
 from collections.abc import Callable, Mapping, Sequence
+from typing import Any
 
 import uvicorn
 from starlette.applications import Starlette
@@ -104,6 +106,36 @@ def application(
 
     own = [Route("/", index), Route("/web/{name}", in_memory(files))]
     return Guard(Starlette(routes=[*own, *routes]), port, scripts)
+
+
+class RequestError(UserError):
+    """A request that is too long, or no JSON object; `status` is that of the answer."""
+
+    def __init__(self, text: str, status: int = 400) -> None:
+        super().__init__(text)
+        self.status = status
+
+
+async def json_object(request: Request, most: int) -> dict[str, Any]:
+    """Read the JSON object of a request, of at most so many bytes.
+
+    Raises
+    ------
+    RequestError
+        If it is longer, or something else.
+    """
+    data = b""
+    async for part in request.stream():
+        data += part
+        if len(data) > most:
+            raise RequestError("the request is too long; leave some out", 413)
+    try:
+        found = json.loads(data)
+    except ValueError:
+        found = None
+    if not isinstance(found, dict):
+        raise RequestError("the request is no object; reload the page")
+    return found
 
 
 def in_memory(files: Mapping[str, bytes]) -> Callable[[Request], Response]:
