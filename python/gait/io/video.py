@@ -34,7 +34,7 @@ SAMPLES = 40  # frames of a clip whose median is the empty scene
 _WAITING = 4  # pictures that may wait for the encoder
 FAST = "veryfast"
 """Preset of x264 that takes 0.4 of the time of ``medium``; files are about as large."""
-#: With AVX-512 x264 gave other files from the same pictures, in 3 of 14 runs on a busy machine.
+#: With AVX-512 x264 gave other files from the same pictures now and then, on a busy machine.
 _SAME_BITS = {"x264-params": "asm=sse4.2"} if platform.machine() in ("x86_64", "AMD64") else {}
 _CONTAINERS = (".mp4", ".mkv", ".mov")
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import time
 from collections import deque
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
@@ -26,6 +27,7 @@ _KEPT = 64  # frames that wait for their estimate, at most, and their bytes
 _KEPT_BYTES = 100_000_000
 _QUEUED = 8  # frames that wait in LCM
 _FURTHEST = 1e6  # metres, or anything else that is drawn
+_LONGEST = 0.5  # seconds without a drawing while messages wait
 _RATED = 2.0  # seconds over which estimates are counted
 KEPT_S = 20.0
 """Seconds of the plots."""
@@ -48,7 +50,8 @@ class _View:
 class Feed:
     """Follows the channels of a tracker and draws estimates into their own frames.
 
-    Live, it draws the newest estimate when no message waits, so that it never falls behind; of a log, all.
+    Live, it draws the newest estimate when no message waits, or after `_LONGEST` at the latest, so that it
+    never falls behind; of a log, all.
 
     Parameters
     ----------
@@ -85,6 +88,7 @@ class Feed:
         self._views = {stream: _View({}, stream in cameras) for stream in streams}
         self._origin: int | None = None
         self._due: dict[int, tuple[Any, Estimate, int]] = {}
+        self._drawn = 0.0
         self._arrivals: deque[int] = deque()
         self._drops = Drops()
         self.damage: str | None = None
@@ -104,14 +108,15 @@ class Feed:
         more = True
         try:
             more = handle(self._lcm, seconds, self._log)
-            if self._due and (self._log or not waiting(self._lcm)):
+            late = time.monotonic() > self._drawn + _LONGEST
+            if self._due and (self._log or late or not waiting(self._lcm)):
                 self._draw()
         except UserError as fault:
             self.damage = self.damage or str(fault)
         return more
 
     def _draw(self) -> None:
-        due, self._due = self._due, {}
+        due, self._due, self._drawn = self._due, {}, time.monotonic()
         for stream, (image, estimate, frame) in due.items():
             view = self._views[stream]
             if view.overlay is not None:

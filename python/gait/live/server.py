@@ -49,7 +49,6 @@ class Hub:
         self._newest: dict[str, tuple[int, Any]] = {}
         self._news: dict[str, asyncio.Event] = {}
         self._lock = threading.Lock()
-        self.listeners: dict[str, int] = {}
 
     def put(self, topic: str, value: Any) -> None:
         """Make `value` the newest of its topic."""
