@@ -21,7 +21,8 @@ static sig_atomic_t on_hangup = QUIT; /* a closed terminal; RELOAD: a service ma
 
 static void on_signal(int number)
 {
-    quit = number == SIGHUP ? on_hangup : QUIT;
+    quit =
+        number == SIGHUP && quit != QUIT ? on_hangup : QUIT; /* both may be delivered at once, in any order */
 }
 
 /* Block the signals that end the program, also in threads that LCM starts; `unblocked` is the mask to wait with. */
