@@ -138,6 +138,7 @@ def test_a_service_manager_is_reported_and_settings_are_read_again(tmp_path, man
         feed(listener, 3, 5)  # the same person, without a start
         config.write_text("particles = many\n")
         os.kill(listener.pid, signal.SIGHUP)
+        assert manager() == "RELOADING=1" and manager() == "READY=1"
         feed(listener, 5, 7)
         outcome = finish()
         assert manager() == "STOPPING=1"

@@ -181,9 +181,11 @@ static bool run(receiver *r, const invocation *call, message *why)
     static settings again;
     message bad;
     while (receiver_run(r, &quit, &call->unblocked, why)) {
+        manager_report(quit == RELOAD ? "RELOADING=1" : "STOPPING=1");
         if (quit != RELOAD || settings_read(&again, call->argc, call->argv, &bad) == OPTION_OK)
             return true;
         log_line("settings are not read again: %s", bad.text);
+        manager_report("READY=1");
         quit = 0;
     }
     return false;
@@ -212,7 +214,6 @@ static bool serve(service *s, const settings *want, parts *p, workers *threads, 
         manager_report("READY=1");
     bool ok = ready && run(&r, call, why);
     if (ok) {
-        manager_report(quit == RELOAD ? "RELOADING=1" : "STOPPING=1");
         snapshot_file_write(&snapshot, s, true);
         service_send_status(s);
         if (!want->quiet)
