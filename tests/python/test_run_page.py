@@ -205,8 +205,7 @@ def test_the_page_plays_and_turns_and_fetches_nothing(page_file):
         cursor = "parseFloat(document.querySelector('.over-time .cursor').style.left)"
         left = page.evaluate(cursor)
         page.keyboard.press("Space")
-        page.wait_for_function("run.film.index > 35")
-        assert page.evaluate("run.scene.index") > 35 and page.evaluate(cursor) > left
+        page.wait_for_function(f"run.film.index > 35 && run.scene.index > 35 && {cursor} > {left}")
         page.keyboard.press("Space")
         assert not page.evaluate("run.film.playing")
         plot = page.locator(".over-time .plot-large").first
