@@ -340,6 +340,7 @@ def checkout(tmp_path):
         ("e.md", b"# E\n## The [O 3], of `e`\n[a](#the-o-3-of-e) [b](#f)\n", "e.md: link to #f"),
         ("a.py", b"x = 1 \n", "blank at the end"),
         ("b.py", b"x = 1", "no newline"),
+        ("errors.sto", b"x = 1\n", "data does not belong"),
         ("python/gait/_version.py", b'__version__ = "1.1.2"\n', "gait.h has 1.1.1"),
     ],
 )

@@ -185,6 +185,7 @@ def test_inverse_kinematics_of_opensim_find_the_same_angles(walk, tmp_path):
     tool.setModel(model)
     tool.setMarkerDataFileName(str(trc))
     tool.setOutputMotionFileName(str(tmp_path / "ik.mot"))
+    tool.setResultsDir(str(tmp_path))
     for name in JOINTS:
         task = osim.IKMarkerTask()
         task.setName(name)
