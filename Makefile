@@ -142,6 +142,8 @@ $(READY): python/lock.txt python/pyproject.toml
 	    'run `$(VENV)/bin/gait detect --fetch` later' >&2
 	@env -u GAIT_WEB $(VENV)/bin/gait studio --fetch --quiet >/dev/null || echo 'setup: no parts of pages, so gait studio does not work yet;' \
 	    'run `$(VENV)/bin/gait studio --fetch` later' >&2
+	@env -u GAIT_AXE $(PY) tests/python/accessibility.py 2>/dev/null || echo 'setup: no axe-core, so the accessibility of' \
+	    'pages is not tested; run `$(PY) tests/python/accessibility.py` later' >&2
 	@pwd -P > $@
 
 # Exact versions with the hashes of their files, of everything that constraints.txt and what it needs bring, on every

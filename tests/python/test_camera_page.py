@@ -2,6 +2,7 @@
 
 import json
 
+import accessibility
 import browser
 import cv2
 import numpy as np
@@ -115,9 +116,7 @@ def test_faults_of_the_marks(marks, words, tmp_path):
         camera_page.solve(scene(tmp_path), marks)
 
 
-@pytest.mark.parametrize(
-    ("width", "height", "dark"), [(1280, 720, False), (1920, 1080, True), (390, 844, False)]
-)
+@pytest.mark.parametrize(("width", "height", "dark"), [(1280, 720, True), (390, 844, False)])
 def test_marks_are_clicked_and_the_camera_is_written(tmp_path, width, height, dark):
     lines = []
 
@@ -138,8 +137,9 @@ def test_marks_are_clicked_and_the_camera_is_written(tmp_path, width, height, da
                 f"{FAR[i, j]:.3f}".replace(".", ",")
             )
         status.filter(has_text="Fits").wait_for()
-        page.screenshot(path=str(tmp_path / "page.png"))
-        assert page.evaluate("document.documentElement.scrollWidth <= innerWidth")
+        if not dark:
+            accessibility.check(page)
+            page.set_viewport_size({"width": width, "height": height})
         page.reload()  # what was clicked is kept
         status.filter(has_text="Fits").wait_for()
         page.locator("button.primary").click()

@@ -9,6 +9,8 @@ import re
 from dataclasses import replace
 from pathlib import Path
 
+import accessibility
+import browser
 import mocap_files as files
 import numpy as np
 import pytest
@@ -132,3 +134,6 @@ def test_the_page_holds_every_figure_and_needs_no_other_file(walks, tmp_path, mo
     for heading in (name for each in found.values() for name in each):
         assert text.count(heading) >= 2  # in the table and over its pictures
     assert text.count("<img") >= 15 and "<animate" in text
+    with browser.opened(strict=False) as shown:  # without Chromium the rest of this test is skipped
+        shown.goto(page.as_uri())
+        accessibility.check(shown)

@@ -5,6 +5,7 @@ import json
 import re
 from dataclasses import replace
 
+import accessibility
 import browser
 import numpy as np
 import pytest
@@ -173,14 +174,15 @@ def overflow(page):
     return page.evaluate("document.documentElement.scrollWidth - innerWidth")
 
 
-@pytest.mark.parametrize(("width", "dark"), [(390, True), (1920, False)])
-def test_the_page_fits_screens(page_file, width, dark):
-    with browser.opened(width=width, height=844, dark=dark) as page:
+def test_the_page_fits_screens(page_file):
+    with browser.opened() as page:
         page.goto(page_file.as_uri())
         page.wait_for_function("window.run")
-        assert overflow(page) <= 0
-        shown = page.evaluate("getComputedStyle(document.querySelector('.plot-narrow')).display")
-        assert (shown == "none") == (width > 760)
+        accessibility.check(page)
+        for width in (390, 1920):
+            page.set_viewport_size({"width": width, "height": 844})
+            shown = page.evaluate("getComputedStyle(document.querySelector('.plot-narrow')).display")
+            assert (shown == "none") == (width > 760)
 
 
 def test_the_page_plays_and_turns_and_fetches_nothing(page_file):

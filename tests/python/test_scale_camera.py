@@ -1,6 +1,7 @@
 """Cameras of another resolution: resized by --scale-camera, else named; upright floors are refused."""
 
 import json
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -8,6 +9,7 @@ import pytest
 from gait import Camera, UserError
 from gait.camera.camera import read_camera
 from gait.cli import main
+from gait.paper.clip import Clip
 
 TRUE = Camera.looking([0.3, -5.0, 1.4], [0, 0, 0.9], (1280, 720), 1000.0)
 
@@ -102,3 +104,10 @@ def test_a_wrong_size_of_keypoints_is_noticed(tmp_path, capsys):
     assert "upper left 1208x600 of --size 1920x1080: is that the size" in capsys.readouterr().err
     main([*words, "--size", "1280x720"])
     assert "--size 1280x720" not in capsys.readouterr().err
+
+
+def test_a_clip_of_the_papers_has_a_camera_of_its_size(camera):
+    clip = Clip("walk", "walk.mp4", camera, "init.json", scale_camera=True)
+    assert clip.calibration((640, 360)).size == (640, 360)
+    with pytest.raises(UserError, match="give --scale-camera"):
+        replace(clip, scale_camera=False).calibration((640, 360))

@@ -9,6 +9,7 @@ import subprocess
 import sys
 import urllib.request
 
+import accessibility
 import browser
 import numpy as np
 import pytest
@@ -295,14 +296,12 @@ def test_the_film_comes_in_ranges_and_bad_requests_are_refused(clip, server):
 
 def test_fits_every_width_light_and_dark(server):
     with studio(server.url) as page:
-        for width, height in ((390, 844), (1280, 720), (1920, 1080)):
-            page.set_viewport_size({"width": width, "height": height})
-            for scheme in ("light", "dark"):
-                page.emulate_media(color_scheme=scheme)
-                assert page.evaluate("document.documentElement.scrollWidth") <= width
-                for name in ("#film .stage", "#scene", "#curves", "#proposals"):
-                    box = page.locator(name).bounding_box()
-                    assert box["width"] > 200 and box["height"] > 60
+        accessibility.check(page)
+        for name in ("#film .stage", "#scene", "#curves", "#proposals"):
+            box = page.locator(name).bounding_box()
+            assert box["width"] > 200 and box["height"] > 60
+        page.keyboard.press("?")
+        accessibility.check(page)
 
 
 def test_usage_is_one_line(capsys, tmp_path, monkeypatch):

@@ -17,6 +17,7 @@ import argparse
 import json
 from pathlib import Path
 
+from gait.cli import values
 from gait.errors import UsageError
 from gait.io.files import require_outputs
 
@@ -35,7 +36,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         help="motion files or folders of them, as for gait learn")  # fmt: skip
     add("-o", "--output", required=True, metavar="PAGE.html", help="the page")
     add("--video", metavar="VIDEO", help="clip of figures 6 and 7")
-    add("--camera", metavar="CAM", help="its calibration")
+    values.add_camera(parser, ", of the clip", scale=True)
     add("--init", metavar="INIT.json", help="where the person is at first, as for gait track")
     add("--background", metavar="IMAGE", help="the empty scene: a picture, auto (the default) or none")
     add("--corrections", metavar="C.json", help="joints marked by hand, as for gait lift")
@@ -48,13 +49,17 @@ def run(args: argparse.Namespace) -> int:
     given = {name: vars(args)[name] for name in CLIP if vars(args)[name] is not None}
     if given and not args.video:
         raise UsageError(f"--{next(iter(given))} is of a clip; give it with --video")
+    if args.scale_camera and not args.camera:
+        raise UsageError("--scale-camera: is for a --camera")
     if args.video and not {"camera", "init"} <= given.keys():
         raise UsageError("--video needs --camera and --init")
     require_outputs((args.output,), (args.video, *(path for path in given.values() if path != "auto")))
     from gait.paper import run as paper  # Matplotlib and SciPy take a second
     from gait.paper.clip import Clip
 
-    clip = Clip(Path(args.video).name, args.video, **given) if args.video else None
+    clip = None
+    if args.video:
+        clip = Clip(Path(args.video).name, args.video, scale_camera=args.scale_camera, **given)
     verdicts = paper.run(paper.Request(tuple(args.mocap), args.output, clip, args.quiet))
     print(json.dumps(verdicts) if args.json else _text(verdicts))
     return 0

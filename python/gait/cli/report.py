@@ -33,7 +33,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     )
     add("--track", metavar="OUT.csv", help="with a log: the track, from gait record")
     add("--video", required=True, metavar="VIDEO", help="the clip that was tracked")
-    values.add_camera(parser, " (default: camera.json beside the track or the film)")
+    values.add_camera(parser, " (default: camera.json beside the track or the film)", scale=True)
     add("-o", "--output", metavar="R.html", help="the page (default: RUN.html)")
     add("--overlay", metavar="O.mp4", help="also draw the estimates into the video")
     add("--truth", metavar="TRUTH.csv", help="true motion, to report errors against")
@@ -60,6 +60,7 @@ def run(args: argparse.Namespace) -> int:
         video=args.video,
         page=output,
         camera=args.camera,
+        scale_camera=args.scale_camera,
         overlay=args.overlay,
         truth=args.truth,
         draws=args.draws,

@@ -56,7 +56,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         help="number of a camera, once for each (default: 0)",
     )
     add("--record-to", default=".", metavar="FOLDER", help="folder of recordings (default: this one)")
-    values.add_camera(parser, " of the first --stream (default: from GAIT_CAMERA_<i>)")
+    values.add_camera(parser, " of the first --stream (default: from GAIT_CAMERA_<i>)", scale=True)
     values.add_model(parser, "model that is tracked")
 
 
@@ -83,7 +83,7 @@ def _serve(
 
     page = Page(args.port, streams, url, args.record_to)
     try:
-        feed = Feed(url, streams, model, cameras, page.show, page.report)
+        feed = Feed(url, streams, model, cameras, page.show, page.report, args.scale_camera)
         page.begin(feed.page_data)
         print(page.address, flush=True)
         with Interruptible(), contextlib.suppress(KeyboardInterrupt):  # the user ends it so
@@ -104,7 +104,14 @@ def _save(
 
     pictures: list[Image] = []
     with replacing(args.save) as path:
-        feed = Feed(url, streams[:1], model, cameras, lambda stream, image: pictures.append(image))
+        feed = Feed(
+            url,
+            streams[:1],
+            model,
+            cameras,
+            lambda stream, image: pictures.append(image),
+            scale=args.scale_camera,
+        )
         note(f"listening on {url}", args.quiet)
         deadline = time.monotonic() + args.patience
         while not pictures and time.monotonic() < deadline and feed.handle(_TURN):

@@ -66,6 +66,8 @@ class Feed:
         Gets the number of a camera and its finished BGR picture.
     report : callable, optional
         Gets "sample" with the numbers of an estimate, or "health" with those of a status.
+    scale : bool
+        Whether cameras that were calibrated at another resolution are resized to the pictures.
 
     Attributes
     ----------
@@ -81,8 +83,9 @@ class Feed:
         cameras: Mapping[int, Camera],
         show: Callable[[int, Image], None],
         report: Callable[[str, dict[str, Any]], None] | None = None,
+        scale: bool = False,
     ) -> None:
-        self.url = url
+        self.url, self._scale = url, scale
         self._lcm, self._log = listener(url), is_log(url)
         self._model, self._show, self._report = model, show, report
         self._views = {stream: _View({}, stream in cameras) for stream in streams}
@@ -120,7 +123,19 @@ class Feed:
         for stream, (image, estimate, frame) in due.items():
             view = self._views[stream]
             if view.overlay is not None:
-                self._show(stream, view.overlay.draw(_fitting(image, view), estimate, frame))
+                pixels = self._fitting(image, view)
+                self._show(stream, view.overlay.draw(pixels, estimate, frame))
+
+    def _fitting(self, image: Any, view: _View) -> Image:
+        """Picture of the camera's size, or with `scale` a camera of the picture's."""
+        pixels = picture(image)
+        found = pixels.shape[1], pixels.shape[0]
+        if found != view.size and self._scale and view.camera is not None and view.camera.same_aspect(found):
+            view.use(view.camera.for_size(found), self._model)
+        if found != view.size:
+            size, own = ("{}x{}".format(*pair) for pair in (found, view.size))
+            raise UserError(f"a picture of {size}, the camera's is {own}; give its --camera")
+        return pixels
 
     def _on_image(self, stream: int, channel: str, data: bytes) -> None:
         message, frames = decode(gaitmsg.image_t, data, channel), self._views[stream].frames
@@ -247,14 +262,6 @@ def health(message: Any, drops: Drops) -> dict[str, Any]:
         "particles": message.particles,
         "threads": message.threads,
     }
-
-
-def _fitting(image: Any, view: _View) -> Image:
-    pixels = picture(image)
-    if pixels.shape[1::-1] != view.size:
-        size, own = ("{}x{}".format(*pair) for pair in (pixels.shape[1::-1], view.size))
-        raise UserError(f"a picture of {size}, the camera's is {own}; give its --camera")
-    return pixels
 
 
 def _plausible(estimate: Estimate) -> bool:

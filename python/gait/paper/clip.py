@@ -24,7 +24,7 @@ STRIDE = 7  # joints from one click to the next
 
 @dataclass(frozen=True)
 class Clip:
-    """Files of a clip; `corrections` and `truth` may be missing."""
+    """Files of a clip; `corrections` and `truth` may be missing, and the camera of another resolution."""
 
     name: str
     video: str
@@ -33,6 +33,11 @@ class Clip:
     background: str = "auto"
     corrections: str | None = None
     truth: str | None = None
+    scale_camera: bool = False
+
+    def calibration(self, size: tuple[int, int]) -> Camera:
+        """Read the camera, for pictures of a size."""
+        return Camera.read(self.camera, size, self.scale_camera)
 
     @property
     def real(self) -> bool:

@@ -119,7 +119,7 @@ def entry(clip: Clip, learning: Learning, update: Callable[[int], None]) -> Entr
         return None
     video = Video(clip.video)
     camera, plate, truth = (
-        Camera.read(clip.camera, video.size),
+        clip.calibration(video.size),
         background(clip.background, video),
         read_truth(clip.truth),
     )

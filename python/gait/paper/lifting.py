@@ -12,7 +12,6 @@ from matplotlib.figure import Figure
 
 from gait.bindings.segment_prior import SegmentPrior
 from gait.body.skeleton import EVAL15, JOINTS, axis_rotation
-from gait.camera.camera import Camera
 from gait.io.video import Image, Video
 from gait.learn.arrays import Floats, Indices
 from gait.learn.segments.corpus import Recorded
@@ -52,7 +51,7 @@ def lift(clip: Clip, motions: Sequence[Recorded], folder: Path, quiet: bool) -> 
     """Lift the first frames of a clip both ways; `folder` is for files in between."""
     prior = SegmentPrior.load()
     video = Video(clip.video)
-    calibrated = Camera.read(clip.camera, video.size)
+    calibrated = clip.calibration(video.size)
     placement = read_placement(clip.init, prior, calibrated is not None)
     stop = min(placement.frame + FRAMES, video.count)
     clicks = clip.clicks_within(range(placement.frame, stop), folder)
@@ -64,6 +63,7 @@ def lift(clip: Clip, motions: Sequence[Recorded], folder: Path, quiet: bool) -> 
             clip.video,
             init,
             camera=clip.camera,
+            scale_camera=clip.scale_camera,
             corrections=clicks,
             background=clip.background,
             start=placement.frame,

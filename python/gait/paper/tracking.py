@@ -63,7 +63,7 @@ class Both:
 def track(clip: Clip, learning: Learning, tasks: int, update: Callable[[int], None]) -> Both:
     """Track the first frames both ways."""
     video = Video(clip.video)
-    camera = Camera.read(clip.camera, video.size)
+    camera = clip.calibration(video.size)
     plate = background(clip.background, video)
     found, first, images = list[Tracked](), 0, list[Image]()
     for learned, prior, mode in (
@@ -90,7 +90,7 @@ def track(clip: Clip, learning: Learning, tasks: int, update: Callable[[int], No
 def require(clip: Clip) -> None:
     """Raise UserError if a clip's files cannot be read or do not fit, or the clip is too short."""
     video = Video(clip.video)
-    Camera.read(clip.camera, video.size)
+    clip.calibration(video.size)
     start = Start.read(clip.init, Model())
     if clip.background not in ("auto", "none"):
         background(clip.background, video)

@@ -41,6 +41,8 @@ class RunFiles:
         The track, the clip that was tracked, the HTML file to write.
     camera : str, optional
         The clip's camera; ``camera.json`` beside the track or the clip if left out.
+    scale_camera : bool
+        Whether a camera of another resolution is resized to the clip's.
     overlay : str, optional
         Video to write.
     truth, draws : str, optional
@@ -55,6 +57,7 @@ class RunFiles:
     video: str
     page: str
     camera: str | None = None
+    scale_camera: bool = False
     overlay: str | None = None
     truth: str | None = None
     draws: str | None = None
@@ -90,7 +93,7 @@ def write_report(
             "film that was tracked"
         )
     path = files.camera or _camera_beside(files)
-    camera = None if path is None else Camera.read(path, video.size)
+    camera = None if path is None else Camera.read(path, video.size, files.scale_camera)
     draws = Draws.read(files.draws, track) if files.draws else None
     errors = compare(track, files.truth, files.model, camera) if files.truth else None
     if path is None:

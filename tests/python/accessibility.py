@@ -1,0 +1,48 @@
+"""Check the accessibility of a page that is open in Chromium, at every width, light and dark, by axe-core.
+
+``python accessibility.py`` fetches axe-core by npm (make setup does); without it the check is left out.
+"""
+
+import sys
+import warnings
+
+from gait.io.published import Published, Store
+
+SCREENS = ((390, 844), (1280, 720), (1920, 1080))
+AXE = Published(
+    "axe.min.js",
+    "axe-core@4.10.3",
+    "package/axe.min.js",
+    "880970c081707360e64f34cea25ff91892f5bc95675b0776925b9709dd8a68bb",
+)
+STORE = Store(
+    "axe",
+    "GAIT_AXE",
+    "the parts of the accessibility check",
+    "run .venv/bin/python tests/python/accessibility.py once, with npm and a network",
+    (AXE,),
+    "axe.min.js: axe-core 4.10.3, copyright Deque Systems, MPL-2.0 (http://mozilla.org/MPL/2.0/).\n",
+)
+_SERIOUS = """async () => (await axe.run(document, {resultTypes: ['violations']})).violations
+    .filter(({impact}) => ['serious', 'critical'].includes(impact))
+    .map(({id, help, nodes}) => [id, help, ...nodes.slice(0, 3).map((node) => node.html)].join('  '))"""
+
+
+def check(page):
+    """Assert that a page needs no scrolling sideways and that axe-core has no serious finding."""
+    axe = STORE.find(AXE)
+    if axe is None:
+        warnings.warn(f"accessibility is not checked: {STORE.remedy}", stacklevel=2)
+    else:
+        page.evaluate(STORE.load(AXE).decode())
+    for width, height in SCREENS:
+        page.set_viewport_size({"width": width, "height": height})
+        for scheme in ("light", "dark"):
+            page.emulate_media(color_scheme=scheme)
+            assert page.evaluate("document.documentElement.scrollWidth") <= width, (width, scheme)
+            found = [] if axe is None else page.evaluate(_SERIOUS)
+            assert not found, (width, scheme, found)
+
+
+if __name__ == "__main__":
+    STORE.fetch(lambda line: print(line, file=sys.stderr))
