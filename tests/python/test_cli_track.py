@@ -98,12 +98,9 @@ def test_track_evaluate_and_every_output(scene, capsys):
     assert errors["abs"]["median"] < 70 and errors["px"]["median"] < 5
     assert main(["eval", str(scene / "out.csv"), "--truth", str(scene / "truth.csv")]) == 0
     table = capsys.readouterr().out
-    assert (
-        "root mm" in table
-        and "far off (root over 150 mm) or lost: 0.0% of 20 frames" in table
-        and "static abs" in table
-    )
-    assert table.rstrip().split("\n")[-1].startswith("abs: 15 joints") and "given the true" in table
+    assert re.search(r"Far off or lost +0\.0% of 20 frames\n", table)
+    assert re.search(r"Pose, mm( +\d+){3}\n", table) and "  Pose, mm: The same after the" in table
+    assert not re.search(r"\b(abs|root\w*|proc|static|free|p90)\b", table)
 
 
 def test_the_result_does_not_depend_on_threads_and_does_on_the_seed(scene, capsys):

@@ -37,7 +37,7 @@ def log(tmp_path):
     return rig.write_log(tmp_path / "both.log", events), estimates
 
 
-def follow(path, camera=None):
+def follow(path, camera=None, watched=lambda: True):
     """The pictures that a log gives, what is reported with them, and the feed itself."""
     shown, reports = [], []
     cameras = {} if camera is None else {0: camera}
@@ -48,6 +48,7 @@ def follow(path, camera=None):
         cameras,
         lambda _, image: shown.append(image),
         lambda topic, value: reports.append((topic, value)),
+        watched=watched,
     )
     while feed.handle(1.0):
         pass
@@ -66,6 +67,16 @@ def test_each_estimate_is_drawn_into_its_own_frame(log):
     for picture, i in zip(shown, (0, 1, 2, 4, 5), strict=True):
         estimate = replace(estimate_of(estimates[i]), utime=rig.utime(i) - rig.utime(0))
         np.testing.assert_array_equal(picture, overlay.draw(rig.picture(i), estimate, i))
+
+
+def test_nothing_is_drawn_until_a_browser_is_there_and_then_the_newest(log):
+    open_pages = []
+    shown, reports, feed = follow(log[0], watched=lambda: bool(open_pages))
+    assert not shown and len([topic for topic, _ in reports if topic == "sample"]) == 6
+    open_pages.append(True)
+    feed.handle(0.0)
+    assert len(shown) == 1
+    np.testing.assert_array_equal(shown[0], view(log[0])[-1])
 
 
 def test_damaged_messages_are_passed_over(log, tmp_path):
@@ -229,11 +240,14 @@ def test_the_command_shows_a_live_stream(tmp_path):
     process = subprocess.Popen(command, stdout=subprocess.PIPE, text=True)
     try:
         address = process.stdout.readline().strip()
-        with rig.daemon(url) as (listener, _):
+        asking = urllib.request.urlopen(f"{address}events", timeout=rig.PATIENCE)
+        with rig.daemon(url) as (listener, _), asking as events:
             listener.ask(rig.opening(), lambda s: s.state == s.ARMED and s.background_mask == 1, "the START")
             for i, event in enumerate(rig.frames(0, 3)):
                 listener.send([event])
                 listener.until(lambda i=i: len(listener.estimates) > i, "an estimate")
+            while b"event: picture" not in events.readline():
+                pass
             with urllib.request.urlopen(f"{address}frame/0.jpg", timeout=rig.PATIENCE) as frame:
                 assert cv2.imdecode(np.frombuffer(frame.read(), np.uint8), cv2.IMREAD_COLOR).shape == (
                     120,

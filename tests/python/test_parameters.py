@@ -93,6 +93,26 @@ def test_errors_that_last_cancel_between_the_ends_of_a_stride():
     np.testing.assert_allclose(right.sd["stride_length_m"] / right.values["stride_length_m"], 0.02, rtol=0.35)
 
 
+def test_errors_of_a_camera_are_common_to_all_frames():
+    """A place that is a metre off in all frames alike changes no stride; a scale that is off changes all."""
+    track = walking_track(sd=0.01)
+    change = np.zeros((len(track.time), 3, 4))
+    change[:, :2, 0] = 1.0
+    change[:, :2, 1] = 0.1 * track.places["pelvis"][:, :2]
+    wider = {}
+    for name, sd in track.sd.items():
+        ahead = 0.1 * (track.places["pelvis"] * (1, 1, 0))
+        wider[name] = np.sqrt(sd**2 + np.array([1.0, 1.0, 0.0]) + ahead**2)
+    plain, found = measure(track), measure(replace(track, sd=wider, camera_change=change))
+    for name, expected in (("stride_length_m", 0.1), ("speed_m_s", 0.1), ("step_width_m", 0.0)):
+        for way in ("right", "left"):
+            least, sd = plain.strides[way].sd[name], found.strides[way].sd[name]
+            np.testing.assert_allclose(
+                sd, np.hypot(least, expected * found.strides[way].values[name]), rtol=0.2
+            )
+    assert found.summary()["stride_length_m"]["both"]["sd"] == pytest.approx(0.13, rel=0.1)  # in the mean too
+
+
 def test_strides_with_lost_or_ambiguous_frames_do_not_count():
     track = walking_track()
     for word in ("lost", "ambiguous"):

@@ -16,7 +16,7 @@ from gait.detect.shapes import find_near
 from gait.errors import UserError
 from gait.io import blob
 from gait.io.video import Frame
-from gait.track import person_shapes
+from gait.track import person_shapes, scene
 from gait.track.box_start import find_start
 from gait.track.follow import Follower
 from gait.track.person_shapes import PersonShapes
@@ -65,6 +65,25 @@ def verdict(monkeypatch, shape, seconds=1.0):
 )
 def test_a_shape_elsewhere_or_none_objects(monkeypatch, shape, agree):
     assert verdict(monkeypatch, shape)[0] is agree
+
+
+@pytest.mark.parametrize(("aside", "taller", "found", "expected"), [
+    (0.0, 1.05, 1, True),  # towards the camera
+    (0.4, 1.0, 1, False),  # across the view
+    (0.0, 1.05, 4, False),  # seen in every fourth frame alone: perhaps elsewhere in the others
+])  # fmt: skip
+def test_a_median_is_judged_by_shapes_too(monkeypatch, aside, taller, found, expected):
+    tall = FOOT[1] - CROWN[1]
+    boxes = []
+    for k in range(16):
+        foot = FOOT + [k * aside * tall, 0.02 * k * tall]
+        boxes.append([] if k % found else [Box(foot, foot - [0, tall * taller**k], 1.0)])
+    monkeypatch.setattr(scene, "find_people", lambda image, stature: boxes[image])
+    monkeypatch.setattr(
+        scene, "sample_frames", lambda video, count: [Frame(k, k / 30, k) for k in range(count)]
+    )
+    one = SimpleNamespace(people={}, model=MODEL, camera=camera(), video=None)
+    assert scene.stays(one) is expected
 
 
 def test_one_frame_without_a_shape_is_no_objection(monkeypatch):

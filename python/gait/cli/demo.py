@@ -69,7 +69,7 @@ def _threads() -> int:
 def run(args: argparse.Namespace) -> int:
     """Run the demo and print its figures."""
     from gait.lcm.demo import RESULTS, Demo
-    from gait.motion.evaluate import as_text
+    from gait.report.error_table import as_text
 
     given = {name: getattr(args, name) for name in Demo.__dataclass_fields__} | {"output": Path(args.output)}
     recording, measures = Demo(**given).run()

@@ -1,13 +1,13 @@
 """Compare a track, or lifted motion, with the truth.
 
-Prints over the frames that both files have:
-  the 3-D error of 15 joints in mm, as they are (abs) and after aligning the hip midpoints (root);
+Prints over the frames that both files have, with the meaning of each line:
+  the 3-D error of 15 joints in mm, as they are and after aligning the hip midpoints (the pose);
   the share of frames that are far off or lost;
-  the error of the phase, with half-cycle flips counted separately;
+  the error of the phase, with swaps of left and right counted separately;
   the distance in the picture;
   how often the 50 % and 90 % intervals cover the truth;
-  the same for two baselines that use no image: the mean pose at the true place (static), and the mean cycle
-  that runs on from the true start (free).
+  the pose error of two rivals that use no image: the mean pose at the true place, and the mean stride that
+  runs on from the true start.
 
 Heel strikes come from meta.json beside the truth.  Without it they are found in the truth, where a heel is
 furthest ahead of the pelvis.
@@ -50,8 +50,9 @@ def run(args: argparse.Namespace) -> int:
     from gait.bindings.model import read_cyclic
     from gait.camera.camera import Camera
     from gait.io.track_file import read_estimates, read_truth
-    from gait.motion.evaluate import as_text, evaluate
+    from gait.motion.evaluate import evaluate
     from gait.motion.footfalls import strikes_of
+    from gait.report.error_table import OTHER_WORLD, as_text
 
     if os.path.realpath(args.track) == os.path.realpath(args.truth):
         raise UserError(f"{args.track}: is given as the track and as its truth; give two files")
@@ -66,6 +67,8 @@ def run(args: argparse.Namespace) -> int:
             "them as the truth does",
             args.quiet,
         )
+    if track.camera_change is not None:
+        note(f"{args.track}: {OTHER_WORLD}", args.quiet)
     measures = evaluate(
         track,
         truth,

@@ -44,7 +44,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 def run(args: argparse.Namespace) -> int:
     """Draw, write, print."""
-    from gait.motion.evaluate import as_text
+    from gait.report.error_table import as_text
     from gait.report.run_files import RunFiles, write_report
 
     is_track = Path(args.source).suffix.lower() == ".csv"

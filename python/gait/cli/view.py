@@ -83,7 +83,7 @@ def _serve(
 
     page = Page(args.port, streams, url, args.record_to)
     try:
-        feed = Feed(url, streams, model, cameras, page.show, page.report, args.scale_camera)
+        feed = Feed(url, streams, model, cameras, page.show, page.report, args.scale_camera, page.watched)
         page.begin(feed.page_data)
         print(page.address, flush=True)
         with Interruptible(), contextlib.suppress(KeyboardInterrupt):  # the user ends it so

@@ -5,7 +5,7 @@ from __future__ import annotations
 import csv
 import os
 import re
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from contextlib import ExitStack
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -15,6 +15,7 @@ import numpy as np
 import numpy.typing as npt
 from numpy.typing import NDArray
 
+from gait.bindings.abi import TrackStatus
 from gait.bindings.estimate import Estimate
 from gait.body.skeleton import EVAL15, JOINTS
 from gait.errors import UserError
@@ -33,6 +34,8 @@ STATUSES = ("init", "tracking", "ambiguous", "lost")
 
 
 CLASS_COLUMN = "motion_class"
+CLIP_COLUMNS = ("reason", "first_frame", "last_frame")
+CAMERA_COLUMNS = tuple(f"camera_{k}_{what}" for k in range(1, 5) for what in ("x", "y", "heading"))
 
 
 def header(components: int, angle_names: tuple[str, ...], classes: tuple[str, ...] = ()) -> list[str]:
@@ -49,7 +52,17 @@ class TrackWriter:
 
     If the block is interrupted or a disk is full, the rows written so far are kept as NAME.unfinished.csv.
 
-    `components`: scores per row; `joint_names`, `angle_names`, `classes` of motion: of the model.
+    Parameters
+    ----------
+    path
+    components : int
+        Scores per row.
+    joint_names, angle_names, classes : tuple of str
+        Joints, angles and classes of motion of the model.
+    frames : range, optional
+        That were to be tracked, if that is known; reasons of `Estimate` are then written too.
+    camera_change : callable, optional
+        Gives `Track.camera_change` at a time in seconds, of a camera that was found from the walk.
     """
 
     def __init__(
@@ -59,6 +72,8 @@ class TrackWriter:
         joint_names: tuple[str, ...],
         angle_names: tuple[str, ...],
         classes: tuple[str, ...] = (),
+        frames: range | None = None,
+        camera_change: Callable[[float], Array] | None = None,
     ) -> None:
         self.path = path
         missing = [name for name in JOINTS if name not in joint_names]
@@ -67,7 +82,10 @@ class TrackWriter:
         self._order = [joint_names.index(name) for name in JOINTS]
         self._components = components
         self._classes = len(classes) if len(classes) > 1 else 0
+        self._frames, self._camera_change = frames, camera_change
         self._header = header(components, angle_names, classes)
+        self._header += CLIP_COLUMNS if frames is not None else ()
+        self._header += CAMERA_COLUMNS if camera_change is not None else ()
         self._stack = ExitStack()
 
     def __enter__(self) -> TrackWriter:
@@ -98,7 +116,19 @@ class TrackWriter:
             + [f"{value:.4f}" for value in self._scores(sd.coef)]
             + ([estimate.motion_class] if self._classes else [])
             + [f"{value:.4f}" for value in estimate.class_probability[: self._classes]]
+            + self._of_clip(estimate)
+            + self._of_camera(frame.time)
         )
+
+    def _of_clip(self, estimate: Estimate) -> list[object]:
+        if self._frames is None:
+            return []
+        reason = estimate.reason if estimate.status == TrackStatus.AMBIGUOUS else ""
+        return [reason, self._frames[0], self._frames[-1]]
+
+    def _of_camera(self, time: float) -> list[str]:
+        change = None if self._camera_change is None else self._camera_change(time)
+        return [] if change is None else [f"{value:.6f}" for value in change.T.ravel()]
 
     def _scores(self, coef: Array) -> Array:
         """One value for each score column; a state may hold fewer, which are 0."""
@@ -138,6 +168,14 @@ class Track(Joints):
     numbers: dict[str, Array] = field(default_factory=dict)
     #: Class of motion of each frame; empty where the model has one.
     motion_class: list[str] = field(default_factory=list)
+    #: Frames that were to be tracked; None where the file does not state them.
+    frames: range | None = None
+    #: Why a clip's rules made each frame ambiguous, empty where the tracker itself decided; none: not stated.
+    reason: list[str] = field(default_factory=list)
+    #: (n, 3, 4) change of the pelvis' x and y, metres, and of the heading, radians, with each of four
+    #: independent parts of the uncertainty of a camera that was found from the walk, each of one sd and
+    #: common to all frames; None where the camera was given.
+    camera_change: Array | None = None
 
     def eval15_sd(self) -> Array:
         """Return the standard deviations of EVAL15, shape (n, 15, 3)."""
@@ -190,7 +228,21 @@ def _track(table: _Table, status: list[str], phase: Array) -> Track:
         sd={name: table.standard_deviations(name) for name in JOINTS},
         numbers={name: table.numbers(name) for name in table.rows if _is_number(name)},
         motion_class=table.column(CLASS_COLUMN) if CLASS_COLUMN in table.rows else [],
+        frames=_frames(table) if set(CLIP_COLUMNS) <= table.rows.keys() else None,
+        reason=table.column("reason") if "reason" in table.rows else [],
+        camera_change=_camera_change(table) if set(CAMERA_COLUMNS) <= table.rows.keys() else None,
     )
+
+
+def _frames(table: _Table) -> range:
+    """Frames that were to be tracked, which all rows state alike."""
+    first, last = (table.numbers(name) for name in CLIP_COLUMNS[1:])
+    return range(int(first[0]), int(last[0]) + 1)
+
+
+def _camera_change(table: _Table) -> Array:
+    values = np.stack([table.numbers(name) for name in CAMERA_COLUMNS], axis=1)
+    return values.reshape(-1, 4, 3).swapaxes(1, 2)
 
 
 def _is_number(column: str) -> bool:

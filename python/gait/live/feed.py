@@ -68,6 +68,8 @@ class Feed:
         Gets "sample" with the numbers of an estimate, or "health" with those of a status.
     scale : bool
         Whether cameras that were calibrated at another resolution are resized to the pictures.
+    watched : callable, optional
+        Whether to draw: the newest estimate waits until it is so.
 
     Attributes
     ----------
@@ -84,10 +86,11 @@ class Feed:
         show: Callable[[int, Image], None],
         report: Callable[[str, dict[str, Any]], None] | None = None,
         scale: bool = False,
+        watched: Callable[[], bool] = lambda: True,
     ) -> None:
         self.url, self._scale = url, scale
         self._lcm, self._log = listener(url), is_log(url)
-        self._model, self._show, self._report = model, show, report
+        self._model, self._show, self._report, self._watched = model, show, report, watched
         self._views = {stream: _View({}, stream in cameras) for stream in streams}
         self._origin: int | None = None
         self._due: dict[int, tuple[Any, Estimate, int]] = {}
@@ -112,7 +115,7 @@ class Feed:
         try:
             more = handle(self._lcm, seconds, self._log)
             late = time.monotonic() > self._drawn + _LONGEST
-            if self._due and (self._log or late or not waiting(self._lcm)):
+            if self._due and self._watched() and (self._log or late or not waiting(self._lcm)):
                 self._draw()
         except UserError as fault:
             self.damage = self.damage or str(fault)

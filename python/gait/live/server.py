@@ -124,6 +124,10 @@ class Page:
         """Make a sample or the tracker's health the newest."""
         self.hub.put(topic, json.dumps(value, allow_nan=False, separators=(",", ":")))
 
+    def watched(self) -> bool:
+        """Whether a browser shows the page."""
+        return self._open > 0
+
     def close(self) -> None:
         """Serve no more, and end a recording."""
         self._server.should_exit = True

@@ -6,7 +6,8 @@ the toe is furthest behind it (Zeni et al. 2008, Gait & Posture 27:710).
 Uncertainty is carried by draws.  With the motions of ``gait track --draws`` each draw is a whole motion, so
 errors that last are the same at both ends of a stride, as they should be.  A track alone has only the
 standard deviations of each frame: then strikes, toe-offs and places are drawn independently, which makes the
-parameters less certain where errors last.
+parameters less certain where errors last.  The errors of a camera that was found from the walk are common to
+all frames, and are drawn so in both cases.
 """
 
 from __future__ import annotations
@@ -303,19 +304,54 @@ def draw_contacts(
     track: Track, events: Events, feet: Mapping[str, Contacts], stride: float, draws: Draws | None
 ) -> tuple[dict[str, Contacts], Events, str]:
     """Draws of the contacts by side, shape (D, ...), standard deviations of the events, and their source."""
+    camera = "" if track.camera_change is None else "; errors of the camera are common to all frames"
     if draws is not None:
-        return (*_of_motions(draws, events, stride), f"{len(draws.phase)} motions drawn from the posterior")
+        source = f"{len(draws.phase)} motions drawn from the posterior{camera}"
+        return (*_of_motions(track, draws, events, stride), source)
     if "phase_sd" not in track.numbers:
         nothing = {side: stack([_nan_like(feet[side])]) for side in SIDES}
         return nothing, _event_sd([events], unknown=True), "unknown: the track has no column phase_sd"
     return (
         *_independent(track, events, feet, stride),
-        "the standard deviations of each frame, taken as independent",
+        f"the standard deviations of each frame, taken as independent{camera}",
     )
 
 
-def _of_motions(draws: Draws, events: Events, stride: float) -> tuple[dict[str, Contacts], Events]:
+def moved_by_camera(change: Array, off: Array) -> Array:
+    """How places move over the floor with each part of the camera's uncertainty.
+
+    Parameters
+    ----------
+    change : ndarray of shape (..., 3, 4)
+        Of the person's place and heading, as `Track.camera_change`.
+    off : ndarray of shape (..., 2)
+        Of the places from the person's, metres.
+
+    Returns
+    -------
+    ndarray of shape (..., 2, 4)
+        Metres.
+    """
+    turned = np.stack([-off[..., 1], off[..., 0]], axis=-1)[..., None] * change[..., 2:, :]
+    return np.asarray(change[..., :2, :] + turned)
+
+
+def _moved(track: Track, name: str) -> Array:
+    """How a joint of a track moves with the camera (n, 2, 4); not at all where the camera was given."""
+    if track.camera_change is None:
+        return np.zeros((len(track.time), 2, 4))
+    return moved_by_camera(track.camera_change, (track.places[name] - track.places["pelvis"])[:, :2])
+
+
+def _of_motions(
+    track: Track, draws: Draws, events: Events, stride: float
+) -> tuple[dict[str, Contacts], Events]:
     motions = [draws.motion(d) for d in range(len(draws.phase))]
+    if track.camera_change is not None:
+        parts = np.random.default_rng(0).standard_normal((len(motions), 4))
+        for motion, part in zip(motions, parts, strict=True):
+            for name in motion.places.keys() & track.places.keys():
+                motion.places[name][:, :2] += _moved(track, name) @ part
     found = [same_events(find_events(motion), events) for motion in motions]
     drawn = {
         side: stack([contacts(m, e, side, stride) for m, e in zip(motions, found, strict=True)])
@@ -332,21 +368,31 @@ def _independent(
     time, rate = track.time, np.maximum(track.numbers["stride_hz"], 0.1)
     late = np.minimum(track.numbers["phase_sd"], 0.29) / rate  # no less sure than knowing nothing
 
+    parts = np.zeros((_COUNT, 4)) if track.camera_change is None else random.standard_normal((_COUNT, 4))
+
     def timing(when: Array) -> Array:
         return np.interp(when, time, late)
 
     def noisy(value: Array, sd: Array) -> Array:
         return np.asarray(value + sd * random.standard_normal((_COUNT, *value.shape)))
 
+    def placed(value: Array, name: str, when: Array) -> Array:
+        moved = _moved(track, name)
+        common = np.pad((moved**2).sum(axis=2), ((0, 0), (0, 1)))
+        own = np.sqrt(np.maximum(track.sd[name] ** 2 - common, 0.0))
+        out = noisy(value, at(time, own, when))
+        there = at(time, moved.reshape(len(time), -1), when).reshape(len(when), 2, 4)
+        out[..., :2] += np.einsum("kap,dp->dka", there, parts)
+        return out
+
     drawn = {}
     for side in SIDES:
         foot = feet[side]
-        heel_sd, pelvis_sd = track.sd[f"{side[0]}_heel"], track.sd["pelvis"]
         drawn[side] = Contacts(
             noisy(foot.strike, timing(foot.strike)),
             noisy(foot.off, timing(foot.off)),
-            noisy(foot.place, at(time, heel_sd, foot.strike + _FLAT * stride)),
-            noisy(foot.pelvis, at(time, pelvis_sd, foot.strike)),
+            placed(foot.place, f"{side[0]}_heel", foot.strike + _FLAT * stride),
+            placed(foot.pelvis, "pelvis", foot.strike),
         )
     sd = Events(
         {side: timing(events.strike[side]) for side in SIDES},

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Mapping
 from dataclasses import dataclass
 
 import numpy as np
@@ -88,7 +87,6 @@ class Verdict:
 def verdict_of(
     track: Track,
     total: int | None = None,
-    why: Mapping[int, str] | None = None,
     parameters: Parameters | None = None,
 ) -> Verdict:
     """Judge a track.
@@ -97,23 +95,20 @@ def verdict_of(
     ----------
     track : Track
     total : int, optional
-        Frames that were to be tracked; those of the track if left out.
-    why : mapping of int to str, optional
-        Why a frame is ambiguous, by its number, where it was not the tracker itself that left it open.  A
-        track alone does not hold it.
+        Frames that were to be tracked, where the track does not state them.
     parameters : Parameters, optional
         Of the track, if they are known already.
     """
     counts = {status: track.status.count(status) for status in STATUSES}
     if parameters is None:
         parameters = measured(track)
-    frames = [int(n) for n, s in zip(track.frame, track.status, strict=True) if s == "ambiguous"]
     reasons: Counter[str] = Counter()
-    if why is not None:
-        reasons.update(why.get(number, LEGS) for number in frames)
+    if track.reason:
+        unsure = [k for k, status in enumerate(track.status) if status == "ambiguous"]
+        reasons.update(track.reason[k] or LEGS for k in unsure)
     speed, in_place = _speed(track)
     return Verdict(
-        total=max(len(track.frame), total or 0),
+        total=max(len(track.frame), total or 0) if track.frames is None else len(track.frames),
         counts=counts,
         strides=0 if parameters is None else max(len(s.start) for s in parameters.strides.values()),
         speed=speed,

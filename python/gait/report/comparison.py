@@ -14,8 +14,8 @@ from gait.camera.camera import Camera
 from gait.io.track_file import Joints, Track, read_truth
 from gait.motion.evaluate import Measures, evaluate, root_errors
 from gait.motion.footfalls import Strikes, strikes_of
-from gait.report import terms
 from gait.report.colours import BLUE, GREY, ORANGE
+from gait.report.error_table import HEAD, OTHER_WORLD, error_rows, share_rows
 from gait.report.gait_parts import time_span, tint
 from gait.report.page import Page
 from gait.report.plots import time_plot
@@ -73,52 +73,16 @@ def _by_frame(measures: Measures, track: Track, truth: Joints, strikes: Strikes)
 
 def add_errors(page: Page, track: Track, errors: Comparison) -> None:
     """Add tables and plots of the errors."""
-    rows, tips = _rows(errors.measures)
-    page.grid("Error against the truth", ("", "median", "mean", "9 of 10 frames below"), rows, tips)
-    shares, explained = _shares(errors.measures)
+    rows, tips = error_rows(errors.measures)
+    page.grid("Error against the truth", HEAD, rows, tips)
+    if track.camera_change is not None:
+        page.words(f"{OTHER_WORLD[0].upper()}{OTHER_WORLD[1:]}.", "warning")
+    shares, explained = share_rows(errors.measures)
     page.table("How far intervals and status can be believed", shares, explained)
     page.html(time_plot(lambda axes: _paint_errors(axes, track, errors), time_span(track), 2.8, "Error, mm"))
     if errors.phase is not None:
         title = "Phase, estimate minus truth, % of the stride"
         page.html(time_plot(lambda axes: _paint_phase(axes, track, errors), time_span(track), 2.2, title))
-
-
-def _rows(m: Measures) -> tuple[list[list[str]], dict[str, str]]:
-    """Cells of the table of errors, and explanations by the words of its rows."""
-    free = m["free"]
-    parts = {
-        "abs": (m["abs"], 1.0, 0),
-        "root": (m["root"], 1.0, 0),
-        "root12": (m["root12"], 1.0, 0),
-        "proc": (m["proc"], 1.0, 0),
-        "px": (m["px"], 1.0, 1),
-        "phase": (m["phase"], 100.0, 1),
-        "static": (m["static"]["root"], 1.0, 0),
-        "free": (None if free is None else free["root"], 1.0, 0),
-    }
-    known = {name: part for name, part in parts.items() if part[0] is not None}
-    rows = [
-        [terms.ERRORS[name][0], *(f"{scale * values[key]:.{digits}f}" for key in ("median", "mean", "p90"))]
-        for name, (values, scale, digits) in known.items()
-    ]
-    return rows, {terms.ERRORS[name][0]: terms.ERRORS[name][1] for name in known}
-
-
-def _shares(m: Measures) -> tuple[dict[str, str], dict[str, str]]:
-    """Single figures in words, and explanations by the same words."""
-    found = {
-        "within50": f"{m['coverage']['50']:.0%}",
-        "within90": f"{m['coverage']['90']:.0%}",
-        "width": f"{m['calibration']['width_mm']:.0f} mm",
-        "score": f"{m['calibration']['crps_mm']:.1f} mm",
-        "lost": f"{m['lost']:.1%} of {m['frames']} frames",
-        "wrong": f"{m['trust']['wrong_tracking']:.1%}",
-    }
-    if m["phase"] is not None:
-        found["flips"] = f"{m['phase']['flips']:.1%}"
-        found["bias"] = f"{100 * m['phase']['bias']:+.1f} %"
-    words = {terms.SHARES[name][0]: value for name, value in found.items()}
-    return words, {terms.SHARES[name][0]: terms.SHARES[name][1] for name in found}
 
 
 def _paint_errors(axes: Axes, track: Track, errors: Comparison) -> None:

@@ -28,10 +28,8 @@ _BY_STRIDE = (
 )
 
 
-def add_gait(
-    page: Page, track: Track, parameters: Parameters, cycles: Mapping[str, AngleCycle], remark: str = ""
-) -> None:
-    """Add all parts that a track with whole strides has; `remark`: on the uncertainty."""
+def add_gait(page: Page, track: Track, parameters: Parameters, cycles: Mapping[str, AngleCycle]) -> None:
+    """Add all parts that a track with whole strides has."""
     tips = {QUANTITIES[name]: words for name, words in terms.QUANTITIES.items()} | terms.COLUMNS
     page.grid("Gait", HEAD, parameter_rows(parameters), tips)
     if parameters.all_unsure:
@@ -42,7 +40,7 @@ def add_gait(
         )
     page.words(
         "Mean over the strides without unsure frames ± its standard deviation; in brackets the "
-        f"standard deviation between strides. Source of the uncertainty: {parameters.source}.{remark}",
+        f"standard deviation between strides. Source of the uncertainty: {parameters.source}.",
         "faint",
     )
     page.figure("Footfalls", footfall_plot(track, parameters))

@@ -102,7 +102,8 @@ def write_report(
         note(f"camera: {path}, found beside it; --camera gives another", files.quiet)
     parameters = measured(track, draws)
     overlay = None if camera is None else Overlay(model, camera)
-    film = _draw(files, video, estimates or estimates_of(track, model), overlay)
+    frames = range(video.count) if track.frames is None else track.frames
+    film = _draw(files, video, frames, estimates or estimates_of(track, model), overlay)
     run = Run(
         title=video.path.name,
         track=track,
@@ -166,25 +167,25 @@ def estimates_of(track: Track, model: Model) -> dict[int, Estimate]:
 
 
 def _draw(
-    files: RunFiles, video: Video, estimates: Mapping[int, Estimate], overlay: Overlay | None
+    files: RunFiles, video: Video, frames: range, estimates: Mapping[int, Estimate], overlay: Overlay | None
 ) -> PageFilm:
-    """Draw every frame of the clip into the films."""
-    frames = range(video.count)
+    """Draw the frames that were to be tracked into the films."""
+    begin = video.times[frames.start]
     with (
         Films(files.overlay, frames, video.size, video.fps) as films,
-        progress("film", video.count, files.quiet) as update,
+        progress("film", len(frames), files.quiet) as update,
     ):
-        for frame in video.frames():
-            estimate, legend = estimates.get(frame.number), frame.time < LEGEND_SECONDS
+        for done, frame in enumerate(video.frames(frames.start, frames.stop), 1):
+            estimate, legend = estimates.get(frame.number), frame.time - begin < LEGEND_SECONDS
             picture = frame.image
             if overlay is not None and estimate is None:
                 picture = overlay.draw_absent(picture, frame.time, frame.number, legend=legend)
             elif overlay is not None and estimate is not None:
                 picture = overlay.draw(picture, estimate, frame.number, legend=legend)
             films.write(picture, frame.number)
-            update(frame.number)
+            update(done)
     if films.page is None:
-        raise video.no_frame(0)
+        raise video.no_frame(frames.start)
     return films.page
 
 

@@ -99,7 +99,7 @@ def run_page(run: Run) -> str:
             "No whole stride was tracked, so there are no gait parameters and no curves over the stride."
         )
     else:
-        add_gait(page, run.track, run.parameters, run.cycles, _COMMON if _is_vague(run.track) else "")
+        add_gait(page, run.track, run.parameters, run.cycles)
     if run.film is not None and modules.available():
         page.figure("Angles over time", '<div id="run-curves" class="screen-only"></div>')
     page.figure("Way over the floor", way_plot(run.track, run.parameters, run.errors))
@@ -153,12 +153,6 @@ _LEGEND = (
     "In the film: the dial is the phase of the stride, with the right heel strike at the top and a coloured "
     "arc where the phase is with 95 %; ellipses hold wrists and ankles with 90 %; left is blue, right "
     "orange; the figure is faded where the person was lost."
-)
-
-
-_COMMON = (
-    " Most of the uncertainty of the places is that of the camera, which is common to all frames: lengths "
-    "and speed are less uncertain than stated, and alike in all strides."
 )
 
 
@@ -285,7 +279,10 @@ def _number_plot(track: Track, name: str, scale: float, title: str) -> str:
         axes.plot(track.time, values, color=BLUE)
         if f"{name}_sd" in track.numbers:
             band = 2 * scale * track.numbers[f"{name}_sd"]
-            axes.fill_between(track.time, values - band, values + band, color=BLUE, alpha=0.2, lw=0)
+            words = "two standard deviations each way"
+            low, high = values - band, values + band
+            axes.fill_between(track.time, low, high, color=BLUE, alpha=0.2, lw=0, label=words)
+            axes.legend(loc="best")
         axes.margins(y=0.2)
 
     return time_plot(paint, time_span(track), 1.9, title)

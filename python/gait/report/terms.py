@@ -96,6 +96,10 @@ SHARES = {
         "Score of the intervals",
         "Continuous ranked probability score: error and width in one; lower is better.",
     ),
+    "squared": (
+        "Squared errors over variances",
+        "Mean; 1 is right, more means too sure of itself.",
+    ),
     "flips": ("Left and right swapped", "Share of frames whose phase is nearer to half a stride off."),
     "bias": ("Phase early (−) or late (+)", "Mean error of the phase, % of the stride."),
     "lost": ("Far off or lost", "Share of frames with a pose error over 150 mm, or status lost."),

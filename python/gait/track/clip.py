@@ -41,7 +41,7 @@ def track_clip(options: ClipOptions) -> dict[str, Any]:
     """
     scene = Scene.read(options)
     start = first_state(options, scene)
-    if options.background == "auto" and (start.in_place or stays(scene)):
+    if options.background == "auto" and scene.plate is not None and (start.in_place or stays(scene)):
         scene = replace(scene, plate=None)  # the median shows the person
     used = setup(options, scene, start, scene.plate is not None)
     config = TrackerConfig.default(options.mode, seed=options.seed, belt=float(start.in_place))
@@ -60,7 +60,7 @@ def track_clip(options: ClipOptions) -> dict[str, Any]:
     follower = _follower(options, scene, tracker, keypoints, plausibility)
     found = follower.follow(start, scene.frames)
     results = write(options, scene, tracker, found, plausibility)
-    report = RunReport(options, scene, results.reasons, used, tracker.config.particles)
+    report = RunReport(options, scene, used, tracker.config.particles)
     for frame, x, y in results.starts[1:]:
         note(f"lost, and a person found at frame {frame}: x {x:.2f} y {y:.2f} m", options.quiet)
     note("; ".join(results.coverage()), options.quiet)

@@ -45,8 +45,6 @@ class Results:
         Their joints, metres.
     starts : list of (int, float, float)
         Frame of each start of the tracker, and the place there, metres.
-    reasons : dict of int to str
-        Why frames are ambiguous, by their numbers, where it was not the tracker itself that left them open.
     film : PageFilm or None
         For the report.
     """
@@ -60,7 +58,6 @@ class Results:
         self.joints: list[np.ndarray[Any, Any]] = []
         self._frames: list[tuple[int, bool, bool]] = []  # number, lost, in the picture
         self.starts: list[tuple[int, float, float]] = []
-        self.reasons: dict[int, str] = {}
         self.film: PageFilm | None = None
 
     def step(self, frame: Frame, estimate: Estimate) -> None:
@@ -73,8 +70,6 @@ class Results:
     def add(self, frame: Frame, estimate: Estimate) -> None:
         """Add an estimate that is written."""
         self._statuses.append(estimate.status)
-        if estimate.reason and estimate.status == TrackStatus.AMBIGUOUS:
-            self.reasons[frame.number] = estimate.reason
         self.times.append(frame.time)
         self.joints.append(estimate.joints)
         shown = self._tracker.cameras[0].shows(estimate.joints[:1])
@@ -126,8 +121,9 @@ def write(
     model, video, span, results = tracker.model, scene.video, scene.frames, Results(tracker)
     with ExitStack() as stack:
         rows = TrackWriter(
-            options.output, model.info.components, model.joint_names, model.angle_names, model.classes
-        )
+            options.output, model.info.components, model.joint_names, model.angle_names, model.classes,
+            span, None if scene.calibration is None else scene.calibration.change_at,
+        )  # fmt: skip
         if options.camera_out:
             write_camera(stack.enter_context(replacing(options.camera_out)), scene.reference_camera)
         if options.cameras_out:

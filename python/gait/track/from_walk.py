@@ -20,6 +20,7 @@ from gait.bindings.model import Model
 from gait.camera.camera import Camera
 from gait.errors import UserError
 from gait.io.keypoints_file import Keypoints
+from gait.motion.footfalls import moved_by_camera
 from gait.reproducible import one_thread
 from gait.track.walk_fit import WalkFit
 from gait.track.walk_model import WalkingBody, WalkModel
@@ -109,9 +110,8 @@ class Calibration:
 
     def widened(self, time: float, estimate: Estimate) -> Estimate:
         """Add the uncertainty of the camera to the sd of an estimate, `time` seconds into the clip."""
-        at = np.array([time])
-        joint_sd = self.joint_sd(at, estimate.joints[None], estimate.joint_sd[None])[0]
-        x, y, turn = np.linalg.norm(self._path_change(at)[0], axis=1)
+        joint_sd = self.joint_sd(np.array([time]), estimate.joints[None], estimate.joint_sd[None])[0]
+        x, y, turn = np.linalg.norm(self.change_at(time), axis=1)
         pelvis = np.hypot(estimate.sd.pelvis, [x, y, 0.0])
         sd = replace(estimate.sd, pelvis=pelvis, heading=float(np.hypot(estimate.sd.heading, turn)))
         return replace(estimate, joint_sd=joint_sd, sd=sd)
@@ -130,12 +130,14 @@ class Calibration:
         -------
         ndarray of shape (T, J, 3)
         """
-        change = self._path_change(time)[:, None]
         here = np.stack([np.interp(time, self.time, column) for column in self.path[:, :2].T], axis=1)
-        off = joints[..., :2] - here[:, None]
-        x = np.linalg.norm(change[..., 0, :] - off[..., 1:] * change[..., 2, :], axis=2)
-        y = np.linalg.norm(change[..., 1, :] + off[..., :1] * change[..., 2, :], axis=2)
-        return np.asarray(np.hypot(sd, np.stack([x, y, np.zeros_like(x)], axis=2)))
+        moved = moved_by_camera(self._path_change(time)[:, None], joints[..., :2] - here[:, None])
+        wider = np.linalg.norm(moved, axis=3)
+        return np.asarray(np.hypot(sd, np.pad(wider, ((0, 0), (0, 0), (0, 1)))))
+
+    def change_at(self, time: float) -> Array:
+        """Give `path_change` `time` seconds into the clip: shape (3, 4)."""
+        return self._path_change(np.array([time]))[0]
 
     def _path_change(self, time: Array) -> Array:
         """Give `path_change` at times (T,): shape (T, 3, 4)."""

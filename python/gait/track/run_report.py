@@ -25,26 +25,17 @@ class RunReport:
     Parameters
     ----------
     options, scene
-    reasons : mapping of int to str
-        Why frames are ambiguous, by their numbers.
     used : mapping of str to str
         Start, background, camera and joints that were used, in words.
     particles : int
     """
 
-    def __init__(
-        self,
-        options: ClipOptions,
-        scene: Scene,
-        reasons: Mapping[int, str],
-        used: Mapping[str, str],
-        particles: int,
-    ) -> None:
+    def __init__(self, options: ClipOptions, scene: Scene, used: Mapping[str, str], particles: int) -> None:
         self._options, self._scene, self._used, self._particles = options, scene, dict(used), particles
         self._track = read_track(options.output)
         self._draws = Draws.read(options.draws, self._track) if options.draws else None
         self._parameters = measured(self._track, self._draws)
-        self._verdict = verdict_of(self._track, len(scene.frames), reasons, self._parameters)
+        self._verdict = verdict_of(self._track, parameters=self._parameters)
 
     def figures(self) -> dict[str, Any]:
         """Return the verdict in words, a warning or null, what was used, where files went, and remarks."""

@@ -7,6 +7,7 @@ from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass, replace
 
 import numpy as np
+from numpy.typing import NDArray
 
 from gait.bindings.abi import Mode
 from gait.bindings.frame import FrameKeypoints
@@ -15,6 +16,7 @@ from gait.bindings.model import Model
 from gait.bindings.start_fit import StartFit
 from gait.camera.camera import Camera
 from gait.detect import weights
+from gait.detect.shapes import find_people
 from gait.errors import UserError
 from gait.io import keypoints_file
 from gait.io.detections import Clip
@@ -29,9 +31,13 @@ from gait.track.options import ClipOptions
 from gait.track.stabilise import SteadyVideo, moves, stabilised
 from gait.track.walk_camera import calibrate_film, expected_camera, note_camera
 
+Array = NDArray[np.float64]
+
 _COLOUR = 4.0  # grey levels between the channels of half of a picture in colour, at least
 _TRUNK = ("l_shoulder", "r_shoulder", "l_hip", "r_hip")
 _TRUNKS = 200  # compared, evenly spread over the clip
+_SHAPES = 16  # frames searched for people's shapes, which is slow
+_TRUNK_HEIGHTS = (0.52, 0.81)  # of hips and shoulders, shares of a person's height
 _HALF_WIDTH = 0.2  # of a trunk seen from the side, shares of its height
 _STAYS = 0.45  # share of a clip's frames from which the median may show who is in them
 
@@ -229,20 +235,33 @@ def _in_place(scene: Scene, frame: int) -> bool:
 def stays(scene: Scene) -> bool:
     """Whether the trunk of the person covers one place of the picture in about half of the clip's frames.
 
-    So does the trunk of a person who walks in place, or towards the camera or away from it.
+    So does the trunk of a person who walks in place, or towards the camera or away from it.  Without
+    keypoints the trunk is that of people's shapes.
     """
-    if not scene.people:
-        return False
+    low, high, shown = _trunks(scene) if scene.people else _shape_trunks(scene)
+    reach = _HALF_WIDTH * (high - low)[:, 1:] * (1, 0)  # of a trunk seen from the side
+    middle = (low + high)[:, None] / 2
+    covered = ((middle > low - reach) & (middle < high + reach)).all(axis=2)  # middle of a frame by frame
+    return bool(covered.mean(axis=1).max(initial=0.0) * shown > _STAYS)
+
+
+def _trunks(scene: Scene) -> tuple[Array, Array, float]:
+    """Corners (n, 2) of the person's trunk in frames with its keypoints, and the share of such frames."""
     keypoints = scene.people[scene.person]
     trunk = keypoints.uv[:, [keypoints.names.index(name) for name in _TRUNK]]
     trunk = trunk[np.isfinite(trunk).all(axis=(1, 2))]
     trunk = trunk[:: len(trunk) // _TRUNKS + 1]
-    low, high = trunk.min(axis=1), trunk.max(axis=1)
-    reach = _HALF_WIDTH * (high - low)[:, 1:] * (1, 0)  # of a trunk seen from the side
-    middle = (low + high)[:, None] / 2
-    covered = ((middle > low - reach) & (middle < high + reach)).all(axis=2)  # middle of a frame by frame
-    shown = len(keypoints.frame) / scene.video.count
-    return bool(covered.mean(axis=1).max(initial=0.0) * shown > _STAYS)
+    return trunk.min(axis=1), trunk.max(axis=1), len(keypoints.frame) / scene.video.count
+
+
+def _shape_trunks(scene: Scene) -> tuple[Array, Array, float]:
+    """Give the same of frames in which a person's shape is found."""
+    stature = StartFit(scene.model, scene.camera).stature
+    people = [find_people(frame.image, stature) for frame in sample_frames(scene.video, _SHAPES)]
+    found = [(boxes[0].head, boxes[0].foot) for boxes in people if boxes]
+    head, foot = np.array(found).reshape(-1, 2, 2).swapaxes(0, 1)
+    ends = [foot + share * (head - foot) for share in _TRUNK_HEIGHTS]
+    return np.minimum(*ends), np.maximum(*ends), len(found) / len(people)
 
 
 def _note_start(options: ClipOptions, scene: Scene, start: Start) -> None:
