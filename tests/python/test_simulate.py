@@ -9,13 +9,16 @@ import cv2
 import numpy as np
 import pytest
 
+from gait.bindings.model import read_blob
+from gait.body.skeleton import points
 from gait.camera.camera import Camera
 from gait.cli import main
 from gait.errors import UserError
 from gait.io import blob
 from gait.io.video import Video
-from gait.simulate.body import PARENTS, POINT_BONE, POINTS, Mesh
-from gait.simulate.clip import FILES, background, find_events, pictures, simulate
+from gait.simulate import aids
+from gait.simulate.body import BONE_INDEX, PARENTS, POINT_BONE, POINTS, Mesh, draw_anatomy
+from gait.simulate.clip import FILES, background, find_events, pictures, planned_events, simulate
 from gait.simulate.curves import NAMES, fourier, normative
 from gait.simulate.render import rasterise
 from gait.simulate.scenario import PRESETS, VIEWS, Scenario
@@ -175,6 +178,62 @@ def test_speed_and_cadence_are_obeyed() -> None:
     assert np.gradient(walk.timing.phase, walk.timing.step).mean() == pytest.approx(0.8, rel=0.03)
 
 
+def test_a_leg_that_is_spared_stands_shorter_and_strikes_later_and_further_ahead() -> None:
+    even, left, right = (set_stage(Scenario(seed=3, asymmetry=a, frames=120)) for a in (0.0, 20.0, -20.0))
+    assert {left.walk.timing.stride_hz, right.walk.timing.stride_hz} == {even.walk.timing.stride_hz}
+    uneven = []
+    for stage in (left, even, right):
+        events, contacts = find_events(stage), planned_events(stage)
+        stance, step = {}, {}
+        places = stage.walk.points()
+        at = {
+            s: stage.frames[0] + stage.walk.timing.per_frame * contacts[f"{s}_heel_strike"][2:4] for s in "lr"
+        }
+        for s in "lr":
+            begun = contacts[f"{s}_heel_strike"]
+            stance[s] = np.mean(
+                [contacts[f"{s}_toe_off"][contacts[f"{s}_toe_off"] > t][0] - t for t in begun[:3]]
+            )
+            index = np.rint(at[s]).astype(int)
+            ahead = (places[f"{s}_ankle"] - places["pelvis"])[index, :2]
+            step[s] = np.linalg.norm(ahead, axis=1).mean()
+        assert all(len(events[name]) >= 3 for name in events)
+        uneven.append((stance["r"] - stance["l"], step["l"] - step["r"]))
+    assert uneven[0][0] > 1 > uneven[1][0] > -1 > uneven[2][0]  # frames
+    assert uneven[0][1] > uneven[1][1] + 0.02 and uneven[2][1] < uneven[1][1] - 0.02  # metres
+
+
+def test_a_stick_is_rigid_and_stands_still_beside_the_other_foot() -> None:
+    stage = set_stage(Scenario(seed=3, asymmetry=10.0, aid="stick", frames=90))
+    walk, bone = stage.walk, BONE_INDEX["r_aid"]
+    turns = walk.turns[stage.frames][:, bone]
+    np.testing.assert_allclose(np.linalg.det(turns), 1.0, atol=1e-9)
+    tip = walk.origins[stage.frames][:, bone] - aids.length(stage.body) * turns[:, :, 2]
+    stands = (walk.timing.of_side("l")[stage.frames] % 1 > 0.1) & (
+        walk.timing.of_side("l")[stage.frames] % 1 < 0.45
+    )
+    step = np.linalg.norm(np.diff(tip, axis=0), axis=1)
+    assert step[stands[1:] & stands[:-1]].max() < 0.02 < step.max() / 2
+    assert np.abs(tip[stands, 2]).max() < 0.1
+    assert not walk.turns[:, BONE_INDEX["l_aid"]].any()
+
+
+def test_drawn_bodies_have_the_proportions_of_the_model() -> None:
+    model = blob.decode(read_blob(None))
+    drawn = [draw_anatomy(1.7, np.random.default_rng(seed), model) for seed in range(40)]
+    for body in drawn:
+        upright = ("ankle_height", "shank", "thigh", "hip_drop", "neck_up", "head_up")
+        assert sum(body[key] for key in upright) == pytest.approx(1.7)
+    mean = dict(zip(blob.unpack_names(model["PTNM"]), points(model, np.zeros((1, 30)))[0], strict=True))
+    for limb, (a, b, c) in {"leg": ("hip", "knee", "ankle"), "arm": ("shoulder", "elbow", "wrist")}.items():
+        ends = [mean[f"l_{name}"] for name in (a, b, c)]
+        meant = np.linalg.norm(ends[0] - ends[1]) / np.linalg.norm(ends[1] - ends[2])
+        first, second = {"leg": ("thigh", "shank"), "arm": ("upper_arm", "forearm")}[limb]
+        ratios = np.array([body[first] / body[second] for body in drawn])
+        assert ratios.mean() == pytest.approx(meant, abs=0.04), limb
+        assert ratios.std() > 0.02
+
+
 def picture_span(stage: Stage, mesh: Mesh, frame: int) -> tuple[np.ndarray, np.ndarray]:
     """Return the bounding box of the figure's surface in pixels."""
     index = stage.frames[frame]
@@ -295,7 +354,7 @@ def test_presets_are_sound() -> None:
     for name, preset in PRESETS.items():
         stage = set_stage(preset)
         assert stage.camera.size == (640, 480), name
-        assert 100 <= preset.frames <= 150
+        assert 90 <= preset.frames <= 180
     assert PRESETS["pole"].pole
 
 
@@ -318,6 +377,8 @@ def test_the_command_reports_what_it_made(tmp_path: Path, capsys: pytest.Capture
         (["--gait", "nowhere.gait"], "nowhere.gait"),
         (["--noise", "-1"], "--noise -1"),
         (["--speed", "nan"], "--speed nan"),
+        (["--asymmetry", "45"], "--asymmetry 45: give a value from -30 to 30"),
+        (["--motion", "backwards", "--aid", "stick"], "--motion backwards: goes without"),
     ],
 )
 def test_bad_values_are_one_line(

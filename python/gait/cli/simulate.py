@@ -13,6 +13,8 @@ presets (other options change them):
   stopping, standing, backwards, turning
            at 45 degrees (turning: from the side): walks, stops and walks on; stands; walks backwards; goes
            round a corner
+  slow, fast, limping, stick, crutches
+           0.6 m/s from the side; 1.9 m/s; spares the left leg; walks with a stick or with forearm crutches
 """
 
 from __future__ import annotations
@@ -24,12 +26,13 @@ from dataclasses import fields, replace
 from typing import Any
 
 from gait.progress import progress
-from gait.simulate.scenario import DIRECTIONS, GENERATOR, MOTIONS, PRESETS, VIEWS, Scenario
+from gait.simulate.scenario import AIDS, BODIES, DIRECTIONS, GENERATOR, MOTIONS, PRESETS, VIEWS, Scenario
 
 EXAMPLES = """\
 examples:
   gait simulate -o walk
   gait simulate -o walk --preset pole --seed 7 --stature 1.68 --size 1280x720
+  gait simulate -o walk --preset stick --body drawn
 """
 
 
@@ -43,6 +46,16 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--direction", choices=DIRECTIONS, help="to the right or to the left of the picture")
     parser.add_argument(
         "--motion", choices=MOTIONS, help="stop: walk, stop, stand and walk on; turn: go round a corner"
+    )
+    parser.add_argument(
+        "--asymmetry",
+        type=float,
+        metavar="PCT",
+        help="how much the left leg (negative: the right) is spared, as with a prosthesis, per cent",
+    )
+    parser.add_argument("--aid", choices=AIDS, help="walk with a stick or with forearm crutches")
+    parser.add_argument(
+        "--body", choices=BODIES, help="drawn: proportions of the people that the model was learnt from"
     )
     parser.add_argument("--frames", type=int, metavar="N")
     parser.add_argument("--fps", type=float, metavar="HZ")

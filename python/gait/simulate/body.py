@@ -6,12 +6,17 @@ bones and blended across joints.
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike
 from scipy.interpolate import PchipInterpolator
 
+from gait.body.skeleton import points
+from gait.errors import UserError
+from gait.io.blob import unpack_names
 from gait.simulate.geometry import Array, Floats, Ints
 
 SIDES = ("l", "r")
@@ -22,10 +27,11 @@ JOINT_OF = {"pelvis": "pelvis", "torso": "spine", "head": "neck"}
 for _s in SIDES:
     PARENTS |= {f"{_s}_upper_arm": "torso", f"{_s}_forearm": f"{_s}_upper_arm", f"{_s}_hand": f"{_s}_forearm"}
     PARENTS |= {f"{_s}_thigh": "pelvis", f"{_s}_shank": f"{_s}_thigh", f"{_s}_foot": f"{_s}_shank"}
-    PARENTS |= {f"{_s}_toes": f"{_s}_foot"}
+    PARENTS |= {f"{_s}_toes": f"{_s}_foot", f"{_s}_aid": f"{_s}_hand"}
     JOINT_OF |= {f"{_s}_upper_arm": f"{_s}_shoulder", f"{_s}_forearm": f"{_s}_elbow"}
     JOINT_OF |= {f"{_s}_hand": f"{_s}_wrist", f"{_s}_thigh": f"{_s}_hip", f"{_s}_shank": f"{_s}_knee"}
     JOINT_OF |= {f"{_s}_foot": f"{_s}_ankle", f"{_s}_toes": f"{_s}_toe"}
+    JOINT_OF |= {f"{_s}_aid": f"{_s}_wrist"}  # a stick or crutch, held in the hand
 BONES = tuple(PARENTS)
 BONE_INDEX = {name: i for i, name in enumerate(BONES)}
 
@@ -69,17 +75,54 @@ class Anatomy:
         return self["thigh"] + self["shank"]
 
 
-def draw_anatomy(stature: float, rng: np.random.Generator) -> Anatomy:
-    """Draw a person of `stature` metres: every proportion varies by about 4 % (standard deviation)."""
+def draw_anatomy(stature: float, rng: np.random.Generator, model: Mapping[str, Any] | None = None) -> Anatomy:
+    """Draw a person of `stature` metres: every proportion varies by about 4 % (standard deviation).
+
+    `model`: sections of a blob; what it has of the proportions of people is drawn from there instead.
+    """
     share = {
         key: value * float(1 + 0.04 * np.clip(rng.standard_normal(), -2, 2)) for key, value in _MEAN.items()
     }
+    if model is not None:
+        share |= _learnt(model, rng)
     upright = sum(share[key] for key in _UPRIGHT)
     for key in _UPRIGHT:
         share[key] /= upright
-    share["shoulder_up"] = share["neck_up"] - _MEAN["neck_up"] + _MEAN["shoulder_up"]
+    if model is None:
+        share["shoulder_up"] = share["neck_up"] - _MEAN["neck_up"] + _MEAN["shoulder_up"]
     lengths = {key: value * stature for key, value in share.items()}
     return Anatomy(stature, lengths, _rest_pose(lengths))
+
+
+def _learnt(model: Mapping[str, Any], rng: np.random.Generator) -> dict[str, float]:
+    """Draw the proportions that a model describes, in statures."""
+    count = len(model.get("PROP", ()))
+    if not count:
+        raise UserError("--body drawn: the package's model has no proportions of people; use --body table")
+    scores = np.clip(rng.standard_normal(count), -2, 2)
+    channels = len(unpack_names(model["CHNM"]))
+    places = dict(
+        zip(unpack_names(model["PTNM"]), points(model, np.zeros((1, channels)), scores)[0], strict=True)
+    )
+
+    def apart(a: str, b: str) -> float:
+        return float(np.linalg.norm(places[a] - places[b]))
+
+    ends = {
+        "thigh": "hip knee",
+        "shank": "knee ankle",
+        "upper_arm": "shoulder elbow",
+        "forearm": "elbow wrist",
+    }
+    out = {
+        bone: 0.5 * sum(apart(*(f"{s}_{joint}" for joint in pair.split())) for s in SIDES)
+        for bone, pair in ends.items()
+    }
+    for joint in ("hip", "shoulder"):
+        out[f"{joint}_half"] = 0.5 * apart(f"l_{joint}", f"r_{joint}")
+    high = {joint: float(places[joint][2]) for joint in ("l_hip", "l_shoulder", "neck", "head_top")}
+    out |= {"hip_drop": -high["l_hip"], "shoulder_up": high["l_shoulder"], "neck_up": high["neck"]}
+    return out | {"head_up": high["head_top"] - high["neck"]}
 
 
 def _rest_pose(k: dict[str, float]) -> dict[str, Array]:

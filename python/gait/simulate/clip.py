@@ -36,7 +36,7 @@ def find_events(stage: Stage) -> dict[str, Array]:
     """
     walk = stage.walk
     if stage.scenario.motion not in STEADY:
-        return _events_of_phase(stage)
+        return planned_events(stage)
     points = walk.points()
     ahead = np.column_stack([np.cos(walk.heading), np.sin(walk.heading)])
     per_frame, first = walk.timing.per_frame, stage.frames[0]
@@ -48,7 +48,7 @@ def find_events(stage: Stage) -> dict[str, Array]:
     return out
 
 
-def _events_of_phase(stage: Stage) -> dict[str, Array]:
+def planned_events(stage: Stage) -> dict[str, Array]:
     """Return the events of a walk that stops or goes backwards, as its feet are planned."""
     timing, first = stage.walk.timing, stage.frames[0]
     index = np.arange(len(timing.phase), dtype=float)
@@ -171,7 +171,10 @@ def describe(stage: Stage, made: Set, events: dict[str, Array]) -> dict[str, Any
         "direction": "left to right" if scenario.direction == "lr" else "right to left",
         "background": "procedural, clutter" if scenario.clutter else "procedural",
         "calibration": "exact",
-        "body": "lofted and skinned mesh with its own skeleton",
+        "body": "lofted and skinned mesh with its own skeleton"
+        + (", proportions drawn from the model's people" if scenario.body == "drawn" else ""),
+        "asymmetry_percent": scenario.asymmetry,
+        "aid": scenario.aid,
         "clothing": made.appearance.notes,
         "difficulty": [word for word in ("pole", "clutter") if getattr(scenario, word)],
         "poles": _pole(stage, made),
@@ -180,8 +183,12 @@ def describe(stage: Stage, made: Set, events: dict[str, Array]) -> dict[str, Any
         "stride_period_sd_s": round(float(strides.std()), 4),
         "net_displacement_m": (pelvis[-1] - pelvis[0]).round(3).tolist(),
         "events_video_frames": inside,
+        "contacts_video_frames": {
+            name: [round(float(t), 3) for t in times if 0 <= t <= len(frames) - 1]
+            for name, times in planned_events(stage).items()
+        },
         "events_note": "fractional 0-based video frames; heel strike: heel furthest ahead of the pelvis "
-        "(Zeni); toe-off: toe (MTP) furthest behind",
+        "(Zeni); toe-off: toe (MTP) furthest behind; contacts: as the walk was planned",
         "limb_lengths_m": {key: round(value, 4) for key, value in stage.body.lengths.items()},
         "stature_m": round(stage.body.stature, 4),
         "person_height_px": [round(float(q)) for q in np.percentile(tall, (0, 50, 100))],

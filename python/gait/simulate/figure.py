@@ -252,13 +252,15 @@ def _shoe(side: str, sign: float, body: Anatomy) -> list[Part]:
     return parts
 
 
-def build_figure(body: Anatomy, appearance: Appearance, rng: np.random.Generator) -> Mesh:
-    """Return the mesh of a person in clothes."""
+def build_figure(
+    body: Anatomy, appearance: Appearance, rng: np.random.Generator, carried: Sequence[Part] = ()
+) -> Mesh:
+    """Return the mesh of a person in clothes, with what they carry."""
     parts = trunk_parts(body, appearance) + limb_parts(body, appearance)
     for part in parts:
         if part.material in (TOP, LEGS):
             _crease(part, 0.0016 * (1 + appearance.loose), rng)
-    return merge(parts, body)
+    return merge([*parts, *carried], body)
 
 
 def _crease(part: Part, depth: float, rng: np.random.Generator) -> None:

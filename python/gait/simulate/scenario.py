@@ -14,13 +14,15 @@ GENERATOR = "generator"
 VIEWS = ("side", "oblique", "toward", "away", "above", "circle")
 DIRECTIONS = ("lr", "rl")
 MOTIONS = ("walk", "stop", "stand", "backwards", "turn")
+AIDS = ("none", "stick", "crutches")
+BODIES = ("table", "drawn")
 
 # option: smallest and largest value
 _LIMITS = {
     "frames": (2, 20_000), "fps": (5.0, 240.0), "stature": (1.2, 2.2), "speed": (0.3, 2.5),
     "stride_hz": (0.4, 1.6),
     "distance": (1.0, 100.0), "camera_height": (0.2, 20.0), "seed": (0, 2**31 - 1), "flicker": (0.0, 50.0),
-    "noise": (0.0, 64.0),
+    "noise": (0.0, 64.0), "asymmetry": (-30.0, 30.0),
 }  # fmt: skip
 _SIZE = (64, 4096)
 
@@ -50,6 +52,15 @@ class Scenario:
     noise: float = 2.0  #: standard deviation of the sensor noise, grey levels
     #: One of `MOTIONS`: ``stop`` walks, stops, stands and walks on, ``turn`` goes round a corner.
     motion: str = "walk"
+    #: Per cent by which the left leg is spared, as with a prosthesis, negative the right one: it strikes
+    #: later and further ahead, stands shorter, its knee stays straighter and its foot pushes off less.
+    asymmetry: float = 0.0
+    #: One of `AIDS`: a ``stick`` in the hand away from the spared leg, or forearm ``crutches``, each moving
+    #: with the leg of the other side.
+    aid: str = "none"
+    #: One of `BODIES`: proportions of textbooks, each with its own spread, or ``drawn`` from those of the
+    #: people that the package's model was learnt from.
+    body: str = "table"
     gait: str = GENERATOR  #: ``generator`` or the name of a ``.gait`` model whose curves are walked
 
     def __post_init__(self) -> None:
@@ -60,6 +71,12 @@ class Scenario:
             raise UsageError(f"--direction {self.direction}: unknown; use lr or rl")
         if self.motion not in MOTIONS:
             raise UsageError(f"--motion {self.motion}: unknown; use one of {' '.join(MOTIONS)}")
+        if self.aid not in AIDS:
+            raise UsageError(f"--aid {self.aid}: unknown; use one of {' '.join(AIDS)}")
+        if self.body not in BODIES:
+            raise UsageError(f"--body {self.body}: unknown; use table or drawn")
+        if (self.asymmetry or self.aid != "none") and self.motion == "backwards":
+            raise UsageError("--motion backwards: goes without --asymmetry and --aid; leave them out")
         for name, (low, high) in _LIMITS.items():
             value = getattr(self, name)
             if value is not None and not low <= value <= high:
@@ -88,6 +105,11 @@ PRESETS: dict[str, Scenario] = {
     "standing": Scenario(motion="stand", view="oblique", frames=100, seed=62),
     "backwards": Scenario(motion="backwards", view="oblique", frames=120, seed=63),
     "turning": Scenario(motion="turn", direction="rl", frames=120, seed=64),
+    "slow": Scenario(speed=0.6, frames=180, seed=65),
+    "fast": Scenario(view="oblique", speed=1.9, frames=90, seed=66),
+    "limping": Scenario(view="oblique", speed=1.0, asymmetry=18.0, frames=130, seed=67),
+    "stick": Scenario(direction="rl", speed=0.8, asymmetry=-12.0, aid="stick", frames=150, seed=68),
+    "crutches": Scenario(speed=0.7, asymmetry=15.0, aid="crutches", frames=160, seed=69),
 }
 """Scenarios for the demo and for evaluation.
 
@@ -101,5 +123,10 @@ stopping   45 degrees, walks, stops, stands and walks on
 standing   45 degrees, stands
 backwards  45 degrees, walks backwards
 turning    side view, goes round a corner
+slow       side view, 0.6 m/s
+fast       45 degrees, 1.9 m/s
+limping    45 degrees, spares the left leg, as with a prosthesis
+stick      side view, spares the right leg, a stick in the left hand
+crutches   side view, forearm crutches, spares the left leg
 =========  =============================================================
 """

@@ -7,9 +7,11 @@ from functools import partial
 
 import numpy as np
 
+from gait.bindings.model import read_blob
 from gait.camera.camera import Camera
 from gait.errors import UsageError
-from gait.simulate import motion
+from gait.io import blob
+from gait.simulate import aids, motion
 from gait.simulate.body import Anatomy, Mesh, draw_anatomy
 from gait.simulate.curves import curves_of_model, normative
 from gait.simulate.figure import build_figure
@@ -115,12 +117,14 @@ def set_stage(scenario: Scenario) -> Stage:
     """Draw a person and let them walk before a camera. UserError if the options contradict each other."""
     rng = scenario.stream("body")
     stature = scenario.stature or float(np.clip(rng.normal(1.73, 0.08), 1.55, 1.95))
-    body = draw_anatomy(stature, rng)
+    model = blob.decode(read_blob(None)) if scenario.body == "drawn" else None
+    body = draw_anatomy(stature, rng, model)
     speed, cadence = pace(scenario, stature)
     rng = scenario.stream("gait")
     generated = scenario.gait == GENERATOR
     curves = normative(rng) if generated else curves_of_model(scenario.gait, rng, cadence)
     timing = draw_timing(cadence, scenario.fps, scenario.frames, len(curves.modes), rng)
+    timing = replace(timing, spared=scenario.asymmetry / 100)
     path = make_path(scenario.view, scenario.direction, float(scenario.stream("path").uniform(-1, 1)))
     if scenario.motion == "turn":
         path = replace(path, corner=CORNER if scenario.direction == "lr" else -CORNER)
@@ -129,6 +133,9 @@ def set_stage(scenario: Scenario) -> Stage:
         blend = partial(motion.posture, stop=stop, rng=scenario.stream("idle"))
         shaped = Shaped(stop.timing, stop.clock, stop.amplitude, blend)
     walk = make_walk(body, curves, timing, path, speed, rng, shaped)
+    held = aids.hands(scenario.aid, scenario.asymmetry)
+    if held:
+        aids.carry(walk, held)
     if scenario.motion == motion.BACKWARDS:
         walk = motion.reversed_in_time(walk)
     names = motion.classes(scenario.motion, stop, len(timing.time))
@@ -144,7 +151,8 @@ def build_set(stage: Stage) -> Set:
     """Make the figure and paint the scene."""
     scenario, walk = stage.scenario, stage.walk
     appearance = draw_appearance(scenario.stream("look"))
-    mesh = build_figure(stage.body, appearance, scenario.stream("cloth"))
+    carried = aids.parts(scenario.aid, aids.hands(scenario.aid, scenario.asymmetry), stage.body)
+    mesh = build_figure(stage.body, appearance, scenario.stream("cloth"), carried)
     ground = walk.origins[stage.frames, 0, :2]
     rng = scenario.stream("scene")
     layout = draw_layout(stage.camera, ground, scenario.clutter, scenario.pole, rng)

@@ -67,6 +67,11 @@ class Path:
 
 CORNER = 0.7  # metres of the path before and after its middle in which a corner turns
 STRIDE_TIME_CV = 0.02
+# What a leg that is spared by a share s does, about as people do who walk on a prosthesis below the knee: it
+# strikes later by _LATE s of the stride and ahead by _AHEAD s of the step, stands shorter by _SHORT s while
+# the other one stands longer by _LONG s; its knee yields less under load, by _STRAIGHT s, and its foot pushes
+# off less, by _WEAK s.
+_LATE, _AHEAD, _SHORT, _LONG, _STRAIGHT, _WEAK = 0.12, 0.65, 0.5, 0.25, 4.0, 1.0
 MARGIN_STRIDES = 2  # whole strides simulated before and after the clip, so that no foot is planned at an edge
 
 
@@ -81,6 +86,8 @@ class Timing:
     per_frame: int
     #: Strides per second of walking, where the person also stands; 0: as the phase has it on average.
     usual_hz: float = 0.0
+    #: Share by which the left leg is spared, negative the right one; see `Scenario.asymmetry`.
+    spared: float = 0.0
 
     @property
     def stride_hz(self) -> float:
@@ -93,8 +100,22 @@ class Timing:
         return float(self.time[1] - self.time[0])
 
     def of_side(self, side: str) -> Array:
-        """Return the unwrapped phase of a foot, whole at its own heel strikes."""
-        return self.phase + (0.5 if side == "l" else 0.0)
+        """Return the unwrapped phase of a foot, whole at its own heel strikes, in swing from `TOE_OFF` on."""
+        phase = self.phase + (0.5 - _LATE * self.spared if side == "l" else 0.0)
+        if not self.spared:
+            return phase
+        off = TOE_OFF * (1 - self.sparing(side) * (_SHORT if self.sparing(side) > 0 else _LONG))
+        knots = np.array([0, 0.5 * off, off, 0.5 * (1 + off)])
+        meant = np.array([0, 0.5 * TOE_OFF, TOE_OFF, 0.5 * (1 + TOE_OFF)])
+        warp = PchipInterpolator(
+            np.concatenate([knots - 1, knots, knots + 1]), np.concatenate([meant - 1, meant, meant + 1])
+        )
+        whole = np.floor(phase)
+        return np.asarray(whole + warp(phase - whole))
+
+    def sparing(self, side: str) -> float:
+        """Share by which this leg is spared; negative where the other one is."""
+        return self.spared if side == "l" else -self.spared
 
 
 def draw_timing(stride_hz: float, fps: float, frames: int, modes: int, rng: np.random.Generator) -> Timing:
@@ -293,7 +314,7 @@ def make_walk(
 
     UsageError if no step length of this person and cadence gives that speed.
     """
-    angles = curves.angles(timing.phase, timing.scores)
+    angles = _angles(curves, timing)
     usual = _stride_gain(angles, timing, body, speed)
     gain: float | Array = usual
     angles = _stretched(angles, usual)
@@ -317,6 +338,17 @@ def make_walk(
         _solve_leg(side, origins, turns, plans[side], yaw, body)
     _upper_body(origins, turns, angles, body)
     return Walk(timing, body, origins, turns, heading, angles["pelvis_yaw"], forward)
+
+
+def _angles(curves: Curves, timing: Timing) -> dict[str, Array]:
+    """Angles of the walk by channel; the limbs of each side go by the phase of its foot."""
+    angles = curves.angles(timing.phase, timing.scores)
+    if not timing.spared:
+        return angles
+    for side, half in (("l", 0.5), ("r", 0.0)):
+        own = curves.angles(timing.of_side(side) - half, timing.scores)
+        angles |= {name: values for name, values in own.items() if name.startswith(f"{side}_")}
+    return angles
 
 
 @dataclass(frozen=True)
@@ -385,7 +417,7 @@ def _forward_speed(angles: dict[str, Array], timing: Timing, body: Anatomy, gain
     for side in SIDES:
         phase = timing.of_side(side)
         p = phase % 1.0
-        pitch = foot_pitch(phase, _pitch_gain(gain))
+        pitch = _pitch(side, timing, gain)
         rolled, _ = rolling_ankle(pitch, toe_bend(phase, pitch), body)
         still = _free_ankle(side, angles, body)[:, 0] - rolled
         share = smoothstep(p, 0.0, 0.12) * (1 - smoothstep(p, 0.48, TOE_OFF))
@@ -400,6 +432,12 @@ def _smoothed(value: Array, strides: float, timing: Timing) -> Array:
     """Return `value` (T,) filtered by a Gaussian whose standard deviation is a share of the stride."""
     per_stride = 1 / (timing.step * timing.stride_hz)
     return gaussian_filter1d(value, strides * per_stride, mode="nearest")
+
+
+def _pitch(side: str, timing: Timing, gain: float | Array) -> Array:
+    """Return the pitch of a foot; one that is spared pushes off less."""
+    pitch = foot_pitch(timing.of_side(side), _pitch_gain(gain))
+    return np.where(pitch < 0, pitch * (1 - _WEAK * max(timing.sparing(side), 0.0)), pitch)
 
 
 def _pitch_gain(gain: float | Array) -> float | Array:
@@ -427,7 +465,7 @@ def _stride_gain(angles: dict[str, Array], timing: Timing, body: Anatomy, speed:
 def _plan_foot(side: str, course: _Course, rng: np.random.Generator) -> _FootPlan:
     """Plant every step of one foot and carry the foot from one to the next."""
     phase = course.timing.of_side(side)
-    pitch = foot_pitch(phase, _pitch_gain(course.gain))
+    pitch = _pitch(side, course.timing, course.gain)
     bend = toe_bend(phase, pitch)
     rel = _free_ankle(side, course.angles, course.body)
     rolled = rolling_ankle(pitch, bend, course.body)
@@ -448,10 +486,12 @@ def _footfalls(
     """Plant each step where the foot is on average while it stands: `place` (T,) along the path, metres."""
     phase, stature = course.timing.of_side(side), course.body.stature
     toe_out = (1.0 if side == "l" else -1.0) * np.radians(rng.uniform(3, 9))
+    steps = np.gradient(course.along, course.timing.step).mean() / course.timing.stride_hz / 2
+    ahead = 0.5 * _AHEAD * course.timing.sparing(side) * steps
     falls = []
     for stride in range(int(np.ceil(phase[0])), int(np.floor(phase[-1] - TOE_OFF)) + 1):
         stance = (phase > stride) & (phase < stride + TOE_OFF)
-        where = float(place[stance].mean()) - _LEAD * stature
+        where = float(place[stance].mean()) - _LEAD * stature + ahead
         aside = left + 0.004 * stature * float(np.clip(rng.standard_normal(), -2, 2))
         yaw = float(course.path.direction(where) + toe_out + np.radians(1.5) * rng.standard_normal())
         falls.append(Footfall(stride, course.path.point(where, aside), yaw))
@@ -467,7 +507,8 @@ def _pelvis_height(
         hip = apply(turn, body.rest[f"{side}_hip"])
         aside = np.linalg.norm(plan.ankle[:, :2] - ground - hip[:, :2], axis=1)
         p = plan.phase % 1.0
-        reach = body.leg * np.where(p < TOE_OFF, _bent(p), 1.0)
+        yields = 1 - np.clip(_STRAIGHT * timing.sparing(side), 0, 1)
+        reach = body.leg * np.where(p < TOE_OFF, _bent(p, yields), 1.0)
         highest = plan.ankle[:, 2] + np.sqrt(np.maximum(reach**2 - aside**2, 0)) - hip[:, 2]
         limit = np.minimum(limit, np.where((p < TOE_OFF) | (p > _LANDING), highest, np.inf))
     height = _smoothed(limit, 0.045, timing)
@@ -476,10 +517,10 @@ def _pelvis_height(
     return height
 
 
-def _bent(p: Array) -> Array:
+def _bent(p: Array, yields: float) -> Array:
     """Return the extension a stance leg aims for: yielding while it takes the load, then almost straight."""
     load = smoothstep(p, 0.02, 0.13) * (1 - smoothstep(p, 0.18, 0.36))
-    return _REACH - 0.0095 * load
+    return _REACH - 0.0095 * yields * load
 
 
 def _set(origins: Array, turns: Array, bone: str, origin: Array, turn: Array) -> None:
