@@ -23,7 +23,7 @@ from gait.report.comparison import Comparison, add_errors
 from gait.report.film import PageFilm, runs
 from gait.report.gait_parts import add_gait, time_span, tint
 from gait.report.page import Page
-from gait.report.plots import for_screen_and_telephone, time_plot
+from gait.report.plots import LARGE, for_screen_and_telephone, time_plot
 from gait.web import modules, parts
 from gait.web.motion_data import curve, motion_data
 
@@ -101,7 +101,8 @@ def run_page(run: Run) -> str:
     else:
         add_gait(page, run.track, run.parameters, run.cycles)
     if run.film is not None and modules.available():
-        page.figure("Angles over time", '<div id="run-curves" class="screen-only"></div>')
+        drawing = '<h2>Angles over time</h2><div id="run-curves"></div>'
+        page.html(f'<section class="screen-only">{drawing}</section>')
     page.figure("Way over the floor", way_plot(run.track, run.parameters, run.errors))
     page.heading("Pace")
     page.html(_number_plot(run.track, "stride_hz", 120.0, "Cadence, steps per minute"))
@@ -255,7 +256,7 @@ def way_plot(track: Track, parameters: Parameters | None, errors: Comparison | N
         if errors is not None:
             axes.plot(*errors.true_path[:, [across, up]].T, color=GREY, lw=4, alpha=0.5, label="truth")
         axes.plot(*pelvis[:, [across, up]].T, color=DARK, lw=1, label="pelvis")
-        axes.plot(*pelvis[0, [across, up]], ">", color=DARK, ms=6, label="begins here")
+        axes.plot(*pelvis[0, [across, up]], "D", color=DARK, ms=6, label="begins here")
         for side, places in feet.items():
             mark = "o" if side == "right" else "s"
             axes.plot(*places[:, [across, up]].T, mark, ms=5, color=ON_PAPER[side], label=f"{side} heel")
@@ -263,7 +264,8 @@ def way_plot(track: Track, parameters: Parameters | None, errors: Comparison | N
         if turned:
             axes.invert_yaxis()  # a turn by 90 degrees, not a mirror image
         axes.set(xlabel=f"{'xy'[across]}, m", ylabel=f"{'xy'[up]}, m", aspect="equal")
-        axes.legend(loc="lower left", bbox_to_anchor=(0, 1), ncols=5, fontsize=8, columnspacing=1)
+        columns = 5 if axes.figure.get_figwidth() > LARGE / 2 else 3
+        axes.legend(loc="lower left", bbox_to_anchor=(0, 1), ncols=columns, fontsize=8, columnspacing=1)
 
     share = float((high - low)[up] / (high - low)[across])
     heights = (min(9.4 * share + 1.2, 7.0), min(3.0 * share + 1.3, 4.5))
