@@ -89,7 +89,7 @@ UNIT := $(patsubst tests/unit/%.c,$(B)/unit/%,$(sort $(wildcard tests/unit/test_
 TOOLS := $(BIN)/gait-trackd
 LIBS := $(B)/libgait.so $(B)/libgait.a
 
-.PHONY: help setup lock lib tools test built check unit python-test demo model paper bench bench-lift detector-profile eval eval-camera eval-real eval-learn eval-lift eval-paper eval-studio mutants asan tsan unit-threads fuzz fuzz-run golden-check \
+.PHONY: help setup lock lib tools test built check unit python-test demo model paper bench bench-lift detector-profile eval eval-camera eval-gait eval-real eval-learn eval-lift eval-paper eval-studio mutants asan tsan unit-threads fuzz fuzz-run golden-check \
         docs screenshots lint format wheel sdist wheel-check install install-daemon uninstall clean
 
 help: ## list the targets
@@ -357,6 +357,9 @@ detector-profile: setup lib ## learn how the detector's joints differ from the m
 
 mutants: setup ## change each equation of both papers once: a test about its meaning has to notice
 	@$(PY) tests/bench/mutants.py $(ARGS)
+
+eval-gait: setup lib ## what a gait lab compares: footfalls, parameters, angles, their intervals: eval_gait.md *
+	@$(PY) tests/bench/eval_gait.py $(ARGS)
 
 eval-lift: setup lib ## lifting of held-out motion, clips and a real motion: tests/bench/results/lift.md *
 	@$(PY) tests/bench/eval_lift.py $(ARGS)

@@ -82,7 +82,7 @@ def test_c3d_is_read_alike_by_two_readers(walk, tmp_path):
 
 
 def test_the_skeleton_of_constant_lengths_is_at_the_joints(walk):
-    found = angles.fit(motion.read(walk.path))
+    found = angles.fit(motion.read(walk.path).places)
     assert found.rms < 1e-3  # the model's own body, whose lengths are constant
     assert np.isnan(found.angles[20]).all() and np.isfinite(np.delete(found.angles, 20, axis=0)).all()
     for name in angles.FIXED:
@@ -98,7 +98,7 @@ def test_bvh_is_read_by_another_reader(walk, tmp_path, capsys):
     bvhio = pytest.importorskip("bvhio", reason="bvhio is not installed: extra dev")
     path = export(walk, tmp_path, ".bvh")
     assert "lacks 1 frames, which repeat the one before" in capsys.readouterr().err
-    fitted = angles.fit(motion.read(walk.path))
+    fitted = angles.fit(motion.read(walk.path).places)
     turns, origins, _ = fitted.pose(walk.kept)
     root = bvhio.readAsHierarchy(str(path))
     bones = {
@@ -136,7 +136,7 @@ def test_the_model_of_opensim_stands_where_the_joints_are(walk, tmp_path):
     assert f"nRows={len(values)}" in head and "inDegrees=yes" in head and len(values) == 59
     row = dict(zip(names, values[30], strict=True))
     markers = kinematics(ElementTree.parse(path.with_suffix(".osim")).getroot(), row)
-    fitted = angles.fit(motion.read(walk.path)).joints()[walk.kept][30]
+    fitted = angles.fit(motion.read(walk.path).places).joints()[walk.kept][30]
     for name, place, near in zip(JOINTS, fitted, walk.places[walk.kept][30], strict=True):
         np.testing.assert_allclose(markers[name], opensim.GROUND @ place, atol=1e-5)
         np.testing.assert_allclose(place, near, atol=2e-3)

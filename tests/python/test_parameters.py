@@ -59,17 +59,18 @@ def test_a_walk_by_rule_has_its_own_parameters():
     assert set(summary) == set(QUANTITIES)
 
 
-def test_sd_follow_those_of_the_track():
-    once, twice = (measure(walking_track(phase_sd=s)) for s in (0.004, 0.008))
+def test_sd_follow_those_of_the_track_and_last():
+    once, twice = (measure(walking_track(sd=0.002, phase_sd=s)) for s in (0.01, 0.02))
+    late = 0.01 / 0.9
+    np.testing.assert_allclose(once.event_sd.strike["left"][1:-1], late, rtol=0.4)
     right = once.strides["right"]
-    expected = np.sqrt(2) * 0.004 / 0.9
-    np.testing.assert_allclose(right.sd["stride_time_s"], expected, rtol=0.15)
-    np.testing.assert_allclose(right.sd["stride_length_m"], np.sqrt(2) * 0.01, rtol=0.15)
-    np.testing.assert_allclose(once.event_sd.strike["left"], 0.004 / 0.9, rtol=1e-6)
+    assert (right.sd["stride_time_s"][1:-1] < 0.85 * np.sqrt(2) * late).all()  # both ends are late together
     ratio = twice.strides["right"].sd["stride_time_s"] / right.sd["stride_time_s"]
-    np.testing.assert_allclose(ratio, 2, rtol=1e-6)
-    both = once.summary()["stride_time_s"]["both"]["sd"]
-    assert both < right.sd["stride_time_s"].mean() / 2  # of a mean over seven strides
+    np.testing.assert_allclose(ratio, 2, rtol=0.35)
+    # A mean over seven strides is surer of what changes between them, not of what is the person's.
+    summary = once.summary()
+    assert summary["stride_time_s"]["both"]["sd"] < 0.6 * right.sd["stride_time_s"].mean()
+    assert summary["step_width_m"]["both"]["sd"] > 0.7 * right.sd["step_width_m"].mean()
 
 
 def test_without_sd_nothing_is_claimed():

@@ -35,7 +35,12 @@ def walking_track(seconds=5.0, hz=0.9, length=1.3, width=0.12, heading=0.4, sd=0
     pelvis = (length * hz * time)[:, None] * ahead + [0, 0, 0.9]
     places = {name: pelvis.copy() for name in JOINTS}
     for side in STEP:
-        places[f"{side[0]}_heel"], places[f"{side[0]}_toe"] = foot(time, side, hz, length, width, heading)
+        heel, toe = foot(time, side, hz, length, width, heading)
+        places |= {
+            f"{side[0]}_heel": heel,
+            f"{side[0]}_toe": toe,
+            f"{side[0]}_ankle": heel + 0.3 * (toe - heel),
+        }
     n = len(time)
     numbers = {"stride_hz": np.full(n, hz), "phase_sd": np.full(n, phase_sd)}
     numbers |= {f"c_{k}": np.zeros(n) for k in range(1, 6)}

@@ -81,7 +81,7 @@ def _fitted(args: argparse.Namespace, suffix: str, beside: str | None) -> dict[s
     from gait.export import angles, bvh, motion, opensim
 
     found = motion.read(args.input)
-    fitted = angles.fit(found)
+    fitted = angles.fit(found.places)
     with replacing(args.output) as file:
         if suffix == ".bvh":
             if lacking := bvh.write(file, found, fitted):

@@ -12,7 +12,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from gait.body.skeleton import CHANNELS, JOINTS, axis_rotation, default_skeleton
-from gait.export.motion import Motion
 
 Array = NDArray[np.float64]
 
@@ -62,10 +61,14 @@ class Fitted:
         return np.asarray(origins[:, at] + np.einsum("tpij,pj->tpi", turns[:, at], self.points))
 
 
-def fit(motion: Motion) -> Fitted:
-    """Fit lengths and angles to a motion, each in turns."""
+def fit(places: Array) -> Fitted:
+    """Fit lengths and angles to joints, each in turns.
+
+    `places` (T, P, 3): of `JOINTS`, metres, world with z up; NaN in frames that are left out.
+    """
     skeleton = default_skeleton()
-    wanted = motion.places[motion.present]
+    present = np.isfinite(places).all(axis=(1, 2))
+    wanted = places[present]
     stature = _stature(wanted)
     links = [tuple(int(n) for n in row) for row in skeleton.links]
     count = len(wanted)
@@ -89,9 +92,9 @@ def fit(motion: Motion) -> Fitted:
     for side in "lr":
         _choose_branch(fitted.angles, f"{side}_shoulder_rotation", f"{side}_elbow_flexion")
     rms = float(np.sqrt(((fitted.joints() - wanted) ** 2).sum(axis=2).mean()))
-    angles, pelvis = (np.full((len(motion.places), n), np.nan) for n in (len(CHANNELS), 3))
-    angles[motion.present] = np.unwrap(fitted.angles, axis=0)
-    pelvis[motion.present] = fitted.pelvis
+    angles, pelvis = (np.full((len(places), n), np.nan) for n in (len(CHANNELS), 3))
+    angles[present] = np.unwrap(fitted.angles, axis=0)
+    pelvis[present] = fitted.pelvis
     return replace(fitted, angles=angles, pelvis=pelvis, rms=rms)
 
 

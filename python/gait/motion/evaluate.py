@@ -5,6 +5,7 @@ The baselines are a standing mean pose and a mean cycle that runs on from the tr
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
@@ -28,19 +29,22 @@ _BONES = [(f"{s}_{a}", f"{s}_{b}") for s in "lr" for a, b in (("hip", "knee"), (
 _BONES += [(f"{s}_{a}", f"{s}_{b}") for s in "lr" for a, b in (("shoulder", "elbow"), ("elbow", "wrist"))]
 
 
-def static_pose(model: dict[str, Any], truth: Joints) -> Array:
-    """Mean pose of the model at the true hip midpoint and walking direction, EVAL15 (n, 15, 3).
+def static_pose(model: dict[str, Any], truth: Joints, names: Sequence[str] = EVAL15) -> Array:
+    """Mean pose of the model at the true hip midpoint and walking direction, joints `names` (n, P, 3).
 
-    `model`: sections of the blob; `truth`: gives place, direction and the stature that fits its limbs.
+    `model`: sections of the blob; `truth`: gives place, direction and the stature that fits its limbs;
+    `names`: P joints that begin with those of EVAL15.
     """
-    joints = _poses(model, _PHASES, stature(model, truth)).mean(axis=0)
+    joints = _poses(model, _PHASES, stature(model, truth), names=names).mean(axis=0)
     joints -= joints[HIPS].mean(axis=0)
     turned = np.einsum("nij,pj->npi", _turns(truth), joints)
     return np.asarray(turned + _hip_midpoint(truth)[:, None])
 
 
-def free_run(model: dict[str, Any], truth: Joints, strikes: Strikes, first: int) -> Array | None:
-    """Mean cycle running on from the true state at row `first` of the truth, EVAL15 (n, 15, 3).
+def free_run(
+    model: dict[str, Any], truth: Joints, strikes: Strikes, first: int, names: Sequence[str] = EVAL15
+) -> Array | None:
+    """Mean cycle running on from the true state at row `first` of the truth, joints `names` (n, P, 3).
 
     Place, direction, phase and stride rate are the truth's at that row, then nothing is looked at.
     None if the phase is unknown.
@@ -51,7 +55,7 @@ def free_run(model: dict[str, Any], truth: Joints, strikes: Strikes, first: int)
     advance = (truth.frame - truth.frame[first]) * (cycles[1] - cycles[0])
     size = stature(model, truth)
     stride = (truth.time[-1] - truth.time[0]) / (advance[-1] - advance[0])
-    joints = _poses(model, cycles[0] + advance, size, 1 / stride)
+    joints = _poses(model, cycles[0] + advance, size, 1 / stride, names)
     joints += size * root_path(model, cycles[0] + advance, 1 / stride)[:, None]
     joints = np.einsum("ij,npj->npi", _turns(truth, stride)[first], joints)
     return np.asarray(joints - joints[first, HIPS].mean(axis=0) + _hip_midpoint(truth)[first])
@@ -67,11 +71,13 @@ def stature(model: dict[str, Any], truth: Joints) -> float:
     return lengths[0] / lengths[1]
 
 
-def _poses(model: dict[str, Any], phase: Array, size: float, rate: float = 0.0) -> Array:
-    """EVAL15 (n, 15, 3) of the mean cycle heading along x with the pelvis at the origin."""
+def _poses(
+    model: dict[str, Any], phase: Array, size: float, rate: float = 0.0, names: Sequence[str] = EVAL15
+) -> Array:
+    """Joints `names` (n, P, 3) of the mean cycle heading along x with the pelvis at the origin."""
     joints, _ = skeleton.pose(model, phase, np.zeros(0), size, 0.0, 0.0, 0.0, np.zeros(3), stride_hz=rate)
-    names = unpack_names(model["PTNM"])
-    return joints[:, [names.index(name) for name in EVAL15]]
+    known = unpack_names(model["PTNM"])
+    return joints[:, [known.index(name) for name in names]]
 
 
 def root_path(model: dict[str, Any], cycles: Array, rate: float = 0.0) -> Array:

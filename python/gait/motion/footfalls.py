@@ -5,17 +5,14 @@ the toe is furthest behind it (Zeni et al. 2008, Gait & Posture 27:710).
 
 Uncertainty is carried by draws.  With the motions of ``gait track --draws`` each draw is a whole motion, so
 errors that last are the same at both ends of a stride, as they should be.  A track alone has only the
-standard deviations of each frame: then strikes, toe-offs and places are drawn independently, which makes the
-parameters less certain where errors last.  The errors of a camera that was found from the walk are common to
-all frames, and are drawn so in both cases.
+standard deviations of each frame: `gait.motion.uncertainty` states how long their errors last.
 """
 
 from __future__ import annotations
 
 import os
 import zipfile
-from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, fields
 from pathlib import Path
 
 import numpy as np
@@ -148,7 +145,8 @@ def _times(events: Fields, key: str) -> Array:
 SIDES = ("right", "left")
 
 _STANCE = np.linspace(0.10, 0.30, 5)  # of a stride after the strike: the foot is flat
-_NEAR = 0.25  # seconds: further apart two events are not the same
+_SWING = np.linspace(0.12, 0.26, 8)  # of a stride before the strike: the toe passes the other foot
+NEAR = 0.25  # seconds: further apart two events are not the same
 
 
 @dataclass(frozen=True)
@@ -172,8 +170,23 @@ class Contacts:
     #: (..., k) seconds; `off` ends the contact that `strike` begins, NaN where it was not seen.
     strike: Array
     off: Array
-    place: Array  #: (..., k, 3) heel while the foot is flat, metres, world; NaN where the track ends before
+    place: Array  #: (..., k, 3) ankle while the foot is flat, metres, world; NaN where the track ends before
     pelvis: Array  #: (..., k, 3) at the strike
+    #: (..., k) metres that the toe clears the floor by in the middle of the swing before the strike, at
+    #: least; NaN where the track begins later
+    clearance: Array
+
+
+def events_from_meta(path: str | os.PathLike[str]) -> Events | None:
+    """Events of the ``events_video_frames`` of a clip's meta.json, as frame numbers; None if it has none."""
+    events = read_json(path, "meta").table("events_video_frames", "give lists of events")
+    names = {f"{side[0]}_{event}" for side in SIDES for event in ("heel_strike", "toe_off")}
+    if any(name not in events for name in names):
+        return None
+    return Events(
+        {side: _times(events, f"{side[0]}_heel_strike") for side in SIDES},
+        {side: _times(events, f"{side[0]}_toe_off") for side in SIDES},
+    )
 
 
 def find_events(joints: Joints) -> Events:
@@ -194,7 +207,7 @@ def same_events(found: Events, wanted: Events) -> Events:
         if not len(have):
             return np.full(len(want), np.nan)
         nearest = have[np.argmin(np.abs(have[:, None] - want), axis=0)] if len(want) else np.zeros(0)
-        return np.where(np.abs(nearest - want) <= _NEAR, nearest, np.nan)
+        return np.where(np.abs(nearest - want) <= NEAR, nearest, np.nan)
 
     return Events(
         {side: pick(found.strike[side], wanted.strike[side]) for side in SIDES},
@@ -208,8 +221,9 @@ def contacts(joints: Joints, events: Events, side: str, stride: float) -> Contac
     return Contacts(
         strike=strike,
         off=_offs(strike, events.off[side], stride),
-        place=_flat(joints.time, joints.places[f"{side[0]}_heel"], strike, stride),
+        place=_flat(joints.time, joints.places[f"{side[0]}_ankle"], strike, stride),
         pelvis=at(joints.time, joints.places["pelvis"], strike),
+        clearance=_clearance(joints.time, joints.places[f"{side[0]}_toe"][:, 2], strike, stride),
     )
 
 
@@ -226,7 +240,7 @@ def stride_time(events: Events) -> float:
 
 def stack(draws: list[Contacts]) -> Contacts:
     """Contacts of many draws as one, shape (draws, ...)."""
-    names = ("strike", "off", "place", "pelvis")
+    names = [item.name for item in fields(Contacts)]
     return Contacts(**{name: np.stack([getattr(draw, name) for draw in draws]) for name in names})
 
 
@@ -240,19 +254,23 @@ def _offs(strike: Array, off: Array, stride: float) -> Array:
     return out
 
 
-def _flat(time: Array, heel: Array, strike: Array, stride: float) -> Array:
-    """Mean of the heel while the foot is flat, as far as the track goes."""
+def _flat(time: Array, ankle: Array, strike: Array, stride: float) -> Array:
+    """Mean of the ankle while the foot is flat, as far as the track goes."""
     out = np.full((len(strike), 3), np.nan)
     for k, begun in enumerate(strike):
         when = begun + stride * _STANCE
         when = when[when <= time[-1]]
         if len(when):
-            out[k] = at(time, heel, when).mean(axis=0)
+            out[k] = at(time, ankle, when).mean(axis=0)
     return out
 
 
-_COUNT = 500  # independent draws; the sd is then known to 3 %
-_FLAT = 0.2  # of a stride after the strike
+def _clearance(time: Array, toe: Array, strike: Array, stride: float) -> Array:
+    """Least height of the toe in the middle of the swing, over that while the foot was flat before."""
+    swing = np.interp(strike[:, None] - stride * _SWING, time, toe)
+    flat = np.interp(strike[:, None] - stride * (1 - _STANCE), time, toe)
+    begun = strike - stride * (1 - _STANCE[0]) >= time[0]
+    return np.where(begun, swing.min(axis=1) - flat.mean(axis=1), np.nan)
 
 
 @dataclass(frozen=True)
@@ -300,23 +318,6 @@ class Draws:
 _ARRAYS = ("frame", "time", "joint_names", "angle_names", "joints", "angles", "phase")
 
 
-def draw_contacts(
-    track: Track, events: Events, feet: Mapping[str, Contacts], stride: float, draws: Draws | None
-) -> tuple[dict[str, Contacts], Events, str]:
-    """Draws of the contacts by side, shape (D, ...), standard deviations of the events, and their source."""
-    camera = "" if track.camera_change is None else "; errors of the camera are common to all frames"
-    if draws is not None:
-        source = f"{len(draws.phase)} motions drawn from the posterior{camera}"
-        return (*_of_motions(track, draws, events, stride), source)
-    if "phase_sd" not in track.numbers:
-        nothing = {side: stack([_nan_like(feet[side])]) for side in SIDES}
-        return nothing, _event_sd([events], unknown=True), "unknown: the track has no column phase_sd"
-    return (
-        *_independent(track, events, feet, stride),
-        f"the standard deviations of each frame, taken as independent{camera}",
-    )
-
-
 def moved_by_camera(change: Array, off: Array) -> Array:
     """How places move over the floor with each part of the camera's uncertainty.
 
@@ -334,86 +335,3 @@ def moved_by_camera(change: Array, off: Array) -> Array:
     """
     turned = np.stack([-off[..., 1], off[..., 0]], axis=-1)[..., None] * change[..., 2:, :]
     return np.asarray(change[..., :2, :] + turned)
-
-
-def _moved(track: Track, name: str) -> Array:
-    """How a joint of a track moves with the camera (n, 2, 4); not at all where the camera was given."""
-    if track.camera_change is None:
-        return np.zeros((len(track.time), 2, 4))
-    return moved_by_camera(track.camera_change, (track.places[name] - track.places["pelvis"])[:, :2])
-
-
-def _of_motions(
-    track: Track, draws: Draws, events: Events, stride: float
-) -> tuple[dict[str, Contacts], Events]:
-    motions = [draws.motion(d) for d in range(len(draws.phase))]
-    if track.camera_change is not None:
-        parts = np.random.default_rng(0).standard_normal((len(motions), 4))
-        for motion, part in zip(motions, parts, strict=True):
-            for name in motion.places.keys() & track.places.keys():
-                motion.places[name][:, :2] += _moved(track, name) @ part
-    found = [same_events(find_events(motion), events) for motion in motions]
-    drawn = {
-        side: stack([contacts(m, e, side, stride) for m, e in zip(motions, found, strict=True)])
-        for side in SIDES
-    }
-    return drawn, _event_sd(found)
-
-
-def _independent(
-    track: Track, events: Events, feet: Mapping[str, Contacts], stride: float
-) -> tuple[dict[str, Contacts], Events]:
-    """Draw each event with the uncertainty of the phase, and its place with that of the heel."""
-    random = np.random.default_rng(0)
-    time, rate = track.time, np.maximum(track.numbers["stride_hz"], 0.1)
-    late = np.minimum(track.numbers["phase_sd"], 0.29) / rate  # no less sure than knowing nothing
-
-    parts = np.zeros((_COUNT, 4)) if track.camera_change is None else random.standard_normal((_COUNT, 4))
-
-    def timing(when: Array) -> Array:
-        return np.interp(when, time, late)
-
-    def noisy(value: Array, sd: Array) -> Array:
-        return np.asarray(value + sd * random.standard_normal((_COUNT, *value.shape)))
-
-    def placed(value: Array, name: str, when: Array) -> Array:
-        moved = _moved(track, name)
-        common = np.pad((moved**2).sum(axis=2), ((0, 0), (0, 1)))
-        own = np.sqrt(np.maximum(track.sd[name] ** 2 - common, 0.0))
-        out = noisy(value, at(time, own, when))
-        there = at(time, moved.reshape(len(time), -1), when).reshape(len(when), 2, 4)
-        out[..., :2] += np.einsum("kap,dp->dka", there, parts)
-        return out
-
-    drawn = {}
-    for side in SIDES:
-        foot = feet[side]
-        drawn[side] = Contacts(
-            noisy(foot.strike, timing(foot.strike)),
-            noisy(foot.off, timing(foot.off)),
-            placed(foot.place, f"{side[0]}_heel", foot.strike + _FLAT * stride),
-            placed(foot.pelvis, "pelvis", foot.strike),
-        )
-    sd = Events(
-        {side: timing(events.strike[side]) for side in SIDES},
-        {side: timing(events.off[side]) for side in SIDES},
-    )
-    return drawn, sd
-
-
-def _event_sd(found: list[Events], unknown: bool = False) -> Events:
-    """Return the sd of each event over the draws that have it; NaN if fewer than half have it."""
-
-    def sd(times: list[Array]) -> Array:
-        stacked = np.stack(times)
-        enough = (np.isfinite(stacked).mean(axis=0) >= 0.5) & (not unknown)
-        return np.where(enough, np.nanstd(np.where(enough, stacked, 0.0), axis=0), np.nan)
-
-    return Events(
-        {side: sd([e.strike[side] for e in found]) for side in SIDES},
-        {side: sd([e.off[side] for e in found]) for side in SIDES},
-    )
-
-
-def _nan_like(c: Contacts) -> Contacts:
-    return Contacts(*(np.full_like(values, np.nan) for values in (c.strike, c.off, c.place, c.pelvis)))

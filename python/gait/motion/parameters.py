@@ -1,6 +1,6 @@
 """Gait parameters and joint-angle cycles of a track, each with its uncertainty, and the files they go into.
 
-Contacts of the feet are drawn from the posterior (`gait.motion.footfalls`) and every parameter is computed
+Contacts of the feet are drawn from the posterior (`gait.motion.uncertainty`) and every parameter is computed
 again from each draw; its standard deviation is that over the draws.
 """
 
@@ -19,17 +19,17 @@ from numpy.typing import NDArray
 
 from gait.body.model_curves import ModelCurves
 from gait.errors import UserError
-from gait.io.track_file import Track
+from gait.io.track_file import Joints, Track
 from gait.motion.footfalls import (
     SIDES,
     Contacts,
     Draws,
     Events,
     contacts,
-    draw_contacts,
     find_events,
     stride_time,
 )
+from gait.motion.uncertainty import draw_contacts
 
 Array = NDArray[np.float64]
 
@@ -41,6 +41,7 @@ QUANTITIES = {
     "step_time_s": "step time, s",
     "step_length_m": "step length, m",
     "step_width_m": "step width, m",
+    "foot_clearance_m": "foot clearance, m",
     "stance_percent": "stance, % of the stride",
     "double_support_percent": "double support, % of the stride",
 }
@@ -106,18 +107,23 @@ class Parameters:
         if not len(values):
             return None
         between = float(values.std(ddof=1)) if len(values) > 1 else float("nan")
-        return {"mean": float(values.mean()), "sd": float(_sd(_mean(draws, 1))), "between": between}
+        return {"mean": float(values.mean()), "sd": float(sd_of(mean_of(draws, 1))), "between": between}
 
     def _asymmetry(self, name: str) -> dict[str, float] | None:
         right, left = (self._sure(name, (side,)) for side in SIDES)
         if not len(right[0]) or not len(left[0]):
             return None
 
-        def index(r: Array, m: Array) -> Array:
-            return 200 * (r - m) / (r + m)
+        value = asymmetry(right[0].mean(), left[0].mean())
+        return {
+            "mean": float(value),
+            "sd": float(sd_of(asymmetry(mean_of(right[1], 1), mean_of(left[1], 1)))),
+        }
 
-        value = index(right[0].mean(), left[0].mean())
-        return {"mean": float(value), "sd": float(_sd(index(_mean(right[1], 1), _mean(left[1], 1))))}
+
+def asymmetry(right: Array, left: Array) -> Array:
+    """Return 200 (right - left) / (right + left), per cent (Robinson 1987)."""
+    return 200 * (right - left) / (right + left)
 
 
 def measure(track: Track, draws: Draws | None = None) -> Parameters:
@@ -134,20 +140,20 @@ def measure(track: Track, draws: Draws | None = None) -> Parameters:
         seconds = track.time[-1] - track.time[0]
         raise UserError(f"has no whole stride in {seconds:.2f} s; track at least two strides")
     feet = {side: contacts(track, events, side, stride) for side in SIDES}
-    drawn, event_sd, source = draw_contacts(track, events, feet, stride, draws)
+    drawn, event_sd, source = draw_contacts(track, events, stride, draws)
     strides = {}
     for side, other in (SIDES, SIDES[::-1]):
         between = _between(feet[side].strike, feet[other].strike)
         values = stride_quantities(feet[side], feet[other], between)
         many = stride_quantities(drawn[side], drawn[other], between)
         start, end = feet[side].strike[:-1], feet[side].strike[1:]
-        whole = (end - start > 0.6 * stride) & (end - start < 1.6 * stride)  # no strike was missed
+        whole = _whole(start, end, stride)
         strides[side] = Strides(
             side,
             start[whole],
             end[whole],
             {name: value[whole] for name, value in values.items()},
-            {name: _sd(value[:, whole]) for name, value in many.items()},
+            {name: sd_of(value[:, whole]) for name, value in many.items()},
             {name: value[:, whole] for name, value in many.items()},
             np.array([_is_free(track, _UNSURE, *ends) for ends in zip(start, end, strict=True)], bool)[whole],
         )
@@ -156,6 +162,32 @@ def measure(track: Track, draws: Draws | None = None) -> Parameters:
         for s in strides.values():
             s.sure[:] = [_is_free(track, {"lost"}, *ends) for ends in zip(s.start, s.end, strict=True)]
     return Parameters(events, event_sd, strides, source, all_unsure=not some)
+
+
+def strides_of(motion: Joints, events: Events) -> dict[str, Strides]:
+    """Strides of a motion whose events are known, by side; all are sure, and there are no draws.
+
+    UserError if no foot strikes twice.
+    """
+    stride = stride_time(events)
+    if not np.isfinite(stride):
+        raise UserError("the true motion has no whole stride; give a longer one")
+    feet = {side: contacts(motion, events, side, stride) for side in SIDES}
+    out = {}
+    for side, other in (SIDES, SIDES[::-1]):
+        values = stride_quantities(feet[side], feet[other], _between(feet[side].strike, feet[other].strike))
+        start, end = feet[side].strike[:-1], feet[side].strike[1:]
+        whole = _whole(start, end, stride)
+        known = {name: value[whole] for name, value in values.items()}
+        unknown = {name: np.full(value.shape, np.nan) for name, value in known.items()}
+        draws = {name: value[None] for name, value in unknown.items()}
+        out[side] = Strides(side, start[whole], end[whole], known, unknown, draws, np.ones(whole.sum(), bool))
+    return out
+
+
+def _whole(start: Array, end: Array, stride: float) -> NDArray[np.bool_]:
+    """Which strides missed no strike."""
+    return (end - start > 0.6 * stride) & (end - start < 1.6 * stride)
 
 
 def measured(track: Track, draws: Draws | None = None) -> Parameters | None:
@@ -191,6 +223,7 @@ def stride_quantities(foot: Contacts, other: Contacts, between: NDArray[np.int64
         "step_time_s": end - middle,
         "step_length_m": np.sum(step * ahead, axis=-1),
         "step_width_m": np.abs(aside),
+        "foot_clearance_m": foot.clearance[..., 1:],
         "stance_percent": 100 * (foot.off[..., :-1] - start) / time,
         "double_support_percent": 100 * (last_off - start + foot.off[..., :-1] - middle) / time,
     }
@@ -217,14 +250,14 @@ def _is_free(track: Track, statuses: set[str], start: float, end: float) -> bool
     return not statuses & {track.status[i] for i in np.flatnonzero(inside)}
 
 
-def _mean(values: Array, axis: int) -> Array:
+def mean_of(values: Array, axis: int) -> Array:
     """Mean of what is there."""
     with warnings.catch_warnings():
         warnings.simplefilter("ignore", RuntimeWarning)  # of nothing: NaN
         return np.asarray(np.nanmean(values, axis=axis))
 
 
-def _sd(draws: Array) -> Array:
+def sd_of(draws: Array) -> Array:
     """Return the standard deviation over the first axis; NaN where fewer than half of the draws have one."""
     with warnings.catch_warnings():
         warnings.simplefilter("ignore", RuntimeWarning)

@@ -259,7 +259,7 @@ def way_plot(track: Track, parameters: Parameters | None, errors: Comparison | N
         axes.plot(*pelvis[0, [across, up]], "D", color=DARK, ms=6, label="begins here")
         for side, places in feet.items():
             mark = "o" if side == "right" else "s"
-            axes.plot(*places[:, [across, up]].T, mark, ms=5, color=ON_PAPER[side], label=f"{side} heel")
+            axes.plot(*places[:, [across, up]].T, mark, ms=5, color=ON_PAPER[side], label=f"{side} foot")
         axes.set(xlim=(low[across], high[across]), ylim=(low[up], high[up]))
         if turned:
             axes.invert_yaxis()  # a turn by 90 degrees, not a mirror image

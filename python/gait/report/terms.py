@@ -35,11 +35,12 @@ ANGLES = {
 QUANTITIES = {
     "stride_time_s": "From a heel strike to the next one of the same foot.",
     "cadence_spm": "Steps per minute: two steps make a stride.",
-    "stride_length_m": "From where a heel strikes to where the same heel strikes next, along the way.",
+    "stride_length_m": "From where a foot stands to where the same foot stands next, along the way.",
     "speed_m_s": "Way of the pelvis over the floor in a stride, by its time.",
     "step_time_s": "From the heel strike of the other foot to that of this one.",
-    "step_length_m": "From where the other heel stands to where this one strikes, along the way.",
-    "step_width_m": "Between the lines on which both heels strike.",
+    "step_length_m": "From where the other foot stands to where this one stands next, along the way.",
+    "step_width_m": "Between the lines on which the ankles stand.",
+    "foot_clearance_m": "Least height of the toe joint in the middle of the swing, over where it stood.",
     "stance_percent": "Share of the stride in which the foot is on the floor.",
     "double_support_percent": "Share of the stride in which both feet are on the floor.",
 }

@@ -1,0 +1,189 @@
+"""Uncertain footfalls: motions that agree with a track's standard deviations, and the contacts of each.
+
+Errors of a track last, and how long they last decides what they do to a gait parameter.  Errors that are
+independent in every frame would claim too much for means over strides and too little for single ones.  Parts:
+
+- place of the whole person: the same for all joints, cancels in every length;
+- size: the same share of every length, as the distance from the camera follows from the size in the picture;
+- the person: joints are elsewhere than in the model, by a constant and by what repeats with every stride, on
+  each side for itself.  Cancels in strides, but not in steps, width, clearance or symmetry, and a mean over
+  strides does not reduce it;
+- what wanders within a stride;
+- the camera, where it was found from the walk: common to all frames.
+
+Motions drawn from the posterior (`Draws`) have all of that but what the model cannot express; that is the
+difference to the standard deviations of the track, and counts as the person's.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import fields
+
+import numpy as np
+from numpy.typing import NDArray
+
+from gait.io.track_file import Joints, Track
+from gait.motion.footfalls import (
+    SIDES,
+    Contacts,
+    Draws,
+    Events,
+    contacts,
+    find_events,
+    moved_by_camera,
+    same_events,
+    stack,
+)
+
+Array = NDArray[np.float64]
+
+JOINTS = ("pelvis", *(f"{s}_{part}" for s in "rl" for part in ("ankle", "heel", "toe")))
+"""Joints that contacts need."""
+
+_COUNT = 100  # motions where the track has none; a standard deviation is then known to 7 %
+# Shares of the variance of a joint and of the phase, where only the standard deviations of frames are known;
+# chosen on people of `gait simulate` that no result is reported for.
+_PERSON, _WANDER = 0.5, 0.15
+_LATE = 0.6  # share of the variance of the phase that lasts
+_CONSTANT = 0.5  # share of the person's variance that is constant; the rest are `_WAVES` waves of the stride
+_WAVES = 2
+_SECONDS = 0.12  # over which what wanders is smooth
+_SIZE = 0.7  # of the person's part of a joint: many joints together determine the size in the picture
+
+
+def draw_contacts(
+    track: Track, events: Events, stride: float, draws: Draws | None
+) -> tuple[dict[str, Contacts], Events, str]:
+    """Draws of the contacts by side, shape (D, ...), standard deviations of the events, and their source."""
+    if draws is None and "phase_sd" not in track.numbers:
+        nothing = {side: _unknown(contacts(track, events, side, stride)) for side in SIDES}
+        return nothing, _event_sd([events], unknown=True), "unknown: the track has no column phase_sd"
+    drawn: dict[str, list[Contacts]] = {side: [] for side in SIDES}
+    found = []
+    for motion in _motions(track, draws):
+        found.append(same_events(find_events(motion), events))
+        for side in SIDES:
+            drawn[side].append(contacts(motion, found[-1], side, stride))
+    source = "the standard deviations of each frame, whose errors last"
+    if draws is not None:
+        source = f"{len(found)} motions drawn from the posterior, and what the model cannot express"
+    source += "" if track.camera_change is None else "; errors of the camera are common to all frames"
+    return {side: stack(drawn[side]) for side in SIDES}, _event_sd(found), source
+
+
+def _motions(track: Track, draws: Draws | None) -> Iterator[Joints]:
+    """Motions of `JOINTS` that agree with the track's standard deviations."""
+    random = np.random.default_rng(0)
+    count = _COUNT if draws is None else len(draws.phase)
+    sd = {name: _without_camera(track, name) for name in JOINTS}
+    own = _person_sd(sd, draws)
+    size = _size_sd(track, own, draws)
+    waves = _waves(track.phase)
+    for d in range(count):
+        places = _warped(track, random) if draws is None else draws.motion(d).places
+        start, scale = places["pelvis"][0].copy(), 1 + size * random.standard_normal()
+        camera = random.standard_normal(4)
+        out = {}
+        for name in JOINTS:
+            lasting = waves @ (random.standard_normal((waves.shape[1], 3)) * own[name])
+            out[name] = start + scale * (places[name] - start) + lasting
+            if draws is None:
+                wander = _wander(track.time, 3, random)
+                out[name] += np.sqrt(_WANDER) * sd[name] * wander
+            if track.camera_change is not None:
+                out[name][:, :2] += _moved(track, name) @ camera
+        yield Joints(track.frame, track.time, out)
+
+
+def _moved(track: Track, name: str) -> Array:
+    """How a joint of a track moves with the parts of the camera's uncertainty (n, 2, 4)."""
+    return moved_by_camera(track.camera_change, (track.places[name] - track.places["pelvis"])[:, :2])
+
+
+def _without_camera(track: Track, name: str) -> Array:
+    """Return the standard deviations (n, 3) of a joint where the camera is right, metres."""
+    if track.camera_change is None:
+        return track.sd[name]
+    common = np.pad((_moved(track, name) ** 2).sum(axis=2), ((0, 0), (0, 1)))
+    return np.sqrt(np.maximum(track.sd[name] ** 2 - common, 0.0))
+
+
+def _person_sd(sd: dict[str, Array], draws: Draws | None) -> dict[str, Array]:
+    """Return the standard deviations (3,) of the person's part by joint, metres."""
+    if draws is None:
+        return {name: np.sqrt(_PERSON) * np.median(sd[name], axis=0) for name in JOINTS}
+    out = {}
+    for name in JOINTS:
+        drawn = draws.joints[:, :, draws.joint_names.index(name)].astype(float).var(axis=0)
+        out[name] = np.sqrt(np.median(np.maximum(sd[name] ** 2 - drawn, 0), axis=0))
+    return out
+
+
+def _size_sd(track: Track, own: dict[str, Array], draws: Draws | None) -> float:
+    """Return the standard deviation of the size, as a share."""
+    if "stature_m" not in track.numbers:
+        return 0.0
+    stature = float(np.median(track.numbers["stature_m"]))
+    stated = float(np.median(track.numbers["stature_sd_m"])) / stature
+    if draws is not None:
+        legs = [draws.joints[:, :, draws.joint_names.index(f"r_{name}")] for name in ("hip", "knee", "ankle")]
+        lengths = sum(
+            np.linalg.norm(a - b, axis=2).mean(axis=1) for a, b in zip(legs, legs[1:], strict=False)
+        )
+        stated = np.sqrt(max(stated**2 - (lengths.std() / lengths.mean()) ** 2, 0.0))
+    fitted = _SIZE * float(np.mean([own[f"{s}_heel"][2] for s in "rl"])) / stature
+    return float(np.hypot(stated, fitted))
+
+
+def _waves(phase: Array) -> Array:
+    """Constant and waves of the stride (n, 1 + 2 `_WAVES`) whose squares sum to 1 in every frame."""
+    if np.isnan(phase).any():
+        return np.ones((len(phase), 1))
+    turn = 2 * np.pi * phase[:, None] * np.arange(1, _WAVES + 1)
+    parts = np.hstack([np.cos(turn), np.sin(turn)]) * np.sqrt((1 - _CONSTANT) / _WAVES)
+    return np.hstack([np.full((len(phase), 1), np.sqrt(_CONSTANT)), parts])
+
+
+def _warped(track: Track, random: np.random.Generator) -> dict[str, Array]:
+    """Places of the track, late by an error of the phase."""
+    rate = np.maximum(track.numbers["stride_hz"], 0.1)
+    sd = np.minimum(track.numbers["phase_sd"], 0.29) / rate  # no less sure than knowing nothing
+    wander = _wander(track.time, 1, random)[:, 0]
+    late = sd * (np.sqrt(_LATE) * random.standard_normal() + np.sqrt(1 - _LATE) * wander)
+    return {
+        name: np.stack(
+            [np.interp(track.time - late, track.time, axis) for axis in track.places[name].T], axis=1
+        )
+        for name in JOINTS
+    }
+
+
+def _wander(time: Array, count: int, random: np.random.Generator) -> Array:
+    """Smooth noise (n, count) of unit variance."""
+    from scipy.ndimage import gaussian_filter1d  # slow to load
+
+    width = max(_SECONDS / float(np.median(np.diff(time))), 0.1)
+    noise = gaussian_filter1d(random.standard_normal((len(time), count)), width, axis=0, mode="reflect")
+    unit = np.zeros(8 * int(np.ceil(width)) + 1)
+    unit[len(unit) // 2] = 1.0
+    return np.asarray(noise / np.linalg.norm(gaussian_filter1d(unit, width)))
+
+
+def _event_sd(found: list[Events], unknown: bool = False) -> Events:
+    """Return the sd of each event over the draws that have it; NaN if fewer than half have it."""
+
+    def sd(times: list[Array]) -> Array:
+        stacked = np.stack(times)
+        enough = (np.isfinite(stacked).mean(axis=0) >= 0.5) & (not unknown)
+        return np.where(enough, np.nanstd(np.where(enough, stacked, 0.0), axis=0), np.nan)
+
+    return Events(
+        {side: sd([e.strike[side] for e in found]) for side in SIDES},
+        {side: sd([e.off[side] for e in found]) for side in SIDES},
+    )
+
+
+def _unknown(c: Contacts) -> Contacts:
+    """Return one draw of contacts of which nothing is known."""
+    return Contacts(**{item.name: np.full_like(getattr(c, item.name), np.nan)[None] for item in fields(c)})

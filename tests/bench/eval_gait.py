@@ -1,0 +1,397 @@
+#!/usr/bin/env python3
+"""What a gait lab compares: footfalls, gait parameters and joint angles of tracks against the truth.
+
+    make eval-gait                           the development clips
+    make eval-gait ARGS='--simulated DIR'    slow, fast, asymmetric and aided walks by gait simulate instead
+
+Each clip is tracked by `gait track --smooth --draws` with a model learnt without its subject, from the truth
+with the noise of `eval_clips`; the same without --smooth is the arm `track`.  Beside them stand a pose that
+does not move and the mean cycle that runs on from the true start.  Angles of both motions come from the same
+fit of a skeleton to joints (`gait.export.angles`), so that a constant is a difference of joint centres.
+"""
+
+from __future__ import annotations
+
+import argparse
+import csv
+import json
+import subprocess
+import sys
+from collections.abc import Iterator
+from concurrent.futures import ThreadPoolExecutor
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import eval_clips
+import gait_cases
+import numpy as np
+import table
+from eval_plan import Clip
+from facts import facts
+
+from gait.bindings.model import read_blob
+from gait.body.skeleton import CHANNELS, JOINTS
+from gait.errors import UserError
+from gait.export import angles
+from gait.io import blob
+from gait.io.track_file import Joints, Track, read_track, read_truth
+from gait.motion.evaluate import free_run, static_pose
+from gait.motion.footfalls import Draws, strikes_of
+from gait.motion.gait_errors import EVENTS, Compared, gait_errors, true_events
+from gait.motion.parameters import MIRRORED, QUANTITIES, measured
+from gait.progress import progress
+
+OUT = eval_clips.ROOT / "build" / "eval-gait"
+ARMS = ("track", "smooth", "free cycle", "static pose")
+
+#: Columns of errors: heading, name in `gait_errors`, factor to the unit of the heading; 0: relative.
+ERRORS = (
+    ("heel strike ms", "heel_strike_s", 1000.0),
+    ("toe-off ms", "toe_off_s", 1000.0),
+    ("stride time ms", "stride_time_s", 1000.0),
+    ("step time ms", "step_time_s", 1000.0),
+    ("stance pp", "stance_percent", 1.0),
+    ("cadence %", "mean:cadence_spm", 0.0),
+    ("step length mm", "step_length_m", 1000.0),
+    ("stride length mm", "stride_length_m", 1000.0),
+    ("the person's mm", "mean:stride_length_m", 1000.0),
+    ("step width mm", "step_width_m", 1000.0),
+    ("clearance mm", "foot_clearance_m", 1000.0),
+    ("speed m/s", "mean:speed_m_s", 1.0),
+    ("step time asym. pp", "asymmetry:step_time_s", 1.0),
+    ("step length asym. pp", "asymmetry:step_length_m", 1.0),
+)
+#: Angles by the names of OpenSim, as in libgait/doc/reference/angles.md: channels of both sides or one.
+ANGLES = {
+    "hip_flexion": ("r_hip_flexion", "l_hip_flexion"),
+    "hip_adduction": ("r_hip_abduction", "l_hip_abduction"),
+    "knee_angle": ("r_knee_flexion", "l_knee_flexion"),
+    "ankle_angle": ("r_ankle_flexion", "l_ankle_flexion"),
+    "pelvis_list": ("root_roll",),
+    "pelvis_rotation": ("root_yaw",),
+    "lumbar_extension": ("torso_y",),
+    "lumbar_bending": ("torso_x",),
+    "lumbar_rotation": ("torso_z",),
+}
+#: What is aimed at: heading, pooled value at most.
+WANTED = {"heel strike ms": 15.0, "the person's mm": 20.0, "speed m/s": 0.03, "cadence %": 1.0}
+WANTED_ANGLES = {"hip_flexion": 3.5, "knee_angle": 3.5}  # degrees, after a constant
+WANTED_COVERAGE = (85.0, 95.0)  # per cent
+
+PUBLISHED = (
+    ("Stenum 2021, OpenPose from the side", "32 people, 1 view", "heel strike, toe-off", "20 ms"),
+    ("", "", "step length, a step / a person", "49 mm / 18 mm"),
+    ("", "", "speed", "0.10 m/s"),
+    ("", "", "hip, knee", "4.0, 5.6 degrees"),
+    ("OpenCap Monocular", "1 view", "angles; pelvis", "4.8 degrees; 34 mm"),
+    ("Portable Biomechanics Laboratory", "1 view", "angles", "below 3 degrees"),
+    ("OpenCap, several telephones", "2 views or more", "stride length", "bias +127 mm"),
+)
+PUBLISHED_NOTE = """\
+Figures of others as they publish them: of other people, on other clips, with other references (marker
+laboratories), and mostly of films of real people.  Ours are of drawn or simulated films whose truth is exact.
+They show the order of size that a laboratory meets, and rank nothing."""
+
+
+@dataclass(frozen=True)
+class Run:
+    """One arm on one clip with one seed."""
+
+    clip: str
+    arm: str
+    seed: int
+    compared: dict[str, Compared]  #: of `gait_errors`; empty if no whole stride was found
+    asked: int  #: strides of the truth
+    #: degrees by name of `ANGLES`: mean absolute error, then without the mean difference of each side
+    raw: dict[str, float]
+    shifted: dict[str, float]
+
+
+def main() -> int:
+    """Track what is missing, compare, print or record; 1 if something wanted is not reached."""
+    parser = argparse.ArgumentParser(
+        description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
+    )
+    add = parser.add_argument
+    add("--seeds", type=int, default=3, help="runs of a clip, each from a start of its own (3)")
+    add("--clips", nargs="+", metavar="NAME", help="names of clips (all with true joints)")
+    add("--simulated", type=Path, metavar="DIR", help="make walks in DIR if need be, and evaluate those")
+    add(
+        "--first-seed",
+        type=int,
+        default=0,
+        metavar="S",
+        help="of the simulated people, for choices: not 0 (0)",
+    )
+    add("--jobs", type=int, default=2, metavar="J", help="clips side by side (2)")
+    add("--record", metavar="NAME", help="write tests/bench/results/NAME.md and NAME.csv")
+    args = parser.parse_args()
+    try:
+        clips = _clips(args)
+        runs = _runs(clips, args)
+    except UserError as exc:
+        print(f"eval-gait: {exc}", file=sys.stderr)
+        return 1
+    missed = report(runs, args.record)
+    if missed:
+        print(f"eval-gait: not reached: {'; '.join(missed)}", file=sys.stderr)
+    return bool(missed)
+
+
+def _clips(args: argparse.Namespace) -> list[Clip]:
+    """Clips that were asked for, of those with true joints."""
+    if args.simulated:
+        with progress("making clips", len(gait_cases.CASES)) as update:
+            gait_cases.make(args.simulated, args.first_seed, args.jobs, update)
+        clips = eval_clips.folder_clips(args.simulated)
+    else:
+        clips = [clip for clip in eval_clips.folder_clips(eval_clips.DATA / "eval" / "dev") if clip.truth]
+    names = [clip.name for clip in clips]
+    unknown = [name for name in args.clips or () if name not in names]
+    if unknown:
+        raise UserError(f"--clips {unknown[0]}: unknown; use {' '.join(names)}")
+    return [clip for clip in clips if not args.clips or clip.name in args.clips]
+
+
+def _runs(clips: list[Clip], args: argparse.Namespace) -> list[Run]:
+    with progress("learning", None) as update:
+        models = eval_clips.models(clips, eval_clips.ROOT / "build" / "eval" / "models", args.jobs, update)
+    tasks = [
+        (clip, models.get(clip.subject or ""), seed) for seed in range(1, args.seeds + 1) for clip in clips
+    ]
+    runs: list[Run] = []
+    with progress("tracking", len(tasks)) as update, ThreadPoolExecutor(args.jobs) as pool:
+        for done, _ in enumerate(pool.map(lambda task: _track(*task), tasks), 1):
+            update(done)
+    for clip, model, seed in tasks:
+        runs += _judged(clip, model, seed)
+    return runs
+
+
+def _folder(clip: Clip, model: Path | None, seed: int) -> Path:
+    """Of a run's files; one for every state of what was learnt."""
+    return OUT / clip.folder.parent.name / f"{clip.name}.{model.stem if model else 'walk'}.{seed}"
+
+
+def _track(clip: Clip, model: Path | None, seed: int) -> None:
+    """Track with and without --smooth, unless that is done."""
+    folder = _folder(clip, model, seed)
+    folder.mkdir(parents=True, exist_ok=True)
+    init = folder / "init.json"
+    init.write_text(json.dumps(eval_clips.noisy_start(clip, seed, 0.0)))
+    words = [
+        "track",
+        clip.video,
+        "--camera",
+        clip.camera,
+        "--init",
+        init,
+        "--seed",
+        seed,
+        "--detector",
+        "none",
+    ]
+    words += ["--quiet", *(["--background", clip.plate] if clip.plate else [])]
+    words += ["--model", model] if model else []
+    for name, more in (("smooth", ["--smooth", "--draws", folder / "draws.npz"]), ("track", [])):
+        target = folder / f"{name}.csv"
+        if target.is_file():
+            continue
+        line = [sys.executable, "-m", "gait", *map(str, [*words, "-o", target, *more])]
+        done = subprocess.run(line, capture_output=True, text=True, check=False)
+        if done.returncode:
+            raise UserError(f"gait track of {clip.name}, seed {seed}: {done.stderr.strip()}")
+
+
+def _judged(clip: Clip, model: Path | None, seed: int) -> Iterator[Run]:
+    """Compare the arms with the truth; baselines do not hang on the seed."""
+    folder, truth = _folder(clip, model, seed), read_truth(clip.truth)
+    events = true_events(truth, clip.folder / "meta.json")
+    for arm in ARMS[:2]:
+        track = read_track(folder / f"{arm}.csv")
+        draws = Draws.read(folder / "draws.npz", track) if arm == "smooth" else None
+        yield _run(clip, arm, seed, track, draws, truth, events)
+    if seed == 1:
+        sections = blob.decode(read_blob(str(model) if model else None), clip.name)
+        strikes = strikes_of(truth, clip.folder / "meta.json")
+        still = static_pose(sections, truth, JOINTS)
+        running = free_run(sections, truth, strikes, 0, JOINTS)
+        for arm, places in (("free cycle", running), ("static pose", still)):
+            if places is not None:
+                yield _run(clip, arm, seed, _as_track(truth, places), None, truth, events)
+
+
+def _as_track(truth: Joints, places: np.ndarray) -> Track:
+    """A motion of `JOINTS` (n, P, 3) as a track that states no uncertainty."""
+    n = len(truth.frame)
+    by_name = dict(zip(JOINTS, np.moveaxis(places, 1, 0), strict=True))
+    return Track(truth.frame, truth.time, by_name, ["tracking"] * n, np.full(n, np.nan), {}, {})
+
+
+def _run(
+    clip: Clip, arm: str, seed: int, track: Track, draws: Draws | None, truth: Joints, events: Any
+) -> Run:
+    parameters = measured(track, draws)
+    compared = {} if parameters is None else gait_errors(parameters, truth, events)
+    inside = [(t >= track.time[0]) & (t <= track.time[-1]) for t in events.strike.values()]
+    asked = int(sum(max(0, each.sum() - 1) for each in inside))
+    return Run(clip.name, arm, seed, compared, asked, *_angle_errors(track, truth))
+
+
+def _angle_errors(track: Joints, truth: Joints) -> tuple[dict[str, float], dict[str, float]]:
+    """Mean absolute errors by name of `ANGLES`, degrees: raw, and after the mean of each side is removed."""
+    _, ours, theirs = np.intersect1d(track.frame, truth.frame, return_indices=True)
+    found, true = (_fitted(motion, rows) for motion, rows in ((track, ours), (truth, theirs)))
+    raw, shifted = {}, {}
+    for name, channels in ANGLES.items():
+        columns = [CHANNELS.index(channel) for channel in channels]
+        off = np.degrees(np.angle(np.exp(1j * (found - true)[:, columns])))
+        raw[name] = float(np.abs(off).mean())
+        shifted[name] = float(np.abs(off - off.mean(axis=0)).mean())
+    return raw, shifted
+
+
+def _fitted(motion: Joints, rows: np.ndarray) -> np.ndarray:
+    """Angles (n, channels) of a skeleton fitted to a motion's joints, radians."""
+    places = np.stack([motion.places[name][rows] for name in JOINTS], axis=1)
+    return angles.fit(places).angles
+
+
+def report(runs: list[Run], record: str | None) -> list[str]:
+    """Print the tables, keep them if asked for, and return what is not reached."""
+    names = list(dict.fromkeys(run.clip for run in runs))
+    errors = [row for clip in (*names, None) for arm in ARMS if (row := _error_row(runs, clip, arm))]
+    angle = [row for clip in (*names, None) for arm in ARMS if (row := _angle_row(runs, clip, arm))]
+    intervals = list(_coverage_rows(runs))
+    heads = (
+        ["clip", "arm", "strides", *(head for head, _, _ in ERRORS)],
+        ["clip", "arm", *(f"{name} {kind}" for name in ANGLES for kind in ("raw", "shifted"))],
+        ["parameter", *(f"{arm}: {what}" for arm in ARMS[:2] for what in ("values", "in 90 %", "z rms"))],
+        ["published by", "of", "what", "error"],
+    )
+    wanted, missed = _verdicts(errors, angle, intervals)
+    parts = [
+        ("Wanted and reached", ["measure", "wanted", "track", "smooth", ""], wanted, ""),
+        ("Footfalls and parameters, mean absolute errors", heads[0], errors, _READING),
+        ("Joint angles, mean absolute errors in degrees", heads[1], angle, _ANGLE_READING),
+        ("Intervals of parameters", heads[2], intervals, _INTERVAL_READING),
+        ("Beside others", heads[3], PUBLISHED, PUBLISHED_NOTE),
+    ]
+    text = [f"# What a gait lab compares\n\n{facts('make eval-gait')}\n"]
+    for title, head, rows, note in parts:
+        shown, cells, numbers = table.show(title, head, rows)
+        text.append(f"## {title}\n\n{note}\n\n{table.markdown(shown, cells, numbers)}\n")
+    if record:
+        table.RESULTS.mkdir(parents=True, exist_ok=True)
+        (table.RESULTS / f"{record}.md").write_text("\n".join(text), encoding="utf-8")
+        _write_values(table.RESULTS / f"{record}.csv", runs)
+    return missed
+
+
+_READING = """\
+Of strides without unsure frames that the truth has as well: strides found / of the truth.  Heel strike and
+toe-off: against the events of meta.json.  A row `all` pools the values of all clips and seeds.  The person's
+stride length, cadence (relative) and speed are means over a clip; asymmetry is 200 (right - left) / (right +
+left), in percentage points.  Foot clearance: least height of the toe joint in the middle of the swing."""
+_ANGLE_READING = """\
+Names and signs as in libgait/doc/reference/angles.md.  raw: as it is; shifted: after the mean difference of
+each side over the clip is removed.  Joints do not show pelvic tilt: hip_flexion is against a pelvis that does
+not tilt, in both motions alike."""
+_INTERVAL_READING = """\
+Share of the true values inside the 90 % intervals (mean +- 1.645 standard deviations), over clips and seeds;
+z rms: root mean square error in standard deviations, 1 where they are right.  track: standard deviations of
+each frame; smooth: draws from the posterior of the whole clip."""
+
+
+def _chosen(runs: list[Run], clip: str | None, arm: str) -> list[Run]:
+    return [run for run in runs if run.arm == arm and clip in (None, run.clip)]
+
+
+def _error_row(runs: list[Run], clip: str | None, arm: str) -> list[Any] | None:
+    chosen = _chosen(runs, clip, arm)
+    if not chosen:
+        return None
+    found = sum(len(run.compared["stride_time_s"].found) for run in chosen if run.compared)
+    row: list[Any] = [clip or "all", arm, f"{found}/{sum(run.asked for run in chosen)}"]
+    for _, name, factor in ERRORS:
+        parts = [run.compared[name] for run in chosen if name in run.compared]
+        off = [np.abs(c.error) * factor if factor else 100 * np.abs(c.error / c.true) for c in parts]
+        values = np.concatenate(off) if off else np.zeros(0)
+        row.append(float(values.mean()) if len(values) else None)
+    return row
+
+
+def _angle_row(runs: list[Run], clip: str | None, arm: str) -> list[Any] | None:
+    chosen = _chosen(runs, clip, arm)
+    if not chosen:
+        return None
+    values = [
+        float(np.mean([getattr(run, kind)[name] for run in chosen]))
+        for name in ANGLES
+        for kind in ("raw", "shifted")
+    ]
+    return [clip or "all", arm, *(f"{value:.1f}" for value in values)]
+
+
+def _coverage_rows(runs: list[Run]) -> Iterator[list[Any]]:
+    names = [*EVENTS, *QUANTITIES, *(f"mean:{n}" for n in QUANTITIES), *(f"asymmetry:{n}" for n in MIRRORED)]
+    groups = [(name, [name]) for name in names]
+    groups += [("all events", list(EVENTS)), ("all strides", list(QUANTITIES))]
+    groups.append(("all means", [f"mean:{n}" for n in QUANTITIES] + [f"asymmetry:{n}" for n in MIRRORED]))
+    groups.append(("all", names))
+    for title, members in groups:
+        row: list[Any] = [title]
+        for arm in ARMS[:2]:
+            parts = [
+                run.compared[n] for run in _chosen(runs, None, arm) for n in members if n in run.compared
+            ]
+            covered = np.concatenate([c.covered for c in parts]) if parts else np.zeros(0)
+            z = np.concatenate(
+                [(c.error / np.maximum(c.sd, 1e-9))[np.isfinite(c.sd)] for c in parts] or [np.zeros(0)]
+            )
+            row += [len(covered), round(100 * float(covered.mean())) if len(covered) else None]
+            row.append(float(np.sqrt(np.mean(z**2))) if len(z) else None)
+        yield row
+
+
+def _verdicts(
+    errors: list[list[Any]], angle: list[list[Any]], intervals: list[list[Any]]
+) -> tuple[list[list[Any]], list[str]]:
+    """Rows of what is wanted and reached, judged by the arm smooth, and what is missed."""
+    head = [name for name, _, _ in ERRORS]
+    rows: list[list[Any]] = []
+    for name, most in WANTED.items():
+        at = 3 + head.index(name)
+        values = [next((r[at] for r in errors if r[:2] == ["all", arm]), None) for arm in ARMS[:2]]
+        rows.append([name, f"<= {most:g}", *values, values[1] is not None and values[1] <= most])
+    for name, most in WANTED_ANGLES.items():
+        at = 3 + 2 * list(ANGLES).index(name)
+        values = [float(next(r[at] for r in angle if r[:2] == ["all", arm])) for arm in ARMS[:2]]
+        rows.append([f"{name}, degrees after a constant", f"<= {most:g}", *values, values[1] <= most])
+    low, high = WANTED_COVERAGE
+    for title in ("all events", "all strides", "all means", "all"):
+        _, _, track, _, _, smooth, _ = next(row for row in intervals if row[0] == title)
+        met = smooth is not None and low <= smooth <= high
+        rows.append([f"90 % intervals, {title}", f"{low:g}-{high:g} %", track, smooth, met])
+    missed = [row[0] for row in rows if not row[-1]]
+    return [[*row[:-1], "pass" if row[-1] else "missed"] for row in rows], missed
+
+
+def _write_values(path: Path, runs: list[Run]) -> None:
+    """Every compared value of every run."""
+    with open(path, "w", newline="", encoding="utf-8") as file:
+        writer = csv.writer(file, lineterminator="\n")
+        writer.writerow(["clip", "arm", "seed", "quantity", "found", "true", "sd"])
+        for run in runs:
+            start = [run.clip, run.arm, run.seed]
+            for name, c in run.compared.items():
+                for values in zip(c.found, c.true, c.sd, strict=True):
+                    writer.writerow([*start, name, *(f"{v:.5g}" if np.isfinite(v) else "" for v in values)])
+            for name in ANGLES:
+                writer.writerow([*start, f"{name}_error_deg", f"{run.raw[name]:.3f}", "0", ""])
+                writer.writerow([*start, f"{name}_error_shifted_deg", f"{run.shifted[name]:.3f}", "0", ""])
+
+
+if __name__ == "__main__":
+    sys.exit(main())
