@@ -19,6 +19,7 @@ import pytest
 from gait.errors import UserError
 from gait.lcm.link import LogWriter, private_url
 from gait.lcm.messages import camera_message, estimate_of
+from gait.live import feed as feeds
 from gait.live import server
 from gait.live.feed import Drops, Feed
 from gait.live.server import Page
@@ -77,6 +78,31 @@ def test_nothing_is_drawn_until_a_browser_is_there_and_then_the_newest(log):
     feed.handle(0.0)
     assert len(shown) == 1
     np.testing.assert_array_equal(shown[0], view(log[0])[-1])
+
+
+def test_several_people_are_drawn_into_one_frame(log, monkeypatch):
+    """A frame is drawn when all trackers at work have answered it."""
+    rig.need_multicast()
+    monkeypatch.setattr(feeds, "_LONGEST", 1e6)
+    shown, heard, urls = [], [], [private_url(), private_url()]
+    feed = Feed(
+        private_url(), [0], rig.model(), {0: rig.CAMERA}, lambda _, image: shown.append(image),
+        lambda _, value: heard.append(value["person"]), people=urls,
+    )  # fmt: skip
+    assert feed.page_data()["people"] == urls
+    apart = [estimate_of(estimate) for estimate in log[1]]
+    for k, answers in ((0, (0, 1)), (1, (0,)), (2, (0, 1))):
+        feed._on_image(
+            0, *(part.encode() if part != "GAIT_IMAGE_0" else part for part in rig.frames(k, k + 1)[0])
+        )
+        for person in answers:
+            feed._on_estimate(person, "GAIT_ESTIMATE", log[1][k].encode())
+            feed.handle(0.0)
+    assert heard == [0, 1, 0, 0, 1] and len(shown) == 2  # the first tracker by itself, then both
+    people = {name: replace(apart[2], utime=rig.utime(2) - rig.utime(0)) for name in ("1", "2")}
+    np.testing.assert_array_equal(
+        shown[-1], Overlay(rig.model(), rig.CAMERA).draw_people(rig.picture(2), people)
+    )
 
 
 def test_damaged_messages_are_passed_over(log, tmp_path):
@@ -160,13 +186,16 @@ def test_browsers_get_the_page_and_the_newest_picture(page):
 
 
 def test_events_reach_a_browser(page):
-    page.report("health", {"text": "tracking"})
+    page.report("health", {"person": 0, "text": "tracking"})
     with get(page, "events") as events:
-        assert [events.readline() for _ in range(2)] == [b"event: health\n", b'data: {"text":"tracking"}\n']
-        page.report("sample", {"frame": 7})
+        assert [events.readline() for _ in range(2)] == [
+            b"event: health\n",
+            b'data: {"person":0,"text":"tracking"}\n',
+        ]
+        page.report("sample", {"person": 0, "frame": 7})
         page.show(0, rig.picture(0))
         lines = set()
-        while not {b"event: sample\n", b'data: {"frame":7}\n', b"event: picture\n"} <= lines:
+        while not {b"event: sample\n", b'data: {"person":0,"frame":7}\n', b"event: picture\n"} <= lines:
             lines.add(events.readline())
             assert b"" not in lines
 
@@ -353,7 +382,7 @@ def test_other_hosts_are_refused(host, page):
 
 def test_browsers_are_bounded_and_their_places_come_free(page, monkeypatch):
     monkeypatch.setattr(server, "_MOST", 3)
-    page.report("health", {})
+    page.report("health", {"person": 0})
     open_now = [get(page, "events") for _ in range(3)]
     for stream in open_now:
         stream.readline()
@@ -363,7 +392,7 @@ def test_browsers_are_bounded_and_their_places_come_free(page, monkeypatch):
         stream.close()
     deadline = time.monotonic() + rig.PATIENCE
     while True:
-        page.report("health", {})  # a server finds out when it sends
+        page.report("health", {"person": 0})  # a server finds out when it sends
         try:
             get(page, "events").close()
             break

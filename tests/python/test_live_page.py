@@ -59,7 +59,7 @@ def test_the_page_waits_and_then_shows_a_tracker(live, reports):
         assert reports[2].url in page.inner_text("#waiting")
         live.report(
             "health",
-            {"state": "waiting", "text": "waiting for a camera", "dropped": 2, "frames": 0, "particles": 9},
+            {"person": 0, "state": "waiting", "text": "waiting for a camera", "dropped": 2, "particles": 9},
         )
         browser.until(page, "document.querySelector('#text').textContent === 'waiting for a camera'")
         send(live, reports, range(6))
@@ -91,6 +91,29 @@ def test_pause_holds_the_page(live, reports):
         page.click("#pause")
         send(live, reports, [5])
         browser.until(page, f"live.scene.data.times.at(-1) === {reports[0][5]['time']}")
+
+
+def test_several_people_have_numbers_and_figures_of_their_own(reports, tmp_path, monkeypatch):
+    browser.chromium()
+    monkeypatch.setenv("GAIT_WEB", str(browser.FETCHED))
+    live = Page(0, [0], private_url(), tmp_path, people=2)
+    live.begin(lambda: reports[2].page_data() | {"people": ["udpm://a", "udpm://b"]})
+    try:
+        with browser.opened() as page:
+            page.goto(live.address)
+            browser.until(page, "window.live !== undefined")
+            live.report("sample", reports[0][0] | {"person": 1, "speed": 1.11})
+            live.report("sample", reports[0][0] | {"speed": 2.22})
+            browser.until(
+                page, "live.scene.others.length === 1 && document.body.innerText.includes('2.22 m/s')"
+            )
+            page.click("#people button >> nth=1")
+            live.report("sample", reports[0][1] | {"person": 1, "speed": 1.11})
+            browser.until(page, "document.querySelector('#list').innerText.includes('1.11 m/s')")
+            assert "2.22" not in page.inner_text("#list")
+            accessibility.check(page)
+    finally:
+        live.close()
 
 
 def test_a_browser_connects_again_to_another_gait_view(live, reports, tmp_path):

@@ -32,6 +32,7 @@ EXAMPLES = """\
 examples:
   gait view --camera camera.json
   gait view --save estimate.png
+  gait view --person 'udpm://239.255.76.67:7671?ttl=0' --person 'udpm://239.255.76.67:7672?ttl=0'
 """
 
 
@@ -54,6 +55,12 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         action="append",
         metavar="I",
         help="number of a camera, once for each (default: 0)",
+    )
+    add(
+        "--person",
+        action="append",
+        metavar="URL",
+        help="LCM on which a tracker publishes (its --out), once for each person (default: --url)",
     )
     add("--record-to", default=".", metavar="FOLDER", help="folder of recordings (default: this one)")
     values.add_camera(parser, " of the first --stream (default: from GAIT_CAMERA_<i>)", scale=True)
@@ -81,9 +88,12 @@ def _serve(
     from gait.live.feed import Feed
     from gait.live.server import Page
 
-    page = Page(args.port, streams, url, args.record_to)
+    people = args.person or [url]
+    page = Page(args.port, streams, url, args.record_to, len(people))
     try:
-        feed = Feed(url, streams, model, cameras, page.show, page.report, args.scale_camera, page.watched)
+        feed = Feed(
+            url, streams, model, cameras, page.show, page.report, args.scale_camera, page.watched, people
+        )
         page.begin(feed.page_data)
         print(page.address, flush=True)
         with Interruptible(), contextlib.suppress(KeyboardInterrupt):  # the user ends it so

@@ -10,7 +10,7 @@ import socket
 import struct
 import sys
 import time
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from importlib import import_module
 from io import BufferedWriter, FileIO
 from pathlib import Path
@@ -220,9 +220,10 @@ def publisher(url: str) -> lcm.LCM | LogWriter:
     return LogWriter(path, mode)
 
 
-def waiting(link: lcm.LCM, seconds: float = 0.0) -> bool:
-    """Whether a live link has a message, or gets one within so long."""
-    return bool(select.select([link.fileno()], [], [], seconds)[0])
+def waiting(links: Sequence[lcm.LCM], seconds: float = 0.0) -> list[lcm.LCM]:
+    """Those of live links that have a message, or get one within so long."""
+    ready = select.select([link.fileno() for link in links], [], [], seconds)[0]
+    return [link for link in links if link.fileno() in ready]
 
 
 def handle(link: lcm.LCM, seconds: float, log: bool) -> bool:
@@ -231,7 +232,7 @@ def handle(link: lcm.LCM, seconds: float, log: bool) -> bool:
     A live link waits in `select`, which a signal interrupts without harm; liblcm's own wait fails then.
     """
     if not log:
-        if waiting(link, seconds):
+        if waiting([link], seconds):
             link.handle()
         return True
     try:

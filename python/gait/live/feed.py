@@ -1,4 +1,8 @@
-"""What the live page shows: estimates drawn into their own frames, and numbers beside them."""
+"""What the live page shows: estimates drawn into their own frames, and numbers beside them.
+
+A tracker follows one person.  Several people are trackers that listen on one URL, from which frames come, and
+publish each on a URL of its own.
+"""
 
 from __future__ import annotations
 
@@ -16,7 +20,7 @@ from gait.bindings.model import Model
 from gait.bindings.state import POSE_SCALARS
 from gait.body.skeleton import BONES
 from gait.camera.camera import Camera
-from gait.errors import UserError
+from gait.errors import UsageError, UserError
 from gait.io.video import Image
 from gait.lcm.link import gaitmsg, handle, is_log, listener, now, waiting
 from gait.lcm.messages import camera_of, decode, estimate_of, picture
@@ -27,7 +31,7 @@ _KEPT = 64  # frames that wait for their estimate, at most, and their bytes
 _KEPT_BYTES = 100_000_000
 _QUEUED = 8  # frames that wait in LCM
 _FURTHEST = 1e6  # metres, or anything else that is drawn
-_LONGEST = 0.5  # seconds without a drawing while messages wait
+_LONGEST = 0.5  # seconds without a drawing while messages wait, or a tracker does not answer
 _RATED = 2.0  # seconds over which estimates are counted
 KEPT_S = 20.0
 """Seconds of the plots."""
@@ -47,8 +51,26 @@ class _View:
         self.overlay, self.size, self.camera = Overlay(model, camera), camera.size, camera
 
 
+@dataclass
+class _Person:
+    """One tracker: when its estimates arrived, the frames it dropped, and when it was heard last."""
+
+    arrivals: deque[int]
+    drops: Drops
+    heard: float = -np.inf  # seconds, monotonic
+
+    def rate(self) -> float | None:
+        """Take in an estimate that arrives now; return estimates per second."""
+        self.heard = time.monotonic()
+        self.arrivals.append(now())
+        while self.arrivals[-1] - self.arrivals[0] > 1e6 * _RATED:
+            self.arrivals.popleft()
+        span = 1e-6 * (self.arrivals[-1] - self.arrivals[0])
+        return round((len(self.arrivals) - 1) / span, 1) if span > 0 else None
+
+
 class Feed:
-    """Follows the channels of a tracker and draws estimates into their own frames.
+    """Follows the channels of one tracker or of several, and draws estimates into their own frames.
 
     Live, it draws the newest estimate when no message waits, or after `_LONGEST` at the latest, so that it
     never falls behind; of a log, all.
@@ -56,6 +78,7 @@ class Feed:
     Parameters
     ----------
     url : str
+        From which frames come.
     streams : sequence of int
         Numbers of the cameras.
     model : Model
@@ -70,6 +93,8 @@ class Feed:
         Whether cameras that were calibrated at another resolution are resized to the pictures.
     watched : callable, optional
         Whether to draw: the newest estimate waits until it is so.
+    people : sequence of str
+        URLs on which trackers answer, one for each person; `url` if left out.
 
     Attributes
     ----------
@@ -87,47 +112,81 @@ class Feed:
         report: Callable[[str, dict[str, Any]], None] | None = None,
         scale: bool = False,
         watched: Callable[[], bool] = lambda: True,
+        people: Sequence[str] = (),
     ) -> None:
-        self.url, self._scale = url, scale
-        self._lcm, self._log = listener(url), is_log(url)
+        self.url, self._scale, self.people = url, scale, tuple(people) or (url,)
+        if (url, *self.people) != (url, url) and any(map(is_log, (url, *self.people))):
+            raise UsageError("--person: is for trackers that run; a log is of one")
+        self._links, self._log = (
+            {name: listener(name) for name in dict.fromkeys((url, *self.people))},
+            is_log(url),
+        )
         self._model, self._show, self._report, self._watched = model, show, report, watched
         self._views = {stream: _View({}, stream in cameras) for stream in streams}
         self._origin: int | None = None
-        self._due: dict[int, tuple[Any, Estimate, int]] = {}
+        self._persons = [_Person(deque(), Drops()) for _ in self.people]
+        self._answers: dict[int, dict[int, tuple[Estimate, int]]] = {}  # by capture time and person
         self._drawn = 0.0
-        self._arrivals: deque[int] = deque()
-        self._drops = Drops()
         self.damage: str | None = None
         for stream, camera in cameras.items():
             self._views[stream].use(camera, model)
         for stream in streams:
-            self._subscribe(f"GAIT_IMAGE_{stream}", partial(self._on_image, stream), _QUEUED)
-            self._subscribe(f"GAIT_CAMERA_{stream}", partial(self._on_camera, stream), 1)
-        self._subscribe("GAIT_ESTIMATE", self._on_estimate, _KEPT)
-        self._subscribe("GAIT_STATUS", self._on_status, _KEPT)
+            self._subscribe(url, f"GAIT_IMAGE_{stream}", partial(self._on_image, stream), _QUEUED)
+            self._subscribe(url, f"GAIT_CAMERA_{stream}", partial(self._on_camera, stream), 1)
+        for person, name in enumerate(self.people):
+            self._subscribe(name, "GAIT_ESTIMATE", partial(self._on_estimate, person), _KEPT)
+            self._subscribe(name, "GAIT_STATUS", partial(self._on_status, person), _KEPT)
 
-    def _subscribe(self, channel: str, handler: Callable[[str, bytes], None], capacity: int) -> None:
-        self._lcm.subscribe(channel, handler).set_queue_capacity(capacity)
+    def _subscribe(self, url: str, channel: str, handler: Callable[[str, bytes], None], most: int) -> None:
+        self._links[url].subscribe(channel, handler).set_queue_capacity(most)
 
     def handle(self, seconds: float) -> bool:
-        """Take in a message, waiting at most so long, but for damaged ones; False at the end of a log."""
-        more = True
+        """Take in messages, waiting at most so long, but for damaged ones; False at the end of a log."""
+        more, links = True, list(self._links.values())
         try:
-            more = handle(self._lcm, seconds, self._log)
+            if len(links) == 1:
+                more = handle(links[0], seconds, self._log)
+            else:
+                for link in waiting(links, seconds):
+                    link.handle()
             late = time.monotonic() > self._drawn + _LONGEST
-            if self._due and self._watched() and (self._log or late or not waiting(self._lcm)):
-                self._draw()
+            utime = self._answered(late)
+            if utime is not None and self._watched() and (self._log or late or not waiting(links)):
+                self._draw(utime)
         except UserError as fault:
             self.damage = self.damage or str(fault)
         return more
 
-    def _draw(self) -> None:
-        due, self._due, self._drawn = self._due, {}, time.monotonic()
-        for stream, (image, estimate, frame) in due.items():
-            view = self._views[stream]
-            if view.overlay is not None:
-                pixels = self._fitting(image, view)
-                self._show(stream, view.overlay.draw(pixels, estimate, frame))
+    def _answered(self, late: bool) -> int | None:
+        """Capture time of the newest frame that all trackers at work have answered; if `late`, that any has.
+
+        Older frames are forgotten.
+        """
+        begun = time.monotonic() - _LONGEST
+        working = {k for k, person in enumerate(self._persons) if person.heard > begun}
+        whole = [utime for utime, found in self._answers.items() if working <= found.keys()]
+        newest = max(whole or (self._answers if late else ()), default=None)
+        if newest is not None:
+            self._forget(lambda utime: utime < newest)
+        return newest
+
+    def _forget(self, old: Callable[[int], bool]) -> None:
+        for table in (self._answers, *(view.frames for view in self._views.values())):
+            for utime in [utime for utime in table if old(utime)]:
+                del table[utime]
+
+    def _draw(self, utime: int) -> None:
+        found, self._drawn = self._answers[utime], time.monotonic()
+        images = {stream: view.frames.get(utime) for stream, view in self._views.items()}
+        self._forget(lambda other: other <= utime)
+        for stream, view in self._views.items():
+            if images[stream] is not None and view.overlay is not None:
+                pixels = self._fitting(images[stream], view)
+                if len(self.people) == 1:
+                    self._show(stream, view.overlay.draw(pixels, *found[0]))
+                else:
+                    people = {f"{k + 1}": estimate for k, (estimate, _) in sorted(found.items())}
+                    self._show(stream, view.overlay.draw_people(pixels, people))
 
     def _fitting(self, image: Any, view: _View) -> Image:
         """Picture of the camera's size, or with `scale` a camera of the picture's."""
@@ -151,7 +210,7 @@ class Feed:
         if not view.given:  # the newest counts: an earlier one may have been wrong
             view.use(camera_of(decode(gaitmsg.camera_t, data, channel)), self._model)
 
-    def _on_estimate(self, channel: str, data: bytes) -> None:
+    def _on_estimate(self, person: int, channel: str, data: bytes) -> None:
         message = decode(gaitmsg.estimate_t, data, channel)
         estimate = estimate_of(message)
         if estimate.joint_names != self._model.joint_names:
@@ -164,20 +223,15 @@ class Feed:
         # The panel shows seconds since the first frame, not the time of the day.
         estimate = replace(estimate, utime=message.utime - self._origin)
         if self._report:
-            self._report("sample", self._sample(estimate, message))
-        for stream, view in self._views.items():
-            image = view.frames.pop(message.utime, None)
-            if image is not None:
-                self._due[stream] = image, estimate, message.frame
+            self._report("sample", self._sample(person, estimate, message))
+        if any(message.utime in view.frames for view in self._views.values()):
+            self._answers.setdefault(message.utime, {})[person] = estimate, message.frame
 
-    def _sample(self, estimate: Estimate, message: Any) -> dict[str, Any]:
+    def _sample(self, person: int, estimate: Estimate, message: Any) -> dict[str, Any]:
         """Report an estimate: numbers of the page, joints of the figure, values of the plots."""
-        self._arrivals.append(now())
-        while self._arrivals[-1] - self._arrivals[0] > 1e6 * _RATED:
-            self._arrivals.popleft()
-        span = 1e-6 * (self._arrivals[-1] - self._arrivals[0])
         mean = estimate.mean
         return {
+            "person": person,
             "time": estimate.utime * 1e-6,
             "frame": message.frame,
             "status": estimate.status.name.lower(),
@@ -187,16 +241,17 @@ class Feed:
             "phase": round(float(mean.phase), 4),
             "cadence": round(120.0 * float(mean.stride_hz), 1),
             "speed": round(float(estimate.speed), 3),
-            "rate": round((len(self._arrivals) - 1) / span, 1) if span > 0 else None,
+            "rate": self._persons[person].rate(),
             "latency_ms": None if self._log else round(1e-3 * (now() - message.utime), 1),
             "step_ms": round(1e-3 * message.step_us, 2),
             "values": _values(estimate, [angle.name for angle in message.angles]),
         }
 
-    def _on_status(self, channel: str, data: bytes) -> None:
+    def _on_status(self, person: int, channel: str, data: bytes) -> None:
         message = decode(gaitmsg.status_t, data, channel)
         if self._report:
-            self._report("health", health(message, self._drops))
+            found = health(message, self._persons[person].drops)
+            self._report("health", {"person": person} | found)
 
     def page_data(self) -> dict[str, Any]:
         """Make what scene.js and curves.js begin with, see motion_data.py: no frame yet."""
@@ -213,6 +268,7 @@ class Feed:
             curves=[curve(name, unit, none, side=side) for name, unit, side, _ in PLOTTED],
             camera=None if camera is None else rounded(camera.centre),
             url=self.url,
+            people=list(self.people),
             streams=list(self._views),
             seconds=KEPT_S,
         )

@@ -5,13 +5,15 @@ const QUIET_MS = 3000; // without an estimate the page reports that there is non
 const TEXT = { tracking: 'tracking', ambiguous: 'ambiguous', lost: 'lost', init: 'settling' };
 
 const start = await (await fetch('/state')).json();
-let scene, curves, paused = false, last = 0, recording = Boolean(start.recording.path);
+let scene, curves, paused = false, recording = Boolean(start.recording.path);
+let chosen = 0; // person whose numbers and plots are shown
+const people = start.people.map((url) => ({ url, last: 0, body: null }));
 
 // ---- figure and plots, where their parts were fetched ----
 if (start.parts) {
   const [{ Scene }, { Curves }] = await Promise.all([import('gait/scene.js'), import('gait/curves.js')]);
   scene = new Scene(element('scene'), { ...start, times: [], points: [], sd: [] });
-  curves = new Curves(element('curves'), { times: [...start.times], curves: start.curves });
+  curves = new Curves(element('curves'), { times: [], curves: start.curves });
   curves.show(-1); // no cursor: the plots end now
 } else {
   element('scene').innerHTML = '<p class="none">The figure and the plots need parts that were not fetched: run gait studio --fetch once, with a network.</p>';
@@ -31,6 +33,34 @@ function draw() {
   if (extra > 0) for (const key of ['times', 'points', 'sd']) data[key].splice(0, extra);
 }
 setInterval(draw, DRAW_MS);
+
+// ---- people: each has a tracker of its own ----
+function choose(who) {
+  chosen = who;
+  people.forEach((one, k) => one.button?.setAttribute('aria-pressed', k === who));
+  waiting = [];
+  element('list').replaceChildren();
+  for (const name of Object.keys(numbers)) delete numbers[name];
+  if (!scene) return;
+  for (const curve of start.curves) curve.values.length = 0;
+  curves.setData({ times: [], curves: start.curves });
+  for (const key of ['times', 'points', 'sd']) scene.data[key].length = 0;
+  showOthers();
+}
+
+function showOthers() {
+  const now = performance.now();
+  scene?.showOthers(people.filter((one, k) => k !== chosen && one.body && now - one.last < QUIET_MS).map((one) => one.body));
+}
+
+if (people.length > 1) {
+  people.forEach((one, k) => {
+    one.button = Object.assign(document.createElement('button'), { type: 'button', textContent: `Person ${k + 1}`, title: one.url });
+    one.button.setAttribute('aria-pressed', k === chosen);
+    one.button.addEventListener('click', () => choose(k));
+    element('people').append(one.button);
+  });
+}
 
 // ---- numbers ----
 const numbers = {};
@@ -53,9 +83,13 @@ function setStatus(status, text) {
 }
 
 function onSample(one) {
-  last = performance.now();
+  const person = people[one.person];
+  person.last = performance.now();
   if (paused) return;
   element('waiting').replaceChildren();
+  person.body = one.points;
+  if (person.button) person.button.textContent = `Person ${one.person + 1}: ${TEXT[one.status] ?? one.status}`;
+  if (one.person !== chosen) return showOthers();
   setStatus(one.status, TEXT[one.status] ?? one.status);
   show('cadence', unit(one.cadence, 0, 'steps/min'));
   show('speed', unit(one.speed, 2, 'm/s'));
@@ -75,21 +109,25 @@ function onSample(one) {
 }
 
 function onHealth(one) {
+  if (one.person !== chosen) return;
   element('text').textContent = one.state === 'running' && one.text === 'tracking' ? '' : one.text;
   show('dropped here', String(one.dropped));
   show('particles', String(one.particles));
-  if (performance.now() - last > QUIET_MS) explain(`The tracker is ${one.state}: ${one.text}.`);
+  if (quiet()) explain(`The tracker is ${one.state}: ${one.text}.`);
 }
 
 // ---- what is missing ----
+const quiet = () => performance.now() - people[chosen].last > QUIET_MS;
 function explain(text) {
   if (paused) return;
   setStatus('', 'waiting');
-  const lines = [text, `Listening for GAIT_ESTIMATE and GAIT_IMAGE_${start.streams.join(', GAIT_IMAGE_')} on ${start.url}.`,
-    'Start gait-trackd on the same URL (--url, or LCM_DEFAULT_URL), and gait capture for a film or camera.'];
+  const images = `GAIT_IMAGE_${start.streams.join(', GAIT_IMAGE_')} on ${start.url}`, { url } = people[chosen];
+  const lines = [text, `Listening for GAIT_ESTIMATE ${url === start.url ? '' : `on ${url} `}and ${images}.`,
+    url === start.url ? 'Start gait-trackd on the same URL (--url, or LCM_DEFAULT_URL), and gait capture for a film or camera.'
+      : `Start gait-trackd --url ${start.url} --out ${url}, and gait capture for a film or camera.`];
   element('waiting').replaceChildren(...lines.map((line) => Object.assign(document.createElement('p'), { textContent: line })));
 }
-setInterval(() => { if (performance.now() - last > QUIET_MS && !element('waiting').textContent) explain('No estimates come.'); }, 500);
+setInterval(() => { if (quiet() && !element('waiting').textContent) explain('No estimates come.'); }, 500);
 
 // ---- pictures: the newest is fetched when the one before is there ----
 const images = new Map();

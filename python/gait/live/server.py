@@ -92,6 +92,8 @@ class Page:
         Of LCM, which a recording listens to.
     folder : path
         Gets the recordings.
+    people : int
+        Whose estimates are shown.
 
     Attributes
     ----------
@@ -99,11 +101,15 @@ class Page:
         What to open in a browser.
     """
 
-    def __init__(self, port: int, streams: Sequence[int], url: str, folder: str | Path) -> None:
+    def __init__(
+        self, port: int, streams: Sequence[int], url: str, folder: str | Path, people: int = 1
+    ) -> None:
         self._streams, self._url, self._folder = tuple(streams), url, folder
         self.hub = Hub()
         self._data: Callable[[], dict[str, Any]] = dict
         self._recording: Recording | None = None
+        self._topics = [f"{topic} {k}" for topic in ("sample", "health") for k in range(people)]
+        self._topics += ["recording", *map(_picture, streams)]
         self._pictures: dict[int, Image] = {}
         self._jpeg: dict[int, tuple[int, bytes]] = {}
         self._open = 0
@@ -122,7 +128,8 @@ class Page:
 
     def report(self, topic: str, value: dict[str, Any]) -> None:
         """Make a sample or the tracker's health the newest."""
-        self.hub.put(topic, json.dumps(value, allow_nan=False, separators=(",", ":")))
+        of_person = f"{topic} {value['person']}" if "person" in value else topic
+        self.hub.put(of_person, json.dumps(value, allow_nan=False, separators=(",", ":")))
 
     def watched(self) -> bool:
         """Whether a browser shows the page."""
@@ -187,7 +194,7 @@ class Page:
 
     def _events(self, request: Request) -> Response:
         async def lines() -> AsyncIterator[bytes]:
-            counts = dict.fromkeys(["sample", "health", "recording", *map(_picture, self._streams)], 0)
+            counts = dict.fromkeys(self._topics, 0)
             while True:
                 waits = [asyncio.ensure_future(self.hub.newer(name, counts[name], _ALIVE)) for name in counts]
                 await asyncio.wait(waits, return_when=asyncio.FIRST_COMPLETED)

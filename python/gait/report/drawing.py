@@ -147,18 +147,36 @@ class Overlay:
 
         The figure of a lost person is faded and has no body.  `legend`: explain what is drawn.
         """
-        picture = _in_colour(image)
-        if estimate.status == TrackStatus.LOST:
-            canvas = picture.copy()
-            self.skeleton(canvas, estimate.joints)
-            canvas = np.asarray(cv2.addWeighted(canvas, _FADED, picture, 1 - _FADED, 0), np.uint8)
-        else:
-            canvas = self.body(picture, estimate.mean)
-            self.skeleton(canvas, estimate.joints)
-            self._ellipses(canvas, estimate)
+        canvas = self._person(_in_colour(image), estimate)
         draw_panel(canvas, estimate, frame, self._scale)
         if legend:
             _draw_legend(canvas, self._scale)
+        return canvas
+
+    def draw_people(self, image: Image, people: Mapping[str, Estimate]) -> Image:
+        """Return a BGR picture: frame, and several people with their names over their heads, no panel."""
+        canvas = _in_colour(image).copy()
+        for estimate in people.values():
+            canvas = self._person(canvas, estimate)
+        for name, estimate in people.items():
+            at = self.camera.project(estimate.joint("head_top"))
+            if np.isfinite(at).all():
+                size = 0.8 * self._scale
+                (width, height), _ = cv2.getTextSize(name, _FONT, size, 1)
+                left, foot = round(at[0] - width / 2), round(at[1] - 0.6 * height)
+                top = max(0, foot - height - 4)
+                _darkened(canvas[top : max(0, foot + 4), max(0, left - 4) : max(0, left + width + 4)])
+                _write(canvas, name, (left, foot), size, _STATUS[estimate.status])
+        return canvas
+
+    def _person(self, picture: Image, estimate: Estimate) -> Image:
+        if estimate.status == TrackStatus.LOST:
+            canvas = picture.copy()
+            self.skeleton(canvas, estimate.joints)
+            return np.asarray(cv2.addWeighted(canvas, _FADED, picture, 1 - _FADED, 0), np.uint8)
+        canvas = self.body(picture, estimate.mean)
+        self.skeleton(canvas, estimate.joints)
+        self._ellipses(canvas, estimate)
         return canvas
 
     def draw_absent(self, image: Image, time: float, frame: int, *, legend: bool = False) -> Image:

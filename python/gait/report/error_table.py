@@ -7,7 +7,7 @@ from gait.report import terms
 
 HEAD = ("", "median", "mean", "9 of 10 frames below")
 """Columns of `error_rows`."""
-_WIDE = 34  # letters of a row's words on the terminal
+_LETTERS = 34  # letters of a row's words on the terminal
 
 OTHER_WORLD = (
     "the track's camera was found from the walk, so its world is not the truth's: compare the pose, not "
@@ -61,8 +61,10 @@ def share_rows(m: Measures) -> tuple[dict[str, str], Explained]:
 def as_text(m: Measures) -> str:
     """Lay the measures out for people, with what each of them means."""
     (rows, errors), (shares, explained) = error_rows(m), share_rows(m)
-    lines = [f"{words:{_WIDE}}{median:>8}{mean:>8}{most:>22}" for words, median, mean, most in [HEAD, *rows]]
-    lines += [f"{words:{_WIDE}}{value:>8}" for words, value in shares.items()]
+    lines = [
+        f"{words:{_LETTERS}}{median:>8}{mean:>8}{most:>22}" for words, median, mean, most in [HEAD, *rows]
+    ]
+    lines += [f"{words:{_LETTERS}}{value:>8}" for words, value in shares.items()]
     status = ", ".join(f"{word} {share:.1%}" for word, share in m["status"].items() if share)
-    lines += [f"{'Status':{_WIDE}} {status}", "", "What these words mean:"]
+    lines += [f"{'Status':{_LETTERS}} {status}", "", "What these words mean:"]
     return "\n".join([*lines, *(f"  {words}: {meaning}" for words, meaning in (errors | explained).items())])

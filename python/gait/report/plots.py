@@ -15,8 +15,7 @@ from gait.report.colours import BLUE, DARK, GREY, ORANGE
 
 Painter = Callable[[Axes], None]
 
-LARGE, _NARROW = 10.4, 3.7
-"""Inches: width of a drawing on a screen or paper, and on a telephone."""
+_LARGE, _NARROW = 10.4, 3.7  # inches: of a screen or paper, and of a telephone
 _LEFT, _RIGHT, _TOP, _BOTTOM = 0.75, 0.15, 0.35, 0.5  # inches beside the axes of a plot over time
 _PANEL = (3.2, 2.2)  # inches of one of many panels
 _VARIABLES = {BLUE: "left", ORANGE: "right", DARK: "middle", GREY: "faint", "#000000": "ink"}
@@ -54,7 +53,7 @@ def panels(painters: Sequence[Painter], label: str) -> str:
 
 def for_screen_and_telephone(paint: Painter, height: float, label: str, narrow: float | None = None) -> str:
     """Draw axes for a screen or paper and again for a telephone; heights in inches."""
-    large = svg_figure([[paint]], (LARGE, height), 10, label=label)
+    large = svg_figure([[paint]], (_LARGE, height), 10, label=label)
     small = svg_figure([[paint]], (_NARROW, narrow or height), 8.5, label=label)
     return f'<div class="plot-large">{large}</div><div class="plot-narrow">{small}</div>'
 
@@ -65,7 +64,7 @@ def time_plot(paint: Painter, span: tuple[float, float], height: float, title: s
     `height` in inches; `title` stands above the axes.
     """
     parts = []
-    for kind, width, font in (("large", LARGE, 10.0), ("narrow", _NARROW, 8.5)):
+    for kind, width, font in (("large", _LARGE, 10.0), ("narrow", _NARROW, 8.5)):
         left, right = _LEFT / width, 1 - _RIGHT / width
         with _settings(font):
             figure = Figure(figsize=(width, height))

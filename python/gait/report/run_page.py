@@ -23,7 +23,7 @@ from gait.report.comparison import Comparison, add_errors
 from gait.report.film import PageFilm, runs
 from gait.report.gait_parts import add_gait, time_span, tint
 from gait.report.page import Page
-from gait.report.plots import LARGE, for_screen_and_telephone, time_plot
+from gait.report.plots import for_screen_and_telephone, time_plot
 from gait.web import modules, parts
 from gait.web.motion_data import curve, motion_data
 
@@ -35,6 +35,7 @@ _OVER_TIME = (
 )
 _VAGUE = 0.15  # metres: from this standard deviation on the ellipsoids would hide the figure
 _LEAST_WAY = 1.0  # metres that the plot of the way shows at least
+_BROAD = 500.0  # pixels of axes above which a legend fits in one row
 
 
 @dataclass(frozen=True)
@@ -264,7 +265,7 @@ def way_plot(track: Track, parameters: Parameters | None, errors: Comparison | N
         if turned:
             axes.invert_yaxis()  # a turn by 90 degrees, not a mirror image
         axes.set(xlabel=f"{'xy'[across]}, m", ylabel=f"{'xy'[up]}, m", aspect="equal")
-        columns = 5 if axes.figure.get_figwidth() > LARGE / 2 else 3
+        columns = 5 if axes.bbox.width > _BROAD else 3
         axes.legend(loc="lower left", bbox_to_anchor=(0, 1), ncols=columns, fontsize=8, columnspacing=1)
 
     share = float((high - low)[up] / (high - low)[across])

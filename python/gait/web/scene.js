@@ -66,8 +66,12 @@ export class Scene {
     this.#clear(this.ground);
     this.scene.background = new THREE.Color(colour('panel'));
     const side = (joint) => new THREE.MeshStandardMaterial({ color: colour(sideOf(joint)), roughness: 0.7 });
-    this.parts = data.bones.map(([a, b]) => this.#add(CYLINDER, side(data.joints[sideOf(data.joints[a]) === 'middle' ? b : a])));
-    this.balls = data.joints.map((joint) => this.#add(SPHERE, side(joint)));
+    this.makeLimbs = () => ({
+      parts: data.bones.map(([a, b]) => this.#add(CYLINDER, side(data.joints[sideOf(data.joints[a]) === 'middle' ? b : a]))),
+      balls: data.joints.map((joint) => this.#add(SPHERE, side(joint))),
+    });
+    this.limbs = this.makeLimbs();
+    this.others = [];
     const glass = (joint) => new THREE.MeshStandardMaterial({
       color: colour(sideOf(joint)), transparent: true, opacity: 0.22, depthWrite: false });
     this.clouds = data.joints.map((joint) => this.#add(SPHERE, glass(joint)));
@@ -87,23 +91,11 @@ export class Scene {
   show(index) {
     this.index = Math.max(0, index);
     if (!this.renderer) return;
-    const { points, sd, bones, radii } = this.data;
+    const { points, sd } = this.data;
     const body = points[this.index];
     this.figure.visible = Boolean(body);
     if (body) {
-      const at = body.map((p) => new THREE.Vector3(...p));
-      bones.forEach(([a, b], k) => {
-        const part = this.parts[k], along = at[b].clone().sub(at[a]);
-        const radius = this.shown.cylinders ? radii?.[k] ?? 0.04 : 0.012;
-        part.position.copy(at[a]).addScaledVector(along, 0.5);
-        part.scale.set(radius, Math.max(along.length(), 1e-6), radius);
-        part.quaternion.setFromUnitVectors(UP, along.normalize());
-      });
-      const spread = sd?.[this.index];
-      this.balls.forEach((ball, j) => {
-        ball.position.copy(at[j]);
-        ball.scale.setScalar(this.shown.cylinders ? (this.data.joints[j] === 'head' ? 0.1 : 0.04) : 0.022);
-      });
+      const at = this.#pose(this.limbs, body, this.shown.cylinders), spread = sd?.[this.index];
       this.clouds.forEach((cloud, j) => {
         cloud.visible = Boolean(this.shown.ellipsoids && spread);
         cloud.position.copy(at[j]);
@@ -112,6 +104,34 @@ export class Scene {
       this.#follow(at);
     }
     this.#draw();
+  }
+
+  /** Draw further people as stick figures: joints of each, as in `points`. */
+  showOthers(bodies) {
+    if (!this.renderer) return;
+    while (this.others.length < bodies.length) this.others.push(this.makeLimbs());
+    this.others.forEach((limbs, k) => {
+      for (const mesh of [...limbs.parts, ...limbs.balls]) mesh.visible = k < bodies.length;
+      if (k < bodies.length) this.#pose(limbs, bodies[k], false);
+    });
+    this.#draw();
+  }
+
+  /** Put the limbs of a figure where its joints are; return these as vectors. */
+  #pose(limbs, body, thick) {
+    const { bones, radii, joints } = this.data, at = body.map((p) => new THREE.Vector3(...p));
+    bones.forEach(([a, b], k) => {
+      const part = limbs.parts[k], along = at[b].clone().sub(at[a]);
+      const radius = thick ? radii?.[k] ?? 0.04 : 0.012;
+      part.position.copy(at[a]).addScaledVector(along, 0.5);
+      part.scale.set(radius, Math.max(along.length(), 1e-6), radius);
+      part.quaternion.setFromUnitVectors(UP, along.normalize());
+    });
+    limbs.balls.forEach((ball, j) => {
+      ball.position.copy(at[j]);
+      ball.scale.setScalar(thick ? (joints[j] === 'head' ? 0.1 : 0.04) : 0.022);
+    });
+    return at;
   }
 
   /** Look at the figure from so many degrees above the floor, and about z from the camera (0) or the side (90). */
