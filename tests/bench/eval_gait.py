@@ -205,7 +205,7 @@ def _track(clip: Clip, model: Path | None, seed: int) -> None:
 
 
 def _judged(clip: Clip, model: Path | None, seed: int) -> Iterator[Run]:
-    """Compare the arms with the truth; baselines do not hang on the seed."""
+    """Compare the arms with the truth; baselines do not depend on the seed."""
     folder, truth = _folder(clip, model, seed), read_truth(clip.truth)
     events = true_events(truth, clip.folder / "meta.json")
     for arm in ARMS[:2]:

@@ -142,6 +142,39 @@ def test_the_model_of_opensim_stands_where_the_joints_are(walk, tmp_path):
         np.testing.assert_allclose(place, near, atol=2e-3)
 
 
+def test_the_page_of_angles_states_axes_order_and_factors(walk, tmp_path):
+    """Each joint's rotations in the .osim are those of the page, and its factors follow from both axes."""
+    lines = (
+        Path(__file__)
+        .parents[2]
+        .joinpath("libgait/doc/reference/angles.md")
+        .read_text(encoding="utf-8")
+        .splitlines()
+    )
+    rows = [
+        [cell.strip().strip("`") for cell in line.split("|")[1:-1]]
+        for line in lines
+        if line.startswith("| `")
+    ]
+    written = []
+    for joint in ElementTree.parse(export(walk, tmp_path, ".mot").with_suffix(".osim")).iter("CustomJoint"):
+        for axis in joint.iter("TransformAxis"):
+            name = axis.findtext("coordinates")
+            if name and axis.get("name").startswith("rotation") and not name.endswith("_l"):
+                written.append((name, [float(x) for x in axis.findtext("axis").split()]))
+    stated = {row[1]: [float(x) for x in row[4].split()] for row in rows}
+    assert len(rows) == len(stated) == len(written)
+    for name, axis in written:
+        assert stated[name] == axis, name
+        assert opensim.coordinate(CHANNELS.index(next(row[0] for row in rows if row[1] == name))) == name
+    for joint in ("pelvis", "lumbar", "neck", "arm", "hip"):  # the order of the rotations
+        order = [name for name, _ in written if name.startswith(joint)]
+        assert [row[1] for row in rows if row[1].startswith(joint)] == order
+    for _, _, _, _, axis, there, other, factor in rows:
+        if there:
+            assert float(factor) == np.dot(*([float(x) for x in a.split()] for a in (axis, other))), there
+
+
 def kinematics(document, row):
     """Markers in the ground for coordinates in degrees and metres."""
 

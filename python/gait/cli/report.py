@@ -39,6 +39,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     add("--truth", metavar="TRUTH.csv", help="true motion, to report errors against")
     add("--draws", metavar="D.npz", help="motions from gait track --smooth --draws")
     values.add_model(parser, "model that was tracked")
+    values.add_norms(parser)
     add("--replayed", action="store_true", help="of a log: not tracked live, show no latency")
 
 
@@ -52,6 +53,7 @@ def run(args: argparse.Namespace) -> int:
         raise UsageError("--track: goes with a log; RUN is a track already")
     if not is_track and not args.track:
         raise UsageError(f"{args.source}: is no track OUT.csv; with a log, give --track as well")
+    values.require_age(args.age, args.sex)
     output = args.output or str(Path(args.source).with_suffix(".html"))
     inputs = (args.source, args.track, args.video, args.camera, args.truth, args.draws, args.model)
     require_outputs((output, args.overlay), inputs)
@@ -65,6 +67,8 @@ def run(args: argparse.Namespace) -> int:
         truth=args.truth,
         draws=args.draws,
         model=args.model,
+        age=args.age,
+        sex=args.sex,
         quiet=args.quiet,
     )
     damage = None

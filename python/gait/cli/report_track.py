@@ -21,6 +21,9 @@ from gait.errors import UserError
 from gait.io.files import filling, require_folder
 
 if TYPE_CHECKING:
+    from collections.abc import Sequence
+
+    from gait.motion.norms import Compared
     from gait.motion.parameters import Parameters
 
 EXAMPLES = """\
@@ -37,6 +40,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "-o", "--output", metavar="DIR", help="folder for the page and tables (default: OUT_gait)"
     )
+    values.add_norms(parser)
     parser.add_argument("--draws", metavar="D.npz", help="motions from gait track --smooth --draws")
 
 
@@ -46,10 +50,12 @@ def run(args: argparse.Namespace) -> int:
     from gait.body.model_curves import ModelCurves
     from gait.io.track_file import read_track
     from gait.motion.footfalls import Draws
+    from gait.motion.norms import beside_norms
     from gait.motion.parameters import angle_cycles, as_json, measure, write_tables
     from gait.motion.verdict import verdict_of
     from gait.report.run_page import Run, run_page
 
+    values.require_age(args.age, args.sex)
     source = Path(args.track)
     output = args.output or source.with_name(source.stem + "_gait")
     require_folder(output)
@@ -59,22 +65,35 @@ def run(args: argparse.Namespace) -> int:
         parameters = measure(track, draws)
     except UserError as exc:
         raise UserError(f"{args.track}: {exc}") from None
-    cycles = angle_cycles(track, parameters, ModelCurves(read_cyclic(args.model)), draws)
-    found, verdict = as_json(track, parameters, cycles), verdict_of(track, parameters=parameters)
+    model = read_cyclic(args.model)
+    cycles = angle_cycles(track, parameters, ModelCurves(model), draws)
+    norms = beside_norms(track, parameters, model, args.age, args.sex)
+    verdict = verdict_of(track, parameters=parameters)
+    found = as_json(track, parameters, cycles) | {"norms": [norm.as_json() for norm in norms]}
     with filling(output) as folder:
         write_tables(folder, found, parameters, cycles)
-        page = run_page(Run(source.name, track, verdict, parameters, cycles))
+        page = run_page(Run(source.name, track, verdict, parameters, cycles, norms))
         (folder / "report.html").write_text(page, encoding="utf-8")
-    print(json.dumps(found, allow_nan=False) if args.json else f"{verdict.sentence()}.\n{_text(parameters)}")
+    print(
+        json.dumps(found, allow_nan=False)
+        if args.json
+        else f"{verdict.sentence()}.\n{_text(parameters, norms)}"
+    )
     return 0
 
 
-def _text(parameters: Parameters) -> str:
-    """Table for the terminal."""
-    from gait.report.gait_parts import HEAD, parameter_rows
+def _text(parameters: Parameters, norms: Sequence[Compared]) -> str:
+    """Tables for the terminal."""
+    from gait.report.gait_parts import HEAD, NORM_HEAD, norm_rows, parameter_rows
 
-    rows = [list(HEAD), *parameter_rows(parameters)]
-    widths = [max(len(row[k]) for row in rows) for k in range(len(HEAD))]
-    lines = ["  ".join(cell.ljust(width) for cell, width in zip(row, widths, strict=True)) for row in rows]
     notes = f"mean ± its standard deviation (between strides); uncertainty from {parameters.source}"
-    return "\n".join(line.rstrip() for line in [*lines, notes])
+    lines = [*_table([list(HEAD), *parameter_rows(parameters)]), notes]
+    if norms:
+        lines += ["", *_table([list(NORM_HEAD), *norm_rows(norms)])]
+    return "\n".join(lines)
+
+
+def _table(rows: list[list[str]]) -> list[str]:
+    widths = [max(len(row[k]) for row in rows) for k in range(len(rows[0]))]
+    lines = ["  ".join(cell.ljust(width) for cell, width in zip(row, widths, strict=True)) for row in rows]
+    return [line.rstrip() for line in lines]

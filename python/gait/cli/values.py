@@ -72,6 +72,14 @@ def seconds(text: str) -> float:
     return value
 
 
+def norm_age(text: str) -> float:
+    """Ages of which norms are known, years."""
+    value = _number(text)
+    if not 20 <= value < 80:  # as gait.motion.norms.AGES
+        raise ArgumentTypeError(f"{text}: norms are known from 20 to 79 years; leave it out")
+    return value
+
+
 def require_order(start: int, stop: int) -> None:
     """Raise UsageError unless `start` comes before `stop`."""
     if stop <= start:
@@ -109,6 +117,20 @@ def add_stabilize(parser: _ActionsContainer, default: str | None) -> None:
         help="auto: undo the motion of a camera that turns; joints are then in the scene's frame, the given "
         "camera is that of the frame that is named (default: off)",
     )
+
+
+def add_norms(parser: ArgumentParser) -> None:
+    """Add what the norm of the comfortable speed depends on."""
+    parser.add_argument(
+        "--age", type=norm_age, metavar="YEARS", help="of the person, for the norm of the speed (20 to 79)"
+    )
+    parser.add_argument("--sex", choices=("f", "m"), help="of the person, with --age (default: both sexes)")
+
+
+def require_age(age: float | None, sex: str | None) -> None:
+    """Raise UsageError if there is a sex without an age."""
+    if sex and age is None:
+        raise UsageError("--sex: needs --age")
 
 
 def add_model(parser: ArgumentParser, what: str = "walking model") -> None:

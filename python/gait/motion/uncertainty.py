@@ -122,9 +122,9 @@ def _person_sd(sd: dict[str, Array], draws: Draws | None) -> dict[str, Array]:
 
 def _size_sd(track: Track, own: dict[str, Array], draws: Draws | None) -> float:
     """Return the standard deviation of the size, as a share."""
-    if "stature_m" not in track.numbers:
+    stature = float(np.median(track.numbers.get("stature_m", 0.0)))
+    if not stature > 0:
         return 0.0
-    stature = float(np.median(track.numbers["stature_m"]))
     stated = float(np.median(track.numbers["stature_sd_m"])) / stature
     if draws is not None:
         legs = [draws.joints[:, :, draws.joint_names.index(f"r_{name}")] for name in ("hip", "knee", "ankle")]

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from typing import Any
 
 import numpy as np
@@ -10,6 +10,7 @@ from matplotlib.axes import Axes
 
 from gait.io.track_file import Track
 from gait.motion.footfalls import SIDES, contacts, stride_time
+from gait.motion.norms import Compared
 from gait.motion.parameters import PERCENT, QUANTITIES, AngleCycle, Parameters
 from gait.report import terms
 from gait.report.colours import DARK, GREY, ON_PAPER, STATUS_TINTS
@@ -52,6 +53,37 @@ def add_gait(page: Page, track: Track, parameters: Parameters, cycles: Mapping[s
     page.figure("Stride by stride", stride_plot(track, parameters))
     page.words("Bars span two standard deviations each way. Hollow: strides with unsure frames.", "faint")
     add_angles(page, cycles)
+
+
+def add_norms(page: Page, norms: Sequence[Compared]) -> None:
+    """Add the parameters beside norms, with what is outside and how sure that is."""
+    if not norms:
+        return
+    tips = {words: terms.NORMS[source] for source, words in _SOURCES.items()} | terms.COLUMNS
+    page.grid("Beside norms", NORM_HEAD, norm_rows(norms), tips)
+    page.words(
+        "Mean ± standard deviation. Outside is what is more than two standard deviations of the norm away; "
+        "the per cent are the probability of that, given the uncertainty of this track.",
+        "faint",
+    )
+
+
+NORM_HEAD = ("", "this track", "norm", "of people", "this track is")
+"""Columns of `norm_rows`."""
+_SOURCES = {"pace": "at this cadence", "speed": "at this speed", "age": "of this age"}
+
+
+def norm_rows(norms: Sequence[Compared]) -> list[list[str]]:
+    """Return the cells of the table of norms, under `NORM_HEAD`."""
+    rows = []
+    for c in norms:
+        plain = c.name.removeprefix("asymmetry:")
+        uneven = plain != c.name
+        name = f"asymmetry of {QUANTITIES[plain].split(',')[0]}, %" if uneven else QUANTITIES[plain]
+        unit = "percent" if uneven else plain
+        pairs = ({"mean": c.value, "sd": c.sd}, {"mean": c.norm, "sd": c.norm_sd})
+        rows.append([name, *(_cell(pair, unit) for pair in pairs), _SOURCES[c.source], c.words])
+    return rows
 
 
 def add_angles(page: Page, cycles: Mapping[str, AngleCycle]) -> None:

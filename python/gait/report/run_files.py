@@ -21,6 +21,7 @@ from gait.io.track_file import Track, read_track
 from gait.io.video import Video
 from gait.motion.evaluate import Measures
 from gait.motion.footfalls import Draws
+from gait.motion.norms import beside_norms
 from gait.motion.parameters import measured
 from gait.motion.verdict import Verdict, verdict_of
 from gait.progress import note, progress
@@ -49,6 +50,8 @@ class RunFiles:
         True motion; motions of ``gait track --smooth --draws``.
     model : str, optional
         The model of the package if left out.
+    age, sex : optional
+        Of the person, years and ``f`` or ``m``, for the norm of the speed.
     quiet : bool
         Print no notes and no progress.
     """
@@ -62,6 +65,8 @@ class RunFiles:
     truth: str | None = None
     draws: str | None = None
     model: str | None = None
+    age: float | None = None
+    sex: str | None = None
     quiet: bool = False
 
 
@@ -101,6 +106,8 @@ def write_report(
     elif files.camera is None:
         note(f"camera: {path}, found beside it; --camera gives another", files.quiet)
     parameters = measured(track, draws)
+    sections = read_cyclic(files.model)
+    norms = [] if parameters is None else beside_norms(track, parameters, sections, files.age, files.sex)
     overlay = None if camera is None else Overlay(model, camera)
     frames = range(video.count) if track.frames is None else track.frames
     film = _draw(files, video, frames, estimates or estimates_of(track, model), overlay)
@@ -109,7 +116,8 @@ def write_report(
         track=track,
         verdict=verdict_of(track, video.count, parameters=parameters),
         parameters=parameters,
-        cycles=cycles_of(track, parameters, ModelCurves(read_cyclic(files.model)), draws),
+        cycles=cycles_of(track, parameters, ModelCurves(sections), draws),
+        norms=norms,
         film=film,
         times=video.times[film.frames.start : film.frames.stop],
         camera=camera,

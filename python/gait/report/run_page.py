@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from html import escape
 
@@ -15,13 +15,14 @@ from gait.body.skeleton import BONES, JOINTS
 from gait.camera.camera import Camera
 from gait.io.track_file import Track
 from gait.motion.footfalls import SIDES, Draws, contacts, stride_time
+from gait.motion.norms import Compared
 from gait.motion.parameters import AngleCycle, Parameters, angle_cycles
 from gait.motion.verdict import Verdict
 from gait.report import terms
 from gait.report.colours import BLUE, DARK, GREY, ON_PAPER, ORANGE
 from gait.report.comparison import Comparison, add_errors
 from gait.report.film import PageFilm, runs
-from gait.report.gait_parts import add_gait, time_span, tint
+from gait.report.gait_parts import add_gait, add_norms, time_span, tint
 from gait.report.page import Page
 from gait.report.plots import for_screen_and_telephone, time_plot
 from gait.web import modules, parts
@@ -51,6 +52,8 @@ class Run:
         None if the track has no whole stride.
     cycles : mapping of str to AngleCycle
         Empty without strides.
+    norms : sequence of Compared
+        Parameters beside norms.
     film : PageFilm or None
     times : ndarray of shape (frames of the film,)
         Seconds; empty without a film.
@@ -70,6 +73,7 @@ class Run:
     verdict: Verdict
     parameters: Parameters | None = None
     cycles: Mapping[str, AngleCycle] = field(default_factory=dict)
+    norms: Sequence[Compared] = ()
     film: PageFilm | None = None
     times: Array = field(default_factory=lambda: np.zeros(0))
     camera: Camera | None = None
@@ -101,6 +105,7 @@ def run_page(run: Run) -> str:
         )
     else:
         add_gait(page, run.track, run.parameters, run.cycles)
+        add_norms(page, run.norms)
     if run.film is not None and modules.available():
         drawing = '<h2>Angles over time</h2><div id="run-curves"></div>'
         page.html(f'<section class="screen-only">{drawing}</section>')

@@ -46,6 +46,13 @@ QUANTITIES = {
 }
 """Name in files to explanation."""
 
+NORMS = {
+    "pace": "People as those that the model was learnt from, drawn from it, who walk at this cadence.",
+    "speed": "People as those that the model was learnt from, who walk at this speed.",
+    "age": "Comfortable speed of healthy adults of this age (Bohannon 1997, 230 people).",
+}
+"""Source of a norm to explanation."""
+
 COLUMNS = {
     "asymmetry, %": "200 (right − left) / (right + left): 0 where both sides are alike.",
 }

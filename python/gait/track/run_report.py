@@ -11,6 +11,7 @@ from gait.body.model_curves import ModelCurves
 from gait.io.files import replacing
 from gait.io.track_file import read_track
 from gait.motion.footfalls import Draws
+from gait.motion.norms import beside_norms
 from gait.motion.parameters import measured
 from gait.motion.verdict import verdict_of
 from gait.report.film import PageFilm
@@ -53,13 +54,14 @@ class RunReport:
         from gait.report.run_page import Run, cycles_of, run_page  # Matplotlib is slow to import
 
         options, scene, track = self._options, self._scene, self._track
-        curves = ModelCurves(read_cyclic(options.model))
+        sections, found = read_cyclic(options.model), self._parameters
         run = Run(
             title=Path(options.video).name,
             track=track,
             verdict=self._verdict,
             parameters=self._parameters,
-            cycles=cycles_of(track, self._parameters, curves, self._draws),
+            cycles=cycles_of(track, found, ModelCurves(sections), self._draws),
+            norms=[] if found is None else beside_norms(track, found, sections),
             film=film,
             times=scene.video.times[film.frames.start : film.frames.stop],
             camera=scene.reference_camera,

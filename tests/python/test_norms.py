@@ -1,0 +1,75 @@
+"""Norms: people at this pace, comfortable speeds by age, and what is outside with how sure that is."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from walking_track import walking_track
+
+from gait import UserError
+from gait.bindings.model import read_cyclic
+from gait.cli import main
+from gait.motion.norms import Compared, beside_norms, comfortable, rate_at
+from gait.motion.parameters import measure
+
+MODEL = read_cyclic(None)
+
+
+def with_stature(track, stature=1.7):
+    numbers = track.numbers | {
+        "stature_m": np.full(len(track.time), stature),
+        "stature_sd_m": 0.01 + 0 * track.time,
+    }
+    return replace(track, numbers=numbers)
+
+
+def test_words_follow_the_probability_of_being_outside():
+    """A norm of 1 +- 0.1: inside is 0.8 to 1.2."""
+    for value, sd, words in (
+        (1.0, 0.05, "inside"),
+        (1.3, 0.03, "above (100 %)"),
+        (0.77, 0.03, "probably below (84 %)"),
+        (1.19, 0.03, "perhaps above (37 %)"),
+        (1.3, np.nan, "above (uncertainty unknown)"),
+        (1.1, np.nan, "inside"),
+    ):
+        assert Compared("speed_m_s", value, sd, 1.0, 0.1, "age").words == words, value
+
+
+def test_a_walk_that_is_wide_and_slow_is_outside_and_an_ordinary_one_inside():
+    usual, odd = (with_stature(walking_track(length=1.35, width=w, hz=0.9, sd=0.004)) for w in (0.09, 0.4))
+    inside, outside = (
+        {c.name: c for c in beside_norms(track, measure(track), MODEL, age=45.0, sex="f")}
+        for track in (usual, odd)
+    )
+    assert inside["step_width_m"].words == "inside" and outside["step_width_m"].words == "above (100 %)"
+    assert inside["speed_m_s"].source == "age" and inside["speed_m_s"].norm == 1.391
+    assert inside["cadence_spm"].words == "inside"
+    without = {c.name for c in beside_norms(usual, measure(usual), MODEL)}
+    assert without == set(inside) - {"speed_m_s"}
+    assert beside_norms(walking_track(), measure(walking_track()), MODEL) == []  # no stature
+
+
+def test_norms_know_their_limits():
+    assert comfortable(79.9, "m") == (1.330, 0.196)
+    mean, sd = comfortable(25)
+    assert mean == pytest.approx(1.4) and 0.153 < sd < 0.175
+    with pytest.raises(UserError, match="age 80: norms of the speed are known from 20 to 79 years"):
+        comfortable(80)
+    slow, usual, fast = (rate_at(MODEL, speed, 1.7)[0] for speed in (0.6, 1.29, 1.9))
+    assert slow < usual < fast and usual == pytest.approx(float(MODEL["GAIT"][0]), rel=0.02)
+
+
+@pytest.mark.parametrize(
+    ("options", "words"),
+    [
+        (["--age", "12"], "12: norms are known from 20 to 79 years; leave it out"),
+        (["--sex", "f"], "--sex: needs --age"),
+    ],
+)
+def test_wrong_ages_are_errors_of_usage(options, words, capsys):
+    try:
+        code = main(["report", "track", "absent.csv", *options])
+    except SystemExit as exc:
+        code = exc.code
+    assert code == 2 and words in capsys.readouterr().err
