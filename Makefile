@@ -290,14 +290,16 @@ model: setup lib ## learn the models of the package, of people and the paper's, 
 
 PAPER_MOCAP ?= $(MOCAP) ../shared/data/mocap/cmu_misc
 PAPER_CLIP := $(wildcard ../shared/data/video/outdoor)
-paper: setup lib ## every figure of both papers, theirs, literal and ours: build/paper/paper.html (PAPER_MOCAP=) *
+paper: setup lib ## every figure of both papers, theirs, literal and ours: build/paper/paper.html (PAPER_MOCAP=; ARGS=--record) *
 	@mkdir -p build/paper
 ifneq ($(PAPER_CLIP),)
 	@$(PY) tests/bench/paper_clicks.py $(PAPER_CLIP)/reference2d.json build/paper/clicks.json
 endif
 	$(VENV)/bin/gait paper --mocap $(PAPER_MOCAP) $(if $(PAPER_CLIP),--video $(PAPER_CLIP)/demo.mp4 --camera \
 	    $(PAPER_CLIP)/Calib_demo.toml --init $(PAPER_CLIP)/init.json --background $(PAPER_CLIP)/background_median.png \
-	    --corrections build/paper/clicks.json) -o build/paper/paper.html $(ARGS)
+	    --corrections build/paper/clicks.json) -o build/paper/paper.html --json $(filter-out --record,$(ARGS)) \
+	    > build/paper/paper.json
+	@$(PY) tests/bench/paper_page.py build/paper/paper.json $(filter --record,$(ARGS))
 
 # The bench calls internal functions, and the linker puts its clocks round those that __wrap_ names.
 BENCH_ISA := $(foreach isa,$(KERNEL_ISAS),$(B)/bench/bench_limit_kernel.$(isa).o)

@@ -20,11 +20,12 @@ import matplotlib
 import numpy as np
 import table
 from facts import facts
-from paper_runs import TAIL, Footage, Run
+from paper_runs import Footage
 
 from gait import Mode, Model
 from gait.io.files import replacing
 from gait.paper import ladder
+from gait.paper.scene import TAIL, Run
 from gait.progress import progress
 
 PAPER = Path(__file__).resolve().parents[2] / "python" / "gait" / "data" / "paper.gait"
@@ -55,7 +56,7 @@ def main() -> int:
         )
     if args.rung_seeds:
         rows, errors, range_of = climbed(footage, paths, args.rung_seeds)
-        names = [f.clip.name for f in footage if f.truth is not None]
+        names = [f.clip.name for f in footage if f.scene is not None]
         write(
             "paper_ladder",
             "From the paper to the default",
@@ -106,7 +107,7 @@ def climbed(
     footage: list[Footage], paths: dict[str, dict[str, Path]], seeds: int
 ) -> tuple[list[list[Any]], dict[str, float], dict[str, tuple[float, float]]]:
     """Track each clip on each rung; return rows, and medians and ranges over the clips by rung."""
-    known = [f for f in footage if f.truth is not None]
+    known = [f for f in footage if f.scene is not None]
     by_rung: dict[str, list[float]] = {}
     with progress("ladder", len(known) * len(ladder.RUNGS)) as update:
         done = 0

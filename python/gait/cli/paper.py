@@ -3,12 +3,12 @@
 The papers are Ormoneit and others (2000), whose model of walking gait learn and gait track follow, and
 Leventon and Freeman (1998), whose prior over segments gait lift follows.  Each figure is made by the paper's
 own algorithm (literal) and by the package (ours), with what the paper states (theirs), a verdict, and what
-the paper leaves open.  The page needs no other file.
+the paper leaves open.  The page needs no other file; --json prints its statements.
 
 Motion capture is as for gait learn: the first paper needs three walks of two strides; the second takes up to
 ten motions, first those that are no walks.  Figures 6 and 7 need a clip of a person who walks for 51 frames
 from the frame of --init, better 100.  Without one a walk is rendered.  --corrections are joints marked by
-hand, as for gait lift; the second paper has about one a frame.
+hand, as for gait lift; the second paper has about one a frame.  Every fifth is left out, to judge by.
 """
 
 from __future__ import annotations
@@ -60,11 +60,14 @@ def run(args: argparse.Namespace) -> int:
     clip = None
     if args.video:
         clip = Clip(Path(args.video).name, args.video, scale_camera=args.scale_camera, **given)
-    verdicts = paper.run(paper.Request(tuple(args.mocap), args.output, clip, args.quiet))
-    print(json.dumps(verdicts) if args.json else _text(verdicts))
+    found = paper.run(paper.Request(tuple(args.mocap), args.output, clip, args.quiet))
+    print(json.dumps(found) if args.json else _text(found))
     return 0
 
 
-def _text(verdicts: dict[str, dict[str, str]]) -> str:
-    lines = [f"{paper}, {name}: {words}" for paper, each in verdicts.items() for name, words in each.items()]
-    return "\n".join(lines)
+def _text(found: dict[str, dict[str, dict[str, str]]]) -> str:
+    return "\n".join(
+        f"{paper}, {name}: {words['verdict']}"
+        for paper, each in found.items()
+        for name, words in each.items()
+    )

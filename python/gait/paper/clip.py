@@ -6,6 +6,7 @@ import json
 from collections.abc import Callable
 from dataclasses import dataclass, replace
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
@@ -20,6 +21,7 @@ PRESET = "demo"
 POINTING = 3.0  # pixels, sd of a simulated click
 CLICKED = [name for name in EVAL15 if name not in ("pelvis", "neck", "head_top")]
 STRIDE = 7  # joints from one click to the next
+LEFT_OUT = 5  # one click of so many is not used: it is judged by
 
 
 @dataclass(frozen=True)
@@ -54,15 +56,19 @@ class Clip:
         path.write_text(json.dumps(known), encoding="utf-8")
         return str(path)
 
-    def clicks_within(self, frames: range, folder: Path) -> str | None:
-        """Write the corrections of some frames; None without any."""
+    def clicks_within(self, frames: range, folder: Path) -> tuple[str | None, list[dict[str, Any]]]:
+        """Write the corrections of some frames but for every LEFT_OUT-th; return the file, None without any.
+
+        Those that are left out are returned, as they stand in the file.
+        """
         if self.corrections is None:
-            return None
+            return None, []
         known = json.loads(Path(self.corrections).read_text(encoding="utf-8"))
-        known["corrections"] = [c for c in known["corrections"] if c["frame"] in frames]
+        within = [c for c in known["corrections"] if c["frame"] in frames]
+        known["corrections"] = [c for k, c in enumerate(within, 1) if k % LEFT_OUT]
         path = folder / "clicks.json"
         path.write_text(json.dumps(known), encoding="utf-8")
-        return str(path)
+        return str(path), within[LEFT_OUT - 1 :: LEFT_OUT]
 
     def joints(self) -> tuple[list[int], dict[str, Floats]]:
         """Return frames and places of the true joints."""

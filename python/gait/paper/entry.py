@@ -32,6 +32,10 @@ class Entry:
     left_open: tuple[str, ...]  #: what the paper does not state, and what is done here
     pictures: tuple[Picture, ...]
 
+    def statements(self) -> dict[str, str]:
+        """Return what each side states and the verdict, by the columns of the page."""
+        return dict(zip(HEAD[1:], (self.theirs, self.literal, self.ours, self.verdict), strict=True))
+
 
 def picture(drawing: Drawing) -> Picture:
     """Return a figure as a picture of an entry."""
@@ -39,6 +43,18 @@ def picture(drawing: Drawing) -> Picture:
     return Picture(
         drawing.caption, f'<img style="max-width: 100%" alt="{alt}" src="{address(drawing.png())}">'
     )
+
+
+def table(caption: str, head: Sequence[str], rows: Sequence[Sequence[str]]) -> Picture:
+    """Return a table as a picture of an entry; the first column names the rows."""
+    top = "".join(f"<th scope=col>{escape(name)}</th>" for name in head)
+    body = "".join(
+        f"<tr><th scope=row>{escape(row[0])}</th>"
+        + "".join(f"<td>{escape(x)}</td>" for x in row[1:])
+        + "</tr>"
+        for row in rows
+    )
+    return Picture(caption, f"<table><thead><tr>{top}</tr></thead><tbody>{body}</tbody></table>")
 
 
 @dataclass(frozen=True)
@@ -56,7 +72,7 @@ def page(title: str, about: Sequence[str], papers: Sequence[Paper]) -> str:
     for words in about:
         made.words(words)
     for paper in papers:
-        rows = [(e.heading, e.theirs, e.literal, e.ours, e.verdict) for e in paper.entries]
+        rows = [(e.heading, *e.statements().values()) for e in paper.entries]
         made.grid(f"{paper.short}: {paper.title}", HEAD, rows)
     for paper in papers:
         for entry in paper.entries:
@@ -66,7 +82,7 @@ def page(title: str, about: Sequence[str], papers: Sequence[Paper]) -> str:
 
 def _body(entry: Entry) -> str:
     """Return the statements and pictures of an entry."""
-    cells = zip(HEAD[1:], (entry.theirs, entry.literal, entry.ours, entry.verdict), strict=True)
+    cells = entry.statements().items()
     rows = "".join(f"<tr><td><b>{k}</b></td><td>{escape(v)}</td></tr>" for k, v in cells)
     items = "".join(f"<li>{escape(choice)}</li>" for choice in entry.left_open)
     choices = f"<p>Left open by the paper, and chosen here:</p><ul>{items}</ul>" if items else ""

@@ -39,6 +39,8 @@ VIEW = looking_along("y")  # rows right, down, ahead
 PICTURE = np.stack([VIEW[0], -VIEW[1]])  # right and up
 DEPTH = 1  # coordinate that is not seen
 PELVIS = MARKERS.index("pelvis")
+_ENDS = ("hip", "knee"), ("knee", "ankle"), ("shoulder", "elbow"), ("elbow", "wrist")
+LIMBS = np.array([[MARKERS.index(f"{side}_{end}") for end in ends] for side in "lr" for ends in _ENDS])
 LN10 = float(np.log(10))
 
 
@@ -249,6 +251,11 @@ def marker_sd(gaussian: Gaussian, found: Posterior) -> Floats:
 def apart(found: Floats, truth: Floats) -> float:
     """Return the mean distance of markers, millimetres."""
     return 1000 * float(np.linalg.norm(found - truth, axis=-1).mean())
+
+
+def limbs(x: Floats) -> Floats:
+    """Return the lengths (..., 8) of thighs, shanks, upper arms and forearms of bodies (..., J, 3)."""
+    return np.asarray(np.linalg.norm(x[..., LIMBS[:, 0], :] - x[..., LIMBS[:, 1], :], axis=-1))
 
 
 def _covered(error: Floats, sd: Floats) -> float:

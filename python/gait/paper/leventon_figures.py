@@ -12,8 +12,8 @@ from gait.learn.segments.corpus import Recorded
 from gait.learn.segments.virtual_markers import MARKERS
 from gait.lift.report.motion_figures import SIDE, Strips
 from gait.lift.segment.explain import share_along, share_rigid
-from gait.paper import leventon
-from gait.paper.entry import Entry, Picture, picture
+from gait.paper import leventon, verdicts
+from gait.paper.entry import Entry, Picture, picture, table
 from gait.paper.leventon import Example, Gaussian, HeldOut
 from gait.report.colours import BLUE, DARK, GREY, ORANGE
 from gait.report.figures import Drawing, grid, line_legend
@@ -21,6 +21,7 @@ from gait.report.figures import Drawing, grid, line_legend
 SHOWN_MOTIONS = 5  # of figure 1
 SYNTHESIS = 40  # modes of figure 2
 DRAWS = UNCERTAIN = 3
+MANY = 200  # draws whose limbs are measured
 SWING = 2.0  # standard deviations
 TALL = 1.75  # metres, of the figures' rows
 ACROSS = np.array([0.0, 1.0, 0.0])  # the depth, drawn to the right
@@ -85,11 +86,13 @@ def _training(found: Segments) -> Entry:
         f"{len(found.motions)} sequences, {min(frames)} to {max(frames)} frames at 20 per second; "
         f"{found.everything.segments} segments.",
         "The same segments, and those of people made up from them: other postures and lengths of limbs.",
-        "the same kind of data",
+        verdicts.training(len(found.motions), min(frames), max(frames)),
         (
             "Which motions: up to ten, first those that are no walks, then a walk of each person; at most "
             "240 frames of each.",
             "The markers: 37 virtual ones on the body that was fitted to each recording.",
+            "The frame rate, about 20 per second: exactly 20. A sequence of F frames gives the whole part of "
+            "(F - 10) / 5 and one more segments.",
         ),
         (picture(Drawing("", "training", caption, strips.figure())),),
     )
@@ -109,22 +112,25 @@ def _synthesis(found: Segments) -> Entry:
     figure = strips.figure()
     line_legend(figure, {"original": GREY, f"{SYNTHESIS} modes": ORANGE})
     explained = found.shown.prior.explained()
+    far = leventon.apart(found.everything.segment(np.zeros(0)), truth)
     return Entry(
         "Fig. 2: synthesis, and the variance explained",
         "A segment from 40 modes is close to the original; 50 modes explain 91 % of the variance.",
-        f"40 modes leave {leventon.apart(own, truth):.0f} mm per marker of a segment that was learnt from, "
+        f"40 modes leave {leventon.apart(own, truth):.0f} mm per marker of a segment that was learnt from "
+        f"({far:.0f} mm from the mean), "
         f"{leventon.apart(left_out, truth):.0f} mm where its sequence was left out. They explain "
         f"{share[SYNTHESIS - 1]:.2f} %, 50 modes {share[leventon.MODES - 1]:.2f} %; {need} are enough for "
         "91 %.",
         f"{found.shown.prior.size} modes of segments that all face one way explain "
         f"{100 * explained[-1]:.1f} %.",
-        "a few modes suffice, fewer than in the paper",
+        verdicts.synthesis(leventon.apart(own, truth) / far, need),
         (
             "Coordinates: here the pelvis of the first frame is over the origin and the heading as "
             f"recorded. 91 % take {need} modes; with places as recorded {placed}, without turned copies "
             f"{rooted}. Which the paper had is open; its motions differ more.",
-            "U S cannot be a covariance; it is the variance of the scores, squared singular values over N "
-            "- 1.",
+            "Printed Lambda = U S cannot be a covariance of the scores; it is diagonal here, squared "
+            "singular values over N - 1. Eq. 1 is read with the mean, which it leaves out.",
+            "The copies turned by 90 degrees: about the vertical through the origin, of every segment.",
         ),
         (picture(Drawing("", "synthesis", f"A segment of {found.shown.name} and its 40 modes.", figure)),),
     )
@@ -162,8 +168,13 @@ def _spectrum(found: Segments) -> Entry:
         f"With {1000 * leventon.NOISE:.0f} mm of noise the variances shrink to {ratio.min():.1g} to "
         f"{ratio.max():.2g} of the prior's, least in modes {', '.join(map(str, open_modes))}.",
         "The same equations in the library; beside the modes, place, heading and stature are unknowns.",
-        "reproduced",
-        (f"The noise: {1000 * leventon.NOISE:.0f} mm, sd of each coordinate seen.",),
+        verdicts.spectrum(ratio.tolist()),
+        (
+            f"The noise: {1000 * leventon.NOISE:.0f} mm, standard deviation of each coordinate seen. The "
+            "text has a variance sigma, eq. 4 sigma squared and eq. 5 sigma times the identity.",
+            "Eqs. 5 and 6 have S where the covariance of the scores stands here. Eq. 6 is computed as the "
+            "inverse of the sum of both precisions, which is the same.",
+        ),
         (
             picture(
                 Drawing(
@@ -177,17 +188,26 @@ def _spectrum(found: Segments) -> Entry:
 def _draws(found: Segments) -> Entry:
     rng = np.random.default_rng(1)
     gaussian = found.everything
+    scores = rng.normal(size=(MANY, len(gaussian.variance))) * np.sqrt(gaussian.variance)
+    drawn = np.array([gaussian.segment(alpha) for alpha in scores])
     strips = _strips([f"draw {k + 1}" for k in range(DRAWS)])
-    for row in range(DRAWS):
-        x = gaussian.segment(rng.normal(size=len(gaussian.variance)) * np.sqrt(gaussian.variance))
+    for row, x in enumerate(drawn[:DRAWS]):
         strips.add(row, x, _across(x), BLUE)
+    learnt = leventon.limbs(np.concatenate([leventon.cut(m) for m in found.motions]))
+    usual = learnt.mean(axis=(0, 1))
+    differ = [float(np.sqrt(np.mean((x / usual - 1) ** 2))) for x in (leventon.limbs(drawn), learnt)]
     return Entry(
         "Fig. 4: draws from the prior",
         "Segments drawn at random from the prior.",
-        f"{DRAWS} draws of the Gaussian.",
-        "The same kind of prior; segments all face one way.",
-        "reproduced: see the picture",
-        (),
+        f"{DRAWS} draws of the Gaussian; of {MANY} the limbs differ from the mean length by "
+        f"{100 * differ[0]:.0f} % (rms).",
+        "The same kind of prior; segments all face one way, so that a draw is no mean of two headings.",
+        verdicts.draws(*differ),
+        (
+            "Which covariance is drawn from: that of the scores in all modes kept, without what they leave "
+            "out.",
+            "From which side a draw is seen: from that of its own hips in the first frame.",
+        ),
         (picture(Drawing("", "draws", "Segments drawn from the prior, from their sides.", strips.figure())),),
     )
 
@@ -205,7 +225,6 @@ def _estimates(found: Segments) -> Entry:
         strips.add(row, x, ACROSS, (DARK, BLUE, ORANGE, "#3a7d44")[row - 1], path=e.truth)
     means = [_mean(held, k) for k in range(len(leventon.TRIED))]
     middle = means[len(means) // 2]
-    better = all(m.bayes < m.likelihood for m in means)
     caption = (
         f"20 frames of {found.shown.name}, left out: three overlapping segments, joined by linear weights. "
         "The camera looks along the depth; below, the depth is drawn to the right. Grey: original. Mean "
@@ -220,13 +239,15 @@ def _estimates(found: Segments) -> Entry:
         f"{100 * middle.covered:.0f} %.",
         f"{middle.ours:.0f} mm, and the intervals cover {100 * middle.ours_covered:.0f} %, though the "
         "heading is unknown.",
-        ("reproduced: Bayes is better at every noise" if better else "Bayes is not better at every noise")
-        + "; the paper's intervals are far too narrow",
+        verdicts.estimates([(m.likelihood, m.bayes) for m in means], middle.covered),
         (
             f"Every one of {len(held)} sequences is left out in turn; shown is the one whose error is the "
             "median. Other sequences of the same person are learnt from.",
             "Likelihood alone: least squares of minimum norm in the modes.",
-            "A segment stands where its pelvis shows; in depth it continues the one before.",
+            "A segment stands where its pelvis shows; in depth it continues the one before. Where two "
+            "overlap, linear weights join them.",
+            f"The noise: {', '.join(f'{1000 * n:.0f}' for n in leventon.TRIED)} mm; shown with "
+            f"{1000 * leventon.NOISE:.0f}. The camera looks along y, level and orthographic.",
         ),
         (picture(Drawing("", "estimates", caption, strips.figure())), _table(means)),
     )
@@ -243,10 +264,8 @@ def _table(scores: Sequence[leventon.Score]) -> Picture:
         )
         for s in scores
     ]
-    top = "".join(f"<th>{name}</th>" for name in head)
-    body = "".join("<tr>" + "".join(f"<td>{cell}</td>" for cell in row) + "</tr>" for row in rows)
     caption = "Errors of single segments, millimetres per marker, mean over all sequences left out in turn."
-    return Picture(caption, f"<table><tr>{top}</tr>{body}</table>")
+    return table(caption, head, rows)
 
 
 def _mean(held: Sequence[HeldOut], noise: int) -> leventon.Score:
@@ -277,7 +296,7 @@ def _uncertain(found: Segments) -> Entry:
         f"Shares of their energy along the depth: {shares}; as translation of the whole body: "
         + ", ".join(f"{100 * s:.0f} %" for s in rigid) + ".",
         "gait lift reports and gait report lift draws the same of any clip.",
-        "reproduced: they are motions in depth" if min(along) > 0.8 else "not only motions in depth",
+        verdicts.uncertain(along, rigid),
         (
             "They are eigenvectors of the posterior covariance. The paper compares diagonal terms, which "
             "depend on the choice of modes.",
@@ -305,7 +324,11 @@ def _volume(found: Segments) -> Entry:
         "The volume shrinks by 10^14 in 50 dimensions (printed the other way round).",
         f"{words}. The paper's 10^-14 is that of {1000 * same:.0f} mm.",
         "gait report lift prints it for any segment.",
-        "reproduced: it is a matter of the noise, which the paper does not state",
-        ("The noise sigma is not stated.",),
+        verdicts.volume(ratios, same, leventon.NOISES),
+        (
+            "The noise sigma is not stated; it is read as a standard deviation.",
+            "The ratio is printed as prior over posterior, which could not be small; it is the square root "
+            "of det Q over det Lambda here.",
+        ),
         (picture(Drawing("", "volume", "Volume against noise.", figure)),),
     )

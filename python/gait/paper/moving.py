@@ -29,13 +29,14 @@ class Moving:
 
 def strip(cells: Sequence[tuple[str, Sequence[Moving]]], seconds: float) -> str:
     """Return cells side by side, each with a title and the bodies that move in it, a cycle in `seconds`."""
-    return '<div class="film">' + "".join(_cell(title, bodies, seconds) for title, bodies in cells) + "</div>"
+    inside = "".join(_cell(title, bodies, seconds) for title, bodies in cells)
+    return f'<div style="display: flex; flex-wrap: wrap; gap: 6px">{inside}</div>'
 
 
 def _cell(title: str, bodies: Sequence[Moving], seconds: float) -> str:
     lines = "".join(_body(body, seconds) for body in bodies)
     return (
-        f'<svg width="{WIDTH}" height="{HEIGHT}" viewBox="0 0 {WIDTH} {HEIGHT}" fill="none" '
+        f'<svg style="width: {WIDTH}px" viewBox="0 0 {WIDTH} {HEIGHT}" fill="none" '
         f'stroke-linecap="round" stroke-linejoin="round"><line x1="0" y1="{FLOOR}" x2="{WIDTH}" y2="{FLOOR}" '
         f'stroke="#ccc"/>{lines}<text x="4" y="{HEIGHT - 5}" font-size="11" fill="#444">'
         f"{escape(title)}</text></svg>"

@@ -20,6 +20,7 @@ from gait.paper import (
     ormoneit,
     ormoneit_figures,
     recordings,
+    scene,
     tracking,
 )
 from gait.paper.clip import Clip
@@ -43,7 +44,10 @@ class Request:
 
 
 def run(request: Request) -> dict[str, Any]:
-    """Make the page; return verdicts by entry.  UserError with one line if it cannot be done."""
+    """Make the page; return its statements by paper and heading.
+
+    UserError with one line if it cannot be done.
+    """
     require_writable(request.output)
     with one_thread(), tempfile.TemporaryDirectory(prefix="gait-") as folder:
         if request.clip is not None:
@@ -51,13 +55,13 @@ def run(request: Request) -> dict[str, Any]:
         found = recordings.read(request.mocap, request.quiet)
         used = request.clip or _rendered(Path(folder), request.quiet)
         papers = [
-            Paper(*ORMONEIT, _ormoneit(found, used, request.quiet)),
+            Paper(*ORMONEIT, _ormoneit(found, used, Path(folder), request.quiet)),
             Paper(*LEVENTON, _leventon(found, used, Path(folder), request.quiet)),
         ]
     text = entry.page("Both papers, figure by figure", _about(found, used), papers)
     with replacing(request.output) as path:
         path.write_text(text, encoding="utf-8")
-    return {p.short: {e.heading: e.verdict for e in p.entries} for p in papers}
+    return {p.short: {e.heading: e.statements() for e in p.entries} for p in papers}
 
 
 def _rendered(folder: Path, quiet: bool) -> Clip:
@@ -65,15 +69,18 @@ def _rendered(folder: Path, quiet: bool) -> Clip:
         return clip.rendered(folder, update)
 
 
-def _ormoneit(found: recordings.Recordings, used: Clip, quiet: bool) -> list[Entry]:
+def _ormoneit(found: recordings.Recordings, used: Clip, folder: Path, quiet: bool) -> list[Entry]:
     with progress("learning both ways", 4, quiet) as update:
         learning = ormoneit.learn(found.walks, update)
-    with progress("tracking both ways", 2 * (tracking.FRAMES + 1), quiet) as update:
+    with progress("tracking both ways", 2 * tracking.SEEDS, quiet) as update:
         tracked = tracking.track(used, learning, cores(), update)
-    with progress("ladder", len(ladder.RUNGS), quiet) as update:
-        climbed = ladder.entry(used, learning, update)
+    with progress("rendering walks", len(scene.VIEWS), quiet) as update:
+        scenes = scene.rendered(folder, update)
+    with progress("ladder", ladder.steps(len(scenes)), quiet) as update:
+        climbed = ladder.climb(scenes, learning, update)
     with progress("drawing", None, quiet):
-        return [*ormoneit_figures.entries(learning), tracking.entry(tracked), *([climbed] if climbed else [])]
+        figures = ormoneit_figures.entries(learning)
+        return [*figures, tracking.entry(tracked), *ladder.entries(climbed)]
 
 
 def _leventon(found: recordings.Recordings, used: Clip, folder: Path, quiet: bool) -> list[Entry]:

@@ -1,0 +1,94 @@
+"""What eqs. 10 to 13 of Ormoneit and others (2000) prefer: bodies on the person, displaced, and at rest."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import fields, replace
+
+import numpy as np
+
+from gait.bindings.abi import Mode
+from gait.bindings.config import TrackerConfig
+from gait.bindings.model import Model
+from gait.bindings.state import State
+from gait.learn.arrays import Floats
+from gait.motion.footfalls import walking_direction
+from gait.paper.scene import Scene
+from gait.track.tracker import Tracker
+
+EVERY = 4  # frames
+STEP = 33_333  # microseconds from frame to frame
+NOISES = ("phase", "rate", "forward", "lateral", "vertical", "heading", "tilt", "coef")
+STILL = {f"{name}_noise": 0.0 for name in NOISES}
+#: Displacement along the way (m), across it (m), of the phase (strides).
+PLACES = {
+    "on the person": (0.0, 0.0, 0.0),
+    "a quarter stride late": (0.0, 0.0, -0.25),
+    "half a stride late": (0.0, 0.0, -0.5),
+    "0.7 m behind": (-0.7, 0.0, 0.0),
+    "0.7 m beside": (0.0, 0.7, 0.0),
+}
+Place = tuple[float, float, float]
+Row = tuple[str, float, float]  #: a body, and its log-likelihoods walking and at rest
+_WHOLE = {"evidence_time": 0.0, "rejuvenation_time": 0.0}  # every frame counts in full
+
+
+def config(mode: Mode, **changes: float) -> TrackerConfig:
+    """Return settings of few particles that all stay one body."""
+    whole = {} if mode == Mode.PAPER else _WHOLE
+    return TrackerConfig.default(mode, particles=16, **STILL, **whole, **changes)
+
+
+class Probe:
+    """The likelihood of one body in a scene: the mean cycle at the true place and phase, or displaced.
+
+    Parameters
+    ----------
+    config : TrackerConfig
+        Without noise (`config`), so that all particles are one body.
+    """
+
+    def __init__(self, scene: Scene, model: Model, config: TrackerConfig, stature: float) -> None:
+        self.scene = scene
+        self.tracker = Tracker(model, scene.camera, config, background=scene.plate)
+        self.mean, sd = model.prior()
+        self.mean = replace(self.mean, stature=stature)
+        self.exactly = replace(sd, **{x.name: np.zeros_like(getattr(sd, x.name)) for x in fields(sd)})
+        way = walking_direction(scene.truth)[scene.rows]
+        self.heading = np.arctan2(way[:, 1], way[:, 0])
+        cycles = scene.cycles()
+        assert cycles is not None
+        self.cycles: Floats = cycles
+
+    def state(self, k: int, along: float, across: float, late: float) -> State:
+        """Mean cycle at the true place of frame k, displaced."""
+        turn = float(self.heading[k])
+        way = np.array([np.cos(turn), np.sin(turn), 0.0])
+        left = np.array([-way[1], way[0], 0.0])
+        pelvis = self.scene.truth.places["pelvis"][self.scene.rows[k]]
+        return replace(
+            self.mean,
+            phase=float((self.cycles[k] + late) % 1.0),
+            stride_hz=float((self.cycles[k + 1] - self.cycles[k]) * 1e6 / STEP),
+            heading=turn,
+            pelvis=pelvis + along * way + across * left,
+        )
+
+    def nats(self, place: Place, speed: float) -> float:
+        """Mean log-likelihood of the next frame, having gone on at so many times the person's speed."""
+        total = []
+        for k in range(EVERY, len(self.scene.frames) - 3, EVERY):
+            self.tracker.start(self.state(k, *place), self.exactly, STEP)
+            self.tracker.step(self.scene.frames[k].image, STEP)
+            later = 2 * STEP if speed == 1 else STEP + max(1, round(speed * STEP))
+            total.append(self.tracker.step(self.scene.frames[k + 1].image, later).log_evidence)
+        return float(np.mean(total))
+
+    def table(self) -> list[Row]:
+        """Return the log-likelihoods of each body, walking on with the person and at rest."""
+        return [(name, self.nats(place, 1.0), self.nats(place, 0.0)) for name, place in PLACES.items()]
+
+
+def gain_at_rest(rows: Sequence[Row]) -> float:
+    """Return by how many nats the best body at rest beats the true one, walking; negative if none does."""
+    return max(rest for _, _, rest in rows) - rows[0][1]

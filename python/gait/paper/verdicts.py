@@ -1,0 +1,151 @@
+"""Verdicts of the page: each follows from numbers, and has a sentence for either outcome."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+ANGLES = 19  # of the first paper
+THEIR_MOTIONS, THEIR_LENGTHS, THEIR_MODES = 10, (120, 240), 50  # of the second
+ALIKE = 0.1  # share of a cycle within which offsets agree
+NEAR = 0.1  # share of the distance to the mean that a good synthesis leaves
+SHRUNK = 0.1  # of the prior's variance
+HUMAN = 0.2  # share by which the limbs of a body may differ from those learnt from
+NARROW = 0.8  # of the depths: less is too few in intervals of 90 %
+MOSTLY = 0.9  # of the runs
+CLEARLY = 0.8  # of the energy of a displacement
+STEP = 3.0  # usual steps, of a curve that does not close
+
+
+def body(angles: int) -> str:
+    """Fig. 1 of the first paper: how many relative angles move."""
+    return "the same" if angles == ANGLES else f"not the same: {angles} angles move"
+
+
+def periods(flat: bool, failed: int, long_failed: bool) -> str:
+    """Fig. 2: whether white noise is flat, and where whole periods fail."""
+    fails = [f"on {failed} walks"] if failed else []
+    fails += ["where the cycle of a long walk is no whole number of frames"] if long_failed else []
+    words = "reproduced" if flat else "not reproduced: the ratio of white noise depends on the period"
+    return words + (f"; whole periods fail {' and '.join(fails)}" if fails else "")
+
+
+def offsets(falling: bool, apart: float) -> str:
+    """Figs. 3 and 4: whether the error falls, and how far the offsets are from ours at most, in cycles."""
+    if not falling:
+        return "not reproduced: the error rises in some pass"
+    return "reproduced" if apart < ALIKE else "it converges, but elsewhere than ours"
+
+
+def passes(falling: bool, filled: float, mean: float) -> str:
+    """Fig. 5: whether the error falls, and how far removed blocks are off, filled and by the mean."""
+    course = "reproduced: the error falls pass by pass" if falling else "the error rises in some pass"
+    return f"{course}; it fills {'better' if filled < mean else 'no better'} than the mean"
+
+
+def components(step: float) -> str:
+    """Components: the largest step from the end of a cycle to its start, in usual steps."""
+    return "reproduced: smooth periodic curves" if step < STEP else "the curves do not close"
+
+
+def tracking(held: Sequence[int], seeds: int, ratio: float) -> str:
+    """Fig. 6: runs in which the person is followed to the end, literal and ours, and ratio of the errors."""
+    literal, ours = held
+    words = "reproduced: " if literal > 0.5 * seeds else "not reproduced: "
+    return (
+        f"{words}the paper's filter stays on the person in {literal} of {seeds} runs, ours in {ours}; its "
+        f"error is {ratio:.1f} times ours"
+    )
+
+
+def without_image(paper: float, ours: float, none: float) -> str:
+    """Ladder: errors of the paper's filter, of ours, and of what needs no image, mm."""
+    return (
+        f"the mean cycle running on from the true start without any image is {none:.0f} mm off: "
+        f"the paper's likelihood {_against(paper, none)}, the default {_against(ours, none)}"
+    )
+
+
+def _against(error: float, none: float) -> str:
+    return f"{'gains' if error < none else 'loses'} {abs(none - error):.0f} mm"
+
+
+def held(runs: Sequence[int], seeds: int) -> str:
+    """Section 4: runs in which the person is followed to the end, of so many in each view."""
+    good = sum(count >= MOSTLY * seeds for count in runs)
+    if good == len(runs):
+        return "reproduced: the person is held in every view"
+    return f"{'reproduced in part' if good else 'not reproduced'}: held in {good} of {len(runs)} views"
+
+
+def at_rest(gains: Sequence[float]) -> str:
+    """Eqs. 10 to 13: nats by which the best body at rest beats the true one, literal and ours."""
+    names = "the paper's likelihood", "the default's"
+    wins = ["prefers a body at rest to" if gain > 0 else "prefers" for gain in gains]
+    each = zip(names, wins, gains, strict=True)
+    return "; ".join(f"{name} {win} the true one by {abs(gain):.0f} nats" for name, win, gain in each)
+
+
+def training(count: int, shortest: int, longest: int) -> str:
+    """Fig. 1 of the second paper: number of sequences and frames of them."""
+    low, high = THEIR_LENGTHS
+    differs = ["fewer sequences"] if count < THEIR_MOTIONS else []
+    differs += ["shorter ones"] if shortest < low else []
+    differs += ["longer ones"] if longest > high else []
+    return f"the same kind of data, but {' and '.join(differs)}" if differs else "the same kind of data"
+
+
+def synthesis(left: float, needed: int) -> str:
+    """Fig. 2: share of the distance to the mean that is left, and modes needed for the paper's share."""
+    words = "reproduced" if left < NEAR else "not reproduced: the synthesis is far from the original"
+    if needed == THEIR_MODES:
+        return f"{words}; as many modes are needed as in the paper"
+    return f"{words}; {'fewer' if needed < THEIR_MODES else 'more'} modes are needed than in the paper"
+
+
+def spectrum(ratios: Sequence[float]) -> str:
+    """Fig. 3: posterior over prior variance of each mode."""
+    count = sum(ratio < SHRUNK for ratio in ratios)
+    words = "reproduced: " if count > 0.5 * len(ratios) else "not reproduced: "
+    return f"{words}{count} of {len(ratios)} variances shrink to less than a tenth"
+
+
+def draws(limbs: float, learnt: float) -> str:
+    """Fig. 4: shares by which limbs differ in length from the mean, in draws and in what was learnt from."""
+    how = f"their limbs differ by {100 * limbs:.0f} % in length, those learnt from by {100 * learnt:.0f} %"
+    return f"{'draws are bodies' if limbs < HUMAN else 'draws are no bodies'}: {how}"
+
+
+def estimates(pairs: Sequence[tuple[float, float]], covered: float) -> str:
+    """Fig. 5: errors by likelihood alone and by Bayes at each noise, and depths within 90 % intervals."""
+    better = all(bayes < alone for alone, bayes in pairs)
+    words = "reproduced: Bayes is better at every noise" if better else "Bayes is not better at every noise"
+    return f"{words}; the paper's intervals {'are far too narrow' if covered < NARROW else 'hold'}"
+
+
+def uncertain(along: Sequence[float], rigid: Sequence[float]) -> str:
+    """Fig. 6: shares of the energy along the depth, and of one displacement of the whole body."""
+    if min(along) <= CLEARLY:
+        return "not reproduced: not only motions in depth"
+    moved = [k for k, share in enumerate(rigid, 1) if share > CLEARLY]
+    return "reproduced: they are motions in depth, " + (
+        f"mode {moved[0]} a translation" if moved else "none of them a translation of the whole body"
+    )
+
+
+def volume(ratios: Sequence[float], same: float, tried: Sequence[float]) -> str:
+    """Volume: its logarithm at each of the noises tried, and the noise of the paper's."""
+    if any(later <= earlier for earlier, later in zip(ratios, ratios[1:], strict=False)):
+        return "not reproduced: the volume does not grow with the noise"
+    if not tried[0] <= same <= tried[-1]:
+        return "not reproduced: no likely noise has the paper's volume"
+    return "reproduced: it is a matter of the noise, which the paper does not state"
+
+
+def sequence(off: Sequence[float], height: float, share: float) -> str:
+    """Fig. 7: distances from marks that were left out, literal and ours, and the person's height, pixels."""
+    literal, ours = (each / height for each in off)
+    words = "reproduced: the person is followed" if literal < share else "the figure leaves the person"
+    return (
+        f"{words}; joints that were not clicked are {100 * literal:.0f} % of the height off, "
+        f"{100 * ours:.0f} % by ours"
+    )
