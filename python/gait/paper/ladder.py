@@ -104,7 +104,7 @@ class Climbed:
     held: list[int]  #: of SEEDS runs in paper mode, in each view
     paper: list[float]  #: their median error in each view
     free: list[float]  #: error of the paper's mean cycle running free in each view
-    preferred: tuple[list[Row], list[Row]]  #: of both likelihoods in the last view
+    preferred: list[tuple[list[Row], list[Row]]]  #: log-likelihoods by theirs and by ours in each view
 
 
 def climb(scenes: Sequence[tuple[Scene, str]], learning: Learning, update: Callable[[int], None]) -> Climbed:
@@ -137,14 +137,13 @@ def climb(scenes: Sequence[tuple[Scene, str]], learning: Learning, update: Calla
         held.append(sum(r.held for r in runs))
         paper.append(float(np.median([r.root for r in runs])))
     free = [each["free"] for each in base["paper"]]
-    last = scenes[-1][0]
-    preferred = tuple(
-        preference.Probe(
-            last, models[p], preference.config(mode), stature(decode(blobs[p]), last.truth)
-        ).table()
-        for p, mode in (("paper", Mode.PAPER), ("people", Mode.DEFAULT))
-    )
-    return Climbed([scene for scene, _ in scenes], rungs, held, paper, free, (preferred[0], preferred[1]))
+
+    def prefers(scene: Scene, prior: str, mode: Mode) -> list[Row]:
+        size = stature(decode(blobs[prior]), scene.truth)
+        return preference.Probe(scene, models[prior], preference.config(mode), size).table()
+
+    preferred = [(prefers(s, "paper", Mode.PAPER), prefers(s, "people", Mode.DEFAULT)) for s, _ in scenes]
+    return Climbed([scene for scene, _ in scenes], rungs, held, paper, free, preferred)
 
 
 def steps(views: int) -> int:
@@ -165,15 +164,18 @@ def _reach(found: Climbed) -> Entry:
         f"{name}: on the person in {held} of {SEEDS} runs, {root:.0f} mm off ({free:.0f} without any image)"
         for name, held, root, free in runs
     )
-    both = zip(*found.preferred, strict=True)
-    rows = [(name, *(f"{x:.1f}" for x in (*one, *other))) for (name, *one), (_, *other) in both]
-    gains = [preference.gain_at_rest(rows) for rows in found.preferred]
-    head = "the body is", "literal: walks", "rests", "ours: walks", "rests"
+    rows = [
+        (view, name, *(f"{x:.1f}" for x in (*one, *other)))
+        for view, both in zip(names, found.preferred, strict=True)
+        for (name, *one), (_, *other) in zip(*both, strict=True)
+    ]
+    gains = [[preference.gain_at_rest(each) for each in side] for side in zip(*found.preferred, strict=True)]
+    head = "view", "the body is", "literal: walks", "rests", "ours: walks", "rests"
     caption = (
         "The paper compares a limb only with what it covered in the frame before, and a static background "
-        "looks like itself. Below: mean log-likelihood, nats, of a frame given the one before, seen "
-        f"{names[-1]}, of the mean cycle at the true state or displaced from it, which walks on with the "
-        "person or rests between the two frames. The two likelihoods have different units."
+        "looks like itself. Below: mean log-likelihood, nats, of a frame given the one before, of the mean "
+        "cycle at the true state or displaced from it, which walks on with the person or rests between the "
+        "two frames. The two likelihoods have different units."
     )
     return Entry(
         "Eqs. 10 to 13: what the likelihood reaches",

@@ -17,6 +17,7 @@ Floats = npt.NDArray[np.float64]
 WIDTH, HEIGHT = 130, 220  # pixels of a figure
 SCALE = 175  # pixels per stature
 FLOOR = 200  # pixels from the top
+ROW, GAP = 6, 6  # figures side by side, pixels between them
 
 
 @dataclass(frozen=True)
@@ -30,7 +31,8 @@ class Moving:
 def strip(cells: Sequence[tuple[str, Sequence[Moving]]], seconds: float) -> str:
     """Return cells side by side, each with a title and the bodies that move in it, a cycle in `seconds`."""
     inside = "".join(_cell(title, bodies, seconds) for title, bodies in cells)
-    return f'<div style="display: flex; flex-wrap: wrap; gap: 6px">{inside}</div>'
+    across = ROW * (WIDTH + GAP)
+    return f'<div style="display: flex; flex-wrap: wrap; gap: {GAP}px; max-width: {across}px">{inside}</div>'
 
 
 def _cell(title: str, bodies: Sequence[Moving], seconds: float) -> str:

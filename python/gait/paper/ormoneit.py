@@ -172,11 +172,11 @@ def noise_row(walk: Walk) -> tuple[float, float]:
 
 
 def closure(curves: Floats) -> float:
-    """Return the largest step of curves (T, A) from the end of a cycle to its start, in their median step."""
+    """Return the step of curves (T, A) from the end of a cycle to its start over their largest, at most."""
     steps = np.abs(np.diff(np.concatenate([curves, curves[:1]]), axis=0))
-    usual = np.median(steps[:-1], axis=0)
-    moving = usual > 1e-9 * max(float(usual.max()), 1e-300)
-    return float(np.max(steps[-1, moving] / usual[moving]))
+    largest = steps[:-1].max(axis=0)
+    moving = largest > 1e-9 * max(float(largest.max()), 1e-300)
+    return float(np.max(steps[-1, moving] / largest[moving]))
 
 
 def printed_mean(learned: Learned) -> Floats:

@@ -279,9 +279,9 @@ def _components(learning: Learning) -> Entry:
     return Entry(
         "Components",
         "Five components (eigen-cycles) of the 19 angles.",
-        f"{len(literal.components.sd)} components with {shares[0]:.0f} % of the variance{out[0]}. The mean "
-        f"steps by {printed:.1f} usual steps where cycles join as printed, by {closed:.1f} in the Fourier "
-        "basis.",
+        f"{len(literal.components.sd)} components with {shares[0]:.0f} % of the variance{out[0]}. Where "
+        f"cycles join, the mean steps by {printed:.1f} times its largest step elsewhere as printed, by "
+        f"{closed:.1f} times in the Fourier basis; the components by {max(steps):.1f} times at most.",
         f"{len(ours.components.sd)} components of 24 angles and the root's 6 channels, mirrored cycles, "
         f"every person alike, distances of joints; {shares[1]:.0f} % of that variance{out[1]}.",
         verdicts.components(max(steps)),

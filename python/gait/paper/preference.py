@@ -28,6 +28,7 @@ PLACES = {
     "0.7 m behind": (-0.7, 0.0, 0.0),
     "0.7 m beside": (0.0, 0.7, 0.0),
 }
+BACKGROUND = "0.7 m behind", "0.7 m beside"  # where a body covers the background
 Place = tuple[float, float, float]
 Row = tuple[str, float, float]  #: a body, and its log-likelihoods walking and at rest
 _WHOLE = {"evidence_time": 0.0, "rejuvenation_time": 0.0}  # every frame counts in full
@@ -90,5 +91,5 @@ class Probe:
 
 
 def gain_at_rest(rows: Sequence[Row]) -> float:
-    """Return by how many nats the best body at rest beats the true one, walking; negative if none does."""
-    return max(rest for _, _, rest in rows) - rows[0][1]
+    """Return by how many nats the best body at rest off the person beats the true one that walks."""
+    return max(rest for name, _, rest in rows if name in BACKGROUND) - rows[0][1]

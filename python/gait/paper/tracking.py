@@ -33,7 +33,8 @@ from gait.track.tracker import Tracker
 FRAMES = 50  # of the paper's figure
 SHOWN = tuple(range(0, FRAMES + 1, 10))
 PARTICLES = 10_000
-HELD = 0.1  # statures in the picture, mean of the joints, within which a person counts as followed
+HELD = 0.1  # statures in the picture, mean of the true joints, within which a person counts as followed
+MARKED = 0.15  # of joints marked by hand, which are not where the model has them
 CUT_OUT = 1.35  # statures, side of a picture cut out about the person
 SIZE = 250  # pixels of a picture
 SEEDS = 10  # runs each way
@@ -84,7 +85,7 @@ def track(clip: Clip, learning: Learning, tasks: int, update: Callable[[int], No
             tracker.start(start.mean, start.sd, frames[0].utime)
             estimates = [tracker.step(frame.image, frame.utime) for frame in frames]
             off = _errors(clip, video, camera, first, estimates)
-            held += len(off[1]) > 0 and followed(camera, estimates, off[1])
+            held += len(off[1]) > 0 and followed(camera, estimates, off[1], MARKED if clip.real else HELD)
             shown, errors = shown or estimates, errors or off
             update(len(found) * SEEDS + seed)
         assert errors is not None
@@ -180,7 +181,7 @@ def entry(both: Both) -> Entry:
             "The start: the init file of the clip, by hand as in the paper, with its standard deviations.",
             f"Both filters have a model learnt from the same walks. Shown is the first of {SEEDS} seeds.",
             "On the person: in the last fifth of the frames that can be judged the joints are, on average, "
-            "within a tenth of the stature.",
+            f"within {MARKED if both.clip.real else HELD:g} of the stature.",
         ),
         tuple(rows),
     )
@@ -205,11 +206,11 @@ def _near(tracked: Tracked) -> list[tuple[int, int]]:
     return [(i, tracked.frames[i]) for i in index]
 
 
-def followed(camera: Camera, estimates: Sequence[Estimate], errors: Floats) -> bool:
-    """Whether the person is followed to the end: errors in the picture (n,) of which the last fifth count."""
+def followed(camera: Camera, estimates: Sequence[Estimate], errors: Floats, share: float) -> bool:
+    """Whether the last fifth of errors in the picture (n,) is within a share of the stature."""
     mean = estimates[0].mean
     height = mean.stature * camera.fy / float(camera.depth(mean.pelvis))
-    return bool(np.median(errors[-max(1, len(errors) // 5) :]) < HELD * height)
+    return bool(np.median(errors[-max(1, len(errors) // 5) :]) < share * height)
 
 
 def _overlays(both: Both, tracked: Tracked) -> Image:
