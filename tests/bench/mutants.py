@@ -49,7 +49,7 @@ class Copy:
         path.write_text(text.replace(mutant.before, mutant.after))
         try:
             for test in mutant.tests.split():
-                c_test = not test.endswith(".py")
+                c_test = ".py" not in test
                 target = f"unit/{test}" if c_test else "libgait.so"
                 if not self._run("make", "--no-print-directory", f"build/release/{target}"):
                     return "does not build", test
@@ -77,9 +77,15 @@ def stale(mutants: tuple[Mutant, ...] = MUTANTS) -> Iterator[Mutant]:
     """Mutants whose line is not in the sources exactly once, or whose tests are not there."""
     for mutant in mutants:
         once = (ROOT / mutant.file).read_text().count(mutant.before) == 1
-        tests = ["python/" + t if t.endswith(".py") else f"unit/{t}.c" for t in mutant.tests.split()]
-        if not once or not all((ROOT / "tests" / t).is_file() for t in tests):
+        if not once or not all(map(_is_there, mutant.tests.split())):
             yield mutant
+
+
+def _is_there(test: str) -> bool:
+    """Whether the file of a test is there, and a function that is named in it."""
+    name, _, function = test.partition("::")
+    path = ROOT / "tests" / (f"python/{name}" if name.endswith(".py") else f"unit/{name}.c")
+    return path.is_file() and f"def {function}(" * bool(function) in path.read_text()
 
 
 def main() -> int:
