@@ -64,10 +64,11 @@ TIGHT := $(if $(GCC),$(GCC_TIGHT))
 SMALL := $(if $(filter -O3,$(OPT)),-O2 $(TIGHT))
 LEAST := $(if $(filter -O3,$(OPT)),-Os $(TIGHT))
 SMALL_VECTOR := $(if $(SMALL),$(SMALL) $(if $(GCC),$(GCC_VECTOR),$(CLANG_VECTOR)))
+LESS := $(if $(SMALL),$(if $(GCC),$(GCC_LESS)))
 # Flags of a source by its file name; kernels and other sources differ where no list names them.
 listed = $(if $(filter $(1),$(VECTOR_SOURCES)),$(SMALL_VECTOR),$(if $(filter $(1),$(O2_SOURCES)),$(SMALL),$(2)))
 C_FLAGS = $(if $(filter $(1),$(O3_SOURCES)),,$(call listed,$(1),$(LEAST)))
-KERNEL_FLAGS = $(if $(filter $(1),$(O3_SOURCES)),$(FAST_FLAGS),$(call listed,$(1),$(SMALL_VECTOR)))
+KERNEL_FLAGS = $(if $(filter $(1),$(O3_SOURCES)),$(FAST_FLAGS),$(call listed,$(1),$(SMALL_VECTOR) $(LESS)))
 FAST_FLAGS := $(if $(GCC),$(GCC_KERNEL))
 WARN   := -Wall -Wextra -Wpedantic -Wshadow -Wconversion -Wundef -Wvla $(if $(GCC),,-Wno-pass-failed) $(if $(werror),-Werror)
 CWARN  := $(WARN) -Wstrict-prototypes -Wmissing-prototypes
@@ -188,7 +189,7 @@ $(B)/src/%.cpp.o: libgait/src/%.cpp Makefile $(MADE) | $(SRC_DIRS) $(if $(filter
 
 define kernel_rule
 $(B)/src/%.$(1).o: libgait/src/%.c Makefile $(MADE) | $(SRC_DIRS)
-	$$(call log,CC   $$< ($(1)))$(CC) -std=c11 $(LIBGAIT) $(CWARN) -DKERNEL_ISA=$(1) $$(call KERNEL_FLAGS,$$(notdir $$<)) $(FLAGS_$(1)) $(if $(filter scalar,$(1)),$(LEAST)) $(CFLAGS) -c $$< -o $$@
+	$$(call log,CC   $$< ($(1)))$(CC) -std=c11 $(LIBGAIT) $(CWARN) -DKERNEL_ISA=$(1) $(if $(filter scalar,$(1)),$(LEAST),$$(call KERNEL_FLAGS,$$(notdir $$<))) $(FLAGS_$(1)) $(CFLAGS) -c $$< -o $$@
 endef
 $(foreach isa,$(KERNEL_ISAS),$(eval $(call kernel_rule,$(isa))))
 
