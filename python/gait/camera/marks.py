@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 
 import numpy as np
 from numpy.typing import NDArray
@@ -44,15 +44,8 @@ def coordinates(count: int, distances: Mapping[tuple[int, int], float]) -> tuple
     """
     from scipy.optimize import least_squares
 
-    needed = 2 * count - 3
-    if len(distances) < needed:
-        lacking = needed - len(distances)
-        more = f"{lacking} more distance{'s' if lacking > 1 else ''}"
-        raise UserError(f"marks: give {more} between {count} marks")
-    pairs, lengths = np.array(list(distances)), np.array(list(distances.values()), float)
-    few = [k for k in range(count) if (pairs == k).sum() < 2]
-    if few:
-        raise UserError(f"marks: give two distances or more to mark {few[0] + 1}")
+    pairs, lengths = np.array(list(distances)).reshape(-1, 2), np.array(list(distances.values()), float)
+    _require_enough(count, pairs)
 
     def missed(flat: Array) -> Array:
         at = flat.reshape(count, 2)
@@ -62,6 +55,26 @@ def coordinates(count: int, distances: Mapping[tuple[int, int], float]) -> tuple
     found = [least_squares(missed, rng.normal(0, lengths.max(), 2 * count)) for _ in range(_STARTS)]
     best = min(found, key=lambda one: float(one.cost))
     off = missed(best.x)
+    _require_agreement(pairs, lengths, off)
+    xy = best.x.reshape(count, 2) - best.x[:2]
+    angle = np.arctan2(xy[1, 1], xy[1, 0])
+    turn = np.array([[np.cos(angle), -np.sin(angle)], [np.sin(angle), np.cos(angle)]])
+    return xy @ turn, off
+
+
+def _require_enough(count: int, pairs: NDArray[np.int64]) -> None:
+    """Refuse distances of too few pairs of marks."""
+    lacking = 2 * count - 3 - len(pairs)
+    if lacking > 0:
+        more = f"{lacking} more distance{'s' if lacking > 1 else ''}"
+        raise UserError(f"marks: give {more} between {count} marks")
+    few = [k for k in range(count) if (pairs == k).sum() < 2]
+    if few:
+        raise UserError(f"marks: give two distances or more to mark {few[0] + 1}")
+
+
+def _require_agreement(pairs: NDArray[np.int64], lengths: Array, off: Array) -> None:
+    """Refuse distances that contradict each other."""
     worst = int(np.abs(off).argmax())
     if abs(off[worst]) > 0.05 * lengths[worst] + 0.02:
         i, j = pairs[worst] + 1
@@ -69,10 +82,6 @@ def coordinates(count: int, distances: Mapping[tuple[int, int], float]) -> tuple
             f"marks: the distances contradict each other by {abs(off[worst]):.2f} m, most that of marks {i} "
             f"and {j}; measure again"
         )
-    xy = best.x.reshape(count, 2) - best.x[:2]
-    angle = np.arctan2(xy[1, 1], xy[1, 0])
-    turn = np.array([[np.cos(angle), -np.sin(angle)], [np.sin(angle), np.cos(angle)]])
-    return xy @ turn, off
 
 
 def place_marks(lens: Camera, uv: Array, xy: Array, mirrored: bool = False) -> tuple[Camera, Array, Array]:
@@ -134,8 +143,6 @@ def place_unknown(
     UserError
         If the marks do not determine it.
     """
-    from scipy.optimize import minimize_scalar
-
     if len(uv) < _FEWEST:
         raise UserError(
             f"marks: {len(uv)} do not determine the focal length; give {_FEWEST} or more, --lens or --fov"
@@ -150,22 +157,30 @@ def place_unknown(
         except UserError:
             return 1e12
 
-    longest, shortest = (float(np.log(0.5 * max(size) / np.tan(np.radians(0.5 * view)))) for view in _VIEWS)
-    tried = np.linspace(shortest, longest, 30)
-    k = int(np.argmin([cost(at) for at in tried]))
-    around = tried[max(0, k - 1)], tried[min(len(tried) - 1, k + 1)]
-    best = float(minimize_scalar(cost, bounds=around, method="bounded", options={"xatol": 1e-5}).x)
+    best, at_end = _least(cost, size)
     camera, off, used = place_marks(lens(best), uv, xy, mirrored)
     step = 0.02
     rise = 0.5 * (cost(best + step) + cost(best - step)) - cost(best)
     noise = max(_CLICK**2, float((off**2).sum()) / max(1, 2 * len(uv) - 7))
     sd = step * float(np.sqrt(noise / max(rise, 1e-12)))
-    if sd > _UNSURE or k in (0, len(tried) - 1):
+    if sd > _UNSURE or at_end:
         raise UserError(
             "marks: do not determine the focal length; give --lens (gait calibrate) or --fov, or add marks "
             "far nearer and farther"
         )
     return camera, off, used, sd
+
+
+def _least(cost: Callable[[float], float], size: tuple[int, int]) -> tuple[float, bool]:
+    """Logarithm of the focal length of least cost, and whether it is at an end of those tried."""
+    from scipy.optimize import minimize_scalar
+
+    longest, shortest = (float(np.log(0.5 * max(size) / np.tan(np.radians(0.5 * view)))) for view in _VIEWS)
+    tried = np.linspace(shortest, longest, 30)
+    k = int(np.argmin([cost(at) for at in tried]))
+    around = tried[max(0, k - 1)], tried[min(len(tried) - 1, k + 1)]
+    best = minimize_scalar(cost, bounds=around, method="bounded", options={"xatol": 1e-5}).x
+    return float(best), k in (0, len(tried) - 1)
 
 
 def lens_of(size: tuple[int, int], focal: float) -> Camera:

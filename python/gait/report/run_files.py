@@ -97,14 +97,11 @@ def write_report(
             f"{files.track}: has frame {track.frame[-1]}, {files.video} ends at {video.count - 1}; give the "
             "film that was tracked"
         )
-    path = files.camera or _camera_beside(files)
+    path, remark = _camera(files, track)
     camera = None if path is None else Camera.read(path, video.size, files.scale_camera)
     draws = Draws.read(files.draws, track) if files.draws else None
     errors = compare(track, files.truth, files.model, camera) if files.truth else None
-    if path is None:
-        note("no camera is known, so the film is shown without the figure; give --camera", files.quiet)
-    elif files.camera is None:
-        note(f"camera: {path}, found beside it; --camera gives another", files.quiet)
+    note(remark, files.quiet or not remark)
     parameters = measured(track, draws)
     sections = read_cyclic(files.model)
     norms = [] if parameters is None else beside_norms(track, parameters, sections, files.age, files.sex)
@@ -197,10 +194,21 @@ def _draw(
     return films.page
 
 
-def _camera_beside(files: RunFiles) -> str | None:
-    """Camera file beside the track or the clip."""
+def _camera(files: RunFiles, track: Track) -> tuple[str | None, str]:
+    """Camera that was given, or the file beside the track or the clip; and a remark, if it was not given.
+
+    A camera that was found from the walk has a world of its own, which no other file's camera shares.
+    """
+    if files.camera is not None:
+        return files.camera, ""
+    if track.camera_change is not None:
+        remedy = "give the file of gait track --camera-out as --camera"
+        return None, f"the track's camera was found from the walk; to see the figure in the film, {remedy}"
     beside = [Path(name).with_name("camera.json") for name in (files.track, files.video)]
-    return next((str(path) for path in beside if path.is_file()), None)
+    path = next((str(one) for one in beside if one.is_file()), None)
+    if path is None:
+        return None, "no camera is known, so the film is shown without the figure; give --camera"
+    return path, f"camera: {path}, found beside it; --camera gives another"
 
 
 def _facts(files: RunFiles, video: Video, path: str | None, camera: Camera | None) -> dict[str, str]:

@@ -56,7 +56,7 @@ document.getElementById('page').append(
     make('fieldset', {}, make('legend', { textContent: 'I measured' }),
       make('div', { className: 'row' }, radio('distances', 'distances between marks'), radio('positions', 'positions x, y'))),
     table, make('p', { className: 'faint', textContent: about.lens })));
-document.head.append(make('link', { rel: 'stylesheet', href: '/camera_page.css' }));
+document.head.append(make('link', { rel: 'stylesheet', href: '/page/camera_page.css' }));
 
 // ---- the picture
 const style = (name) => getComputedStyle(document.documentElement).getPropertyValue(name).trim();

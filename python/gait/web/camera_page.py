@@ -63,14 +63,28 @@ class Scene:
 
 def application(scene: Scene, port: int, written: Callable[[str], None] = lambda words: None) -> ASGIApp:
     """Application of the page; `written` is called with a line when the camera file was written."""
+    own = {name: (_HERE / name).read_bytes() for name in ("camera_page.js", "camera_page.css")}
+    page = _Page(scene, written)
+    routes = [
+        Route("/page/{name}", serve.in_memory(own)),
+        Route("/about.json", page.about),
+        Route("/frame/{number:int}.jpg", page.frame),
+        Route("/place", page.place, methods=["POST"]),
+        Route("/save", page.save, methods=["POST"]),
+    ]
+    body = '<main id="page"></main><script type="module" src="/page/camera_page.js"></script>'
+    return serve.application(body, f"gait camera: {scene.name}", routes, port, drawing=False)
 
-    async def script(request: Request) -> Response:
-        return Response((_HERE / "camera_page.js").read_bytes(), media_type="text/javascript")
 
-    async def style(request: Request) -> Response:
-        return Response((_HERE / "camera_page.css").read_bytes(), media_type="text/css")
+class _Page:
+    """Answers of the page."""
 
-    async def about(request: Request) -> Response:
+    def __init__(self, scene: Scene, written: Callable[[str], None]) -> None:
+        self._scene, self._written = scene, written
+
+    def about(self, request: Request) -> Response:
+        """State what is shown."""
+        scene = self._scene
         return JSONResponse(
             {
                 "name": scene.name,
@@ -83,40 +97,40 @@ def application(scene: Scene, port: int, written: Callable[[str], None] = lambda
             }
         )
 
-    async def frame(request: Request) -> Response:
+    def frame(self, request: Request) -> Response:
+        """Give a frame of the film."""
         number = int(request.path_params["number"])
-        if number >= scene.frames:
+        if number >= self._scene.frames:
             return PlainTextResponse("not here\n", 404)
-        image = await run_in_threadpool(scene.picture, number)
-        data = cv2.imencode(".jpg", image, [cv2.IMWRITE_JPEG_QUALITY, 92])[1].tobytes()
+        quality = [cv2.IMWRITE_JPEG_QUALITY, 92]
+        data = cv2.imencode(".jpg", self._scene.picture(number), quality)[1].tobytes()
         return Response(data, media_type="image/jpeg")
 
-    async def answer(request: Request) -> Response:
+    async def place(self, request: Request) -> Response:
+        """Place the camera by the marks."""
+        return await self._answer(request, lambda found: None)
+
+    async def save(self, request: Request) -> Response:
+        """Place the camera by the marks and write its file."""
+        return await self._answer(request, self._save)
+
+    async def _answer(self, request: Request, use: Callable[[dict[str, Any]], None]) -> Response:
         try:
             marks = await serve.json_object(request, _BYTES)
-            found = await run_in_threadpool(solve, scene, marks)
-            if request.url.path == "/save":
-                with replacing(scene.output) as temporary:
-                    write_camera(temporary, found["camera"])
+            found = await run_in_threadpool(solve, self._scene, marks)
+            use(found)
         except UserError as error:
             return JSONResponse({"fault": str(error).removeprefix("marks: ")})
         except OSError as error:
-            return JSONResponse({"fault": f"{scene.output} is not written: {error.strerror}"})
-        if request.url.path == "/save":
-            written(f"{scene.output}: written, {found['rms']:.2f} px rms from {len(found['off'])} marks")
-        found.pop("camera", None)
+            return JSONResponse({"fault": f"{self._scene.output} is not written: {error.strerror}"})
+        del found["camera"]
         return JSONResponse(found)
 
-    routes = [
-        Route("/camera_page.js", script),
-        Route("/camera_page.css", style),
-        Route("/about.json", about),
-        Route("/frame/{number:int}.jpg", frame),
-        Route("/place", answer, methods=["POST"]),
-        Route("/save", answer, methods=["POST"]),
-    ]
-    body = '<main id="page"></main><script type="module" src="/camera_page.js"></script>'
-    return serve.application(body, f"gait camera: {scene.name}", routes, port, drawing=False)
+    def _save(self, found: dict[str, Any]) -> None:
+        output = self._scene.output
+        with replacing(output) as temporary:
+            write_camera(temporary, found["camera"])
+        self._written(f"{output}: written, {found['rms']:.2f} px rms from {len(found['off'])} marks")
 
 
 def solve(scene: Scene, marks: dict[str, Any]) -> dict[str, Any]:
