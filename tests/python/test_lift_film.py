@@ -13,7 +13,7 @@ from gait.camera.camera import read_camera, write_camera
 from gait.cli import main
 from gait.detect import people
 from gait.errors import UserError
-from gait.io.video import VideoWriter
+from gait.io.video import Video, VideoWriter
 from gait.lift.video import run as video_run
 from gait.lift.video.placement import Placement
 from gait.track.from_walk import calibrate
@@ -77,9 +77,13 @@ def test_the_camera_comes_from_the_walk(lift, files, tmp_path):
     assert widened[2] == pytest.approx(usual[2], rel=0.5)
 
 
-def test_points_of_little_confidence_are_left_out(lift, files):
-    _, figures, _ = lift("--camera", files / "camera.json", "--keep-spikes")
+def test_points_of_little_confidence_are_left_out_and_suggested(lift, files, tmp_path):
+    also = "--suggest", 2, "--overlay", tmp_path / "overlay.mp4"
+    found, figures, _ = lift("--camera", files / "camera.json", "--keep-spikes", *also)
     assert figures["visible_share"] == pytest.approx(1 - 1 / len(NAMES))
+    assert figures["suggest"][0]["joint"] == "l_wrist"
+    film = Video(tmp_path / "overlay.mp4")
+    assert film.count == len(found["frame"]) and next(iter(film.frames())).image.max() > 100
 
 
 def test_the_users_view_is_used(lift):
@@ -117,7 +121,7 @@ def test_a_placement_in_the_picture_is_put_on_the_floor():
             "--fov: is for a camera that is found",
         ),
         (["--camera-out", "c.json"], "--camera-out: there is no camera"),
-        (["--height", "1.7", "--suggest", "3"], "--suggest needs --placement"),
+        (["--height", "1.7", "--background", "none"], "--background needs --placement"),
         (
             ["--height", "1.7", "--placement", "p.json", "--camera", "camera.json"],
             "--height: the placement has",

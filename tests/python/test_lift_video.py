@@ -20,7 +20,7 @@ from gait.lift.keypoints.corrections import CLICK_SD, Correction, as_json, read_
 from gait.lift.video import run as lift_video
 from gait.lift.video.clip_segments import Settings
 from gait.lift.video.figure import LIMBS, Figure, draw_figure
-from gait.lift.video.fit_clip import _share, fit_clip, suggest
+from gait.lift.video.fit_clip import _share, fit_clip, suggestions
 from gait.lift.video.placement import (
     HEADING_SD,
     PHASE_SD,
@@ -89,12 +89,12 @@ def test_corrections_help_and_are_kept(corrected, prior):
 def test_corrections_make_the_estimate_surer(corrected, clip):
     (_, free), (some, fit) = corrected[0], corrected[-1]
     assert np.median(fit.sd) < np.median(free.sd)
-    assert len(suggest(some, fit)) <= len(suggest(clip, free))
+    assert len(suggestions(some, fit)) <= len(suggestions(clip, free))
 
 
 def test_what_is_suggested_is_the_least_certain(corrected, clip):
     _, fit = corrected[0]
-    asked = suggest(clip, fit)
+    asked = suggestions(clip, fit)
     assert asked[0].sd_px == max(s.sd_px for s in asked)
     frame, joint = asked[0].frame, clip.prior.index([asked[0].joint])[0]
     assert clip.view.scale(fit.places[frame, joint]) * fit.sd[frame, joint].max() > 0.3 * asked[0].sd_px

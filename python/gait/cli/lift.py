@@ -70,7 +70,7 @@ _ONLY_KEYPOINTS = (
     *("no_bones", "ignore_unknown", "keep_sides", "keep_spikes", "trc", "person", "fps", "video"),
     *("stabilize", "balance"),
 )
-_ONLY_PICTURES = ("background", "alone", "overlay", "suggest")
+_ONLY_PICTURES = ("background", "alone")
 _ONLY_VIDEO = ("placement", *_ONLY_PICTURES, "start", "stop", "fov", "camera_out", "stabilize")
 PIXEL_SD, FLOOR_SD = Options.pixel_sd, Options.floor_sd  # pixels, metres
 MOVED = 3  # joints named that a displacement moves most
@@ -187,6 +187,17 @@ def _add_video_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "--corrections", metavar="C.json", help="what was corrected by hand, as gait studio writes it"
     )
+    parser.add_argument(
+        "--suggest",
+        type=values.whole(0),
+        metavar="N",
+        help="name the N corrections that would help most (default: 0)",
+    )
+    parser.add_argument(
+        "--overlay",
+        metavar="O.mp4",
+        help="draw the cylinder figure into the video; of keypoints, into --video",
+    )
     group = parser.add_argument_group("from a video's pictures", FILES)
     group.add_argument(
         "--placement", metavar="P.json", help="where the person roughly is in one frame; lifts the pictures"
@@ -201,13 +212,6 @@ def _add_video_arguments(parser: argparse.ArgumentParser) -> None:
         "--alone",
         action="store_true",
         help="estimate segments one after the other, as in the paper (default: together)",
-    )
-    group.add_argument("--overlay", metavar="O.mp4", help="draw the cylinder figure into the video")
-    group.add_argument(
-        "--suggest",
-        type=values.whole(0),
-        metavar="N",
-        help="name the N corrections that would help most (default: 0)",
     )
 
 
@@ -287,6 +291,16 @@ def _lift_keypoints(args: argparse.Namespace, video: bool) -> tuple[dict[str, An
         write_trc(args.trc, found.names, keypoints.time, found.places, _rate(keypoints))
     _write_camera(args, calibration)
     summary = _summary(args, keypoints, found) | lifted.repairs | {"pixel_sd": lifted.options.pixel_sd}
+    if args.overlay or args.suggest:
+        from gait.io.video import Video  # OpenCV and PyAV, which keypoints alone do not need
+        from gait.lift import picture
+
+        if args.overlay:
+            film = Video(args.input if video else args.video)
+            picture.draw_overlay(args.overlay, film, lifted, args.quiet)
+        if args.suggest:
+            asked = picture.suggestions(lifted, args.suggest)
+            summary["suggest"] = [{"frame": s.frame, "joint": s.joint, "sd_px": s.sd_px} for s in asked]
     summary |= {} if calibration is None else {"camera": calibration.figures()}
     return summary, _text(summary)
 
@@ -296,8 +310,6 @@ def _clip(args: argparse.Namespace) -> Clip:
     from gait.camera.camera import Camera
     from gait.io.detections import Clip
 
-    if args.fps and args.video:
-        raise UsageError("--fps and --video exclude each other; give one of them")
     size = times = None
     if args.video:
         from gait.io.video import Video  # PyAV, which a file that has times does not need
@@ -374,7 +386,7 @@ def _scaled(args: argparse.Namespace) -> tuple[int, int] | None:
     """Size to which --scale-camera resizes the camera: that of the video."""
     from gait.io.video import Video
 
-    return Video(args.input).size if args.scale_camera else None
+    return Video(args.video or args.input).size if args.scale_camera else None
 
 
 def _lift_pictures(args: argparse.Namespace) -> tuple[dict[str, Any], str]:
@@ -430,6 +442,7 @@ def _options(args: argparse.Namespace) -> Options:
         not args.no_contact,
         not args.no_bones,
         args.balance,
+        covariance=bool(args.suggest),
     )
 
 
@@ -452,8 +465,8 @@ def _require_own(args: argparse.Namespace, video: bool) -> None:
             raise UsageError(f"--{option.replace('_', '-')} {why}")
     if video and args.placement and args.camera and args.height:
         raise UsageError("--height: the placement has the stature; leave it out, or --camera")
-    if args.scale_camera and not (video and args.camera):
-        raise UsageError("--scale-camera: is for the --camera of a VIDEO, whose size it takes")
+    if args.scale_camera and not ((video or args.video) and args.camera):
+        raise UsageError("--scale-camera: is for the --camera of a VIDEO (or --video), whose size it takes")
     if args.fov and (given or not args.height):
         raise UsageError("--fov: is for a camera that is found from the walk, with --height and no --camera")
     if args.camera_out and not (args.camera or (args.height and not given)):
@@ -479,6 +492,14 @@ def _require_person(args: argparse.Namespace, found: Motion) -> None:
 def _check(args: argparse.Namespace, video: bool) -> None:
     """Refuse options that do not go together."""
     smooth = args.method in (None, "smooth")
+    if args.fps and args.video:
+        raise UsageError("--fps and --video exclude each other; give one of them")
+    if args.overlay:
+        from gait.io.video import require_video_name
+
+        if not (video or args.video):
+            raise UsageError("--overlay: give the --video in which the keypoints were found")
+        require_video_name(args.overlay)
     if args.camera and args.orthographic:
         raise UsageError("--camera and --orthographic exclude each other; give one of them")
     if args.metres_per_unit and not args.orthographic:
@@ -548,7 +569,11 @@ def _text(s: dict[str, Any]) -> str:
     ]
     if s["iterations"]:
         lines.append(f"{'converged after' if s['settled'] else 'stopped after'} {s['iterations']} iterations")
-    return "\n".join([*lines, _left(s["segments"])])
+    return "\n".join([*lines, _left(s["segments"]), *_asked(s.get("suggest", []))])
+
+
+def _asked(suggested: list[dict[str, Any]]) -> list[str]:
+    return [f"frame {s['frame']:5d}  {s['joint']:<11} +- {s['sd_px']:.0f} px" for s in suggested]
 
 
 def _left(segments: dict[str, Any]) -> str:
@@ -573,5 +598,4 @@ def _video_text(summary: dict[str, Any]) -> str:
         f"{c['within_px']:.0f} px",
         f"figure: stature {figure['stature_m']:.2f} m, {figure['residual_mm']:.0f} mm from the markers",
     ]
-    asked = [f"frame {s['frame']:5d}  {s['joint']:<11} +- {s['sd_px']:.0f} px" for s in summary["suggest"]]
-    return "\n".join([*lines, *asked])
+    return "\n".join([*lines, *_asked(summary["suggest"])])

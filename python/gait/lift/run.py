@@ -113,6 +113,8 @@ class Lifted:
     motion : Motion
     repairs : dict
         What was repaired, as in the ``--json`` summary.
+    edits : Edits
+        What was corrected by hand.
     """
 
     keypoints: Keypoints
@@ -120,6 +122,7 @@ class Lifted:
     options: Options
     motion: Motion
     repairs: dict[str, Any] = field(default_factory=dict)
+    edits: Edits = Edits()
 
 
 def load_prior(model: str | None, warn: Warn) -> SegmentPrior:
@@ -198,7 +201,7 @@ def lift_prepared(
     if request.calibration is not None:
         wider = request.calibration.joint_sd(keypoints.time, lifted.places, lifted.sd)
         lifted = replace(lifted, sd=wider)
-    return Lifted(keypoints, view, options, lifted, prepared.repairs)
+    return Lifted(keypoints, view, options, lifted, prepared.repairs, edits)
 
 
 def _check(path: str, keypoints: Keypoints, sd: float, warn: Warn) -> None:

@@ -173,7 +173,7 @@ def energy_by_part(lifted: LiftedVideo) -> Floats:
         rows.append([
             float(np.sum(energy.residuals(state) ** 2)),
             float(prior @ prior),
-            float(np.sum(energy.correction_residuals(state) ** 2)),
+            float(np.sum(energy.correction_rows(state)[0] ** 2)),
         ])  # fmt: skip
     return np.array(rows)
 

@@ -275,7 +275,7 @@ def corrected(keypoints: Keypoints, edits: Edits, sd: float) -> Keypoints:
         if np.isfinite(off).all():
             since = np.abs(found.time - found.time[row])
             wrong = max(float(off @ off) / 2 - c.sd_px**2 - sd**2, 0.0)
-            for other in _found_alike(found.names, c.joint):
+            for other in found_alike(found.names, c.joint):
                 errs[:, other] = np.maximum(errs[:, other], wrong * np.exp(-2 * since / ERRS_FOR))
         by_hand[row, column] = c.sd_px
     for c in edits.corrections:  # all errors are known before the points move
@@ -293,7 +293,7 @@ def corrected(keypoints: Keypoints, edits: Edits, sd: float) -> Keypoints:
     )
 
 
-def _found_alike(names: Sequence[str], joint: str) -> list[int]:
+def found_alike(names: Sequence[str], joint: str) -> list[int]:
     """Columns of points that a detector finds together: a joint alone, or all of its foot."""
     if not joint.endswith(FEET):
         return [names.index(joint)]

@@ -13,10 +13,11 @@ import numpy.typing as npt
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
+from gait.body.skeleton import side_of
 from gait.io.keypoints_file import Keypoints
 from gait.lift.segment.view import Perspective, View
 from gait.lift.smooth.motion import Motion
-from gait.report.colours import DARK, GREY, ON_PAPER, side_of
+from gait.report.colours import DARK, GREY, ON_PAPER
 from gait.report.figures import STICKS, Drawing, plain
 
 Floats = npt.NDArray[np.float64]

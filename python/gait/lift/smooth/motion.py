@@ -77,6 +77,9 @@ class Motion:
         Where the markers are in the picture.
     state : State
         Of the smoother, to go on from; None for segments alone.
+    covariance : (T, 3 J, 3 J) or None
+        Of all coordinates of a frame's markers, square metres, if the options ask for it; None for segments
+        alone.
     """
 
     names: tuple[str, ...]
@@ -97,6 +100,7 @@ class Motion:
     outliers: npt.NDArray[np.bool_] | None = None
     uv: Floats | None = None
     state: State | None = None
+    covariance: Floats | None = None
 
 
 class Unlike(UserError):
@@ -401,6 +405,7 @@ def _lift(of: _Sequence) -> Motion:
         contact=of.options.contact,
         bones=of.options.bones,
         balance=of.options.balance,
+        covariance=of.options.covariance,
     )
     sized = _sized(of, found, found.chi2_per_observation)
     require_size(sized.places, of.prior, task.stature)
@@ -421,6 +426,7 @@ def _lift(of: _Sequence) -> Motion:
         outliers=found.outliers,
         uv=of.view.project(sized.places, found.lengths),
         state=found.state,
+        covariance=sized.covariance,
     )
 
 
@@ -436,7 +442,7 @@ def _sized(of: _Sequence, found: Lifted | Motion | size.Resized, chi2: float) ->
     than the bones do, unless joints that no person sees were put there by the prior to suit them.
     """
     prior, view, options = of.prior, of.view, of.options
-    fitted = size.Resized(found.places, found.sd, found.rooted_sd)
+    fitted = size.Resized(found.places, found.sd, found.rooted_sd, covariance=found.covariance)
     if isinstance(view, Parallel) or not options.bones:
         return size.widened(fitted, chi2)
     stature, stature_sd = believed_stature(options, prior.stature)

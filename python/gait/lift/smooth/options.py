@@ -25,6 +25,8 @@ class Options:
         Feet stay put; bones keep their length.
     balance : bool
         The ground pushes where feet stand; needs `contact`.
+    covariance : bool
+        Give the covariances of each frame's joints too, which takes time.
     """
 
     method: str = "smooth"
@@ -34,3 +36,4 @@ class Options:
     contact: bool = True
     bones: bool = True
     balance: bool = False
+    covariance: bool = False

@@ -34,12 +34,20 @@ class Resized:
         Metres, as in `motion.Motion`.
     factor : float
         By which the size was changed; 1 if it is a likely one.
+    covariance : (T, 3 J, 3 J) or None
+        As in `motion.Motion`.
     """
 
     places: Floats
     sd: Floats
     rooted_sd: Floats
     factor: float = 1.0
+    covariance: Floats | None = None
+
+    def grown(self, factor: float) -> Resized:
+        """Multiply the standard deviations."""
+        wider = None if self.covariance is None else factor**2 * self.covariance
+        return replace(self, sd=factor * self.sd, rooted_sd=factor * self.rooted_sd, covariance=wider)
 
 
 def shows_distance(keypoints: Keypoints) -> bool:
@@ -94,14 +102,15 @@ def resized(
         return widened(found, chi2)
     lens = -camera.R.T @ camera.t
     grown = max(off, float(np.sqrt(chi2))) / ratio
-    sized = Resized(
-        lens + (found.places - lens) / ratio, grown * found.sd, grown * found.rooted_sd, 1 / ratio
-    )
+    sized = replace(found.grown(grown), places=lens + (found.places - lens) / ratio, factor=1 / ratio)
     return of_any_size(sized, camera, own)
 
 
 def of_any_size(found: Resized, camera: Camera, own: float) -> Resized:
-    """Widen standard deviations by the relative standard deviation `own` of size and distance."""
+    """Widen standard deviations by the relative standard deviation `own` of size and distance.
+
+    Covariances stay: neither angles nor the picture depend on it.
+    """
     away = found.places - (-camera.R.T @ camera.t)
     rooted = away - away.mean(axis=1, keepdims=True)
     return replace(
@@ -113,5 +122,4 @@ def of_any_size(found: Resized, camera: Camera, own: float) -> Resized:
 
 def widened(found: Resized, chi2: float) -> Resized:
     """Widen standard deviations by the root of chi2 per observation, if that is above 1."""
-    grown = float(np.sqrt(max(chi2, 1.0)))
-    return replace(found, sd=grown * found.sd, rooted_sd=grown * found.rooted_sd)
+    return found.grown(float(np.sqrt(max(chi2, 1.0))))

@@ -123,6 +123,8 @@ class Lifted:
         Mean squared residual in standard deviations: about 1 if the motion is of the prior's kind.
     state : State
         Where the iteration came to rest, to go on from.
+    covariance : (T, 3 J, 3 J) or None
+        Of all coordinates of the places of a frame, square metres, if it was asked for.
     """
 
     places: Floats
@@ -140,6 +142,7 @@ class Lifted:
     outliers: npt.NDArray[np.bool_]
     chi2_per_observation: float
     state: State
+    covariance: Floats | None = None
 
 
 def smooth(
@@ -152,6 +155,7 @@ def smooth(
     contact: bool = True,
     bones: bool = True,
     balance: bool = False,
+    covariance: bool = False,
 ) -> Lifted:
     """Estimate the motion of all markers of a prior (`chain.restricted`) over a sequence."""
     problem = Problem(prior, observed, view, freedom, start, contact, bones, balance)
@@ -160,7 +164,7 @@ def smooth(
         problem.weight(state)
         before, state = state, problem.step(state, constrained=state.steps >= FREE_STEPS)
         settled = state.steps > FREE_STEPS and _change(state.places - before.places) < SETTLED
-    return problem.result(state, settled)
+    return problem.result(state, settled, covariance)
 
 
 def evidence(
@@ -383,7 +387,7 @@ class Problem:
         """Logarithm of the density of what is seen, but for a constant."""
         return unconstrained.evidence - _cost(self.visible.points, self.points)
 
-    def result(self, state: State, settled: bool) -> Lifted:
+    def result(self, state: State, settled: bool, covariances: bool) -> Lifted:
         """Covariances and figures of the last estimate."""
         prior = self.chain(state)
         system = self.system(state, prior, constrained=True)
@@ -409,6 +413,7 @@ class Problem:
             outliers=self.points.sd > self.visible.points.sd,
             chi2_per_observation=unconstrained.square / max(2 * int(self.visible.points.visible.sum()), 1),
             state=state,
+            covariance=self._frame_covariances(*covariance) if covariances else None,
         )
 
     def _rooted(self, own: Floats, diagonal: Floats, across: Floats) -> Floats:
@@ -431,19 +436,37 @@ class Problem:
         total = np.zeros((len(frames), len(first), 3))
         for i in range(frames.shape[1]):
             for k in range(frames.shape[1]):
-                (s, row), (o, column) = (
-                    np.divmod(layout.place(frames[:, [at]], markers)[..., None] + axes, layout.size)
+                one, other = (
+                    layout.place(frames[:, [at]], markers)[..., None] + axes
                     for at, markers in ((i, first), (k, second))
                 )
-                low, high = np.minimum(s, o), np.maximum(s, o)
-                later, sooner = np.where(s >= o, row, column), np.where(s >= o, column, row)
-                value = np.where(
-                    low == high,
-                    diagonal[high, later, sooner],
-                    across[np.minimum(low, len(across) - 1), later, sooner],
+                value = _entries(
+                    diagonal, across, *np.divmod(one, layout.size), *np.divmod(other, layout.size)
                 )
                 total += (weights[:, i] * weights[:, k])[:, None, None] * value
         return total
+
+    def _frame_covariances(self, diagonal: Floats, across: Floats) -> Floats:
+        """Covariances (T, 3 J, 3 J) of the coordinates of all interpolated places of a frame."""
+        frames, weights = self.at
+        every = np.arange(self.layout.markers)
+        total = np.empty((len(frames), 3 * len(every), 3 * len(every)))
+        for t, (nodes, shares) in enumerate(zip(frames, weights, strict=True)):
+            places = self.layout.place(nodes[:, None], every)[..., None] + np.arange(3)
+            block, row = np.divmod(places.reshape(-1), self.layout.size)
+            near = _entries(diagonal, across, block[:, None], row[:, None], block, row)
+            apart = near.reshape(len(nodes), total.shape[1], len(nodes), total.shape[1])
+            total[t] = np.einsum("w,wavb,v->ab", shares, apart, shares)
+        return total
+
+
+def _entries(diagonal: Floats, across: Floats, s: Ints, row: Ints, o: Ints, column: Ints) -> Floats:
+    """Covariances of the numbers `row` of blocks `s` with the numbers `column` of blocks `o`."""
+    low, high = np.minimum(s, o), np.maximum(s, o)
+    later, sooner = np.where(s >= o, row, column), np.where(s >= o, column, row)
+    return np.where(
+        low == high, diagonal[high, later, sooner], across[np.minimum(low, len(across) - 1), later, sooner]
+    )
 
 
 def weighted(points: Observations, predicted: Floats) -> Observations:

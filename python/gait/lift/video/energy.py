@@ -261,8 +261,8 @@ class Energy:
         parts = [((state - self.mean) / self.sd, np.diag(1 / self.sd))]
         if self.reading is not None and len(self.reading.value):
             parts.append(self.sensor_rows(self.reading, state))
-        if self.corrections is not None and len(self.corrections.frame):
-            parts.append(self._correction_rows(self.corrections, state))
+        if self.corrections is not None:
+            parts.append(self.correction_rows(state))
         if self.anchor is not None:
             parts.append(self._anchor_rows(self.anchor, state))
         return np.concatenate([r for r, _ in parts]), np.concatenate([slope for _, slope in parts])
@@ -272,12 +272,6 @@ class Energy:
         if self.reading is None:
             return np.zeros(0)
         return self.sensor_rows(self.reading, state)[0] * self.reading.sd
-
-    def correction_residuals(self, state: Floats) -> Floats:
-        """Differences (2 C,) of markers and corrections in standard deviations; empty without corrections."""
-        if self.corrections is None or not len(self.corrections.frame):
-            return np.zeros(0)
-        return self._correction_rows(self.corrections, state)[0]
 
     def sensor_rows(self, reading: Reading, state: Floats) -> tuple[Floats, Floats]:
         """Residuals (T * S,) of the sensors over their sd, and their slopes (T * S, k + 6) by the state."""
@@ -291,7 +285,11 @@ class Energy:
         residual = state[LEVEL] + gain * response - reading.value
         return residual.ravel() / reading.sd, slope.reshape(-1, len(state)) / reading.sd
 
-    def _correction_rows(self, corrections: Corrections, state: Floats) -> tuple[Floats, Floats]:
+    def correction_rows(self, state: Floats) -> tuple[Floats, Floats]:
+        """Differences (2 C,) of markers and corrections over their sd, and their slopes (2 C, k + 6)."""
+        corrections = self.corrections
+        if corrections is None or not len(corrections.frame):
+            return np.zeros(0), np.zeros((0, len(state)))
         places, by_state = self.shape.positions(state, self.weights[corrections.frame], slice(None))
         each = np.arange(len(corrections.frame))
         uv, by_place = self.view.project(places[each, corrections.marker])

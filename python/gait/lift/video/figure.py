@@ -17,12 +17,13 @@ import numpy.typing as npt
 
 from gait.body.skeleton import ELLIPSOID, JOINTS, default_skeleton
 from gait.errors import UserError
-from gait.io.video import Image
+from gait.io.video import FAST, Image, Video, VideoWriter
 from gait.learn.segments.virtual_markers import MARKERS, SKIN, marked_skeleton
 from gait.learn.solve import skeleton_fit
 from gait.learn.solve.kinematics import Pose, pose_skeleton, segment_origins, segment_scales
 from gait.lift.keypoints.corrections import Correction
 from gait.lift.video.sensors import View
+from gait.progress import progress
 from gait.report.drawing import draw_bones, tinted
 
 Floats = npt.NDArray[np.float64]
@@ -168,6 +169,48 @@ def draw_figure(
     for correction, place in corrections:
         _draw_correction(canvas, np.asarray(correction.uv), view.project(place[None])[0][0], width)
     return canvas
+
+
+def write_overlay(
+    path: str,
+    video: Video,
+    frame: npt.NDArray[np.int64],
+    views: Sequence[View],
+    figure: Figure,
+    corrections: Sequence[tuple[Correction, Floats]],
+    quiet: bool,
+) -> None:
+    """Write the frames of a video from the first to the last of a motion, with the figure drawn into them.
+
+    Parameters
+    ----------
+    path : str
+        Video to write.
+    video : Video
+    frame : (T,)
+        Numbers of the motion's frames; others between them are left as they are.
+    views : sequence of T View
+    figure : Figure
+        In T poses.
+    corrections : sequence of (Correction, (3,))
+        Corrections and where their markers are, metres.
+    quiet : bool
+        Show no progress.
+    """
+    surfaces, joints = figure.surfaces(), figure.joints()
+    rows = {int(number): row for row, number in enumerate(frame)}
+    first, end = int(frame[0]), int(frame[-1]) + 1
+    with (
+        VideoWriter(path, video.fps, preset=FAST) as film,
+        progress("drawing", end - first, quiet) as update,
+    ):
+        for done, shown in enumerate(video.frames(first, end), 1):
+            image, row = shown.image, rows.get(shown.number)
+            if row is not None:
+                own = [each for each in corrections if each[0].frame == shown.number]
+                image = draw_figure(image, views[row], surfaces[row], joints[row], own)
+            film.write(image)
+            update(done)
 
 
 def _limb_ids(size: tuple[int, ...], view: View, surfaces: Floats) -> npt.NDArray[np.uint8]:

@@ -1,4 +1,4 @@
-"""Fit a clip: correlation of sensors and stick figure, the fit, and the next corrections to ask for.
+"""Fit a clip: correlation of sensors and stick figure, the fit, and the next corrections to suggest.
 
 Where the figure lies on the person it explains most of what the sensors read.  Where it explains little, they
 read edges of the scene, which stand still: the figure is held back, and the longer, the further.
@@ -9,12 +9,6 @@ Each segment starts from the one before (Leventon & Freeman 1998), and what both
 observation of it.  By default all are then solved together, neighbours tied where they overlap, so that a
 correction in one helps the others.  The paper's way (`Settings.joined` False) leaves them as they are and
 moves each in depth until it goes on where the one before ended.  Either way they are blended linearly.
-
-The next correction is most useful for the joints that are least certain in the picture.
-
-Greedy: the joint with the largest standard deviation in the picture is taken, as if it were corrected, and so
-on.  A correction counts for the segment that its frame lies most in the middle of, and what is close in time
-and of the same joint is not asked for again.
 """
 
 from __future__ import annotations
@@ -26,9 +20,9 @@ import numpy as np
 import numpy.typing as npt
 
 from gait.body.skeleton import JOINTS
-from gait.lift.keypoints.corrections import CLICK_SD
+from gait.lift.keypoints.suggestions import FramePosterior, Suggestion, suggest
 from gait.lift.video.clip_segments import CORRELATED, ClipSegments
-from gait.lift.video.descent import Link, descend, information, moves
+from gait.lift.video.descent import Link, Normal, descend, information, moves, normal
 from gait.lift.video.energy import HEADING, PLACE, Anchor, Energy
 
 Floats = npt.NDArray[np.float64]
@@ -309,6 +303,24 @@ def _share(clip: ClipSegments, segment: int) -> Floats:
     return np.maximum(1 - np.abs(2 * since / (clip.span + 2 * half) - 1), LEAST)
 
 
+def blended(clip: ClipSegments, sequence: ClipStates) -> Floats:
+    """Places (T, J, 3) of all markers, metres: segments blended linearly."""
+    count = len(clip.film.times)
+    places, total = np.zeros((count, len(clip.prior.names), 3)), np.zeros(count)
+    for s, (component, state) in enumerate(zip(sequence.components, sequence.states, strict=True)):
+        frames, share = clip.frames(s), _share(clip, s)
+        found, _ = clip.shapes[int(component)].positions(state, clip.weights(s), slice(None))
+        places[frames] += share[:, None, None] * found
+        total[frames] += share
+    return np.asarray(places / total[:, None, None])
+
+
+def linearised(clip: ClipSegments, sequence: ClipStates) -> Normal:
+    """Gauss-Newton's equations of all segments together at an estimate."""
+    chain, link = _chain(_with_noise(clip, sequence), sequence, looking=True)
+    return normal(chain, link if clip.settings.joined else None, sequence.states)
+
+
 def _finished(clip: ClipSegments, sequence: ClipStates) -> ClipFit:
     """Blend the segments linearly, with sd from the information of all of them and what they share."""
     chain, link = _chain(clip, sequence, looking=True)
@@ -319,17 +331,15 @@ def _finished(clip: ClipSegments, sequence: ClipStates) -> ClipFit:
     pulled = moves(chain, factor, sequence.states, drifted)
     covariance = overlap * factor.covariance()[0] + pulled @ pulled.swapaxes(1, 2)
     count, markers = len(clip.film.times), len(clip.prior.names)
-    places, variance, total = np.zeros((count, markers, 3)), np.zeros((count, markers, 3)), np.zeros(count)
+    variance, total = np.zeros((count, markers, 3)), np.zeros(count)
     for s, energy in enumerate(chain):
         frames = clip.frames(s)
         share = _share(clip, s)
-        found, slope = energy.shape.positions(sequence.states[s], energy.weights, slice(None))
+        _, slope = energy.shape.positions(sequence.states[s], energy.weights, slice(None))
         sds = np.einsum("tjin,nm,tjim->tji", slope, covariance[s], slope, optimize=True)
-        places[frames] += share[:, None, None] * found
         variance[frames] += share[:, None, None] * (sds + energy.shape.residual[:, None] ** 2)
         total[frames] += share
-    frame = clip.film.first + np.arange(count)
-    places /= total[:, None, None]
+    frame, places = clip.film.first + np.arange(count), blended(clip, sequence)
     size = clip.placement.stature_sd / clip.placement.stature * clip.view.growth(places)
     return ClipFit(
         frame=frame,
@@ -346,77 +356,58 @@ ENOUGH = 0.03  # statures: joints known this well in the picture need no correct
 MOST = 2.0  # corrections per frame that are counted
 
 
-@dataclass(frozen=True)
-class Suggestion:
-    """A joint to correct: its frame in the video and its standard deviation in the picture, pixels."""
-
-    frame: int
-    joint: str
-    sd_px: float
-
-
-@dataclass
-class _Part:
-    """Frames of one segment: numbers (T,), slopes (T, J, 2, n) of pixels by the state, covariance (n, n)."""
-
-    frame: Indices
-    slope: Floats
-    covariance: Floats
-
-    def sds(self) -> Floats:
-        """Give standard deviations (T, J) in the picture, both axes together."""
-        half = self.slope @ self.covariance
-        return np.asarray(np.sqrt(np.maximum((half * self.slope).sum(axis=(2, 3)), 0)))
-
-    def correct(self, at: tuple[int, int], sd: float) -> None:
-        """Take a correction of a frame and joint into the covariance."""
-        slope = self.slope[at]
-        across = self.covariance @ slope.T
-        inner = slope @ across + sd**2 * np.eye(2)
-        self.covariance = self.covariance - across @ np.linalg.solve(inner, across.T)
-
-
-def suggest(clip: ClipSegments, fit: ClipFit) -> list[Suggestion]:
+def suggestions(clip: ClipSegments, fit: ClipFit) -> list[Suggestion]:
     """Corrections, most useful first, until every joint is known within `ENOUGH` of the stature.
 
-    At most `MOST` per frame.
+    At most `MOST` per frame.  A correction counts for the segment that its frame lies most in the middle of.
     """
     joints = [j for j in JOINTS if j in clip.prior.names]
-    parts = _parts(clip, fit, clip.prior.index(joints))
-    sds = [part.sds() for part in parts]
     near = 0.5 * clip.hop / float(np.median(np.diff(clip.film.times))) if len(clip.film.times) > 1 else 1.0
-    enough = ENOUGH * clip.placement.stature
     scale = float(np.median([clip.view.scale(body.mean(axis=0)) for body in fit.places]))
-    asked: list[Suggestion] = []
-    while parts and len(asked) < MOST * len(fit.frame):
-        which = int(np.argmax([values.max(initial=0.0) for values in sds]))
-        at = np.unravel_index(np.argmax(sds[which]), sds[which].shape)
-        frame, joint = int(at[0]), int(at[1])
-        sd = float(sds[which][frame, joint])
-        if sd <= enough * scale:
-            break
-        number = int(parts[which].frame[frame])
-        asked.append(Suggestion(number, joints[joint], sd))
-        parts[which].correct((frame, joint), CLICK_SD)
-        sds[which] = parts[which].sds()
-        for part, values in zip(parts, sds, strict=True):
-            for old in asked:
-                values[np.abs(part.frame - old.frame) < near, joints.index(old.joint)] = 0.0
-    return asked
+    enough = ENOUGH * clip.placement.stature * scale
+    posteriors = _posteriors(clip, fit, clip.prior.index(joints))
+    return suggest(posteriors, joints, near, enough, int(MOST * len(fit.frame)))
 
 
-def _parts(clip: ClipSegments, fit: ClipFit, joints: Indices) -> list[_Part]:
-    """Frames by the segment that they lie most in the middle of."""
-    middle = clip.starts + 0.5 * clip.span
-    owner = np.argmin(np.abs(clip.film.times[:, None] - middle), axis=1)
-    parts = []
-    for segment in np.unique(owner):
-        own = clip.frames(segment)
-        mine = np.isin(own, np.flatnonzero(owner == segment))
+def picture_sd(clip: ClipSegments, fit: ClipFit, joints: Indices) -> Floats:
+    """Give standard deviations (T, J) of joints along an axis of the picture, pixels."""
+    found = np.zeros((len(fit.frame), len(joints)))
+    for posterior in _posteriors(clip, fit, joints):
+        found[posterior.frame - clip.film.first] = posterior.off / np.sqrt(2)
+    return found
+
+
+def joint_covariances(clip: ClipSegments, fit: ClipFit, joints: Indices) -> Floats:
+    """Covariances (T, 3 J, 3 J) of the coordinates of a frame's joints, square metres."""
+    found = np.zeros((len(fit.frame), 3 * len(joints), 3 * len(joints)))
+    for segment, rows, frames in _middles(clip):
         shape = clip.shapes[int(fit.sequence.components[segment])]
-        weights = clip.weights(segment)[mine]
+        _, slope = shape.positions(fit.sequence.states[segment], clip.weights(segment)[rows], joints)
+        flat = slope.reshape(len(slope), -1, slope.shape[-1])
+        found[frames] = flat @ fit.covariance[segment] @ flat.swapaxes(1, 2)
+        found[frames] += np.diag(np.repeat(shape.residual[joints] ** 2, 3))
+    return found
+
+
+def _posteriors(clip: ClipSegments, fit: ClipFit, joints: Indices) -> list[FramePosterior]:
+    """Frames by the segment that they lie most in the middle of."""
+    found = []
+    for segment, rows, frames in _middles(clip):
+        shape = clip.shapes[int(fit.sequence.components[segment])]
+        weights = clip.weights(segment)[rows]
         places, by_state = shape.positions(fit.sequence.states[segment], weights, joints)
         _, by_place = clip.view.project(places)
-        number = clip.film.first + own[mine]
-        parts.append(_Part(number, by_place @ by_state, fit.covariance[segment]))
-    return [part for part in parts if len(part.frame)]
+        found.append(FramePosterior(clip.film.first + frames, by_place @ by_state, fit.covariance[segment]))
+    return found
+
+
+def _middles(clip: ClipSegments) -> list[tuple[int, npt.NDArray[np.bool_], Indices]]:
+    """Segments, and the frames that lie most in their middle: which of their own, and their indices."""
+    owner = np.argmin(np.abs(clip.film.times[:, None] - (clip.starts + 0.5 * clip.span)), axis=1)
+    found = []
+    for segment in np.unique(owner).tolist():
+        own = clip.frames(segment)
+        rows = np.isin(own, np.flatnonzero(owner == segment))
+        if rows.any():
+            found.append((segment, rows, own[rows]))
+    return found

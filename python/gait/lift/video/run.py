@@ -16,11 +16,11 @@ from gait.body.skeleton import JOINTS
 from gait.camera.camera import Camera
 from gait.errors import UserError
 from gait.io.blob import decode
-from gait.io.video import FAST, Video, VideoWriter, background
+from gait.io.video import Video, background
 from gait.lift.keypoints.corrections import Correction, read_corrections
 from gait.lift.video.clip_segments import ClipSegments, Settings
-from gait.lift.video.figure import Figure, draw_figure
-from gait.lift.video.fit_clip import ENOUGH, HELD, POOR_CORRELATION, ClipFit, fit_clip, suggest, work
+from gait.lift.video.figure import Figure, write_overlay
+from gait.lift.video.fit_clip import ENOUGH, HELD, POOR_CORRELATION, ClipFit, fit_clip, suggestions, work
 from gait.lift.video.placement import PhasePrior, Placement, read_placement
 from gait.lift.video.sensors import CameraView, Film, FlatView, View
 from gait.progress import progress
@@ -97,6 +97,16 @@ def lift_video(request: Request, prior: SegmentPrior, warn: Warn, quiet: bool) -
     UserError
         One line that names the file at fault.
     """
+    video, clip = open_clip(request, prior, warn, quiet)
+    free, fit = _fits(clip, quiet)
+    if fit.fit_correlation < POOR_CORRELATION:
+        warn(poor_correlation(request, fit.fit_correlation))
+    free, fit = (widened(request, one) for one in (free, fit))
+    return LiftedVideo(video, clip, free, fit, Figure.fit(fit.places, prior.names))
+
+
+def open_clip(request: Request, prior: SegmentPrior, warn: Warn, quiet: bool) -> tuple[Video, ClipSegments]:
+    """Read everything and the sensors, as `lift_video` does before it estimates."""
     video = Video(request.video)
     camera = Camera.read(request.camera, video.size, request.scale_camera) if request.camera else None
     placement = read_placement(request.placement, prior, camera is not None)
@@ -117,13 +127,7 @@ def lift_video(request: Request, prior: SegmentPrior, warn: Warn, quiet: bool) -
         warn(f"{len(corrections) - len(used)} corrections are in frames that are not used")
     phase_prior = PhasePrior.of(prior, _cycle(request.model), placement)
     settings = Settings(joined=request.joined)
-    clip = ClipSegments(prior, view, film, placement, used, settings, phase_prior)
-    free, fit = _fits(clip, quiet)
-    if fit.fit_correlation < POOR_CORRELATION:
-        warn(_poor_correlation(request, fit.fit_correlation))
-    if request.calibration is not None:
-        free, fit = (_widened(one, request.calibration) for one in (free, fit))
-    return LiftedVideo(video, clip, free, fit, Figure.fit(fit.places, prior.names))
+    return video, ClipSegments(prior, view, film, placement, used, settings, phase_prior)
 
 
 def _on_floor(request: Request, placement: Placement, prior: SegmentPrior) -> Placement:
@@ -139,12 +143,15 @@ def _on_floor(request: Request, placement: Placement, prior: SegmentPrior) -> Pl
     return replace(placement, ground=ground, stature=request.height)
 
 
-def _widened(fit: ClipFit, calibration: Calibration) -> ClipFit:
-    """Add the uncertainty of the camera to the standard deviations of an estimate."""
-    return replace(fit, sd=calibration.joint_sd(fit.time, fit.places, fit.sd))
+def widened(request: Request, fit: ClipFit) -> ClipFit:
+    """Add the uncertainty of a camera that was found from the walk to an estimate's standard deviations."""
+    if request.calibration is None:
+        return fit
+    return replace(fit, sd=request.calibration.joint_sd(fit.time, fit.places, fit.sd))
 
 
-def _poor_correlation(request: Request, fit_correlation: float) -> str:
+def poor_correlation(request: Request, fit_correlation: float) -> str:
+    """Words on a figure that explains little of what the sensors read."""
     remedy = "--background or --corrections" if request.background == "none" else "--corrections"
     return (
         f"{request.video}: the sensors hardly show the person (correlation with the stick figure "
@@ -247,16 +254,11 @@ def _marker(clip: ClipSegments, fit: ClipFit, correction: Correction) -> Floats:
 
 def draw_overlay(path: str, lifted: LiftedVideo, quiet: bool) -> None:
     """Write the video with the cylinder figure and the corrections drawn into it."""
-    video, clip, fit, figure = lifted.video, lifted.clip, lifted.fit, lifted.figure
-    surfaces, joints, first = figure.surfaces(), figure.joints(), clip.film.first
-    with (
-        VideoWriter(path, video.fps, preset=FAST) as film,
-        progress("drawing", len(fit.frame), quiet) as update,
-    ):
-        for k, frame in enumerate(video.frames(first, first + len(fit.frame))):
-            corrections = [(c, _marker(clip, fit, c)) for c in clip.corrections if c.frame == frame.number]
-            film.write(draw_figure(frame.image, clip.view, surfaces[k], joints[k], corrections))
-            update(k + 1)
+    clip, fit = lifted.clip, lifted.fit
+    corrections = [(c, _marker(clip, fit, c)) for c in clip.corrections]
+    write_overlay(
+        path, lifted.video, fit.frame, [clip.view] * len(fit.frame), lifted.figure, corrections, quiet
+    )
 
 
 def correction_errors(clip: ClipSegments, fit: ClipFit) -> Floats:
@@ -272,7 +274,7 @@ def summary(lifted: LiftedVideo, most: int) -> dict[str, Any]:
     pixels = float(np.median([clip.view.scale(body.mean(axis=0)) for body in fit.places]))
     enough = ENOUGH * clip.placement.stature * pixels
     before, after = correction_errors(clip, free), correction_errors(clip, fit)
-    wanted = suggest(clip, fit)
+    wanted = suggestions(clip, fit)
     joints = clip.prior.index([j for j in JOINTS if j in clip.prior.names])
     return {
         "frames": frames,

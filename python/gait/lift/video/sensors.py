@@ -12,7 +12,7 @@ in a flat view they are in the picture's own axes: x to the right, y away from t
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import Protocol
 
 import cv2
@@ -21,6 +21,7 @@ import numpy.typing as npt
 
 from gait.camera.camera import Camera
 from gait.io.video import Frame, Image
+from gait.lift.segment.view import looking_along
 
 Floats = npt.NDArray[np.float64]
 Field = npt.NDArray[np.float32]
@@ -250,14 +251,17 @@ class FlatView:
         Per metre.
     origin : (2,)
         Pixel of the point (0, 0, 0).
+    axes : (3, 3)
+        Right, down and ahead in the world as rows; level along y if left out.
     """
 
     pixels: float
     origin: tuple[float, float]
+    axes: Floats = field(default_factory=lambda: looking_along("y"))
 
     def project(self, points: Floats) -> tuple[Floats, Floats]:
         """Pixels and slopes, see `View`."""
-        slope = self.pixels * np.array([[1.0, 0, 0], [0, 0, -1.0]])
+        slope = self.pixels * self.axes[:2]
         uv = points @ slope.T + np.asarray(self.origin)
         return uv, np.broadcast_to(slope, (*points.shape[:-1], 2, 3))
 
@@ -267,7 +271,7 @@ class FlatView:
 
     def depth(self, points: Floats) -> Floats:
         """Distance from the point (0, 0, 0) away from the viewer."""
-        return np.asarray(points[..., 1])
+        return np.asarray(points @ self.axes[2])
 
     def scale(self, point: Floats) -> float:
         """Pixels per metre, the same everywhere."""
@@ -279,4 +283,4 @@ class FlatView:
 
     def away(self, point: Floats) -> Floats:
         """Direction of depth."""
-        return np.array([0.0, 1.0, 0.0])
+        return self.axes[2]

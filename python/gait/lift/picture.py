@@ -1,0 +1,114 @@
+"""A lifted motion in the picture: uncertainty, which corrections would help, the overlay."""
+
+from __future__ import annotations
+
+import numpy as np
+import numpy.typing as npt
+
+from gait.body.skeleton import JOINTS
+from gait.io.video import Video
+from gait.lift.keypoints.corrections import found_alike
+from gait.lift.keypoints.suggestions import FramePosterior, Suggestion, suggest
+from gait.lift.run import Lifted
+from gait.lift.segment.view import Perspective
+from gait.lift.video.figure import Figure, write_overlay
+from gait.lift.video.fit_clip import ENOUGH
+from gait.lift.video.sensors import CameraView, FlatView, View
+
+Floats = npt.NDArray[np.float64]
+
+NEAR_S = 0.35  # seconds from a correction of the same joint within which another would add little
+
+
+def views(lifted: Lifted) -> list[View]:
+    """View of each frame: the camera, or one from far away whose scale may change."""
+    motion, view = lifted.motion, lifted.view
+    assert motion.uv is not None
+    if isinstance(view, Perspective):
+        return [CameraView(view.camera)] * len(motion.places)
+    found: list[View] = []
+    for places, uv in zip(motion.places, motion.uv, strict=True):
+        flat, middle = places @ view.axes[:2].T, uv.mean(axis=0)
+        pixels = float(np.linalg.norm(uv - middle) / np.linalg.norm(flat - flat.mean(axis=0)))
+        u, v = middle - pixels * flat.mean(axis=0)
+        found.append(FlatView(pixels, (float(u), float(v)), view.axes))
+    return found
+
+
+def slopes(lifted: Lifted) -> Floats:
+    """Slopes (T, J, 2, 3) of the markers' pixels by their places."""
+    places = lifted.motion.places
+    return np.stack([view.project(body)[1] for view, body in zip(views(lifted), places, strict=True)])
+
+
+def covariances(lifted: Lifted) -> Floats:
+    """Covariances (T, 3 J, 3 J) of the coordinates of a frame's markers, square metres.
+
+    Of segments estimated alone only the standard deviations about the hips are known: the errors of joints
+    are then taken for independent, which makes intervals of angles too wide.
+    """
+    motion = lifted.motion
+    if motion.covariance is not None:
+        return motion.covariance
+    variance = motion.rooted_sd.reshape(len(motion.places), -1) ** 2
+    return np.asarray(variance[:, :, None] * np.eye(variance.shape[1]))
+
+
+def picture_sd(lifted: Lifted) -> Floats:
+    """Give standard deviations (T, J) of the markers along an axis of the picture, pixels.
+
+    An uncertain camera moves the places in the world, and hardly where they are in its picture.
+    """
+    by_place, frames = slopes(lifted), len(lifted.motion.places)
+    count = by_place.shape[1]
+    blocks = covariances(lifted).reshape(frames, count, 3, count, 3)
+    own = np.moveaxis(np.diagonal(blocks, axis1=1, axis2=3), -1, 1)  # (T, J, 3, 3)
+    square = np.einsum("tjab,tjbc,tjac->tj", by_place, own, by_place)
+    return np.asarray(np.sqrt(np.maximum(square / 2, 0.0)))
+
+
+def missed(lifted: Lifted) -> Floats:
+    """How far (T, J) each marker is from where it was detected, pixels.
+
+    0 where it was not detected, and near a correction of it, which has told how wrong the detector was.
+    """
+    motion, points = lifted.motion, lifted.keypoints
+    found = np.zeros(motion.places.shape[:2])
+    for column, name in enumerate(points.names):
+        found[:, motion.names.index(name)] = np.nan_to_num(motion.error[:, column])
+    rows = {int(frame): row for row, frame in enumerate(points.frame)}
+    for done in lifted.edits.corrections:
+        if done.joint in motion.names and done.frame in rows:
+            near = np.abs(points.time - points.time[rows[done.frame]]) < NEAR_S
+            found[np.ix_(near, found_alike(motion.names, done.joint))] = 0.0
+    return found
+
+
+def suggestions(lifted: Lifted, most: int) -> list[Suggestion]:
+    """Corrections of joints, most useful first, of a motion lifted from keypoints."""
+    motion, points = lifted.motion, lifted.keypoints
+    joints = [name for name in motion.names if name in JOINTS]
+    columns = [motion.names.index(name) for name in joints]
+    rows = (3 * np.array(columns)[:, None] + np.arange(3)).ravel()
+    by_place, off = slopes(lifted)[:, columns], missed(lifted)[:, columns]
+    slope = np.zeros((len(by_place), len(joints), 2, len(rows)))
+    for j in range(len(joints)):
+        slope[:, j, :, 3 * j : 3 * j + 3] = by_place[:, j]
+    posteriors = [
+        FramePosterior(points.frame[[t]], slope[[t]], own[np.ix_(rows, rows)], off[[t]])
+        for t, own in enumerate(covariances(lifted))
+    ]
+    enough = ENOUGH * motion.stature * float(np.median(np.linalg.norm(by_place, axis=(2, 3)))) / np.sqrt(2)
+    near = NEAR_S / float(np.median(np.diff(points.time) / np.diff(points.frame)))
+    return suggest(posteriors, joints, near, enough, most)
+
+
+def draw_overlay(path: str, video: Video, lifted: Lifted, quiet: bool) -> None:
+    """Write a video with the cylinder figure and the corrections drawn into it."""
+    motion, frame = lifted.motion, lifted.keypoints.frame
+    figure = Figure.fit(motion.places, motion.names)
+    rows = {int(number): row for row, number in enumerate(frame)}
+    pulled = [
+        (c, motion.places[rows[c.frame], motion.names.index(c.joint)]) for c in lifted.edits.corrections
+    ]
+    write_overlay(path, video, frame, views(lifted), figure, pulled, quiet)
