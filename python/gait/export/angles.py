@@ -17,6 +17,7 @@ Array = NDArray[np.float64]
 
 FIXED = ("root_forward", "root_sway", "root_height", "root_pitch", "neck_z")
 """Channels that are 0: those of the path are kept as the pelvis's place, the others are undetermined."""
+_FREE = tuple(i for i, name in enumerate(CHANNELS) if name not in FIXED)
 _ROUNDS, _STEPS = 6, 12  # of lengths and angles in turns; of Gauss and Newton within
 _RIDGE = 1e-8  # metres squared per radian squared: so small that it changes nothing that joints determine
 _SETTLED = 1e-10  # radians
@@ -118,25 +119,12 @@ def _heading(joints: Array) -> Array:
 
 def _with_angles(fitted: Fitted, wanted: Array) -> Fitted:
     """Angles and pelvis that bring the joints nearest to those wanted, by Gauss and Newton."""
-    free = [i for i, name in enumerate(CHANNELS) if name not in FIXED]
-    inside = _descendants(fitted.parents)
+    free = list(_FREE)
     for _ in range(_STEPS):
-        turns, origins, axes = fitted.pose()
-        at = fitted.point_frames
-        joints = origins[:, at] + np.einsum("tpij,pj->tpi", turns[:, at], fitted.points)
-        slopes = np.zeros((len(wanted), joints.shape[1], 3, len(free) + 3))
-        for channel, frame, axis in axes:
-            if channel not in free:
-                continue
-            moved = inside[frame][at]
-            arm = joints[:, moved] - origins[:, None, frame]
-            slopes[..., free.index(channel)][:, moved] = np.cross(axis[:, None], arm)
-        slopes[..., len(free) :] = np.eye(3)
-        rows = slopes.reshape(len(wanted), -1, len(free) + 3)
+        joints, rows, normal = _equations(fitted)
         missed = (wanted - joints).reshape(len(wanted), -1)
         pull = np.zeros((len(wanted), len(free) + 3))
         pull[:, : len(free)] = _RIDGE * fitted.angles[:, free]
-        normal = rows.transpose(0, 2, 1) @ rows + np.diag([_RIDGE] * len(free) + [0.0] * 3)
         step = np.linalg.solve(normal, (np.einsum("tri,tr->ti", rows, missed) - pull)[..., None])[..., 0]
         step[:, : len(free)] = np.clip(step[:, : len(free)], -0.5, 0.5)
         angles = fitted.angles.copy()
@@ -145,6 +133,41 @@ def _with_angles(fitted: Fitted, wanted: Array) -> Fitted:
         if np.abs(step).max() < _SETTLED:
             break
     return fitted
+
+
+def _equations(fitted: Fitted) -> tuple[Array, Array, Array]:
+    """Joints (T, P, 3), their slopes (T, 3 P, n) by the free angles and the pelvis, and the normal matrix."""
+    turns, origins, axes = fitted.pose()
+    at, inside, free = fitted.point_frames, _descendants(fitted.parents), list(_FREE)
+    joints = origins[:, at] + np.einsum("tpij,pj->tpi", turns[:, at], fitted.points)
+    slopes = np.zeros((*joints.shape, len(free) + 3))
+    for channel, frame, axis in axes:
+        if channel not in free:
+            continue
+        moved = inside[frame][at]
+        arm = joints[:, moved] - origins[:, None, frame]
+        slopes[..., free.index(channel)][:, moved] = np.cross(axis[:, None], arm)
+    slopes[..., len(free) :] = np.eye(3)
+    rows = slopes.reshape(len(joints), -1, len(free) + 3)
+    return joints, rows, rows.transpose(0, 2, 1) @ rows + np.diag([_RIDGE] * len(free) + [0.0] * 3)
+
+
+def standard_deviations(fitted: Fitted, covariance: Array) -> Array:
+    """Give standard deviations (T, C) of the angles, radians, 0 of `FIXED` ones, by the joints' covariance.
+
+    Parameters
+    ----------
+    fitted : Fitted
+        Of a motion that has all its frames.
+    covariance : (T, 3 P, 3 P)
+        Of the coordinates of the motion's joints in a frame, square metres.
+    """
+    _, rows, normal = _equations(fitted)
+    by_joint = np.linalg.solve(normal, rows.transpose(0, 2, 1))[:, : len(_FREE)]
+    found = np.zeros((len(rows), len(CHANNELS)))
+    square = np.einsum("tna,tab,tnb->tn", by_joint, covariance, by_joint, optimize=True)
+    found[:, list(_FREE)] = np.sqrt(np.maximum(square, 0.0))
+    return found
 
 
 def _choose_branch(angles: Array, rotation: str, flexion: str) -> None:

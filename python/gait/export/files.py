@@ -1,0 +1,82 @@
+"""Files of other tools, by their suffix."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+from gait.errors import UserError
+from gait.io.files import replacing
+
+SUFFIXES = (".trc", ".c3d", ".bvh", ".mot", ".parquet", ".rrd", ".mcap")
+BESIDE = {".mot": ".osim"}
+"""Suffixes of files that come with a second one, of the same name."""
+
+
+def write(source: str, target: str, tell: Callable[[str], None] = lambda words: None) -> dict[str, Any]:
+    """Write a track, a motion of ``gait lift`` or an LCM log in the format that the target's suffix names.
+
+    Parameters
+    ----------
+    source, target : str
+    tell : callable
+        Called with a line on what the format cannot hold.
+
+    Returns
+    -------
+    dict
+        Figures by their words.
+
+    Raises
+    ------
+    UserError
+        If there is no such format, or the source does not go into it.
+    """
+    suffix = Path(target).suffix.lower()
+    if suffix not in SUFFIXES:
+        raise UserError(f"{target}: not a format that is written; use one of {' '.join(SUFFIXES)}")
+    if suffix in (".bvh", ".mot"):
+        return _fitted(source, target, suffix, tell)
+    return _plain(source, target, suffix)
+
+
+def _plain(source: str, target: str, suffix: str) -> dict[str, Any]:
+    """Write what needs no skeleton."""
+    from gait.export import c3d, mcap, motion, parquet, rerun  # each has packages of its own
+    from gait.io.trc import write_trc
+
+    if suffix == ".trc":
+        found = motion.read(source)
+        rows = found.present
+        write_trc(target, found.names, found.time[rows], found.places[rows], found.rate)
+        return {"frames": int(rows.sum())}
+    with replacing(target) as file:
+        if suffix == ".parquet":
+            return {"rows": parquet.write(file, source)}
+        if suffix == ".mcap" and mcap.is_lcm_log(source):
+            counts = mcap.write_log(file, source)
+            return {"messages": sum(counts.values()), "topics": len(counts)}
+        found = motion.read(source)
+        if suffix == ".c3d":
+            return {"frames": len(found.places), "events": c3d.write(file, found)}
+        to = rerun.write if suffix == ".rrd" else mcap.write_motion
+        return {"frames": to(file, found)}
+
+
+def _fitted(source: str, target: str, suffix: str, tell: Callable[[str], None]) -> dict[str, Any]:
+    """Write the motion of a skeleton."""
+    from gait.export import angles, bvh, motion, opensim
+
+    found = motion.read(source)
+    fitted = angles.fit(found.places)
+    with replacing(target) as file:
+        if suffix == ".bvh":
+            if lacking := bvh.write(file, found, fitted):
+                tell(f"{source}: lacks {lacking} frames, which repeat the one before")
+        else:
+            opensim.write_mot(file, found, fitted)
+    if suffix in BESIDE:
+        with replacing(Path(target).with_suffix(BESIDE[suffix])) as file:
+            opensim.write_osim(file, found.name, fitted)
+    return {"frames": len(found.places), "mm from the joints (rms)": round(1000 * fitted.rms, 2)}
