@@ -51,6 +51,11 @@ BONES = (
 )
 
 
+def side_of(name: str) -> str:
+    """Side of the body that a joint, limb or angle is on, by its name: ``left``, ``right`` or ``middle``."""
+    return {"l_": "left", "r_": "right"}.get(name[:2], "middle")
+
+
 @dataclass(frozen=True)
 class Proportions:
     """Generic body, fractions of stature; the right side mirrors the left.

@@ -10,8 +10,3 @@ STATUS_TINTS = {"init": "#c8c8c8", "ambiguous": "#f4d06f", "lost": "#e07a7a"}
 ON_PAPER = {"left": BLUE, "right": ORANGE, "middle": DARK}
 OVER_PICTURES = {"left": (235, 165, 60), "right": (50, 125, 250), "middle": (190, 215, 120)}
 """BGR; brighter, to show on dark clothes, and pale green for the middle."""
-
-
-def side_of(name: str) -> str:
-    """Side of the body that a joint, limb or angle is on, by its name: ``left``, ``right`` or ``middle``."""
-    return {"l_": "left", "r_": "right"}.get(name[:2], "middle")

@@ -13,10 +13,10 @@ from gait.bindings.abi import TrackStatus
 from gait.bindings.estimate import Estimate
 from gait.bindings.model import Model
 from gait.bindings.state import State
-from gait.body.skeleton import BONES
+from gait.body.skeleton import BONES, side_of
 from gait.camera.camera import Camera
 from gait.io.video import Image
-from gait.report.colours import OVER_PICTURES, side_of
+from gait.report.colours import OVER_PICTURES
 
 _PANEL_SIZE = (236, 92)  # of the panel, pixels at scale 1
 _INK = (240, 240, 240)

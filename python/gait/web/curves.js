@@ -96,7 +96,7 @@ export class Curves {
       grid: GRID,
       tooltip: { trigger: 'axis', confine: true, valueFormatter: (value) => (value === null || value === undefined ? '–' : value.toFixed(1)) },
       xAxis: { type: 'value', min: this.data.times[0], max: this.data.times.at(-1), axisLabel: { ...text, showMaxLabel: false, formatter: (value) => `${Math.round(value * 100) / 100} s` }, splitLine: { show: false }, axisLine: line },
-      yAxis: { type: 'value', scale: true, splitNumber: 3, axisLabel: text, splitLine: line },
+      yAxis: { type: 'value', scale: true, ...limits(curves[0]), splitNumber: 3, axisLabel: text, splitLine: line },
       series: curves.flatMap((curve) => this.#series(curve)),
     }, { notMerge: true });
   }
@@ -138,7 +138,7 @@ function key(curves) {
   return curves.filter((curve) => curve.side).map((curve) => {
     const mark = document.createElement('span');
     mark.className = curve.side;
-    mark.textContent = `${curve.side === 'left' ? '——' : '– –'} ${curve.side} `;
+    mark.textContent = `${curve.side === 'left' ? '—' : '- -'} ${curve.side} `;
     return mark;
   });
 }
@@ -148,4 +148,9 @@ export function nearest(times, time) {
   let best = 0;
   times.forEach((each, k) => { if (Math.abs(each - time) < Math.abs(times[best] - time)) best = k; });
   return best;
+}
+
+/** Bounds of an axis, with a line between them; empty where they follow the values. */
+function limits({ limits: bounds }) {
+  return bounds ? { min: bounds[0], max: bounds[1], interval: (bounds[1] - bounds[0]) / 2 } : {};
 }

@@ -9,8 +9,10 @@ rate        number                  frames per second of the film
 first       integer                 number in the film of the first frame; a frame is an index from 0 below
 times       [frame]                 seconds of the film
 offset      integer                 frame of the video file that shows index 0 (0 if absent)
-joints      [joint]                 names; those that start with ``l_`` or ``r_`` are left or right
+joints      [joint]                 names
+sides       [joint]                 ``left``, ``right`` or ``middle``
 bones       [bone][2]               indices of the two joints of a bone
+bone_sides  [bone]                  ``left``, ``right`` or ``middle``
 radii       [bone]                  radius of its cylinder, metres
 points      [frame][joint][3]       metres; world frame, z up, floor at z = 0; null for a frame without
 sd          [frame][joint][3]       standard deviations along x, y and z, metres; null where not known
@@ -24,13 +26,15 @@ curves      list of curves          plots under the film, each with these keys:
   side                              ``left``, ``right`` or empty: colour and dash
   values    [frame]                 null where not known
   low, high [frame] or null         bounds of the 90 % interval
+  limits    [2] or null             of the axis; by the values if null
 events      list of events          marks on the timeline: ``time`` in seconds, ``name``, ``side``
 strip       [frame]                 how uncertain a frame is, in any unit: a strip under the timeline
 =========== ======================= ==========================================================================
 
-Curves of the same `name` share one plot.  Everything but ``rate``, ``times``, ``joints``, ``bones`` and
-``points`` may be absent.  Frames may be appended to a page that is open: an object with the keys by frame
-alone goes to ``append()`` of the module.  All numbers are finite; unknown ones are null.
+Curves of the same `name` share one plot.  Everything but ``rate``, ``times``, ``joints``, ``sides``,
+``bones``, ``bone_sides`` and ``points`` may be absent.  Frames may be appended to a page that is open: an
+object with the keys by frame alone goes to ``append()`` of the module.  All numbers are finite; unknown ones
+are null.
 """
 
 from __future__ import annotations
@@ -40,6 +44,8 @@ from typing import Any
 
 import numpy as np
 import numpy.typing as npt
+
+from gait.body.skeleton import side_of
 
 Floats = npt.NDArray[np.float64]
 
@@ -76,7 +82,9 @@ def motion_data(
         "rate": rate,
         "times": rounded(times, 6),
         "joints": list(joints),
+        "sides": [side_of(joint) for joint in joints],
         "bones": [[int(a), int(b)] for a, b in bones],
+        "bone_sides": [_either(side_of(joints[a]), side_of(joints[b])) for a, b in bones],
         "radii": [_radius(joints[b]) for _, b in bones],
         "points": frames(points),
         "sd": None if sd is None else frames(sd),
@@ -85,7 +93,13 @@ def motion_data(
 
 
 def curve(
-    name: str, unit: str, values: Floats, sd: Floats | None = None, side: str = "", id: str = ""
+    name: str,
+    unit: str,
+    values: Floats,
+    sd: Floats | None = None,
+    side: str = "",
+    id: str = "",
+    limits: tuple[float, float] | None = None,
 ) -> dict[str, Any]:
     """Make a curve: `values` (T,) and its 90 % interval by standard deviations `sd` (T,)."""
     low = high = None
@@ -99,6 +113,7 @@ def curve(
         "values": rounded(values, 3),
         "low": low,
         "high": high,
+        "limits": limits,
     }
 
 
@@ -115,13 +130,13 @@ def frames(values: Floats, digits: int = 4) -> list[Any]:
     return [rounded(one, digits) if np.isfinite(one).all() else None for one in values]
 
 
-def side_of(joint: str) -> str:
-    """``left``, ``right`` or empty, by a joint's name."""
-    return {"l_": "left", "r_": "right"}.get(joint[:2], "")
+def _either(one: str, other: str) -> str:
+    """Side of a bone by those of its ends."""
+    return other if one == "middle" else one
 
 
 def _radius(joint: str) -> float:
-    return RADIUS.get(joint[2:] if side_of(joint) else joint, _THIN)
+    return RADIUS.get(joint[2:] if side_of(joint) != "middle" else joint, _THIN)
 
 
 def _plain(value: Any) -> Any:

@@ -9,8 +9,6 @@ const CYLINDER = new THREE.CylinderGeometry(1, 1, 1, 14, 1);
 const NINETY = 2.5003; // radius of the ellipsoid that holds 90 % of a Gaussian in three dimensions, sd
 const UP = new THREE.Vector3(0, 1, 0); // axis of CYLINDER
 
-export const sideOf = (joint) => (joint.startsWith('l_') ? 'left' : joint.startsWith('r_') ? 'right' : 'middle');
-
 /** Colour of a custom property of style.css. */
 export const colour = (name) => getComputedStyle(document.documentElement).getPropertyValue(`--${name}`).trim();
 
@@ -65,16 +63,16 @@ export class Scene {
     this.#clear(this.figure);
     this.#clear(this.ground);
     this.scene.background = new THREE.Color(colour('panel'));
-    const side = (joint) => new THREE.MeshStandardMaterial({ color: colour(sideOf(joint)), roughness: 0.7 });
+    const solid = (side) => new THREE.MeshStandardMaterial({ color: colour(side), roughness: 0.7 });
     this.makeLimbs = () => ({
-      parts: data.bones.map(([a, b]) => this.#add(CYLINDER, side(data.joints[sideOf(data.joints[a]) === 'middle' ? b : a]))),
-      balls: data.joints.map((joint) => this.#add(SPHERE, side(joint))),
+      parts: data.bone_sides.map((side) => this.#add(CYLINDER, solid(side))),
+      balls: data.sides.map((side) => this.#add(SPHERE, solid(side))),
     });
     this.limbs = this.makeLimbs();
     this.others = [];
-    const glass = (joint) => new THREE.MeshStandardMaterial({
-      color: colour(sideOf(joint)), transparent: true, opacity: 0.22, depthWrite: false });
-    this.clouds = data.joints.map((joint) => this.#add(SPHERE, glass(joint)));
+    const glass = (side) => new THREE.MeshStandardMaterial({
+      color: colour(side), transparent: true, opacity: 0.22, depthWrite: false });
+    this.clouds = data.sides.map((side) => this.#add(SPHERE, glass(side)));
     this.#floor();
     this.show(Math.min(this.index, data.times.length - 1));
   }

@@ -9,10 +9,10 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.ticker import MaxNLocator
 
-from gait.body.skeleton import ANGLES, CHANNELS, JOINTS, default_skeleton, points
+from gait.body.skeleton import ANGLES, CHANNELS, JOINTS, default_skeleton, points, side_of
 from gait.learn.arrays import Floats
 from gait.learn.prior.fit import SAMPLES, Learned
-from gait.report.colours import BLUE, DARK, GREY, ON_PAPER, ORANGE, side_of
+from gait.report.colours import BLUE, DARK, GREY, ON_PAPER, ORANGE
 from gait.report.figures import STICKS, grid, line_legend, plain
 
 SHOWN = (
