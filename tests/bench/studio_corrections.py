@@ -17,12 +17,14 @@ from pathlib import Path
 import eval_clips
 import lift_detector
 import numpy as np
+import studio_page
 import table
 from numpy.typing import NDArray
 
 from gait.body.skeleton import EVAL15
 from gait.detect import profile
 from gait.io.track_file import read_truth
+from gait.lift import picture
 from gait.lift import run as lift_run
 from gait.lift.keypoints.corrections import Correction, Edits, corrected
 from gait.lift.run import Lifted, Prepared, Request
@@ -31,8 +33,6 @@ from gait.lift.smooth.options import Options
 from gait.motion.evaluate import root_errors
 from gait.progress import progress
 from gait.reproducible import one_thread
-from gait.studio import curves
-from gait.studio.source import picture_sd
 
 Array = NDArray[np.float64]
 
@@ -51,8 +51,9 @@ class Clip:
 
     def __init__(self, folder: Path, frames: int) -> None:
         points = profile.corrected(lift_detector.joints(folder, "full"), "full").part(slice(frames))
+        self.points = points
         self.prior = lift_run.load_prior(None, print)
-        self.request = Request(Options(), camera=str(folder / "camera.json"))
+        self.request = Request(Options(covariance=True), camera=str(folder / "camera.json"))
         self.prepared: Prepared = lift_run.prepare(
             folder.name, points, self.prior, self.request, lambda _: None, True
         )
@@ -85,13 +86,11 @@ class Clip:
             np.median(off.mean(axis=1))
         )
 
-    def proposed(self, lifted: Lifted, edits: Edits, most: int) -> list[tuple[int, str]]:
-        """Rows and joints that the studio proposes."""
-        points, names = lifted.keypoints, tuple(EVAL15)
-        sd = picture_sd(self.camera.project, lifted.motion.places, lifted.motion.sd)
-        px = curves.off_px(lifted, names, sd)
-        found = curves.proposals(points.frame, points.time, names, px, edits, most)
-        return [(int(np.searchsorted(points.frame, each.frame)), each.joint) for each in found]
+    def proposed(self, lifted: Lifted, most: int) -> list[tuple[int, str]]:
+        """Rows and joints that are suggested."""
+        frame = lifted.keypoints.frame
+        asked = [s for s in picture.suggestions(lifted, 3 * most) if s.joint in EVAL15]
+        return [(int(np.searchsorted(frame, s.frame)), s.joint) for s in asked[:most]]
 
 
 def course(clip: Clip, kind: str, seed: int, update: Callable[[], None]) -> list[tuple[float, float]]:
@@ -101,7 +100,7 @@ def course(clip: Clip, kind: str, seed: int, update: Callable[[], None]) -> list
     found = [clip.errors(lifted)]
     for count in COUNTS:
         wanted = count - len(edits.corrections)
-        asked = clip.proposed(lifted, edits, wanted) if kind == "proposed" else []
+        asked = clip.proposed(lifted, wanted) if kind == "proposed" else []
         taken = {(c.frame, c.joint) for c in edits.corrections}
         rows = len(clip.true)
         while len(asked) < wanted:  # random ones, or all proposals are used up
@@ -124,7 +123,7 @@ def solving(clip: Clip) -> tuple[Array, Array]:
         clip.prior, clip.prepared.view, clip.prepared.options, lifted.keypoints.names, lifted.motion
     )
     spent = []
-    for row, joint in clip.proposed(lifted, edits, SOLVED):
+    for row, joint in clip.proposed(lifted, SOLVED):
         edits = Edits((*edits.corrections, clip.click(row, joint, rng)))
         frame = edits.corrections[-1].frame
         cpu, clock = time.process_time(), time.perf_counter()
@@ -161,6 +160,12 @@ def main() -> int:
                     rows.append([name, len(clip.true), kind, measure, *values])
     long = Clip(folder / LONG, 10_000)
     cpu, clock = solving(long)
+    rng = np.random.default_rng(0)
+
+    def target(frame: int, joint: str) -> tuple[float, float]:
+        return long.click(int(np.searchsorted(long.prepared.keypoints.frame, frame)), joint, rng).uv
+
+    painted = studio_page.seconds(folder / LONG, long.points, target, SOLVED)
     verdict = "met" if cpu.max() <= WANTED_S else "MISSED"
     note = (
         f"The first {FRAMES} frames of clips, the detector's joints (`full`), corrections at the true joint "
@@ -171,6 +176,7 @@ def main() -> int:
         f"of one processor (longest {cpu.max():.2f}; by the clock of this machine, "
         f"{np.median(clock):.2f} and {clock.max():.2f}); wanted {WANTED_S:g} s ({verdict} in processor time)."
     )
+    note += studio_page.words(painted, WANTED_S)
     head = ["clip", "frames", "corrections", "error", "0", *map(str, COUNTS)]
     table.publish("studio", "Corrections by hand", head, rows, note)
     return 0

@@ -5,7 +5,9 @@ Needs Chromium and playwright.  Every step is the command that the tutorial name
 
 from __future__ import annotations
 
+import json
 import shutil
+import signal
 import subprocess
 import sys
 import tempfile
@@ -143,6 +145,24 @@ def tracking(clip: Path, folder: Path) -> None:
         keep(shot(page), folder / "run.jpg")
 
 
+def correcting(clip: Path, folder: Path) -> None:
+    """Show a proposed correction on the studio's page."""
+    words = [clip / "video.mp4", "--camera", clip / "camera.json", "--port", "0"]
+    command = [sys.executable, "-m", "gait", "studio", *map(str, words), "--no-browser", "--json", "--quiet"]
+    with subprocess.Popen(command, stdout=subprocess.PIPE, text=True) as server, browser(1280, 720) as page:
+        assert server.stdout is not None
+        try:
+            page.goto(json.loads(server.stdout.readline())["url"])
+            page.locator("#proposals li").first.wait_for()
+            page.get_by_role("button", name="Begin").click()
+            page.get_by_role("button", name="Follow").click()
+            page.keyboard.press("n")
+            page.wait_for_timeout(1500)  # the film goes there
+            keep(shot(page), folder / "studio.jpg")
+        finally:
+            server.send_signal(signal.SIGINT)
+
+
 def main() -> int:
     """Make all of them."""
     folder = Path(sys.argv[1]) if len(sys.argv) > 1 else DOC / "tutorial"
@@ -153,6 +173,7 @@ def main() -> int:
         board(folder)
         clicking(clip, folder)
         tracking(clip, folder)
+        correcting(clip, folder)
     return 0
 
 

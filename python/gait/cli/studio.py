@@ -5,9 +5,10 @@ Drag a joint to where it is: the motion around it is solved again at once.  Ever
 made, in VIDEO.studio/corrections.json unless --corrections names another file; gait lift --corrections gives
 the same motion from it.  Leventon and Freeman (1998) correct motions so in section 4.
 
-The person's joints come from the detector, from --keypoints, or from --track, what gait track wrote.  With
---camera the motion is in the camera's world and feet can be put on its floor; with --height the camera is
-found from the walk; without either it is assumed to be level and far away.
+The person's joints come from the detector, from --keypoints, or from --track, what gait track wrote; with
+--placement the pictures themselves are lifted, without a detector.  With --camera the motion is in the
+camera's world and feet can be put on its floor; with --height the camera is found from the walk; without
+either it is assumed to be level and far away.
 
 The folder VIDEO.studio beside the video keeps what takes long to make.  The page can be opened from this
 machine alone.  Ctrl-C ends the command; nothing is lost.
@@ -18,6 +19,7 @@ from __future__ import annotations
 import argparse
 import json
 import sys
+from dataclasses import fields
 
 from gait.cli import values
 from gait.errors import UsageError, UserError
@@ -30,6 +32,7 @@ examples:
   gait studio walk.mp4 --height 1.75
   gait studio walk.mp4 --camera camera.json --corrections corrections.json
   gait studio walk.mp4 --camera camera.json --track track.csv
+  gait studio walk.mp4 --camera camera.json --placement init.json
 """
 _PORT = 8730
 
@@ -37,12 +40,20 @@ _PORT = 8730
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Add the command's options."""
     parser.add_argument("video", nargs="?", metavar="VIDEO", help="video file")
-    values.add_camera(parser, "; without it see --height")
+    values.add_camera(parser, "; without it see --height", scale=True)
     parser.add_argument(
         "--height", type=values.stature, metavar="M", help="the person's stature in metres; finds the camera"
     )
     parser.add_argument("--keypoints", metavar="K.csv", help="2-D keypoints instead of the detector's")
     parser.add_argument("--track", metavar="OUT.csv", help="what gait track wrote, instead of keypoints")
+    parser.add_argument(
+        "--placement",
+        metavar="P.json",
+        help="where the person roughly is in one frame; lifts the pictures themselves, as gait lift does",
+    )
+    parser.add_argument(
+        "--background", metavar="PNG|auto|none", help="the empty scene, with --placement (default: auto)"
+    )
     parser.add_argument("--corrections", metavar="C.json", help="file of the corrections, read and written")
     parser.add_argument(
         "-m", "--model", metavar="M.gait", help="model with a segment prior (default: the shipped one)"
@@ -65,10 +76,7 @@ def run(args: argparse.Namespace) -> int:
             return 0
     if not args.video:
         raise UsageError("give VIDEO, or --fetch")
-    if args.keypoints and args.track:
-        raise UsageError("--keypoints and --track exclude each other; give one of them")
-    if args.camera and args.height and args.track:
-        raise UsageError("--height: the track has the stature; leave it out")
+    _check(args)
     for part in parts.STORE.files:  # before anything takes long
         parts.load(part)
     # Imported here, as they load numpy, OpenCV and the server.
@@ -81,11 +89,9 @@ def run(args: argparse.Namespace) -> int:
     if args.corrections:
         require_writable(args.corrections)
     own = serve.listen(args.port)
-    wanted = Wanted(
-        args.video, args.camera, args.height, args.keypoints, args.track, args.corrections, args.model
-    )
+    wanted = Wanted(**{each.name: getattr(args, each.name) for each in fields(Wanted)})
     source = open_source(wanted, lambda words: note(words, args.quiet), args.quiet)
-    session = Session(source, args.model)
+    session = Session(source)
     url = serve.address(own)
     figures = {"url": url, "corrections": str(source.corrections)}
     print(json.dumps(figures) if args.json else f"{url}  (corrections in {source.corrections})", flush=True)
@@ -93,6 +99,19 @@ def run(args: argparse.Namespace) -> int:
         _open(url)
     server.run(session, own)
     return 0
+
+
+def _check(args: argparse.Namespace) -> None:
+    """Refuse options that do not go together."""
+    given = [name for name in ("keypoints", "track", "placement") if getattr(args, name)]
+    if len(given) > 1:
+        raise UsageError(f"--{given[0]} and --{given[1]} exclude each other; give one of them")
+    if args.background and not args.placement:
+        raise UsageError("--background: goes with --placement")
+    if args.camera and args.height and given and given[0] != "keypoints":
+        raise UsageError(f"--height: the {given[0]} has the stature; leave it out, or --camera")
+    if args.scale_camera and not args.camera:
+        raise UsageError("--scale-camera: needs --camera")
 
 
 def _open(url: str) -> None:

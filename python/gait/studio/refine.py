@@ -14,21 +14,19 @@ from collections.abc import Callable
 from multiprocessing.connection import Connection
 
 from gait.errors import UserError
-from gait.lift import run as lift_run
 from gait.lift.keypoints.corrections import Edits
-from gait.lift.run import Lifted, Prepared, Request
+from gait.studio.shown import Lift, Solved
 
-Answer = Callable[[int, "Lifted | str"], None]
+Answer = Callable[[int, "Solved | str"], None]
 LAST = -1
 """Number of the answer that no other follows, because the process has ended."""
 ENDED = "the process that solves the whole motion has ended; corrections are saved, start gait studio again"
 
 
-def _serve(pipe: Connection, model: str | None, prepared: Prepared, request: Request, path: str) -> None:
+def _serve(pipe: Connection, lift: Lift) -> None:
     """Solve the newest of what arrives, until the other end closes."""
     signal.signal(signal.SIGINT, signal.SIG_IGN)  # the server ends this process
     os.nice(10)  # what moves while the user looks on comes first
-    prior = lift_run.load_prior(model, lambda words: None)
     while True:
         try:
             number, edits = pipe.recv()
@@ -37,7 +35,7 @@ def _serve(pipe: Connection, model: str | None, prepared: Prepared, request: Req
         except (EOFError, OSError):
             return
         try:
-            found: Lifted | str = lift_run.lift_prepared(path, prepared, edits, prior, request, quiet=True)
+            found: Solved | str = lift.whole(edits)
         except UserError as error:
             found = str(error)
         except Exception:
@@ -53,23 +51,15 @@ class Refiner:
 
     Parameters
     ----------
-    model : str or None
-        File of the model.
-    prior : SegmentPrior
-        Of that model.
-    prepared, request, path :
-        As `gait.lift.run.lift_prepared` takes them.
+    lift : Lift
     answer : callable
         Called in a thread with the number of a request, and the motion or what is wrong with it.
     """
 
-    def __init__(
-        self, model: str | None, prepared: Prepared, request: Request, path: str, answer: Answer
-    ) -> None:
+    def __init__(self, lift: Lift, answer: Answer) -> None:
         context = multiprocessing.get_context("spawn")  # a copy would share the threads of the server
         self._pipe, other = context.Pipe()
-        arguments = (other, model, prepared, request, path)
-        self._process = context.Process(target=_serve, args=arguments, daemon=True)
+        self._process = context.Process(target=_serve, args=(other, lift), daemon=True)
         self._process.start()
         other.close()
         self._answer = answer

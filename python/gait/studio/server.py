@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import asyncio
 import socket
-from collections.abc import AsyncIterator, Callable
+from collections.abc import AsyncIterator, Awaitable, Callable
 from pathlib import Path
 from typing import Any
 
@@ -25,43 +25,48 @@ _PERIOD = 0.05  # seconds between two checks of the version
 _ALIVE = 10.0  # seconds after which a quiet stream shows that it is there
 
 
-def application(session: Session, port: int) -> ASGIApp:
-    """Application of a session's page, for browsers that name the port."""
-    own = {name: (_HERE / name).read_bytes() for name in _FILES}
+class _Endpoints:
+    """What the page asks of a session."""
 
-    def answered(act: Callable[[], Any]) -> Response:
-        try:
-            return JSONResponse(act())
-        except UserError as error:
-            return JSONResponse({"error": str(error)}, 409)
+    def __init__(self, session: Session) -> None:
+        self._session = session
 
-    def state(request: Request) -> Response:
-        return answered(session.state)
+    def routes(self) -> list[Route]:
+        """Routes of all endpoints."""
+        own = {name: (_HERE / name).read_bytes() for name in _FILES}
+        session, posted = self._session, ["POST"]
+        return [
+            Route("/state", lambda request: _answered(session.state)),
+            Route("/edit", self._action(session.edit), methods=posted),
+            Route("/start", self._action(session.place_start), methods=posted),
+            Route("/undo", lambda request: _answered(session.undo), methods=posted),
+            Route("/redo", lambda request: _answered(session.redo), methods=posted),
+            Route("/film.mp4", self.film),
+            Route("/changes", self.changes),
+            Route("/export/{kind:str}", self.export),
+            Route("/studio/{name}", serve.in_memory(own)),
+        ]
 
-    async def edit(request: Request) -> Response:
-        return await acted(request, session.edit)
+    @staticmethod
+    def _action(act: Callable[[dict[str, Any]], Any]) -> Callable[[Request], Awaitable[Response]]:
+        """Endpoint that reads the JSON object of a request and acts on it."""
 
-    async def acted(request: Request, act: Callable[[dict[str, Any]], Any]) -> Response:
-        try:
-            action = await serve.json_object(request, _LONGEST)
-        except serve.RequestError as error:
-            return JSONResponse({"error": str(error)}, error.status)
-        return await run_in_threadpool(answered, lambda: act(action))
+        async def answer(request: Request) -> Response:
+            try:
+                action = await serve.json_object(request, _LONGEST)
+            except serve.RequestError as error:
+                return JSONResponse({"error": str(error)}, error.status)
+            return await run_in_threadpool(_answered, lambda: act(action))
 
-    async def start(request: Request) -> Response:
-        return await acted(request, session.place_start)
+        return answer
 
-    def undo(request: Request) -> Response:
-        return answered(session.undo)
+    def film(self, request: Request) -> Response:
+        """Answer with the film, or ranges of it."""
+        return FileResponse(self._session.source.film, media_type="video/mp4")
 
-    def redo(request: Request) -> Response:
-        return answered(session.redo)
-
-    def film(request: Request) -> Response:
-        return FileResponse(session.source.film, media_type="video/mp4")  # answers ranges
-
-    def export(request: Request) -> Response:
-        kind = request.path_params["kind"]
+    def export(self, request: Request) -> Response:
+        """Write a file and answer with it."""
+        session, kind = self._session, request.path_params["kind"]
         try:
             if kind == "corrections":
                 session.save()
@@ -69,39 +74,40 @@ def application(session: Session, port: int) -> ASGIApp:
             path = session.export(kind)
         except (UserError, RuntimeError) as error:
             return JSONResponse({"error": str(error)}, 409)
-        return FileResponse(path, filename=f"{Path(session.source.video.path).stem}.{kind}")
+        return FileResponse(path, filename=f"{Path(session.source.video.path).stem}.{path.name}")
 
-    async def changes(request: Request) -> Response:
-        async def versions() -> AsyncIterator[str]:
-            reported, quiet = -1, 0.0
-            while not await request.is_disconnected():
-                if session.version != reported:
-                    reported, quiet = session.version, 0.0
-                    yield f"data: {reported}\n\n"
-                elif quiet >= _ALIVE:
-                    quiet = 0.0
-                    yield ": here\n\n"
-                await asyncio.sleep(_PERIOD)
-                quiet += _PERIOD
-
+    async def changes(self, request: Request) -> Response:
+        """Send the version of what is shown whenever it changes."""
         return StreamingResponse(
-            versions(), media_type="text/event-stream", headers={"cache-control": "no-store"}
+            self._versions(request), media_type="text/event-stream", headers={"cache-control": "no-store"}
         )
 
-    routes = [
-        Route("/state", state),
-        Route("/edit", edit, methods=["POST"]),
-        Route("/start", start, methods=["POST"]),
-        Route("/undo", undo, methods=["POST"]),
-        Route("/redo", redo, methods=["POST"]),
-        Route("/film.mp4", film),
-        Route("/changes", changes),
-        Route("/export/{kind:str}", export),
-        Route("/studio/{name}", serve.in_memory(own)),
-    ]
+    async def _versions(self, request: Request) -> AsyncIterator[str]:
+        reported, quiet = -1, 0.0
+        while not await request.is_disconnected():
+            if self._session.version != reported:
+                reported, quiet = self._session.version, 0.0
+                yield f"data: {reported}\n\n"
+            elif quiet >= _ALIVE:
+                quiet = 0.0
+                yield ": here\n\n"
+            await asyncio.sleep(_PERIOD)
+            quiet += _PERIOD
+
+
+def _answered(act: Callable[[], Any]) -> Response:
+    """Answer with what is done, or with what is wrong."""
+    try:
+        return JSONResponse(act())
+    except UserError as error:
+        return JSONResponse({"error": str(error)}, 409)
+
+
+def application(session: Session, port: int) -> ASGIApp:
+    """Application of a session's page, for browsers that name the port."""
     page = (_HERE / "page.html").read_text(encoding="utf-8")
     title = f"gait studio: {Path(session.source.video.path).name}"
-    return serve.application(page, title, routes, port)
+    return serve.application(page, title, _Endpoints(session).routes(), port)
 
 
 def run(session: Session, own: socket.socket) -> None:

@@ -1,7 +1,7 @@
 """A session of corrections: saved as they are made, undone and redone; what they move is solved at once.
 
-Each edit solves the motion around it (`gait.lift.smooth.interactive`) and asks for the whole in the
-background (`refine`); when that comes, it replaces what was shown.
+Each edit solves the motion around it (`Lift.near`) and asks for the whole in the background (`refine`); when
+that comes, it replaces what was shown.
 """
 
 from __future__ import annotations
@@ -10,6 +10,7 @@ import json
 import shlex
 import threading
 import time
+import zipfile
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
@@ -17,12 +18,10 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
-from gait.body.skeleton import BONES, JOINTS
+from gait.camera.camera import write_camera
 from gait.errors import UserError
+from gait.export import files as exports
 from gait.io.files import replacing
-from gait.io.track_file import write_lifted
-from gait.io.trc import write_trc
-from gait.lift import run as lift_run
 from gait.lift.keypoints.corrections import (
     FEET,
     Correction,
@@ -30,18 +29,13 @@ from gait.lift.keypoints.corrections import (
     FloorPin,
     Hidden,
     Swap,
-    corrected,
-    pins,
     read_edits,
 )
-from gait.lift.run import Lifted
-from gait.lift.segment.view import Perspective
-from gait.lift.smooth.interactive import Interactive
-from gait.reproducible import one_thread
-from gait.studio import curves
+from gait.studio.curves import phase_at
 from gait.studio.refine import ENDED, LAST, Refiner
-from gait.studio.source import Source, picture_sd
-from gait.web.motion_data import frames, motion_data, rounded
+from gait.studio.shown import Solved, page_data
+from gait.studio.source import Source
+from gait.web.motion_data import frames, rounded
 
 Floats = npt.NDArray[np.float64]
 
@@ -57,12 +51,10 @@ class Session:
     Parameters
     ----------
     source : Source
-    model : str or None
-        File of the model.
     """
 
-    def __init__(self, source: Source, model: str | None) -> None:
-        self.source, self._model = source, model
+    def __init__(self, source: Source) -> None:
+        self.source, self._lift = source, source.lift
         self._lock = threading.RLock()
         self.edits = self._read()
         self._undo: list[Edits] = []
@@ -70,9 +62,8 @@ class Session:
         self.version = 0  #: of what is shown; the page asks again when it grows
         self._asked = 0
         self.fault = ""
-        prior, prepared, request = source.prior, source.prepared, source.request
-        self._use(lift_run.lift_prepared(source.keypoints, prepared, self.edits, prior, request, False))
-        self._refiner = Refiner(model, prepared, request, source.keypoints, self._on_refined)
+        self._refiner = Refiner(source.lift, self._on_refined)
+        self._use(source.lift.whole(self.edits))
         self.refining = False
 
     def close(self) -> None:
@@ -84,60 +75,10 @@ class Session:
     def state(self) -> dict[str, Any]:
         """Everything the page shows: the object of `gait.web.motion_data`, and the corrections."""
         with self._lock:
-            motion, keypoints, video = self._lifted.motion, self._lifted.keypoints, self.source.video
-            first, names = int(keypoints.frame[0]), self._names
-            number = np.arange(first, int(keypoints.frame[-1]) + 1)
-            times = video.times[number]
-
-            def placed(values: Floats) -> Floats:
-                return _by_frame(values, keypoints.frame, number)
-
-            places, sd = self._places[:, self._shown], motion.sd[:, self._shown]
-            events = curves.events_of(keypoints.frame, keypoints.time, names, places)
-            plots = curves.angle_curves(names, places, motion.rooted_sd[:, self._shown])
-            plots += curves.phase_curve(keypoints.time, events)
-            for plot in plots:
-                for key in ("values", "low", "high"):
-                    if plot[key] is not None:
-                        values = np.array([np.nan if v is None else v for v in plot[key]])
-                        plot[key] = rounded(placed(values), 3)
-            view = self._lifted.view
-            px = curves.off_px(self._lifted, self._names, self._picture_sd())
-            data = motion_data(
-                video.fps,
-                times,
-                names,
-                [(names.index(a), names.index(b)) for a, b in BONES if {a, b} <= set(names)],
-                placed(places),
-                placed(sd),
-                first=first,
-                offset=first,
-                uv=[self._pixels(one) for one in placed(self._uv[:, self._shown])],
-                uv_sd=frames(placed(self._picture_sd()[:, self._shown]), 2),
-                size=list(video.size),
-                camera=rounded(view.camera.centre, 3) if isinstance(view, Perspective) else None,
-                status=None,
-                curves=plots,
-                events=curves.event_marks(events),
-                strip=rounded(placed(np.nan_to_num(px).mean(axis=1) / max(self._tall(), 1.0)), 4),
-            )
-            asked = curves.proposals(keypoints.frame, keypoints.time, names, px, self.edits)
-            return (
-                data
-                | self._work()
-                | {
-                    "title": Path(video.path).name,
-                    "tall": self._tall(),
-                    "proposals": [{"frame": p.frame, "joint": p.joint, "px": round(p.px, 1)} for p in asked],
-                    "command": self.command(),
-                    "warnings": lift_run.warnings_of(self._lifted, self.source.prior.stature),
-                    "figures": {
-                        "px": round(float(np.nanmedian(motion.error)), 2),
-                        "sd_mm": round(1000 * float(np.median(sd)), 1),
-                        "stature_m": round(float(motion.stature), 3),
-                    },
-                }
-            )
+            source = self.source
+            data = page_data(self._solved.shown, self._uv, self._places, source.video, self._lift.camera)
+            also = {"title": Path(source.video.path).name, "command": self.command()}
+            return data | self._work() | also
 
     def _work(self) -> dict[str, Any]:
         """Corrections and what can be done with them."""
@@ -149,18 +90,14 @@ class Session:
             "redo": len(self._redo),
             "refining": self.refining,
             "fault": self.fault,
-            "floor": isinstance(self._lifted.view, Perspective),
+            "tools": [*self._lift.tools, *(["start"] if self._lift.camera else [])],
             "start": self._start(),
         }
 
     def command(self) -> str:
         """Command that gives the same motion from the file."""
-        request, source = self.source.request, self.source
-        words = ["gait lift", _quoted(source.keypoints if request.calibration is None else source.video.path)]
-        words += ["--camera", _quoted(request.camera)] if request.camera else []
-        words += ["--height", f"{request.options.stature:g}"] if request.options.stature else []
-        words += ["--model", _quoted(self._model)] if self._model else []
-        return " ".join([*words, "--corrections", _quoted(source.corrections), "-o", "motion.csv"])
+        words = [*self._lift.words(), *self.source.model_words, "--corrections"]
+        return " ".join([*words, shlex.quote(str(self.source.corrections)), "-o", "motion.csv"])
 
     # ---- edits
 
@@ -198,11 +135,11 @@ class Session:
             If there is no camera, or the points are none of the floor.
         """
         with self._lock:
-            view = self._lifted.view
-            if not isinstance(view, Perspective):
+            camera, shown = self._lift.camera, self._solved.shown
+            if camera is None:
                 raise UserError("a start is a place on the floor of a calibrated camera; give --camera")
             frame, ends = self._frame(action), [self._pixel(action, key) for key in ("from", "to")]
-            here, ahead = view.camera.on_plane(np.array(ends), 0.0)
+            here, ahead = camera.on_plane(np.array(ends), 0.0)
             way = ahead - here
             if not np.linalg.norm(way) > LEAST_WAY:
                 raise UserError("drag over the floor, from under the person to where they walk")
@@ -210,11 +147,9 @@ class Session:
                 "frame": frame,
                 "pelvis": rounded(here[:2]),
                 "heading_rad": round(float(np.arctan2(way[1], way[0])), 4),
-                "stature_m": round(float(self._lifted.motion.stature), 3),
+                "stature_m": shown.figures["stature_m"],
             }
-            keypoints, places = self._lifted.keypoints, self._places[:, self._shown]
-            events = curves.events_of(keypoints.frame, keypoints.time, self._names, places)
-            begin |= curves.phase_at(float(self.source.video.times[frame]), events)
+            begin |= phase_at(float(self.source.video.times[frame]), shown.events)
             with replacing(self._start_file) as temporary:
                 temporary.write_text(json.dumps(begin, indent=1) + "\n", encoding="utf-8")
             return {"start": self._start()}
@@ -225,18 +160,15 @@ class Session:
 
     def _start(self) -> dict[str, Any] | None:
         """Where the start is in the picture, and the command that takes it; None without one."""
-        view = self._lifted.view
-        if not self._start_file.exists() or not isinstance(view, Perspective):
+        camera = self._lift.camera
+        if camera is None or not self._start_file.exists():
             return None
         begin = json.loads(self._start_file.read_text(encoding="utf-8"))
         here = np.array([*begin["pelvis"][:2], 0.0])
         ahead = here + ARROW * np.array([np.cos(begin["heading_rad"]), np.sin(begin["heading_rad"]), 0.0])
-        words = ["gait track", _quoted(self.source.video.path), "--init", _quoted(self._start_file)]
-        request = self.source.request
-        words += ["--camera", _quoted(request.camera)] if request.camera else []
-        words += ["--height", f"{request.options.stature:g}"] if request.options.stature else []
-        words += ["-o track.csv"]
-        ends = rounded(view.camera.project(np.stack([here, ahead])), 2)
+        words = ["gait track", shlex.quote(str(self.source.video.path)), "--init"]
+        words += [shlex.quote(str(self._start_file)), *self.source.camera_words, "-o track.csv"]
+        ends = rounded(camera.project(np.stack([here, ahead])), 2)
         return {"frame": begin["frame"], "from": ends[0], "to": ends[1], "command": " ".join(words)}
 
     def _after(self, action: dict[str, Any]) -> Edits:
@@ -268,9 +200,9 @@ class Session:
         raise UserError(f"the page asked for {kind!r}, which is unknown; reload it")
 
     def _frame(self, action: dict[str, Any], key: str = "frame") -> int:
-        frame, known = action.get(key), self.source.prepared.keypoints.frame
-        if not isinstance(frame, int) or frame not in known:
-            raise UserError(f"frame {frame}: has no keypoints; choose another")
+        frame = action.get(key)
+        if not isinstance(frame, int) or frame not in self._lift.frames:
+            raise UserError(f"frame {frame}: is not among those that are lifted; choose another")
         return frame
 
     def _range(self, action: dict[str, Any]) -> tuple[int, int]:
@@ -279,7 +211,7 @@ class Session:
 
     def _joint(self, action: dict[str, Any]) -> str:
         joint = action.get("joint")
-        if joint not in self._names:
+        if joint not in self._solved.shown.names:
             raise UserError(f"{joint}: no such joint")
         return str(joint)
 
@@ -304,28 +236,10 @@ class Session:
         """Save other edits, solve what they move, and ask for the whole; a refused edit changes nothing."""
         begin = time.perf_counter()
         touched = _touched(self.edits, wanted)
-        keypoints, pinned = self._applied(wanted)  # refused before anything is saved
+        self._lift.check(wanted)  # refused before anything is saved
         self._save(wanted)
         self.edits, self._undo, self._redo = wanted, undo, redo
-        answer: dict[str, Any] = {}
-        if (
-            touched
-            and self._interactive is not None
-            and set(keypoints.names) <= set(self._lifted.motion.names)
-        ):
-            try:
-                with one_thread():
-                    near = self._interactive.solve(keypoints, pinned, touched)
-            except np.linalg.LinAlgError:
-                self.fault = "the motion cannot be solved near this correction; it waits for the whole"
-            else:
-                self._places[near.rows], self._uv[near.rows] = near.places, near.uv
-                frame = self._lifted.keypoints.frame[near.rows] - self._lifted.keypoints.frame[0]
-                answer = {
-                    "rows": frame.tolist(),
-                    "points": frames(near.places[:, self._shown]),
-                    "uv": [self._pixels(one) for one in near.uv[:, self._shown]],
-                }
+        answer = self._moved(wanted, touched) if touched else {}
         self.version += 1
         self._asked += 1
         self.refining = True
@@ -334,7 +248,24 @@ class Session:
         seconds = time.perf_counter() - begin
         return self._work() | answer | {"ms": round(1000 * seconds)}
 
-    def _on_refined(self, number: int, found: Lifted | str) -> None:
+    def _moved(self, wanted: Edits, touched: range) -> dict[str, Any]:
+        """Solve near what was touched; what moved, for the page."""
+        try:
+            near = self._lift.near(wanted, touched)
+        except np.linalg.LinAlgError:
+            self.fault = "the motion cannot be solved near this correction; it waits for the whole"
+            return {}
+        if near is None:
+            return {}
+        self._places[near.rows], self._uv[near.rows] = near.places, near.uv
+        frame = self._solved.shown.frame
+        return {
+            "rows": (frame[near.rows] - frame[0]).tolist(),
+            "points": frames(near.places),
+            "uv": frames(near.uv, 2),
+        }
+
+    def _on_refined(self, number: int, found: Solved | str) -> None:
         """Take the whole motion, unless there were more edits since."""
         with self._lock:
             if number not in (self._asked, LAST):
@@ -344,51 +275,26 @@ class Session:
                 self._use(found)
             self.version += 1
 
-    def _applied(self, edits: Edits) -> tuple[Any, Any]:
-        prepared = self.source.prepared
-        keypoints = corrected(prepared.keypoints, edits, prepared.options.pixel_sd)
-        camera = prepared.view.camera if isinstance(prepared.view, Perspective) else None
-        return keypoints, pins(keypoints, edits, camera, self.source.prior)
-
-    def _use(self, lifted: Lifted) -> None:
+    def _use(self, solved: Solved) -> None:
         """Show a motion and go on from it."""
-        motion = lifted.motion
-        assert motion.uv is not None
-        self._lifted, self._places, self._uv = lifted, motion.places.copy(), motion.uv.copy()
-        self._names = tuple(name for name in motion.names if name in JOINTS)
-        self._shown = [motion.names.index(name) for name in self._names]
-        self._interactive = None
-        if motion.state is not None:
-            known = self.source.prior, lifted.view, lifted.options, lifted.keypoints.names
-            self._interactive = Interactive(*known, motion)
-
-    # ---- how far joints may be off
-
-    def _picture_sd(self) -> Floats:
-        """Give standard deviations (T, J) in the picture, pixels."""
-        motion, view = self._lifted.motion, self._lifted.view
-        if isinstance(view, Perspective):
-            # An uncertain camera moves the places in the world, and hardly where they are in its picture.
-            sd = motion.sd if self.source.request.calibration is None else motion.rooted_sd
-            return picture_sd(view.camera.project, motion.places, sd)
-        return np.asarray(motion.sd.mean(axis=2) * self._tall() / max(motion.stature, 0.1))
-
-    def _tall(self) -> float:
-        """Median height of the person in the picture, pixels."""
-        v = self._uv[:, self._shown, 1]
-        return float(np.median(v.max(axis=1) - v.min(axis=1)))
-
-    def _pixels(self, uv: Floats) -> list[Any] | None:
-        return rounded(uv, 2) if np.isfinite(uv).all() else None
+        self._solved = solved
+        self._places, self._uv = solved.shown.places.copy(), solved.shown.uv.copy()
+        self._lift.follow(solved)
 
     # ---- files
 
     def _read(self) -> Edits:
-        path, keypoints = self.source.corrections, self.source.prepared.keypoints
+        path, known = self.source.corrections, self._lift.frames
         if not path.exists():
             return Edits()
-        whole = range(int(keypoints.frame[0]), int(keypoints.frame[-1]) + 1)
-        return read_edits(path, self.source.prior, whole, self.source.video.size)
+        edits = read_edits(
+            path, self.source.prior, range(int(known[0]), int(known[-1]) + 1), self.source.video.size
+        )
+        try:
+            self._lift.check(edits)
+        except UserError as error:
+            raise UserError(f"{path}: {error}") from None
+        return edits
 
     def save(self) -> None:
         """Write the corrections; they appear whole or not at all."""
@@ -402,28 +308,54 @@ class Session:
             raise UserError(f"{self.source.corrections}: not saved: {error.strerror}") from error
 
     def export(self, kind: str) -> Path:
-        """Write the whole motion of the corrections as a batch command does; `csv` or `trc`.
+        """Write what a command writes of the whole motion: a format of `gait export`, ``csv`` or ``mp4``.
+
+        ``camera`` gives the camera, found or given.
 
         Raises
         ------
         UserError
             If the whole is not solved yet, or there is no such file.
         """
-        if kind not in ("csv", "trc"):
+        if kind not in EXPORTS:
             raise UserError(f"{kind}: no such export")
         with self._lock:
             if self.refining:
                 raise UserError("the whole motion is still being solved; wait a moment")
             if self.fault:
                 raise UserError(f"the last corrections are not in the whole motion: {self.fault}")
-            keypoints, motion = self._lifted.keypoints, self._lifted.motion
-            path = self.source.folder / f"motion.{kind}"
-            if kind == "csv":
-                write_lifted(path, keypoints.frame, keypoints.time, motion.names, motion.places, motion.sd)
-            else:
-                rate = (len(keypoints.time) - 1) / float(keypoints.time[-1] - keypoints.time[0])
-                write_trc(path, motion.names, keypoints.time, motion.places, rate)
-            return path
+            solved, folder = self._solved, self.source.folder
+        path = folder / EXPORTS[kind]
+        if kind == "camera":
+            if self._lift.camera is None:
+                raise UserError("there is no camera; give --camera, or --height for one from the walk")
+            with replacing(path) as temporary:
+                write_camera(temporary, self._lift.camera)
+        elif kind == "mp4":
+            self._lift.write_overlay(str(path), self.source.video, solved)
+        else:
+            table = str(folder / EXPORTS["csv"])
+            self._lift.write_table(table, solved)
+            if kind != "csv":
+                exports.write(table, str(path))
+            if beside := exports.BESIDE.get(path.suffix):
+                return _zipped(path, path.with_suffix(beside))
+        return path
+
+
+EXPORTS = {"csv": "motion.csv", "mp4": "overlay.mp4", "camera": "camera.json"} | {
+    suffix[1:]: f"motion{suffix}" for suffix in exports.SUFFIXES
+}
+"""Kinds of exports and their files in the folder beside the film."""
+
+
+def _zipped(*paths: Path) -> Path:
+    """Write an archive of files beside the first of them."""
+    found = paths[0].with_suffix(f"{paths[0].suffix}.zip")
+    with replacing(found) as temporary, zipfile.ZipFile(temporary, "w", zipfile.ZIP_DEFLATED) as archive:
+        for path in paths:
+            archive.write(path, path.name)
+    return found
 
 
 def _touched(old: Edits, new: Edits) -> range | None:
@@ -433,14 +365,3 @@ def _touched(old: Edits, new: Edits) -> range | None:
         for each in set(getattr(old, key)) ^ set(getattr(new, key)):
             changed += [each.first, each.last] if isinstance(each, Hidden | Swap) else [each.frame]
     return range(min(changed), max(changed) + 1) if changed else None
-
-
-def _by_frame(values: Floats, frame: npt.NDArray[np.int64], number: npt.NDArray[np.int64]) -> Floats:
-    """Values (T, ...) of some frames at all of `number`; NaN where there is no such frame."""
-    found = np.full((len(number), *values.shape[1:]), np.nan)
-    found[frame - number[0]] = values
-    return found
-
-
-def _quoted(path: str | Path) -> str:
-    return shlex.quote(str(path))

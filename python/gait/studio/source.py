@@ -9,6 +9,7 @@ from __future__ import annotations
 import fcntl
 import json
 import os
+import shlex
 from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
@@ -26,9 +27,14 @@ from gait.io.keypoints_file import Keypoints
 from gait.io.track_file import read_track
 from gait.io.video import FAST, Video, VideoWriter
 from gait.lift import run as lift_run
-from gait.lift.run import Prepared, Request, Warn
+from gait.lift.run import Request, Warn
 from gait.lift.smooth.options import Options
+from gait.lift.video import run as video_run
 from gait.progress import progress
+from gait.studio.keypoint_lift import KeypointLift
+from gait.studio.picture_lift import PictureLift
+from gait.studio.shown import Lift
+from gait.track.from_walk import Calibration
 from gait.track.walk_camera import calibrate_film, find_person, note_camera
 
 Floats = npt.NDArray[np.float64]
@@ -45,9 +51,12 @@ class Wanted:
 
     video: str
     camera: str | None = None
+    scale_camera: bool = False
     height: float | None = None
     keypoints: str | None = None
     track: str | None = None
+    placement: str | None = None
+    background: str | None = None
     corrections: str | None = None
     model: str | None = None
 
@@ -65,23 +74,21 @@ class Source:
         Video for browsers; its frame k is that of the film.
     corrections : Path
         File of the corrections; may not exist yet.
-    keypoints : str
-        File of the keypoints.
     prior : SegmentPrior
-    request : Request
+    lift : Lift
         How it is lifted.
-    prepared : Prepared
-        Keypoints without the detector's swaps and spikes.
+    camera_words, model_words : list of str
+        Options of commands that use the same camera and model.
     """
 
     video: Video
     folder: Path
     film: Path
     corrections: Path
-    keypoints: str
     prior: SegmentPrior
-    request: Request
-    prepared: Prepared
+    lift: Lift
+    camera_words: list[str]
+    model_words: list[str]
 
 
 def open_source(wanted: Wanted, warn: Warn, quiet: bool) -> Source:
@@ -93,26 +100,75 @@ def open_source(wanted: Wanted, warn: Warn, quiet: bool) -> Source:
         One line that names the file at fault.
     """
     video = Video(wanted.video)
-    camera = Camera.read(wanted.camera, video.size) if wanted.camera else None
+    camera = Camera.read(wanted.camera, video.size, wanted.scale_camera) if wanted.camera else None
     if camera is not None and wanted.camera is not None:
         camera.check_place(wanted.camera)
     folder = _folder(video)
     prior = lift_run.load_prior(wanted.model, warn)
+    lift: Lift
+    if wanted.placement:
+        lift = _pictures(wanted, video, folder, prior, warn, quiet)
+    else:
+        lift = _keypoint_lift(wanted, video, camera, folder, prior, warn, quiet)
+    film = _kept(folder / "film.mp4", video, lambda target: _write_film(target, video, quiet))
+    corrections = Path(wanted.corrections) if wanted.corrections else folder / "corrections.json"
+    words = ["--camera", shlex.quote(wanted.camera)] if wanted.camera else []
+    words += ["--scale-camera"] if wanted.scale_camera else []
+    words += ["--height", f"{wanted.height:g}"] if wanted.height else []
+    model = ["--model", shlex.quote(wanted.model)] if wanted.model else []
+    return Source(video, folder, film, corrections, prior, lift, words, model)
+
+
+def _keypoint_lift(
+    wanted: Wanted,
+    video: Video,
+    camera: Camera | None,
+    folder: Path,
+    prior: SegmentPrior,
+    warn: Warn,
+    quiet: bool,
+) -> KeypointLift:
     path, keypoints = _keypoints(wanted, video, camera, folder, prior, quiet)
-    calibration = None
-    if camera is None and wanted.height:
-        calibration = calibrate_film(video, keypoints, Model(None), wanted.height, None, quiet)
-        note_camera(calibration, quiet)
     request = Request(
         options=Options(stature=wanted.height),
         camera=wanted.camera,
-        calibration=calibration,
+        size=video.size if wanted.scale_camera else None,
+        calibration=_calibration(wanted, video, keypoints, quiet),
         hints=False,
     )
     prepared = lift_run.prepare(path, keypoints, prior, request, warn, quiet)
-    film = _kept(folder / "film.mp4", video, lambda target: _write_film(target, video, quiet))
-    corrections = Path(wanted.corrections) if wanted.corrections else folder / "corrections.json"
-    return Source(video, folder, film, corrections, path, prior, request, prepared)
+    return KeypointLift(path, prior, prepared, request, wanted.video)
+
+
+def _pictures(
+    wanted: Wanted, video: Video, folder: Path, prior: SegmentPrior, warn: Warn, quiet: bool
+) -> PictureLift:
+    assert wanted.placement is not None
+    calibration = None
+    if wanted.height and not wanted.camera:
+        keypoints, _ = keypoints_file.read(_detected(video, folder, quiet), prior.names, ignore_unknown=True)
+        calibration = _calibration(wanted, video, keypoints, quiet)
+    request = video_run.Request(
+        video=wanted.video,
+        placement=wanted.placement,
+        model=wanted.model,
+        camera=wanted.camera,
+        scale_camera=wanted.scale_camera,
+        calibration=calibration,
+        height=wanted.height,
+        background=wanted.background or "auto",
+    )
+    _, clip = video_run.open_clip(request, prior, warn, quiet)
+    return PictureLift(clip, request)
+
+
+def _calibration(wanted: Wanted, video: Video, keypoints: Keypoints, quiet: bool) -> Calibration | None:
+    """Camera from the walk, where the stature is given and no camera."""
+    if wanted.camera or not wanted.height:
+        return None
+    found = calibrate_film(video, keypoints, Model(None), wanted.height, None, quiet)
+    note_camera(found, quiet)
+    return found
 
 
 def _folder(video: Video) -> Path:
@@ -160,17 +216,22 @@ def _keypoints(
         path = str(folder / "track.csv")
         keypoints_file.write(path, keypoints_of_track(wanted.track, camera))
     else:
-
-        def detect(target: Path) -> None:
-            keypoints_file.write(target, find_person(video, quiet))
-
-        path = str(_kept(folder / "keypoints.csv", video, detect))
+        path = _detected(video, folder, quiet)
     keypoints, _ = keypoints_file.read(path, prior.names, ignore_unknown=True)
     if note := keypoints.compare_times(path, video.times):
         raise UserError(f"{path}: {note}")
     if keypoints.frame[-1] >= video.count:
         raise UserError(f"{path}: has frame {keypoints.frame[-1]}, and {video.path} {video.count} frames")
     return path, keypoints
+
+
+def _detected(video: Video, folder: Path, quiet: bool) -> str:
+    """File of the detector's keypoints."""
+
+    def detect(target: Path) -> None:
+        keypoints_file.write(target, find_person(video, quiet))
+
+    return str(_kept(folder / "keypoints.csv", video, detect))
 
 
 def keypoints_of_track(path: str, camera: Camera) -> Keypoints:
@@ -189,13 +250,13 @@ def keypoints_of_track(path: str, camera: Camera) -> Keypoints:
     sd = np.stack([track.sd[name] for name in names], axis=1)
     tracked = ~np.isin(track.status, WITHOUT_PERSON)
     uv = np.where(tracked[:, None, None], camera.project(places), np.nan)
-    pixels = np.maximum(picture_sd(camera.project, places, sd), LEAST_SD)
+    pixels = np.maximum(_picture_sd(camera.project, places, sd), LEAST_SD)
     return Keypoints(
         track.frame, track.time, names, uv, np.ones(uv.shape[:2]), np.nan_to_num(pixels, nan=LEAST_SD)
     )
 
 
-def picture_sd(project: Callable[[Floats], Floats], places: Floats, sd: Floats) -> Floats:
+def _picture_sd(project: Callable[[Floats], Floats], places: Floats, sd: Floats) -> Floats:
     """Give standard deviations (T, J) along an axis of the picture, of places (T, J, 3) with sd (T, J, 3).
 
     Parameters

@@ -1,10 +1,11 @@
 // The studio: corrections by hand on the film, saved and solved by the server as they are made.
-import { Scene, colour, sideOf } from 'gait/scene.js';
+import { Scene } from 'gait/scene.js';
 import { Film } from 'gait/film.js';
 import { Curves } from 'gait/curves.js';
 
 const NEAR = 14; // screen pixels within which the pointer takes a joint
 const CLICK = 3; // screen pixels that a click may be off
+const BUTTONS = { pin: ['tool-pin'], start: ['tool-start'], hide: ['hide'], swap: ['from', 'to', 'range', 'swap'] }; // by tool
 const WAIT = 250; // milliseconds after the last key before a moved joint is sent
 const NINETY = 2.1460; // radius of the circle that holds 90 % of a Gaussian in two dimensions, sd
 const at = (id) => document.getElementById(id);
@@ -63,7 +64,7 @@ function build() {
   scene = new Scene(at('scene'), data);
   curves = new Curves(at('curves'), data, (index) => { film.pause(); film.seek(index); });
   at('joint').replaceChildren(...data.joints.map((joint, j) => new Option(words(joint), j)));
-  at('tool-pin').hidden = at('tool-start').hidden = !data.floor;
+  for (const [tool, id] of Object.entries(BUTTONS)) for (const each of id) at(each).hidden = !data.tools.includes(tool);
   const { canvas } = film.picture;
   canvas.addEventListener('pointermove', hover);
   canvas.addEventListener('pointerdown', press);
@@ -125,8 +126,8 @@ function paint(context, picture, index) {
   context.lineCap = 'round';
   const thick = Math.min(2.5, Math.max(1.2, 0.007 * data.tall * picture.scale));
   for (const [wide, halo] of [[2 * thick, true], [thick, false]]) {
-    for (const [a, b] of data.bones) {
-      const side = sideOf(data.joints[sideOf(data.joints[a]) === 'middle' ? b : a]);
+    for (const [k, [a, b]] of data.bones.entries()) {
+      const side = data.bone_sides[k];
       context.strokeStyle = halo ? 'rgba(0,0,0,0.55)' : INK[side];
       context.lineWidth = wide;
       context.setLineDash(!halo && side === 'right' ? [7, 5] : []);
@@ -135,7 +136,7 @@ function paint(context, picture, index) {
   }
   context.setLineDash([]);
   data.joints.forEach((joint, j) => {
-    const [x, y] = places[j], side = sideOf(joint);
+    const [x, y] = places[j], side = data.sides[j];
     if (spread && (scene?.shown.ellipsoids ?? true)) {
       context.strokeStyle = 'rgba(255,255,255,0.45)';
       context.lineWidth = 1;
@@ -241,9 +242,14 @@ function lists(saved = 'saved') {
   at('count').textContent = entries.length ? `(${entries.length})` : '(none yet)';
   at('command').textContent = data.command;
   at('start').textContent = data.start ? `Start in frame ${data.start.frame}: ${data.start.command}` : '';
-  at('warnings').textContent = [data.fault, ...data.warnings].filter(Boolean).join('\n');
+  at('warnings').textContent = [data.fault, ...data.warnings].filter(Boolean).join('\n').replace(/\b[lr]_\w+/g, words);
+  solved();
+}
+
+/** What it took, and how good it is. */
+function solved() {
   const { px, sd_mm: sd } = data.figures;
-  at('solved').textContent = `${sent ? `solved in ${sent} ms · ` : ''}${data.refining ? 'refining the whole…' : `${px} px from the points, ± ${sd.toFixed(0)} mm`}`;
+  at('solved').textContent = `${sent ? `shown in ${sent} ms · ` : ''}${data.refining ? 'refining the whole…' : `${px === null ? '' : `${px} px from the points, `}± ${sd.toFixed(0)} mm`}`;
 }
 
 const span = ({ first, last }) => (first === last ? `@ ${first}` : `${first}–${last}`);
@@ -251,7 +257,7 @@ const span = ({ first, last }) => (first === last ? `@ ${first}` : `${first}–$
 // ---- corrections
 
 async function change(path, body = {}) {
-  const begin = performance.now();
+  const begin = performance.now(); // of the release
   at('saved').textContent = 'saving…';
   try {
     const found = await ask(path, body);
@@ -265,9 +271,12 @@ async function change(path, body = {}) {
     pulled = null;
     film.redraw();
     scene.show(film.index);
-    sent = Math.round(performance.now() - begin); // from release to the new overlay
-    window.studio.sent = sent;
     lists();
+    painted().then((end) => {
+      sent = Math.round(end - begin);
+      window.studio.sent = sent;
+      solved();
+    });
   } catch (error) {
     pulled = null;
     film.redraw();
@@ -275,6 +284,11 @@ async function change(path, body = {}) {
     say(error.message);
   }
 }
+
+/** When what was drawn last is on the screen. */
+const painted = () => new Promise((done) => {
+  requestAnimationFrame(() => setTimeout(() => done(performance.now())));
+});
 
 /** A click is as exact as it can be pointed at on the screen. */
 const exact = () => Math.max(0.5, CLICK / film.picture.scale);
@@ -456,12 +470,12 @@ const KEYS = {
   ' ': () => film.toggle(),
   n: () => propose(proposal + 1),
   d: () => choose('pull'),
-  f: () => data.floor && choose('pin'),
-  b: () => data.floor && choose('start'),
-  h: hide,
+  f: () => data.tools.includes('pin') && choose('pin'),
+  b: () => data.tools.includes('start') && choose('start'),
+  h: () => data.tools.includes('hide') && hide(),
   i: () => mark(frameOf(film.index), range[1]),
   o: () => mark(range[0], frameOf(film.index)),
-  s: swap,
+  s: () => data.tools.includes('swap') && swap(),
   '+': () => film.picture.zoomBy(1.25),
   '=': () => film.picture.zoomBy(1.25),
   '-': () => film.picture.zoomBy(0.8),

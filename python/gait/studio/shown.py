@@ -1,0 +1,197 @@
+"""What the page shows of a motion, whatever it was lifted from, and the JSON object that it is sent as."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Any, Protocol
+
+import numpy as np
+import numpy.typing as npt
+
+from gait.body.skeleton import BONES
+from gait.camera.camera import Camera
+from gait.io.video import Video
+from gait.lift.keypoints.corrections import Edits
+from gait.lift.keypoints.suggestions import Suggestion
+from gait.motion.footfalls import Events
+from gait.studio import curves
+from gait.web.motion_data import frames, motion_data, rounded
+
+Floats = npt.NDArray[np.float64]
+Ints = npt.NDArray[np.int64]
+
+
+@dataclass(frozen=True)
+class Shown:
+    """A motion of T frames and J joints.
+
+    Attributes
+    ----------
+    frame : (T,)
+        Numbers in the film.
+    time : (T,)
+        Seconds.
+    names : tuple of str
+    places, sd : (T, J, 3)
+        Metres, and standard deviations.
+    uv : (T, J, 2)
+        Where the joints are in the picture, pixels.
+    uv_sd : (T, J)
+        Standard deviations along an axis of the picture, pixels.
+    off : (T, J)
+        How far joints may be from where they are drawn, pixels: what is uncertain, and what was missed.
+    curves : list
+        Of `gait.web.motion_data.curve`.
+    events : Events or None
+        Heel strikes; None where no person walks.
+    suggestions : list of Suggestion
+    warnings : list of str
+    figures : dict
+        ``px`` from what was seen (None for pictures), ``sd_mm``, ``stature_m``.
+    """
+
+    frame: Ints
+    time: Floats
+    names: tuple[str, ...]
+    places: Floats
+    sd: Floats
+    uv: Floats
+    uv_sd: Floats
+    off: Floats
+    curves: list[dict[str, Any]]
+    events: Events | None
+    suggestions: list[Suggestion]
+    warnings: list[str]
+    figures: dict[str, float | None]
+
+    @property
+    def tall(self) -> float:
+        """Median height of the person in the picture, pixels."""
+        v = self.uv[..., 1]
+        return float(np.median(v.max(axis=1) - v.min(axis=1)))
+
+
+@dataclass(frozen=True)
+class Solved:
+    """A motion of all corrections: what is shown of it, and what `Lift` needs to go on from it."""
+
+    shown: Shown
+    lifted: Any
+
+
+@dataclass(frozen=True)
+class Nearby:
+    """What a correction moved at once: rows (n,) of the frames, places (n, J, 3) and pixels (n, J, 2)."""
+
+    rows: npt.NDArray[np.intp]
+    places: Floats
+    uv: Floats
+
+
+class Lift(Protocol):
+    """A way to lift the film with corrections; another process gets a copy of it."""
+
+    tools: tuple[str, ...]  #: kinds of corrections that it takes: pull, pin, hide, swap
+    camera: Camera | None  #: whose world the motion is in
+
+    @property
+    def frames(self) -> Ints:
+        """Numbers of the frames that can be corrected."""
+        ...
+
+    def check(self, edits: Edits) -> None:
+        """Refuse corrections that cannot be."""
+        ...
+
+    def whole(self, edits: Edits) -> Solved:
+        """Solve as the batch command does."""
+        ...
+
+    def follow(self, solved: Solved) -> None:
+        """Go on from a motion."""
+        ...
+
+    def near(self, edits: Edits, touched: range) -> Nearby | None:
+        """Solve again near what was touched; None if that cannot be, LinAlgError if it fails."""
+        ...
+
+    def words(self) -> list[str]:
+        """Words of the batch command but for the corrections and the output."""
+        ...
+
+    def write_table(self, path: str, solved: Solved) -> None:
+        """Write the motion as the batch command does."""
+        ...
+
+    def write_overlay(self, path: str, video: Video, solved: Solved) -> None:
+        """Write the film with the figure as the batch command does."""
+        ...
+
+
+def page_data(
+    shown: Shown, uv: Floats, places: Floats, video: Video, camera: Camera | None
+) -> dict[str, Any]:
+    """Give the object of `gait.web.motion_data`: of the film's frames from the motion's first to its last.
+
+    Parameters
+    ----------
+    shown : Shown
+    uv, places : (T, J, 2), (T, J, 3)
+        Where the joints are now, which a correction may have moved.
+    """
+    first, names = int(shown.frame[0]), shown.names
+    number = np.arange(first, int(shown.frame[-1]) + 1)
+    row = shown.frame - first
+
+    def placed(values: Floats) -> Floats:
+        found = np.full((len(number), *values.shape[1:]), np.nan)
+        found[row] = values
+        return found
+
+    plots = []
+    for plot in shown.curves:
+        of_all = {key: plot[key] for key in ("values", "low", "high") if plot[key] is not None}
+        plots.append(plot | {key: rounded(placed(np.array(each, float)), 3) for key, each in of_all.items()})
+    data = motion_data(
+        video.fps,
+        video.times[number],
+        names,
+        [(names.index(a), names.index(b)) for a, b in BONES if {a, b} <= set(names)],
+        placed(places),
+        placed(shown.sd),
+        first=first,
+        offset=first,
+        uv=frames(placed(uv), 2),
+        uv_sd=frames(placed(shown.uv_sd), 2),
+        size=list(video.size),
+        camera=None if camera is None else rounded(camera.centre, 3),
+        status=None,
+        curves=plots,
+        events=curves.event_marks(shown.events),
+        strip=rounded(placed(np.nan_to_num(shown.off).mean(axis=1) / max(shown.tall, 1.0)), 4),
+    )
+    asked = [{"frame": s.frame, "joint": s.joint, "px": round(s.sd_px, 1)} for s in shown.suggestions]
+    return data | {
+        "tall": shown.tall,
+        "proposals": asked,
+        "warnings": shown.warnings,
+        "figures": shown.figures,
+    }
+
+
+def curves_of(
+    frame: Ints, time: Floats, names: Sequence[str], places: Floats, covariance: Floats
+) -> tuple[list[dict[str, Any]], Events | None]:
+    """Curves of angles and phase, and the heel strikes they are measured from.
+
+    Parameters
+    ----------
+    places : (T, J, 3)
+        Metres.
+    covariance : (T, 3 J, 3 J)
+        Of the coordinates of a frame's joints, square metres.
+    """
+    events = curves.events_of(frame, time, names, places)
+    found = curves.angles_of(names, places, covariance)
+    return [*curves.angle_curves(found), *curves.phase_curve(time, events, found)], events
