@@ -78,7 +78,7 @@ def phase_curve(time: Floats, events: Events | None, found: Angles) -> list[dict
     """
     strikes = np.sort(events.strike["right"]) if events else np.zeros(0)
     if len(strikes) < 2:
-        return []
+        return [curve("Phase", "0: right heel strike", np.full(len(time), np.nan), limits=(0, 1))]
     count = np.interp(time, strikes, np.arange(len(strikes)), left=np.nan, right=np.nan)
     information = np.zeros(len(time))
     for name, (values, sd) in found.items():

@@ -18,6 +18,7 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
+from gait import extras
 from gait.camera.camera import write_camera
 from gait.errors import UserError
 from gait.export import files as exports
@@ -59,6 +60,7 @@ class Session:
         self.edits = self._read()
         self._undo: list[Edits] = []
         self._redo: list[Edits] = []
+        self._begun = time.time_ns()  # versions of another session count from 0 too
         self.version = 0  #: of what is shown; the page asks again when it grows
         self._asked = 0
         self.fault = ""
@@ -83,6 +85,7 @@ class Session:
     def _work(self) -> dict[str, Any]:
         """Corrections and what can be done with them."""
         return {
+            "begun": self._begun,
             "version": self.version,
             "edits": self.edits.as_json(),
             "file": str(self.source.corrections),
@@ -337,7 +340,7 @@ class Session:
             table = str(folder / EXPORTS["csv"])
             self._lift.write_table(table, solved)
             if kind != "csv":
-                exports.write(table, str(path))
+                _convert(table, path)
             if beside := exports.BESIDE.get(path.suffix):
                 return _zipped(path, path.with_suffix(beside))
         return path
@@ -347,6 +350,15 @@ EXPORTS = {"csv": "motion.csv", "mp4": "overlay.mp4", "camera": "camera.json"} |
     suffix[1:]: f"motion{suffix}" for suffix in exports.SUFFIXES
 }
 """Kinds of exports and their files in the folder beside the film."""
+
+
+def _convert(table: str, path: Path) -> None:
+    """Write a motion in the format of another tool."""
+    try:
+        exports.write(table, str(path))
+    except ImportError as error:
+        lacking = (error.name or "").partition(".")[0]
+        raise UserError(extras.remedy(f"a file {path.suffix}", (), lacking) or str(error)) from None
 
 
 def _zipped(*paths: Path) -> Path:

@@ -45,6 +45,7 @@ function say(text, seconds = 5) {
 
 async function load() {
   const found = await ask('/state');
+  if (found.begun === data?.begun && found.version < data.version) return; // an edit was answered meanwhile
   const first = !data;
   data = found;
   document.title = `gait studio: ${data.title}`;

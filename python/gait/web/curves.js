@@ -34,6 +34,7 @@ export class Curves {
       this.plots.forEach((plot) => plot.chart.dispose());
       this.element.replaceChildren();
       this.plots = names.map((name) => this.#plot(name));
+      this.plots.forEach((plot) => plot.chart.resize()); // all share the width, which the first had alone
     }
     this.plots.forEach((plot) => this.#fill(plot));
     this.show(this.index);
