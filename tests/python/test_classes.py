@@ -120,9 +120,12 @@ def test_learn_makes_classes_and_info_shows_them(tmp_path: Path, capsys: pytest.
 
 def test_classes_are_added_to_a_model(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     out = tmp_path / "m.gait"
-    assert main(["learn", str(SHIPPED), "-o", str(out), "--class", "backwards", "--class", "stand"]) == 0
-    assert "classes walk backwards stand" in capsys.readouterr().out
-    assert gait.Model(out).classes == ("walk", "backwards", "stand")
+    words = ["--class", "backwards", "--class", "stand", "--class", f"stroll={SHIPPED}"]
+    assert main(["learn", str(SHIPPED), "-o", str(out), *words]) == 0
+    assert "classes walk backwards stand stroll" in capsys.readouterr().out
+    model = gait.Model(out)
+    assert model.classes == ("walk", "backwards", "stand", "stroll")
+    assert model.class_info(3).components == model.info.components
     assert blob.read(out)["SGMD"].tobytes() == blob.read(SHIPPED)["SGMD"].tobytes()
     assert main(["learn", str(SHIPPED), "-o", str(out), "--class", "run"]) == 2
     assert "--class run: give recordings" in capsys.readouterr().err

@@ -18,7 +18,7 @@ import gait.cli
 from gait import Model
 from gait.body.skeleton import ANGLES, CHANNELS, Proportions
 from gait.io import blob
-from gait.learn.corpus import sources
+from gait.learn.corpus import load, sources
 from gait.learn.corpus.sources import names, subjects
 from gait.learn.mocap import acclaim, recording
 from gait.learn.options import LearnOptions
@@ -82,6 +82,15 @@ def test_a_folder_or_a_glob_is_excluded(walks, name):
     assert [path.name for path, _ in found] == ["02_01.amc"] and warnings == [
         "--exclude nothing*: no file's path ends like this"
     ]
+
+
+def test_lengths_of_a_generic_skeleton_are_not_learnt(walks):
+    options = LearnOptions(generic_lengths=("01",), jobs=1)
+    files, _ = sources.find([str(walks)])
+    first, second = load.load_all(files, options).sequences
+    assert first.measures is None and second.measures is not None
+    learned = fit.fit([first, second])
+    assert learned.proportions == retarget.generic_proportions([second.measures])
 
 
 def test_an_idle_glob_and_all_that_fails_are_named(walks, tmp_path, capsys):

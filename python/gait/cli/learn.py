@@ -45,6 +45,7 @@ examples:
   gait learn recordings/ -o model.gait --report report
   gait learn walk_01.trc walk_02.trc -o model.gait --markers map.json
   gait learn ../shared/data/mocap/cmu_walk -o python/gait/data/walk.gait    # the model in the package
+  gait learn walks runs -o all.gait --class stand --class backwards --class run
 """
 
 AUTO = "auto"
@@ -72,8 +73,8 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         metavar="NAME[=SRC]",
         help="also hold this class of motion, so that gait track follows changes; may be repeated. stand and "
         "backwards are made from the walk; run is learnt from the runs among the sources, or like any other "
-        "NAME from the recordings of SRC. With a model of walking as the only source, the classes are "
-        "added to it",
+        "NAME from the recordings of SRC, or taken from SRC if that is a model. With a model of walking as "
+        "the only source, the classes are added to it",
     )
     add(
         "--subjects",
@@ -108,6 +109,15 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         default=[],
         metavar="GLOB",
         help="leave out files whose path ends like this, such as 'cmu_walk/02/*', and folders of that name",
+    )
+    add(
+        "--generic-lengths",
+        nargs="+",
+        action="extend",
+        default=[],
+        metavar="GLOB",
+        help="in files whose path ends like this limbs have not the person's lengths, as where a skeleton is "
+        "the same for several people: learn only the motion from them",
     )
     add(
         "--period-mode",
@@ -229,6 +239,7 @@ def _options(args: argparse.Namespace) -> LearnOptions:
         | {
             "sources": tuple(args.sources),
             "exclude": tuple(args.exclude),
+            "generic_lengths": tuple(args.generic_lengths),
             "static": tuple(args.static),
             "classes": tuple(args.classes),
             "markers": markers.read_map(args.markers) if args.markers else None,

@@ -53,6 +53,7 @@ class LearnOptions:
 
     sources: tuple[str, ...] = ()  #: motion files and folders of them
     exclude: tuple[str, ...] = ()  #: globs of files to leave out
+    generic_lengths: tuple[str, ...] = ()  #: globs of files whose limb lengths are not the person's
     output: str = ""  #: path of the model
     report: str | None = None  #: folder of the report
     quiet: bool = False  #: no progress and no notes on stderr

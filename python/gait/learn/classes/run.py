@@ -37,9 +37,10 @@ OTHER = Change(0.1)  # of a class of the user's, to and from the walk and standi
 def learn(options: LearnOptions, note: Note, run: Run) -> dict[str, Any]:
     """Learn the walk by `run`, then each of ``options.classes``, and write one blob.
 
-    A class is ``stand`` or ``backwards``, made from the walk; or ``NAME=SRC``, learnt from those recordings;
-    or ``run``, learnt from the runs among the sources.  Returns the figures of the walk, with those of the
-    classes under ``classes``.  UsageError or UserError with one line if it cannot be done.
+    A class is ``stand`` or ``backwards``, made from the walk; or ``NAME=SRC``, learnt from those recordings
+    or taken from a model (``.gait``); or ``run``, learnt from the runs among the sources.  Returns the
+    figures of the walk, with those of the classes under ``classes``.  UsageError or UserError with one line
+    if it cannot be done.
     """
     wanted = _parsed(options)
     if adds_to_a_model(options):
@@ -96,7 +97,9 @@ def _derived(name: str, walk: Mapping[str, blob.Array], activity: str) -> Motion
 
 
 def _learnt(name: str, source: str, options: LearnOptions, note: Note, run: Run) -> MotionClass | None:
-    """Learn a class from recordings; None if none of the sources is of it."""
+    """Learn a class from recordings, or take it from a model; None if none of the sources is of it."""
+    if Path(source).suffix == ".gait":
+        return _counted(MotionClass(name, own=read_cyclic(source)), None)
     with tempfile.TemporaryDirectory() as folder:
         own = replace(
             options,

@@ -112,7 +112,8 @@ def load_all(
     with closing(_outcomes(tasks, options)) as outcomes, ArrayFile() as signals:
         for i, outcome in enumerate(outcomes):
             found, error = outcome.sequence, outcome.refused
-            measures.append(outcome.body)
+            generic = any(sources.matches(paths[i], glob) for glob in options.generic_lengths)
+            measures.append(None if generic else outcome.body)
             if notes is not None:
                 notes.add(paths[i], outcome.notes, found is not None)
             if corpus is not None and outcome.motion is not None:
@@ -122,8 +123,16 @@ def load_all(
                 signals.put(found.channels)
                 one = None if outcome.alone else shared[i]
                 count = one.recordings if one else found.recordings
+                own = None if generic else found.measures
                 sequences.append(
-                    replace(found, name=names[i], subject=persons[i], channels=NOT_YET, recordings=count)
+                    replace(
+                        found,
+                        name=names[i],
+                        subject=persons[i],
+                        channels=NOT_YET,
+                        measures=own,
+                        recordings=count,
+                    )
                 )
             elif error is not None and (files[i][1] or outcome.motion is not None):
                 left_out = outcome.motion is None or corpus is None

@@ -47,9 +47,9 @@ def find(
             found[os.path.abspath(source)] = source, False
     globs = list(exclude)
     for glob in globs:
-        if not any(_matches(path, glob) for path, _ in found.values()):
+        if not any(matches(path, glob) for path, _ in found.values()):
             warn(f"--exclude {glob}: no file's path ends like this")
-    kept = [(p, inside) for p, inside in found.values() if not any(_matches(p, glob) for glob in globs)]
+    kept = [(p, inside) for p, inside in found.values() if not any(matches(p, glob) for glob in globs)]
     if not kept:
         raise UserError(f"--exclude {' '.join(globs)}: leaves none of {len(found)} files; exclude less")
     return kept, closed
@@ -74,8 +74,8 @@ def _inside(folder: Path, closed: list[str]) -> Iterator[Path]:
                 yield path
 
 
-def _matches(path: Path, glob: str) -> bool:
-    """Whether a glob excludes a file."""
+def matches(path: Path, glob: str) -> bool:
+    """Whether a glob, or a folder's name, means a file."""
     folder = glob.rstrip("/")
     return bool(folder) and (
         path.match(folder) or (not set(folder) & set("*?[") and any(p.match(folder) for p in path.parents))
