@@ -36,11 +36,13 @@ def test_words_follow_the_probability_of_being_outside():
         assert Compared("speed_m_s", value, sd, 1.0, 0.1, "age").words == words, value
 
 
-def test_a_walk_that_is_wide_and_slow_is_outside_and_an_ordinary_one_inside():
-    usual, odd = (with_stature(walking_track(length=1.35, width=w, hz=0.9, sd=0.004)) for w in (0.09, 0.4))
+def test_a_large_step_width_is_outside_and_an_ordinary_walk_inside():
+    usual, straddling = (
+        with_stature(walking_track(length=1.35, width=w, hz=0.9, sd=0.004)) for w in (0.09, 0.4)
+    )
     inside, outside = (
         {c.name: c for c in beside_norms(track, measure(track), MODEL, age=45.0, sex="f")}
-        for track in (usual, odd)
+        for track in (usual, straddling)
     )
     assert inside["step_width_m"].words == "inside" and outside["step_width_m"].words == "above (100 %)"
     assert inside["speed_m_s"].source == "age" and inside["speed_m_s"].norm == 1.391

@@ -95,8 +95,8 @@ def gait_errors(parameters: Parameters, truth: Joints, events: Events) -> dict[s
         )
         if name in MIRRORED and all(len(values[0]) for values in both):
             index = [asymmetry(*(values[k].mean() for values in both)) for k in (0, 1)]
-            spread = sd_of(asymmetry(*(mean_of(values[2], 1) for values in both)))
-            out[f"asymmetry:{name}"] = Compared(*(np.array([value]) for value in (*index, spread)))
+            sd = sd_of(asymmetry(*(mean_of(values[2], 1) for values in both)))
+            out[f"asymmetry:{name}"] = Compared(*(np.array([value]) for value in (*index, sd)))
     return out
 
 

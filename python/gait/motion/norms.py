@@ -65,7 +65,7 @@ class Compared:
 
     @property
     def words(self) -> str:
-        """Say whether it is inside, and how sure that is."""
+        """State whether it is inside, and how sure that is."""
         low, high = self._ends
         way = "below" if ndtr(low) > 1 - ndtr(high) else "above"
         if self.outside < _POSSIBLE:
@@ -153,9 +153,9 @@ def rate_at(model: Mapping[str, Any], speed: float, stature: float) -> tuple[flo
     Logarithms of rate and length of the stride are taken as independent normals among people.
     """
     rate, rate_sd, _, length, length_sd, *_ = (float(value) for value in model["GAIT"])
-    spread, other = rate_sd / rate, length_sd / length
+    rate_share, other = rate_sd / rate, length_sd / length
     faster = np.log(speed / (rate * length * stature))
-    share = spread**2 / max(spread**2 + other**2, 1e-12)
+    share = rate_share**2 / max(rate_share**2 + other**2, 1e-12)
     mean = rate * np.exp(share * faster)
     return float(mean), float(mean * np.sqrt(share) * other)
 

@@ -76,7 +76,8 @@ def _motions(track: Track, draws: Draws | None) -> Iterator[Joints]:
     """Motions of `JOINTS` that agree with the track's standard deviations."""
     random = np.random.default_rng(0)
     count = _COUNT if draws is None else len(draws.phase)
-    sd = {name: _without_camera(track, name) for name in JOINTS}
+    moved = {name: _moved(track, name) for name in JOINTS}
+    sd = {name: _without_camera(track.sd[name], moved[name]) for name in JOINTS}
     own = _person_sd(sd, draws)
     size = _size_sd(track, own, draws)
     waves = _waves(track.phase)
@@ -91,22 +92,21 @@ def _motions(track: Track, draws: Draws | None) -> Iterator[Joints]:
             if draws is None:
                 wander = _wander(track.time, 3, random)
                 out[name] += np.sqrt(_WANDER) * sd[name] * wander
-            if track.camera_change is not None:
-                out[name][:, :2] += _moved(track, name) @ camera
+            out[name][:, :2] += moved[name] @ camera
         yield Joints(track.frame, track.time, out)
 
 
 def _moved(track: Track, name: str) -> Array:
-    """How a joint of a track moves with the parts of the camera's uncertainty (n, 2, 4)."""
+    """How a joint moves with the parts of the camera's uncertainty (n, 2, 4); 0 where it was given."""
+    if track.camera_change is None:
+        return np.zeros((len(track.time), 2, 4))
     return moved_by_camera(track.camera_change, (track.places[name] - track.places["pelvis"])[:, :2])
 
 
-def _without_camera(track: Track, name: str) -> Array:
+def _without_camera(sd: Array, moved: Array) -> Array:
     """Return the standard deviations (n, 3) of a joint where the camera is right, metres."""
-    if track.camera_change is None:
-        return track.sd[name]
-    common = np.pad((_moved(track, name) ** 2).sum(axis=2), ((0, 0), (0, 1)))
-    return np.sqrt(np.maximum(track.sd[name] ** 2 - common, 0.0))
+    common = np.pad((moved**2).sum(axis=2), ((0, 0), (0, 1)))
+    return np.asarray(np.sqrt(np.maximum(sd**2 - common, 0.0)))
 
 
 def _person_sd(sd: dict[str, Array], draws: Draws | None) -> dict[str, Array]:
