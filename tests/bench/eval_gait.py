@@ -117,9 +117,9 @@ PUBLISHED_NOTE = """\
 Stenum and others 2021, PLoS Computational Biology 17:e1008935 (32 people); Gilon and others 2026,
 arXiv:2603.24733; Peiffer and others 2025, arXiv:2507.08268; Keating and others 2026, Sensors (39 people,
 beside a walkway with light barriers).  These are of other people, on other clips, with other references, and
-mostly of films of real people; ours are of drawn or simulated films whose truth is exact.  They show the order
-of size that a laboratory meets, and rank nothing.  Ours are pooled, angles as they are; `make eval` has the
-pelvis among its joints."""
+mostly of films of real people; ours are of drawn or simulated films whose truth is exact.  They show the
+order of size that a laboratory meets, and rank nothing.  Ours are pooled, angles as they are; `make eval` has
+the pelvis among its joints."""
 
 
 @dataclass(frozen=True)

@@ -20,6 +20,7 @@ SIZE = (400, 300)  # pixels: the tracker looks at a person of 192
 CASES: dict[str, Scenario] = {
     **{name: PRESETS[name] for name in ("slow", "fast", "limping", "stick", "crutches")},
     "usual": Scenario(frames=120, seed=81),
+    "limping_side": Scenario(direction="rl", speed=0.9, asymmetry=-15.0, frames=140, seed=83),
 }
 
 
