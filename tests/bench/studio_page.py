@@ -80,7 +80,7 @@ def _drag(page: Any, target: Target) -> float:
 
 
 def words(spent: list[float], wanted: float) -> str:
-    """Say what was measured."""
+    """Sentence on what was measured."""
     if not spent:
         return ""
     middle, longest = sorted(spent)[len(spent) // 2], max(spent)

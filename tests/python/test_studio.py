@@ -3,11 +3,13 @@
 import contextlib
 import csv
 import json
+import math
 import os
 import shutil
 import signal
 import subprocess
 import sys
+import time
 import urllib.request
 
 import accessibility
@@ -307,38 +309,36 @@ def test_fits_every_width_light_and_dark(server):
         accessibility.check_here(page)
 
 
+def get(url, path):
+    with urllib.request.urlopen(url + path) as answer:
+        return answer.read()
+
+
 def test_pictures_are_corrected_as_the_batch_command_does(clip):
+    """Without a browser, as the page would ask."""
     folder, truth = clip
-    shutil.copytree(folder / "clip", folder / "pictures/clip", ignore=shutil.ignore_patterns("*.studio"))
-    server = Server(
-        folder / "pictures", "--placement", "clip/init.json", "--background", "clip/background.png"
-    )
-    saved = folder / "pictures/clip/video.mp4.studio/corrections.json"
-    frame, joint = 20, "l_ankle"
-    target = truth[frame, JOINTS.index(joint)] + [6.0, 0.0]
-    shown = f"studio.data.uv[{frame}][studio.data.joints.indexOf('{joint}')]"
-    with studio(server.url) as page:
-        assert not page.locator("#tool-pin").is_visible() and not page.locator("#hide").is_visible()
-        before = np.linalg.norm(np.array(page.evaluate(shown)) - target)
-        drag(page, frame, joint, target)
-        assert np.linalg.norm(np.array(page.evaluate(shown)) - target) < 0.5 * before
-        rest(page)
-        assert np.linalg.norm(np.array(page.evaluate(shown)) - target) < 0.5 * before
-        assert page.evaluate("studio.data.fault") == "" and page.locator("#proposals li").count() > 0
-        with page.expect_download() as download:
-            page.select_option("#export", "csv")
-        download.value.save_as(folder / "pictures/exported.csv")
-        with page.expect_download() as download:
-            page.select_option("#export", "mp4")
-        download.value.save_as(folder / "pictures/overlay.mp4")
-    assert server.end(signal.SIGINT) == 0
-    assert Video(folder / "pictures/overlay.mp4").count == FRAMES
     here = folder / "pictures/clip"
-    words = ["lift", here / "video.mp4", "--placement", here / "init.json", "--camera", here / "camera.json"]
-    words += ["--background", "none", "--corrections", saved]
-    words += ["-o", folder / "pictures/batch.csv", "--quiet"]
-    subprocess.run([sys.executable, "-m", "gait", *map(str, words)], check=True, capture_output=True)
-    assert (folder / "pictures/exported.csv").read_bytes() == (folder / "pictures/batch.csv").read_bytes()
+    shutil.copytree(folder / "clip", here, ignore=shutil.ignore_patterns("*.studio"))
+    server = Server(folder / "pictures", "--placement", "clip/init.json", "--background", "none")
+    target = (truth[20, JOINTS.index("l_ankle")] + [6.0, 0.0]).tolist()
+    state = json.loads(get(server.url, "state"))
+    assert set(state["tools"]) == {"pull", "start"} and state["proposals"]
+    joint = state["joints"].index("l_ankle")
+    before = math.dist(state["uv"][20][joint], target)
+    pull = {"do": "pull", "frame": 20, "joint": "l_ankle", "uv": target, "sd_px": 1.0}
+    near = post(server.url, "edit", pull)[1]
+    assert math.dist(near["uv"][near["rows"].index(20)][joint], target) < 0.5 * before
+    while (state := json.loads(get(server.url, "state")))["refining"]:
+        time.sleep(0.1)
+    assert math.dist(state["uv"][20][joint], target) < 0.5 * before and state["fault"] == ""
+    exported = get(server.url, "export/csv")
+    (folder / "overlay.mp4").write_bytes(get(server.url, "export/mp4"))
+    assert Video(folder / "overlay.mp4").count == FRAMES
+    assert server.end(signal.SIGINT) == 0
+    words = state["command"].replace("motion.csv", "batch.csv").split()[1:]
+    command = [sys.executable, "-m", "gait", *words, "--quiet"]
+    subprocess.run(command, cwd=folder / "pictures", check=True, capture_output=True)
+    assert (folder / "pictures/batch.csv").read_bytes() == exported
 
 
 def test_usage_is_one_line(capsys, tmp_path, monkeypatch):

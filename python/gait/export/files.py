@@ -14,13 +14,13 @@ BESIDE = {".mot": ".osim"}
 """Suffixes of files that come with a second one, of the same name."""
 
 
-def write(source: str, target: str, tell: Callable[[str], None] = lambda words: None) -> dict[str, Any]:
+def write(source: str, target: str, report: Callable[[str], None] = lambda words: None) -> dict[str, Any]:
     """Write a track, a motion of ``gait lift`` or an LCM log in the format that the target's suffix names.
 
     Parameters
     ----------
     source, target : str
-    tell : callable
+    report : callable
         Called with a line on what the format cannot hold.
 
     Returns
@@ -37,7 +37,7 @@ def write(source: str, target: str, tell: Callable[[str], None] = lambda words: 
     if suffix not in SUFFIXES:
         raise UserError(f"{target}: not a format that is written; use one of {' '.join(SUFFIXES)}")
     if suffix in (".bvh", ".mot"):
-        return _fitted(source, target, suffix, tell)
+        return _fitted(source, target, suffix, report)
     return _plain(source, target, suffix)
 
 
@@ -64,7 +64,7 @@ def _plain(source: str, target: str, suffix: str) -> dict[str, Any]:
         return {"frames": to(file, found)}
 
 
-def _fitted(source: str, target: str, suffix: str, tell: Callable[[str], None]) -> dict[str, Any]:
+def _fitted(source: str, target: str, suffix: str, report: Callable[[str], None]) -> dict[str, Any]:
     """Write the motion of a skeleton."""
     from gait.export import angles, bvh, motion, opensim
 
@@ -73,7 +73,7 @@ def _fitted(source: str, target: str, suffix: str, tell: Callable[[str], None]) 
     with replacing(target) as file:
         if suffix == ".bvh":
             if lacking := bvh.write(file, found, fitted):
-                tell(f"{source}: lacks {lacking} frames, which repeat the one before")
+                report(f"{source}: lacks {lacking} frames, which repeat the one before")
         else:
             opensim.write_mot(file, found, fitted)
     if suffix in BESIDE:

@@ -70,7 +70,7 @@ def picture_sd(lifted: Lifted) -> Floats:
 def missed(lifted: Lifted) -> Floats:
     """How far (T, J) each marker is from where it was detected, pixels.
 
-    0 where it was not detected, and near a correction of it, which has told how wrong the detector was.
+    0 where it was not detected, and near a correction of it, which has shown how wrong the detector was.
     """
     motion, points = lifted.motion, lifted.keypoints
     found = np.zeros(motion.places.shape[:2])

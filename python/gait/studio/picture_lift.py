@@ -72,7 +72,7 @@ class PictureLift:
         with one_thread():
             fit = fit_clip(clip)
             at = linearised(clip, fit.sequence)
-        wide = video_run.widened(self._request, fit)
+        whole = video_run.widened(self._request, fit)
         places = fit.places[:, self._joints]
         curves, events = curves_of(
             fit.frame, fit.time, self._names, places, joint_covariances(clip, fit, self._joints)
@@ -84,7 +84,7 @@ class PictureLift:
             time=fit.time,
             names=self._names,
             places=places,
-            sd=wide.sd[:, self._joints],
+            sd=whole.sd[:, self._joints],
             uv=clip.view.project(places)[0],
             uv_sd=sd,
             off=sd,
@@ -94,11 +94,11 @@ class PictureLift:
             warnings=[video_run.poor_correlation(self._request, fit.fit_correlation)] if poor else [],
             figures={
                 "px": None,
-                "sd_mm": round(1000 * float(np.median(wide.sd[:, self._joints])), 1),
+                "sd_mm": round(1000 * float(np.median(whole.sd[:, self._joints])), 1),
                 "stature_m": round(float(clip.placement.stature), 3),
             },
         )
-        return Solved(shown, (edits, wide, at))
+        return Solved(shown, (edits, whole, at))
 
     def follow(self, solved: Solved) -> None:
         """Go on from an estimate."""
