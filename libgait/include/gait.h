@@ -21,7 +21,7 @@
 #define GAIT_VERSION_MINOR 1
 #define GAIT_VERSION_PATCH 0
 #define GAIT_VERSION (GAIT_VERSION_MAJOR * 10000 + GAIT_VERSION_MINOR * 100 + GAIT_VERSION_PATCH)
-#define GAIT_ABI 8          /* SONAME; raised by any incompatible change below, struct layout included */
+#define GAIT_ABI 9          /* SONAME; raised by any incompatible change below, struct layout included */
 #define GAIT_FORMAT_MAJOR 1 /* model blob: another major is refused, */
 #define GAIT_FORMAT_MINOR 0 /* sections added by a newer minor are skipped */
 
@@ -383,14 +383,33 @@ typedef struct gait_tracker_config {
 
 typedef struct gait_keypoint { GAIT_KEYPOINT_FIELDS(GAIT_DECLARE) } gait_keypoint;
 
-/* What is observed at one time. */
+/* Where a camera is in one frame. */
+#define GAIT_CAMERA_POSE_FIELDS(RANGE)                                                                                \
+    RANGE("Rotation from world to camera, row-major.",                                                                \
+          float, R, [9], "", -2, 2)                                                                                   \
+    RANGE("World origin in camera coordinates.",                                                                      \
+          float, t, [3], "metres", -1e4, 1e4)                                                                         \
+    RANGE("Standard deviation of the direction in which it looks, about each axis; 0: exact.",                        \
+          float, turn_sd, , "radians", 0, 1)                                                                          \
+    RANGE("Standard deviation of each coordinate of its place; 0: exact.",                                            \
+          float, place_sd, , "metres", 0, 10)
+
+typedef struct gait_camera_pose { GAIT_CAMERA_POSE_FIELDS(GAIT_DECLARE) } gait_camera_pose;
+
+/* What is observed at one time.  Fields left at 0 are not given. */
 #define GAIT_FRAME_FIELDS(FIELD)                                                                                      \
+    FIELD("Size of this struct in the caller's header; 0: this one.",                                                 \
+          uint64_t, struct_size, , "bytes")                                                                           \
     FIELD("Capture time; must increase.",                                                                             \
           int64_t, utime, , "microseconds")                                                                           \
     FIELD("Image of each camera; data NULL: that camera missed this frame.",                                          \
           gait_image, image, [GAIT_MAX_CAMERAS], "")                                                                  \
     FIELD("The model's joints in order, for GAIT_TERM_KEYPOINTS; NULL: none.  Read if the camera has an image.",      \
-          const gait_keypoint *, keypoints, [GAIT_MAX_CAMERAS], "")
+          const gait_keypoint *, keypoints, [GAIT_MAX_CAMERAS], "")                                                   \
+    FIELD("Where each camera is in this frame; NULL: where the config puts it.  The state stays in the world.",       \
+          const gait_camera_pose *, pose, [GAIT_MAX_CAMERAS], "")                                                     \
+    FIELD("Empty scene as each camera sees it in this frame; data NULL: that of gait_tracker_set_background().",      \
+          gait_image, background, [GAIT_MAX_CAMERAS], "")
 
 typedef struct gait_frame { GAIT_FRAME_FIELDS(GAIT_DECLARE) } gait_frame;
 
@@ -454,8 +473,9 @@ GAIT_API gait_result gait_tracker_bytes(const gait_model *m, const gait_tracker_
                                         gait_error *err);
 GAIT_API gait_result gait_tracker_init(void *mem, size_t mem_bytes, const gait_model *m,
                                        const gait_tracker_config *cfg, gait_tracker **out, gait_error *err);
-/* Empty scene of one camera as captured (distorted).  Its pixels are borrowed until it is replaced or the tracker is
- * done.  plate NULL: none; the silhouette term then has no effect.  Snapshots do not hold it. */
+/* Empty scene of one camera as captured (distorted), where the config puts it: in a frame of another pose it does not
+ * count.  Its pixels are borrowed until it is replaced or the tracker is done.  plate NULL: none; without one the
+ * silhouette term has no effect.  Snapshots do not hold it. */
 GAIT_API gait_result gait_tracker_set_background(gait_tracker *t, int32_t camera, const gait_image *plate,
                                                  gait_error *err);
 /* Broad prior: phase uniform, stride rate and stature of people in general, heading unknown, pelvis at the origin. */

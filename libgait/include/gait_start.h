@@ -1,8 +1,8 @@
 /* gait_start.h - the automatic start: where a person is and how they walk, from a second of observations.
  *
  * A walk is fitted to keypoints of one person, as a 2-D detector finds them, or to boxes around people: found by a
- * detector, or by gait_start_find_boxes() against the empty scene.  The camera does not move; a person walks straight on
- * at an even pace, or stays in place.  From keypoints every direction, phase and side is tried; boxes give place,
+ * detector, or by gait_start_find_boxes() against the empty scene.  The camera stands still or its pose is given with
+ * gait_start_set_pose(); a person walks straight on at an even pace, or stays in place.  From keypoints every direction, phase and side is tried; boxes give place,
  * direction and stature, and leave the phase open.  The answers are a few weighted hypotheses, each ready for
  * gait_tracker_start_hypotheses().
  * Conventions, units, memory and errors are those of gait.h. */
@@ -84,6 +84,9 @@ static inline void gait_start_default(gait_start_config *cfg)
 GAIT_API gait_result gait_start_bytes(const gait_model *m, const gait_start_config *cfg, size_t *bytes, gait_error *err);
 GAIT_API gait_result gait_start_init(void *mem, size_t mem_bytes, const gait_model *m, const gait_start_config *cfg,
                                      gait_start **out, gait_error *err);
+/* Where the camera is in the frames and boxes given from now on, instead of where the config puts it; its standard
+ * deviations are not used. */
+GAIT_API gait_result gait_start_set_pose(gait_start *s, const gait_camera_pose *pose, gait_error *err);
 /* One frame: the model's joints in order, as in gait_frame; utime must increase. */
 GAIT_API gait_result gait_start_add(gait_start *s, int64_t utime, const gait_keypoint *keypoints, gait_error *err);
 /* One frame: boxes around people, the most certain first; utime must increase.  Boxes that make a person shorter than

@@ -14,6 +14,7 @@ typedef struct walk { /* what the keypoints are made from */
     float noise;   /* pixels */
     float wrong;   /* share of keypoints that are somewhere else */
     bool legs_cut; /* hips and ankles are not in view */
+    float drive, pan; /* of the camera, to the right and to the left: metres and radians per second */
 } walk;
 
 static walk usual(void)
@@ -24,6 +25,17 @@ static walk usual(void)
 static gait_camera camera(void)
 {
     return level_camera(1280, 720, 1000.0f);
+}
+
+/* The camera at a moment. */
+static gait_camera camera_at(const walk *w, float t)
+{
+    gait_camera c = camera();
+    float sn, cs;
+    m_sincos_one(w->pan * t, &sn, &cs);
+    const float R[9] = {cs, sn, 0, 0, 0, -1, -sn, cs, 0}, x = w->drive * t;
+    const float move[3] = {-R[0] * x, c.t[1], -R[6] * x};
+    return camera_placed(&c, R, move);
 }
 
 static gait_state state_at(const walk *w, float t)
@@ -43,7 +55,7 @@ static gait_state state_at(const walk *w, float t)
 
 static void detect(const walk *w, float t, uint32_t n, gait_keypoint *out)
 {
-    gait_camera const cam = camera();
+    gait_camera const cam = camera_at(w, t);
     gait_state const s = state_at(w, t);
     gait_pose pose;
     CHECK(gait_model_pose(toy_model(), &s, &pose, NULL) == GAIT_OK);
@@ -66,6 +78,13 @@ static void show(gait_start *s, const walk *w, int frames)
     gait_keypoint k[JOINTS];
     for (int n = 0; n < frames; n++) {
         detect(w, (float)n / 25.0f, (uint32_t)n, k);
+        if (w->drive > 0.0f) {
+            gait_camera const c = camera_at(w, (float)n / 25.0f);
+            gait_camera_pose pose = {.turn_sd = 0.0f};
+            memcpy(pose.R, c.R, sizeof pose.R);
+            memcpy(pose.t, c.t, sizeof pose.t);
+            CHECK(gait_start_set_pose(s, &pose, NULL) == GAIT_OK);
+        }
         CHECK(gait_start_add(s, 1000000 + n * 40000, k, NULL) == GAIT_OK);
     }
 }
@@ -111,6 +130,22 @@ static void test_headings(void)
         CHECK(!h.in_place && h.probability > 0.9f);
         CHECK(h.chi2_per_observation < 1.5f && h.observations == 2 * JOINTS * 12);
     }
+}
+
+/* A camera that drives past the person and turns to them, its poses given. */
+static void test_moving_camera(void)
+{
+    walk w = usual();
+    w.drive = 1.5f;
+    w.pan = -0.2f;
+    w.noise = 2.0f;
+    gait_hypothesis const h = find(&w);
+    check_found(&w, &h);
+    CHECK(!h.in_place && h.probability > 0.9f && h.chi2_per_observation < 1.5f);
+    gait_start *const s = toy_start_new(camera(), ~0u);
+    gait_camera_pose bad = {.turn_sd = 0.0f};
+    CHECK(gait_start_set_pose(s, &bad, NULL) == GAIT_ERR_ARG && gait_start_set_pose(s, NULL, NULL) != GAIT_OK);
+    free(s);
 }
 
 static void test_slow_and_fast(void)
@@ -276,6 +311,7 @@ static uint64_t digest(uint32_t cpu_mask)
 static void tests(void)
 {
     test_headings();
+    test_moving_camera();
     test_slow_and_fast();
     test_treadmill();
     test_outliers();

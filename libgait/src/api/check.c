@@ -1,5 +1,6 @@
 #include "api/check.h"
 
+#include "api/fields.h"
 #include "image/camera.h"
 #include "image/view.h"
 #include "raster/rast.h"
@@ -15,6 +16,18 @@ gait_result check_camera(const gait_camera *c, int32_t index, gait_error *err)
         return base_fail(err, GAIT_ERR_LIMIT, (int)index, "camera %d: %d x %d pixels, at most %d each way",
                          number, (int)c->width, (int)c->height, RAST_LIMIT);
     return GAIT_OK;
+}
+
+gait_result check_camera_pose(const gait_camera *c, int32_t index, const gait_camera_pose *pose,
+                              gait_camera *out, gait_error *err)
+{
+    gait_camera const moved = camera_placed(c, pose->R, pose->t);
+    gait_result s = fields_check("gait_camera_pose", pose, "pose: ", err);
+    if (s == GAIT_OK)
+        s = check_camera(&moved, index, err);
+    if (s == GAIT_OK)
+        *out = moved;
+    return s;
 }
 
 gait_result check_image(const gait_camera *cam, int32_t camera, const gait_image *im, const char *what,

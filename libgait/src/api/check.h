@@ -6,6 +6,10 @@
 /* A camera that can be projected with; `index` is its number in errors, -1: the only one. */
 gait_result check_camera(const gait_camera *c, int32_t index, gait_error *err);
 
+/* Where a camera is in a frame; `out`, which may be the camera itself, becomes the camera there. */
+gait_result check_camera_pose(const gait_camera *c, int32_t index, const gait_camera_pose *pose,
+                              gait_camera *out, gait_error *err);
+
 /* Pixels as the camera of this number gives them; `what` is their name in errors. */
 gait_result check_image(const gait_camera *cam, int32_t camera, const gait_image *im, const char *what,
                         gait_error *err);

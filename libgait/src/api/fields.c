@@ -16,6 +16,7 @@
     OF(gait_tasks, GAIT_TASKS_FIELDS(F))                                                                     \
     OF(gait_tracker_config, GAIT_TRACKER_CONFIG_FIELDS(S, P, F))                                             \
     OF(gait_keypoint, GAIT_KEYPOINT_FIELDS(F))                                                               \
+    OF(gait_camera_pose, GAIT_CAMERA_POSE_FIELDS(R))                                                         \
     OF(gait_frame, GAIT_FRAME_FIELDS(F))                                                                     \
     OF(gait_estimate, GAIT_ESTIMATE_FIELDS(F))                                                               \
     OF(gait_lift_info, GAIT_LIFT_INFO_FIELDS(F))                                                             \

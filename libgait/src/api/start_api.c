@@ -73,6 +73,13 @@ gait_result gait_start_init(void *mem, size_t mem_bytes, const gait_model *m, co
     return GAIT_OK;
 }
 
+gait_result gait_start_set_pose(gait_start *s, const gait_camera_pose *pose, gait_error *err)
+{
+    if (!s || !pose)
+        return base_null(err, "gait_start_set_pose");
+    return check_camera_pose(&s->cfg.camera, 0, pose, &s->cfg.camera, err);
+}
+
 gait_result gait_start_add(gait_start *s, int64_t utime, const gait_keypoint *keypoints, gait_error *err)
 {
     if (!s || !keypoints)

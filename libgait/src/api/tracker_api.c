@@ -196,6 +196,20 @@ gait_result gait_tracker_start_hypotheses(gait_tracker *t, const gait_hypothesis
     return GAIT_OK;
 }
 
+/* Everything about one camera in a frame. */
+static gait_result check_view(const gait_tracker *t, int32_t c, const gait_frame *frame, gait_error *err)
+{
+    gait_result s = GAIT_OK;
+    gait_camera moved;
+    if (frame->pose[c])
+        s = check_camera_pose(&t->home[c], c, frame->pose[c], &moved, err);
+    if (s == GAIT_OK && frame->image[c].data)
+        s = check_image(&t->home[c], c, &frame->image[c], "image", err);
+    if (s == GAIT_OK && frame->background[c].data)
+        s = check_image(&t->home[c], c, &frame->background[c], "background", err);
+    return s;
+}
+
 static gait_result check_frame(const gait_tracker *t, const gait_frame *frame, gait_error *err)
 {
     int64_t const before = t->core->utime;
@@ -208,9 +222,7 @@ static gait_result check_frame(const gait_tracker *t, const gait_frame *frame, g
                          "%.3f s since the last frame, max_dt is %.3f s: start again", 1e-6 * (double)dt,
                          (double)t->cfg.max_dt);
     for (int32_t c = 0; c < t->cfg.cameras; c++) {
-        gait_result const s = frame->image[c].data
-                                  ? check_image(&t->cfg.camera[c], c, &frame->image[c], "image", err)
-                                  : GAIT_OK;
+        gait_result const s = check_view(t, c, frame, err);
         if (s != GAIT_OK)
             return s;
     }
@@ -224,9 +236,15 @@ gait_result gait_tracker_step(gait_tracker *t, const gait_frame *frame, gait_est
     if (!t->core->started)
         return base_fail(err, GAIT_ERR_STATE, -1,
                          "gait_tracker_step: not started; call gait_tracker_start() first");
-    gait_result const s = check_frame(t, frame, err);
+    gait_frame full = {0};
+    uint64_t const size = frame->struct_size ? frame->struct_size : sizeof full;
+    gait_result s = fields_check_size("gait_frame", size, "its caller", err);
+    if (s != GAIT_OK)
+        return s;
+    memcpy(&full, frame, (size_t)size);
+    s = check_frame(t, &full, err);
     if (s == GAIT_OK)
-        tracker_step(t, frame, out);
+        tracker_step(t, &full, out);
     return s;
 }
 

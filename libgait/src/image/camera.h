@@ -2,6 +2,7 @@
 #ifndef GAIT_IMAGE_CAMERA_H
 #define GAIT_IMAGE_CAMERA_H
 #include "base/base.h"
+#include <string.h>
 
 #define CAMERA_NEAR 0.05f /* metres: points nearer than this are not projected */
 
@@ -27,6 +28,15 @@ static inline void camera_distort(const gait_camera *c, float u, float v, float 
 /* The inverse: a pixel of the captured image to the ideal pixel, by fixed-point iteration, which converges
  * for lenses within their image. */
 void camera_ideal(const gait_camera *c, const double distorted[2], double ideal[2]);
+
+/* The same camera at another place. */
+static inline gait_camera camera_placed(const gait_camera *c, const float R[9], const float t[3])
+{
+    gait_camera out = *c;
+    memcpy(out.R, R, sizeof out.R);
+    memcpy(out.t, t, sizeof out.t);
+    return out;
+}
 
 /* Vector from the camera centre to the point p, both in the world, metres. */
 static inline void camera_to(const gait_camera *c, const float p[3], float ray[3])

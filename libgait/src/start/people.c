@@ -1,10 +1,20 @@
 #include "start/people.h"
 #include "image/camera.h"
 
+#include <string.h>
+
 static const double SHORTEST = 1.2, TALLEST = 2.4; /* metres by foot and head ray, which shadows lengthen */
 static const double BLUR = 0.25;                   /* heights by which a foot point may jump */
 static const double FASTEST = 2.0;                 /* heights per second */
 static const double STANDS = 0.5; /* probability of a person who stays, against one who walks */
+
+start_view start_view_of(const gait_camera *c)
+{
+    start_view v;
+    memcpy(v.R, c->R, sizeof v.R);
+    memcpy(v.t, c->t, sizeof v.t);
+    return v;
+}
 
 bool people_box(const gait_camera *c, const gait_box *in, start_box *out)
 {
@@ -13,6 +23,7 @@ bool people_box(const gait_camera *c, const gait_box *in, start_box *out)
     camera_ideal(c, (const double[2]){(double)in->foot[0], (double)in->foot[1]}, out->foot);
     camera_ideal(c, (const double[2]){(double)in->head[0], (double)in->head[1]}, out->head);
     out->sd = (double)in->sd;
+    out->view = start_view_of(c);
     return true;
 }
 

@@ -6,8 +6,13 @@
 
 #define START_KEEP 1500000 /* microseconds after which an observation is forgotten */
 
+typedef struct start_view { /* where the camera was */
+    float R[9], t[3];
+} start_view;
+
 typedef struct start_box { /* ideal pixels */
     double foot[2], head[2], sd;
+    start_view view;
 } start_box;
 
 typedef struct start_person {
@@ -27,6 +32,8 @@ static inline double people_distance(const double a[2], const double b[2])
     double const u = a[0] - b[0], v = a[1] - b[1];
     return sqrt(u * u + v * v);
 }
+
+start_view start_view_of(const gait_camera *c);
 
 /* Undo the distortion; false: its numbers are not finite, or sd is negative. */
 bool people_box(const gait_camera *c, const gait_box *in, start_box *out);

@@ -89,6 +89,7 @@ void start_add(gait_start *s, int64_t utime, const gait_keypoint *keypoints)
 {
     int32_t const slot = s->count % GAIT_START_MAX_FRAMES;
     s->utime[slot] = utime;
+    s->view[slot] = start_view_of(&s->cfg.camera);
     for (int32_t j = 0; j < s->model->points; j++) {
         const gait_keypoint *const k = &keypoints[j];
         start_keypoint *const to = &s->keypoint[slot][j];
@@ -124,12 +125,25 @@ static double median(double *x, int32_t n)
     return n % 2 ? x[n / 2] : 0.5 * (x[n / 2 - 1] + x[n / 2]);
 }
 
-/* Put the place on the floor below the hips, at the distance at which the legs have their usual length; returns the
- * person's height, pixels. */
+/* Whether the camera is at one place in all frames that are fitted. */
+static bool stands_still(const gait_start *s, int32_t frames)
+{
+    gait_camera const first = start_camera(s, 0);
+    bool same = true;
+    for (int32_t k = 1; k < frames; k++) {
+        gait_camera const c = start_camera(s, k);
+        same &= memcmp(&c, &first, sizeof c) == 0;
+    }
+    return same;
+}
+
+/* Put the place on the floor below the hips, at the distance at which the legs have their usual length, seen from the
+ * camera in the middle of the frames; returns the person's height, pixels. */
 static double rough_place(const gait_start *s, start_problem *p)
 {
     double leg[START_FITTED], u[START_FITTED], v[START_FITTED];
-    const gait_camera *const c = &s->cfg.camera;
+    int32_t const middle = p->frames / 2;
+    gait_camera const cam = start_camera(s, middle), *const c = &cam;
     for (int32_t k = 0; k < p->frames; k++) {
         double hips[2], ankles[2];
         if (p->person) {
@@ -148,8 +162,9 @@ static double rough_place(const gait_start *s, start_problem *p)
     double const pixels = median(leg, p->frames) / LEG; /* of the person's height */
     double const focal = 0.5 * (double)(c->fx + c->fy),
                  away = focal * (double)s->cfg.stature / f_max((float)pixels, 1.0f);
-    double const x = (median(u, p->frames) - (double)c->cx) / (double)c->fx;
-    double const y = (median(v, p->frames) - (double)c->cy) / (double)c->fy;
+    bool const still = stands_still(s, p->frames);
+    double const x = ((still ? median(u, p->frames) : u[middle]) - (double)c->cx) / (double)c->fx;
+    double const y = ((still ? median(v, p->frames) : v[middle]) - (double)c->cy) / (double)c->fy;
     for (int32_t k = 0; k < 2; k++) { /* R'(ray - t) */
         double const camera[3] = {away * x - (double)c->t[0], away * y - (double)c->t[1],
                                   away - (double)c->t[2]};

@@ -50,15 +50,22 @@ static void place_states(const gait_start *s, const double (*theta)[N], int32_t 
     }
 }
 
+gait_camera start_camera(const gait_start *s, int32_t k)
+{
+    const start_problem *const p = &s->scratch->problem;
+    const start_view *const v = p->person ? &p->person->box[p->frame[k]].view : &s->view[p->frame[k]];
+    return camera_placed(&s->cfg.camera, v->R, v->t);
+}
+
 /* Two rows of residuals of one lane: of a point X and where it is found, down-weighted so that their squares are
  * Student's t costs. */
-static void point_residuals(const gait_start *s, const float X[3], double u, double v, double weight,
+static void point_residuals(const gait_start *s, const gait_camera *cam, const float X[3], double u, double v, double weight,
                             int32_t row, int32_t lane)
 {
     start_scratch *const w = s->scratch;
     float uv[2];
     double du = BEHIND, dv = BEHIND;
-    if (camera_project(&s->cfg.camera, X, uv) > CAMERA_NEAR) {
+    if (camera_project(cam, X, uv) > CAMERA_NEAR) {
         du = ((double)uv[0] - u) * weight;
         dv = ((double)uv[1] - v) * weight;
     }
@@ -75,17 +82,18 @@ static int32_t box_residuals(const gait_start *s, int32_t k, const double (*thet
     const start_problem *const p = &w->problem;
     const start_box *const b = &p->person->box[p->frame[k]];
     double const weight = w->inverse_sd[k][0];
+    gait_camera const cam = start_camera(s, k);
     place_states(s, theta, lanes, p->at[k], &w->states);
     for (int32_t i = 0; i < lanes; i++) {
         float X[3] = {w->states.f[F_X][i], w->states.f[F_Y][i], w->states.f[F_Z][i]}, from[3];
         float const tall = w->states.f[F_STATURE][i];
-        camera_to(&s->cfg.camera, X, from);
+        camera_to(&cam, X, from);
         float const away = __builtin_sqrtf(from[0] * from[0] + from[1] * from[1]);
         float const lead = away > 0.0f ? (float)LEAD * tall / away : 0.0f;
         float const foot[3] = {X[0] - lead * from[0], X[1] - lead * from[1], X[2]};
         X[2] += (float)s->crown * tall;
-        point_residuals(s, foot, b->foot[0], b->foot[1], weight, 0, i);
-        point_residuals(s, X, b->head[0], b->head[1], weight, 2, i);
+        point_residuals(s, &cam, foot, b->foot[0], b->foot[1], weight, 0, i);
+        point_residuals(s, &cam, X, b->head[0], b->head[1], weight, 2, i);
     }
     return START_BOX_ROWS;
 }
@@ -98,6 +106,7 @@ static int32_t frame_residuals(const gait_start *s, int32_t k, const double (*th
     int32_t rows = 0;
     if (p->person)
         return box_residuals(s, k, theta, lanes);
+    gait_camera const cam = start_camera(s, k);
     place_states(s, theta, lanes, p->at[k], &w->states);
     particle_block_bodies(&s->layout, &w->states, &w->body);
     kin_points(s->model, &w->body, w->points);
@@ -108,7 +117,7 @@ static int32_t frame_residuals(const gait_start *s, int32_t k, const double (*th
             continue;
         for (int32_t i = 0; i < lanes; i++) {
             float const X[3] = {w->points[j][0][i], w->points[j][1][i], w->points[j][2][i]};
-            point_residuals(s, X, found->u, found->v, weight, rows, i);
+            point_residuals(s, &cam, X, found->u, found->v, weight, rows, i);
         }
         rows += 2;
     }

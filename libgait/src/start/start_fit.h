@@ -70,18 +70,22 @@ typedef struct start_keypoint { /* of one joint in one frame: ideal pixels; sd 0
 struct gait_start { /* observations and what is known of the person */
     const gait_model *model;
     const kernels *run;
-    gait_start_config cfg;
+    gait_start_config cfg; /* camera: as it is now */
     state_layout layout;
     gait_state prior_sd;      /* where nothing is known about the person */
     int32_t hip[2], ankle[2]; /* points of the model */
     double crown;             /* height of head_top over the floor while walking, statures */
     int32_t count; /* frames of keypoints added, of which the last GAIT_START_MAX_FRAMES are kept */
     int64_t utime[GAIT_START_MAX_FRAMES];
+    start_view view[GAIT_START_MAX_FRAMES];
     start_keypoint (*keypoint)[GAIT_MAX_JOINTS]; /* GAIT_START_MAX_FRAMES */
     start_people *people;
     blob_finder blobs;
     start_scratch *scratch;
 };
+
+/* The camera in one of the frames that are fitted. */
+gait_camera start_camera(const gait_start *s, int32_t k);
 
 /* Fit walks to the scratch's problem: candidates that differ, at most capacity, the best first; returns how many. */
 int32_t start_fit(const gait_start *s, int32_t capacity);

@@ -4,6 +4,7 @@
 #include "base/linalg.h"
 #include "image/camera.h"
 #include "tracker/class_strata.h"
+#include "tracker/pose_error.h"
 #include <string.h>
 
 /* Standard deviation of a stature from one camera, as a fraction: soles, hair and clothes are the same in all frames,
@@ -133,8 +134,9 @@ static void report_joints(const sums *s, float stature, gait_estimate *out)
         for (int32_t k = 0; k < 3; k++)
             at[k] = (float)s->joint[3 * p + k].mean;
         camera_to(&t->cfg.camera[0], at, ray);
+        double const pose = pose_error_variance(t, at);
         for (int32_t k = 0; k < 3; k++)
-            out->joint_sd[p][k] = combined_sd(s->joint[3 * p + k].var, model, size * ray[k]);
+            out->joint_sd[p][k] = combined_sd(s->joint[3 * p + k].var + pose, model, size * ray[k]);
     }
 }
 

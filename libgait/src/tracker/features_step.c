@@ -22,13 +22,13 @@ static bool move_region(gait_tracker *t, int32_t c, const particle_state *p)
 
 /* Resample the background if the region moved or the frames changed between grey and colour: a grey frame is compared
  * with a grey plate. */
-static void refresh_plate(gait_tracker *t, int32_t c, bool grey)
+static void refresh_plate(gait_tracker *t, int32_t c, const gait_image *empty, bool grey)
 {
     camera_state *const s = &t->camera[c];
-    bool const colour = s->background.format != GAIT_GREY8;
+    bool const colour = empty->format != GAIT_GREY8;
     if (!s->plate_stale && s->plate.channels == (colour && !grey ? 3 : 1))
         return;
-    view_sample(t->like->run, &s->features.map, &t->cfg.camera[c], &s->background, &s->plate);
+    view_sample(t->like->run, &s->features.map, &t->cfg.camera[c], empty, &s->plate);
     if (colour && grey) {
         t->like->run->view_grey(&s->plate, 0, VIEW_SIZE, s->plate.channel[0]);
         s->plate.channels = 1;
@@ -91,12 +91,16 @@ static void camera_features(gait_tracker *t, int32_t c, const gait_frame *frame,
 {
     camera_state *const s = &t->camera[c];
     features_job j = {.t = t, .c = c, .image = frame->image[c]};
+    bool const own = frame->background[c].data != NULL; /* of this frame alone */
+    const gait_image *const empty = own ? &frame->background[c] : &s->background;
     if (!move_region(t, c, predicted))
         j.image.data = NULL;
     s->features.map = t->core->map[c];
-    if (s->plate.channel[0] && s->background.data && j.image.data) {
-        refresh_plate(t, c, j.image.format == GAIT_GREY8);
+    s->plate_stale |= own;
+    if (s->plate.channel[0] && empty->data && (own || !s->moved) && j.image.data) {
+        refresh_plate(t, c, empty, j.image.format == GAIT_GREY8);
         j.plate = &s->plate;
+        s->plate_stale = own;
     }
     features_begin(&s->features, &j.image, &t->planes);
     if (s->features.has_image) {
@@ -106,10 +110,22 @@ static void camera_features(gait_tracker *t, int32_t c, const gait_frame *frame,
     take_keypoints(t, c, frame->keypoints[c], &s->features.keypoints);
 }
 
+/* Put a camera where it is in this frame. */
+static void place_camera(gait_tracker *t, int32_t c, const gait_camera_pose *pose)
+{
+    camera_state *const s = &t->camera[c];
+    gait_camera *const cam = &t->cfg.camera[c], *const home = &t->home[c];
+    *cam = pose ? camera_placed(home, pose->R, pose->t) : *home;
+    s->moved = memcmp(cam, home, sizeof *cam) != 0;
+    s->turn_sd = pose ? pose->turn_sd : 0.0f;
+    s->place_sd = pose ? pose->place_sd : 0.0f;
+}
+
 int32_t features_step(gait_tracker *t, const gait_frame *frame, const particle_state *predicted)
 {
     int32_t count = 0;
     for (int32_t c = 0; c < t->cfg.cameras; c++) {
+        place_camera(t, c, frame->pose[c]);
         camera_features(t, c, frame, predicted);
         count += t->camera[c].features.has_image;
     }

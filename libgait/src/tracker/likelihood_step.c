@@ -1,5 +1,6 @@
 #include "tracker/likelihood_step.h"
 #include "likelihood/likelihood.h"
+#include "tracker/pose_error.h"
 #include <string.h>
 
 void likelihood_outline(const gait_tracker *t, int32_t c, likelihood_scratch *w)
@@ -35,16 +36,36 @@ like_body likelihood_body(const gait_tracker *t, int32_t c, int32_t hypothesis, 
 }
 
 /* ---- particles ---- */
+/* The terms of particle i, which is in a lane of the projected block.  samples: receives its surface samples. */
+static like_body evaluate(const gait_tracker *t, int32_t c, int32_t i, int32_t lane, likelihood_scratch *w,
+                          like_patch *samples)
+{
+    like_patch *const texture = texture_of(t, i, c);
+    like_body b = likelihood_body(t, c, hypothesis_of(t, i), lane, w, texture ? samples : NULL);
+    b.ancestor = t->core->sampled_cameras >> c & 1u ? texture : NULL;
+    like_evaluate(&b);
+    return b;
+}
+
 /* One particle of a block in one camera.  Its samples replace those of its ancestor. */
 static void particle_in_camera(gait_tracker *t, int32_t c, int32_t i, int32_t lane, likelihood_scratch *w)
 {
     like_patch samples[MODEL_MAX_LIMBS], *const texture = texture_of(t, i, c);
-    like_body b = likelihood_body(t, c, hypothesis_of(t, i), lane, w, texture ? samples : NULL);
-    b.ancestor = t->core->sampled_cameras >> c & 1u ? texture : NULL;
-    like_evaluate(&b);
+    like_body const b = evaluate(t, c, i, lane, w, samples);
     t->explained[i] += like_silhouette_parts(&b).explained;
     if (texture)
         memcpy(texture, samples, (size_t)t->like->limbs * sizeof *samples);
+}
+
+void likelihood_particles(gait_tracker *t, int32_t c, const int32_t *index, int32_t lanes,
+                          likelihood_scratch *w, float nats[BLOCK])
+{
+    like_patch samples[MODEL_MAX_LIMBS];
+    likelihood_outline(t, c, w);
+    memset(&w->terms, 0, sizeof w->terms);
+    for (int32_t lane = 0; lane < lanes; lane++)
+        (void)evaluate(t, c, index[lane], lane, w, samples);
+    like_sum(t->like, w->outline, t->core->sampled_cameras >> c & 1u, &w->terms, nats);
 }
 
 static void block_in_camera(gait_tracker *t, int32_t c, int32_t begin, int32_t lanes, likelihood_scratch *w)
@@ -93,6 +114,8 @@ void likelihood_step(gait_tracker *t)
     for (int32_t c = 0; c < t->cfg.cameras; c++)
         for (int32_t h = 0; h < 2 && t->template_ring[h][c]; h++)
             template_ring(t->template[h][c], t->like->limbs, t->template_ring[h][c]);
+    for (int32_t c = 0; c < t->cfg.cameras; c++)
+        pose_error_correct(t, c);
     task_run(&t->cfg.exec, t->cfg.tasks, t->cfg.particles, BLOCK, likelihood_range, t);
 }
 

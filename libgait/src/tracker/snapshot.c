@@ -18,11 +18,13 @@ static size_t state_bytes(const gait_tracker *t)
     return (size_t)(t->state_end - (unsigned char *)t->core);
 }
 
-/* The configuration without what does not change results: threads, tasks and instruction sets. */
+/* The configuration without what does not change results: threads, tasks and instruction sets.  Nor does it matter where
+ * the cameras are in this frame. */
 static uint64_t config_digest(const gait_tracker *t)
 {
     gait_tracker_config c = t->cfg;
     c.particles = t->config_particles;
+    memcpy(c.camera, t->home, (size_t)c.cameras * sizeof *c.camera);
     memset(&c.camera[c.cameras], 0, (size_t)(GAIT_MAX_CAMERAS - c.cameras) * sizeof *c.camera);
     memset(&c.exec, 0, sizeof c.exec);
     c.tasks = 0;

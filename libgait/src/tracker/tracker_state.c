@@ -158,6 +158,7 @@ gait_tracker *tracker_layout(arena *a, const gait_model *m, const gait_tracker_c
     t.layout = state_layout_init(m, &t.cfg, run);
     t.cfg.components = t.layout.components;
     t.cfg.proportions = t.layout.proportions;
+    memcpy(t.home, cfg->camera, sizeof t.home);
     a->solid = true;
     layout_state(a, &t);
     a->solid = false;

@@ -80,6 +80,8 @@ typedef struct camera_state {
     view_planes plate;     /* background resampled to the region of interest */
     gait_image background; /* borrowed; data NULL: none */
     bool plate_stale;
+    bool moved;              /* in this frame the camera is not where the config puts it */
+    float turn_sd, place_sd; /* of its pose: radians, metres */
 } camera_state;
 
 typedef struct likelihood_scratch { /* one per task; its arrays are as long as the model's limbs and points */
@@ -120,7 +122,8 @@ typedef struct lag_scratch { /* of fixed_lag_estimate() */
 
 struct gait_tracker {
     const gait_model *model;
-    gait_tracker_config cfg;  /* particles: those in use now */
+    gait_tracker_config cfg;  /* particles: those in use now; camera: as it is in this frame */
+    gait_camera home[GAIT_MAX_CAMERAS]; /* of the caller's config */
     int32_t config_particles; /* of the caller's config */
     int32_t target_particles; /* that the caller wants outside acquisition */
     int32_t capacity;         /* particles that fit into the memory */

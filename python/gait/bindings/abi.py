@@ -24,7 +24,7 @@ from ctypes import (
 from enum import IntEnum, IntFlag
 from typing import Any, NamedTuple
 
-ABI = 8
+ABI = 9
 ALIGN = 64
 MAX_JOINTS, MAX_ANGLES, MAX_COMPONENTS, MAX_PROPORTIONS, MAX_CAMERAS = 32, 32, 16, 8, 4
 MAX_CLASSES = 8
@@ -144,6 +144,10 @@ class KeypointC(ctypes.Structure):
     """``gait_keypoint``."""
 
 
+class CameraPoseC(ctypes.Structure):
+    """``gait_camera_pose``."""
+
+
 class FrameC(ctypes.Structure):
     """``gait_frame``."""
 
@@ -221,6 +225,7 @@ STRUCTS: dict[str, type[ctypes.Structure]] = {
     "gait_tasks": Tasks,
     "gait_tracker_config": TrackerConfigC,
     "gait_keypoint": KeypointC,
+    "gait_camera_pose": CameraPoseC,
     "gait_frame": FrameC,
     "gait_estimate": EstimateC,
     "gait_lift_info": LiftInfoC,
@@ -244,6 +249,7 @@ _TYPES: dict[str, Any] = {
     "const uint8_t *": c_void_p,
     "gait_run_fn *": RunFn,
     "const gait_keypoint *": POINTER(KeypointC),
+    "const gait_camera_pose *": POINTER(CameraPoseC),
     **dict.fromkeys(
         ("gait_result", "gait_mode", "gait_pixel_format", "gait_track_status", "gait_projection"), c_int32
     ),
@@ -324,6 +330,7 @@ FUNCTIONS: tuple[tuple[str, list[Any], Any], ...] = (
     ("gait_lift_estimate", [_HANDLE, POINTER(LiftFrameC), _ERR], _RESULT),
     ("gait_lift_reset", [_HANDLE], None),
     ("gait_start_fill", [POINTER(StartConfigC), c_size_t], None),
+    ("gait_start_set_pose", [_HANDLE, POINTER(CameraPoseC), _ERR], _RESULT),
     ("gait_start_add", [_HANDLE, c_int64, POINTER(KeypointC), _ERR], _RESULT),
     ("gait_start_add_boxes", [_HANDLE, c_int64, POINTER(BoxC), c_int32, _ERR], _RESULT),
     (

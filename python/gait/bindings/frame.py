@@ -12,6 +12,7 @@ from numpy.typing import ArrayLike
 
 from gait.bindings import abi
 from gait.camera.camera import Camera
+from gait.camera.path import CameraPose
 from gait.io.video import Image
 
 
@@ -36,7 +37,7 @@ class FrameKeypoints:
 
 def per_camera(items: Any) -> list[Any]:
     """One item for each camera: a list, or the only camera's own."""
-    if items is None or isinstance(items, np.ndarray | FrameKeypoints):
+    if items is None or isinstance(items, np.ndarray | FrameKeypoints | CameraPose):
         return [items]
     return list(items)
 

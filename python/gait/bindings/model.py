@@ -17,6 +17,7 @@ from gait.bindings.library import aligned, call, check, library, make
 from gait.bindings.state import State
 from gait.body.model_curves import slope_of
 from gait.camera.camera import Camera
+from gait.camera.path import CameraPose
 from gait.errors import GaitError, UserError
 from gait.io.blob import decode
 
@@ -223,6 +224,14 @@ def camera_c(camera: Camera) -> abi.CameraC:
     c = abi.CameraC(camera.width, camera.height, camera.fx, camera.fy, camera.cx, camera.cy)
     c.R[:], c.t[:] = camera.R.ravel().tolist(), camera.t.tolist()
     c.distortion[:] = camera.distortion.tolist()
+    return c
+
+
+def pose_c(pose: CameraPose) -> abi.CameraPoseC:
+    """Make a ``gait_camera_pose``."""
+    library()  # describes the structures
+    c = abi.CameraPoseC(turn_sd=pose.turn_sd, place_sd=pose.place_sd)
+    c.R[:], c.t[:] = pose.R.ravel().tolist(), pose.t.tolist()
     return c
 
 

@@ -12,9 +12,10 @@ from numpy.typing import NDArray
 from gait.bindings import abi
 from gait.bindings.frame import FrameKeypoints, image_view, keypoint_array
 from gait.bindings.library import call, library, make
-from gait.bindings.model import Model, camera_c
+from gait.bindings.model import Model, camera_c, pose_c
 from gait.bindings.state import State
 from gait.camera.camera import Camera
+from gait.camera.path import CameraPose
 from gait.io.video import Image
 
 
@@ -89,7 +90,7 @@ class StartFit:
     ----------
     model : Model
     camera : Camera
-        Calibrated; it must not move.
+        Calibrated; if it moves, see `set_pose`.
     stature, stature_sd : float, optional
         Of the person, metres; the model's adults if left out.
     box_time : float, optional
@@ -117,6 +118,10 @@ class StartFit:
         config.stature_sd = config.stature_sd if stature_sd is None else stature_sd
         config.box_time = config.box_time if box_time is None else box_time
         self._handle, self._memory = make("start", model.handle, config)
+
+    def set_pose(self, pose: CameraPose) -> None:
+        """Put the camera where it is in the frames and boxes given from now on."""
+        call("gait_start_set_pose", self._handle, pose_c(pose))
 
     def add(self, utime: int, keypoints: FrameKeypoints) -> None:
         """Add the keypoints of one frame; the time, microseconds, must increase."""

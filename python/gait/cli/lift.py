@@ -343,13 +343,13 @@ def _stabilised(args: argparse.Namespace, video: Video, keypoints: Keypoints) ->
     """Move keypoints to where the camera of one frame would see them, if the camera turns."""
     from gait.camera.camera import Camera
     from gait.io.video import sample_frames
-    from gait.track.stabilise import stabilised
+    from gait.track.stabilise import find_turns
     from gait.track.walk_camera import expected_camera
 
     given = Camera.read(args.camera, video.size, args.scale_camera) if args.camera else None
     camera = given or expected_camera(video, args.fov)
-    steady = stabilised(video, camera, sample_frames(video), {0: keypoints}, None, args.quiet)
-    return keypoints if steady is None else steady.of_reference(steady.keypoints(keypoints))
+    motion = find_turns(video, camera, sample_frames(video), {0: keypoints}, None, args.quiet)
+    return keypoints if motion is None else motion.in_reference(keypoints)
 
 
 def _calibrate(args: argparse.Namespace, video: Video, keypoints: Keypoints) -> Calibration:

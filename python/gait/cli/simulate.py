@@ -1,6 +1,7 @@
 """Make a test clip of a walking person, with the exact truth.
 
-Writes video.mp4, background.png (the empty scene), camera.json, truth.csv (joints in metres and pixels),
+Writes video.mp4, background.png (the empty scene; of a camera that moves poses.csv instead, for gait track
+--camera-path), camera.json, truth.csv (joints in metres and pixels),
 init.json (the truth at frame 0 with some error, to start a tracker), meta.json (heel strikes, stature and how
 the clip was made) and contact.jpg into DIR.  The same options and seed give the same pictures.
 
@@ -26,11 +27,22 @@ from dataclasses import fields, replace
 from typing import Any
 
 from gait.progress import progress
-from gait.simulate.scenario import AIDS, BODIES, DIRECTIONS, GENERATOR, MOTIONS, PRESETS, VIEWS, Scenario
+from gait.simulate.scenario import (
+    AIDS,
+    BODIES,
+    DIRECTIONS,
+    GENERATOR,
+    MOTIONS,
+    MOVING,
+    PRESETS,
+    VIEWS,
+    Scenario,
+)
 
 EXAMPLES = """\
 examples:
   gait simulate -o walk
+  gait simulate -o follow --moving follow
   gait simulate -o walk --preset pole --seed 7 --stature 1.68 --size 1280x720
   gait simulate -o walk --preset stick --body drawn
 """
@@ -56,6 +68,11 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--aid", choices=AIDS, help="walk with a stick or with forearm crutches")
     parser.add_argument(
         "--body", choices=BODIES, help="drawn: proportions of the people that the model was learnt from"
+    )
+    parser.add_argument(
+        "--moving",
+        choices=MOVING,
+        help="a robot follows the person at 1 m, a camera is turned to them, or a hand holds it",
     )
     parser.add_argument("--frames", type=int, metavar="N")
     parser.add_argument("--fps", type=float, metavar="HZ")
@@ -84,7 +101,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 def run(args: argparse.Namespace) -> int:
     """Make the clip and print what is in it."""
-    from gait.simulate.clip import FILES, simulate
+    from gait.simulate.clip import files, simulate
 
     scenario = replace(PRESETS[args.preset], **_given(args))
     begun = time.perf_counter()
@@ -100,7 +117,9 @@ def run(args: argparse.Namespace) -> int:
         "person_px": meta["person_height_px"],
         "seconds": round(time.perf_counter() - begun, 2),
     }
-    print(json.dumps(summary | {"files": list(FILES)}) if args.json else _text(summary, args.output))
+    print(
+        json.dumps(summary | {"files": list(files(scenario))}) if args.json else _text(summary, args.output)
+    )
     return 0
 
 

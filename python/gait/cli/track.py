@@ -58,8 +58,14 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         parser, "; without it the camera is found from the walk, which needs --height", scale=True
     )
     values.add_fov(parser)
+    add(
+        "--camera-path",
+        metavar="POSES.csv",
+        help="where a camera that moves is: time or frame; r11 to r33, tx, ty, tz (world to camera) or x, y, "
+        "z, qx, qy, qz, qw (camera to world); turn_sd_deg, place_sd_m if not exact; --camera is its lens",
+    )
     add("--camera-out", metavar="CAM.json", help="also write the camera, found or given")
-    add("--cameras-out", metavar="CAMERAS.csv", help="also write each frame's camera, for one that turns")
+    add("--cameras-out", metavar="CAMERAS.csv", help="also write each frame's camera, for one that moves")
     add("-o", "--output", required=True, metavar="OUT.csv", help="the track")
     values.add_model(parser)
     values.add_clip(parser, "track")
@@ -120,13 +126,21 @@ def run(args: argparse.Namespace) -> int:
         raise UsageError("give --camera CAM, or --height M for a camera that is found from the walk")
     if not args.camera and args.init != "auto":
         raise UsageError("--init: needs --camera, in whose world it is")
+    if args.camera_path and not args.camera:
+        raise UsageError("--camera-path: needs --camera, the lens")
+    if args.camera_path and args.stabilize == "auto":
+        raise UsageError("--stabilize: finds the poses that --camera-path gives; leave out one of them")
+    if args.camera_path and args.background not in ("auto", "none"):
+        raise UsageError(
+            "--background: is of a camera that stands still; with --camera-path give auto or none"
+        )
     if args.scale_camera and not args.camera:
         raise UsageError("--scale-camera: needs --camera")
     if args.camera and args.fov:
         raise UsageError("--fov: is for a camera that is found; leave out --camera or --fov")
     require_outputs(
         (args.output, args.camera_out, args.cameras_out, args.overlay, args.trc, args.draws, args.report),
-        (args.video, args.camera, args.model, args.init, args.background, args.keypoints),
+        (args.video, args.camera, args.model, args.camera_path, args.init, args.background, args.keypoints),
     )
     if args.report:
         import gait.report.run_page  # noqa: F401  a package that it needs is missed before the long work

@@ -25,6 +25,9 @@ from gait.io.files import replacing
 if TYPE_CHECKING:
     import av
 
+    from gait.camera.camera import Camera
+    from gait.camera.path import CameraPose
+
 Image = NDArray[np.uint8]
 """A picture: (height, width) grey or (height, width, 3) BGR, uint8."""
 
@@ -47,8 +50,14 @@ class Frame(NamedTuple):
     time: float
     """Presentation time since the first frame of the file, seconds."""
     image: Image
-    captured: Image | None = None
-    """The picture as captured, if `image` is another one made of it."""
+    pose: CameraPose | None = None
+    """Where the camera is, if it moves."""
+    plate: Image | None = None
+    """The empty scene as the camera sees it from there, if that is known."""
+
+    def camera(self, lens: Camera) -> Camera:
+        """Camera of this frame: the one given, where it is now."""
+        return lens if self.pose is None else self.pose.camera(lens)
 
     @property
     def utime(self) -> int:

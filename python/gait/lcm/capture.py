@@ -56,7 +56,7 @@ class FileSource:
         shift_number, shift_time = 0, 0.0
         while True:
             number = time_ = None
-            for index, seconds, image, _ in self.video.frames(self._start, self._stop, grey=self._grey):
+            for index, seconds, image, *_ in self.video.frames(self._start, self._stop, grey=self._grey):
                 number, time_ = index + shift_number, seconds + shift_time
                 yield Frame(number, time_, image)
             if not self._loop or number is None or time_ is None:

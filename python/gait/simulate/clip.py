@@ -5,7 +5,7 @@ from __future__ import annotations
 import csv
 import json
 import os
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterable, Iterator
 from pathlib import Path
 from typing import Any
 
@@ -14,6 +14,7 @@ import numpy as np
 
 from gait._version import __version__
 from gait.bindings.initial import DEFAULT_SD
+from gait.camera.path import CameraPose, write_path
 from gait.errors import UserError
 from gait.io.files import replacing, require_writable
 from gait.io.video import VideoWriter
@@ -21,6 +22,7 @@ from gait.simulate.body import BONE_INDEX, SIDES
 from gait.simulate.geometry import Array, Ints, Picture
 from gait.simulate.render import DEFOCUS_PX, SHUTTER, Renderer, develop
 from gait.simulate.scenario import Scenario
+from gait.simulate.scene import build_scene
 from gait.simulate.stage import Set, Stage, build_set, set_stage
 from gait.simulate.walk import TOE_OFF, Walk
 
@@ -95,7 +97,7 @@ def write_truth(path: Path, stage: Stage, strikes: Array) -> None:
         "speed_m_s": walk.speed[frames],
     }
     for name, place in walk.points(frames).items():
-        uv = stage.camera.project(place)
+        uv = stage.project(place)
         for axis, values in zip("xyzuv", (*place.T, *uv.T), strict=True):
             columns[f"{name}_{axis}"] = values
     columns |= _angles(walk, frames)
@@ -167,6 +169,7 @@ def describe(stage: Stage, made: Set, events: dict[str, Array]) -> dict[str, Any
         "height": stage.camera.height,
         "motion": _source(scenario.gait),
         "steady": scenario.motion in STEADY,
+        "moving": scenario.moving,
         "view": scenario.view,
         "direction": "left to right" if scenario.direction == "lr" else "right to left",
         "background": "procedural, clutter" if scenario.clutter else "procedural",
@@ -211,7 +214,7 @@ def _source(gait: str) -> str:
 
 def _height_px(stage: Stage) -> Array:
     """Return the picture height of the person from the lower heel to the head's top, per frame."""
-    points = {name: stage.camera.project(xyz)[:, 1] for name, xyz in stage.walk.points(stage.frames).items()}
+    points = {name: stage.project(xyz)[:, 1] for name, xyz in stage.walk.points(stage.frames).items()}
     low = np.max([points[name] for name in ("l_heel", "r_heel", "l_toe", "r_toe")], axis=0)
     return low - points["head_top"]
 
@@ -242,6 +245,7 @@ def _pole(stage: Stage, made: Set) -> list[dict[str, Any]]:
 
 
 FILES = ("video.mp4", "background.png", "camera.json", "truth.csv", "init.json", "meta.json", "contact.jpg")
+_POSES = "poses.csv"  # instead of the empty scene, of a camera that moves
 _CONTACTS = (3, 2)  # pictures across and down in contact.jpg
 
 
@@ -250,9 +254,19 @@ def pictures(stage: Stage, made: Set) -> Iterator[Picture]:
     scenario = stage.scenario
     renderer = Renderer(stage.camera, made.scene, made.mesh, made.appearance, stage.walk)
     for frame in range(scenario.frames):
+        if stage.cameras:
+            scene = build_scene(stage.cameras[frame], made.layout, made.coats)
+            renderer = Renderer(stage.cameras[frame], scene, made.mesh, made.appearance, stage.walk)
         rng = scenario.stream("sensor", frame)
         gain = 1 + 0.01 * scenario.flicker * float(np.clip(rng.standard_normal(), -2.5, 2.5))
         yield develop(renderer.light(frame), gain, scenario.noise, rng)
+
+
+def files(scenario: Scenario) -> tuple[str, ...]:
+    """Return the names of the files of a clip."""
+    if scenario.moving == "none":
+        return FILES
+    return tuple(_POSES if name == "background.png" else name for name in FILES)
 
 
 def background(made: Set) -> Picture:
@@ -265,18 +279,24 @@ def simulate(
 ) -> dict[str, Any]:
     """Write a clip and everything known about it into `folder`, which is made if need be.
 
-    `folder`: gets the files of `FILES`, in the formats that `gait capture` and `gait eval` read; `progress`:
+    `folder`: gets the files of `files`, in the formats that `gait capture` and `gait eval` read; `progress`:
     called with the number of frames done. Returns the contents of meta.json. UserError if the folder cannot
     be written or the options contradict each other.
     """
     stage = set_stage(scenario)
-    target = _folder(folder)
+    target = _folder(folder, files(scenario))
     made = build_set(stage)
     events = find_events(stage)
     meta = describe(stage, made, events)
     strikes = events["r_heel_strike"]
     _write_video(target, stage, made, progress)
-    _write_picture(target / "background.png", background(made))
+    if stage.cameras:
+        times = [frame / scenario.fps for frame in range(scenario.frames)]
+        poses = [CameraPose.of(camera) for camera in stage.cameras]
+        with replacing(target / _POSES) as temporary:
+            write_path(temporary, times, poses, by_frame=False)
+    else:
+        _write_picture(target / "background.png", background(made))
     write_truth(target / "truth.csv", stage, strikes)
     _write_json(target / "camera.json", stage.camera.to_dict())
     _write_json(target / "init.json", first_state(stage, strikes))
@@ -284,7 +304,7 @@ def simulate(
     return meta
 
 
-def _folder(folder: str | os.PathLike[str]) -> Path:
+def _folder(folder: str | os.PathLike[str], names: Iterable[str]) -> Path:
     """Make the folder and check that every file can be put there, before the work."""
     target = Path(folder)
     try:
@@ -293,7 +313,7 @@ def _folder(folder: str | os.PathLike[str]) -> Path:
         raise UserError(f"{target}: is a file; give the name of a folder") from None
     except OSError as exc:
         raise UserError(f"{target}: cannot be made ({exc.strerror}); choose another place") from None
-    for name in FILES:
+    for name in names:
         require_writable(target / name)
     return target
 

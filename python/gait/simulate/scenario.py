@@ -16,6 +16,7 @@ DIRECTIONS = ("lr", "rl")
 MOTIONS = ("walk", "stop", "stand", "backwards", "turn")
 AIDS = ("none", "stick", "crutches")
 BODIES = ("table", "drawn")
+MOVING = ("none", "follow", "pan", "shake")
 
 # option: smallest and largest value
 _LIMITS = {
@@ -61,6 +62,8 @@ class Scenario:
     #: One of `BODIES`: proportions of textbooks, each with its own spread, or ``drawn`` from those of the
     #: people that the package's model was learnt from.
     body: str = "table"
+    #: One of `MOVING`: a robot follows the person, a camera is turned to them, a hand holds it.
+    moving: str = "none"
     gait: str = GENERATOR  #: ``generator`` or the name of a ``.gait`` model whose curves are walked
 
     def __post_init__(self) -> None:
@@ -77,6 +80,10 @@ class Scenario:
             raise UsageError(f"--body {self.body}: unknown; use table or drawn")
         if (self.asymmetry or self.aid != "none") and self.motion == "backwards":
             raise UsageError("--motion backwards: goes without --asymmetry and --aid; leave them out")
+        if self.moving not in MOVING:
+            raise UsageError(f"--moving {self.moving}: unknown; use one of {' '.join(MOVING)}")
+        if self.moving != "none" and (self.pole or self.motion == "stand"):
+            raise UsageError("--moving: is for a person who walks, without a pole")
         for name, (low, high) in _LIMITS.items():
             value = getattr(self, name)
             if value is not None and not low <= value <= high:

@@ -8,6 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass, field
+from typing import Any, TypeVar
 
 import cv2
 import numpy as np
@@ -74,11 +75,19 @@ class Layout:
     pole: Block | None = None
 
 
-def draw_layout(camera: Camera, ground: Array, clutter: bool, pole: bool, rng: np.random.Generator) -> Layout:
+def draw_layout(
+    camera: Camera,
+    ground: Array,
+    clutter: bool,
+    pole: bool,
+    rng: np.random.Generator,
+    extent: tuple[float, float] | None = None,
+) -> Layout:
     """Draw a yard or street behind the path.
 
     `ground` (n, 2): the path on the ground, metres; `clutter`: more and stronger things behind the person;
-    `pole`: stand a pole between camera and path.
+    `pole`: stand a pole between camera and path; `extent`: x range of the wall that a camera that moves may
+    show, metres, with nothing before it of which a picture is drawn by chance.
     """
     wall_y = float(ground[:, 1].max() + rng.uniform(2.2, 3.4))
     side, high = rng.choice([-1.0, 1.0]), np.radians(rng.uniform(42, 58))
@@ -90,12 +99,14 @@ def draw_layout(camera: Camera, ground: Array, clutter: bool, pole: bool, rng: n
         str(rng.choice(["tiles", "asphalt", "tiles"])), float(rng.choice([0.0, np.pi / 4, 0.3])),
         str(rng.choice(["grass", "tiles", "asphalt"])), float(rng.uniform(0.7, 1.3)),
     )  # fmt: skip
-    left, right = _visible_range(camera, wall_y)
+    left, right = extent or _visible_range(camera, wall_y)
     if tall:
         layout.panels = _panels(left, right, clutter, rng)
     else:
         layout.bushes += _hedge(left, right, wall_y + 0.6, layout.wall_height, rng)
     _furnish(layout, left, right, float(ground[:, 1].max()), clutter, rng)
+    if extent is not None:
+        layout.bushes.clear()
     if pole:
         layout.pole = _pole(camera, ground, rng)
     return layout
@@ -260,7 +271,7 @@ def draw_bush(
             cv2.ellipse(layer, centre, axes, tilt[i], 0, 360, colour, -1, cv2.LINE_8, 4)
 
 
-_SAMPLES = 2  # rays per pixel, each way
+_SAMPLES = 2  # rays per pixel, each way; 1 in a clip of a camera that moves, which casts them for each frame
 
 
 @dataclass(frozen=True)
@@ -280,11 +291,39 @@ class Scene:
         return self.ambient + self.direct
 
 
-class _Caster:
-    """Nearest surface along every ray, at `_SAMPLES` times the camera's size."""
+_Coat = TypeVar("_Coat")
 
-    def __init__(self, camera: Camera) -> None:
-        fine = camera.scaled(_SAMPLES)
+
+class Coats:
+    """Paints of a scene, mixed in the order in which they are asked for.
+
+    `keep`: mix each once, and also what a camera does not see, so that one scene can be painted for every
+    frame of a camera that moves.
+    """
+
+    def __init__(self, rng: np.random.Generator, *, keep: bool = False) -> None:
+        self.rng, self.keep = rng, keep
+        self._mixed: list[Any] = []
+        self._next = 0
+
+    def restart(self) -> None:
+        """Paint the scene anew."""
+        self._next = 0
+
+    def mix(self, make: Callable[[np.random.Generator], _Coat]) -> _Coat:
+        """Return the next paint."""
+        if self._next == len(self._mixed):
+            self._mixed.append(make(self.rng))
+        self._next += self.keep
+        coat: _Coat = self._mixed[self._next - 1] if self.keep else self._mixed.pop()
+        return coat
+
+
+class _Caster:
+    """Nearest surface along every ray, at `samples` times the camera's size."""
+
+    def __init__(self, camera: Camera, samples: int) -> None:
+        fine = camera.scaled(samples)
         u, v = np.meshgrid(np.arange(fine.width), np.arange(fine.height))
         plane = np.stack([(u - fine.cx) / fine.fx, (v - fine.cy) / fine.fy, np.ones(u.shape)], axis=-1)
         self.camera, self.origin = fine, camera.centre
@@ -317,15 +356,16 @@ class _Caster:
         self.open[box][hit] = sky[hit] if isinstance(sky, np.ndarray) else sky
 
 
-def build_scene(camera: Camera, layout: Layout, rng: np.random.Generator) -> Scene:
+def build_scene(camera: Camera, layout: Layout, coats: Coats) -> Scene:
     """Paint the scene of `layout` as `camera` sees it."""
-    cast = _Caster(camera)
+    cast = _Caster(camera, 1 if coats.keep else _SAMPLES)
     sun = layout.to_sun
-    _paint_sky(cast, rng)
-    _paint_ground(cast, layout, rng)
-    _paint_wall(cast, layout, rng)
+    coats.restart()
+    _paint_sky(cast, coats)
+    _paint_ground(cast, layout, coats)
+    _paint_wall(cast, layout, coats)
     for block in layout.blocks:
-        _paint_block(cast, block, sun, rng)
+        _paint_block(cast, block, sun, coats)
     position = cast.position()
     lit = _sunlit(position, layout)
     ambient = cast.albedo * (AMBIENT * cast.open)[..., None]
@@ -333,7 +373,7 @@ def build_scene(camera: Camera, layout: Layout, rng: np.random.Generator) -> Sce
     no_surface = ~np.isfinite(cast.depth)
     ambient[no_surface], direct[no_surface] = cast.albedo[no_surface], 0
     for bush in layout.bushes:
-        draw_bush(ambient, direct, cast.depth, cast.camera, bush, sun, rng)
+        draw_bush(ambient, direct, cast.depth, cast.camera, bush, sun, coats.rng)
     front = np.zeros(cast.depth.shape, np.float32)
     if layout.pole is not None:
         front = _paint_pole(ambient, direct, cast, layout.pole, sun)
@@ -345,24 +385,24 @@ def build_scene(camera: Camera, layout: Layout, rng: np.random.Generator) -> Sce
     return Scene(reduce(ambient), reduce(direct), place, reduce(front), sun)
 
 
-def _paint_sky(cast: _Caster, rng: np.random.Generator) -> None:
+def _paint_sky(cast: _Caster, coats: Coats) -> None:
     level = np.linalg.norm(cast.ray[..., :2], axis=-1)
     azimuth = np.arctan2(cast.ray[..., 0], cast.ray[..., 1])
-    cast.albedo[:] = paint.sky(rng)(azimuth, cast.ray[..., 2] / np.maximum(level, 1e-3))
+    cast.albedo[:] = coats.mix(paint.sky)(azimuth, cast.ray[..., 2] / np.maximum(level, 1e-3))
 
 
-def _paint_ground(cast: _Caster, layout: Layout, rng: np.random.Generator) -> None:
+def _paint_ground(cast: _Caster, layout: Layout, coats: Coats) -> None:
     """Paint pavement, and a strip of another kind along the wall behind a kerb."""
     depth, at = cast.plane(2, 0.0)
     turn = layout.paving_turn
     u = (at[..., 0] * np.cos(turn) - at[..., 1] * np.sin(turn)).astype(np.float32)
     v = (at[..., 0] * np.sin(turn) + at[..., 1] * np.cos(turn)).astype(np.float32)
-    colour = getattr(paint, layout.paving)(rng)(u, v)
-    strip = getattr(paint, layout.strip)(rng)(at[..., 0], at[..., 1])
+    colour = coats.mix(getattr(paint, layout.paving))(u, v)
+    strip = coats.mix(getattr(paint, layout.strip))(at[..., 0], at[..., 1])
     edge = layout.wall_y - layout.strip_width
-    kerb = np.clip(1 + 0.06 * paint.Noise(rng)(at[..., 0], at[..., 1], 2.0), 0.6, 1.3)[..., None] * linear(
-        (172, 168, 160)
-    )
+    kerb = np.clip(1 + 0.06 * coats.mix(paint.Noise)(at[..., 0], at[..., 1], 2.0), 0.6, 1.3)[
+        ..., None
+    ] * linear((172, 168, 160))
     colour = np.where((at[..., 1] > edge)[..., None], strip, colour)
     colour = np.where((np.abs(at[..., 1] - edge) < 0.07)[..., None], kerb, colour).astype(np.float32)
     corner = 1 - 0.55 * np.exp(-np.maximum(layout.wall_y - at[..., 1], 0) / 0.35)
@@ -371,24 +411,25 @@ def _paint_ground(cast: _Caster, layout: Layout, rng: np.random.Generator) -> No
     cast.put(np.isfinite(depth), depth, colour, float(layout.to_sun[2]), corner.astype(np.float32))
 
 
-def _paint_wall(cast: _Caster, layout: Layout, rng: np.random.Generator) -> None:
+def _paint_wall(cast: _Caster, layout: Layout, coats: Coats) -> None:
     """Paint the facade with its windows, shutters and doors."""
     depth, at = cast.plane(1, layout.wall_y)
     u, v = np.ascontiguousarray(at[..., 0]), np.ascontiguousarray(at[..., 2])
-    colour = getattr(paint, layout.wall)(rng)(u, v)
+    colour = coats.mix(getattr(paint, layout.wall))(u, v)
     for panel in layout.panels:
         inside = (u > panel.left) & (u < panel.right) & (v > panel.low) & (v < panel.high)
-        if inside.any():
+        coat = coats.mix(panel.paint) if coats.keep or inside.any() else None
+        if coat is not None and inside.any():
             box = _bounds(inside)
-            colour[box][inside[box]] = panel.paint(rng)(u[box], v[box])[inside[box]]
+            colour[box][inside[box]] = coat(u[box], v[box])[inside[box]]
     foot = 1 - 0.4 * np.exp(-np.maximum(v, 0) / 0.4)
     hit = np.isfinite(depth) & (v >= 0) & (v < layout.wall_height)
     cast.put(hit, depth, colour, float(-layout.to_sun[1]), foot.astype(np.float32))
 
 
-def _paint_block(cast: _Caster, block: Block, sun: Array, rng: np.random.Generator) -> None:
+def _paint_block(cast: _Caster, block: Block, sun: Array, coats: Coats) -> None:
     """Paint the faces of a box that look towards the camera."""
-    finish = getattr(paint, block.finish)(rng)
+    finish = coats.mix(getattr(paint, block.finish))
     for axis, other in ((0, 1), (1, 0), (2, 0)):
         upper = cast.origin[axis] > 0.5 * (block.low[axis] + block.high[axis])
         depth, at = cast.plane(axis, float(block.high[axis] if upper else block.low[axis]))

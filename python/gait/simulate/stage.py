@@ -16,14 +16,16 @@ from gait.simulate.body import Anatomy, Mesh, draw_anatomy
 from gait.simulate.curves import curves_of_model, normative
 from gait.simulate.figure import build_figure
 from gait.simulate.geometry import Array, Ints
+from gait.simulate.moving import make_cameras
 from gait.simulate.scenario import GENERATOR, Scenario
-from gait.simulate.scene import Layout, Scene, build_scene, draw_layout
+from gait.simulate.scene import Coats, Layout, Scene, build_scene, draw_layout
 from gait.simulate.walk import Path, Shaped, Walk, draw_timing, make_walk
 from gait.simulate.wardrobe import Appearance, draw_appearance
 
 CIRCLE_RADIUS = 2.5
 CORNER = np.radians(80.0)  # of a turn, to the far side of a camera at the side
 _CLOSEST = 2.2  # metres between lens and path
+_AROUND = 20.0  # metres before and after the path that a camera that moves may show
 # heading of the path for left to right, degrees from world x; the camera looks along +y
 _HEADING = {"side": 0, "oblique": -45, "toward": -90, "away": 90, "above": -30, "circle": 0}
 _HEIGHT = {"side": 1.5, "oblique": 1.6, "toward": 1.5, "away": 1.5, "above": 3.6, "circle": 1.7}
@@ -99,8 +101,15 @@ class Stage:
     body: Anatomy
     walk: Walk
     camera: Camera
+    cameras: list[Camera]  #: of each frame, if it moves; `camera` is then the first
     frames: Ints  #: (frames,) index of each frame on the walk's time grid
     classes: list[str]  #: class of motion of each frame
+
+    def project(self, places: Array) -> Array:
+        """Return pixels (frames, ..., 2) of places (frames, ..., 3), each as its frame's camera sees it."""
+        if not self.cameras:
+            return self.camera.project(places)
+        return np.array([camera.project(one) for camera, one in zip(self.cameras, places, strict=True)])
 
 
 @dataclass(frozen=True)
@@ -110,6 +119,7 @@ class Set:
     mesh: Mesh
     appearance: Appearance
     layout: Layout
+    coats: Coats
     scene: Scene
 
 
@@ -141,10 +151,16 @@ def set_stage(scenario: Scenario) -> Stage:
     names = motion.classes(scenario.motion, stop, len(timing.time))
     zero = int(np.argmin(np.abs(timing.time)))
     frames = zero + timing.per_frame * np.arange(scenario.frames)
-    camera = make_camera(
-        scenario.view, scenario.size, _envelope(walk, frames), scenario.distance, scenario.camera_height
-    )
-    return Stage(scenario, body, walk, camera, frames, [names[k] for k in frames.tolist()])
+    reach, follows = _envelope(walk, frames), scenario.moving == "follow"
+    away, high = (None, None) if follows else (scenario.distance, scenario.camera_height)
+    camera = make_camera(scenario.view, scenario.size, reach.reshape(-1, 3), away, high)
+    cameras = []
+    if scenario.moving != "none":
+        rng = scenario.stream("moving")
+        pelvis, away, high = walk.origins[frames, 0], scenario.distance, scenario.camera_height
+        cameras = make_cameras(scenario.moving, camera, pelvis, reach, scenario.fps, rng, away, high)
+        camera = cameras[0]
+    return Stage(scenario, body, walk, camera, cameras, frames, [names[k] for k in frames.tolist()])
 
 
 def build_set(stage: Stage) -> Set:
@@ -155,8 +171,10 @@ def build_set(stage: Stage) -> Set:
     mesh = build_figure(stage.body, appearance, scenario.stream("cloth"), carried)
     ground = walk.origins[stage.frames, 0, :2]
     rng = scenario.stream("scene")
-    layout = draw_layout(stage.camera, ground, scenario.clutter, scenario.pole, rng)
-    return Set(mesh, appearance, layout, build_scene(stage.camera, layout, rng))
+    extent = None if not stage.cameras else (ground[:, 0].min() - _AROUND, ground[:, 0].max() + _AROUND)
+    layout = draw_layout(stage.camera, ground, scenario.clutter, scenario.pole, rng, extent)
+    coats = Coats(rng, keep=bool(stage.cameras))
+    return Set(mesh, appearance, layout, coats, build_scene(stage.camera, layout, coats))
 
 
 def pace(scenario: Scenario, stature: float) -> tuple[float, float]:
@@ -173,7 +191,7 @@ def pace(scenario: Scenario, stature: float) -> tuple[float, float]:
 
 
 def _envelope(walk: Walk, frames: Ints) -> Array:
-    """Return points (n, 3) around all that the person's surface reaches."""
-    joints = np.concatenate(list(walk.points(frames).values()))
+    """Return points (frames, n, 3) around all that the person's surface reaches."""
+    joints = np.stack(list(walk.points(frames).values()), axis=1)
     offsets = _SURFACE * np.array([(x, y, z) for x in (-1, 1) for y in (-1, 1) for z in (-0.3, 0.5)])
-    return (joints[:, None] + offsets).reshape(-1, 3)
+    return (joints[:, :, None] + offsets).reshape(len(frames), -1, 3)

@@ -42,6 +42,7 @@ class BoxStart:
     ----------
     camera, plate, model
         `plate` is the empty scene, BGR; without one people are found by their shape, every 0.09 s at most.
+        Frames of a camera that moves have their own.
     height : float, optional
         Known stature, metres.
     window : float
@@ -81,7 +82,7 @@ class BoxStart:
         """Find people in a frame and give their boxes to the fit."""
         if self._plate is None and self._times and 0 <= frame.time - self._times[-1][1] < _SELDOM:
             return
-        boxes = self._boxes(frame.image)
+        boxes = self._boxes(frame)
         self._times.append((frame.number, frame.time))
         self._fit.add_boxes(frame.utime, boxes)
         self._statures += [self._fit.stature(box) for box in boxes[:1]]
@@ -92,7 +93,7 @@ class BoxStart:
             return True
         probes = np.unique(np.linspace(first, stop - 1, _PROBES).astype(int)).tolist()
         shown = (frame for n in probes for frame in video.frames(n, n + 1))
-        return any(self._boxes(frame.image) for frame in shown)
+        return any(self._boxes(frame) for frame in shown)
 
     def best(self, frame: Frame, *, latest: bool = False) -> tuple[Start, Hypothesis] | None:
         """Most probable start, at a frame (`latest`) or half a window earlier; None: there is none."""
@@ -129,10 +130,14 @@ class BoxStart:
         self.observe(frame)
         return self.walks_in(frame)
 
-    def _boxes(self, image: Image) -> list[Box]:
+    def _boxes(self, frame: Frame) -> list[Box]:
+        plate = self._plate
+        if frame.pose is not None:
+            self._fit.set_pose(frame.pose)
+            plate = None if plate is None else frame.plate
         if self._plate is None:
-            return find_people(image, self._fit.stature)
-        boxes = self._fit.find_boxes(image, self._plate)
+            return find_people(frame.image, self._fit.stature)
+        boxes = [] if plate is None else self._fit.find_boxes(frame.image, plate)
         statures = [self._fit.stature(box) for box in boxes]
         people = [
             box for box, tall in zip(boxes, statures, strict=True) if PLAUSIBLE[0] <= tall <= PLAUSIBLE[1]

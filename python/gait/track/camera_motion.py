@@ -16,6 +16,7 @@ from numpy.typing import NDArray
 
 from gait.camera.camera import Camera
 from gait.io.video import Image
+from gait.track.moving_video import map_pixels
 
 Array = NDArray[np.float64]
 Box = tuple[float, float, float, float]
@@ -69,11 +70,6 @@ class View:
 
 
 UNMOVED = View(np.eye(3))
-
-
-def map_pixels(pixels: Array, source: Camera, target: Camera) -> Array:
-    """Pixels (..., 2) of `source` as `target` sees the same directions from the same place."""
-    return target.project(target.centre + source.rays(pixels))
 
 
 class CameraMotion:

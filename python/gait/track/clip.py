@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -41,9 +40,9 @@ def track_clip(options: ClipOptions) -> dict[str, Any]:
     """
     scene = Scene.read(options)
     start = first_state(options, scene)
-    if options.background == "auto" and scene.plate is not None and (start.in_place or stays(scene)):
-        scene = replace(scene, plate=None)  # the median shows the person
-    used = setup(options, scene, start, scene.plate is not None)
+    if options.background == "auto" and scene.empty is not None and (start.in_place or stays(scene)):
+        scene = scene.without_plate()  # the median shows the person
+    used = setup(options, scene, start, scene.empty is not None)
     config = TrackerConfig.default(options.mode, seed=options.seed, belt=float(start.in_place))
     if options.particles is not None:
         config = config.replace(particles=options.particles)
@@ -53,7 +52,8 @@ def track_clip(options: ClipOptions) -> dict[str, Any]:
     tracker = Tracker(scene.model, scene.camera, config, background=scene.plate, tasks=options.threads)
     keypoints: PersonKeypoints | PersonShapes
     if shapes:
-        keypoints = PersonShapes(scene.camera, StartFit(scene.model, scene.camera).stature)
+        fit = StartFit(scene.model, scene.camera)
+        keypoints = PersonShapes(scene.camera, fit.stature, fit.set_pose)
     else:
         keypoints = PersonKeypoints(scene.camera, scene.keypoints, scene.person)
     plausibility = Plausibility(keypoints, *_stature(options, scene, start), config.belt)
@@ -102,7 +102,7 @@ def _follower(
 
     auto_start = None
     if not options.smooth and not scene.people:
-        plate = None if finds_shapes(options) else scene.plate
+        plate = None if finds_shapes(options) else scene.empty
         auto_start = BoxStart(scene.camera, plate, scene.model, options.height)
     return Follower(
         tracker, scene.video, keypoints, plausibility, find_start, auto_start, one_pass=options.smooth
@@ -116,7 +116,13 @@ def _find_start(
     for ids in keypoints.ids, scene.others():
         found = {
             id: find_keypoint_start(
-                scene.people[id], scene.camera, scene.model, first=first, stop=stop, height=stature
+                scene.people[id],
+                scene.camera,
+                scene.model,
+                first=first,
+                stop=stop,
+                height=stature,
+                poses=scene.poses,
             )
             for id in ids
         }

@@ -72,7 +72,7 @@ class Results:
         self._statuses.append(estimate.status)
         self.times.append(frame.time)
         self.joints.append(estimate.joints)
-        shown = self._tracker.cameras[0].shows(estimate.joints[:1])
+        shown = frame.camera(self._tracker.cameras[0]).shows(estimate.joints[:1])
         self._frames.append((frame.number, estimate.status == TrackStatus.LOST, shown))
 
     def coverage(self) -> list[str]:
@@ -125,11 +125,11 @@ def write(
             span, None if scene.calibration is None else scene.calibration.change_at,
         )  # fmt: skip
         if options.camera_out:
-            write_camera(stack.enter_context(replacing(options.camera_out)), scene.reference_camera)
+            write_camera(stack.enter_context(replacing(options.camera_out)), scene.camera)
         if options.cameras_out:
             _write_cameras(stack.enter_context(replacing(options.cameras_out)), scene)
         sinks: list[Sink] = [results.add, _widened(stack.enter_context(rows).write, scene.calibration)]
-        size = (scene.reference_camera.width, scene.reference_camera.height)
+        size = (scene.camera.width, scene.camera.height)
         films = stack.enter_context(Films(options.overlay, span if options.report else None, size, video.fps))
         if films.wanted:
             sinks.append(_drawing(model, scene, films))
@@ -151,7 +151,7 @@ def write(
 
 
 def _write_cameras(path: Path, scene: Scene) -> None:
-    """Write the camera of each frame as captured: frame, fx fy cx cy, R by rows, t."""
+    """Write the camera of each frame: frame, fx fy cx cy, R by rows, t; `CameraPath` reads it."""
     with path.open("w", newline="") as file:
         rows = csv.writer(file)
         names = [f"r{row}{column}" for row in (1, 2, 3) for column in (1, 2, 3)]
@@ -169,9 +169,8 @@ def _drawing(model: Model, scene: Scene, films: Films) -> Sink:
     begun = False
 
     def draw(frame: Frame, estimate: Estimate | None) -> None:
-        moved = frame.captured is not None
-        overlay = Overlay(model, scene.camera_at(frame.number)) if moved else still
-        picture = frame.image if frame.captured is None else frame.captured
+        overlay = still if frame.pose is None else Overlay(model, frame.camera(scene.camera))
+        picture = frame.image
         legend = frame.time - first < LEGEND_SECONDS
         if estimate is None:
             films.write(overlay.draw_absent(picture, frame.time, frame.number, legend=legend), frame.number)

@@ -189,7 +189,8 @@ class Follower:
     def _step(self, tracker: Tracker, frame: Frame, utime: int, last: Estimate | None) -> Estimate:
         """Step with the person's keypoints; judge the estimate."""
         joints = self._keypoints.choose(frame, last)
-        now = self._plausibility.judged(frame, tracker.step(frame.image, utime, joints))
+        found = tracker.step(frame.image, utime, joints, poses=frame.pose, backgrounds=frame.plate)
+        now = self._plausibility.judged(frame, found)
         self.step_seconds.append(tracker.step_seconds)
         sure = now.status != TrackStatus.TRACKING or not self._uncertain
         return now if sure else replace(now, status=TrackStatus.AMBIGUOUS, reason=_DISAGREE)

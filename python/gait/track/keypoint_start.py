@@ -6,6 +6,8 @@ or who comes into view late, is found as soon as they walk.
 
 from __future__ import annotations
 
+from collections.abc import Mapping
+
 import numpy as np
 
 from gait.bindings.frame import FrameKeypoints
@@ -13,6 +15,7 @@ from gait.bindings.initial import Start
 from gait.bindings.model import Model
 from gait.bindings.start_fit import Hypothesis, StartFit
 from gait.camera.camera import Camera
+from gait.camera.path import CameraPose
 from gait.detect.profile import frame_sd
 from gait.errors import GaitError
 from gait.io.keypoints_file import Keypoints
@@ -50,6 +53,7 @@ def find_keypoint_start(
     first: int = 0,
     stop: int | None = None,
     height: float | None = None,
+    poses: Mapping[int, CameraPose] | None = None,
 ) -> Start | None:
     """Find the first state of the person whose keypoints these are.
 
@@ -63,6 +67,8 @@ def find_keypoint_start(
         Frames to use, first <= number < stop.
     height : float, optional
         Known stature, metres.
+    poses : mapping of int to CameraPose, optional
+        Of the camera in each frame, if it moves.
 
     Returns
     -------
@@ -83,7 +89,7 @@ def find_keypoint_start(
         if time < begin + _STEP:
             continue
         begin = time
-        found = _fit_window(fit, by_frame, frames, times, at)
+        found = _fit_window(fit, by_frame, frames, times, at, poses or {})
         if found is None:
             continue
         start, hypothesis = found
@@ -100,6 +106,7 @@ def _fit_window(
     frames: np.ndarray[tuple[int], np.dtype[np.int64]],
     times: np.ndarray[tuple[int], np.dtype[np.float64]],
     at: int,
+    poses: Mapping[int, CameraPose],
 ) -> tuple[Start, Hypothesis] | None:
     """Fit the second from ``frames[at]`` on; None if no walk fits or hips and ankles are not in view.
 
@@ -109,6 +116,8 @@ def _fit_window(
     for frame, time in zip(frames[at:], times[at:], strict=True):
         if time > times[at] + _WINDOW:
             break
+        if int(frame) in poses:
+            fit.set_pose(poses[int(frame)])
         fit.add(round(1e6 * time), by_frame[int(frame)])
     try:
         found = fit.solve(round(1e6 * times[at]))

@@ -21,6 +21,8 @@ class ClipOptions:
         Its camera file; the camera is found from the walk if left out, which needs `height` and keypoints.
     scale_camera : bool
         Whether a camera of pictures of another size and the same aspect is resized to the clip's.
+    camera_path : str, optional
+        File of the poses of a camera that moves; `camera` is then its lens.
     camera_out : str, optional
         File to write the camera to.
     cameras_out : str, optional
@@ -48,7 +50,7 @@ class ClipOptions:
     keypoints_sd : float
         Their standard deviation at full confidence, pixels.
     stabilize : str
-        ``auto``: undo the turns of the camera; ``off``: take it for one that stands still.
+        ``auto``: find how the camera turns; ``off``: it stands still, or its poses are given.
     overlay, draws, trc, report : str, optional
         Further files to write.
     smooth : bool
@@ -65,6 +67,7 @@ class ClipOptions:
     background: str = "auto"
     height: float | None = None
     scale_camera: bool = False
+    camera_path: str | None = None
     camera_out: str | None = None
     cameras_out: str | None = None
     fov: float | None = None

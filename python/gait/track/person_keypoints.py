@@ -60,13 +60,15 @@ class PersonKeypoints:
         """
         if last is None or last.status == TrackStatus.LOST:
             return self._own(frame.number)
-        near = [(self._distance(last, keypoints), keypoints) for keypoints in self._found(frame.number)]
+        near = [
+            (self._distance(frame, last, keypoints), keypoints) for keypoints in self._found(frame.number)
+        ]
         distance, keypoints = min(near, key=lambda pair: pair[0], default=(np.inf, None))
         return keypoints if distance < _GATE else None
 
     def near(self, frame: Frame, estimate: Estimate) -> bool | None:
         """Whether a person was found near the estimate; None if the person to track was not found at all."""
-        if any(self._distance(estimate, keypoints) < _NEAR for keypoints in self._found(frame.number)):
+        if any(self._distance(frame, estimate, keypoints) < _NEAR for keypoints in self._found(frame.number)):
             return True
         return None if self._own(frame.number) is None else False
 
@@ -77,7 +79,7 @@ class PersonKeypoints:
         keypoints = self.choose(frame, estimate)
         if keypoints is None:
             return False
-        legs = self._apart(estimate, keypoints, _LEGS)
+        legs = self._apart(frame, estimate, keypoints, _LEGS)
         return not len(legs) or bool(legs.mean() < _AGREE)
 
     def _own(self, frame: int) -> FrameKeypoints | None:
@@ -93,16 +95,16 @@ class PersonKeypoints:
         people = (keypoints[frame] for keypoints in self._keypoints.values() if frame in keypoints)
         return [keypoints for keypoints in people if np.isfinite(keypoints.uv).any()]
 
-    def _distance(self, estimate: Estimate, keypoints: FrameKeypoints) -> float:
+    def _distance(self, frame: Frame, estimate: Estimate, keypoints: FrameKeypoints) -> float:
         """Median distance from the estimated joints, person's heights; infinite without common joints."""
-        apart = self._apart(estimate, keypoints, tuple(keypoints.names))
+        apart = self._apart(frame, estimate, keypoints, tuple(keypoints.names))
         return float(np.median(apart)) if len(apart) else np.inf
 
     def _apart(
-        self, estimate: Estimate, keypoints: FrameKeypoints, names: tuple[str, ...]
+        self, frame: Frame, estimate: Estimate, keypoints: FrameKeypoints, names: tuple[str, ...]
     ) -> NDArray[np.float64]:
         """Distances (K,) of the named keypoints found from the estimated joints, person's heights."""
-        expected = self._camera.project(estimate.joints)
+        expected = frame.camera(self._camera).project(estimate.joints)
         if np.isnan(expected).any():  # behind the camera
             return np.full(len(names), np.inf)
         common = [name for name in names if name in keypoints.names and name in estimate.joint_names]

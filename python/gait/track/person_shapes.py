@@ -17,6 +17,7 @@ from gait.bindings.estimate import Estimate
 from gait.bindings.frame import FrameKeypoints
 from gait.bindings.start_fit import Box
 from gait.camera.camera import Camera
+from gait.camera.path import CameraPose
 from gait.detect.shapes import find_near
 from gait.io.video import Frame
 
@@ -40,10 +41,17 @@ class PersonShapes:
     camera : Camera
     stature : callable
         Of the person in a box, metres.
+    place : callable, optional
+        Tells `stature` where a camera that moves is.
     """
 
-    def __init__(self, camera: Camera, stature: Callable[[Box], float]) -> None:
-        self._camera, self._stature = camera, stature
+    def __init__(
+        self,
+        camera: Camera,
+        stature: Callable[[Box], float],
+        place: Callable[[CameraPose], None] = lambda pose: None,
+    ) -> None:
+        self._camera, self._stature, self._place = camera, stature, place
         self.restart()
 
     def restart(self) -> None:
@@ -63,14 +71,16 @@ class PersonShapes:
         if self._searched is not None and abs(frame.time - self._searched.time) < _SELDOM:
             return None
         self._last = frame.time if self._last is None else self._last
-        box = self._box(last)
+        if frame.pose is not None:
+            self._place(frame.pose)
+        camera, box = frame.camera(self._camera), self._box(frame, last)
         self._searched = frame
         self._found = None if box is None else find_near(frame.image, box, self._stature)
         if self._found is None:
             return None
         self._last = frame.time
         head, foot, tall = self._found.head, self._found.foot, self._found.tall
-        expected = self._camera.project(last.joints)
+        expected = camera.project(last.joints)
         lowest = int(np.argmax(expected[:, 1]))  # it hardly moves, as the person stands on it
         sole = np.array([expected[lowest, 0], foot[1] - _LOW * tall])
         uv = np.array([head, _PELVIS * head + (1 - _PELVIS) * foot, sole])
@@ -79,7 +89,7 @@ class PersonShapes:
     def agree(self, frame: Frame, estimate: Estimate) -> bool | None:
         """Whether shapes object to an estimate (False); a shape does not show the legs, so never True."""
         if self._searched is frame and self._found is not None:
-            self._off.append(_difference(self._box(estimate), self._found))
+            self._off.append(_difference(self._box(frame, estimate), self._found))
         missing = self._last is not None and abs(frame.time - self._last) > _PATIENCE
         return False if not self._fits() or missing else None
 
@@ -87,9 +97,9 @@ class PersonShapes:
         """Whether the person is not seen elsewhere than in the estimate just judged."""
         return self.agree(frame, estimate) is not False
 
-    def _box(self, estimate: Estimate) -> Box | None:
+    def _box(self, frame: Frame, estimate: Estimate) -> Box | None:
         """Box of the estimated body; None if part of it is behind the camera."""
-        expected = self._camera.project(estimate.joints)
+        expected = frame.camera(self._camera).project(estimate.joints)
         if np.isnan(expected).any():
             return None
         crown = expected[estimate.joint_names.index("head_top")]

@@ -64,7 +64,7 @@ class RunReport:
             norms=[] if found is None else beside_norms(track, found, sections),
             film=film,
             times=scene.video.times[film.frames.start : film.frames.stop],
-            camera=scene.reference_camera,
+            camera=scene.camera,
             notes=beside(options),
             facts={
                 "Camera and settings": self._used | settings(options, scene, self._particles),

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass, replace
 
@@ -14,7 +14,8 @@ from gait.bindings.frame import FrameKeypoints
 from gait.bindings.initial import OUTSIDE, Start
 from gait.bindings.model import Model
 from gait.bindings.start_fit import StartFit
-from gait.camera.camera import Camera
+from gait.camera.camera import Camera, read_camera
+from gait.camera.path import CameraPath, CameraPose, stand_still
 from gait.detect import weights
 from gait.detect.shapes import find_people
 from gait.errors import UserError
@@ -27,8 +28,9 @@ from gait.track.box_start import find_start
 from gait.track.camera_check import contradiction
 from gait.track.from_walk import Calibration
 from gait.track.keypoint_start import find_keypoint_start, keypoint_noise
+from gait.track.moving_video import MovingVideo, map_pixels, panorama_of
 from gait.track.options import ClipOptions
-from gait.track.stabilise import SteadyVideo, moves, stabilised
+from gait.track.stabilise import Motion, find_turns, moves
 from gait.track.walk_camera import calibrate_film, expected_camera, note_camera
 
 Array = NDArray[np.float64]
@@ -49,12 +51,14 @@ class Scene:
     Attributes
     ----------
     video : Video
+        A `MovingVideo` if the camera moves.
     camera : Camera
+        If it moves, that of the reference frame of `motion`, or of the first frame.
     model : Model
     plate : image or None
-        The empty scene.
-    steady : SteadyVideo or None
-        `video` if the camera turns; its frames are then as the camera of one of them would see them.
+        The empty scene; of a camera that moves in `video`.
+    motion : Motion or None
+        How the camera turns, if that was found in the clip.
     frames : range
         Frames to track.
     people : dict of int to Keypoints
@@ -71,7 +75,7 @@ class Scene:
     camera: Camera
     model: Model
     plate: Image | None
-    steady: SteadyVideo | None
+    motion: Motion | None
     frames: range
     people: dict[int, Keypoints]
     person: int
@@ -79,13 +83,29 @@ class Scene:
     calibration: Calibration | None
 
     @property
-    def reference_camera(self) -> Camera:
-        """Camera of the captured picture; if the camera turns, of the reference frame."""
-        return self.camera if self.steady is None else self.steady.reference(self.camera)
+    def moving(self) -> MovingVideo | None:
+        """`video`, if the camera moves."""
+        return self.video if isinstance(self.video, MovingVideo) else None
+
+    @property
+    def poses(self) -> Mapping[int, CameraPose]:
+        """Pose of the camera in each frame, if it moves."""
+        return self.moving.poses if self.moving else {}
+
+    @property
+    def empty(self) -> Image | None:
+        """The empty scene, of a camera that turns in a wider picture; None if it is not known."""
+        if self.moving is None or self.moving.panorama is None:
+            return self.plate
+        return self.moving.panorama.image
 
     def camera_at(self, number: int) -> Camera:
-        """Camera of a frame as captured."""
-        return self.camera if self.steady is None else self.steady.camera_at(number, self.camera)
+        """Camera of a frame."""
+        return self.poses[number].camera(self.camera) if self.poses else self.camera
+
+    def without_plate(self) -> Scene:
+        """Return the same without the empty scene."""
+        return replace(self, plate=None, video=self.moving.without_panorama() if self.moving else self.video)
 
     def others(self) -> list[int]:
         """Ids of those who are never in view together with the person: they may be the same one."""
@@ -104,82 +124,99 @@ class Scene:
             If a file cannot be read or does not fit the others.
         """
         video = Video(options.video)
-        camera = Camera.read(options.camera, video.size, options.scale_camera) if options.camera else None
-        model = Model(options.model or ("paper" if options.mode == Mode.PAPER else "walk"))
-        if camera is not None and options.camera:
-            camera.check_place(options.camera)
-            if options.init != "auto":
-                _read_start(options, video, camera, model)  # refused before the work on the whole clip
         frames = video.span(options.start or 0, options.stop)
+        camera, poses = _cameras(options, video, frames)
+        model = Model(options.model or ("paper" if options.mode == Mode.PAPER else "walk"))
+        if camera is not None and options.init != "auto":
+            _read_start(options, video, camera, poses, model)  # refused before the work on the whole clip
         _require_detector(options)
         given = None if options.background in ("auto", "none") else background(options.background, video)
         with ThreadPoolExecutor(1) as pool:
             # The median of the clip is computed on another core while the detector runs.
-            beside = pool.submit(_sample, options, video) if _detects(options) else None
+            beside = pool.submit(_sample, options, video, poses) if _detects(options) else None
             if beside is None:
                 with progress("background", video.count, options.quiet) as update:
-                    samples, plate = _sample(options, video, update)
+                    samples, plate = _sample(options, video, poses, update)
             if options.keypoints:
                 people, person = {0: _read_keypoints(options, video, model, frames)}, 0
             else:
                 people, person = _detect(options, video, frames)
             if beside is not None:
                 samples, plate = beside.result()
-        captured, plate = video, plate if given is None else given
-        steady = _stabilise(options, video, camera, samples, people, given)
-        if steady is not None:
-            video, plate = steady, _steady_plate(options, steady, plate)
-            people = {id: steady.keypoints(found) for id, found in people.items()}
+        motion = None if poses else _find_motion(options, video, camera, samples, people, given)
         calibration = None
         if camera is None:
-            calibration = _calibrate(options, captured, model, _in_reference(steady, people.get(person)))
+            keypoints = people.get(person)
+            if keypoints is not None and motion is not None:
+                keypoints = motion.in_reference(keypoints)
+            calibration = _calibrate(options, video, model, keypoints)
             camera = calibration.camera
-        if steady is not None:
-            camera = steady.extended(camera)
+        if motion is not None:
+            poses = motion.poses(camera)
+        plate = plate if given is None else given
+        if poses:
+            wanted = options.background != "none"
+            panorama = panorama_of(samples, camera, poses, given) if wanted else None
+            video, plate = MovingVideo(video, camera, poses, panorama), None
         if options.keypoints:
-            keypoints = {id: found.by_frame(options.keypoints_sd) for id, found in people.items()}
+            sure = {id: found.by_frame(options.keypoints_sd) for id, found in people.items()}
         else:
-            keypoints = {id: keypoint_noise(found) for id, found in people.items()}
-        return Scene(video, camera, model, plate, steady, frames, people, person, keypoints, calibration)
+            sure = {id: keypoint_noise(found) for id, found in people.items()}
+        return Scene(video, camera, model, plate, motion, frames, people, person, sure, calibration)
+
+
+def _cameras(
+    options: ClipOptions, video: Video, frames: range
+) -> tuple[Camera | None, dict[int, CameraPose]]:
+    """Read the camera given, and its pose in each frame if it moves."""
+    if options.camera_path:
+        assert options.camera is not None
+        lens = read_camera(options.camera, video.size, placed=False, scale=options.scale_camera)
+        path = CameraPath.read(options.camera_path)
+        found = path.at_times(video.times[frames.start : frames.stop], frames.start)
+        camera = found[0].camera(lens)
+        camera.check_place(options.camera_path)
+        still = stand_still(found)
+        return camera, {} if still else dict(zip(frames, found, strict=True))
+    if options.camera is None:
+        return None, {}
+    camera = Camera.read(options.camera, video.size, options.scale_camera)
+    camera.check_place(options.camera)
+    return camera, {}
 
 
 def _sample(
-    options: ClipOptions, video: Video, update: Callable[[int], None] | None = None
+    options: ClipOptions,
+    video: Video,
+    poses: Mapping[int, CameraPose],
+    update: Callable[[int], None] | None = None,
 ) -> tuple[list[Frame], Image | None]:
     """Frames over the clip, as far as they are needed, and their median if that is the background."""
     if options.background != "auto" and options.stabilize == "off":
         return [], None
     samples = sample_frames(video, progress=update)
-    return samples, median([frame.image for frame in samples]) if options.background == "auto" else None
+    static = options.background == "auto" and not poses
+    return samples, median([frame.image for frame in samples]) if static else None
 
 
-def _stabilise(
+def _find_motion(
     options: ClipOptions,
     video: Video,
     camera: Camera | None,
     samples: list[Frame],
     people: dict[int, Keypoints],
     given: Image | None,
-) -> SteadyVideo | None:
-    """Undo the turns of the camera, if asked to; None if it stands still or they cannot be undone."""
+) -> Motion | None:
+    """Find how the camera turns, if asked to; None if it stands still or does not only turn."""
     camera = camera or expected_camera(video, options.fov)
     if options.stabilize == "off":
-        if samples and moves(camera, samples, people, given):
-            note("the camera moves during the clip; --stabilize auto undoes its turns", options.quiet)
+        if samples and not options.camera_path and moves(camera, samples, people, given):
+            note(
+                "the camera moves during the clip: --stabilize auto finds its turns, --camera-path takes it",
+                options.quiet,
+            )
         return None
-    return stabilised(video, camera, samples, people, given, options.quiet)
-
-
-def _steady_plate(options: ClipOptions, steady: SteadyVideo, plate: Image | None) -> Image | None:
-    """Background of the stabilised frames."""
-    if plate is None:
-        return None
-    return steady.plate if options.background == "auto" else steady.place(plate)
-
-
-def _in_reference(steady: SteadyVideo | None, keypoints: Keypoints | None) -> Keypoints | None:
-    """Keypoints in a picture of the size of the captured ones."""
-    return keypoints if steady is None or keypoints is None else steady.of_reference(keypoints)
+    return find_turns(video, camera, samples, people, given, options.quiet)
 
 
 def _calibrate(options: ClipOptions, video: Video, model: Model, keypoints: Keypoints | None) -> Calibration:
@@ -198,7 +235,7 @@ def _calibrate(options: ClipOptions, video: Video, model: Model, keypoints: Keyp
 def first_state(options: ClipOptions, scene: Scene) -> Start:
     """First state, from the init file or found in the clip."""
     if options.init != "auto":
-        start = _read_start(options, scene.video, scene.camera, scene.model)
+        start = _read_start(options, scene.video, scene.camera, scene.poses, scene.model)
         _require_scene(options, scene, start.frame)
         start = replace(start, in_place=_in_place(scene, start.frame))
         _check_camera(options, scene)
@@ -209,7 +246,9 @@ def first_state(options: ClipOptions, scene: Scene) -> Start:
     return start
 
 
-def _read_start(options: ClipOptions, video: Video, camera: Camera, model: Model) -> Start:
+def _read_start(
+    options: ClipOptions, video: Video, camera: Camera, poses: Mapping[int, CameraPose], model: Model
+) -> Start:
     """Read a start from the init file; it must be in the picture, in a frame to track."""
     start = Start.read(options.init, model, frame=options.start, height=options.height)
     stop = video.count if options.stop is None else min(options.stop, video.count)
@@ -217,7 +256,8 @@ def _read_start(options: ClipOptions, video: Video, camera: Camera, model: Model
         raise UserError(
             f"{options.init}: frame is {start.frame}, the frames to track end at {stop - 1}; give one"
         )
-    if not camera.shows(model.pose(start.mean)[0]):
+    seen_by = poses[start.frame].camera(camera) if start.frame in poses else camera
+    if not seen_by.shows(model.pose(start.mean)[0]):
         raise UserError(f"{options.init}: {OUTSIDE}")
     return start
 
@@ -228,7 +268,9 @@ def _in_place(scene: Scene, frame: int) -> bool:
         return False
     stop = frame + round(1.2 * scene.video.fps)
     keypoints = scene.people[scene.person]
-    found = find_keypoint_start(keypoints, scene.camera, scene.model, first=frame, stop=stop)
+    found = find_keypoint_start(
+        keypoints, scene.camera, scene.model, first=frame, stop=stop, poses=scene.poses
+    )
     return found is not None and found.in_place
 
 
@@ -247,7 +289,8 @@ def stays(scene: Scene) -> bool:
 
 def _trunks(scene: Scene) -> tuple[Array, Array, float]:
     """Corners (n, 2) of the person's trunk in frames with its keypoints, and the share of such frames."""
-    keypoints = scene.people[scene.person]
+    keypoints = _in_reference(scene)
+    assert keypoints is not None
     trunk = keypoints.uv[:, [keypoints.names.index(name) for name in _TRUNK]]
     trunk = trunk[np.isfinite(trunk).all(axis=(1, 2))]
     trunk = trunk[:: len(trunk) // _TRUNKS + 1]
@@ -256,12 +299,18 @@ def _trunks(scene: Scene) -> tuple[Array, Array, float]:
 
 def _shape_trunks(scene: Scene) -> tuple[Array, Array, float]:
     """Give the same of frames in which a person's shape is found."""
-    stature = StartFit(scene.model, scene.camera).stature
-    people = [find_people(frame.image, stature) for frame in sample_frames(scene.video, _SHAPES)]
-    found = [(boxes[0].head, boxes[0].foot) for boxes in people if boxes]
+    fit, found = StartFit(scene.model, scene.camera), []
+    samples = sample_frames(scene.video, _SHAPES)
+    for frame in samples:
+        if frame.pose is not None:
+            fit.set_pose(frame.pose)
+        for box in find_people(frame.image, fit.stature)[:1]:
+            ends = np.array([box.head, box.foot])
+            moved = frame.pose is not None
+            found.append(map_pixels(ends, frame.camera(scene.camera), scene.camera) if moved else ends)
     head, foot = np.array(found).reshape(-1, 2, 2).swapaxes(0, 1)
-    ends = [foot + share * (head - foot) for share in _TRUNK_HEIGHTS]
-    return np.minimum(*ends), np.maximum(*ends), len(found) / len(people)
+    trunk = [foot + share * (head - foot) for share in _TRUNK_HEIGHTS]
+    return np.minimum(*trunk), np.maximum(*trunk), len(found) / len(samples)
 
 
 def _note_start(options: ClipOptions, scene: Scene, start: Start) -> None:
@@ -289,7 +338,13 @@ def _find_first_state(options: ClipOptions, scene: Scene) -> Start:
     if scene.people:
         keypoints = scene.people[scene.person]
         found = find_keypoint_start(
-            keypoints, camera, model, first=frames.start, stop=frames.stop, height=height
+            keypoints,
+            camera,
+            model,
+            first=frames.start,
+            stop=frames.stop,
+            height=height,
+            poses=scene.poses,
         )
         _check_camera(options, scene)
         if found is not None:
@@ -297,7 +352,7 @@ def _find_first_state(options: ClipOptions, scene: Scene) -> Start:
     found = find_start(
         scene.video,
         camera,
-        scene.plate,
+        scene.empty,
         model,
         first=frames.start,
         stop=options.stop,
@@ -308,26 +363,35 @@ def _find_first_state(options: ClipOptions, scene: Scene) -> Start:
     return replace(found, source="where the pictures show a person")
 
 
+def _in_reference(scene: Scene) -> Keypoints | None:
+    """Keypoints of the person as one camera that stands still would see them; None if none can."""
+    keypoints = scene.people.get(scene.person)
+    if keypoints is None or not scene.poses:
+        return keypoints
+    return scene.motion.in_reference(keypoints) if scene.motion is not None else None
+
+
 def _check_camera(options: ClipOptions, scene: Scene) -> None:
     """Report a camera file that contradicts the walk."""
-    keypoints = _in_reference(scene.steady, scene.people.get(scene.person))
+    keypoints = _in_reference(scene)
     if options.camera is None or keypoints is None:
         return
-    if words := contradiction(scene.reference_camera, keypoints, scene.model, options.height):
+    if words := contradiction(scene.camera, keypoints, scene.model, options.height):
         note(f"{options.camera}: {words}", options.quiet)
 
 
 def _require_scene(options: ClipOptions, scene: Scene, first: int) -> None:
     """Refuse a background image of another scene than frame `first`, or of which only one has colours."""
     frame = next(iter(scene.video.frames(first, first + 1)), None)
-    if scene.plate is None or frame is None:
+    plate = frame.plate if frame is not None and scene.moving else scene.plate
+    if plate is None or frame is None:
         return
-    if one_is_grey(frame.image, scene.plate):
+    if one_is_grey(frame.image, plate):
         raise UserError(
             f"{options.background}: one of it and {scene.video.path} is grey, the other in colour; "
             "give both in the same colours"
         )
-    if not StartFit(scene.model, scene.camera).other_scene(frame.image, scene.plate):
+    if not StartFit(scene.model, scene.camera).other_scene(frame.image, plate):
         return
     differs = f"half of frame {first} differs from"
     if options.background != "auto":
@@ -335,7 +399,8 @@ def _require_scene(options: ClipOptions, scene: Scene, first: int) -> None:
             f"{options.background}: {differs} it; give the empty scene of this camera, auto or none"
         )
     note(
-        f"{differs} the median of the clip, the background: if the camera moves, --background none",
+        f"{differs} the median of the clip, the background: if the camera moves, give --camera-path, "
+        "--stabilize auto or --background none",
         options.quiet,
     )
 

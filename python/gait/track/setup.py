@@ -8,6 +8,7 @@ import numpy as np
 
 from gait.bindings.abi import Mode
 from gait.bindings.initial import Start
+from gait.camera.path import one_place
 from gait.io.video import SAMPLES
 from gait.report.camera_words import camera_facts
 from gait.track.options import ClipOptions
@@ -20,7 +21,7 @@ def setup(options: ClipOptions, scene: Scene, start: Start, used: bool) -> dict[
     """Describe what was used, by name, each in words; `used`: whether the background was."""
     return {
         "start": _start(options, start),
-        "background": _background(options, used),
+        "background": _background(options, scene, used),
         "camera": _camera(options, scene),
         "joints found": _keypoints(options, scene),
     }
@@ -28,7 +29,7 @@ def setup(options: ClipOptions, scene: Scene, start: Start, used: bool) -> dict[
 
 def settings(options: ClipOptions, scene: Scene, particles: int) -> dict[str, str]:
     """Further settings in words, by name."""
-    return camera_facts(scene.reference_camera) | {
+    return camera_facts(scene.camera) | {
         "picture": f"{scene.video.width} × {scene.video.height} px, {scene.video.fps:.4g} frames per second",
         "stature given": "not given" if options.height is None else f"{options.height:.2f} m",
         "model": "the package's" if options.model is None else options.model,
@@ -73,18 +74,24 @@ def _start(options: ClipOptions, start: Start) -> str:
     )
 
 
-def _background(options: ClipOptions, used: bool) -> str:
+def _background(options: ClipOptions, scene: Scene, used: bool) -> str:
     if options.background == "none":
         return "none, as asked"
     if options.background != "auto":
         return options.background
     median = f"the median of {SAMPLES} frames of the film"
+    if not used and scene.poses and not one_place(list(scene.poses.values())):
+        return "none: the camera travels"
     return median if used else f"none: {median} shows the person"
 
 
 def _camera(options: ClipOptions, scene: Scene) -> str:
     if scene.calibration is None:
-        return str(options.camera)
+        return (
+            f"{options.camera}, moving as in {options.camera_path}"
+            if options.camera_path
+            else str(options.camera)
+        )
     return f"found from the walk and the stature of {options.height:.2f} m"
 
 

@@ -254,7 +254,7 @@ class Smoother:
 
     def add(self, frame: Frame, estimate: Estimate) -> None:
         """Take in a frame, whose picture is not kept, after the tracker's step."""
-        self._filtered.append((frame._replace(image=_NOTHING), estimate))
+        self._filtered.append((frame._replace(image=_NOTHING, plate=None), estimate))
         self._stature_sd.append(self._tracker.start_stature_sd)
         self._spool.add(self._tracker, estimate)
 
@@ -292,8 +292,12 @@ class Smoother:
         tracker, start_sd = self._tracker, self._stature_sd[index]
         share, one_view = tracker.config.joint_sd_model, len(tracker.cameras) == 1
         size = _SIZE_SD * start_sd / np.hypot(_SIZE_SD, start_sd) if one_view and share > 0 else 0.0
-        rays = size * (now.joints - tracker.cameras[0].centre)
-        joint_sd = np.sqrt(now.joint_sd**2 + (share * now.mean.stature) ** 2 + rays**2)
+        frame = self._filtered[index][0]
+        ways = now.joints - frame.camera(tracker.cameras[0]).centre
+        doubt = np.zeros((len(ways), 1))
+        if frame.pose is not None:
+            doubt = frame.pose.turn_sd**2 * (ways**2).sum(axis=1, keepdims=True) + frame.pose.place_sd**2
+        joint_sd = np.sqrt(now.joint_sd**2 + (share * now.mean.stature) ** 2 + (size * ways) ** 2 + doubt)
         stature = float(np.hypot(now.sd.stature, size * now.mean.stature))
         return replace(now, joint_sd=joint_sd, sd=replace(now.sd, stature=stature, pelvis=joint_sd[0]))
 

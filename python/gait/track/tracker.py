@@ -14,10 +14,11 @@ from gait.bindings.config import TrackerConfig
 from gait.bindings.estimate import Estimate
 from gait.bindings.frame import FrameKeypoints, capture_time, image_view, keypoint_array, per_camera
 from gait.bindings.library import aligned, call, library, make
-from gait.bindings.model import Model, camera_c
+from gait.bindings.model import Model, camera_c, pose_c
 from gait.bindings.start_fit import Hypothesis
 from gait.bindings.state import LEAST_STATURE, State
 from gait.camera.camera import Camera
+from gait.camera.path import CameraPose
 from gait.errors import GaitError, UserError
 from gait.io.video import Image
 from gait.track.tasks import PythonTasks, Runner, TaskSource, threads
@@ -131,6 +132,9 @@ class Tracker:
         frames: Image | Sequence[Image | None] | None,
         utime: int,
         keypoints: FrameKeypoints | Sequence[FrameKeypoints | None] | None = None,
+        *,
+        poses: CameraPose | Sequence[CameraPose | None] | None = None,
+        backgrounds: Image | Sequence[Image | None] | None = None,
     ) -> Estimate:
         """Take in one frame and estimate.
 
@@ -142,14 +146,27 @@ class Tracker:
             Capture time, microseconds; must increase.
         keypoints : FrameKeypoints, or sequence of FrameKeypoints or None, optional
             Found in each camera's picture; they count if ``config.terms`` has ``Term.KEYPOINTS``.
+        poses : CameraPose, or sequence of CameraPose or None, optional
+            Where each camera is in this frame, if it moves; otherwise it is where it was made.
+        backgrounds : image, or sequence of image or None, optional
+            The empty scene as each camera sees it in this frame.  That of `set_background` counts only in
+            frames in which the camera is where it was made.
         """
-        images = [None if image is None else np.ascontiguousarray(image) for image in per_camera(frames)]
-        if len(images) > len(self.cameras):
+        images, plates = (
+            [None if image is None else np.ascontiguousarray(image) for image in per_camera(pictures)]
+            for pictures in (frames, backgrounds)
+        )
+        placed = per_camera(poses)
+        if max(len(images), len(plates), len(placed)) > len(self.cameras):
             raise ValueError(f"{len(images)} images for {len(self.cameras)} cameras")
-        frame = abi.FrameC(utime=capture_time(utime))
-        for i, image in enumerate(images):
-            if image is not None:
-                frame.image[i] = image_view(image, self.cameras[i], "frame")
+        frame = abi.FrameC(utime=capture_time(utime), struct_size=ctypes.sizeof(abi.FrameC))
+        for what, field, views in (("frame", frame.image, images), ("background", frame.background, plates)):
+            for i, image in enumerate(views):
+                if image is not None:
+                    field[i] = image_view(image, self.cameras[i], what)
+        for i, pose in enumerate(placed):
+            if pose is not None:
+                frame.pose[i] = ctypes.pointer(pose_c(pose))
         found = [one and keypoint_array(one, self.model.joint_names) for one in per_camera(keypoints)]
         for i, array in enumerate(found[: len(self.cameras)]):
             if array is not None:

@@ -1,0 +1,101 @@
+#include "tracker/pose_error.h"
+#include "base/fmath.h"
+#include "image/camera.h"
+#include "likelihood/likelihood.h"
+#include "tracker/likelihood_step.h"
+
+static const float FINEST = 0.5f; /* working pixels: last step of the search */
+
+typedef struct sample { /* a block of particles, spread over those of one class */
+    int32_t lanes, index[BLOCK];
+    particle_block states;
+    float sd; /* of the shift, pixels */
+} sample;
+
+static sample draw_sample(const gait_tracker *t, int32_t c)
+{
+    int32_t const best = pf_heaviest(&t->filter);
+    sample s;
+    int32_t first = 0, end = t->filter.n;
+    if (t->classes) {
+        const strata *const of = tracker_strata(t);
+        int32_t const k = stratum_at(of, best);
+        first = of->first[k];
+        end = of->first[k + 1];
+    }
+    s.lanes = i_min(BLOCK, end - first);
+    for (int32_t i = 0; i < s.lanes; i++)
+        s.index[i] = first + (int32_t)((int64_t)(end - first) * i / s.lanes);
+    s.index[0] = best;
+    particle_block_get(&t->particles, s.index, s.lanes, &s.states);
+    const gait_camera *const cam = &t->cfg.camera[c];
+    const camera_state *const now = &t->camera[c];
+    float to[3];
+    camera_to(cam, (const float[3]){s.states.f[F_X][0], s.states.f[F_Y][0], s.states.f[F_Z][0]}, to);
+    float const square = to[0] * to[0] + to[1] * to[1] + to[2] * to[2];
+    s.sd = f_max(cam->fx, cam->fy) * __builtin_sqrtf(now->turn_sd * now->turn_sd +
+                                                     now->place_sd * now->place_sd / f_max(square, 0.01f));
+    return s;
+}
+
+/* Log probability of a shift, pixels, up to a constant. */
+static float score(gait_tracker *t, int32_t c, const sample *s, float du, float dv)
+{
+    likelihood_scratch *const w = &t->work[0];
+    gait_camera *const cam = &t->cfg.camera[c];
+    float nats[BLOCK], top = -FLT_MAX, sum = 0.0f;
+    gait_camera const aimed = *cam;
+    cam->cx += du;
+    cam->cy += dv;
+    likelihood_particles(t, c, s->index, s->lanes, w, nats);
+    *cam = aimed;
+    for (int32_t i = 0; i < s->lanes; i++)
+        top = f_max(top, nats[i]);
+    for (int32_t i = 0; i < s->lanes; i++)
+        sum += (float)t->filter.weight[s->index[i]] * m_exp(f_max(nats[i] - top, -80.0f));
+    return top + m_log(f_max(sum, 1e-30f)) - 0.5f * (du * du + dv * dv) / (s->sd * s->sd);
+}
+
+void pose_error_correct(gait_tracker *t, int32_t c)
+{
+    static const float WAY[4][2] = {{1, 0}, {-1, 0}, {0, 1}, {0, -1}};
+    const camera_state *const now = &t->camera[c];
+    if (!now->features.has_image || !(now->turn_sd + now->place_sd > 0.0f))
+        return;
+    likelihood_scratch *const w = &t->work[0];
+    sample const s = draw_sample(t, c);
+    particle_block_bodies(layout_at(t, s.index[0]), &s.states, &w->body);
+    kin_points(t->model, &w->body, w->points);
+    float at[2] = {0.0f, 0.0f}, best = score(t, c, &s, 0.0f, 0.0f);
+    for (float step = s.sd; step * now->features.map.scale > FINEST;) {
+        float const from[2] = {at[0], at[1]};
+        for (int32_t k = 0; k < 4; k++) {
+            float const u = from[0] + step * WAY[k][0], v = from[1] + step * WAY[k][1],
+                        found = score(t, c, &s, u, v);
+            if (found > best) {
+                best = found;
+                at[0] = u;
+                at[1] = v;
+            }
+        }
+        if (at[0] == from[0] && at[1] == from[1])
+            step *= 0.5f;
+    }
+    t->cfg.camera[c].cx += at[0];
+    t->cfg.camera[c].cy += at[1];
+}
+
+double pose_error_variance(const gait_tracker *t, const float at[3])
+{
+    double least = 1e12;
+    for (int32_t c = 0; c < t->cfg.cameras; c++) {
+        float to[3];
+        camera_to(&t->cfg.camera[c], at, to);
+        double const turn = (double)t->camera[c].turn_sd, place = (double)t->camera[c].place_sd;
+        double const square = (double)to[0] * (double)to[0] + (double)to[1] * (double)to[1] +
+                              (double)to[2] * (double)to[2];
+        double const variance = turn * turn * square + place * place;
+        least = variance < least ? variance : least;
+    }
+    return least;
+}

@@ -1,0 +1,15 @@
+/* pose_error.h - how a camera of doubtful pose looked after all: a shift of the whole image, the same for every particle.
+ *
+ * At a person's distance an error of the direction, or of the place across it, moves the body in the image and hardly
+ * turns or scales it.  Left to the particles, such an error would be taken for motion of the person. */
+#ifndef GAIT_TRACKER_POSE_ERROR_H
+#define GAIT_TRACKER_POSE_ERROR_H
+#include "tracker/tracker_state.h"
+
+/* Move the principal point of camera c by the most probable shift, given its pose's standard deviations; not if they are 0. */
+void pose_error_correct(gait_tracker *t, int32_t c);
+
+/* Variance that the poses add to each coordinate of a place in the world, of the camera that knows it best; square
+ * metres. */
+double pose_error_variance(const gait_tracker *t, const float at[3]);
+#endif
