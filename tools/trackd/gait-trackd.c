@@ -63,6 +63,7 @@ static bool read_background(service *s, const char *path, message *why)
 typedef struct parts { /* optional ones */
     lift_service lift;
     keypoint_cue cue;
+    pose_path path;
 } parts;
 
 /* The second service, if requested. */
@@ -100,6 +101,10 @@ static bool load(service *s, const settings *want, parts *p, workers *threads, s
                           want->keypoints_sd > 0 ? want->keypoints_sd : 4);
         s->cue = &p->cue;
     }
+    if (want->moving_camera) {
+        p->path = (pose_path){.turn_sd = want->pose_turn_sd / 57.29578f, .place_sd = want->pose_place_sd};
+        s->path = &p->path;
+    }
     s->max_gap = (double)want->max_gap;
     s->max_pixels = want->max_pixels;
     s->camera_fixed = want->camera[0] != '\0';
@@ -134,6 +139,8 @@ static void print_summary(const service *s, bool live)
         printf(" keypoint_messages %" PRId64 " keypoints_used %" PRId64 " keypoints_late %" PRId64
                " keypoints_left_out %" PRId64,
                s->cue->messages, s->cue->used, s->cue->late, s->cue->filter.left_out);
+    if (s->path)
+        printf(" poses_refused %" PRId64 " frames_without_pose %" PRId64, s->path->refused, s->path->unknown);
     if (s->lift)
         printf(" lift_frames %" PRId64 " lifted %" PRId64 " lift_rejected %" PRId64
                " lift_keypoints_left_out %" PRId64 " lift_ms median %.3f p99 %.3f",
@@ -255,7 +262,6 @@ int main(int argc, char **argv)
         workers_stop(&threads);
         service_close(&s);
         lift_service_close(&extra.lift);
-        keypoint_cue_close(&extra.cue);
     }
     if (ok && quit == RELOAD) {
         sigprocmask(SIG_SETMASK, &call.unblocked, NULL);

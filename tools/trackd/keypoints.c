@@ -2,7 +2,6 @@
 
 #include "gaitmsg_tracks_t.h"
 
-#include <stdlib.h>
 #include <string.h>
 
 /* ---- messages ---- */
@@ -70,8 +69,6 @@ bool keypoints_view_unknown(message *why)
 }
 
 /* ---- keypoints for the tracker ---- */
-enum { BESIDE_PIXELS = 1 << 16 }; /* of an image_t: fields, metadata, padding of rows */
-
 void keypoint_cue_open(keypoint_cue *cue, const gait_model *model, int32_t joints, float sd)
 {
     *cue = (keypoint_cue){.model = model, .joints = joints, .sd = sd, .frame_utime = -1};
@@ -79,25 +76,9 @@ void keypoint_cue_open(keypoint_cue *cue, const gait_model *model, int32_t joint
         cue->past[i].utime = -1;
 }
 
-void keypoint_cue_close(keypoint_cue *cue)
-{
-    free(cue->held);
-    *cue = (keypoint_cue){0};
-}
-
 void keypoint_cue_forget(keypoint_cue *cue)
 {
     cue->frame_utime = -1;
-}
-
-bool keypoint_cue_allocate(keypoint_cue *cue, const gait_camera *camera, message *why)
-{
-    free(cue->held);
-    cue->held_bytes = 0;
-    cue->capacity = (size_t)camera->width * (size_t)camera->height * 3 + BESIDE_PIXELS;
-    cue->held = malloc(cue->capacity);
-    return cue->held ||
-           message_set(why, "--keypoints-term: not enough memory for a frame of %zu bytes", cue->capacity);
 }
 
 static int32_t find(const keypoint_cue *cue, const char *name)
@@ -149,15 +130,4 @@ const gait_keypoint *keypoint_cue_use(keypoint_cue *cue, int64_t utime)
     cue->frame_utime = utime;
     cue->used += found != NULL;
     return found;
-}
-
-bool keypoint_cue_hold(keypoint_cue *cue, int64_t utime, const void *image, size_t bytes, int64_t arrival)
-{
-    if (!cue->held || bytes > cue->capacity)
-        return false;
-    memcpy(cue->held, image, bytes);
-    cue->held_bytes = bytes;
-    cue->held_utime = utime;
-    cue->held_arrival = arrival;
-    return true;
 }

@@ -58,24 +58,16 @@ typedef struct keypoint_cue {
     keypoints_filter filter;
     int64_t messages, used, late; /* messages that arrived; used by a frame; after their frame */
     int64_t frame_utime;          /* of the last tracked frame; -1: none */
-    uint8_t *held;                /* the frame that waits, an encoded image_t */
-    size_t capacity, held_bytes;  /* held_bytes 0: no frame waits */
-    int64_t held_utime, held_arrival;
 } keypoint_cue;
 
 /* `cue` is all zero before.  `model` must outlive it. */
 void keypoint_cue_open(keypoint_cue *cue, const gait_model *model, int32_t joints, float sd);
 /* Tracking has stopped: accept keypoints of any time again. */
 void keypoint_cue_forget(keypoint_cue *cue);
-void keypoint_cue_close(keypoint_cue *cue);
-/* Take the memory for one frame of a camera; only once. */
-bool keypoint_cue_allocate(keypoint_cue *cue, const gait_camera *camera, message *why);
 /* Keep the keypoints of one message.  false if none is known to the model or their frame has been tracked. */
 bool keypoint_cue_take(keypoint_cue *cue, keypoints_view *v, message *why);
 /* Keypoints of the frame with this capture time, in the order of the model's joints; NULL: none have arrived. */
 const gait_keypoint *keypoint_cue_at(const keypoint_cue *cue, int64_t utime);
 /* The same for the frame that is being tracked, and count it. */
 const gait_keypoint *keypoint_cue_use(keypoint_cue *cue, int64_t utime);
-/* Hold an encoded frame; false if it is too large. */
-bool keypoint_cue_hold(keypoint_cue *cue, int64_t utime, const void *image, size_t bytes, int64_t arrival);
 #endif

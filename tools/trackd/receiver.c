@@ -33,29 +33,35 @@ static bool newest(const receiver *r)
     return r->log || lcm_subscription_get_queue_size(r->frames) == 0;
 }
 
-/* Track the frame that waits for its keypoints, if any. */
+/* Track the frame that waits, if any. */
 static void flush_held(receiver *r)
 {
-    keypoint_cue *const cue = r->service->cue;
+    frame_hold *const hold = &r->service->hold;
     image_view v;
     message why;
-    if (cue && cue->held_bytes && image_view_open(&v, cue->held, cue->held_bytes, &why))
-        service_frame(r->service, &v, newest(r), cue->held_arrival);
-    if (cue)
-        cue->held_bytes = 0;
+    if (hold->bytes && image_view_open(&v, hold->frame, hold->bytes, &why))
+        service_frame(r->service, &v, newest(r), hold->arrival);
+    hold->bytes = 0;
+}
+
+/* Track it if all that it waits for has arrived. */
+static void flush_complete(receiver *r)
+{
+    const frame_hold *const hold = &r->service->hold;
+    if (hold->bytes && !service_waits(r->service, hold->utime))
+        flush_held(r);
 }
 
 static void on_frame(const lcm_recv_buf_t *buf, const char *channel, void *user)
 {
     receiver *const r = user;
     image_view v;
-    keypoint_cue *const cue = r->service->cue;
     flush_held(r);
     r->service->arrived++;
     if (!open_view(r->service, buf, channel, &v))
         return;
-    bool const wait = cue && !keypoint_cue_at(cue, v.utime);
-    if (!wait || !keypoint_cue_hold(cue, v.utime, buf->data, buf->data_size, buf->recv_utime))
+    if (!service_waits(r->service, v.utime) ||
+        !frame_hold_keep(&r->service->hold, v.utime, buf->data, buf->data_size, buf->recv_utime))
         service_frame(r->service, &v, newest(r), buf->recv_utime);
 }
 
@@ -82,8 +88,7 @@ static void on_keypoints(const lcm_recv_buf_t *buf, const char *channel, void *u
         service_complain(r->service, "%.40s: %.180s", channel, why.text);
     if (cue && !keypoint_cue_take(cue, &again, &why))
         service_complain(r->service, "%.40s: %.180s", channel, why.text);
-    if (cue && cue->held_bytes && keypoint_cue_at(cue, cue->held_utime))
-        flush_held(r);
+    flush_complete(r);
 }
 
 static void on_camera(const lcm_recv_buf_t *buf, const char *channel, void *user)
@@ -94,6 +99,7 @@ static void on_camera(const lcm_recv_buf_t *buf, const char *channel, void *user
         service_complain(r->service, DAMAGED, channel);
     else
         service_camera(r->service, &msg);
+    flush_complete(r);
 }
 
 static void on_command(const lcm_recv_buf_t *buf, const char *channel, void *user)

@@ -128,6 +128,7 @@ void service_close(service *s)
     free(s->hypothesis);
     free(s->cloud.weight);
     free(s->cloud.state);
+    frame_hold_close(&s->hold);
     tracking_close(&s->track);
 }
 
@@ -144,12 +145,12 @@ static bool start_usable(service *s, const gait_state *mean, const gait_state *s
 
 bool service_set_camera(service *s, const gait_camera *camera, message *why)
 {
-    s->track.memory_bytes -= s->cue ? s->cue->capacity : 0;
+    s->track.memory_bytes -= s->hold.capacity;
     if (!tracking_set_camera(&s->track, camera, why) ||
-        (s->cue && !keypoint_cue_allocate(s->cue, camera, why)) ||
+        ((s->cue || s->path) && !frame_hold_allocate(&s->hold, camera, why)) ||
         (s->lift && !lift_service_camera(s->lift, camera, why)))
         return false;
-    s->track.memory_bytes += s->cue ? s->cue->capacity : 0;
+    s->track.memory_bytes += s->hold.capacity;
     const tracking *const t = &s->track;
     bool const armed = s->start.armed;
     log_line("model %016" PRIx64 ", camera %dx%d, %d particles, %d thread%s, %s, %zu bytes (model %zu, "
@@ -176,6 +177,15 @@ static bool replaces(service *s, const gait_camera *camera, int64_t utime)
     return !s->camera_fixed && utime - s->other_since >= SERVICE_CAMERA_SILENT; /* both are 0 or more */
 }
 
+/* Whether two cameras differ at most in where they are. */
+static bool same_lens(const gait_camera *a, const gait_camera *b)
+{
+    gait_camera there = *a;
+    memcpy(there.R, b->R, sizeof there.R);
+    memcpy(there.t, b->t, sizeof there.t);
+    return convert_same_camera(&there, b);
+}
+
 void service_camera(service *s, const gaitmsg_camera_t *msg)
 {
     gait_camera camera;
@@ -185,7 +195,13 @@ void service_camera(service *s, const gaitmsg_camera_t *msg)
         service_complain(s, "%s", why.text);
         return;
     }
-    if (known && convert_same_camera(&camera, &s->track.config.camera[0])) {
+    if (s->path && (!known || same_lens(&camera, &s->track.config.camera[0]))) {
+        if (!pose_path_add(s->path, msg->utime, &camera, &why))
+            service_complain(s, "%s", why.text);
+        s->other_since = -1;
+        if (known)
+            return;
+    } else if (known && convert_same_camera(&camera, &s->track.config.camera[0])) {
         s->other_since = -1;
         return;
     }

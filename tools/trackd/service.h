@@ -2,12 +2,14 @@
 #ifndef TRACKD_SERVICE_H
 #define TRACKD_SERVICE_H
 #include "convert.h"
+#include "frame_hold.h"
 #include "gaitmsg_command_t.h"
 #include "gaitmsg_particles_t.h"
 #include "gaitmsg_status_t.h"
 #include "keypoints.h"
 #include "lcm_link.h"
 #include "lift_service.h"
+#include "pose_path.h"
 #include "strides.h"
 #include "timing.h"
 #include "tracking.h"
@@ -43,6 +45,8 @@ typedef struct service {
     tracking track;
     lift_service *lift; /* the second service; NULL: not requested */
     keypoint_cue *cue;  /* a detector's keypoints for the tracker; NULL: not requested */
+    pose_path *path;    /* poses of a camera that moves; NULL: it stands still */
+    frame_hold hold;    /* with one of them: the frame that waits */
     sink *out;          /* where messages go */
     int threads;
     int stream;               /* number of the camera, [0, 30] */
@@ -93,11 +97,13 @@ bool service_open(service *s, sink *out, int stream, int threads, const init_sta
 void service_close(service *s);
 
 bool service_set_camera(service *s, const gait_camera *camera, message *why);
-/* One that differs from the camera in use replaces it after it has been announced for SERVICE_CAMERA_SILENT, by the times of
+/* With a path: a pose, if the lens is that of the camera in use.  One that differs from the camera in use replaces it after it has been announced for SERVICE_CAMERA_SILENT, by the times of
  * its messages, while the other was not, unless that is of a file. */
 void service_camera(service *s, const gaitmsg_camera_t *msg);
 void service_background(service *s, const image_view *v);
 void service_command(service *s, const gaitmsg_command_t *msg);
+/* Whether a frame should wait for its keypoints, or for the pose of its camera. */
+bool service_waits(const service *s, int64_t utime);
 /* A frame that arrived at `arrival_utime`; it is dropped if it is not the newest one. */
 void service_frame(service *s, const image_view *v, bool newest, int64_t arrival_utime);
 /* Report a fault of the input in the status and, unless it is the last one repeated, on stderr. */

@@ -107,7 +107,7 @@ static bool in_time(service *s, const image_view *v)
 static void compare_scene(service *s, const gait_image *frame)
 {
     int32_t other = 0;
-    if (s->compared || !s->track.background.data)
+    if (s->compared || s->path || !s->track.background.data)
         return;
     s->compared = true;
     (void)gait_start_other_scene(s->track.start, frame, &s->track.background, &other, NULL);
@@ -125,8 +125,13 @@ static bool observe(service *s, int64_t utime, const gait_image *frame)
 {
     gait_start *const start = s->track.start;
     const gait_keypoint *const found = s->cue ? keypoint_cue_at(s->cue, utime) : NULL;
-    bool const scene = s->track.background.data != NULL;
+    bool const scene = s->track.background.data != NULL && !s->path;
     bool fine = true;
+    gait_camera_pose pose;
+    message why;
+    if (s->path && (pose_path_at(s->path, utime, &pose, &why) != POSE_KNOWN ||
+                    gait_start_set_pose(start, &pose, NULL) != GAIT_OK))
+        return false;
     if (found)
         fine = gait_start_add(start, utime, found, NULL) == GAIT_OK;
     if (scene) {
@@ -221,6 +226,7 @@ static bool step(service *s, const image_view *v, int64_t received, int64_t birt
     gait_frame frame = {.utime = v->utime};
     gait_estimate estimate;
     gait_error err = {.text = ""};
+    gait_camera_pose pose;
     message why;
     int64_t const begun = clock_monotonic();
     if (!service_pixels(s, v, &frame.image[0], &why)) {
@@ -231,6 +237,12 @@ static bool step(service *s, const image_view *v, int64_t received, int64_t birt
     compare_scene(s, &frame.image[0]);
     if (s->cue)
         frame.keypoints[0] = keypoint_cue_use(s->cue, v->utime);
+    if (s->path && pose_path_now(s->path, v->utime, &pose, &why))
+        frame.pose[0] = &pose;
+    else if (s->path) {
+        frame.image[0].data = NULL; /* from an unknown place: predict */
+        service_complain(s, "%s", why.text);
+    }
     gait_result status = bridge(s, v->utime, &estimate, &err);
     if (status == GAIT_OK)
         status = gait_tracker_step(s->track.tracker, &frame, &estimate, &err);
@@ -249,7 +261,7 @@ static bool step(service *s, const image_view *v, int64_t received, int64_t birt
     s->steps++;
     histogram_add(&s->counts.latency, clock_wall() - v->utime);
     adapt(s, birth, step_us);
-    if (estimate.status == GAIT_TRACK_LOST)
+    if (estimate.status == GAIT_TRACK_LOST && frame.image[0].data)
         try_auto_start(s, v, &frame.image[0]);
     else if (estimate.status != GAIT_TRACK_INIT)
         gait_start_reset(s->track.start);
@@ -278,7 +290,7 @@ static int idle_of(const service *s)
         return SERVICE_IDLE_NOT;
     if (!s->seek)
         return SERVICE_IDLE_START;
-    return s->track.background.data || s->cue ? SERVICE_IDLE_SEARCHING : SERVICE_IDLE_SCENE;
+    return (s->track.background.data && !s->path) || s->cue ? SERVICE_IDLE_SEARCHING : SERVICE_IDLE_SCENE;
 }
 
 /* What is missing in such a state. */
@@ -289,6 +301,9 @@ static void set_lack(const service *s, int idle, message *why)
         message_set(why, "no camera: give --camera or announce it on GAIT_CAMERA_%d", i);
     else if (idle == SERVICE_IDLE_START)
         message_set(why, "no START: send it on GAIT_COMMAND, or run with --init");
+    else if (idle == SERVICE_IDLE_SCENE && s->path)
+        message_set(why, "--init auto needs keypoints to find a person before a camera that moves: run with "
+                         "--keypoints-term, or send START on GAIT_COMMAND");
     else if (idle == SERVICE_IDLE_SCENE)
         message_set(why,
                     "--init auto needs the background to detect a person: give --background, send "
@@ -321,6 +336,14 @@ void service_lack(const service *s, message *why)
         *why = s->complaint;
     else
         set_lack(s, idle_of(s), why);
+}
+
+bool service_waits(const service *s, int64_t utime)
+{
+    gait_camera_pose pose;
+    message why;
+    return (s->cue && !keypoint_cue_at(s->cue, utime)) ||
+           (s->path && pose_path_at(s->path, utime, &pose, &why) == POSE_LATER);
 }
 
 void service_frame(service *s, const image_view *v, bool newest, int64_t arrival_utime)

@@ -169,6 +169,14 @@ static int make_table(settings *s, option *table)
          "standard deviation of a keypoint with confidence 1, including how the detector's joints differ\n"
          "        from the model's, default 4 pixels",
          OPTION_FLOAT, &s->keypoints_sd, 0.01, 1000},
+        {"moving-camera", 0, "",
+         "the camera moves: GAIT_CAMERA_<i> has its pose at the time of each message, between which it is\n"
+         "        interpolated; a frame waits for its pose until the next one arrives",
+         FLAG(moving_camera)},
+        {"pose-turn-sd", 0, "DEG", "standard deviation of the direction of these poses, default 0 degrees",
+         OPTION_FLOAT, &s->pose_turn_sd, 0, 10},
+        {"pose-place-sd", 0, "M", "standard deviation of their places, default 0 metres", OPTION_FLOAT,
+         &s->pose_place_sd, 0, 1},
         {"lift", 0, "",
          "also lift 2-D keypoints, GAIT_TRACKS_<i>, to 3-D joints with standard deviations on GAIT_LIFT,\n"
          "        by the segment prior of the model",
@@ -238,10 +246,15 @@ static bool check_dependencies(const settings *s, message *why)
         {"snapshot-s", "snapshot", s->snapshot_s > 0, s->snapshot[0]},
         {"snapshot", "init auto", s->snapshot[0], strcmp(s->init, "auto") == 0},
         {"keypoints-sd", "keypoints-term", s->keypoints_sd > 0, s->keypoints_term},
+        {"pose-turn-sd", "moving-camera", s->pose_turn_sd > 0, s->moving_camera},
+        {"pose-place-sd", "moving-camera", s->pose_place_sd > 0, s->moving_camera},
+        {"lift", "a camera that stands still", s->lift, !s->moving_camera},
+        {"background", "a camera that stands still", s->background[0], !s->moving_camera},
     };
     for (size_t i = 0; i < sizeof pair / sizeof *pair; i++)
         if (pair[i].given && !pair[i].there)
-            return message_set(why, "--%s needs --%s", pair[i].option, pair[i].needs);
+            return message_set(why, "--%s needs %s%s", pair[i].option, pair[i].needs[1] == ' ' ? "" : "--",
+                               pair[i].needs);
     return true;
 }
 

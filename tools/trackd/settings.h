@@ -14,7 +14,8 @@ typedef struct settings { /* 0 or empty: not given, unless noted */
     float lift_stature, lift_sd;
     int32_t lift_lag; /* -1: not given */
     float keypoints_sd;
-    bool particles_channel, quiet, version, lift, keypoints_term;
+    float pose_turn_sd, pose_place_sd;
+    bool particles_channel, quiet, version, lift, keypoints_term, moving_camera;
     gait_tracker_config tracker; /* with the defaults of the mode; tasks 0: not given */
 } settings;
 

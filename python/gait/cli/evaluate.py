@@ -58,7 +58,9 @@ def run(args: argparse.Namespace) -> int:
         raise UserError(f"{args.track}: is given as the track and as its truth; give two files")
     truth = read_truth(args.truth)
     beside = Path(args.truth).parent
-    camera = args.camera or (beside / "camera.json" if (beside / "camera.json").is_file() else None)
+    moves = (beside / "poses.csv").is_file()  # one camera does not see all frames
+    there = (beside / "camera.json").is_file() and not moves
+    camera = args.camera or (beside / "camera.json" if there else None)
     track = read_estimates(args.track)
     apart = _drift(track, truth)
     if apart > DRIFT:

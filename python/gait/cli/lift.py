@@ -348,7 +348,9 @@ def _stabilised(args: argparse.Namespace, video: Video, keypoints: Keypoints) ->
 
     given = Camera.read(args.camera, video.size, args.scale_camera) if args.camera else None
     camera = given or expected_camera(video, args.fov)
-    motion = find_turns(video, camera, sample_frames(video), {0: keypoints}, None, args.quiet)
+    motion = find_turns(
+        video, camera, sample_frames(video), {0: keypoints}, None, args.quiet, first=given is not None
+    )
     return keypoints if motion is None else motion.in_reference(keypoints)
 
 

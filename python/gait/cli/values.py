@@ -114,8 +114,8 @@ def add_stabilize(parser: _ActionsContainer, default: str | None) -> None:
         "--stabilize",
         choices=["auto", "off"],
         default=default,
-        help="auto: undo the motion of a camera that turns; joints are then in the scene's frame, the given "
-        "camera is that of the frame that is named (default: off)",
+        help="auto: find how a camera turns; joints are in the scene's frame: that of the first frame if "
+        "a camera is given, or else that of the frame that is named (default: off)",
     )
 
 

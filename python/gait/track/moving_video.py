@@ -44,7 +44,7 @@ class Panorama:
         samples: Sequence[Frame], lens: Camera, poses: Mapping[int, CameraPose], given: Image | None = None
     ) -> Panorama:
         """Median of the samples where they show the scene; `given` is the empty scene as `lens` sees it."""
-        wide = _extended(lens, poses.values())
+        wide = _extended(lens, list(poses.values()))
         known = [
             (frame.image, poses[frame.number].camera(lens)) for frame in samples if frame.number in poses
         ]
@@ -128,9 +128,9 @@ def panorama_of(
     return Panorama.of(samples, lens, poses, given) if one_place(list(poses.values())) else None
 
 
-def _extended(lens: Camera, poses: Sequence[CameraPose] | Any) -> Camera:
+def _extended(lens: Camera, poses: Sequence[CameraPose]) -> Camera:
     """Camera without distortion that sees all that the frames show, as far as one picture can."""
-    flat = replace(lens, distortion=np.zeros(5))
+    flat = replace(_middle(poses).camera(lens), distortion=np.zeros(5))
     size = np.array(lens.size)
     u, v = (np.linspace(0, length - 1, 9) for length in lens.size)
     border = np.stack(np.meshgrid(u, v), axis=-1).reshape(-1, 2)
@@ -139,6 +139,12 @@ def _extended(lens: Camera, poses: Sequence[CameraPose] | Any) -> Camera:
     high = np.ceil(np.clip(np.nanmax(places, axis=0) + 1, size, (1 + _WIDEST) * size)).astype(int)
     width, height = (high - low).tolist()
     return replace(flat, width=width, height=height, cx=lens.cx - low[0], cy=lens.cy - low[1])
+
+
+def _middle(poses: Sequence[CameraPose]) -> CameraPose:
+    """Find the pose that looks nearest to the median direction of all."""
+    ways = np.array([pose.R[2] for pose in poses])
+    return poses[int(np.linalg.norm(ways - np.median(ways, axis=0), axis=1).argmin())]
 
 
 def _median(known: Sequence[tuple[Image, Camera]], wide: Camera) -> Image:

@@ -216,7 +216,8 @@ def _find_motion(
                 options.quiet,
             )
         return None
-    return find_turns(video, camera, samples, people, given, options.quiet)
+    first = options.camera is not None
+    return find_turns(video, camera, samples, people, given, options.quiet, first=first)
 
 
 def _calibrate(options: ClipOptions, video: Video, model: Model, keypoints: Keypoints | None) -> Calibration:

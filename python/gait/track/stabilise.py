@@ -78,6 +78,8 @@ def find_motion(
     people: Mapping[int, Keypoints],
     plate: Image | None = None,
     update: Callable[[int], None] | None = None,
+    *,
+    first: bool = False,
 ) -> tuple[Motion | None, str]:
     """Measure how the camera turns.
 
@@ -91,7 +93,9 @@ def find_motion(
     people : mapping of int to Keypoints
         Who is in the clip: they are not taken for the scene.
     plate : image, optional
-        The empty scene, which is then the reference; otherwise it is the frame in the middle of the motion.
+        The empty scene, which is then the reference.
+    first : bool
+        Otherwise the reference is the first frame, or else the one in the middle of the motion.
 
     Returns
     -------
@@ -112,7 +116,7 @@ def find_motion(
     found = np.isfinite([view.residual for view in views])
     if found.mean() < _MOSTLY or motion.scale * np.median([v.residual for v in views]) > _TRAVELS:
         return None, "the camera moves along, or the scene has too little texture to show how it turns"
-    reference = -1 if plate is not None else _middle(views)
+    reference = -1 if plate is not None else 0 if first else _middle(views)
     if reference >= 0:
         back = views[reference].inverse()
         views = [view.after(back) for view in views]
@@ -126,13 +130,15 @@ def find_turns(
     people: Mapping[int, Keypoints],
     plate: Image | None,
     quiet: bool,
+    *,
+    first: bool,
 ) -> Motion | None:
     """Find the turns of a clip's camera, and report them; None if it stands still or does not only turn.
 
     Parameters are as for `find_motion`.
     """
     with progress("camera's motion", video.count, quiet) as update:
-        motion, why = find_motion(video, camera, samples, people, plate, update)
+        motion, why = find_motion(video, camera, samples, people, plate, update, first=first)
     if why:
         note(f"{why}; its motion is not used: give its poses with --camera-path", quiet)
     if motion is None:
