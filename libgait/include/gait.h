@@ -389,7 +389,7 @@ typedef struct gait_keypoint { GAIT_KEYPOINT_FIELDS(GAIT_DECLARE) } gait_keypoin
           float, R, [9], "", -2, 2)                                                                                   \
     RANGE("World origin in camera coordinates.",                                                                      \
           float, t, [3], "metres", -1e4, 1e4)                                                                         \
-    RANGE("Standard deviation of the direction in which it looks, about each axis; 0: exact.",                        \
+    RANGE("Standard deviation of its direction, about each axis; 0: exact.",                                          \
           float, turn_sd, , "radians", 0, 1)                                                                          \
     RANGE("Standard deviation of each coordinate of its place; 0: exact.",                                            \
           float, place_sd, , "metres", 0, 10)

@@ -33,7 +33,7 @@ FOLDER = Path(__file__).resolve().parents[2] / "build" / "eval-moving"
 TURN_SD, PLACE_SD = np.radians(0.5), 0.02
 WANTED = {"exact": 1.15, "noisy": 1.15, "estimated": 1.25}
 STILL = {"follow": "away", "pan": "side", "shake": "side"}  # the view of a still camera beside each
-ARMS = ("exact", "noisy", "noisy, not told", "estimated")
+ARMS = ("exact", "noisy", "noisy, sd not given", "estimated")
 
 
 def main() -> int:
@@ -64,7 +64,7 @@ def main() -> int:
             noisy(folder, seed)
             add(kind, "exact", folder, camera_path="poses.csv")
             add(kind, "noisy", folder, camera_path="noisy.csv")
-            add(kind, "noisy, not told", folder, camera_path="untold.csv")
+            add(kind, "noisy, sd not given", folder, camera_path="unstated.csv")
             if kind != "follow":
                 add(kind, "estimated", folder, stabilize="auto")
     rows, missed = [], False
@@ -73,19 +73,19 @@ def main() -> int:
         ratio = float(np.median(values) / still)
         bound = WANTED.get(arm)
         missed |= bound is not None and ratio > bound
-        spread = f"{min(values):.0f}-{max(values):.0f}"
+        extremes = f"{min(values):.0f}-{max(values):.0f}"
         rows.append(
-            [kind, arm, float(np.median(values)), spread, ratio, bound, float(np.median(places[kind, arm])),
+            [kind, arm, float(np.median(values)), extremes, ratio, bound, float(np.median(places[kind, arm])),
              lost[kind, arm]]
         )  # fmt: skip
     head = ["camera", "poses", "root mm", "from-to", "to still", "wanted", "abs mm", "lost"]
     title = "Cameras that move"
     note = (
         f"{facts('make eval-moving ARGS=--record')}\n\nSimulated walks of {args.frames} frames, seeds "
-        f"{args.seeds}, 640 x 480, from an init file, no detector. root, abs: medians over clips of the "
+        f"{args.seeds}, 640 x 480, from an init file, no detector. root, abs: medians over clips of "
         "median over frames, and the extremes. to still: against a still camera of that view. "
-        f"noisy: errors of {np.degrees(TURN_SD):.1f} degrees and {1000 * PLACE_SD / 10:.0f} cm, drawn anew for "
-        "each frame; not told: without standard deviations in the file. follow: a robot 1 m behind. "
+        f"noisy: errors of {np.degrees(TURN_SD):.1f} degrees and {1000 * PLACE_SD / 10:.0f} cm, drawn "
+        "anew for each frame; sd not given: without standard deviations in the file. follow: a robot 1 m behind. "
         "lost: frames with the status lost."
     )
     (table.publish if args.record else _show)("moving", title, head, rows, note)
@@ -107,13 +107,13 @@ def made(scenario: Scenario, name: str) -> Path:
 def noisy(folder: Path, seed: int) -> None:
     """Write the poses with errors, with and without their standard deviations."""
     path, rng = CameraPath.read(str(folder / "poses.csv")), np.random.default_rng(seed)
-    told = []
+    stated = []
     for pose in path.poses:
         R = Rotation.from_rotvec(TURN_SD * rng.standard_normal(3)).as_matrix() @ pose.R
         centre = pose.centre + PLACE_SD * rng.standard_normal(3)
-        told.append(CameraPose(R, -R @ centre, TURN_SD, PLACE_SD))
-    untold = [CameraPose(pose.R, pose.t) for pose in told]
-    for name, poses in (("noisy.csv", told), ("untold.csv", untold)):
+        stated.append(CameraPose(R, -R @ centre, TURN_SD, PLACE_SD))
+    unstated = [CameraPose(pose.R, pose.t) for pose in stated]
+    for name, poses in (("noisy.csv", stated), ("unstated.csv", unstated)):
         write_path(folder / name, path.at.tolist(), poses, by_frame=False)
 
 

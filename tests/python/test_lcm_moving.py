@@ -80,7 +80,7 @@ def test_a_frame_between_two_poses_waits_for_the_later_one(tmp_path):
         assert np.hypot(*off[:2]) < 0.12 and not estimate.flags & Flag.NO_IMAGE
 
 
-def test_frames_in_gaps_and_jumps_are_predicted_and_late_poses_left_out(tmp_path):
+def test_frames_in_gaps_and_breaks_are_predicted_and_late_poses_left_out(tmp_path):
     far = replace(camera_at(13), t=camera_at(13).t + [0, 0, 9.0])
     order = [0, 1, 2, 3, 24, 25, 24.5]  # a gap of 0.7 s; then one that is late
     events = [event for i in order[:4] for event in (pose(i), image(i))]

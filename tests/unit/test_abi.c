@@ -11,11 +11,11 @@ typedef struct want {
 
 #define WANT(T) {#T, sizeof(T)}
 static const want STRUCTS[] = {
-    WANT(gait_error),       WANT(gait_image),      WANT(gait_camera),     WANT(gait_state),
-    WANT(gait_pose),        WANT(gait_model_info), WANT(gait_tasks),      WANT(gait_tracker_config),
-    WANT(gait_keypoint),    WANT(gait_camera_pose), WANT(gait_frame),     WANT(gait_estimate),
-    WANT(gait_lift_info),   WANT(gait_lift_config), WANT(gait_lift_fit),  WANT(gait_lift_frame),
-    WANT(gait_start_config), WANT(gait_box),        WANT(gait_hypothesis),
+    WANT(gait_error),        WANT(gait_image),       WANT(gait_camera),     WANT(gait_state),
+    WANT(gait_pose),         WANT(gait_model_info),  WANT(gait_tasks),      WANT(gait_tracker_config),
+    WANT(gait_keypoint),     WANT(gait_camera_pose), WANT(gait_frame),      WANT(gait_estimate),
+    WANT(gait_lift_info),    WANT(gait_lift_config), WANT(gait_lift_fit),   WANT(gait_lift_frame),
+    WANT(gait_start_config), WANT(gait_box),         WANT(gait_hypothesis),
 };
 enum { COUNT = sizeof STRUCTS / sizeof *STRUCTS };
 

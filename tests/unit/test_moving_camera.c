@@ -143,10 +143,11 @@ static void test_background(void)
     toy_tracker_free(t);
 }
 
-/* Poses with errors of 1 degree: those who are told of them see where the camera looked, and the person walks on. */
-static void test_doubt(void)
+/* Poses with errors of 1 degree: where their standard deviations are given, the shift of the image is found and the
+ * person walks on. */
+static void test_uncertain_poses(void)
 {
-    gait_tracker *const told = tracker(GAIT_TERMS_DEFAULT), *const untold = tracker(GAIT_TERMS_DEFAULT);
+    gait_tracker *const stated = tracker(GAIT_TERMS_DEFAULT), *const unstated = tracker(GAIT_TERMS_DEFAULT);
     float const error = 0.0175f;
     float steady = 0.0f, jumping = 0.0f, last[2] = {0}, sd[2] = {0};
     for (int n = 0; n < FRAMES; n++) {
@@ -154,10 +155,10 @@ static void test_doubt(void)
         gait_camera const true_one = camera_at(0.0f, 0.0f), wrong = camera_at(0.0f, sign * error);
         gait_camera_pose pose = pose_of(&wrong);
         shoot(&true_one, n);
-        gait_estimate const b = step(untold, n, &pose, NULL);
+        gait_estimate const b = step(unstated, n, &pose, NULL);
         pose.turn_sd = error;
-        gait_estimate const a = step(told, n, &pose, NULL);
-        float const moved = told->cfg.camera[0].cx - told->home[0].cx;
+        gait_estimate const a = step(stated, n, &pose, NULL);
+        float const moved = stated->cfg.camera[0].cx - stated->home[0].cx;
         CHECK_NEAR(moved, -sign * error * true_one.fx, 5.0);
         if (n > 0) {
             steady += fabsf(a.mean.pelvis[0] - last[0]);
@@ -170,9 +171,9 @@ static void test_doubt(void)
         CHECK(off(&a, n) < 0.06f);
     }
     CHECK(steady < jumping);
-    CHECK(sd[0] > error * 5.0f && sd[1] < error * 5.0f); /* the doubt at 5.5 m is in the estimate */
-    toy_tracker_free(told);
-    toy_tracker_free(untold);
+    CHECK(sd[0] > error * 5.0f && sd[1] < error * 5.0f); /* the pose at 5.5 m is in the estimate */
+    toy_tracker_free(stated);
+    toy_tracker_free(unstated);
 }
 
 static void refused(gait_tracker *t, const gait_frame *f, gait_result want, const char *words)
@@ -214,7 +215,7 @@ int main(void)
     test_still();
     test_follows();
     test_background();
-    test_doubt();
+    test_uncertain_poses();
     test_refusals();
     return CHECK_DONE();
 }

@@ -11,9 +11,9 @@ enum { FRAMES = 26, JOINTS = TOY_POINTS };
 
 typedef struct walk { /* what the keypoints are made from */
     float heading, speed, rate, stature, phase, x, y;
-    float noise;   /* pixels */
-    float wrong;   /* share of keypoints that are somewhere else */
-    bool legs_cut; /* hips and ankles are not in view */
+    float noise;      /* pixels */
+    float wrong;      /* share of keypoints that are somewhere else */
+    bool legs_cut;    /* hips and ankles are not in view */
     float drive, pan; /* of the camera, to the right and to the left: metres and radians per second */
 } walk;
 
@@ -144,7 +144,8 @@ static void test_moving_camera(void)
     CHECK(!h.in_place && h.probability > 0.9f && h.chi2_per_observation < 1.5f);
     gait_start *const s = toy_start_new(camera(), ~0u);
     gait_camera_pose bad = {.turn_sd = 0.0f};
-    CHECK(gait_start_set_pose(s, &bad, NULL) == GAIT_ERR_ARG && gait_start_set_pose(s, NULL, NULL) != GAIT_OK);
+    CHECK(gait_start_set_pose(s, &bad, NULL) == GAIT_ERR_ARG &&
+          gait_start_set_pose(s, NULL, NULL) != GAIT_OK);
     free(s);
 }
 

@@ -3,7 +3,8 @@
 #include <math.h>
 #include <string.h>
 
-static const double FASTEST = 20.0; /* metres and radians per second: what is faster is a jump, not a motion */
+static const double FASTEST =
+    20.0; /* metres and radians per second: what is faster is a jump, not a motion */
 
 static const timed_pose *pose_at(const pose_path *p, int64_t index)
 {
@@ -82,8 +83,8 @@ static double length(const double v[3])
 }
 
 /* Between two poses; false: across a gap or a jump. */
-static bool between(const timed_pose *a, const timed_pose *b, int64_t utime,
-                    gait_camera_pose *out, message *why)
+static bool between(const timed_pose *a, const timed_pose *b, int64_t utime, gait_camera_pose *out,
+                    message *why)
 {
     double const seconds = 1e-6 * (double)(b->utime - a->utime),
                  share = (double)(utime - a->utime) / (double)(b->utime - a->utime);
@@ -138,8 +139,9 @@ bool pose_path_now(pose_path *p, int64_t utime, gait_camera_pose *out, message *
         *out = last->sent;
         known = true;
     } else if (answer == POSE_LATER)
-        message_set(why, "no pose of the camera for a frame: send GAIT_CAMERA_<i> with the time of each frame, or "
-                         "twice a second and more often");
+        message_set(why,
+                    "no pose of the camera for a frame: send GAIT_CAMERA_<i> with the time of each frame, or "
+                    "twice a second and more often");
     p->unknown += !known;
     return known;
 }

@@ -5,9 +5,9 @@
 #include "gait.h"
 
 enum {
-    POSE_PATH_KEPT = 256,       /* poses; the oldest are forgotten */
-    POSE_PATH_GAP = 500000,     /* microseconds between two poses, beyond which none is known between them */
-    POSE_PATH_LATE = 100000,    /* for which the last pose holds, if the next one does not arrive in time */
+    POSE_PATH_KEPT = 256,        /* poses; the oldest are forgotten */
+    POSE_PATH_GAP = 500000,      /* microseconds between two poses, beyond which none is known between them */
+    POSE_PATH_LATE = 100000,     /* for which the last pose holds, if the next one does not arrive in time */
     POSE_PATH_SET_BACK = 2000000 /* from which an earlier pose means that the clock was set back */
 };
 

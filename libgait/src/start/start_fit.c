@@ -59,8 +59,8 @@ gait_camera start_camera(const gait_start *s, int32_t k)
 
 /* Two rows of residuals of one lane: of a point X and where it is found, down-weighted so that their squares are
  * Student's t costs. */
-static void point_residuals(const gait_start *s, const gait_camera *cam, const float X[3], double u, double v, double weight,
-                            int32_t row, int32_t lane)
+static void point_residuals(const gait_start *s, const gait_camera *cam, const float X[3], double u, double v,
+                            double weight, int32_t row, int32_t lane)
 {
     start_scratch *const w = s->scratch;
     float uv[2];

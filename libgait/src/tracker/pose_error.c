@@ -92,8 +92,8 @@ double pose_error_variance(const gait_tracker *t, const float at[3])
         float to[3];
         camera_to(&t->cfg.camera[c], at, to);
         double const turn = (double)t->camera[c].turn_sd, place = (double)t->camera[c].place_sd;
-        double const square = (double)to[0] * (double)to[0] + (double)to[1] * (double)to[1] +
-                              (double)to[2] * (double)to[2];
+        double const square =
+            (double)to[0] * (double)to[0] + (double)to[1] * (double)to[1] + (double)to[2] * (double)to[2];
         double const variance = turn * turn * square + place * place;
         least = variance < least ? variance : least;
     }

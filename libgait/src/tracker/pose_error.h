@@ -1,4 +1,4 @@
-/* pose_error.h - how a camera of doubtful pose looked after all: a shift of the whole image, the same for every particle.
+/* pose_error.h - where a camera whose pose is uncertain was pointed: a shift of the image, the same for every particle.
  *
  * At a person's distance an error of the direction, or of the place across it, moves the body in the image and hardly
  * turns or scales it.  Left to the particles, such an error would be taken for motion of the person. */

@@ -122,12 +122,12 @@ typedef struct lag_scratch { /* of fixed_lag_estimate() */
 
 struct gait_tracker {
     const gait_model *model;
-    gait_tracker_config cfg;  /* particles: those in use now; camera: as it is in this frame */
+    gait_tracker_config cfg;            /* particles: those in use now; camera: as it is in this frame */
     gait_camera home[GAIT_MAX_CAMERAS]; /* of the caller's config */
-    int32_t config_particles; /* of the caller's config */
-    int32_t target_particles; /* that the caller wants outside acquisition */
-    int32_t capacity;         /* particles that fit into the memory */
-    state_layout layout;      /* of the first class */
+    int32_t config_particles;           /* of the caller's config */
+    int32_t target_particles;           /* that the caller wants outside acquisition */
+    int32_t capacity;                   /* particles that fit into the memory */
+    state_layout layout;                /* of the first class */
     like_setup *like;
     /* Mutable state: one block of memory from core to state_end. */
     tracker_core *core;

@@ -19,7 +19,7 @@ Array = NDArray[np.float64]
 _ROTATION = tuple(f"r{row}{column}" for row in (1, 2, 3) for column in (1, 2, 3))
 _MATRIX = (*_ROTATION, "tx", "ty", "tz")
 _QUATERNION = ("x", "y", "z", "qx", "qy", "qz", "qw")
-_DOUBT = ("turn_sd_deg", "place_sd_m")
+_SD_COLUMNS = ("turn_sd_deg", "place_sd_m")
 _LENS = ("fx", "fy", "cx", "cy")
 LONGEST_GAP = 0.5  #: seconds between two poses between which others are interpolated
 _SLACK = 0.02  # seconds before the first and after the last pose in which these count
@@ -185,7 +185,7 @@ def _turn(before: Array, after: Array) -> Array:
 
 
 def between(left: CameraPose, right: CameraPose, share: float) -> CameraPose:
-    """Pose at a share of the way from one to another; its doubt is the larger one."""
+    """Pose at a share of the way from one to another; its standard deviations are the larger ones."""
     from scipy.spatial.transform import Rotation
 
     sd = max(left.turn_sd, right.turn_sd), max(left.place_sd, right.place_sd)
@@ -197,12 +197,12 @@ def between(left: CameraPose, right: CameraPose, share: float) -> CameraPose:
 
 def write_path(path: Path, at: Sequence[float], poses: Sequence[CameraPose], *, by_frame: bool) -> None:
     """Write poses as `CameraPath.read` reads them, with all their digits."""
-    doubt = any(pose.turn_sd + pose.place_sd > 0 for pose in poses)
+    uncertain = any(pose.turn_sd + pose.place_sd > 0 for pose in poses)
     with path.open("w", newline="", encoding="ascii") as file:
         rows = csv.writer(file)
-        rows.writerow(["frame" if by_frame else "time", *_MATRIX, *(_DOUBT if doubt else ())])
+        rows.writerow(["frame" if by_frame else "time", *_MATRIX, *(_SD_COLUMNS if uncertain else ())])
         for moment, pose in zip(at, poses, strict=True):
-            sd = [float(np.degrees(pose.turn_sd)), pose.place_sd] if doubt else []
+            sd = [float(np.degrees(pose.turn_sd)), pose.place_sd] if uncertain else []
             numbers = [*pose.R.ravel().tolist(), *pose.t.tolist(), *sd]
             rows.writerow([moment if by_frame else f"{moment:.6f}", *map(repr, numbers)])
 
@@ -225,7 +225,7 @@ def _read_table(path: str) -> tuple[list[str], Array, list[int]]:
         )
     if len(rows) < 2:
         raise UserError(f"{path}: has no pose; give a row for each moment")
-    wanted = {*placed, *_DOUBT, *_LENS, "time" if "time" in head else "frame"}
+    wanted = {*placed, *_SD_COLUMNS, *_LENS, "time" if "time" in head else "frame"}
     where = [(name, at) for at, name in enumerate(head) if name in wanted]
     table = [[_number(path, line, cells, at, name) for name, at in where] for line, cells in rows[1:]]
     return [name for name, _ in where], np.array(table), [line for line, _ in rows[1:]]
@@ -237,8 +237,8 @@ def _number(path: str, line: int, cells: list[str], at: int, name: str) -> float
         value = float(text)
     except ValueError:
         value = np.nan
-    if not abs(value) <= 1e9 or (name in _DOUBT and value < 0):
-        least = " of 0 or more" if name in _DOUBT else ""
+    if not abs(value) <= 1e9 or (name in _SD_COLUMNS and value < 0):
+        least = " of 0 or more" if name in _SD_COLUMNS else ""
         raise UserError(f"{path}: line {line}: {name} is {text[:20]!r}; give a number{least}")
     return value
 
@@ -247,7 +247,7 @@ def _poses(path: str, names: list[str], table: Array, lines: list[int]) -> tuple
     def columns(wanted: Sequence[str]) -> Array:
         return table[:, [names.index(name) for name in wanted]]
 
-    sd = [columns([name])[:, 0] if name in names else np.zeros(len(table)) for name in _DOUBT]
+    sd = [columns([name])[:, 0] if name in names else np.zeros(len(table)) for name in _SD_COLUMNS]
     if set(_MATRIX) <= set(names):
         turns, shifts = columns(_ROTATION).reshape(-1, 3, 3), columns(_MATRIX[9:])
         wrong = np.abs(turns @ turns.swapaxes(1, 2) - np.eye(3)).max(axis=(1, 2)) > _ROTATED

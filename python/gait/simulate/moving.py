@@ -89,9 +89,9 @@ def _zoomed(cameras: list[Camera], reach: Array) -> list[Camera]:
     """Return the cameras with the longest lens that shows the person in every frame."""
     across = tall = 0.0
     for camera, points in zip(cameras, reach, strict=True):
-        seen = points @ camera.R.T + camera.t
-        across = max(across, float(np.abs(seen[:, 0] / seen[:, 2]).max()))
-        tall = max(tall, float(np.abs(seen[:, 1] / seen[:, 2]).max()))
+        inside = points @ camera.R.T + camera.t
+        across = max(across, float(np.abs(inside[:, 0] / inside[:, 2]).max()))
+        tall = max(tall, float(np.abs(inside[:, 1] / inside[:, 2]).max()))
     width, height = cameras[0].size
     focal = (1 - _EDGE) * min(0.5 * width / across, 0.5 * height / tall)
     return [replace(camera, fx=focal, fy=focal) for camera in cameras]

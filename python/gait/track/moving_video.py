@@ -44,16 +44,16 @@ class Panorama:
         samples: Sequence[Frame], lens: Camera, poses: Mapping[int, CameraPose], given: Image | None = None
     ) -> Panorama:
         """Median of the samples where they show the scene; `given` is the empty scene as `lens` sees it."""
-        wide = _extended(lens, list(poses.values()))
+        whole = _extended(lens, list(poses.values()))
         known = [
             (frame.image, poses[frame.number].camera(lens)) for frame in samples if frame.number in poses
         ]
-        image = _median(known, wide)
+        image = _median(known, whole)
         if given is not None:
-            image = warped(given, lens, wide, image)
-        return Panorama(wide, image)
+            image = warped(given, lens, whole, image)
+        return Panorama(whole, image)
 
-    def seen_by(self, camera: Camera) -> Image | None:
+    def as_shown_to(self, camera: Camera) -> Image | None:
         """Empty scene as a camera in the same place sees it; None if part of that is not known."""
         u, v = (np.arange(0, size, _STEP, dtype=float) for size in camera.size)
         places = map_pixels(np.stack(np.meshgrid(u, v), axis=-1), camera, self.camera)
@@ -117,7 +117,7 @@ class MovingVideo(Video):
     def _placed(self, frame: Frame) -> Frame:
         pose, plate = self.poses[frame.number], None
         if self.panorama is not None and frame.image.ndim == 3:
-            plate = self.panorama.seen_by(pose.camera(self._lens))
+            plate = self.panorama.as_shown_to(pose.camera(self._lens))
         return frame._replace(pose=pose, plate=plate)
 
 
@@ -147,16 +147,16 @@ def _middle(poses: Sequence[CameraPose]) -> CameraPose:
     return poses[int(np.linalg.norm(ways - np.median(ways, axis=0), axis=1).argmin())]
 
 
-def _median(known: Sequence[tuple[Image, Camera]], wide: Camera) -> Image:
+def _median(known: Sequence[tuple[Image, Camera]], whole: Camera) -> Image:
     """Median of pictures at each pixel that any of them shows; elsewhere the nearest pixel of the first."""
-    width, height = wide.size
+    width, height = whole.size
     blank = np.zeros((height, width, 3), np.uint8)
     pictures, shown = [], []
     for image, camera in known:
         white = np.full(image.shape[:2], 255, np.uint8)
-        pictures.append(warped(image, camera, wide, blank))
-        shown.append(warped(white, camera, wide, blank[..., 0]) == 255)
-    plate = warped(known[0][0], known[0][1], wide)
+        pictures.append(warped(image, camera, whole, blank))
+        shown.append(warped(white, camera, whole, blank[..., 0]) == 255)
+    plate = warped(known[0][0], known[0][1], whole)
     for row in range(height):
         values = np.array([picture[row] for picture in pictures], np.int16)
         visible = np.array([mask[row] for mask in shown])

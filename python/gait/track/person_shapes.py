@@ -42,7 +42,7 @@ class PersonShapes:
     stature : callable
         Of the person in a box, metres.
     place : callable, optional
-        Tells `stature` where a camera that moves is.
+        Gives `stature` the pose of a camera that moves.
     """
 
     def __init__(

@@ -257,8 +257,8 @@ def _read_start(
         raise UserError(
             f"{options.init}: frame is {start.frame}, the frames to track end at {stop - 1}; give one"
         )
-    seen_by = poses[start.frame].camera(camera) if start.frame in poses else camera
-    if not seen_by.shows(model.pose(start.mean)[0]):
+    there = poses[start.frame].camera(camera) if start.frame in poses else camera
+    if not there.shows(model.pose(start.mean)[0]):
         raise UserError(f"{options.init}: {OUTSIDE}")
     return start
 

@@ -294,10 +294,14 @@ class Smoother:
         size = _SIZE_SD * start_sd / np.hypot(_SIZE_SD, start_sd) if one_view and share > 0 else 0.0
         frame = self._filtered[index][0]
         ways = now.joints - frame.camera(tracker.cameras[0]).centre
-        doubt = np.zeros((len(ways), 1))
+        pose_variance = np.zeros((len(ways), 1))
         if frame.pose is not None:
-            doubt = frame.pose.turn_sd**2 * (ways**2).sum(axis=1, keepdims=True) + frame.pose.place_sd**2
-        joint_sd = np.sqrt(now.joint_sd**2 + (share * now.mean.stature) ** 2 + (size * ways) ** 2 + doubt)
+            pose_variance = (
+                frame.pose.turn_sd**2 * (ways**2).sum(axis=1, keepdims=True) + frame.pose.place_sd**2
+            )
+        joint_sd = np.sqrt(
+            now.joint_sd**2 + (share * now.mean.stature) ** 2 + (size * ways) ** 2 + pose_variance
+        )
         stature = float(np.hypot(now.sd.stature, size * now.mean.stature))
         return replace(now, joint_sd=joint_sd, sd=replace(now.sd, stature=stature, pelvis=joint_sd[0]))
 

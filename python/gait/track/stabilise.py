@@ -66,8 +66,8 @@ class Motion:
         out = {}
         for number, view in enumerate(self.views):
             after = map_pixels(before, self.camera, view.camera(self.camera))
-            seen = np.isfinite(after).all(axis=1)
-            out[number] = CameraPose.of(fit_view(camera, before[seen], after[seen])[0].camera(camera))
+            inside = np.isfinite(after).all(axis=1)
+            out[number] = CameraPose.of(fit_view(camera, before[inside], after[inside])[0].camera(camera))
         return out
 
 
