@@ -23,11 +23,14 @@ if TYPE_CHECKING:
     from gait.bindings.model import Model, ModelInfo
     from gait.bindings.state import State
     from gait.camera.camera import Camera
+    from gait.camera.path import CameraPath, CameraPose
     from gait.io.video import Frame, Video, VideoWriter, background
     from gait.track.tracker import Tracker
 
 _HOME = {
     "Camera": "camera.camera",
+    "CameraPath": "camera.path",
+    "CameraPose": "camera.path",
     "Estimate": "bindings.estimate",
     "Flag": "bindings.abi",
     "Frame": "io.video",
@@ -53,6 +56,8 @@ _OF_VIDEO = ("Video", "VideoWriter", "background")
 
 __all__ = [
     "Camera",
+    "CameraPath",
+    "CameraPose",
     "Estimate",
     "Flag",
     "Frame",

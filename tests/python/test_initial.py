@@ -372,4 +372,4 @@ def test_who_stays_in_one_place_of_the_picture_is_in_the_median(aside, nearer, s
     frame = np.arange(90)
     film = SimpleNamespace(count=round(90 / shown))
     people = {0: Keypoints(frame, frame / 30, names, uv, np.ones(uv.shape[:2]))}
-    assert stays(SimpleNamespace(people=people, person=0, video=film)) == expected
+    assert stays(SimpleNamespace(people=people, person=0, video=film, poses={})) == expected
