@@ -1,6 +1,5 @@
 #include "tracker/likelihood_step.h"
 #include "likelihood/likelihood.h"
-#include "tracker/pose_error.h"
 #include <string.h>
 
 void likelihood_outline(const gait_tracker *t, int32_t c, likelihood_scratch *w)
@@ -109,13 +108,16 @@ static void likelihood_range(void *ctx, int32_t begin, int32_t end, int32_t task
     }
 }
 
-void likelihood_step(gait_tracker *t)
+void likelihood_templates(gait_tracker *t)
 {
     for (int32_t c = 0; c < t->cfg.cameras; c++)
         for (int32_t h = 0; h < 2 && t->template_ring[h][c]; h++)
             template_ring(t->template[h][c], t->like->limbs, t->template_ring[h][c]);
-    for (int32_t c = 0; c < t->cfg.cameras; c++)
-        pose_error_correct(t, c);
+}
+
+void likelihood_step(gait_tracker *t)
+{
+    likelihood_templates(t);
     task_run(&t->cfg.exec, t->cfg.tasks, t->cfg.particles, BLOCK, likelihood_range, t);
 }
 

@@ -26,7 +26,10 @@ float likelihood_since(gait_tracker *t, const particle_state *p, uint32_t camera
 /* Support of one body by the keypoints of all cameras, in units of the term's cost; 0 without keypoints. */
 float likelihood_of_keypoints(gait_tracker *t, const state_layout *of, const particle_state *p);
 
-/* Log-likelihood in camera c of the particles index[0 .. lanes), whose bodies and points are in w; changes no particle. */
+/* Make the templates ready to be compared with this frame; likelihood_step() does so too. */
+void likelihood_templates(gait_tracker *t);
+
+/* After that: log-likelihood in camera c of the particles index[0 .. lanes), whose bodies and points are in w; changes no particle. */
 void likelihood_particles(gait_tracker *t, int32_t c, const int32_t *index, int32_t lanes,
                           likelihood_scratch *w, float nats[BLOCK]);
 

@@ -56,18 +56,16 @@ static float score(gait_tracker *t, int32_t c, const sample *s, float du, float 
     return top + m_log(f_max(sum, 1e-30f)) - 0.5f * (du * du + dv * dv) / (s->sd * s->sd);
 }
 
-void pose_error_correct(gait_tracker *t, int32_t c)
+static void correct_camera(gait_tracker *t, int32_t c)
 {
     static const float WAY[4][2] = {{1, 0}, {-1, 0}, {0, 1}, {0, -1}};
-    const camera_state *const now = &t->camera[c];
-    if (!now->features.has_image || !(now->turn_sd + now->place_sd > 0.0f))
-        return;
     likelihood_scratch *const w = &t->work[0];
+    float const scale = t->camera[c].features.map.scale;
     sample const s = draw_sample(t, c);
     particle_block_bodies(layout_at(t, s.index[0]), &s.states, &w->body);
     kin_points(t->model, &w->body, w->points);
     float at[2] = {0.0f, 0.0f}, best = score(t, c, &s, 0.0f, 0.0f);
-    for (float step = s.sd; step * now->features.map.scale > FINEST;) {
+    for (float step = s.sd; step * scale > FINEST;) {
         float const from[2] = {at[0], at[1]};
         for (int32_t k = 0; k < 4; k++) {
             float const u = from[0] + step * WAY[k][0], v = from[1] + step * WAY[k][1],
@@ -83,6 +81,20 @@ void pose_error_correct(gait_tracker *t, int32_t c)
     }
     t->cfg.camera[c].cx += at[0];
     t->cfg.camera[c].cy += at[1];
+}
+
+void pose_error_correct(gait_tracker *t)
+{
+    bool ready = false;
+    for (int32_t c = 0; c < t->cfg.cameras; c++) {
+        const camera_state *const now = &t->camera[c];
+        if (!now->features.has_image || !(now->turn_sd + now->place_sd > 0.0f))
+            continue;
+        if (!ready)
+            likelihood_templates(t);
+        ready = true;
+        correct_camera(t, c);
+    }
 }
 
 double pose_error_variance(const gait_tracker *t, const float at[3])

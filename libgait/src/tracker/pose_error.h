@@ -6,8 +6,9 @@
 #define GAIT_TRACKER_POSE_ERROR_H
 #include "tracker/tracker_state.h"
 
-/* Move the principal point of camera c by the most probable shift, given its pose's standard deviations; not if they are 0. */
-void pose_error_correct(gait_tracker *t, int32_t c);
+/* Before the likelihood step: move the principal point of each camera by the most probable shift, given the standard
+ * deviations of its pose; not if they are 0. */
+void pose_error_correct(gait_tracker *t);
 
 /* Variance that the poses add to each coordinate of a place in the world, of the camera that knows it best; square
  * metres. */

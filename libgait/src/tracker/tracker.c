@@ -10,6 +10,7 @@
 #include "tracker/hypotheses.h"
 #include "tracker/left_right.h"
 #include "tracker/likelihood_step.h"
+#include "tracker/pose_error.h"
 #include "tracker/track_loss.h"
 #include "tracker/walk_check.h"
 
@@ -350,6 +351,7 @@ void tracker_step(gait_tracker *t, const gait_frame *frame, gait_estimate *out)
     /* Features, likelihood and weights. */
     particle_state const place = particle_set_place(&t->particles, t->filter.weight);
     bool const has_image = features_step(t, frame, &place) > 0;
+    pose_error_correct(t);
     likelihood_step(t); /* without an image: only the joints */
     if (has_image)
         track_loss_bound(t);
