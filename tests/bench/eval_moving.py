@@ -85,11 +85,11 @@ def main() -> int:
     title = "Cameras that move"
     note = (
         f"{facts('make eval-moving ARGS=--record')}\n\nSimulated walks of {args.frames} frames, seeds "
-        f"{args.seeds}, {SIZE[0]} x {SIZE[1]}, from an init file, no detector. root, abs: medians over clips of the "
-        "median over frames, and the extremes. to still: against a still camera of that view. noisy: "
-        f"errors of {np.degrees(TURN_SD):.1f} degrees and {100 * PLACE_SD:.0f} cm, drawn anew for each "
-        "frame; sd not given: without standard deviations in the file. follow: a robot 1 m behind. "
-        "lost: frames with the status lost."
+        f"{args.seeds}, {SIZE[0]} x {SIZE[1]}, from an init file, no detector. root, abs: medians over "
+        "clips of the median over frames, and the extremes. to still: against a still camera of that "
+        f"view. noisy: errors of {np.degrees(TURN_SD):.1f} degrees and {100 * PLACE_SD:.0f} cm, drawn anew "
+        "for each frame; sd not given: without standard deviations in the file. follow: a robot 1 m "
+        "behind. lost: frames with the status lost."
     )
     (table.publish if args.record else _show)("moving", title, head, rows, note)
     return int(missed)

@@ -14,7 +14,9 @@ from scipy.spatial.transform import Rotation
 
 from gait.bindings.abi import Flag
 from gait.bindings.config import TrackerConfig
-from gait.camera.path import CameraPose
+from gait.camera.path import CameraPose, write_path
+from gait.cli import main
+from gait.lcm.link import gaitmsg
 from gait.lcm.messages import camera_message, image_message
 from gait.track.tracker import Tracker
 
@@ -99,6 +101,20 @@ def test_equal_poses_give_the_bits_of_a_still_camera(tmp_path):
     ]
     log = rig.write_log(tmp_path / "a.log", [*rig.opening(), *events])
     assert rig.play(log, "--moving-camera").digest == rig.play(log).digest
+
+
+def test_capture_announces_the_pose_of_each_frame(tmp_path):
+    folder = rig.write_clip(tmp_path, 4)
+    poses = [CameraPose(camera_at(i).R, camera_at(i).t) for i in range(4)]
+    write_path(folder / "poses.csv", [i / rig.FPS for i in range(4)], poses, by_frame=False)
+    words = ["capture", folder / "video.mp4", "--camera", folder / "camera.json", "--rate", "max"]
+    words += ["--camera-path", folder / "poses.csv", "--url", f"file://{folder}/a.log?mode=w", "--quiet"]
+    assert main([str(word) for word in words]) == 0
+    sent = rig.read_log(folder / "a.log", "GAIT_CAMERA_0", gaitmsg.camera_t)[-4:]
+    images = rig.read_log(folder / "a.log", "GAIT_IMAGE_0", gaitmsg.image_t)
+    assert [one.utime for one in sent] == [one.utime for one in images]
+    assert [one.t for one in sent] == [pytest.approx(pose.t.tolist()) for pose in poses]
+    assert main([*map(str, words), "--loop"]) == 2
 
 
 @pytest.mark.parametrize(

@@ -32,6 +32,7 @@ from gait.progress import note, progress
 
 if TYPE_CHECKING:
     from gait.bindings.initial import Start
+    from gait.camera.camera import Camera
     from gait.io.video import Frame
     from gait.lcm.capture import DeviceSource, FileSource, Pacer, Publisher, Setup
 
@@ -53,6 +54,11 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         help="file that FFmpeg reads, or camera: 0, /dev/video0, rtsp://..., http://...",
     )
     values.add_camera(parser, ", to announce", scale=True)
+    add(
+        "--camera-path",
+        metavar="POSES.csv",
+        help="of a file: poses of a camera that moves, announced with the frames (gait-trackd --moving-camera)",
+    )
     values.add_clip(parser, "send", init="none", background="none")
     parser.set_defaults(init=None, start=0)
     values.add_model(parser, "model whose prior fills in what --init leaves open")
@@ -105,7 +111,9 @@ def _require_sense(args: argparse.Namespace, url: str) -> None:
         return
     if args.wait > 0:
         raise UsageError(f"--wait: no tracker listens to the log {url}; leave it out")
-    require_unread(log_of(url)[0], (args.source, args.camera, args.background, args.init, args.model))
+    require_unread(
+        log_of(url)[0], (args.source, args.camera, args.camera_path, args.background, args.init, args.model)
+    )
 
 
 def _send(
@@ -163,8 +171,10 @@ def _setup(args: argparse.Namespace, source: FileSource | DeviceSource) -> Setup
     from gait.lcm.capture import DeviceSource, FileSource, Setup
 
     setup = Setup(stream=args.stream, jpeg=args.jpeg)
-    if args.camera:
+    if args.camera and not args.camera_path:
         setup.camera = Camera.read(args.camera, source.size, args.scale_camera)
+    if args.camera_path:
+        setup.camera, setup.cameras = _moving(args, source)
     if isinstance(source, DeviceSource):
         setup.plate = None if args.background == "none" else read_plate(args.background, source.size)
     else:
@@ -185,6 +195,29 @@ def _setup(args: argparse.Namespace, source: FileSource | DeviceSource) -> Setup
     if args.grey and setup.plate is not None and setup.plate.ndim == 3:
         setup.plate = np.asarray(cv2.cvtColor(setup.plate, cv2.COLOR_BGR2GRAY), np.uint8)
     return setup
+
+
+def _moving(args: argparse.Namespace, source: FileSource | DeviceSource) -> tuple[Camera, dict[int, Camera]]:
+    """Camera of the first frame, and of each, of one that moves."""
+    from gait.camera.camera import read_camera
+    from gait.camera.path import CameraPath
+    from gait.lcm.capture import FileSource
+
+    if not args.camera or not isinstance(source, FileSource) or args.loop or args.init == "auto":
+        raise UsageError(
+            "--camera-path: needs --camera, the lens, and a file, without --loop and --init auto"
+        )
+    if args.background != "none":
+        raise UsageError(
+            "--camera-path: the empty scene of a camera that moves is not sent; --background none"
+        )
+    frames = source.video.span(args.start, args.stop)
+    lens = read_camera(args.camera, source.size, placed=False, scale=args.scale_camera)
+    poses = CameraPath.read(args.camera_path).at_times(
+        source.video.times[frames.start : frames.stop], frames.start
+    )
+    found = {number: pose.camera(lens) for number, pose in zip(frames, poses, strict=True)}
+    return found[frames.start], found
 
 
 def _start(args: argparse.Namespace, source: FileSource | DeviceSource, setup: Setup) -> Start:

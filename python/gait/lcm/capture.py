@@ -5,9 +5,9 @@ from __future__ import annotations
 import queue
 import threading
 import time
-from collections.abc import Callable, Iterable, Iterator
+from collections.abc import Callable, Iterable, Iterator, Mapping
 from contextlib import AbstractContextManager, nullcontext
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from functools import partial
 from pathlib import Path
 from typing import Any, TypeVar
@@ -245,6 +245,8 @@ class Setup:
     stream : int
         Number of the camera.
     camera : Camera or None
+    cameras : mapping of int to Camera
+        Of each frame, by its number, if the camera moves.
     plate : image or None
         Empty scene.
     start : Start or None
@@ -257,6 +259,7 @@ class Setup:
 
     stream: int = 0
     camera: Camera | None = None
+    cameras: Mapping[int, Camera] = field(default_factory=dict)
     plate: Image | None = None
     start: Start | None = None
     start_time: float = 0.0
@@ -331,12 +334,14 @@ class Publisher:
         """
         channel = f"GAIT_IMAGE_{self._setup.stream}"
         for number, seconds, data in ahead(self._encoded(frames, pacer), _AHEAD):
-            if seconds - self._announced >= ANNOUNCE:
+            if seconds - self._announced >= ANNOUNCE and not self._setup.cameras:
                 self._announced = seconds
                 with whole():
                     self.announce(pacer.utime(seconds))
             pacer.wait(seconds)
             with whole():
+                if number in self._setup.cameras:
+                    self._send_camera(self._setup.cameras[number], pacer.utime(seconds))
                 self._out.publish(channel, data)
                 self.sent += 1
             done(number)
@@ -351,9 +356,12 @@ class Publisher:
         """Send calibration and empty scene, as far as they are known."""
         stream, setup = self._setup.stream, self._setup
         if setup.camera is not None:
-            self._out.publish(f"GAIT_CAMERA_{stream}", camera_message(setup.camera, utime).encode())
+            self._send_camera(setup.camera, utime)
         if setup.plate is not None:
             self._out.publish(f"GAIT_BACKGROUND_{stream}", image_message(setup.plate, utime, -1).encode())
+
+    def _send_camera(self, camera: Camera, utime: int) -> None:
+        self._out.publish(f"GAIT_CAMERA_{self._setup.stream}", camera_message(camera, utime).encode())
 
     def _send_start(self, utime: int) -> int:
         """Send START for capture time `utime`; return its id."""
