@@ -122,7 +122,7 @@ def noisy(folder: Path, seed: int) -> None:
 
 def measured(folder: Path, arm: str, **more: str | None) -> tuple[float, float, int]:
     """Track a clip: median root and absolute error, mm, and the frames lost."""
-    output = folder / f"{arm.replace(', ', '-').replace(' ', '-')}.csv"
+    output = folder / f"track-{arm.replace(', ', '-').replace(' ', '-')}.csv"
     if more.get("camera_path"):
         more["camera_path"] = str(folder / str(more["camera_path"]))
     camera, init = str(folder / "camera.json"), str(folder / "init.json")

@@ -119,6 +119,7 @@ static void place_camera(gait_tracker *t, int32_t c, const gait_camera_pose *pos
     s->moved = memcmp(cam, home, sizeof *cam) != 0;
     s->turn_sd = pose ? pose->turn_sd : 0.0f;
     s->place_sd = pose ? pose->place_sd : 0.0f;
+    s->shift_sd = 0.0f;
 }
 
 int32_t features_step(gait_tracker *t, const gait_frame *frame, const particle_state *predicted)

@@ -1,4 +1,5 @@
 #include "tracker/likelihood_step.h"
+#include "image/camera.h"
 #include "likelihood/likelihood.h"
 #include <string.h>
 
@@ -34,6 +35,47 @@ like_body likelihood_body(const gait_tracker *t, int32_t c, int32_t hypothesis, 
     return b;
 }
 
+/* ---- bodies before a camera whose pose is uncertain ---- */
+typedef struct alignment {
+    float by[3][BLOCK],
+        nats[BLOCK]; /* metres, world; log-likelihood of the error of the pose that it takes */
+} alignment;
+
+/* Displacement of each body of the block, across the view, to where the person appears: the error of the pose that is
+ * most probable for it.  Nothing where the pose is exact. */
+static bool align(const gait_tracker *t, int32_t c, const likelihood_scratch *w, alignment *a)
+{
+    const camera_state *const s = &t->camera[c];
+    const gait_camera *const cam = &t->cfg.camera[c];
+    if (s->shift_sd == 0.0f)
+        return false;
+    memset(a, 0, sizeof *a);
+    for (int32_t i = 0; i < BLOCK; i++) {
+        float const pelvis[3] = {w->points[0][0][i], w->points[0][1][i], w->points[0][2][i]};
+        float uv[2];
+        float const depth = camera_project(cam, pelvis, uv);
+        if (!(depth > CAMERA_NEAR))
+            continue;
+        float const du = s->aim[0] + cam->cx - t->home[c].cx - uv[0],
+                    dv = s->aim[1] + cam->cy - t->home[c].cy - uv[1];
+        float const u = du + cam->cx - t->home[c].cx, v = dv + cam->cy - t->home[c].cy;
+        a->nats[i] = -0.5f * (u * u + v * v) / (s->shift_sd * s->shift_sd);
+        for (int32_t k = 0; k < 3; k++)
+            a->by[k][i] = depth * (du / cam->fx * cam->R[k] + dv / cam->fy * cam->R[3 + k]);
+    }
+    return true;
+}
+
+static void displace(const gait_tracker *t, const alignment *a, float sign, likelihood_scratch *w)
+{
+    for (int32_t f = 0; f < t->model->frames + t->model->points; f++)
+        for (int32_t k = 0; k < 3; k++) {
+            float *const to = f < t->model->frames ? w->body.o[f][k] : w->points[f - t->model->frames][k];
+            for (int32_t i = 0; i < BLOCK; i++)
+                to[i] += sign * a->by[k][i];
+        }
+}
+
 /* ---- particles ---- */
 /* The terms of particle i, which is in a lane of the projected block.  samples: receives its surface samples. */
 static like_body evaluate(const gait_tracker *t, int32_t c, int32_t i, int32_t lane, likelihood_scratch *w,
@@ -60,23 +102,38 @@ void likelihood_particles(gait_tracker *t, int32_t c, const int32_t *index, int3
                           likelihood_scratch *w, float nats[BLOCK])
 {
     like_patch samples[MODEL_MAX_LIMBS];
+    alignment a;
+    bool const aligned = align(t, c, w, &a);
+    if (aligned)
+        displace(t, &a, 1.0f, w);
     likelihood_outline(t, c, w);
     memset(&w->terms, 0, sizeof w->terms);
     for (int32_t lane = 0; lane < lanes; lane++)
         (void)evaluate(t, c, index[lane], lane, w, samples);
     like_sum(t->like, w->outline, t->core->sampled_cameras >> c & 1u, &w->terms, nats);
+    if (aligned)
+        displace(t, &a, -1.0f, w);
+    for (int32_t lane = 0; lane < lanes && aligned; lane++)
+        nats[lane] += a.nats[lane];
 }
 
 static void block_in_camera(gait_tracker *t, int32_t c, int32_t begin, int32_t lanes, likelihood_scratch *w)
 {
     float nats[BLOCK];
+    alignment a;
+    bool const aligned = align(t, c, w, &a);
+    if (aligned)
+        displace(t, &a, 1.0f, w);
     likelihood_outline(t, c, w);
     if (lanes < BLOCK) /* empty lanes are summed too, though the sums are not used: let them be defined */
         memset(&w->terms, 0, sizeof w->terms);
     for (int32_t lane = 0; lane < lanes; lane++)
         particle_in_camera(t, c, begin + lane, lane, w);
     like_sum(t->like, w->outline, t->core->sampled_cameras >> c & 1u, &w->terms, nats);
+    if (aligned)
+        displace(t, &a, -1.0f, w);
     for (int32_t lane = 0; lane < lanes; lane++) {
+        nats[lane] += aligned ? a.nats[lane] : 0.0f;
         t->loglik_raw[begin + lane] += nats[lane];
         if (t->core->hypotheses.stage == HYPOTHESES_TWO)
             t->loglik_without_silhouette[begin + lane] += nats[lane] - w->terms.nats[LIKE_SILHOUETTE][lane];

@@ -9,10 +9,9 @@ static const float FINEST = 0.5f; /* working pixels: last step of the search */
 typedef struct sample { /* a block of particles, spread over those of one class */
     int32_t lanes, index[BLOCK];
     particle_block states;
-    float sd; /* of the shift, pixels */
 } sample;
 
-static sample draw_sample(const gait_tracker *t, int32_t c)
+static sample draw_sample(const gait_tracker *t)
 {
     int32_t const best = pf_heaviest(&t->filter);
     sample s;
@@ -28,14 +27,30 @@ static sample draw_sample(const gait_tracker *t, int32_t c)
         s.index[i] = first + (int32_t)((int64_t)(end - first) * i / s.lanes);
     s.index[0] = best;
     particle_block_get(&t->particles, s.index, s.lanes, &s.states);
-    const gait_camera *const cam = &t->cfg.camera[c];
-    const camera_state *const now = &t->camera[c];
-    float to[3];
-    camera_to(cam, (const float[3]){s.states.f[F_X][0], s.states.f[F_Y][0], s.states.f[F_Z][0]}, to);
-    float const square = to[0] * to[0] + to[1] * to[1] + to[2] * to[2];
-    s.sd = f_max(cam->fx, cam->fy) * __builtin_sqrtf(now->turn_sd * now->turn_sd +
-                                                     now->place_sd * now->place_sd / f_max(square, 0.01f));
     return s;
+}
+
+/* Where the sample's pelvises are in the image, and how far an error of the pose shifts it; false: behind the camera. */
+static bool aim(const gait_tracker *t, camera_state *now, const gait_camera *cam, const sample *s)
+{
+    float uv[2], middle[3] = {0.0f}, sum = 0.0f;
+    for (int32_t i = 0; i < s->lanes; i++) {
+        float const weight = (float)t->filter.weight[s->index[i]];
+        for (int32_t k = 0; k < 3; k++)
+            middle[k] += weight * t->work[0].points[0][k][i];
+        sum += weight;
+    }
+    for (int32_t k = 0; k < 3; k++)
+        middle[k] /= f_max(sum, 1e-30f);
+    float const depth = camera_project(cam, middle, uv);
+    if (!(sum > 0.0f && depth > CAMERA_NEAR))
+        return false;
+    now->aim[0] = uv[0];
+    now->aim[1] = uv[1];
+    now->shift_sd =
+        f_max(cam->fx, cam->fy) *
+        __builtin_sqrtf(now->turn_sd * now->turn_sd + now->place_sd * now->place_sd / (depth * depth));
+    return true;
 }
 
 /* Log probability of a shift, pixels, up to a constant. */
@@ -53,7 +68,7 @@ static float score(gait_tracker *t, int32_t c, const sample *s, float du, float 
         top = f_max(top, nats[i]);
     for (int32_t i = 0; i < s->lanes; i++)
         sum += (float)t->filter.weight[s->index[i]] * m_exp(f_max(nats[i] - top, -80.0f));
-    return top + m_log(f_max(sum, 1e-30f)) - 0.5f * (du * du + dv * dv) / (s->sd * s->sd);
+    return top + m_log(f_max(sum, 1e-30f));
 }
 
 static void correct_camera(gait_tracker *t, int32_t c)
@@ -61,11 +76,13 @@ static void correct_camera(gait_tracker *t, int32_t c)
     static const float WAY[4][2] = {{1, 0}, {-1, 0}, {0, 1}, {0, -1}};
     likelihood_scratch *const w = &t->work[0];
     float const scale = t->camera[c].features.map.scale;
-    sample const s = draw_sample(t, c);
+    sample const s = draw_sample(t);
     particle_block_bodies(layout_at(t, s.index[0]), &s.states, &w->body);
     kin_points(t->model, &w->body, w->points);
+    if (!aim(t, &t->camera[c], &t->cfg.camera[c], &s))
+        return;
     float at[2] = {0.0f, 0.0f}, best = score(t, c, &s, 0.0f, 0.0f);
-    for (float step = s.sd; step * scale > FINEST;) {
+    for (float step = t->camera[c].shift_sd; step * scale > FINEST;) {
         float const from[2] = {at[0], at[1]};
         for (int32_t k = 0; k < 4; k++) {
             float const u = from[0] + step * WAY[k][0], v = from[1] + step * WAY[k][1],

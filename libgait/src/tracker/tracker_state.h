@@ -82,6 +82,8 @@ typedef struct camera_state {
     bool plate_stale;
     bool moved;              /* in this frame the camera is not where the config puts it */
     float turn_sd, place_sd; /* of its pose: radians, metres */
+    float shift_sd;          /* of the image by an error of its pose, pixels; 0: none */
+    float aim[2];            /* with one: where the predicted pelvis is before that shift, ideal pixels */
 } camera_state;
 
 typedef struct likelihood_scratch { /* one per task; its arrays are as long as the model's limbs and points */

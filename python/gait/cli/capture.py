@@ -57,7 +57,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     add(
         "--camera-path",
         metavar="POSES.csv",
-        help="of a file: poses of a camera that moves, announced with the frames (gait-trackd --moving-camera)",
+        help="of a file: poses of a camera that moves, sent with the frames for gait-trackd --moving-camera",
     )
     values.add_clip(parser, "send", init="none", background="none")
     parser.set_defaults(init=None, start=0)
