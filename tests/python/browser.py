@@ -1,6 +1,7 @@
 """Pages in a real Chromium, driven by playwright; tests that use it are skipped where either is absent."""
 
 import contextlib
+import functools
 import shutil
 import sys
 import time
@@ -9,7 +10,6 @@ from pathlib import Path
 import pytest
 
 FETCHED = Path(sys.prefix) / "share/gait/web"
-SERIOUS = ("serious", "critical")
 
 
 def chromium():
@@ -22,25 +22,40 @@ def chromium():
     return path, pytest.importorskip("playwright.sync_api", reason="no playwright").sync_playwright
 
 
-@contextlib.contextmanager
-def opened(width=1280, height=720, dark=False, strict=True):
-    """A page of a headless Chromium; errors of its scripts and, if `strict`, of its console fail the test."""
+@functools.cache
+def _launched():
+    """Playwright and a headless Chromium, for all pages of a file of tests."""
     path, start = chromium()
     options = ["--no-sandbox", "--use-angle=swiftshader", "--enable-unsafe-swiftshader"]
-    with start() as playwright:
-        browser = playwright.chromium.launch(executable_path=path, args=options)
-        page = browser.new_page(
-            viewport={"width": width, "height": height}, color_scheme="dark" if dark else "light"
-        )
-        faults = []
-        page.on("pageerror", lambda error: faults.append(str(error)))
-        page.on("console", lambda text: faults.append(text.text) if text.type == "error" else None)
-        page.set_default_timeout(20000)
-        try:
-            yield page
-        finally:
-            browser.close()
-        assert not (strict and faults), faults
+    playwright = start().start()
+    return playwright, playwright.chromium.launch(executable_path=path, args=options)
+
+
+def end():
+    """Close the Chromium, if there is one."""
+    if _launched.cache_info().currsize:
+        playwright, browser = _launched()
+        browser.close()
+        playwright.stop()
+        _launched.cache_clear()
+
+
+@contextlib.contextmanager
+def opened(width=1280, height=720, dark=False, strict=True):
+    """A page apart from others; errors of its scripts and, if `strict`, of its console fail the test."""
+    _, browser = _launched()
+    page = browser.new_page(
+        viewport={"width": width, "height": height}, color_scheme="dark" if dark else "light"
+    )
+    faults = []
+    page.on("pageerror", lambda error: faults.append(str(error)))
+    page.on("console", lambda text: faults.append(text.text) if text.type == "error" else None)
+    page.set_default_timeout(20000)
+    try:
+        yield page
+    finally:
+        page.close()
+    assert not (strict and faults), faults
 
 
 def until(page, expression, seconds=60):

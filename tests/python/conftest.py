@@ -37,6 +37,14 @@ def pytest_collection_modifyitems(items):
     items.sort(key=lambda item: item.path.name not in FIRST)
 
 
+@pytest.fixture(scope="module", autouse=True)
+def _chromium_ends():
+    """A file's tests share one Chromium (browser.py)."""
+    yield
+    if "browser" in sys.modules:
+        sys.modules["browser"].end()
+
+
 def _cpu():
     """Processor time of this process and of its children that ended, seconds."""
     used = [resource.getrusage(who) for who in (resource.RUSAGE_SELF, resource.RUSAGE_CHILDREN)]

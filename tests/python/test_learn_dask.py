@@ -137,15 +137,16 @@ def test_a_worker_with_other_kernels_is_refused_with_the_remedy(walks, scheduler
 
 def test_the_remedy_gives_the_model_of_the_command_line(walks, tmp_path):
     dask = [sys.executable, "-m", "distributed.cli.dask_worker", "--preload-nanny", "gait.reproducible"]
-    learn = [sys.executable, "-m", "gait", "learn", walks, "--components", "2", "--quiet", "-o"]
+    learn = ["learn", str(walks), "--components", "2", "--quiet", "-o"]
+    program = [sys.executable, "-m", "gait", *learn, tmp_path / "dask.gait"]
     with distributed.LocalCluster(n_workers=0, dashboard_address=None, silence_logs=50) as local:
         worker = subprocess.Popen([*dask, local.scheduler_address], stderr=subprocess.DEVNULL)
         try:
             with distributed.Client(local, set_as_default=False) as client:
                 client.wait_for_workers(1, timeout=60)
-            subprocess.run([*learn, tmp_path / "dask.gait", "--dask", local.scheduler_address], check=True)
+            subprocess.run([*program, "--dask", local.scheduler_address], check=True)
         finally:
             worker.terminate()
             worker.wait(30)
-    subprocess.run([*learn, tmp_path / "alone.gait"], check=True)
+    assert gait.cli.main([*learn, str(tmp_path / "alone.gait")]) == 0
     assert (tmp_path / "dask.gait").read_bytes() == (tmp_path / "alone.gait").read_bytes()

@@ -291,7 +291,7 @@ def test_a_full_disk_is_one_line_with_its_remedy(walks, monkeypatch):
 
 STATUS = Path("/proc/self/status")
 MOST = 0.05  # MB per cycle; a cycle's values alone are 0.03 MB, and they are used in a dozen ways
-COPIES = 30, 60  # of six recordings: enough cycles for the components' fixed memory to be in use
+COPIES = 18, 36  # of six recordings: enough cycles for the components' fixed memory to be in use
 
 CHILD = """
 import json, sys
