@@ -118,9 +118,8 @@ def _error(walk: lift_people.Walk, observed: Keypoints, places: Floats, rows: sl
 def undo_swaps(walk: lift_people.Walk, tracks: Keypoints) -> Keypoints:
     """Keypoints with sides put back as by gait lift."""
     view, options = Perspective(walk.camera), Options(pixel_sd=lift_tracks.NOISE)
-    return swaps.undo_swaps(
-        tracks, options.pixel_sd, lambda part: motion.evidence(walk.prior, part, view, options)
-    )[0]
+    evidence = motion.Evidence(walk.prior, tracks.names, view, options)
+    return swaps.undo_swaps(tracks, options.pixel_sd, evidence)[0]
 
 
 def swapped(tracks: Keypoints, joints: tuple[str, ...], begin: int, end: int) -> Keypoints:

@@ -7,7 +7,7 @@ import pytest
 
 from gait.io.keypoints_file import Keypoints
 from gait.lift.keypoints import swaps
-from gait.lift.keypoints.swaps import CLEAR, undo_swaps
+from gait.lift.keypoints.swaps import CLEAR, Reading, undo_swaps
 
 NAMES = ("pelvis", "l_knee", "r_knee", "l_ankle", "r_ankle")
 LEFT, RIGHT = [1, 3], [2, 4]
@@ -31,11 +31,11 @@ def places(time):
     return np.stack([u, v + np.zeros_like(u)], axis=2)
 
 
-def model(keypoints):
+def model(keypoints, near=None):
     """Log density of keypoints by one who knows how these legs swing, and where they then are."""
     expected = places(keypoints.time)
     square = ((keypoints.uv - expected) ** 2).sum(axis=2) / NOISE**2
-    return -0.5 * float(np.nansum(np.minimum(square, 50))), expected
+    return Reading(-0.5 * float(np.nansum(np.minimum(square, 50))), expected)
 
 
 def swapped(keypoints, first, last, left=LEFT, right=RIGHT):
@@ -96,7 +96,7 @@ def test_outliers_do_not_hide_a_swap():
 def test_the_motion_decides():
     """What goes on better swapped stays where the motion does not fit better for it."""
     spoilt = swapped(walking(), 30, 50)
-    back, found = undo_swaps(spoilt, NOISE, lambda keypoints: (0.0, keypoints.uv))
+    back, found = undo_swaps(spoilt, NOISE, lambda keypoints, near: Reading(0.0, keypoints.uv))
     assert found == []
     np.testing.assert_array_equal(back.uv, spoilt.uv)
 
@@ -105,7 +105,7 @@ def test_what_the_motion_explains_no_better_is_not_tried():
     """The motion is fitted with and without the proposal; nothing else may gain."""
     tried = []
 
-    def counted(keypoints):
+    def counted(keypoints, near):
         tried.append(keypoints)
         return model(keypoints)
 
@@ -121,9 +121,9 @@ def test_what_fits_hardly_better_stays():
     for nats, put in ((0.7 * 2 * CLEAR, False), (1.5 * 2 * CLEAR, True)):
         share = nats / gain
 
-        def scaled(keypoints, share=share):
-            density, expected = model(keypoints)
-            return share * density, expected
+        def scaled(keypoints, near, share=share):
+            found = model(keypoints)
+            return found._replace(density=share * found.density)
 
         _, found = undo_swaps(spoilt, NOISE, scaled)
         assert bool(found) == put
@@ -178,7 +178,7 @@ def test_a_point_whose_partner_is_missing_goes_with_its_limb():
 def test_an_interval_is_judged_by_its_surroundings_without_outliers():
     keypoints, parts = walking(), []
     keypoints.uv[33, 0] += 300
-    undo_swaps(swapped(keypoints, 30, 40), NOISE, lambda part: parts.append(part) or model(part))
+    undo_swaps(swapped(keypoints, 30, 40), NOISE, lambda part, near: parts.append(part) or model(part))
     assert parts
     for part in parts:
         assert part.frame[0] == 7 and abs(int(part.frame[-1]) - (40 + 30 + 7)) <= 1  # a second more

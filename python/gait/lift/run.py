@@ -273,10 +273,11 @@ def _without_swaps(
     with _naming(path):
         motion.require(prior, keypoints, view, options)
     with one_thread(), progress("sides", len(keypoints.time), quiet) as update:
+        model = motion.Evidence(prior, keypoints.names, view, options)
 
-        def evidence(part: Keypoints) -> tuple[float, swaps.Floats]:
+        def evidence(part: Keypoints, near: swaps.Reading | None) -> swaps.Reading:
             update(int(np.searchsorted(keypoints.frame, part.frame[0])))
-            return motion.evidence(prior, part, view, options)
+            return model(part, near)
 
         found, swapped = swaps.undo_swaps(keypoints, options.pixel_sd, evidence)
     if swapped:

@@ -6,6 +6,7 @@ start is fitted with that camera to a second of the walk.
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -32,6 +33,7 @@ _TILT, _TILT_SD, _ROLL_SD = 0.05, 0.2, 0.02  # radians
 _STICK_SD = 0.025  # of the height, of hips over ankles as an upright stick
 _STARTS = (0.6, 0.85, 1.2, 2.2, 4.0)  # focal lengths to start from, longer sides of the picture
 _LONGEST = 12.0  # seconds of a walk that are used
+_LEVEL_STEPS, _SETTLED = 30, 1e-9  # of the fit of sticks, and relative change of its cost that ends it
 _RATE = 10.0  # frames per second that are used
 
 
@@ -166,8 +168,21 @@ def _level(q: Array, keypoints: Keypoints, size: tuple[int, int], height: float,
             [off / _STICK_SD / np.sqrt(len(off)) * 3, (p - prior.mean[[1, 3]]) / prior.sd[[1, 3]]]
         )
 
-    from scipy.optimize import least_squares  # here, as it takes a second to load
-
-    starts = [least_squares(residuals, [tilt, np.log(_HEIGHT)]) for tilt in (0.05, 0.4)]
-    q[1], q[3] = min(starts, key=lambda fit: float(fit.cost)).x
+    starts = [_descent(residuals, np.array([tilt, np.log(_HEIGHT)])) for tilt in (0.05, 0.4)]
+    q[1], q[3] = min(starts, key=lambda p: float(np.sum(residuals(p) ** 2)))
     return q
+
+
+def _descent(residuals: Callable[[Array], Array], p: Array) -> Array:
+    """Least squares from `p` by Levenberg and Marquardt; SciPy's takes longer to load than this to run."""
+    cost, damping, h = float(np.sum(residuals(p) ** 2)), 1e-3, 1e-6
+    for _ in range(_LEVEL_STEPS):
+        here = residuals(p)
+        slope = np.stack([(residuals(p + h * axis) - here) / h for axis in np.eye(len(p))], axis=1)
+        matrix = slope.T @ slope
+        step = np.linalg.solve(matrix + damping * np.diag(np.diag(matrix)), -slope.T @ here)
+        now = float(np.sum(residuals(p + step) ** 2))
+        if abs(cost - now) <= _SETTLED * cost:
+            break
+        p, cost, damping = (p + step, now, 0.2 * damping) if now < cost else (p, cost, 6.0 * damping)
+    return p

@@ -16,6 +16,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass, replace
+from typing import Any, NamedTuple
 
 import numpy as np
 import numpy.typing as npt
@@ -201,8 +202,27 @@ NEAR = 0.5  # seconds between intervals that are judged as one
 LIMBS = (("hip", "knee", "ankle", "heel", "toe"), ("shoulder", "elbow", "wrist", "hand"))
 CLEAR = 9.0  # log-evidence that an swap must gain, each pair
 
-#: Log density of keypoints by the model of motion, and where it expects them (T, P, 2).
-Evidence = Callable[[Keypoints], tuple[float, Floats]]
+
+class Reading(NamedTuple):
+    """Keypoints as a model of motion reads them.
+
+    Attributes
+    ----------
+    density : float
+        Logarithm, but for a constant.
+    predicted : (T, P, 2)
+        Where the motion has the points, pixels.
+    motion : object
+        For the model to begin with from.
+    """
+
+    density: float
+    predicted: Floats
+    motion: Any = None
+
+
+#: Read keypoints, from scratch or beginning with the motion of a reading that is nearly the same.
+Evidence = Callable[[Keypoints, Reading | None], Reading]
 
 
 @dataclass(frozen=True)
@@ -229,8 +249,7 @@ def undo_swaps(keypoints: Keypoints, sd: float, evidence: Evidence) -> tuple[Key
     sd : float
         Noise of a point at full confidence, pixels.
     evidence : callable
-        Logarithm of the density of some frames of keypoints by a model of the motion, but for a constant, and
-        where that motion has the points.
+        Model of the motion, for some frames of keypoints.
     """
     joints = [
         name[2:] for name in keypoints.names if name.startswith("l_") and f"r_{name[2:]}" in keypoints.names
@@ -325,24 +344,24 @@ def _judged(
     """Take in `own` rows of a proposal (T, P) what the motion confirms: all or nothing, then each limb.
 
     Where something was swapped, other pairs may have been along with it for as long.  What the best motion so
-    far explains no better than before is not tried.
+    far explains no better than before is not tried; what it explains better is fitted beginning with it.
     """
     sds = keypoints.standard_deviations(sd)
 
-    def score(flags: Flags) -> tuple[float, Floats]:
-        density, predicted = evidence(_swapped(keypoints, pairs, flags))
-        return density - CLEAR * int(flags[own].any(axis=0).sum()), predicted
+    def score(flags: Flags, near: Reading | None = None) -> tuple[float, Reading]:
+        found = evidence(_swapped(keypoints, pairs, flags), near)
+        return found.density - CLEAR * int(flags[own].any(axis=0).sum()), found
 
     def cost(flags: Flags) -> float:
-        off = _swapped(keypoints, pairs, flags).uv - predicted
+        off = _swapped(keypoints, pairs, flags).uv - motion.predicted
         return float(np.nansum(np.minimum(0.5 * (off**2).sum(axis=2) / sds**2, CAP)))
 
     best = wrong.copy()
     best[own] = False
-    most, predicted = score(best)
+    most, motion = score(best)
     proposed = score(wrong)
     if proposed[0] > most:
-        best, (most, predicted) = wrong.copy(), proposed
+        best, (most, motion) = wrong.copy(), proposed
     for limb in _limbs(keypoints, pairs):
         for flags in _others(best[own], wrong[own], observed[own], limb):
             other = best.copy()
@@ -351,9 +370,9 @@ def _judged(
                 continue
             if best.any() and not cost(other) < cost(best):
                 continue
-            changed = score(other)
+            changed = score(other, motion if best.any() else None)
             if changed[0] > most:
-                best, (most, predicted) = other, changed
+                best, (most, motion) = other, changed
     return best
 
 

@@ -111,9 +111,20 @@ class SegmentLifter:
         viewed_by = view.camera if isinstance(view, Perspective) else view.axes[:2]
         self._prior, self._latent, self._place = prior, prior.headings == 0, np.zeros(3)
         self._lifter = Lifter(blob.encode(prior.sections()), viewed_by, config)
+        self._known: dict[bytes, tuple[list[Explanation], Floats]] = {}
 
     def explanations(self, observed: Observations) -> list[Explanation]:
-        """Find all explanations of a segment, the most probable first; none if too little is seen."""
+        """Find all explanations of a segment, the most probable first; none if too little is seen.
+
+        A segment that was explained before is not explained again.
+        """
+        shown = observed.uv.tobytes() + observed.sd.tobytes()
+        if shown not in self._known:
+            self._known[shown] = self._explanations(observed), self._place
+        found, self._place = self._known[shown]
+        return found
+
+    def _explanations(self, observed: Observations) -> list[Explanation]:
         if observed.visible.sum() < FEWEST:
             return []
         fit, weighted = self._robust(observed)

@@ -25,6 +25,7 @@ from gait.errors import GaitError, UsageError, UserError
 from gait.io.keypoints_file import Keypoints
 from gait.lift.keypoints.corrections import Pins
 from gait.lift.keypoints.observations import LONGEST_GAP, Grid, Observations, interpolated, resampled
+from gait.lift.keypoints.swaps import Reading
 from gait.lift.segment import explain
 from gait.lift.segment.explain import FEWEST, Explanation, SegmentFit, SegmentLifter, Uncertain
 from gait.lift.segment.view import Parallel, Perspective, View
@@ -241,20 +242,6 @@ def require(prior: SegmentPrior, keypoints: Keypoints, view: View, options: Opti
         require_metres(view.camera, keypoints, prior, believed_stature(options, prior.stature)[0], options)
 
 
-def evidence(prior: SegmentPrior, keypoints: Keypoints, view: View, options: Options) -> tuple[float, Floats]:
-    """Log density of keypoints by the prior and the smoother, but for a constant; -inf if it refuses them.
-
-    Also where the points (T, P, 2) are expected in the picture; NaN if it refuses them.
-    """
-    names = tuple(name for name in prior.names if name in {*keypoints.names, *smoother.HIPS})
-    smooth = replace(options, method="smooth")
-    try:
-        prior = prior.restricted(names)
-        return _evidence(_Sequence(prior, keypoints, view, smooth, Grid.over(keypoints.time, prior)))
-    except UserError:
-        return -np.inf, np.full_like(keypoints.uv, np.nan)
-
-
 def _widest_needed(of: _Sequence) -> Motion:
     """Estimate by the prior, or by a wider one if the keypoints ask for it."""
     best: Motion | None = None
@@ -338,8 +325,15 @@ class _Task:
         )
 
 
-def _task(of: _Sequence, displacements: bool = True) -> _Task:
-    """Estimate each segment alone."""
+def _lifter(prior: SegmentPrior, view: View, options: Options) -> SegmentLifter:
+    """Make what explains segments alone."""
+    stature, stature_sd = believed_stature(options, prior.stature)
+    # a start must not shrink a motion that does not fit: its noise in the picture would grow
+    return SegmentLifter(prior, view, stature, 0.0 if options.method == "smooth" else stature_sd)
+
+
+def _task(of: _Sequence, displacements: bool = True, lifter: SegmentLifter | None = None) -> _Task:
+    """Estimate each segment alone, by `lifter` where it is at hand."""
     prior, keypoints, view, options, grid = of.prior, of.keypoints, of.view, of.options, of.grid
     points = Observations(keypoints.uv, keypoints.errors(options.pixel_sd))
     sampled = resampled(points, keypoints.time, grid.time).among(of.markers, len(prior.names))
@@ -348,14 +342,14 @@ def _task(of: _Sequence, displacements: bool = True) -> _Task:
     if isinstance(view, Parallel):
         lengths = view.lengths(sampled, prior.mean[0].mean(axis=0), stature)
         sampled = view.metric(sampled, lengths)
-    # a start must not shrink a motion that does not fit: its noise in the picture would grow
-    start_sd = 0.0 if options.method == "smooth" else stature_sd
-    lifter = SegmentLifter(prior, view, stature, start_sd)
+    lifter = lifter or _lifter(prior, view, options)
     found = explain.explanations(lifter, prior, sampled, of.update)
     require_visible(found, grid, keypoints, alone=options.method != "smooth")
     course = explain.course(found)
     if options.method == "likelihood":
-        fits = explain.without_prior(prior, view, stature, start_sd, course)
+        fits = explain.without_prior(
+            prior, view, stature, believed_stature(options, prior.stature)[1], course
+        )
     else:
         fits = [lifter.solve(each, displacements) for each in course]
     return _Task(_observed(of), _freedom(of), stature, lengths, fits)
@@ -383,11 +377,40 @@ def _observed(of: _Sequence) -> Observed:
     )
 
 
-@_numbers_in_range()
-def _evidence(of: _Sequence) -> tuple[float, Floats]:
-    """Log density of keypoints by all markers of a prior, and where they are expected."""
-    task = _task(of, displacements=False)
-    return smoother.evidence(of.prior, task.observed, of.view, task.freedom, task.start(of.grid.frames))
+class Evidence:
+    """Log density of keypoints by a prior and the smoother, for keypoints that differ in few frames.
+
+    Parameters
+    ----------
+    names : tuple of str
+        The points.
+    """
+
+    def __init__(self, prior: SegmentPrior, names: tuple[str, ...], view: View, options: Options) -> None:
+        self._view, self._options = view, replace(options, method="smooth")
+        self._prior = prior.restricted(tuple(n for n in prior.names if n in {*names, *smoother.HIPS}))
+        self._lifter = _lifter(self._prior, view, self._options)
+
+    @_numbers_in_range()
+    def _read(self, keypoints: Keypoints, near: Reading | None) -> Reading:
+        grid = Grid.over(keypoints.time, self._prior)
+        of = _Sequence(self._prior, keypoints, self._view, self._options, grid)
+        begun: Start | State
+        if near is not None and near.motion is not None:
+            begun = near.motion
+        else:
+            begun = _task(of, displacements=False, lifter=self._lifter).start(grid.frames)
+        return Reading(*smoother.evidence(self._prior, _observed(of), self._view, _freedom(of), begun))
+
+    def __call__(self, keypoints: Keypoints, near: Reading | None = None) -> Reading:
+        """Read keypoints; -inf and NaN if the smoother refuses them.
+
+        `near`: reading of nearly the same keypoints, whose motion is gone on from.
+        """
+        try:
+            return self._read(keypoints, near)
+        except UserError:
+            return Reading(-np.inf, np.full_like(keypoints.uv, np.nan))
 
 
 @_numbers_in_range()

@@ -168,24 +168,31 @@ def smooth(
 
 
 def evidence(
-    prior: SegmentPrior, observed: Observed, view: View, freedom: Freedom, start: Start
-) -> tuple[float, Floats]:
+    prior: SegmentPrior, observed: Observed, view: View, freedom: Freedom, begun: Start | State
+) -> tuple[float, Floats, State]:
     """Logarithm of the density of what is seen, but for a constant, after the steps without constraints.
+
+    Parameters
+    ----------
+    begun : Start or State
+        First guess, or the motion of nearly the same observations, which needs one more step.
 
     Returns
     -------
     density : float
     predicted : (T, P, 2)
         Where the points are then expected in the picture.
+    state : State
     """
-    problem = Problem(prior, observed, view, freedom, start)
-    state = problem.first(start)
-    for _ in range(FREE_STEPS):
+    problem = Problem(prior, observed, view, freedom, begun)
+    first = isinstance(begun, Start)
+    state = problem.first(begun) if isinstance(begun, Start) else begun
+    for _ in range(FREE_STEPS if first else 1):
         problem.weight(state)
         state = problem.step(state, constrained=False)
     problem.weight(state)
     system = problem.system(state, problem.chain(state), constrained=False)
-    return problem.evidence(system), problem.predicted(state)
+    return problem.evidence(system), problem.predicted(state), state
 
 
 @dataclass(frozen=True)
@@ -245,7 +252,7 @@ class Problem:
         observed: Observed,
         view: View,
         freedom: Freedom,
-        start: Start,
+        start: Start | State,
         contact: bool = False,
         bones: bool = False,
         balance: bool = False,
