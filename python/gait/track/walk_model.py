@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 
 from gait.bindings.model import Model
 from gait.bindings.state import State
-from gait.detect.profile import changing_sd, picture_height
+from gait.detect.profile import changing_sd, load, picture_height
 from gait.io.keypoints_file import Keypoints
 from gait.track.walk_start import STATURE_SD, CameraPrior, make_camera, swap_sides
 
@@ -32,9 +32,8 @@ _REPEATING = {
 }  # fmt: skip
 _REPEATING_ELSEWHERE = 0.007
 _REPEATING_TIME = 0.25
-_OFFSET_SD = 0.008  # of the stature, constant difference between the detector's joints and the model's
+_LEAST_OFFSET_SD = 0.003  # of the stature, constant difference between any detector's joint and the model's
 _LEAN_SD, _SIDE_LEAN_SD, _TRUNK_SD = 0.021, 0.013, 0.040  # radians, as recorded people and walks differ
-_CARRIES = {"elbow": "shoulder", "wrist": "elbow", "knee": "hip", "heel": "ankle", "toe": "ankle"}
 _SLIDE_SD = 0.05  # metres per second, of feet on the floor, along the heading
 _SIDEWAYS_SD = 0.05  # metres per second, of the walk across the heading
 _STILL_SD = 0.03  # metres per second on a treadmill
@@ -49,12 +48,6 @@ def _heavy_tailed(residual: Array) -> Array:
     """Residuals whose squares are Student-t costs: unusual cameras are not pulled to the usual one."""
     root = np.sqrt(_DEGREES * np.log1p(residual**2 / _DEGREES))
     return np.asarray(np.sign(residual) * root)
-
-
-def _limb_above(name: str) -> str:
-    """Joint whose offset a joint shares, empty if none."""
-    side, _, joint = name.partition("_")
-    return f"{side}_{_CARRIES[joint]}" if joint in _CARRIES else ""
 
 
 class WalkingBody:
@@ -91,13 +84,8 @@ class WalkingBody:
         self.parts = len(self.table) - 2  # scores, proportions, leans
         self.rate, self.rate_sd = model.info.stride_hz, model.info.stride_hz_sd
         self.offsets = 3 * len(self.names)  # of the detector's joints: forward, left, up
-        #: (J, J): which offsets (columns) move a joint (row).
-        self.carried = np.eye(len(self.names))
-        for j, name in enumerate(self.names):
-            above = name
-            while above := _limb_above(above):
-                if above in self.names:
-                    self.carried[j, self.names.index(above)] = 1.0
+        lasting = [load("full").joint(name).lasting_sd for name in self.names]
+        self.offset_sd = np.repeat(np.maximum(lasting, _LEAST_OFFSET_SD), 3)  # statures
 
     def _cycle(self, model: Model, state: State) -> Array:
         out = np.empty((self.PHASES, model.info.joints, 3))
@@ -156,7 +144,7 @@ class WalkingBody:
         cycle = np.tensordot(weights[:1, :-1], self.table[:-1], axes=(1, 0))[0]  # parts are constant
         out = cycle[left] * (1 - share) + cycle[(left + 1) % self.PHASES] * share
         out = out + weights[:, -1, None, None] * self.table[-1, left]
-        return np.asarray(out + self.carried @ offsets.reshape(-1, 3))
+        return np.asarray(out + offsets.reshape(-1, 3))
 
     def strides(self, rate: Array, parts: Array) -> Array:
         """Stride lengths, statures."""
@@ -290,7 +278,7 @@ class WalkModel:
             _heavy_tailed((q[:4] - self._prior.mean) / self._prior.sd),
             [q[4] / STATURE_SD],
             parts,
-            offsets / _OFFSET_SD,
+            offsets / self.body.offset_sd,
             *speed,
             (rates - body.rate) / (2 * body.rate_sd) / np.sqrt(len(rates)),
             faster.ravel() / _BEND_SD,
@@ -312,8 +300,7 @@ class WalkModel:
         plain = self.fixed - self.body.offsets
         for k in range(plain):
             yield np.array([k]), np.ones(1)
-        # All offsets move at once, so a joint's change is shared out among those that move it.
-        joints = (self.body.carried / self.body.carried.sum(axis=1, keepdims=True))[:, None]
+        joints = np.eye(len(self.body.names))[:, None]  # each offset moves a joint of its own
         for axis in range(3):
             yield np.arange(plain + axis, self.fixed, 3), joints
         knots = np.arange(len(self.knot_time))
@@ -343,7 +330,7 @@ class WalkModel:
             data[..., columns] = change[..., None] * share
         own = np.arange(self.fixed - self.body.offsets, self.fixed)  # each offset is expected by itself
         prior[:, own] = 0.0
-        prior[own, own] = 1.0 / _OFFSET_SD
+        prior[own, own] = 1.0 / self.body.offset_sd
         for k in np.delete(np.arange(len(q)), own):
             moved = q.copy()
             moved[k] += h
