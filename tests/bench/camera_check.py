@@ -45,8 +45,7 @@ WORDS = {
 
 def main() -> int:
     """Check every clip with every camera and publish; 0 also without the data."""
-    if not eval_clips.DATA.is_dir():
-        print(f"camera_check: {eval_clips.DATA} is not there, left out", file=sys.stderr)
+    if eval_clips.absent():
         return 0
     folders = [eval_clips.DATA / "eval" / "dev", eval_clips.DATA / "real"]
     clips = [c for folder in folders for c in sorted(folder.iterdir()) if (c / "camera.json").is_file()]

@@ -40,8 +40,7 @@ HIPS = [EVAL15.index("l_hip"), EVAL15.index("r_hip")]
 
 def main() -> int:
     """Track every clip twice and publish; 1 if a bound is missed, 0 also without the data."""
-    if not eval_clips.DATA.is_dir():
-        print(f"camera_walk: {eval_clips.DATA} is not there, left out", file=sys.stderr)
+    if eval_clips.absent():
         return 0
     folder = eval_clips.DATA / "eval" / "dev"
     clips = [c for c in sorted(folder.iterdir()) if not sys.argv[1:] or c.name in sys.argv[1:]]

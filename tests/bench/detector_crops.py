@@ -42,8 +42,7 @@ HIDDEN_S = 1.0
 
 def main() -> int:
     """Search every clip and publish; 0 also without the data."""
-    if not eval_clips.DATA.is_dir():
-        print(f"detector_crops: {eval_clips.DATA} is not there, left out", file=sys.stderr)
+    if eval_clips.absent():
         return 0
     folder = eval_clips.DATA / "eval" / "dev"
     clips = [c for c in sorted(folder.iterdir()) if not sys.argv[1:] or c.name in sys.argv[1:]]

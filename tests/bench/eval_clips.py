@@ -95,9 +95,16 @@ def meta_of(folder: Path) -> dict[str, Any]:
     return dict(json.loads(path.read_text())) if path.is_file() else {}
 
 
-def people() -> tuple[list[Clip], dict[str, Path]]:
-    """Clips with true joints, and models learnt without each one's subject."""
-    clips = [clip for clip in shared_clips(None) if clip.truth]
+def absent() -> bool:
+    """Whether the shared data are not there, which is stated."""
+    if not DATA.is_dir():
+        print(f"{Path(sys.argv[0]).stem}: {DATA} is not there, left out", file=sys.stderr)
+    return not DATA.is_dir()
+
+
+def people(names: list[str] | None = None) -> tuple[list[Clip], dict[str, Path]]:
+    """Clips with true joints (of these names, or all), and models learnt without each one's subject."""
+    clips = [clip for clip in shared_clips(names) if clip.truth]
     with progress("learning", None) as update:
         return clips, models(clips, ROOT / "build" / "eval" / "models", 1, update)
 

@@ -67,8 +67,7 @@ class Case:
 
 def main() -> int:
     """Lift and publish; 1 if feet slide more, or poses are worse, with feet that should not slide."""
-    if not eval_clips.DATA.is_dir():
-        print(f"lift_balance: {eval_clips.DATA} is not there, left out", file=sys.stderr)
+    if eval_clips.absent():
         return 0
     found: dict[str, list[list[list[float]]]] = {}
     with tempfile.TemporaryDirectory() as folder, progress("motions", None) as update, one_thread():

@@ -8,14 +8,15 @@ from __future__ import annotations
 
 import sys
 
+import eval_clips
 import numpy as np
 import numpy.typing as npt
 import table
-from lift_mocap import MOCAP, HeldOut, one_of_each
+from lift_mocap import HeldOut, one_of_each
 
 from gait.bindings.lifter import LiftConfig, Lifter
 from gait.lift.report.segment_figures import placed_as_learnt
-from gait.lift.uncertain import share_along, share_rigid
+from gait.lift.segment.explain import share_along, share_rigid
 
 Floats = npt.NDArray[np.float64]
 
@@ -29,8 +30,7 @@ OTHERS = 0.95  # of all of them
 
 def main() -> int:
     """Publish the table; 1 if displacements are not as wanted where the place is open."""
-    if not MOCAP.is_dir():
-        print(f"eval-lift: {MOCAP} is not there, left out", file=sys.stderr)
+    if eval_clips.absent():
         return 0
     rows = []
     for source, known in one_of_each():

@@ -17,6 +17,7 @@ from collections.abc import Iterator
 from dataclasses import dataclass
 from pathlib import Path
 
+import eval_clips
 import numpy as np
 import numpy.typing as npt
 import table
@@ -86,8 +87,7 @@ class Errors:
 
 def main() -> int:
     """Run all sequences; 1 if a bound is missed."""
-    if not MOCAP.is_dir():
-        print(f"eval-lift: {MOCAP} is not there, left out", file=sys.stderr)
+    if eval_clips.absent():
         return 0
     with progress("held-out sequences", len(SEQUENCES)) as update, tempfile.TemporaryDirectory() as folder:
         rows, missing = [], []

@@ -11,8 +11,9 @@ import tempfile
 from collections.abc import Iterator
 from pathlib import Path
 
+import eval_clips
 import table
-from lift_mocap import MOCAP, NOISE, SEQUENCES, WITHIN_SCALED, errors_of, held_out
+from lift_mocap import NOISE, SEQUENCES, WITHIN_SCALED, errors_of, held_out
 
 from gait.progress import progress
 
@@ -29,8 +30,7 @@ TRIED = (25, 50, 80)
 
 def main() -> int:
     """Lift all sequences with all numbers of modes."""
-    if not MOCAP.is_dir():
-        print(f"eval-lift: {MOCAP} is not there, left out", file=sys.stderr)
+    if eval_clips.absent():
         return 0
     rows = []
     count = len(TRIED) * (len(OTHERS) + len(SEQUENCES) - 1)

@@ -36,8 +36,7 @@ PARTS = {
 
 def main() -> int:
     """Publish the table; nothing is wanted of it."""
-    if not eval_clips.DATA.is_dir():
-        print(f"eval-lift: {eval_clips.DATA} is not there, left out", file=sys.stderr)
+    if eval_clips.absent():
         return 0
     clips, models = eval_clips.people()
     measured: dict[str, list[list[float]]] = {part: [] for part in PARTS}

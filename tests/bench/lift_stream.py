@@ -22,7 +22,6 @@ from gait.bindings.lifter import LiftConfig, Lifter
 from gait.camera.camera import Camera
 from gait.io.keypoints_file import Keypoints
 from gait.io.track_file import read_truth
-from gait.progress import progress
 
 Floats = npt.NDArray[np.float64]
 Ints = npt.NDArray[np.int64]
@@ -37,13 +36,9 @@ STRICT = 4.0  # fit_threshold, below the usual one
 
 def main() -> int:
     """Publish the table; 1 if the intervals of a clip hold too little."""
-    if not eval_clips.DATA.is_dir():
-        print(f"lift_stream: {eval_clips.DATA} is not there, left out", file=sys.stderr)
+    if eval_clips.absent():
         return 0
-    clips = [c for c in eval_clips.shared_clips(None) if c.truth]
-    models = eval_clips.ROOT / "build" / "eval" / "models"
-    with progress("learning", None) as update:
-        paths = eval_clips.models(clips, models, 1, update)
+    clips, paths = eval_clips.people()
     rows = [_row(clip, paths[str(clip.subject)]) for clip in clips]
     head = ["clip", "root mm", "abs mm", "coverage"]
     head += ["given: root mm", "given: abs mm", "given: coverage", "exact"]

@@ -43,12 +43,9 @@ ARMS = {
 
 def main() -> int:
     """Track and publish the table."""
-    if not eval_clips.DATA.is_dir():
-        print(f"tracks_term: {eval_clips.DATA} is not there, left out", file=sys.stderr)
+    if eval_clips.absent():
         return 0
-    clips = [c for c in eval_clips.shared_clips(sys.argv[1:] or None) if c.truth]
-    with progress("learning", None) as update:
-        paths = eval_clips.models(clips, eval_clips.ROOT / "build" / "eval" / "models", 1, update)
+    clips, paths = eval_clips.people(sys.argv[1:] or None)
     rows: list[list[object]] = []
     with tempfile.TemporaryDirectory() as folder, progress("clips", len(clips)) as update:
         for done, clip in enumerate(clips, 1):

@@ -1,5 +1,6 @@
 """The parts of the evaluation (tests/bench/eval_*.py) that decide what counts as good."""
 
+import importlib
 import json
 import sys
 from dataclasses import replace
@@ -323,3 +324,9 @@ def test_a_camera_from_a_walk_that_misses_a_bound_fails(place, value, name, tmp_
         found = figures, [True] * held + [False] * (10 - held)
         monkeypatch.setattr(camera_walk, "_clip", lambda _, found=found: found)
         assert camera_walk.main() == code
+
+
+def test_every_bench_finds_what_it_imports():
+    """Most run by hand and seldom: a module of the package that moved would be noticed late."""
+    for path in Path(eval_clips.__file__).parent.glob("*.py"):
+        importlib.import_module(path.stem)
