@@ -27,6 +27,10 @@ _SERIOUS = """async () => (await axe.run(document, {resultTypes: ['violations']}
     .filter(({impact}) => ['serious', 'critical'].includes(impact))
     .map(({id, help, nodes}) => [id, help, ...nodes.slice(0, 3).map((node) => node.html)].join('  '))"""
 
+_BEYOND = """[...document.querySelectorAll('body *')]
+    .filter((each) => each.getBoundingClientRect().right > innerWidth && !each.closest('.movable'))
+    .map((each) => each.outerHTML.slice(0, 120)).slice(0, 5)"""
+
 
 def check(page):
     """Assert that a page needs no scrolling sideways and has no serious finding, on any screen."""
@@ -34,7 +38,8 @@ def check(page):
         page.set_viewport_size({"width": width, "height": height})
         for scheme in ("light", "dark"):
             page.emulate_media(color_scheme=scheme)
-            assert page.evaluate("document.documentElement.scrollWidth") <= width, (width, scheme)
+            across = page.evaluate("document.documentElement.scrollWidth")
+            assert across <= width, (width, scheme, page.evaluate(_BEYOND))
             check_here(page)
 
 

@@ -19,7 +19,7 @@ from typing import Any
 from gait.batch.project import Clip
 from gait.ending import die_with_parent
 from gait.io.files import replacing
-from gait.report.page import Page
+from gait.report.page import Page, movable
 
 DONE, FAILED = "done", "failed"
 RECORD = "done.json"  #: in the folder of a clip that is done
@@ -191,7 +191,7 @@ def _page(output: Path, rows: Sequence[Row]) -> str:
         + f"<td>{_links(output, row)}</td></tr>"
         for row in rows
     )
-    page.html(f"<table><thead><tr>{head}</tr></thead><tbody>{body}</tbody></table>")
+    page.html(movable(f"<table><thead><tr>{head}</tr></thead><tbody>{body}</tbody></table>"))
     for row in rows:
         if row["state"] == FAILED:
             page.words(f"{row['name']}: {row['error']}", "warning")

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from html import escape
 
 from gait.report.figures import Drawing, address
-from gait.report.page import Page
+from gait.report.page import Page, movable
 
 HEAD = ("", "theirs", "literal", "ours", "verdict")
 
@@ -54,7 +54,8 @@ def table(caption: str, head: Sequence[str], rows: Sequence[Sequence[str]]) -> P
         + "</tr>"
         for row in rows
     )
-    return Picture(caption, f"<table><thead><tr>{top}</tr></thead><tbody>{body}</tbody></table>")
+    table = f"<table><thead><tr>{top}</tr></thead><tbody>{body}</tbody></table>"
+    return Picture(caption, movable(table))
 
 
 @dataclass(frozen=True)
@@ -87,4 +88,4 @@ def _body(entry: Entry) -> str:
     items = "".join(f"<li>{escape(choice)}</li>" for choice in entry.left_open)
     choices = f"<p>Left open by the paper, and chosen here:</p><ul>{items}</ul>" if items else ""
     pictures = "".join(f"<p>{escape(p.caption)}</p>{p.html}" for p in entry.pictures)
-    return f"<table>{rows}</table>{choices}{pictures}"
+    return f"{movable(f'<table>{rows}</table>')}{choices}{pictures}"

@@ -48,7 +48,7 @@ class Page:
         cells = "".join(
             f"<tr><th scope=row>{_explained(k, tips)}</th><td>{escape(v)}</td></tr>" for k, v in rows.items()
         )
-        self._parts.append(f"<h2>{escape(heading)}</h2>{_movable(f'<table class=pairs>{cells}</table>')}")
+        self._parts.append(f"<h2>{escape(heading)}</h2>{movable(f'<table class=pairs>{cells}</table>')}")
         self._explain(tips)
 
     def grid(
@@ -65,7 +65,7 @@ class Page:
             for row in rows
         )
         table = f"<table><thead><tr>{top}</tr></thead><tbody>{body}</tbody></table>"
-        self._parts.append(f"<h2>{escape(heading)}</h2>{_movable(table)}")
+        self._parts.append(f"<h2>{escape(heading)}</h2>{movable(table)}")
         self._explain(tips)
 
     def figure(self, heading: str, drawing: str) -> None:
@@ -103,7 +103,7 @@ def _explained(words: str, tips: Tips | None) -> str:
     return f'<abbr title="{escape(tip)}">{escape(words)}</abbr>' if tip else escape(words)
 
 
-def _movable(table: str) -> str:
+def movable(table: str) -> str:
     """Let a table that is larger than the page be moved sideways, by keyboard too."""
     return f'<div class="movable" tabindex="0" role="group" aria-label="table">{table}</div>'
 
