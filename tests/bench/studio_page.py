@@ -9,7 +9,7 @@ import signal
 import subprocess
 import sys
 import tempfile
-from collections.abc import Callable
+from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
@@ -20,12 +20,12 @@ import browser
 from gait.io import keypoints_file
 from gait.io.keypoints_file import Keypoints
 
-Target = Callable[[int, str], tuple[float, float]]
-"""Where a joint is to be dragged to in a frame, pixels."""
+Drag = tuple[int, str, tuple[float, float]]
+"""Frame, joint, and the pixel that it is dragged to."""
 
 
-def seconds(folder: Path, points: Keypoints, target: Target, drags: int) -> list[float]:
-    """Drag what the page proposes to where it is, one after the other; empty without Chromium.
+def seconds(folder: Path, points: Keypoints, drags: Sequence[Drag]) -> list[float]:
+    """Drag joints one after the other, while the whole is solved in the background; empty without Chromium.
 
     Parameters
     ----------
@@ -33,8 +33,7 @@ def seconds(folder: Path, points: Keypoints, target: Target, drags: int) -> list
         Clip, with video and camera; nothing is written there.
     points : Keypoints
         What the page begins with.
-    target : callable
-    drags : int
+    drags : sequence of Drag
     """
     if shutil.which("chromium") is None and shutil.which("chromium-browser") is None:
         print("eval-studio: no chromium, so the page is not measured", file=sys.stderr)
@@ -53,16 +52,13 @@ def seconds(folder: Path, points: Keypoints, target: Target, drags: int) -> list
                     page.goto(url)
                     browser.until(page, "window.studio?.film?.video?.readyState >= 2", 300)
                     page.get_by_role("button", name="Begin").click()
-                    return [_drag(page, target) for _ in range(drags)]
+                    return [_drag(page, *drag) for drag in drags]
             finally:
                 server.send_signal(signal.SIGINT)
 
 
-def _drag(page: Any, target: Target) -> float:
-    browser.until(page, "!studio.data.refining", 300)
-    asked = page.evaluate("studio.data.proposals.find((p) => !/toe|heel/.test(p.joint))")
-    uv = target(asked["frame"], asked["joint"])
-    page.evaluate(f"studio.film.seek({asked['frame']} - studio.data.first)")
+def _drag(page: Any, frame: int, joint: str, uv: tuple[float, float]) -> float:
+    page.evaluate(f"studio.film.seek({frame} - studio.data.first)")
     page.evaluate("studio.sent = 0")
     box = page.locator("#film .stage canvas").bounding_box()
 
@@ -70,7 +66,7 @@ def _drag(page: Any, target: Target) -> float:
         x, y = page.evaluate(f"studio.film.picture.toScreen({pixel})")
         return box["x"] + x, box["y"] + y
 
-    shown = f"studio.data.uv[studio.film.index][studio.data.joints.indexOf('{asked['joint']}')]"
+    shown = f"studio.data.uv[studio.film.index][studio.data.joints.indexOf('{joint}')]"
     page.mouse.move(*on_screen(shown))
     page.mouse.down()
     page.mouse.move(*on_screen(str(list(uv))), steps=4)
