@@ -23,6 +23,7 @@ Array = NDArray[np.float64]
 _WIDEST = 1.0  # picture sizes added at each side
 _STEP = 16  # pixels between points of which the place in another picture is computed; others are interpolated
 _COVERED = 0.98  # of a frame's directions that the picture of the scene must show
+_FEWEST = 5  # samples whose median is the scene
 
 
 @dataclass(frozen=True)
@@ -45,15 +46,12 @@ class Panorama:
     ) -> Panorama:
         """Median of the samples where they show the scene; `given` is the empty scene as `lens` sees it."""
         whole = _extended(lens, list(poses.values()))
-        known = [
-            (frame.image, poses[frame.number].camera(lens)) for frame in samples if frame.number in poses
-        ]
-        image = _median(known, whole)
+        image = _median([(frame.image, poses[frame.number].camera(lens)) for frame in samples], whole)
         if given is not None:
             image = warped(given, lens, whole, image)
         return Panorama(whole, image)
 
-    def as_shown_to(self, camera: Camera) -> Image | None:
+    def plate_for(self, camera: Camera) -> Image | None:
         """Empty scene as a camera in the same place sees it; None if part of that is not known."""
         u, v = (np.arange(0, size, _STEP, dtype=float) for size in camera.size)
         places = map_pixels(np.stack(np.meshgrid(u, v), axis=-1), camera, self.camera)
@@ -117,15 +115,18 @@ class MovingVideo(Video):
     def _placed(self, frame: Frame) -> Frame:
         pose, plate = self.poses[frame.number], None
         if self.panorama is not None and frame.image.ndim == 3:
-            plate = self.panorama.as_shown_to(pose.camera(self._lens))
+            plate = self.panorama.plate_for(pose.camera(self._lens))
         return frame._replace(pose=pose, plate=plate)
 
 
 def panorama_of(
     samples: Sequence[Frame], lens: Camera, poses: Mapping[int, CameraPose], given: Image | None = None
 ) -> Panorama | None:
-    """Picture of the empty scene; None if the camera travels, so that there is none."""
-    return Panorama.of(samples, lens, poses, given) if one_place(list(poses.values())) else None
+    """Picture of the empty scene; None if the camera travels, or too few samples have a pose."""
+    known = [frame for frame in samples if frame.number in poses]
+    if len(known) < _FEWEST or not one_place(list(poses.values())):
+        return None
+    return Panorama.of(known, lens, poses, given)
 
 
 def _extended(lens: Camera, poses: Sequence[CameraPose]) -> Camera:
