@@ -11,6 +11,8 @@ from gait.bindings.model import read_cyclic
 from gait.cli import main
 from gait.motion.norms import Compared, beside_norms, comfortable, rate_at
 from gait.motion.parameters import measure
+from gait.report.gait_parts import add_norms
+from gait.report.page import Page
 
 MODEL = read_cyclic(None)
 
@@ -60,6 +62,17 @@ def test_norms_know_their_limits():
         comfortable(80)
     slow, usual, fast = (rate_at(MODEL, speed, 1.7)[0] for speed in (0.6, 1.29, 1.9))
     assert slow < usual < fast and usual == pytest.approx(float(MODEL["GAIT"][0]), rel=0.02)
+
+
+def test_the_page_shows_what_is_outside_and_of_which_people_the_norm_is():
+    page = Page("walk.mp4", "Tracked.")
+    add_norms(page, [Compared("asymmetry:step_length_m", 15.0, 2.0, 1.0, 4.0, "pace")])
+    text = page.text().replace("\N{NO-BREAK SPACE}", " ")
+    cells = ("asymmetry of step length, %", "15.0 ± 2.0", "1.0 ± 4.0", "at this cadence", "above (100 %)")
+    assert "<h2>Beside norms</h2>" in text and all(cell in text for cell in cells)
+    empty = Page("walk.mp4", "Tracked.")
+    add_norms(empty, [])
+    assert "norms" not in empty.text()
 
 
 @pytest.mark.parametrize(
