@@ -21,6 +21,7 @@ from gait.motion.verdict import LEGS, verdict_of
 from gait.report.film import page_size
 
 MODEL = Model()
+CHANGE = np.arange(12.0).reshape(3, 4) / 1000
 FRAMES, FIRST = 90, 6  # of the film; the first with an estimate
 STATUS = {
     **dict.fromkeys(range(6, 9), TrackStatus.INIT),
@@ -49,7 +50,8 @@ def folder(tmp_path_factory):
     with TrackWriter(here / "run.csv", 5, MODEL.joint_names, MODEL.angle_names) as rows:
         for number in range(FIRST, FRAMES):
             rows.write(Frame(number, number / FPS, None), estimate(number, states[number]))
-    with TrackWriter(here / "part.csv", 5, MODEL.joint_names, MODEL.angle_names, frames=range(4, 84)) as rows:
+    names = MODEL.joint_names, MODEL.angle_names, ()
+    with TrackWriter(here / "part.csv", 5, *names, range(4, 84), lambda time: time * CHANGE) as rows:
         for number in range(FIRST, 84):
             found = replace(estimate(number, states[number]), reason="legs cross" if number < 42 else "")
             rows.write(Frame(number, number / FPS, None), found)
@@ -81,12 +83,16 @@ def test_the_verdict_counts_what_is_tracked_unsure_and_missing(folder):
     assert found.warning() is None
 
 
-def test_a_page_of_a_part_of_the_film_states_the_same_as_the_tracker(folder):
+def test_a_page_of_a_part_of_the_film_states_the_same_as_the_tracker(folder, capsys):
     words = ["report", folder / "part.csv", "--video", folder / "walk.mp4", "-o", folder / "part.html"]
     assert main([str(word) for word in words]) == 0
     lead = re.search('<p class="lead">(.*?)</p>', (folder / "part.html").read_text())[1]
     assert "Tracked 75 of 80 frames" in lead and lead.endswith("not found in 2 frames.")
     assert f"unsure in 4 frames: legs cross (2), {LEGS} (2)" in lead
+    # Its camera has a world of its own, in which the camera.json beside it is not.
+    track = read_track(folder / "part.csv")
+    np.testing.assert_allclose(track.camera_change[-1], track.time[-1] * CHANGE, atol=1e-6)
+    assert "camera was found from the walk; to see the figure" in capsys.readouterr().err
 
 
 def test_a_track_without_any_sure_frame_is_warned_of():
