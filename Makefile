@@ -285,9 +285,18 @@ demo: ## clip -> LCM -> gait-trackd -> report (VIDEO CAMERA INIT BACKGROUND HEIG
 	@$(VENV)/bin/gait demo $(pass) $(ARGS)
 
 MOCAP ?= ../shared/data/mocap/cmu_walk
+# People whose recordings may be shipped and show the whole body.
+MORE = $(MOCAP)/../more
+WALKERS := btk/b2 gaitalytics/g1 bvhtoolbox opensim/p2 opensim/p4 mcgill cmu_more/c12 cmu_more/c15 cmu_more/c46
+RUNNERS := run_cmu
+LEARN_CLASSES = $(VENV)/bin/gait learn --subjects folder --segments none
 model: setup lib ## learn the models of the package, of people and the paper's, from MOCAP= *
 	$(VENV)/bin/gait learn $(MOCAP) -o python/gait/data/walk.gait $(ARGS)
 	$(VENV)/bin/gait learn $(MOCAP) --prior paper --segments none -o python/gait/data/paper.gait $(ARGS)
+	@mkdir -p build
+	$(LEARN_CLASSES) $(addprefix $(MORE)/,$(RUNNERS)) --activity run -o build/run.gait $(ARGS)
+	$(LEARN_CLASSES) $(MOCAP) $(addprefix $(MORE)/,$(WALKERS)) --generic-lengths cmu_more/c15 cmu_more/c46 \
+	    --class stand --class backwards --class run=build/run.gait -o python/gait/data/classes.gait $(ARGS)
 
 PAPER_MOCAP ?= $(MOCAP) ../shared/data/mocap/cmu_misc
 PAPER_CLIP := $(wildcard ../shared/data/video/outdoor)
@@ -453,7 +462,7 @@ install-daemon: tools
 	install -m 755 $(BIN)/gait-trackd '$(DESTDIR)$(PREFIX)/bin/'
 	install -m 755 $(SITE)/lib/liblcm.so.1 '$(DESTDIR)$(PREFIX)/lib/gait/'
 	install -m 644 $(LCM_TYPES) '$(DESTDIR)$(PREFIX)/share/gait/lcm_types/'
-	install -m 644 python/gait/data/walk.gait python/gait/data/paper.gait '$(DESTDIR)$(PREFIX)/share/gait/'
+	install -m 644 $(addprefix python/gait/data/,walk.gait paper.gait classes.gait) '$(DESTDIR)$(PREFIX)/share/gait/'
 	sed 's|/usr/local|$(PREFIX)|' tools/trackd/trackd.toml > '$(DESTDIR)$(PREFIX)/share/gait/trackd.toml'
 	sed 's|@PREFIX@|$(PREFIX)|' tools/trackd/gait-trackd.service.in \
 	    > '$(DESTDIR)$(PREFIX)/lib/systemd/system/gait-trackd.service'

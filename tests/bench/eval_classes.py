@@ -4,8 +4,8 @@
     .venv/bin/python tests/bench/eval_classes.py --only stopping backwards
 
 The clips are presets of `gait simulate`, with further seeds of the person, and those of `eval_simulated` for
-slow walks and runs.  Models: the package's walk; and the walk, standing, backwards and a run learnt from
-recordings of ../shared/data.  A start is the truth with the noise of `eval_clips`, without the class.
+slow walks and runs.  Models are the package's: walk, and classes, which walks, stands, walks backwards and
+runs.  A start is the truth with the noise of `eval_clips`, without the class.
 """
 
 from __future__ import annotations
@@ -13,10 +13,10 @@ from __future__ import annotations
 import argparse
 import csv
 import json
-import subprocess
-import sys
 from collections.abc import Iterator
+from concurrent.futures import ProcessPoolExecutor
 from dataclasses import dataclass, replace
+from multiprocessing import get_context
 from pathlib import Path
 
 import eval_clips
@@ -29,7 +29,6 @@ from facts import facts
 from gait import Camera, Model, Start, Tracker, TrackerConfig, Video
 from gait.bindings.abi import TrackStatus
 from gait.body.skeleton import EVAL15
-from gait.errors import UserError
 from gait.io.track_file import read_truth
 from gait.io.video import read_plate
 from gait.progress import progress
@@ -38,7 +37,7 @@ from gait.simulate.scenario import PRESETS, Scenario
 
 ROOT = Path(__file__).resolve().parents[2]
 OUT = ROOT / "build" / "eval-classes"
-RUNS = eval_clips.DATA / "mocap" / "more"
+MODELS = "walk", "classes"  # of the package
 HIPS = [EVAL15.index("l_hip"), EVAL15.index("r_hip")]
 FAR = 0.15  # metres, root-aligned: a wrong frame
 DELAY = 0.5  # seconds for which the class before a change may be reported
@@ -104,14 +103,14 @@ def main() -> None:
         description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
     )
     parser.add_argument("--seeds", type=int, default=3, help="runs of a clip (3)")
+    parser.add_argument("--jobs", type=int, default=2, help="runs side by side, same results (2)")
     parser.add_argument("--only", nargs="+", metavar="NAME", help="names of clips")
     parser.add_argument("--record", action="store_true", help="write results/eval_classes.md and .csv")
     args = parser.parse_args()
     clips = _clips(args.only)
-    models = _models()
     runs: list[Run] = []
-    with progress("tracking", len(clips) * len(models) * args.seeds) as update:
-        for run in _runs(clips, models, args.seeds):
+    with progress("tracking", len(clips) * len(MODELS) * args.seeds) as update:
+        for run in _runs(clips, args.seeds, args.jobs):
             runs.append(run)
             update(len(runs))
     rows = list(_rows(runs))
@@ -136,48 +135,21 @@ def _clips(only: list[str] | None) -> list[Clip]:
             for clip in eval_clips.folder_clips(OUT) if clip.name in wanted]  # fmt: skip
 
 
-def _models() -> dict[str, Path | None]:
-    """The package's walk, and one with classes."""
-    path = OUT / "classes.gait"
-    if not path.is_file():
-        words = [
-            "learn",
-            eval_clips.MOCAP,
-            "-o",
-            path,
-            "--class",
-            "stand",
-            "--class",
-            "backwards",
-            "--quiet",
-        ]
-        if (RUNS / "run_cmu").is_dir():
-            words += ["--class", f"run={RUNS / 'run_cmu'}"]
-        done = subprocess.run(
-            [sys.executable, "-m", "gait", *map(str, words)],
-            capture_output=True,
-            text=True,
-            check=False,
-        )
-        if done.returncode:
-            raise UserError(f"gait learn: {done.stderr.strip()}")
-    return {"walk": None, "classes": path}
+def _runs(clips: list[Clip], seeds: int, jobs: int) -> Iterator[Run]:
+    """Every clip with every model, side by side."""
+    each = [(clip, name, seed) for clip in clips for name in MODELS for seed in range(1, seeds + 1)]
+    with ProcessPoolExecutor(jobs, mp_context=get_context("spawn")) as pool:
+        yield from pool.map(_run, *zip(*each, strict=True))
 
 
-def _runs(clips: list[Clip], models: dict[str, Path | None], seeds: int) -> Iterator[Run]:
-    for clip in clips:
-        for name, path in models.items():
-            for seed in range(1, seeds + 1):
-                yield _run(clip, name, Model(path), seed)
-
-
-def _run(clip: Clip, name: str, model: Model, seed: int) -> Run:
+def _run(clip: Clip, name: str, seed: int) -> Run:
     """Track a clip from the truth with noise."""
+    model = Model(name)
     video = Video(clip.video)
     camera = Camera.read(str(clip.camera), video.size)
     plate = read_plate(clip.plate, video.size) if clip.plate else None
     tracker = Tracker(model, camera, TrackerConfig.default(seed=seed), background=plate)
-    init = OUT / "init.json"
+    init = OUT / f"{clip.name}.{name}.{seed}.json"
     init.write_text(json.dumps(eval_clips.noisy_start(clip, seed, 0.0)))
     start, truth = Start.read(init, model), read_truth(clip.truth)
     joints, classes = truth.eval15(), _classes(clip.truth, len(truth.frame))

@@ -41,7 +41,7 @@ def test_install_puts_everything_and_uninstall_removes_it(installed):
     headers = {f"include/{header.name}" for header in (ROOT / "libgait/include").glob("*.h")}
     types = {f"share/gait/lcm_types/{t.name}" for t in (ROOT / "lcm_types").glob("*.lcm")}
     daemon = {"bin/gait-trackd", "lib/gait/liblcm.so.1", "share/gait/walk.gait", "share/gait/trackd.toml"}
-    daemon.add("share/gait/paper.gait")
+    daemon |= {"share/gait/paper.gait", "share/gait/classes.gait"}
     service = {"lib/systemd/system/gait-trackd.service", "share/man/man1/gait-trackd.1"}
     assert names == libraries | described | headers | types | daemon | service
     assert make("uninstall", f"DESTDIR={installed}", "PREFIX=/opt/gait").returncode == 0

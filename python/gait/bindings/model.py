@@ -23,8 +23,9 @@ from gait.io.blob import decode
 
 Array = NDArray[np.float64]
 
-#: Models of the package by name: of people, the default; of Ormoneit and others (2000), for paper mode.
-SHIPPED = ("walk", "paper")
+#: Models of the package by name: of people, the default; of Ormoneit and others (2000), for paper mode; of
+#: people of several laboratories who walk, stand, walk backwards and run.
+SHIPPED = ("walk", "paper", "classes")
 NOT_CYCLIC = "holds no cyclic model; learn it without --segments only"
 
 
@@ -38,7 +39,7 @@ class LoadedModel:
 
 
 def load(source: str | os.PathLike[str] | bytes | None) -> LoadedModel:
-    """Check and take in a blob: a file, its contents, or one of the package (its name; None: ``walk``).
+    """Check and take in a blob: a file, its contents, or one of the package (`SHIPPED`; None: ``walk``).
 
     Raises
     ------
