@@ -84,14 +84,11 @@ class CameraMotion:
     ----------
     scale : float
         Size of the pictures used over that of the frames.
-    untextured : int
-        How often too few corners agreed, or only those of one thing in the picture.
     """
 
     def __init__(self, camera: Camera) -> None:
         self.scale = min(1.0, _SIDE / max(camera.size))
         self._camera = replace(camera.scaled(self.scale), R=np.eye(3), t=np.zeros(3))
-        self.untextured = 0
         self._last = self._key_view = UNMOVED
         self._key = self._previous = np.zeros((0, 0), np.uint8)
         self._people: Iterable[Box] = ()
@@ -137,13 +134,11 @@ class CameraMotion:
         guess = self._last.after(self._key_view.inverse())
         after = self._track(small, guess)
         if after is None:
-            self.untextured += 1
             return None, 0.0
         visible = np.isfinite(after[:, 0])
         places = after[visible].astype(float)
         view, agree = fit_view(self._camera, self._corners[visible].astype(float), places, guess)
         enough = agree.sum() >= _FEWEST and self._everywhere(places[agree])
-        self.untextured += not enough
         found = enough and agree.mean() > _SHARE and view.residual < _BLUNTEST
         return view.after(self._key_view) if found else None, agree.sum() / len(after)
 

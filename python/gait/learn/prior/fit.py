@@ -159,9 +159,7 @@ def fit(
     paces = people.paces(sequences, index)
     slope, even = np.zeros(model.mean.shape), model.filled
     if not paper:
-        whole = people.bounded(model.filled, rows.mask, row_subject)
-        slope = people.pace_slope(whole, row_subject, paces[rows.sequence])
-        even = people.at_mean_pace(whole, paces[rows.sequence], slope)
+        slope, even = _paces_removed(model.filled, rows.mask, row_subject, paces[rows.sequence])
         model = people.refine(model, even, row_subject, wanted, metric)
     static = people.static_sd(even, row_subject, wanted, metric)
     model = grounded(model, rows.visible, proportions)
@@ -214,6 +212,13 @@ def _analysed(values: Floats, mask: Mask, count: int, paper: bool) -> Components
         mean=widened(found.mean, constant),
         curves=widened(found.curves, np.zeros(len(constant))),
     )
+
+
+def _paces_removed(filled: Floats, mask: Mask, subject: Indices, paces: Floats) -> tuple[Floats, Floats]:
+    """Return how curves change with the pace (T, M), and the cycles (R, T, M) as at the mean pace."""
+    whole = people.bounded(filled, mask, subject)
+    slope = people.pace_slope(whole, subject, paces)
+    return slope, people.at_mean_pace(whole, paces, slope)
 
 
 def most_components(cycles: int, wanted: int | str | None, files: list[str] | None = None) -> int:
