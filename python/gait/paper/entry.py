@@ -47,7 +47,7 @@ def picture(drawing: Drawing) -> Picture:
 
 def table(caption: str, head: Sequence[str], rows: Sequence[Sequence[str]]) -> Picture:
     """Return a table as a picture of an entry; the first column names the rows."""
-    top = "".join(f"<th scope=col>{escape(name)}</th>" for name in head)
+    top = "".join(f"<th scope=col>{escape(name)}</th>" if name else "<td></td>" for name in head)
     body = "".join(
         f"<tr><th scope=row>{escape(row[0])}</th>"
         + "".join(f"<td>{escape(x)}</td>" for x in row[1:])
