@@ -287,15 +287,15 @@ demo: ## clip -> LCM -> gait-trackd -> report (VIDEO CAMERA INIT BACKGROUND HEIG
 MOCAP ?= ../shared/data/mocap/cmu_walk
 # People whose recordings may be shipped and show the whole body.
 MORE = $(MOCAP)/../more
-WALKERS := btk/b2 gaitalytics/g1 bvhtoolbox opensim/p2 opensim/p4 mcgill cmu_more/c12 cmu_more/c15 cmu_more/c46
-RUNNERS := run_cmu
+WALKING := btk/b2 gaitalytics/g1 bvhtoolbox opensim/p2 opensim/p4 mcgill cmu_more/c12 cmu_more/c15 cmu_more/c46
+RUNNING := run_cmu
 LEARN_CLASSES = $(VENV)/bin/gait learn --subjects folder --segments none
 model: setup lib ## learn the models of the package, of people and the paper's, from MOCAP= *
 	$(VENV)/bin/gait learn $(MOCAP) -o python/gait/data/walk.gait $(ARGS)
 	$(VENV)/bin/gait learn $(MOCAP) --prior paper --segments none -o python/gait/data/paper.gait $(ARGS)
 	@mkdir -p build
-	$(LEARN_CLASSES) $(addprefix $(MORE)/,$(RUNNERS)) --activity run -o build/run.gait $(ARGS)
-	$(LEARN_CLASSES) $(MOCAP) $(addprefix $(MORE)/,$(WALKERS)) --generic-lengths cmu_more/c15 cmu_more/c46 \
+	$(LEARN_CLASSES) $(addprefix $(MORE)/,$(RUNNING)) --activity run -o build/run.gait $(ARGS)
+	$(LEARN_CLASSES) $(MOCAP) $(addprefix $(MORE)/,$(WALKING)) --generic-lengths cmu_more/c15 cmu_more/c46 \
 	    --class stand --class backwards --class run=build/run.gait -o python/gait/data/classes.gait $(ARGS)
 
 PAPER_MOCAP ?= $(MOCAP) ../shared/data/mocap/cmu_misc
