@@ -179,15 +179,14 @@ def _verdict(points: Points, reference: Points) -> tuple[str, float]:
 def _timing(clip: Clip, track: Track) -> tuple[float, float]:
     """Error of the stride rate, as a share, and of the heel strikes, frames; NaN without a reference.
 
-    The rate is that between the first and the last counted strike: a person who stands has none.
+    The rate is that from the first counted strike on: a person who stands before has none.
     """
     followed = np.isin(track.status, ("tracking", "ambiguous"))
     used = followed & (track.frame >= clip.first) & (track.frame <= clip.last) & np.isfinite(track.phase)
     if used.sum() <= 15:
         return np.nan, np.nan
     frames, cycles = track.frame[used], np.unwrap(track.phase[used], period=1.0)
-    counted = [frame for frame, _ in clip.strikes] or [clip.first, clip.last]
-    walks = (frames >= min(counted)) & (frames <= max(counted))
+    walks = frames >= min((frame for frame, _ in clip.strikes), default=clip.first)
     stride_hz = clip.fps * float(np.polyfit(frames[walks], cycles[walks], 1)[0])
     late = [
         abs((np.interp(frame, frames, cycles) - phase + 0.5) % 1.0 - 0.5)
