@@ -2,9 +2,9 @@
  *
  * A walk is fitted to keypoints of one person, as a 2-D detector finds them, or to boxes around people: found by a
  * detector, or by gait_start_find_boxes() against the empty scene.  The camera stands still or its pose is given with
- * gait_start_set_pose(); a person walks straight on at an even pace, or stays in place.  From keypoints every direction, phase and side is tried; boxes give place,
- * direction and stature, and leave the phase open.  The answers are a few weighted hypotheses, each ready for
- * gait_tracker_start_hypotheses().
+ * gait_start_set_pose(); a person walks straight on at an even pace, or stays in place.  From keypoints every
+ * direction, phase and side is tried; boxes give place, direction and stature, and leave the phase open.  The answers
+ * are a few weighted hypotheses, each ready for gait_tracker_start_hypotheses().
  * Conventions, units, memory and errors are those of gait.h. */
 #ifndef GAIT_START_H
 #define GAIT_START_H
