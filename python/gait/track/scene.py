@@ -282,10 +282,12 @@ def stays(scene: Scene) -> bool:
     keypoints the trunk is that of people's shapes.
     """
     low, high, shown = _trunks(scene) if scene.people else _shape_trunks(scene)
+    if not len(low):
+        return False
     reach = _HALF_WIDTH * (high - low)[:, 1:] * (1, 0)  # of a trunk seen from the side
     middle = (low + high)[:, None] / 2
     covered = ((middle > low - reach) & (middle < high + reach)).all(axis=2)  # middle of a frame by frame
-    return bool(covered.mean(axis=1).max(initial=0.0) * shown > _STAYS)
+    return bool(covered.mean(axis=1).max() * shown > _STAYS)
 
 
 def _trunks(scene: Scene) -> tuple[Array, Array, float]:
