@@ -93,7 +93,7 @@ def about() -> str:
 Mean log-likelihood (eqs. 10-13) of a frame given the one before, over 11 frames, for the mean
 cycle at the true state or displaced from it, which walks on with the person or rests between the two
 frames.  The settings are those before the search.  A limb that lies on a static background and rests is
-predicted best of all."""
+predicted as well as can be."""
 
 
 if __name__ == "__main__":

@@ -195,7 +195,7 @@ def publish(search: Search, best: Settings) -> None:
     rows = [
         [name, symbol, BEFORE[name], frozen[name], low, high] for name, (symbol, low, high) in SPACE.items()
     ]
-    columns = ("setting", "in the paper", "before", "frozen", "smallest tried", "largest tried")
+    columns = ("setting", "in the paper", "before", "frozen", "smallest allowed", "largest allowed")
     table.publish("search_paper", "What the paper determines empirically", columns, rows, note=about(search))
     tried = [
         [row["what"], row["seeds"], row["score"], row["ratio"], row["lost"], *row["roots"]]
@@ -216,10 +216,11 @@ def about(search: Search) -> str:
     people = ", ".join(CLIPS)
     return f"""{facts("search_paper.py --record")}
 
-Frozen as the defaults of paper mode: the best of {len(search.rows)} settings in
+Frozen as the defaults of paper mode: the best of {len(search.rows) - AGAIN} settings in
 [search_paper_runs](search_paper_runs.md), by the mean over six clips of the root-aligned error over that of
-the free-running cycle plus the share of runs that leave the person; the five best by one seed are judged
-again by {SEEDS}.  The clips (480 x 360, {FRAMES + 1} frames used) are made by `gait simulate` with the
+the free-running cycle plus the share of runs that leave the person; the best by one seed is judged again
+by {SEEDS}.  On these clips, too, the cycle that needs no image is better.
+The clips (480 x 360, {FRAMES + 1} frames used) are made by `gait simulate` with the
 gaits of people {people}, who are neither in the model nor in a development clip.  The noise of a pixel (3
 grey levels) is not searched, since only its sum with sigma counts."""
 

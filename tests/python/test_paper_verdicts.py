@@ -88,7 +88,7 @@ def shown(found, **changes):
         (4, "draws are bodies", "no bodies", lambda f: replace(f, everything=shuffled(f.everything))),
         (5, "reproduced: Bayes leaves 50 %", "not reproduced", lambda f: scored(f, bayes=61)),
         (5, "reproduced: Bayes leaves 50 %", "in part: Bayes leaves 97 %", lambda f: scored(f, bayes=58)),
-        (5, "are far too narrow", "intervals hold", lambda f: scored(f, covered=0.9)),
+        (5, "are too narrow", "intervals cover", lambda f: scored(f, covered=0.9)),
         ("Volume", "reproduced", "no likely noise", lambda f: shown(f, variance=TINY)),
         (6, "are motions in depth", "not only motions in depth", lambda f: turned_inside_out(f)),
     ],

@@ -322,7 +322,7 @@ def _volume(found: Segments) -> Entry:
     return Entry(
         "Volume of the posterior",
         "The volume shrinks by 10^14 in 50 dimensions (printed the other way round).",
-        f"{words}. The paper's 10^-14 is that of {1000 * same:.0f} mm.",
+        f"{words}. 10^-14 needs {1000 * same:.0f} mm of noise.",
         "gait report lift prints it for any segment.",
         verdicts.volume(ratios, same, leventon.NOISES),
         (

@@ -137,7 +137,7 @@ def _periods(learning: Learning) -> Entry:
         "Ratio of each angle against periods of 50 to 250 frames, white noise flat, the sum with its peak "
         "at 126 frames (898.65).",
         f"{shown.name}: {shown.period.frames:.0f} frames, sum {shown.period.peak:.0f}; white noise "
-        f"{mean:.2f} on average, rising by {rise:+.2f} over the range. {same} of {total} walks get their "
+        f"{mean:.2f} on average, changing by {rise:+.2f} over the range. {same} of {total} walks get their "
         f"cycle. A walk of {ormoneit.LONG_FRAMES} frames with a cycle of {ormoneit.LONG_PERIOD} frames: "
         f"{long_literal:.0f}.",
         f"{shown.name}: {refined.frames:.2f} frames; the median difference from whole frames is "
@@ -310,7 +310,7 @@ def _left_out(learned: Learned) -> str:
     if found is None:
         return ""
     return (
-        f"; a person left out is met to {np.nanmedian(found.degrees[1]):.1f} degrees, "
+        f"; a person left out is reproduced to within {np.nanmedian(found.degrees[1]):.1f} degrees, "
         f"{np.nanmedian(found.millimetres[1]):.0f} mm (median)"
     )
 

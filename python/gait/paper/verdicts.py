@@ -107,10 +107,10 @@ def synthesis(left: float, needed: int) -> str:
 def spectrum(ratios: Sequence[float]) -> str:
     """Fig. 3: posterior over prior variance of each mode."""
     count = sum(ratio < SHRUNK for ratio in ratios)
-    words = "reproduced: " if count > 0.5 * len(ratios) else "not reproduced: "
-    return (
-        f"{words}{count} of {len(ratios)} variances shrink to less than {SHRUNK:.2f}, as the volume implies"
+    words = (
+        f"{count} of {len(ratios)} variances shrink below {SHRUNK:.2f}, as the paper's volume implies"
     )
+    return f"{'reproduced' if count > 0.5 * len(ratios) else 'not reproduced'}: {words}"
 
 
 def draws(limbs: float, learnt: float) -> str:
@@ -128,7 +128,7 @@ def estimates(pairs: Sequence[tuple[float, float]], covered: float) -> str:
         words = f"not reproduced: {words}"
     else:
         words = f"reproduced{'' if min(left) < FAR_BETTER else ' in part'}: {words}"
-    return f"{words}; the paper's intervals {'are far too narrow' if covered < NARROW else 'hold'}"
+    return f"{words}; the paper's intervals {'are too narrow' if covered < NARROW else 'cover the truth'}"
 
 
 def uncertain(along: Sequence[float], rigid: Sequence[float]) -> str:
@@ -136,18 +136,18 @@ def uncertain(along: Sequence[float], rigid: Sequence[float]) -> str:
     if min(along) <= CLEARLY:
         return "not reproduced: not only motions in depth"
     moved = [k for k, share in enumerate(rigid, 1) if share > CLEARLY]
-    return "reproduced: they are motions in depth, " + (
-        f"mode {moved[0]} a translation" if moved else "none of them a translation of the whole body"
-    )
+    if not moved:
+        return "reproduced in part: they are motions in depth, none of them a translation of the whole body"
+    return f"reproduced: they are motions in depth, mode {moved[0]} a translation"
 
 
 def volume(ratios: Sequence[float], same: float, tried: Sequence[float]) -> str:
-    """Volume: its logarithm at each of the noises tried, and the noise of the paper's."""
+    """Volume: its logarithm at each of the noises tried, and the noise of the paper's, metres."""
     if any(later <= earlier for earlier, later in zip(ratios, ratios[1:], strict=False)):
         return "not reproduced: the volume does not grow with the noise"
     if not tried[0] <= same <= tried[-1]:
         return "not reproduced: no likely noise has the paper's volume"
-    return "reproduced: it is a matter of the noise, which the paper does not state"
+    return f"reproduced at a noise of {1000 * same:.0f} mm; the paper does not state its own"
 
 
 def sequence(off: Sequence[float], height: float, share: float) -> str:
