@@ -67,13 +67,16 @@ class Compared:
     def words(self) -> str:
         """State whether it is inside, and how sure that is."""
         low, high = self._ends
-        way = "below" if ndtr(low) > 1 - ndtr(high) else "above"
+        below, above = float(ndtr(low)), float(1 - ndtr(high))
+        share, way = max((below, "below"), (above, "above"))
         if self.outside < _POSSIBLE:
             return "inside"
         if np.isnan(self.sd):
             return f"{way} (uncertainty unknown)"
-        sure = "" if self.outside >= _SURE else "probably " if self.outside >= _LIKELY else "perhaps "
-        return f"{sure}{way} ({100 * self.outside:.0f} %)"
+        if min(below, above) >= _POSSIBLE:
+            return "too uncertain to tell"
+        sure = "" if share >= _SURE else "probably " if share >= _LIKELY else "perhaps "
+        return f"{sure}{way} ({100 * share:.0f} %)"
 
     def as_json(self) -> dict[str, Any]:
         """Return all of it for JSON; an unknown standard deviation is null."""
