@@ -212,7 +212,10 @@ def _keypoints(
         path = wanted.keypoints
     elif wanted.track:
         if camera is None:
-            raise UserError(f"{wanted.track}: give the --camera that it was tracked with")
+            raise UserError(
+                f"{wanted.track}: give the --camera that it was tracked with; "
+                "gait track --camera-out writes one that was found"
+            )
         path = str(folder / "track.csv")
         keypoints_file.write(path, keypoints_of_track(wanted.track, camera))
     else:
