@@ -32,7 +32,7 @@ def test_words_follow_the_probability_of_being_outside():
         (1.3, 0.03, "above (100 %)"),
         (0.77, 0.03, "probably below (84 %)"),
         (1.19, 0.03, "perhaps above (37 %)"),
-        (1.05, 1.0, "too uncertain to tell"),
+        (1.05, 1.0, "uncertain either way"),
         (1.3, np.nan, "above (uncertainty unknown)"),
         (1.1, np.nan, "inside"),
     ):

@@ -74,7 +74,7 @@ class Compared:
         if np.isnan(self.sd):
             return f"{way} (uncertainty unknown)"
         if min(below, above) >= _POSSIBLE:
-            return "too uncertain to tell"
+            return "uncertain either way"
         sure = "" if share >= _SURE else "probably " if share >= _LIKELY else "perhaps "
         return f"{sure}{way} ({100 * share:.0f} %)"
 
