@@ -44,6 +44,14 @@ def cyclic(path):
     return {tag: array.tobytes() for tag, array in blob.read(path).items() if tag not in TAGS}
 
 
+def differences(path, other):
+    """Sections in which two models differ, with the largest difference; NaN if one lacks it."""
+    one, two = blob.read(path), blob.read(other)
+    shared = [tag for tag in one.keys() & two.keys() if one[tag].tobytes() != two[tag].tobytes()]
+    found = {tag: float(np.abs(one[tag].astype(float) - two[tag]).max()) for tag in shared}
+    return found | dict.fromkeys(one.keys() ^ two.keys(), np.nan)
+
+
 def test_the_prior_is_learnt_beside_the_cyclic_model_which_stays_the_same(walks, tmp_path, capsys):
     both, without = tmp_path / "both.gait", tmp_path / "without.gait"
     assert learn(walks, both, "--json") == 0
@@ -59,7 +67,7 @@ def test_the_prior_is_learnt_beside_the_cyclic_model_which_stays_the_same(walks,
     assert run("info", both, "--json") == 0
     assert json.loads(capsys.readouterr().out)["segments"]["gamma"] == reported["gamma"]
     assert learn(walks, tmp_path / "again.gait") == 0
-    assert (tmp_path / "again.gait").read_bytes() == both.read_bytes()
+    assert differences(tmp_path / "again.gait", both) == {}
 
 
 def test_options_set_what_a_segment_is(walks, tmp_path):
