@@ -177,17 +177,13 @@ def _verdict(points: Points, reference: Points) -> tuple[str, float]:
 
 
 def _timing(clip: Clip, track: Track) -> tuple[float, float]:
-    """Error of the stride rate, as a share, and of the heel strikes, frames; NaN without a reference.
-
-    The rate is that from the first counted strike on: a person who stands before has none.
-    """
+    """Error of the stride rate, as a share, and of the heel strikes, frames; NaN without a reference."""
     followed = np.isin(track.status, ("tracking", "ambiguous"))
     used = followed & (track.frame >= clip.first) & (track.frame <= clip.last) & np.isfinite(track.phase)
     if used.sum() <= 15:
         return np.nan, np.nan
     frames, cycles = track.frame[used], np.unwrap(track.phase[used], period=1.0)
-    walks = frames >= min((frame for frame, _ in clip.strikes), default=clip.first)
-    stride_hz = clip.fps * float(np.polyfit(frames[walks], cycles[walks], 1)[0])
+    stride_hz = clip.fps * float(np.polyfit(frames, cycles, 1)[0])
     late = [
         abs((np.interp(frame, frames, cycles) - phase + 0.5) % 1.0 - 0.5)
         for frame, phase in clip.strikes

@@ -30,6 +30,8 @@ STATE_COLUMNS = (
     *("ess", "log_evidence"),
 )
 SD_COLUMNS = ("phase_sd", "stride_hz_sd", "heading_sd_rad", "stature_sd_m")
+STRIDE_COLUMNS = ("phase", "stride_hz", "speed_m_s", "phase_sd", "stride_hz_sd")
+"""Empty in frames in which the person takes no strides."""
 STATUSES = ("init", "tracking", "ambiguous", "lost")
 
 
@@ -107,12 +109,12 @@ class TrackWriter:
         values = [state.phase, state.stride_hz, state.heading, state.stature, estimate.speed]
         self._csv.writerow(
             [frame.number, f"{frame.time:.6f}", estimate.status.name.lower()]
-            + [f"{value:.6f}" for value in values]
+            + [_or_empty(value) for value in values]
             + [f"{estimate.ess:.2f}", f"{estimate.log_evidence:.4f}"]
             + [f"{value:.4f}" for value in self._scores(state.coef)]
             + [f"{value:.5f}" for value in joints.ravel()]
             + [f"{value:.3f}" for value in np.degrees(estimate.angles)]
-            + [f"{value:.6f}" for value in (sd.phase, sd.stride_hz, sd.heading, sd.stature)]
+            + [_or_empty(value) for value in (sd.phase, sd.stride_hz, sd.heading, sd.stature)]
             + [f"{value:.4f}" for value in self._scores(sd.coef)]
             + ([estimate.motion_class] if self._classes else [])
             + [f"{value:.4f}" for value in estimate.class_probability[: self._classes]]
@@ -133,6 +135,10 @@ class TrackWriter:
     def _scores(self, coef: Array) -> Array:
         """One value for each score column; a state may hold fewer, which are 0."""
         return np.pad(np.asarray(coef, float)[: self._components], (0, max(0, self._components - len(coef))))
+
+
+def _or_empty(value: float) -> str:
+    return "" if np.isnan(value) else f"{value:.6f}"
 
 
 def _end_at_a_row(path: Path) -> bool:
@@ -162,9 +168,10 @@ class Track(Joints):
     """A track file."""
 
     status: list[str]  #: of each frame: init, tracking, ambiguous or lost
-    phase: Array  #: (n,)
+    phase: Array  #: (n,) NaN where the person takes no strides
     sd: dict[str, Array]  #: (n, 3) posterior standard deviations, metres
-    #: (n,) every other column of numbers by its name: state, scores, angles and their standard deviations.
+    #: (n,) every other column of numbers by its name: state, scores, angles and their standard deviations;
+    #: NaN in `STRIDE_COLUMNS` where the person takes no strides.
     numbers: dict[str, Array] = field(default_factory=dict)
     #: Class of motion of each frame; empty where the model has one.
     motion_class: list[str] = field(default_factory=list)
@@ -286,6 +293,9 @@ class _Table:
         cells = self.column(name)
         values = np.empty(len(cells))
         for i, cell in enumerate(cells):
+            if not cell and name in STRIDE_COLUMNS:
+                values[i] = np.nan
+                continue
             try:
                 values[i] = float(cell)
             except ValueError:

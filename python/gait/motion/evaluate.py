@@ -249,9 +249,10 @@ def phase_errors(found: Array, true: Array) -> dict[str, float]:
 
     A frame is flipped when it is nearer to half a cycle away than to the truth: ``flips`` is their share.
     The rest measures what is left after taking the half cycle off: ``median``, ``mean``, ``p90`` of its
-    absolute value, ``bias`` its signed mean.
+    absolute value, ``bias`` its signed mean.  Frames without a phase do not count.
     """
-    error = (found - true + 0.5) % 1.0 - 0.5
+    known = np.isfinite(found)
+    error = (found[known] - true[known] + 0.5) % 1.0 - 0.5
     flipped = np.abs(error) > 0.25
     error = np.where(flipped, error - np.copysign(0.5, error), error)
     return {**summary(np.abs(error)), "bias": float(error.mean()), "flips": float(flipped.mean())}

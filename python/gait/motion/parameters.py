@@ -245,9 +245,10 @@ def _between(strike: Array, other: Array) -> NDArray[np.int64]:
 
 
 def _is_free(track: Track, statuses: set[str], start: float, end: float) -> bool:
-    """Whether no frame of a stride has one of these statuses."""
+    """Whether no frame of a stride has one of these statuses, or is one in which no strides are taken."""
     inside = (track.time >= start) & (track.time <= end)
-    return not statuses & {track.status[i] for i in np.flatnonzero(inside)}
+    walks = np.isfinite(track.phase[inside]).all() or np.isnan(track.phase).all()  # motion that was lifted
+    return bool(walks) and not statuses & {track.status[i] for i in np.flatnonzero(inside)}
 
 
 def mean_of(values: Array, axis: int) -> Array:
@@ -316,13 +317,19 @@ def angle_cycles(
         when = _times(parameters, "left" if left else "right")
         if not len(when):
             continue
-        strides = np.interp(when, track.time, angles[name])
+        strides = _interpolated(when, track.time, angles[name])
         rate = 1 / float(np.median(when[:, -1] - when[:, 0]))
         norm_mean, norm_sd = curves.norm(name, PERCENT / 100 + (0.5 if left else 0.0), rate)
         drawn = draws is not None and name in draws.angle_names
         sd = _drawn_sd(draws, name, when) if draws and drawn else _linear_sd(track, name, curves, when)
         out[name] = AngleCycle(strides, strides.mean(axis=0), sd, np.degrees(norm_mean), np.degrees(norm_sd))
     return out
+
+
+def _interpolated(when: Array, time: Array, values: Array) -> Array:
+    """Values (n,) linear in time at `when` (...), over frames without a value."""
+    known = np.isfinite(values)
+    return np.interp(when, time[known], values[known]) if known.any() else np.full(when.shape, np.nan)
 
 
 def _pelvis_angles(track: Track, curves: ModelCurves) -> dict[str, Array]:
@@ -337,7 +344,7 @@ def _pelvis_angles(track: Track, curves: ModelCurves) -> dict[str, Array]:
         "root_yaw": (turn + np.pi) % (2 * np.pi) - np.pi,
         "root_pitch": curves.channel(
             "root_pitch",
-            track.phase,
+            np.nan_to_num(track.phase),  # the rate is NaN in the same frames
             np.stack([track.numbers[name] for name in scores], axis=1),
             track.numbers["stride_hz"],
         ),
@@ -371,7 +378,7 @@ def _linear_sd(track: Track, name: str, curves: ModelCurves, when: Array) -> Arr
     if "phase_sd" not in numbers:
         return np.full(len(PERCENT), np.nan)
     scores = _scores(track, curves)
-    phase, coef = numbers["phase"], np.stack([numbers[n] for n in scores], axis=1)
+    phase, coef = np.nan_to_num(track.phase), np.stack([numbers[n] for n in scores], axis=1)
     rate = numbers["stride_hz"]
     here = curves.channel(name, phase, coef, rate)
     late, early = (curves.channel(name, phase + move, coef, rate) for move in (_SMALL, -_SMALL))
@@ -380,7 +387,7 @@ def _linear_sd(track: Track, name: str, curves: ModelCurves, when: Array) -> Arr
     for k, score in enumerate(scores):
         one = np.eye(len(scores))[k]
         variance += ((curves.channel(name, phase, coef + one, rate) - here) * numbers[f"{score}_sd"]) ** 2
-    return np.asarray(np.interp(when, track.time, np.degrees(np.sqrt(variance))).mean(axis=0))
+    return np.asarray(_interpolated(when, track.time, np.degrees(np.sqrt(variance))).mean(axis=0))
 
 
 def _number(score: str) -> int:

@@ -137,20 +137,22 @@ def _size_sd(track: Track, own: dict[str, Array], draws: Draws | None) -> float:
 
 
 def _waves(phase: Array) -> Array:
-    """Constant and waves of the stride (n, 1 + 2 `_WAVES`) whose squares sum to 1 in every frame."""
-    if np.isnan(phase).any():
-        return np.ones((len(phase), 1))
-    turn = 2 * np.pi * phase[:, None] * np.arange(1, _WAVES + 1)
-    parts = np.hstack([np.cos(turn), np.sin(turn)]) * np.sqrt((1 - _CONSTANT) / _WAVES)
-    return np.hstack([np.full((len(phase), 1), np.sqrt(_CONSTANT)), parts])
+    """Constant and waves of the stride (n, 1 + 2 `_WAVES`) whose squares sum to 1 in every frame.
+
+    Where there is no phase the constant is all.
+    """
+    known = np.isfinite(phase)[:, None]
+    turn = 2 * np.pi * np.where(known, phase[:, None], 0.0) * np.arange(1, _WAVES + 1)
+    parts = known * np.hstack([np.cos(turn), np.sin(turn)]) * np.sqrt((1 - _CONSTANT) / _WAVES)
+    return np.hstack([np.where(known, np.sqrt(_CONSTANT), 1.0), parts])
 
 
 def _warped(track: Track, random: np.random.Generator) -> dict[str, Array]:
-    """Places of the track, late by an error of the phase."""
+    """Places of the track, late by an error of the phase where there is one."""
     rate = np.maximum(track.numbers["stride_hz"], 0.1)
     sd = np.minimum(track.numbers["phase_sd"], 0.29) / rate  # no less sure than knowing nothing
     wander = _wander(track.time, 1, random)[:, 0]
-    late = sd * (np.sqrt(_LATE) * random.standard_normal() + np.sqrt(1 - _LATE) * wander)
+    late = np.nan_to_num(sd) * (np.sqrt(_LATE) * random.standard_normal() + np.sqrt(1 - _LATE) * wander)
     return {
         name: np.stack(
             [np.interp(track.time - late, track.time, axis) for axis in track.places[name].T], axis=1

@@ -32,6 +32,8 @@ class Verdict:
         Metres per second along the ground; of a person who walks in place, of the strides.
     in_place : bool
         The person walks in place, as on a treadmill.
+    no_strides : int
+        Frames with an estimate in which the person takes no strides.
     why : dict of str to int
         Why frames are ambiguous: frames by reason, most first; empty if that is not known.
     """
@@ -41,6 +43,7 @@ class Verdict:
     strides: int
     speed: float | None
     in_place: bool
+    no_strides: int
     why: dict[str, int]
 
     @property
@@ -65,7 +68,8 @@ class Verdict:
             text += f"; {what} in {count_of(self.counts['ambiguous'], 'frame')}"
             why = [f"{reason} ({count})" for reason, count in self.why.items()]
             text += f": {', '.join(why if len(why) > 1 else self.why)}" if why else ""
-        rest = {"lost": self.counts["lost"], "still settling": self.counts["init"], "not found": self.absent}
+        rest = {"no strides yet": self.no_strides} if self.no_strides else {}
+        rest |= {"lost": self.counts["lost"], "still settling": self.counts["init"], "not found": self.absent}
         return "; ".join([text, *(f"{what} in {count_of(n, 'frame')}" for what, n in rest.items() if n)])
 
     def statuses(self) -> str:
@@ -113,6 +117,7 @@ def verdict_of(
         strides=0 if parameters is None else max(len(s.start) for s in parameters.strides.values()),
         speed=speed,
         in_place=in_place,
+        no_strides=0 if np.isnan(track.phase).all() else int(np.isnan(track.phase).sum()),
         why=dict(reasons.most_common()),
     )
 
@@ -122,7 +127,8 @@ def _speed(track: Track) -> tuple[float | None, bool]:
     followed = np.isin(track.status, ("tracking", "ambiguous"))
     if not followed.any() or "speed_m_s" not in track.numbers:
         return None, False
-    of_strides = float(np.median(track.numbers["speed_m_s"][followed]))
+    speed = track.numbers["speed_m_s"][followed]
+    of_strides = float(np.median(speed[np.isfinite(speed)])) if np.isfinite(speed).any() else 0.0
     time, place = track.time[followed], track.places["pelvis"][followed, :2]
     if time[-1] - time[0] < _SECONDS:
         return of_strides, False

@@ -56,6 +56,8 @@ def draw_panel(canvas: Image, estimate: Estimate, frame: int, scale: float) -> N
 
 
 def _figures(estimate: Estimate) -> tuple[str, str]:
+    if np.isnan(estimate.mean.phase):
+        return "no strides", ""
     steps = 120 * estimate.mean.stride_hz if estimate.speed else 0.0
     of_class = f" {estimate.motion_class}" if len(estimate.class_probability) > 1 else ""
     return f"{steps:5.1f} steps/min", f"{estimate.speed:5.2f} m/s{of_class}"
@@ -97,10 +99,15 @@ def _draw_legend(canvas: Image, scale: float) -> None:
 
 
 def _dial(region: Image, estimate: Estimate, at: tuple[int, int], radius: float, scale: float) -> None:
-    """Clock face of one stride: right heel strike at the top, the hand within two standard deviations."""
-    turn, spread = 360 * estimate.mean.phase, min(2 * 360 * estimate.sd.phase, 180.0)
+    """Clock face of one stride: right heel strike at the top, the hand within two standard deviations.
+
+    Without a phase there is no hand.
+    """
     thin, r = max(1, round(scale)), round(radius)
     cv2.circle(region, at, r, _DIM, thin, cv2.LINE_AA)
+    if np.isnan(estimate.mean.phase):
+        return
+    turn, spread = 360 * estimate.mean.phase, min(2 * 360 * estimate.sd.phase, 180.0)
     colour = _STATUS[estimate.status]
     start, end = turn - 90 - spread, turn - 90 + spread
     cv2.ellipse(region, at, (r, r), 0, start, end, colour, round(4 * scale), cv2.LINE_AA)
@@ -174,7 +181,8 @@ class Overlay:
             canvas = picture.copy()
             self.skeleton(canvas, estimate.joints)
             return np.asarray(cv2.addWeighted(canvas, _FADED, picture, 1 - _FADED, 0), np.uint8)
-        canvas = self.body(picture, estimate.mean)
+        posed = np.isfinite(estimate.mean.phase)
+        canvas = self.body(picture, estimate.mean) if posed else picture.copy()
         self.skeleton(canvas, estimate.joints)
         self._ellipses(canvas, estimate)
         return canvas

@@ -59,7 +59,8 @@ def track_clip(options: ClipOptions) -> dict[str, Any]:
     plausibility = Plausibility(keypoints, *_stature(options, scene, start), config.belt)
     follower = _follower(options, scene, tracker, keypoints, plausibility)
     found = follower.follow(start, scene.frames)
-    results = write(options, scene, tracker, found, plausibility)
+    joints_found = keypoints if isinstance(keypoints, PersonKeypoints) else None
+    results = write(options, scene, tracker, found, plausibility, joints_found)
     report = RunReport(options, scene, used, tracker.config.particles)
     for frame, x, y in results.starts[1:]:
         note(f"lost, and a person found at frame {frame}: x {x:.2f} y {y:.2f} m", options.quiet)

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import csv
 import time
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Iterable, Sequence
 from contextlib import ExitStack
 from itertools import groupby
 from pathlib import Path
@@ -24,14 +24,14 @@ from gait.report.drawing import LEGEND_SECONDS, Overlay
 from gait.report.film import Films, PageFilm
 from gait.track.from_walk import Calibration
 from gait.track.options import ClipOptions
+from gait.track.person_keypoints import PersonKeypoints
 from gait.track.plausible import Plausibility
 from gait.track.scene import Scene
 from gait.track.smooth import Smoother
+from gait.track.standing import Sink, Standing
 from gait.track.tracker import Tracker
 
 _HARDLY = 0.1  # of the frames: a person followed in fewer was hardly followed
-
-Sink = Callable[[Frame, Estimate], None]
 
 
 class Results:
@@ -116,8 +116,12 @@ def write(
     tracker: Tracker,
     found: Iterable[tuple[Frame, Estimate]],
     plausibility: Plausibility,
+    keypoints: PersonKeypoints | None,
 ) -> Results:
-    """Write the estimates into all outputs, which appear together at the end."""
+    """Write the estimates into all outputs, which appear together at the end.
+
+    Keypoints, where there are any, show in which frames the person takes no strides.
+    """
     model, video, span, results = tracker.model, scene.video, scene.frames, Results(tracker)
     with ExitStack() as stack:
         rows = TrackWriter(
@@ -133,6 +137,8 @@ def write(
         films = stack.enter_context(Films(options.overlay, span if options.report else None, size, video.fps))
         if films.wanted:
             sinks.append(_drawing(model, scene, films))
+        standing = None if keypoints is None else Standing(keypoints, scene.camera, sinks)
+        sinks = sinks if standing is None else [standing.add]
         smoother = None
         if options.smooth:
             smoother = stack.enter_context(Smoother(tracker))
@@ -144,6 +150,8 @@ def write(
             update(done)
         if smoother is not None and len(smoother):
             _smooth(options, video, smoother, sinks, plausibility)
+        if standing is not None:
+            standing.finish()
         if not results.times:
             raise video.no_frame(span.start)
     results.film = films.page

@@ -1,0 +1,107 @@
+"""Who stands takes no strides: phase, stride rate and speed are left open until strides begin.
+
+A model of walking alone follows a person who stands, or takes a half step from there, with a phase that moves
+on slowly.  A person stands where for `_STILL` seconds neither ankle moves in the picture against the hips and
+the pelvis goes a small part of the way of the strides.  A stride leads from strike to strike of one foot, so
+from there on there is none before both feet have struck.
+"""
+
+from __future__ import annotations
+
+from collections import deque
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from gait.bindings.estimate import Estimate
+from gait.camera.camera import Camera
+from gait.io.video import Frame
+from gait.track.person_keypoints import PersonKeypoints
+
+Sink = Callable[[Frame, Estimate], None]
+
+_STILL = 0.3  # seconds: longer than both feet are on the floor in a step
+_MOVES = 0.01  # person's heights: standard deviation of the place of an ankle that moves
+_WAY = 0.5  # of the way of the strides: who stands goes less
+_HIPS, _ANKLES = ("l_hip", "r_hip"), ("l_ankle", "r_ankle")
+
+
+@dataclass
+class _Held:
+    """A frame whose neighbours are still to come."""
+
+    frame: Frame
+    estimate: Estimate
+    ankles: NDArray[np.float64]  #: (2, 2) against the hips, person's heights; NaN where they were not found
+    stands: bool = False
+
+
+class Standing:
+    """Passes estimates on to sinks in their order, without phase, rate and speed where there are no strides.
+
+    Parameters
+    ----------
+    keypoints : PersonKeypoints
+    camera : Camera
+    sinks : sequence of Sink
+    """
+
+    def __init__(self, keypoints: PersonKeypoints, camera: Camera, sinks: Sequence[Sink]) -> None:
+        self._keypoints, self._camera, self._sinks = keypoints, camera, sinks
+        self._held: deque[_Held] = deque()
+        self._strikes = 2  # since the person stood last
+        self._half = 0  # half strides of the last phase
+
+    def add(self, frame: Frame, estimate: Estimate) -> None:
+        """Take in the next frame, and pass on those that are decided."""
+        self._held.append(_Held(frame, estimate, self._ankles(frame, estimate)))
+        while len(self._held) > 1 and frame.time - self._held[1].frame.time >= _STILL:
+            self._pass_on(self._held.popleft())
+        if frame.time - self._held[0].frame.time >= _STILL and self._still():
+            for held in self._held:
+                held.stands = True
+
+    def finish(self) -> None:
+        """Pass on what is held."""
+        while self._held:
+            self._pass_on(self._held.popleft())
+
+    def _ankles(self, frame: Frame, estimate: Estimate) -> NDArray[np.float64]:
+        found = self._keypoints.choose(frame, estimate)
+        if found is None or any(name not in found.names for name in _HIPS + _ANKLES):
+            return np.full((2, 2), np.nan)
+        uv = np.asarray(found.uv, float)
+        hips, ankles = (uv[[list(found.names).index(name) for name in names]] for names in (_HIPS, _ANKLES))
+        height = np.ptp(frame.camera(self._camera).project(estimate.joints)[:, 1])
+        return np.asarray((ankles - hips.mean(axis=0)) / height)
+
+    def _still(self) -> bool:
+        """Whether the person stands in all frames that are held."""
+        spread = np.std([held.ankles for held in self._held], axis=0)
+        if not np.hypot(*spread.T).max() < _MOVES:  # not if any is NaN
+            return False
+        heading = [held.estimate.mean.heading for held in self._held]
+        speed = [held.estimate.speed for held in self._held]
+        place = [held.estimate.mean.pelvis[:2] for held in self._held]
+        seconds = self._held[-1].frame.time - self._held[0].frame.time
+        way = np.mean(speed * np.array([np.cos(heading), np.sin(heading)]), axis=1) * seconds
+        return bool((place[-1] - place[0]) @ way < _WAY * way @ way)
+
+    def _pass_on(self, held: _Held) -> None:
+        half = int(2 * held.estimate.mean.phase)
+        if held.stands:
+            self._strikes = 0
+        elif half != self._half:
+            self._strikes += 1
+        self._half = half
+        estimate = held.estimate if self._strikes >= 2 else _without_stride(held.estimate)
+        for sink in self._sinks:
+            sink(held.frame, estimate)
+
+
+def _without_stride(estimate: Estimate) -> Estimate:
+    nan = float("nan")
+    mean, sd = (replace(state, phase=nan, stride_hz=nan) for state in (estimate.mean, estimate.sd))
+    return replace(estimate, mean=mean, sd=sd, speed=nan)
