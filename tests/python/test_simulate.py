@@ -18,9 +18,9 @@ from gait.io import blob
 from gait.io.video import Video
 from gait.simulate import aids
 from gait.simulate.body import BONE_INDEX, PARENTS, POINT_BONE, POINTS, Mesh, draw_anatomy
-from gait.simulate.clip import FILES, background, find_events, pictures, planned_events, simulate
+from gait.simulate.clip import FILES, background, files, find_events, pictures, planned_events, simulate
 from gait.simulate.curves import NAMES, fourier, normative
-from gait.simulate.render import rasterise
+from gait.simulate.render import Renderer, light, rasterise
 from gait.simulate.scenario import PRESETS, VIEWS, Scenario
 from gait.simulate.stage import Stage, build_set, set_stage
 
@@ -348,6 +348,29 @@ def test_a_models_curves_can_be_walked(tmp_path: Path) -> None:
     write_model(tmp_path / "arms.gait", "knee_of_another_kind")
     with pytest.raises(UserError, match=r"arms\.gait: has no channel r_knee_flexion"):
         set_stage(replace(TINY, gait=str(tmp_path / "arms.gait")))
+
+
+def test_people_cross_and_the_nearer_one_hides_the_other(tmp_path: Path) -> None:
+    scenario = replace(TINY, people="crossing", frames=41)
+    stage = set_stage(scenario)
+    made, people = build_set(stage), [stage, *stage.others]
+    ways = [one.walk.origins[one.frames, 0] for one in people]
+    assert (ways[0][0, 0] - ways[1][0, 0]) * (ways[0][-1, 0] - ways[1][-1, 0]) < 0
+    figures = zip([(made.mesh, made.appearance), *made.others], people, strict=True)
+    drawn = [Renderer(stage.camera, made.scene, *figure, one.walk) for figure, one in figures]
+    both, nearer = light(drawn, 20), min(drawn, key=lambda one: one.depth(20))
+    alone = light([nearer], 20)
+    shown = np.abs(alone - made.scene.plate).max(axis=2) > 0.1
+    assert shown.sum() > 100 and np.median(np.abs(both - alone)[shown]) < 1e-6
+    simulate(replace(scenario, frames=3), tmp_path)
+    assert sorted(one.name for one in tmp_path.iterdir()) == sorted(files(scenario))
+    apart = np.abs(place(read_truth(tmp_path), "pelvis")[0] - json_pelvis(tmp_path / "init_2.json"))
+    assert apart.max() > 0.5
+
+
+def json_pelvis(path: Path) -> np.ndarray:
+    """Return the place in an init file."""
+    return np.array(json.loads(path.read_text())["pelvis"])
 
 
 def test_presets_are_sound() -> None:

@@ -3,7 +3,8 @@
 Writes video.mp4, background.png (the empty scene; of a camera that moves poses.csv instead, for gait track
 --camera-path), camera.json, truth.csv (joints in metres and pixels),
 init.json (the truth at frame 0 with some error, to start a tracker), meta.json (heel strikes, stature and how
-the clip was made) and contact.jpg into DIR.  The same options and seed give the same pictures.
+the clip was made) and contact.jpg into DIR; of further people truth_2.csv, init_2.json, meta_2.json and so
+on.  The same options and seed give the same pictures.
 
 presets (other options change them):
   demo     side view, left to right, 4 s
@@ -30,6 +31,7 @@ from gait.progress import progress
 from gait.simulate.scenario import (
     AIDS,
     BODIES,
+    COMPANY,
     DIRECTIONS,
     GENERATOR,
     MOTIONS,
@@ -43,6 +45,7 @@ EXAMPLES = """\
 examples:
   gait simulate -o walk
   gait simulate -o follow --moving follow
+  gait simulate -o meet --people crossing --view oblique
   gait simulate -o walk --preset pole --seed 7 --stature 1.68 --size 1280x720
   gait simulate -o walk --preset stick --body drawn
 """
@@ -73,6 +76,11 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         "--moving",
         choices=MOVING,
         help="a robot follows the person at 1 m, a camera is turned to them, or a hand holds it",
+    )
+    parser.add_argument(
+        "--people",
+        choices=COMPANY,
+        help="another person comes the other way, three walk abreast, or a faster person overtakes",
     )
     parser.add_argument("--frames", type=int, metavar="N")
     parser.add_argument("--fps", type=float, metavar="HZ")

@@ -6,6 +6,7 @@ import csv
 import json
 import os
 from collections.abc import Callable, Iterable, Iterator
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -20,8 +21,8 @@ from gait.io.files import replacing, require_writable
 from gait.io.video import VideoWriter
 from gait.simulate.body import BONE_INDEX, SIDES
 from gait.simulate.geometry import Array, Ints, Picture
-from gait.simulate.render import DEFOCUS_PX, SHUTTER, Renderer, develop
-from gait.simulate.scenario import Scenario
+from gait.simulate.render import DEFOCUS_PX, SHUTTER, Renderer, develop, light
+from gait.simulate.scenario import COMPANY, Scenario
 from gait.simulate.scene import build_scene
 from gait.simulate.stage import Set, Stage, build_set, set_stage
 from gait.simulate.walk import TOE_OFF, Walk
@@ -246,27 +247,32 @@ def _pole(stage: Stage, made: Set) -> list[dict[str, Any]]:
 
 FILES = ("video.mp4", "background.png", "camera.json", "truth.csv", "init.json", "meta.json", "contact.jpg")
 _POSES = "poses.csv"  # instead of the empty scene, of a camera that moves
+_PERSON = (("truth", ".csv"), ("init", ".json"), ("meta", ".json"))  # of each person; the first has no number
 _CONTACTS = (3, 2)  # pictures across and down in contact.jpg
 
 
 def pictures(stage: Stage, made: Set) -> Iterator[Picture]:
     """Yield the frames of the clip, (h, w, 3) BGR; each depends only on the scenario and its own number."""
     scenario = stage.scenario
-    renderer = Renderer(stage.camera, made.scene, made.mesh, made.appearance, stage.walk)
+    figures = [(made.mesh, made.appearance, stage.walk)]
+    figures += [(*figure, one.walk) for figure, one in zip(made.others, stage.others, strict=True)]
+    people = [Renderer(stage.camera, made.scene, *figure) for figure in figures]
     for frame in range(scenario.frames):
         if stage.cameras:
             scene = build_scene(stage.cameras[frame], made.layout, made.coats)
-            renderer = Renderer(stage.cameras[frame], scene, made.mesh, made.appearance, stage.walk)
+            people = [Renderer(stage.cameras[frame], scene, *figure) for figure in figures]
         rng = scenario.stream("sensor", frame)
         gain = 1 + 0.01 * scenario.flicker * float(np.clip(rng.standard_normal(), -2.5, 2.5))
-        yield develop(renderer.light(frame), gain, scenario.noise, rng)
+        yield develop(light(people, frame), gain, scenario.noise, rng)
 
 
 def files(scenario: Scenario) -> tuple[str, ...]:
     """Return the names of the files of a clip."""
+    more = [f"{stem}_{k}{suffix}" for k in range(2, 2 + COMPANY[scenario.people]) for stem, suffix in _PERSON]
+    names = [*FILES, *more]
     if scenario.moving == "none":
-        return FILES
-    return tuple(_POSES if name == "background.png" else name for name in FILES)
+        return tuple(names)
+    return tuple(_POSES if name == "background.png" else name for name in names)
 
 
 def background(made: Set) -> Picture:
@@ -286,9 +292,7 @@ def simulate(
     stage = set_stage(scenario)
     target = _folder(folder, files(scenario))
     made = build_set(stage)
-    events = find_events(stage)
-    meta = describe(stage, made, events)
-    strikes = events["r_heel_strike"]
+    figures = [(made.mesh, made.appearance), *made.others]
     _write_video(target, stage, made, progress)
     if stage.cameras:
         times = [frame / scenario.fps for frame in range(scenario.frames)]
@@ -297,11 +301,16 @@ def simulate(
             write_path(temporary, times, poses, by_frame=False)
     else:
         _write_picture(target / "background.png", background(made))
-    write_truth(target / "truth.csv", stage, strikes)
     _write_json(target / "camera.json", stage.camera.to_dict())
-    _write_json(target / "init.json", first_state(stage, strikes))
-    _write_json(target / "meta.json", meta)
-    return meta
+    metas = []
+    for k, (one, (_, appearance)) in enumerate(zip([stage, *stage.others], figures, strict=True), 1):
+        number = "" if k == 1 else f"_{k}"
+        events = find_events(one)
+        write_truth(target / f"truth{number}.csv", one, events["r_heel_strike"])
+        _write_json(target / f"init{number}.json", first_state(one, events["r_heel_strike"]))
+        metas.append(describe(one, replace(made, appearance=appearance), events))
+        _write_json(target / f"meta{number}.json", metas[-1])
+    return metas[0]
 
 
 def _folder(folder: str | os.PathLike[str], names: Iterable[str]) -> Path:

@@ -1,8 +1,10 @@
-"""Frames of the clip: the figure with sun, self-shadow, cast shadow and motion blur laid over the scene."""
+"""Frames of the clip: figures with sun, self-shadow, cast shadow and motion blur laid over the scene."""
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
+from functools import reduce
 from typing import NamedTuple
 
 import cv2
@@ -174,6 +176,10 @@ class _Instant:
     normals: Floats
 
 
+Shutter = tuple[_Instant, _Instant]
+"""The figure as the shutter opens and closes."""
+
+
 class Renderer:
     """Draws any frame of one walk."""
 
@@ -187,18 +193,20 @@ class Renderer:
             self._cloth[mesh.faces[mesh.material == material]] = _SLIP
         self._tile = (SIZE / appearance.spans).astype(np.float32)
 
-    def light(self, frame: int) -> Floats:
-        """Return linear light (h, w, 3), RGB, before the lens and the sensor."""
-        opened, closed = self._shutter(frame)
-        middle = _between(opened, closed, 0.5)
+    def shadow(self, shutter: Shutter) -> tuple[Floats, Floats]:
+        """Return what the figure leaves of the sun's light and of the sky's at each pixel, (h, w, 1)."""
+        middle = _between(*shutter, 0.5)
         self._sun.update(middle.vertices, self.mesh.faces)
         behind = 1 - self.scene.front  # what stands in front takes no shadow of the figure
         sunny = (1 - self._sun.cast() * behind)[..., None]
-        touch = (1 - self._contact.dark(middle.vertices) * behind)[..., None]
-        picture = self.scene.ambient * touch + self.scene.direct * (sunny * (0.4 + 0.6 * touch))
-        return self._over(picture, opened, closed, frame)
+        return sunny, (1 - self._contact.dark(middle.vertices) * behind)[..., None]
 
-    def _shutter(self, frame: int) -> tuple[_Instant, _Instant]:
+    def depth(self, frame: int) -> float:
+        """Distance of the pelvis along the optical axis, metres."""
+        index = self._zero + frame * self.walk.timing.per_frame
+        return float(self.camera.depth(self.walk.origins[index, 0]))
+
+    def shutter(self, frame: int) -> Shutter:
         """Return the figure as the shutter opens and closes, a quarter interval either side of the frame."""
         centre = self._zero + frame * self.walk.timing.per_frame
         half = self.walk.timing.per_frame // 4
@@ -209,8 +217,9 @@ class Renderer:
         vertices, normals = self.mesh.pose(origins, turns)
         return _Instant(vertices + origins[0].astype(np.float32), normals)
 
-    def _over(self, picture: Floats, opened: _Instant, closed: _Instant, frame: int) -> Floats:
+    def over(self, picture: Floats, shutter: Shutter, frame: int) -> Floats:
         """Lay the average of the instants over `picture`, behind what stands in front."""
+        opened, closed = shutter
         window = self._window(opened, closed)
         rows, columns = window
         shape = (rows.stop - rows.start, columns.stop - columns.start)
@@ -274,6 +283,18 @@ class Renderer:
         texel = np.floor(uv * self._tile[material][:, None]).astype(np.int32)
         row = np.where(material == FACE, np.clip(texel[:, 1], 0, SIZE - 1), texel[:, 1] % SIZE)
         return self.appearance.tiles[material, row, texel[:, 0] % SIZE]
+
+
+def light(people: Sequence[Renderer], frame: int) -> Floats:
+    """Return linear light (h, w, 3), RGB, before the lens and the sensor; all `people` are in one scene."""
+    scene = people[0].scene
+    shutters = [one.shutter(frame) for one in people]
+    shadows = [one.shadow(shutter) for one, shutter in zip(people, shutters, strict=True)]
+    sunny, touch = (reduce(np.multiply, parts) for parts in zip(*shadows, strict=True))
+    picture: Floats = scene.ambient * touch + scene.direct * (sunny * (0.4 + 0.6 * touch))
+    for k in sorted(range(len(people)), key=lambda k: -people[k].depth(frame)):
+        picture = people[k].over(picture, shutters[k], frame)
+    return picture
 
 
 def _between(a: _Instant, b: _Instant, share: float) -> _Instant:

@@ -17,6 +17,8 @@ MOTIONS = ("walk", "stop", "stand", "backwards", "turn")
 AIDS = ("none", "stick", "crutches")
 BODIES = ("table", "drawn")
 MOVING = ("none", "follow", "pan", "shake")
+COMPANY = {"one": 0, "crossing": 1, "abreast": 2, "overtaking": 1}
+"""How many walk beside the first person."""
 
 # option: smallest and largest value
 _LIMITS = {
@@ -64,6 +66,8 @@ class Scenario:
     body: str = "table"
     #: One of `MOVING`: a robot follows the person, a camera is turned to them, a hand holds it.
     moving: str = "none"
+    #: One of `COMPANY`: another person comes the other way, three walk abreast, a faster person overtakes.
+    people: str = "one"
     gait: str = GENERATOR  #: ``generator`` or the name of a ``.gait`` model whose curves are walked
 
     def __post_init__(self) -> None:
@@ -84,6 +88,11 @@ class Scenario:
             raise UsageError(f"--moving {self.moving}: unknown; use one of {' '.join(MOVING)}")
         if self.moving != "none" and (self.pole or self.motion == "stand"):
             raise UsageError("--moving: is for a person who walks, without a pole")
+        if self.people not in COMPANY:
+            raise UsageError(f"--people {self.people}: unknown; use one of {' '.join(COMPANY)}")
+        alone = self.pole or self.moving != "none" or self.motion != "walk" or self.view == "circle"
+        if self.people != "one" and alone:
+            raise UsageError("--people: walk straight on before a camera that stands still, without a pole")
         for name, (low, high) in _LIMITS.items():
             value = getattr(self, name)
             if value is not None and not low <= value <= high:

@@ -1,8 +1,8 @@
-"""Everything of one clip before its pictures: person, walk, camera, scene."""
+"""Everything of one clip before its pictures: people, walks, camera, scene."""
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from functools import partial
 
 import numpy as np
@@ -91,6 +91,8 @@ def _extent(points: Array, place: Array, rotation: Array) -> tuple[Array, Array]
 
 _USUAL_SPEED, _USUAL_CADENCE, _USUAL_STATURE = 1.25, 0.92, 1.75  # m/s, strides/s, m
 _SURFACE = 0.10  # metres from a joint to the skin, hair or shoe around it
+_APART = (0.65, 0.95)  # metres between the paths of people who meet
+_FASTER = 1.4  # times the speed of a person who is overtaken
 
 
 @dataclass(frozen=True)
@@ -104,6 +106,7 @@ class Stage:
     cameras: list[Camera]  #: of each frame, if it moves; `camera` is then the first
     frames: Ints  #: (frames,) index of each frame on the walk's time grid
     classes: list[str]  #: class of motion of each frame
+    others: list[Stage] = field(default_factory=list)  #: further people, before the same camera
 
     def project(self, places: Array) -> Array:
         """Return pixels (frames, ..., 2) of places (frames, ..., 3), each as its frame's camera sees it."""
@@ -114,17 +117,40 @@ class Stage:
 
 @dataclass(frozen=True)
 class Set:
-    """What is needed to draw: the figure and the empty scene."""
+    """What is needed to draw: the figure, those of `Stage.others`, and the empty scene."""
 
     mesh: Mesh
     appearance: Appearance
+    others: list[tuple[Mesh, Appearance]]
     layout: Layout
     coats: Coats
     scene: Scene
 
 
 def set_stage(scenario: Scenario) -> Stage:
-    """Draw a person and let them walk before a camera. UserError if the options contradict each other."""
+    """Draw people and let them walk before a camera. UserError if the options contradict each other."""
+    path = make_path(scenario.view, scenario.direction, float(scenario.stream("path").uniform(-1, 1)))
+    if scenario.motion == "turn":
+        path = replace(path, corner=CORNER if scenario.direction == "lr" else -CORNER)
+    first, *others = [_cast(one, way) for one, way in [(scenario, path), *_company(scenario, path)]]
+    reach, follows = _envelope(first.walk, first.frames), scenario.moving == "follow"
+    away, high = (None, None) if follows else (scenario.distance, scenario.camera_height)
+    reaches = [reach, *(_envelope(one.walk, one.frames) for one in others)]
+    camera = make_camera(
+        scenario.view, scenario.size, np.concatenate(reaches, axis=1).reshape(-1, 3), away, high
+    )
+    cameras = []
+    if scenario.moving != "none":
+        rng = scenario.stream("moving")
+        pelvis, away, high = first.walk.origins[first.frames, 0], scenario.distance, scenario.camera_height
+        cameras = make_cameras(scenario.moving, camera, pelvis, reach, scenario.fps, rng, away, high)
+        camera = cameras[0]
+    others = [replace(one, camera=camera) for one in others]
+    return replace(first, camera=camera, cameras=cameras, others=others)
+
+
+def _cast(scenario: Scenario, path: Path) -> Stage:
+    """Draw a person who walks along a path, before the camera is placed: one that shows nothing."""
     rng = scenario.stream("body")
     stature = scenario.stature or float(np.clip(rng.normal(1.73, 0.08), 1.55, 1.95))
     model = blob.decode(read_blob(None)) if scenario.body == "drawn" else None
@@ -135,9 +161,6 @@ def set_stage(scenario: Scenario) -> Stage:
     curves = normative(rng) if generated else curves_of_model(scenario.gait, rng, cadence)
     timing = draw_timing(cadence, scenario.fps, scenario.frames, len(curves.modes), rng)
     timing = replace(timing, spared=scenario.asymmetry / 100)
-    path = make_path(scenario.view, scenario.direction, float(scenario.stream("path").uniform(-1, 1)))
-    if scenario.motion == "turn":
-        path = replace(path, corner=CORNER if scenario.direction == "lr" else -CORNER)
     stop, shaped = motion.pause(timing, scenario.motion, scenario.frames), None
     if stop is not None:
         blend = partial(motion.posture, stop=stop, rng=scenario.stream("idle"))
@@ -151,30 +174,63 @@ def set_stage(scenario: Scenario) -> Stage:
     names = motion.classes(scenario.motion, stop, len(timing.time))
     zero = int(np.argmin(np.abs(timing.time)))
     frames = zero + timing.per_frame * np.arange(scenario.frames)
-    reach, follows = _envelope(walk, frames), scenario.moving == "follow"
-    away, high = (None, None) if follows else (scenario.distance, scenario.camera_height)
-    camera = make_camera(scenario.view, scenario.size, reach.reshape(-1, 3), away, high)
-    cameras = []
-    if scenario.moving != "none":
-        rng = scenario.stream("moving")
-        pelvis, away, high = walk.origins[frames, 0], scenario.distance, scenario.camera_height
-        cameras = make_cameras(scenario.moving, camera, pelvis, reach, scenario.fps, rng, away, high)
-        camera = cameras[0]
-    return Stage(scenario, body, walk, camera, cameras, frames, [names[k] for k in frames.tolist()])
+    unplaced = Camera(*scenario.size, 1.0, 1.0, 0.0, 0.0, np.eye(3), np.zeros(3))
+    return Stage(scenario, body, walk, unplaced, [], frames, [names[k] for k in frames.tolist()])
+
+
+def _company(scenario: Scenario, path: Path) -> list[tuple[Scenario, Path]]:
+    """Who else walks, and where: beside the first person's path, on either side of it."""
+    if scenario.people == "one":
+        return []
+    rng = scenario.stream("people")
+    other = replace(
+        scenario, people="one", stature=None, speed=None, stride_hz=None, asymmetry=0.0, aid="none"
+    )
+    speed = pace(scenario, scenario.stature or _USUAL_STATURE)[0]
+    side, apart = float(rng.choice([-1, 1])), float(rng.uniform(*_APART))
+    if scenario.people == "crossing":
+        return [
+            (
+                replace(other, seed=_another(scenario, 1)),
+                replace(path, heading=path.heading + np.pi, aside=-side * apart),
+            )
+        ]
+    if scenario.people == "overtaking":
+        faster = replace(other, seed=_another(scenario, 1), speed=min(_FASTER * speed, 2.5))
+        return [(faster, replace(path, aside=side * apart))]
+    return [
+        (
+            replace(other, seed=_another(scenario, k), speed=speed),
+            replace(path, aside=way * float(rng.uniform(*_APART)), ahead=float(rng.uniform(-0.25, 0.25))),
+        )
+        for k, way in ((1, 1.0), (2, -1.0))
+    ]
+
+
+def _another(scenario: Scenario, number: int) -> int:
+    """Seed of another person in the same clip."""
+    return (scenario.seed + 7919 * number) % 2**31
 
 
 def build_set(stage: Stage) -> Set:
-    """Make the figure and paint the scene."""
-    scenario, walk = stage.scenario, stage.walk
-    appearance = draw_appearance(scenario.stream("look"))
-    carried = aids.parts(scenario.aid, aids.hands(scenario.aid, scenario.asymmetry), stage.body)
-    mesh = build_figure(stage.body, appearance, scenario.stream("cloth"), carried)
-    ground = walk.origins[stage.frames, 0, :2]
+    """Make the figures and paint the scene."""
+    scenario = stage.scenario
+    people = [stage, *stage.others]
+    (mesh, appearance), *others = [_figure(one) for one in people]
+    ground = np.concatenate([one.walk.origins[one.frames, 0, :2] for one in people])
     rng = scenario.stream("scene")
     extent = None if not stage.cameras else (ground[:, 0].min() - _AROUND, ground[:, 0].max() + _AROUND)
     layout = draw_layout(stage.camera, ground, scenario.clutter, scenario.pole, rng, extent)
     coats = Coats(rng, keep=bool(stage.cameras))
-    return Set(mesh, appearance, layout, coats, build_scene(stage.camera, layout, coats))
+    return Set(mesh, appearance, others, layout, coats, build_scene(stage.camera, layout, coats))
+
+
+def _figure(stage: Stage) -> tuple[Mesh, Appearance]:
+    """Dress a person."""
+    scenario = stage.scenario
+    appearance = draw_appearance(scenario.stream("look"))
+    carried = aids.parts(scenario.aid, aids.hands(scenario.aid, scenario.asymmetry), stage.body)
+    return build_figure(stage.body, appearance, scenario.stream("cloth"), carried), appearance
 
 
 def pace(scenario: Scenario, stature: float) -> tuple[float, float]:

@@ -33,6 +33,9 @@ class Path:
     radius: float = 0.0
     #: Angle of a corner in the middle of the path, radians, positive to the left.
     corner: float = 0.0
+    #: Metres by which all of a straight path is moved to the left and ahead.
+    aside: float = 0.0
+    ahead: float = 0.0
 
     def direction(self, along: ArrayLike) -> Array:
         """Return the heading at arc lengths (...), radians, unwrapped."""
@@ -49,8 +52,8 @@ class Path:
         if self.corner:
             base = self._round_the_corner(along)
         else:
-            base = -self.radius * aside if self.radius else along[..., None] * ahead
-        return base + left[..., None] * aside
+            base = -self.radius * aside if self.radius else (along + self.ahead)[..., None] * ahead
+        return base + (left + self.aside)[..., None] * aside
 
     def _round_the_corner(self, along: Array) -> Array:
         """World x, y (..., 2) at arc lengths (...), by the trapezoidal rule."""
