@@ -66,14 +66,25 @@ static bool align(const gait_tracker *t, int32_t c, const likelihood_scratch *w,
     return true;
 }
 
-static void displace(const gait_tracker *t, const alignment *a, float sign, likelihood_scratch *w)
+/* Displace the bodies and points of the block; `put_back` undoes that to the last bit. */
+static void displace(const gait_tracker *t, const alignment *a, likelihood_scratch *w)
 {
-    for (int32_t f = 0; f < t->model->frames + t->model->points; f++)
-        for (int32_t k = 0; k < 3; k++) {
-            float *const to = f < t->model->frames ? w->body.o[f][k] : w->points[f - t->model->frames][k];
+    int32_t const frames = t->model->frames, points = t->model->points;
+    memcpy(w->home, w->body.o, (size_t)frames * sizeof *w->home);
+    memcpy(w->home + frames, w->points, (size_t)points * sizeof *w->home);
+    for (int32_t f = 0; f < frames + points; f++) {
+        float(*const to)[BLOCK] = f < frames ? w->body.o[f] : w->points[f - frames];
+        for (int32_t k = 0; k < 3; k++)
             for (int32_t i = 0; i < BLOCK; i++)
-                to[i] += sign * a->by[k][i];
-        }
+                to[k][i] += a->by[k][i];
+    }
+}
+
+static void put_back(const gait_tracker *t, likelihood_scratch *w)
+{
+    int32_t const frames = t->model->frames, points = t->model->points;
+    memcpy(w->body.o, w->home, (size_t)frames * sizeof *w->home);
+    memcpy(w->points, w->home + frames, (size_t)points * sizeof *w->home);
 }
 
 /* ---- particles ---- */
@@ -105,14 +116,14 @@ void likelihood_particles(gait_tracker *t, int32_t c, const int32_t *index, int3
     alignment a;
     bool const aligned = align(t, c, w, &a);
     if (aligned)
-        displace(t, &a, 1.0f, w);
+        displace(t, &a, w);
     likelihood_outline(t, c, w);
     memset(&w->terms, 0, sizeof w->terms);
     for (int32_t lane = 0; lane < lanes; lane++)
         (void)evaluate(t, c, index[lane], lane, w, samples);
     like_sum(t->like, w->outline, t->core->sampled_cameras >> c & 1u, &w->terms, nats);
     if (aligned)
-        displace(t, &a, -1.0f, w);
+        put_back(t, w);
     for (int32_t lane = 0; lane < lanes && aligned; lane++)
         nats[lane] += a.nats[lane];
 }
@@ -123,7 +134,7 @@ static void block_in_camera(gait_tracker *t, int32_t c, int32_t begin, int32_t l
     alignment a;
     bool const aligned = align(t, c, w, &a);
     if (aligned)
-        displace(t, &a, 1.0f, w);
+        displace(t, &a, w);
     likelihood_outline(t, c, w);
     if (lanes < BLOCK) /* empty lanes are summed too, though the sums are not used: let them be defined */
         memset(&w->terms, 0, sizeof w->terms);
@@ -131,7 +142,7 @@ static void block_in_camera(gait_tracker *t, int32_t c, int32_t begin, int32_t l
         particle_in_camera(t, c, begin + lane, lane, w);
     like_sum(t->like, w->outline, t->core->sampled_cameras >> c & 1u, &w->terms, nats);
     if (aligned)
-        displace(t, &a, -1.0f, w);
+        put_back(t, w);
     for (int32_t lane = 0; lane < lanes; lane++) {
         nats[lane] += aligned ? a.nats[lane] : 0.0f;
         t->loglik_raw[begin + lane] += nats[lane];

@@ -68,6 +68,7 @@ static void layout_likelihood_scratch(arena *a, const gait_model *m, likelihood_
     void *const pose = arena_take(a, sizeof(like_pose_limb), limbs);
     void *const drawn = arena_take(a, offsetof(layers, visible) + limbs * sizeof(grid_mask), 1);
     void *const points = arena_take(a, sizeof *w->points, (size_t)m->points);
+    void *const home = arena_take(a, sizeof *w->home, (size_t)(m->frames + m->points));
     if (!w)
         return;
     w->outline = outline;
@@ -76,6 +77,7 @@ static void layout_likelihood_scratch(arena *a, const gait_model *m, likelihood_
     w->pose = pose;
     w->layers = drawn;
     w->points = points;
+    w->home = home;
 }
 
 static void layout_lag(arena *a, gait_tracker *t)

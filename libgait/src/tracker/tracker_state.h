@@ -95,6 +95,7 @@ typedef struct likelihood_scratch { /* one per task; its arrays are as long as t
     layers *layers;
     like_block terms;
     float (*points)[3][BLOCK];
+    float (*home)[3][BLOCK]; /* origins of the frames, then points, where a displaced body is put back to */
 } likelihood_scratch;
 
 typedef struct generation_record { /* what an estimate reports of its frame as a whole */
