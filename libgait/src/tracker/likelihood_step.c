@@ -73,7 +73,7 @@ static void displace(const gait_tracker *t, const alignment *a, likelihood_scrat
     memcpy(w->home, w->body.o, (size_t)frames * sizeof *w->home);
     memcpy(w->home + frames, w->points, (size_t)points * sizeof *w->home);
     for (int32_t f = 0; f < frames + points; f++) {
-        float(*const to)[BLOCK] = f < frames ? w->body.o[f] : w->points[f - frames];
+        float (*const to)[BLOCK] = f < frames ? w->body.o[f] : w->points[f - frames];
         for (int32_t k = 0; k < 3; k++)
             for (int32_t i = 0; i < BLOCK; i++)
                 to[k][i] += a->by[k][i];

@@ -79,8 +79,8 @@ class Standing:
 
     def _still(self) -> bool:
         """Whether the person stands in all frames that are held."""
-        spread = np.std([held.ankles for held in self._held], axis=0)
-        if not np.hypot(*spread.T).max() < _MOVES:  # not if any is NaN
+        sd = np.std([held.ankles for held in self._held], axis=0)
+        if not np.hypot(*sd.T).max() < _MOVES:  # not if any is NaN
             return False
         heading = [held.estimate.mean.heading for held in self._held]
         speed = [held.estimate.speed for held in self._held]
