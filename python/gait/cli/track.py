@@ -91,6 +91,13 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     )
     values.add_person(parser)
     add(
+        "--people",
+        type=_people,
+        metavar="N",
+        help="track several people: all who walk, or the N (up to 8) in view longest and tallest; each "
+        "has files of their own, OUT-1.csv and so on, --overlay shows all",
+    )
+    add(
         "--keypoints-sd",
         "--tracks-sd",
         type=values.positive,
@@ -113,6 +120,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 def run(args: argparse.Namespace) -> int:
     """Track and report."""
     from gait.track.clip import ClipOptions, track_clip
+    from gait.track.people import track_people
 
     if args.stop is not None:
         values.require_order(args.start or 0, args.stop)
@@ -122,6 +130,12 @@ def run(args: argparse.Namespace) -> int:
         raise UsageError("--keypoints-sd: needs --keypoints")
     if args.person and not args.keypoints:
         raise UsageError("--person: needs --keypoints")
+    if args.people is not None:
+        alone = {"--init": args.init != "auto", "--keypoints": args.keypoints, "--mode": args.mode == "paper"}
+        alone["--detector none"] = args.detector == "none"
+        for option, given in alone.items():
+            if given:
+                raise UsageError(f"--people: finds everyone by the detector; leave out {option}")
     if not args.camera and args.height is None:
         raise UsageError("give --camera CAM, or --height M for a camera that is found from the walk")
     if not args.camera and args.init != "auto":
@@ -147,9 +161,39 @@ def run(args: argparse.Namespace) -> int:
 
     given = {name: getattr(args, name) for name in ClipOptions.__dataclass_fields__}
     given |= {"mode": Mode[args.mode.upper()], "keypoints_sd": args.keypoints_sd or KEYPOINTS_SD}
-    summary = track_clip(ClipOptions(**given))
-    print(json.dumps(summary) if args.json else _text(summary))
+    if args.people is None:
+        summary = track_clip(ClipOptions(**given))
+        text = _text
+    else:
+        summary = track_people(ClipOptions(**given))
+        text = _text_of_people
+    print(json.dumps(summary) if args.json else text(summary))
     return 0 if summary["followed"] else 1
+
+
+def _people(text: str) -> int:
+    """Read how many people to track at most."""
+    most = 8
+    if text == "all":
+        return most
+    if text.isdecimal() and 1 <= int(text) <= most:
+        return int(text)
+    raise argparse.ArgumentTypeError(f"{text!r} is neither all nor a number from 1 to {most}")
+
+
+def _text_of_people(summary: dict[str, Any]) -> str:
+    lines = []
+    for number, one in summary["people"].items():
+        lines.append(f"person {number}: {one['verdict']}.")
+        if one["warning"]:
+            lines.append(f"warning: {one['warning']}")
+        lines.append(f"  written: {', '.join(f'{what} {path}' for what, path in one['files'].items())}")
+    lines += [f"written: {what} {path}" for what, path in summary["files"].items()]
+    if summary["others"]:
+        lines.append(
+            f"found but not tracked: {', '.join(f'person {number}' for number in summary['others'])}"
+        )
+    return "\n".join(lines)
 
 
 def _text(summary: dict[str, Any]) -> str:

@@ -106,6 +106,8 @@ class PeopleDetector:
         Landmark network: ``full``, ``lite`` or ``heavy``.
     most : int
         People followed at a time.
+    everyone : bool
+        Search all of the picture for small people although some were found.
 
     Attributes
     ----------
@@ -118,10 +120,10 @@ class PeopleDetector:
         If the weights are absent or damaged.
     """
 
-    def __init__(self, network: str = "full", most: int = _MOST) -> None:
+    def __init__(self, network: str = "full", most: int = _MOST, everyone: bool = False) -> None:
         self._find = PersonNetwork()
         self._landmarks = LandmarkNetwork(network)
-        self._most = most
+        self._most, self._everyone = most, everyone
         self._scanned = -np.inf
         self.people: list[Followed] = []
 
@@ -177,8 +179,8 @@ class PeopleDetector:
         """
         time = frame.time
         self._add_new(frame, found, [p.expected(time) for p in self.people if self._just_lost(p, time)])
-        for crops in self._find(frame.image, small=not found):
-            if self._add_new(frame, found, crops):
+        for crops in self._find(frame.image, small=self._everyone or not found):
+            if self._add_new(frame, found, crops) and not self._everyone:
                 return
         if not found:
             self._add_new(frame, found, [whole_picture(frame.image)])
@@ -246,6 +248,7 @@ def detect(
     stop: int | None = None,
     update: Callable[[int], None] | None = None,
     correct: bool = True,
+    everyone: bool = False,
 ) -> dict[int, Keypoints]:
     """Find the keypoints of everyone in a video.
 
@@ -262,6 +265,8 @@ def detect(
         Called with the number of frames done.
     correct : bool
         Move the joints to where the model has them, and give their errors (`gait.detect.profile`).
+    everyone : bool
+        Search all of the picture for small people although some were found.
 
     Returns
     -------
@@ -274,7 +279,7 @@ def detect(
     UserError
         If the weights are absent or damaged, or the video cannot be read.
     """
-    detector = PeopleDetector(network, most)
+    detector = PeopleDetector(network, most, everyone)
     times = {}
     for frame in video.frames(first, stop):
         detector.step(frame)

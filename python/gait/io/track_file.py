@@ -65,6 +65,8 @@ class TrackWriter:
         That were to be tracked, if that is known; reasons of `Estimate` are then written too.
     camera_change : callable, optional
         Gives `Track.camera_change` at a time in seconds, of a camera that was found from the walk.
+    person : int, optional
+        Number of the person, of several in a clip.
     """
 
     def __init__(
@@ -76,6 +78,7 @@ class TrackWriter:
         classes: tuple[str, ...] = (),
         frames: range | None = None,
         camera_change: Callable[[float], Array] | None = None,
+        person: int | None = None,
     ) -> None:
         self.path = path
         missing = [name for name in JOINTS if name not in joint_names]
@@ -88,6 +91,8 @@ class TrackWriter:
         self._header = header(components, angle_names, classes)
         self._header += CLIP_COLUMNS if frames is not None else ()
         self._header += CAMERA_COLUMNS if camera_change is not None else ()
+        self._person = [] if person is None else [person]
+        self._header += ["person"] * len(self._person)
         self._stack = ExitStack()
 
     def __enter__(self) -> TrackWriter:
@@ -120,6 +125,7 @@ class TrackWriter:
             + [f"{value:.4f}" for value in estimate.class_probability[: self._classes]]
             + self._of_clip(estimate)
             + self._of_camera(frame.time)
+            + self._person
         )
 
     def _of_clip(self, estimate: Estimate) -> list[object]:

@@ -160,11 +160,16 @@ class Overlay:
             _draw_legend(canvas, self._scale)
         return canvas
 
-    def draw_people(self, image: Image, people: Mapping[str, Estimate]) -> Image:
-        """Return a BGR picture: frame, and several people with their names over their heads, no panel."""
+    def draw_people(
+        self, image: Image, people: Mapping[str, Estimate], colours: Mapping[str, Colour] | None = None
+    ) -> Image:
+        """Return a BGR picture: frame, and several people with their names over their heads, no panel.
+
+        `colours`: of each person, instead of those of the sides of bodies.
+        """
         canvas = _in_colour(image).copy()
-        for estimate in people.values():
-            canvas = self._person(canvas, estimate)
+        for name, estimate in people.items():
+            canvas = self._person(canvas, estimate, None if colours is None else colours[name])
         for name, estimate in people.items():
             at = self.camera.project(estimate.joint("head_top"))
             if np.isfinite(at).all():
@@ -176,14 +181,14 @@ class Overlay:
                 _write(canvas, name, (left, foot), size, _STATUS[estimate.status])
         return canvas
 
-    def _person(self, picture: Image, estimate: Estimate) -> Image:
+    def _person(self, picture: Image, estimate: Estimate, colour: Colour | None = None) -> Image:
         if estimate.status == TrackStatus.LOST:
             canvas = picture.copy()
-            self.skeleton(canvas, estimate.joints)
+            self.skeleton(canvas, estimate.joints, colour)
             return np.asarray(cv2.addWeighted(canvas, _FADED, picture, 1 - _FADED, 0), np.uint8)
         posed = np.isfinite(estimate.mean.phase)
-        canvas = self.body(picture, estimate.mean) if posed else picture.copy()
-        self.skeleton(canvas, estimate.joints)
+        canvas = self.body(picture, estimate.mean, colour) if posed else picture.copy()
+        self.skeleton(canvas, estimate.joints, colour)
         self._ellipses(canvas, estimate)
         return canvas
 
@@ -202,25 +207,26 @@ class Overlay:
         self.skeleton(canvas, self.model.pose(state)[0])
         return canvas
 
-    def body(self, canvas: Image, state: State) -> Image:
-        """Tint the limbs and outline each where it shows."""
+    def body(self, canvas: Image, state: State, colour: Colour | None = None) -> Image:
+        """Tint the limbs and outline each where it shows, in one colour or that of its side."""
         ids = self.model.render(self.camera, state)
         if self._lens is not None:
             ids = np.asarray(cv2.remap(ids, *self._lens, cv2.INTER_NEAREST), np.uint8)
-        return tinted(canvas, ids, self.model.limb_names, max(1, round(1.5 * self._size(state.pelvis))))
+        width = max(1, round(1.5 * self._size(state.pelvis)))
+        return tinted(canvas, ids, self.model.limb_names, width, colour)
 
-    def skeleton(self, canvas: Image, joints: Array) -> None:
+    def skeleton(self, canvas: Image, joints: Array, colour: Colour | None = None) -> None:
         """Draw bones and joints (P, 3) in place; what is behind the camera is left out."""
         size = self._size(joints[self.model.joint_names.index("pelvis")])
         thick = max(1, round(2 * size))
         self.sticks(
             canvas, joints, thick + max(1, round(size)), _DARK
         )  # a dark seam keeps lines readable on any clothes
-        self.sticks(canvas, joints, thick)
+        self.sticks(canvas, joints, thick, None if colour is None else _brighter(colour))
         for name, at in zip(self.model.joint_names, self.camera.project(joints), strict=True):
             if np.isfinite(at).all():
                 _dot(canvas, at, 3.6 * size, _DARK)
-                _dot(canvas, at, 2.4 * size, _brighter(side_colour(name)))
+                _dot(canvas, at, 2.4 * size, _brighter(colour or side_colour(name)))
 
     def sticks(self, canvas: Image, joints: Array, thick: int, colour: Colour | None = None) -> None:
         """Draw bones as lines of `thick` pixels in place, in one colour or that of their side."""
@@ -254,22 +260,27 @@ def _in_colour(image: Image) -> Image:
     return np.asarray(cv2.cvtColor(image, cv2.COLOR_GRAY2BGR), np.uint8) if image.ndim == 2 else image
 
 
-def tinted(canvas: Image, ids: NDArray[np.uint8], limbs: Sequence[str], width: int) -> Image:
-    """Return `canvas` (h, w, 3) with limbs tinted and outlined; `ids` (h, w) holds limb index + 1, or 0."""
+def tinted(
+    canvas: Image, ids: NDArray[np.uint8], limbs: Sequence[str], width: int, colour: Colour | None = None
+) -> Image:
+    """Return `canvas` (h, w, 3) with limbs tinted and outlined; `ids` (h, w) holds limb index + 1, or 0.
+
+    `colour`: of all limbs, instead of those of their sides.
+    """
     rows, columns = (np.flatnonzero(ids.any(axis=axis)) for axis in (1, 0))
     out = canvas.copy()
     if not len(rows):
         return out
     y, x = max(rows[0] - width, 0), max(columns[0] - width, 0)  # of the part that is drawn into
     part, ids = (one[y : rows[-1] + width + 1, x : columns[-1] + width + 1] for one in (out, ids))
-    colours = [side_colour(name) for name in limbs]
+    colours = [colour or side_colour(name) for name in limbs]
     table = np.array([(0, 0, 0), *colours], np.float32)
     inside = ids > 0
     part[inside] = np.rint((1 - _FILL) * part[inside] + _FILL * table[ids[inside]]).astype(np.uint8)
     lines = np.ascontiguousarray(part)
-    for limb, colour in enumerate(colours, 1):
+    for limb, ink in enumerate(colours, 1):
         contours, _ = cv2.findContours((ids == limb).view(np.uint8), cv2.RETR_EXTERNAL, cv2.CHAIN_APPROX_NONE)
-        cv2.drawContours(lines, contours, -1, colour, width, cv2.LINE_AA)
+        cv2.drawContours(lines, contours, -1, ink, width, cv2.LINE_AA)
     part[:] = lines
     return out
 
@@ -290,7 +301,7 @@ def _lens_map(camera: Camera) -> tuple[NDArray[np.float32], NDArray[np.float32]]
 
 
 def _brighter(colour: Colour) -> Colour:
-    b, g, r = (int(0.45 * 255 + 0.55 * c) for c in colour)
+    b, g, r = (int(0.45 * 255 + 0.55 * part) for part in colour)
     return b, g, r
 
 

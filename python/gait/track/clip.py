@@ -23,6 +23,7 @@ from gait.track.plausible import Plausibility
 from gait.track.run_report import RunReport
 from gait.track.scene import Scene, finds_shapes, first_state, stays
 from gait.track.setup import setup
+from gait.track.standing import Sink
 from gait.track.tracker import Tracker
 
 __all__ = ["KEYPOINTS_SD", "ClipOptions", "track_clip"]
@@ -39,7 +40,11 @@ def track_clip(options: ClipOptions) -> dict[str, Any]:
         If a file cannot be read, if no person can be found to start with, or no frame can be tracked.
     """
     scene = Scene.read(options)
-    start = first_state(options, scene)
+    return track_scene(options, scene, first_state(options, scene))
+
+
+def track_scene(options: ClipOptions, scene: Scene, start: Start, also: Sink | None = None) -> dict[str, Any]:
+    """Track the person of a scene from a start on; `also` gets each estimate that is written."""
     if options.background == "auto" and scene.empty is not None and (start.in_place or stays(scene)):
         scene = scene.without_plate()  # the median shows the person
     used = setup(options, scene, start, scene.empty is not None)
@@ -55,12 +60,12 @@ def track_clip(options: ClipOptions) -> dict[str, Any]:
         fit = StartFit(scene.model, scene.camera)
         keypoints = PersonShapes(scene.camera, fit.stature, fit.set_pose)
     else:
-        keypoints = PersonKeypoints(scene.camera, scene.keypoints, scene.person)
+        keypoints = PersonKeypoints(scene.camera, scene.keypoints, scene.person, scene.apart)
     plausibility = Plausibility(keypoints, *_stature(options, scene, start), config.belt)
     follower = _follower(options, scene, tracker, keypoints, plausibility)
     found = follower.follow(start, scene.frames)
     joints_found = keypoints if isinstance(keypoints, PersonKeypoints) else None
-    results = write(options, scene, tracker, found, plausibility, joints_found)
+    results = write(options, scene, tracker, found, plausibility, joints_found, also)
     report = RunReport(options, scene, used, tracker.config.particles)
     for frame, x, y in results.starts[1:]:
         note(f"lost, and a person found at frame {frame}: x {x:.2f} y {y:.2f} m", options.quiet)
@@ -106,7 +111,14 @@ def _follower(
         plate = None if finds_shapes(options) else scene.empty
         auto_start = BoxStart(scene.camera, plate, scene.model, options.height)
     return Follower(
-        tracker, scene.video, keypoints, plausibility, find_start, auto_start, one_pass=options.smooth
+        tracker,
+        scene.video,
+        keypoints,
+        plausibility,
+        find_start,
+        auto_start,
+        one_pass=options.smooth,
+        plate_of=scene.plate_of(),
     )
 
 

@@ -117,8 +117,9 @@ def write(
     found: Iterable[tuple[Frame, Estimate]],
     plausibility: Plausibility,
     keypoints: PersonKeypoints | None,
+    also: Sink | None = None,
 ) -> Results:
-    """Write the estimates into all outputs, which appear together at the end.
+    """Write the estimates into all outputs, which appear together at the end, and into `also`.
 
     Keypoints, where there are any, show in which frames the person takes no strides.
     """
@@ -127,12 +128,15 @@ def write(
         rows = TrackWriter(
             options.output, model.info.components, model.joint_names, model.angle_names, model.classes,
             span, None if scene.calibration is None else scene.calibration.change_at,
+            scene.person if scene.outlines else None,
         )  # fmt: skip
         if options.camera_out:
             write_camera(stack.enter_context(replacing(options.camera_out)), scene.camera)
         if options.cameras_out:
             _write_cameras(stack.enter_context(replacing(options.cameras_out)), scene)
         sinks: list[Sink] = [results.add, _widened(stack.enter_context(rows).write, scene.calibration)]
+        if also is not None:
+            sinks.append(also)
         size = (scene.camera.width, scene.camera.height)
         films = stack.enter_context(Films(options.overlay, span if options.report else None, size, video.fps))
         if films.wanted:

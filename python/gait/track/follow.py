@@ -10,7 +10,7 @@ import numpy as np
 from gait.bindings.abi import Flag, TrackStatus
 from gait.bindings.estimate import Estimate
 from gait.bindings.initial import DEFAULT_SD, Start
-from gait.io.video import Frame, Video
+from gait.io.video import Frame, Image, Video
 from gait.track.box_start import BoxStart
 from gait.track.person_keypoints import PersonKeypoints
 from gait.track.person_shapes import PersonShapes
@@ -66,6 +66,8 @@ class Follower:
     one_pass : bool
         All estimates come from one forward pass, which the smoother needs; tracking backwards only finds an
         earlier start.
+    plate_of : callable
+        Empty scene of a frame, if that is not the tracker's.
 
     Attributes
     ----------
@@ -83,10 +85,12 @@ class Follower:
         auto_start: BoxStart | None = None,
         *,
         one_pass: bool = False,
+        plate_of: Callable[[Frame], Image | None] = lambda frame: frame.plate,
     ) -> None:
         self._tracker, self._video, self._keypoints = tracker, video, keypoints
         self._plausibility = plausibility
         self._find_start, self._auto_start, self._one_pass = find_start, auto_start, one_pass
+        self._plate_of = plate_of
         self._uncertain = False  # which leg is which
         self.step_seconds: list[float] = []
 
@@ -189,7 +193,7 @@ class Follower:
     def _step(self, tracker: Tracker, frame: Frame, utime: int, last: Estimate | None) -> Estimate:
         """Step with the person's keypoints; judge the estimate."""
         joints = self._keypoints.choose(frame, last)
-        found = tracker.step(frame.image, utime, joints, poses=frame.pose, backgrounds=frame.plate)
+        found = tracker.step(frame.image, utime, joints, poses=frame.pose, backgrounds=self._plate_of(frame))
         now = self._plausibility.judged(frame, found)
         self.step_seconds.append(tracker.step_seconds)
         sure = now.status != TrackStatus.TRACKING or not self._uncertain

@@ -47,6 +47,8 @@ class ClipOptions:
         File of 2-D keypoints found in the frames, instead of a detector.
     person : str, optional
         Who of several people in a keypoint file of another tool; the one who is seen most if left out.
+    people : int, optional
+        Track everyone who walks, at most so many, with `track_people`; None for one person.
     keypoints_sd : float
         Their standard deviation at full confidence, pixels.
     stabilize : str
@@ -80,6 +82,7 @@ class ClipOptions:
     detector: str = "auto"
     keypoints: str | None = None
     person: str | None = None
+    people: int | None = None
     keypoints_sd: float = KEYPOINTS_SD
     stabilize: str = "off"
     overlay: str | None = None

@@ -33,6 +33,8 @@ class PersonKeypoints:
         By id of the person and number of the frame.
     person : int
         Id of the person to track.
+    apart : mapping, optional
+        The same as `keypoints` of people with tracks of their own.
 
     Attributes
     ----------
@@ -41,9 +43,13 @@ class PersonKeypoints:
     """
 
     def __init__(
-        self, camera: Camera, keypoints: Mapping[int, Mapping[int, FrameKeypoints]], person: int
+        self,
+        camera: Camera,
+        keypoints: Mapping[int, Mapping[int, FrameKeypoints]],
+        person: int,
+        apart: Mapping[int, Mapping[int, FrameKeypoints]] | None = None,
     ) -> None:
-        self._camera, self._keypoints, self.ids = camera, keypoints, [person]
+        self._camera, self._keypoints, self._apart, self.ids = camera, keypoints, apart or {}, [person]
 
     def add(self, id: int) -> None:
         """Take an id for another one of this person."""
@@ -67,20 +73,28 @@ class PersonKeypoints:
         return keypoints if distance < _GATE else None
 
     def near(self, frame: Frame, estimate: Estimate) -> bool | None:
-        """Whether a person was found near the estimate; None if the person to track was not found at all."""
+        """Whether a person was found near the estimate; None if the person to track was not found at all.
+
+        False also if only a person with a track of their own was found there.
+        """
         if any(self._distance(frame, estimate, keypoints) < _NEAR for keypoints in self._found(frame.number)):
             return True
-        return None if self._own(frame.number) is None else False
+        return None if self._own(frame.number) is None and not self._taken(frame, estimate) else False
 
     def agree(self, frame: Frame, estimate: Estimate) -> bool | None:
         """Whether the keypoints in a frame agree with the estimate, legs included; None if there are none."""
         if not self._found(frame.number):
-            return None
+            return False if self._taken(frame, estimate) else None
         keypoints = self.choose(frame, estimate)
         if keypoints is None:
             return False
-        legs = self._apart(frame, estimate, keypoints, _LEGS)
+        legs = self._distances(frame, estimate, keypoints, _LEGS)
         return not len(legs) or bool(legs.mean() < _AGREE)
+
+    def _taken(self, frame: Frame, estimate: Estimate) -> bool:
+        """Whether a person with a track of their own was found near the estimate."""
+        there = (one[frame.number] for one in self._apart.values() if frame.number in one)
+        return any(self._distance(frame, estimate, keypoints) < _NEAR for keypoints in there)
 
     def _own(self, frame: int) -> FrameKeypoints | None:
         """Keypoints of the person to track in a frame."""
@@ -97,10 +111,10 @@ class PersonKeypoints:
 
     def _distance(self, frame: Frame, estimate: Estimate, keypoints: FrameKeypoints) -> float:
         """Median distance from the estimated joints, person's heights; infinite without common joints."""
-        apart = self._apart(frame, estimate, keypoints, tuple(keypoints.names))
+        apart = self._distances(frame, estimate, keypoints, tuple(keypoints.names))
         return float(np.median(apart)) if len(apart) else np.inf
 
-    def _apart(
+    def _distances(
         self, frame: Frame, estimate: Estimate, keypoints: FrameKeypoints, names: tuple[str, ...]
     ) -> NDArray[np.float64]:
         """Distances (K,) of the named keypoints found from the estimated joints, person's heights."""

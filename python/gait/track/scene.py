@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping
 from concurrent.futures import ThreadPoolExecutor
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -30,6 +30,7 @@ from gait.track.from_walk import Calibration
 from gait.track.keypoint_start import find_keypoint_start, keypoint_noise
 from gait.track.moving_video import MovingVideo, map_pixels, panorama_of
 from gait.track.options import ClipOptions
+from gait.track.other_people import OtherPeople, Outline
 from gait.track.stabilise import Motion, find_turns, moves
 from gait.track.walk_camera import calibrate_film, expected_camera, note_camera
 
@@ -69,6 +70,10 @@ class Scene:
         The keypoints with their noise, by id and frame.
     calibration : Calibration or None
         How the camera was found, if it was not given.
+    apart : dict of int to dict of int to FrameKeypoints
+        The same as `keypoints` of people who have tracks of their own.
+    outlines : dict of int to Outline
+        Where people are in the picture, by id, if several are tracked.
     """
 
     video: Video
@@ -81,6 +86,8 @@ class Scene:
     person: int
     keypoints: dict[int, dict[int, FrameKeypoints]]
     calibration: Calibration | None
+    apart: dict[int, dict[int, FrameKeypoints]] = field(default_factory=dict)
+    outlines: dict[int, Outline] = field(default_factory=dict)
 
     @property
     def moving(self) -> MovingVideo | None:
@@ -106,6 +113,13 @@ class Scene:
     def without_plate(self) -> Scene:
         """Return the same without the empty scene."""
         return replace(self, plate=None, video=self.moving.without_panorama() if self.moving else self.video)
+
+    def plate_of(self) -> Callable[[Frame], Image | None]:
+        """Return what gives a frame's empty scene, if not `plate`: others count for nothing in it."""
+        if not self.outlines:
+            return lambda frame: frame.plate
+        others = [outline for id, outline in self.outlines.items() if id != self.person]
+        return OtherPeople(self.plate, self.outlines[self.person], others).plate
 
     def others(self) -> list[int]:
         """Ids of those who are never in view together with the person: they may be the same one."""
@@ -237,11 +251,11 @@ def first_state(options: ClipOptions, scene: Scene) -> Start:
     """First state, from the init file or found in the clip."""
     if options.init != "auto":
         start = _read_start(options, scene.video, scene.camera, scene.poses, scene.model)
-        _require_scene(options, scene, start.frame)
+        require_scene(options, scene, start.frame)
         start = replace(start, in_place=_in_place(scene, start.frame))
         _check_camera(options, scene)
     else:
-        _require_scene(options, scene, scene.frames.start)
+        require_scene(options, scene, scene.frames.start)
         start = _find_first_state(options, scene)
         _note_start(options, scene, start)
     return start
@@ -383,7 +397,7 @@ def _check_camera(options: ClipOptions, scene: Scene) -> None:
         note(f"{options.camera}: {words}", options.quiet)
 
 
-def _require_scene(options: ClipOptions, scene: Scene, first: int) -> None:
+def require_scene(options: ClipOptions, scene: Scene, first: int) -> None:
     """Refuse a background image of another scene than frame `first`, or of which only one has colours."""
     frame = next(iter(scene.video.frames(first, first + 1)), None)
     plate = frame.plate if frame is not None and scene.moving else scene.plate
@@ -423,7 +437,10 @@ def _detect(options: ClipOptions, video: Video, frames: range) -> tuple[dict[int
     if not options.camera:
         detector.require_length(video)
     with progress("detecting", len(frames), options.quiet) as update:
-        people = detector.detect(video, options.network, first=frames.start, stop=frames.stop, update=update)
+        everyone = options.people is not None
+        people = detector.detect(
+            video, options.network, first=frames.start, stop=frames.stop, update=update, everyone=everyone
+        )
     if not options.camera:
         detector.require_person(people, video)
     if not people:

@@ -1,0 +1,167 @@
+"""What other people in a clip do to the images of one: they hide the person, and are foreground themselves.
+
+Where another person covers the picture, the empty scene given to the tracker is changed so that a body there
+costs as much as none: foreground that is another person's is not missed, and a person behind them is hidden
+rather than absent.  Who is nearer is decided by the feet: on level ground the nearer ones are lower.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+
+import cv2
+import numpy as np
+from numpy.typing import NDArray
+
+from gait.io.keypoints_file import Keypoints
+from gait.io.video import Frame, Image
+
+Array = NDArray[np.float64]
+Mask = NDArray[np.bool_]
+
+_CHANGE = 11  # grey levels from the empty scene at which body and no body cost the same, with missed_weight
+_HEIGHTS = 1.28  # heights of a person from shoulder to ankle
+_HEAD = (0.115, 0.085)  # of the head over the shoulders, and its radius, heights
+_TRUNK = ("l_shoulder", "r_shoulder", "r_hip", "l_hip")
+_TRUNK_EDGE = 0.06  # heights by which clothes reach beyond shoulders and hips
+_LIMBS = {
+    ("shoulder", "elbow"): 0.075, ("elbow", "wrist"): 0.065, ("hip", "knee"): 0.115, ("knee", "ankle"): 0.09,
+    ("ankle", "toe"): 0.07, ("ankle", "heel"): 0.07,
+}  # fmt: skip
+"""Width of a limb with its clothes, heights."""
+_STANCE = 0.25  # seconds either way in which a foot stands: the lowest ankle is on the ground
+_FEET = ("l_ankle", "r_ankle")
+
+
+class Outline:
+    """Where one person covers the picture, by the keypoints in each frame.
+
+    Parameters
+    ----------
+    keypoints : Keypoints
+        Those of frames in which the person was not found lie between those before and after.
+    fps : float
+        Frames per second.
+    """
+
+    def __init__(self, keypoints: Keypoints, fps: float) -> None:
+        self._first, self._names = int(keypoints.frame[0]), list(keypoints.names)
+        self._uv = _filled(keypoints.uv)
+        ankles = self._uv[:, [self._names.index(name) for name in _FEET], 1].max(axis=1)
+        reach = max(1, round(_STANCE * fps))
+        padded = np.pad(ankles, reach, mode="edge")
+        self._foot = np.lib.stride_tricks.sliding_window_view(padded, 2 * reach + 1).max(axis=1)
+
+    def foot(self, number: int) -> float | None:
+        """Row of the foot on the ground in a frame, pixels; None before and after the person's frames."""
+        row = number - self._first
+        return float(self._foot[row]) if 0 <= row < len(self._foot) else None
+
+    def mask(self, number: int, size: tuple[int, int]) -> Mask:
+        """Pixels (h, w) of a picture of this width and height that the person covers in a frame."""
+        canvas = np.zeros(size[::-1], np.uint8)
+        row = number - self._first
+        if not 0 <= row < len(self._uv):
+            return canvas > 0
+        at = dict(zip(self._names, self._uv[row], strict=True))
+        if not np.isfinite(list(at.values())).all():
+            return canvas > 0
+        shoulders, hips = (0.5 * (at[f"l_{name}"] + at[f"r_{name}"]) for name in ("shoulder", "hip"))
+        ankle = max((at[name] for name in _FEET), key=lambda one: float(one[1]))
+        tall = _HEIGHTS * float(np.hypot(*(shoulders - ankle)))
+        trunk = cv2.convexHull(np.rint([at[name] for name in _TRUNK]).astype(np.int32))
+        cv2.fillConvexPoly(canvas, trunk, 255)
+        cv2.polylines(canvas, [trunk], True, 255, _pixels(2 * _TRUNK_EDGE * tall))
+        up = (shoulders - hips) / max(float(np.hypot(*(shoulders - hips))), 1e-6)
+        cv2.circle(canvas, _point(shoulders + _HEAD[0] * tall * up), _pixels(_HEAD[1] * tall), 255, -1)
+        for (upper, lower), width in _LIMBS.items():
+            for side in "lr":
+                ends = at.get(f"{side}_{upper}"), at.get(f"{side}_{lower}")
+                if ends[0] is not None and ends[1] is not None:
+                    cv2.line(canvas, _point(ends[0]), _point(ends[1]), 255, _pixels(width * tall))
+        return canvas > 0
+
+
+class OtherPeople:
+    """Gives each frame an empty scene in which the other people count for nothing.
+
+    Parameters
+    ----------
+    plate : image or None
+        Empty scene; of a camera that moves each frame has its own.
+    own : Outline
+        The person who is tracked.
+    others : sequence of Outline
+    """
+
+    def __init__(self, plate: Image | None, own: Outline, others: Sequence[Outline]) -> None:
+        self._plate, self._own, self._others = plate, own, others
+
+    def plate(self, frame: Frame) -> Image | None:
+        """Empty scene for a frame; None if the tracker's own needs no change."""
+        empty = self._plate if frame.plate is None else frame.plate
+        if empty is None or empty.shape != frame.image.shape:
+            return frame.plate
+        covered = self._covered(frame)
+        if not covered.any():
+            return frame.plate
+        pixels = frame.image[covered].astype(np.int16)
+        out = empty.copy()
+        out[covered] = np.where(pixels >= _CHANGE, pixels - _CHANGE, pixels + _CHANGE)
+        return out
+
+    def _covered(self, frame: Frame) -> Mask:
+        """Pixels of others, without those where the person is in front of them."""
+        size = frame.image.shape[1], frame.image.shape[0]
+        mine, foot = self._own.mask(frame.number, size), self._own.foot(frame.number)
+        out = np.zeros(frame.image.shape[:2], bool)
+        for other in self._others:
+            theirs = other.foot(frame.number)
+            if theirs is None:
+                continue
+            mask = other.mask(frame.number, size)
+            out |= mask & ~mine if foot is not None and foot > theirs else mask
+        return out
+
+
+def with_track(keypoints: Keypoints, joints: Mapping[int, Mapping[str, Array]], times: Array) -> Keypoints:
+    """Keypoints with the joints of a track in the frames in which the detector did not find the person.
+
+    Parameters
+    ----------
+    keypoints : Keypoints
+    joints : mapping of int to mapping of str to ndarray of shape (2,)
+        By frame and name, pixels.
+    times : ndarray
+        Seconds of all frames of the clip.
+    """
+    frames = np.arange(min([int(keypoints.frame[0]), *joints]), max([int(keypoints.frame[-1]), *joints]) + 1)
+    uv = np.full((len(frames), len(keypoints.names), 2), np.nan)
+    confidence = np.zeros(uv.shape[:2])
+    rows = keypoints.frame - frames[0]
+    uv[rows], confidence[rows] = keypoints.uv, keypoints.confidence
+    for number, at in joints.items():
+        row = number - frames[0]
+        if not np.isfinite(uv[row]).any() and set(keypoints.names) <= set(at):
+            uv[row] = [at[name] for name in keypoints.names]
+    return Keypoints(frames, times[frames], keypoints.names, uv, confidence)
+
+
+def _filled(uv: Array) -> Array:
+    """Coordinates (T, J, 2) with those between two frames interpolated; NaN where never found."""
+    out = uv.copy()
+    rows = np.arange(len(uv))
+    for column in out.reshape(len(uv), -1).T:
+        found = np.isfinite(column)
+        if found.any():
+            column[:] = np.interp(rows, rows[found], column[found])
+    return out
+
+
+def _point(at: Array) -> tuple[int, int]:
+    x, y = np.clip(np.rint(at), -32000, 32000).astype(int)
+    return int(x), int(y)
+
+
+def _pixels(length: float) -> int:
+    return int(np.clip(round(length), 1, 255))

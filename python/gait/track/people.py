@@ -1,0 +1,169 @@
+"""Track several people of a clip, each with a tracker of their own.
+
+The detector tells who is who, also where people cross.  Each person is tracked as if alone, except that
+keypoints of the others are left out and that where the others are in the picture, the tracker is told that it
+sees neither the person nor the empty scene (`gait.track.other_people`).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from gait.bindings.abi import TrackStatus
+from gait.bindings.estimate import Estimate
+from gait.bindings.initial import Start
+from gait.detect.people import height
+from gait.errors import UserError
+from gait.io.keypoints_file import Keypoints
+from gait.io.video import Frame
+from gait.progress import note, progress
+from gait.report.colours import PEOPLE
+from gait.report.drawing import Overlay
+from gait.report.film import Films
+from gait.track.clip import track_scene
+from gait.track.keypoint_start import find_keypoint_start
+from gait.track.options import ClipOptions
+from gait.track.other_people import Outline, with_track
+from gait.track.scene import Scene, require_scene
+
+Array = NDArray[np.float64]
+
+MOST = 8
+"""People tracked in one clip."""
+
+Estimates = dict[int, Estimate]
+
+
+def track_people(options: ClipOptions) -> dict[str, Any]:
+    """Track everyone who walks, at most `options.people`; return the figures of ``gait track --json``.
+
+    Files are written for each person, with the person's number in their names; the overlay shows all.
+
+    Raises
+    ------
+    UserError
+        If a file cannot be read, or no one is found who walks.
+    """
+    assert options.people is not None
+    scene = Scene.read(options)
+    require_scene(options, scene, scene.frames.start)
+    starts = _starts(options, scene)
+    found: dict[int, Estimates] = {}
+    outlines = dict(scene.people)
+    people: dict[str, Any] = {}
+    for id, start in starts.items():
+        note(f"person {id}", options.quiet)
+        own = _scene_of(scene, id, list(starts), outlines)
+        found[id] = {}
+        people[str(id)] = track_scene(_options_of(options, scene, id), own, start, _kept(found[id]))
+        outlines[id] = with_track(scene.people[id], _joints(scene, found[id]), np.asarray(scene.video.times))
+    files = {}
+    if options.overlay:
+        _draw(options, scene, found)
+        files["overlay"] = options.overlay
+    return {
+        "people": people,
+        "others": [id for id in scene.people if id not in starts],
+        "followed": any(one["followed"] for one in people.values()),
+        "files": files,
+    }
+
+
+def numbered(path: str, id: int) -> str:
+    """Name of a person's file: track.csv becomes track-2.csv."""
+    named = Path(path)
+    return str(named.with_name(f"{named.stem}-{id}{named.suffix}"))
+
+
+def _starts(options: ClipOptions, scene: Scene) -> dict[int, Start]:
+    """First state of everyone who walks, the one in view longest and tallest first."""
+    seen = {id: len(one.visible_frames()) * height(one) for id, one in scene.people.items()}
+    starts: dict[int, Start] = {}
+    for id in sorted(seen, key=lambda id: -seen[id]):
+        if len(starts) == options.people:
+            break
+        found = find_keypoint_start(
+            scene.people[id],
+            scene.camera,
+            scene.model,
+            first=scene.frames.start,
+            stop=scene.frames.stop,
+            height=options.height if id == scene.person else None,
+            poses=scene.poses,
+        )
+        if found is None or not found.hypotheses[0].walks:
+            note(f"person {id} is not tracked: no second in which they walk in full view", options.quiet)
+        else:
+            starts[id] = replace(found, source="the joints found in the pictures")
+    if not starts:
+        raise UserError(f"{options.video}: no one walks in full view for a second; check the camera")
+    return starts
+
+
+def _options_of(options: ClipOptions, scene: Scene, id: int) -> ClipOptions:
+    """Give the options of one person's track."""
+    main = id == scene.person
+    return replace(
+        options,
+        output=numbered(options.output, id),
+        trc=options.trc and numbered(options.trc, id),
+        draws=options.draws and numbered(options.draws, id),
+        report=options.report and numbered(options.report, id),
+        overlay=None,
+        camera_out=options.camera_out if main else None,
+        cameras_out=options.cameras_out if main else None,
+        height=options.height if main else None,
+    )
+
+
+def _scene_of(scene: Scene, id: int, tracked: list[int], outlines: dict[int, Keypoints]) -> Scene:
+    """Give the scene of one person: others who are tracked are set apart."""
+    apart = {other for other in tracked if other != id}
+    return replace(
+        scene,
+        person=id,
+        people={other: one for other, one in scene.people.items() if other not in apart},
+        keypoints={other: one for other, one in scene.keypoints.items() if other not in apart},
+        apart={other: one for other, one in scene.keypoints.items() if other in apart},
+        outlines={other: Outline(one, scene.video.fps) for other, one in outlines.items()},
+    )
+
+
+def _kept(into: Estimates) -> Callable[[Frame, Estimate], None]:
+    def keep(frame: Frame, estimate: Estimate) -> None:
+        into[frame.number] = estimate
+
+    return keep
+
+
+def _joints(scene: Scene, found: Estimates) -> dict[int, dict[str, Array]]:
+    """Pixels of the estimated joints in the frames in which the person was followed."""
+    out = {}
+    for number, estimate in found.items():
+        uv = scene.camera_at(number).project(estimate.joints)
+        if estimate.status != TrackStatus.LOST and np.isfinite(uv).all():
+            out[number] = dict(zip(estimate.joint_names, uv, strict=True))
+    return out
+
+
+def _draw(options: ClipOptions, scene: Scene, found: dict[int, Estimates]) -> None:
+    """Write the film of everyone, each in a colour of their own with the number over the head."""
+    assert options.overlay is not None
+    colours = {str(id): PEOPLE[k % len(PEOPLE)] for k, id in enumerate(sorted(found))}
+    still = Overlay(scene.model, scene.camera)
+    size = (scene.camera.width, scene.camera.height)
+    with (
+        Films(options.overlay, None, size, scene.video.fps) as films,
+        progress("drawing", len(scene.frames), options.quiet) as update,
+    ):
+        for frame in scene.video.frames(scene.frames.start, scene.frames.stop):
+            overlay = still if frame.pose is None else Overlay(scene.model, frame.camera(scene.camera))
+            now = {str(id): one[frame.number] for id, one in sorted(found.items()) if frame.number in one}
+            films.write(overlay.draw_people(frame.image, now, colours), frame.number)
+            update(frame.number - scene.frames.start + 1)

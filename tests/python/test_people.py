@@ -1,0 +1,96 @@
+"""Several people in one clip: each has a track, though one hides the other."""
+
+import json
+
+import cv2
+import numpy as np
+import pytest
+from drawn_person import camera, clip, draw, wall, write
+
+from gait import Model, Video
+from gait.bindings.model import read_blob
+from gait.cli import main
+from gait.io import blob
+from gait.io.keypoints_file import Keypoints
+from gait.io.track_file import read_track
+from gait.io.video import Frame
+from gait.track import scene
+from gait.track.other_people import OtherPeople, Outline
+
+MODEL = Model()
+NAMES = (
+    *("l_shoulder", "r_shoulder", "l_elbow", "r_elbow", "l_wrist", "r_wrist"),
+    *("l_hip", "r_hip", "l_knee", "r_knee", "l_ankle", "r_ankle", "l_heel", "r_heel", "l_toe", "r_toe"),
+)
+FRAMES = 44
+
+
+@pytest.fixture(scope="module")
+def crossing():
+    """Pictures of two people who cross, and the joints (people, frames, J, 3); the first is behind."""
+    sections, plate = blob.decode(read_blob(None)), wall()
+    ways = ({"start": (-0.85, 0.8)}, {"start": (0.85, -0.2), "heading": np.pi, "phase": 0.6, "stature": 1.65})
+    states = [clip(MODEL, sections, FRAMES, plate=plate, **way)[1] for way in ways]
+    pictures = [
+        draw(MODEL, camera(), near, draw(MODEL, camera(), far, plate, k), k)
+        for k, (far, near) in enumerate(zip(*states, strict=True))
+    ]
+    return pictures, np.array([[MODEL.pose(one)[0] for one in track] for track in states])
+
+
+def detected(joints, hidden=()):
+    """Keypoints of a person, whom a detector does not find in some frames."""
+    order = [MODEL.joint_names.index(name) for name in NAMES]
+    uv = camera().project(joints[:, order].reshape(-1, 3)).reshape(len(joints), -1, 2)
+    uv[list(hidden)] = np.nan
+    frame = np.arange(len(joints))
+    return Keypoints(frame, frame / 30, NAMES, uv, np.isfinite(uv[..., 0]).astype(float))
+
+
+def test_people_who_cross_keep_their_numbers(crossing, tmp_path, monkeypatch, capsys):
+    pictures, joints = crossing
+    apart = np.abs(joints[0, :, 0, 0] - joints[1, :, 0, 0])
+    hidden = np.flatnonzero(apart < 0.3)
+    assert 4 < len(hidden) < 15
+    people = {4: detected(joints[0], hidden), 7: detected(joints[1])}
+    monkeypatch.setattr(scene, "_detect", lambda *_: (people, 7))
+    write(tmp_path / "v.mp4", pictures)
+    cv2.imwrite(str(tmp_path / "plate.png"), wall())
+    (tmp_path / "camera.json").write_text(json.dumps(camera().to_dict()))
+    words = ["track", "v.mp4", "--people", "all", "--camera", "camera.json", "--background", "plate.png"]
+    words += ["-o", "t.csv", "--overlay", "o.mp4", "--particles", "600"]
+    monkeypatch.chdir(tmp_path)
+    assert main(words) == 0
+    said = capsys.readouterr().out
+    assert "person 4: Tracked" in said and "t-7.csv" in said
+    assert Video("o.mp4").count == FRAMES
+    order = [MODEL.joint_names.index(name) for name in ("l_knee", "r_knee", "l_ankle", "r_ankle")]
+    for truth, id in zip(joints, (4, 7), strict=True):
+        rows = read_track(f"t-{id}.csv")
+        assert rows.frame.tolist() == list(range(FRAMES)) and "lost" not in rows.status
+        mine = np.stack([rows.places[MODEL.joint_names[k]] for k in order], axis=1)
+        assert np.linalg.norm(mine - truth[:, order], axis=2).mean(axis=1).max() < 0.25
+    assert (tmp_path / "t-4.csv").read_text().splitlines()[0].endswith(",person")
+
+
+def test_another_person_hides_and_is_not_missed(crossing):
+    pictures, joints = crossing
+    number = int(np.argmin(np.abs(joints[0, :, 0, 0] - joints[1, :, 0, 0])))
+    behind, before = (Outline(detected(one), 30) for one in joints)
+    frame, plate = Frame(number, number / 30, pictures[number]), wall()
+    changed = [
+        np.abs(OtherPeople(plate, own, [other]).plate(frame).astype(int) - plate).any(axis=2)
+        for own, other in ((behind, before), (before, behind))
+    ]
+    chest = camera().project(joints[1, number, MODEL.joint_names.index("neck")] - (0, 0, 0.25))
+    u, v = np.rint(chest).astype(int)
+    assert changed[0][v, u] and not changed[1][v, u]  # hidden there, and in front there
+    assert changed[0].sum() > 3 * changed[1].sum()
+    away = frame._replace(number=FRAMES)
+    assert OtherPeople(plate, behind, [before]).plate(away) is None
+
+
+@pytest.mark.parametrize("more", [["--init", "i.json"], ["--detector", "none"], ["--mode", "paper"]])
+def test_everyone_is_found_by_the_detector_alone(more, capsys):
+    assert main(["track", "v.mp4", "--camera", "c.json", "-o", "t.csv", "--people", "2", *more]) == 2
+    assert "--people" in capsys.readouterr().err
