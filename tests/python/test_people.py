@@ -39,7 +39,7 @@ def crossing():
 
 
 def detected(joints, hidden=()):
-    """Keypoints of a person, whom a detector does not find in some frames."""
+    """Keypoints of a person, none in the frames `hidden`."""
     order = [MODEL.joint_names.index(name) for name in NAMES]
     uv = camera().project(joints[:, order].reshape(-1, 3)).reshape(len(joints), -1, 2)
     uv[list(hidden)] = np.nan
@@ -61,8 +61,8 @@ def test_people_who_cross_keep_their_numbers(crossing, tmp_path, monkeypatch, ca
     words += ["-o", "t.csv", "--overlay", "o.mp4", "--particles", "600"]
     monkeypatch.chdir(tmp_path)
     assert main(words) == 0
-    said = capsys.readouterr().out
-    assert "person 4: Tracked" in said and "t-7.csv" in said
+    printed = capsys.readouterr().out
+    assert "person 4: Tracked" in printed and "t-7.csv" in printed
     assert Video("o.mp4").count == FRAMES
     order = [MODEL.joint_names.index(name) for name in ("l_knee", "r_knee", "l_ankle", "r_ankle")]
     for truth, id in zip(joints, (4, 7), strict=True):

@@ -1,7 +1,7 @@
 """Track several people of a clip, each with a tracker of their own.
 
-The detector tells who is who, also where people cross.  Each person is tracked as if alone, except that
-keypoints of the others are left out and that where the others are in the picture, the tracker is told that it
+The detector finds who is who, also where people cross.  Each person is tracked as if alone, except that
+keypoints of the others are left out and that where the others are in the picture, the tracker takes it that it
 sees neither the person nor the empty scene (`gait.track.other_people`).
 """
 
@@ -83,9 +83,9 @@ def numbered(path: str, id: int) -> str:
 
 def _starts(options: ClipOptions, scene: Scene) -> dict[int, Start]:
     """First state of everyone who walks, the one in view longest and tallest first."""
-    seen = {id: len(one.visible_frames()) * height(one) for id, one in scene.people.items()}
+    extent = {id: len(one.visible_frames()) * height(one) for id, one in scene.people.items()}
     starts: dict[int, Start] = {}
-    for id in sorted(seen, key=lambda id: -seen[id]):
+    for id in sorted(extent, key=lambda id: -extent[id]):
         if len(starts) == options.people:
             break
         found = find_keypoint_start(
