@@ -274,6 +274,15 @@ def test_files_named_in_the_text_exist():
     assert missing == []
 
 
+def test_the_architecture_shows_every_folder():
+    text = (DOC / "architecture.md").read_text(encoding="utf-8")
+    layers = [(ROOT / f"{part}/LAYERS").read_text(encoding="utf-8") for part in ("libgait", "python")]
+    names = [[word for line in lines.splitlines() for word in line.split("#")[0].split()] for lines in layers]
+    folders = [name for name in names[1] if (ROOT / "python/gait" / name).is_dir() and "/" not in name]
+    assert [name for name in names[0] if f"### {name}\n" not in text] == []
+    assert [name for name in folders if f"| `{name}` | " not in text] == []
+
+
 def test_every_command_has_a_place_in_the_docs():
     text = "".join(page.read_text(encoding="utf-8") for page in PAGES)
     assert [name for name in COMMANDS if f"`gait {name}" not in text and f"gait {name} " not in text] == []
