@@ -56,16 +56,89 @@ SEGMENT = ("frames", "hop", "fps", "modes", "headings", "mixture", "markers")  #
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Add the command's options."""
-    usual, add = SegmentOptions(), parser.add_argument
-    add("sources", nargs="+", metavar="SRC", help="motion files or folders of them")
-    add("-o", "--output", required=True, metavar="M.gait", help="the model")
-    add(
+    parser.add_argument("sources", nargs="+", metavar="SRC", help="motion files or folders of them")
+    parser.add_argument("-o", "--output", required=True, metavar="M.gait", help="the model")
+    parser.add_argument("--report", metavar="DIR", help="also write figures and index.html into this folder")
+    _add_recordings(parser.add_argument_group("recordings"))
+    _add_model(parser.add_argument_group("cyclic model"))
+    _add_segments(parser.add_argument_group("prior over short segments, which gait lift uses"))
+    _add_processes(parser.add_argument_group("processes"))
+
+
+def _add_recordings(group: argparse._ArgumentGroup) -> None:
+    """Add which files are read, who is in them, and where their markers and joints are."""
+    _add_globs(
+        group,
+        "--exclude",
+        "leave out files whose path ends like this, such as 'cmu_walk/02/*', and folders of that name",
+    )
+    group.add_argument(
+        "--subjects",
+        choices=SUBJECT_RULES,
+        default=SUBJECT_RULES[0],
+        help="which files are of one person. prefix: those whose names begin alike up to '_'. folder: those "
+        "of one folder. file: each alone. auto (the default): prefix, but folder for files without '_', and "
+        "for all files if a prefix occurs in several folders, such as Anna/walk_01 and Ben/walk_01. Lengths "
+        "of limbs are measured from all recordings of a person with markers",
+    )
+    _add_globs(
+        group,
+        "--generic-lengths",
+        "in files whose path ends like this limbs have not the person's lengths, as where a skeleton is "
+        "the same for several people: learn only the motion from them",
+    )
+    group.add_argument(
+        "--fps",
+        type=values.between(10, 2000, "frames per second"),
+        metavar="F",
+        help="frames per second (default: from the file; .amc: 120)",
+    )
+    group.add_argument(
+        "--markers",
+        type=Path,
+        metavar="MAP.json",
+        help="where the markers of .c3d and .trc sit on the body",
+    )
+    group.add_argument(
+        "--joints",
+        choices=JOINT_CENTRES,
+        default=JOINT_CENTRES[0],
+        help="joint centres of CMU's skeletons (.amc, .bvh made from them). recorded (default): as in the "
+        "file. anatomical: where markers put them, for models of CMU's and other people together",
+    )
+    _add_globs(
+        group,
+        "--static",
+        "static trials (.c3d, .trc): people standing with markers at knees and ankles that recordings "
+        "may lack. Each gives its person's (--subjects) limb lengths and the places of all markers, also of "
+        "clusters with unknown labels",
+        metavar="FILE",
+    )
+    group.add_argument(
+        "--zeros-missing",
+        action="store_true",
+        help="three or more exact zeros in a row are missing data, for systems that write 0 for what they "
+        "did not see (empty cells of .csv, and points of .c3d and .trc at the origin, always are missing)",
+    )
+    group.add_argument(
+        "--no-trim", action="store_true", help="keep starts, stops and turns at the ends of recordings"
+    )
+
+
+def _add_globs(group: argparse._ArgumentGroup, option: str, help: str, metavar: str = "GLOB") -> None:
+    """Add an option of one or more files, which may be repeated."""
+    group.add_argument(option, nargs="+", action="extend", default=[], metavar=metavar, help=help)
+
+
+def _add_model(group: argparse._ArgumentGroup) -> None:
+    """Add which motion is learnt, and how."""
+    group.add_argument(
         "--activity",
         default="walk",
         metavar="NAME",
         help="name of the motion; walk refuses runs and run refuses walks (default: walk)",
     )
-    add(
+    group.add_argument(
         "--class",
         dest="classes",
         action="append",
@@ -76,16 +149,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         "NAME from the recordings of SRC, or taken from SRC if that is a model. With a model of walking as "
         "the only source, the classes are added to it",
     )
-    add(
-        "--subjects",
-        choices=SUBJECT_RULES,
-        default=SUBJECT_RULES[0],
-        help="which files are of one person. prefix: those whose names begin alike up to '_'. folder: those "
-        "of one folder. file: each alone. auto (the default): prefix, but folder for files without '_', and "
-        "for all files if a prefix occurs in several folders, such as Anna/walk_01 and Ben/walk_01. Lengths "
-        "of limbs are measured from all recordings of a person with markers",
-    )
-    add(
+    group.add_argument(
         "--components",
         type=lambda text: _auto_or(text, MOST_COMPONENTS),
         metavar="auto|N",
@@ -94,7 +158,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         f"({PAPER_COMPONENTS} with --prior paper), or two less than "
         "there are cycles if that is fewer",
     )
-    add(
+    group.add_argument(
         "--prior",
         choices=PRIORS,
         default=PRIORS[0],
@@ -102,96 +166,64 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         "postures of their own. paper: as in Ormoneit and others (2000): 19 angles, 5 components, gaps "
         "filled by an iterated SVD, trunk and ankles rigid, one body for all",
     )
-    add(
-        "--exclude",
-        nargs="+",
-        action="extend",
-        default=[],
-        metavar="GLOB",
-        help="leave out files whose path ends like this, such as 'cmu_walk/02/*', and folders of that name",
-    )
-    add(
-        "--generic-lengths",
-        nargs="+",
-        action="extend",
-        default=[],
-        metavar="GLOB",
-        help="in files whose path ends like this limbs have not the person's lengths, as where a skeleton is "
-        "the same for several people: learn only the motion from them",
-    )
-    add(
+    group.add_argument(
         "--period-mode",
         choices=PERIOD_MODES,
         default=PERIOD_MODES[0],
         help="literal: whole frames, at 120 per second from 50 to 250, as in the paper (default: refined)",
     )
-    add("--fps", type=values.between(10, 2000, "frames per second"), metavar="F",
-        help="frames per second (default: from the file; .amc: 120)")  # fmt: skip
-    add("--markers", type=Path, metavar="MAP.json", help="where the markers of .c3d and .trc sit on the body")
-    add(
-        "--joints",
-        choices=JOINT_CENTRES,
-        default=JOINT_CENTRES[0],
-        help="joint centres of CMU's skeletons (.amc, .bvh made from them). recorded (default): as in the "
-        "file. anatomical: where markers put them, for models of CMU's and other people together",
-    )
-    add(
-        "--static",
-        nargs="+",
-        action="extend",
-        default=[],
-        metavar="FILE",
-        help="static trials (.c3d, .trc): people standing with markers at knees and ankles that recordings "
-        "may lack. Each gives its person's (--subjects) limb lengths and the places of all markers, also of "
-        "clusters with unknown labels",
-    )
-    add(
-        "--zeros-missing",
-        action="store_true",
-        help="three or more exact zeros in a row are missing data, for systems that write 0 for what they "
-        "did not see (empty cells of .csv, and points of .c3d and .trc at the origin, always are missing)",
-    )
-    add("--no-trim", action="store_true", help="keep starts, stops and turns at the ends of recordings")
-    add("--jobs", type=values.whole(1), metavar="N", help="processes that read files (default: one per core)")
-    add("--dask", metavar="SCHEDULER", help="read on a Dask cluster, such as tcp://host:8786")
-    values.add_seed(parser, "the held-out data")
-    add("--report", metavar="DIR", help="also write figures and index.html into this folder")
-    add(
+    values.add_seed(group, "the held-out data")
+
+
+def _add_segments(group: argparse._ArgumentGroup) -> None:
+    """Add what the segment prior is learnt from, and its size."""
+    usual = SegmentOptions()
+    group.add_argument(
         "--segments",
         choices=SEGMENT_SOURCES,
         default=usual.source,
-        help="what the prior over short segments, which gait lift uses, is learnt from. learnt (default): "
-        "the recordings of the cyclic model; all: whole recordings, also those that the cyclic model "
-        "refuses; none: no segment prior; only: as all, but without a cyclic model, so that gait track "
-        "cannot use the file",
+        help="what it is learnt from. learnt (default): the recordings of the cyclic model; all: whole "
+        "recordings, also those that the cyclic model refuses; none: no segment prior; only: as all, but "
+        "without a cyclic model, so that gait track cannot use the file",
     )
-    add("--segment-frames", type=values.whole(*FRAMES), metavar="F",
-        help=f"frames of a segment (default: {usual.frames})")  # fmt: skip
-    add("--segment-hop", type=values.whole(1, FRAMES[1]), metavar="H",
-        help="frames from one segment to the next (default: half of F)")  # fmt: skip
-    add("--segment-fps", type=values.whole(*FPS), metavar="R",
-        help=f"frames per second of a segment (default: {usual.fps:g})")  # fmt: skip
-    add("--segment-modes", type=values.whole(*MODES), metavar="K",
-        help=f"modes kept, at most a quarter of the segments (default: {usual.modes})")  # fmt: skip
-    add(
+    numbers = (
+        ("frames", "F", FRAMES, f"frames of a segment (default: {usual.frames})"),
+        ("hop", "H", (1, FRAMES[1]), "frames from one segment to the next (default: half of F)"),
+        ("fps", "R", FPS, f"frames per second of a segment (default: {usual.fps:g})"),
+        ("modes", "K", MODES, f"modes kept, at most a quarter of the segments (default: {usual.modes})"),
+    )
+    for name, metavar, limits, help in numbers:
+        group.add_argument(f"--segment-{name}", type=values.whole(*limits), metavar=metavar, help=help)
+    group.add_argument(
         "--segment-headings",
         choices=list(SEGMENT_HEADINGS),
         help="free (default): gait lift finds the heading. 2: every segment also rotated by 90 degrees, as "
         "in the paper; 8: by each 45 degrees; headings in the world are then part of the prior",
     )
-    add(
+    group.add_argument(
         "--segment-mixture",
         type=lambda text: _auto_or(text, MIXTURE[1]),
         metavar="auto|K",
         help=f"Gaussians in the segment prior (default: {usual.mixture}); auto: as many as predict people "
         "left out best",
     )
-    add(
+    group.add_argument(
         "--segment-markers",
         choices=SEGMENT_MARKERS,
         help="virtual (default): 37 of the default skeleton; recorded: those that most of the files have "
         "(.c3d, .trc)",
     )
+
+
+def _add_processes(group: argparse._ArgumentGroup) -> None:
+    """Add where recordings are read."""
+    group.add_argument(
+        "--jobs",
+        type=values.whole(1),
+        metavar="N",
+        help="processes that read files (default: one per core)",
+    )
+    group.add_argument("--dask", metavar="SCHEDULER", help="read on a Dask cluster, such as tcp://host:8786")
 
 
 def _auto_or(text: str, most: int) -> int | str:

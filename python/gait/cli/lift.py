@@ -80,6 +80,14 @@ UNKNOWN_MM = 1000.0  # a displacement less certain than that is the distance, in
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Add the command's options."""
+    _add_common(parser)
+    _add_keypoints(parser.add_argument_group("from keypoints"))
+    _add_video(parser.add_argument_group("from a video"))
+    _add_pictures(parser.add_argument_group("from a video's pictures", FILES))
+
+
+def _add_common(parser: argparse.ArgumentParser) -> None:
+    """Add the files, the camera and the person, and what is written besides."""
     parser.add_argument(
         "input", metavar="KEYPOINTS|VIDEO", help="2-D keypoints, or a video in which they are found"
     )
@@ -101,7 +109,24 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "--all-markers", action="store_true", help="write all markers of the prior, not its joints alone"
     )
-    group = parser.add_argument_group("from keypoints")
+    parser.add_argument(
+        "--corrections", metavar="C.json", help="what was corrected by hand, as gait studio writes it"
+    )
+    parser.add_argument(
+        "--suggest",
+        type=values.whole(0),
+        metavar="N",
+        help="name the N corrections that would help most (default: 0)",
+    )
+    parser.add_argument(
+        "--overlay",
+        metavar="O.mp4",
+        help="draw the cylinder figure into the video; of keypoints, into --video",
+    )
+
+
+def _add_keypoints(group: argparse._ArgumentGroup) -> None:
+    """Add the view, the estimator and the repairs of keypoints, and what another tool's file lacks."""
     add = group.add_argument
     add(
         "--orthographic",
@@ -135,24 +160,16 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         "estimated alone and blended as in the paper; segment: one after another; likelihood: like blend, "
         "but without the prior of the modes (least squares), for comparison",
     )
-    add("--no-contact", action="store_true", help="smooth: do not keep feet on the ground in place")
-    add("--no-bones", action="store_true", help="smooth: do not keep the lengths of bones constant")
-    add(
-        "--balance",
-        action="store_true",
-        help="smooth: draw the place where the ground pushes into the polygon of the standing feet",
+    switches = (
+        ("--no-contact", "smooth: do not keep feet on the ground in place"),
+        ("--no-bones", "smooth: do not keep the lengths of bones constant"),
+        ("--balance", "smooth: draw the place where the ground pushes into the polygon of the standing feet"),
+        ("--ignore-unknown", "leave out points that the model does not know"),
+        ("--keep-sides", "do not undo swaps of left and right"),
+        ("--keep-spikes", "keep spikes: points far from where they were a frame before and after"),
     )
-    add("--ignore-unknown", action="store_true", help="leave out points that the model does not know")
-    add(
-        "--keep-sides",
-        action="store_true",
-        help="do not undo swaps of left and right",
-    )
-    add(
-        "--keep-spikes",
-        action="store_true",
-        help="keep spikes: points far from where they were a frame before and after",
-    )
+    for option, help in switches:
+        add(option, action="store_true", help=help)
     add("--trc", metavar="O.trc", help="also write the positions for OpenSim")
     values.add_person(group)
     add(
@@ -166,12 +183,10 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         metavar="VIDEO",
         help="video in which another tool found the keypoints: gives the times of its frames and its size",
     )
-    _add_video_arguments(parser)
 
 
-def _add_video_arguments(parser: argparse.ArgumentParser) -> None:
+def _add_video(group: argparse._ArgumentGroup) -> None:
     """Add the options that only a video has."""
-    group = parser.add_argument_group("from a video")
     values.add_fov(group)
     group.add_argument("--camera-out", metavar="CAM.json", help="also write the camera, found or given")
     values.add_stabilize(group, default=None)
@@ -184,21 +199,10 @@ def _add_video_arguments(parser: argparse.ArgumentParser) -> None:
     group.add_argument(
         "--stop", type=values.whole(0), metavar="F", help="first frame not to use (default: to the end)"
     )
-    parser.add_argument(
-        "--corrections", metavar="C.json", help="what was corrected by hand, as gait studio writes it"
-    )
-    parser.add_argument(
-        "--suggest",
-        type=values.whole(0),
-        metavar="N",
-        help="name the N corrections that would help most (default: 0)",
-    )
-    parser.add_argument(
-        "--overlay",
-        metavar="O.mp4",
-        help="draw the cylinder figure into the video; of keypoints, into --video",
-    )
-    group = parser.add_argument_group("from a video's pictures", FILES)
+
+
+def _add_pictures(group: argparse._ArgumentGroup) -> None:
+    """Add the options of a lift without a detector."""
     group.add_argument(
         "--placement", metavar="P.json", help="where the person roughly is in one frame; lifts the pictures"
     )

@@ -143,7 +143,7 @@ def add_model(parser: ArgumentParser, what: str = "walking model") -> None:
     )
 
 
-def add_seed(parser: ArgumentParser, of: str) -> None:
+def add_seed(parser: _ActionsContainer, of: str) -> None:
     """Add ``--seed``; `of` is what it is the seed of."""
     help = f"seed of {of} (default: 1)"
     parser.add_argument("--seed", type=whole(*SEED), default=1, metavar="S", help=help)
