@@ -29,6 +29,7 @@ import numpy as np
 import table
 from eval_plan import Clip
 from facts import facts
+from gait_errors import EVENTS, Compared, gait_errors, true_events
 
 from gait.bindings.model import read_blob
 from gait.body.skeleton import CHANNELS, JOINTS
@@ -38,7 +39,6 @@ from gait.io import blob
 from gait.io.track_file import Joints, Track, read_track, read_truth
 from gait.motion.evaluate import free_run, static_pose
 from gait.motion.footfalls import Draws, strikes_of
-from gait.motion.gait_errors import EVENTS, Compared, gait_errors, true_events
 from gait.motion.parameters import MIRRORED, QUANTITIES, measured
 from gait.progress import progress
 

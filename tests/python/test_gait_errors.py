@@ -1,6 +1,8 @@
 """Errors of gait parameters against a truth: known errors are found, intervals that hold them counted."""
 
+import sys
 from dataclasses import replace
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -9,8 +11,10 @@ from walking_track import walking_track
 from gait import UserError
 from gait.io.track_file import Joints
 from gait.motion.footfalls import find_events
-from gait.motion.gait_errors import gait_errors, true_events
 from gait.motion.parameters import QUANTITIES, measure
+
+sys.path.insert(0, str(Path(__file__).resolve().parents[1] / "bench"))
+from gait_errors import gait_errors, true_events
 
 
 def truth_of(track):

@@ -7,11 +7,11 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
+from gait.bindings.abi import MAX_CLASSES
 from gait.errors import UserError
 from gait.io import blob
 
 Sections = Mapping[str, blob.Array]
-MOST = 8  # classes in a blob, GAIT_MAX_CLASSES
 #: Sections of a class of its own, with the tag for class k.
 TAGS = {"CURV": "CUR{}", "CHST": "CHS{}", "SCST": "SCS{}", "GAIT": "GAI{}", "PACE": "PAC{}"}
 CYCLES, RECORDINGS = 2, 3  # columns of CLIN
@@ -46,8 +46,8 @@ def join(first: Sections, classes: Sequence[MotionClass]) -> dict[str, blob.Arra
     UserError if a class does not fit: other channels, a name twice, no source.
     """
     names = [c.name for c in classes]
-    if len(set(names)) < len(names) or len(names) > MOST:
-        raise UserError(f"classes {' '.join(names)}: give each a name of its own, at most {MOST}")
+    if len(set(names)) < len(names) or len(names) > MAX_CLASSES:
+        raise UserError(f"classes {' '.join(names)}: give each a name of its own, at most {MAX_CLASSES}")
     out = {tag: array for tag, array in first.items() if tag[:2] != "CL" and not tag[3].isdigit()}
     info = np.zeros((len(classes), 4), np.int32)
     changes = np.zeros((len(classes), len(classes), 4), np.float32)
