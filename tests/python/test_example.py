@@ -84,7 +84,7 @@ def test_the_example_follows_the_person_of_a_clip(program, tmp_path):
     clip = tmp_path / "walk"
     python = ROOT / ".venv/bin/python"
     simulate = [python, "-m", "gait", "simulate", "-o", clip, "--quiet"]
-    subprocess.run([*simulate, "--size", "640x480", "--frames", "50"], check=True, timeout=300)
+    subprocess.run([*simulate, "--size", "640x480", "--frames", "40"], check=True, timeout=300)
     subprocess.run([python, ROOT / "libgait/doc/example_clip.py", clip], check=True, timeout=300)
     pictures = sorted(clip.glob("frame*.pgm"))
     command = [*program, MODEL, clip / "scene.txt", clip / "empty.pgm", *pictures]
@@ -92,7 +92,7 @@ def test_the_example_follows_the_person_of_a_clip(program, tmp_path):
     found = [float(row.split()[2]) for row in done.stdout.splitlines()[:-1]]
     with open(clip / "truth.csv", encoding="utf-8") as truth:
         places = [float(row["pelvis_x"]) for row in csv.DictReader(truth)]
-    assert len(found) == len(pictures) == 50
+    assert len(found) == len(pictures) == 40
     assert np.abs(np.array(found) - places)[25:].max() < 0.2
 
 

@@ -1,11 +1,12 @@
 """Files read on a Dask cluster, here one of this machine: the same result, one line for what fails."""
 
+import contextlib
 import importlib.metadata
+import io
 import os
 import shutil
 import subprocess
 import sys
-from contextlib import contextmanager
 from pathlib import Path
 
 import marked_person as mw
@@ -22,12 +23,22 @@ from gait.learn.options import LearnOptions
 distributed = pytest.importorskip("distributed", reason="Dask is not installed: make setup")
 dask = pytest.importorskip("dask")
 pytestmark = pytest.mark.filterwarnings("ignore")  # those of distributed are not ours to mend
+LEARN = ["learn", "--components", "2"]
 
 
 @pytest.fixture(scope="module")
 def walks(tmp_path_factory):
     """Six toy walks and a broken file in their midst."""
     return files.write_trials(tmp_path_factory.mktemp("walks"), 6)
+
+
+@pytest.fixture(scope="module")
+def alone(walks, tmp_path_factory):
+    """Bytes of the model that this machine learns without a cluster, and what it notes."""
+    model, notes = tmp_path_factory.mktemp("alone") / "m.gait", io.StringIO()
+    with contextlib.redirect_stderr(notes):
+        assert gait.cli.main([*LEARN, str(walks), "-o", str(model), "--jobs", "1"]) == 0
+    return model.read_bytes(), notes.getvalue()
 
 
 @pytest.fixture(autouse=True)
@@ -43,7 +54,7 @@ def scheduler():
         yield address
 
 
-@contextmanager
+@contextlib.contextmanager
 def _two_workers():
     with distributed.LocalCluster(
         n_workers=2, threads_per_worker=1, processes=True, dashboard_address=None, silence_logs=50
@@ -51,14 +62,13 @@ def _two_workers():
         yield local.scheduler_address
 
 
-def test_a_cluster_gives_the_same_model(walks, scheduler, tmp_path, monkeypatch, capsys):
+def test_a_cluster_gives_the_same_model(walks, alone, scheduler, tmp_path, monkeypatch, capsys):
     monkeypatch.chdir(walks.parent)  # the workers have another folder
-    words = ["learn", walks.name, "--components", "2", "-o"]
-    assert gait.cli.main([*words, str(tmp_path / "alone.gait"), "--jobs", "1"]) == 0
-    alone = capsys.readouterr()
-    assert gait.cli.main([*words, str(tmp_path / "dask.gait"), "--dask", scheduler]) == 0
-    assert capsys.readouterr().err == alone.err and "01_02x.amc:3" in alone.err
-    assert (tmp_path / "dask.gait").read_bytes() == (tmp_path / "alone.gait").read_bytes()
+    model = tmp_path / "dask.gait"
+    assert gait.cli.main([*LEARN, walks.name, "-o", str(model), "--dask", scheduler]) == 0
+    notes = alone[1].replace(f"{walks.parent}/", "")
+    assert capsys.readouterr().err == notes and "01_02x.amc:3" in notes
+    assert model.read_bytes() == alone[0]
 
 
 def test_a_cluster_measures_people_alike(scheduler, tmp_path, monkeypatch):
@@ -135,10 +145,9 @@ def test_a_worker_with_other_kernels_is_refused_with_the_remedy(walks, scheduler
         load.load_all([(walks / "01_00.amc", True)], LearnOptions(dask=scheduler))
 
 
-def test_the_remedy_gives_the_model_of_the_command_line(walks, tmp_path):
+def test_the_remedy_gives_the_model_of_the_command_line(walks, alone, tmp_path):
     dask = [sys.executable, "-m", "distributed.cli.dask_worker", "--preload-nanny", "gait.reproducible"]
-    learn = ["learn", str(walks), "--components", "2", "--quiet", "-o"]
-    program = [sys.executable, "-m", "gait", *learn, tmp_path / "dask.gait"]
+    program = [sys.executable, "-m", "gait", *LEARN, walks, "--quiet", "-o", tmp_path / "dask.gait"]
     with distributed.LocalCluster(n_workers=0, dashboard_address=None, silence_logs=50) as local:
         worker = subprocess.Popen([*dask, local.scheduler_address], stderr=subprocess.DEVNULL)
         try:
@@ -148,5 +157,4 @@ def test_the_remedy_gives_the_model_of_the_command_line(walks, tmp_path):
         finally:
             worker.terminate()
             worker.wait(30)
-    assert gait.cli.main([*learn, str(tmp_path / "alone.gait")]) == 0
-    assert (tmp_path / "dask.gait").read_bytes() == (tmp_path / "alone.gait").read_bytes()
+    assert (tmp_path / "dask.gait").read_bytes() == alone[0]
