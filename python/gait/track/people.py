@@ -1,8 +1,8 @@
 """Track several people of a clip, each with a tracker of their own.
 
-The detector finds who is who, also where people cross.  Each person is tracked as if alone, except that
-keypoints of the others are left out and that where the others are in the picture, the tracker takes it that it
-sees neither the person nor the empty scene (`gait.track.other_people`).
+The detector finds who is who, also where people cross.  Each person is tracked as if alone, with two
+differences: keypoints of the others are left out, and where the others are in the picture it counts neither
+as the person nor as the empty scene (`gait.track.other_people`).
 """
 
 from __future__ import annotations
