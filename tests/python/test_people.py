@@ -58,12 +58,14 @@ def test_people_who_cross_keep_their_numbers(crossing, tmp_path, monkeypatch, ca
     cv2.imwrite(str(tmp_path / "plate.png"), wall())
     (tmp_path / "camera.json").write_text(json.dumps(camera().to_dict()))
     words = ["track", "v.mp4", "--people", "all", "--camera", "camera.json", "--background", "plate.png"]
-    words += ["-o", "t.csv", "--overlay", "o.mp4", "--particles", "600"]
+    words += ["-o", "t.csv", "--overlay", "o.mp4", "--particles", "400", "--report", "r.html"]
     monkeypatch.chdir(tmp_path)
     assert main(words) == 0
     printed = capsys.readouterr().out
     assert "person 4: Tracked" in printed and "t-7.csv" in printed
     assert Video("o.mp4").count == FRAMES
+    page = (tmp_path / "r.html").read_text()
+    assert 'href="r-4.html"' in page and (tmp_path / "r-7.html").stat().st_size > 100_000
     order = [MODEL.joint_names.index(name) for name in ("l_knee", "r_knee", "l_ankle", "r_ankle")]
     for truth, id in zip(joints, (4, 7), strict=True):
         rows = read_track(f"t-{id}.csv")

@@ -20,12 +20,14 @@ from gait.bindings.estimate import Estimate
 from gait.bindings.initial import Start
 from gait.detect.people import height
 from gait.errors import UserError
+from gait.io.files import replacing
 from gait.io.keypoints_file import Keypoints
 from gait.io.video import Frame
 from gait.progress import note, progress
 from gait.report.colours import PEOPLE
 from gait.report.drawing import Overlay
-from gait.report.film import Films
+from gait.report.film import Films, PageFilm
+from gait.report.people_page import Person, people_page
 from gait.track.clip import track_scene
 from gait.track.keypoint_start import find_keypoint_start
 from gait.track.options import ClipOptions
@@ -64,9 +66,19 @@ def track_people(options: ClipOptions) -> dict[str, Any]:
         people[str(id)] = track_scene(_options_of(options, scene, id), own, start, _kept(found[id]))
         outlines[id] = with_track(scene.people[id], _joints(scene, found[id]), np.asarray(scene.video.times))
     files = {}
+    if options.overlay or options.report:
+        film = _draw(options, scene, found)
     if options.overlay:
-        _draw(options, scene, found)
         files["overlay"] = options.overlay
+    if options.report:
+        assert film is not None
+        shown = {
+            str(id): Person(people[str(id)]["verdict"], Path(numbered(options.report, id)).name, colour)
+            for id, colour in _colours(found).items()
+        }
+        with replacing(options.report) as temporary:
+            temporary.write_text(people_page(Path(options.video).name, shown, film), encoding="utf-8")
+        files["report"] = options.report
     return {
         "people": people,
         "others": [id for id in scene.people if id not in starts],
@@ -152,14 +164,21 @@ def _joints(scene: Scene, found: Estimates) -> dict[int, dict[str, Array]]:
     return out
 
 
-def _draw(options: ClipOptions, scene: Scene, found: dict[int, Estimates]) -> None:
-    """Write the film of everyone, each in a colour of their own with the number over the head."""
-    assert options.overlay is not None
-    colours = {str(id): PEOPLE[k % len(PEOPLE)] for k, id in enumerate(sorted(found))}
+def _colours(found: dict[int, Estimates]) -> dict[int, tuple[int, int, int]]:
+    """Colour of each person, BGR."""
+    return {id: PEOPLE[k % len(PEOPLE)] for k, id in enumerate(sorted(found))}
+
+
+def _draw(options: ClipOptions, scene: Scene, found: dict[int, Estimates]) -> PageFilm | None:
+    """Write the film of everyone, each in a colour of their own with the number over the head.
+
+    Return the page's film if there is to be a page.
+    """
+    colours = {str(id): colour for id, colour in _colours(found).items()}
     still = Overlay(scene.model, scene.camera)
     size = (scene.camera.width, scene.camera.height)
     with (
-        Films(options.overlay, None, size, scene.video.fps) as films,
+        Films(options.overlay, scene.frames if options.report else None, size, scene.video.fps) as films,
         progress("drawing", len(scene.frames), options.quiet) as update,
     ):
         for frame in scene.video.frames(scene.frames.start, scene.frames.stop):
@@ -167,3 +186,4 @@ def _draw(options: ClipOptions, scene: Scene, found: dict[int, Estimates]) -> No
             now = {str(id): one[frame.number] for id, one in sorted(found.items()) if frame.number in one}
             films.write(overlay.draw_people(frame.image, now, colours), frame.number)
             update(frame.number - scene.frames.start + 1)
+    return films.page
