@@ -60,9 +60,9 @@ def main() -> int:
         write(
             "paper_ladder",
             "From the paper to the default",
-            ["rung", "median", *names],
+            ["rung", "median", "gain", *names],
             rows,
-            note=about_ladder(),
+            note=about_ladder(args.rung_seeds),
         )
         if args.record:
             draw(errors, range_of)
@@ -113,20 +113,24 @@ def climbed(
         done = 0
         for f in known:
             paper, people, _ = _models(f, paths)
-            base = f.baselines(
-                paths["people"][f.clip.subject] if f.clip.subject else PAPER.with_name("walk.gait")
-            )
+            for prior, path in (("paper", PAPER), ("people", PAPER.with_name("walk.gait"))):
+                base = f.baselines(paths[prior].get(f.clip.subject or "", path))
+                by_rung.setdefault(ladder.FREE[prior == "people"], []).append(base["free"])
             by_rung.setdefault(ladder.STATIC, []).append(base["static"])
-            by_rung.setdefault(ladder.FREE, []).append(base["free"])
             for rung in ladder.RUNGS:
                 model = people if rung.people else paper
                 runs = [f.run(model, rung.mode, seed, rung.changes).root for seed in range(1, seeds + 1)]
                 by_rung.setdefault(rung.name, []).append(float(np.median(runs)))
                 update(done := done + 1)
-    rows = [[name, round(float(np.median(v)), 1), *(round(x, 1) for x in v)] for name, v in by_rung.items()]
+    median = {name: float(np.median(v)) for name, v in by_rung.items()}
+    gains = {r.name: round(ladder.own_free(median, r) - median[r.name], 1) for r in ladder.RUNGS}
+    rows = [
+        [name, round(median[name], 1), gains.get(name), *(round(x, 1) for x in v)]
+        for name, v in by_rung.items()
+    ]
     return (
         rows,
-        {name: float(np.median(v)) for name, v in by_rung.items()},
+        median,
         {name: (min(v), max(v)) for name, v in by_rung.items()},
     )
 
@@ -155,14 +159,16 @@ of the same model running on from the exact truth, and its mean pose at the true
 image."""
 
 
-def about_ladder() -> str:
+def about_ladder(seeds: int) -> str:
     """State how the ladder was made."""
-    return f"""{facts("paper_ladder.py --record")}
+    return f"""{facts(f"paper_ladder.py --record --rung-seeds {seeds}")}
 
 Root-aligned error, mm, of frames 0 to 50 from a true start with noise, median over the frames and then over
-the seeds; models without the clip's subject. Each rung adds to the one above it. Static pose and
-free-running cycle (of the people model, from the exact truth) need no image: what a rung has below the
-free-running cycle is all that the images give.
+the seeds; models without the clip's subject. Each rung adds to the one above it. Static pose (of the model
+of people) and free-running cycles need no image. Gain: how far a rung is below the free-running cycle of
+its own model, which is all that the images give it; medians of the clips. The cycles start from the exact
+truth, the rungs from the truth with noise (pelvis 3 cm, phase 0.03, rate 0.03 per second, heading 0.05
+rad), so the comparison favours no image.
 
 ![the ladder](paper_ladder.svg)"""
 

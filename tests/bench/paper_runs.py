@@ -55,8 +55,8 @@ class Footage:
         if self.scene is not None:
             return self.scene.judged(found)
         off, height = self._marked(found)
-        held = bool(np.nanmedian(off[-TAIL:]) < LOST_SHARE * height)
-        return Run(np.nan, float(np.nanmedian(off)), held, share_lost(found))
+        last = float(np.nanmedian(off[-TAIL:]))
+        return Run(np.nan, float(np.nanmedian(off)), last < LOST_SHARE * height, share_lost(found), last)
 
     def _marked(self, found: list[Any]) -> tuple[np.ndarray, float]:
         """Mean distance from the clear marks of each frame, NaN where none is marked; the person's height."""

@@ -107,10 +107,12 @@ def test_the_ladder_goes_from_the_paper_to_the_default_and_adds_one_thing_a_rung
     terms = [TrackerConfig.default(rung.mode, **rung.changes).terms for rung in rungs]
     assert terms[0] == Term.TEXTURE and terms[-1] == TrackerConfig.default().terms
     assert all(a & b == a for a, b in itertools.pairwise(terms))
-    errors = {ladder.STATIC: 80.0, ladder.FREE: 40.0, "paper": 60.0}
-    axes = ladder.plot(errors, {"paper": (50.0, 70.0)}).axes[0]
-    assert [bar.get_width() for bar in axes.patches] == [80.0, 40.0, 60.0]
-    assert axes.lines[-1].get_xdata()[0] == 40.0  # without any image
+    without = {ladder.STATIC: 80.0, ladder.FREE[False]: 50.0, ladder.FREE[True]: 40.0}
+    tracked = {rung.name: 60.0 - k for k, rung in enumerate(ladder.RUNGS)}
+    axes = ladder.plot(without | tracked).axes[0]
+    assert [bar.get_width() for bar in axes.patches] == [*without.values(), *tracked.values()]
+    free = [line.get_xdata()[0] for line in axes.lines]  # of the rung's own model, without any image
+    assert free == [40.0 if rung.people else 50.0 for rung in ladder.RUNGS]
 
 
 def test_the_page_holds_every_figure_and_needs_no_other_file(walks, tmp_path, monkeypatch, capsys):
@@ -134,7 +136,12 @@ def test_the_page_holds_every_figure_and_needs_no_other_file(walks, tmp_path, mo
     assert [len(each) for each in found.values()] == [8, 8]
     text = page.read_text(encoding="utf-8")
     assert not re.search(r'(src|href)="(?!data:|#)', text)
-    assert re.search(r"without any image is \d+ mm off: .* likelihood (gains|loses) \d+ mm", text)
+    assert re.search(r"without any image, .* likelihood (gains|loses) \d+ of \d+ mm", text)
+    sums = [
+        re.findall(r"<td>([-+.\d]+)", row)
+        for row in re.findall(r">(?:sum of the terms|log-lik.*?)</tr>", text)
+    ]
+    assert len(sums) == 2 and np.array(sums[0], float) == pytest.approx(np.array(sums[1], float), abs=1)
     for heading in (name for each in found.values() for name in each):
         assert text.count(heading) >= 2  # in the table and over its pictures
     assert text.count("<img") >= 15 and "<animate" in text

@@ -127,7 +127,7 @@ def test_every_verdict_of_numbers_can_come_out_otherwise():
         (verdicts.tracking, ((9, 9), 10, 1.0), ((2, 9), 10, 3.0)),
         (verdicts.held, ([10, 9], 10), ([10, 8], 10)),
         (verdicts.at_rest, ([[-3.0], [-9.0]],), ([[3.0], [-9.0]],)),
-        (verdicts.without_image, (30.0, 20.0, 40.0), (50.0, 20.0, 40.0)),
+        (verdicts.without_image, ((30.0, 40.0), (20.0, 40.0)), ((50.0, 40.0), (20.0, 40.0))),
         (verdicts.volume, ([-20, -10], 0.05, [0.01, 0.1]), ([-20, -10], 0.5, [0.01, 0.1])),
         (verdicts.volume, ([-20, -10], 0.05, [0.01, 0.1]), ([-10, -20], 0.05, [0.01, 0.1])),
         (verdicts.sequence, ([5.0, 4.0], 100.0, 0.1), ([20.0, 4.0], 100.0, 0.1)),

@@ -11,6 +11,7 @@ from gait.bindings.abi import Mode
 from gait.bindings.config import TrackerConfig
 from gait.bindings.model import Model
 from gait.bindings.state import State
+from gait.io.video import Image
 from gait.learn.arrays import Floats
 from gait.motion.footfalls import walking_direction
 from gait.paper.scene import Scene
@@ -30,6 +31,7 @@ PLACES = {
 }
 BACKGROUND = "0.7 m behind", "0.7 m beside"  # where a body covers the background
 Place = tuple[float, float, float]
+Seen = tuple[Image, Image]
 Row = tuple[str, float, float]  #: a body, and its log-likelihoods walking and at rest
 _WHOLE = {"evidence_time": 0.0, "rejuvenation_time": 0.0}  # every frame counts in full
 
@@ -75,15 +77,26 @@ class Probe:
             pelvis=pelvis + along * way + across * left,
         )
 
+    def step(self, k: int, place: Place, speed: float, seen: Seen | None = None) -> tuple[float, State]:
+        """Log-likelihood of frame k + 1, having gone on at so many times the person's speed; the body there.
+
+        seen : two images that are shown in place of frames k and k + 1.
+        """
+        now, then = seen or (self.scene.frames[k].image, self.scene.frames[k + 1].image)
+        self.tracker.start(self.state(k, *place), self.exactly, STEP)
+        self.tracker.step(now, STEP)
+        later = 2 * STEP if speed == 1 else STEP + max(1, round(speed * STEP))
+        found = self.tracker.step(then, later)
+        return found.log_evidence, found.mean
+
+    @property
+    def picked(self) -> range:
+        """Frames from which a step is looked at."""
+        return range(EVERY, len(self.scene.frames) - 3, EVERY)
+
     def nats(self, place: Place, speed: float) -> float:
         """Mean log-likelihood of the next frame, having gone on at so many times the person's speed."""
-        total = []
-        for k in range(EVERY, len(self.scene.frames) - 3, EVERY):
-            self.tracker.start(self.state(k, *place), self.exactly, STEP)
-            self.tracker.step(self.scene.frames[k].image, STEP)
-            later = 2 * STEP if speed == 1 else STEP + max(1, round(speed * STEP))
-            total.append(self.tracker.step(self.scene.frames[k + 1].image, later).log_evidence)
-        return float(np.mean(total))
+        return float(np.mean([self.step(k, place, speed)[0] for k in self.picked]))
 
     def table(self) -> list[Row]:
         """Return the log-likelihoods of each body, walking on with the person and at rest."""
@@ -93,3 +106,8 @@ class Probe:
 def gain_at_rest(rows: Sequence[Row]) -> float:
     """Return by how many nats the best body at rest off the person beats the true one that walks."""
     return max(rest for name, _, rest in rows if name in BACKGROUND) - rows[0][1]
+
+
+def best_at_rest(rows: Sequence[Row]) -> str:
+    """Return which place on the background the likelihood likes best for a body at rest."""
+    return max((row for row in rows if row[0] in BACKGROUND), key=lambda row: row[2])[0]

@@ -40,6 +40,7 @@ class Run:
     px: float  #: distance of the joints in the picture, pixels, median over the frames
     held: bool  #: in the last frames the joints are near in the picture
     lost: float  #: share of frames that are reported as lost
+    last: float  #: distance of the joints in the picture in the last frames, pixels, median
 
 
 @dataclass(frozen=True)
@@ -93,8 +94,8 @@ class Scene:
             axis=1
         )
         root = float(np.median(root_errors(joints, self.true)))
-        held = bool(np.median(off[-TAIL:]) < tracking.HELD * self.height)
-        return Run(root, float(np.median(off)), held, share_lost(found))
+        last = float(np.median(off[-TAIL:]))
+        return Run(root, float(np.median(off)), last < tracking.HELD * self.height, share_lost(found), last)
 
 
 def share_lost(found: Sequence[Estimate]) -> float:

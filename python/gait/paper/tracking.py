@@ -222,12 +222,12 @@ def _overlays(both: Both, tracked: Tracked) -> Image:
         canvas = cv2.cvtColor(picture, cv2.COLOR_GRAY2BGR) if picture.ndim == 2 else picture.copy()
         drawn = overlay.figure(np.asarray(canvas, np.uint8), estimate.mean)
         side = CUT_OUT * about.stature * both.camera.fy / float(both.camera.depth(about.pelvis))
-        cells.append(labelled(_cut(drawn, both.camera.project(about.pelvis), side), f"frame {k}"))
+        cells.append(labelled(cut(drawn, both.camera.project(about.pelvis), side), f"frame {k}"))
     return np.asarray(np.hstack(cells))
 
 
-def _cut(picture: Image, middle: Floats, side: float) -> Image:
-    """Cut a square out of a picture and resize it."""
+def cut(picture: Image, middle: Floats, side: float) -> Image:
+    """Cut a square of SIZE pixels out of a picture, `side` of its own."""
     scale = SIZE / side
     matrix = np.array([[scale, 0, SIZE / 2 - scale * middle[0]], [0, scale, SIZE / 2 - scale * middle[1]]])
     return np.asarray(cv2.warpAffine(picture, matrix, (SIZE, SIZE), flags=cv2.INTER_AREA), np.uint8)

@@ -59,16 +59,16 @@ def tracking(held: Sequence[int], seeds: int, ratio: float) -> str:
     )
 
 
-def without_image(paper: float, ours: float, none: float) -> str:
-    """Ladder: errors of the paper's filter, of ours, and of what needs no image, mm."""
+def without_image(paper: tuple[float, float], ours: tuple[float, float]) -> str:
+    """Ladder: errors of the paper's filter and of ours, mm, each with that of what needs no image."""
     return (
-        f"the mean cycle running on from the true start without any image is {none:.0f} mm off: "
-        f"the paper's likelihood {_against(paper, none)}, the default {_against(ours, none)}"
+        "no counterpart: against its own mean cycle, running on from the exact truth without any image, "
+        f"the paper's likelihood {_against(*paper)}, the default {_against(*ours)}"
     )
 
 
 def _against(error: float, none: float) -> str:
-    return f"{'gains' if error < none else 'loses'} {abs(none - error):.0f} mm"
+    return f"{'gains' if error < none else 'loses'} {abs(none - error):.0f} of {none:.0f} mm"
 
 
 def held(runs: Sequence[int], seeds: int) -> str:

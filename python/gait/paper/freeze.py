@@ -1,0 +1,213 @@
+"""The freeze on the static background: which term of eqs. 10 to 13 prefers it, with pictures.
+
+The terms are taken from the tracker's own log-likelihood.  On an even grey picture no limb differs from what
+it was (E = 0), so that q, p_occluded and sigma(alpha) are left; with tilt 0 all limbs have one sigma.  E of a
+limb is what comes back where the pictures are shown within that limb alone.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import cv2
+import numpy as np
+
+from gait.bindings.abi import Mode
+from gait.bindings.estimate import Estimate
+from gait.bindings.model import Model
+from gait.io.video import Image
+from gait.learn.arrays import Floats
+from gait.paper import preference
+from gait.paper.entry import Picture, table
+from gait.paper.pictures import image, labelled
+from gait.paper.preference import PLACES, Place, Probe
+from gait.paper.scene import Scene
+from gait.paper.tracking import CUT_OUT, SHOWN, cut
+from gait.report.drawing import Overlay, draw_bones
+
+GREY = 128
+PIXEL_VARIANCE = 9.0  # grey levels squared, of either frame
+FEW = 2.0**-20, 2.0**-19  # densities of an occluded limb that count for hidden limbs alone
+Q = "q: turned from the image, or seen in part"
+OCCLUDED = "p_occluded: hidden, or not told apart"
+WIDTHS = "sigma(alpha): widths"
+TRUTH = (60, 230, 250)  # BGR
+FULL = 0.6  # nats that a limb drawn in full red costs
+
+
+@dataclass(frozen=True)
+class Body:
+    """A body of which the log-likelihood is split: nats, means over the frames."""
+
+    terms: dict[str, float]  #: what q, p_occluded, the widths and E of each limb add to an ideal limb's
+    total: float  #: of a frame given the one before, less that of limbs that all are ideal
+
+    @property
+    def differences(self) -> float:
+        """What the differences of grey levels cost, all limbs together."""
+        return sum(value for name, value in self.terms.items() if name.startswith("E"))
+
+
+@dataclass(frozen=True)
+class Freeze:
+    """The true body, which walks, and the best one at rest on the background, in one scene."""
+
+    scene: Scene
+    model: Model
+    place: str  #: where the still body is, a name of `preference.PLACES`
+    walks: Body
+    rests: Body
+
+    def gains(self) -> dict[str, float]:
+        """By how many nats each term prefers the still body."""
+        return {name: value - self.walks.terms[name] for name, value in self.rests.terms.items()}
+
+    def causes(self) -> tuple[float, float]:
+        """By how many nats the differences of grey levels prefer the still body, and all other terms."""
+        of_e = self.rests.differences - self.walks.differences
+        return of_e, sum(self.gains().values()) - of_e
+
+
+def look(scene: Scene, model: Model, stature: float, rows: Sequence[preference.Row]) -> Freeze:
+    """Split the log-likelihoods of the true body and of the best still one of `preference.Probe.table`."""
+    place = preference.best_at_rest(rows)
+    probes = _Probes(scene, model, stature)
+    walks = probes.split(PLACES["on the person"], 1.0)
+    return Freeze(scene, model, place, walks, probes.split(PLACES[place], 0.0))
+
+
+class _Probes:
+    """The same body under settings of which each leaves terms out."""
+
+    def __init__(self, scene: Scene, model: Model, stature: float) -> None:
+        def probe(**changes: float) -> Probe:
+            return Probe(scene, model, preference.config(Mode.PAPER, **changes), stature)
+
+        self.model, self.scene = model, scene
+        usual = preference.config(Mode.PAPER)
+        self.density, self.whole = usual.occluded_density, probe()
+        self.even = probe(surface_tilt=0.0)
+        self.hidden = [probe(surface_tilt=0.0, occluded_density=few) for few in FEW]
+        self.ideal = -0.5 * float(np.log(2 * np.pi * (2 * PIXEL_VARIANCE + usual.surface_sd**2)))
+
+    def split(self, place: Place, speed: float) -> Body:
+        """Split the log-likelihood of a body, the mean over the frames."""
+        found = [self._frame(k, place, speed) for k in self.whole.picked]
+        terms = {name: float(np.mean([each[name] for each, _ in found])) for name in found[0][0]}
+        return Body(terms, float(np.mean([total for _, total in found])))
+
+    def _frame(self, k: int, place: Place, speed: float) -> tuple[dict[str, float], float]:
+        blank = np.full_like(self.scene.frames[k].image, GREY)
+        total, after = self.whole.step(k, place, speed)
+
+        def on_grey(probe: Probe) -> float:
+            return probe.step(k, place, speed, (blank, blank))[0]
+
+        less, more = (on_grey(probe) for probe in self.hidden)
+        limbs, hidden = len(self.model.limb_names), round((more - less) / float(np.log(FEW[1] / FEW[0])))
+        seen = (limbs - hidden) * self.ideal
+        one, each = on_grey(self.even), on_grey(self.whole)
+        q = less - hidden * float(np.log(FEW[0])) - seen
+        terms = {Q: q, OCCLUDED: one - limbs * self.ideal - q, WIDTHS: each - one}
+        bodies = self.whole.state(k, *place), after
+        ids = [self.model.render(self.scene.camera, state) for state in bodies]
+        frames = self.scene.frames[k].image, self.scene.frames[k + 1].image
+        for limb, name in enumerate(self.model.limb_names, 1):
+            now, then = (_only(frame, drawn == limb) for frame, drawn in zip(frames, ids, strict=True))
+            terms[f"E, {name.replace('_', ' ')}"] = self.whole.step(k, place, speed, (now, then))[0] - each
+        return terms, total - limbs * self.ideal
+
+
+def _only(frame: Image, where: np.ndarray) -> Image:
+    """Return a frame that is grey elsewhere."""
+    return np.where(where[..., None] if frame.ndim == 3 else where, frame, np.uint8(GREY))
+
+
+def split_table(found: Sequence[Freeze]) -> Picture:
+    """Return the terms by view: the true body, the still one, and by how much the still one is preferred."""
+    head = ["nats a frame"]
+    for each in found:
+        head += [f"{each.scene.name}: walks", f"rests {each.place}", "prefers rest by"]
+    shown = {name: [(f.walks.terms[name], f.rests.terms[name]) for f in found] for name in found[0].gains()}
+    shown["sum of the terms"] = [(sum(f.walks.terms.values()), sum(f.rests.terms.values())) for f in found]
+    shown["log-likelihood"] = [(f.walks.total, f.rests.total) for f in found]
+    rows = [
+        (name, *(f"{x:+.1f}" for walks, rests in each for x in (walks, rests, rests - walks)))
+        for name, each in shown.items()
+    ]
+    return table(
+        "Which term prefers rest: what each takes from the log-likelihood of limbs that face the camera, are "
+        "seen whole and do not change, for the true body, which walks, and the best body at rest on the "
+        "background. Terms are added in the order of the rows, E limb by limb; p_occluded bounds each.",
+        head,
+        rows,
+    )
+
+
+def pictures(found: Freeze, estimates: Sequence[Estimate], seed: int) -> list[Picture]:
+    """Return the estimates of a run that leaves the person over the frames, and the bodies of the table."""
+    overlay = Overlay(found.model, found.scene.camera)
+    cells = []
+    for k in (k for k in SHOWN if k < len(estimates)):
+        drawn = overlay.body(_colour(found.scene.frames[k].image), estimates[k].mean)
+        _truth(found.scene, drawn, k)
+        cells.append(_about(found.scene, drawn, k, f"frame {k}"))
+    return [
+        Picture(
+            f"Literal, {found.scene.name}, seed {seed}, the run that ends farthest off: the expected body "
+            "over the frames (tinted) beside the truth (yellow).",
+            image(np.asarray(np.hstack(cells)), "the filter's body beside the true one"),
+        ),
+        Picture(
+            f"What eq. 11 compares, {found.scene.name}, in one step: the true body, which walks, and the "
+            f"still one {found.place}. Each limb is as red as what it covers has changed since the frame "
+            f"before (E; full at {FULL:g} nats): on the background hardly anything changes.",
+            image(_costs(found), "limbs of the walking and of the still body by their cost"),
+        ),
+    ]
+
+
+def _costs(found: Freeze) -> Image:
+    """Draw the walking and the still body, each limb by its mean cost."""
+    cells = []
+    k = preference.EVERY * (len(found.scene.frames) // (2 * preference.EVERY))
+    probe = Probe(found.scene, found.model, preference.config(Mode.PAPER), stature=_stature(found))
+    for body, place, words in (
+        (found.walks, "on the person", "walks"),
+        (found.rests, found.place, f"rests {found.place}"),
+    ):
+        drawn = _colour(found.scene.frames[k].image)
+        ids = found.model.render(found.scene.camera, probe.state(k, *PLACES[place]))
+        for limb, name in enumerate(found.model.limb_names, 1):
+            cost = -body.terms[f"E, {name.replace('_', ' ')}"]
+            pale = 235 * (1 - float(np.clip(cost / FULL, 0, 1)))
+            colour = np.array([pale, pale, 235])
+            where = ids == limb
+            drawn[where] = np.rint(0.25 * drawn[where] + 0.75 * colour).astype(np.uint8)
+        _truth(found.scene, drawn, k)
+        cells.append(_about(found.scene, drawn, k, f"{words}: E {body.differences:.1f} nats"))
+    return np.asarray(np.hstack(cells))
+
+
+def _stature(found: Freeze) -> float:
+    places = found.scene.truth.places
+    ends = places["head_top"][found.scene.rows] - places["l_heel"][found.scene.rows]
+    return float(np.median(np.abs(ends[:, 2])))
+
+
+def _truth(scene: Scene, canvas: Image, k: int) -> None:
+    """Draw the true bones in place."""
+    at = {name: scene.camera.project(place[scene.rows[k]]) for name, place in scene.truth.places.items()}
+    draw_bones(canvas, at, 1, TRUTH)
+
+
+def _colour(frame: Image) -> Image:
+    return np.array(cv2.cvtColor(frame, cv2.COLOR_GRAY2BGR) if frame.ndim == 2 else frame, np.uint8)
+
+
+def _about(scene: Scene, drawn: Image, k: int, words: str) -> Image:
+    """Cut out about the true person, with room for a body beside."""
+    pelvis: Floats = scene.truth.places["pelvis"][scene.rows[k]]
+    side = 1.3 * CUT_OUT * scene.height
+    return labelled(cut(drawn, scene.camera.project(pelvis), side), words)
