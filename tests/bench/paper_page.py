@@ -6,18 +6,47 @@ paper_page.py build/paper/paper.json [--record]
 from __future__ import annotations
 
 import argparse
+import csv
 import json
 from pathlib import Path
 
 import table
 from facts import facts
 
+from gait.paper.verdicts import KINDS, kind
+
 NOTE = """{facts}
 
 What stands on the page build/paper/paper.html, which has the pictures and every choice that the papers leave
 open. Walks and motions: CMU's; the clip: the outdoor one, with joints marked by hand. Theirs: what the paper
 states. Literal: its algorithm as printed, errors of print resolved. Ours: the package's default, on the same
-data."""
+data. {verdicts}.
+
+The paper's filter on the target's seven clips of real motion ([paper_mode](paper_mode.md), recorded apart) is
+on the person, and nearer than its own mean cycle running on without any image: {clips}. By term,
+what prefers rest on the background: [paper_terms](paper_terms.md); the readings of equations that were tried:
+[paper_readings](paper_readings.md)."""
+
+
+def counted(verdicts: list[str]) -> str:
+    """Return how many verdicts there are of each kind."""
+    kinds = [kind(each) for each in verdicts]
+    return ", ".join(f"{kinds.count(each)} {each}" for each in KINDS)
+
+
+def seven() -> str:
+    """Return what the recorded runs on the target's clips came to."""
+    with open(table.RESULTS / "paper_mode.csv", newline="", encoding="utf-8") as file:
+        rows = list(csv.DictReader(file))
+    return "; ".join(
+        f"{row['clip']} in {row['held']} runs"
+        + (
+            f", {row['root mm']} mm against {row['free mm']}"
+            if row["root mm"]
+            else ", without a truth in space"
+        )
+        for row in rows
+    )
 
 
 def main() -> None:
@@ -36,7 +65,9 @@ def main() -> None:
         return
     head = ("paper", "figure", *rows[0][2])
     whole = [(p, name, *each.values()) for p, name, each in rows]
-    table.publish("paper", title, head, whole, NOTE.format(facts=facts("make paper ARGS=--record")))
+    verdicts = counted([e["verdict"] for _, _, e in rows])
+    note = NOTE.format(facts=facts("make paper ARGS=--record"), verdicts=verdicts, clips=seven())
+    table.publish("paper", title, head, whole, note)
 
 
 if __name__ == "__main__":

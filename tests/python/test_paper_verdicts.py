@@ -119,13 +119,16 @@ def test_every_verdict_of_numbers_can_come_out_otherwise():
     """Sentences of the figures whose numbers are made by long runs."""
     for function, good, bad in (
         (verdicts.body, (19,), (24,)),
-        (verdicts.periods, (True, 0, False), (False, 2, True)),
+        (verdicts.periods, (True, 1.0, 0, False), (True, 0.5, 9, False)),
+        (verdicts.periods, (True, 1.0, 0, False), (False, 1.0, 0, False)),
         (verdicts.offsets, (True, 0.01), (True, 0.3)),
         (verdicts.offsets, (True, 0.01), (False, 0.01)),
         (verdicts.passes, (True, 1.0, 2.0), (True, 2.0, 1.0)),
-        (verdicts.components, (1.0,), (9.0,)),
-        (verdicts.tracking, ((9, 9), 10, 1.0), ((2, 9), 10, 3.0)),
-        (verdicts.held, ([10, 9], 10), ([10, 8], 10)),
+        (verdicts.components, (1.0, (5.0, 9.0)), (9.0, (5.0, 9.0))),
+        (verdicts.components, (1.0, (5.0, 9.0)), (1.0, (8.0, 9.0))),
+        (verdicts.tracking, ((9, 9), 10, 1.0, (1, 0)), ((2, 9), 10, 3.0, (8, 0))),
+        (verdicts.held, ([10, 9], 10, [30, 30], [40, 40]), ([10, 8], 10, [30, 30], [40, 40])),
+        (verdicts.held, ([10, 9], 10, [30, 30], [40, 40]), ([10, 9], 10, [30, 50], [40, 40])),
         (verdicts.at_rest, ([[-3.0], [-9.0]],), ([[3.0], [-9.0]],)),
         (verdicts.without_image, ((30.0, 40.0), (20.0, 40.0)), ((50.0, 40.0), (20.0, 40.0))),
         (verdicts.volume, ([-20, -10], 0.05, [0.01, 0.1]), ([-20, -10], 0.5, [0.01, 0.1])),
@@ -134,4 +137,5 @@ def test_every_verdict_of_numbers_can_come_out_otherwise():
     ):
         assert function(*good) != function(*bad), function
         assert re.search(r"\b(not?|elsewhere|loses|leaves|part|in 1 of 1 views)\b", function(*bad))
-    assert verdicts.held([2, 1], 10).startswith("not reproduced")
+    assert verdicts.held([2, 1], 10, [30, 30], [40, 40]).startswith("not reproduced")
+    assert verdicts.kind("reproduced in part: x") == "reproduced in part"

@@ -2,10 +2,12 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Sequence
 from dataclasses import dataclass
 from html import escape
 
+from gait.paper import verdicts
 from gait.report.figures import Drawing, address
 from gait.report.page import Page, movable
 
@@ -72,13 +74,31 @@ def page(title: str, about: Sequence[str], papers: Sequence[Paper]) -> str:
     made = Page(title)
     for words in about:
         made.words(words)
+    made.html(_counts(papers))
     for paper in papers:
         rows = [(e.heading, *e.statements().values()) for e in paper.entries]
         made.grid(f"{paper.short}: {paper.title}", HEAD, rows)
     for paper in papers:
         for entry in paper.entries:
-            made.figure(f"{paper.short}, {entry.heading}", _body(entry))
+            heading = escape(f"{paper.short}, {entry.heading}")
+            made.html(f'<h2 id="{_anchor(paper, entry)}">{heading}</h2>{_body(entry)}')
     return made.text()
+
+
+def _anchor(paper: Paper, entry: Entry) -> str:
+    return re.sub(r"\W+", "-", f"{paper.short} {entry.heading}".lower())
+
+
+def _counts(papers: Sequence[Paper]) -> str:
+    """Return how many verdicts there are of each kind, with links to their figures."""
+    links = {kind: list[str]() for kind in verdicts.KINDS}
+    for paper in papers:
+        author = paper.short.split()[0]
+        for entry in paper.entries:
+            words = escape(f"{author}, {entry.heading.split(':')[0]}")
+            links[verdicts.kind(entry.verdict)].append(f'<a href="#{_anchor(paper, entry)}">{words}</a>')
+    items = (f"<li>{len(each)} {kind}: {'; '.join(each)}</li>" for kind, each in links.items() if each)
+    return f"<p>Verdicts:</p><ul>{''.join(items)}</ul>"
 
 
 def _body(entry: Entry) -> str:

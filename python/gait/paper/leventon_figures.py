@@ -91,7 +91,8 @@ def _training(found: Segments) -> Entry:
             "Which motions: up to ten, first those that are no walks, then a walk of each person; at most "
             "240 frames of each.",
             "The markers: 37 virtual ones on the body that was fitted to each recording.",
-            "The frame rate, about 20 per second: exactly 20. A sequence of F frames gives the whole part of "
+            "The frame rate, about 20 per second: exactly 20, resampled after a low-pass filter. A sequence "
+            "of F frames gives the whole part of "
             "(F - 10) / 5 and one more segments.",
         ),
         (picture(Drawing("", "training", caption, strips.figure())),),

@@ -182,3 +182,15 @@ def closure(curves: Floats) -> float:
 def printed_mean(learned: Learned) -> Floats:
     """Return the mean (T, 19) of the completed cycles as printed: not in the Fourier basis."""
     return np.asarray(np.array(learned.components.filled[:, :, :COUNT]).mean(axis=0))
+
+
+def left_by_mean(learned: Learned) -> float:
+    """Return what the mean cycle of the others leaves of a person, degrees rms, the median of the people."""
+    values, mask = (np.asarray(x[:, :, : len(ANGLES)]) for x in (learned.cycles.values, learned.cycles.mask))
+    subject = learned.row_subject
+    found = []
+    for one in np.unique(subject):
+        own = subject == one
+        mean = np.broadcast_to(column_mean(values[~own], mask[~own]), values[own].shape)
+        found.append(_rms(np.degrees(values[own] - mean), mask[own]))
+    return float(np.median(found))

@@ -142,7 +142,7 @@ def _periods(learning: Learning) -> Entry:
         f"{long_literal:.0f}.",
         f"{shown.name}: {refined.frames:.2f} frames; the median difference from whole frames is "
         f"{np.median(off):.2f}. All {total} walks. The long walk: {long_refined:.2f}.",
-        verdicts.periods(flat, total - same, abs(long_literal - ormoneit.LONG_PERIOD) > 1),
+        verdicts.periods(flat, same / total, total - same, abs(long_literal - ormoneit.LONG_PERIOD) > 1),
         (
             "Eq. 1 is read as folding modulo p, as its text has it, not as the number of the cycle, which "
             "it prints.",
@@ -284,7 +284,7 @@ def _components(learning: Learning) -> Entry:
         f"{closed:.1f} times in the Fourier basis; the components by {max(steps):.1f} times at most.",
         f"{len(ours.components.sd)} components of 24 angles and the root's 6 channels, mirrored cycles, "
         f"every person alike, distances of joints; {shares[1]:.0f} % of that variance{out[1]}.",
-        verdicts.components(max(steps)),
+        verdicts.components(max(steps), _served(learning)),
         (
             "Signs of components: the entry of largest magnitude is positive.",
             "Cycles keep their open ends; the package closes them by a line.",
@@ -313,6 +313,14 @@ def _left_out(learned: Learned) -> str:
         f"; a person left out is reproduced to within {np.nanmedian(found.degrees[1]):.1f} degrees, "
         f"{np.nanmedian(found.millimetres[1]):.0f} mm (median)"
     )
+
+
+def _served(learning: Learning) -> tuple[float, float] | None:
+    """Return what the components and the mean alone leave of people left out, degrees, median."""
+    found = learning.literal.by_subject
+    if found is None:
+        return None
+    return float(np.nanmedian(found.degrees[1])), ormoneit.left_by_mean(learning.literal)
 
 
 def _moving(learned: Learned) -> str:

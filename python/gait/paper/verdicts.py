@@ -1,4 +1,4 @@
-"""Verdicts of the page: each follows from numbers, and has a sentence for either outcome."""
+"""Verdicts of the page: each follows from numbers, begins with its kind, and can come out otherwise."""
 
 from __future__ import annotations
 
@@ -14,19 +14,32 @@ HUMAN = 0.2  # share by which the limbs of a body may differ from those learnt f
 NARROW = 0.8  # of the depths: less is too few in intervals of 90 %
 MOSTLY = 0.9  # of the runs
 CLEARLY = 0.8  # of the energy of a displacement
+SERVES = 0.75  # of what the mean alone leaves
 JUMP = 2.0  # times the largest step within a cycle, from its end to its start
+
+
+KINDS = "reproduced", "reproduced in part", "not reproduced", "no counterpart"
+"""How a verdict begins; the last: the paper states nothing to compare with."""
+
+
+def kind(verdict: str) -> str:
+    """Return which of KINDS a verdict is."""
+    return max((each for each in KINDS if verdict.startswith(each)), key=len)
 
 
 def body(angles: int) -> str:
     """Fig. 1 of the first paper: how many relative angles move."""
-    return "the same" if angles == ANGLES else f"not the same: {angles} angles move"
+    return "reproduced" if angles == ANGLES else f"not reproduced: {angles} angles move"
 
 
-def periods(flat: bool, failed: int, long_failed: bool) -> str:
-    """Fig. 2: whether white noise is flat, and where whole periods fail."""
+def periods(flat: bool, agreeing: float, failed: int, long_failed: bool) -> str:
+    """Fig. 2: whether white noise is flat, share of walks whose cycle is found, where whole periods fail."""
     fails = [f"on {failed} walks"] if failed else []
     fails += ["where the cycle of a long walk is no whole number of frames"] if long_failed else []
-    words = "reproduced" if flat else "not reproduced: the ratio of white noise depends on the period"
+    if agreeing < MOSTLY:
+        words = f"not reproduced: the cycle of {100 * agreeing:.0f} % of the walks is found"
+    else:
+        words = "reproduced" if flat else "reproduced in part: the ratio of white noise depends on the period"
     return words + (f"; whole periods fail {' and '.join(fails)}" if fails else "")
 
 
@@ -34,28 +47,53 @@ def offsets(falling: bool, apart: float) -> str:
     """Figs. 3 and 4: whether the error falls, and how far the offsets are from ours at most, in cycles."""
     if not falling:
         return "not reproduced: the error rises in some pass"
-    return "reproduced" if apart < ALIKE else "it converges, but elsewhere than ours"
+    return "reproduced" if apart < ALIKE else "reproduced in part: it converges, but elsewhere than ours"
 
 
 def passes(falling: bool, filled: float, mean: float) -> str:
     """Fig. 5: whether the error falls, and how far removed blocks are off, filled and by the mean."""
-    course = "reproduced: the error falls pass by pass" if falling else "the error rises in some pass"
-    return f"{course}; it fills {'better' if filled < mean else 'no better'} than the mean"
+    better = f"it fills {'better' if filled < mean else 'no better'} than the mean"
+    if falling and filled < mean:
+        return f"reproduced: the error falls pass by pass, and {better}"
+    part = falling or filled < mean
+    course = "the error falls pass by pass" if falling else "the error rises in some pass"
+    return f"{'reproduced in part' if part else 'not reproduced'}: {course}, and {better}"
 
 
-def components(step: float) -> str:
-    """Components: the step from the end of a cycle to its start, over the largest within it."""
-    return "reproduced: smooth periodic curves" if step < JUMP else "not reproduced: curves that do not close"
+def components(step: float, others: tuple[float, float] | None) -> str:
+    """Components: the step from the end of a cycle to its start, over the largest within it.
+
+    others : what five components and the mean alone leave of people left out, degrees; None: too few people.
+    """
+    if step >= JUMP:
+        return "not reproduced: curves that do not close"
+    if others is None:
+        return "reproduced in part: smooth periodic curves, of too few people to leave one out"
+    five, mean = others
+    serves = "and serve" if five < SERVES * mean else "but do not serve"
+    words = (
+        f"smooth periodic curves that {serves} people left out: {five:.1f} degrees, {mean:.1f} by the mean"
+    )
+    return f"{'reproduced' if five < SERVES * mean else 'not reproduced'}: {words} alone"
 
 
-def tracking(held: Sequence[int], seeds: int, ratio: float) -> str:
-    """Fig. 6: runs in which the person is followed to the end, literal and ours, and ratio of the errors."""
+def tracking(held: Sequence[int], seeds: int, ratio: float, unnoticed: Sequence[int]) -> str:
+    """Fig. 6: runs in which the person is followed to the end, literal and ours, and ratio of the errors.
+
+    unnoticed : of the runs that left, those of status tracking at the end.
+    """
     literal, ours = held
     part = "reproduced in part" if literal > 0.5 * seeds else "not reproduced"
     words = "reproduced" if literal >= MOSTLY * seeds else part
+    left = [
+        f"{of} {missed} of {seeds - stayed} that left"
+        for of, missed, stayed in zip(("of the paper's", "of ours"), unnoticed, held, strict=True)
+        if stayed < seeds
+    ]
     return (
         f"{words}: the paper's filter stays on the person in {literal} of {seeds} runs, ours in {ours}; its "
         f"error is {ratio:.1f} times ours"
+        + (f"; under status tracking to the end: {', '.join(left)}" if left else "")
     )
 
 
@@ -71,12 +109,18 @@ def _against(error: float, none: float) -> str:
     return f"{'gains' if error < none else 'loses'} {abs(none - error):.0f} of {none:.0f} mm"
 
 
-def held(runs: Sequence[int], seeds: int) -> str:
-    """Eqs. 10 to 13: runs in which the person is followed to the end, of so many in each view."""
-    good = sum(count >= MOSTLY * seeds for count in runs)
-    if good == len(runs):
-        return "reproduced: the person is held in every view"
-    return f"{'reproduced in part' if good else 'not reproduced'}: held in {good} of {len(runs)} views"
+def held(runs: Sequence[int], seeds: int, errors: Sequence[float], none: Sequence[float]) -> str:
+    """Eqs. 10 to 13, by view: runs in which the person is followed to the end, and errors, mm.
+
+    none : of the mean cycle running on without any image.
+    """
+    stays = [count >= MOSTLY * seeds for count in runs]
+    nearer = [error < free for error, free in zip(errors, none, strict=True)]
+    both = sum(a and b for a, b in zip(stays, nearer, strict=True))
+    if both == len(runs):
+        return "reproduced: the person is held in every view, nearer than without any image"
+    words = f"held in {sum(stays)} of {len(runs)} views, nearer than without any image in {sum(nearer)}"
+    return f"{'reproduced in part' if any(stays) else 'not reproduced'}: {words}, both in {both}"
 
 
 def at_rest(gains: Sequence[Sequence[float]]) -> str:
@@ -93,7 +137,8 @@ def training(count: int, shortest: int, longest: int) -> str:
     differs = ["fewer sequences"] if count < THEIR_MOTIONS else []
     differs += ["shorter ones"] if shortest < low else []
     differs += ["longer ones"] if longest > high else []
-    return f"the same kind of data, but {' and '.join(differs)}" if differs else "the same kind of data"
+    words = f"in part: the same kind of data, but {' and '.join(differs)}" if differs else ""
+    return f"reproduced {words}" if words else "reproduced: the same kind of data"
 
 
 def synthesis(left: float, needed: int) -> str:
@@ -114,7 +159,7 @@ def spectrum(ratios: Sequence[float]) -> str:
 def draws(limbs: float, learnt: float) -> str:
     """Fig. 4: shares by which limbs differ in length from the mean, in draws and in what was learnt from."""
     how = f"their limbs differ by {100 * limbs:.0f} % in length, those learnt from by {100 * learnt:.0f} %"
-    return f"{'draws are bodies' if limbs < HUMAN else 'draws are no bodies'}: {how}"
+    return f"reproduced{': draws are bodies' if limbs < HUMAN else ' in part: draws are no bodies'}: {how}"
 
 
 def estimates(pairs: Sequence[tuple[float, float]], covered: float) -> str:
@@ -151,7 +196,11 @@ def volume(ratios: Sequence[float], same: float, tried: Sequence[float]) -> str:
 def sequence(off: Sequence[float], height: float, share: float) -> str:
     """Fig. 7: distances from marks that were left out, literal and ours, and the person's height, pixels."""
     literal, ours = (each / height for each in off)
-    words = "reproduced: the person is followed" if literal < share else "the figure leaves the person"
+    words = (
+        "reproduced: the person is followed"
+        if literal < share
+        else "not reproduced: the figure leaves the person"
+    )
     return (
         f"{words}; joints that were not clicked are {100 * literal:.0f} % of the height off, "
         f"{100 * ours:.0f} % by ours"
