@@ -30,7 +30,7 @@ GREY = 128
 PIXEL_VARIANCE = 9.0  # grey levels squared, of either frame
 FEW = 2.0**-20, 2.0**-19  # densities of an occluded limb that count for hidden limbs alone
 Q = "q: turned from the image, or seen in part"
-OCCLUDED = "p_occluded: hidden, or not told apart"
+OCCLUDED = "p_occluded: limbs that are hidden"
 WIDTHS = "sigma(alpha): widths"
 TRUTH = (60, 230, 250)  # BGR
 FULL = 0.6  # nats that a limb drawn in full red costs
@@ -69,7 +69,7 @@ class Freeze:
         return of_e, sum(self.gains().values()) - of_e
 
 
-def look(scene: Scene, model: Model, stature: float, rows: Sequence[preference.Row]) -> Freeze:
+def examine(scene: Scene, model: Model, stature: float, rows: Sequence[preference.Row]) -> Freeze:
     """Split the log-likelihoods of the true body and of the best still one of `preference.Probe.table`."""
     place = preference.best_at_rest(rows)
     probes = _Probes(scene, model, stature)
@@ -207,7 +207,7 @@ def _colour(frame: Image) -> Image:
 
 
 def _about(scene: Scene, drawn: Image, k: int, words: str) -> Image:
-    """Cut out about the true person, with room for a body beside."""
+    """Cut out about the true person, with a body beside."""
     pelvis: Floats = scene.truth.places["pelvis"][scene.rows[k]]
     side = 1.3 * CUT_OUT * scene.height
     return labelled(cut(drawn, scene.camera.project(pelvis), side), words)

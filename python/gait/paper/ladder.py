@@ -156,7 +156,9 @@ def climb(scenes: Sequence[tuple[Scene, str]], learning: Learning, update: Calla
 
     views = range(len(scenes))
     preferred = [(prefers(k, "paper", Mode.PAPER), prefers(k, "people", Mode.DEFAULT)) for k in views]
-    frozen = [freeze.look(scenes[k][0], models["paper"], sizes["paper"][k], preferred[k][0]) for k in views]
+    frozen = [
+        freeze.examine(scenes[k][0], models["paper"], sizes["paper"][k], preferred[k][0]) for k in views
+    ]
     farthest = max(far, key=lambda each: each[0])[1:]
     return Climbed([scene for scene, _ in scenes], rungs, held, paper, preferred, frozen, farthest)
 
@@ -206,7 +208,7 @@ def _reach(found: Climbed) -> Entry:
         "Silhouette, edges and a template compare with the background, too; the ladder has the errors.",
         f"{verdicts.held(found.held, SEEDS, found.paper, found.free)}; {verdicts.at_rest(gains)}",
         (
-            "The clips: walks of a normative gait, which nobody in the recordings has, rendered from several "
+            "The clips: walks of a normative gait, which no person in the recordings has, rendered from several "
             "sides and started near the truth. The same on seven clips of "
             "real motion, one of them filmed outdoors: tests/bench/results/paper_mode.md of the sources.",
             "Held: in the last frames the joints are on average within a tenth of the person's height.",

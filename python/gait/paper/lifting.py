@@ -122,8 +122,8 @@ def entry(both: Both) -> Entry:
             "The filter of the sensors (gradients over local contrast, blurred) and the weights lambda: "
             "found from the clip as in gait lift.",
             "Eq. 7's minimiser: Levenberg-Marquardt with exact slopes. Its start: at the placement the mean "
-            "of the prior, and 1.5 sd to both sides along its first 3 modes; after that what the segment before "
-            "predicts, and where there are clicks also these alone. The lowest minimum is taken.",
+            "of the prior, and 1.5 sd to both sides along its first 3 modes; after that what the segment "
+            "before predicts, and where there are clicks also these alone. The lowest minimum is taken.",
             "The frames: those of the clip, at which the prior's 20 per second are interpolated. The motion: "
             "what the clip has, here mostly a walk; the paper has a dance.",
             "10 by 8 sensors are 10 rows of 8, as a standing person is tall; they follow the person.",
