@@ -5,7 +5,8 @@
 
 On the clips of search_paper.py the mean cycle is put at the true place and phase, or displaced, in one frame,
 and either walks on as the person does to the next frame or stays.  The tables give the log-likelihood of that
-next frame; maps over displacement and speed are drawn beside the clips.
+next frame, whole by the settings before the search, and by term for those that it froze; maps over
+displacement and speed are drawn beside the clips.
 """
 
 from __future__ import annotations
@@ -24,7 +25,7 @@ from matplotlib.figure import Figure
 from paper_runs import Footage
 
 from gait import Mode, Model
-from gait.paper import preference
+from gait.paper import freeze, preference
 from gait.progress import progress
 
 SETTINGS = {
@@ -41,6 +42,14 @@ def probe_of(f: Footage, model: Model) -> preference.Probe:
     return preference.Probe(f.scene, model, config, float(meta_of(f.clip.folder)["stature_m"]))
 
 
+def frozen(f: Footage, model: Model) -> freeze.Freeze:
+    """The true body and the best still one in a clip by term, by the settings that were frozen."""
+    assert f.scene is not None
+    size = float(meta_of(f.clip.folder)["stature_m"])
+    rows = preference.Probe(f.scene, model, preference.config(Mode.PAPER), size).table()
+    return freeze.examine(f.scene, model, size, rows)
+
+
 def main() -> int:
     """Probe, draw and publish."""
     parser = argparse.ArgumentParser(
@@ -51,17 +60,25 @@ def main() -> int:
     parser.add_argument("--draw", action="store_true", help="draw the maps, which takes some minutes")
     args = parser.parse_args()
     search = search_paper.Search(args.folder)
-    rows = list[list[Any]]()
+    rows, found = list[list[Any]](), list[freeze.Freeze]()
     with progress("clips", len(search.footage)) as update:
         for k, f in enumerate(search.footage):
             probe = probe_of(f, search.model)
             view = search_paper.CLIPS[f.clip.name].view
             rows += [[f.clip.name, view, name, *(round(x, 1) for x in nats)] for name, *nats in probe.table()]
+            found.append(frozen(f, search.model))
             if args.draw:
                 draw(probe, args.folder / f"map_{f.clip.name}.png")
             update(k + 1)
     write = table.publish if args.record else lambda name, *rest, note="": table.show(*rest)
     columns = ("clip", "view", "the body is", "walks, nats", "rests, nats")
+    terms = [
+        [name, *(f"{x:+.1f}" for f in found for x in (f.walks.terms[name], f.rests.terms[name]))]
+        for name in found[0].walks.terms
+    ]
+    terms.append(["log-likelihood", *(f"{x:+.1f}" for f in found for x in (f.walks.total, f.rests.total))])
+    heads = ("nats", *(word for f in found for word in (f"{f.scene.name} walks", "rests")))
+    write("paper_terms", "Which term of the likelihood prefers rest", heads, terms, note=about_terms(found))
     write("paper_maps", "What the likelihood as printed prefers", columns, rows, note=about())
     return 0
 
@@ -94,6 +111,19 @@ Mean log-likelihood (eqs. 10-13) of a frame given the one before, over 11 frames
 cycle at the true state or displaced from it, which walks on with the person or rests between the two
 frames.  The settings are those before the search.  A limb that lies on a static background and rests is
 predicted as well as can be."""
+
+
+def about_terms(found: list[freeze.Freeze]) -> str:
+    """State what the table of terms shows."""
+    places = ", ".join(f"{f.scene.name} {f.place}" for f in found)
+    gains = ", ".join(f"{f.scene.name} {e:+.1f} and {rest:+.1f}" for f in found for e, rest in (f.causes(),))
+    return f"""{facts("paper_maps.py --record")}
+
+Log-likelihood of a frame given the one before, nats, less that of limbs that face the camera, are seen
+whole and do not change, by the settings of paper mode: of the true body, which walks, and of the best
+body at rest on the background ({places}). Terms are added in the order of the rows (q, p_occluded,
+sigma(alpha), then E limb by limb), and their sum is the last row but for rounding and pixels at the
+edges of limbs. Preference for rest, of all E together and of all other terms: {gains}."""
 
 
 if __name__ == "__main__":
