@@ -167,8 +167,9 @@ def tables(
         parts.append(
             ("Changed since: mean over the runs, 95 % interval", shape(eval_ablate.grid(changes), 2))
         )
-    if wanted:
-        parts.append(("Wanted and reached", shape(eval_wanted.grid(eval_wanted.verdicts(rows)), 4)))
+    judged = eval_wanted.verdicts(rows)
+    if wanted and any(verdict.passed is not None for verdict in judged):  # all are of the default mode
+        parts.append(("Wanted and reached", shape(eval_wanted.grid(judged), 4)))
     return parts
 
 

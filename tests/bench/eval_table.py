@@ -65,7 +65,7 @@ SHOWN = {  # column of the printed table: figure, decimals
     "clear": ("clear_px", 1),
     "phase%": ("phase_pct", 1),
     "flip%": ("flips_pct", 0),
-    "lost%": ("lost_pct", 1),
+    "far%": ("lost_pct", 1),
     "twice%": ("lost2_pct", 1),
     "ambig%": ("ambig_pct", 0),
     "c90": ("cover90", 2),
@@ -96,11 +96,10 @@ LEGEND = (
     "together, as it stands, after the best similarity of each frame (to compare with literature only), "
     "root over 12 limb joints; MPipe: MediaPipe Pose in the measure of 12j; static: mean pose at the true "
     "place (root); free: mean cycle running free from the true start (root); px: distance in the image, "
-    "outdoor: near leg; clear: all clear marks; lost: root > 150 mm or reported as lost; twice: "
+    "outdoor: near leg; clear: all clear marks; far: root > 150 mm or reported as lost; twice: "
     "the same, frames under tracking counted twice; c90: share of joint coordinates inside the 90 % "
-    "intervals; HS: heel "
-    "strikes within 2 frames; from: first frame tracked; ms: a step. Intervals and status: PIT chi2: "
-    "probability integral transform against flat, 10 bins; z2: squared error in variances, 1 is right; "
+    "intervals; HS: heel strikes within 2 frames; from: first frame tracked; ms: a step. Intervals and "
+    "status: lost: reported as lost; PIT chi2: probability integral transform against flat, 10 bins; z2: squared error in variances, 1 is right; "
     "NEES: error of all joints in the particles' covariance per dimension, 1 is right; CRPS: score of the "
     "intervals, lower is better; width: of the 90 % intervals; silent: frames more than 150 mm off under "
     "tracking; swapped: frames half a cycle off under tracking, of those after the first second. Starts "
