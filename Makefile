@@ -299,8 +299,10 @@ model: setup lib ## learn the models of the package, of people and the paper's, 
 	    --class stand --class backwards --class run=build/run.gait -o python/gait/data/classes.gait $(ARGS)
 
 PAPER_MOCAP ?= $(MOCAP) ../shared/data/mocap/cmu_misc
-PAPER_CLIP := $(wildcard ../shared/data/video/outdoor)
-paper: setup lib ## every figure of both papers, theirs, literal and ours: build/paper/paper.html (PAPER_MOCAP=; ARGS=--record) *
+PAPER_CLIP ?= $(wildcard ../shared/data/video/outdoor)
+paper: setup lib ## every figure of both papers, theirs, literal and ours: build/paper/paper.html (PAPER_MOCAP=, PAPER_CLIP=; ARGS=--record) *
+	@for each in $(PAPER_MOCAP); do test -e $$each || { echo "paper: no motion capture in $$each: give folders with" \
+	    'PAPER_MOCAP="..."; a clip is the folder PAPER_CLIP, or one is rendered' >&2; exit 1; }; done
 	@mkdir -p build/paper
 ifneq ($(PAPER_CLIP),)
 	@$(PY) tests/bench/paper_clicks.py $(PAPER_CLIP)/reference2d.json build/paper/clicks.json

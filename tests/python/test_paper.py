@@ -79,11 +79,14 @@ def test_removed_blocks_are_filled_better_than_by_the_mean(learning):
         (["--mocap", "{walks}", "--video", "v.mp4"], "--video needs --camera and --init"),
         (["--mocap", "absent"], "absent: no such file or folder"),
         (["--mocap", "{one}"], "the first paper needs 3"),
+        (["--mocap", "{still}"], "holds no walk, and the first paper needs 3"),
     ],
 )
 def test_what_is_missing_is_one_line(words, expected, walks, tmp_path, capsys):
     one = next(iter(sorted(walks.rglob("*.amc"))))
-    words = [word.format(walks=walks, one=one) for word in words]
+    still = tmp_path.with_name("still")
+    files.write_toy(still, swing=0.0)
+    words = [word.format(walks=walks, one=one, still=still) for word in words]
     assert main(["paper", *words, "-o", str(tmp_path / "p.html"), "--quiet"]) in (1, 2)
     error = capsys.readouterr().err
     assert expected in error and error.count("\n") == 1

@@ -39,7 +39,9 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     values.add_camera(parser, ", of the clip", scale=True)
     add("--init", metavar="INIT.json", help="where the person is at first, as for gait track")
     add("--background", metavar="IMAGE", help="the empty scene: a picture, auto (the default) or none")
-    add("--corrections", metavar="C.json", help="joints marked by hand, as for gait lift")
+    add("--corrections", metavar="C.json",
+        help="joints marked by hand in the clip, as for gait lift: figure 6 is judged by all of them, figure "
+             "7 uses four of five and is judged by the fifth (default: none, and no verdict)")  # fmt: skip
 
 
 def run(args: argparse.Namespace) -> int:

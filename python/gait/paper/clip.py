@@ -79,7 +79,7 @@ class Clip:
 
 def rendered(folder: Path, update: Callable[[int], None]) -> Clip:
     """Render a walk, and click a joint in each frame as a user would."""
-    simulate(PRESETS[PRESET], folder, update)
+    simulate(PRESETS[PRESET], folder, update, keep=False)
     files = ("video.mp4", "camera.json", "init.json", "background.png")
     video, camera_file, init, plate = (str(folder / name) for name in files)
     clip = Clip("a walk", video, camera_file, init, plate, truth=str(folder / "truth.csv"))

@@ -42,7 +42,13 @@ def read(mocap: Sequence[str], quiet: bool) -> Recordings:
         shared = load.shared_lengths(files, options, update)
     with Corpus() as corpus:
         with progress("reading motion", len(files), quiet) as update:
-            found = load.load_all(files, options, update, corpus=corpus, shared=shared)
+            try:
+                found = load.load_all(files, options, update, corpus=corpus, shared=shared)
+            except load.NothingLeft as error:  # its remedy is of gait learn
+                raise UserError(
+                    f"{' '.join(mocap)}: holds no walk, and the first paper needs {FEWEST_WALKS}; add "
+                    f"recordings of steady walking ({error.refused[0]})"
+                ) from error
         motions = corpus.recordings()
     name = " ".join(mocap)
     if len(found.sequences) < FEWEST_WALKS:

@@ -122,7 +122,7 @@ def rendered(folder: Path, update: Callable[[int], None]) -> list[tuple[Scene, s
     found = []
     for k, (name, preset) in enumerate(VIEWS.items()):
         place, frames = folder / name, tracking.FRAMES + 1
-        simulate(replace(PRESETS[preset], size=SIZE, frames=frames + SPARE), place)
+        simulate(replace(PRESETS[preset], size=SIZE, frames=frames + SPARE), place, keep=False)
         video = Video(str(place / "video.mp4"))
         camera = Camera.read(str(place / "camera.json"), video.size)
         plate = background(str(place / "background.png"), video)

@@ -281,19 +281,22 @@ def background(made: Set) -> Picture:
 
 
 def simulate(
-    scenario: Scenario, folder: str | os.PathLike[str], progress: Callable[[int], None] | None = None
+    scenario: Scenario,
+    folder: str | os.PathLike[str],
+    progress: Callable[[int], None] | None = None,
+    keep: bool = True,
 ) -> dict[str, Any]:
     """Write a clip and everything known about it into `folder`, which is made if need be.
 
     `folder`: gets the files of `files`, in the formats that `gait capture` and `gait eval` read; `progress`:
-    called with the number of frames done. Returns the contents of meta.json. UserError if the folder cannot
-    be written or the options contradict each other.
+    called with the number of frames done; `keep`: keep an unfinished video if interrupted. Returns the
+    contents of meta.json. UserError if the folder cannot be written or the options contradict each other.
     """
     stage = set_stage(scenario)
     target = _folder(folder, files(scenario))
     made = build_set(stage)
     figures = [(made.mesh, made.appearance), *made.others]
-    _write_video(target, stage, made, progress)
+    _write_video(target, stage, made, progress, keep)
     if stage.cameras:
         times = [frame / scenario.fps for frame in range(scenario.frames)]
         poses = [CameraPose.of(camera) for camera in stage.cameras]
@@ -327,12 +330,14 @@ def _folder(folder: str | os.PathLike[str], names: Iterable[str]) -> Path:
     return target
 
 
-def _write_video(target: Path, stage: Stage, made: Set, progress: Callable[[int], None] | None) -> None:
+def _write_video(
+    target: Path, stage: Stage, made: Set, progress: Callable[[int], None] | None, keep: bool
+) -> None:
     """Write the frames, and a sheet of some of them."""
     across, down = _CONTACTS
     wanted = np.linspace(0, stage.scenario.frames - 1, across * down).round().astype(int).tolist()
     sheet = {}
-    with VideoWriter(target / "video.mp4", stage.scenario.fps, crf=CRF) as writer:
+    with VideoWriter(target / "video.mp4", stage.scenario.fps, crf=CRF, keep=keep) as writer:
         for number, picture in enumerate(pictures(stage, made)):
             writer.write(picture)
             if number in wanted:
