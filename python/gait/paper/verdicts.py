@@ -70,9 +70,9 @@ def components(step: float, others: tuple[float, float] | None) -> str:
     if others is None:
         return "reproduced in part: smooth periodic curves, of too few people to leave one out"
     five, mean = others
-    serves = "and serve" if five < SERVES * mean else "but do not serve"
+    serves = "serve" if five < SERVES * mean else "do not serve"
     words = (
-        f"smooth periodic curves that {serves} people left out: {five:.1f} degrees, {mean:.1f} by the mean"
+        f"smooth periodic curves, which {serves} people left out: {five:.1f} degrees, {mean:.1f} by the mean"
     )
     return f"{'reproduced' if five < SERVES * mean else 'not reproduced'}: {words} alone"
 
