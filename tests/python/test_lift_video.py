@@ -67,8 +67,8 @@ def root(fit, prior):
 
 @pytest.fixture(scope="module")
 def corrected(clip):
-    """The clip and its estimate: without corrections, then after some."""
-    return list(lift_clicks.corrected(clip, walk().joints[:, EVAL], EVAL15, 12))
+    """The clip and its estimate: without corrections, then after each six."""
+    return list(lift_clicks.corrected(clip, walk().joints[:, EVAL], EVAL15, 12, share=0.25))
 
 
 def test_sensors_alone_follow_a_stick_figure(corrected, prior):
