@@ -31,7 +31,7 @@ from gait.cli import COMMANDS
 ROOT = Path(__file__).resolve().parents[2]
 DOC = ROOT / "libgait/doc"
 BIN = ROOT / ".venv/bin"
-SHORT = ["--frames", "40", "--fps", "15", "--size", "480x360", "--quiet"]
+SHORT = ["--frames", "32", "--fps", "12", "--size", "400x300", "--quiet"]
 FLAGS = ["-std=c11", "-Wall", "-Wextra", "-Wpedantic", "-Werror"]
 RUN = [ROOT / "README.md", *sorted(DOC.rglob("*.md"))]
 PAGES = [*RUN, ROOT / ".github/CONTRIBUTING.md"]  # the last has tests of its own
