@@ -17,7 +17,6 @@ from gait.io.keypoints_file import Keypoints
 from gait.io.video import Frame, Image
 
 Array = NDArray[np.float64]
-Mask = NDArray[np.bool_]
 
 _CHANGE = 11  # grey levels from the empty scene at which body and no body cost the same, with missed_weight
 _HEIGHTS = 1.28  # heights of a person from shoulder to ankle
@@ -31,6 +30,8 @@ _LIMBS = {
 """Width of a limb with its clothes, heights."""
 _STANCE = 0.25  # seconds either way in which a foot stands: the lowest ankle is on the ground
 _FEET = ("l_ankle", "r_ankle")
+_REACH = 0.3  # heights from shoulder to foot by which head and clothes reach beyond the joints
+_REGION = 0.8  # heights from the middle of a person up to which the tracker compares the picture
 
 
 class Outline:
@@ -57,29 +58,36 @@ class Outline:
         row = number - self._first
         return float(self._foot[row]) if 0 <= row < len(self._foot) else None
 
-    def mask(self, number: int, size: tuple[int, int]) -> Mask:
-        """Pixels (h, w) of a picture of this width and height that the person covers in a frame."""
-        canvas = np.zeros(size[::-1], np.uint8)
+    def box(self, number: int) -> Array | None:
+        """Smallest and largest (u, v) that the person reaches in a frame, (2, 2); None if not there."""
         row = number - self._first
-        if not 0 <= row < len(self._uv):
-            return canvas > 0
-        at = dict(zip(self._names, self._uv[row], strict=True))
-        if not np.isfinite(list(at.values())).all():
-            return canvas > 0
+        if not 0 <= row < len(self._uv) or not np.isfinite(self._uv[row]).all():
+            return None
+        low, high = self._uv[row].min(axis=0), self._uv[row].max(axis=0)
+        return np.array([low, high]) + _REACH * (high[1] - low[1]) * np.array([[-1.0], [1.0]])
+
+    def draw(self, number: int, canvas: Image, corner: Array, value: int) -> None:
+        """Set the pixels that the person covers in a frame, of a window (h, w) of the picture, in place.
+
+        `corner`: (u, v) of the window's first pixel.
+        """
+        row = number - self._first
+        if self.box(number) is None:
+            return
+        at = dict(zip(self._names, self._uv[row] - corner, strict=True))
         shoulders, hips = (0.5 * (at[f"l_{name}"] + at[f"r_{name}"]) for name in ("shoulder", "hip"))
         ankle = max((at[name] for name in _FEET), key=lambda one: float(one[1]))
         tall = _HEIGHTS * float(np.hypot(*(shoulders - ankle)))
         trunk = cv2.convexHull(np.rint([at[name] for name in _TRUNK]).astype(np.int32))
-        cv2.fillConvexPoly(canvas, trunk, 255)
-        cv2.polylines(canvas, [trunk], True, 255, _pixels(2 * _TRUNK_EDGE * tall))
+        cv2.fillConvexPoly(canvas, trunk, value)
+        cv2.polylines(canvas, [trunk], True, value, _pixels(2 * _TRUNK_EDGE * tall))
         up = (shoulders - hips) / max(float(np.hypot(*(shoulders - hips))), 1e-6)
-        cv2.circle(canvas, _point(shoulders + _HEAD[0] * tall * up), _pixels(_HEAD[1] * tall), 255, -1)
+        cv2.circle(canvas, _point(shoulders + _HEAD[0] * tall * up), _pixels(_HEAD[1] * tall), value, -1)
         for (upper, lower), width in _LIMBS.items():
             for side in "lr":
                 ends = at.get(f"{side}_{upper}"), at.get(f"{side}_{lower}")
                 if ends[0] is not None and ends[1] is not None:
-                    cv2.line(canvas, _point(ends[0]), _point(ends[1]), 255, _pixels(width * tall))
-        return canvas > 0
+                    cv2.line(canvas, _point(ends[0]), _point(ends[1]), value, _pixels(width * tall))
 
 
 class OtherPeople:
@@ -102,26 +110,47 @@ class OtherPeople:
         empty = self._plate if frame.plate is None else frame.plate
         if empty is None or empty.shape != frame.image.shape:
             return frame.plate
-        covered = self._covered(frame)
-        if not covered.any():
+        near = [other for other in self._others if self._near(other, frame.number)]
+        if not near:
             return frame.plate
-        pixels = frame.image[covered].astype(np.int16)
+        size = np.array(frame.image.shape[1::-1])
+        boxes = np.array([other.box(frame.number) for other in near])
+        low = np.clip(np.floor(boxes[:, 0].min(axis=0)), 0, size).astype(int)
+        high = np.clip(np.ceil(boxes[:, 1].max(axis=0)), 0, size).astype(int)
+        if (high <= low).any():
+            return frame.plate
+        window = slice(low[1], high[1]), slice(low[0], high[0])
+        covered = self._covered(near, frame.number, low, high - low)
+        pixels = frame.image[window]
         out = empty.copy()
-        out[covered] = np.where(pixels >= _CHANGE, pixels - _CHANGE, pixels + _CHANGE)
+        changed = np.where(pixels >= _CHANGE, pixels - np.uint8(_CHANGE), pixels + np.uint8(_CHANGE))
+        out[window] = cv2.copyTo(changed, covered, out[window].copy())
         return out
 
-    def _covered(self, frame: Frame) -> Mask:
-        """Pixels of others, without those where the person is in front of them."""
-        size = frame.image.shape[1], frame.image.shape[0]
-        mine, foot = self._own.mask(frame.number, size), self._own.foot(frame.number)
-        out = np.zeros(frame.image.shape[:2], bool)
-        for other in self._others:
-            theirs = other.foot(frame.number)
-            if theirs is None:
-                continue
-            mask = other.mask(frame.number, size)
-            out |= mask & ~mine if foot is not None and foot > theirs else mask
-        return out
+    def _near(self, other: Outline, number: int) -> bool:
+        """Whether another person may be in the part of the picture that the tracker compares."""
+        mine, theirs = self._own.box(number), other.box(number)
+        if theirs is None or mine is None:
+            return theirs is not None
+        reach = _REGION * (mine[1, 1] - mine[0, 1])
+        middle = mine.mean(axis=0)
+        return bool((theirs[0] < middle + reach).all() and (theirs[1] > middle - reach).all())
+
+    def _covered(self, near: Sequence[Outline], number: int, corner: Array, size: Array) -> Image:
+        """Pixels (h, w) of a window that others cover, without those where the person is in front of them."""
+        foot = self._own.foot(number)
+        feet = [other.foot(number) for other in near]
+        canvas = np.zeros(size[::-1], np.uint8)
+        behind = [foot is not None and theirs is not None and foot > theirs for theirs in feet]
+        for other, hidden in zip(near, behind, strict=True):
+            if hidden:
+                other.draw(number, canvas, corner, 255)
+        if any(behind):
+            self._own.draw(number, canvas, corner, 0)
+        for other, hidden in zip(near, behind, strict=True):
+            if not hidden:
+                other.draw(number, canvas, corner, 255)
+        return canvas
 
 
 def with_track(keypoints: Keypoints, joints: Mapping[int, Mapping[str, Array]], times: Array) -> Keypoints:

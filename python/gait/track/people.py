@@ -63,7 +63,8 @@ def track_people(options: ClipOptions) -> dict[str, Any]:
         note(f"person {id}", options.quiet)
         own = _scene_of(scene, id, list(starts), outlines)
         found[id] = {}
-        people[str(id)] = track_scene(_options_of(options, scene, id), own, start, _kept(found[id]))
+        first = id == next(iter(starts))
+        people[str(id)] = track_scene(_options_of(options, scene, id, first), own, start, _kept(found[id]))
         outlines[id] = with_track(scene.people[id], _joints(scene, found[id]), np.asarray(scene.video.times))
     files = {}
     if options.overlay or options.report:
@@ -118,9 +119,8 @@ def _starts(options: ClipOptions, scene: Scene) -> dict[int, Start]:
     return starts
 
 
-def _options_of(options: ClipOptions, scene: Scene, id: int) -> ClipOptions:
-    """Give the options of one person's track."""
-    main = id == scene.person
+def _options_of(options: ClipOptions, scene: Scene, id: int, first: bool) -> ClipOptions:
+    """Give the options of one person's track; that of the `first` writes the camera, which is everyone's."""
     return replace(
         options,
         output=numbered(options.output, id),
@@ -128,9 +128,9 @@ def _options_of(options: ClipOptions, scene: Scene, id: int) -> ClipOptions:
         draws=options.draws and numbered(options.draws, id),
         report=options.report and numbered(options.report, id),
         overlay=None,
-        camera_out=options.camera_out if main else None,
-        cameras_out=options.cameras_out if main else None,
-        height=options.height if main else None,
+        camera_out=options.camera_out if first else None,
+        cameras_out=options.cameras_out if first else None,
+        height=options.height if id == scene.person else None,
     )
 
 
