@@ -1,6 +1,8 @@
 """The page of a run: what it states, and that it opens, plays and fits in a real Chromium."""
 
+import contextlib
 import csv
+import io
 import json
 import re
 from dataclasses import replace
@@ -63,10 +65,26 @@ def folder(tmp_path_factory):
     return here
 
 
-def report(folder, *options, out="run.html"):
-    words = ["report", folder / "run.csv", "--video", folder / "walk.mp4", "-o", folder / out, "--quiet"]
-    assert main([str(word) for word in (*words, *options)]) == 0
-    return (folder / out).read_text(encoding="utf-8")
+@pytest.fixture(scope="module")
+def whole(folder):
+    """A page with everything (the turning figure where its parts were fetched), and what was printed."""
+    out = io.StringIO()
+    words = [
+        "report",
+        "run.csv",
+        "--video",
+        "walk.mp4",
+        "--truth",
+        "truth.csv",
+        "--overlay",
+        "o.mp4",
+        "--quiet",
+    ]
+    with pytest.MonkeyPatch.context() as patch, contextlib.redirect_stdout(out):
+        patch.setenv("GAIT_WEB", str(browser.FETCHED))
+        patch.chdir(folder)
+        assert main([*words, "-o", "whole.html"]) == 0
+    return folder / "whole.html", out.getvalue()
 
 
 def test_the_verdict_counts_what_is_tracked_unsure_and_missing(folder):
@@ -122,9 +140,8 @@ def test_the_film_in_a_page_is_some_megabytes(size, frames, least, most):
     assert bits * frames / 30 / 8 == pytest.approx(5e6, rel=0.01)
 
 
-def test_the_page_states_the_verdict_first_and_no_raw_names(folder, capsys):
-    page = report(folder, "--truth", folder / "truth.csv", "--overlay", folder / "o.mp4")
-    printed = capsys.readouterr().out
+def test_the_page_states_the_verdict_first_and_no_raw_names(folder, whole):
+    page, printed = whole[0].read_text(encoding="utf-8"), whole[1]
     assert f'<p class="lead">{printed.splitlines()[0]}</p>' in page
     body = re.sub(r"<script.*?</script>|<style.*?</style>|<svg.*?</svg>", "", page, flags=re.S).replace(
         str(folder), ""
@@ -139,18 +156,16 @@ def test_the_page_states_the_verdict_first_and_no_raw_names(folder, capsys):
     assert (film.size, film.count) == ((320, 240), FRAMES)  # frames without an estimate too
 
 
-def test_without_a_camera_the_film_is_shown_as_it_is(folder, tmp_path, capsys):
+def test_without_a_camera_or_the_parts_the_page_names_how_to_get_the_figure(
+    folder, tmp_path, monkeypatch, capsys
+):
+    monkeypatch.setenv("GAIT_WEB", str(tmp_path))
     for name in ("run.csv", "walk.mp4"):
         (tmp_path / name).write_bytes((folder / name).read_bytes())
     words = ["report", tmp_path / "run.csv", "--video", tmp_path / "walk.mp4"]
     assert main([str(word) for word in words]) == 0
     assert "no camera is known, so the film is shown without the figure; give" in capsys.readouterr().err
-    assert (tmp_path / "run.html").is_file()
-
-
-def test_without_the_parts_the_page_names_how_to_get_the_figure(folder, tmp_path, monkeypatch):
-    monkeypatch.setenv("GAIT_WEB", str(tmp_path))
-    page = report(folder, out="plain.html")
+    page = (tmp_path / "run.html").read_text(encoding="utf-8")
     assert "The figure that turns is not in this page: run gait studio --fetch" in page
     assert 'id="run-figure"' not in page and "echarts" not in page and len(page) < 2e6
 
@@ -176,14 +191,11 @@ def test_what_does_not_fit_is_one_line(folder, options, words, monkeypatch, caps
     assert words in printed and printed.count("\n") == 1 and sorted(folder.iterdir()) == before
 
 
-@pytest.fixture(scope="module")
-def page_file(folder):
-    """A page with everything."""
+@pytest.fixture
+def page_file(whole):
+    """The page, for a browser."""
     browser.chromium()
-    with pytest.MonkeyPatch.context() as patch:
-        patch.setenv("GAIT_WEB", str(browser.FETCHED))
-        report(folder, "--truth", folder / "truth.csv", out="whole.html")
-    return folder / "whole.html"
+    return whole[0]
 
 
 def overflow(page):
