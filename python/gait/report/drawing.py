@@ -175,7 +175,7 @@ class Overlay:
             if np.isfinite(at).all():
                 size = 0.8 * self._scale
                 (width, height), _ = cv2.getTextSize(name, _FONT, size, 1)
-                left, foot = round(at[0] - width / 2), round(at[1] - 0.6 * height)
+                left, foot = round(at[0] - width / 2), max(round(at[1] - 0.6 * height), height + 4)
                 top = max(0, foot - height - 4)
                 _darkened(canvas[top : max(0, foot + 4), max(0, left - 4) : max(0, left + width + 4)])
                 _write(canvas, name, (left, foot), size, _STATUS[estimate.status])
