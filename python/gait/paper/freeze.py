@@ -33,6 +33,8 @@ Q = "q: turned from the image, or seen in part"
 OCCLUDED = "p_occluded: limbs that are hidden"
 WIDTHS = "sigma(alpha): widths"
 TRUTH = (60, 230, 250)  # BGR
+RIM = 3  # pixels about a limb that are shown with it: points at its edge are compared between pixels
+LAST = "E, beyond the edges of limbs"
 FULL = 0.6  # nats that a limb drawn in full red costs
 
 
@@ -113,15 +115,20 @@ class _Probes:
         bodies = self.whole.state(k, *place), after
         ids = [self.model.render(self.scene.camera, state) for state in bodies]
         frames = self.scene.frames[k].image, self.scene.frames[k + 1].image
+        shown, before = [blank.copy(), blank.copy()], each
         for limb, name in enumerate(self.model.limb_names, 1):
-            now, then = (_only(frame, drawn == limb) for frame, drawn in zip(frames, ids, strict=True))
-            terms[f"E, {name.replace('_', ' ')}"] = self.whole.step(k, place, speed, (now, then))[0] - each
-        return terms, total - limbs * self.ideal
+            for part, frame, drawn in zip(shown, frames, ids, strict=True):
+                where = _widened(drawn == limb)
+                part[where] = frame[where]
+            after_it = self.whole.step(k, place, speed, (shown[0], shown[1]))[0]
+            terms[f"E, {name.replace('_', ' ')}"], before = after_it - before, after_it
+        return terms | {LAST: total - before}, total - limbs * self.ideal
 
 
-def _only(frame: Image, where: np.ndarray) -> Image:
-    """Return a frame that is grey elsewhere."""
-    return np.where(where[..., None] if frame.ndim == 3 else where, frame, np.uint8(GREY))
+def _widened(where: np.ndarray) -> np.ndarray:
+    """Return a mask and `RIM` pixels about it."""
+    size = 2 * RIM + 1
+    return np.asarray(cv2.dilate(where.astype(np.uint8), np.ones((size, size), np.uint8)), bool)
 
 
 def split_table(found: Sequence[Freeze]) -> Picture:
@@ -130,8 +137,7 @@ def split_table(found: Sequence[Freeze]) -> Picture:
     for each in found:
         head += [f"{each.scene.name}: walks", f"rests {each.place}", "prefers rest by"]
     shown = {name: [(f.walks.terms[name], f.rests.terms[name]) for f in found] for name in found[0].gains()}
-    shown["sum of the terms"] = [(sum(f.walks.terms.values()), sum(f.rests.terms.values())) for f in found]
-    shown["log-likelihood"] = [(f.walks.total, f.rests.total) for f in found]
+    shown["log-likelihood, their sum"] = [(f.walks.total, f.rests.total) for f in found]
     rows = [
         (name, *(f"{x:+.1f}" for walks, rests in each for x in (walks, rests, rests - walks)))
         for name, each in shown.items()
