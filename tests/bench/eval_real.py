@@ -49,8 +49,8 @@ Films of real people against the joints of a 2-D detector that a person checked;
 guessed.  good: knees and ankles within 9 % of the person's height on average, hips in place; swap: left and
 right swapped; legs: hips in place, legs not; off: hips or legs elsewhere; none: not in the track.  wrong:
 frames under `tracking` that are not good.  Heel strikes: median distance of those by the phase from those
-counted in the pictures (tests/bench/real_strikes.json).  Stride rate: over the frames
-that have a phase.  CPU s and frames/s: of the whole command, detector and all, also where other programs ran."""
+counted in the pictures (tests/bench/real_strikes.json).  Stride rate: over the frames that
+have a phase.  CPU s and frames/s: of the whole command, detector and all, also where other programs ran."""
 
 
 @dataclass(frozen=True)
