@@ -16,6 +16,7 @@ from gait.io.fields import read_json
 from gait.io.track_file import read_truth
 from gait.motion.footfalls import SIDES, Draws, find_events, stride_time, strikes_from_meta
 from gait.motion.parameters import QUANTITIES, angle_cycles, measure
+from gait.motion.verdict import verdict_of
 
 MODEL = Model()
 CURVES = ModelCurves(blob.decode(read_blob(None)))
@@ -125,6 +126,16 @@ def test_strides_with_lost_or_ambiguous_frames_do_not_count():
     hidden = measure(replace(track, status=["lost"] * len(track.time)))
     assert all(row["both"] is None for row in hidden.summary().values())
     assert angle_cycles(track, hidden, CURVES) == {}
+
+
+def test_the_stride_in_which_the_person_stops_does_not_count():
+    track = walking_track(seconds=7)
+    slow = replace(track, time=track.time + 0.7 * np.maximum(track.time - 5.0, 0.0))
+    found, steady = measure(slow), measure(track)
+    assert found.slowing >= 1 and steady.slowing == 0
+    assert f"{found.slowing} in which the person starts or stops" in found.counted()
+    assert found.speed == pytest.approx(steady.speed, rel=0.03)
+    assert verdict_of(slow).speed == found.speed  # one speed on the page
 
 
 def test_a_missed_strike_does_not_make_one_long_stride():

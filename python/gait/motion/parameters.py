@@ -48,6 +48,7 @@ QUANTITIES = {
 """Names in files, with the words for people."""
 
 _UNSURE = {"lost", "ambiguous"}
+_STEADY = 0.8  # of the median speed: slower strides at an end of the walk are of starting or stopping
 MIRRORED = ("step_time_s", "step_length_m", "stance_percent")
 """Quantities whose left and right are compared."""
 
@@ -64,7 +65,8 @@ class Strides:
     values: dict[str, Array]
     sd: dict[str, Array]
     draws: dict[str, Array]  #: (D, k) the same of every draw
-    #: (k,) no frame of the stride was lost or ambiguous; if no stride is so, none was lost
+    #: (k,) no frame of the stride was lost or ambiguous; if no stride is so, none was lost; and the person
+    #: neither starts nor stops in it
     sure: NDArray[np.bool_]
 
 
@@ -78,6 +80,25 @@ class Parameters:
     strides: dict[str, Strides]  #: by side
     source: str  #: where the uncertainty comes from, in words
     all_unsure: bool = False  #: every stride has ambiguous frames; those that were not lost count as sure
+    slowing: int = 0  #: strides that do not count because the person starts or stops in them
+
+    @property
+    def speed(self) -> float | None:
+        """Mean over the sure strides of both feet, metres per second."""
+        found = self._mean("speed_m_s", SIDES)
+        return None if found is None else found["mean"]
+
+    def counted(self) -> str:
+        """State which strides the means are over."""
+        right, left = (int(self.strides[side].sure.sum()) for side in SIDES)
+        text = f"{right} right and {left} left strides"
+        left_out = sum(len(s.sure) for s in self.strides.values()) - right - left
+        if not left_out:
+            return text
+        unsure = left_out - self.slowing
+        why = [f"{unsure} with unsure frames"] * bool(unsure)
+        why += [f"{self.slowing} in which the person starts or stops"] * bool(self.slowing)
+        return f"{text} (not counted: {', '.join(why)})"
 
     def summary(self) -> dict[str, dict[str, Any]]:
         """Means over the sure strides: by quantity, for right, left and both feet.
@@ -161,7 +182,23 @@ def measure(track: Track, draws: Draws | None = None) -> Parameters:
     if not some:  # better than nothing: left and right seldom swap for some frames only
         for s in strides.values():
             s.sure[:] = [_is_free(track, {"lost"}, *ends) for ends in zip(s.start, s.end, strict=True)]
-    return Parameters(events, event_sd, strides, source, all_unsure=not some)
+    return Parameters(events, event_sd, strides, source, all_unsure=not some, slowing=_leave_out(strides))
+
+
+def _leave_out(strides: Mapping[str, Strides]) -> int:
+    """Let strides at the ends of the walk that are much slower than the others not count; how many."""
+    speed = np.concatenate([s.values["speed_m_s"] for s in strides.values()])
+    start = np.concatenate([s.start for s in strides.values()])
+    sure = np.concatenate([s.sure for s in strides.values()])
+    steady = sure & (speed >= _STEADY * np.median(speed[sure])) if sure.any() else sure
+    if not steady.any():
+        return 0
+    count = 0
+    for s in strides.values():
+        slow = (s.start < start[steady].min()) | (s.start > start[steady].max())
+        count += int((slow & s.sure).sum())
+        s.sure[slow] = False
+    return count
 
 
 def strides_of(motion: Joints, events: Events) -> dict[str, Strides]:

@@ -27,9 +27,11 @@ class Verdict:
     counts : dict of str to int
         Frames by status.
     strides : int
-        Whole strides of the foot that has more of them.
+        Strides that count for the gait parameters, of the foot that has more of them; whole strides if none
+        counts.
     speed : float or None
-        Metres per second along the ground; of a person who walks in place, of the strides.
+        Metres per second along the ground: the mean of `Parameters`, or of the way if no stride counts; of a
+        person who walks in place, of the strides.
     in_place : bool
         The person walks in place, as on a treadmill.
     no_strides : int
@@ -111,15 +113,22 @@ def verdict_of(
         unsure = [k for k, status in enumerate(track.status) if status == "ambiguous"]
         reasons.update(track.reason[k] or LEGS for k in unsure)
     speed, in_place = _speed(track)
+    if parameters is not None and not in_place:
+        speed = parameters.speed or speed
     return Verdict(
         total=max(len(track.frame), total or 0) if track.frames is None else len(track.frames),
         counts=counts,
-        strides=0 if parameters is None else max(len(s.start) for s in parameters.strides.values()),
+        strides=0 if parameters is None else _strides(parameters),
         speed=speed,
         in_place=in_place,
         no_strides=0 if np.isnan(track.phase).all() else int(np.isnan(track.phase).sum()),
         why=dict(reasons.most_common()),
     )
+
+
+def _strides(parameters: Parameters) -> int:
+    every = parameters.strides.values()
+    return max(int(s.sure.sum()) for s in every) or max(len(s.start) for s in every)
 
 
 def _speed(track: Track) -> tuple[float | None, bool]:

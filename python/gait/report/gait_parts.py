@@ -40,8 +40,8 @@ def add_gait(page: Page, track: Track, parameters: Parameters, cycles: Mapping[s
             "warning",
         )
     page.words(
-        "Mean over the strides without unsure frames ± its standard deviation; in brackets the "
-        f"standard deviation between strides. Source of the uncertainty: {parameters.source}.",
+        f"Mean over {parameters.counted()} ± its standard deviation; in brackets the standard deviation "
+        f"between strides. Source of the uncertainty: {parameters.source}.",
         "faint",
     )
     page.figure("Footfalls", footfall_plot(track, parameters))
@@ -51,7 +51,7 @@ def add_gait(page: Page, track: Track, parameters: Parameters, cycles: Mapping[s
         "faint",
     )
     page.figure("Stride by stride", stride_plot(track, parameters))
-    page.words("Bars span two standard deviations each way. Hollow: strides with unsure frames.", "faint")
+    page.words("Bars span two standard deviations each way. Hollow: strides that do not count.", "faint")
     add_angles(page, cycles)
 
 
@@ -241,7 +241,7 @@ def _cell(value: dict[str, Any] | None, name: str) -> str:
     digits = 1 if name.endswith(("percent", "spm")) else 3 if name.endswith("time_s") else 2
     if name == "percent" and value["sd"] > _OPEN:
         return "not determined"
-    text = f"{value['mean']:.{digits}f}"
+    text = f"{round(value['mean'], digits) + 0.0:.{digits}f}"  # no -0.0
     if np.isfinite(value["sd"]):
         text += f"\N{NO-BREAK SPACE}±\N{NO-BREAK SPACE}{value['sd']:.{digits}f}"
     between = value.get("between", np.nan)
