@@ -136,6 +136,22 @@ def test_cut_off_video_is_reported(film, tmp_path):
         list(Video(path).frames())
 
 
+@pytest.mark.parametrize("suffix", ["mp4", "mkv"])
+def test_a_film_that_breaks_off_says_after_which_frame(suffix, film, tmp_path):
+    whole, cut = tmp_path / f"whole.{suffix}", tmp_path / f"cut.{suffix}"
+    with av.open(str(film)) as source, av.open(str(whole), "w", options={"movflags": "faststart"}) as target:
+        stream = target.add_stream_from_template(source.streams.video[0])
+        for packet in source.demux(video=0):
+            packet.stream = stream
+            if packet.dts is not None:
+                target.mux(packet)
+    with av.open(str(whole)) as container:
+        ninth = [packet.pos for packet in container.demux(video=0) if packet.size][8]
+    cut.write_bytes(whole.read_bytes()[:ninth])
+    assert Video(whole).broken is None
+    assert f"cut.{suffix}: breaks off after frame 8 of 12" in Video(cut).broken
+
+
 def test_missing_video(tmp_path):
     with pytest.raises(UserError, match="none.mp4: no such video file"):
         Video(tmp_path / "none.mp4")

@@ -102,6 +102,7 @@ def run(args: argparse.Namespace) -> int:
 
     video = Video(args.video)
     require_length(video)
+    note(video.broken or "", args.quiet or not video.broken)
     with progress("detecting", video.count, args.quiet) as update:
         people = detect(video, args.network, args.people, update=update)
     require_person(people, video)

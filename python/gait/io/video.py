@@ -35,6 +35,7 @@ _ONE = 1 << 16  # of a display matrix, in fixed point
 _CHUNK_BYTES = 100_000_000  # of pictures kept at a time when they are read backwards
 SAMPLES = 40  # frames of a clip whose median is the empty scene
 _WAITING = 4  # pictures that may wait for the encoder
+_END = 3  # frames by which a duration may be longer than the pictures
 FAST = "veryfast"
 """Preset of x264 that takes 0.4 of the time of ``medium``; files are about as large."""
 #: With AVX-512 x264 gave other files from the same pictures now and then, on a busy machine.
@@ -79,6 +80,8 @@ class Video:
         Frames to show: those of the file without those that an edit list cuts off.  Damage may hide some.
     times : ndarray of shape (count,)
         When they are shown, seconds since the first, by the file's index.
+    broken : str or None
+        In words, if the file ends before all the frames that it states.
 
     Raises
     ------
@@ -143,9 +146,17 @@ class Video:
             stream = container.streams.video[0]
             self.fps = float(stream.average_rate or stream.guessed_rate or 30)
             unit = float(stream.time_base or 0)
-            stamps = [p.pts for p in container.demux(stream) if p.size > 0 and not p.is_discard]
+            packets = [p for p in container.demux(stream) if p.size > 0]
+            stamps = [p.pts for p in packets if not p.is_discard]
             self.count = len(stamps)
             self.times = _times(stamps, unit, self.fps)
+            stated, more = stream.frames, 0
+            if not stated and container.duration and len(container.streams) == 1:  # sound may last longer
+                stated, more = round(container.duration * 1e-6 * self.fps), _END
+            self.broken = None
+            if len(packets) + more < stated:
+                found = f"breaks off after frame {self.count} of {stated}"
+                self.broken = f"{self.path}: {found}; copy it anew if the rest is wanted"
         for _, _, frame in self._decode(1):
             self.height, self.width = self._upright(frame, "gray").shape
             return

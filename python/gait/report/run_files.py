@@ -119,6 +119,7 @@ def write_report(
         times=video.times[film.frames.start : film.frames.stop],
         camera=camera,
         errors=errors,
+        notes=[video.broken] if video.broken else [],
         facts={**(facts or {}), "Camera and files": _facts(files, video, path, camera)},
         drawings=dict(drawings or {}),
     )

@@ -103,6 +103,8 @@ def open_source(wanted: Wanted, warn: Warn, quiet: bool) -> Source:
     camera = Camera.read(wanted.camera, video.size, wanted.scale_camera) if wanted.camera else None
     if camera is not None and wanted.camera is not None:
         camera.check_place(wanted.camera)
+    if video.broken and (wanted.keypoints or wanted.track):  # the detector and the pictures warn themselves
+        warn(video.broken)
     folder = _folder(video)
     prior = lift_run.load_prior(wanted.model, warn)
     lift: Lift

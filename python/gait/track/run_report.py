@@ -46,8 +46,12 @@ class RunReport:
             "warning": self._verdict.warning(),
             "used": self._used,
             "files": files(self._options),
-            "notes": beside(self._options),
+            "notes": self._notes(),
         }
+
+    def _notes(self) -> list[str]:
+        broken = self._scene.video.broken
+        return [*([broken] if broken else []), *beside(self._options)]
 
     def write(self, path: str, film: PageFilm) -> None:
         """Write the page."""
@@ -65,7 +69,7 @@ class RunReport:
             film=film,
             times=scene.video.times[film.frames.start : film.frames.stop],
             camera=scene.camera,
-            notes=beside(options),
+            notes=self._notes(),
             facts={
                 "Camera and settings": self._used | settings(options, scene, self._particles),
                 "Files": files(options),

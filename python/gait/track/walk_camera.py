@@ -25,6 +25,7 @@ def find_person(video: Video, quiet: bool, first: int = 0, stop: int | None = No
     from gait.detect.people import detect, main_person, require_length, require_person  # loads the runtime
 
     require_length(video)
+    note(video.broken or "", quiet or not video.broken)
     with progress("detecting", len(video.span(first, stop)), quiet) as update:
         people = detect(video, first=first, stop=stop, update=update)
     require_person(people, video)

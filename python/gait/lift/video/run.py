@@ -108,6 +108,8 @@ def lift_video(request: Request, prior: SegmentPrior, warn: Warn, quiet: bool) -
 def open_clip(request: Request, prior: SegmentPrior, warn: Warn, quiet: bool) -> tuple[Video, ClipSegments]:
     """Read everything and the sensors, as `lift_video` does before it estimates."""
     video = Video(request.video)
+    if video.broken:
+        warn(video.broken)
     camera = Camera.read(request.camera, video.size, request.scale_camera) if request.camera else None
     placement = read_placement(request.placement, prior, camera is not None)
     if request.calibration is not None:
