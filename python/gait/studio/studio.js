@@ -22,6 +22,8 @@ let proposal = -1;
 let following = false;
 let sent = 0;
 let timer = 0;
+let asking = 0; // edits that are not answered yet
+let reported = -1; // version of the motion that the server has
 
 const frameOf = (index) => index + data.first;
 const indexOf = (frame) => frame - data.first;
@@ -43,8 +45,17 @@ function say(text, seconds = 5) {
 
 // ---- what is shown
 
+/** Whether a joint is moved or an edit is answered, which a whole motion must not keep waiting. */
+const busy = () => asking || pulled || placing;
+
+/** Show what the server has, if it is newer. */
+function refresh() {
+  if (data && reported > data.version && !busy()) load();
+}
+
 async function load() {
   const found = await ask('/state');
+  if (busy()) return; // it is shown afterwards
   if (found.begun === data?.begun && found.version < data.version) return; // an edit was answered meanwhile
   const first = !data;
   data = found;
@@ -70,7 +81,7 @@ function build() {
   canvas.addEventListener('pointermove', hover);
   canvas.addEventListener('pointerdown', press);
   canvas.addEventListener('pointerup', release);
-  canvas.addEventListener('pointercancel', () => { pulled = panning = placing = null; film.redraw(); });
+  canvas.addEventListener('pointercancel', () => { panning = null; drop(); });
   canvas.addEventListener('contextmenu', remove);
   canvas.setAttribute('role', 'application');
   canvas.setAttribute('aria-label', 'The figure over the film. Choose a joint and press Alt with an arrow key to move it.');
@@ -103,7 +114,14 @@ function moved(index) {
   scene?.show(index);
   curves?.show(index);
   if (timer) send();
-  else pulled = null;
+  else if (pulled) drop();
+}
+
+/** Leave the joint, or the start, where it was. */
+function drop() {
+  pulled = placing = null;
+  film.redraw();
+  refresh();
 }
 
 function corrections() {
@@ -260,6 +278,8 @@ const span = ({ first, last }) => (first === last ? `@ ${first}` : `${first}–$
 async function change(path, body = {}) {
   const begin = performance.now(); // of the release
   at('saved').textContent = 'saving…';
+  const moving = pulled;
+  asking += 1;
   try {
     const found = await ask(path, body);
     if (found.rows) {
@@ -269,21 +289,20 @@ async function change(path, body = {}) {
       });
     }
     for (const key of ['version', 'edits', 'undo', 'redo', 'refining', 'fault']) data[key] = found[key];
-    pulled = null;
-    film.redraw();
+    if (pulled === moving) pulled = null; // or else the next is moved already
+    film.redraw(); // the overlay first: what else shows the motion can wait for it
+    sent = Math.round((await painted()) - begin);
+    window.studio.sent = sent;
     scene.show(film.index);
     lists();
-    painted().then((end) => {
-      sent = Math.round(end - begin);
-      window.studio.sent = sent;
-      solved();
-    });
   } catch (error) {
-    pulled = null;
+    if (pulled === moving) pulled = null;
     film.redraw();
     lists('not saved');
     say(error.message);
   }
+  asking -= 1;
+  refresh();
 }
 
 /** When what was drawn last is on the screen. */
@@ -371,15 +390,12 @@ function release() {
       data.start = found.start;
       lists();
       film.redraw();
-    }, (error) => { film.redraw(); say(error.message); });
+    }, (error) => { film.redraw(); say(error.message); }).finally(refresh);
     return;
   }
   if (!pulled) return;
   if (pulled.moved) pull(pulled.joint, pulled.uv);
-  else {
-    pulled = null;
-    film.redraw();
-  }
+  else drop();
 }
 
 /** A right click removes the correction under it. */
@@ -544,6 +560,8 @@ at('export').addEventListener('change', async () => {
 await load();
 if (!localStorage.getItem('gait studio: helped')) at('helping').showModal();
 const changes = new EventSource('/changes');
-changes.addEventListener('message', (event) => { if (Number(event.data) > data.version || (data.refining && Number(event.data) !== data.version)) load(); });
-changes.addEventListener('error', () => { at('saved').textContent = 'no connection to gait studio; it goes on when that runs again'; });
-changes.addEventListener('open', () => { if (data) load(); });
+changes.addEventListener('message', (event) => { reported = Number(event.data); refresh(); });
+changes.addEventListener('error', () => {
+  data.version = -1; // of a server that may be another one when it runs again
+  at('saved').textContent = 'no connection to gait studio; it goes on when that runs again';
+});

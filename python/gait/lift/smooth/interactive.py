@@ -1,8 +1,8 @@
 """A lifted motion that is solved again near a correction, in a fraction of the time of the whole.
 
 What changes is near: blocks around the corrected frames are solved given those further away and what lasts,
-from the estimate that there is.  It is the linear problem of the whole, so that solving that as well moves
-the figure little.
+from the estimate that there is.  It is one step of the linear problem of the whole, so that solving that as
+well moves the figure little.
 """
 
 from __future__ import annotations
@@ -25,7 +25,6 @@ from gait.lift.smooth.smoother import Problem, Start, State
 Floats = npt.NDArray[np.float64]
 
 AROUND = 3  # blocks before and after the corrected ones that are solved again
-STEPS = 2  # iterations
 
 
 @dataclass(frozen=True)
@@ -88,9 +87,8 @@ class Interactive:
         part, own = problem.part(first, end), _part(state, first, end, problem.grid.frames)
         held = first > 0, end < problem.grid.blocks
         before = part.at_video(own.places)
-        for _ in range(STEPS):
-            part.weight(own)
-            own = part.inner_step(own, held)
+        part.weight(own)
+        own = part.inner_step(own, held)  # a second step moves the figure by hundredths of a pixel
         rows = problem.rows_of(first, end)
         places, lengths = part.at_video(own.places), part.at_video(own.lengths)
         self._state, self._points = _joined(state, own, first, end, problem.grid.frames), keypoints.names
