@@ -329,6 +329,7 @@ def _find_keypoints(args: argparse.Namespace, prior: SegmentPrior) -> tuple[Keyp
     """Find the keypoints of the person in a video and, unless the view is given, the camera."""
     from gait.camera.camera import Camera
     from gait.io.video import Video  # PyAV, and below OpenCV, which files of keypoints do not need
+    from gait.lift.keypoints.corrections import read_edits  # refused before the detector's work
     from gait.track.walk_camera import find_person
 
     if not (args.camera or args.orthographic or args.height):
@@ -336,11 +337,13 @@ def _find_keypoints(args: argparse.Namespace, prior: SegmentPrior) -> tuple[Keyp
     video = Video(args.input)
     if args.camera:
         Camera.read(args.camera, video.size, args.scale_camera).check_place(args.camera)
+    if args.corrections:
+        read_edits(args.corrections, prior, video.span(args.start or 0, args.stop), video.size)
     keypoints = find_person(video, args.quiet, args.start or 0, args.stop)
     if args.stabilize == "auto":
         keypoints = _stabilised(args, video, keypoints)
     calibration = None if args.camera or args.orthographic else _calibrate(args, video, keypoints)
-    return keypoints.certain(), calibration
+    return keypoints, calibration
 
 
 def _stabilised(args: argparse.Namespace, video: Video, keypoints: Keypoints) -> Keypoints:
@@ -401,15 +404,18 @@ def _lift_pictures(args: argparse.Namespace) -> tuple[dict[str, Any], str]:
     from gait.io.track_file import write_lifted
     from gait.io.video import Video, require_video_name  # OpenCV and PyAV, which keypoints do not need
     from gait.lift import run as lift_run
+    from gait.lift.keypoints.corrections import read_corrections
     from gait.lift.video import run as video_run
     from gait.track.walk_camera import find_person
 
     if args.overlay:
         require_video_name(args.overlay)
     warn = warner(args.quiet)
-    calibration = None
+    prior, calibration = lift_run.load_prior(args.model, warn), None
     if args.height:
         video = Video(args.input)
+        if args.corrections:
+            read_corrections(args.corrections, prior, video.count, size=video.size)
         calibration = _calibrate(args, video, find_person(video, args.quiet))
     request = video_run.Request(
         video=args.input,
@@ -425,7 +431,6 @@ def _lift_pictures(args: argparse.Namespace) -> tuple[dict[str, Any], str]:
         stop=args.stop,
         joined=not args.alone,
     )
-    prior = lift_run.load_prior(args.model, warn)
     lifted = video_run.lift_video(request, prior, warn, args.quiet)
     fit = lifted.fit
     shown = [i for i, name in enumerate(prior.names) if name in JOINTS or args.all_markers]

@@ -15,6 +15,7 @@ import sys
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
+from tempfile import TemporaryDirectory
 from typing import Any
 
 import numpy as np
@@ -76,10 +77,6 @@ class Keypoints:
             values = getattr(self, name)
             columns[name] = None if values is None else values[rows]
         return replace(self, **columns)
-
-    def certain(self) -> Keypoints:
-        """Keypoints without those of little confidence, as a file of them is read."""
-        return replace(self, uv=np.where(self.confidence[..., None] < LEAST_CONFIDENCE, np.nan, self.uv))
 
     def visible_frames(self) -> set[int]:
         """Return the numbers of the frames in which any point is seen."""
@@ -293,6 +290,14 @@ def write(path: str | os.PathLike[str], keypoints: Keypoints) -> None:
                 row += [f"{u:.4f}", f"{v:.4f}", f"{keypoints.confidence[t, j]:.3g}"]
                 row += [f"{values[t, j]:.3f}" for values in given.values()]
             table.writerow(row)
+
+
+def as_filed(keypoints: Keypoints) -> Keypoints:
+    """Keypoints as `read` gets them from what `write` writes: what is made from either is the same."""
+    with TemporaryDirectory() as folder:
+        path = Path(folder) / "keypoints.csv"
+        write(path, keypoints)
+        return read(path, keypoints.names)[0]
 
 
 class _Numbers:

@@ -155,13 +155,13 @@ def lift_keypoints(
     path: str, keypoints: Keypoints, prior: SegmentPrior, request: Request, warn: Warn, quiet: bool
 ) -> Lifted:
     """Lift keypoints of the prior's markers as `lift_file` does; errors name `path`, where they are from."""
-    prepared = prepare(path, keypoints, prior, request, warn, quiet)
     edits = Edits()
-    if request.corrections:
+    if request.corrections:  # refused before the work
         frames = range(int(keypoints.frame[0]), int(keypoints.frame[-1]) + 1)
-        view = prepared.view
+        view = _view(keypoints, request, lambda _: None)
         size = {"size": view.camera.size} if isinstance(view, Perspective) else {}
         edits = read_edits(request.corrections, prior, frames, **size)
+    prepared = prepare(path, keypoints, prior, request, warn, quiet)
     return lift_prepared(path, prepared, edits, prior, request, quiet)
 
 

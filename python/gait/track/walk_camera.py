@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from gait.bindings.model import Model
 from gait.camera.camera import Camera
+from gait.io import keypoints_file
 from gait.io.keypoints_file import Keypoints
 from gait.io.lens_tag import equivalent_mm, lens_tag, view_across
 from gait.io.video import Video
@@ -15,7 +16,7 @@ _TAG_SD = 0.1  # of the focal length's logarithm; stabilised films are cropped b
 
 
 def find_person(video: Video, quiet: bool, first: int = 0, stop: int | None = None) -> Keypoints:
-    """Find the keypoints of the main person of a film by the detector.
+    """Find the keypoints of the main person of a film by the detector, as a file of them has them.
 
     Raises
     ------
@@ -29,7 +30,7 @@ def find_person(video: Video, quiet: bool, first: int = 0, stop: int | None = No
     with progress("detecting", len(video.span(first, stop)), quiet) as update:
         people = detect(video, first=first, stop=stop, update=update)
     require_person(people, video)
-    return people[main_person(people)]
+    return keypoints_file.as_filed(people[main_person(people)])
 
 
 def expected_fov(video: Video, fov: float | None, quiet: bool) -> tuple[float | None, float]:
