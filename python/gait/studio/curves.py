@@ -23,6 +23,7 @@ ANGLES = ("hip_flexion", "knee_flexion", "elbow_flexion")
 """Angles that are shown: those of the package's skeleton, with its signs."""
 LEGS = ("hip_flexion", "knee_flexion")
 SIDES = {"left": "l", "right": "r"}
+_PHASE = "0: right heel strike; known from the first to the last"
 
 
 def angles_of(names: Sequence[str], places: Floats, covariance: Floats) -> Angles:
@@ -78,7 +79,7 @@ def phase_curve(time: Floats, events: Events | None, found: Angles) -> list[dict
     """
     strikes = np.sort(events.strike["right"]) if events else np.zeros(0)
     if len(strikes) < 2:
-        return [curve("Phase", "0: right heel strike", np.full(len(time), np.nan), limits=(0, 1))]
+        return [curve("Phase", "no two right heel strikes", np.full(len(time), np.nan), limits=(0, 1))]
     count = np.interp(time, strikes, np.arange(len(strikes)), left=np.nan, right=np.nan)
     information = np.zeros(len(time))
     for name, (values, sd) in found.items():
@@ -87,7 +88,7 @@ def phase_curve(time: Floats, events: Events | None, found: Angles) -> list[dict
     sd = np.minimum(1 / np.sqrt(np.maximum(information, 1e-9)), 0.5)
     phase = count % 1
     phase[1:][np.diff(phase) < 0] = np.nan  # no line from the end of a cycle to the beginning of the next
-    return [curve("Phase", "0: right heel strike", phase, sd if found else None, limits=(0, 1))]
+    return [curve("Phase", _PHASE, phase, sd if found else None, limits=(0, 1))]
 
 
 def phase_at(time: float, events: Events | None) -> dict[str, float]:

@@ -15,7 +15,7 @@ from starlette.routing import Route
 from starlette.types import ASGIApp
 
 from gait.errors import UserError
-from gait.studio.session import Session
+from gait.studio.session import NotSavedError, Session
 from gait.web import serve
 
 _HERE = Path(__file__).parent
@@ -100,7 +100,7 @@ def _answered(act: Callable[[], Any]) -> Response:
     try:
         return JSONResponse(act())
     except UserError as error:
-        return JSONResponse({"error": str(error)}, 409)
+        return JSONResponse({"error": str(error)}, 507 if isinstance(error, NotSavedError) else 409)
 
 
 def application(session: Session, port: int) -> ASGIApp:

@@ -46,6 +46,10 @@ ARROW = 0.7  # metres, of the arrow that shows it
 LEAST_SD, MOST_SD = 0.3, 50.0  # pixels, of a point given by hand
 
 
+class NotSavedError(UserError):
+    """The corrections could not be written; every other refusal leaves them saved as they were."""
+
+
 class Session:
     """Film, motion and corrections of one page.
 
@@ -185,6 +189,11 @@ class Session:
             pin = FloorPin(self._frame(action), self._joint(action), self._pixel(action), self._sd(action))
             if not pin.joint.endswith(FEET):
                 raise UserError(f"{pin.joint}: only a toe, heel or ankle stands on the floor")
+            if (
+                self._lift.camera is not None
+                and np.isnan(self._lift.camera.on_plane(np.array(pin.uv), 0.0)).any()
+            ):
+                raise UserError("no floor is seen there, above the horizon; click where the foot stands")
             others = tuple(p for p in edits.floor if (p.frame, p.joint) != (pin.frame, pin.joint))
             return replace(edits, floor=(*others, pin))
         if kind == "hide":
@@ -308,7 +317,8 @@ class Session:
             with replacing(self.source.corrections) as temporary:
                 temporary.write_text(json.dumps(edits.as_json(), indent=1) + "\n", encoding="utf-8")
         except OSError as error:
-            raise UserError(f"{self.source.corrections}: not saved: {error.strerror}") from error
+            why = f"not saved: {error.strerror}; make room, then correct again"
+            raise NotSavedError(f"{self.source.corrections}: {why}") from error
 
     def export(self, kind: str) -> Path:
         """Write what a command writes of the whole motion: a format of `gait export`, ``csv`` or ``mp4``.

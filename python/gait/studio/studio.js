@@ -6,6 +6,7 @@ import { Curves } from 'gait/curves.js';
 const NEAR = 14; // screen pixels within which the pointer takes a joint
 const CLICK = 3; // screen pixels that a click may be off
 const BUTTONS = { pin: ['tool-pin'], start: ['tool-start'], hide: ['hide'], swap: ['from', 'to', 'range', 'swap'] }; // by tool
+const REFUSED = 409; // an edit that changes nothing: what there was is saved
 const WAIT = 250; // milliseconds after the last key before a moved joint is sent
 const NINETY = 2.1460; // radius of the circle that holds 90 % of a Gaussian in two dimensions, sd
 const at = (id) => document.getElementById(id);
@@ -32,7 +33,7 @@ const words = (joint) => joint.replace(/^l_/, 'left ').replace(/^r_/, 'right ').
 async function ask(path, body) {
   const answer = await fetch(path, body === undefined ? {} : { method: 'POST', body: JSON.stringify(body) });
   const found = await answer.json();
-  if (!answer.ok) throw new Error(found.error ?? answer.statusText);
+  if (!answer.ok) throw Object.assign(new Error(found.error ?? answer.statusText), { refused: answer.status === REFUSED });
   return found;
 }
 
@@ -42,6 +43,8 @@ function say(text, seconds = 5) {
   clearTimeout(say.timer);
   say.timer = setTimeout(() => at('message').classList.remove('shown'), 1000 * seconds);
 }
+
+const hush = () => at('message').classList.remove('shown');
 
 // ---- what is shown
 
@@ -93,10 +96,15 @@ function follow(on) {
   following = on;
   at('follow').setAttribute('aria-pressed', on);
   if (!on) return film.picture.fit();
+  film.picture.zoom = near();
+  track(film.index);
+}
+
+/** Zoom at which the person is three quarters as high as the stage. */
+function near() {
   const stage = film.picture.element;
   const whole = Math.min(stage.clientWidth / data.size[0], stage.clientHeight / data.size[1]);
-  film.picture.zoom = Math.max(1, (0.75 * stage.clientHeight) / (data.tall * whole));
-  track(film.index);
+  return Math.max(1, (0.75 * stage.clientHeight) / (data.tall * whole));
 }
 
 function track(index) {
@@ -293,12 +301,13 @@ async function change(path, body = {}) {
     film.redraw(); // the overlay first: what else shows the motion can wait for it
     sent = Math.round((await painted()) - begin);
     window.studio.sent = sent;
+    hush();
     scene.show(film.index);
     lists();
   } catch (error) {
     if (pulled === moving) pulled = null;
     film.redraw();
-    lists('not saved');
+    lists(error.refused ? 'saved' : 'not saved');
     say(error.message);
   }
   asking -= 1;
@@ -356,6 +365,7 @@ function hover(event) {
 function press(event) {
   if (event.button !== 0 && event.button !== 1) return;
   film.pause();
+  hush();
   const { canvas } = film.picture, place = film.picture.at(event);
   const [joint, off] = nearestJoint(place);
   if (tool === 'pin' && event.button === 0) {
@@ -474,6 +484,9 @@ function propose(k) {
   proposal = k % data.proposals.length;
   const { frame, joint } = data.proposals[proposal];
   go(frame, joint);
+  const uv = data.uv[film.index]?.[chosen];
+  if (uv) film.picture.look(uv, Math.max(film.picture.zoom, near()));
+  say(`${words(joint)}, frame ${frame}: drag it to where you see it.`, 3);
 }
 
 function choose(name) {
