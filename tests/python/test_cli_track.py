@@ -123,7 +123,7 @@ def test_automatic_start_reports_what_it_found(scene, capsys):
     assert track(scene, "--init", "auto", "--height", 1.75) == 0
     out, err = capsys.readouterr()
     assert re.match(r"start found at frame \d+: x ", err) and "digest " in out
-    assert re.match(r"Tracked \d+ of 20 frames, no whole stride", out)
+    assert re.search(r"(?m)^Tracked \d+ of 20 frames, no whole stride", out)
     counted = re.search(r"^(\d+) frames: (\d+) init, (\d+) tracking, (\d+) ambiguous, (\d+) lost", out, re.M)
     total, *each = map(int, counted.groups())
     assert sum(each) == total <= 20

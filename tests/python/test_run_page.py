@@ -174,6 +174,7 @@ def test_without_a_camera_or_the_parts_the_page_names_how_to_get_the_figure(
     ("options", "words"),
     [
         (["run.csv", "--track", "run.csv"], "--track: goes with a log"),
+        (["walk.mp4"], "walk.mp4: is a film, not a track; track it first"),
         (["camera.json"], "camera.json: is no track OUT.csv; with a log, give --track as well"),
         (["run.csv", "--camera", "none.json"], "none.json: no such camera file"),
         (["run.csv", "--truth", "none.csv"], "none.csv: no such truth file"),

@@ -23,6 +23,7 @@ examples:
   gait report estimates.log --track track.csv --video walk.mp4 --camera camera.json -o report.html
   gait report all.log --track track.csv --video walk.mp4 --camera camera.json -o report.html --replayed
 """
+_FILMS = (".mp4", ".mov", ".m4v", ".mkv", ".avi", ".webm", ".3gp")
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
@@ -32,7 +33,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         "source", metavar="RUN", help="OUT.csv from gait track, or E.log from gait record --log or lcm-logger"
     )
     add("--track", metavar="OUT.csv", help="with a log: the track, from gait record")
-    add("--video", required=True, metavar="VIDEO", help="the clip that was tracked")
+    add("--video", metavar="VIDEO", help="the clip that was tracked (always needed)")
     values.add_camera(parser, " (default: camera.json beside the track or the film)", scale=True)
     add("-o", "--output", metavar="R.html", help="the page (default: RUN.html)")
     add("--overlay", metavar="O.mp4", help="also draw the estimates into the video")
@@ -48,7 +49,15 @@ def run(args: argparse.Namespace) -> int:
     from gait.report.error_table import as_text
     from gait.report.run_files import RunFiles, write_report
 
-    is_track = Path(args.source).suffix.lower() == ".csv"
+    suffix = Path(args.source).suffix.lower()
+    if suffix in _FILMS:
+        track = f"gait track {args.source} --height 1.75 -o track.csv --report run.html"
+        raise UsageError(
+            f"{args.source}: is a film, not a track; track it first, which makes the page: {track}"
+        )
+    if not args.video:
+        raise UsageError("give --video VIDEO, the clip that was tracked")
+    is_track = suffix == ".csv"
     if is_track and args.track:
         raise UsageError("--track: goes with a log; RUN is a track already")
     if not is_track and not args.track:

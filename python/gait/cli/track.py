@@ -198,15 +198,15 @@ def _text_of_people(summary: dict[str, Any]) -> str:
 
 def _text(summary: dict[str, Any]) -> str:
     step, threads = summary["step_ms"], summary["threads"]
-    lines = [f"{summary['verdict']}.", summary["statuses"]]
+    lines = [
+        f"{summary['particles']} particles, {threads} thread{'s' if threads > 1 else ''}, "
+        f"{summary['memory_bytes']} bytes, digest {summary['digest']}",
+        f"step {step['median']:.1f} ms median, {step['p99']:.1f} ms p99, {step['max']:.1f} ms max; "
+        f"{summary['wall_fps']:.1f} frames/s in all",
+    ]
     lines += [f"{name}: {words}" for name, words in summary["used"].items()]
     lines += [f"written: {', '.join(f'{what} {path}' for what, path in summary['files'].items())}"]
     lines += [f"note: {words}" for words in summary["notes"]]
     if summary["warning"]:
         lines.append(f"warning: {summary['warning']}")
-    return "\n".join(lines) + (
-        f"\n{summary['particles']} particles, {threads} thread{'s' if threads > 1 else ''}, "
-        f"{summary['memory_bytes']} bytes\n"
-        f"step {step['median']:.1f} ms median, {step['p99']:.1f} ms p99, {step['max']:.1f} ms max; "
-        f"{summary['wall_fps']:.1f} frames/s in all\ndigest {summary['digest']}"
-    )
+    return "\n".join([*lines, summary["statuses"], f"{summary['verdict']}."])
