@@ -137,7 +137,7 @@ def test_cut_off_video_is_reported(film, tmp_path):
 
 
 @pytest.mark.parametrize("suffix", ["mp4", "mkv"])
-def test_a_film_that_breaks_off_says_after_which_frame(suffix, film, tmp_path):
+def test_a_film_that_breaks_off_names_the_last_frame(suffix, film, tmp_path):
     whole, cut = tmp_path / f"whole.{suffix}", tmp_path / f"cut.{suffix}"
     with av.open(str(film)) as source, av.open(str(whole), "w", options={"movflags": "faststart"}) as target:
         stream = target.add_stream_from_template(source.streams.video[0])

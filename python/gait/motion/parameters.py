@@ -96,7 +96,7 @@ class Parameters:
         if not left_out:
             return text
         unsure = left_out - self.slowing
-        why = [f"{unsure} with unsure frames"] * bool(unsure)
+        why = [f"{unsure} unsure"] * bool(unsure)
         why += [f"{self.slowing} in which the person starts or stops"] * bool(self.slowing)
         return f"{text} (not counted: {', '.join(why)})"
 

@@ -23,7 +23,7 @@ ANGLES = ("hip_flexion", "knee_flexion", "elbow_flexion")
 """Angles that are shown: those of the package's skeleton, with its signs."""
 LEGS = ("hip_flexion", "knee_flexion")
 SIDES = {"left": "l", "right": "r"}
-_PHASE = "0: right heel strike; known from the first to the last"
+_PHASE = "0 to 1 between right heel strikes"
 
 
 def angles_of(names: Sequence[str], places: Floats, covariance: Floats) -> Angles:

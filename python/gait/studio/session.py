@@ -317,7 +317,7 @@ class Session:
             with replacing(self.source.corrections) as temporary:
                 temporary.write_text(json.dumps(edits.as_json(), indent=1) + "\n", encoding="utf-8")
         except OSError as error:
-            why = f"not saved: {error.strerror}; make room, then correct again"
+            why = f"not saved: {error.strerror}; mend that, then correct again"
             raise NotSavedError(f"{self.source.corrections}: {why}") from error
 
     def export(self, kind: str) -> Path:

@@ -267,7 +267,7 @@ function lists(saved = 'saved') {
   at('edits').replaceChildren(...entries.map((entry) => entry.item));
   for (const close of at('edits').querySelectorAll('li button + button')) close.setAttribute('aria-label', close.title);
   at('count').textContent = entries.length ? `(${entries.length})` : '(none yet)';
-  at('command').textContent = data.command;
+  at('command').textContent = at('command').title = data.command;
   at('start').textContent = data.start ? `Start in frame ${data.start.frame}: ${data.start.command}` : '';
   at('warnings').textContent = [data.fault, ...data.warnings].filter(Boolean).join('\n').replace(/\b[lr]_\w+/g, words);
   solved();
@@ -557,6 +557,8 @@ at('helping').addEventListener('close', () => {
 document.addEventListener('click', (event) => {
   if (event.detail > 0) event.target.closest?.('button')?.blur();
 });
+at('copy').addEventListener('click', () => navigator.clipboard.writeText(data.command).then(
+  () => say(`Copied: ${data.command}`), () => say(data.command, 20)));
 at('export').addEventListener('change', async () => {
   const kind = at('export').value;
   at('export').value = '';
