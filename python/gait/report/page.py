@@ -64,7 +64,8 @@ class Page:
             + "</tr>"
             for row in rows
         )
-        table = f"<table><thead><tr>{top}</tr></thead><tbody>{body}</tbody></table>"
+        table = f"<thead><tr>{top}</tr></thead><tbody>{body}</tbody></table>"
+        table = f'<table class="grid" style="--columns: {len(head) - 1}">{table}'
         self._parts.append(f"<h2>{escape(heading)}</h2>{movable(table)}")
         self._explain(tips)
 
