@@ -157,6 +157,8 @@ class Session:
                 "stature_m": shown.figures["stature_m"],
             }
             begin |= phase_at(float(self.source.video.times[frame]), shown.events)
+            if not self.source.camera_words:
+                self._write_camera()  # gait track has to be given the one that was found
             with replacing(self._start_file) as temporary:
                 temporary.write_text(json.dumps(begin, indent=1) + "\n", encoding="utf-8")
             return {"start": self._start()}
@@ -174,7 +176,8 @@ class Session:
         here = np.array([*begin["pelvis"][:2], 0.0])
         ahead = here + ARROW * np.array([np.cos(begin["heading_rad"]), np.sin(begin["heading_rad"]), 0.0])
         words = ["gait track", shlex.quote(str(self.source.video.path)), "--init"]
-        words += [shlex.quote(str(self._start_file)), *self.source.camera_words, "-o track.csv"]
+        found = ["--camera", shlex.quote(str(self.source.folder / EXPORTS["camera"]))]
+        words += [shlex.quote(str(self._start_file)), *(self.source.camera_words or found), "-o track.csv"]
         ends = rounded(camera.project(np.stack([here, ahead])), 2)
         return {"frame": begin["frame"], "from": ends[0], "to": ends[1], "command": " ".join(words)}
 
@@ -340,10 +343,7 @@ class Session:
             solved, folder = self._solved, self.source.folder
         path = folder / EXPORTS[kind]
         if kind == "camera":
-            if self._lift.camera is None:
-                raise UserError("there is no camera; give --camera, or --height for one from the walk")
-            with replacing(path) as temporary:
-                write_camera(temporary, self._lift.camera)
+            self._write_camera()
         elif kind == "mp4":
             self._lift.write_overlay(str(path), self.source.video, solved)
         else:
@@ -354,6 +354,12 @@ class Session:
             if beside := exports.BESIDE.get(path.suffix):
                 return _zipped(path, path.with_suffix(beside))
         return path
+
+    def _write_camera(self) -> None:
+        if self._lift.camera is None:
+            raise UserError("there is no camera; give --camera, or --height for one from the walk")
+        with replacing(self.source.folder / EXPORTS["camera"]) as temporary:
+            write_camera(temporary, self._lift.camera)
 
 
 EXPORTS = {"csv": "motion.csv", "mp4": "overlay.mp4", "camera": "camera.json"} | {

@@ -78,7 +78,7 @@ class Source:
     lift : Lift
         How it is lifted.
     camera_words, model_words : list of str
-        Options of commands that use the same camera and model.
+        Options of commands that use the same camera, none if it was found, and model.
     """
 
     video: Video
@@ -116,7 +116,6 @@ def open_source(wanted: Wanted, warn: Warn, quiet: bool) -> Source:
     corrections = Path(wanted.corrections) if wanted.corrections else folder / "corrections.json"
     words = ["--camera", shlex.quote(wanted.camera)] if wanted.camera else []
     words += ["--scale-camera"] if wanted.scale_camera else []
-    words += ["--height", f"{wanted.height:g}"] if wanted.height else []
     model = ["--model", shlex.quote(wanted.model)] if wanted.model else []
     return Source(video, folder, film, corrections, prior, lift, words, model)
 
