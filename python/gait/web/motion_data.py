@@ -129,7 +129,7 @@ def frames(values: Floats, digits: int = 4) -> list[Any]:
     """Nested lists by frame; null for a frame that is not finite."""
     known = np.isfinite(values).reshape(len(values), -1).all(axis=1)
     found = np.round(values, digits).tolist()  # of all frames at once, which takes a tenth of the time
-    return [one if each else None for one, each in zip(found, known.tolist(), strict=True)]
+    return [one if each else None for one, each in zip(found, known, strict=True)]
 
 
 def _either(one: str, other: str) -> str:
