@@ -122,7 +122,8 @@ def about_terms(found: list[freeze.Freeze]) -> str:
 Log-likelihood of a frame given the one before, nats, less that of limbs that face the camera, are seen
 whole and do not change, by the settings of paper mode: of the true body, which walks, and of the best
 body at rest on the background ({places}). Terms are added in the order of the rows (q, p_occluded,
-sigma(alpha), then E limb by limb), and their sum is the last row. Preference for rest, of all E together and of all other terms: {gains}."""
+sigma(alpha), then E limb by limb), and their sum is the last row. Preference for rest, of all E together
+and of all other terms: {gains}."""
 
 
 if __name__ == "__main__":

@@ -273,6 +273,7 @@ def test_only_one_part_is_run_and_the_heads_of_the_others_stay(tmp_path, monkeyp
     def run(commit, only, code=0):
         for name in ("one", "two"):
             text = f"from pathlib import Path\nat = Path(__file__).parent / '{name}_table.md'\n"
+            text += "raise SystemExit(3)\n" if code == 3 else ""
             text += f"at.write_text('## {name} {commit}')\n"
             text += f"at.with_suffix('.csv').write_text('measure,met')\nraise SystemExit({code})\n"
             (tmp_path / f"{name}.py").write_text(text)
@@ -286,6 +287,9 @@ def test_only_one_part_is_run_and_the_heads_of_the_others_stay(tmp_path, monkeyp
     code, page = run("ccc", ["one.py"])
     assert code == 0 and "at commit ccc; Took: one.py" in page and "at commit bbb; Took: two.py" in page
     assert "aaa" not in page and "Failed: two.py" in page
+    code, page = run("ddd", ["two.py"], 3)
+    assert code == 1 and "## two bbb" in page and "ddd" not in page
+    assert "Failed: two.py (no table: run it by itself; its tables are older)" in page
 
 
 def test_bounds_of_learning_are_counted_by_measure(tmp_path):

@@ -245,6 +245,8 @@ def _estimates(found: Segments) -> Entry:
             f"Every one of {len(held)} sequences is left out in turn; shown is the one whose error is the "
             "median. Other sequences of the same person are learnt from.",
             "Likelihood alone: least squares of minimum norm in the modes.",
+            "Eq. 1 is printed without the mean and eq. 3 without the 1/2; sigma, a variance in the text and "
+            "squared in eq. 4, is a standard deviation.",
             "A segment stands where its pelvis shows; in depth it continues the one before. Where two "
             "overlap, linear weights join them.",
             f"The noise: {', '.join(f'{1000 * n:.0f}' for n in leventon.TRIED)} mm; shown with "

@@ -257,6 +257,8 @@ def _passes(learning: Learning) -> Entry:
             "The mean is in this basis too (as printed it is not); otherwise it jumps where cycles join.",
             "Cycles are resampled at 120 phases by penalised cubic splines, since unconstrained ones "
             "explode in gaps; what lies more than 0.75 knots from a sample is missing.",
+            "The parts of a cycle before the first whole one and after the last count as cycles, with what "
+            "they lack missing.",
             "Samples at j = 0 ... T - 1: j = T, which is printed too, is the next cycle's 0. The row-mean of "
             "step 3 is one value for each column, and 1' mu is 1 mu'.",
             "Missing entries start from the mean of their column; cycles with less than 40 % observed are "
