@@ -22,8 +22,9 @@ open. Walks and motions: CMU's; the clip: the outdoor one, with joints marked by
 states. Literal: its algorithm as printed, errors of print resolved. Ours: the package's default, on the same
 data. {verdicts}.
 
-The paper's filter on the target's seven clips of real motion ([paper_mode](paper_mode.md), recorded apart) is
-on the person, and nearer than its own mean cycle running on without any image: {clips}. By term,
+The paper's filter on the target's seven clips of real motion ([paper_mode](paper_mode.md), recorded apart):
+runs that end on the person, and the error against that of its own mean cycle running on without any image:
+{clips}. By term,
 what prefers rest on the background: [paper_terms](paper_terms.md); the readings of equations that were tried:
 [paper_readings](paper_readings.md)."""
 
@@ -41,7 +42,7 @@ def seven() -> str:
     return "; ".join(
         f"{row['clip']} in {row['held']} runs"
         + (
-            f", {row['root mm']} mm against {row['free mm']}"
+            f", {row['root mm']} against {row['free mm']} mm"
             if row["root mm"]
             else ", without a truth in space"
         )
