@@ -87,7 +87,7 @@ MUTANTS = (
     ),
     Mutant(
         "O Fig. 3",
-        "the curve to which offsets are fitted is not periodic in its table",
+        "the curve to which offsets are fitted is interpolated the wrong way round",
         "python/gait/learn/cycles/align.py",
         "curve = table[low] * (1 - part) + table[(low + 1) % TABLE] * part",
         "curve = table[low] * part + table[(low + 1) % TABLE] * (1 - part)",
@@ -119,7 +119,7 @@ MUTANTS = (
     ),
     Mutant(
         "O 2, Fig. 5, 6",
-        "components have the singular values as spread",
+        "components have their spread by the number of cycles, not one less",
         "python/gait/learn/prior/components.py",
         "sd=singular[:components] / np.sqrt(max(rows - 1, 1)),",
         "sd=singular[:components] / np.sqrt(max(rows, 1)),",
@@ -240,7 +240,7 @@ MUTANTS = (
     ),
     Mutant(
         "O 7",
-        "the rate relaxes to zero",
+        "the rate relaxes to less than the mean",
         "libgait/src/filter/dynamics_kernel.c",
         "dynamics_reflect_rate(s->mean_rate + off)",
         "dynamics_reflect_rate(0.9f * s->mean_rate + off)",
@@ -264,7 +264,7 @@ MUTANTS = (
     ),
     Mutant(
         "O 8",
-        "the level of the ground has no noise",
+        "the level of the ground has the noise of its tilt",
         "libgait/src/filter/dynamics_kernel.c",
         "relax(s->level, from->f[F_Z], n[4], to->f[F_Z]);",
         "relax(s->tilt, from->f[F_Z], n[4], to->f[F_Z]);",
@@ -562,7 +562,7 @@ MUTANTS = (
     ),
     Mutant(
         "L 4",
-        "turned copies are turned back again",
+        "copies are turned by a whole turn, not a quarter",
         "python/gait/paper/leventon.py",
         "axis_rotation(2, np.pi / 2).T",
         "axis_rotation(2, 2 * np.pi).T",
@@ -602,7 +602,7 @@ MUTANTS = (
     ),
     Mutant(
         "L Fig. 5",
-        "the view alone is explained by the prior, too",
+        "the view alone explains half of what it shows",
         "python/gait/paper/leventon.py",
         "np.linalg.lstsq(self.visible, rest, rcond=None)[0]",
         "np.linalg.lstsq(self.visible, 0.5 * rest, rcond=None)[0]",
