@@ -28,6 +28,7 @@ from facts import facts
 from paper_runs import Footage
 
 from gait import Mode, Model
+from gait.paper import ladder
 from gait.paper.tracking import FRAMES
 from gait.progress import progress
 from gait.simulate.clip import simulate
@@ -68,11 +69,7 @@ GUESS = {
     "vertical_noise": 0.01, "heading_noise": 0.02, "tilt_noise": 0.01, "coef_noise": 0.05, "coef_start": 0.3,
     "occluded_density": 0.015, "surface_sd": 14.0, "surface_tilt": 1.0, "limb_points": 16,
 }  # fmt: skip
-BEFORE = {
-    "phase_noise": 0.022, "rate_noise": 0.055, "forward_noise": 0.044, "lateral_noise": 0.044,
-    "vertical_noise": 0.022, "heading_noise": 0.11, "tilt_noise": 0.055, "coef_noise": 0.5, "coef_start": 1.0,
-    "occluded_density": 0.0018, "surface_sd": 8.0, "surface_tilt": 1.0, "limb_points": 16,
-}  # fmt: skip
+BEFORE = ladder.UNSEARCHED
 WORST = 3.0  # of a run's error over the free cycle's
 AGAIN = 1  # of the best ones are judged by more seeds
 KEPT = 3  # settings that are changed in turn

@@ -45,7 +45,7 @@ _WITHOUT: dict[str, Any] = {
     "acquisition_particles": 0,
 }
 #: The paper's sigmas, p_occluded and sigma(alpha) before they were searched.
-_UNSEARCHED: dict[str, Any] = {
+UNSEARCHED: dict[str, Any] = {
     "phase_noise": 0.022,
     "rate_noise": 0.055,
     "forward_noise": 0.044,
@@ -58,6 +58,7 @@ _UNSEARCHED: dict[str, Any] = {
     "occluded_density": 0.0018,
     "surface_sd": 8.0,
     "surface_tilt": 1.0,
+    "limb_points": 16,
 }
 
 
@@ -78,7 +79,7 @@ def _default(terms: Term, *added: str) -> dict[str, Any]:
 
 _ALL = Term.TEXTURE | Term.SILHOUETTE | Term.EDGES | Term.TEMPLATE
 RUNGS = (
-    Rung("paper, sigmas by hand", Mode.PAPER, False, _UNSEARCHED),
+    Rung("paper, sigmas by hand", Mode.PAPER, False, UNSEARCHED),
     Rung("paper", Mode.PAPER, False),
     Rung("+ prior over people", Mode.PAPER, True),
     Rung("+ robust texture, dynamics that relax, root motion", Mode.DEFAULT, True, _default(Term.TEXTURE)),
@@ -87,7 +88,7 @@ RUNGS = (
     Rung("+ template", Mode.DEFAULT, True, _default(_ALL)),
     Rung("+ errors that last (evidence_time)", Mode.DEFAULT, True, _default(_ALL, "evidence_time")),
     Rung(
-        "+ rejuvenation, posture, stature: the default",
+        "+ rejuvenation, posture, stature, more particles at first: the default",
         Mode.DEFAULT,
         True,
     ),
