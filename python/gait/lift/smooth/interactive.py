@@ -1,8 +1,8 @@
 """A lifted motion that is solved again near a correction, in a fraction of the time of the whole.
 
 What changes is near: blocks around the corrected frames are solved given those further away and what lasts,
-from the estimate that there is.  It is one step of the linear problem of the whole, so that solving that as
-well moves the figure little.
+from the estimate that there is.  It is the linear problem of the whole, so that solving that as well moves
+the figure little.
 """
 
 from __future__ import annotations
@@ -87,8 +87,12 @@ class Interactive:
         part, own = problem.part(first, end), _part(state, first, end, problem.grid.frames)
         held = first > 0, end < problem.grid.blocks
         before = part.at_video(own.places)
-        part.weight(own)
-        own = part.inner_step(own, held)  # a second step moves the figure by hundredths of a pixel
+        # A second step moves a joint that is pulled by hundredths of a pixel.  What is no longer corrected
+        # is judged by the moved body at first, and only then by the one that moved back.
+        by_hand = keypoints.by_hand is not None and np.isfinite(keypoints.by_hand[corrected]).any()
+        for _ in range(1 if by_hand else 2):
+            part.weight(own)
+            own = part.inner_step(own, held)
         rows = problem.rows_of(first, end)
         places, lengths = part.at_video(own.places), part.at_video(own.lengths)
         self._state, self._points = _joined(state, own, first, end, problem.grid.frames), keypoints.names
