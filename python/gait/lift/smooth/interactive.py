@@ -87,8 +87,8 @@ class Interactive:
         part, own = problem.part(first, end), _part(state, first, end, problem.grid.frames)
         held = first > 0, end < problem.grid.blocks
         before = part.at_video(own.places)
-        # A second step moves a joint that is pulled by hundredths of a pixel.  What is no longer corrected
-        # is judged by the moved body at first, and only then by the one that moved back.
+        # A joint that is pulled is there after one step.  What is no longer corrected is judged by the moved
+        # body at first, and only then by the one that moved back.
         by_hand = keypoints.by_hand is not None and np.isfinite(keypoints.by_hand[corrected]).any()
         for _ in range(1 if by_hand else 2):
             part.weight(own)
