@@ -1,14 +1,14 @@
 #!/usr/bin/env python3
 """Find what Ormoneit and others (2000) call empirically determined, on simulated clips.
 
-    search_paper.py --folder build/search_paper [--count 60] [--record]
+    search_paper.py [--folder build/search_paper] [--count 7] [--changes 20] [--record]
 
 The clips are made by `gait simulate` (no development clip is looked at).  The first settings are those
 before the search, the second a guess from pictures of the likelihood; more are drawn at random, evenly in
 their logarithms. Then the best ones are changed at random in half of their settings.  A setting's score is
 the mean over clips of its root-aligned error over that of the mean cycle running free from the true start
-(at most 3), plus the share of runs that leave the person.  Results are kept in the folder; a run goes on
-where the last one ended.
+(at most 3), plus the share of runs that leave the person.  One seed each; the best ones are judged again by
+others.  Results are kept in the folder; a run goes on where the last one ended.
 """
 
 from __future__ import annotations
@@ -71,10 +71,10 @@ GUESS = {
 }  # fmt: skip
 BEFORE = ladder.UNSEARCHED
 WORST = 3.0  # of a run's error over the free cycle's
-AGAIN = 1  # of the best ones are judged by more seeds
+AGAIN = 5  # of the best ones are judged by more seeds
 KEPT = 3  # settings that are changed in turn
 SPREAD = 0.6  # sd of the logarithm of a factor
-SEEDS = 3
+FIRST, MORE = range(1), range(1, 4)  # seeds of all settings, and of the best
 NEVER_LOST = {"stayed_nats": 0.0}
 
 Settings = dict[str, float]
@@ -86,25 +86,28 @@ def main() -> int:
         description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
     )
     parser.add_argument("--folder", type=Path, default=FOLDER)
-    parser.add_argument("--count", type=int, default=24, help="settings drawn at random")
-    parser.add_argument("--changes", type=int, default=48, help="changes of the best")
+    parser.add_argument("--count", type=int, default=7, help="settings drawn at random")
+    parser.add_argument("--changes", type=int, default=20, help="changes of the best")
     parser.add_argument("--record", action="store_true", help="publish the table")
     args = parser.parse_args()
     search = Search(args.folder)
     with progress("search", args.count) as update:
         for k in range(args.count):
-            search.score(f"random {k}", drawn(k), seeds=1)
+            search.score(("before", "guess")[k] if k < 2 else f"random {k}", drawn(k), FIRST)
             update(k + 1)
     with progress("changes", args.changes) as update:
         for k in range(args.changes):
-            search.score(f"change {k}", changed(search.top(1, KEPT)[k % KEPT], k), seeds=1)
+            search.score(f"change {k}", changed(search.top(FIRST, KEPT)[k % KEPT][1], k), FIRST)
             update(k + 1)
-    for row in search.top(1, AGAIN):
-        search.score("best again", row, seeds=SEEDS)
-    best = search.best(SEEDS)
+    finalists = search.top(FIRST, AGAIN)
+    with progress("best again", len(finalists)) as update:
+        for k, (what, settings) in enumerate(finalists):
+            search.score(what, settings, MORE)
+            update(k + 1)
+    [(_, best)] = search.top(MORE, 1)
     print(json.dumps(best, indent=1))
     if args.record:
-        publish(search, best)
+        publish(search, best, f"--count {args.count} --changes {args.changes}")
     return 0
 
 
@@ -148,13 +151,12 @@ class Search:
         lines = self._path.read_text().splitlines() if self._path.is_file() else []
         self.rows: list[dict[str, Any]] = [json.loads(line) for line in lines]
 
-    def score(self, what: str, settings: Settings, seeds: int) -> float:
+    def score(self, what: str, settings: Settings, seeds: range) -> None:
         """Score settings, if that has not been done."""
-        for row in self.rows:
-            if row["settings"] == settings and row["seeds"] == seeds:
-                return float(row["score"])
+        if any(row["settings"] == settings and row["seeds"] == list(seeds) for row in self.rows):
+            return
         runs = [
-            [f.run(self.model, Mode.PAPER, 100 * k + seed, settings | NEVER_LOST) for seed in range(seeds)]
+            [f.run(self.model, Mode.PAPER, 100 * k + seed, settings | NEVER_LOST) for seed in seeds]
             for k, f in enumerate(self.footage, 1)
         ]
         ratios = [
@@ -168,39 +170,38 @@ class Search:
             "ratio": float(np.mean(ratios)),
             "lost": lost,
             "roots": [round(float(np.mean([r.root for r in each])), 1) for each in runs],
-            "seeds": seeds,
+            "seeds": list(seeds),
             "settings": settings,
         }
         self.rows.append(row)
         with open(self._path, "a", encoding="utf-8") as file:
             file.write(json.dumps(row) + "\n")
-        return float(row["score"])
 
-    def top(self, seeds: int, count: int) -> list[Settings]:
-        """Return the settings of the lowest scores."""
-        rows = [row for row in self.rows if row["seeds"] == seeds]
-        return [row["settings"] for row in sorted(rows, key=lambda row: row["score"])[:count]]
-
-    def best(self, seeds: int) -> Settings:
-        """Return the settings of the lowest score."""
-        return self.top(seeds, 1)[0]
+    def top(self, seeds: range, count: int) -> list[tuple[str, Settings]]:
+        """Return what was tried and its settings, of the lowest scores."""
+        rows = [row for row in self.rows if row["seeds"] == list(seeds)]
+        rows.sort(key=lambda row: row["score"])
+        return [(row["what"], row["settings"]) for row in rows[:count]]
 
 
-def publish(search: Search, best: Settings) -> None:
+def publish(search: Search, best: Settings, counts: str) -> None:
     """Write the frozen settings, and every score on which they rest."""
     frozen = {name: frozen_value(name, value) for name, value in best.items()}
     rows = [
         [name, symbol, BEFORE[name], frozen[name], low, high] for name, (symbol, low, high) in SPACE.items()
     ]
     columns = ("setting", "in the paper", "before", "frozen", "smallest allowed", "largest allowed")
-    table.publish("search_paper", "What the paper determines empirically", columns, rows, note=about(search))
+    table.publish(
+        "search_paper", "What the paper determines empirically", columns, rows, note=about(search, counts)
+    )
     tried = [
-        [row["what"], row["seeds"], row["score"], row["ratio"], row["lost"], *row["roots"]]
+        [row["what"], len(row["seeds"]), row["score"], row["ratio"], row["lost"], *row["roots"]]
         for row in search.rows
     ]
     columns = ("tried", "seeds", "score", "root / free", "left", *CLIPS)
     free = ["free-running cycle", "-", 1.0, 1.0, "-", *(round(f, 1) for f in search.free)]
-    table.publish("search_paper_runs", "Settings tried", columns, [free, *tried])
+    note = "By [search_paper](search_paper.md), which names command and commit. Errors in mm."
+    table.publish("search_paper_runs", "Settings tried", columns, [free, *tried], note)
 
 
 def frozen_value(name: str, value: float) -> float:
@@ -208,15 +209,16 @@ def frozen_value(name: str, value: float) -> float:
     return _whole(name, float(f"{value:.2g}"))
 
 
-def about(search: Search) -> str:
+def about(search: Search, counts: str) -> str:
     """State how the search was made."""
     people = ", ".join(CLIPS)
-    return f"""{facts("search_paper.py --record")}
+    tried = sum(row["seeds"] == list(FIRST) for row in search.rows)
+    return f"""{facts(f"search_paper.py {counts} --record")}
 
-Frozen as the defaults of paper mode: the best of {len(search.rows) - AGAIN} settings in
+Frozen as the defaults of paper mode: the best of {tried} settings in
 [search_paper_runs](search_paper_runs.md), by the mean over six clips of the root-aligned error over that of
-the free-running cycle plus the share of runs that leave the person; the best by one seed is judged again
-by {SEEDS}.  On these clips, too, the cycle that needs no image is better.
+the free-running cycle plus the share of runs that leave the person. All are tried with one seed, the best
+{AGAIN} again with {len(MORE)} others, which alone decide between them.
 The clips (480 x 360, {FRAMES + 1} frames used) are made by `gait simulate` with the
 gaits of people {people}, who are neither in the model nor in a development clip.  The noise of a pixel (3
 grey levels) is not searched, since only its sum with sigma counts."""
