@@ -10,6 +10,7 @@ import numpy.typing as npt
 
 from gait.bindings.segment_prior import SegmentPrior
 from gait.body.skeleton import JOINTS
+from gait.io.keypoints_file import Keypoints
 from gait.io.track_file import write_lifted
 from gait.io.video import Video
 from gait.lift import picture
@@ -50,6 +51,7 @@ class KeypointLift:
         self.camera = prepared.view.camera if isinstance(prepared.view, Perspective) else None
         self.tools = ("pull", "hide", "swap", *(["pin"] if self.camera else []))
         self._near: Interactive | None = None
+        self._corrected = Edits(), self._prepared.keypoints
         self._names: tuple[str, ...] = ()
 
     @property
@@ -59,7 +61,14 @@ class KeypointLift:
 
     def check(self, edits: Edits) -> None:
         """Refuse corrections of frames and places that do not exist."""
-        pins(corrected(self._prepared.keypoints, edits, 1.0), edits, self.camera, self._prior)
+        pins(self._points(edits), edits, self.camera, self._prior)
+
+    def _points(self, edits: Edits) -> Keypoints:
+        """Keypoints with corrections, which are checked before they are solved."""
+        if self._corrected[0] is not edits:
+            sd = self._prepared.options.pixel_sd
+            self._corrected = edits, corrected(self._prepared.keypoints, edits, sd)
+        return self._corrected[1]
 
     def whole(self, edits: Edits) -> Solved:
         """Lift the keypoints with corrections."""
@@ -99,11 +108,12 @@ class KeypointLift:
         self._names, self._near = lifted.motion.names, None
         if lifted.motion.state is not None:
             known = self._prior, lifted.view, lifted.options, lifted.keypoints.names
-            self._near = Interactive(*known, lifted.motion)
+            with one_thread():
+                self._near = Interactive(*known, lifted.motion)
 
     def near(self, edits: Edits, touched: range) -> Nearby | None:
         """Solve the blocks around what was touched."""
-        keypoints = corrected(self._prepared.keypoints, edits, self._prepared.options.pixel_sd)
+        keypoints = self._points(edits)
         if self._near is None or not set(keypoints.names) <= set(self._names):
             return None
         pinned = pins(keypoints, edits, self.camera, self._prior)

@@ -283,8 +283,8 @@ const span = ({ first, last }) => (first === last ? `@ ${first}` : `${first}–$
 
 // ---- corrections
 
-async function change(path, body = {}) {
-  const begin = performance.now(); // of the release
+/** Do something on the server that began at a time of the page's clock, such as the release of a joint. */
+async function change(path, body = {}, begin = performance.now()) {
   at('saved').textContent = 'saving…';
   const moving = pulled;
   asking += 1;
@@ -322,8 +322,8 @@ const painted = () => new Promise((done) => {
 /** A click is as exact as it can be pointed at on the screen. */
 const exact = () => Math.max(0.5, CLICK / film.picture.scale);
 
-function pull(joint, uv, index = film.index) {
-  return change('/edit', { do: 'pull', frame: frameOf(index), joint: data.joints[joint], uv, sd_px: exact() });
+function pull({ joint, uv, index = film.index }, begin) {
+  return change('/edit', { do: 'pull', frame: frameOf(index), joint: data.joints[joint], uv, sd_px: exact() }, begin);
 }
 
 function nearestJoint(place, allowed = () => true) {
@@ -389,7 +389,7 @@ function press(event) {
   film.redraw();
 }
 
-function release() {
+function release(event) {
   film.picture.canvas.classList.remove('pulling');
   panning = null;
   if (placing) {
@@ -404,7 +404,7 @@ function release() {
     return;
   }
   if (!pulled) return;
-  if (pulled.moved) pull(pulled.joint, pulled.uv);
+  if (pulled.moved) pull(pulled, event.timeStamp);
   else drop();
 }
 
@@ -462,7 +462,7 @@ function nudge(du, dv) {
 function send() {
   clearTimeout(timer);
   timer = 0;
-  if (pulled) pull(pulled.joint, pulled.uv, pulled.index);
+  if (pulled) pull(pulled);
 }
 
 // ---- getting about

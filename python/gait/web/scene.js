@@ -51,17 +51,29 @@ export class Scene {
     this.sized = new ResizeObserver(() => this.#resize());
     this.sized.observe(element);
     this.dark = matchMedia('(prefers-color-scheme: dark)');
-    this.dark.addEventListener('change', (this.recolour = () => this.setData(this.data)));
+    this.dark.addEventListener('change', (this.recolour = () => {
+      this.#build();
+      this.setData(this.data);
+    }));
     this.setData(data);
     this.lookFrom(30);
   }
 
   /** Draw another motion, keeping the view and, if it exists, the frame. */
   setData(data) {
+    const same = this.limbs && [data.bones, data.joints].join() === [this.data.bones, this.data.joints].join();
     this.data = data;
     if (!this.renderer) return;
-    this.#clear(this.figure);
     this.#clear(this.ground);
+    this.#floor();
+    if (!same) this.#build();
+    this.show(Math.min(this.index, data.times.length - 1));
+  }
+
+  /** Make the figure, in the colours of the page. */
+  #build() {
+    const { data } = this;
+    this.#clear(this.figure);
     this.scene.background = new THREE.Color(colour('panel'));
     const solid = (side) => new THREE.MeshStandardMaterial({ color: colour(side), roughness: 0.7 });
     this.makeLimbs = () => ({
@@ -73,8 +85,6 @@ export class Scene {
     const glass = (side) => new THREE.MeshStandardMaterial({
       color: colour(side), transparent: true, opacity: 0.22, depthWrite: false });
     this.clouds = data.sides.map((side) => this.#add(SPHERE, glass(side)));
-    this.#floor();
-    this.show(Math.min(this.index, data.times.length - 1));
   }
 
   /** Append frames: an object with the keys by frame alone. */

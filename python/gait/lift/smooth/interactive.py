@@ -17,7 +17,7 @@ from gait.io.keypoints_file import Keypoints
 from gait.lift.keypoints.corrections import Pins
 from gait.lift.segment.view import View
 from gait.lift.smooth import motion
-from gait.lift.smooth.chain import Around
+from gait.lift.smooth.chain import Around, Prior
 from gait.lift.smooth.motion import Motion
 from gait.lift.smooth.options import Options
 from gait.lift.smooth.smoother import Problem, Start, State
@@ -66,6 +66,7 @@ class Interactive:
     ) -> None:
         assert found.state is not None
         self._prior = prior.restricted(found.names).widened(found.wider)
+        self._chained = Prior(self._prior)
         self._view, self._options, self._state, self._points = view, options, found.state, points
         assert found.uv is not None
         self._places, self._uv = found.places.copy(), found.uv.copy()
@@ -105,8 +106,8 @@ class Interactive:
         observed, freedom = motion.problem_of(self._prior, keypoints, self._view, self._options, pins)
         around, state = self._state.around, self._state
         start = Start(around.heading, around.component, around.stature, state.places, state.lengths)
-        constraints = self._options.contact, self._options.bones
-        return Problem(self._prior, observed, self._view, freedom, start, *constraints)
+        how = {"contact": self._options.contact, "bones": self._options.bones, "chained": self._chained}
+        return Problem(self._prior, observed, self._view, freedom, start, **how)
 
     def _errors(self, problem: Problem, points: tuple[str, ...]) -> Floats:
         """Numbers of the detector's lasting errors, of other points than before."""

@@ -256,9 +256,10 @@ class Problem:
         contact: bool = False,
         bones: bool = False,
         balance: bool = False,
+        chained: Prior | None = None,
     ) -> None:
         self.prior, self.visible, self.view, self.freedom = prior, observed, view, freedom
-        self._chained = Prior(prior)
+        self._chained = Prior(prior) if chained is None else chained
         self.contact, self.bones, self.balance = contact, bones, balance
         self.points = observed.points
         self.grid = Grid.over(observed.time, prior)
