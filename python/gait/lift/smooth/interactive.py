@@ -106,8 +106,9 @@ class Interactive:
         observed, freedom = motion.problem_of(self._prior, keypoints, self._view, self._options, pins)
         around, state = self._state.around, self._state
         start = Start(around.heading, around.component, around.stature, state.places, state.lengths)
-        how = {"contact": self._options.contact, "bones": self._options.bones, "chained": self._chained}
-        return Problem(self._prior, observed, self._view, freedom, start, **how)
+        constraints = self._options.contact, self._options.bones
+        known = self._chained
+        return Problem(self._prior, observed, self._view, freedom, start, *constraints, chained=known)
 
     def _errors(self, problem: Problem, points: tuple[str, ...]) -> Floats:
         """Numbers of the detector's lasting errors, of other points than before."""
