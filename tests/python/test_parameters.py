@@ -6,6 +6,7 @@ from itertools import pairwise
 import numpy as np
 import pytest
 from drawn_person import DATA
+from scipy.signal import find_peaks
 from walking_track import STANCE, STEP, walking_track
 
 from gait import Model, UserError
@@ -14,7 +15,7 @@ from gait.body.model_curves import ModelCurves
 from gait.io import blob
 from gait.io.fields import read_json
 from gait.io.track_file import read_truth
-from gait.motion.footfalls import SIDES, Draws, find_events, stride_time, strikes_from_meta
+from gait.motion.footfalls import SIDES, Draws, find_events, maxima, stride_time, strikes_from_meta
 from gait.motion.parameters import QUANTITIES, angle_cycles, measure
 from gait.motion.verdict import verdict_of
 
@@ -37,6 +38,13 @@ def drawn(track, count=60, late=0.02, seed=0):
     angles = np.zeros((count, len(track.time), MODEL.info.angles), np.float32)
     phase = np.zeros((count, len(track.time)), np.float32)
     return Draws(track.frame, track.time, names, MODEL.angle_names, joints, angles, phase)
+
+
+@pytest.mark.parametrize(("least", "apart"), [(-1.0, 1), (0.5, 4), (0.0, 9)])
+def test_maxima_are_those_of_scipy(least, apart):
+    values = np.random.default_rng(3).normal(size=400)
+    values[100:103] = 9.0
+    np.testing.assert_array_equal(maxima(values, least, apart), find_peaks(values, least, distance=apart)[0])
 
 
 def test_a_walk_by_rule_has_its_own_parameters():

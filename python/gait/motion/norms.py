@@ -9,11 +9,11 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass
+from statistics import NormalDist
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.special import ndtr
 
 from gait.body.model_curves import curves
 from gait.body.skeleton import points
@@ -43,6 +43,7 @@ _PEOPLE = 40
 _STRIDES, _SAMPLES = 3.4, 48  # strides that each walks, and frames of a stride
 _RANGE = 2.0  # standard deviations of the norm within which a value is inside
 _SURE, _LIKELY, _POSSIBLE = 0.95, 0.5, 0.05  # probabilities
+_cdf = NormalDist().cdf  # SciPy takes longer to load than all else here
 
 
 @dataclass(frozen=True)
@@ -61,13 +62,13 @@ class Compared:
     def outside(self) -> float:
         """Probability that the true value is outside two standard deviations of the norm, either way."""
         low, high = self._ends
-        return float(ndtr(low) + 1 - ndtr(high))
+        return _cdf(low) + 1 - _cdf(high)
 
     @property
     def words(self) -> str:
         """State whether it is inside, and how sure that is."""
         low, high = self._ends
-        below, above = float(ndtr(low)), float(1 - ndtr(high))
+        below, above = _cdf(low), 1 - _cdf(high)
         share, way = max((below, "below"), (above, "above"))
         if self.outside < _POSSIBLE:
             return "inside"

@@ -163,13 +163,11 @@ def _warped(track: Track, random: np.random.Generator) -> dict[str, Array]:
 
 def _wander(time: Array, count: int, random: np.random.Generator) -> Array:
     """Smooth noise (n, count) of unit variance."""
-    from scipy.ndimage import gaussian_filter1d  # slow to load
-
     width = max(_SECONDS / float(np.median(np.diff(time))), 0.1)
-    noise = gaussian_filter1d(random.standard_normal((len(time), count)), width, axis=0, mode="reflect")
-    unit = np.zeros(8 * int(np.ceil(width)) + 1)
-    unit[len(unit) // 2] = 1.0
-    return np.asarray(noise / np.linalg.norm(gaussian_filter1d(unit, width)))
+    reach = int(4 * width + 0.5)
+    bell = np.exp(-0.5 * (np.arange(-reach, reach + 1) / width) ** 2)
+    noise = np.pad(random.standard_normal((len(time), count)), ((reach, reach), (0, 0)), "symmetric")
+    return np.apply_along_axis(np.convolve, 0, noise, bell / np.linalg.norm(bell), "valid")
 
 
 def _event_sd(found: list[Events], unknown: bool = False) -> Events:
