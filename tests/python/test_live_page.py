@@ -96,8 +96,9 @@ def test_pause_holds_the_page(live, reports):
 def test_several_people_have_numbers_and_figures_of_their_own(reports, tmp_path, monkeypatch):
     browser.chromium()
     monkeypatch.setenv("GAIT_WEB", str(browser.FETCHED))
-    live = Page(0, [0], private_url(), tmp_path, people=2)
-    live.begin(lambda: reports[2].page_data() | {"people": ["udpm://a", "udpm://b"]})
+    url, people = private_url(), [private_url(), private_url()]
+    live = Page(0, [0], url, tmp_path, people)
+    live.begin(lambda: reports[2].page_data() | {"people": people})
     try:
         with browser.opened() as page:
             page.goto(live.address)

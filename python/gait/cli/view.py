@@ -89,7 +89,7 @@ def _serve(
     from gait.live.server import Page
 
     people = args.person or [url]
-    page = Page(args.port, streams, url, args.record_to, len(people))
+    page = Page(args.port, streams, url, args.record_to, people)
     try:
         feed = Feed(
             url, streams, model, cameras, page.show, page.report, args.scale_camera, page.watched, people

@@ -1,88 +1,102 @@
-"""All messages of a URL into an LCM log, from one press of a button to the next."""
+"""All messages of some URLs into LCM logs, from one press of a button to the next."""
 
 from __future__ import annotations
 
 import threading
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
+from functools import partial
 from pathlib import Path
 
 from gait.errors import UserError
-from gait.lcm.link import LogWriter, now, open_lcm
+from gait.lcm.link import LogWriter, is_log, now, open_lcm, waiting
 
-_TURN_MS = 100
+_TURN = 0.1  # seconds
 _WAITING = 1000  # messages
 _OWN = "LCM_SELF_TEST"  # of LCM itself, when a program connects
 
 
 class Recording:
-    """A log that is being written, in a thread with a connection of its own.
+    """Logs that are being written, one for each URL, in a thread with connections of its own.
 
     Parameters
     ----------
     url : str
+        From which frames come.
+    people : sequence of str
+        URLs on which trackers answer, one for each person; those that are `url` have no log of their own.
     folder : path
-        Gets ``gait-DATE-TIME.log``; a file that exists is not touched.
+        Gets ``gait-DATE-TIME.log`` and, for each further URL, ``gait-DATE-TIME-person-2.log``; a file that
+        exists is not touched.
     failed : callable
-        Called in the recording's thread when the log cannot be written; it has ended then.
+        Called in the recording's thread when a log cannot be written; all have ended then.
 
     Attributes
     ----------
-    path : Path
+    paths : list of Path
     fault : str or None
-        Why the log is not complete.
+        Why the logs are not complete.
 
     Raises
     ------
     UserError
-        If the file cannot be made.
+        If a file cannot be made, or the URL is a log already.
     """
 
-    def __init__(self, url: str, folder: str | Path, failed: Callable[[], None]) -> None:
-        self.path = _unused(Path(folder))
+    def __init__(
+        self, url: str, people: Sequence[str], folder: str | Path, failed: Callable[[], None]
+    ) -> None:
+        if is_log(url):
+            raise UserError(f"{url}: is a log already; copy the file")
+        further = {name: f"-person-{k}" for k, name in enumerate(people, 1) if name != url}
+        self.paths = _unused(Path(folder), ["", *further.values()])
         self.fault: str | None = None
         self._failed = failed
-        self._log = LogWriter(self.path, "w")
-        self._lcm = open_lcm(url)
-        self._lcm.subscribe(".*", self._write).set_queue_capacity(_WAITING)
+        self._links, self._logs = [], [LogWriter(path, "w") for path in self.paths]
+        for name, log in zip([url, *further], self._logs, strict=True):
+            self._links.append(open_lcm(name))
+            self._links[-1].subscribe(".*", partial(self._write, log)).set_queue_capacity(_WAITING)
         self._end = threading.Event()
         self._thread = threading.Thread(target=self._run, daemon=True)
         self._thread.start()
 
     def _run(self) -> None:
         while not self._end.is_set() and self.fault is None:
-            self._lcm.handle_timeout(_TURN_MS)
+            for link in waiting(self._links, _TURN):
+                link.handle()
         if self.fault is not None:
             self._failed()
 
-    def _write(self, channel: str, data: bytes) -> None:
+    def _write(self, log: LogWriter, channel: str, data: bytes) -> None:
         if channel == _OWN:
             return
         try:
-            self._log.write(now(), channel, data)
+            log.write(now(), channel, data)
         except UserError as error:
             self.fault = str(error)
 
     def end(self) -> None:
-        """Write what waits, and close the log."""
+        """Write what waits, and close the logs."""
         self._end.set()
         self._thread.join()
-        try:
-            self._log.close()
-        except UserError as error:
-            self.fault = self.fault or str(error)
+        for log in self._logs:
+            try:
+                log.close()
+            except UserError as error:
+                self.fault = self.fault or str(error)
 
 
-def _unused(folder: Path) -> Path:
-    """Make an empty file of a name that no file has."""
+def _unused(folder: Path, endings: Sequence[str]) -> list[Path]:
+    """Make empty files of names that no file has, one for each ending."""
     stem = time.strftime("gait-%Y%m%d-%H%M%S")
     for k in range(100):
-        path = folder / f"{stem}{f'-{k}' if k else ''}.log"
+        paths = [folder / f"{stem}{f'-{k}' if k else ''}{ending}.log" for ending in endings]
         try:
-            path.open("xb").close()
+            for path in paths:
+                path.open("xb").close()
         except FileExistsError:
             continue
         except OSError as error:
             raise UserError(f"{path}: cannot be made: {error.strerror}") from None
-        return path
+        return paths
     raise UserError(f"{folder}: has all names of logs of this second")

@@ -34,7 +34,7 @@ def _picture(stream: int) -> str:
 
 
 def _described(recording: Recording) -> dict[str, Any]:
-    return {"path": str(recording.path), "fault": recording.fault}
+    return {"path": ", ".join(map(str, recording.paths)), "fault": recording.fault}
 
 
 class Hub:
@@ -89,11 +89,11 @@ class Page:
     streams : sequence of int
         Numbers of the cameras.
     url : str
-        Of LCM, which a recording listens to.
+        Of LCM, from which frames come; recorded.
     folder : path
         Gets the recordings.
-    people : int
-        Whose estimates are shown.
+    people : sequence of str
+        URLs on which the trackers answer whose estimates are shown; recorded. `url` if left out.
 
     Attributes
     ----------
@@ -102,13 +102,14 @@ class Page:
     """
 
     def __init__(
-        self, port: int, streams: Sequence[int], url: str, folder: str | Path, people: int = 1
+        self, port: int, streams: Sequence[int], url: str, folder: str | Path, people: Sequence[str] = ()
     ) -> None:
         self._streams, self._url, self._folder = tuple(streams), url, folder
+        self._people = tuple(people) or (url,)
         self.hub = Hub()
         self._data: Callable[[], dict[str, Any]] = dict
         self._recording: Recording | None = None
-        self._topics = [f"{topic} {k}" for topic in ("sample", "health") for k in range(people)]
+        self._topics = [f"{topic} {k}" for topic in ("sample", "health") for k in range(len(self._people))]
         self._topics += ["recording", *map(_picture, streams)]
         self._pictures: dict[int, Image] = {}
         self._jpeg: dict[int, tuple[int, bytes]] = {}
@@ -167,7 +168,7 @@ class Page:
         ended = self._recording
         if on and ended is None:
             try:
-                self._recording = Recording(self._url, self._folder, self._report_recording)
+                self._recording = Recording(self._url, self._people, self._folder, self._report_recording)
             except UserError as error:
                 return JSONResponse({"error": str(error)}, 409)
         elif not on and ended is not None:
