@@ -248,6 +248,22 @@ MUTANTS = (
     ),
     Mutant(
         "O 7",
+        "a rate beyond the range of walking is held at its end, not reflected",
+        "libgait/src/filter/dynamics.h",
+        "m_select(m_less(x, lo), 2.0f * lo - x, m_select(m_less(hi, x), 2.0f * hi - x, x));",
+        "x;",
+        "test_dynamics",
+    ),
+    Mutant(
+        "O 7",
+        "a rate above the range of walking is reflected at the lower end",
+        "libgait/src/filter/dynamics.h",
+        "2.0f * hi - x",
+        "2.0f * lo - x",
+        "test_dynamics",
+    ),
+    Mutant(
+        "O 7",
         "the rate has no noise",
         "libgait/src/filter/dynamics_kernel.c",
         "+ s->rate.noise * n[1][lane];",
