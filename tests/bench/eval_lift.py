@@ -15,6 +15,7 @@ import parts
 PARTS = (
     "lift_mocap.py",
     "lift_modes.py",
+    "lift_mixture.py",
     "lift_volume.py",
     "lift_directions.py",
     "lift_tracks.py",

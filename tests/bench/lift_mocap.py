@@ -101,19 +101,22 @@ def main() -> int:
     return any("NO" in row for row in [*rows, *missing])
 
 
-def learnt_without(file: Path, model: Path, sources: tuple[str, ...], modes: int = 50) -> SegmentPrior:
+def learnt_without(
+    file: Path, model: Path, sources: tuple[str, ...], modes: int = 50, mixture: str = "1"
+) -> SegmentPrior:
     """Prior of all recordings of folders but those of a file's subject, whose folder it is in."""
     out = f"{file.parent.name}/*"
     command = ["learn", *(str(MOCAP / source) for source in sources), "--segments", "only"]
-    command += ["--exclude", out, "--segment-modes", str(modes), "-o", str(model), "--jobs", "1", "--quiet"]
+    command += ["--exclude", out, "--segment-modes", str(modes), "--segment-mixture", mixture]
+    command += ["-o", str(model), "--jobs", "1", "--quiet"]
     subprocess.run([sys.executable, "-m", "gait", *command], check=True, stdout=subprocess.DEVNULL)
     return SegmentPrior.load(model)
 
 
-def held_out(file: str, folder: Path, modes: int) -> HeldOut:
+def held_out(file: str, folder: Path, modes: int, mixture: str = "1") -> HeldOut:
     """Learn what is beside a sequence, and cut the sequence into segments placed as in the prior."""
     path, wanted, model = MOCAP / file, SegmentOptions(source="only", people=False), folder / "m.gait"
-    prior = learnt_without(path, model, (file.split("/")[0],), modes)
+    prior = learnt_without(path, model, (file.split("/")[0],), modes, mixture)
     motion = segment_motion.of(path, readers.read(path), wanted)
     with Corpus() as corpus:
         corpus.put(path.stem, path.parent.name, path, motion)
