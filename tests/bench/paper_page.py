@@ -40,7 +40,8 @@ def seven() -> str:
     with open(table.RESULTS / "paper_mode.csv", newline="", encoding="utf-8") as file:
         rows = list(csv.DictReader(file))
     return "; ".join(
-        f"{row['clip']} in {row['held']} runs"
+        f"{row['clip']} in {row['held']} runs (reported as lost: {row['lost, left']} that leave, "
+        f"{row['lost, held']} that hold)"
         + (
             f", {row['root mm']} against {row['free mm']} mm"
             if row["root mm"]

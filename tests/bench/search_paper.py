@@ -2,6 +2,7 @@
 """Find what Ormoneit and others (2000) call empirically determined, on simulated clips.
 
     search_paper.py [--folder build/search_paper] [--count 7] [--changes 20] [--record]
+    search_paper.py --lost [--record]
 
 The clips are made by `gait simulate` (no development clip is looked at).  The first settings are those
 before the search, the second a guess from pictures of the likelihood; more are drawn at random, evenly in
@@ -9,6 +10,8 @@ their logarithms. Then the best ones are changed at random in half of their sett
 the mean over clips of its root-aligned error over that of the mean cycle running free from the true start
 (at most 3), plus the share of runs that leave the person.  One seed each; the best ones are judged again by
 others.  Results are kept in the folder; a run goes on where the last one ended.
+
+--lost chooses, with the settings of paper mode as they are, from when on a person counts as lost.
 """
 
 from __future__ import annotations
@@ -29,6 +32,7 @@ from paper_runs import Footage
 
 from gait import Mode, Model
 from gait.paper import ladder
+from gait.paper.scene import reported
 from gait.paper.tracking import FRAMES
 from gait.progress import progress
 from gait.simulate.clip import simulate
@@ -76,6 +80,7 @@ KEPT = 3  # settings that are changed in turn
 SPREAD = 0.6  # sd of the logarithm of a factor
 FIRST, MORE = range(1), range(1, 4)  # seeds of all settings, and of the best
 NEVER_LOST = {"stayed_nats": 0.0}
+THRESHOLDS = (1.0, 1.5, 2.5, 5.0)  # of stayed_nats; 5 is that before the search
 
 Settings = dict[str, float]
 
@@ -88,9 +93,13 @@ def main() -> int:
     parser.add_argument("--folder", type=Path, default=FOLDER)
     parser.add_argument("--count", type=int, default=7, help="settings drawn at random")
     parser.add_argument("--changes", type=int, default=20, help="changes of the best")
+    parser.add_argument("--lost", action="store_true", help="choose from when on a person counts as lost")
     parser.add_argument("--record", action="store_true", help="publish the table")
     args = parser.parse_args()
     search = Search(args.folder)
+    if args.lost:
+        lost(search, args.record)
+        return 0
     with progress("search", args.count) as update:
         for k in range(args.count):
             search.score(("before", "guess")[k] if k < 2 else f"random {k}", drawn(k), FIRST)
@@ -202,6 +211,30 @@ def publish(search: Search, best: Settings, counts: str) -> None:
     free = ["free-running cycle", "-", 1.0, 1.0, "-", *(round(f, 1) for f in search.free)]
     note = "By [search_paper](search_paper.md), which names command and commit. Errors in mm."
     table.publish("search_paper_runs", "Settings tried", columns, [free, *tried], note)
+
+
+def lost(search: Search, record: bool) -> None:
+    """Show, by threshold, how often a run is reported as lost that leaves the person, and that does not."""
+    rows = list[list[Any]]()
+    with progress("thresholds", len(THRESHOLDS)) as update:
+        for nats in THRESHOLDS:
+            runs = [
+                f.run(search.model, Mode.PAPER, 100 * k + seed, {"stayed_nats": nats})
+                for k, f in enumerate(search.footage, 1)
+                for seed in MORE
+            ]
+            shares = [np.mean([r.lost > 0 for r in runs if r.held == held] or [0]) for held in (False, True)]
+            rows.append([nats, reported(runs, False), reported(runs, True), float(shares[0] - shares[1])])
+            update(len(rows))
+    best = max(rows, key=lambda row: (row[-1], row[0]))[0]
+    note = f"""{facts("search_paper.py --lost --record")}
+
+Of the runs that leave the person, and of those that hold it, how many are reported as lost in some frame, by
+stayed_nats; on the clips of [search_paper](search_paper.md), {len(MORE)} seeds each. Chosen: the largest
+difference of the two shares, {best:g}."""
+    write = table.publish if record else lambda name, *rest, note="": table.show(*rest)
+    columns = ("stayed_nats", "lost of those that leave", "lost of those that hold", "difference of shares")
+    write("search_paper_lost", "From when on a person counts as lost", columns, rows, note=note)
 
 
 def frozen_value(name: str, value: float) -> float:

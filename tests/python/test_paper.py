@@ -103,19 +103,19 @@ def test_paper_mode_has_the_values_that_the_search_froze():
 
 def test_the_ladder_goes_from_the_paper_to_the_default_and_adds_one_thing_a_rung():
     unsearched, first, *rungs = ladder.RUNGS
-    assert first.mode == unsearched.mode == Mode.PAPER and not first.changes and not first.people
-    assert rungs[-1].mode == Mode.DEFAULT and not rungs[-1].changes and rungs[-1].people
+    assert first.mode == unsearched.mode == Mode.PAPER and not first.changes and first.model == "paper"
+    assert rungs[-1].mode == Mode.DEFAULT and not rungs[-1].changes and rungs[-1].model == "people"
     off = [len(rung.changes) for rung in rungs if rung.mode == Mode.DEFAULT]
     assert off == sorted(off, reverse=True)
     terms = [TrackerConfig.default(rung.mode, **rung.changes).terms for rung in rungs]
     assert terms[0] == Term.TEXTURE and terms[-1] == TrackerConfig.default().terms
     assert all(a & b == a for a, b in itertools.pairwise(terms))
-    without = {ladder.STATIC: 80.0, ladder.FREE[False]: 50.0, ladder.FREE[True]: 40.0}
+    without = {ladder.STATIC: 80.0, ladder.FREE["paper"]: 50.0, ladder.FREE["people"]: 40.0}
     tracked = {rung.name: 60.0 - k for k, rung in enumerate(ladder.RUNGS)}
     axes = ladder.plot(without | tracked).axes[0]
     assert [bar.get_width() for bar in axes.patches] == [*without.values(), *tracked.values()]
     free = [line.get_xdata()[0] for line in axes.lines]  # of the rung's own model, without any image
-    assert free == [40.0 if rung.people else 50.0 for rung in ladder.RUNGS]
+    assert free == [50.0 if rung.model == "paper" else 40.0 for rung in ladder.RUNGS]
 
 
 def test_the_page_holds_every_figure_and_needs_no_other_file(walks, tmp_path, monkeypatch, capsys):

@@ -15,7 +15,7 @@ from gait.bindings.config import TrackerConfig
 from gait.bindings.estimate import Estimate
 from gait.bindings.initial import Start
 from gait.bindings.model import Model
-from gait.io.blob import decode
+from gait.io.blob import decode, encode, unpack_names
 from gait.motion.evaluate import stature
 from gait.paper import freeze, preference, tracking, verdicts
 from gait.paper.entry import Entry, picture, table
@@ -23,7 +23,7 @@ from gait.paper.freeze import Freeze
 from gait.paper.ormoneit import Learning
 from gait.paper.ormoneit_figures import blob_of
 from gait.paper.preference import Probe, Row
-from gait.paper.scene import Scene, follow
+from gait.paper.scene import Run, Scene, follow, reported
 from gait.report.figures import Drawing
 
 SEED, SEEDS = 1, 10  # of the rungs; runs of the paper's filter in each view
@@ -33,8 +33,8 @@ CAPTION = (
     "the rung's own model, from the exact truth, where the rungs start with the error of a start."
 )
 STATIC = "static pose"
-FREE = {False: "free-running cycle, the paper's model", True: "free-running cycle, model of people"}
-PRIORS = {False: "paper", True: "people"}  # by `Rung.people`
+_FREE = "free-running cycle, the paper's model", "free-running cycle, model of people"
+FREE = {"paper": _FREE[0], "people": _FREE[1], "plain": _FREE[1]}  # by `Rung.model`
 #: What is added in later steps, off: settings of the default mode.
 _WITHOUT: dict[str, Any] = {
     "evidence_time": 0.0,
@@ -62,13 +62,32 @@ UNSEARCHED: dict[str, Any] = {
 }
 
 
+#: Settings of the dynamics, and of the spread of a start, which differ between the modes.
+_DYNAMICS = (
+    "phase_noise",
+    "rate_noise",
+    "rate_time",
+    "forward_noise",
+    "lateral_noise",
+    "vertical_noise",
+    "heading_noise",
+    "turn_sd",
+    "turn_time",
+    "tilt_noise",
+    "tilt_time",
+    "coef_noise",
+    "coef_time",
+    "coef_start",
+)
+
+
 @dataclass(frozen=True)
 class Rung:
     """A way of tracking: one addition to the one before."""
 
     name: str
     mode: Mode
-    people: bool  #: the model is of people, not the paper's
+    model: str  #: "paper"; "people"; "plain": of people, whose pelvis goes evenly ahead, as the paper's does
     changes: dict[str, Any] = field(default_factory=dict)
 
 
@@ -77,21 +96,29 @@ def _default(terms: Term, *added: str) -> dict[str, Any]:
     return {"terms": terms} | {k: v for k, v in _WITHOUT.items() if k not in added}
 
 
+def _relaxing() -> dict[str, Any]:
+    """Return the default's dynamics."""
+    usual = TrackerConfig.default()
+    return {name: getattr(usual, name) for name in _DYNAMICS}
+
+
 _ALL = Term.TEXTURE | Term.SILHOUETTE | Term.EDGES | Term.TEMPLATE
+_LATER = "evidence_time", "rejuvenation_time", "offset_angles", "stature_noise", "stature_noise_start"
 RUNGS = (
-    Rung("paper, sigmas by hand", Mode.PAPER, False, UNSEARCHED),
-    Rung("paper", Mode.PAPER, False),
-    Rung("+ prior over people", Mode.PAPER, True),
-    Rung("+ robust texture, dynamics that relax, root motion", Mode.DEFAULT, True, _default(Term.TEXTURE)),
-    Rung("+ silhouette", Mode.DEFAULT, True, _default(Term.TEXTURE | Term.SILHOUETTE)),
-    Rung("+ edges", Mode.DEFAULT, True, _default(Term.TEXTURE | Term.SILHOUETTE | Term.EDGES)),
-    Rung("+ template", Mode.DEFAULT, True, _default(_ALL)),
-    Rung("+ errors that last (evidence_time)", Mode.DEFAULT, True, _default(_ALL, "evidence_time")),
-    Rung(
-        "+ rejuvenation, posture, stature, more particles at first: the default",
-        Mode.DEFAULT,
-        True,
-    ),
+    Rung("paper, sigmas by hand", Mode.PAPER, "paper", UNSEARCHED),
+    Rung("paper", Mode.PAPER, "paper"),
+    Rung("+ prior over people", Mode.PAPER, "people"),
+    Rung("+ dynamics that relax", Mode.PAPER, "people", _relaxing()),
+    Rung("+ robust texture", Mode.DEFAULT, "plain", _default(Term.TEXTURE)),
+    Rung("+ root motion", Mode.DEFAULT, "people", _default(Term.TEXTURE)),
+    Rung("+ silhouette", Mode.DEFAULT, "people", _default(Term.TEXTURE | Term.SILHOUETTE)),
+    Rung("+ edges", Mode.DEFAULT, "people", _default(Term.TEXTURE | Term.SILHOUETTE | Term.EDGES)),
+    Rung("+ template", Mode.DEFAULT, "people", _default(_ALL)),
+    Rung("+ errors that last (evidence_time)", Mode.DEFAULT, "people", _default(_ALL, *_LATER[:1])),
+    Rung("+ rejuvenation", Mode.DEFAULT, "people", _default(_ALL, *_LATER[:2])),
+    Rung("+ posture", Mode.DEFAULT, "people", _default(_ALL, *_LATER[:3])),
+    Rung("+ stature", Mode.DEFAULT, "people", _default(_ALL, *_LATER)),
+    Rung("+ more particles at first: the default", Mode.DEFAULT, "people"),
 )
 PAPER = RUNGS[1]
 
@@ -99,6 +126,20 @@ PAPER = RUNGS[1]
 def config_of(rung: Rung, seed: int) -> TrackerConfig:
     """Return the settings of a rung."""
     return TrackerConfig.default(rung.mode, seed=seed, **rung.changes)
+
+
+def models(blobs: dict[str, bytes]) -> dict[str, Model]:
+    """Return the models of the rungs, of those of the paper and of people."""
+    sections = dict(decode(blobs["people"]))
+    names, curves = unpack_names(sections["CHNM"]), np.array(sections["CURV"])
+    for name in ("root_forward", "root_sway", "root_height"):
+        channel = curves[:, :, names.index(name)]
+        channel[1:] = 0.0
+        channel[0] = channel[0].mean()
+    sections.pop("PACE", None)
+    return {
+        name: Model(each) for name, each in (blobs | {"plain": encode(sections | {"CURV": curves})}).items()
+    }
 
 
 @dataclass(frozen=True)
@@ -109,6 +150,7 @@ class Climbed:
     rungs: dict[str, list[float]]  #: error in each view, by rung and for what needs no image
     held: list[int]  #: of SEEDS runs in paper mode, in each view
     paper: list[float]  #: their median error in each view
+    lost: tuple[str, str]  #: of those that leave the person, and that hold it: how many are reported as lost
     preferred: list[tuple[list[Row], list[Row]]]  #: log-likelihoods by theirs and by ours in each view
     frozen: list[Freeze]  #: which term prefers rest, in each view
     farthest: tuple[int, int, list[Estimate]]  #: view and seed of the run that ends farthest off, and the run
@@ -116,7 +158,7 @@ class Climbed:
     @property
     def free(self) -> list[float]:
         """Error of the paper's mean cycle running free in each view."""
-        return self.rungs[FREE[False]]
+        return self.rungs[FREE["paper"]]
 
 
 def climb(scenes: Sequence[tuple[Scene, str]], learning: Learning, update: Callable[[int], None]) -> Climbed:
@@ -126,15 +168,15 @@ def climb(scenes: Sequence[tuple[Scene, str]], learning: Learning, update: Calla
         Views with the init files of their starts.
     """
     blobs = {p: blob_of(m, p) for p, m in (("paper", learning.literal), ("people", learning.ours))}
-    models = {p: Model(each) for p, each in blobs.items()}
+    known = models(blobs)
     base = {p: [scene.baselines(decode(each)) for scene, _ in scenes] for p, each in blobs.items()}
     rungs = {STATIC: [each["static"] for each in base["people"]]}
-    rungs |= {FREE[people]: [each["free"] for each in base[prior]] for people, prior in PRIORS.items()}
+    rungs |= {FREE[prior]: [each["free"] for each in found] for prior, found in base.items()}
     done = 0
 
     def followed(rung: Rung, scene: Scene, init: str, seed: int) -> list[Estimate]:
         nonlocal done
-        model = models[PRIORS[rung.people]]
+        model = known[rung.model]
         start = Start.read(init, model)
         found = follow(model, scene.camera, scene.plate, config_of(rung, seed), start, scene.frames)
         update(done := done + 1)
@@ -143,9 +185,11 @@ def climb(scenes: Sequence[tuple[Scene, str]], learning: Learning, update: Calla
     for rung in RUNGS:
         rungs[rung.name] = [scene.judged(followed(rung, scene, init, SEED)).root for scene, init in scenes]
     held, paper, far = list[int](), list[float](), list[tuple[float, int, int, list[Estimate]]]()
+    every = list[Run]()
     for k, (scene, init) in enumerate(scenes):
         found = [followed(PAPER, scene, init, seed) for seed in range(1, SEEDS + 1)]
         runs = [scene.judged(each) for each in found]
+        every += runs
         held.append(sum(r.held for r in runs))
         paper.append(float(np.median([r.root for r in runs])))
         worst = max(range(SEEDS), key=lambda i: runs[i].last)
@@ -153,15 +197,14 @@ def climb(scenes: Sequence[tuple[Scene, str]], learning: Learning, update: Calla
     sizes = {p: [stature(decode(each), scene.truth) for scene, _ in scenes] for p, each in blobs.items()}
 
     def prefers(k: int, prior: str, mode: Mode) -> list[Row]:
-        return Probe(scenes[k][0], models[prior], preference.config(mode), sizes[prior][k]).table()
+        return Probe(scenes[k][0], known[prior], preference.config(mode), sizes[prior][k]).table()
 
     views = range(len(scenes))
     preferred = [(prefers(k, "paper", Mode.PAPER), prefers(k, "people", Mode.DEFAULT)) for k in views]
-    frozen = [
-        freeze.examine(scenes[k][0], models["paper"], sizes["paper"][k], preferred[k][0]) for k in views
-    ]
+    frozen = [freeze.examine(scenes[k][0], known["paper"], sizes["paper"][k], preferred[k][0]) for k in views]
     farthest = max(far, key=lambda each: each[0])[1:]
-    return Climbed([scene for scene, _ in scenes], rungs, held, paper, preferred, frozen, farthest)
+    lost = reported(every, held=False), reported(every, held=True)
+    return Climbed([scene for scene, _ in scenes], rungs, held, paper, lost, preferred, frozen, farthest)
 
 
 def steps(views: int) -> int:
@@ -204,7 +247,8 @@ def _reach(found: Climbed) -> Entry:
     return Entry(
         "Eqs. 10 to 13: what the likelihood reaches",
         "A walking person is held for 50 frames, with drift where limbs hide each other, and recovery.",
-        f"Rendered walks by view, frames 0 to {tracking.FRAMES}, root-aligned, medians. {each}. By so "
+        f"Rendered walks by view, frames 0 to {tracking.FRAMES}, root-aligned, medians. {each}. Reported as "
+        f"lost: {found.lost[0]} runs that leave the person, {found.lost[1]} that hold it. By so "
         f"many nats a frame the best still body on the background beats the true one: {'; '.join(terms)}.",
         "Silhouette, edges and a template compare with the background, too; the ladder has the errors.",
         f"{verdicts.held(found.held, SEEDS, found.paper, found.free)}; {verdicts.at_rest(gains)}",
@@ -227,7 +271,7 @@ def _reach(found: Climbed) -> Entry:
 
 def own_free(errors: dict[str, float], rung: Rung) -> float:
     """Return the error of the free-running cycle of a rung's own model."""
-    return errors[FREE[rung.people]]
+    return errors[FREE[rung.model]]
 
 
 def _ladder(found: Climbed) -> Entry:
@@ -271,13 +315,13 @@ def plot(errors: dict[str, float], spread: dict[str, tuple[float, float]] | None
 
     spread : smallest and largest error of each rung.
     """
-    own = {rung.name: own_free(errors, rung) for rung in RUNGS if FREE[rung.people] in errors}
+    own = {rung.name: own_free(errors, rung) for rung in RUNGS if FREE[rung.model] in errors}
     with matplotlib.rc_context({"font.size": 9}):
         figure = Figure(figsize=(8.0, 0.32 * len(errors) + 1.0), layout="constrained")
         axes = figure.subplots()
         names = list(errors)
         values = [errors[name] for name in names]
-        colours = ["#b8b8b8" if name in (STATIC, *FREE.values()) else "#2a6f97" for name in names]
+        colours = ["#b8b8b8" if name in (STATIC, *_FREE) else "#2a6f97" for name in names]
         axes.barh(range(len(names)), values, color=colours)
         for k, name in enumerate(names):
             low, high = (spread or {}).get(name, (values[k], values[k]))

@@ -103,6 +103,12 @@ def share_lost(found: Sequence[Estimate]) -> float:
     return float(np.mean([e.status == TrackStatus.LOST for e in found]))
 
 
+def reported(runs: Sequence[Run], held: bool) -> str:
+    """Return in how many of the runs that hold the person, or leave it, some frame is reported as lost."""
+    chosen = [run for run in runs if run.held == held]
+    return f"{sum(run.lost > 0 for run in chosen)} of {len(chosen)}"
+
+
 def follow(
     model: Model,
     camera: Camera,
