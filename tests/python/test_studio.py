@@ -320,10 +320,11 @@ def test_pictures_are_corrected_as_the_batch_command_does(clip):
     folder, truth = clip
     here = folder / "pictures/clip"
     shutil.copytree(folder / "clip", here, ignore=shutil.ignore_patterns("*.studio"))
-    server = Server(folder / "pictures", "--placement", "clip/init.json", "--background", "none")
+    words = ["--placement", "clip/init.json", "--background", "none", "--stop", "60"]
+    server = Server(folder / "pictures", *words)
     target = (truth[20, JOINTS.index("l_ankle")] + [6.0, 0.0]).tolist()
     state = json.loads(get(server.url, "state"))
-    assert set(state["tools"]) == {"pull", "start"} and state["proposals"]
+    assert set(state["without"]) == {"hide", "pin", "swap"} and state["proposals"]
     joint = state["joints"].index("l_ankle")
     before = math.dist(state["uv"][20][joint], target)
     pull = {"do": "pull", "frame": 20, "joint": "l_ankle", "uv": target, "sd_px": 1.0}
@@ -334,7 +335,7 @@ def test_pictures_are_corrected_as_the_batch_command_does(clip):
     assert math.dist(state["uv"][20][joint], target) < 0.5 * before and state["fault"] == ""
     exported = get(server.url, "export/csv")
     (folder / "overlay.mp4").write_bytes(get(server.url, "export/mp4"))
-    assert Video(folder / "overlay.mp4").count == FRAMES
+    assert Video(folder / "overlay.mp4").count == 60
     assert server.end(signal.SIGINT) == 0
     words = state["command"].replace("motion.csv", "batch.csv").split()[1:]
     command = [sys.executable, "-m", "gait", *words, "--quiet"]
@@ -345,6 +346,10 @@ def test_pictures_are_corrected_as_the_batch_command_does(clip):
 def test_usage_is_one_line(capsys, tmp_path, monkeypatch):
     assert main(["studio"]) == 2
     assert "give VIDEO, or --fetch" in capsys.readouterr().err
+    assert main(["studio", "film.mp4", "--keypoints", "k.csv", "--start", "3"]) == 2
+    assert "cut that file" in capsys.readouterr().err
+    assert main(["studio", "film.mp4", "--camera", "camera.json", "--fov", "60"]) == 2
+    assert "no --camera" in capsys.readouterr().err
     monkeypatch.setenv("GAIT_WEB", str(tmp_path))
     assert main(["studio", "film.mp4"]) == 1
     assert "run gait studio --fetch once" in capsys.readouterr().err

@@ -8,7 +8,8 @@ the same motion from it.  Leventon and Freeman (1998) correct motions so in sect
 The person's joints come from the detector, from --keypoints, or from --track, what gait track wrote; with
 --placement the pictures themselves are lifted, without a detector.  With --camera the motion is in the
 camera's world and feet can be put on its floor; with --height the camera is found from the walk; without
-either it is assumed to be level and far away.
+either it is assumed to be level and far away.  The camera has to stand still: a film whose camera turns is
+lifted by gait lift --stabilize auto.
 
 The folder VIDEO.studio beside the video keeps what takes long to make.  The page can be opened from this
 machine alone.  Ctrl-C ends the command; nothing is lost.
@@ -43,6 +44,13 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     values.add_camera(parser, "; without it see --height", scale=True)
     parser.add_argument(
         "--height", type=values.stature, metavar="M", help="the person's stature in metres; finds the camera"
+    )
+    values.add_fov(parser)
+    parser.add_argument(
+        "--start", type=values.whole(0), metavar="F", help="first frame (default: that of --placement, or 0)"
+    )
+    parser.add_argument(
+        "--stop", type=values.whole(0), metavar="F", help="first frame not to use (default: to the end)"
     )
     parser.add_argument("--keypoints", metavar="K.csv", help="2-D keypoints instead of the detector's")
     parser.add_argument("--track", metavar="OUT.csv", help="what gait track wrote, instead of keypoints")
@@ -110,6 +118,15 @@ def _check(args: argparse.Namespace) -> None:
         raise UsageError("--background: goes with --placement")
     if args.camera and args.height and given and given[0] != "keypoints":
         raise UsageError(f"--height: the {given[0]} has the stature; leave it out, or --camera")
+    if args.fov and (args.camera or not args.height):
+        raise UsageError("--fov: is for a camera that is found from the walk, with --height and no --camera")
+    for option in ("start", "stop"):
+        if getattr(args, option) is not None and args.keypoints:
+            raise UsageError(
+                f"--{option}: the frames are those of --keypoints; cut that file, or leave it out"
+            )
+    if args.stop is not None:
+        values.require_order(args.start or 0, args.stop)
     if args.scale_camera and not args.camera:
         raise UsageError("--scale-camera: needs --camera")
 

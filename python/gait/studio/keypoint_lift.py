@@ -20,7 +20,7 @@ from gait.lift.run import Lifted, Prepared, Request
 from gait.lift.segment.view import Perspective
 from gait.lift.smooth.interactive import Interactive
 from gait.reproducible import one_thread
-from gait.studio.shown import Nearby, Shown, Solved, curves_of
+from gait.studio.shown import NO_CAMERA, Nearby, Shown, Solved, curves_of
 
 Floats = npt.NDArray[np.float64]
 
@@ -41,15 +41,24 @@ class KeypointLift:
         How they are lifted.
     video : str
         The film.
+    more : list of str
+        Further words of the command that lifts the film itself.
     """
 
     def __init__(
-        self, path: str, prior: SegmentPrior, prepared: Prepared, request: Request, video: str
+        self,
+        path: str,
+        prior: SegmentPrior,
+        prepared: Prepared,
+        request: Request,
+        video: str,
+        more: list[str],
     ) -> None:
         self._path, self._prior, self._request, self._video = path, prior, request, video
+        self._more = more
         self._prepared = replace(prepared, options=replace(prepared.options, covariance=True))
         self.camera = prepared.view.camera if isinstance(prepared.view, Perspective) else None
-        self.tools = ("pull", "hide", "swap", *(["pin"] if self.camera else []))
+        self.without = {} if self.camera else {"pin": f"Pin foot {NO_CAMERA}"}
         self._near: Interactive | None = None
         self._corrected = Edits(), self._prepared.keypoints
         self._names: tuple[str, ...] = ()
@@ -125,7 +134,10 @@ class KeypointLift:
     def words(self) -> list[str]:
         """Words of ``gait lift``."""
         request = self._request
-        found = ["gait lift", shlex.quote(self._path if request.calibration is None else self._video)]
+        if request.calibration is None:
+            found = ["gait lift", shlex.quote(self._path)]
+        else:
+            found = ["gait lift", shlex.quote(self._video), *self._more]
         found += ["--camera", shlex.quote(request.camera)] if request.camera else []
         found += ["--scale-camera", "--video", shlex.quote(self._video)] if request.size else []
         return found + (["--height", f"{request.options.stature:g}"] if request.options.stature else [])

@@ -45,12 +45,18 @@ class PictureLift:
         Without corrections.
     request : Request
         How the pictures are lifted.
+    more : list of str
+        Further words of the command.
     """
 
-    tools: tuple[str, ...] = ("pull",)
+    without = {
+        "hide": "Nothing is detected where pictures are lifted, so nothing can be hidden; drag the joint",
+        "swap": "Nothing is detected where pictures are lifted, so there are no sides to swap; drag the legs",
+        "pin": "Feet are pinned where detected points are lifted; here drag the foot to the floor",
+    }
 
-    def __init__(self, clip: ClipSegments, request: Request) -> None:
-        self._clip, self._request = clip, request
+    def __init__(self, clip: ClipSegments, request: Request, more: list[str]) -> None:
+        self._clip, self._request, self._more = clip, request, more
         self.camera: Camera | None = clip.view.camera if isinstance(clip.view, CameraView) else None
         self._joints = clip.prior.index([name for name in JOINTS if name in clip.prior.names])
         self._names = tuple(clip.prior.names[j] for j in self._joints)
@@ -120,6 +126,7 @@ class PictureLift:
         found += ["--camera", shlex.quote(request.camera)] if request.camera else []
         found += ["--scale-camera"] if request.scale_camera else []
         found += ["--height", f"{request.height:g}"] if request.height else []
+        found += self._more
         found += ["--background", shlex.quote(request.background)] if request.background != "auto" else []
         return found
 

@@ -34,7 +34,7 @@ from gait.lift.keypoints.corrections import (
 )
 from gait.studio.curves import phase_at
 from gait.studio.refine import ENDED, LAST, Refiner
-from gait.studio.shown import Solved, page_data
+from gait.studio.shown import NO_CAMERA, Solved, page_data
 from gait.studio.source import Source
 from gait.web.motion_data import frames, rounded
 
@@ -97,7 +97,8 @@ class Session:
             "redo": len(self._redo),
             "refining": self.refining,
             "fault": self.fault,
-            "tools": [*self._lift.tools, *(["start"] if self._lift.camera else [])],
+            "without": self._lift.without
+            | ({} if self._lift.camera else {"start": f"Track start {NO_CAMERA}"}),
             "start": self._start(),
         }
 

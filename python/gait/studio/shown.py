@@ -72,6 +72,9 @@ class Shown:
         return float(np.median(v.max(axis=1) - v.min(axis=1)))
 
 
+NO_CAMERA = "needs a camera: start gait studio with --camera, or with --height, which finds it from the walk"
+
+
 @dataclass(frozen=True)
 class Solved:
     """A motion of all corrections: what is shown of it, and what `Lift` needs to go on from it."""
@@ -92,7 +95,7 @@ class Nearby:
 class Lift(Protocol):
     """A way to lift the film with corrections; another process gets a copy of it."""
 
-    tools: tuple[str, ...]  #: kinds of corrections that it takes: pull, pin, hide, swap
+    without: dict[str, str]  #: corrections (pin, hide, swap) that it does not take, and why
     camera: Camera | None  #: whose world the motion is in
 
     @property

@@ -47,18 +47,26 @@ WITHOUT_PERSON = ("init", "lost")  # statuses of frames whose joints are not use
 
 @dataclass(frozen=True)
 class Wanted:
-    """What the command was given: files, None where they are left out, and the stature in metres."""
+    """What the command was given: files, None where they are left out; stature in metres; view in degrees."""
 
     video: str
     camera: str | None = None
     scale_camera: bool = False
     height: float | None = None
+    fov: float | None = None
+    start: int | None = None
+    stop: int | None = None
     keypoints: str | None = None
     track: str | None = None
     placement: str | None = None
     background: str | None = None
     corrections: str | None = None
     model: str | None = None
+
+    def more(self) -> list[str]:
+        """Words of ``gait lift`` that state which frames are lifted, and the field of view."""
+        given = {"--fov": self.fov, "--start": self.start, "--stop": self.stop}
+        return [word for name, value in given.items() if value is not None for word in (name, f"{value:g}")]
 
 
 @dataclass(frozen=True)
@@ -138,7 +146,7 @@ def _keypoint_lift(
         hints=False,
     )
     prepared = lift_run.prepare(path, keypoints, prior, request, warn, quiet)
-    return KeypointLift(path, prior, prepared, request, wanted.video)
+    return KeypointLift(path, prior, prepared, request, wanted.video, wanted.more())
 
 
 def _pictures(
@@ -147,7 +155,8 @@ def _pictures(
     assert wanted.placement is not None
     calibration = None
     if wanted.height and not wanted.camera:
-        keypoints, _ = keypoints_file.read(_detected(video, folder, quiet), prior.names, ignore_unknown=True)
+        path = _detected(video, folder, quiet)
+        keypoints, _ = keypoints_file.read(path, prior.names, ignore_unknown=True)
         calibration = _calibration(wanted, video, keypoints, quiet)
     request = video_run.Request(
         video=wanted.video,
@@ -158,16 +167,18 @@ def _pictures(
         calibration=calibration,
         height=wanted.height,
         background=wanted.background or "auto",
+        start=wanted.start,
+        stop=wanted.stop,
     )
     _, clip = video_run.open_clip(request, prior, warn, quiet)
-    return PictureLift(clip, request)
+    return PictureLift(clip, request, wanted.more())
 
 
 def _calibration(wanted: Wanted, video: Video, keypoints: Keypoints, quiet: bool) -> Calibration | None:
     """Camera from the walk, where the stature is given and no camera."""
     if wanted.camera or not wanted.height:
         return None
-    found = calibrate_film(video, keypoints, Model(None), wanted.height, None, quiet)
+    found = calibrate_film(video, keypoints, Model(None), wanted.height, wanted.fov, quiet)
     note_camera(found, quiet)
     return found
 
@@ -189,11 +200,11 @@ def _folder(video: Video) -> Path:
     return folder
 
 
-def _kept(path: Path, video: Video, make: Callable[[Path], None]) -> Path:
-    """Make a file unless it was made from this film before."""
+def _kept(path: Path, video: Video, make: Callable[[Path], None], **how: int | None) -> Path:
+    """Make a file unless it was made from this film before, in the same way."""
     mark = path.with_name(f".{path.name}.json")
     state = Path(video.path).stat()
-    source = {"film": Path(video.path).name, "bytes": state.st_size, "changed": state.st_mtime_ns}
+    source = {"film": Path(video.path).name, "bytes": state.st_size, "changed": state.st_mtime_ns} | how
     try:
         known = json.loads(mark.read_text(encoding="utf-8"))
     except (OSError, ValueError):
@@ -218,9 +229,11 @@ def _keypoints(
                 "gait track --camera-out writes one that was found"
             )
         path = str(folder / "track.csv")
-        keypoints_file.write(path, keypoints_of_track(wanted.track, camera))
+        found, span = keypoints_of_track(wanted.track, camera), video.span(wanted.start or 0, wanted.stop)
+        rows = slice(*np.searchsorted(found.frame, [span.start, span.stop]))
+        keypoints_file.write(path, found.part(rows))
     else:
-        path = _detected(video, folder, quiet)
+        path = _detected(video, folder, quiet, wanted.start or 0, wanted.stop)
     keypoints, _ = keypoints_file.read(path, prior.names, ignore_unknown=True)
     if note := keypoints.compare_times(path, video.times):
         raise UserError(f"{path}: {note}")
@@ -229,13 +242,13 @@ def _keypoints(
     return path, keypoints
 
 
-def _detected(video: Video, folder: Path, quiet: bool) -> str:
-    """File of the detector's keypoints."""
+def _detected(video: Video, folder: Path, quiet: bool, start: int = 0, stop: int | None = None) -> str:
+    """File of the detector's keypoints in the frames from `start` to before `stop`."""
 
     def detect(target: Path) -> None:
-        keypoints_file.write(target, find_person(video, quiet))
+        keypoints_file.write(target, find_person(video, quiet, start, stop))
 
-    return str(_kept(folder / "keypoints.csv", video, detect))
+    return str(_kept(folder / "keypoints.csv", video, detect, start=start, stop=stop))
 
 
 def keypoints_of_track(path: str, camera: Camera) -> Keypoints:

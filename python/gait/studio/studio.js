@@ -5,7 +5,7 @@ import { Curves } from 'gait/curves.js';
 
 const NEAR = 14; // screen pixels within which the pointer takes a joint
 const CLICK = 3; // screen pixels that a click may be off
-const BUTTONS = { pin: ['tool-pin'], start: ['tool-start'], hide: ['hide'], swap: ['from', 'to', 'range', 'swap'] }; // by tool
+const BUTTONS = { pin: 'tool-pin', start: 'tool-start', hide: 'hide', swap: 'swap' }; // by tool
 const REFUSED = 409; // an edit that changes nothing: what there was is saved
 const WAIT = 250; // milliseconds after the last key before a moved joint is sent
 const NINETY = 2.1460; // radius of the circle that holds 90 % of a Gaussian in two dimensions, sd
@@ -79,7 +79,7 @@ function build() {
   scene = new Scene(at('scene'), data);
   curves = new Curves(at('curves'), data, (index) => { film.pause(); film.seek(index); });
   at('joint').replaceChildren(...data.joints.map((joint, j) => new Option(words(joint), j)));
-  for (const [tool, id] of Object.entries(BUTTONS)) for (const each of id) at(each).hidden = !data.tools.includes(tool);
+  for (const [tool, id] of Object.entries(BUTTONS)) at(id).setAttribute('aria-disabled', tool in data.without);
   const { canvas } = film.picture;
   canvas.addEventListener('pointermove', hover);
   canvas.addEventListener('pointerdown', press);
@@ -424,12 +424,20 @@ function remove(event) {
   else say('There is no correction here.', 2);
 }
 
+/** Whether there is such a tool here; the page states why not. */
+function allowed(name) {
+  if (name in data.without) say(`${data.without[name]}.`);
+  return !(name in data.without);
+}
+
 function hide() {
+  if (!allowed('hide')) return;
   const [first, last] = marked() ?? [frameOf(film.index), frameOf(film.index)];
   change('/edit', { do: 'hide', joint: data.joints[chosen], first, last });
 }
 
 function swap() {
+  if (!allowed('swap')) return;
   const found = marked();
   if (!found) return say('Mark a range first: “From” (I) at its first frame, “To” (O) at its last.');
   change('/edit', { do: 'swap', first: found[0], last: found[1] });
@@ -490,6 +498,7 @@ function propose(k) {
 }
 
 function choose(name) {
+  if (!allowed(name)) return;
   tool = name;
   for (const each of ['pull', 'pin', 'start']) at(`tool-${each}`).setAttribute('aria-pressed', each === name);
   if (name === 'start') say('Drag over the floor, from under the person to where they walk.', 3);
@@ -500,12 +509,12 @@ const KEYS = {
   ' ': () => film.toggle(),
   n: () => propose(proposal + 1),
   d: () => choose('pull'),
-  f: () => data.tools.includes('pin') && choose('pin'),
-  b: () => data.tools.includes('start') && choose('start'),
-  h: () => data.tools.includes('hide') && hide(),
+  f: () => choose('pin'),
+  b: () => choose('start'),
+  h: hide,
   i: () => mark(frameOf(film.index), range[1]),
   o: () => mark(range[0], frameOf(film.index)),
-  s: () => data.tools.includes('swap') && swap(),
+  s: swap,
   '+': () => film.picture.zoomBy(1.25),
   '=': () => film.picture.zoomBy(1.25),
   '-': () => film.picture.zoomBy(0.8),
