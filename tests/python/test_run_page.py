@@ -151,6 +151,7 @@ def test_the_page_states_the_verdict_first_and_no_raw_names(folder, whole):
         assert f"<h2>{heading}</h2>" in body
     assert not re.search(r"\b(abs|root\w*|proc|static|free|\w+_mm|torso_\w|\w+_deg)\b", body)
     assert 'abbr title="Mean distance of 15 joints' in body
+    assert "start, background, particles" in body and "not in these files" in body
     assert "as large as the one tracked, 320 × 240 pixels" in body
     film = Video(folder / "o.mp4")
     assert (film.size, film.count) == ((320, 240), FRAMES)  # frames without an estimate too

@@ -218,6 +218,7 @@ def _facts(files: RunFiles, video: Video, path: str | None, camera: Camera | Non
         "film": f"{files.video}, {video.width} × {video.height} px, {video.count} frames, "
         f"{video.fps:.4g} per second",
         "camera": "not given" if path is None else path,
+        "start, background, particles": "not in these files; the page of gait track --report shows them",
     }
     if camera is not None:
         rows |= camera_facts(camera)
