@@ -315,7 +315,7 @@ typedef struct gait_tasks { GAIT_TASKS_FIELDS(GAIT_DECLARE) } gait_tasks;
           float, joint_sd_model, , "statures", 0.015, 0, 0, 1)                                                        \
     /* ---- advanced settings: dynamics (eqs. 5-9): standard deviations of random walks, time constants ---- */       \
     PAPER("Random walk of the phase.",                                                                                \
-          float, phase_noise, , "strides per sqrt(second)", 0.0164, 0.008, 0, 10)                                     \
+          float, phase_noise, , "strides per sqrt(second)", 0.0164, 0.002, 0, 10)                                     \
     PAPER("Random walk of the stride rate, as a fraction of the model's mean rate.",                                  \
           float, rate_noise, , "1 per sqrt(second)", 0.055, 0.03, 0, 10)                                              \
     SETTING("Time in which stature and rate settle once phase, left and right are known.",                            \
@@ -325,21 +325,21 @@ typedef struct gait_tasks { GAIT_TASKS_FIELDS(GAIT_DECLARE) } gait_tasks;
     PAPER("Random walk of the pelvis along the heading.",                                                             \
           float, forward_noise, , "metres per sqrt(second)", 0.08, 0.06, 0, 100)                                      \
     PAPER("Random walk of the pelvis across the heading.",                                                            \
-          float, lateral_noise, , "metres per sqrt(second)", 0.02, 0.0085, 0, 100)                                    \
+          float, lateral_noise, , "metres per sqrt(second)", 0.02, 0.0096, 0, 100)                                    \
     PAPER("Random walk of the height of the pelvis.",                                                                 \
-          float, vertical_noise, , "metres per sqrt(second)", 0.0096, 0.01, 0, 100)                                   \
+          float, vertical_noise, , "metres per sqrt(second)", 0.0096, 0.015, 0, 100)                                  \
     PAPER("Random walk of the heading.",                                                                              \
-          float, heading_noise, , "radians per sqrt(second)", 0.044, 0.02, 0, 100)                                    \
+          float, heading_noise, , "radians per sqrt(second)", 0.044, 0.021, 0, 100)                                   \
     PAPER("Standard deviation of turn rates.",                                                                        \
           float, turn_sd, , "radians per second", 0.5, 0, 0, 100)                                                     \
     PAPER("Mean time until the turn rate changes, half of the time to 0; 0: always straight on.",                     \
           float, turn_time, , "seconds", 6, 0, 0, 1e6)                                                                \
     PAPER("Random walk of pitch and roll.",                                                                           \
-          float, tilt_noise, , "radians per sqrt(second)", 0.033, 0.011, 0, 100)                                      \
+          float, tilt_noise, , "radians per sqrt(second)", 0.033, 0.01, 0, 100)                                       \
     PAPER("Time constant with which pitch, roll and height return to the model's; 0: never.",                         \
           float, tilt_time, , "seconds", 1.1, 0, 0, 1e6)                                                              \
     PAPER("Random walk of the principal-component scores.",                                                           \
-          float, coef_noise, , "standard deviations per sqrt(second)", 0.667, 0.036, 0, 100)                          \
+          float, coef_noise, , "standard deviations per sqrt(second)", 0.667, 0.028, 0, 100)                          \
     PAPER("Time constant with which the scores return to the mean; 0: never.",                                        \
           float, coef_time, , "seconds", 4.5, 0, 0, 1e6)                                                              \
     PAPER("Random walk of the stature, in standard deviations of the start.",                                         \
@@ -356,17 +356,17 @@ typedef struct gait_tasks { GAIT_TASKS_FIELDS(GAIT_DECLARE) } gait_tasks;
           double, reverse, , "", 0, 0, 1)                                                                             \
     /* ---- paper mode: what eqs. 10-12 leave to be determined ---- */                                                \
     SETTING("Paper mode: density of the image of a hidden limb, p_occluded of eq. 12.",                               \
-          float, occluded_density, , "1 per grey level", 0.018, 0x1p-20, 1)                                           \
+          float, occluded_density, , "1 per grey level", 0.01, 0x1p-20, 1)                                            \
     SETTING("Paper mode: by how much the surface of a limb changes from frame to frame (eq. 11).",                    \
           float, surface_sd, , "grey levels", 14, 0, 255)                                                             \
     SETTING("Paper mode: growth of the variance of surface_sd with the squared tangent of the angle to the image.",   \
-          float, surface_tilt, , "", 2.8, 0, 1e3)                                                                     \
+          float, surface_tilt, , "", 0.99, 0, 1e3)                                                                    \
     SETTING("Paper mode: surface points compared on a limb that faces the camera, n_s of eq. 10.",                    \
-          int32_t, limb_points, , "", 10, 2, 16)                                                                      \
+          int32_t, limb_points, , "", 16, 2, 16)                                                                      \
     SETTING("Paper mode: lost where the picture under the body stayed rather than moved, by so much more; 0: never.", \
           float, stayed_nats, , "nats", 5, 0, 1e6)                                                                    \
     PAPER("Share of a start's standard deviation of the scores with which they are drawn.",                           \
-          float, coef_start, , "", 1, 0.36, 0, 1)
+          float, coef_start, , "", 1, 0.3, 0, 1)
 
 typedef struct gait_tracker_config {
     GAIT_TRACKER_CONFIG_FIELDS(GAIT_DECLARE, GAIT_DECLARE, GAIT_DECLARE)
