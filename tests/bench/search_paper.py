@@ -32,7 +32,7 @@ from paper_runs import Footage
 
 from gait import Mode, Model
 from gait.paper import ladder
-from gait.paper.scene import reported
+from gait.paper.scene import Run, reported
 from gait.paper.tracking import FRAMES
 from gait.progress import progress
 from gait.simulate.clip import simulate
@@ -215,17 +215,20 @@ def publish(search: Search, best: Settings, counts: str) -> None:
 
 def lost(search: Search, record: bool) -> None:
     """Show, by threshold, how often a run is reported as lost that leaves the person, and that does not."""
+    runs: dict[float, list[Run]] = {nats: [] for nats in THRESHOLDS}
+    with progress("lost", len(search.footage)) as update:
+        for k, f in enumerate(search.footage, 1):
+            for seed in MORE:
+                run: Run | None = None
+                for nats in THRESHOLDS:  # who is not lost by one is lost by no larger one
+                    if run is None or run.lost:
+                        run = f.run(search.model, Mode.PAPER, 100 * k + seed, {"stayed_nats": nats})
+                    runs[nats].append(run)
+            update(k)
     rows = list[list[Any]]()
-    with progress("thresholds", len(THRESHOLDS)) as update:
-        for nats in THRESHOLDS:
-            runs = [
-                f.run(search.model, Mode.PAPER, 100 * k + seed, {"stayed_nats": nats})
-                for k, f in enumerate(search.footage, 1)
-                for seed in MORE
-            ]
-            shares = [np.mean([r.lost > 0 for r in runs if r.held == held] or [0]) for held in (False, True)]
-            rows.append([nats, reported(runs, False), reported(runs, True), float(shares[0] - shares[1])])
-            update(len(rows))
+    for nats, each in runs.items():
+        shares = [np.mean([r.lost > 0 for r in each if r.held == held] or [0]) for held in (False, True)]
+        rows.append([nats, reported(each, False), reported(each, True), float(shares[0] - shares[1])])
     best = max(rows, key=lambda row: (row[-1], row[0]))[0]
     note = f"""{facts("search_paper.py --lost --record")}
 
