@@ -246,7 +246,7 @@ def picture_span(stage: Stage, mesh: Mesh, frame: int) -> tuple[np.ndarray, np.n
 def test_every_view_shows_the_whole_person_in_front_of_the_scene(view: str) -> None:
     stage = set_stage(replace(TINY, view=view, frames=40))
     made = build_set(stage)
-    empty = background(made).astype(int)
+    empty = background(made.scene).astype(int)
     for frame in (0, 39):
         low, high = picture_span(stage, made.mesh, frame)
         assert (low > 0).all()
@@ -276,7 +276,7 @@ def test_pole_hides_joints_and_is_part_of_the_background() -> None:
     assert build_set(plain).scene.front.max() == 0
     front = made.scene.front > 0.99
     assert front.sum() > 200
-    empty = background(made)
+    empty = background(made.scene)
     quiet = replace(pole, scenario=replace(pole.scenario, noise=0.0))
     inner = cv2.erode(front.astype(np.uint8), np.ones((3, 3))) > 0
     changed = np.abs(np.stack(list(pictures(quiet, made)))[:, inner].astype(int) - empty[inner]).max()
@@ -286,7 +286,7 @@ def test_pole_hides_joints_and_is_part_of_the_background() -> None:
 def test_noise_and_flicker_have_their_stated_size() -> None:
     stage = set_stage(replace(TINY, frames=30))
     made = build_set(stage)
-    empty = background(made).astype(float)
+    empty = background(made.scene).astype(float)
     noisy = replace(stage, scenario=replace(stage.scenario, noise=3.0))
     difference = next(pictures(noisy, made)) - empty
     low, high = np.percentile(difference, (16, 84))

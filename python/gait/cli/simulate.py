@@ -4,7 +4,8 @@ Writes video.mp4, background.png (the empty scene; of a camera that moves poses.
 --camera-path), camera.json, truth.csv (joints in metres and pixels),
 init.json (the truth at frame 0 with some error, to start a tracker), meta.json (heel strikes, stature and how
 the clip was made) and contact.jpg into DIR; of further people truth_2.csv, init_2.json, meta_2.json and so
-on.  The same options and seed give the same pictures.
+on; of further cameras video_2.mp4, background_2.png, camera_2.json and so on (the pixels in truth.csv are of
+the first).  The same options and seed give the same pictures.
 
 presets (other options change them):
   demo     side view, left to right, 4 s
@@ -34,6 +35,7 @@ from gait.simulate.scenario import (
     COMPANY,
     DIRECTIONS,
     GENERATOR,
+    MOST_CAMERAS,
     MOTIONS,
     MOVING,
     PRESETS,
@@ -45,6 +47,7 @@ EXAMPLES = """\
 examples:
   gait simulate -o walk
   gait simulate -o follow --moving follow
+  gait simulate -o two --cameras 2
   gait simulate -o meet --people crossing --view oblique
   gait simulate -o walk --preset pole --seed 7 --stature 1.68 --size 1280x720
   gait simulate -o walk --preset stick --body drawn
@@ -82,6 +85,12 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         choices=COMPANY,
         help="another person comes the other way, three walk abreast, or a faster person overtakes",
     )
+    parser.add_argument(
+        "--cameras",
+        type=int,
+        metavar="N",
+        help=f"film with several cameras at once, up to {MOST_CAMERAS}: video_2.mp4, camera_2.json and so on",
+    )
     parser.add_argument("--frames", type=int, metavar="N")
     parser.add_argument("--fps", type=float, metavar="HZ")
     parser.add_argument("--size", type=_size, metavar="WxH", help="pixels, even")
@@ -113,7 +122,7 @@ def run(args: argparse.Namespace) -> int:
 
     scenario = replace(PRESETS[args.preset], **_given(args))
     begun = time.perf_counter()
-    with progress("rendering", scenario.frames, args.quiet) as update:
+    with progress("rendering", scenario.frames * scenario.cameras, args.quiet) as update:
         meta = simulate(scenario, args.output, update)
     summary = {
         "frames": scenario.frames,

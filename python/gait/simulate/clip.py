@@ -23,7 +23,7 @@ from gait.simulate.body import BONE_INDEX, SIDES
 from gait.simulate.geometry import Array, Ints, Picture
 from gait.simulate.render import DEFOCUS_PX, SHUTTER, Renderer, develop, light
 from gait.simulate.scenario import COMPANY, Scenario
-from gait.simulate.scene import build_scene
+from gait.simulate.scene import Scene, build_scene
 from gait.simulate.stage import Set, Stage, build_set, set_stage
 from gait.simulate.walk import TOE_OFF, Walk
 
@@ -247,37 +247,53 @@ def _pole(stage: Stage, made: Set) -> list[dict[str, Any]]:
 
 FILES = ("video.mp4", "background.png", "camera.json", "truth.csv", "init.json", "meta.json", "contact.jpg")
 _POSES = "poses.csv"  # instead of the empty scene, of a camera that moves
-_PERSON = (("truth", ".csv"), ("init", ".json"), ("meta", ".json"))  # of each person; the first has no number
+_PERSON = ("truth.csv", "init.json", "meta.json")  # of each person; the first has no number
+_CAMERA = ("video.mp4", "background.png", "camera.json")  # of each camera; the first has no number
 _CONTACTS = (3, 2)  # pictures across and down in contact.jpg
 
 
-def pictures(stage: Stage, made: Set) -> Iterator[Picture]:
-    """Yield the frames of the clip, (h, w, 3) BGR; each depends only on the scenario and its own number."""
+def pictures(stage: Stage, made: Set, number: int = 1) -> Iterator[Picture]:
+    """Yield the frames of a camera, (h, w, 3) BGR; each depends only on the scenario and its own number.
+
+    `number`: of the camera, from 1.
+    """
     scenario = stage.scenario
     figures = [(made.mesh, made.appearance, stage.walk)]
     figures += [(*figure, one.walk) for figure, one in zip(made.others, stage.others, strict=True)]
-    people = [Renderer(stage.camera, made.scene, *figure) for figure in figures]
+    camera, scene = stage.camera, made.scene
+    if number > 1:
+        camera = stage.beside[number - 2]
+        scene = build_scene(camera, made.layout, made.coats)
+    people = [Renderer(camera, scene, *figure) for figure in figures]
     for frame in range(scenario.frames):
         if stage.cameras:
             scene = build_scene(stage.cameras[frame], made.layout, made.coats)
             people = [Renderer(stage.cameras[frame], scene, *figure) for figure in figures]
-        rng = scenario.stream("sensor", frame)
+        rng = scenario.stream("sensor", frame, *([number] if number > 1 else []))
         gain = 1 + 0.01 * scenario.flicker * float(np.clip(rng.standard_normal(), -2.5, 2.5))
         yield develop(light(people, frame), gain, scenario.noise, rng)
 
 
 def files(scenario: Scenario) -> tuple[str, ...]:
     """Return the names of the files of a clip."""
-    more = [f"{stem}_{k}{suffix}" for k in range(2, 2 + COMPANY[scenario.people]) for stem, suffix in _PERSON]
+    more = [_numbered(name, k) for k in range(2, 2 + COMPANY[scenario.people]) for name in _PERSON]
     names = [*FILES, *more]
+    for number in range(2, scenario.cameras + 1):
+        names += [_numbered(name, number) for name in _CAMERA]
     if scenario.moving == "none":
         return tuple(names)
     return tuple(_POSES if name == "background.png" else name for name in names)
 
 
-def background(made: Set) -> Picture:
-    """Return the empty scene as the camera sees it, without noise, (h, w, 3) BGR."""
-    return develop(made.scene.plate, 1.0, 0.0, None)
+def _numbered(name: str, number: int) -> str:
+    """Name of a file of the camera or person with this number, from 1."""
+    path = Path(name)
+    return name if number == 1 else f"{path.stem}_{number}{path.suffix}"
+
+
+def background(scene: Scene) -> Picture:
+    """Return the empty scene as its camera sees it, without noise, (h, w, 3) BGR."""
+    return develop(scene.plate, 1.0, 0.0, None)
 
 
 def simulate(
@@ -289,30 +305,35 @@ def simulate(
     """Write a clip and everything known about it into `folder`, which is made if need be.
 
     `folder`: gets the files of `files`, in the formats that `gait capture` and `gait eval` read; `progress`:
-    called with the number of frames done; `keep`: keep an unfinished video if interrupted. Returns the
-    contents of meta.json. UserError if the folder cannot be written or the options contradict each other.
+    called with the number of frames done, of all cameras; `keep`: keep an unfinished video if interrupted.
+    Returns the contents of meta.json. UserError if the folder cannot be written or the options contradict
+    each other.
     """
     stage = set_stage(scenario)
     target = _folder(folder, files(scenario))
     made = build_set(stage)
     figures = [(made.mesh, made.appearance), *made.others]
-    _write_video(target, stage, made, progress, keep)
+    for number in range(1, scenario.cameras + 1):
+        _write_video(target, stage, made, number, progress, keep)
     if stage.cameras:
         times = [frame / scenario.fps for frame in range(scenario.frames)]
         poses = [CameraPose.of(camera) for camera in stage.cameras]
         with replacing(target / _POSES) as temporary:
             write_path(temporary, times, poses, by_frame=False)
     else:
-        _write_picture(target / "background.png", background(made))
+        _write_picture(target / "background.png", background(made.scene))
     _write_json(target / "camera.json", stage.camera.to_dict())
+    for number, camera in enumerate(stage.beside, 2):
+        scene = build_scene(camera, made.layout, made.coats)
+        _write_picture(target / _numbered("background.png", number), background(scene))
+        _write_json(target / _numbered("camera.json", number), camera.to_dict())
     metas = []
     for k, (one, (_, appearance)) in enumerate(zip([stage, *stage.others], figures, strict=True), 1):
-        number = "" if k == 1 else f"_{k}"
         events = find_events(one)
-        write_truth(target / f"truth{number}.csv", one, events["r_heel_strike"])
-        _write_json(target / f"init{number}.json", first_state(one, events["r_heel_strike"]))
+        write_truth(target / _numbered("truth.csv", k), one, events["r_heel_strike"])
+        _write_json(target / _numbered("init.json", k), first_state(one, events["r_heel_strike"]))
         metas.append(describe(one, replace(made, appearance=appearance), events))
-        _write_json(target / f"meta{number}.json", metas[-1])
+        _write_json(target / _numbered("meta.json", k), metas[-1])
     return metas[0]
 
 
@@ -331,20 +352,29 @@ def _folder(folder: str | os.PathLike[str], names: Iterable[str]) -> Path:
 
 
 def _write_video(
-    target: Path, stage: Stage, made: Set, progress: Callable[[int], None] | None, keep: bool
+    target: Path,
+    stage: Stage,
+    made: Set,
+    number: int,
+    progress: Callable[[int], None] | None,
+    keep: bool,
 ) -> None:
-    """Write the frames, and a sheet of some of them."""
+    """Write the frames of a camera, and a sheet of some of the first one's."""
     across, down = _CONTACTS
-    wanted = np.linspace(0, stage.scenario.frames - 1, across * down).round().astype(int).tolist()
+    frames = stage.scenario.frames
+    wanted = np.linspace(0, frames - 1, across * down).round().astype(int).tolist()
     sheet = {}
-    with VideoWriter(target / "video.mp4", stage.scenario.fps, crf=CRF, keep=keep) as writer:
-        for number, picture in enumerate(pictures(stage, made)):
+    video = target / _numbered("video.mp4", number)
+    with VideoWriter(video, stage.scenario.fps, crf=CRF, keep=keep) as writer:
+        for frame, picture in enumerate(pictures(stage, made, number)):
             writer.write(picture)
-            if number in wanted:
-                sheet[number] = picture
+            if frame in wanted:
+                sheet[frame] = picture
             if progress is not None:
-                progress(number + 1)
-    shown = [sheet[number] for number in wanted]
+                progress((number - 1) * frames + frame + 1)
+    if number > 1:
+        return
+    shown = [sheet[frame] for frame in wanted]
     rows = [np.hstack(shown[k * across : (k + 1) * across]) for k in range(down)]
     _write_picture(target / "contact.jpg", np.vstack(rows))
 

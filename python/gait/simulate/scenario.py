@@ -19,6 +19,7 @@ BODIES = ("table", "drawn")
 MOVING = ("none", "follow", "pan", "shake")
 COMPANY = {"one": 0, "crossing": 1, "abreast": 2, "overtaking": 1}
 """How many walk beside the first person."""
+MOST_CAMERAS = 4
 
 # option: smallest and largest value
 _LIMITS = {
@@ -68,6 +69,7 @@ class Scenario:
     moving: str = "none"
     #: One of `COMPANY`: another person comes the other way, three walk abreast, a faster person overtakes.
     people: str = "one"
+    cameras: int = 1  #: that film the walk at once, standing still
     gait: str = GENERATOR  #: ``generator`` or the name of a ``.gait`` model whose curves are walked
 
     def __post_init__(self) -> None:
@@ -93,6 +95,10 @@ class Scenario:
         alone = self.pole or self.moving != "none" or self.motion != "walk" or self.view == "circle"
         if self.people != "one" and alone:
             raise UsageError("--people: walk straight on before a camera that stands still, without a pole")
+        if not 1 <= self.cameras <= MOST_CAMERAS:
+            raise UsageError(f"--cameras {self.cameras}: give 1 to {MOST_CAMERAS}")
+        if self.cameras > 1 and (self.moving != "none" or self.pole):
+            raise UsageError("--cameras: stand still, without a pole; leave out --moving and --pole")
         for name, (low, high) in _LIMITS.items():
             value = getattr(self, name)
             if value is not None and not low <= value <= high:

@@ -8,6 +8,7 @@ from functools import partial
 import numpy as np
 
 from gait.bindings.model import read_blob
+from gait.body.skeleton import axis_rotation
 from gait.camera.camera import Camera
 from gait.errors import UsageError
 from gait.io import blob
@@ -25,7 +26,8 @@ from gait.simulate.wardrobe import Appearance, draw_appearance
 CIRCLE_RADIUS = 2.5
 CORNER = np.radians(80.0)  # of a turn, to the far side of a camera at the side
 _CLOSEST = 2.2  # metres between lens and path
-_AROUND = 20.0  # metres before and after the path that a camera that moves may show
+_AROUND = 20.0  # metres before and after the path that several cameras, or one that moves, may show
+_TURNS = 60.0, -60.0, 30.0  # degrees about the middle of the path from the first camera to the others
 # heading of the path for left to right, degrees from world x; the camera looks along +y
 _HEADING = {"side": 0, "oblique": -45, "toward": -90, "away": 90, "above": -30, "circle": 0}
 _HEIGHT = {"side": 1.5, "oblique": 1.6, "toward": 1.5, "away": 1.5, "above": 3.6, "circle": 1.7}
@@ -107,6 +109,7 @@ class Stage:
     frames: Ints  #: (frames,) index of each frame on the walk's time grid
     classes: list[str]  #: class of motion of each frame
     others: list[Stage] = field(default_factory=list)  #: further people, before the same camera
+    beside: list[Camera] = field(default_factory=list)  #: further cameras, which stand still
 
     def project(self, places: Array) -> Array:
         """Return pixels (frames, ..., 2) of places (frames, ..., 3), each as its frame's camera sees it."""
@@ -136,9 +139,9 @@ def set_stage(scenario: Scenario) -> Stage:
     reach, follows = _envelope(first.walk, first.frames), scenario.moving == "follow"
     away, high = (None, None) if follows else (scenario.distance, scenario.camera_height)
     reaches = [reach, *(_envelope(one.walk, one.frames) for one in others)]
-    camera = make_camera(
-        scenario.view, scenario.size, np.concatenate(reaches, axis=1).reshape(-1, 3), away, high
-    )
+    points = np.concatenate(reaches, axis=1).reshape(-1, 3)
+    camera = make_camera(scenario.view, scenario.size, points, away, high)
+    beside = [_turned_camera(scenario, points, turn) for turn in _TURNS[: scenario.cameras - 1]]
     cameras = []
     if scenario.moving != "none":
         rng = scenario.stream("moving")
@@ -146,7 +149,16 @@ def set_stage(scenario: Scenario) -> Stage:
         cameras = make_cameras(scenario.moving, camera, pelvis, reach, scenario.fps, rng, away, high)
         camera = cameras[0]
     others = [replace(one, camera=camera) for one in others]
-    return replace(first, camera=camera, cameras=cameras, others=others)
+    return replace(first, camera=camera, cameras=cameras, others=others, beside=beside)
+
+
+def _turned_camera(scenario: Scenario, points: Array, degrees: float) -> Camera:
+    """Place a camera as the first one, turned about the middle of the path."""
+    turn = axis_rotation(2, np.radians(degrees))
+    there = make_camera(
+        scenario.view, scenario.size, points @ turn, scenario.distance, scenario.camera_height
+    )
+    return replace(there, R=there.R @ turn.T)
 
 
 def _cast(scenario: Scenario, path: Path) -> Stage:
@@ -219,9 +231,10 @@ def build_set(stage: Stage) -> Set:
     (mesh, appearance), *others = [_figure(one) for one in people]
     ground = np.concatenate([one.walk.origins[one.frames, 0, :2] for one in people])
     rng = scenario.stream("scene")
-    extent = None if not stage.cameras else (ground[:, 0].min() - _AROUND, ground[:, 0].max() + _AROUND)
+    one_view = not (stage.cameras or stage.beside)
+    extent = None if one_view else (ground[:, 0].min() - _AROUND, ground[:, 0].max() + _AROUND)
     layout = draw_layout(stage.camera, ground, scenario.clutter, scenario.pole, rng, extent)
-    coats = Coats(rng, keep=bool(stage.cameras))
+    coats = Coats(rng, keep=not one_view)
     return Set(mesh, appearance, others, layout, coats, build_scene(stage.camera, layout, coats))
 
 
