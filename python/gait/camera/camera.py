@@ -347,6 +347,20 @@ def read_camera(
     return camera
 
 
+def camera_names(path: str) -> list[str]:
+    """Name each camera of a TOML file as `read_camera` takes it; a file of another kind is one camera.
+
+    Raises
+    ------
+    UserError
+        If the file cannot be read.
+    """
+    file, name = _split(path)
+    if name is not None or Path(file).suffix.lower() != ".toml" or not Path(file).is_file():
+        return [path]
+    return [f"{file}:{name}" for name in _toml_cameras(file)[1]]
+
+
 def write_camera(path: Path, camera: Camera) -> None:
     """Write a JSON camera file."""
     path.write_text(json.dumps(camera.to_dict(), indent=1) + "\n")
@@ -505,10 +519,17 @@ def _refuse_other_lenses(fields: Fields, others: Mapping[str, Any]) -> None:
         )
 
 
-def _from_toml(path: str, name: str | None) -> Camera:
+def _toml_cameras(path: str) -> tuple[dict[str, Any], dict[str, Mapping[str, Any]]]:
+    """Read the content of a TOML file, and the tables in it that are cameras."""
     with parsing(path, "TOML", "export the calibration anew"):
         data = tomllib.loads(Path(path).read_text(encoding="utf-8-sig"))
-    cameras = {key: value for key, value in data.items() if isinstance(value, Mapping) and "matrix" in value}
+    return data, {
+        key: value for key, value in data.items() if isinstance(value, Mapping) and "matrix" in value
+    }
+
+
+def _from_toml(path: str, name: str | None) -> Camera:
+    data, cameras = _toml_cameras(path)
     if name is None and len(cameras) == 1:
         name = next(iter(cameras))
     if name not in cameras:

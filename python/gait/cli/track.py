@@ -18,6 +18,10 @@ The person is tracked backwards from the start as well.  A lost person is search
 With keypoints the track continues from the next second in which the same person walks; without them it starts
 anew with a person who walks in full view for a second (not with --smooth).
 
+Several films of the same walk, by cameras that stand still, locate the person much better than one.  OUT.csv
+has the frames of the first film, in which the start is found; of the others those nearest in time are used.
+When they began is found from the person's motion unless --offsets gives it.
+
 --keypoints adds joints that a detector has found in the frames, in the formats that gait lift reads.  Joints
 that the model does not have are left out; frames may be missing.
 
@@ -31,9 +35,10 @@ from __future__ import annotations
 
 import argparse
 import json
+import math
 from typing import Any
 
-from gait.bindings.abi import Mode
+from gait.bindings.abi import MAX_CAMERAS, Mode
 from gait.cli import values
 from gait.errors import UsageError
 from gait.io.files import require_outputs
@@ -46,6 +51,7 @@ examples:
   gait track walk.mp4 --camera camera.json --init init.json --background empty.png --height 1.75 \\
       -o track.csv --overlay overlay.mp4
   gait track walk.mp4 --camera camera.json -o track.csv --report run.html
+  gait track left.mp4 right.mp4 --camera calibration.toml -o track.csv
   gait track walk.mp4 --camera camera.json -o track.csv --smooth --draws draws.npz
 """
 
@@ -53,9 +59,19 @@ examples:
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Add the command's options."""
     add = parser.add_argument
-    add("video", metavar="VIDEO", help="any file that FFmpeg reads")
+    add("video", nargs="+", metavar="VIDEO", help="any file that FFmpeg reads; several: see above")
     values.add_camera(
-        parser, "; without it the camera is found from the walk, which needs --height", scale=True
+        parser,
+        "; without it the camera is found from the walk, which needs --height; of several films one for each "
+        "in their order, or a TOML file with as many cameras",
+        scale=True,
+        several=True,
+    )
+    add(
+        "--offsets",
+        type=_offsets,
+        metavar="S[,S]",
+        help="when each further film began, seconds after the first (default: found from the motion)",
     )
     values.add_fov(parser)
     add(
@@ -136,6 +152,8 @@ def run(args: argparse.Namespace) -> int:
         for option, given in alone.items():
             if given:
                 raise UsageError(f"--people: finds everyone by the detector; leave out {option}")
+    films = args.video
+    cameras = _cameras(args)
     if not args.camera and args.height is None:
         raise UsageError("give --camera CAM, or --height M for a camera that is found from the walk")
     if not args.camera and args.init != "auto":
@@ -154,13 +172,15 @@ def run(args: argparse.Namespace) -> int:
         raise UsageError("--fov: is for a camera that is found; leave out --camera or --fov")
     require_outputs(
         (args.output, args.camera_out, args.cameras_out, args.overlay, args.trc, args.draws, args.report),
-        (args.video, args.camera, args.model, args.camera_path, args.init, args.background, args.keypoints),
+        (*films, *cameras, args.model, args.camera_path, args.init, args.background, args.keypoints),
     )
     if args.report:
         import gait.report.run_page  # noqa: F401  a package that it needs is missed before the long work
 
-    given = {name: getattr(args, name) for name in ClipOptions.__dataclass_fields__}
+    given = {name: getattr(args, name) for name in ClipOptions.__dataclass_fields__ if name != "further"}
     given |= {"mode": Mode[args.mode.upper()], "keypoints_sd": args.keypoints_sd or KEYPOINTS_SD}
+    given |= {"video": films[0], "camera": cameras[0] if cameras else None}
+    given["further"] = tuple(zip(films[1:], cameras[1:], strict=True)) if films[1:] else ()
     if args.people is None:
         summary = track_clip(ClipOptions(**given))
         text = _text
@@ -169,6 +189,46 @@ def run(args: argparse.Namespace) -> int:
         text = _text_of_people
     print(json.dumps(summary) if args.json else text(summary))
     return 0 if summary["followed"] else 1
+
+
+def _cameras(args: argparse.Namespace) -> list[str]:
+    """Camera file of each film; none if the camera is to be found."""
+    films = len(args.video)
+    if films > MAX_CAMERAS:
+        raise UsageError(f"{films} films; give at most {MAX_CAMERAS}")
+    if films == 1:
+        if args.offsets is not None:
+            raise UsageError("--offsets: is for further films")
+        if args.camera and len(args.camera) > 1:
+            raise UsageError("--camera: more than one for one film")
+        return args.camera or []
+    alone = {
+        "--people": args.people, "--keypoints": args.keypoints, "--camera-path": args.camera_path,
+        "--stabilize": args.stabilize != "off", "--cameras-out": args.cameras_out,
+        "--background with a file": args.background not in ("auto", "none"),
+    }  # fmt: skip
+    for option, given in alone.items():
+        if given:
+            raise UsageError(f"{option}: is for one film; leave it out, or track one film")
+    from gait.camera.camera import camera_names  # here, so that --help answers at once
+
+    cameras = [name for given in args.camera or () for name in camera_names(given)]
+    if len(cameras) != films:
+        raise UsageError(f"--camera: {len(cameras)} for {films} films; give one for each, in one world")
+    if args.offsets is not None and len(args.offsets) != films - 1:
+        raise UsageError(f"--offsets: {len(args.offsets)} for {films - 1} further films; give one for each")
+    return cameras
+
+
+def _offsets(text: str) -> tuple[float, ...]:
+    """Read seconds, separated by commas."""
+    try:
+        seconds = tuple(float(part) for part in text.split(","))
+    except ValueError:
+        raise argparse.ArgumentTypeError(f"{text!r} is no list of seconds, such as 0.5,-1.2") from None
+    if not all(math.isfinite(one) for one in seconds):
+        raise argparse.ArgumentTypeError(f"{text!r} has a number that is not finite")
+    return seconds
 
 
 def _people(text: str) -> int:

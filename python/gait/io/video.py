@@ -55,6 +55,8 @@ class Frame(NamedTuple):
     """Where the camera is, if it moves."""
     plate: Image | None = None
     """The empty scene as the camera sees it from there, if that is known."""
+    others: tuple[Frame | None, ...] = ()
+    """What further cameras saw at the same time, by the times and numbers of their own films."""
 
     def camera(self, lens: Camera) -> Camera:
         """Camera of this frame: the one given, where it is now."""

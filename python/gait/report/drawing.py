@@ -165,12 +165,15 @@ class Overlay:
     ) -> Image:
         """Return a BGR picture: frame, and several people with their names over their heads, no panel.
 
-        `colours`: of each person, instead of those of the sides of bodies.
+        `people`: by name; one whose name is empty gets none.  `colours`: of each person, instead of those of
+        the sides of bodies.
         """
         canvas = _in_colour(image).copy()
         for name, estimate in people.items():
             canvas = self._person(canvas, estimate, None if colours is None else colours[name])
         for name, estimate in people.items():
+            if not name:
+                continue
             at = self.camera.project(estimate.joint("head_top"))
             if np.isfinite(at).all():
                 size = 0.8 * self._scale

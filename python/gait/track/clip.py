@@ -15,6 +15,7 @@ from gait.progress import note
 from gait.track.box_start import BoxStart
 from gait.track.clip_output import write
 from gait.track.follow import Follower
+from gait.track.further_cameras import with_further_cameras
 from gait.track.keypoint_start import find_keypoint_start
 from gait.track.options import KEYPOINTS_SD, ClipOptions
 from gait.track.person_keypoints import PersonKeypoints
@@ -39,7 +40,7 @@ def track_clip(options: ClipOptions) -> dict[str, Any]:
     UserError
         If a file cannot be read, if no person can be found to start with, or no frame can be tracked.
     """
-    scene = Scene.read(options)
+    scene = with_further_cameras(options, Scene.read(options))
     return track_scene(options, scene, first_state(options, scene))
 
 
@@ -54,13 +55,21 @@ def track_scene(options: ClipOptions, scene: Scene, start: Start, also: Sink | N
     shapes = finds_shapes(options)
     if scene.people or shapes:
         config = config.replace(terms=config.terms | Term.KEYPOINTS)
-    tracker = Tracker(scene.model, scene.camera, config, background=scene.plate, tasks=options.threads)
+    scenes = (scene, *scene.further)
+    tracker = Tracker(
+        scene.model,
+        [one.camera for one in scenes],
+        config,
+        background=[one.plate for one in scenes],
+        tasks=options.threads,
+    )
     keypoints: PersonKeypoints | PersonShapes
     if shapes:
         fit = StartFit(scene.model, scene.camera)
         keypoints = PersonShapes(scene.camera, fit.stature, fit.set_pose)
     else:
-        keypoints = PersonKeypoints(scene.camera, scene.keypoints, scene.person, scene.apart)
+        further = [PersonKeypoints(one.camera, one.keypoints, one.person) for one in scene.further]
+        keypoints = PersonKeypoints(scene.camera, scene.keypoints, scene.person, scene.apart, further)
     plausibility = Plausibility(keypoints, *_stature(options, scene, start), config.belt)
     follower = _follower(options, scene, tracker, keypoints, plausibility)
     found = follower.follow(start, scene.frames)

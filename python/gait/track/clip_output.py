@@ -10,12 +10,13 @@ from itertools import groupby
 from pathlib import Path
 from typing import Any
 
+import cv2
 import numpy as np
 
 from gait.bindings.abi import TrackStatus
 from gait.bindings.estimate import Estimate
 from gait.bindings.model import Model
-from gait.camera.camera import write_camera
+from gait.camera.camera import Camera, write_camera
 from gait.io.files import replacing
 from gait.io.track_file import TrackWriter
 from gait.io.video import Frame, Video
@@ -137,10 +138,10 @@ def write(
         sinks: list[Sink] = [results.add, _widened(stack.enter_context(rows).write, scene.calibration)]
         if also is not None:
             sinks.append(also)
-        size = (scene.camera.width, scene.camera.height)
+        size = Drawing.size(scene)
         films = stack.enter_context(Films(options.overlay, span if options.report else None, size, video.fps))
         if films.wanted:
-            sinks.append(_drawing(model, scene, films))
+            sinks.append(Drawing(model, scene, films).add)
         standing = None if keypoints is None else Standing(keypoints, scene.camera, sinks)
         sinks = sinks if standing is None else [standing.add]
         smoother = None
@@ -174,30 +175,61 @@ def _write_cameras(path: Path, scene: Scene) -> None:
             rows.writerow([number, *(f"{value:.9g}" for value in values)])
 
 
-def _drawing(model: Model, scene: Scene, films: Films) -> Sink:
-    """Return a sink that draws every frame as captured, those before the first estimate too."""
-    still = Overlay(model, scene.camera)
-    first = scene.video.times[scene.frames.start]
-    begun = False
+class Drawing:
+    """Draws every frame as captured, those before the first estimate too; of several cameras side by side.
 
-    def draw(frame: Frame, estimate: Estimate | None) -> None:
-        overlay = still if frame.pose is None else Overlay(model, frame.camera(scene.camera))
-        picture = frame.image
-        legend = frame.time - first < LEGEND_SECONDS
-        if estimate is None:
-            films.write(overlay.draw_absent(picture, frame.time, frame.number, legend=legend), frame.number)
-        else:
-            films.write(overlay.draw(picture, estimate, frame.number, legend=legend), frame.number)
+    Parameters
+    ----------
+    model : Model
+    scene : Scene
+    films : Films
+    """
 
-    def sink(frame: Frame, estimate: Estimate) -> None:
-        nonlocal begun
-        if not begun and frame.number > scene.frames.start:
+    def __init__(self, model: Model, scene: Scene, films: Films) -> None:
+        self._model, self._scene, self._films = model, scene, films
+        self._overlays = [Overlay(model, one.camera) for one in (scene, *scene.further)]
+        self._beside = [np.zeros((*one.camera.size[::-1], 3), np.uint8) for one in scene.further]
+        self._begun = False
+
+    @staticmethod
+    def size(scene: Scene) -> tuple[int, int]:
+        """Width and height of the frames in pixels, all cameras' as tall as the first one's."""
+        width, height = scene.camera.size
+        return width + sum(_scaled_width(one.camera, height) for one in scene.further), height
+
+    def add(self, frame: Frame, estimate: Estimate) -> None:
+        """Draw a frame; frames increase."""
+        scene = self._scene
+        if not self._begun and frame.number > scene.frames.start:
             for before in scene.video.frames(scene.frames.start, frame.number):
-                draw(before, None)
-        begun = True
-        draw(frame, estimate)
+                self._draw(before, None)
+        self._begun = True
+        self._draw(frame, estimate)
 
-    return sink
+    def _draw(self, frame: Frame, estimate: Estimate | None) -> None:
+        camera, (overlay, *others) = self._scene.camera, self._overlays
+        if frame.pose is not None:
+            overlay = Overlay(self._model, frame.camera(camera))
+        legend = frame.time - self._scene.video.times[self._scene.frames.start] < LEGEND_SECONDS
+        if estimate is None:
+            picture = overlay.draw_absent(frame.image, frame.time, frame.number, legend=legend)
+        else:
+            picture = overlay.draw(frame.image, estimate, frame.number, legend=legend)
+        for k, (other, view) in enumerate(zip(others, frame.others, strict=True)):
+            if view is not None:  # else what the camera saw last
+                drawn = view.image if estimate is None else other.draw_people(view.image, {"": estimate})
+                self._beside[k] = drawn
+        size = camera.height
+        beside = [
+            cv2.resize(one, (_scaled_width(self._scene.further[k].camera, size), size))
+            for k, one in enumerate(self._beside)
+        ]
+        self._films.write(np.hstack([picture, *beside]) if beside else picture, frame.number)
+
+
+def _scaled_width(camera: Camera, height: int) -> int:
+    """Width of a camera's picture of another height, pixels."""
+    return 2 * round(camera.width * height / camera.height / 2)
 
 
 def _widened(sink: Sink, calibration: Calibration | None) -> Sink:

@@ -55,7 +55,7 @@ class Follower:
     ----------
     tracker : Tracker
     video : Video
-        Of the tracker's only camera.
+        Of the tracker's first camera; its frames have those of the others.
     keypoints : PersonKeypoints or PersonShapes
     plausibility : Plausibility
         Of its estimates.
@@ -192,8 +192,9 @@ class Follower:
 
     def _step(self, tracker: Tracker, frame: Frame, utime: int, last: Estimate | None) -> Estimate:
         """Step with the person's keypoints; judge the estimate."""
-        joints = self._keypoints.choose(frame, last)
-        found = tracker.step(frame.image, utime, joints, poses=frame.pose, backgrounds=self._plate_of(frame))
+        joints = self._keypoints.of_cameras(frame, last)
+        images = [frame.image, *(None if view is None else view.image for view in frame.others)]
+        found = tracker.step(images, utime, joints, poses=frame.pose, backgrounds=self._plate_of(frame))
         now = self._plausibility.judged(frame, found)
         self.step_seconds.append(tracker.step_seconds)
         sure = now.status != TrackStatus.TRACKING or not self._uncertain

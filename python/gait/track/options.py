@@ -19,6 +19,10 @@ class ClipOptions:
         The clip and the track to write.
     camera : str, optional
         Its camera file; the camera is found from the walk if left out, which needs `height` and keypoints.
+    further : tuple of (str, str)
+        Film and camera file of each further camera, in the world of the first.
+    offsets : tuple of float, optional
+        When each further film began, seconds after `video`; found from the motion if left out.
     scale_camera : bool
         Whether a camera of pictures of another size and the same aspect is resized to the clip's.
     camera_path : str, optional
@@ -68,6 +72,8 @@ class ClipOptions:
     init: str = "auto"
     background: str = "auto"
     height: float | None = None
+    further: tuple[tuple[str, str], ...] = ()
+    offsets: tuple[float, ...] | None = None
     scale_camera: bool = False
     camera_path: str | None = None
     camera_out: str | None = None

@@ -6,7 +6,7 @@ someone else, or of a detector that jumped, are left out.
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping, Sequence
 
 import numpy as np
 from numpy.typing import NDArray
@@ -35,6 +35,8 @@ class PersonKeypoints:
         Id of the person to track.
     apart : mapping, optional
         The same as `keypoints` of people with tracks of their own.
+    further : sequence of PersonKeypoints
+        Of the same person in the films of further cameras.
 
     Attributes
     ----------
@@ -48,8 +50,10 @@ class PersonKeypoints:
         keypoints: Mapping[int, Mapping[int, FrameKeypoints]],
         person: int,
         apart: Mapping[int, Mapping[int, FrameKeypoints]] | None = None,
+        further: Sequence[PersonKeypoints] = (),
     ) -> None:
         self._camera, self._keypoints, self._apart, self.ids = camera, keypoints, apart or {}, [person]
+        self._further = further
 
     def add(self, id: int) -> None:
         """Take an id for another one of this person."""
@@ -58,6 +62,14 @@ class PersonKeypoints:
 
     def restart(self) -> None:
         """Nothing is remembered from frame to frame."""
+
+    def of_cameras(self, frame: Frame, last: Estimate | None) -> list[FrameKeypoints | None]:
+        """Keypoints of the person in the picture of each camera, as `choose` finds them."""
+        views = zip(self._further, frame.others, strict=False)
+        return [
+            self.choose(frame, last),
+            *(None if view is None else one.choose(view, last) for one, view in views),
+        ]
 
     def choose(self, frame: Frame, last: Estimate | None) -> FrameKeypoints | None:
         """Keypoints of the person in a frame after the last estimate; None if there are none.
@@ -75,14 +87,25 @@ class PersonKeypoints:
     def near(self, frame: Frame, estimate: Estimate) -> bool | None:
         """Whether a person was found near the estimate; None if the person to track was not found at all.
 
-        False also if only a person with a track of their own was found there.
+        False also if only a person with a track of their own was found there.  Most cameras decide.
         """
+        views = [one.near(view, estimate) for one, view in self._views(frame)]
+        return _most([self._near(frame, estimate), *views])
+
+    def _near(self, frame: Frame, estimate: Estimate) -> bool | None:
+        """Answer the same for the first camera."""
         if any(self._distance(frame, estimate, keypoints) < _NEAR for keypoints in self._found(frame.number)):
             return True
         return None if self._own(frame.number) is None and not self._taken(frame, estimate) else False
 
     def agree(self, frame: Frame, estimate: Estimate) -> bool | None:
         """Whether the keypoints in a frame agree with the estimate, legs included; None if there are none."""
+        return _most(
+            [self._agree(frame, estimate), *(one.agree(view, estimate) for one, view in self._views(frame))]
+        )
+
+    def _agree(self, frame: Frame, estimate: Estimate) -> bool | None:
+        """Answer the same for the first camera."""
         if not self._found(frame.number):
             return False if self._taken(frame, estimate) else None
         keypoints = self.choose(frame, estimate)
@@ -90,6 +113,12 @@ class PersonKeypoints:
             return False
         legs = self._distances(frame, estimate, keypoints, _LEGS)
         return not len(legs) or bool(legs.mean() < _AGREE)
+
+    def _views(self, frame: Frame) -> Iterator[tuple[PersonKeypoints, Frame]]:
+        """Yield what further cameras saw at the time of a frame."""
+        for one, view in zip(self._further, frame.others, strict=False):
+            if view is not None:
+                yield one, view
 
     def _taken(self, frame: Frame, estimate: Estimate) -> bool:
         """Whether a person with a track of their own was found near the estimate."""
@@ -132,3 +161,9 @@ class PersonKeypoints:
         # A figure that is too large is as far off as one of the right size.
         height = np.ptp(expected[:, 1]) * min(extent[1] / max(extent[0], 1e-9), 1.0)
         return np.asarray(np.hypot(*(ours - theirs).T) / max(height, 1.0))
+
+
+def _most(answers: Sequence[bool | None]) -> bool | None:
+    """Answer as at least half of those do who know; None if none does."""
+    known = [answer for answer in answers if answer is not None]
+    return 2 * sum(known) >= len(known) if known else None

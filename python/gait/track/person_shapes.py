@@ -61,6 +61,10 @@ class PersonShapes:
         self._last: float | None = None  # seconds, when a shape was found
         self._off: deque[Array] = deque(maxlen=_MEDIAN_OF)
 
+    def of_cameras(self, frame: Frame, last: Estimate | None) -> list[FrameKeypoints | None]:
+        """Give what `choose` finds in the picture of the first camera."""
+        return [self.choose(frame, last)]
+
     def choose(self, frame: Frame, last: Estimate | None) -> FrameKeypoints | None:
         """Crown, pelvis and lowest point of the shape near the last estimate; None if unseen, or too soon.
 

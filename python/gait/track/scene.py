@@ -74,6 +74,10 @@ class Scene:
         The same as `keypoints` of people who have tracks of their own.
     outlines : dict of int to Outline
         Where people are in the picture, by id, if several are tracked.
+    further : tuple of Scene
+        The same walk as further cameras filmed it; `video` has their frames, too.
+    began : tuple of str
+        When each of these films began, in words.
     """
 
     video: Video
@@ -88,6 +92,8 @@ class Scene:
     calibration: Calibration | None
     apart: dict[int, dict[int, FrameKeypoints]] = field(default_factory=dict)
     outlines: dict[int, Outline] = field(default_factory=dict)
+    further: tuple[Scene, ...] = ()
+    began: tuple[str, ...] = ()
 
     @property
     def moving(self) -> MovingVideo | None:

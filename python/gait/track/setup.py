@@ -19,12 +19,15 @@ _BESIDE = {"init": "init.json", "camera": "camera.json"}
 
 def setup(options: ClipOptions, scene: Scene, start: Start, used: bool) -> dict[str, str]:
     """Describe what was used, by name, each in words; `used`: whether the background was."""
-    return {
+    words = {
         "start": _start(options, start),
         "background": _background(options, scene, used),
         "camera": _camera(options, scene),
         "joints found": _keypoints(options, scene),
     }
+    for (video, camera), began in zip(options.further, scene.began, strict=True):
+        words |= {f"further film {video}": f"camera {camera}, {began}"}
+    return words
 
 
 def settings(options: ClipOptions, scene: Scene, particles: int) -> dict[str, str]:

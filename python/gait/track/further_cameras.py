@@ -1,0 +1,143 @@
+"""Further cameras that film the same walk: read, and brought to the time of the first one."""
+
+from __future__ import annotations
+
+from collections.abc import Collection, Iterator, Sequence
+from dataclasses import replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from gait.errors import UserError
+from gait.io.video import Frame, Video
+from gait.progress import note
+from gait.track.options import ClipOptions
+from gait.track.scene import Scene, require_scene, stays
+from gait.track.synchronise import Offset, find_offset
+
+Array = NDArray[np.float64]
+
+
+class SeveralVideos(Video):
+    """The film of the first camera; each frame has the nearest ones of the others.
+
+    Parameters
+    ----------
+    video : Video
+    others : sequence of Video
+    offsets : sequence of float
+        When each of these began, seconds after `video`.
+    """
+
+    def __init__(self, video: Video, others: Sequence[Video], offsets: Sequence[float]) -> None:
+        self.path, self.fps, self.count, self.times = video.path, video.fps, video.count, video.times
+        self.broken = video.broken
+        self.width, self.height = video.size
+        self._video, self._others = video, others
+        self._partners = [
+            _nearest(video.times, other.times + offset) for other, offset in zip(others, offsets, strict=True)
+        ]
+
+    def frames(self, start: int = 0, stop: int | None = None, *, grey: bool = False) -> Iterator[Frame]:
+        """Yield the frames `start` <= index < `stop` in order, as BGR or grey."""
+        beside = [
+            self._beside(other, partners[start:stop], grey)
+            for other, partners in zip(self._others, self._partners, strict=True)
+        ]
+        for frame in self._video.frames(start, stop, grey=grey):
+            yield frame._replace(others=tuple(next(views, None) for views in beside))
+
+    def pick(self, wanted: Collection[int], progress: object = None) -> Iterator[Frame]:
+        """Yield the frames of the first camera with the numbers `wanted`, as BGR."""
+        yield from self._video.pick(wanted)
+
+    @staticmethod
+    def _beside(other: Video, partners: NDArray[np.int64], grey: bool) -> Iterator[Frame | None]:
+        """Yield the frames with the numbers `partners`, which increase; None for -1."""
+        wanted = partners[partners >= 0]
+        frames = other.frames(int(wanted[0]), int(wanted[-1]) + 1, grey=grey) if len(wanted) else iter(())
+        found: Frame | None = None
+        for number in partners.tolist():
+            while number >= 0 and (found is None or found.number < number):
+                found = next(frames, None)
+                if found is None:  # the film ends before its frames do
+                    return
+            yield found if number >= 0 and found is not None and found.number == number else None
+
+
+def _nearest(times: Array, others: Array) -> NDArray[np.int64]:
+    """Index (T,) of the frame of another film nearest to each time; -1 if that is nearer to another time."""
+
+    def nearest(to: Array, of: Array) -> NDArray[np.int64]:
+        after = np.searchsorted(of, to).clip(1, len(of) - 1)
+        return after - (to - of[after - 1] < of[after] - to)
+
+    partner = nearest(times, others)
+    known = nearest(others, times)[partner] == np.arange(len(times))
+    frame = max(float(np.median(np.diff(times))), float(np.median(np.diff(others))))
+    known &= np.abs(others[partner] - times) <= frame / 2
+    return np.where(known, partner, -1)
+
+
+def with_further_cameras(options: ClipOptions, scene: Scene) -> Scene:
+    """Read the other films of `options`, find when they began, and add them to the scene.
+
+    Raises
+    ------
+    UserError
+        If a film cannot be read, or when it began cannot be told.
+    """
+    if not options.further:
+        return scene
+    scenes, offsets, began = [], [], []
+    for k, (video, camera) in enumerate(options.further):
+        one = Scene.read(
+            replace(options, video=video, camera=camera, start=None, stop=None, further=(), offsets=None)
+        )
+        require_scene(options, one, 0)
+        given = None if options.offsets is None else options.offsets[k]
+        person, offset = _offset(scene, one, given)
+        one = replace(one, person=person)
+        if options.background == "auto" and one.plate is not None and one.people and stays(one):
+            one = one.without_plate()
+        began.append(_words(given, offset))
+        note(f"{video}: {began[-1]}", options.quiet)
+        scenes.append(one)
+        offsets.append(offset.seconds)
+    several = SeveralVideos(scene.video, [one.video for one in scenes], offsets)
+    return replace(scene, video=several, further=tuple(scenes), began=tuple(began))
+
+
+def _offset(scene: Scene, other: Scene, given: float | None) -> tuple[int, Offset]:
+    """Find who is the same person in another film, and when that began."""
+    first = scene.people.get(scene.person)
+    found: dict[int, Offset] = {}
+    for id, keypoints in other.people.items():
+        if first is None or len(keypoints.time) < 2:
+            continue
+        one = find_offset(first, scene.camera, keypoints, other.camera, given)
+        if one is not None:
+            found[id] = one
+    if found:
+        person = min(found, key=lambda id: found[id].misfit)
+        if given is not None or found[person].certain:
+            return person, found[person]
+    if given is not None:
+        return other.person, Offset(given, np.nan, True)
+    raise UserError(
+        f"{other.video.path}: when it began against {scene.video.path} does not follow from the person's "
+        "motion; give --offsets, the seconds by which each further film began later, and check the cameras"
+    )
+
+
+def _words(given: float | None, offset: Offset) -> str:
+    if offset.seconds == 0:
+        when = "began together with the first film"
+    else:
+        when = (
+            f"began {abs(offset.seconds):.3f} s {'after' if offset.seconds > 0 else 'before'} the first film"
+        )
+    how = "as given" if given is not None else "by the person's motion"
+    return (
+        when + f", {how}" + ("" if np.isnan(offset.misfit) else f" (joints fit to {offset.misfit:.1f} deg)")
+    )

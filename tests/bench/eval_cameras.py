@@ -1,0 +1,123 @@
+#!/usr/bin/env python3
+"""Tracks with one and with two cameras, and the offset between films that is found beside the true one.
+
+    eval_cameras.py [--record] [--seeds 501,502,503] [--frames 110] [--late 0.5]
+
+Simulated walks (gait simulate --cameras 2), from the side, at 45 degrees and towards the first camera,
+tracked with the detector and all defaults; the second film is cut so that it begins --late seconds later.
+Clips and tracks are kept in build/eval-cameras.
+"""
+
+from __future__ import annotations
+
+import argparse
+import re
+import sys
+from pathlib import Path
+
+import numpy as np
+import table
+from facts import facts
+
+from gait.bindings.model import read_cyclic
+from gait.io.track_file import read_estimates, read_truth
+from gait.io.video import Video, VideoWriter
+from gait.motion.evaluate import evaluate
+from gait.motion.footfalls import strikes_of
+from gait.simulate.clip import CRF, simulate
+from gait.simulate.scenario import Scenario
+from gait.track.clip import ClipOptions, track_clip
+
+FOLDER = Path(__file__).resolve().parents[2] / "build" / "eval-cameras"
+VIEWS = "side", "oblique", "toward"
+WANTED = 40.0  # mm, median over frames of the distance of joints from where they are, towards the camera
+
+
+def main() -> int:
+    """Make, track, compare, print; 1 if walks towards the camera are beyond what is wanted."""
+    options = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawTextHelpFormatter)
+    options.add_argument("--seeds", default="501,502,503")
+    options.add_argument("--frames", type=int, default=110)
+    options.add_argument("--late", type=float, default=0.5, help="seconds")
+    options.add_argument("--record", action="store_true")
+    args = options.parse_args()
+    seeds = [int(seed) for seed in args.seeds.split(",")]
+    rows: list[list[object]] = []
+    toward = []
+    for view in VIEWS:
+        for seed in seeds:
+            folder, late = made(view, seed, args.frames, args.late)
+            one = measured(folder, "one", ())
+            two = measured(folder, "two", ((str(folder / "late.mp4"), str(folder / "camera_2.json")),))
+            toward += [two[0]] if view == "toward" else []
+            off = None if two[4] is None else round(1000 * (two[4] - late))
+            pairs = zip(one[:4], two[:4], strict=True)
+            rows.append([view, seed, *(round(value) for pair in pairs for value in pair), off])
+            print(*rows[-1], file=sys.stderr)
+    head = ["walk", "seed"]
+    for what in ("joints mm", "pose mm", "inside %", "tracking %"):
+        head += [f"{what}, one", "two"]
+    head.append("offset off by ms")
+    middle = float(np.median(toward))
+    missed = middle > WANTED
+    note = (
+        f"{facts('make eval-cameras ARGS=--record')}\n\nSimulated walks of {args.frames} frames, seeds "
+        f"{args.seeds}, with the detector and all defaults, by one camera and by two; the second one stands "
+        f"60 degrees round the path, and its film begins {args.late:g} s later, found from the motion. "
+        "Medians over the frames: joints in space; pose, the midpoints of the hips laid on each other. "
+        "inside: coordinates within their 90 % intervals. Towards the camera, two cameras: median of clips "
+        f"{middle:.0f} mm, wanted at most {WANTED:.0f}{', missed' if missed else ''}."
+    )
+    (table.publish if args.record else _show)("cameras", "One camera and two", head, rows, note)
+    return int(missed)
+
+
+def _show(name: str, title: str, head: list[str], rows: list[list[object]], note: str) -> None:
+    table.show(title, head, rows)
+    print(note)
+
+
+def made(view: str, seed: int, frames: int, late: float) -> tuple[Path, float]:
+    """Make a clip unless it is there; return its folder, and when the second film begins, seconds."""
+    scenario = Scenario(view=view, seed=seed, frames=frames, cameras=2)
+    folder, cut = FOLDER / f"{view}_{seed}", round(late * scenario.fps)
+    if not (folder / "late.mp4").is_file():
+        simulate(scenario, folder)
+        with VideoWriter(folder / "late.mp4", scenario.fps, crf=CRF) as writer:
+            for frame in Video(folder / "video_2.mp4").frames(cut):
+                writer.write(frame.image)
+    return folder, cut / scenario.fps
+
+
+def measured(
+    folder: Path, name: str, further: tuple[tuple[str, str], ...]
+) -> tuple[float, float, float, float, float | None]:
+    """Track; return joints and pose (mm), shares in 90 % intervals and `tracking`, and the offset found."""
+    output = folder / f"{name}.csv"
+    options = ClipOptions(
+        str(folder / "video.mp4"), str(folder / "camera.json"), str(output), further=further, quiet=True
+    )
+    used = track_clip(options)["used"]
+    truth = read_truth(folder / "truth.csv")
+    result = evaluate(
+        read_estimates(output),
+        truth,
+        strikes=strikes_of(truth, folder / "meta.json"),
+        model=read_cyclic(None),
+    )
+    began = next((words for what, words in used.items() if what.startswith("further")), "")
+    seconds = re.search(r"began ([\d.]+) s (after|before)", began)
+    offset = None if not further else 0.0
+    if seconds:
+        offset = float(seconds[1]) * (1 if seconds[2] == "after" else -1)
+    return (
+        result["abs"]["median"],
+        result["root"]["median"],
+        100 * result["coverage"]["90"],
+        100 * result["status"]["tracking"],
+        offset,
+    )
+
+
+if __name__ == "__main__":
+    sys.exit(main())

@@ -1,0 +1,204 @@
+"""Several cameras that film one walk: the films are brought together, and the place becomes sure."""
+
+import json
+from dataclasses import replace
+from types import SimpleNamespace
+
+import numpy as np
+import pytest
+
+from gait import Video
+from gait.cli import main
+from gait.io.keypoints_file import Keypoints
+from gait.io.track_file import read_estimates, read_truth
+from gait.io.video import Frame
+from gait.simulate.clip import simulate
+from gait.simulate.scenario import PRESETS
+from gait.simulate.stage import set_stage
+from gait.track.further_cameras import SeveralVideos
+from gait.track.person_keypoints import PersonKeypoints
+from gait.track.synchronise import find_offset
+
+FRAMES, FPS = 30, 30.0
+SCENARIO = replace(PRESETS["toward"], frames=FRAMES, size=(160, 120), cameras=2)
+JOINTS = (
+    "l_hip",
+    "r_hip",
+    "l_knee",
+    "r_knee",
+    "l_ankle",
+    "r_ankle",
+    "l_wrist",
+    "r_wrist",
+    "l_elbow",
+    "r_elbow",
+)
+
+
+@pytest.fixture(scope="module")
+def stage():
+    return set_stage(replace(SCENARIO, view="oblique", frames=90, size=(640, 480)))
+
+
+def keypoints(stage, camera, frames, rate=1, noise=0.7, stands=False):
+    """Joints of a simulated walk in some frames, timed from the first of them."""
+    index = stage.frames[list(frames)[:: int(rate)]]
+    index = np.full_like(index, index[0]) if stands else index
+    points = stage.walk.points(index)
+    uv = np.stack([camera.project(points[name]) for name in JOINTS], axis=1)
+    uv = uv + noise * np.random.default_rng(int(camera.fx)).standard_normal(uv.shape)
+    number = np.arange(len(index))
+    return Keypoints(number, rate * number / FPS, JOINTS, uv, np.ones(uv.shape[:2]))
+
+
+def test_a_film_that_began_later_is_brought_to_the_time_of_the_first(stage):
+    first, second = stage.camera, stage.beside[0]
+    ours = keypoints(stage, first, range(90))
+    for begin, rate in ((0, 1), (7, 1), (25, 2)):
+        theirs = keypoints(stage, second, range(begin, 90), rate)
+        found = find_offset(ours, first, theirs, second)
+        assert found.certain
+        assert found.seconds == pytest.approx(begin / FPS, abs=0.012)
+        back = find_offset(theirs, second, ours, first)
+        assert back.seconds == pytest.approx(-begin / FPS, abs=0.012)
+
+
+def test_a_person_who_stands_does_not_give_the_time(stage):
+    first, second = stage.camera, stage.beside[0]
+    ours, theirs = (keypoints(stage, camera, range(60), stands=True) for camera in (first, second))
+    assert not find_offset(ours, first, theirs, second).certain
+    assert find_offset(ours, first, theirs, second, given=0.2).seconds == 0.2
+
+
+class _Film(Video):
+    """Frames without a file."""
+
+    def __init__(self, times):
+        self.path, self.fps, self.count, self.times, self.broken = (
+            None,
+            1 / np.diff(times).mean(),
+            len(times),
+            times,
+            None,
+        )
+        self.width = self.height = 2
+
+    def frames(self, start=0, stop=None, *, grey=False):
+        for number, time in list(enumerate(self.times))[start:stop]:
+            yield Frame(number, float(time), np.full((2, 2, 3), number, np.uint8))
+
+
+def test_each_frame_has_the_nearest_of_the_other_film_and_none_is_used_twice():
+    slow, fast = _Film(np.arange(20) / 25), _Film(np.arange(40) / 60)
+    offset = 0.2
+    for one, other, began in ((slow, fast, offset), (fast, slow, -offset)):
+        several = SeveralVideos(one, [other], [began])
+        forwards = list(several.frames(3, 18))
+        assert [frame.number for frame in forwards] == list(range(3, 18))
+        pairs = [(frame, frame.others[0]) for frame in forwards if frame.others[0] is not None]
+        assert len(pairs) >= 6
+        assert len({view.number for _, view in pairs}) == len(pairs)
+        for frame, view in pairs:
+            apart = np.abs(other.times + began - frame.time)
+            assert view.number == apart.argmin() and apart.min() <= 0.5 / 25
+        back = [
+            (frame.number, frame.others[0] and frame.others[0].number) for frame in several.backwards(18, 3)
+        ]
+        assert back[::-1] == [(f.number, f.others[0] and f.others[0].number) for f in forwards]
+    early = list(SeveralVideos(slow, [fast], [0.5]).frames(0, 5))
+    assert all(frame.others == (None,) for frame in early)  # the other film had not begun
+
+
+def test_most_cameras_decide_whether_keypoints_are_near():
+    camera, frame = SimpleNamespace(), Frame(0, 0.0, np.zeros((2, 2), np.uint8))
+    frame = frame._replace(others=(frame, None, frame))
+
+    class Says(PersonKeypoints):
+        def __init__(self, answer, further=()):
+            super().__init__(camera, {}, 0, further=further)
+            self.answer = answer
+
+        def _near(self, frame, estimate):
+            return self.answer
+
+        _agree = _near
+
+    for answers, wanted in (
+        ((None, None, None), None),
+        ((False, True, True), True),
+        ((False, None, True), True),
+        ((False, None, False), False),
+        ((None, None, False), False),
+    ):
+        first, second, third = answers
+        one = Says(first, [Says(second), Says(True), Says(third)])  # the third camera has no frame
+        assert one.near(frame, None) is one.agree(frame, None) is wanted
+
+
+def test_a_second_camera_shows_how_far_the_person_is(tmp_path, monkeypatch, capsys):
+    monkeypatch.chdir(tmp_path)
+    simulate(SCENARIO, ".")
+    start = json.loads((tmp_path / "init.json").read_text())
+    start["pelvis"][1] += 0.3  # nearer to the camera than the person is
+    start["sd"]["pelvis"] = 0.4
+    (tmp_path / "init.json").write_text(json.dumps(start))
+    words = ["--init", "init.json", "--particles", "300", "--detector", "none", "--seed", "3"]
+    cameras = ["--camera", "camera.json", "--camera", "camera_2.json"]
+    assert (
+        main(
+            [
+                "track",
+                "video.mp4",
+                "video_2.mp4",
+                *cameras,
+                "--offsets",
+                "0",
+                *words,
+                "-o",
+                "two.csv",
+                "--overlay",
+                "o.mp4",
+            ]
+        )
+        == 0
+    )
+    assert "further film video_2.mp4: camera camera_2.json, began together" in capsys.readouterr().out
+    assert Video("o.mp4").size == (320, 120)
+    assert main(["track", "video.mp4", *cameras[:2], *words, "-o", "one.csv"]) == 0
+    truth = read_truth("truth.csv").eval15()
+    errors = {}
+    for name in ("one", "two"):
+        track = read_estimates(f"{name}.csv")
+        errors[name] = np.median(np.linalg.norm(track.eval15() - truth[track.frame], axis=2).mean(axis=1))
+    assert errors["two"] < 0.6 * errors["one"]
+
+
+@pytest.mark.parametrize(
+    ("words", "message"),
+    [
+        (["--camera", "a.json"], "--camera: 1 for 2 films"),
+        (["--camera", "a.json", "--camera", "b.json", "--offsets", "0,1"], "--offsets: 2 for 1 further"),
+        (["--camera", "a.json", "--camera", "b.json", "--people", "all"], "--people: is for one film"),
+        (["--camera", "three.toml"], "--camera: 3 for 2 films"),
+        (["--camera", "three.toml", "--offsets", "soon"], "'soon' is no list of seconds"),
+    ],
+)
+def test_films_cameras_and_offsets_must_match(words, message, tmp_path, monkeypatch, capsys):
+    monkeypatch.chdir(tmp_path)
+    table = "matrix = [[500, 0, 320], [0, 500, 240], [0, 0, 1]]\n"
+    (tmp_path / "three.toml").write_text("".join(f"[c{k}]\n{table}" for k in range(3)))
+    try:
+        code = main(["track", "v.mp4", "w.mp4", *words, "-o", "t.csv"])
+    except SystemExit as exc:  # of argparse
+        code = exc.code
+    assert code == 2
+    assert message in capsys.readouterr().err
+
+
+def test_without_joints_the_offset_must_be_given(tmp_path, monkeypatch, capsys):
+    monkeypatch.chdir(tmp_path)
+    simulate(replace(SCENARIO, frames=8), ".")
+    words = ["track", "video.mp4", "video_2.mp4", "--camera", "camera.json", "--camera", "camera_2.json"]
+    assert main([*words, "--init", "init.json", "--detector", "none", "-o", "t.csv"]) == 1
+    assert "give --offsets" in capsys.readouterr().err
+    assert not (tmp_path / "t.csv").exists()
