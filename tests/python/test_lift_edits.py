@@ -25,6 +25,7 @@ from gait.lift.keypoints.corrections import (
     read_corrections,
     read_edits,
 )
+from gait.lift.keypoints.suggestions import FramePosterior
 from gait.lift.smooth.interactive import Interactive
 from gait.lift.smooth.options import Options
 from gait.reproducible import one_thread
@@ -211,3 +212,13 @@ def test_a_pinned_foot_stands_on_its_point(walk, lifted):
     found = run.lift_prepared("k.csv", prepared, edits, PRIOR, request, True).motion
     off = [np.linalg.norm(m.places[19, column, :2] - at[:2]) for m in (before.motion, found)]
     assert off[1] < 0.5 * off[0]
+
+
+def test_the_gain_of_a_correction_is_the_variance_that_it_takes():
+    rng = np.random.default_rng(0)
+    half = rng.normal(size=(6, 6))
+    posterior = FramePosterior(np.arange(2), rng.normal(size=(2, 3, 2, 6)), half @ half.T)
+    before, gain = (posterior.off**2).sum(), posterior.gain[1, 2]
+    assert posterior.best(0.0)[0] == posterior.gain.max()
+    posterior.correct(1, 2, CLICK_SD)
+    assert before - (posterior.off**2).sum() == pytest.approx(gain)

@@ -92,10 +92,9 @@ def test_corrections_make_the_estimate_surer(corrected, clip):
     assert len(suggestions(some, fit)) <= len(suggestions(clip, free))
 
 
-def test_what_is_suggested_is_the_least_certain(corrected, clip):
+def test_what_is_suggested_is_uncertain(corrected, clip):
     _, fit = corrected[0]
     asked = suggestions(clip, fit)
-    assert asked[0].sd_px == max(s.sd_px for s in asked)
     frame, joint = asked[0].frame, clip.prior.index([asked[0].joint])[0]
     assert clip.view.scale(fit.places[frame, joint]) * fit.sd[frame, joint].max() > 0.3 * asked[0].sd_px
     assert len({(s.frame, s.joint) for s in asked}) == len(asked)

@@ -7,7 +7,7 @@ import numpy.typing as npt
 
 from gait.body.skeleton import JOINTS
 from gait.io.video import Video
-from gait.lift.keypoints.corrections import found_alike
+from gait.lift.keypoints.corrections import ERRS_FOR, found_alike
 from gait.lift.keypoints.suggestions import FramePosterior, Suggestion, suggest
 from gait.lift.run import Lifted
 from gait.lift.segment.view import Perspective
@@ -94,8 +94,16 @@ def suggestions(lifted: Lifted, most: int) -> list[Suggestion]:
     slope = np.zeros((len(by_place), len(joints), 2, len(rows)))
     for j in range(len(joints)):
         slope[:, j, :, 3 * j : 3 * j + 3] = by_place[:, j]
+    # A detector errs for a while, and about a foot as a whole: a correction shows what it missed around it.
+    lasts = np.exp(-2 * np.abs(points.time[:, None] - points.time) / ERRS_FOR)
+    alike = np.array(
+        [[other in found_alike(joints, joint) for other in range(len(joints))] for joint in joints]
+    )
+    told = lasts @ off**2 @ alike.T
     posteriors = [
-        FramePosterior(points.frame[[t]], slope[[t]], own[np.ix_(rows, rows)], off[[t]])
+        FramePosterior(
+            points.frame[[t]], slope[[t]], own[np.ix_(rows, rows)], off[[t]], told[[t]], float(lasts[t].sum())
+        )
         for t, own in enumerate(covariances(lifted))
     ]
     enough = ENOUGH * motion.stature * float(np.median(np.linalg.norm(by_place, axis=(2, 3)))) / np.sqrt(2)

@@ -35,7 +35,7 @@ def add_gait(page: Page, track: Track, parameters: Parameters, cycles: Mapping[s
     page.grid("Gait", HEAD, parameter_rows(parameters), tips)
     if parameters.all_unsure:
         page.words(
-            "In every stride there are frames in which left and right are unsure. The values are means over "
+            "In every stride there are frames that are unsure. The values are means over "
             "these strides all the same: right and left may be swapped.",
             "warning",
         )
@@ -47,7 +47,7 @@ def add_gait(page: Page, track: Track, parameters: Parameters, cycles: Mapping[s
     page.figure("Footfalls", footfall_plot(track, parameters))
     page.words(
         "Bars: the foot is on the floor. Ticks: heel strikes (above) and toe-offs (below), two sd to each "
-        "side. Tinted: left and right unsure (yellow) or lost (red).",
+        "side. Tinted: unsure (yellow) or lost (red).",
         "faint",
     )
     page.figure("Stride by stride", stride_plot(track, parameters))

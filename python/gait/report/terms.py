@@ -59,7 +59,7 @@ COLUMNS = {
 
 STATUSES = {
     "tracking": ("tracking", "left and right are known"),
-    "ambiguous": ("left or right unsure", "the person is followed; left and right may be swapped"),
+    "ambiguous": ("unsure", "the person is followed; left and right may be swapped, or the figure be off"),
     "init": ("settling", "the track has just begun"),
     "lost": ("lost", "what is drawn is a guess"),
     "": ("no estimate", "the person was not found in the frame"),

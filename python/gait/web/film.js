@@ -66,10 +66,11 @@ export class Picture {
     this.look([this.size[0] / 2, this.size[1] / 2], 1);
   }
 
-  /** Show a pixel in the middle, at a zoom. */
+  /** Show a pixel in the middle, at a zoom, or as near to it as the picture fills the stage. */
   look(middle, zoom = this.zoom) {
     this.zoom = Math.min(20, Math.max(1, zoom));
-    this.#move(middle);
+    const half = [this.element.clientWidth, this.element.clientHeight].map((length) => length / 2 / this.scale);
+    this.#move(middle.map((m, k) => (2 * half[k] < this.size[k] ? Math.min(this.size[k] - half[k], Math.max(half[k], m)) : this.size[k] / 2)));
   }
 
   #move(middle) {

@@ -1,7 +1,7 @@
-"""Which correction would help most: where a joint is least certain in the picture, one after the other.
+"""Which correction would help most: the one after which all joints are surest in the picture, one by one.
 
-Greedy: the joint that may be furthest from where it is drawn is taken, as if it were corrected, and so on.
-What is close in time and of the same joint is not suggested again.
+Greedy: the correction that is expected to take most from the total variance of all joints is taken, as if it
+were made, and so on.  What is close in time and of the same joint is not suggested again.
 """
 
 from __future__ import annotations
@@ -40,14 +40,22 @@ class FramePosterior:
         Of those numbers.
     missed : (T, J) or None
         How far each joint is from where it was detected, pixels: more that it may be off.
+    told : (T, J) or None
+        What a correction also takes from what was missed around it, square pixels, summed over frames.
+    lasts : float
+        Frames for which a correction of one of these helps.
     """
 
     frame: npt.NDArray[np.intp]
     slope: Floats
     covariance: Floats
     missed: Floats | None = None
+    told: Floats | None = None
+    lasts: float = 1.0
 
     def __post_init__(self) -> None:
+        flat = self.slope.reshape(-1, self.slope.shape[-1])
+        self._total = flat.T @ flat
         self._open = np.ones(self.slope.shape[:2], bool)
         self._measure()
 
@@ -57,6 +65,10 @@ class FramePosterior:
         if self.missed is not None:
             square = square + self.missed**2
         self.off = np.where(self._open, np.sqrt(square), 0.0)  #: (T, J) pixels, both axes together
+        inner = half @ self.slope.swapaxes(2, 3) + CLICK_SD**2 * np.eye(2)
+        reach = half @ self._total @ half.swapaxes(2, 3)
+        gain = self.lasts * np.trace(np.linalg.solve(inner, reach), axis1=2, axis2=3)
+        self.gain = gain if self.told is None else gain + self.told  #: (T, J) square pixels
 
     def correct(self, row: int, joint: int, sd: float) -> None:
         """Take a correction of a frame and joint into the covariance."""
@@ -71,9 +83,17 @@ class FramePosterior:
         rows = np.abs(self.frame - frame) < near
         if rows.any():
             self._open[rows, joint] = False
-            if self.missed is not None:
-                self.missed[np.flatnonzero(rows)[:, None], np.array(alike)] = 0.0
+            near_by = np.flatnonzero(rows)[:, None], np.array(alike)
+            for values in (self.missed, self.told):
+                if values is not None:
+                    values[near_by] = 0.0
             self._measure()
+
+    def best(self, enough: float) -> tuple[float, int, int]:
+        """Gain, row and joint of the best correction of a joint that is further off than `enough`."""
+        gain = np.where(self.off > enough, self.gain, 0.0)
+        row, joint = (int(at) for at in np.unravel_index(int(gain.argmax()), gain.shape))
+        return float(gain[row, joint]), row, joint
 
 
 def suggest(
@@ -96,10 +116,10 @@ def suggest(
     """
     asked: list[Suggestion] = []
     while posteriors and len(asked) < most:
-        which = max(posteriors, key=lambda posterior: float(posterior.off.max(initial=0.0)))
-        if not which.off.max(initial=0.0) > enough:
+        gain, row, joint, k = max((*each.best(enough), k) for k, each in enumerate(posteriors))
+        if not gain > 0:
             break
-        row, joint = (int(at) for at in np.unravel_index(int(which.off.argmax()), which.off.shape))
+        which = posteriors[k]
         frame = int(which.frame[row])
         asked.append(Suggestion(frame, joints[joint], float(which.off[row, joint])))
         which.correct(row, joint, CLICK_SD)
