@@ -99,10 +99,15 @@ def suggestions(lifted: Lifted, most: int) -> list[Suggestion]:
     alike = np.array(
         [[other in found_alike(joints, joint) for other in range(len(joints))] for joint in joints]
     )
-    told = lasts @ off**2 @ alike.T
+    missed_around = lasts @ off**2 @ alike.T
     posteriors = [
         FramePosterior(
-            points.frame[[t]], slope[[t]], own[np.ix_(rows, rows)], off[[t]], told[[t]], float(lasts[t].sum())
+            points.frame[[t]],
+            slope[[t]],
+            own[np.ix_(rows, rows)],
+            off[[t]],
+            missed_around[[t]],
+            float(lasts[t].sum()),
         )
         for t, own in enumerate(covariances(lifted))
     ]

@@ -40,7 +40,7 @@ class FramePosterior:
         Of those numbers.
     missed : (T, J) or None
         How far each joint is from where it was detected, pixels: more that it may be off.
-    told : (T, J) or None
+    missed_around : (T, J) or None
         What a correction also takes from what was missed around it, square pixels, summed over frames.
     lasts : float
         Frames for which a correction of one of these helps.
@@ -50,7 +50,7 @@ class FramePosterior:
     slope: Floats
     covariance: Floats
     missed: Floats | None = None
-    told: Floats | None = None
+    missed_around: Floats | None = None
     lasts: float = 1.0
 
     def __post_init__(self) -> None:
@@ -68,7 +68,7 @@ class FramePosterior:
         inner = half @ self.slope.swapaxes(2, 3) + CLICK_SD**2 * np.eye(2)
         reach = half @ self._total @ half.swapaxes(2, 3)
         gain = self.lasts * np.trace(np.linalg.solve(inner, reach), axis1=2, axis2=3)
-        self.gain = gain if self.told is None else gain + self.told  #: (T, J) square pixels
+        self.gain = gain if self.missed_around is None else gain + self.missed_around  #: (T, J) square pixels
 
     def correct(self, row: int, joint: int, sd: float) -> None:
         """Take a correction of a frame and joint into the covariance."""
@@ -84,7 +84,7 @@ class FramePosterior:
         if rows.any():
             self._open[rows, joint] = False
             near_by = np.flatnonzero(rows)[:, None], np.array(alike)
-            for values in (self.missed, self.told):
+            for values in (self.missed, self.missed_around):
                 if values is not None:
                     values[near_by] = 0.0
             self._measure()
