@@ -364,7 +364,7 @@ typedef struct gait_tasks { GAIT_TASKS_FIELDS(GAIT_DECLARE) } gait_tasks;
     SETTING("Paper mode: surface points compared on a limb that faces the camera, n_s of eq. 10.",                    \
           int32_t, limb_points, , "", 16, 2, 16)                                                                      \
     SETTING("Paper mode: lost where the picture under the body stayed rather than moved, by so much more; 0: never.", \
-          float, stayed_nats, , "nats", 5, 0, 1e6)                                                                    \
+          float, stayed_nats, , "nats", 2.5, 0, 1e6)                                                                  \
     PAPER("Share of a start's standard deviation of the scores with which they are drawn.",                           \
           float, coef_start, , "", 1, 0.3, 0, 1)
 
