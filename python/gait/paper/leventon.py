@@ -189,10 +189,10 @@ class HeldOut:
 
 
 def hold_out(motions: Sequence[Recorded], update: Callable[[int], None] = lambda done: None) -> list[HeldOut]:
-    """Leave out one sequence after the other, and estimate its segments from one view."""
+    """Leave out one sequence after the other, with all of its recording, and estimate its segments."""
     found = []
     for k, out in enumerate(motions):
-        others = [m for m in motions if m is not out]
+        others = [m for m in motions if m.source != out.source]
         windows = cut(out, WINDOW, HOP)
         if len(windows):
             found.append(_held_out(out, windows, learn_all(others), _ours(others)))

@@ -88,8 +88,9 @@ def _training(found: Segments) -> Entry:
         "The same segments, and those of people made up from them: other postures and lengths of limbs.",
         verdicts.training(len(found.motions), min(frames), max(frames)),
         (
-            "Which motions: up to ten, half of them no walks if there are enough, the others a walk of a "
-            "person each; at most 240 frames of each.",
+            "Which motions: up to ten of 120 to 240 frames, longer recordings in equal parts, of all kinds "
+            "before walks; where these are too few, shorter ones, of walks one a person. A sequence is left "
+            "out with all of its recording.",
             "The markers: 37 virtual ones on the body that was fitted to each recording.",
             "The frame rate, about 20 per second: exactly 20, resampled after a low-pass filter. A sequence "
             "of F frames gives the whole part of "

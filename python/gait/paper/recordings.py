@@ -21,7 +21,7 @@ from gait.progress import progress
 FEWEST_WALKS, FEWEST_MOTIONS = 3, 3
 ALIKE = 0.1  # share of the period within which the paper's agrees with the refined one
 ECLECTIC = 10  # sequences of the second paper
-LONGEST = 240  # frames of them
+SHORTEST, LONGEST = 120, 240  # frames of them
 EVERYTHING = SegmentOptions(source="all")
 
 
@@ -57,20 +57,36 @@ def read(mocap: Sequence[str], quiet: bool) -> Recordings:
             "recordings of steady walking"
         )
     eclectic = _eclectic(motions, {walk.source for walk in found.sequences})
-    if len(eclectic) < FEWEST_MOTIONS:
-        raise UserError(f"{name}: {len(eclectic)} recordings are long enough for segments; add recordings")
+    long = len({motion.source for motion in eclectic})
+    if long < FEWEST_MOTIONS:
+        raise UserError(f"{name}: {long} recordings are long enough for segments; add recordings")
     return Recordings(found.sequences, eclectic, closed + found.refused)
 
 
 def _eclectic(motions: list[Recorded], walks: set[object]) -> list[Recorded]:
-    """Choose up to ECLECTIC motions, LONGEST frames at most: all kinds first, then a walk a person."""
-    long = [m for m in motions if len(m.table) >= 2 * EVERYTHING.frames]
-    others = [m for m in long if m.source not in walks]
-    walking = list({m.subject: m for m in reversed(long) if m.source in walks}.values())[::-1]
-    half = max(ECLECTIC // 2, ECLECTIC - len(walking))
-    chosen = others[:half]
-    chosen += walking[: ECLECTIC - len(chosen)]
-    return [replace(m, table=m.table[:LONGEST], people=[p[:LONGEST] for p in m.people]) for m in chosen]
+    """Choose up to ECLECTIC sequences: first those as long as the paper's, and of all kinds before walks."""
+    parts = [p for m in motions if len(m.table) >= 2 * EVERYTHING.frames for p in _parts(m)]
+    others = [p for p in parts if p.source not in walks]
+    walking = list({p.subject: p for p in reversed(parts) if p.source in walks}.values())[::-1]
+    return sorted([*others, *walking], key=lambda p: len(p.table) < SHORTEST)[:ECLECTIC]
+
+
+def _parts(motion: Recorded) -> list[Recorded]:
+    """Return a motion of at most LONGEST frames, or the equal parts of a longer one that are so short."""
+    count = -(-len(motion.table) // LONGEST)
+    if count == 1:
+        return [motion]
+    size = len(motion.table) // count
+    spans = [slice(k * size, (k + 1) * size) for k in range(count)]
+    return [
+        replace(
+            motion,
+            name=f"{motion.name} ({k} of {count})",
+            table=motion.table[span],
+            people=[each[span] for each in motion.people],
+        )
+        for k, span in enumerate(spans, 1)
+    ]
 
 
 def by_person(walks: list[Walk], count: int) -> list[Walk]:
