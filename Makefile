@@ -91,7 +91,7 @@ TOOLS := $(BIN)/gait-trackd
 LIBS := $(B)/libgait.so $(B)/libgait.a
 
 .PHONY: help setup lock lib tools test built check unit python-test demo model paper bench bench-lift detector-profile eval eval-camera eval-cameras eval-gait eval-moving eval-real eval-learn eval-lift eval-paper eval-people eval-studio mutants asan tsan unit-threads fuzz fuzz-run golden-check \
-        docs screenshots lint format wheel sdist wheel-check install install-daemon uninstall clean
+        docs screenshots sbom lint format wheel sdist wheel-check install install-daemon uninstall clean
 
 help: ## list the targets
 	@echo 'make demo     track a walking clip end to end, results in build/demo (VIDEO= CAMERA= for your own)'
@@ -432,6 +432,15 @@ screenshots: setup lib ## the figures of the pages and the tutorial's pictures, 
 # ---- style ---------------------------------------------------------------------------------------------------
 C_FILES := $(sort $(wildcard libgait/doc/*.c libgait/src/*/*.[ch] libgait/src/*/*.cpp tests/unit/*.[ch] tests/bench/*.[ch] tests/fuzz/*.[ch] \
            tools/trackd/*.[ch]))
+SBOM := build/sbom
+sbom: setup ## what the product consists of, with versions, hashes and licences (CycloneDX): build/sbom/libgait.cdx.json
+	@mkdir -p $(SBOM)
+	@test -x $(SBOM)/venv/bin/cyclonedx-py || { $(PYTHON) -m venv $(SBOM)/venv && \
+	    $(SBOM)/venv/bin/pip install --quiet --disable-pip-version-check 'cyclonedx-bom==7.5.0'; }
+	@$(SBOM)/venv/bin/cyclonedx-py environment $(VENV)/bin/python --pyproject python/pyproject.toml --mc-type library \
+	    --output-reproducible --output-file $(SBOM)/packages.json 2>$(SBOM)/log || { cat $(SBOM)/log >&2; exit 1; }
+	@$(PY) tools/sbom.py $(SBOM)/packages.json -o $(SBOM)/libgait.cdx.json
+
 lint: export PATH := $(abspath $(VENV)/bin):$(PATH)
 lint: setup ## clang-format, ruff, mypy; clang-tidy where it is installed
 	@clang-format --dry-run -Werror $(C_FILES)

@@ -1,0 +1,26 @@
+"""The bill of materials holds what no Python package states."""
+
+import importlib.util
+from pathlib import Path
+
+from gait.detect import weights
+from gait.web import parts
+
+SCRIPT = Path(__file__).resolve().parents[2] / "tools/sbom.py"
+
+
+def test_the_bill_has_what_is_compiled_in_inside_wheels_and_fetched():
+    spec = importlib.util.spec_from_file_location("sbom", SCRIPT)
+    sbom = importlib.util.module_from_spec(spec)
+    spec.loader.exec_module(sbom)
+    packages = [{"name": "av", "type": "library"}, {"name": "no-such-package", "type": "library"}]
+    bill = sbom.complete({"components": packages, "bomFormat": "CycloneDX"})
+    assert bill["bomFormat"] == "CycloneDX"
+    found = {one["name"]: one for one in bill["components"]}
+    inside = {one["name"].split("-")[0]: one for one in found["av"]["components"]}
+    assert {"libavcodec", "libx264"} <= inside.keys()
+    assert len(inside["libavcodec"]["hashes"][0]["content"]) == 64
+    assert "components" not in found["no-such-package"]
+    assert found["Eigen"]["licenses"] == [{"license": {"id": "MPL-2.0"}}]
+    for file in (*weights.STORE.files, *parts.STORE.files):
+        assert found[file.file]["hashes"] == [{"alg": "SHA-256", "content": file.sha256}]

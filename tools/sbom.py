@@ -1,0 +1,93 @@
+#!/usr/bin/env python3
+"""Complete a bill of materials of Python packages (CycloneDX, JSON) by what no package states.
+
+    sbom.py PACKAGES.json -o SBOM.json
+
+Adds the shared libraries inside the packages, Eigen in the C library, and the files that `--fetch` downloads:
+the detector's weights and the parts of pages.  `make sbom` calls this.
+"""
+
+from __future__ import annotations
+
+import argparse
+import hashlib
+import json
+import sys
+from importlib.metadata import PackageNotFoundError, files, version
+from pathlib import Path
+from typing import Any
+
+from gait.detect import weights
+from gait.io.files import replacing
+from gait.io.published import Published
+from gait.web import parts
+
+LICENCES = {  # SPDX, of files that are fetched
+    **dict.fromkeys(weights.STORE.files, "Apache-2.0"),
+    parts.THREE: "MIT",
+    parts.ORBIT: "MIT",
+    parts.ECHARTS: "Apache-2.0",
+}
+
+
+def main() -> int:
+    """Read, add, write."""
+    options = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawTextHelpFormatter)
+    options.add_argument("packages", type=Path)
+    options.add_argument("-o", "--output", type=Path, required=True)
+    args = options.parse_args()
+    document = complete(json.loads(args.packages.read_text()))
+    with replacing(args.output) as temporary:
+        temporary.write_text(json.dumps(document, indent=1) + "\n")
+    print(f"{args.output}: {len(document['components'])} parts")
+    return 0
+
+
+def complete(document: dict[str, Any]) -> dict[str, Any]:
+    """Return the bill with what is inside packages, compiled in, and fetched."""
+    packages = [one | within(one["name"]) for one in document["components"]]
+    eigen = {
+        "type": "library",
+        "name": "Eigen",
+        "version": version("cmeel-eigen"),
+        "description": "headers, compiled into libgait (libgait/src/base/linalg.cpp)",
+        "licenses": [{"license": {"id": "MPL-2.0"}}],
+    }
+    return document | {"components": [*packages, eigen, *map(fetched, LICENCES)]}
+
+
+def fetched(file: Published) -> dict[str, Any]:
+    """Describe a file that `--fetch` downloads."""
+    return {
+        "type": "machine-learning-model" if file in weights.STORE.files else "file",
+        "name": file.file,
+        "description": f"{file.member} of {file.package}, downloaded by --fetch",
+        "hashes": [{"alg": "SHA-256", "content": file.sha256}],
+        "licenses": [{"license": {"id": LICENCES[file]}}],
+    }
+
+
+def within(package: str) -> dict[str, Any]:
+    """Shared libraries of others that an installed package holds."""
+    try:
+        held = [file for file in files(package) or () if any(".libs" in part for part in file.parts[:-1])]
+    except PackageNotFoundError:
+        return {}
+    libraries = [
+        {
+            "type": "library",
+            "name": file.name,
+            "hashes": [{"alg": "SHA-256", "content": sha256(Path(str(file.locate())))}],
+        }
+        for file in sorted(held, key=str)
+    ]
+    return {"components": libraries} if libraries else {}
+
+
+def sha256(path: Path) -> str:
+    """Digest of a file, hexadecimal."""
+    return hashlib.sha256(path.read_bytes()).hexdigest()
+
+
+if __name__ == "__main__":
+    sys.exit(main())
