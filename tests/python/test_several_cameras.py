@@ -113,7 +113,7 @@ def test_most_cameras_decide_whether_keypoints_are_near():
     camera, frame = SimpleNamespace(), Frame(0, 0.0, np.zeros((2, 2), np.uint8))
     frame = frame._replace(others=(frame, None, frame))
 
-    class Says(PersonKeypoints):
+    class Answers(PersonKeypoints):
         def __init__(self, answer, further=()):
             super().__init__(camera, {}, 0, further=further)
             self.answer = answer
@@ -131,7 +131,9 @@ def test_most_cameras_decide_whether_keypoints_are_near():
         ((None, None, False), False),
     ):
         first, second, third = answers
-        one = Says(first, [Says(second), Says(True), Says(third)])  # the third camera has no frame
+        one = Answers(
+            first, [Answers(second), Answers(True), Answers(third)]
+        )  # the third camera has no frame
         assert one.near(frame, None) is one.agree(frame, None) is wanted
 
 

@@ -85,7 +85,7 @@ def with_further_cameras(options: ClipOptions, scene: Scene) -> Scene:
     Raises
     ------
     UserError
-        If a film cannot be read, or when it began cannot be told.
+        If a film cannot be read, or when it began cannot be found.
     """
     if not options.further:
         return scene
@@ -119,7 +119,7 @@ def _offset(scene: Scene, other: Scene, given: float | None) -> tuple[int, Offse
         if one is not None:
             found[id] = one
     if found:
-        person = min(found, key=lambda id: found[id].misfit)
+        person = min(found, key=lambda id: found[id].mismatch)
         if given is not None or found[person].certain:
             return person, found[person]
     if given is not None:
@@ -139,5 +139,7 @@ def _words(given: float | None, offset: Offset) -> str:
         )
     how = "as given" if given is not None else "by the person's motion"
     return (
-        when + f", {how}" + ("" if np.isnan(offset.misfit) else f" (joints fit to {offset.misfit:.1f} deg)")
+        when
+        + f", {how}"
+        + ("" if np.isnan(offset.mismatch) else f" (joints fit to {offset.mismatch:.1f} deg)")
     )

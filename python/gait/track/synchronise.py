@@ -2,8 +2,8 @@
 
 The two directions in which two cameras see one joint at one time meet: the second lies in the plane through
 both cameras and the first (the epipolar constraint).  With the films shifted against each other, joints that
-move across these planes miss them.  What a detector and the camera files miss lasts, so the misfit counts how
-far directions are from the planes, and once more how far they are from that joint's usual distance.
+move across these planes miss them.  What a detector and the camera files miss lasts, so the mismatch counts
+how far directions are from the planes, and once more how far they are from that joint's usual distance.
 """
 
 from __future__ import annotations
@@ -24,9 +24,9 @@ _MOST = 300  # frames compared
 _GAP = 0.15  # seconds between frames from which joints between them are not known
 _LEAST_SINE = 0.05  # of the angle between a direction and that to the other camera
 _ELSEWHERE = 0.2  # seconds from the best offset to another one
-_CLEARLY = 1.25  # times the misfit of the best offset that any other must have
+_CLEARLY = 1.25  # times the mismatch of the best offset that any other must have
 _FINE = 10  # parts of a frame in which an offset is found
-_TOGETHER = 1.1  # times the best misfit up to which films begin together if that is a frame away
+_TOGETHER = 1.1  # times the best mismatch up to which films begin together if that is a frame away
 
 
 @dataclass(frozen=True)
@@ -37,14 +37,14 @@ class Offset:
     ----------
     seconds : float
         Of its first frame, after that of the other film.
-    misfit : float
+    mismatch : float
         Of directions to each other's planes, degrees.
     certain : bool
         Whether any other offset fits clearly worse.
     """
 
     seconds: float
-    misfit: float
+    mismatch: float
     certain: bool
 
 
@@ -60,7 +60,7 @@ def find_offset(
     first_camera, camera : Camera
         In one world.
     given : float, optional
-        The offset, seconds, if only its misfit is wanted.
+        The offset, seconds, if only its mismatch is wanted.
 
     Returns
     -------
@@ -71,8 +71,8 @@ def find_offset(
     planes, times = _planes(first, names, first_camera, camera.centre - first_camera.centre)
     rays = _rays(other, names, camera)
     if given is not None:
-        misfit = _misfit(planes, times, rays, other.time, given)
-        return Offset(given, misfit, True) if np.isfinite(misfit) else None
+        mismatch = _mismatch(planes, times, rays, other.time, given)
+        return Offset(given, mismatch, True) if np.isfinite(mismatch) else None
     step = float(np.median(np.diff(first.time)))
     span = min(np.ptp(first.time), np.ptp(other.time))
     least = max(_OVERLAP, _SHARE * span)
@@ -80,16 +80,16 @@ def find_offset(
     if len(names) == 0 or low > high:
         return None
     offsets = step * np.arange(np.ceil(low / step), np.floor(high / step) + 1)
-    coarse = np.array([_misfit(planes, times, rays, other.time, offset) for offset in offsets])
+    coarse = np.array([_mismatch(planes, times, rays, other.time, offset) for offset in offsets])
     if not np.isfinite(coarse).any():
         return None
     at = float(offsets[np.nanargmin(coarse)])
     elsewhere = coarse[np.abs(offsets - at) > _ELSEWHERE]
     fine = at + step * np.arange(-_FINE, _FINE + 1) / _FINE
-    near = np.array([_misfit(planes, times, rays, other.time, offset) for offset in fine])
+    near = np.array([_mismatch(planes, times, rays, other.time, offset) for offset in fine])
     best = float(np.nanmin(near))
     certain = not bool((elsewhere < _CLEARLY * best).any())
-    together = _misfit(planes, times, rays, other.time, 0.0)
+    together = _mismatch(planes, times, rays, other.time, 0.0)
     if abs(at) < 1.5 * step and together < _TOGETHER * best:
         return Offset(0.0, together, certain)
     return Offset(float(fine[np.nanargmin(near)]), best, certain)
@@ -109,14 +109,14 @@ def _planes(keypoints: Keypoints, names: list[str], camera: Camera, baseline: Ar
 def _rays(keypoints: Keypoints, names: list[str], camera: Camera) -> Array:
     """Give unit directions (T, J, 3) of joints, world; NaN where they were not found."""
     columns = [keypoints.names.index(name) for name in names]
-    seen = keypoints.visible[:, columns]
-    rays = camera.rays(np.where(seen[..., None], keypoints.uv[:, columns], 0.0))
+    visible = keypoints.visible[:, columns]
+    rays = camera.rays(np.where(visible[..., None], keypoints.uv[:, columns], 0.0))
     rays = rays / np.linalg.norm(rays, axis=-1, keepdims=True)
-    return np.asarray(np.where(seen[..., None], rays, np.nan))
+    return np.asarray(np.where(visible[..., None], rays, np.nan))
 
 
-def _misfit(planes: Array, times: Array, rays: Array, ray_times: Array, offset: float) -> float:
-    """Misfit of an offset, degrees; NaN if too few directions can be compared."""
+def _mismatch(planes: Array, times: Array, rays: Array, ray_times: Array, offset: float) -> float:
+    """Mismatch of an offset, degrees; NaN if too few directions can be compared."""
     wanted = times - offset
     after = np.searchsorted(ray_times, wanted).clip(1, len(ray_times) - 1)
     begin, end = ray_times[after - 1], ray_times[after]
