@@ -2,6 +2,7 @@
 import { Picture } from 'gait/film.js';
 
 const NEAR = 14; // screen pixels within which a mark is taken
+const SLOW = 400; // milliseconds from which an answer that is awaited is announced
 const about = await (await fetch('/about.json')).json();
 const KEY = `gait camera ${about.name} ${about.size}`;
 const state = { marks: [], lengths: {}, mode: 'distances', frame: about.first, chosen: -1, found: null, fault: '' };
@@ -231,12 +232,16 @@ async function send(path) {
 let turn = 0;
 async function solve() {
   const mine = ++turn;
+  const slow = setTimeout(() => {
+    verdict.replaceChildren(make('p', { className: 'faint', style: 'margin: 0', textContent: 'checking…' }));
+  }, SLOW);
   let found;
   try {
     found = await send('/place');
   } catch {
     found = { fault: 'the command has ended; start gait camera --page again' };
   }
+  clearTimeout(slow);
   if (mine !== turn) return;
   state.found = found.fault ? null : found;
   state.fault = found.fault ?? '';
