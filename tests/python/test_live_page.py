@@ -74,6 +74,9 @@ def test_the_page_waits_and_then_shows_a_tracker(live, reports):
             and not page.inner_text("#waiting")
         )
         browser.until(page, "document.querySelector('#pictures img').naturalWidth === 160")
+        assert not page.evaluate("live.curves.data.curves[0].values.includes(null)")
+        live.report("sample", last | {"time": last["time"] + 5})  # no line crosses that gap
+        browser.until(page, "live.curves.data.curves[0].values.includes(null)")
         accessibility.check(page)
 
 

@@ -265,7 +265,10 @@ class Feed:
             [(names.index(a), names.index(b)) for a, b in BONES if a in names and b in names],
             np.empty((0, len(names), 3)),
             np.empty((0, len(names), 3)),
-            curves=[curve(name, unit, none, side=side) for name, unit, side, _ in PLOTTED],
+            curves=[
+                curve(name, unit, none, side=side, limits=(0, 1) if name == "phase" else None)
+                for name, unit, side, _ in PLOTTED
+            ],
             camera=None if camera is None else rounded(camera.centre),
             url=self.url,
             people=list(self.people),

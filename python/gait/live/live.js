@@ -1,12 +1,14 @@
 // The live page: pictures, figure, numbers and plots of the tracker as it runs.
 const element = (id) => document.getElementById(id);
 const DRAW_MS = 200; // between two drawings of the plots
+const GAP = 1; // seconds without an estimate that no line crosses
 const QUIET_MS = 3000; // without an estimate the page reports that there is none
 const TEXT = { tracking: 'tracking', ambiguous: 'ambiguous', lost: 'lost', init: 'settling' };
 
 const start = await (await fetch('/state')).json();
 let scene, curves, paused = false, recording = Boolean(start.recording.path);
 let chosen = 0; // person whose numbers and plots are shown
+const PHASE = start.curves.findIndex((curve) => curve.name === 'phase');
 const people = start.people.map((url) => ({ url, last: 0, body: null }));
 
 // ---- figure and plots, where their parts were fetched ----
@@ -19,9 +21,20 @@ if (start.parts) {
   element('scene').innerHTML = '<p class="none">The figure and the plots need parts that were not fetched: run gait studio --fetch once, with a network.</p>';
 }
 
-let waiting = [];
+let waiting = [], drawn = null;
+
+/** Samples with breaks of lines: where estimates are missing, and where the phase begins again. */
+function broken(samples) {
+  return samples.flatMap((one) => {
+    const before = drawn;
+    drawn = one;
+    if (before && one.time - before.time > GAP) return [{ ...before, values: one.values.map(() => null) }, one];
+    return [{ ...one, values: one.values.map((value, k) => (before && k === PHASE && before.values[k] - value > 0.5 ? null : value)) }];
+  });
+}
+
 function draw() {
-  const found = waiting;
+  const found = broken(waiting);
   waiting = [];
   if (paused || !curves || !found.length) return;
   curves.append({
@@ -37,6 +50,7 @@ setInterval(draw, DRAW_MS);
 // ---- people: each has a tracker of its own ----
 function choose(who) {
   chosen = who;
+  drawn = null;
   people.forEach((one, k) => one.button?.setAttribute('aria-pressed', k === who));
   waiting = [];
   element('list').replaceChildren();

@@ -2,7 +2,7 @@
 import { colour } from 'gait/scene.js';
 
 const DASH = { left: 'solid', right: 'dashed', '': 'solid' };
-const GRID = { left: 44, right: 10, top: 10, bottom: 20 };
+const GRID = { left: 44, right: 18, top: 10, bottom: 20 };
 
 export class Curves {
   /**
@@ -96,7 +96,7 @@ export class Curves {
       aria: { enabled: true, label: { description: `${plot.name} by time, with 90 % intervals` } },
       grid: GRID,
       tooltip: { trigger: 'axis', confine: true, valueFormatter: (value) => (value === null || value === undefined ? '–' : value.toFixed(1)) },
-      xAxis: { type: 'value', min: this.data.times[0], max: this.data.times.at(-1), axisLabel: { ...text, showMaxLabel: false, formatter: (value) => `${Math.round(value * 100) / 100} s` }, splitLine: { show: false }, axisLine: line },
+      xAxis: { type: 'value', min: this.data.times[0], max: this.data.times.at(-1), axisLabel: { ...text, showMinLabel: this.data.times[0] === 0, showMaxLabel: false, formatter: (value) => `${Math.round(value * 100) / 100} s` }, splitLine: { show: false }, axisLine: line },
       yAxis: { type: 'value', scale: true, ...limits(curves[0]), splitNumber: 3, axisLabel: text, splitLine: line },
       series: curves.flatMap((curve) => this.#series(curve)),
     }, { notMerge: true });
