@@ -255,10 +255,10 @@ def _reach(found: Climbed) -> Entry:
         (
             "The clips: walks of a normative gait, which no person in the recordings has, rendered from "
             "several sides and started near the truth. The goal, held in nine of ten runs and nearer than "
-            "without any image, is missed on most of seven clips of real motion, one of them filmed outdoors: "
-            "tests/bench/results/paper_mode.md of the sources.",
-            "Lost: for a third of a second the picture under the body stayed behind when the body walked; the "
-            "threshold was chosen on simulated clips: tests/bench/results/search_paper_lost.md.",
+            "without any image, is missed on most of seven clips of real motion, one of them filmed "
+            "outdoors: tests/bench/results/paper_mode.md of the sources.",
+            "Lost: for a third of a second the picture under the body stayed behind when the body walked. "
+            "The threshold was chosen on simulated clips: tests/bench/results/search_paper_lost.md.",
             "Held: in the last frames the joints are on average within a tenth of the person's height.",
             "Terms: q, p_occluded and sigma(alpha) are what is left where nothing in the picture differs; E "
             "of a limb is what its pixels add when the picture is shown limb by limb.",
