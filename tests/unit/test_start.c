@@ -231,6 +231,26 @@ static void test_refused(void)
     free(s);
 }
 
+/* Four frames over 0.3 s are enough, as the error says; a microsecond less is not, nor are three. */
+static void test_fewest_frames(void)
+{
+    walk const w = usual();
+    for (int kind = 0; kind < 3; kind++) {
+        gait_start *const s = toy_start_new(camera(), ~0u);
+        gait_keypoint k[JOINTS];
+        gait_hypothesis h;
+        int32_t const frames = kind == 2 ? 3 : 4;
+        int32_t count = 0;
+        for (int32_t n = 0; n < frames; n++) {
+            int32_t const utime = 300000 * n / (frames - 1) - (kind == 1 && n == 3);
+            detect(&w, 1e-6f * (float)utime, (uint32_t)n, k);
+            CHECK(gait_start_add(s, utime, k, NULL) == GAIT_OK);
+        }
+        CHECK(gait_start_solve(s, 300000, &h, 1, &count, NULL) == (kind == 0 ? GAIT_OK : GAIT_ERR_STATE));
+        free(s);
+    }
+}
+
 static void refuse(void (*spoil)(gait_start_config *), gait_result result, const char *text)
 {
     gait_start_config cfg;
@@ -319,6 +339,7 @@ static void tests(void)
     test_no_walk();
     test_coverage();
     test_refused();
+    test_fewest_frames();
     test_config();
     test_old_frames_are_dropped();
 }

@@ -4,7 +4,9 @@
 #define GAIT_LIFT_FIT_H
 #include "lift/segment_posterior.h"
 
-enum { LIFT_HEADINGS = 8 }; /* from which an unknown heading is searched for */
+/* From which an unknown heading is searched for, 45 degrees apart: each starts a local search, so that one more or
+ * less finds the same optimum.  What is promised is that the heading is found, wherever it points. */
+enum { LIFT_HEADINGS = 8 };
 
 typedef struct lift_trial { /* a component and a heading, as far as they were followed */
     int32_t component;
