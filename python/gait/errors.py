@@ -35,7 +35,7 @@ class GaitError(Exception):
     Attributes
     ----------
     status : int
-        The negative ``gait_status``.
+        The negative ``gait_result``.
     name : str
         Its name, such as ``"GAIT_ERR_CORRUPT"``.
     text : str

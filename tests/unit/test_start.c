@@ -231,7 +231,7 @@ static void test_refused(void)
     free(s);
 }
 
-/* Four frames over 0.3 s are enough, as the error says; a microsecond less is not, nor are three. */
+/* Four frames over 0.3 s are enough, as the error states; a microsecond less is not, nor are three. */
 static void test_fewest_frames(void)
 {
     walk const w = usual();
