@@ -146,7 +146,7 @@ def execute(block, folder, clip, env):
         (folder / "block.c").write_text(block.text if whole else AMONG % block.text, encoding="utf-8")
         run("cc", *FLAGS, f"-I{ROOT}/libgait/include", "-fsyntax-only", "block.c", cwd=folder)
     elif block.language == "python":
-        run(BIN / "python", "-c", block.text, cwd=folder)
+        python_here(block.text)
     elif block.language == "sh" and all(re.match(r"gait [^$>|]*$", line) for line in block.commands):
         for line in block.commands:  # here, as importing takes longer than most of them
             gait_here(*shlex.split(line)[1:], clip=clip)
@@ -163,6 +163,14 @@ def gait_here(*words, clip):
     with contextlib.redirect_stdout(out), contextlib.redirect_stderr(out):
         code = gait.cli.main(words)
     assert code == 0, f"gait {words}: {out.getvalue()}"
+
+
+def python_here(text):
+    """What a program prints that is run in this process, as importing takes longer than most of them."""
+    out = io.StringIO()
+    with contextlib.redirect_stdout(out):
+        exec(compile(text, "block", "exec"), {"__name__": "__main__"})
+    return out.getvalue()
 
 
 def stand_in(clip, folder):
@@ -294,24 +302,31 @@ def test_every_public_name_has_a_place_in_the_reference():
     assert set(names) == set(gait.__all__) - {"__version__"}
 
 
-def output_of(page, start, folder, clip):
-    """What the first Python block of a page that begins so prints, beside a clip."""
-    shutil.copytree(clip, folder / "walk")
+def output_of(page, start, folder):
+    """What the first Python block of a page that begins so prints, beside the clip in a folder."""
     (block,) = (b for b in ALL[DOC / page] if b.language == "python" and start in b.text)
     with (folder / "walk/truth.csv").open(encoding="utf-8", newline="") as f:
-        return run(BIN / "python", "-c", block.text, cwd=folder).stdout.splitlines(), list(csv.DictReader(f))
+        return python_here(block.text).splitlines(), list(csv.DictReader(f))
 
 
-def test_the_tracker_of_the_python_page_follows_the_person(tmp_path, clip):
-    (*rows, last), truth = output_of("howto/python.md", "tracker.start", tmp_path, clip)
+@pytest.fixture
+def beside(tmp_path, clip, monkeypatch):
+    """The working folder, which has the clip."""
+    shutil.copytree(clip, tmp_path / "walk")
+    monkeypatch.chdir(tmp_path)
+    return tmp_path
+
+
+def test_the_tracker_of_the_python_page_follows_the_person(beside):
+    (*rows, last), truth = output_of("howto/python.md", "tracker.start", beside)
     found = {int(row.split()[0]): float(row.split()[1]) for row in rows}
     assert sorted(found) == [int(row["frame"]) for row in truth]
     assert np.median([abs(found[int(row["frame"])] - float(row["pelvis_x"])) for row in truth]) < 0.1
     assert re.fullmatch(r"\d+ bytes, digest [0-9a-f]{16}", last)
 
 
-def test_the_lifter_of_the_python_page_follows_a_knee(tmp_path, clip):
-    rows, truth = output_of("howto/python.md", "lifter.push", tmp_path, clip)
+def test_the_lifter_of_the_python_page_follows_a_knee(beside):
+    rows, truth = output_of("howto/python.md", "lifter.push", beside)
     knee = [[float(row[f"l_knee_{axis}"]) for axis in "xyz"] for row in truth]
     off = [np.linalg.norm(np.array(row.split()[1:4], float) - knee[int(row.split()[0])]) for row in rows]
     assert len(off) > len(truth) - 20

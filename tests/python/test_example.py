@@ -11,6 +11,8 @@ import numpy as np
 import pytest
 from example_scene import drawn_walk
 
+from gait.cli import main
+
 ROOT = Path(__file__).resolve().parents[2]
 SOURCE = ROOT / "libgait/doc/example.c"
 MODEL = ROOT / "python/gait/data/walk.gait"
@@ -82,9 +84,9 @@ def test_the_example_follows_a_drawn_person(program, walk):
 def test_the_example_follows_the_person_of_a_clip(program, tmp_path):
     """As in the C how-to: a clip of gait simulate, made into pictures and numbers by example_clip.py."""
     clip = tmp_path / "walk"
+    simulate = ["simulate", "-o", str(clip), "--quiet", "--size", "640x480", "--frames", "40"]
+    assert main(simulate) == 0
     python = ROOT / ".venv/bin/python"
-    simulate = [python, "-m", "gait", "simulate", "-o", clip, "--quiet"]
-    subprocess.run([*simulate, "--size", "640x480", "--frames", "40"], check=True, timeout=300)
     subprocess.run([python, ROOT / "libgait/doc/example_clip.py", clip], check=True, timeout=300)
     pictures = sorted(clip.glob("frame*.pgm"))
     command = [*program, MODEL, clip / "scene.txt", clip / "empty.pgm", *pictures]
