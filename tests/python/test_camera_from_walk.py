@@ -2,6 +2,7 @@
 
 import json
 from dataclasses import replace
+from functools import cache
 
 import numpy as np
 import pytest
@@ -19,6 +20,12 @@ from gait.track.walk_model import WalkingBody
 from gait.track.walk_start import swap_sides
 
 
+@cache
+def calibrated(walk=TOWARDS, **truth):
+    """Camera found from a walk before a camera; found once, though several tests look at it."""
+    return calibrate(keypoints(view(**truth), walk), SIZE, MODEL, 1.75)
+
+
 @pytest.mark.parametrize(
     "truth",
     [
@@ -30,7 +37,7 @@ from gait.track.walk_start import swap_sides
 )
 def test_a_walk_towards_the_camera_gives_all_of_it(truth):
     camera = view(**truth)
-    found = calibrate(keypoints(camera), SIZE, MODEL, 1.75)
+    found = calibrated(**truth)
     focal, height = (
         np.log(found.camera.fx / camera.fx),
         np.log(found.camera.centre[2] / camera.centre[2]),
@@ -51,8 +58,7 @@ def test_a_walk_towards_the_camera_gives_all_of_it(truth):
 
 def test_a_straight_path_across_leaves_the_focal_length_open():
     camera = view()
-    across = calibrate(keypoints(camera, ACROSS), SIZE, MODEL, 1.75)
-    towards = calibrate(keypoints(camera), SIZE, MODEL, 1.75)
+    across, towards = calibrated(ACROSS), calibrated()
     assert across.sd[0] > 1.5 * towards.sd[0]
     assert abs(np.log(across.camera.fx / camera.fx)) < 2 * across.sd[0]
     given = calibrate(keypoints(camera, ACROSS), SIZE, MODEL, 1.75, fov=65.2)
@@ -60,8 +66,7 @@ def test_a_straight_path_across_leaves_the_focal_length_open():
 
 
 def test_the_uncertainty_covers_the_path():
-    camera = view()
-    found = calibrate(keypoints(camera), SIZE, MODEL, 1.75)
+    found = calibrated()
     heading, place = TOWARDS
     way = 1.25 * found.time[:, None] * [np.cos(heading), np.sin(heading)]
     off = found.path[:, :2] - (np.array(place) + way)
@@ -135,10 +140,10 @@ def test_what_is_no_walk_is_refused(change, words):
 
 @pytest.mark.parametrize("share", [0.3, 1.0], ids=["some frames", "all frames"])
 def test_sides_that_a_detector_swaps_are_put_right(share):
-    camera = view()
-    away = keypoints(camera, (1.8, (0.3, 3.6)))
-    wrong = np.random.default_rng(3).uniform(size=len(away.time)) < share
-    right, found = (calibrate(k, SIZE, MODEL, 1.75) for k in (away, swap_sides(away, wrong)))
+    away = 1.8, (0.3, 3.6)
+    walk, right = keypoints(view(), away), calibrated(away)
+    wrong = np.random.default_rng(3).uniform(size=len(walk.time)) < share
+    found = calibrate(swap_sides(walk, wrong), SIZE, MODEL, 1.75)
     assert found.camera.fx == pytest.approx(right.camera.fx, rel=0.02)
     assert found.sd == pytest.approx(right.sd, rel=0.1)
 
