@@ -137,18 +137,19 @@ def test_help_is_quick(numpy_alone, tmp_path):
 
 
 def test_the_wheel_makes_a_clip_and_tracks_it(tmp_path):
-    """The commands of the README, with only the environment on the PATH: no compiler, no FFmpeg."""
+    """The commands of the README on fewer and smaller frames, with only the environment on the PATH."""
     venv = tmp_path / "venv"
     subprocess.run([sys.executable, "-m", "venv", "--without-pip", venv], check=True)
     pins = ["--no-compile", "--constraint", ROOT / "python/constraints.txt"]
     wheel = f"{WHEEL}[video,detect,lcm]"
     subprocess.run([*PIP, "--python", venv / "bin/python", "install", *pins, wheel], check=True)
-    for command in ("gait simulate -o walk", "gait track walk/video.mp4 --camera walk/camera.json -o t.csv"):
+    simulate = "gait simulate -o walk --frames 40 --fps 15 --size 400x300"
+    for command in (simulate, "gait track walk/video.mp4 --camera walk/camera.json -o t.csv"):
         name, *words = command.split()
         done = run([venv / "bin" / name, *words], tmp_path, PATH=str(venv / "bin"))
         assert done.returncode == 0, done.stderr
     assert run([venv / "bin/python", "-c", LCM_MESSAGES], tmp_path).returncode == 0
-    assert len((tmp_path / "t.csv").read_text().splitlines()) > 100
+    assert len((tmp_path / "t.csv").read_text().splitlines()) > 40
 
 
 def test_cmake_and_make_build_libraries_of_the_same_bits(tmp_path):
@@ -163,7 +164,8 @@ def test_cmake_and_make_build_libraries_of_the_same_bits(tmp_path):
 
 def test_the_source_package_builds_the_same_wheel_without_a_network(tmp_path):
     words = ["wheel", "--no-deps", "--no-index", "--no-build-isolation", "--wheel-dir", tmp_path, SDIST]
-    subprocess.run([*PIP, *words], check=True)
+    quickly = "--config-settings=cmake.build-type=Debug"
+    subprocess.run([*PIP, *words, quickly], check=True)
     (built,) = tmp_path.glob("*.whl")
     contents = [set(zipfile.ZipFile(file).namelist()) for file in (built, WHEEL)]
     assert contents[0] == contents[1]
