@@ -31,7 +31,7 @@ def clip(tmp_path_factory):
 @pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM, signal.SIGHUP])
 def test_track_keeps_the_rows_that_are_finished(clip, tmp_path, number):
     words = ["track", clip / "video.mp4", "--camera", clip / "camera.json", "--init", clip / "init.json"]
-    words += ["--background", "none", "--particles", "2000"]
+    words += ["--background", "none", "--particles", "500"]
     words += ["-o", tmp_path / "t.csv", "--overlay", tmp_path / "o.mp4"]
     process = subprocess.Popen(
         [sys.executable, "-m", "gait", *map(str, words)], stderr=subprocess.PIPE, text=True
