@@ -125,7 +125,7 @@ def test_the_ladder_goes_from_the_paper_to_the_default_and_adds_one_thing_a_rung
 
 def test_the_page_holds_every_figure_and_needs_no_other_file(walks, tmp_path, monkeypatch, capsys):
     """A whole run on toy walks and a small rendered clip."""
-    small = replace(PRESETS[clips.PRESET], size=(320, 240), frames=24)
+    small = replace(PRESETS[clips.PRESET], size=(320, 240), frames=16)
     monkeypatch.setitem(PRESETS, clips.PRESET, small)
     monkeypatch.setattr(tracking, "FRAMES", 12)
     monkeypatch.setattr(tracking, "SHOWN", (0, 6, 12))
@@ -134,7 +134,7 @@ def test_the_page_holds_every_figure_and_needs_no_other_file(walks, tmp_path, mo
     monkeypatch.setattr(ladder, "SEEDS", 1)
     monkeypatch.setattr(scene, "VIEWS", {"side": "demo"})
     monkeypatch.setattr(scene, "SIZE", (320, 240))
-    monkeypatch.setattr(lifting, "FRAMES", 20)
+    monkeypatch.setattr(lifting, "FRAMES", 14)
     monkeypatch.setattr(recordings, "ECLECTIC", 4)
     monkeypatch.setattr(recordings, "cores", lambda: 1)
     monkeypatch.setattr(Drawing, "png", lambda self: b"PNG")  # Matplotlib takes a second for each
