@@ -45,6 +45,7 @@ if TYPE_CHECKING:
     from gait.lift.segment.explain import Uncertain
     from gait.lift.smooth.motion import Motion
     from gait.track.from_walk import Calibration
+    from gait.track.stabilise import Motion as Turns
 
 EXAMPLES = """\
 examples:
@@ -257,7 +258,7 @@ def _lift_keypoints(args: argparse.Namespace, video: bool) -> tuple[dict[str, An
     _check(args, video)
     warn = warner(args.quiet)
     prior = lift_run.load_prior(args.model, warn)
-    keypoints, calibration = _find_keypoints(args, prior) if video else (None, None)
+    keypoints, calibration, turns = _find_keypoints(args, prior) if video else (None, None, None)
     request = lift_run.Request(
         options=_options(args),
         pixel_sd_given=args.pixel_sd is not None,
@@ -301,7 +302,7 @@ def _lift_keypoints(args: argparse.Namespace, video: bool) -> tuple[dict[str, An
 
         if args.overlay:
             film = Video(args.input if video else args.video)
-            picture.draw_overlay(args.overlay, film, lifted, args.quiet)
+            picture.draw_overlay(args.overlay, film, lifted, args.quiet, turns)
         if args.suggest:
             asked = picture.suggestions(lifted, args.suggest)
             summary["suggest"] = [{"frame": s.frame, "joint": s.joint, "sd_px": s.sd_px} for s in asked]
@@ -325,8 +326,10 @@ def _clip(args: argparse.Namespace) -> Clip:
     return Clip(args.person, args.fps, times, size, args.quiet)
 
 
-def _find_keypoints(args: argparse.Namespace, prior: SegmentPrior) -> tuple[Keypoints, Calibration | None]:
-    """Find the keypoints of the person in a video and, unless the view is given, the camera."""
+def _find_keypoints(
+    args: argparse.Namespace, prior: SegmentPrior
+) -> tuple[Keypoints, Calibration | None, Turns | None]:
+    """Find the keypoints of the person in a video, the camera unless the view is given, and how it turns."""
     from gait.camera.camera import Camera
     from gait.io.video import Video  # PyAV, and below OpenCV, which files of keypoints do not need
     from gait.lift.keypoints.corrections import read_edits  # refused before the detector's work
@@ -340,14 +343,15 @@ def _find_keypoints(args: argparse.Namespace, prior: SegmentPrior) -> tuple[Keyp
     if args.corrections:
         read_edits(args.corrections, prior, video.span(args.start or 0, args.stop), video.size)
     keypoints = find_person(video, args.quiet, args.start or 0, args.stop)
-    if args.stabilize == "auto":
-        keypoints = _stabilised(args, video, keypoints)
+    turns = _turns(args, video, keypoints) if args.stabilize == "auto" else None
+    if turns is not None:  # keypoints move to where the camera of one frame would see them
+        keypoints = turns.in_reference(keypoints)
     calibration = None if args.camera or args.orthographic else _calibrate(args, video, keypoints)
-    return keypoints, calibration
+    return keypoints, calibration, turns
 
 
-def _stabilised(args: argparse.Namespace, video: Video, keypoints: Keypoints) -> Keypoints:
-    """Move keypoints to where the camera of one frame would see them, if the camera turns."""
+def _turns(args: argparse.Namespace, video: Video, keypoints: Keypoints) -> Turns | None:
+    """Find how the camera turns; None if it stands still."""
     from gait.camera.camera import Camera
     from gait.io.video import sample_frames
     from gait.track.stabilise import find_turns
@@ -355,10 +359,9 @@ def _stabilised(args: argparse.Namespace, video: Video, keypoints: Keypoints) ->
 
     given = Camera.read(args.camera, video.size, args.scale_camera) if args.camera else None
     camera = given or expected_camera(video, args.fov)
-    motion = find_turns(
+    return find_turns(
         video, camera, sample_frames(video), {0: keypoints}, None, args.quiet, first=given is not None
     )
-    return keypoints if motion is None else motion.in_reference(keypoints)
 
 
 def _calibrate(args: argparse.Namespace, video: Video, keypoints: Keypoints) -> Calibration:
@@ -511,6 +514,8 @@ def _check(args: argparse.Namespace, video: bool) -> None:
         if not (video or args.video):
             raise UsageError("--overlay: give the --video in which the keypoints were found")
         require_video_name(args.overlay)
+    if args.overlay and args.orthographic and args.stabilize == "auto":
+        raise UsageError("--overlay: of a camera that turns needs its lens; give --camera or --height")
     if args.camera and args.orthographic:
         raise UsageError("--camera and --orthographic exclude each other; give one of them")
     if args.metres_per_unit and not args.orthographic:

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import numpy.typing as npt
 
@@ -14,6 +16,8 @@ from gait.lift.segment.view import Perspective
 from gait.lift.video.figure import Figure, write_overlay
 from gait.lift.video.fit_clip import ENOUGH
 from gait.lift.video.sensors import CameraView, FlatView, View
+from gait.track.moving_video import map_pixels
+from gait.track.stabilise import Motion
 
 Floats = npt.NDArray[np.float64]
 
@@ -116,12 +120,26 @@ def suggestions(lifted: Lifted, most: int) -> list[Suggestion]:
     return suggest(posteriors, joints, near, enough, most)
 
 
-def draw_overlay(path: str, video: Video, lifted: Lifted, quiet: bool) -> None:
-    """Write a video with the cylinder figure and the corrections drawn into it."""
-    motion, frame = lifted.motion, lifted.keypoints.frame
+def draw_overlay(path: str, video: Video, lifted: Lifted, quiet: bool, turns: Motion | None = None) -> None:
+    """Write a video with the cylinder figure and the corrections drawn into it.
+
+    Parameters
+    ----------
+    turns : Motion, optional
+        Of the calibrated camera, against which the keypoints were stabilised.
+    """
+    motion, frame, seen = lifted.motion, lifted.keypoints.frame, views(lifted)
     figure = Figure.fit(motion.places, motion.names)
     rows = {int(number): row for row, number in enumerate(frame)}
     pulled = [
         (c, motion.places[rows[c.frame], motion.names.index(c.joint)]) for c in lifted.edits.corrections
     ]
-    write_overlay(path, video, frame, views(lifted), figure, pulled, quiet)
+    if turns is not None and isinstance(lifted.view, Perspective):
+        reference = lifted.view.camera
+        own = turns.cameras(reference)
+        seen = [CameraView(own.get(number, reference)) for number in frame.tolist()]
+        pulled = [
+            (replace(c, uv=tuple(map_pixels(np.array(c.uv), reference, own[c.frame]).tolist())), place)
+            for c, place in pulled
+        ]
+    write_overlay(path, video, frame, seen, figure, pulled, quiet)

@@ -59,6 +59,11 @@ class Motion:
                 uv[row] = map_pixels(uv[row], self.views[number].camera(self.camera), self.camera)
         return replace(captured, uv=uv)
 
+    def cameras(self, camera: Camera) -> dict[int, Camera]:
+        """Camera of each frame; `camera`, of the reference, may be better known by now."""
+        poses = self.poses(camera)
+        return {number: replace(camera, R=pose.R, t=pose.t) for number, pose in poses.items()}
+
     def poses(self, camera: Camera) -> dict[int, CameraPose]:
         """Pose of each frame; `camera`, of the reference, may be better known by now."""
         u, v = (np.linspace(0, size - 1, 7) for size in camera.size)
