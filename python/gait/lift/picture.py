@@ -128,7 +128,7 @@ def draw_overlay(path: str, video: Video, lifted: Lifted, quiet: bool, turns: Mo
     turns : Motion, optional
         Of the calibrated camera, against which the keypoints were stabilised.
     """
-    motion, frame, seen = lifted.motion, lifted.keypoints.frame, views(lifted)
+    motion, frame, by_frame = lifted.motion, lifted.keypoints.frame, views(lifted)
     figure = Figure.fit(motion.places, motion.names)
     rows = {int(number): row for row, number in enumerate(frame)}
     pulled = [
@@ -137,9 +137,9 @@ def draw_overlay(path: str, video: Video, lifted: Lifted, quiet: bool, turns: Mo
     if turns is not None and isinstance(lifted.view, Perspective):
         reference = lifted.view.camera
         own = turns.cameras(reference)
-        seen = [CameraView(own.get(number, reference)) for number in frame.tolist()]
+        by_frame = [CameraView(own.get(number, reference)) for number in frame.tolist()]
         pulled = [
             (replace(c, uv=tuple(map_pixels(np.array(c.uv), reference, own[c.frame]).tolist())), place)
             for c, place in pulled
         ]
-    write_overlay(path, video, frame, seen, figure, pulled, quiet)
+    write_overlay(path, video, frame, by_frame, figure, pulled, quiet)
