@@ -4,7 +4,8 @@
     eval_cameras.py [--record] [--seeds 501,502,503] [--frames 110] [--late 0.5]
 
 Simulated walks (gait simulate --cameras 2), from the side, at 45 degrees and towards the first camera,
-tracked with the detector and all defaults; the second film is cut so that it begins --late seconds later.
+tracked with the detector and all defaults; the second film once as it is, and once cut so that it begins
+--late seconds later, which has to be found.
 Clips and tracks are kept in build/eval-cameras.
 """
 
@@ -47,23 +48,25 @@ def main() -> int:
     for view in VIEWS:
         for seed in seeds:
             folder, late = made(view, seed, args.frames, args.late)
+            second = str(folder / "camera_2.json")
             one = measured(folder, "one", ())
-            two = measured(folder, "two", ((str(folder / "late.mp4"), str(folder / "camera_2.json")),))
+            two = measured(folder, "two", ((str(folder / "video_2.mp4"), second),))
+            cut = measured(folder, "cut", ((str(folder / "late.mp4"), second),))
             toward += [two[0]] if view == "toward" else []
-            off = None if two[4] is None else round(1000 * (two[4] - late))
-            pairs = zip(one[:4], two[:4], strict=True)
-            rows.append([view, seed, *(round(value) for pair in pairs for value in pair), off])
+            values = [round(value) for arms in zip(one[:4], two[:4], cut[:4], strict=True) for value in arms]
+            rows.append([view, seed, *values, round(1000 * (cut[4] - late))])
             print(*rows[-1], file=sys.stderr)
     head = ["walk", "seed"]
     for what in ("joints mm", "pose mm", "inside %", "tracking %"):
-        head += [f"{what}, one", "two"]
+        head += [f"{what}, one", "two", "cut"]
     head.append("offset off by ms")
     middle = float(np.median(toward))
     missed = middle > WANTED
     note = (
         f"{facts('make eval-cameras ARGS=--record')}\n\nSimulated walks of {args.frames} frames, seeds "
         f"{args.seeds}, with the detector and all defaults, by one camera and by two; the second one stands "
-        f"60 degrees round the path, and its film begins {args.late:g} s later, found from the motion. "
+        f"60 degrees round the path, and its film begins with the first (two) or {args.late:g} s later "
+        "(cut), which is found from the motion. "
         "Medians over the frames: joints in space; pose, the midpoints of the hips laid on each other. "
         "inside: coordinates within their 90 % intervals. Towards the camera, two cameras: median of clips "
         f"{middle:.0f} mm, wanted at most {WANTED:.0f}{', missed' if missed else ''}."
@@ -91,7 +94,7 @@ def made(view: str, seed: int, frames: int, late: float) -> tuple[Path, float]:
 
 def measured(
     folder: Path, name: str, further: tuple[tuple[str, str], ...]
-) -> tuple[float, float, float, float, float | None]:
+) -> tuple[float, float, float, float, float]:
     """Track; return joints and pose (mm), shares in 90 % intervals and `tracking`, and the offset found."""
     output = folder / f"{name}.csv"
     options = ClipOptions(
@@ -107,7 +110,7 @@ def measured(
     )
     began = next((words for what, words in used.items() if what.startswith("further")), "")
     seconds = re.search(r"began ([\d.]+) s (after|before)", began)
-    offset = None if not further else 0.0
+    offset = 0.0
     if seconds:
         offset = float(seconds[1]) * (1 if seconds[2] == "after" else -1)
     return (
