@@ -167,8 +167,8 @@ def main() -> int:
     painted = studio_page.seconds(folder / LONG, long.points, drags)
     verdict = "met" if cpu.max() <= WANTED_S else "MISSED"
     note = (
-        f"The first {FRAMES} frames of clips that the rule for proposals was not chosen on, the detector's joints "
-        "(`full`), corrections at the true joint "
+        f"The first {FRAMES} frames of clips that the rule for proposals was not chosen on, the detector's "
+        "joints (`full`), corrections at the true joint "
         f"with a noise of {100 * POINTING:g} % of the height. mm: median error about the hips; px: median "
         "error in the picture. proposed: those that the studio lists, asked again after each column; random: "
         f"any joint in any frame, mean of {SEEDS} runs. Leventon and Freeman gave about one a frame (last "
