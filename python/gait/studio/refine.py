@@ -26,7 +26,7 @@ ENDED = "the process that solves the whole motion has ended; corrections are sav
 def _serve(pipe: Connection, lift: Lift) -> None:
     """Solve the newest of what arrives, until the other end closes."""
     signal.signal(signal.SIGINT, signal.SIG_IGN)  # the server ends this process
-    os.nice(19)  # what moves while the user looks on comes first
+    os.nice(10)  # what moves while the user looks on comes first
     while True:
         try:
             number, edits = pipe.recv()

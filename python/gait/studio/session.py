@@ -11,6 +11,7 @@ import shlex
 import threading
 import time
 import zipfile
+from concurrent.futures import ThreadPoolExecutor
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
@@ -253,9 +254,15 @@ class Session:
         begin = time.perf_counter()
         touched = _touched(self.edits, wanted)
         self._lift.check(wanted)  # refused before anything is saved
-        self._save(wanted)
+        with ThreadPoolExecutor(1) as other:
+            saving = other.submit(self._save, wanted)  # the disk works while the motion is solved
+            answer = self._moved(wanted, touched) if touched else {}
+        try:
+            saving.result()
+        except NotSavedError:
+            self._use(self._solved)  # not what moved
+            raise
         self.edits, self._undo, self._redo = wanted, undo, redo
-        answer = self._moved(wanted, touched) if touched else {}
         self.version += 1
         self._asked += 1
         self.refining = True
