@@ -148,7 +148,7 @@ def about(seeds: int, found: list[Climbed]) -> str:
 Frames 0 to 50 (outdoor: from the first frame in full view), 10,000 particles, models of 19 angles and 5
 components without the clip's subject; the start is the truth with noise (pelvis 3 cm, phase 0.03, rate 0.03
 per second, heading 0.05 rad), outdoor the clip's own. Settings are those of
-[search_paper](search_paper.md); no development clip was looked at before. Held: in the last {TAIL} frames
+[search_paper](search_paper.md); chosen without development clips. Held: in the last {TAIL} frames
 the joints are on average within a tenth of the person's height in the picture (outdoor: 0.15, of the clear
 marks). Lost: runs that are reported as lost in some frame, of those that leave the person (right) and of
 those that hold it (wrong); in all {reported(runs, held=False)} and {reported(runs, held=True)}. root mm:

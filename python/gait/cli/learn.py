@@ -164,7 +164,8 @@ def _add_model(group: argparse._ArgumentGroup) -> None:
         default=PRIORS[0],
         help="people (the default): also allow for people who were not recorded, with lengths of limbs and "
         "postures of their own. paper: as in Ormoneit and others (2000): 19 angles, 5 components, gaps "
-        "filled by an iterated SVD, trunk and ankles rigid, one body for all",
+        "filled by an iterated SVD, trunk and ankles rigid, one body for all (its whole periods: "
+        "--period-mode literal)",
     )
     group.add_argument(
         "--period-mode",

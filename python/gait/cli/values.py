@@ -146,7 +146,8 @@ def add_model(parser: ArgumentParser, what: str = "walking model") -> None:
         "-m",
         "--model",
         metavar="M.gait",
-        help=f"{what}: a file, or one of the package by its name, walk (default; paper mode: paper) or paper",
+        help=f"{what}: a file, or one of the package by its name: walk (default; paper mode: paper), paper, "
+        "classes",
     )
 
 

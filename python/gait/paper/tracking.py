@@ -165,7 +165,7 @@ def entry(both: Both) -> Entry:
         (
             "Sigma of psi, rho, tau and theta, epsilon, p_occluded, sigma(alpha), the points on a limb n_s: "
             "paper mode's, searched on simulated clips; tests/bench/results/search_paper.md has them. The "
-            "search lets n_s be 4 to 16; of that number alone little depends.",
+            "search lets n_s be 4 to 16.",
             "Sigmas: per square root of a second, so that they mean the same at any frame rate; the paper's "
             "may be per frame. The rate: strides per second, its sigma in those; in the paper a speed of "
             "the phase in no stated unit.",

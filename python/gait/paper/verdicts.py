@@ -170,7 +170,7 @@ def estimates(pairs: Sequence[tuple[float, float]], covered: float) -> str:
     if max(left) >= 1:
         words = f"not reproduced: {words}"
     else:
-        words = f"reproduced{'' if min(left) < FAR_BETTER else ' in part'}: {words}"
+        words = f"reproduced{'' if max(left) < FAR_BETTER else ' in part'}: {words}"
     return f"{words}; the paper's intervals {'are too narrow' if covered < NARROW else 'cover the truth'}"
 
 
