@@ -154,7 +154,8 @@ def test_a_page_gets_each_estimate_and_the_state_of_the_tracker(log):
 
 def test_drops_are_counted_over_restarts():
     drops = Drops()
-    assert [drops.add(reported) for reported in (1, 3, 3, 0, 2, 100, 1)] == [1, 3, 3, 3, 5, 103, 104]
+    reports = [(1, 10), (3, 20), (3, 30), (0, 2), (2, 12), (100, 300), (1, 5), (5, 4)]
+    assert [drops.add(*report) for report in reports] == [1, 3, 3, 3, 5, 103, 104, 109]
 
 
 @pytest.fixture

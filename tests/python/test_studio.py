@@ -350,6 +350,8 @@ def test_usage_is_one_line(capsys, tmp_path, monkeypatch):
     assert "cut that file" in capsys.readouterr().err
     assert main(["studio", "film.mp4", "--camera", "camera.json", "--fov", "60"]) == 2
     assert "no --camera" in capsys.readouterr().err
+    assert main(["studio", "film.mp4", "--keypoints", "k.csv", "--height", "1.75"]) == 2
+    assert "gait camera --walk k.csv --size WxH --height 1.75" in capsys.readouterr().err
     monkeypatch.setenv("GAIT_WEB", str(tmp_path))
     assert main(["studio", "film.mp4"]) == 1
     assert "run gait studio --fetch once" in capsys.readouterr().err

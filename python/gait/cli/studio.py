@@ -118,6 +118,11 @@ def _check(args: argparse.Namespace) -> None:
         raise UsageError("--background: goes with --placement")
     if args.camera and args.height and given and given[0] != "keypoints":
         raise UsageError(f"--height: the {given[0]} has the stature; leave it out, or --camera")
+    if args.keypoints and args.height and not args.camera:
+        raise UsageError(
+            f"--keypoints: needs a camera: run gait camera --walk {args.keypoints} --size WxH --height "
+            f"{args.height:g} -o camera.json, then give --camera camera.json"
+        )
     if args.fov and (args.camera or not args.height):
         raise UsageError("--fov: is for a camera that is found from the walk, with --height and no --camera")
     for option in ("start", "stop"):

@@ -295,19 +295,17 @@ def _values(estimate: Estimate, angles: list[str]) -> list[float | None]:
 
 
 class Drops:
-    """Frames dropped since the page was opened, also over restarts and RESETs of the tracker."""
+    """Frames dropped: those counted when the page was opened and all since, over restarts of the tracker."""
 
     def __init__(self) -> None:
-        self._before: int | None = None
+        self._before, self._frames = 0, 0
         self.total = 0
 
-    def add(self, reported: int) -> int:
-        """Take in a tracker's own count, which begins anew when it does; return all of them."""
-        if self._before is None or reported < self._before:
-            self.total += reported
-        else:
-            self.total += reported - self._before
-        self._before = reported
+    def add(self, reported: int, frames: int) -> int:
+        """Take in a tracker's counts of drops and frames, which begin anew with it; return all drops."""
+        restarted = reported < self._before or frames < self._frames
+        self.total += reported if restarted else reported - self._before
+        self._before, self._frames = reported, frames
         return self.total
 
 
@@ -319,7 +317,7 @@ def health(message: Any, drops: Drops) -> dict[str, Any]:
         "text": message.text,
         "version": message.version,
         "frames": message.frames,
-        "dropped": drops.add(message.dropped),
+        "dropped": drops.add(message.dropped, message.frames),
         "rejected": message.rejected,
         "particles": message.particles,
         "threads": message.threads,
