@@ -107,21 +107,29 @@ def test_border_is_dense_algebra(prior):
 
 def test_chain_holds_each_overlap_once(prior):
     """Its first segment has the segment's own covariance, its determinant is that of the factors."""
-    there = around(prior)
+    straight, axes = around(prior), axis_rotation(2, 0.4)
+    places = straight.places @ axes.T
+    there = replace(straight, heading=straight.heading + 0.4, places=places, grown=places)
     found = chain.chain(chain.Prior(prior), there, FREEDOM)
     full, vector = whole(found.information)
     assert found.log_det == pytest.approx(np.linalg.slogdet(full)[1])
     segment = Segment(chain.Prior(prior), there, FREEDOM, 0)
-    offset = np.sqrt((1 - chain.THROUGHOUT) * chain.LASTING / (1 - chain.LASTING)) * segment.sd
-    offsets = offset * np.tile(np.eye(3 * MARKERS), FRAMES)  # of each marker, alike in all frames
-    wanted = np.diag(segment.sd**2) + segment.lasting.T @ segment.lasting
-    wanted += sum(loads.T @ loads for loads in (segment.modes, segment.rigid, offsets))
+    outside = prior.gamma * prior.residual[0]
+    each = np.tile(np.eye(3 * MARKERS), FRAMES)  # offsets of each marker along each axis, alike in all frames
+    changing = np.sqrt((1 - chain.THROUGHOUT) * chain.LASTING / (1 - chain.LASTING)) * segment.sd * each
+    lasting = np.sqrt(chain.THROUGHOUT * chain.LASTING * outside + chain.OFFSET_SD**2)
+    lasting = there.stature * np.repeat(lasting, 3)[:, None] * each
+    modes = there.stature * prior.modes[0].reshape(-1, len(segment.sd))
+    wanted = np.diag(segment.sd**2)
+    wanted += sum(loads.T @ loads for loads in (segment.own[1:], segment.rigid, modes, changing, lasting))
+    turn = np.kron(np.eye(FRAMES * MARKERS), axes)
+    wanted = turn @ wanted @ turn.T
     size = len(wanted)
     np.testing.assert_allclose(
         np.linalg.inv(full)[:size, :size], wanted, rtol=4e-5, atol=4e-6
     )  # condition 1e9
     mean = np.linalg.solve(full, vector)
-    np.testing.assert_allclose(mean[:size], segment.mean, atol=1e-6)
+    np.testing.assert_allclose(mean[:size], turn @ segment.own[0], atol=1e-6)
     assert found.constant == pytest.approx(mean @ full @ mean, rel=1e-6)
 
 

@@ -100,8 +100,8 @@ class Chain:
 class Common:
     """What all segments of a component have in common, whatever their place, heading and stature.
 
-    In standard deviations of what changes from frame to frame, a segment's modes and its markers' offsets are
-    the same but for the heading.  So is the factor of their part of I + loads loads'.
+    In standard deviations of what changes from frame to frame, and in the axes of the body, a segment's modes
+    and its markers' offsets are the same.  So is the factor of their part of I + loads loads'.
 
     Attributes
     ----------
@@ -111,61 +111,111 @@ class Common:
         Cholesky factor of I + scaled scaled', of modes and offsets.
     thin : (k, n)
         lower^-1 scaled.
+    offsets : (3 J, n)
+        Offsets of markers that last throughout, in standard deviations.
+    left : (3 J, n)
+        These times I - thin' thin.
+    squares : (3 J, 3 J)
+        left offsets'.
     """
 
     sd: Floats
     lower: Floats
     thin: Floats
+    offsets: Floats
+    left: Floats
+    squares: Floats
 
     @classmethod
     def of(cls, prior: SegmentPrior, component: int, frames: int) -> Common:
         """Prepare the first frames of a component."""
-        modes = prior.modes[component][:, :frames]
-        sd = np.sqrt((1 - LASTING) * prior.gamma * prior.residual[component])
-        offsets = _each_marker(np.full(len(sd), np.sqrt((1 - THROUGHOUT) * LASTING / (1 - LASTING))), frames)
-        scaled = np.concatenate([modes / sd[:, None], offsets]).reshape(len(modes) + len(offsets), -1)
+        modes, outside = prior.modes[component][:, :frames], prior.gamma * prior.residual[component]
+        sd = np.sqrt((1 - LASTING) * outside)
+        shares = _each_marker(np.full(len(sd), np.sqrt((1 - THROUGHOUT) * LASTING / (1 - LASTING))), frames)
+        scaled = np.concatenate([modes / sd[:, None], shares]).reshape(len(modes) + len(shares), -1)
         lower = np.linalg.cholesky(np.eye(len(scaled)) + scaled @ scaled.T)
-        return cls(np.tile(sd, frames), lower, _divided(lower, scaled))
+        thin = _divided(lower, scaled)
+        offsets = _each_marker(_offset_sd(outside) / sd, frames).reshape(len(shares), -1)
+        left = offsets - (offsets @ thin.T) @ thin
+        return cls(np.tile(sd, frames), lower, thin, offsets, left, left @ offsets.T)
+
+    def information(self) -> Floats:
+        """Information (n, n) of a body of stature 1 m without its rigid motions, in its axes."""
+        sd = np.repeat(self.sd, 3)
+        return np.asarray((np.eye(len(sd)) - self.thin.T @ self.thin) / (sd * sd[:, None]))
 
 
 class Prior:
-    """A segment prior with what its chains need over and over."""
+    """A segment prior with what its chains need over and over.
+
+    Attributes
+    ----------
+    segments : SegmentPrior
+    common : tuple of (Common, Common)
+        Of each component's C, of whole segments and of their first halves.
+    alone : (C, n, n)
+        Information of the first half alone, of a body of stature 1 m, without its rigid motions, in its axes.
+    diagonal : (10 C, n n)
+        `_harmonics` of that of the first half, less alone, and of that of the second half.
+    below : (5 C, n n)
+        `_harmonics` of that of the second half with the first.
+    """
 
     def __init__(self, segments: SegmentPrior) -> None:
         self.segments = segments
         half = segments.frames // 2
         parts = [[Common.of(segments, c, n) for n in (2 * half, half)] for c in range(len(segments.mean))]
         self.common = tuple(tuple(part) for part in parts)
+        whole, self.alone = (
+            np.stack([own.information() for own in each]) for each in zip(*parts, strict=True)
+        )
+        n = self.alone.shape[1]
+        first, second, across = whole[:, :n, :n] - self.alone, whole[:, n:, n:], whole[:, n:, :n]
+        self.diagonal = np.concatenate([_harmonics(own) for own in (*first, *second)])
+        self.below = np.concatenate([_harmonics(own) for own in across])
 
 
 def chain(prior: Prior, around: Around, freedom: Freedom) -> Chain:
     """Make the chain of a prior (of `SegmentPrior.restricted`) with 2 b frames a segment."""
     segments, frames, markers = around.places.shape[:3]
     size, lasting = 3 * markers * frames // 2, WHOLE + 3 * markers
-    diagonal, below = np.zeros((segments + 1, size, size)), np.empty((segments, size, size))
+    diagonal, below = _common_information(prior, around, size)
     border, corner = np.zeros((segments + 1, size, lasting)), np.eye(lasting)
     vector, edge, constant, log_det = np.zeros((segments + 1, size)), np.zeros(lasting), 0.0, 0.0
-    halves = slice(0, size), slice(size, 2 * size)
     for s in range(segments):
         whole = Segment(prior, around, freedom, s)
-        factors = [(1.0, whole)] if s == 0 else [(1.0, whole), (-1.0, whole.first_half())]
-        for sign, part in factors:
-            thin, sure = part.thin / part.sd, part.sd**-2
-            both = np.vstack([part.mean, part.lasting])
-            product = sign * (both * sure - (both @ thin.T) @ thin)
-            constant += float(part.mean @ product[0])
+        half = whole.first_half()
+        for sign, part in ((1.0, whole), (-1.0 if s else 0.0, half)):
+            product, squares = part.products()
+            constant += sign * float(squares[0, 0])
             log_det += sign * part.log_det()
-            corner += part.lasting @ product[1:].T
-            edge -= part.lasting @ product[0]
-            for block, half in enumerate(halves[: 1 + (sign > 0)], s):
-                own = thin[:, half]
-                diagonal[block] -= sign * (own.T @ own)
-                diagonal[block].flat[:: size + 1] += sign * sure[half]
-                vector[block] += product[0, half]
-                border[block] -= product[1:, half].T
-            if sign > 0:
-                np.matmul(-thin[:, size:].T, thin[:, :size], out=below[s])
+            corner += sign * squares[1:, 1:]
+            edge -= sign * squares[1:, 0]
+            for block, own in enumerate(np.split(sign * product, product.shape[1] // size, axis=1), s):
+                vector[block] += own[0]
+                border[block] -= own[1:].T
+        thin, alone = whole.rigid_thin(), half.rigid_thin()
+        first, second = thin[:, :size], thin[:, size:]
+        if s:
+            diagonal[s] += np.vstack([-first, alone]).T @ np.vstack([first, alone])
+        else:
+            diagonal[s] -= first.T @ first
+        diagonal[s + 1] -= second.T @ second
+        below[s] -= second.T @ first
     return Chain(Information(diagonal, below, border, corner, vector, edge), constant, log_det)
+
+
+def _common_information(prior: Prior, around: Around, size: int) -> tuple[Floats, Floats]:
+    """Blocks (B, n, n) and (B - 1, n, n) of the information matrix without the rigid motions."""
+    count, components = len(around.heading), len(prior.common)
+    each = np.zeros((count, components, 5))
+    each[np.arange(count), around.component] = _circle(around.heading) / around.stature**2
+    own = each.reshape(count, -1)
+    turns = np.hstack([np.pad(own, ((0, 1), (0, 0))), np.pad(own, ((1, 0), (0, 0)))])
+    diagonal = (turns @ prior.diagonal).reshape(-1, size, size)
+    below = (own @ prior.below).reshape(-1, size, size)
+    diagonal[0] += _turned(prior.alone[around.component[0]], around.heading[0]) / around.stature**2
+    return diagonal, below
 
 
 def moved(prior: Prior, around: Around, freedom: Freedom, places: Floats, lasting: Floats) -> Around:
@@ -180,10 +230,10 @@ def moved(prior: Prior, around: Around, freedom: Freedom, places: Floats, lastin
     headings, shapes, grown = [], [], []
     half = around.places.shape[1] // 2
     for s, place in enumerate(overlapping(places, half)):
-        turn, shape, full = Segment(prior, around, freedom, s).explained(place.ravel(), lasting)
-        grown.append(full.reshape(place.shape))
+        turn, shape, full = Segment(prior, around, freedom, s).explained(place, lasting)
+        grown.append(full)
         headings.append(around.heading[s] + turn)
-        shapes.append(shape.reshape(place.shape))
+        shapes.append(shape)
     common = overlapping(blended(np.stack(shapes), half), half)
     stature = freedom.stature + freedom.stature_sd * float(lasting[0])
     return Around(np.array(headings), around.component, stature, common, np.stack(grown))
@@ -217,53 +267,52 @@ def in_turn(segments: Floats, half: int) -> Floats:
 
 
 class Segment:
-    """One segment in the world: N(mean + lasting' g, diag(sd^2) + loads' loads), g ~ N(0, I).
+    """One segment in the axes of its body: N(mean + lasting' g, diag(sd^2) + loads' loads), g ~ N(0, I).
 
-    The loads are `modes`, offsets of the markers, and `rigid`: place on the ground and heading.  The inverse
-    of the covariance is (I - thin' thin) with rows and columns divided by sd.
+    The loads are modes, offsets of the markers, and `rigid`: place on the ground and heading.  The inverse
+    of the covariance is (I - thin' thin) with rows and columns divided by sd, where thin are the rows of
+    `Common` and those of the rigid motions.
     """
 
     def __init__(self, prior: Prior, around: Around, freedom: Freedom, s: int) -> None:
-        component, place, stature = around.component[s], around.places[s], around.stature
-        known, (frames, markers) = prior.segments, place.shape[:2]
+        component, stature = around.component[s], around.stature
         self._turn = axis_rotation(2, around.heading[s])
+        place, grown = around.places[s] @ self._turn, around.grown[s] @ self._turn
+        known = prior.segments
         whole, self._half = prior.common[component]
         shape = place - _over_ground(place)
-        own = stature * self._turned(known.mean[component])
-        middle = _over_ground(place) - _over_ground(own)
-        growth = (around.grown[s] - _over_ground(around.grown[s])) / stature
-        self.mean = (own + middle + (freedom.stature - stature) * growth).ravel()
-        self.modes = stature * self._turned(known.modes[component]).reshape(-1, own.size)
+        own = stature * known.mean[component]
+        growth = (grown - _over_ground(grown)) / stature
+        mean = own + _over_ground(place) - _over_ground(own) + (freedom.stature - stature) * growth
+        floor = np.zeros(place.shape)
+        floor[..., 2] = freedom.height_sd
+        self.own = np.stack([mean, freedom.stature_sd * growth, floor]).reshape(1 + WHOLE, -1)
+        self._modes = known.modes[component].reshape(-1, own.size)
         rigid = np.zeros((3, *place.shape))
         rigid[0, ..., 0] = rigid[1, ..., 1] = GROUND_SD
         if known.headings == 0:
             rigid[2, ..., 0], rigid[2, ..., 1] = -HEADING_SD * shape[..., 1], HEADING_SD * shape[..., 0]
         self.rigid = rigid.reshape(3, -1)
-        outside = known.gamma * known.residual[component]
-        lasting = np.zeros((WHOLE + 3 * markers, *place.shape))
-        lasting[0], lasting[1, ..., 2] = freedom.stature_sd * growth, freedom.height_sd
-        offset_sd = stature * np.sqrt(THROUGHOUT * LASTING * outside + OFFSET_SD**2)
-        lasting[WHOLE:] = self._turned(_each_marker(offset_sd, frames))
-        self.lasting = lasting.reshape(len(lasting), -1)
+        self._offset_sd = stature * _offset_sd(known.gamma * known.residual[component])
         self._stature = stature
         self._prepare(whole)
 
-    def _turned(self, places: Floats) -> Floats:
-        return (places.reshape(-1, 3) @ self._turn.T).reshape(places.shape)
+    def _in_world(self, values: Floats) -> Floats:
+        return (values.reshape(-1, 3) @ self._turn.T).reshape(values.shape)
 
     def _prepare(self, common: Common) -> None:
         """Complete the factor of what segments have in common by the rigid motions."""
         self._common, self.sd = common, np.repeat(self._stature * common.sd, 3)
-        thin, rigid = self._turned(common.thin), self.rigid / self.sd
-        self._across = rigid @ thin.T
+        rigid = self.rigid / self.sd
+        self._across = rigid @ common.thin.T
         self._lower = np.linalg.cholesky(np.eye(3) + rigid @ rigid.T - self._across @ self._across.T)
-        self.thin = np.concatenate([thin, _divided(self._lower, rigid - self._across @ thin)])
+        self._rigid_thin = _divided(self._lower, rigid - self._across @ common.thin)
 
     def first_half(self) -> Segment:
         """Marginal of the first half."""
         half = copy(self)
-        keep = len(self.mean) // 2
-        half.mean, half.rigid, half.lasting = self.mean[:keep], self.rigid[:, :keep], self.lasting[:, :keep]
+        keep = len(self.sd) // 2
+        half.own, half.rigid = self.own[:, :keep], self.rigid[:, :keep]
         half._prepare(self._half)
         return half
 
@@ -276,15 +325,58 @@ class Segment:
         )  # sd has the sign of stature
         return -2 * sum(float(np.log(values).sum()) for values in roots)
 
+    def rigid_thin(self) -> Floats:
+        """Rows (3, n) of the rigid motions in the world: less information by their product."""
+        return self._in_world(self._rigid_thin / self.sd)
+
+    def products(self) -> tuple[Floats, Floats]:
+        """Give information times mean and lasting (1 + G, n), in the world, and that times these."""
+        common, own = self._common, self.own / self.sd
+        left = np.concatenate([own - (own @ common.thin.T) @ common.thin, common.left])
+        across = np.concatenate([own, common.offsets]) @ self._rigid_thin.T
+        squares = np.empty((len(left), len(left)))
+        squares[: len(own)] = own @ left.T
+        squares[len(own) :, : len(own)] = squares[: len(own), len(own) :].T
+        squares[len(own) :, len(own) :] = common.squares
+        return self._in_world((left - across @ self._rigid_thin) / self.sd), squares - across @ across.T
+
     def explained(self, places: Floats, lasting: Floats) -> tuple[float, Floats, Floats]:
-        """Turn of places in radians, their shape by the leading modes and by all, given what lasts."""
-        values = self.thin @ ((places - self.mean - lasting @ self.lasting) / self.sd)
-        rigid = np.linalg.solve(self._lower.T, values[-3:])
-        rest = values[:-3] - rigid @ self._across
-        modes = lapack.dtrtrs(self._common.lower.T, rest)[0][: len(self.modes)]
-        middle = self.mean + lasting[:WHOLE] @ self.lasting[:WHOLE] + rigid @ self.rigid
-        leading = middle + modes[:LEADING] @ self.modes[:LEADING]
-        return HEADING_SD * float(rigid[2]), leading, leading + modes[LEADING:] @ self.modes[LEADING:]
+        """Give the turn of places (F, J, 3), radians, and their shapes by the leading modes and by all."""
+        middle = self.own[0] + lasting[:WHOLE] @ self.own[1:]
+        offsets = lasting[WHOLE:].reshape(-1, 3) * self._offset_sd[:, None]
+        off = ((places @ self._turn - offsets).ravel() - middle) / self.sd
+        rigid = np.linalg.solve(self._lower.T, self._rigid_thin @ off)
+        rest = self._common.thin @ off - rigid @ self._across
+        modes = self._stature * lapack.dtrtrs(self._common.lower.T, rest)[0][: len(self._modes)]
+        leading = middle + rigid @ self.rigid + modes[:LEADING] @ self._modes[:LEADING]
+        full = leading + modes[LEADING:] @ self._modes[LEADING:]
+        leading, full = (self._in_world(shape).reshape(places.shape) for shape in (leading, full))
+        return HEADING_SD * float(rigid[2]), leading, full
+
+
+def _circle(heading: Floats) -> Floats:
+    """Give functions (S, 5) of headings whose sum a turned matrix is: 1, cos, sin, cos and sin of twice."""
+    turns = [f(k * heading) for k in (1, 2) for f in (np.cos, np.sin)]
+    return np.stack([np.ones(len(heading)), *turns], axis=-1)
+
+
+def _harmonics(matrix: Floats) -> Floats:
+    """Factors (5, n n) of these functions in a matrix (n, n) of coordinates whose axes are turned."""
+    angles = 2 * np.pi / 5 * np.arange(5.0)
+    turned = np.stack([_turned(matrix, angle).ravel() for angle in angles])
+    return np.asarray(np.linalg.inv(_circle(angles)) @ turned)
+
+
+def _turned(matrix: Floats, heading: float) -> Floats:
+    """Matrix (n, n) of coordinates of markers in axes that are turned."""
+    turn = axis_rotation(2, heading).T
+    rows = (matrix.reshape(-1, 3) @ turn).reshape(matrix.shape).T
+    return np.asarray((rows.reshape(-1, 3) @ turn).reshape(rows.shape).T)
+
+
+def _offset_sd(outside: Floats) -> Floats:
+    """Give standard deviations (J,) of markers' offsets that last throughout, statures."""
+    return np.asarray(np.sqrt(THROUGHOUT * LASTING * outside + OFFSET_SD**2))
 
 
 def _divided(lower: Floats, rows: Floats) -> Floats:
