@@ -71,7 +71,8 @@ class SegmentFit:
     log10_volume : float
         log10 of the posterior's volume over the prior's.
     mode_sd : (n,)
-        Standard deviations of its displacements over all markers and frames, metres, the least certain first.
+        Standard deviations of its displacements over all markers and frames, metres, the least certain first;
+        of as many of them as were asked for.
     modes : (n, F, J, 3)
         These displacements, one standard deviation long.
     """
@@ -145,13 +146,13 @@ class SegmentLifter:
                 found[same] = replace(found[same], share=found[same].share + one.share)
         return sorted(found, key=lambda e: -e.share)
 
-    def solve(self, chosen: Explanation, displacements: bool = True) -> SegmentFit:
-        """Posterior of an explanation; `displacements` may be left out, as they take half of the time."""
+    def solve(self, chosen: Explanation, displacements: int | None = None) -> SegmentFit:
+        """Posterior of an explanation with so many displacements, all if None: they take half of the time."""
         fit = self._fit(chosen.visible, chosen.heading, chosen.place)
         places, sd = self._lifter.positions()
         mode_sd, modes = np.empty(0), np.empty((0, *places.shape))
-        if displacements:
-            mode_sd, modes = self._lifter.uncertain(len(self._lifter.posterior()[0]))
+        if displacements != 0:
+            mode_sd, modes = self._lifter.uncertain(displacements or len(self._lifter.posterior()[0]))
         return SegmentFit(fit.heading, fit.component, places, sd, fit.log10_volume, mode_sd, modes)
 
     def open_modes(self, chosen: Explanation) -> float:

@@ -332,8 +332,8 @@ def _lifter(prior: SegmentPrior, view: View, options: Options) -> SegmentLifter:
     return SegmentLifter(prior, view, stature, 0.0 if options.method == "smooth" else stature_sd)
 
 
-def _task(of: _Sequence, displacements: bool = True, lifter: SegmentLifter | None = None) -> _Task:
-    """Estimate each segment alone, by `lifter` where it is at hand."""
+def _task(of: _Sequence, displacements: int | None, lifter: SegmentLifter | None = None) -> _Task:
+    """Estimate each segment alone with so many displacements (`solve`), by `lifter` where it is at hand."""
     prior, keypoints, view, options, grid = of.prior, of.keypoints, of.view, of.options, of.grid
     points = Observations(keypoints.uv, keypoints.errors(options.pixel_sd))
     sampled = resampled(points, keypoints.time, grid.time).among(of.markers, len(prior.names))
@@ -399,7 +399,7 @@ class Evidence:
         if near is not None and near.motion is not None:
             begun = near.motion
         else:
-            begun = _task(of, displacements=False, lifter=self._lifter).start(grid.frames)
+            begun = _task(of, displacements=0, lifter=self._lifter).start(grid.frames)
         return Reading(*smoother.evidence(self._prior, _observed(of), self._view, _freedom(of), begun))
 
     def __call__(self, keypoints: Keypoints, near: Reading | None = None) -> Reading:
@@ -416,9 +416,9 @@ class Evidence:
 @_numbers_in_range()
 def _lift(of: _Sequence) -> Motion:
     """Estimate all markers of a prior."""
-    task = _task(of)
     if of.options.method != "smooth":
-        return _alone(of, task)
+        return _alone(of, _task(of, displacements=None))
+    task = _task(of, displacements=explain.COUNT)
     found = smoother.smooth(
         of.prior,
         task.observed,
