@@ -128,11 +128,15 @@ class WalkingBody:
         return out
 
     def weights(self, parts: Array, rate: Array) -> Array:
-        """Weights (T, parts + 2) of the table's rows: mean, scores and proportions, stride rate."""
+        """Weights (..., T, parts + 2) of the table's rows: mean, scores and proportions, stride rate."""
         faster = np.clip((rate - self.rate) / self.rate_sd, -2.0, 2.0)
         return np.concatenate(
-            [np.ones((len(rate), 1)), np.broadcast_to(parts, (len(rate), self.parts)), faster[:, None]],
-            axis=1,
+            [
+                np.ones((*rate.shape, 1)),
+                np.broadcast_to(parts[..., None, :], (*rate.shape, self.parts)),
+                faster[..., None],
+            ],
+            axis=-1,
         )
 
     def joints(self, phase: Array, rate: Array, parts: Array, offsets: Array) -> Array:
@@ -147,7 +151,7 @@ class WalkingBody:
         return np.asarray(out + offsets.reshape(-1, 3))
 
     def strides(self, rate: Array, parts: Array) -> Array:
-        """Stride lengths, statures."""
+        """Stride lengths (..., T), statures."""
         return np.asarray(self.weights(parts, rate) @ self.stride)
 
 
@@ -222,8 +226,8 @@ class WalkModel:
         return self.over(self.time[0], self.time[-1], swap_sides(self._all, rows))
 
     def knots(self, q: Array) -> Array:
-        """Knots (K, 4): x, y, metres; heading, radians; phase."""
-        return q[self.fixed :].reshape(-1, 4)
+        """Knots (..., K, 4): x, y, metres; heading, radians; phase."""
+        return q[..., self.fixed :].reshape(*q.shape[:-1], -1, 4)
 
     def errors(self, q: Array) -> Array:
         """Errors of the keypoints (T, J, 2), in standard deviations."""
@@ -253,38 +257,38 @@ class WalkModel:
         return np.asarray((self.knot_time[1:] + self.knot_time[:-1]) / 2)
 
     def rates(self, q: Array) -> Array:
-        """Stride rates between knots (K - 1,), hertz."""
-        return np.asarray(np.diff(self.knots(q)[:, 3]) / np.diff(self.knot_time))
+        """Stride rates between knots (..., K - 1), hertz."""
+        return np.asarray(np.diff(self.knots(q)[..., 3]) / np.diff(self.knot_time))
 
     def expected(self, q: Array) -> Array:
-        """Residuals of what is expected of camera and walk."""
-        body, knots = self.body, self.knots(q)
-        step = np.diff(self.knot_time)
-        velocity = np.diff(knots[:, :2], axis=0) / step[:, None]
-        heading = (knots[1:, 2] + knots[:-1, 2]) / 2
-        ahead = velocity[:, 0] * np.cos(heading) + velocity[:, 1] * np.sin(heading)
-        aside = velocity[:, 1] * np.cos(heading) - velocity[:, 0] * np.sin(heading)
+        """Residuals (..., R) of what is expected of camera and walk; `q` (..., P)."""
+        body, knots, flat = self.body, self.knots(q), (*q.shape[:-1], -1)
+        step, heading = np.diff(self.knot_time), knots[..., 2]
+        velocity = np.diff(knots[..., :2], axis=-2) / step[:, None]
+        x, y, between = velocity[..., 0], velocity[..., 1], (heading[..., 1:] + heading[..., :-1]) / 2
+        ahead, aside = x * np.cos(between) + y * np.sin(between), y * np.cos(between) - x * np.sin(between)
         rates = self.rates(q)
-        parts, offsets = q[5 : 5 + body.parts], q[5 + body.parts : self.fixed]
+        parts, offsets = q[..., 5 : 5 + body.parts], q[..., 5 + body.parts : self.fixed]
         if self.in_place:
             speed = [ahead / _STILL_SD, aside / _STILL_SD]
         else:
-            usual = body.strides(rates, parts) * self._height * np.exp(q[4]) * rates
+            usual = body.strides(rates, parts) * self._height * np.exp(q[..., 4:5]) * rates
             many = np.sqrt(len(step))  # one uncertainty of the whole walk
             speed = [(ahead - usual) / _SLIDE_SD / many, aside / _SIDEWAYS_SD / many]
-        faster = np.diff(np.stack([ahead, aside], axis=1), axis=0) * np.diff(self._middles())[:, None]
-        bends = np.diff(knots[:, 2:], 2, axis=0) / np.array([_TURN_SD, _HURRY_SD])
+        faster = np.diff(np.stack([ahead, aside], axis=-1), axis=-2) * np.diff(self._middles())[:, None]
+        bends = np.diff(knots[..., 2:], 2, axis=-2) / np.array([_TURN_SD, _HURRY_SD])
+        turn = (heading[..., -1:] - heading[..., :1]) / (self.knot_time[-1] - self.knot_time[0])
         return np.concatenate([
-            _heavy_tailed((q[:4] - self._prior.mean) / self._prior.sd),
-            [q[4] / STATURE_SD],
+            _heavy_tailed((q[..., :4] - self._prior.mean) / self._prior.sd),
+            q[..., 4:5] / STATURE_SD,
             parts,
             offsets / self.body.offset_sd,
             *speed,
-            (rates - body.rate) / (2 * body.rate_sd) / np.sqrt(len(rates)),
-            faster.ravel() / _BEND_SD,
-            bends.ravel(),
-            [(knots[-1, 2] - knots[0, 2]) / (self.knot_time[-1] - self.knot_time[0]) / _CURVE_SD],
-        ])  # fmt: skip
+            (rates - body.rate) / (2 * body.rate_sd) / np.sqrt(len(step)),
+            faster.reshape(flat) / _BEND_SD,
+            bends.reshape(flat),
+            turn / _CURVE_SD,
+        ], axis=-1)  # fmt: skip
 
     def cost(self, q: Array) -> float:
         """Minus twice the log posterior, up to a constant."""
@@ -331,10 +335,8 @@ class WalkModel:
         own = np.arange(self.fixed - self.body.offsets, self.fixed)  # each offset is expected by itself
         prior[:, own] = 0.0
         prior[own, own] = 1.0 / self.body.offset_sd
-        for k in np.delete(np.arange(len(q)), own):
-            moved = q.copy()
-            moved[k] += h
-            prior[:, k] = (self.expected(moved) - expected) / h
+        others = np.delete(np.arange(len(q)), own)
+        prior[:, others] = (self.expected(q + h * np.eye(len(q))[others]) - expected).T / h
         data = data.reshape(-1, len(q))
         gradient = data.T @ (weight * errors).ravel() + prior.T @ expected
         return data.T @ data + prior.T @ prior, gradient

@@ -14,6 +14,7 @@ from __future__ import annotations
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass, replace
+from functools import cached_property
 
 import numpy as np
 import numpy.typing as npt
@@ -30,7 +31,7 @@ from gait.lift.segment import explain
 from gait.lift.segment.explain import FEWEST, Explanation, SegmentFit, SegmentLifter, Uncertain
 from gait.lift.segment.view import Parallel, Perspective, View
 from gait.lift.smooth import size, smoother, soft_constraints
-from gait.lift.smooth.chain import Freedom, blended, in_turn
+from gait.lift.smooth.chain import Freedom, Prior, blended, in_turn
 from gait.lift.smooth.options import Options
 from gait.lift.smooth.smoother import Lifted, Observed, Start, State
 
@@ -389,7 +390,14 @@ class Evidence:
     def __init__(self, prior: SegmentPrior, names: tuple[str, ...], view: View, options: Options) -> None:
         self._view, self._options = view, replace(options, method="smooth")
         self._prior = prior.restricted(tuple(n for n in prior.names if n in {*names, *smoother.HIPS}))
-        self._lifter = _lifter(self._prior, view, self._options)
+
+    @cached_property
+    def _lifter(self) -> SegmentLifter:
+        return _lifter(self._prior, self._view, self._options)
+
+    @cached_property
+    def _chained(self) -> Prior:
+        return Prior(self._prior)
 
     @_numbers_in_range()
     def _read(self, keypoints: Keypoints, near: Reading | None) -> Reading:
@@ -400,7 +408,7 @@ class Evidence:
             begun = near.motion
         else:
             begun = _task(of, displacements=0, lifter=self._lifter).start(grid.frames)
-        return Reading(*smoother.evidence(self._prior, _observed(of), self._view, _freedom(of), begun))
+        return Reading(*smoother.evidence(self._chained, _observed(of), self._view, _freedom(of), begun))
 
     def __call__(self, keypoints: Keypoints, near: Reading | None = None) -> Reading:
         """Read keypoints; -inf and NaN if the smoother refuses them.

@@ -168,7 +168,7 @@ def smooth(
 
 
 def evidence(
-    prior: SegmentPrior, observed: Observed, view: View, freedom: Freedom, begun: Start | State
+    prior: Prior, observed: Observed, view: View, freedom: Freedom, begun: Start | State
 ) -> tuple[float, Floats, State]:
     """Logarithm of the density of what is seen, but for a constant, after the steps without constraints.
 
@@ -184,7 +184,7 @@ def evidence(
         Where the points are then expected in the picture.
     state : State
     """
-    problem = Problem(prior, observed, view, freedom, begun)
+    problem = Problem(prior.segments, observed, view, freedom, begun, chained=prior)
     first = isinstance(begun, Start)
     state = problem.first(begun) if isinstance(begun, Start) else begun
     for _ in range(FREE_STEPS if first else 1):
