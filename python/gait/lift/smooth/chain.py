@@ -89,11 +89,14 @@ class Chain:
         Mean' information mean, summed over the factors.
     log_det : float
         Of the information matrix.
+    segments : list of Segment
+        Its segments.
     """
 
     information: Information
     constant: float
     log_det: float
+    segments: list[Segment]
 
 
 @dataclass(frozen=True)
@@ -182,8 +185,8 @@ def chain(prior: Prior, around: Around, freedom: Freedom) -> Chain:
     diagonal, below = _common_information(prior, around, size)
     border, corner = np.zeros((segments + 1, size, lasting)), np.eye(lasting)
     vector, edge, constant, log_det = np.zeros((segments + 1, size)), np.zeros(lasting), 0.0, 0.0
-    for s in range(segments):
-        whole = Segment(prior, around, freedom, s)
+    wholes = [Segment(prior, around, freedom, s) for s in range(segments)]
+    for s, whole in enumerate(wholes):
         half = whole.first_half()
         for sign, part in ((1.0, whole), (-1.0 if s else 0.0, half)):
             product, squares = part.products()
@@ -202,7 +205,7 @@ def chain(prior: Prior, around: Around, freedom: Freedom) -> Chain:
             diagonal[s] -= first.T @ first
         diagonal[s + 1] -= second.T @ second
         below[s] -= second.T @ first
-    return Chain(Information(diagonal, below, border, corner, vector, edge), constant, log_det)
+    return Chain(Information(diagonal, below, border, corner, vector, edge), constant, log_det, wholes)
 
 
 def _common_information(prior: Prior, around: Around, size: int) -> tuple[Floats, Floats]:
@@ -218,8 +221,10 @@ def _common_information(prior: Prior, around: Around, size: int) -> tuple[Floats
     return diagonal, below
 
 
-def moved(prior: Prior, around: Around, freedom: Freedom, places: Floats, lasting: Floats) -> Around:
+def moved(before: Chain, around: Around, freedom: Freedom, places: Floats, lasting: Floats) -> Around:
     """Linearise around new places (grid, J, 3): headings, stature and shapes that they imply under the prior.
+
+    `before`: the chain `around` the old ones.
 
     The shapes hold the leading modes only.  What else an estimate fits goes with the noise that it is fitted
     to: derivatives taken there are correlated with the residuals, and draw the body to the lens, where the
@@ -229,10 +234,12 @@ def moved(prior: Prior, around: Around, freedom: Freedom, places: Floats, lastin
     """
     headings, shapes, grown = [], [], []
     half = around.places.shape[1] // 2
-    for s, place in enumerate(overlapping(places, half)):
-        turn, shape, full = Segment(prior, around, freedom, s).explained(place, lasting)
+    for segment, heading, place in zip(
+        before.segments, around.heading, overlapping(places, half), strict=True
+    ):
+        turn, shape, full = segment.explained(place, lasting)
         grown.append(full)
-        headings.append(around.heading[s] + turn)
+        headings.append(heading + turn)
         shapes.append(shape)
     common = overlapping(blended(np.stack(shapes), half), half)
     stature = freedom.stature + freedom.stature_sd * float(lasting[0])

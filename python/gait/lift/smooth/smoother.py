@@ -363,7 +363,8 @@ class Problem:
 
     def inner_step(self, state: State, held: tuple[bool, bool]) -> State:
         """Estimate a part as `step` does, given what lasts and its first and last block if they are held."""
-        found, _ = self.information(state, self.chain(state), constrained=True)
+        prior = self.chain(state)
+        found, _ = self.information(state, prior, constrained=True)
         first, end = int(held[0]), self.layout.blocks - int(held[1])
         values = self.layout.values(state.places, state.lengths)
         right = found.vector - found.border @ np.concatenate([state.lasting, state.errors])
@@ -375,7 +376,7 @@ class Problem:
         values[first:end] = solved.solve(right[first:end, :, None])[..., 0]
         places = self.layout.places(values)
         lengths = self.layout.lengths(values) if self.view.scaled else state.lengths
-        around = moved(self._chained, state.around, self.freedom, places, state.lasting)
+        around = moved(prior, state.around, self.freedom, places, state.lasting)
         return replace(state, around=around, places=places, lengths=lengths, steps=state.steps + 1)
 
     def at_video(self, values: Floats) -> Floats:
@@ -384,11 +385,12 @@ class Problem:
 
     def step(self, state: State, constrained: bool) -> State:
         """Estimate by the linear problem around another."""
-        found = self.system(state, self.chain(state), constrained).found
+        prior = self.chain(state)
+        found = self.system(state, prior, constrained).found
         places = self.layout.places(found.blocks)
         lengths = self.layout.lengths(found.blocks) if self.view.scaled else state.lengths
         lasting, errors = np.split(found.lasting, [len(found.lasting) - self.errors.count])
-        around = moved(self._chained, state.around, self.freedom, places, lasting)
+        around = moved(prior, state.around, self.freedom, places, lasting)
         return State(around, places, lengths, lasting, errors, state.steps + 1)
 
     def evidence(self, unconstrained: _System) -> float:
