@@ -199,9 +199,7 @@ def _cameras(args: argparse.Namespace) -> list[str]:
     if films == 1:
         if args.offsets is not None:
             raise UsageError("--offsets: is for further films")
-        if args.camera and len(args.camera) > 1:
-            raise UsageError("--camera: more than one for one film")
-        return args.camera or []
+        return (args.camera or [])[-1:]
     alone = {
         "--people": args.people, "--keypoints": args.keypoints, "--camera-path": args.camera_path,
         "--stabilize": args.stabilize != "off", "--cameras-out": args.cameras_out,
