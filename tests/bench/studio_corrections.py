@@ -19,6 +19,7 @@ import lift_detector
 import numpy as np
 import studio_page
 import table
+from facts import facts
 from numpy.typing import NDArray
 
 from gait.body.skeleton import EVAL15
@@ -37,7 +38,9 @@ from gait.reproducible import one_thread
 Array = NDArray[np.float64]
 
 CLIPS = ("side_rl_16", "above_38", "toward300_08")
-"""Not those on which the rule for proposals was chosen: oblique45_07, side_lr_35, oblique45_pole_05."""
+"""Not those on which the rule for proposals was chosen: oblique45_07, side_lr_35, oblique45_pole_05.
+
+On these it was then compared with the rule before it."""
 LONG = "toward300_08"
 FRAMES = 100
 COUNTS = (5, 10, 20, 40, 70, 100)
@@ -167,8 +170,9 @@ def main() -> int:
     painted = studio_page.seconds(folder / LONG, long.points, drags)
     verdict = "met" if cpu.max() <= WANTED_S else "MISSED"
     note = (
-        f"The first {FRAMES} frames of clips that the rule for proposals was not chosen on, the detector's "
-        "joints (`full`), corrections at the true joint "
+        f"{facts('make eval-studio')}\n\nThe first {FRAMES} frames of clips on which the rule for proposals "
+        "was compared with the one before it (it was chosen on others), the detector's joints (`full`), "
+        "corrections at the true joint "
         f"with a noise of {100 * POINTING:g} % of the height. mm: median error about the hips; px: median "
         "error in the picture. proposed: those that the studio lists, asked again after each column; random: "
         f"any joint in any frame, mean of {SEEDS} runs. Leventon and Freeman gave about one a frame (last "
