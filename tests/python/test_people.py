@@ -10,11 +10,13 @@ from drawn_person import camera, clip, draw, wall, write
 from gait import Model, Video
 from gait.bindings.model import read_blob
 from gait.cli import main
+from gait.detect.people import by_size, main_person
 from gait.io import blob
 from gait.io.keypoints_file import Keypoints
 from gait.io.track_file import read_track
 from gait.io.video import Frame
 from gait.track import scene
+from gait.track.options import ClipOptions
 from gait.track.other_people import OtherPeople, Outline
 
 MODEL = Model()
@@ -73,6 +75,20 @@ def test_people_who_cross_keep_their_numbers(crossing, tmp_path, monkeypatch, ca
         mine = np.stack([rows.places[MODEL.joint_names[k]] for k in order], axis=1)
         assert np.linalg.norm(mine - truth[:, order], axis=2).mean(axis=1).max() < 0.25
     assert (tmp_path / "t-4.csv").read_text().splitlines()[0].endswith(",person")
+
+
+def test_a_start_takes_the_person_who_walks(crossing):
+    joints = crossing[1]
+    stands, walks = detected(np.repeat(joints[1][:1], FRAMES, axis=0)), detected(joints[0])
+    assert by_size({1: walks, 2: stands})[0] == 2  # nearer
+    options = ClipOptions("v.mp4", "camera.json", "t.csv")
+
+    def chosen(people):
+        return scene._who_walks(options, people, main_person(people), camera(), MODEL, range(FRAMES), {})
+
+    assert chosen({1: walks, 2: stands}) == 1
+    assert chosen({2: stands}) == 2
+    assert chosen({1: walks, 2: detected(joints[1])}) == 2  # both walk
 
 
 def test_another_person_hides_and_is_not_missed(crossing):

@@ -333,9 +333,14 @@ def require_feet(keypoints: Keypoints, video: Video) -> None:
         )
 
 
+def by_size(people: dict[int, Keypoints]) -> list[int]:
+    """Sort the people of a clip, the one in view longest and tallest first."""
+    return sorted(people, key=lambda n: -np.isfinite(people[n].uv[:, 0, 0]).sum() * height(people[n]))
+
+
 def main_person(people: dict[int, Keypoints]) -> int:
     """Choose the main person of a clip: the one in view longest and tallest."""
-    return max(people, key=lambda n: np.isfinite(people[n].uv[:, 0, 0]).sum() * height(people[n]))
+    return by_size(people)[0]
 
 
 def _apart(a: Crop, b: Crop) -> float:

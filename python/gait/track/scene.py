@@ -178,6 +178,9 @@ class Scene:
             wanted = options.background != "none"
             panorama = panorama_of(samples, camera, poses, given) if wanted else None
             video, plate = MovingVideo(video, camera, poses, panorama), None
+        if people and not options.keypoints and options.init == "auto" and options.people is None:
+            person = _who_walks(options, people, person, camera, model, frames, poses)
+            _require_feet(people[person], video)
         if options.keypoints:
             sure = {id: found.by_frame(options.keypoints_sd) for id, found in people.items()}
         else:
@@ -451,10 +454,44 @@ def _detect(options: ClipOptions, video: Video, frames: range) -> tuple[dict[int
         detector.require_person(people, video)
     if not people:
         return {}, -1
-    person = detector.main_person(people)
-    if options.init == "auto":
-        detector.require_feet(people[person], video)
-    return people, person
+    return people, detector.main_person(people)
+
+
+def _require_feet(keypoints: Keypoints, video: Video) -> None:
+    """Refuse a person whose feet are not in view for a start."""
+    from gait.detect.people import require_feet  # here, as it loads the networks' runtime
+
+    require_feet(keypoints, video)
+
+
+def _who_walks(
+    options: ClipOptions,
+    people: dict[int, Keypoints],
+    person: int,
+    camera: Camera,
+    model: Model,
+    frames: range,
+    poses: Mapping[int, CameraPose],
+) -> int:
+    """Choose, of several people, one who walks, the one in view longest and tallest if there are more.
+
+    `person`: who it is if nobody walks.
+    """
+    from gait.detect.people import by_size  # here, as it loads the networks' runtime
+
+    for id in by_size(people) if len(people) > 1 else []:
+        found = find_keypoint_start(
+            people[id],
+            camera,
+            model,
+            first=frames.start,
+            stop=frames.stop,
+            height=options.height,
+            poses=poses,
+        )
+        if found is not None and found.hypotheses[0].walks:
+            return id
+    return person
 
 
 def _require_detector(options: ClipOptions) -> None:
