@@ -475,7 +475,7 @@ def _who_walks(
 ) -> int:
     """Choose, of several people, one who walks, the one in view longest and tallest if there are more.
 
-    `person`: who it is if nobody walks.
+    `person`: who it is if no one walks.
     """
     from gait.detect.people import by_size  # here, as it loads the networks' runtime
 
