@@ -22,6 +22,7 @@ import eval_clips
 import lift_tracks
 import numpy as np
 import table
+from facts import facts
 
 from gait.body.skeleton import EVAL15
 from gait.detect import profile
@@ -132,7 +133,9 @@ def main() -> int:
         for done, (network, clip) in enumerate(jobs, 1):
             rows.append(["detector", clip.name, network, *row(clip, network, Path(folder))])
             update(done)
-    table.publish("lift_detector", "Joints of the detector", HEAD, rows, note(rows))
+    table.publish(
+        "lift_detector", "Joints of the detector", HEAD, rows, f"{facts('make eval-lift')}\n\n{note(rows)}"
+    )
     return 0
 
 
