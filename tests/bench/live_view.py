@@ -4,7 +4,7 @@
     live_view.py [--seconds 20] [--browsers 10] [--record]
 
 gait-trackd follows a simulated walk that `gait capture` sends at its 30 frames a second, first by itself,
-then with `gait view`, then with browsers that take every event and picture.  The clip is
+then with `gait view`, then with clients that take every event and picture, as browsers do.  The clip is
 made once in build/bench.
 """
 
@@ -44,7 +44,7 @@ def main() -> int:
     cases = (
         ("tracker alone", None),
         ("with gait view", 0),
-        (f"with {args.browsers} browsers", args.browsers),
+        (f"with {args.browsers} clients", args.browsers),
     )
     rows = [[name, *measure(args.seconds, browsers)] for name, browsers in cases]
     head = ["case", "frames", "dropped", "step ms", "latency ms", "latency p99", "pictures/s a browser"]
