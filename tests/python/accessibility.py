@@ -3,8 +3,11 @@
 ``python accessibility.py`` fetches axe-core by npm (make setup does); without it the check is left out.
 """
 
+import shutil
 import sys
 import warnings
+
+import browser
 
 from gait.io.published import Published, Store
 
@@ -41,6 +44,14 @@ def check(page):
             across = page.evaluate("document.documentElement.scrollWidth")
             assert across <= width, (width, scheme, page.evaluate(_BEYOND))
             check_here(page)
+
+
+def check_file(path):
+    """Check a page that is a file, where there is a Chromium."""
+    if browser.FETCHED.is_dir() and (shutil.which("chromium") or shutil.which("chromium-browser")):
+        with browser.opened() as page:
+            page.goto(path.absolute().as_uri())
+            check(page)
 
 
 def check_here(page):

@@ -7,6 +7,7 @@ from dataclasses import replace
 from html.parser import HTMLParser
 from types import SimpleNamespace
 
+import accessibility
 import mocap_files as files
 import numpy as np
 import pytest
@@ -86,6 +87,7 @@ def report(walks, tmp_path_factory):
 def test_the_page_holds_everything_and_needs_nothing(report):
     folder, summary = report
     page = Page((folder / "index.html").read_text())
+    accessibility.check_file(folder / "index.html")
     stems = {p.stem for p in folder.glob("*.png")}
     strips = {"strip-rate", *(f"strip-{k + 1}" for k in range(summary["components"]))}
     assert stems == strips | {

@@ -120,6 +120,25 @@ def test_several_people_have_numbers_and_figures_of_their_own(reports, tmp_path,
         live.close()
 
 
+def test_several_cameras_have_pictures_of_their_own(reports, tmp_path, monkeypatch):
+    browser.chromium()
+    monkeypatch.setenv("GAIT_WEB", str(browser.FETCHED))
+    live = Page(0, [0, 3], private_url(), tmp_path)
+    live.begin(lambda: reports[2].page_data() | {"streams": [0, 3]})
+    try:
+        with browser.opened() as page:
+            page.goto(live.address)
+            browser.until(page, "window.live !== undefined")
+            assert page.locator("#pictures figcaption").all_inner_texts() == ["camera 0", "camera 3"]
+            live.show(3, reports[1][0][:60])
+            live.show(0, reports[1][0])
+            sizes = "[...document.querySelectorAll('#pictures img')].map((each) => each.naturalHeight)"
+            browser.until(page, f"JSON.stringify({sizes}) === '[120,60]'")
+            accessibility.check(page)
+    finally:
+        live.close()
+
+
 def test_a_browser_connects_again_to_another_gait_view(live, reports, tmp_path):
     with browser.opened(strict=False) as page:
         page.goto(live.address)

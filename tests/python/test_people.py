@@ -2,6 +2,7 @@
 
 import json
 
+import accessibility
 import cv2
 import numpy as np
 import pytest
@@ -67,6 +68,7 @@ def test_people_who_cross_keep_their_numbers(crossing, tmp_path, monkeypatch, ca
     assert "person 4: Tracked" in printed and "t-7.csv" in printed
     assert Video("o.mp4").count == FRAMES
     page = (tmp_path / "r.html").read_text()
+    accessibility.check_file(tmp_path / "r.html")
     assert 'href="r-4.html"' in page and (tmp_path / "r-7.html").stat().st_size > 100_000
     order = [MODEL.joint_names.index(name) for name in ("l_knee", "r_knee", "l_ankle", "r_ankle")]
     for truth, id in zip(joints, (4, 7), strict=True):

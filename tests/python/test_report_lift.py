@@ -6,6 +6,7 @@ import json
 from dataclasses import replace
 from pathlib import Path
 
+import accessibility
 import numpy as np
 import pytest
 import threadpoolctl
@@ -46,6 +47,7 @@ def test_figures_of_a_draw(folder, capsys):
     page = (folder / "r" / "report.html").read_text()
     assert page.count("data:image/png;base64,") == len(FIGURES) + 1
     assert 'src="http' not in page
+    accessibility.check_file(folder / "r/report.html")
 
 
 def test_the_variance_explained_is_that_of_the_segments_learnt_from(folder):

@@ -5,6 +5,7 @@ import json
 import re
 from xml.etree import ElementTree
 
+import accessibility
 import numpy as np
 import pytest
 from test_parameters import drawn
@@ -60,6 +61,7 @@ def test_the_page_needs_nothing_else_and_its_drawings_are_sound(folder, capsys):
     words = capsys.readouterr().out
     assert "stride time, s" in words and "of each frame, whose errors last" in words
     page = (folder / "page/report.html").read_text(encoding="utf-8")
+    accessibility.check_file(folder / "page/report.html")
     assert not re.search(r'(src|href)="(?!data:|#)', page)
     drawings = re.findall(r"<svg.*?</svg>", page, re.DOTALL)
     assert len(drawings) == 6 + 5 + 2 * 6  # strides and angles; what has a form for telephones too
