@@ -1,5 +1,6 @@
 """What pages share: parts, modules, and the server."""
 
+import asyncio
 import http.client
 import json
 
@@ -134,3 +135,15 @@ def test_only_this_machines_own_page_is_answered(fetched):
 def test_a_port_that_is_taken_is_one_line():
     with serve.listen(0) as own, pytest.raises(UserError, match="give another --port"):
         serve.listen(own.getsockname()[1])
+
+
+@pytest.mark.parametrize(
+    "body", [b'{"a": NaN}', b'{"a": 1e999}', b'{"a": 1' + b"0" * 400 + b"}", b"[" * 3000, b"[]"]
+)
+def test_a_request_holds_finite_numbers_alone(body):
+    class Sent:
+        async def stream(self):
+            yield body
+
+    with pytest.raises(serve.RequestError, match="no object"):
+        asyncio.run(serve.json_object(Sent(), 10_000))

@@ -5,6 +5,7 @@ from __future__ import annotations
 import contextlib
 import html
 import json
+import math
 import mimetypes
 import socket
 import threading
@@ -130,12 +131,25 @@ async def json_object(request: Request, most: int) -> dict[str, Any]:
         if len(data) > most:
             raise RequestError("the request is too long; leave some out", 413)
     try:
-        found = json.loads(data)
-    except ValueError:
+        found = json.loads(
+            data,
+            parse_constant=_finite,
+            parse_float=_finite,
+            parse_int=lambda text: int(text) if _finite(text) else 0,
+        )
+    except (ValueError, RecursionError):
         found = None
     if not isinstance(found, dict):
         raise RequestError("the request is no object; reload the page")
     return found
+
+
+def _finite(text: str) -> float:
+    """Read a number; ValueError if it is not finite."""
+    value = float(text)
+    if not math.isfinite(value):
+        raise ValueError(text)
+    return value
 
 
 def in_memory(files: Mapping[str, bytes]) -> Callable[[Request], Response]:
