@@ -204,3 +204,18 @@ def test_without_joints_the_offset_must_be_given(tmp_path, monkeypatch, capsys):
     assert main([*words, "--init", "init.json", "--detector", "none", "-o", "t.csv"]) == 1
     assert "give --offsets" in capsys.readouterr().err
     assert not (tmp_path / "t.csv").exists()
+
+
+def test_only_the_first_film_has_to_show_the_start(tmp_path, monkeypatch, capsys):
+    monkeypatch.chdir(tmp_path)
+    simulate(replace(SCENARIO, frames=6), ".")
+    away = json.loads((tmp_path / "camera_2.json").read_text())
+    away["cx"], away["fx"], away["fy"] = 79.5, 4000.0, 4000.0  # shows the person's middle at most
+    turned = np.diag([-1.0, 1.0, -1.0])  # looks the other way
+    away["R"], away["t"] = (turned @ away["R"]).tolist(), (turned @ away["t"]).tolist()
+    (tmp_path / "away.json").write_text(json.dumps(away))
+    words = ["track", "video.mp4", "video_2.mp4", "--camera", "camera.json", "--camera", "away.json"]
+    words += ["--offsets", "0", "--init", "init.json", "--detector", "none", "--background", "none"]
+    code = main([*words, "--particles", "100", "-o", "t.csv"])
+    assert "the start is outside" not in capsys.readouterr().err
+    assert code in (0, 1)

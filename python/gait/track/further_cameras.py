@@ -91,9 +91,10 @@ def with_further_cameras(options: ClipOptions, scene: Scene) -> Scene:
         return scene
     scenes, offsets, began = [], [], []
     for k, (video, camera) in enumerate(options.further):
-        one = Scene.read(
-            replace(options, video=video, camera=camera, start=None, stop=None, further=(), offsets=None)
-        )
+        own = replace(options, video=video, camera=camera, start=None, stop=None, further=(), offsets=None)
+        one = Scene.read(own, starts=False)
+        if one.video.count < 2:
+            raise UserError(f"{video}: has one frame; give a film of the walk")
         require_scene(options, one, 0)
         given = None if options.offsets is None else options.offsets[k]
         person, offset = _offset(scene, one, given)

@@ -135,8 +135,10 @@ class Scene:
         return [id for id in frames if id != self.person and frames[id].isdisjoint(frames[self.person])]
 
     @staticmethod
-    def read(options: ClipOptions) -> Scene:
+    def read(options: ClipOptions, *, starts: bool = True) -> Scene:
         """Read the files, run the detector if there is one, and find the camera if none is given.
+
+        `starts`: whether the track starts in this film, so that the person has to be in it, feet included.
 
         Raises
         ------
@@ -147,7 +149,7 @@ class Scene:
         frames = video.span(options.start or 0, options.stop)
         camera, poses = _cameras(options, video, frames)
         model = Model(options.model or ("paper" if options.mode == Mode.PAPER else "walk"))
-        if camera is not None and options.init != "auto":
+        if starts and camera is not None and options.init != "auto":
             _read_start(options, video, camera, poses, model)  # refused before the work on the whole clip
         _require_detector(options)
         given = None if options.background in ("auto", "none") else background(options.background, video)
@@ -178,7 +180,7 @@ class Scene:
             wanted = options.background != "none"
             panorama = panorama_of(samples, camera, poses, given) if wanted else None
             video, plate = MovingVideo(video, camera, poses, panorama), None
-        if people and not options.keypoints and options.init == "auto" and options.people is None:
+        if starts and people and not options.keypoints and options.init == "auto" and options.people is None:
             person = _who_walks(options, people, person, camera, model, frames, poses)
             _require_feet(people[person], video)
         if options.keypoints:
