@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 
 from gait import Video
+from gait.body.skeleton import axis_rotation
 from gait.cli import main
 from gait.io.keypoints_file import Keypoints
 from gait.io.track_file import read_estimates, read_truth
@@ -210,12 +211,12 @@ def test_only_the_first_film_has_to_show_the_start(tmp_path, monkeypatch, capsys
     monkeypatch.chdir(tmp_path)
     simulate(replace(SCENARIO, frames=6), ".")
     away = json.loads((tmp_path / "camera_2.json").read_text())
-    away["cx"], away["fx"], away["fy"] = 79.5, 4000.0, 4000.0  # shows the person's middle at most
-    turned = np.diag([-1.0, 1.0, -1.0])  # looks the other way
+    turned = axis_rotation(1, 0.7)  # aside, so that the person is out of the picture
     away["R"], away["t"] = (turned @ away["R"]).tolist(), (turned @ away["t"]).tolist()
     (tmp_path / "away.json").write_text(json.dumps(away))
     words = ["track", "video.mp4", "video_2.mp4", "--camera", "camera.json", "--camera", "away.json"]
     words += ["--offsets", "0", "--init", "init.json", "--detector", "none", "--background", "none"]
-    code = main([*words, "--particles", "100", "-o", "t.csv"])
-    assert "the start is outside" not in capsys.readouterr().err
-    assert code in (0, 1)
+    assert main([*words, "--particles", "100", "-o", "t.csv"]) == 0, capsys.readouterr().err
+    alone = ["track", "video_2.mp4", "--camera", "away.json", *words[words.index("--init") :], "-o", "u.csv"]
+    assert main(alone) == 1
+    assert "the start is outside of the picture" in capsys.readouterr().err
