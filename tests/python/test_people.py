@@ -86,7 +86,7 @@ def test_a_start_takes_the_person_who_walks(crossing):
     options = ClipOptions("v.mp4", "camera.json", "t.csv")
 
     def chosen(people):
-        return scene._who_walks(options, people, main_person(people), camera(), MODEL, range(FRAMES), {})
+        return scene._who_starts(options, people, main_person(people), camera(), MODEL, range(FRAMES), {})
 
     assert chosen({1: walks, 2: stands}) == 1
     assert chosen({2: stands}) == 2

@@ -18,7 +18,7 @@ from numpy.typing import NDArray
 from gait.bindings.abi import TrackStatus
 from gait.bindings.estimate import Estimate
 from gait.bindings.initial import Start
-from gait.detect.people import height
+from gait.detect.people import by_size
 from gait.errors import UserError
 from gait.io.files import replacing
 from gait.io.keypoints_file import Keypoints
@@ -96,9 +96,8 @@ def numbered(path: str, id: int) -> str:
 
 def _starts(options: ClipOptions, scene: Scene) -> dict[int, Start]:
     """First state of everyone who walks, the one in view longest and tallest first."""
-    extent = {id: len(one.visible_frames()) * height(one) for id, one in scene.people.items()}
     starts: dict[int, Start] = {}
-    for id in sorted(extent, key=lambda id: -extent[id]):
+    for id in by_size(scene.people):
         if len(starts) == options.people:
             break
         found = find_keypoint_start(

@@ -181,7 +181,7 @@ class Scene:
             panorama = panorama_of(samples, camera, poses, given) if wanted else None
             video, plate = MovingVideo(video, camera, poses, panorama), None
         if starts and people and not options.keypoints and options.init == "auto" and options.people is None:
-            person = _who_walks(options, people, person, camera, model, frames, poses)
+            person = _who_starts(options, people, person, camera, model, frames, poses)
             _require_feet(people[person], video)
         if options.keypoints:
             sure = {id: found.by_frame(options.keypoints_sd) for id, found in people.items()}
@@ -466,7 +466,7 @@ def _require_feet(keypoints: Keypoints, video: Video) -> None:
     require_feet(keypoints, video)
 
 
-def _who_walks(
+def _who_starts(
     options: ClipOptions,
     people: dict[int, Keypoints],
     person: int,
