@@ -1,11 +1,11 @@
 #!/usr/bin/env python3
 """Of two readings of an equation of Ormoneit and others (2000), which one tracks: paper mode under both.
 
-    paper_readings.py [--folder build/search_paper] [--seeds 10] [--record]
+    paper_readings.py [--folder build/search_paper] [--seeds 6] [--record]
 
 On the clips of search_paper.py, with the settings that it froze; no development clip is looked at.  A
 reading that changes how much a grey level counts has a sigma of its own, the best of some by one seed;
-all are judged by others, which the search did not use.  Each is compared with what was taken seed by seed.
+all are judged by others, which the search did not use.  Each is compared with what was taken run by run.
 """
 
 from __future__ import annotations
@@ -96,7 +96,7 @@ def main() -> int:
         description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
     )
     parser.add_argument("--folder", type=Path, default=search_paper.FOLDER)
-    parser.add_argument("--seeds", type=int, default=10, help="runs of a clip under each reading")
+    parser.add_argument("--seeds", type=int, default=6, help="runs of a clip under each reading")
     parser.add_argument("--record", action="store_true", help="publish the table")
     args = parser.parse_args()
     search = search_paper.Search(args.folder)
@@ -146,15 +146,13 @@ class Judged:
 
     @property
     def scores(self) -> np.ndarray:
-        """As in the search, by seed: the ratio, and the share of the runs that leave the person."""
-        each = [
-            [r.root / f + (not r.held) for r in runs] for runs, f in zip(self.runs, self.free, strict=True)
-        ]
-        return np.mean(each, axis=0)
+        """As in the search, by clip and seed: the ratio, and 1 more for a run that leaves the person."""
+        pairs = zip(self.runs, self.free, strict=True)
+        return np.array([[r.root / free + (not r.held) for r in each] for each, free in pairs])
 
     @property
     def score(self) -> float:
-        """Mean of the seeds."""
+        """Mean of the runs."""
         return float(np.mean(self.scores))
 
     def row(self, taken: Judged) -> list[Any]:
@@ -165,11 +163,13 @@ class Judged:
         return [*numbers, left, reported(every, held=False), *(round(root, 1) for root in self.roots)]
 
     def _apart(self, taken: Judged) -> tuple[Any, Any]:
-        """Mean difference of the scores, seed by seed, and its 95 % interval by Student's t."""
+        """Mean difference of the scores, run by run, and its 95 % interval by Student's t within the clips."""
         apart = self.scores - taken.scores
-        if self is taken or len(apart) < 2:
+        clips, seeds = apart.shape
+        if self is taken or seeds < 2:
             return None, None
-        low, high = stats.t.interval(0.95, len(apart) - 1, apart.mean(), stats.sem(apart))
+        sd = np.sqrt(apart.var(axis=1, ddof=1).sum() / seeds) / clips
+        low, high = stats.t.interval(0.95, clips * (seeds - 1), apart.mean(), sd)
         return f"{apart.mean():+.2f}", f"{low:+.2f} to {high:+.2f}"
 
 
@@ -182,8 +182,8 @@ Where an equation of the filter can be read in two ways, paper mode under both, 
 [search_paper](search_paper.md): root-aligned error, mm, frames 0 to 50, the mean of {seeds} seeds; over
 that of the free-running cycle, the mean of the clips; runs that leave the person, and how many of these are
 reported as lost; score: that ratio and the share of the runs that leave, as in the search. Than taken: by
-how much the score differs from the first row's, the mean of the seeds, and its 95 % interval, both under the
-same starts and random numbers; the interval is of other seeds on these clips, one row at a time. sigma: that
+how much the score differs from the first row's, run by run from the same starts and random numbers, and the
+95 % interval of that for other seeds on these clips, one row at a time. sigma: that
 of eq. 11, in grey levels, where a reading changes how much it counts the best of three by a seed of its own.
 A constant sigma is no reading: the paper has it increase with narrow angles, in a form that it leaves open.
 
