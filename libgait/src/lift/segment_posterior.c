@@ -112,7 +112,8 @@ lift_axes lift_axes_prior(const lift_table *t, const segment_posterior *b)
     return axes_at(t, b->heading, b->place);
 }
 
-lift_axes lift_axes_now(const lift_table *t, const segment_posterior *b)
+/* By theta. */
+static lift_axes axes_now(const lift_table *t, const segment_posterior *b)
 {
     double place[3];
     for (int32_t i = 0; i < 3; i++)
@@ -128,6 +129,12 @@ void lift_clear(const lift_table *t, segment_posterior *b)
     b->observed = 0;
     b->log_noise = b->chi2 = 0.0;
 }
+
+typedef struct lift_marker { /* linearised about theta, statures */
+    double base[3];          /* without modes and growth */
+    double shape[3];         /* grows with the stature */
+    double grown;            /* factor of the modes */
+} lift_marker;
 
 /* Marker j displaced by `moved` by the modes: its parts, and in x its position in the body. */
 static void displaced_marker(const lift_table *t, const segment_posterior *b, const lift_moment *m, int32_t j,
@@ -147,8 +154,9 @@ static void displaced_marker(const lift_table *t, const segment_posterior *b, co
     }
 }
 
-void lift_marker_at(const lift_table *t, const segment_posterior *b, const lift_moment *m, int32_t j,
-                    lift_marker *r, double x[3])
+/* Marker j by theta: its modes in t->shape, its position in the body in x. */
+static void marker_at(const lift_table *t, const segment_posterior *b, const lift_moment *m, int32_t j,
+                      lift_marker *r, double x[3])
 {
     const segment_prior *const p = &t->prior;
     size_t const J = (size_t)p->markers, first = (size_t)b->component * (size_t)p->frames;
@@ -214,7 +222,7 @@ int32_t lift_rows(const lift_table *t, segment_posterior *b, double at, const li
                   const double *guess, double depth, const lift_residuals *residuals)
 {
     lift_moment const m = lift_find_moment(t, at);
-    adding const a = {.prior = lift_axes_prior(t, b), .now = lift_axes_now(t, b), .depth = depth};
+    adding const a = {.prior = lift_axes_prior(t, b), .now = axes_now(t, b), .depth = depth};
     double det = 1.0; /* one logarithm for many factors */
     int32_t rows = 0;
     for (int32_t j = 0; j < t->prior.markers; j++) {
@@ -222,7 +230,7 @@ int32_t lift_rows(const lift_table *t, segment_posterior *b, double at, const li
         double x[3], own[3], square[2];
         if (!lift_observed_at(observed, j))
             continue;
-        lift_marker_at(t, b, &m, j, &r, x);
+        marker_at(t, b, &m, j, &r, x);
         lift_to_world(&a.now, x, own);
         det *= add_marker(t, b, &a, observed->uv + 2 * j, observed->sd[j], j, &r, guess ? guess + 3 * j : own,
                           t->W + (size_t)rows * (size_t)t->ld, square);
@@ -330,19 +338,19 @@ static void set_identity(double P[3][3])
 void lift_positions(const lift_table *t, const segment_posterior *b, double at, const int32_t *marker,
                     int32_t count, double *mean)
 {
-    lift_axes const axes = lift_axes_now(t, b);
+    lift_axes const axes = axes_now(t, b);
     lift_moment const moment = lift_find_moment(t, at);
     for (int32_t r = 0; r < count; r++) {
         lift_marker m;
         double x[3];
-        lift_marker_at(t, b, &moment, marker[r], &m, x);
+        marker_at(t, b, &moment, marker[r], &m, x);
         lift_to_world(&axes, x, mean + 3 * r);
     }
 }
 
 void lift_modes(const lift_table *t, const segment_posterior *b, double at)
 {
-    lift_axes const axes = lift_axes_now(t, b);
+    lift_axes const axes = axes_now(t, b);
     lift_moment const moment = lift_find_moment(t, at);
     int32_t const k = t->prior.modes;
     double *z = t->Z;
@@ -350,7 +358,7 @@ void lift_modes(const lift_table *t, const segment_posterior *b, double at)
         lift_marker m;
         effects by;
         double x[3], own[3], P[3][3];
-        lift_marker_at(t, b, &moment, j, &m, x);
+        marker_at(t, b, &moment, j, &m, x);
         lift_to_world(&axes, x, own);
         set_identity(P);
         find_effects(t, b, &axes, &m, own, P, &by);
@@ -422,7 +430,7 @@ static void read_eight(const lift_table *t, const segment_posterior *b, const re
 void lift_read(const lift_table *t, const segment_posterior *b, const lift_query *q, double *mean, double *sd)
 {
     double variance[3 * GAIT_MAX_MARKERS] = {0.0};
-    reading to = {.axes = lift_axes_now(t, b),
+    reading to = {.axes = axes_now(t, b),
                   .moment = lift_find_moment(t, q->at),
                   .columns = cholesky_padded(q->count),
                   .mean = mean,

@@ -87,9 +87,8 @@ typedef struct lift_axes {
     double place[3];
 } lift_axes;
 
-lift_axes lift_axes_prior(const lift_table *t,
-                          const segment_posterior *b); /* at the expected place, b->heading */
-lift_axes lift_axes_now(const lift_table *t, const segment_posterior *b); /* by theta */
+/* At the expected place, heading b->heading. */
+lift_axes lift_axes_prior(const lift_table *t, const segment_posterior *b);
 
 static inline void lift_to_world(const lift_axes *f, const double x[3], double out[3])
 {
@@ -104,16 +103,6 @@ static inline double lift_residual(const lift_table *t, const segment_posterior 
     double const psi = (double)t->prior.residual[b->component * t->prior.markers + j];
     return t->gamma * psi * t->stature * t->stature;
 }
-
-typedef struct lift_marker { /* linearised about theta, statures */
-    double base[3];          /* without modes and growth */
-    double shape[3];         /* grows with the stature */
-    double grown;            /* factor of the modes */
-} lift_marker;
-
-/* Marker j by theta: its modes in t->shape, its position in the body in x. */
-void lift_marker_at(const lift_table *t, const segment_posterior *b, const lift_moment *m, int32_t j,
-                    lift_marker *r, double x[3]);
 
 typedef struct lift_residuals { /* of the markers observed in a frame */
     double *position;           /* J x 3, by theta */
