@@ -1,7 +1,8 @@
 #!/usr/bin/env python3
 """hygiene.py ROOT: what git tracks is source, carries one version and names no machine.
 
-A source of more than 700 lines, other than a public header, is a warning only.
+Warnings only: a source of more than 700 lines, other than a public header, and a recorded result whose commit is
+not in this history (a rebase after the recording has left it behind).
 """
 
 import fnmatch
@@ -95,14 +96,35 @@ def faults(root: Path, name: str) -> list[str]:
 
 
 def version_faults(root: Path) -> list[str]:
-    """The version of gait.h is the one of the package."""
+    """The version of gait.h is the one of the package, its ABI number the changelog's."""
     header = (root / "libgait/include/gait.h").read_text(encoding="utf-8")
     parts = [re.search(rf"define GAIT_VERSION_{p} (\d+)", header) for p in ("MAJOR", "MINOR", "PATCH")]
     version = ".".join(p.group(1) for p in parts if p)
     module = root / "python/gait/_version.py"
     package = re.search(r'^__version__ = "(.*?)"', module.read_text(encoding="utf-8"), re.M)
     have = package.group(1) if package else "none"
-    return [] if have == version else [f"python/gait/_version.py: version {have}, gait.h has {version}"]
+    found = [] if have == version else [f"python/gait/_version.py: version {have}, gait.h has {version}"]
+    changes = root / "libgait/doc/changelog.md"
+    for abi in re.findall(r"define GAIT_ABI (\d+)", header):
+        if not re.search(rf"^\| {abi} \|", changes.read_text(encoding="utf-8"), re.M):
+            found.append(f"libgait/doc/changelog.md: no row for ABI {abi}")
+    return found
+
+
+def lost_commits(root: Path, names: list[str]) -> list[str]:
+    """Commits named by recorded results that the history here, if it is whole, does not have."""
+    git = ["git", "-C", str(root)]
+    whole = subprocess.run([*git, "rev-parse", "--is-shallow-repository"], capture_output=True, text=True)
+    history = subprocess.run([*git, "rev-list", "HEAD"], capture_output=True, text=True)
+    if whole.stdout.strip() != "false" or history.returncode:
+        return []
+    pages = [name for name in names if fnmatch.fnmatch(name, "tests/bench/results/*.md")]
+    named = [(p, c) for p in pages for c in re.findall(r"commit ([0-9a-f]{7,})", (root / p).read_text())]
+    return [
+        f"warning: {page} names commit {commit}, which is not in this history"
+        for page, commit in dict.fromkeys(named)
+        if f"\n{commit}" not in f"\n{history.stdout}"
+    ]
 
 
 def main() -> int:
@@ -113,7 +135,8 @@ def main() -> int:
         return 0
     names = [n for n in git.stdout.split("\0") if n and (root / n).is_file()]
     found = [f for name in names for f in faults(root, name)] + version_faults(root)
-    print(*found, *(w for name in names for w in warnings(root, name)), sep="\n")
+    warned = [w for name in names for w in warnings(root, name)] + lost_commits(root, names)
+    print(*found, *warned, sep="\n")
     return bool(found)
 
 

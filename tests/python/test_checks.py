@@ -309,8 +309,9 @@ def checkout(tmp_path):
     """A git checkout that passes."""
     for name, text in {
         "libgait/include/gait.h": "".join(
-            f"#define GAIT_VERSION_{p} 1\n" for p in ("MAJOR", "MINOR", "PATCH")
+            f"#define GAIT_{p} 1\n" for p in ("VERSION_MAJOR", "VERSION_MINOR", "VERSION_PATCH", "ABI")
         ),
+        "libgait/doc/changelog.md": "| 1 | first |\n",
         "python/gait/_version.py": '__version__ = "1.1.1"\n',
         "libgait/src/a.c": "int gait_a;\n",
     }.items():
@@ -342,6 +343,7 @@ def checkout(tmp_path):
         ("b.py", b"x = 1", "no newline"),
         ("errors.sto", b"x = 1\n", "data does not belong"),
         ("python/gait/_version.py", b'__version__ = "1.1.2"\n', "gait.h has 1.1.1"),
+        ("libgait/doc/changelog.md", b"| 0 | first |\n", "no row for ABI 1"),
     ],
 )
 def test_hygiene_sees_what_does_not_belong(checkout, name, content, words):
@@ -358,6 +360,22 @@ def test_hygiene_warns_of_a_long_source(checkout):
     done = run("hygiene.py", checkout)
     assert done.returncode == 0
     assert done.stdout == "\nwarning: libgait/src/long.c has 701 lines, more than 700\n".lstrip()
+
+
+def test_hygiene_warns_of_results_whose_commit_is_lost(checkout):
+    git = ["git", "-C", checkout, "-c", "user.name=a", "-c", "user.email=a@b.c"]
+    subprocess.run([*git, "commit", "-qm", "a"], check=True)
+    head = subprocess.run([*git, "rev-parse", "--short", "HEAD"], capture_output=True, text=True, check=True)
+    results = checkout / "tests/bench/results"
+    results.mkdir(parents=True)
+    (results / "a.md").write_text(f"made at commit {head.stdout.strip()}, once at commit 0123456.\n")
+    subprocess.run([*git, "add", "."], check=True)
+    done = run("hygiene.py", checkout)
+    assert done.returncode == 0
+    assert (
+        done.stdout
+        == "warning: tests/bench/results/a.md names commit 0123456, which is not in this history\n"
+    )
 
 
 @pytest.mark.parametrize(
