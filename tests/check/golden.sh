@@ -3,6 +3,12 @@
 # these tests at every optimisation level, with every compiler found and for every instruction set of the CPU, here
 # and on an emulated aarch64, where the tests of the kernels run as well.  What is missing is skipped and listed
 # at the end.
+if [ $# -gt 0 ]; then
+    sed -n '2,/^[^#]/s/^# //p' "$0"
+    echo 'usage: make golden-check (some minutes; CC= for another first compiler)'
+    [ "$*" = --help ]
+    exit
+fi
 cd "$(dirname "$0")/../.." || exit 1
 release=$(sed -n 's/^OPT_release *:= *//p' Makefile)
 kernels=$(echo tests/unit/test_*kernel*.c tests/unit/test_fmath.c | sed 's|tests/unit/||g; s|\.c||g')
