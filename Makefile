@@ -102,7 +102,7 @@ help: ## list the targets
 	@echo 'config=release|debug|sanitize|thread (now $(config)), werror=1: warnings are errors'
 
 # What the objects were built with; when it changes they are rebuilt.
-MADE_WITH := CC=$(CC) CXX=$(CXX) OPT=$(OPT) CFLAGS=$(CFLAGS) CXXFLAGS=$(CXXFLAGS) LDFLAGS=$(LDFLAGS)
+MADE_WITH := CC=$(CC) CXX=$(CXX) OPT=$(OPT) CFLAGS=$(CFLAGS) CXXFLAGS=$(CXXFLAGS) LDFLAGS=$(LDFLAGS)$(if $(SYSROOT), SYSROOT=$(SYSROOT))
 MADE := $(B)/.made_with
 ifneq ($(strip $(shell cat $(MADE) 2>/dev/null)),$(strip $(MADE_WITH)))
 .PHONY: $(MADE)
@@ -117,9 +117,8 @@ ifneq ($(COMPILED),)
 $(if $(call has,$(CC)),,$(error no C compiler '$(CC)': install it or set CC=))
 $(if $(call has,$(CXX)),,$(error no C++ compiler '$(CXX)': install it or set CXX=))
 endif
-ifneq ($(and $(FOREIGN),$(filter tools built test python-test demo,$(COMPILED))),)
-$(error the LCM and libjpeg found here are not for $(MACHINE): on that machine run `make tools`; \
-    `make lib CC=$(CC)` builds the library alone)
+ifneq ($(and $(FOREIGN),$(filter built test python-test demo,$(COMPILED))),)
+$(error what runs on $(MACHINE) is not tested here: `make lib tools CC=$(CC)` builds it)
 endif
 
 # ---- python environment --------------------------------------------------------------------------------------
@@ -199,19 +198,37 @@ $(foreach isa,$(KERNEL_ISAS),$(eval $(call kernel_rule,$(isa))))
 # ---- LCM tools -----------------------------------------------------------------------------------------------
 LCM_TYPES := $(sort $(wildcard lcm_types/*.lcm))
 # JPEG frames need libjpeg's headers; without them gait-trackd reports that it cannot decode JPEG.
+ifndef FOREIGN
+LCM := $(SITE)
 JPEG_LIBS := $(shell pkg-config --libs libjpeg 2>/dev/null)
 JPEG_CFLAGS := $(if $(JPEG_LIBS),-DHAVE_LIBJPEG $(shell pkg-config --cflags libjpeg))
-LCM_CFLAGS := -isystem $(SITE)/include -isystem build/lcm
-LCM_LIBS = -L$(SITE)/lib -llcm \
-           -Wl,-rpath,'$$ORIGIN/$(shell realpath -ms --relative-to=$(BIN) $(SITE)/lib):$$ORIGIN/../lib/gait'
+else
+# For another CPU: libjpeg of SYSROOT, a copy of that machine's / or a part of it; LCM from its package, or LCM=FOLDER with
+# include and lib.  GLib, which LCM needs, is found when the daemon starts.
+LCM ?= build/lcm-$(MACHINE)
+in_sysroot = $(firstword $(wildcard $(foreach d,$(1)/$(MACHINE) $(1),$(SYSROOT)/usr/$(d)/$(2))))
+JPEG_LIBS := $(and $(SYSROOT),$(call in_sysroot,include,jpeglib.h),$(call in_sysroot,lib,libjpeg.so))
+JPEG_CFLAGS := $(if $(JPEG_LIBS),-DHAVE_LIBJPEG $(patsubst %,-idirafter $(SYSROOT)/usr/include%,/$(MACHINE) /))
+LCM_LDFLAGS := -Wl,--allow-shlib-undefined
+endif
+LCM_CFLAGS := -isystem $(LCM)/include -isystem build/lcm
+LCM_LIBS = -L$(LCM)/lib -llcm $(LCM_LDFLAGS) \
+           -Wl,-rpath,'$$ORIGIN/$(shell realpath -ms --relative-to=$(BIN) $(LCM)/lib):$$ORIGIN/../lib/gait'
 
-tools: $(TOOLS) build/lcm/.stamp ## LCM programs in build/bin, LCM types in build/lcm
+build/lcm-%/lib/liblcm.so: python/lock.txt | $(READY) build/lcm-%/
+	$(call log,LCM  $@)sed -n '/^lcm==/,/[^\\]$$/p' $< > build/lcm-$*/lock.txt && \
+	    $(PIP_INSTALL) --upgrade --require-hashes --no-deps --only-binary :all: --platform manylinux_2_28_$(call cpu_of,$*) \
+	    --target build/lcm-$* -r build/lcm-$*/lock.txt || \
+	    { echo 'tools: no LCM for $*: give LCM=, a folder with include and lib' >&2; exit 1; }
+	@touch $@
+
+tools: $(TOOLS) build/lcm/.stamp ## LCM programs in build/bin, LCM types in build/lcm (CC=aarch64-linux-gnu-gcc SYSROOT= for that CPU)
 
 build/lcm/.stamp: $(LCM_TYPES) | $(READY) build/lcm/python/
 	$(call log,LCM  lcm_types)$(VENV)/bin/lcm-gen -c --c-cpath build/lcm --c-hpath build/lcm -p --ppath build/lcm/python $(LCM_TYPES)
 	@touch $@
 
-$(B)/libgaitmsg.a: build/lcm/.stamp $(MADE) | $(B)/lcm/
+$(B)/libgaitmsg.a: build/lcm/.stamp $(MADE) | $(B)/lcm/ $(LCM)/lib/liblcm.so
 	$(call log,AR   $@)for f in $(LCM_TYPES:lcm_types/%.lcm=%); do \
 	    $(CC) $(OPT) -g $(LCM_CFLAGS) -c build/lcm/$$f.c -o $(B)/lcm/$$f.o || exit 1; done
 	@rm -f $@
@@ -221,7 +238,7 @@ TOOL_PARTS := $(patsubst tools/%,$(B)/tools/%.o,$(sort $(wildcard tools/trackd/*
 $(BIN)/gait-trackd: $(TOOL_PARTS) $(B)/libgait.a $(B)/libgaitmsg.a | $(BIN)/
 	$(call log,LD   $@)$(CC) $(OPT) -pthread $(LDFLAGS) -o $@ $^ $(LCM_LIBS) $(JPEG_LIBS) -lm
 
-$(B)/tools/%.c.o: tools/%.c Makefile $(MADE) build/lcm/.stamp | $(B)/tools/trackd/
+$(B)/tools/%.c.o: tools/%.c Makefile $(MADE) build/lcm/.stamp | $(B)/tools/trackd/ $(LCM)/lib/liblcm.so
 	$(call log,CC   $<)$(CC) -std=c11 -D_POSIX_C_SOURCE=200809L $(COMMON) $(CWARN) -pthread -Ilibgait/include -Itools $(LCM_CFLAGS) \
 	    $(JPEG_CFLAGS) $(CFLAGS) -c $< -o $@
 
@@ -472,24 +489,31 @@ install: lib ## the library and, after `make tools`, the daemon as a service (DE
 	@if [ -x $(BIN)/gait-trackd ]; then $(MAKE) --no-print-directory install-daemon; \
 	else echo 'install: without the daemon; build it by `make tools` first'; fi
 
+# Pages of the manual, from --help: the daemon for another CPU has the page of the one built for this machine.
+MANUAL := build/man/.stamp
+PAGED := $(if $(FOREIGN),$(wildcard build/bin/gait-trackd),$(BIN)/gait-trackd)
+$(MANUAL): tools/man.py $(wildcard python/gait/cli/*.py) $(PAGED) | $(READY) build/man/
+	$(PY) $< $(@D) $(VERSION) $(VENV)/bin/gait $(PAGED)
+	@touch $@
+
 # Its LCM, which no Debian package has, lies beside it in lib/gait.
-install-daemon: tools
+install-daemon: tools $(MANUAL)
 	install -d '$(DESTDIR)$(PREFIX)/bin' '$(DESTDIR)$(PREFIX)/lib/gait' '$(DESTDIR)$(PREFIX)/lib/systemd/system' \
 	    '$(DESTDIR)$(PREFIX)/share/man/man1' '$(DESTDIR)$(PREFIX)/share/gait/lcm_types'
 	install -m 755 $(BIN)/gait-trackd '$(DESTDIR)$(PREFIX)/bin/'
-	install -m 755 $(SITE)/lib/liblcm.so.1 '$(DESTDIR)$(PREFIX)/lib/gait/'
+	install -m 755 $(LCM)/lib/liblcm.so.1 '$(DESTDIR)$(PREFIX)/lib/gait/'
 	install -m 644 $(LCM_TYPES) '$(DESTDIR)$(PREFIX)/share/gait/lcm_types/'
 	install -m 644 $(addprefix python/gait/data/,walk.gait paper.gait classes.gait) '$(DESTDIR)$(PREFIX)/share/gait/'
 	sed 's|/usr/local|$(PREFIX)|' tools/trackd/trackd.toml > '$(DESTDIR)$(PREFIX)/share/gait/trackd.toml'
 	sed 's|@PREFIX@|$(PREFIX)|' tools/trackd/gait-trackd.service.in \
 	    > '$(DESTDIR)$(PREFIX)/lib/systemd/system/gait-trackd.service'
-	$(PY) tools/trackd/man.py $(BIN)/gait-trackd $(VERSION) > '$(DESTDIR)$(PREFIX)/share/man/man1/gait-trackd.1'
+	install -m 644 build/man/*.1 '$(DESTDIR)$(PREFIX)/share/man/man1/'
 
 uninstall: ## remove what install put there
 	cd '$(DESTDIR)$(LIBDIR)' && rm -rf libgait.so.$(ABI) libgait.so libgait.a pkgconfig/gait.pc cmake/gait
 	cd '$(DESTDIR)$(INCLUDEDIR)' && rm -f $(notdir $(HEADERS))
 	test ! -d '$(DESTDIR)$(PREFIX)/share/gait' || { cd '$(DESTDIR)$(PREFIX)' && rm -rf bin/gait-trackd lib/gait share/gait \
-	    lib/systemd/system/gait-trackd.service share/man/man1/gait-trackd.1; }
+	    lib/systemd/system/gait-trackd.service share/man/man1/gait.1 share/man/man1/gait-*.1; }
 
 clean: ## remove build/ (not .venv)
 	rm -rf build

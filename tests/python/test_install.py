@@ -8,6 +8,8 @@ from pathlib import Path
 
 import pytest
 
+from gait.cli import COMMANDS, parser_of
+
 ROOT = Path(__file__).resolve().parents[2]
 HEADER = (ROOT / "libgait/include/gait.h").read_text(encoding="utf-8")
 ABI = re.findall(r"^#define GAIT_ABI (\d+)", HEADER, re.M)[0]
@@ -42,7 +44,9 @@ def test_install_puts_everything_and_uninstall_removes_it(installed):
     types = {f"share/gait/lcm_types/{t.name}" for t in (ROOT / "lcm_types").glob("*.lcm")}
     daemon = {"bin/gait-trackd", "lib/gait/liblcm.so.1", "share/gait/walk.gait", "share/gait/trackd.toml"}
     daemon |= {"share/gait/paper.gait", "share/gait/classes.gait"}
-    service = {"lib/systemd/system/gait-trackd.service", "share/man/man1/gait-trackd.1"}
+    service = {"lib/systemd/system/gait-trackd.service"}
+    commands = ["gait", "gait-trackd", *(f"gait-{name.replace(' ', '-')}" for name in COMMANDS)]
+    service |= {f"share/man/man1/{name}.1" for name in commands}
     assert names == libraries | described | headers | types | daemon | service
     assert make("uninstall", f"DESTDIR={installed}", "PREFIX=/opt/gait").returncode == 0
     assert not [p for p in installed.rglob("*") if not p.is_dir()]
@@ -70,16 +74,26 @@ def test_the_unit_is_one_that_systemd_accepts(installed):
     assert done.returncode == 0 and not done.stderr, done.stderr
 
 
-def test_the_manual_page_has_every_option(installed):
-    page = (installed / "opt/gait/share/man/man1/gait-trackd.1").read_text().replace("\\-", "-")
+def test_the_manual_pages_have_every_option(installed):
+    pages = installed / "opt/gait/share/man/man1"
     trackd = ROOT / "build/bin/gait-trackd"
     shown = subprocess.run([trackd, "--help"], capture_output=True, text=True, check=True).stdout
-    options = re.findall(r"^  ((?:-\w, )?--[a-z-]+.*)$", shown, re.M)
-    assert len(options) > 30 and all(f"\n.B {option}\n" in page for option in options)
+    options = {"gait-trackd": re.findall(r"^  ((?:-\w, )?--[a-z-]+.*)$", shown, re.M)}
+    assert len(options["gait-trackd"]) > 30
+    for name in COMMANDS:
+        actions = parser_of(name)._actions
+        options[f"gait-{name.replace(' ', '-')}"] = [
+            a.option_strings[-1] for a in actions if a.option_strings
+        ]
+    for name, words in options.items():
+        page = (pages / f"{name}.1").read_text().replace("\\-", "-")
+        heads = re.findall(r"^\.B (.*)$", page, re.M)
+        assert all(
+            any(re.search(rf"(^|, ){re.escape(word)}( |$)", head) for head in heads) for word in words
+        ), name
     if shutil.which("groff"):
-        page = installed / "opt/gait/share/man/man1/gait-trackd.1"
         done = subprocess.run(
-            ["groff", "-man", "-ww", "-z", page], capture_output=True, text=True, check=True
+            ["groff", "-man", "-ww", "-z", *pages.iterdir()], capture_output=True, text=True, check=True
         )
         assert not done.stderr
 
