@@ -55,9 +55,10 @@ OPT_release  := $(RELEASE_FLAGS)
 OPT_debug    := -O0
 OPT_sanitize := -O1 -fsanitize=address,undefined,float-cast-overflow -fno-sanitize-recover=all -fno-omit-frame-pointer
 OPT_thread   := -O1 -fsanitize=thread -fno-omit-frame-pointer
+OPT_fuzz     := $(OPT_sanitize) -fsanitize=fuzzer-no-link
 OPT ?= $(OPT_$(config))
 ifeq ($(OPT),)
-$(error unknown config=$(config): use release, debug, sanitize or thread)
+$(error unknown config=$(config): use release, debug, sanitize, thread or fuzz)
 endif
 GCC   := $(if $(findstring clang,$(shell $(CC) --version 2>/dev/null)),,gcc)
 TIGHT := $(if $(GCC),$(GCC_TIGHT))
@@ -90,7 +91,7 @@ UNIT := $(patsubst tests/unit/%.c,$(B)/unit/%,$(sort $(wildcard tests/unit/test_
 TOOLS := $(BIN)/gait-trackd
 LIBS := $(B)/libgait.so $(B)/libgait.a
 
-.PHONY: help setup lock lib tools test built check unit python-test demo model paper bench bench-lift detector-profile eval eval-camera eval-cameras eval-gait eval-moving eval-real eval-learn eval-lift eval-paper eval-people eval-studio mutants asan tsan unit-threads fuzz fuzz-run golden-check \
+.PHONY: help setup lock lib tools test built check unit python-test demo model paper bench bench-lift detector-profile eval eval-camera eval-cameras eval-gait eval-moving eval-real eval-learn eval-lift eval-paper eval-people eval-studio mutants asan tsan unit-threads fuzz fuzz-run fuzz-long fuzz-targets golden-check \
         docs screenshots sbom lint format wheel sdist wheel-check install install-daemon uninstall clean
 
 help: ## list the targets
@@ -99,7 +100,7 @@ help: ## list the targets
 	@echo; awk -F ':.*## ' '/^[a-z-]+:.*## / { printf "  %-14s %s\n", $$1, $$2 }' $(firstword $(MAKEFILE_LIST))
 	@echo; echo '* needs the data beside the repository (../shared/data); without it, tests that need some are skipped'
 	@echo 'targets eval* fail if a bound is missed; bench, bench-lift print MISSED: rates depend on the host'
-	@echo 'config=release|debug|sanitize|thread (now $(config)), werror=1: warnings are errors'
+	@echo 'config=release|debug|sanitize|thread|fuzz (now $(config)), werror=1: warnings are errors'
 
 # What the objects were built with; when it changes they are rebuilt.
 MADE_WITH := CC=$(CC) CXX=$(CXX) OPT=$(OPT) CFLAGS=$(CFLAGS) CXXFLAGS=$(CXXFLAGS) LDFLAGS=$(LDFLAGS)$(if $(SYSROOT), SYSROOT=$(SYSROOT))
@@ -212,8 +213,9 @@ JPEG_CFLAGS := $(if $(JPEG_LIBS),-DHAVE_LIBJPEG $(patsubst %,-idirafter $(SYSROO
 LCM_LDFLAGS := -Wl,--allow-shlib-undefined
 endif
 LCM_CFLAGS := -isystem $(LCM)/include -isystem build/lcm
-LCM_LIBS = -L$(LCM)/lib -llcm $(LCM_LDFLAGS) \
-           -Wl,-rpath,'$$ORIGIN/$(shell realpath -ms --relative-to=$(BIN) $(LCM)/lib):$$ORIGIN/../lib/gait'
+# Of programs in a folder.
+lcm_libs = -L$(LCM)/lib -llcm $(LCM_LDFLAGS) \
+           -Wl,-rpath,'$$ORIGIN/$(shell realpath -ms --relative-to=$(1) $(LCM)/lib):$$ORIGIN/../lib/gait'
 
 build/lcm-%/lib/liblcm.so: python/lock.txt | $(READY) build/lcm-%/
 	$(call log,LCM  $@)sed -n '/^lcm==/,/[^\\]$$/p' $< > build/lcm-$*/lock.txt && \
@@ -236,7 +238,7 @@ $(B)/libgaitmsg.a: build/lcm/.stamp $(MADE) | $(B)/lcm/ $(LCM)/lib/liblcm.so
 
 TOOL_PARTS := $(patsubst tools/%,$(B)/tools/%.o,$(sort $(wildcard tools/trackd/*.c)))
 $(BIN)/gait-trackd: $(TOOL_PARTS) $(B)/libgait.a $(B)/libgaitmsg.a | $(BIN)/
-	$(call log,LD   $@)$(CC) $(OPT) -pthread $(LDFLAGS) -o $@ $^ $(LCM_LIBS) $(JPEG_LIBS) -lm
+	$(call log,LD   $@)$(CC) $(OPT) -pthread $(LDFLAGS) -o $@ $^ $(call lcm_libs,$(BIN)) $(JPEG_LIBS) -lm
 
 $(B)/tools/%.c.o: tools/%.c Makefile $(MADE) build/lcm/.stamp | $(B)/tools/trackd/ $(LCM)/lib/liblcm.so
 	$(call log,CC   $<)$(CC) -std=c11 -D_POSIX_C_SOURCE=200809L $(COMMON) $(CWARN) -pthread -Ilibgait/include -Itools $(LCM_CFLAGS) \
@@ -248,13 +250,13 @@ test: built check unit python-test ## everything below that can fail
 # As many compilers at a time as there are processors, unless make has a -j option.
 JOBS = $(if $(filter -j% --jobserver%,$(MAKEFLAGS)),,-j$(shell getconf _NPROCESSORS_ONLN))
 built:
-	@$(MAKE) --no-print-directory $(JOBS) setup lib tools $(UNIT)
+	@$(MAKE) --no-print-directory $(JOBS) setup lib tools $(UNIT) fuzz-targets
 
 check: lib ## symbols, heap, threads, globals, size, layers, stack, recursion, headers, hygiene
 	@B=$(B) CC='$(CC)' CXX='$(CXX)' tests/check/run.sh
 
-unit: $(UNIT) ## C tests
-	@tests/unit/run.sh $(UNIT)
+unit: $(UNIT) fuzz-targets ## C tests, and the kept inputs of the fuzz targets
+	@tests/unit/run.sh $(UNIT) $(FUZZ)
 
 # Linked with the objects, so that tests can call internal functions.  Their own code is compiled in a third of the time.
 $(B)/unit/%: tests/unit/%.c $(OBJ) Makefile $(MADE) | $(B)/unit/
@@ -279,17 +281,35 @@ unit-threads: $(THREADED)
 tsan: ## C tests of threads under the thread sanitizer
 	@LIMIT=1200 $(MAKE) --no-print-directory config=thread unit-threads
 
-# The plain program needs no libFuzzer; with clang: -fsanitize=fuzzer instead of standalone.c's main.
+# With config=fuzz, which needs clang, libFuzzer drives the targets, else standalone.c.
 FUZZ := $(patsubst tests/fuzz/%.c,$(B)/fuzz/%,$(sort $(wildcard tests/fuzz/fuzz_*.c)))
-$(B)/fuzz/%: tests/fuzz/%.c tests/fuzz/standalone.c tests/fuzz/fuzz.h $(OBJ) Makefile $(MADE) | $(B)/fuzz/
-	$(call log,CC   $<)$(CC) -std=c11 $(OPT) -g -ffp-contract=off $(CWARN) -Ilibgait/include -iquote libgait/src \
-	    $(CFLAGS) $(LDFLAGS) -o $@ $(filter %.c %.o,$^) -lm
+FUZZ_ENGINE := $(if $(filter fuzz,$(config)),,tests/fuzz/standalone.c)
+$(B)/fuzz/%: tests/fuzz/%.c $(FUZZ_ENGINE) $(OBJ) $(B)/libtrackd.a $(B)/libgaitmsg.a Makefile $(MADE) | $(B)/fuzz/
+	$(call log,CC   $<)$(CC) -std=c11 -D_POSIX_C_SOURCE=200809L $(COMMON:-O3=-O1) -MT $@ -MF $@.d $(if $(FUZZ_ENGINE),,-fsanitize=fuzzer) \
+	    $(CWARN) -pthread -Ilibgait/include -iquote libgait/src -Itools $(LCM_CFLAGS) $(JPEG_CFLAGS) $(CFLAGS) $(LDFLAGS) \
+	    -o $@ $< $(FUZZ_ENGINE) $(B)/libtrackd.a $(OBJ) $(B)/libgaitmsg.a $(call lcm_libs,$(B)/fuzz) $(JPEG_LIBS) -lm
+
+# Their parts beside main(); a target may include one of them instead.
+$(B)/libtrackd.a: $(filter-out %/gait-trackd.c.o,$(TOOL_PARTS))
+	$(call log,AR   $@)rm -f $@ && $(AR) rcs $@ $^
 
 fuzz-run: $(FUZZ)
-	@for f in $^; do $$f python/gait/data/walk.gait $(or $(COUNT),500) $(SEED) || exit 1; done
+	@for f in $(FUZZ); do \
+	    found=build/fuzz/found/$${f##*/fuzz_} && mkdir -p $$found && \
+	    $$f -runs=$(RUNS) -seed=$(SEED) -max_len=4096 -timeout=60 -verbosity=0 -artifact_prefix=build/fuzz/ \
+	        $$found tests/fuzz/corpus/$${f##*/fuzz_} || { echo "fuzz: $${f##*/} failed with RUNS=$(RUNS) SEED=$(SEED)" >&2; exit 1; }; \
+	done
 
-fuzz: ## damaged models and snapshots under the sanitizers (COUNT=500 SEED=0)
-	@$(MAKE) --no-print-directory config=sanitize fuzz-run
+# With libFuzzer where there is clang.
+RUNS ?= 2000
+SEED ?= $(shell date +%s)
+fuzz: ## damaged models, snapshots, frames, messages, files ... under the sanitizers (RUNS=2000 SEED=, else a fresh one)
+	@$(MAKE) --no-print-directory $(if $(call has,clang),config=fuzz CC=clang,config=sanitize) SEED=$(SEED) fuzz-run
+
+fuzz-long: setup ## 10^6 executions of each (ARGS='--runs N --record')
+	@$(MAKE) --no-print-directory config=fuzz CC=clang fuzz-targets
+	@$(PY) tests/bench/fuzz_long.py $(ARGS)
+fuzz-targets: $(FUZZ)
 
 golden-check: ## tracker and lifter have their pinned digests at -O0, -O2 and -O3, with every compiler found
 	@tests/check/golden.sh
@@ -518,4 +538,4 @@ uninstall: ## remove what install put there
 clean: ## remove build/ (not .venv)
 	rm -rf build
 
--include $(wildcard $(B)/src/*/*.d $(B)/unit/*.d $(B)/bench/*.d $(B)/tools/trackd/*.d)
+-include $(wildcard $(B)/src/*/*.d $(B)/unit/*.d $(B)/fuzz/*.d $(B)/bench/*.d $(B)/tools/trackd/*.d)

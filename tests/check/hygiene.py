@@ -11,7 +11,7 @@ import subprocess
 import sys
 from pathlib import Path
 
-BINARY = ["libgait/doc/*.jpg", "libgait/doc/*.png", "python/gait/data/*.gait"]
+BINARY = ["libgait/doc/*.jpg", "libgait/doc/*.png", "python/gait/data/*.gait", "tests/fuzz/corpus/*"]
 TABLES = ["tests/bench/results/*.csv"]
 DATA = re.compile(r"\.(csv|npz|npy|amc|asf|bvh|c3d|trc|sto|mp4|avi|webm|log|pgm|ppm)$", re.I)
 BUILT = re.compile(r"(^|/)(build|\.venv|__pycache__|[^/]+\.egg-info)/|\.(o|so|a|d|pyc|su)$")

@@ -1,55 +1,97 @@
-/* fuzz_model.c - a damaged model is refused, or else can be used: pose, picture, tracking. */
+/* fuzz_model.c - a damaged model is refused, or else can be used: pose, picture, tracking, lifting. */
 #include "fuzz.h"
 
-#include <stdlib.h>
+#include "../unit/toy_classes.h"
+#include "../unit/toy_segment.h"
 
-enum { WIDTH = 64, HEIGHT = 48 };
+#include <stdbool.h>
 
-void fuzz_seed(const uint8_t *blob, size_t blob_size, uint8_t *out, size_t cap, size_t *size)
+/* One of three good models; the shipped ones have the same sections. */
+static size_t write_model(uint8_t *out, int which)
 {
-    if (blob_size > cap)
-        abort();
-    memcpy(out, blob, blob_size);
-    fuzz_repair(out, blob_size);
-    if (memcmp(out, blob, blob_size) != 0) /* else every damaged model would be refused for its checksum */
-        abort();
-    *size = blob_size;
+    static toy_segments segments;
+    toy_classes_spec const classes = toy_classes_usual();
+    if (which == 0)
+        return toy_write(out, TOY_PHASES, TOY_COMPONENTS);
+    if (which == 1)
+        return toy_classes_write(out, &classes);
+    toy_segments_fill(&segments, 2, 0);
+    return toy_segments_write(out, &segments);
 }
 
-static void use(const gait_model *m)
+static void track(const gait_model *m)
 {
-    static uint8_t ids[WIDTH * HEIGHT];
-    gait_camera const cam = {WIDTH, HEIGHT, 80, 80, 32, 24, {1, 0, 0, 0, 0, -1, 0, 1, 0}, {0, 1, 5}, {0}};
+    static uint8_t ids[FUZZ_WIDTH * FUZZ_HEIGHT];
+    gait_camera const camera = fuzz_camera();
+    gait_tracker_config const config = fuzz_config();
     gait_state mean, sd;
     gait_pose pose;
-    void *memory = NULL;
+    void *memory;
     if (gait_tracker_prior(m, &mean, &sd, NULL) != GAIT_OK)
         return;
-    for (int i = 0; i < 3; i++) {
-        mean.phase = 0.33f * (float)i;
+    for (int i = 0; i < 2; i++) {
+        mean.phase = 0.4f * (float)i;
         gait_model_pelvis_height(m, &mean, &mean.pelvis[2], NULL);
         gait_model_pose(m, &mean, &pose, NULL);
-        gait_render(m, &cam, &mean, ids, WIDTH, NULL);
+        gait_render(m, &camera, &mean, ids, FUZZ_WIDTH, NULL);
     }
-    gait_tracker *const t = fuzz_tracker(m, &memory);
-    if (t)
-        fuzz_steps(t, &mean, &sd, 0, 3);
+    gait_tracker *const t = fuzz_tracker(m, &config, &memory);
+    if (t && gait_tracker_start(t, &mean, &sd, 0, NULL) == GAIT_OK)
+        fuzz_steps(t, 0, 2);
+    free(memory);
+}
+
+static void lift(const gait_model *m, bool perspective)
+{
+    enum { POINTS = GAIT_MAX_SEGMENT_FRAMES * GAIT_MAX_MARKERS };
+    static double uv[2 * POINTS], mean[3 * POINTS], sd[3 * POINTS];
+    static gait_lift_frame out;
+    gait_lift_config c;
+    gait_lift_fit fit;
+    gait_lift *l = NULL;
+    size_t bytes = 0;
+    gait_lift_default(&c);
+    c.projection = perspective ? GAIT_LIFT_PERSPECTIVE : GAIT_LIFT_ORTHOGRAPHIC;
+    c.heading_sd = 0.3; /* looking all round takes long */
+    c.max_iterations = 3;
+    c.camera = fuzz_camera();
+    if (gait_lift_bytes(m, &c, &bytes, NULL) != GAIT_OK)
+        return;
+    void *const memory = fuzz_memory(bytes);
+    if (memory && gait_lift_init(memory, bytes, m, &c, &l, NULL) == GAIT_OK) {
+        for (int i = 0; i < 2 * POINTS; i++)
+            uv[i] = 20.0 + i % 17;
+        if (gait_lift_segment(l, uv, NULL, &fit, NULL) == GAIT_OK)
+            gait_lift_positions(l, mean, sd, NULL);
+        for (int i = 0; i < 12; i++) {
+            gait_lift_push(l, 1 + (int64_t)i * 33333, uv, NULL, NULL);
+            gait_lift_estimate(l, &out, NULL);
+        }
+    }
     free(memory);
 }
 
 int LLVMFuzzerTestOneInput(const uint8_t *data, size_t size)
 {
-    void *copy = NULL;
-    uint8_t *const blob = fuzz_aligned(data, size, &copy);
+    static uint8_t made[TOY_BYTES];
+    fuzz_bytes b = {data, size};
+    uint8_t const choice = fuzz_take(&b);
+    size_t const left = fuzz_damage(made, write_model(made, choice % 3), &b);
+    if (left >= 24)
+        toy_seal(made, left); /* else every one would be refused for its checksum */
+    uint8_t *const blob = fuzz_copy(made, left);
     size_t bytes = 0;
     gait_model *m = NULL;
-    fuzz_repair(blob, size);
-    if (gait_model_bytes(blob, size, &bytes, NULL) == GAIT_OK) {
-        void *const memory = aligned_alloc(GAIT_ALIGN, (bytes + GAIT_ALIGN) / GAIT_ALIGN * GAIT_ALIGN);
-        if (memory && gait_model_init(memory, bytes, blob, size, &m, NULL) == GAIT_OK)
-            use(m);
+    if (gait_model_bytes(blob, left, &bytes, NULL) == GAIT_OK) {
+        void *const memory = fuzz_memory(bytes);
+        gait_lift_info info;
+        if (memory && gait_model_init(memory, bytes, blob, left, &m, NULL) == GAIT_OK) {
+            track(m);
+            if (gait_lift_get_info(m, &info, NULL) == GAIT_OK)
+                lift(m, choice / 3 % 2);
+        }
         free(memory);
     }
-    free(copy);
+    free(blob);
     return 0;
 }

@@ -2,12 +2,7 @@
 #include "fuzz.h"
 #include "base/hash.h"
 
-#include <stdlib.h>
-#include <string.h>
-
-enum { BODY_AT = 48, HASH_AT = 40, MODEL_BYTES = 1 << 20 };
-
-static gait_tracker *tracker;
+enum { BODY_AT = 48, HASH_AT = 40 };
 
 /* The checksum of what follows the header, so that the checks behind it are reached. */
 static void repair(uint8_t *data, size_t size)
@@ -18,32 +13,33 @@ static void repair(uint8_t *data, size_t size)
     memcpy(data + HASH_AT, &hash, sizeof hash);
 }
 
-void fuzz_seed(const uint8_t *blob, size_t blob_size, uint8_t *out, size_t cap, size_t *size)
-{
-    static _Alignas(GAIT_ALIGN) uint8_t model_memory[MODEL_BYTES];
-    static void *copy, *memory;
-    gait_model *model = NULL;
-    gait_state mean, sd;
-    if (gait_model_init(model_memory, sizeof model_memory, fuzz_aligned(blob, blob_size, &copy), blob_size,
-                        &model, NULL) != GAIT_OK ||
-        gait_tracker_prior(model, &mean, &sd, NULL) != GAIT_OK || !(tracker = fuzz_tracker(model, &memory)))
-        abort();
-    fuzz_steps(tracker, &mean, &sd, 0, 3);
-    if (gait_tracker_save(tracker, out, cap, size, NULL) != GAIT_OK)
-        abort();
-    memset(out + HASH_AT, 0, sizeof(uint64_t));
-    repair(out, *size);
-    if (gait_tracker_restore(tracker, out, *size, NULL) != GAIT_OK)
-        abort();
-}
-
 int LLVMFuzzerTestOneInput(const uint8_t *data, size_t size)
 {
-    void *memory = NULL;
-    uint8_t *const copy = fuzz_aligned(data, size, &memory);
-    repair(copy, size);
-    if (gait_tracker_restore(tracker, copy, size, NULL) == GAIT_OK)
-        fuzz_steps(tracker, NULL, NULL, 200000, 2);
-    free(memory);
+    static gait_tracker *tracker;
+    static uint8_t *good, *work;
+    static size_t bytes;
+    void *memory;
+    fuzz_bytes b = {data, size};
+    if (!tracker) {
+        gait_tracker_config const config = fuzz_config();
+        gait_state mean, sd;
+        tracker = fuzz_tracker(toy_model(), &config, &memory);
+        gait_tracker_prior(toy_model(), &mean, &sd, NULL);
+        gait_tracker_start(tracker, &mean, &sd, 0, NULL);
+        fuzz_steps(tracker, 0, 3);
+        gait_tracker_save(tracker, NULL, 0, &bytes, NULL);
+        good = fuzz_memory(bytes);
+        work = fuzz_memory(bytes);
+        gait_tracker_save(tracker, good, bytes, &bytes, NULL);
+    }
+    memcpy(work, good, bytes);
+    size_t const left = fuzz_damage(work, bytes, &b);
+    repair(work, left);
+    uint8_t *const copy = fuzz_copy(work, left);
+    if (gait_tracker_restore(tracker, copy, left, NULL) == GAIT_OK)
+        fuzz_steps(tracker, 200000, 2);
+    else if (size < 8) /* not damaged */
+        abort();
+    free(copy);
     return 0;
 }

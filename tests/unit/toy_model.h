@@ -192,8 +192,8 @@ static inline void toy_curves(float *curve, int phases, int components)
                 double const swing = (double)curve[(size_t)j * row + i] - average[i];
                 double const elbow = i == TOY_ELBOW || i == TOY_ELBOW + 1 ? 0.15 : 0.0;
                 double const posture = i == TOY_TORSO + 1 ? 0.04 : elbow;
-                double const stride = i == TOY_ROOT ? 0.05 : 0.12 * swing;
-                curve[(size_t)k * table + (size_t)j * row + i] = toy_round(k == 1 ? stride : posture);
+                double const change = i == TOY_ROOT ? 0.05 : 0.12 * swing;
+                curve[(size_t)k * table + (size_t)j * row + i] = toy_round(k == 1 ? change : posture);
             }
 }
 

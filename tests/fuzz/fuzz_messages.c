@@ -1,0 +1,95 @@
+/* fuzz_messages.c - any messages, in any order: gait-trackd answers or complains, with lift, keypoints and a moving camera. */
+#include "../../tools/trackd/receiver.c"
+
+#include "daemon.h"
+
+#include "../unit/toy_segment.h"
+
+#include "gaitmsg_image_t.h"
+#include "gaitmsg_tracks_t.h"
+
+static void start(service *s, lift_service *lift, keypoint_cue *cue, pose_path *path, sink *out,
+                  uint8_t choice)
+{
+    static memory_file model, segments;
+    static uint8_t blob[TOY_BYTES];
+    static toy_segments made;
+    gait_tracker_config config = fuzz_config();
+    lift_settings const set = {.sd = 3, .lag = 2, .cpu_mask = ~0u};
+    message why;
+    size_t bytes;
+    if (!model.path[0]) {
+        model = memory_file_make();
+        segments = memory_file_make();
+        const void *const toy = toy_model_blob(&bytes);
+        memory_file_write(&model, toy, bytes);
+        toy_segments_fill(&made, 1, 0);
+        memory_file_write(&segments, blob, toy_segments_write(blob, &made));
+    }
+    config.terms |= choice & 1 ? GAIT_TERM_KEYPOINTS : 0;
+    bool ok = tracking_open(&s->track, model.path, &config, &why);
+    if (choice & 1) {
+        keypoint_cue_open(cue, s->track.model, s->track.info.joints, 4);
+        s->cue = cue;
+    }
+    if (choice & 2) {
+        ok = ok && lift_service_open(lift, segments.path, &set, out, &why);
+        s->lift = lift;
+    } else if (choice & 4)
+        s->path = path;
+    s->max_gap = 2;
+    s->max_pixels = FUZZ_WIDTH * FUZZ_HEIGHT;
+    if (!ok || !service_open(s, out, 0, 1, NULL, choice & 8, &why))
+        abort();
+}
+
+int LLVMFuzzerTestOneInput(const uint8_t *data, size_t size)
+{
+    static service s;
+    static lift_service lift;
+    static keypoint_cue cue;
+    static pose_path path;
+    static const struct {
+        lcm_msg_handler_t call;
+        int64_t (*type)(void);
+    } handlers[] = {
+        {on_frame, __gaitmsg_image_t_get_hash},      {on_camera, __gaitmsg_camera_t_get_hash},
+        {on_background, __gaitmsg_image_t_get_hash}, {on_keypoints, __gaitmsg_tracks_t_get_hash},
+        {on_command, __gaitmsg_command_t_get_hash},  {on_status, __gaitmsg_status_t_get_hash},
+    };
+    enum { HANDLERS = sizeof handlers / sizeof *handlers, TYPE = 8 };
+    fuzz_bytes b = {data, size};
+    sink out = {0};
+    snapshot_file snapshot = {0};
+    s = (service){0};
+    lift = (lift_service){0};
+    cue = (keypoint_cue){0};
+    path = (pose_path){.turn_sd = 0.01f, .place_sd = 0.01f};
+    start(&s, &lift, &cue, &path, &out, fuzz_take(&b));
+    receiver r = {.service = &s, .log = true, .snapshot = &snapshot};
+    while (b.left > 0) { /* kind, length, and the message without its type, unless that is to be wrong */
+        uint8_t const kind = fuzz_take(&b);
+        size_t const stated = (size_t)(fuzz_take(&b) << 8 | fuzz_take(&b)),
+                     n = stated < b.left ? stated : b.left;
+        int64_t const type = handlers[kind % 8 % HANDLERS].type();
+        uint8_t *const message_bytes = malloc(TYPE + n); /* ends where the message ends */
+        if (!message_bytes)
+            abort();
+        for (int i = 0; i < TYPE; i++)
+            message_bytes[i] = (uint8_t)((uint64_t)type >> (56 - 8 * i));
+        memcpy(message_bytes + TYPE, b.at, n);
+        lcm_recv_buf_t const buffer = {.data = message_bytes + (kind & 128 ? TYPE : 0),
+                                       .data_size = (uint32_t)(n + (kind & 128 ? 0 : TYPE)),
+                                       .recv_utime = 1};
+        handlers[kind % 8 % HANDLERS].call(&buffer, "FUZZ", &r);
+        b.at += n;
+        b.left -= n;
+        free(message_bytes);
+        service_send_status(&s);
+    }
+    flush_held(&r);
+    if (s.lift)
+        lift_service_close(s.lift);
+    service_close(&s);
+    return 0;
+}
