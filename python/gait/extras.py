@@ -21,6 +21,7 @@ EXTRAS = {
     "parquet": {"pyarrow": "PyArrow"},
     "rerun": {"rerun": "Rerun"},
     "mcap": {"mcap": "mcap"},
+    "ros2": {"mcap_ros2": "mcap-ros2-support", "scipy": "SciPy"},
     "dask": {"distributed": "Dask"},
     "studio": {"starlette": "Starlette", "uvicorn": "uvicorn"},
 }

@@ -22,6 +22,7 @@ IMPORTED = {
     "PyYAML": "yaml",
     "rerun-sdk": "rerun",
     "ai-edge-litert": "ai_edge_litert",
+    "mcap-ros2-support": "mcap_ros2",
 }  # by another name than installed
 
 

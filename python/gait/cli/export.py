@@ -7,6 +7,7 @@
   .parquet  all columns of the table; extra parquet
   .rrd      joints, bones and state for the Rerun viewer; extra rerun
   .mcap     the same for Foxglove; of an LCM log every message at its time; extra mcap
+            with --ros2 messages of ROS 2: TF and bodies of REP 155; extra ros2
 
 World axes are those of the track but for .trc, .mot and .bvh, where x is the track's y, y its z and z its x.
 """
@@ -26,6 +27,7 @@ examples:
   gait export track.csv -o walk.c3d
   gait export motion.csv -o walk.mot
   gait export session.lcm -o session.mcap
+  gait export session.lcm -o session.mcap --ros2
 """
 
 
@@ -36,6 +38,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         "input", metavar="TRACK", help="a track, a motion of gait lift, or for .mcap an LCM log"
     )
     parser.add_argument("-o", "--output", required=True, metavar="FILE", help=f"one of {suffixes}")
+    parser.add_argument("--ros2", action="store_true", help="write .mcap with messages of ROS 2")
 
 
 def run(args: argparse.Namespace) -> int:
@@ -43,7 +46,7 @@ def run(args: argparse.Namespace) -> int:
     beside = files.BESIDE.get(Path(args.output).suffix.lower())
     outputs = (args.output, str(Path(args.output).with_suffix(beside)) if beside else None)
     require_outputs(outputs, (args.input,))
-    figures = files.write(args.input, args.output, lambda words: note(words, args.quiet))
+    figures = files.write(args.input, args.output, lambda words: note(words, args.quiet), args.ros2)
     print(
         json.dumps(figures) if args.json else ", ".join(f"{value:g} {key}" for key, value in figures.items())
     )

@@ -6,7 +6,7 @@ from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
-from gait.errors import UserError
+from gait.errors import UsageError, UserError
 from gait.io.files import replacing
 
 SUFFIXES = (".trc", ".c3d", ".bvh", ".mot", ".parquet", ".rrd", ".mcap")
@@ -14,7 +14,9 @@ BESIDE = {".mot": ".osim"}
 """Suffixes of files that come with a second one, of the same name."""
 
 
-def write(source: str, target: str, report: Callable[[str], None] = lambda words: None) -> dict[str, Any]:
+def write(
+    source: str, target: str, report: Callable[[str], None] = lambda words: None, ros2: bool = False
+) -> dict[str, Any]:
     """Write a track, a motion of ``gait lift`` or an LCM log in the format that the target's suffix names.
 
     Parameters
@@ -22,6 +24,8 @@ def write(source: str, target: str, report: Callable[[str], None] = lambda words
     source, target : str
     report : callable
         Called with a line on what the format cannot hold.
+    ros2 : bool
+        Of .mcap: messages of ROS 2 instead of Foxglove's.
 
     Returns
     -------
@@ -36,9 +40,20 @@ def write(source: str, target: str, report: Callable[[str], None] = lambda words
     suffix = Path(target).suffix.lower()
     if suffix not in SUFFIXES:
         raise UserError(f"{target}: not a format that is written; use one of {' '.join(SUFFIXES)}")
+    if ros2 and suffix != ".mcap":
+        raise UsageError(f"--ros2: is for .mcap, not for {target}")
     if suffix in (".bvh", ".mot"):
         return _fitted(source, target, suffix, report)
-    return _plain(source, target, suffix)
+    return _to_ros2(source, target) if ros2 else _plain(source, target, suffix)
+
+
+def _to_ros2(source: str, target: str) -> dict[str, Any]:
+    from gait.export import mcap, motion, ros2
+
+    with replacing(target) as file:
+        log = mcap.is_lcm_log(source)
+        counts = ros2.write_log(file, source) if log else ros2.write_motion(file, motion.read(source))
+    return {"messages": sum(counts.values()), "topics": len(counts)}
 
 
 def _plain(source: str, target: str, suffix: str) -> dict[str, Any]:
