@@ -163,7 +163,7 @@ class Judged:
         return [*numbers, left, reported(every, held=False), *(round(root, 1) for root in self.roots)]
 
     def _apart(self, taken: Judged) -> tuple[Any, Any]:
-        """Mean difference of the scores, run by run, and its 95 % interval by Student's t within the clips."""
+        """Mean difference of the scores, run by run, and its 95 % interval by Student's t within clips."""
         apart = self.scores - taken.scores
         clips, seeds = apart.shape
         if self is taken or seeds < 2:

@@ -10,15 +10,15 @@ from typing import Any
 import cv2
 import numpy as np
 from eval_clips import noisy_start
-from eval_marks import LOST_SHARE, Marks
+from eval_marks import Marks
 from eval_plan import Clip
 
 from gait import Camera, Model, Start, TrackerConfig, Video
 from gait.bindings.abi import Mode
 from gait.io import blob
 from gait.io.video import Frame, Image, read_plate
-from gait.paper.scene import TAIL, Run, Scene, follow, share_lost
-from gait.paper.tracking import FRAMES
+from gait.paper.scene import Run, Scene, follow, share_lost
+from gait.paper.tracking import FRAMES, TAIL, followed, joints_of, picture_height
 
 
 class Footage:
@@ -54,12 +54,13 @@ class Footage:
         found = follow(model, self.camera, self.plate, config, start, self.frames)
         if self.scene is not None:
             return self.scene.judged(found)
-        off, height = self._marked(found)
-        last = float(np.nanmedian(off[-TAIL:]))
-        return Run(np.nan, float(np.nanmedian(off)), last < LOST_SHARE * height, share_lost(found), last)
+        off = self._marked(found)
+        tail = off[-TAIL:][np.isfinite(off[-TAIL:])]
+        held = followed(tail, picture_height(self.camera, joints_of(found[:1])), marked=True)
+        return Run(np.nan, float(np.nanmedian(off)), held, share_lost(found), float(np.median(tail)))
 
-    def _marked(self, found: list[Any]) -> tuple[np.ndarray, float]:
-        """Mean distance from the clear marks of each frame, NaN where none is marked; the person's height."""
+    def _marked(self, found: list[Any]) -> np.ndarray:
+        """Mean distance from the clear marks of each frame, NaN where none is marked."""
         marks = Marks.read(self.clip.marks)
         off = np.full(len(found), np.nan)
         for k, (frame, estimate) in enumerate(zip(self.frames, found, strict=True)):
@@ -68,7 +69,7 @@ class Footage:
                 off[k] = np.mean(
                     [self._distance(marks, int(row[0]), j, estimate) for j in _clear(marks, row)]
                 )
-        return off, marks.height
+        return off
 
     def _distance(self, marks: Marks, row: int, joint: int, estimate: Any) -> float:
         uv = self.camera.project(estimate.joint(marks.joints[joint]))

@@ -16,8 +16,9 @@ import numpy as np
 import pytest
 
 from gait import Mode, TrackerConfig
-from gait.bindings.abi import Term
+from gait.body.skeleton import ANGLES, PAPER_ANGLES
 from gait.cli import main
+from gait.io.blob import decode, unpack_names
 from gait.learn.corpus import load, sources
 from gait.learn.report import figures_model
 from gait.paper import clip as clips
@@ -74,8 +75,11 @@ def test_removed_blocks_are_filled_better_than_by_the_mean(learning):
 @pytest.mark.parametrize(
     ("words", "expected"),
     [
-        ([], "--mocap SRC is missing"),
-        (["--mocap", "{walks}", "--camera", "c.json"], "--camera is of a clip"),
+        (["--camera", "c.json"], "holds walks; --camera is of a clip"),
+        (
+            ["--mocap", "absent", "--video", "v.mp4", "--camera", "c.json", "--init", "i.json"],
+            "absent: no such file or folder; check the name; c.json: no such camera file",
+        ),
         (["--mocap", "{walks}", "--video", "v.mp4"], "--video needs --camera and --init"),
         (["--mocap", "absent"], "absent: no such file or folder"),
         (["--mocap", "{one}"], "the first paper needs 3"),
@@ -106,21 +110,51 @@ def test_paper_mode_has_the_values_that_the_search_froze():
     assert {name: paper[name] for name in frozen} == pytest.approx(frozen, rel=1e-3)
 
 
+ADDED = (  # settings that change from rung to rung, with the mode and the model of the rung
+    *(set(ladder.UNSEARCHED), {"model", "components"}, {"model"}, set(ladder._RELAXING)),
+    *(set(ladder._TURNING), {"particles"}, {"resample_ess"}),
+    *({"mode", "texture_weight", "joint_sd_model", "components"}, {"model"}, {"model"}),
+    *({"terms"}, {"terms"}, {"terms"}, {"evidence_time"}, {"rejuvenation_time"}, {"offset_angles"}),
+    {"stature_noise", "stature_noise_start"},
+)
+
+
 def test_the_ladder_goes_from_the_paper_to_the_default_and_adds_one_thing_a_rung():
-    unsearched, first, *rungs = ladder.RUNGS
-    assert first.mode == unsearched.mode == Mode.PAPER and not first.changes and first.model == "paper"
-    assert rungs[-1].mode == Mode.DEFAULT and not rungs[-1].changes and rungs[-1].model == "people"
-    off = [len(rung.changes) for rung in rungs if rung.mode == Mode.DEFAULT]
-    assert off == sorted(off, reverse=True)
-    terms = [TrackerConfig.default(rung.mode, **rung.changes).terms for rung in rungs]
-    assert terms[0] == Term.TEXTURE and terms[-1] == TrackerConfig.default().terms
-    assert all(a & b == a for a, b in itertools.pairwise(terms))
-    without = {ladder.STATIC: 80.0, ladder.FREE["paper"]: 50.0, ladder.FREE["people"]: 40.0}
+    assert not ladder.PAPER.changes and ladder.PAPER.mode == Mode.PAPER and ladder.PAPER.model == "paper"
+    assert not ladder.RUNGS[-1].changes and ladder.RUNGS[-1].mode == Mode.DEFAULT
+    fields = [item.name for item in TrackerConfig.settings()]
+    settings = [
+        {name: getattr(ladder.config_of(rung, 1), name) for name in (*fields, "mode")}
+        | {"model": rung.model, "acquisition_particles": 0}  # which only a start without a phase has
+        for rung in ladder.RUNGS
+    ]
+    for added, (before, after) in zip(ADDED, itertools.pairwise(settings), strict=True):
+        changed = {name for name in after if after[name] != before[name]}
+        assert changed and changed <= added
+
+
+def test_the_models_of_the_ladder_differ_in_one_thing_a_rung():
+    shipped = Path(ladder.__file__).parents[1] / "data"
+    found = ladder.blobs(*((shipped / f"{name}.gait").read_bytes() for name in ("paper", "walk")))
+    assert list(found) == list(ladder.FREE)
+    sections = [decode(found[name]) for name in ("rigid", "plain", "root", "people")]
+    names = unpack_names(sections[0]["CHNM"])
+    moving = [
+        {name for k, name in enumerate(names) if np.ptp(each["CURV"][:, :, k], axis=1).any()}
+        for each in sections
+    ]
+    assert moving[1] - moving[0] == set(ANGLES) - set(PAPER_ANGLES) and moving[0] > set(PAPER_ANGLES)
+    assert moving[2] - moving[1] == {"root_forward", "root_sway", "root_height"} and moving[2] == moving[3]
+    assert ["PACE" in each for each in sections] == [False, False, False, True]
+
+
+def test_the_plot_of_the_ladder_has_each_rungs_own_cycle():
+    without = {name: 40.0 + k for k, name in enumerate((ladder.STATIC, *ladder.FREE.values()))}
     tracked = {rung.name: 60.0 - k for k, rung in enumerate(ladder.RUNGS)}
     axes = ladder.plot(without | tracked).axes[0]
     assert [bar.get_width() for bar in axes.patches] == [*without.values(), *tracked.values()]
     free = [line.get_xdata()[0] for line in axes.lines]  # of the rung's own model, without any image
-    assert free == [50.0 if rung.model == "paper" else 40.0 for rung in ladder.RUNGS]
+    assert free == [without[ladder.FREE[rung.model]] for rung in ladder.RUNGS]
 
 
 def test_the_page_holds_every_figure_and_needs_no_other_file(walks, tmp_path, monkeypatch, capsys):

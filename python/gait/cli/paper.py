@@ -46,15 +46,18 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 def run(args: argparse.Namespace) -> int:
     """Make the page and print the verdicts."""
-    if not args.mocap:
-        raise UsageError("--mocap SRC is missing; give a folder of motion capture that holds walks")
     given = {name: vars(args)[name] for name in CLIP if vars(args)[name] is not None}
+    wrong = []
+    if not args.mocap:
+        wrong.append("--mocap SRC is missing; give a folder of motion capture that holds walks")
     if given and not args.video:
-        raise UsageError(f"--{next(iter(given))} is of a clip; give it with --video")
+        wrong.append(f"--{next(iter(given))} is of a clip; give it with --video")
     if args.scale_camera and not args.camera:
-        raise UsageError("--scale-camera: is for a --camera")
+        wrong.append("--scale-camera: is for a --camera")
     if args.video and not {"camera", "init"} <= given.keys():
-        raise UsageError("--video needs --camera and --init")
+        wrong.append("--video needs --camera and --init")
+    if wrong:
+        raise UsageError("; ".join(wrong))
     require_outputs((args.output,), (args.video, *(path for path in given.values() if path != "auto")))
     from gait.paper import run as paper  # Matplotlib and SciPy take a second
     from gait.paper.clip import Clip

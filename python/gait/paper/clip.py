@@ -37,8 +37,8 @@ class Clip:
     truth: str | None = None
     scale_camera: bool = False
 
-    def calibration(self, size: tuple[int, int]) -> Camera:
-        """Read the camera, for pictures of a size."""
+    def calibration(self, size: tuple[int, int] | None) -> Camera:
+        """Read the camera, for pictures of a size if that is known."""
         return Camera.read(self.camera, size, self.scale_camera)
 
     @property

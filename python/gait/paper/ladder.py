@@ -15,6 +15,7 @@ from gait.bindings.config import TrackerConfig
 from gait.bindings.estimate import Estimate
 from gait.bindings.initial import Start
 from gait.bindings.model import Model
+from gait.body.skeleton import ANGLES, PAPER_ANGLES
 from gait.io.blob import decode, encode, unpack_names
 from gait.motion.evaluate import stature
 from gait.paper import freeze, preference, tracking, verdicts
@@ -33,8 +34,12 @@ CAPTION = (
     "the rung's own model, from the exact truth, where the rungs start with the error of a start."
 )
 STATIC = "static pose"
-_FREE = "free-running cycle, the paper's model", "free-running cycle, model of people"
-FREE = {"paper": _FREE[0], "people": _FREE[1], "plain": _FREE[1]}  # by `Rung.model`
+_FREE = tuple(
+    f"free-running cycle, {whose}" for whose in ("the paper's model", "people, 19 angles", "people")
+)
+#: The free-running cycle that a rung is compared with, by `Rung.model`.
+FREE = {"paper": _FREE[0], "rigid": _FREE[1], "plain": _FREE[2], "root": _FREE[2], "people": _FREE[2]}
+COMPARED = "paper", "rigid", "people"  # models of these cycles
 #: What is added in later steps, off: settings of the default mode.
 _WITHOUT: dict[str, Any] = {
     "evidence_time": 0.0,
@@ -42,7 +47,6 @@ _WITHOUT: dict[str, Any] = {
     "offset_angles": 0,
     "stature_noise": 0.0,
     "stature_noise_start": 0.0,
-    "acquisition_particles": 0,
 }
 #: The paper's sigmas, p_occluded and sigma(alpha) before they were searched.
 UNSEARCHED: dict[str, Any] = {
@@ -61,9 +65,8 @@ UNSEARCHED: dict[str, Any] = {
     "limb_points": 16,
 }
 
-
 #: Settings of the dynamics, and of the spread of a start, which differ between the modes.
-_DYNAMICS = (
+_RELAXING = (
     "phase_noise",
     "rate_noise",
     "rate_time",
@@ -71,14 +74,13 @@ _DYNAMICS = (
     "lateral_noise",
     "vertical_noise",
     "heading_noise",
-    "turn_sd",
-    "turn_time",
     "tilt_noise",
     "tilt_time",
     "coef_noise",
     "coef_time",
     "coef_start",
 )
+_TURNING = "turn_sd", "turn_time"
 
 
 @dataclass(frozen=True)
@@ -87,7 +89,10 @@ class Rung:
 
     name: str
     mode: Mode
-    model: str  #: "paper"; "people"; "plain": of people, whose pelvis goes evenly ahead, as the paper's does
+    #: "paper"; "rigid": of people, with the paper's 19 angles and a pelvis that goes evenly ahead, as the
+    #: paper's does; "plain": with all angles; "root": the pelvis moves within a stride, too; "people": angles
+    #: and pelvis follow the stride rate, too.
+    model: str
     changes: dict[str, Any] = field(default_factory=dict)
 
 
@@ -96,29 +101,36 @@ def _default(terms: Term, *added: str) -> dict[str, Any]:
     return {"terms": terms} | {k: v for k, v in _WITHOUT.items() if k not in added}
 
 
-def _relaxing() -> dict[str, Any]:
-    """Return the default's dynamics."""
+def _usual(*names: str) -> dict[str, Any]:
+    """Return settings of the default mode, and as many components as it has."""
     usual = TrackerConfig.default()
-    return {name: getattr(usual, name) for name in _DYNAMICS}
+    return {"components": COMPONENTS} | {name: getattr(usual, name) for name in names}
 
 
+COMPONENTS = 5  # of each model: those of the paper, the first of the default's
+_FILTER = *_RELAXING, *_TURNING, "particles", "resample_ess"
+_CUES = Term.TEXTURE | Term.SILHOUETTE, Term.TEXTURE | Term.SILHOUETTE | Term.EDGES
 _ALL = Term.TEXTURE | Term.SILHOUETTE | Term.EDGES | Term.TEMPLATE
-_LATER = "evidence_time", "rejuvenation_time", "offset_angles", "stature_noise", "stature_noise_start"
+_LATER = "evidence_time", "rejuvenation_time", "offset_angles"
 RUNGS = (
     Rung("paper, sigmas by hand", Mode.PAPER, "paper", UNSEARCHED),
     Rung("paper", Mode.PAPER, "paper"),
-    Rung("+ prior over people", Mode.PAPER, "people"),
-    Rung("+ dynamics that relax", Mode.PAPER, "people", _relaxing()),
+    Rung("+ prior over people", Mode.PAPER, "rigid", _usual()),
+    Rung("+ trunk and ankles", Mode.PAPER, "plain", _usual()),
+    Rung("+ dynamics that relax", Mode.PAPER, "plain", _usual(*_RELAXING)),
+    Rung("+ turning", Mode.PAPER, "plain", _usual(*_RELAXING, *_TURNING)),
+    Rung("+ only 2,000 particles", Mode.PAPER, "plain", _usual(*_FILTER[:-1])),
+    Rung("+ resampling only when needed", Mode.PAPER, "plain", _usual(*_FILTER)),
     Rung("+ robust texture", Mode.DEFAULT, "plain", _default(Term.TEXTURE)),
-    Rung("+ root motion", Mode.DEFAULT, "people", _default(Term.TEXTURE)),
-    Rung("+ silhouette", Mode.DEFAULT, "people", _default(Term.TEXTURE | Term.SILHOUETTE)),
-    Rung("+ edges", Mode.DEFAULT, "people", _default(Term.TEXTURE | Term.SILHOUETTE | Term.EDGES)),
+    Rung("+ root motion", Mode.DEFAULT, "root", _default(Term.TEXTURE)),
+    Rung("+ curves by stride rate", Mode.DEFAULT, "people", _default(Term.TEXTURE)),
+    Rung("+ silhouette", Mode.DEFAULT, "people", _default(_CUES[0])),
+    Rung("+ edges", Mode.DEFAULT, "people", _default(_CUES[1])),
     Rung("+ template", Mode.DEFAULT, "people", _default(_ALL)),
     Rung("+ errors that last (evidence_time)", Mode.DEFAULT, "people", _default(_ALL, *_LATER[:1])),
     Rung("+ rejuvenation", Mode.DEFAULT, "people", _default(_ALL, *_LATER[:2])),
-    Rung("+ posture", Mode.DEFAULT, "people", _default(_ALL, *_LATER[:3])),
-    Rung("+ stature", Mode.DEFAULT, "people", _default(_ALL, *_LATER)),
-    Rung("+ more particles at first: the default", Mode.DEFAULT, "people"),
+    Rung("+ posture", Mode.DEFAULT, "people", _default(_ALL, *_LATER)),
+    Rung("+ stature: the default", Mode.DEFAULT, "people"),
 )
 PAPER = RUNGS[1]
 
@@ -128,18 +140,22 @@ def config_of(rung: Rung, seed: int) -> TrackerConfig:
     return TrackerConfig.default(rung.mode, seed=seed, **rung.changes)
 
 
-def models(blobs: dict[str, bytes]) -> dict[str, Model]:
+def blobs(paper: bytes, people: bytes) -> dict[str, bytes]:
     """Return the models of the rungs, of those of the paper and of people."""
-    sections = dict(decode(blobs["people"]))
-    names, curves = unpack_names(sections["CHNM"]), np.array(sections["CURV"])
-    for name in ("root_forward", "root_sway", "root_height"):
-        channel = curves[:, :, names.index(name)]
-        channel[1:] = 0.0
-        channel[0] = channel[0].mean()
-    sections.pop("PACE", None)
-    return {
-        name: Model(each) for name, each in (blobs | {"plain": encode(sections | {"CURV": curves})}).items()
-    }
+    root = dict(decode(people))
+    root.pop("PACE", None)
+    names, curves = unpack_names(root["CHNM"]), np.array(root["CURV"])
+
+    def still(channels: Sequence[str]) -> bytes:
+        for name in channels:
+            curve = curves[:, :, names.index(name)]
+            curve[1:] = 0.0
+            curve[0] = curve[0].mean()
+        return encode(root | {"CURV": curves})
+
+    plain = still(("root_forward", "root_sway", "root_height"))
+    rigid = still(ANGLES[len(PAPER_ANGLES) :])
+    return {"paper": paper, "rigid": rigid, "plain": plain, "root": encode(root), "people": people}
 
 
 @dataclass(frozen=True)
@@ -167,11 +183,11 @@ def climb(scenes: Sequence[tuple[Scene, str]], learning: Learning, update: Calla
     scenes : sequence of (Scene, str)
         Views with the init files of their starts.
     """
-    blobs = {p: blob_of(m, p) for p, m in (("paper", learning.literal), ("people", learning.ours))}
-    known = models(blobs)
-    base = {p: [scene.baselines(decode(each)) for scene, _ in scenes] for p, each in blobs.items()}
+    learnt = blobs(blob_of(learning.literal, "paper"), blob_of(learning.ours, "people"))
+    known = {name: Model(each) for name, each in learnt.items()}
+    base = {p: [scene.baselines(decode(each)) for scene, _ in scenes] for p, each in learnt.items()}
     rungs = {STATIC: [each["static"] for each in base["people"]]}
-    rungs |= {FREE[prior]: [each["free"] for each in found] for prior, found in base.items()}
+    rungs |= {FREE[prior]: [each["free"] for each in base[prior]] for prior in COMPARED}
     done = 0
 
     def followed(rung: Rung, scene: Scene, init: str, seed: int) -> list[Estimate]:
@@ -194,7 +210,7 @@ def climb(scenes: Sequence[tuple[Scene, str]], learning: Learning, update: Calla
         paper.append(float(np.median([r.root for r in runs])))
         worst = max(range(SEEDS), key=lambda i: runs[i].last)
         far.append((runs[worst].last / scene.height, k, worst + 1, found[worst]))
-    sizes = {p: [stature(decode(each), scene.truth) for scene, _ in scenes] for p, each in blobs.items()}
+    sizes = {p: [stature(decode(learnt[p]), scene.truth) for scene, _ in scenes] for p in ("paper", "people")}
 
     def prefers(k: int, prior: str, mode: Mode) -> list[Row]:
         return Probe(scenes[k][0], known[prior], preference.config(mode), sizes[prior][k]).table()
@@ -220,9 +236,11 @@ def entries(found: Climbed) -> Iterator[Entry]:
 
 def _reach(found: Climbed) -> Entry:
     names = [scene.name for scene in found.scenes]
+    wanted = round(verdicts.MOSTLY * SEEDS)
     runs = zip(names, found.held, found.paper, found.free, strict=True)
     each = "; ".join(
-        f"{name}: on the person in {held} of {SEEDS} runs, {root:.0f} mm off ({free:.0f} without any image)"
+        f"{name}: on the person in {held} of {SEEDS} runs (wanted {wanted}), {root:.0f} mm off (wanted less "
+        f"than {free:.0f}, without any image)"
         for name, held, root, free in runs
     )
     rows = [
@@ -254,12 +272,13 @@ def _reach(found: Climbed) -> Entry:
         f"{verdicts.held(found.held, SEEDS, found.paper, found.free)}; {verdicts.at_rest(gains)}",
         (
             "The clips: walks of a normative gait, which no person in the recordings has, rendered from "
-            "several sides and started near the truth. The goal, held in nine of ten runs and nearer than "
-            "without any image, is missed on most of seven clips of real motion, one of them filmed "
-            "outdoors: tests/bench/results/paper_mode.md of the sources.",
+            f"several sides and started near the truth. Wanted in every view: {wanted} of {SEEDS} runs on "
+            "the person, and an error below that of the mean cycle that runs on from the exact truth. What "
+            "is wanted and reached on seven clips of real motion, one of them filmed outdoors: "
+            "tests/bench/results/paper_mode.md of the sources.",
             "Lost: for a third of a second the picture under the body stayed behind when the body walked. "
             "The threshold was chosen on simulated clips: tests/bench/results/search_paper_lost.md.",
-            "Held: in the last frames the joints are on average within a tenth of the person's height.",
+            f"On the person: {tracking.CRITERION}.",
             "Terms: q, p_occluded and sigma(alpha) are what is left where nothing in the picture differs; E "
             "of a limb is what its pixels add when the picture is shown limb by limb.",
         ),
@@ -271,9 +290,9 @@ def _reach(found: Climbed) -> Entry:
     )
 
 
-def own_free(errors: dict[str, float], rung: Rung) -> float:
-    """Return the error of the free-running cycle of a rung's own model."""
-    return errors[FREE[rung.model]]
+def own_free(errors: dict[str, float], name: str) -> float:
+    """Return the error of the free-running cycle of a rung's own model, of people beyond the ladder."""
+    return errors[FREE[next((rung.model for rung in RUNGS if rung.name == name), "people")]]
 
 
 def _ladder(found: Climbed) -> Entry:
@@ -281,7 +300,7 @@ def _ladder(found: Climbed) -> Entry:
     median = {name: float(np.median(errors)) for name, errors in found.rungs.items()}
     ranges = {name: (min(errors), max(errors)) for name, errors in found.rungs.items()}
     drawing = Drawing("ladder", "From the paper to the default", CAPTION, plot(median, ranges))
-    gains = {rung.name: f"{own_free(median, rung) - median[rung.name]:+.0f}" for rung in RUNGS}
+    gains = {rung.name: f"{own_free(median, rung.name) - median[rung.name]:+.0f}" for rung in RUNGS}
     rows = [
         (name, f"{median[name]:.0f}", gains.get(name, "-"), *(f"{x:.0f}" for x in errors))
         for name, errors in found.rungs.items()
@@ -292,11 +311,16 @@ def _ladder(found: Climbed) -> Entry:
         f"{median[PAPER.name]:.0f} mm root-aligned over frames 0 to {tracking.FRAMES}, the median of "
         f"{len(names)} views; {median[RUNGS[0].name]:.0f} mm with sigmas set by hand.",
         f"{median[RUNGS[-1].name]:.0f} mm.",
-        verdicts.without_image(*((median[rung.name], own_free(median, rung)) for rung in (PAPER, RUNGS[-1]))),
+        verdicts.without_image(
+            *((median[rung.name], own_free(median, rung.name)) for rung in (PAPER, RUNGS[-1]))
+        ),
         (
             "Sigmas, epsilon, p_occluded, sigma(alpha) and n_s: searched on simulated clips. Here each rung "
             f"has one seed ({SEED}); differences of some millimetres may be chance. The table and plot of "
-            "clips of real motion: tests/bench/results/paper_ladder.md of the sources.",
+            "clips of real motion, which go on to keypoints of a detector and automatic starts: "
+            "tests/bench/results/paper_ladder.md of the sources.",
+            "Each rung adds one thing and keeps the rest. Robust texture is that of the default mode, which "
+            "resamples systematically; 5 components throughout.",
             "What needs no image starts from the exact truth, the rungs from the clip's init file with its "
             "standard deviations: the comparison favours no image.",
         ),
@@ -317,21 +341,21 @@ def plot(errors: dict[str, float], spread: dict[str, tuple[float, float]] | None
 
     spread : smallest and largest error of each rung.
     """
-    own = {rung.name: own_free(errors, rung) for rung in RUNGS if FREE[rung.model] in errors}
     with matplotlib.rc_context({"font.size": 9}):
         figure = Figure(figsize=(8.0, 0.32 * len(errors) + 1.0), layout="constrained")
         axes = figure.subplots()
         names = list(errors)
         values = [errors[name] for name in names]
-        colours = ["#b8b8b8" if name in (STATIC, *_FREE) else "#2a6f97" for name in names]
+        blind = STATIC, *_FREE
+        colours = ["#b8b8b8" if name in blind else "#2a6f97" for name in names]
         axes.barh(range(len(names)), values, color=colours)
         for k, name in enumerate(names):
             low, high = (spread or {}).get(name, (values[k], values[k]))
             if high > low:
                 axes.plot([low, high], [k, k], color="black", lw=1)
             axes.text(max(high, values[k]), k, f" {values[k]:.0f}", va="center")
-            if name in own:
-                axes.plot([own[name]] * 2, [k - 0.5, k + 0.5], color="#d9722e", lw=1.5, ls="--")
+            if name not in blind:
+                axes.plot([own_free(errors, name)] * 2, [k - 0.5, k + 0.5], color="#d9722e", lw=1.5, ls="--")
         axes.set_yticks(range(len(names)), names)
         axes.invert_yaxis()
         axes.set_xlabel("root-aligned error, mm (dashed: own free-running cycle, without any image)")

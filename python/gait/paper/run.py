@@ -3,11 +3,14 @@
 from __future__ import annotations
 
 import tempfile
+from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
+from gait.errors import UserError
 from gait.io.files import replacing, require_writable
+from gait.learn.corpus import sources
 from gait.learn.corpus.forkserver import cores
 from gait.learn.prior import model
 from gait.paper import (
@@ -50,8 +53,7 @@ def run(request: Request) -> dict[str, Any]:
     """
     require_writable(request.output)
     with one_thread(), tempfile.TemporaryDirectory(prefix="gait-") as folder:
-        if request.clip is not None:
-            tracking.require(request.clip)  # before the long work
+        _require(request)
         found = recordings.read(request.mocap, request.quiet)
         used = request.clip or _rendered(Path(folder), request.quiet)
         papers = [
@@ -62,6 +64,19 @@ def run(request: Request) -> dict[str, Any]:
     with replacing(request.output) as path:
         path.write_text(text, encoding="utf-8")
     return {p.short: {e.heading: e.statements() for e in p.entries} for p in papers}
+
+
+def _require(request: Request) -> None:
+    """Raise UserError with all that is found wrong before the long work."""
+    checks: list[Callable[[], object]] = [lambda: sources.find(request.mocap)]
+    wrong = list[str]()
+    for check in checks + ([] if request.clip is None else tracking.checks(request.clip)):
+        try:
+            check()
+        except UserError as error:
+            wrong.append(str(error))
+    if wrong:
+        raise UserError("; ".join(dict.fromkeys(wrong)))
 
 
 def _rendered(folder: Path, quiet: bool) -> Clip:

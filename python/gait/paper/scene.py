@@ -29,7 +29,6 @@ from gait.track.tracker import Tracker
 VIEWS = {"side": "demo", "oblique": "oblique", "toward": "toward"}  # presets by name
 SIZE = (480, 360)  # pixels of a rendered view
 SPARE = 20  # frames after those used, so that the last steps are whole
-TAIL = 10  # last frames, in which a person who is held is near
 
 
 @dataclass(frozen=True)
@@ -70,8 +69,7 @@ class Scene:
     @property
     def height(self) -> float:
         """Height of the person in the picture from head to ankle, pixels."""
-        ends = self.camera.project(self.true[:, [EVAL15.index("head_top"), EVAL15.index("l_ankle")]])
-        return float(np.median(np.abs(np.diff(ends[..., 1], axis=1))))
+        return tracking.picture_height(self.camera, self.true)
 
     def cycles(self) -> Floats | None:
         """Return the true phase of the frames without wrapping, strides; None if it is unknown."""
@@ -89,13 +87,14 @@ class Scene:
 
     def judged(self, found: Sequence[Estimate]) -> Run:
         """Compare the estimates of the frames with the truth."""
-        joints = np.array([[e.joint(name) for name in EVAL15] for e in found])
+        joints = tracking.joints_of(found)
         off = np.linalg.norm(self.camera.project(joints) - self.camera.project(self.true), axis=2).mean(
             axis=1
         )
         root = float(np.median(root_errors(joints, self.true)))
-        last = float(np.median(off[-TAIL:]))
-        return Run(root, float(np.median(off)), last < tracking.HELD * self.height, share_lost(found), last)
+        tail = off[-tracking.TAIL :]
+        held = tracking.followed(tail, self.height, marked=False)
+        return Run(root, float(np.median(off)), held, share_lost(found), float(np.median(tail)))
 
 
 def share_lost(found: Sequence[Estimate]) -> float:

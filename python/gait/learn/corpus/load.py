@@ -160,7 +160,7 @@ def _lonely(sequences: list[Sequence]) -> dict[str, str]:
     count = Counter(s.subject for s in sequences)
     return {
         s.name: f"{s.source}: the trial is too short alone: {s.cycles:.2f} cycles (at least {CYCLES}); add "
-        f"more trials of {s.subject!r} (see --subjects), or leave it out"
+        f"more trials of {s.subject!r} (gait learn has --subjects), or leave it out"
         for s in sequences
         if s.short and count[s.subject] == 1
     }
@@ -272,7 +272,7 @@ def _other_lengths(person: str, bodies: list[list[Path]]) -> list[str]:
     return [
         f"{' '.join(map(str, files[:MOST_NAMES]))}{' ...' * (len(files) > MOST_NAMES)}: limb lengths differ "
         f"from {most[0]}, which is also taken for {person!r}; measured separately. "
-        "If these are two people, see --subjects"
+        "If these are two people, give each a folder (gait learn has --subjects)"
         for files in bodies
         if files is not most
     ]
