@@ -56,6 +56,7 @@ OPT_debug    := -O0
 OPT_sanitize := -O1 -fsanitize=address,undefined,float-cast-overflow -fno-sanitize-recover=all -fno-omit-frame-pointer
 OPT_thread   := -O1 -fsanitize=thread -fno-omit-frame-pointer
 OPT_fuzz     := $(OPT_sanitize) -fsanitize=fuzzer-no-link
+CXX_FLAGS    += $(if $(filter fuzz,$(config)),-fno-sanitize=function) # needs the C++ runtime
 OPT ?= $(OPT_$(config))
 ifeq ($(OPT),)
 $(error unknown config=$(config): use release, debug, sanitize, thread or fuzz)
@@ -244,6 +245,13 @@ $(B)/tools/%.c.o: tools/%.c Makefile $(MADE) build/lcm/.stamp | $(B)/tools/track
 	$(call log,CC   $<)$(CC) -std=c11 -D_POSIX_C_SOURCE=200809L $(COMMON) $(CWARN) -pthread -Ilibgait/include -Itools $(LCM_CFLAGS) \
 	    $(JPEG_CFLAGS) $(CFLAGS) -c $< -o $@
 
+# The daemon's parts beside main(); a program of tests may include some of them instead.
+$(B)/libtrackd.a: $(filter-out %/gait-trackd.c.o,$(TOOL_PARTS))
+	$(call log,AR   $@)rm -f $@ && $(AR) rcs $@ $^
+WITH_TOOLS = $(CC) -std=c11 -D_POSIX_C_SOURCE=200809L $(COMMON:-O3=-O1) -MT $@ -MF $@.d $(CWARN) -pthread \
+    -Ilibgait/include -iquote libgait/src -Itools $(LCM_CFLAGS) $(JPEG_CFLAGS) $(CFLAGS) $(LDFLAGS) \
+    -o $@ $< $(B)/libtrackd.a $(OBJ) $(B)/libgaitmsg.a $(call lcm_libs,$(@D)) $(JPEG_LIBS) -lm
+
 # ---- tests ---------------------------------------------------------------------------------------------------
 test: built check unit python-test ## everything below that can fail
 
@@ -259,6 +267,9 @@ unit: $(UNIT) fuzz-targets ## C tests, and the kept inputs of the fuzz targets
 	@tests/unit/run.sh $(UNIT) $(FUZZ)
 
 # Linked with the objects, so that tests can call internal functions.  Their own code is compiled in a third of the time.
+$(B)/unit/test_tool_%: tests/unit/test_tool_%.c $(OBJ) $(B)/libtrackd.a $(B)/libgaitmsg.a Makefile $(MADE) | $(B)/unit/
+	$(call log,CC   $<)$(WITH_TOOLS)
+
 $(B)/unit/%: tests/unit/%.c $(OBJ) Makefile $(MADE) | $(B)/unit/
 	$(call log,CC   $<)$(CC) -std=c11 -D_POSIX_C_SOURCE=200809L $(COMMON:-O3=-O1) -MT $@ -MF $@.d $(CWARN) -pthread -Ilibgait/include -iquote libgait/src $(CFLAGS) \
 	    $(LDFLAGS) -o $@ $< $(OBJ) -lm
@@ -285,13 +296,7 @@ tsan: ## C tests of threads under the thread sanitizer
 FUZZ := $(patsubst tests/fuzz/%.c,$(B)/fuzz/%,$(sort $(wildcard tests/fuzz/fuzz_*.c)))
 FUZZ_ENGINE := $(if $(filter fuzz,$(config)),,tests/fuzz/standalone.c)
 $(B)/fuzz/%: tests/fuzz/%.c $(FUZZ_ENGINE) $(OBJ) $(B)/libtrackd.a $(B)/libgaitmsg.a Makefile $(MADE) | $(B)/fuzz/
-	$(call log,CC   $<)$(CC) -std=c11 -D_POSIX_C_SOURCE=200809L $(COMMON:-O3=-O1) -MT $@ -MF $@.d $(if $(FUZZ_ENGINE),,-fsanitize=fuzzer) \
-	    $(CWARN) -pthread -Ilibgait/include -iquote libgait/src -Itools $(LCM_CFLAGS) $(JPEG_CFLAGS) $(CFLAGS) $(LDFLAGS) \
-	    -o $@ $< $(FUZZ_ENGINE) $(B)/libtrackd.a $(OBJ) $(B)/libgaitmsg.a $(call lcm_libs,$(B)/fuzz) $(JPEG_LIBS) -lm
-
-# Their parts beside main(); a target may include one of them instead.
-$(B)/libtrackd.a: $(filter-out %/gait-trackd.c.o,$(TOOL_PARTS))
-	$(call log,AR   $@)rm -f $@ && $(AR) rcs $@ $^
+	$(call log,CC   $<)$(WITH_TOOLS) $(FUZZ_ENGINE) $(if $(FUZZ_ENGINE),,-fsanitize=fuzzer)
 
 fuzz-run: $(FUZZ)
 	@for f in $(FUZZ); do \
@@ -467,7 +472,7 @@ screenshots: setup lib ## the figures of the pages and the tutorial's pictures, 
 	@$(VENV)/bin/python libgait/doc/site/screenshots.py
 
 # ---- style ---------------------------------------------------------------------------------------------------
-C_FILES := $(sort $(wildcard libgait/doc/*.c libgait/src/*/*.[ch] libgait/src/*/*.cpp tests/unit/*.[ch] tests/bench/*.[ch] tests/fuzz/*.[ch] \
+C_FILES := $(sort $(wildcard libgait/doc/*.c libgait/src/*/*.[ch] libgait/src/*/*.cpp tests/unit/*.[ch] tests/bench/*.[ch] tests/fuzz/*.[ch] tests/python/*.c \
            tools/trackd/*.[ch]))
 SBOM := build/sbom
 sbom: setup ## what the product consists of, with versions, hashes and licences (CycloneDX): build/sbom/libgait.cdx.json

@@ -202,6 +202,17 @@ def test_junk_does_not_flood_the_log_and_the_status(url):
         assert sum(map(int, re.findall(r"(\d+) more lines, not written", words))) > 50
 
 
+def test_two_daemons_on_one_url_are_reported_by_both(url):
+    words = "another gait-trackd answers on this URL"
+    with rig.daemon(url) as (listener, finish), rig.daemon(url, "--particles", 80) as (_, finish_other):
+
+        def reporting():
+            return {status.particles for status in listener.statuses if words in status.text}
+
+        listener.until(lambda: len(reporting()) == 2, "reports of both")
+        assert [finish().words.count(words), finish_other().words.count(words)] == [1, 1]
+
+
 def test_two_streams_do_not_meet(url):
     with rig.daemon(url, "--stream", 1) as (listener, finish):
         one = [(channel.replace("_0", "_1"), message) for channel, message in rig.opening()[:2]]

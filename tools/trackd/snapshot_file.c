@@ -2,9 +2,11 @@
 
 #include "options.h"
 
+#include <dirent.h>
 #include <errno.h>
 #include <fcntl.h>
 #include <inttypes.h>
+#include <signal.h>
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
@@ -55,7 +57,16 @@ static bool write_all(int file, const unsigned char *data, size_t bytes)
     return true;
 }
 
-/* Write beside the file, then rename; 0 or an errno. */
+/* The folder of a file, to be closed; -1: none. */
+static int open_folder(const char *path)
+{
+    char folder[OPTION_TEXT];
+    const char *const slash = strrchr(path, '/');
+    snprintf(folder, sizeof folder, "%.*s", slash ? (int)(slash - path + 1) : 1, slash ? path : ".");
+    return open(folder, O_RDONLY | O_DIRECTORY | O_CLOEXEC);
+}
+
+/* Write beside the file, then rename; 0 or an errno.  After a loss of power the old or the new one is there, complete. */
 static int replace(const char *path, const unsigned char *data, size_t bytes)
 {
     char beside[OPTION_TEXT + 16];
@@ -69,9 +80,36 @@ static int replace(const char *path, const unsigned char *data, size_t bytes)
         fault = errno;
     if (!fault && rename(beside, path) != 0)
         fault = errno;
-    if (fault)
+    if (fault) {
         unlink(beside);
+        return fault;
+    }
+    int const folder = open_folder(path);
+    if (folder < 0 || (fsync(folder) != 0 && errno != EINVAL))
+        fault = errno;
+    if (folder >= 0)
+        close(folder);
     return fault;
+}
+
+/* Remove what daemons that were killed while they wrote left beside the file. */
+static void sweep(const char *path)
+{
+    const char *const slash = strrchr(path, '/'), *const name = slash ? slash + 1 : path;
+    size_t const n = strlen(name);
+    int const folder = open_folder(path);
+    DIR *const list = folder < 0 ? NULL : fdopendir(folder);
+    for (struct dirent *e; list && (e = readdir(list));) {
+        char *end = e->d_name;
+        long const writer =
+            strncmp(e->d_name, name, n) == 0 && e->d_name[n] == '.' ? strtol(e->d_name + n + 1, &end, 10) : 0;
+        if (writer > 0 && *end == '\0' && kill((pid_t)writer, 0) != 0 && errno == ESRCH)
+            unlinkat(folder, e->d_name, 0);
+    }
+    if (list)
+        closedir(list);
+    else if (folder >= 0)
+        close(folder);
 }
 
 void snapshot_file_write(snapshot_file *f, const service *s, bool at_once)
@@ -125,7 +163,10 @@ void snapshot_file_resume(const snapshot_file *f, service *s)
 {
     file_bytes file;
     message why;
-    if (!f->path || access(f->path, F_OK) != 0)
+    if (!f->path)
+        return;
+    sweep(f->path);
+    if (access(f->path, F_OK) != 0)
         return;
     if (!file_read(f->path, "snapshot", &file, &why)) {
         log_line("%s", why.text);

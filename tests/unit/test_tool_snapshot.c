@@ -1,0 +1,241 @@
+/* The daemon's snapshot on a disk that fails: every call of the file system in turn, in every way that it can; the order of
+ * calls that a loss of power tests; files that are torn. */
+#include <dirent.h>
+#include <errno.h>
+#include <fcntl.h>
+#include <stdarg.h>
+#include <stdbool.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <unistd.h>
+
+#include "../../tools/trackd/common.h"
+#define log_line(...) ((void)0) /* a line for each damaged file */
+
+/* The layer under snapshot_file.c: a letter for each call, and one of them fails. */
+static char calls[4096]; /* o: open, w: write, s: fsync, c: close, r: rename, D: a folder is opened */
+static size_t called, fail_at;
+static int fail_with; /* an errno, or -1: a short write */
+
+static bool fails(char call)
+{
+    if (called + 1 < sizeof calls)
+        calls[called] = call;
+    called++;
+    if (called != fail_at || fail_with < 0)
+        return false;
+    errno = fail_with;
+    return true;
+}
+
+static int layer_open(const char *path, int flags, ...)
+{
+    va_list args;
+    va_start(args, flags);
+    int const mode = flags & O_CREAT ? va_arg(args, int) : 0;
+    va_end(args);
+    return fails(flags & O_CREAT ? 'o' : 'D') ? -1 : open(path, flags, mode);
+}
+
+static ssize_t layer_write(int file, const void *data, size_t bytes)
+{
+    if (fails('w'))
+        return -1;
+    return write(file, data, called == fail_at && bytes > 1 ? bytes / 2 : bytes);
+}
+
+static int layer_fsync(int file)
+{
+    return fails('s') ? -1 : fsync(file);
+}
+
+static int layer_close(int file)
+{
+    close(file); /* also when it reports a fault */
+    return fails('c') ? -1 : 0;
+}
+
+static int layer_rename(const char *from, const char *to)
+{
+    return fails('r') ? -1 : rename(from, to);
+}
+
+#define open   layer_open
+#define write  layer_write
+#define fsync  layer_fsync
+#define close  layer_close
+#define rename layer_rename
+#include "../../tools/trackd/snapshot_file.c"
+#undef open
+#undef write
+#undef fsync
+#undef close
+#undef rename
+
+#include "check.h"
+#include "toy_model.h"
+
+static char folder[] = P_tmpdir "/gait_snapshot_XXXXXX", path[64], model[64];
+static service s;
+
+static void write_file(const char *name, const void *data, size_t bytes)
+{
+    FILE *const f = fopen(name, "wb");
+    if (!f || fwrite(data, 1, bytes, f) != bytes || fclose(f) != 0)
+        abort();
+}
+
+/* A service that follows a person, in memory of its own. */
+static void start(void)
+{
+    static sink out;
+    gait_tracker_config config;
+    gait_camera const camera = {48, 32, 50, 50, 24, 16, {1, 0, 0, 0, 0, -1, 0, 1, 0}, {0, 1, 5}, {0}};
+    gait_state mean, sd;
+    size_t bytes;
+    message why;
+    if (!mkdtemp(folder))
+        abort();
+    snprintf(path, sizeof path, "%s/state", folder);
+    snprintf(model, sizeof model, "%s/model", folder);
+    const void *const toy = toy_model_blob(&bytes);
+    write_file(model, toy, bytes);
+    gait_tracker_default(&config, GAIT_MODE_DEFAULT);
+    config.particles = config.acquisition_particles = 16;
+    s.max_pixels = 48 * 32;
+    gait_tracker_prior(toy_model(), &mean, &sd, NULL);
+    if (!tracking_open(&s.track, model, &config, &why) || !service_open(&s, &out, 0, 1, NULL, false, &why) ||
+        !service_set_camera(&s, &camera, &why) || !tracking_start(&s.track, &mean, &sd, 0, &why))
+        abort();
+    s.state = GAITMSG_STATUS_T_RUNNING;
+}
+
+/* Number of files beside the model. */
+static int files(void)
+{
+    int count = -3; /* ., .., model */
+    DIR *const list = opendir(folder);
+    while (readdir(list))
+        count++;
+    closedir(list);
+    return count;
+}
+
+static file_bytes content(void)
+{
+    file_bytes file;
+    message why;
+    CHECK(file_read(path, "snapshot", &file, &why));
+    return file;
+}
+
+static bool save(size_t at, int with)
+{
+    snapshot_file f = {.path = path};
+    called = 0;
+    fail_at = at;
+    fail_with = with;
+    snapshot_file_write(&f, &s, true);
+    return !f.failed;
+}
+
+/* The data are on the disk before the name is theirs, and the name before anything is reported as written. */
+static void test_order(void)
+{
+    CHECK(save(0, 0) && files() == 1);
+    calls[called] = '\0';
+    CHECK(strcmp(calls, "owscrDsc") == 0);
+}
+
+/* Whichever call fails: the file is the old one or the new one, nothing is left beside it, and only success is reported as
+ * such. */
+static void test_every_call(void)
+{
+    static const int faults[] = {ENOSPC, EIO, EROFS};
+    CHECK(save(0, 0));
+    size_t const count = called;
+    for (size_t k = 0; k < sizeof faults / sizeof *faults; k++)
+        for (size_t at = 1; at <= count; at++) {
+            write_file(path, "old", 3);
+            bool const ok = save(at, faults[k]);
+            bool const renamed = strchr(calls, 'r') < calls + at - 1, last = at == count;
+            file_bytes const now = content();
+            CHECK(ok == last); /* closing the folder loses nothing */
+            CHECK(renamed == (now.size != 3) && files() == 1);
+            free(now.data);
+        }
+}
+
+static void test_interrupted_and_short_writes(void)
+{
+    CHECK(save(0, 0));
+    file_bytes const whole = content();
+    for (int with = -1; with <= EINTR; with += EINTR + 1) {
+        write_file(path, "old", 3);
+        CHECK(save(2, with) && files() == 1);
+        file_bytes const now = content();
+        CHECK(now.size == whole.size && memcmp(now.data, whole.data, whole.size) == 0);
+        free(now.data);
+    }
+    free(whole.data);
+}
+
+/* A file that ends anywhere, or has another byte anywhere, is not used and changes nothing. */
+static void test_torn(void)
+{
+    snapshot_file const f = {.path = path};
+    CHECK(save(0, 0));
+    file_bytes const whole = content();
+    uint64_t const digest = service_digest(&s);
+    s.last_utime = -5; /* resuming would set it */
+    for (size_t n = 0; n < whole.size; n += n < 400 || n + 9 > whole.size ? 1 : whole.size / 97) {
+        write_file(path, whole.data, n);
+        snapshot_file_resume(&f, &s);
+        whole.data[n] ^= 1;
+        write_file(path, whole.data, whole.size);
+        whole.data[n] ^= 1;
+        /* stream and camera stand before the tracker's state: one is compared, the other checked */
+        if (n >= sizeof(head) || n < sizeof MAGIC)
+            snapshot_file_resume(&f, &s);
+        CHECK(service_digest(&s) == digest && s.last_utime == -5);
+    }
+    write_file(path, whole.data, whole.size);
+    snapshot_file_resume(&f, &s);
+    CHECK(service_digest(&s) == digest && s.last_utime != -5);
+    free(whole.data);
+}
+
+/* Leftovers of killed daemons go, those of running ones and other files stay. */
+static void test_leftovers(void)
+{
+    static const char *const names[] = {"2147483646", "1", "bak", "7x"};
+    snapshot_file const f = {.path = path};
+    char name[96];
+    CHECK(save(0, 0));
+    for (size_t i = 0; i < sizeof names / sizeof *names; i++) {
+        snprintf(name, sizeof name, "%s.%s", path, names[i]);
+        write_file(name, "x", 1);
+    }
+    snapshot_file_resume(&f, &s);
+    CHECK(files() == 4);
+    for (size_t i = 0; i < sizeof names / sizeof *names; i++) {
+        snprintf(name, sizeof name, "%s.%s", path, names[i]);
+        CHECK((access(name, F_OK) == 0) == (i > 0));
+        unlink(name);
+    }
+}
+
+int main(void)
+{
+    start();
+    test_order();
+    test_every_call();
+    test_interrupted_and_short_writes();
+    test_torn();
+    test_leftovers();
+    unlink(path);
+    unlink(model);
+    rmdir(folder);
+    service_close(&s);
+    return CHECK_DONE();
+}
