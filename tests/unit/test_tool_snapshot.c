@@ -1,5 +1,6 @@
 /* The daemon's snapshot on a disk that fails: every call of the file system in turn, in every way that it can; the order of
  * calls that a loss of power tests; files that are torn. */
+#define _XOPEN_SOURCE 700 /* P_tmpdir */
 #include <dirent.h>
 #include <errno.h>
 #include <fcntl.h>
