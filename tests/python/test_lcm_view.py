@@ -90,7 +90,7 @@ def test_several_people_are_drawn_into_one_frame(log, monkeypatch):
         private_url(), [0], rig.model(), {0: rig.CAMERA}, lambda _, image: shown.append(image),
         lambda _, value: heard.append(value["person"]), people=urls,
     )  # fmt: skip
-    assert feed.page_data()["people"] == urls
+    assert [one["url"] for one in feed.page_data()["people"]] == urls
     apart = [estimate_of(estimate) for estimate in log[1]]
     for k, answers in ((0, (0, 1)), (1, (0,)), (2, (0, 1))):
         feed._on_image(

@@ -211,8 +211,10 @@ static bool serve(service *s, const settings *want, parts *p, workers *threads, 
     receiver r = {0};
     sink out = {0};
     message lost;
-    bool const ready = (!to || sink_open(&out, to, why)) && load(s, want, p, threads, &out, why) &&
-                       receiver_open(&r, s, &snapshot, url, why);
+    bool const opened = !to || sink_open(&out, to, why);
+    out.person = want->person;
+    bool const ready =
+        opened && load(s, want, p, threads, &out, why) && receiver_open(&r, s, &snapshot, url, why);
     if (ready)
         snapshot_file_resume(&snapshot, s);
     if (ready && !log && !want->quiet)

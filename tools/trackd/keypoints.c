@@ -129,5 +129,6 @@ const gait_keypoint *keypoint_cue_use(keypoint_cue *cue, int64_t utime)
     const gait_keypoint *const found = keypoint_cue_at(cue, utime);
     cue->frame_utime = utime;
     cue->used += found != NULL;
+    cue->used_utime = found ? utime : cue->used_utime;
     return found;
 }

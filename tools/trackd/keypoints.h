@@ -58,6 +58,7 @@ typedef struct keypoint_cue {
     keypoints_filter filter;
     int64_t messages, used, late; /* messages that arrived; used by a frame; after their frame */
     int64_t frame_utime;          /* of the last tracked frame; -1: none */
+    int64_t used_utime;           /* of the last that had keypoints */
 } keypoint_cue;
 
 /* `cue` is all zero before.  `model` must outlive it. */

@@ -173,6 +173,12 @@ lcm_subscription_t *link_subscribe(lcm_t *lcm, const char *channel, lcm_msg_hand
     return s;
 }
 
+const char *link_channel(const char *channel, int person, char name[LINK_CHANNEL])
+{
+    snprintf(name, LINK_CHANNEL, person ? "%s_%d" : "%s", channel, person);
+    return name;
+}
+
 /* ---- output ---- */
 bool sink_open(sink *s, const char *url, message *why)
 {
@@ -202,8 +208,10 @@ static bool write_event(lcm_eventlog_t *log, const char *channel, const uint8_t 
     return lcm_eventlog_write_event(log, &e) == 0 && !ferror(log->f);
 }
 
-void sink_publish(sink *s, const char *channel, const uint8_t *bytes, int size)
+void sink_publish(sink *s, const char *base, const uint8_t *bytes, int size)
 {
+    char name[LINK_CHANNEL];
+    const char *const channel = link_channel(base, s->person, name);
     if (size <= 0)
         return;
     if (s->lcm && lcm_publish(s->lcm, channel, bytes, (unsigned)size) != 0) {

@@ -11,7 +11,10 @@
 /* Number of complete messages, -1 if this is not a regular file.  `why` reports an empty or truncated log, or is empty. */
 int64_t log_scan(const char *path, message *why);
 /* ---- the LCM connections of a program. */
-enum { LINK_PATH = 1024 }; /* bytes of a log's name, with its end */
+enum { LINK_PATH = 1024, LINK_CHANNEL = 40 }; /* bytes of a log's name, of a channel's, with their ends */
+
+/* The channel of a person: GAIT_ESTIMATE is GAIT_ESTIMATE_2 of person 2; of person 0 as it is. */
+const char *link_channel(const char *channel, int person, char name[LINK_CHANNEL]);
 
 /* The URL sets the receive buffer: with the system's default a 640x480 colour stream loses nine frames of ten. */
 #define LINK_DEFAULT_URL "udpm://239.255.76.67:7667?ttl=0&recv_buf_size=4194304"
@@ -32,13 +35,14 @@ char link_log(const char *url, char path[LINK_PATH]);
 typedef struct sink {    /* all zero: no output */
     lcm_t *lcm;          /* or NULL */
     lcm_eventlog_t *log; /* or NULL */
+    int person;          /* whose channels these are; 0: people are not distinguished */
     int64_t failed;      /* messages that did not go out */
     message fault;       /* of the first of them */
 } sink;
 
 /* Open `url`; a log has ?mode=w (new) or a (append). */
 bool sink_open(sink *s, const char *url, message *why);
-/* Publish `size` bytes.  The first failure of LCM is reported on stderr; after one of a log nothing more is written. */
+/* Publish `size` bytes on the person's channel.  The first failure of LCM is reported on stderr; after one of a log nothing more is written. */
 void sink_publish(sink *s, const char *channel, const uint8_t *bytes, int size);
 /* Whether writing the log has failed, so that the program should end. */
 bool sink_ended(const sink *s, message *why);

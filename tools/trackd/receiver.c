@@ -125,8 +125,8 @@ static void on_status(const lcm_recv_buf_t *buf, const char *channel, void *user
 
 static bool subscribe(receiver *r, message *why)
 {
-    int const camera = r->service->stream;
-    char name[4][32];
+    int const camera = r->service->stream, person = r->service->out->person;
+    char name[4][32], of_person[3][LINK_CHANNEL];
     snprintf(name[0], sizeof name[0], "GAIT_IMAGE_%d", camera);
     snprintf(name[1], sizeof name[1], "GAIT_CAMERA_%d", camera);
     snprintf(name[2], sizeof name[2], "GAIT_BACKGROUND_%d", camera);
@@ -134,11 +134,14 @@ static bool subscribe(receiver *r, message *why)
     r->frames = link_subscribe(r->images, name[0], on_frame, r, FRAMES_WAITING, why);
     return r->frames &&
            ((!r->service->lift && !r->service->cue) ||
-            link_subscribe(r->others, name[3], on_keypoints, r, OTHERS_WAITING, why)) &&
+            link_subscribe(r->others, link_channel(name[3], person, of_person[0]), on_keypoints, r,
+                           OTHERS_WAITING, why)) &&
            link_subscribe(r->others, name[1], on_camera, r, OTHERS_WAITING, why) &&
            link_subscribe(r->others, name[2], on_background, r, OTHERS_WAITING, why) &&
-           link_subscribe(r->others, "GAIT_COMMAND", on_command, r, OTHERS_WAITING, why) &&
-           (r->log || link_subscribe(r->others, "GAIT_STATUS", on_status, r, OTHERS_WAITING, why));
+           link_subscribe(r->others, link_channel("GAIT_COMMAND", person, of_person[1]), on_command, r,
+                          OTHERS_WAITING, why) &&
+           (r->log || link_subscribe(r->others, link_channel("GAIT_STATUS", person, of_person[2]), on_status,
+                                     r, OTHERS_WAITING, why));
 }
 
 bool receiver_open(receiver *r, service *s, snapshot_file *snapshot, const char *url, message *why)

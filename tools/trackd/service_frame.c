@@ -6,7 +6,9 @@
 #include <string.h>
 
 enum {
-    FIT_PERIOD = 100000,  /* microseconds between two fits of the automatic start */
+    FIT_PERIOD = 100000, /* microseconds between two fits of the automatic start */
+    AWAY =
+        1000000, /* microseconds without keypoints after which one of several people who is lost has left */
     LONGEST_GAP = 1 << 20 /* frames; a number further away begins another count */
 };
 
@@ -77,6 +79,14 @@ static bool begin(service *s, const image_view *v)
     return true;
 }
 
+/* The person is out of view: wait for their keypoints. */
+static void leave(service *s)
+{
+    stop(s);
+    message_set(&s->text, "person %d is out of view", s->out->person);
+    log_line("%s", s->text.text);
+}
+
 /* What happens after tracking has stopped. */
 static const char *next_start(const service *s)
 {
@@ -125,7 +135,7 @@ static bool observe(service *s, int64_t utime, const gait_image *frame)
 {
     gait_start *const start = s->track.start;
     const gait_keypoint *const found = s->cue ? keypoint_cue_at(s->cue, utime) : NULL;
-    bool const scene = s->track.background.data != NULL && !s->path;
+    bool const scene = s->track.background.data != NULL && !s->path && !s->out->person;
     bool fine = true;
     gait_camera_pose pose;
     message why;
@@ -261,7 +271,9 @@ static bool step(service *s, const image_view *v, int64_t received, int64_t birt
     s->steps++;
     histogram_add(&s->counts.latency, clock_wall() - v->utime);
     adapt(s, birth, step_us);
-    if (estimate.status == GAIT_TRACK_LOST && frame.image[0].data)
+    if (s->out->person && estimate.status == GAIT_TRACK_LOST && v->utime - s->cue->used_utime > AWAY)
+        leave(s); /* images alone would find another person */
+    else if (estimate.status == GAIT_TRACK_LOST && frame.image[0].data)
         try_auto_start(s, v, &frame.image[0]);
     else if (estimate.status != GAIT_TRACK_INIT)
         gait_start_reset(s->track.start);
@@ -290,7 +302,8 @@ static int idle_of(const service *s)
         return SERVICE_IDLE_NOT;
     if (!s->seek)
         return SERVICE_IDLE_START;
-    return (s->track.background.data && !s->path) || s->cue ? SERVICE_IDLE_SEARCHING : SERVICE_IDLE_SCENE;
+    return (s->track.background.data && !s->path && !s->out->person) || s->cue ? SERVICE_IDLE_SEARCHING
+                                                                               : SERVICE_IDLE_SCENE;
 }
 
 /* What is missing in such a state. */

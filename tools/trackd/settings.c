@@ -131,6 +131,10 @@ static int make_table(settings *s, option *table)
         {"snapshot-s", 0, "S", "seconds between two snapshots, default 1", OPTION_FLOAT, &s->snapshot_s, 0.1,
          3600},
         {"stream", 0, "I", "number of the camera, default 0", INT(stream, 0, 30)},
+        {"person", 0, "N",
+         "of several people track person N, with the keypoints on GAIT_TRACKS_<i>_<N>, and answer on\n"
+         "        GAIT_ESTIMATE_<N> and so on: all channels but those of the camera end in _<N>",
+         INT(person, 1, 8)},
         {"mode", 0, "default|paper", "all likelihood terms, or those of Ormoneit et al. 2000", TEXT(mode)},
         {"budget-ms", 0, "MS",
          "live: drop and count frames that cannot be answered within MS milliseconds of their capture; a\n"
@@ -246,6 +250,7 @@ static bool check_dependencies(const settings *s, message *why)
         {"snapshot-s", "snapshot", s->snapshot_s > 0, s->snapshot[0]},
         {"snapshot", "init auto", s->snapshot[0], strcmp(s->init, "auto") == 0},
         {"keypoints-sd", "keypoints-term", s->keypoints_sd > 0, s->keypoints_term},
+        {"person", "keypoints-term", s->person > 0, s->keypoints_term},
         {"pose-turn-sd", "moving-camera", s->pose_turn_sd > 0, s->moving_camera},
         {"pose-place-sd", "moving-camera", s->pose_place_sd > 0, s->moving_camera},
         {"lift", "a camera that stands still", s->lift, !s->moving_camera},

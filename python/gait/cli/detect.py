@@ -4,7 +4,9 @@ Writes the keypoints of one person: the one in view longest and tallest, or --pe
 gait lift takes.  The network's weights are fetched once: gait detect --fetch.
 
 --lcm locates the joints in frames that arrive over LCM (GAIT_IMAGE_<i>), in as many as the machine has time
-for, and sends them on GAIT_TRACKS_<i>, which gait-trackd --keypoints-term and --lift take.  Ctrl-C ends it.
+for, and sends them: those of person N on GAIT_TRACKS_<i>_<N>, which gait-trackd --person N takes, and on
+GAIT_TRACKS_<i>, for gait-trackd --keypoints-term and --lift, those of the person seen longest.  Numbers are
+from 1 to --people; a person out of view for ten seconds may lose the number to another.  Ctrl-C ends it.
 """
 
 from __future__ import annotations
@@ -66,7 +68,7 @@ def _live(args: argparse.Namespace) -> int:
     from gait.lcm.link import lcm_url
 
     if args.video or args.output or args.person is not None:
-        raise UsageError("--lcm takes no VIDEO, -o or --person; it follows the person seen longest")
+        raise UsageError("--lcm takes no VIDEO, -o or --person; it sends everyone's joints")
     url = lcm_url(args.url)
     detector = LiveDetector(url, args.stream or 0, args.network, args.people)
     note(f"listening on {url}", args.quiet)

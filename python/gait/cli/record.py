@@ -39,6 +39,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     add("--frames", type=values.whole(1), metavar="N", help="end after N estimates")
     add("--until-idle", type=values.seconds, metavar="S", help="end when none has come for S seconds")
     add("--patience", type=values.seconds, metavar="S", help="fail if none has come at all after S seconds")
+    add("--person", type=values.whole(1, 8), metavar="N", help="of several people the one with this number")
     add("--lagged", action="store_true", help="each frame as estimated some frames later (gait-trackd --lag)")
     add("--log", metavar="E.log", help="also write the messages to an LCM log, for gait report")
 
@@ -49,7 +50,8 @@ def run(args: argparse.Namespace) -> int:
 
     url = lcm_url(args.url)
     require_outputs((args.output, args.log), (log_of(url)[0] if is_log(url) else None,))
-    recorder = Recorder(url, args.output, args.log, LAGGED if args.lagged else ESTIMATE)
+    channel = (LAGGED if args.lagged else ESTIMATE) + (f"_{args.person}" if args.person else "")
+    recorder = Recorder(url, args.output, args.log, channel)
 
     def stop(number: int, frame: Any) -> None:
         recorder.stop = True

@@ -32,6 +32,7 @@ EXAMPLES = """\
 examples:
   gait view --camera camera.json
   gait view --save estimate.png
+  gait view --person 1 --person 2
   gait view --person 'udpm://239.255.76.67:7671?ttl=0' --person 'udpm://239.255.76.67:7672?ttl=0'
 """
 
@@ -59,8 +60,9 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     add(
         "--person",
         action="append",
-        metavar="URL",
-        help="LCM on which a tracker publishes (its --out), once for each person (default: --url)",
+        metavar="N|URL",
+        help="number of a person (gait-trackd --person), or LCM on which a tracker publishes (its --out); "
+        "once for each (default: the one on --url)",
     )
     add("--record-to", default=".", metavar="FOLDER", help="folder of recordings (default: this one)")
     values.add_camera(parser, " of the first --stream (default: from GAIT_CAMERA_<i>)", scale=True)
@@ -85,11 +87,11 @@ def run(args: argparse.Namespace) -> int:
 def _serve(
     args: argparse.Namespace, url: str, streams: tuple[int, ...], model: Model, cameras: dict[int, Camera]
 ) -> None:
-    from gait.live.feed import Feed
+    from gait.live.feed import Feed, answers
     from gait.live.server import Page
 
-    people = args.person or [url]
-    page = Page(args.port, streams, url, args.record_to, people)
+    people = args.person or []
+    page = Page(args.port, streams, url, args.record_to, [one.url for one in answers(url, people)])
     try:
         feed = Feed(
             url, streams, model, cameras, page.show, page.report, args.scale_camera, page.watched, people

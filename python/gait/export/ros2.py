@@ -23,7 +23,7 @@ from gait.export.motion import Motion
 Array = NDArray[np.float64]
 
 WORLD = "world"
-_SEEN = ("tracking", "ambiguous")
+_IN_VIEW = ("tracking", "ambiguous")
 _GONE = 10**9  # nanoseconds without an estimate after which a person is no longer listed
 _STILL = {"x": 0.0, "y": 0.0, "z": 0.0, "w": 1.0}
 _TF, _POSE = "tf2_msgs/msg/TFMessage", "geometry_msgs/msg/PoseWithCovarianceStamped"
@@ -87,7 +87,7 @@ class Bodies:
     """Makes the messages of ROS 2 from the estimates of one or several people, in the order of time."""
 
     def __init__(self) -> None:
-        self._seen: dict[int, int] = {}  # person to nanoseconds
+        self._visible: dict[int, int] = {}  # person to nanoseconds
         self._camera: tuple[int, Camera] | None = None
 
     def camera(self, stream: int, camera: Camera, nanoseconds: int) -> list[Message]:
@@ -116,7 +116,7 @@ class Bodies:
         person : int
             Number, from 1.
         status : str
-            ``init``, ``tracking``, ``ambiguous`` or ``lost``; the body is there while the person is seen.
+            ``init``, ``tracking``, ``ambiguous`` or ``lost``; the body is there while the person is visible.
         nanoseconds : int
             Of the frame, since the Unix epoch.
         joints : mapping of str to ndarray of shape (3,)
@@ -126,16 +126,18 @@ class Bodies:
         sd : (ndarray of shape (3,), float), optional
             Standard deviations of the pelvis [m] and the heading [rad].
         """
-        self._seen = {k: at for k, at in self._seen.items() if k != person and abs(nanoseconds - at) < _GONE}
-        if seen := status in _SEEN and bool(joints):
-            self._seen[person] = nanoseconds
+        self._visible = {
+            k: at for k, at in self._visible.items() if k != person and abs(nanoseconds - at) < _GONE
+        }
+        if visible := status in _IN_VIEW and bool(joints):
+            self._visible[person] = nanoseconds
         header = _header(nanoseconds, WORLD)
-        ids = {"header": header, "ids": [str(k) for k in sorted(self._seen)]}
+        ids = {"header": header, "ids": [str(k) for k in sorted(self._visible)]}
         found = [
             Message(f"/gait/{person}/status", "std_msgs/msg/String", {"data": status}),
             Message("/humans/bodies/tracked", "hri_msgs/msg/IdsList", ids),
         ]
-        if not seen:
+        if not visible:
             return found
         across = joints["l_hip"] - joints["r_hip"]
         turn = heading if np.isfinite(heading) else float(np.arctan2(-across[0], across[1]))

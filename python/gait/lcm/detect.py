@@ -1,4 +1,4 @@
-"""Joints of a person in frames that arrive over LCM: ``GAIT_IMAGE_<i>`` in, ``GAIT_TRACKS_<i>`` out."""
+"""Joints of people in frames that arrive over LCM: ``GAIT_IMAGE_<i>`` in, ``GAIT_TRACKS_<i>`` out."""
 
 from __future__ import annotations
 
@@ -18,10 +18,42 @@ from gait.lcm.messages import decode, frame_number, picture, tracks_message
 _KEPT = 1  # frames that wait: older ones are dropped while the detector is busy
 
 
-class LiveDetector:
-    """Locates the joints of one person in every frame that the machine has time for.
+_KEEPS = 10.0  # seconds out of view after which a person's number may be given to another
 
-    The person is the one found in most frames so far, and the next one when that person is gone.
+
+class Numbers:
+    """Numbers of the people in view, from 1: the trackers are few, the people who pass are not.
+
+    A person who comes back has the old number, surely within `_KEEPS` seconds.
+
+    Parameters
+    ----------
+    most : int
+        Largest number.
+    """
+
+    def __init__(self, most: int) -> None:
+        self._most = most
+        self._owners: dict[int, tuple[int, float]] = {}  # number: id, and when that person was seen last
+
+    def number(self, id: int, time: float) -> int | None:
+        """Give the number of the person with an id, in view at a time in seconds; None: all are taken."""
+        found = next((number for number, (owner, _) in self._owners.items() if owner == id), None)
+        if found is None and len(self._owners) < self._most:
+            found = len(self._owners) + 1
+        elif found is None:
+            oldest = min(self._owners, key=lambda number: self._owners[number][1])
+            found = oldest if time - self._owners[oldest][1] >= _KEEPS else None
+        if found is not None:
+            self._owners[found] = id, time
+        return found
+
+
+class LiveDetector:
+    """Locates the joints of people in every frame that the machine has time for.
+
+    Those of person N go to ``GAIT_TRACKS_<i>_<N>``, and to ``GAIT_TRACKS_<i>`` those of the person found in
+    most frames so far, and of the next one when that person is gone.
 
     Parameters
     ----------
@@ -51,6 +83,7 @@ class LiveDetector:
         if is_log(url):
             raise UserError(f"--url {url}: --lcm answers on a network, not in a log; use gait detect VIDEO")
         self._network, self._detector = network, PeopleDetector(network, people)
+        self._numbers = Numbers(people)
         self._lcm = open_lcm(url)
         self._channel = f"GAIT_TRACKS_{stream}"
         self._lcm.subscribe(f"GAIT_IMAGE_{stream}", self._on_image).set_queue_capacity(_KEPT)
@@ -75,9 +108,14 @@ class LiveDetector:
         people = self._detector.step(Frame(self.frames, seconds, image))
         self.frames += 1
         if people:
-            one, _ = max(people, key=lambda pair: len(pair[0].frames))
+            longest, _ = max(people, key=lambda pair: len(pair[0].frames))
             self.found += 1
-            self._lcm.publish(self._channel, self._tracks(one, message).encode())
+            for one, _ in people:
+                data = self._tracks(one, message).encode()
+                if one is longest:
+                    self._lcm.publish(self._channel, data)
+                if (number := self._numbers.number(one.id, seconds)) is not None:
+                    self._lcm.publish(f"{self._channel}_{number}", data)
 
     def _tracks(self, one: Followed, image: Any) -> Any:
         """Joints of a person in the newest frame, where the model has them."""

@@ -1,7 +1,7 @@
 """What the live page shows: estimates drawn into their own frames, and numbers beside them.
 
 A tracker follows one person.  Several people are trackers that listen on one URL, from which frames come, and
-publish each on a URL of its own.
+publish each on channels of its own there (``gait-trackd --person``), or on a URL of its own.
 """
 
 from __future__ import annotations
@@ -11,7 +11,7 @@ from collections import deque
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import partial
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -49,6 +49,28 @@ class _View:
 
     def use(self, camera: Camera, model: Model) -> None:
         self.overlay, self.size, self.camera = Overlay(model, camera), camera.size, camera
+
+
+class Answers(NamedTuple):
+    """Where the tracker of a person publishes."""
+
+    name: str
+    """Of the person."""
+    url: str
+    channel: str
+    """Of its estimates."""
+    ending: str
+    """Of its channels: ``_2`` of person 2."""
+
+
+def answers(url: str, people: Sequence[str]) -> list[Answers]:
+    """Where trackers publish: numbers are people on `url`, others URLs; without any, one on `url`."""
+    return [
+        Answers(one, url, f"GAIT_ESTIMATE_{one}", f"_{one}")
+        if one.isdigit()
+        else Answers(str(k), one, "GAIT_ESTIMATE", "")
+        for k, one in enumerate(people or (url,), 1)
+    ]
 
 
 @dataclass
@@ -94,7 +116,8 @@ class Feed:
     watched : callable, optional
         Whether to draw: the newest estimate waits until it is so.
     people : sequence of str
-        URLs on which trackers answer, one for each person; `url` if left out.
+        Numbers of people whose trackers answer on `url`, or URLs on which they do; if left out, the one that
+        answers on `url`.
 
     Attributes
     ----------
@@ -114,13 +137,11 @@ class Feed:
         watched: Callable[[], bool] = lambda: True,
         people: Sequence[str] = (),
     ) -> None:
-        self.url, self._scale, self.people = url, scale, tuple(people) or (url,)
-        if (url, *self.people) != (url, url) and any(map(is_log, (url, *self.people))):
-            raise UsageError("--person: is for trackers that run; a log is of one")
-        self._links, self._log = (
-            {name: listener(name) for name in dict.fromkeys((url, *self.people))},
-            is_log(url),
-        )
+        self.url, self._scale, self.people = url, scale, answers(url, people)
+        urls = list(dict.fromkeys([url, *(one.url for one in self.people)]))
+        if len(urls) > 1 and any(map(is_log, urls)):
+            raise UsageError("--person URL: is for trackers that run; give the numbers of people in a log")
+        self._links, self._log = {name: listener(name) for name in urls}, is_log(url)
         self._model, self._show, self._report, self._watched = model, show, report, watched
         self._views = {stream: _View({}, stream in cameras) for stream in streams}
         self._origin: int | None = None
@@ -133,9 +154,9 @@ class Feed:
         for stream in streams:
             self._subscribe(url, f"GAIT_IMAGE_{stream}", partial(self._on_image, stream), _QUEUED)
             self._subscribe(url, f"GAIT_CAMERA_{stream}", partial(self._on_camera, stream), 1)
-        for person, name in enumerate(self.people):
-            self._subscribe(name, "GAIT_ESTIMATE", partial(self._on_estimate, person), _KEPT)
-            self._subscribe(name, "GAIT_STATUS", partial(self._on_status, person), _KEPT)
+        for person, one in enumerate(self.people):
+            self._subscribe(one.url, one.channel, partial(self._on_estimate, person), _KEPT)
+            self._subscribe(one.url, f"GAIT_STATUS{one.ending}", partial(self._on_status, person), _KEPT)
 
     def _subscribe(self, url: str, channel: str, handler: Callable[[str, bytes], None], most: int) -> None:
         self._links[url].subscribe(channel, handler).set_queue_capacity(most)
@@ -185,7 +206,7 @@ class Feed:
                 if len(self.people) == 1:
                     self._show(stream, view.overlay.draw(pixels, *found[0]))
                 else:
-                    people = {f"{k + 1}": estimate for k, (estimate, _) in sorted(found.items())}
+                    people = {self.people[k].name: estimate for k, (estimate, _) in sorted(found.items())}
                     self._show(stream, view.overlay.draw_people(pixels, people))
 
     def _fitting(self, image: Any, view: _View) -> Image:
@@ -271,7 +292,7 @@ class Feed:
             ],
             camera=None if camera is None else rounded(camera.centre),
             url=self.url,
-            people=list(self.people),
+            people=[one._asdict() for one in self.people],
             streams=list(self._views),
             seconds=KEPT_S,
         )

@@ -9,7 +9,7 @@ const start = await (await fetch('/state')).json();
 let scene, curves, paused = false, recording = Boolean(start.recording.path);
 let chosen = 0; // person whose numbers and plots are shown
 const PHASE = start.curves.findIndex((curve) => curve.name === 'phase');
-const people = start.people.map((url) => ({ url, last: 0, body: null }));
+const people = start.people.map((one) => ({ ...one, last: 0, body: null }));
 
 // ---- figure and plots, where their parts were fetched ----
 if (start.parts) {
@@ -69,7 +69,7 @@ function showOthers() {
 
 if (people.length > 1) {
   people.forEach((one, k) => {
-    one.button = Object.assign(document.createElement('button'), { type: 'button', textContent: `Person ${k + 1}`, title: one.url });
+    one.button = Object.assign(document.createElement('button'), { type: 'button', textContent: `Person ${one.name}`, title: `${one.channel} on ${one.url}` });
     one.button.setAttribute('aria-pressed', k === chosen);
     one.button.addEventListener('click', () => choose(k));
     element('people').append(one.button);
@@ -102,7 +102,7 @@ function onSample(one) {
   if (paused) return;
   element('waiting').replaceChildren();
   person.body = one.points;
-  if (person.button) person.button.textContent = `Person ${one.person + 1}: ${TEXT[one.status] ?? one.status}`;
+  if (person.button) person.button.textContent = `Person ${person.name}: ${TEXT[one.status] ?? one.status}`;
   if (one.person !== chosen) return showOthers();
   setStatus(one.status, TEXT[one.status] ?? one.status);
   show('cadence', unit(one.cadence, 0, 'steps/min'));
@@ -135,9 +135,10 @@ const quiet = () => performance.now() - people[chosen].last > QUIET_MS;
 function explain(text) {
   if (paused) return;
   setStatus('', 'waiting');
-  const images = `GAIT_IMAGE_${start.streams.join(', GAIT_IMAGE_')} on ${start.url}`, { url } = people[chosen];
-  const lines = [text, `Listening for GAIT_ESTIMATE ${url === start.url ? '' : `on ${url} `}and ${images}.`,
-    url === start.url ? 'Start gait-trackd on the same URL (--url, or LCM_DEFAULT_URL), and gait capture for a film or camera.'
+  const images = `GAIT_IMAGE_${start.streams.join(', GAIT_IMAGE_')} on ${start.url}`, { url, channel, name } = people[chosen];
+  const lines = [text, `Listening for ${channel} ${url === start.url ? '' : `on ${url} `}and ${images}.`,
+    channel !== 'GAIT_ESTIMATE' ? `Start gait-trackd --person ${name} --keypoints-term, gait detect --lcm, and gait capture for a film or camera.`
+      : url === start.url ? 'Start gait-trackd on the same URL (--url, or LCM_DEFAULT_URL), and gait capture for a film or camera.'
       : `Start gait-trackd --url ${start.url} --out ${url}, and gait capture for a film or camera.`];
   element('waiting').replaceChildren(...lines.map((line) => Object.assign(document.createElement('p'), { textContent: line })));
 }

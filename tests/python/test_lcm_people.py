@@ -1,0 +1,123 @@
+"""gait-trackd --person: one tracker for each of several people in a stream, told apart by their keypoints."""
+
+from dataclasses import replace
+from functools import cache
+
+import cv2
+import lcm_rig as rig
+import numpy as np
+import pytest
+
+from gait.bindings.abi import TrackStatus
+from gait.cli import main
+from gait.io.track_file import read_track
+from gait.lcm.detect import Numbers
+from gait.lcm.link import gaitmsg
+from gait.lcm.messages import camera_message, image_message, tracks_message
+from gait.live.feed import Feed
+
+FPS, WALK, BACK = 12, 42, 12 * 12  # frames: both walk, the second one is away, and comes back
+AHEAD = {1: 0.0, 2: np.pi}
+NEXT, LOST = TrackStatus.TRACKING, TrackStatus.LOST
+
+
+def state(person, frame):
+    """Two people who cross in the middle of the picture; None: out of view."""
+    if frame >= WALK and (person == 1 or frame < BACK):
+        return None
+    time = frame / FPS if frame < WALK else (frame - BACK) / FPS
+    heading = AHEAD[person] if frame < WALK else 0.0
+    mean, _ = rig.model().prior()
+    found = replace(mean, phase=(0.3 * person + time) % 1, stride_hz=1.0, stature=1.75, heading=heading)
+    found.pelvis = np.array([(-2.0 + 1.2 * time) * np.cos(heading), 0.9 if person == 1 else -0.4, 0.0])
+    found.pelvis[2] = rig.model().pelvis_height(found)
+    return found
+
+
+@cache
+def picture(frame):
+    image = rig.plate().copy()
+    for person, seed in ((1, 2), (2, 3)):  # the second is nearer
+        if (one := state(person, frame)) is not None:
+            ids = rig.model().render(rig.CAMERA, one)
+            colours = np.random.default_rng(seed).integers(0, 255, (256, 3), np.uint8)
+            image = np.where(ids[..., None] > 0, colours[ids], image)
+    return image
+
+
+def joints(person, frame):
+    return rig.model().pose(state(person, frame))[0]
+
+
+@pytest.fixture(scope="module")
+def streams(tmp_path_factory):
+    """Estimates of both people's trackers, and the log that they were played."""
+    rng, names = np.random.default_rng(1), list(rig.model().joint_names)
+    camera = camera_message(rig.CAMERA, 1)
+    log = [("GAIT_CAMERA_0", camera), ("GAIT_BACKGROUND_0", image_message(rig.plate(), 1, -1))]
+    for frame in range(BACK + WALK):
+        at = 1_000_000 + round(frame * 1e6 / FPS)
+        log.append(("GAIT_IMAGE_0", image_message(picture(frame), at, frame)))
+        for person in (1, 2):
+            if state(person, frame) is not None and (person == 2 or not 17 < frame < 24):  # hidden
+                uv = rig.CAMERA.project(joints(person, frame)) + 0.5 * rng.normal(size=(len(names), 2))
+                log.append((f"GAIT_TRACKS_0_{person}", tracks_message(names, uv, at, frame)))
+    path = rig.write_log(tmp_path_factory.mktemp("people") / "a.log", log)
+    found = {}
+    for person in (1, 2):
+        out = path.with_name(f"{person}.log")
+        rig.run(*rig.command("--url", f"file://{path}?speed=0", "--out", f"file://{out}?mode=w",
+                             "--keypoints-term", "--person", person, "-n", 300)[1:])  # fmt: skip
+        found[person] = rig.read_log(out, f"GAIT_ESTIMATE_{person}", gaitmsg.estimate_t)
+    return found, path
+
+
+def off(person, estimate):
+    """Mean distance of the joints from a person's, metres."""
+    found = np.array([joint.position for joint in estimate.joints])
+    return np.linalg.norm(found - joints(person, estimate.frame), axis=1).mean()
+
+
+def test_people_who_cross_keep_their_trackers(streams):
+    for person, other in ((1, 2), (2, 1)):
+        walk = [e for e in streams[0][person] if e.frame < WALK]
+        assert len(walk) > 0.6 * WALK and {e.status for e in walk[6:]} <= {1, 2}
+        assert max(off(person, e) for e in walk[6:]) < 0.35
+        assert min(off(other, e) for e in walk[6:] if abs(e.frame - 21) > 8) > 0.6
+
+
+def test_a_person_who_comes_back_has_the_same_number(streams):
+    """Away for 8.5 s, in which nobody is tracked."""
+    for person in (1, 2):
+        gone = range(WALK + FPS // 2 + 1, 1000 if person == 1 else BACK)
+        away = [e for e in streams[0][person] if e.frame in gone]
+        assert {e.status for e in away} == {LOST} and max(e.frame for e in away) < WALK + 2 * FPS
+    back = [e for e in streams[0][2] if e.frame >= BACK + 2 * FPS]
+    assert len(back) >= FPS and NEXT in {e.status for e in back} and max(off(2, e) for e in back) < 0.35
+    numbers = Numbers(2)
+    assert [numbers.number(id, 0.0) for id in (7, 9, 7)] == [1, 2, 1]
+    assert numbers.number(7, 9.0) == 1 and numbers.number(12, 9.5) is None  # 9 may come back
+    assert numbers.number(9, 9.9) == 2 and numbers.number(12, 19.5) == 1  # 7 did not
+
+
+def test_the_page_and_the_recorder_take_people_by_number(streams, tmp_path):
+    found, path = streams
+    both = tmp_path / "both.log"
+    frames = [("GAIT_CAMERA_0", camera_message(rig.CAMERA, 1))]
+    for frame in range(20, 24):
+        at = 1_000_000 + round(frame * 1e6 / FPS)
+        frames.append(("GAIT_IMAGE_0", image_message(picture(frame), at, frame)))
+        frames += [(f"GAIT_ESTIMATE_{k}", e) for k in found for e in found[k] if e.frame == frame]
+    rig.write_log(both, frames)
+    shown, heard = [], []
+    feed = Feed(
+        f"file://{both}?speed=0", [0], rig.model(), {}, lambda _, image: shown.append(image),
+        lambda topic, value: heard.append((value["person"], value["frame"])), people=("1", "2"),
+    )  # fmt: skip
+    while feed.handle(0.1):
+        pass
+    assert sorted(heard) == [(k, frame) for k in (0, 1) for frame in range(20, 24)] and shown
+    assert cv2.absdiff(shown[-1], picture(23)).max() > 0 and feed.damage is None
+    track = tmp_path / "track.csv"
+    assert main(["record", "-o", str(track), "--url", f"file://{both}?speed=0", "--person", "2"]) == 0
+    assert read_track(track).frame.tolist() == [20, 21, 22, 23]
