@@ -232,6 +232,11 @@ def _estimates(found: Segments) -> Entry:
         "The camera looks along the depth; below, the depth is drawn to the right. Grey: original. Mean "
         "distance of all markers, but for the common depth, which no such view shows."
     )
+    if leventon.apart(e.bayes, e.truth) > leventon.apart(e.likelihood, e.truth):
+        caption += (
+            " Here, where this sequence moves most, Bayes is farther off than the likelihood alone; the "
+            "table has the mean of all segments."
+        )
     return Entry(
         "Fig. 5: estimates from one view",
         "20 frames of a sequence left out: original, orthographic view, likelihood alone, and Bayes, "
@@ -244,7 +249,7 @@ def _estimates(found: Segments) -> Entry:
         verdicts.estimates([(m.likelihood, m.bayes) for m in means], shown.covered),
         (
             f"Every one of {len(held)} sequences is left out in turn; shown is the one whose error is the "
-            "median. Other sequences of the same person are learnt from.",
+            "median, where it moves most. Other sequences of the same person are learnt from.",
             "Likelihood alone: least squares of minimum norm in the modes.",
             "Eq. 1 is printed without the mean and eq. 3 without the 1/2; sigma, a variance in the text and "
             "squared in eq. 4, is a standard deviation.",

@@ -117,7 +117,8 @@ def _articulated(model: Model, literal: Learned) -> Image:
         for axis, tip in enumerate(tips):
             cv2.arrowedLine(image, start, tip, AXES[axis], 2, cv2.LINE_AA, tipLength=0.25)
         words = str(count) if count else "6"
-        place = start[0] - 22, start[1] + 4
+        aside, down = (10, 20) if name.startswith("l_") else (-22, 4) if count else (-5, 24)
+        place = start[0] + aside, start[1] + down
         cv2.putText(image, words, place, cv2.FONT_HERSHEY_DUPLEX, 0.5, (20, 20, 20), 1, cv2.LINE_AA)
     return image
 
