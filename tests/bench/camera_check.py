@@ -28,7 +28,7 @@ from gait.errors import UserError
 from gait.io.keypoints_file import Keypoints
 from gait.io.video import Video
 from gait.track.camera_check import contradiction
-from gait.track.walk_camera import find_person
+from gait.track.walk_camera import find_people
 
 THIRD = 4 / 3
 Change = Callable[[Camera], Camera]
@@ -87,7 +87,7 @@ def _clip(folder: Path) -> list[Any]:
     meta = json.loads((folder / "meta.json").read_text())
     stature = meta.get("stature_m") or meta["limb_lengths_m"]["stature"]
     camera = read_camera(str(folder / "camera.json"), video.size)
-    keypoints, model = find_person(video, quiet=True), Model()
+    keypoints, model = next(iter(find_people(video, quiet=True).values())), Model()
     cells = [_reported(camera, video, keypoints, model, stature)]
     for _, change in _changes():
         cells.append(_reported(change(camera), video, keypoints, model, stature))

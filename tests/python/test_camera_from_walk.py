@@ -3,6 +3,7 @@
 import json
 from dataclasses import replace
 from functools import cache
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -11,11 +12,14 @@ from walking_keypoints import ACROSS, MODEL, NAMES, SIZE, TOWARDS, keypoints, vi
 from gait.camera.camera import read_camera
 from gait.cli import main
 from gait.detect import profile
+from gait.detect.people import by_size
 from gait.errors import UserError
 from gait.io.keypoints_file import Keypoints, write
 from gait.simulate.scenario import Scenario
 from gait.simulate.stage import set_stage
+from gait.track import scene
 from gait.track.from_walk import calibrate
+from gait.track.options import ClipOptions
 from gait.track.walk_model import WalkingBody
 from gait.track.walk_start import swap_sides
 
@@ -114,6 +118,20 @@ def test_a_lean_grows_with_height_and_an_offset_is_of_one_joint():
     assert not np.delete(change, shoulder, axis=0).any()
     sd = body.offset_sd.reshape(-1, 3)
     assert sd[shoulder, 0] == profile.load("full").joint("l_shoulder").lasting_sd > sd[ankle, 0]
+
+
+def test_of_several_people_one_who_walks_gives_the_camera():
+    film, options = (
+        SimpleNamespace(path="v.mp4", size=SIZE, fps=15),
+        ClipOptions("v.mp4", None, "t.csv", height=1.75, fov=65.2),
+    )
+    walks, stands = keypoints(view()), keypoints(view(), (0.0, (0.0, 3.0)), standing=True)
+    people = {1: walks, 2: stands}
+    assert by_size(people)[0] == 2  # nearer
+    person, found = scene._calibrate(options, film, MODEL, people, None)
+    assert person == 1 and found.camera.fx == pytest.approx(1000, rel=0.1)
+    with pytest.raises(UserError, match="the person stands"):
+        scene._calibrate(options, film, MODEL, {2: stands}, None)
 
 
 def test_a_treadmill_is_in_place():

@@ -107,7 +107,7 @@ def test_gait_lift_undoes_the_turns_too(tmp_path, monkeypatch, capsys):
     rng, frame = np.random.default_rng(5), np.arange(count)
     uv += 0.5 * rng.standard_normal(uv.shape)
     known = Keypoints(frame, video.times[frame], MODEL.joint_names, uv, np.ones(uv.shape[:2]))
-    monkeypatch.setattr(walk_camera, "find_person", lambda *_: known)
+    monkeypatch.setattr(walk_camera, "find_people", lambda *_: {1: known})
     write_camera(tmp_path / "c.json", turned[0].camera(CAMERA))  # of the first frame
     errors = []
     for choice in ("auto", "off"):

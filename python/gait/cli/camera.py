@@ -182,7 +182,7 @@ def _calibrate(args: argparse.Namespace, model: Model) -> Calibration:
     from gait.io import keypoints_file
     from gait.io.video import Video
     from gait.track.from_walk import calibrate
-    from gait.track.walk_camera import calibrate_film, find_person
+    from gait.track.walk_camera import calibrate_film, find_people
 
     if Path(args.walk).suffix.lower() == ".csv":
         if args.size is None:
@@ -193,8 +193,8 @@ def _calibrate(args: argparse.Namespace, model: Model) -> Calibration:
     if args.size:
         raise UsageError("--size: is for KEYPOINTS.csv; a video has its own")
     video = Video(args.walk)
-    keypoints = find_person(video, args.quiet)
-    return calibrate_film(video, keypoints, model, args.height, args.fov, args.quiet)
+    people = find_people(video, args.quiet)
+    return calibrate_film(video, people, model, args.height, args.fov, args.quiet)[1]
 
 
 def _check_size(args: argparse.Namespace, keypoints: Keypoints) -> None:

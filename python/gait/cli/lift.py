@@ -333,7 +333,7 @@ def _find_keypoints(
     from gait.camera.camera import Camera
     from gait.io.video import Video  # PyAV, and below OpenCV, which files of keypoints do not need
     from gait.lift.keypoints.corrections import read_edits  # refused before the detector's work
-    from gait.track.walk_camera import find_person
+    from gait.track.walk_camera import find_people
 
     if not (args.camera or args.orthographic or args.height):
         raise UsageError("give --camera CAM, or --height M for a camera that is found from the walk")
@@ -342,15 +342,17 @@ def _find_keypoints(
         Camera.read(args.camera, video.size, args.scale_camera).check_place(args.camera)
     if args.corrections:
         read_edits(args.corrections, prior, video.span(args.start or 0, args.stop), video.size)
-    keypoints = find_person(video, args.quiet, args.start or 0, args.stop)
-    turns = _turns(args, video, keypoints) if args.stabilize == "auto" else None
+    people = find_people(video, args.quiet, args.start or 0, args.stop)
+    turns = _turns(args, video, people) if args.stabilize == "auto" else None
     if turns is not None:  # keypoints move to where the camera of one frame would see them
-        keypoints = turns.in_reference(keypoints)
-    calibration = None if args.camera or args.orthographic else _calibrate(args, video, keypoints)
-    return keypoints, calibration, turns
+        people = {id: turns.in_reference(keypoints) for id, keypoints in people.items()}
+    if args.camera or args.orthographic:
+        return next(iter(people.values())), None, turns
+    id, calibration = _calibrate(args, video, people)
+    return people[id], calibration, turns
 
 
-def _turns(args: argparse.Namespace, video: Video, keypoints: Keypoints) -> Turns | None:
+def _turns(args: argparse.Namespace, video: Video, people: dict[int, Keypoints]) -> Turns | None:
     """Find how the camera turns; None if it stands still."""
     from gait.camera.camera import Camera
     from gait.io.video import sample_frames
@@ -359,18 +361,18 @@ def _turns(args: argparse.Namespace, video: Video, keypoints: Keypoints) -> Turn
 
     given = Camera.read(args.camera, video.size, args.scale_camera) if args.camera else None
     camera = given or expected_camera(video, args.fov)
-    return find_turns(
-        video, camera, sample_frames(video), {0: keypoints}, None, args.quiet, first=given is not None
-    )
+    return find_turns(video, camera, sample_frames(video), people, None, args.quiet, first=given is not None)
 
 
-def _calibrate(args: argparse.Namespace, video: Video, keypoints: Keypoints) -> Calibration:
-    """Find the camera from the walk, and report it."""
+def _calibrate(
+    args: argparse.Namespace, video: Video, people: dict[int, Keypoints]
+) -> tuple[int, Calibration]:
+    """Find who walks and the camera from that walk, and report it."""
     from gait.track.walk_camera import calibrate_film, note_camera
 
-    found = calibrate_film(video, keypoints, _walking_model(args), args.height, args.fov, args.quiet)
+    id, found = calibrate_film(video, people, _walking_model(args), args.height, args.fov, args.quiet)
     note_camera(found, args.quiet)
-    return found
+    return id, found
 
 
 def _walking_model(args: argparse.Namespace) -> Model:
@@ -409,7 +411,7 @@ def _lift_pictures(args: argparse.Namespace) -> tuple[dict[str, Any], str]:
     from gait.lift import run as lift_run
     from gait.lift.keypoints.corrections import read_corrections
     from gait.lift.video import run as video_run
-    from gait.track.walk_camera import find_person
+    from gait.track.walk_camera import find_people
 
     if args.overlay:
         require_video_name(args.overlay)
@@ -419,7 +421,7 @@ def _lift_pictures(args: argparse.Namespace) -> tuple[dict[str, Any], str]:
         video = Video(args.input)
         if args.corrections:
             read_corrections(args.corrections, prior, video.count, size=video.size)
-        calibration = _calibrate(args, video, find_person(video, args.quiet))
+        calibration = _calibrate(args, video, find_people(video, args.quiet))[1]
     request = video_run.Request(
         video=args.input,
         placement=args.placement,

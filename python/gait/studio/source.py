@@ -35,7 +35,7 @@ from gait.studio.keypoint_lift import KeypointLift
 from gait.studio.picture_lift import PictureLift
 from gait.studio.shown import Lift
 from gait.track.from_walk import Calibration
-from gait.track.walk_camera import calibrate_film, find_person, note_camera
+from gait.track.walk_camera import calibrate_film, find_people, note_camera
 
 Floats = npt.NDArray[np.float64]
 
@@ -155,7 +155,7 @@ def _pictures(
     assert wanted.placement is not None
     calibration = None
     if wanted.height and not wanted.camera:
-        path = _detected(video, folder, quiet)
+        path = _detected(wanted, video, folder, quiet)
         keypoints, _ = keypoints_file.read(path, prior.names, ignore_unknown=True)
         calibration = _calibration(wanted, video, keypoints, quiet)
     request = video_run.Request(
@@ -178,7 +178,7 @@ def _calibration(wanted: Wanted, video: Video, keypoints: Keypoints, quiet: bool
     """Camera from the walk, where the stature is given and no camera."""
     if wanted.camera or not wanted.height:
         return None
-    found = calibrate_film(video, keypoints, Model(None), wanted.height, wanted.fov, quiet)
+    _, found = calibrate_film(video, {1: keypoints}, Model(None), wanted.height, wanted.fov, quiet)
     note_camera(found, quiet)
     return found
 
@@ -233,7 +233,7 @@ def _keypoints(
         rows = slice(*np.searchsorted(found.frame, [span.start, span.stop]))
         keypoints_file.write(path, found.part(rows))
     else:
-        path = _detected(video, folder, quiet, wanted.start or 0, wanted.stop)
+        path = _detected(wanted, video, folder, quiet, wanted.start or 0, wanted.stop)
     keypoints, _ = keypoints_file.read(path, prior.names, ignore_unknown=True)
     if note := keypoints.compare_times(path, video.times):
         raise UserError(f"{path}: {note}")
@@ -242,13 +242,24 @@ def _keypoints(
     return path, keypoints
 
 
-def _detected(video: Video, folder: Path, quiet: bool, start: int = 0, stop: int | None = None) -> str:
-    """File of the detector's keypoints in the frames from `start` to before `stop`."""
+def _detected(
+    wanted: Wanted, video: Video, folder: Path, quiet: bool, start: int = 0, stop: int | None = None
+) -> str:
+    """File of the detector's keypoints in the frames from `start` to before `stop`.
+
+    They are of the person whose walk gives the camera, if it is to be found.
+    """
+    height = None if wanted.camera else wanted.height
 
     def detect(target: Path) -> None:
-        keypoints_file.write(target, find_person(video, quiet, start, stop))
+        people = find_people(video, quiet, start, stop)
+        id = next(iter(people))
+        if height and len(people) > 1:
+            id, _ = calibrate_film(video, people, Model(None), height, wanted.fov, True)
+        keypoints_file.write(target, people[id])
 
-    return str(_kept(folder / "keypoints.csv", video, detect, start=start, stop=stop))
+    walks = int(height is not None)
+    return str(_kept(folder / "keypoints.csv", video, detect, start=start, stop=stop, walks=walks))
 
 
 def keypoints_of_track(path: str, camera: Camera) -> Keypoints:

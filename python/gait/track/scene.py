@@ -168,10 +168,7 @@ class Scene:
         motion = None if poses else _find_motion(options, video, camera, samples, people, given)
         calibration = None
         if camera is None:
-            keypoints = people.get(person)
-            if keypoints is not None and motion is not None:
-                keypoints = motion.in_reference(keypoints)
-            calibration = _calibrate(options, video, model, keypoints)
+            person, calibration = _calibrate(options, video, model, people, motion)
             camera = calibration.camera
         if motion is not None:
             poses = motion.poses(camera)
@@ -181,7 +178,8 @@ class Scene:
             panorama = panorama_of(samples, camera, poses, given) if wanted else None
             video, plate = MovingVideo(video, camera, poses, panorama), None
         if starts and people and not options.keypoints and options.init == "auto" and options.people is None:
-            person = _who_starts(options, people, person, camera, model, frames, poses)
+            if calibration is None:
+                person = _who_starts(options, people, person, camera, model, frames, poses)
             _require_feet(people[person], video)
         if options.keypoints:
             sure = {id: found.by_frame(options.keypoints_sd) for id, found in people.items()}
@@ -245,17 +243,22 @@ def _find_motion(
     return find_turns(video, camera, samples, people, given, options.quiet, first=first)
 
 
-def _calibrate(options: ClipOptions, video: Video, model: Model, keypoints: Keypoints | None) -> Calibration:
-    """Find the camera from the walk of the person with these keypoints."""
-    if keypoints is None:
+def _calibrate(
+    options: ClipOptions, video: Video, model: Model, people: dict[int, Keypoints], motion: Motion | None
+) -> tuple[int, Calibration]:
+    """Find the camera from a walk, and the id of the person who walks."""
+    if not people:
         remedy = (
             "leave out --detector none, or give --camera" if options.detector == "none" else weights.FETCH
         )
         raise UserError(f"{video.path}: without --camera keypoints of a walk are needed: {remedy}")
+    from gait.detect.people import by_size  # here, as it loads the networks' runtime
+
     assert options.height is not None
-    found = calibrate_film(video, keypoints, model, options.height, options.fov, options.quiet)
+    still = {id: people[id] if motion is None else motion.in_reference(people[id]) for id in by_size(people)}
+    person, found = calibrate_film(video, still, model, options.height, options.fov, options.quiet)
     note_camera(found, options.quiet)
-    return found
+    return person, found
 
 
 def first_state(options: ClipOptions, scene: Scene) -> Start:

@@ -2,8 +2,11 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
+
 from gait.bindings.model import Model
 from gait.camera.camera import Camera
+from gait.errors import UserError
 from gait.io import keypoints_file
 from gait.io.keypoints_file import Keypoints
 from gait.io.lens_tag import equivalent_mm, lens_tag, view_across
@@ -15,22 +18,24 @@ from gait.track.walk_start import GIVEN_FOV_SD, usual_camera
 _TAG_SD = 0.1  # of the focal length's logarithm; stabilised films are cropped by about as much
 
 
-def find_person(video: Video, quiet: bool, first: int = 0, stop: int | None = None) -> Keypoints:
-    """Find the keypoints of the main person of a film by the detector, as a file of them has them.
+def find_people(video: Video, quiet: bool, first: int = 0, stop: int | None = None) -> dict[int, Keypoints]:
+    """Find the keypoints of people in a film by the detector, as a file of them has them.
+
+    The person in view longest and tallest is the first.
 
     Raises
     ------
     UserError
         If the detector's weights are absent, or it finds no person.
     """
-    from gait.detect.people import detect, main_person, require_length, require_person  # loads the runtime
+    from gait.detect.people import by_size, detect, require_length, require_person  # loads the runtime
 
     require_length(video)
     note(video.broken or "", quiet or not video.broken)
     with progress("detecting", len(video.span(first, stop)), quiet) as update:
         people = detect(video, first=first, stop=stop, update=update)
     require_person(people, video)
-    return keypoints_file.as_filed(people[main_person(people)])
+    return {id: keypoints_file.as_filed(people[id]) for id in by_size(people)}
 
 
 def expected_fov(video: Video, fov: float | None, quiet: bool) -> tuple[float | None, float]:
@@ -74,28 +79,49 @@ def expected_camera(video: Video, fov: float | None) -> Camera:
 
 
 def calibrate_film(
-    video: Video, keypoints: Keypoints, model: Model, height: float, fov: float | None, quiet: bool
-) -> Calibration:
-    """Find the camera of a film from the keypoints of the person who walks in it.
+    video: Video,
+    people: Mapping[int, Keypoints],
+    model: Model,
+    height: float,
+    fov: float | None,
+    quiet: bool,
+) -> tuple[int, Calibration]:
+    """Find the camera of a film from the first of the people whose walk gives it.
 
     Parameters
     ----------
     video : Video
-    keypoints, model, height
-        As for `calibrate`.
+    people : mapping of int to Keypoints
+        By id, in the order in which they are tried.
+    model, height
+        As for `calibrate`; `height` is of the person who walks.
     fov, quiet
         As for `expected_fov`.
+
+    Returns
+    -------
+    id : int
+        Who walks.
+    found : Calibration
 
     Raises
     ------
     UserError
-        As `calibrate`, or if the feet are not in view; it names the file.
+        As `calibrate`, or if the feet are not in view, of the first person; it names the file.
     """
     from gait.detect.people import require_feet  # as above
 
-    require_feet(keypoints, video)
     fov, sd = expected_fov(video, fov, quiet)
-    return calibrate(keypoints, video.size, model, height, fov=fov, fov_sd=sd, where=str(video.path))
+    faults = []
+    for id, keypoints in people.items():
+        try:
+            require_feet(keypoints, video)
+            found = calibrate(keypoints, video.size, model, height, fov=fov, fov_sd=sd, where=str(video.path))
+        except UserError as fault:
+            faults.append(fault)
+        else:
+            return id, found
+    raise faults[0]
 
 
 def note_camera(found: Calibration, quiet: bool) -> None:
