@@ -39,7 +39,7 @@ class Clip:
         Frames in which the person walks in full view.
     fps, stature : float
     stride_hz : float or None
-        Counted in the pictures.
+        Counted in the pictures; of the strikes where only these were counted.
     strikes : list of (float, float)
         Frame of a heel strike in the pictures, and its phase: 0 right, 0.5 left.
     reference : dict of int to Points
@@ -92,6 +92,7 @@ def read_clips(folder: Path, names: list[str] | None) -> list[Clip]:
 def _read(path: Path) -> Clip:
     meta, folder = json.loads(path.read_text()), path.parent
     known = json.loads(_STRIKES.read_text()).get(folder.name, {"right": [], "left": []})
+    strikes = [(frame, phase) for side, phase in (("right", 0.0), ("left", 0.5)) for frame in known[side]]
     return Clip(
         folder,
         next(video for video in sorted(folder.iterdir()) if video.stem == "video"),
@@ -99,10 +100,16 @@ def _read(path: Path) -> Clip:
         last=meta["window"][1],
         fps=meta["fps"],
         stature=meta["stature_m"],
-        stride_hz=meta.get("stride_hz"),
-        strikes=[(frame, phase) for side, phase in (("right", 0.0), ("left", 0.5)) for frame in known[side]],
+        stride_hz=meta.get("stride_hz") or rate_of(strikes, meta["fps"]),
+        strikes=strikes,
         reference=_read_reference(folder / "reference2d.csv"),
     )
+
+
+def rate_of(strikes: list[tuple[float, float]], fps: float) -> float | None:
+    """Strides per second of heel strikes that follow each other, right and left in turn; None of too few."""
+    frames = sorted(frame for frame, _ in strikes)
+    return 0.5 * fps / float(np.polyfit(range(len(frames)), frames, 1)[0]) if len(frames) > 2 else None
 
 
 def _read_reference(path: Path) -> dict[int, Points]:

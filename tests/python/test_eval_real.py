@@ -57,6 +57,18 @@ def test_the_truth_is_good_and_on_time():
     assert score.error < 1e-6 and abs(score.stride_error) < 1e-6 and score.strike_error < 1e-3
 
 
+def test_a_rate_that_is_wrong_or_not_known_is_missed():
+    strikes = [(frame + side, 0.5 * (side > 0)) for frame in (4.0, 30.0, 56.0) for side in (0.0, 13.5)]
+    assert real_clip.rate_of(strikes, 26.0) == pytest.approx(1.0, rel=0.02)
+    assert real_clip.rate_of(strikes[:2], 26.0) is None
+    score = real_clip.score(clip(), track(), CAMERAS)
+    result = eval_real.Result("walk", "known", score, 1.0, 1.0)
+    assert not eval_real._missed([result], [result])
+    for error in (0.04, np.nan):
+        wrong = replace(result, score=replace(score, stride_error=error))
+        assert "stride rate" in eval_real._missed([wrong], [wrong])[0]
+
+
 def test_a_person_who_stands_at_first_has_no_rate_there():
     walk = track()
     late = [(frame, phase) for frame, phase in clip().strikes if frame > 20]
