@@ -13,7 +13,9 @@ import cv2
 import numpy as np
 
 from gait import Camera, Video
-from gait.io.track_file import Track
+from gait.io import keypoints_file
+from gait.io.track_file import Track, read_truth
+from gait.motion.footfalls import strikes_of
 from gait.report.drawing import draw_bones
 
 Points = dict[str, np.ndarray]
@@ -24,6 +26,7 @@ JOINTS = tuple(f"{side}_{joint}" for joint in ("shoulder", "elbow", "wrist") for
 KINDS = ("good", "swap", "legs", "off", "none")
 """Of a frame: all in place; left and right swapped; legs elsewhere; hips or legs far off; no row."""
 _GOOD, _HIPS, _LEGS = 0.09, 0.15, 0.20  # limits of good legs, of hips and legs far off, person's heights
+_EARS = 0.925  # height of the ears, person's heights
 _STRIKES = Path(__file__).parent / "real_strikes.json"
 _TILES, _TILE = 8, 300  # of a contact sheet; pixels
 
@@ -112,6 +115,38 @@ def rate_of(strikes: list[tuple[float, float]], fps: float) -> float | None:
     return 0.5 * fps / float(np.polyfit(range(len(frames)), frames, 1)[0]) if len(frames) > 2 else None
 
 
+def from_truth(folder: Path) -> Clip:
+    """Give a clip of `gait simulate`, or one like it, with the true joints as the reference.
+
+    Frames with a joint outside of the picture do not count.
+    """
+    meta, truth = json.loads((folder / "meta.json").read_text()), read_truth(folder / "truth.csv")
+    names = (*JOINTS, "l_heel", "r_heel", "head_top")
+    true, _ = keypoints_file.read(folder / "truth.csv", names, ignore_unknown=True)
+    inside = ((true.uv >= 0) & (true.uv < (meta["width"], meta["height"]))).all(axis=(1, 2))
+    reference = {}
+    for frame, uv in zip(true.frame[inside].tolist(), true.uv[inside], strict=True):
+        points = dict(zip(true.names, uv, strict=True))
+        heels = max(points["l_heel"][1], points["r_heel"][1])
+        crown = points.pop("head_top")
+        ear = np.array([crown[0], heels - _EARS * (heels - crown[1])])
+        reference[frame] = points | {"l_ear": ear, "r_ear": ear}
+    known = strikes_of(truth, folder / "meta.json")
+    feet = ((known.right, 0.0), (known.left, 0.5))
+    strikes = [(float(frame), phase) for frames, phase in feet for frame in frames]
+    return Clip(
+        folder,
+        folder / "video.mp4",
+        first=min(reference),
+        last=max(reference),
+        fps=meta["fps"],
+        stature=meta.get("stature_m") or meta["limb_lengths_m"]["stature"],
+        stride_hz=rate_of(strikes, meta["fps"]),
+        strikes=strikes,
+        reference=reference,
+    )
+
+
 def _read_reference(path: Path) -> dict[int, Points]:
     found = {}
     for row in csv.DictReader(path.open()):
@@ -163,7 +198,7 @@ def score(clip: Clip, track: Track, cameras: Mapping[int, Camera]) -> Score:
 def _verdict(points: Points, reference: Points) -> tuple[str, float]:
     """Kind of a frame, of KINDS, and the median error of its joints, person's heights."""
     ears = np.mean([reference[ear][1] for ear in ("l_ear", "r_ear") if ear in reference])
-    size = abs(max(reference[heel][1] for heel in ("l_heel", "r_heel") if heel in reference) - ears) / 0.925
+    size = abs(max(reference[heel][1] for heel in ("l_heel", "r_heel") if heel in reference) - ears) / _EARS
     if any(joint not in points for joint in HIPS + LEGS):
         return "off", 9.0
 

@@ -1,0 +1,126 @@
+#!/usr/bin/env python3
+"""Status of the track of people who walk in unusual ways, with all defaults: what a newcomer types.
+
+    eval_status.py [--seeds 0,100] [--only NAME...] [--record]
+
+`gait track VIDEO --camera CAMERA -o OUT`, the detector on, of clips that `gait simulate` makes and of the
+development clip of a person who comes towards a long lens.  Each preset is made with its own seed plus each
+of --seeds.  Clips are kept in build/eval-status.
+"""
+
+from __future__ import annotations
+
+import argparse
+import sys
+from collections import Counter
+from dataclasses import replace
+from pathlib import Path
+
+import eval_clips
+import numpy as np
+import table
+from eval_real import OUT, run
+from facts import facts
+from real_clip import Clip, from_truth
+
+from gait.body.skeleton import EVAL15
+from gait.io.track_file import Track, read_estimates, read_truth
+from gait.motion.evaluate import root_errors
+from gait.progress import progress
+from gait.simulate.clip import simulate
+from gait.simulate.scenario import PRESETS
+
+FOLDER = Path(__file__).resolve().parents[2] / "build" / "eval-status"
+NAMES = ("toward", "backwards", "limping", "stick", "crutches", "stopping", "standing")
+FAR = "toward300_08"
+STATUSES = ("tracking", "ambiguous", "init", "lost")
+_READING = """\
+`gait track` with the camera alone, detector on, all else default, of clips of `gait simulate --preset` and of
+a development clip. Shares of the frames in which all joints are in the picture. good: knees and ankles within
+9 % of the person's height on average in the picture, hips in place; swap, off: left and right swapped; hips
+or legs elsewhere. wrong: of the frames under `tracking`, those that are not good. Root-aligned and absolute
+error of 15 joints in space, and of the heading: medians over the frames under `tracking`."""
+
+
+def main() -> int:
+    """Make, track, print; always 0: the page reports."""
+    parser = argparse.ArgumentParser(
+        description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
+    )
+    parser.add_argument("--seeds", default="0,100", help="added to that of each preset (default: 0,100)")
+    parser.add_argument("--only", nargs="+", metavar="NAME", help="presets, or the development clip (all)")
+    parser.add_argument("--record", action="store_true")
+    args = parser.parse_args()
+    folders = [made(name, int(more)) for name in args.only or NAMES if name != FAR
+               for more in args.seeds.split(",")]  # fmt: skip
+    far = eval_clips.DATA / "eval" / "dev" / FAR
+    if far.is_dir() and FAR in (args.only or (FAR,)):
+        folders.append(far)
+    rows = []
+    with progress("eval-status", len(folders)) as update:
+        for done, folder in enumerate(folders, 1):
+            rows.append(_row(from_truth(folder)))
+            update(done)
+    head = ["clip", *(f"{status} %" for status in STATUSES), "good %", "swap %", "off %", "wrong %",
+            "root mm", "abs mm", "heading deg", "stride rate %", "failed"]  # fmt: skip
+    note = f"{facts('tests/bench/eval_status.py')}\n\n{_READING}"
+    if args.record:
+        table.publish("eval_status", "Status of unusual walks", head, rows, note)
+    else:
+        table.show("Status of unusual walks", head, rows)
+    return 0
+
+
+def made(name: str, more: int) -> Path:
+    """Folder of a preset's clip by another seed, which is made unless it is there."""
+    scenario = replace(PRESETS[name], seed=PRESETS[name].seed + more)
+    folder = FOLDER / f"{name}_{scenario.seed}"
+    if not (folder / "meta.json").is_file():
+        simulate(scenario, folder)
+    return folder
+
+
+def _row(clip: Clip) -> list[object]:
+    """Track a clip and give its row."""
+    name, found = clip.folder.name, run(clip, "auto", [])
+    if found.failed:
+        return [name, *[None] * (len(STATUSES) + 8), found.failed]
+    track = read_estimates(OUT / f"{name}_auto.csv")
+    status = Counter(one for one, frame in zip(track.status, track.frame, strict=True)
+                     if int(frame) in clip.reference)  # fmt: skip
+    score = found.score
+    return [
+        name,
+        *(round(100 * status[one] / len(clip.reference)) for one in STATUSES),
+        *(round(100 * score.share[kind]) for kind in ("good", "swap", "off")),
+        100 * score.wrong / score.tracking if score.tracking else None,
+        *_errors(clip, track),
+        100 * score.stride_error,
+        "",
+    ]
+
+
+def _errors(clip: Clip, track: Track) -> list[float | None]:
+    """Median root-aligned and absolute error, mm, and error of the heading, degrees, under `tracking`."""
+    truth = read_truth(clip.folder / "truth.csv")
+    rows = np.array([status == "tracking" for status in track.status])
+    rows &= np.isin(track.frame, list(clip.reference))
+    if not rows.any():
+        return [None] * 3
+    true_rows = np.searchsorted(truth.frame, track.frame[rows])
+    found, true = (
+        np.stack([joints.places[name][at] for name in EVAL15], axis=1)
+        for joints, at in ((track, rows), (truth, true_rows))
+    )
+    across, true_across = (
+        joints[:, EVAL15.index("r_hip"), :2] - joints[:, EVAL15.index("l_hip"), :2]
+        for joints in (found, true)
+    )
+    turn = np.arctan2(*across.T) - np.arctan2(*true_across.T)
+    apart = 1000 * np.linalg.norm(found - true, axis=2).mean(axis=1)
+    off = np.degrees(np.abs(np.angle(np.exp(1j * turn))))
+    return [float(np.median(values)) for values in (root_errors(found, true), apart, off)]
+
+
+if __name__ == "__main__":
+    sys.exit(main())
