@@ -1,0 +1,120 @@
+#!/usr/bin/env python3
+"""Tracks of real films, and of simulated cameras that move, with and without `--stabilize auto`.
+
+    eval_stabilize.py [--only NAME...] [--record]
+
+never: --stabilize off; moving: --stabilize auto, which leaves alone what stands still; always: the same,
+told that every camera moves.  Where auto finds that the camera stands still it is the same as never, and is
+not run; where it finds that it moves, always is the same as moving.  Clips of `gait simulate` are kept in
+build/eval-stabilize.
+"""
+
+from __future__ import annotations
+
+import argparse
+import sys
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import table
+from eval_real import OUT, Result, run
+from facts import facts
+from real_clip import Clip, from_truth, read_cameras, read_clips, score
+
+from gait import Camera, Video
+from gait.io.track_file import read_estimates
+from gait.progress import progress
+from gait.simulate.clip import simulate
+from gait.simulate.scenario import PRESETS
+
+ROOT = Path(__file__).resolve().parents[2]
+FOLDER = ROOT / "build" / "eval-stabilize"
+SIMULATED = [(preset, moving) for preset in ("demo", "oblique") for moving in ("pan", "shake")]
+AUTO = ["--stabilize", "auto"]
+ALWAYS = (
+    "-c",
+    "import sys; from gait.cli import main; from gait.track import stabilise; "
+    "stabilise._still = lambda *_: False; sys.exit(main(sys.argv[1:]))",
+)
+_READING = """\
+The arm `auto` of `make eval-real` (camera given, detector on). never, moving, always: --stabilize off; auto;
+auto, told that every camera moves. good, wrong under `tracking`: as there, joints in the picture by the
+camera of each frame. one camera: good frames if the joints are drawn by the one camera that was given, as a
+program does that knows no other. Clips of which auto finds that the camera stands still have the same track
+by it as by off. Simulated: `gait simulate --preset P --moving KIND`."""
+
+
+def main() -> int:
+    """Run, print, and publish if asked to."""
+    parser = argparse.ArgumentParser(
+        description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
+    )
+    parser.add_argument("--only", nargs="+", metavar="NAME", help="names of clips (all)")
+    parser.add_argument("--record", action="store_true")
+    args = parser.parse_args()
+    clips = read_clips(ROOT.parent / "shared/data/real", None)
+    clips += [from_truth(_made(*names)) for names in SIMULATED]
+    clips = [clip for clip in clips if not args.only or clip.folder.name in args.only]
+    rows: list[list[object]] = []
+    with progress("eval-stabilize", len(clips)) as update:
+        for done, clip in enumerate(clips, 1):
+            rows += _rows(clip)
+            update(done)
+    for kind in dict.fromkeys(tuple(row[1:3]) for row in rows):
+        same = [row[3:-1] for row in rows if tuple(row[1:3]) == kind and not row[-1]]
+        rows.append(["mean", *kind, *np.nanmean(np.array(same, float), axis=0).tolist(), ""])
+    head = ["clip", "camera", "stabilised", "good %", "one camera, good %", "tracking", "wrong",
+            "error % of height", "stride rate %", "CPU s", "failed"]  # fmt: skip
+    note = f"{facts('tests/bench/eval_stabilize.py')}\n\n{_READING}"
+    if args.record:
+        table.publish("eval_stabilize", "Stabilising", head, rows, note)
+    else:
+        table.show("Stabilising", head, rows)
+    return 0
+
+
+def _made(preset: str, moving: str) -> Path:
+    """Folder of a simulated clip, which is made unless it is there."""
+    folder = FOLDER / f"{preset}_{moving}"
+    if not (folder / "meta.json").is_file():
+        simulate(replace(PRESETS[preset], moving=moving), folder)
+    return folder
+
+
+def _rows(clip: Clip) -> list[list[object]]:
+    """Rows of a clip: as it is, and stabilised."""
+    auto = _row(clip, "moving", run(clip, "auto", AUTO))
+    cameras = _cameras(clip)
+    if len({camera.R.tobytes() for camera in cameras.values()}) > 1:
+        return [_row(clip, "never", run(clip, "auto", [])), auto]
+    auto[1:3] = "still", "never, moving"
+    always = _row(clip, "always", run(clip, "auto", AUTO, ALWAYS))
+    always[1] = "still"
+    return [auto, always]
+
+
+def _row(clip: Clip, arm: str, found: Result) -> list[object]:
+    """Cells of a run on a clip whose camera moves."""
+    own, one = found.score, 0.0
+    if not found.failed:
+        track, given = read_estimates(OUT / f"{clip.folder.name}_auto.csv"), _given(clip)
+        one = score(clip, track, dict.fromkeys(track.frame.tolist(), given)).share["good"]
+    return [
+        *(clip.folder.name, "moves", arm, 100 * own.share["good"], 100 * one, own.tracking, own.wrong),
+        *(100 * own.error, 100 * own.stride_error, found.cpu, found.failed),
+    ]
+
+
+def _given(clip: Clip) -> Camera:
+    """Camera that the command gets."""
+    return Camera.read(str(clip.folder / "camera.json"), Video(clip.video).size)
+
+
+def _cameras(clip: Clip) -> dict[int, Camera]:
+    """Camera of each frame as the last run found it."""
+    return read_cameras(OUT / f"{clip.folder.name}_auto_cameras.csv", _given(clip))
+
+
+if __name__ == "__main__":
+    sys.exit(main())
