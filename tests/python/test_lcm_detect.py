@@ -19,6 +19,7 @@ from gait.io.keypoints_file import Keypoints
 from gait.lcm import detect
 from gait.lcm.link import gaitmsg, private_url
 from gait.lcm.messages import camera_message, command_message, image_message
+from gait.track.keypoint_start import keypoint_noise
 
 UV = np.random.default_rng(1).uniform(100, 300, (len(JOINTS), 2))
 CONFIDENCE = np.linspace(0.3, 1, len(JOINTS))
@@ -57,7 +58,7 @@ def rigged(monkeypatch):
             assert count == 1  # the newest frame
 
         def publish(self, channel, data):
-            sent.append((channel, gaitmsg.tracks_t.decode(data)))
+            sent.append((channel, gaitmsg.tracks2_t.decode(data)))
 
     link = Link()
     monkeypatch.setattr(detect, "PeopleDetector", FakePeople)
@@ -96,8 +97,14 @@ def test_joints_are_the_models_of_the_person_in_view_longest(rigged):
     raw = Keypoints(np.zeros(1, int), np.zeros(1), tuple(JOINTS), UV[None], CONFIDENCE[None])
     tracks = next(message for channel, message in reversed(sent) if channel == "GAIT_TRACKS_3").tracks
     assert [t.name for t in tracks] == list(JOINTS)
-    np.testing.assert_allclose([(t.u, t.v) for t in tracks], profile.corrected(raw, "full").uv[0], atol=1e-3)
+    found = profile.corrected(raw, "full")
+    np.testing.assert_allclose([(t.u, t.v) for t in tracks], found.uv[0], atol=1e-3)
     np.testing.assert_allclose([t.confidence for t in tracks], CONFIDENCE, atol=1e-6)
+    # The doubt of gait track and gait lift, which read the same keypoints from a film.
+    np.testing.assert_allclose([t.sd for t in tracks], keypoint_noise(found)[0].sd, rtol=1e-6)
+    np.testing.assert_allclose([t.lasting_sd for t in tracks], found.lasting_sd[0], rtol=1e-6)
+    of_joint = [profile.load("full").joint(name).correlation_s for name in JOINTS]
+    np.testing.assert_allclose([t.correlation for t in tracks], of_joint, rtol=1e-6)
 
 
 def test_the_tracker_uses_the_joints_of_every_second_frame(tmp_path, monkeypatch):

@@ -55,10 +55,24 @@ def observations() -> list[tuple[int, np.ndarray, np.ndarray]]:
     return found
 
 
-def events(start: int = 0) -> list[rig.Event]:
+def errors() -> np.ndarray:
+    """Errors that a detector states: all and lasting, pixels, and correlation, seconds."""
+    return np.random.default_rng(9).uniform([2, 1, 0], [3, 1.5, 0.1], (NAMES_SHOWN, 3)).astype(np.float32)
+
+
+def independent_sd(since: float) -> np.ndarray:
+    """Standard deviations of `errors`, `since` seconds after the frame before; 0: the first frame."""
+    sd, lasting, correlation = errors().astype(float).T
+    if not since:
+        return sd
+    return np.sqrt(lasting * lasting + np.maximum(correlation / since, 1.0) * (sd * sd - lasting * lasting))
+
+
+def events(start: int = 0, stated: bool = False) -> list[rig.Event]:
     names = model()[1][:NAMES_SHOWN]
+    known = errors() if stated else None
     tracks = [
-        ("GAIT_TRACKS_0", tracks_message(names, uv, utime, 100 + i, confidence))
+        ("GAIT_TRACKS_0", tracks_message(names, uv, utime, 100 + i, confidence, errors=known))
         for i, (utime, uv, confidence) in enumerate(observations())
     ]
     return [("GAIT_CAMERA_0", camera_message(CAMERA, rig.utime(0))), *tracks[start:]]
@@ -72,8 +86,9 @@ def lift(tmp_path: Path, happenings: list[rig.Event], *options: object) -> tuple
     return outcome, rig.read_log(log.with_suffix(".out"), "GAIT_LIFT", gaitmsg.estimate_t)
 
 
-def test_joints_are_those_of_the_library(tmp_path: Path) -> None:
-    outcome, lifted = lift(tmp_path, events())
+@pytest.mark.parametrize("stated", [False, True], ids=["by confidence", "stated errors"])
+def test_joints_are_those_of_the_library(tmp_path: Path, stated: bool) -> None:
+    outcome, lifted = lift(tmp_path, events(stated=stated))
     lifter = Lifter(model()[0], camera(), LiftConfig.default(lag=LAG, sd=SD))
     assert len(lifted) == FRAMES - LAG
     assert f"lift_frames {FRAMES} lifted {FRAMES - LAG} lift_rejected 0" in outcome.printed
@@ -83,6 +98,8 @@ def test_joints_are_those_of_the_library(tmp_path: Path) -> None:
         pixels, sd = np.full((19, 2), np.nan), np.full(19, np.inf)
         pixels[:NAMES_SHOWN] = uv.astype(np.float32)
         sd[:NAMES_SHOWN] = SD / confidence.astype(np.float32).astype(float)
+        if stated:
+            sd[:NAMES_SHOWN] = independent_sd(1e-6 * (rig.utime(i) - rig.utime(i - 1)) if i else 0.0)
         lifter.push(utime, pixels, sd)
         want = lifter.estimate()
         assert (want is None) == (i < LAG)

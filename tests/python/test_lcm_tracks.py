@@ -43,6 +43,12 @@ def tracks(frame: int, names: list[str] | None = None) -> rig.Event:
     return "GAIT_TRACKS_0", tracks_message(names, uv[order], rig.utime(frame), frame, confidence[order])
 
 
+def errors(frame: int) -> np.ndarray:
+    """Errors that a detector states: all and lasting, pixels, and correlation, seconds."""
+    rng = np.random.default_rng(100 + frame)
+    return rng.uniform([0.5, 0.1, 0.0], [3.0, 0.4, 2.0], (len(rig.model().joint_names), 3))
+
+
 def play(tmp_path: Path, events: list[rig.Event], *options: object) -> tuple[rig.Outcome, tuple[int, ...]]:
     """Track a log with the term; also how many tracks came, were used and were late."""
     log = rig.write_log(tmp_path / "a.log", [*rig.opening(), *events])
@@ -63,8 +69,8 @@ def as_in_messages(camera: rig.Camera) -> rig.Camera:
     )
 
 
-def by_python() -> str:
-    """Digest of the library that is given the same."""
+def by_python(stated: bool = False) -> str:
+    """Digest of the library that is given the same; `stated`: the errors of `errors`."""
     terms = TrackerConfig.default().terms | Term.KEYPOINTS
     tracker = Tracker(
         rig.model(),
@@ -75,7 +81,7 @@ def by_python() -> str:
     tracker.start(rig.person(0), rig.SD, rig.utime(0))
     for i in range(FRAMES):
         uv, confidence = found(i)
-        sd = SD / confidence.astype(float)
+        sd = errors(i)[:, 0] if stated else SD / confidence.astype(float)
         tracker.step(rig.picture(i), rig.utime(i), FrameKeypoints(rig.model().joint_names, uv, sd))
     return f"{tracker.digest():016x}"
 
@@ -88,6 +94,19 @@ def test_joints_are_those_of_their_frame_whichever_comes_first(tmp_path: Path) -
     before, _ = play(tmp_path, [event for i in range(FRAMES) for event in (tracks(i), image(i))])
     mixed, _ = play(tmp_path, [*each(0, 7), tracks(8), image(7), tracks(7), image(8), *each(9)])
     assert before.digest == after.digest == mixed.digest
+
+
+def test_errors_that_a_detector_states_count_as_in_a_film(tmp_path: Path) -> None:
+    events = []
+    for i in range(FRAMES):
+        uv, confidence = found(i)
+        message = tracks_message(rig.model().joint_names, uv, rig.utime(i), i, confidence, errors=errors(i))
+        events += [image(i), ("GAIT_TRACKS_0", message)]
+    outcome, printed = play(tmp_path, events)
+    assert printed == (FRAMES, FRAMES, 0) and outcome.digest == by_python(stated=True)
+    events[9][1].tracks[3].sd = float("nan")
+    outcome, printed = play(tmp_path, events)
+    assert "or a standard deviation is wrong" in outcome.words and printed == (FRAMES, FRAMES, 0)
 
 
 def test_they_help_and_are_not_read_without_the_option(tmp_path: Path) -> None:

@@ -41,6 +41,8 @@ FINGERPRINTS = {
     "status_t": "a0ea033100bad162",
     "track_t": "3bf4b97187897236",
     "tracks_t": "e04dceb9e672c2c6",
+    "track2_t": "a63f4541a8505f8b",
+    "tracks2_t": "b4e2e65a28009d71",
 }
 
 

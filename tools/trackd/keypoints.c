@@ -1,18 +1,26 @@
 #include "keypoints.h"
 
+#include "gaitmsg_tracks2_t.h"
 #include "gaitmsg_tracks_t.h"
 
+#include <math.h>
 #include <string.h>
 
 /* ---- messages ---- */
 #define LEAST_CONFIDENCE 0.1f /* keypoints below it count as not seen, as in keypoint files */
 
-static bool read_keypoint(byte_reader *r, keypoint_view *out)
+static bool read_keypoint(byte_reader *r, bool profiled, keypoint_view *out)
 {
+    *out = (keypoint_view){.sd = -1.0f};
     out->name = bytes_text(r);
     out->u = bytes_float(r);
     out->v = bytes_float(r);
     out->confidence = bytes_float(r);
+    if (profiled) {
+        out->sd = bytes_float(r);
+        out->lasting_sd = bytes_float(r);
+        out->correlation = bytes_float(r);
+    }
     return r->ok;
 }
 
@@ -20,25 +28,39 @@ bool keypoints_view_open(keypoints_view *v, const void *message_bytes, size_t si
 {
     byte_reader r = {.at = message_bytes, .left = size, .ok = true};
     keypoint_view each;
-    if (bytes_int(&r, 8) != __gaitmsg_tracks_t_get_hash())
-        return message_set(why, "not a gaitmsg.tracks_t (another type or version)");
+    int64_t const type = bytes_int(&r, 8);
+    v->profiled = type == __gaitmsg_tracks2_t_get_hash();
+    if (!v->profiled && type != __gaitmsg_tracks_t_get_hash())
+        return message_set(why, "not a gaitmsg.tracks_t or tracks2_t (another type or version)");
     v->utime = bytes_int(&r, 8);
     v->frame = bytes_int(&r, 8);
     v->count = bytes_int32(&r);
     v->rest = r;
     for (int32_t i = 0; r.ok && i < v->count; i++)
-        read_keypoint(&r, &each);
+        read_keypoint(&r, v->profiled, &each);
     return (r.ok && v->count >= 0) || message_set(why, "damaged message: shorter than its lengths state");
 }
 
 bool keypoints_view_next(keypoints_view *v, keypoint_view *out)
 {
-    return v->count-- > 0 && read_keypoint(&v->rest, out);
+    return v->count-- > 0 && read_keypoint(&v->rest, v->profiled, out);
 }
 
 double keypoints_view_sd(const keypoint_view *k, double sd)
 {
-    return k->confidence >= LEAST_CONFIDENCE ? sd / (double)k->confidence : -1.0;
+    if (k->confidence < LEAST_CONFIDENCE)
+        return -1.0;
+    return k->sd >= 0.0f ? (double)k->sd : sd / (double)k->confidence;
+}
+
+double keypoints_view_independent_sd(const keypoint_view *k, double sd, double step)
+{
+    double const all = keypoints_view_sd(k, sd);
+    if (all < 0.0 || k->sd < 0.0f || step <= 0.0)
+        return all;
+    double const lasting = fmin((double)k->lasting_sd, all);
+    double const changing = fmax((double)k->correlation / step, 1.0) * (all * all - lasting * lasting);
+    return sqrt(lasting * lasting + changing);
 }
 
 void keypoints_filter_begin(keypoints_filter *f)
@@ -48,9 +70,13 @@ void keypoints_filter_begin(keypoints_filter *f)
 
 bool keypoints_filter_pass(keypoints_filter *f, const keypoint_view *k, int32_t joint)
 {
-    static const char *const reason[] = {"the model does not know it", "its message names it twice",
-                                         "its confidence is not from 0 to 1"};
-    bool const valid = k->confidence >= 0.0f && k->confidence <= 1.0f; /* false for NaN */
+    static const char *const reason[] = {
+        "the model does not know it", "its message names it twice",
+        "its confidence is not from 0 to 1, or a standard deviation is wrong"};
+    bool valid = k->confidence >= 0.0f && k->confidence <= 1.0f; /* false for NaN */
+    if (k->sd != -1.0f && k->confidence >= LEAST_CONFIDENCE)
+        valid = valid && k->sd > 0.0f && k->lasting_sd >= 0.0f && k->correlation >= 0.0f &&
+                isfinite(k->sd + k->lasting_sd + k->correlation);
     int const why = joint < 0 ? 0 : f->named[joint] ? 1 : !valid ? 2 : -1;
     if (joint >= 0)
         f->named[joint] = true;

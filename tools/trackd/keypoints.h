@@ -1,4 +1,4 @@
-/* keypoints.h - 2-D keypoints of a detector: read from an encoded gaitmsg.tracks_t, and used as a term of the likelihood. */
+/* keypoints.h - 2-D keypoints of a detector: read from an encoded gaitmsg.tracks_t or tracks2_t, and used as a term of the likelihood. */
 #ifndef TRACKD_KEYPOINTS_H
 #define TRACKD_KEYPOINTS_H
 #include "byte_reader.h"
@@ -10,12 +10,14 @@
 typedef struct keypoints_view {
     int64_t utime, frame;
     int32_t count;
+    bool profiled;    /* the message states the errors of each */
     byte_reader rest; /* keypoints not yet read */
 } keypoints_view;
 
 typedef struct keypoint_view {
     const char *name; /* in the message */
     float u, v, confidence;
+    float sd, lasting_sd, correlation; /* as in track2_t; sd -1: not stated */
 } keypoint_view;
 
 /* Checks keypoints: a model takes those it knows, each once per message, with a confidence from 0 to 1. */
@@ -34,8 +36,10 @@ bool keypoints_filter_pass(keypoints_filter *f, const keypoint_view *k, int32_t 
 bool keypoints_view_open(keypoints_view *v, const void *message_bytes, size_t size, message *why);
 /* The next keypoint; false: there are no more. */
 bool keypoints_view_next(keypoints_view *v, keypoint_view *out);
-/* Standard deviation of a keypoint, pixels; sd: that of one with confidence 1.  -1: not seen. */
+/* Standard deviation of a keypoint, pixels: as stated or, from `sd`, by its confidence.  -1: not seen. */
 double keypoints_view_sd(const keypoint_view *k, double sd);
+/* The same so large that frames `step` seconds apart count as independent, but for what lasts; 0: no frame before. */
+double keypoints_view_independent_sd(const keypoint_view *k, double sd, double step);
 /* Report, as false, that no keypoint of a message is known. */
 bool keypoints_view_unknown(message *why);
 

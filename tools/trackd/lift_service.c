@@ -67,6 +67,7 @@ static int32_t take(lift_service *s, keypoints_view *v)
 {
     keypoint_view k;
     int32_t known = 0;
+    double const step = s->last < 0 ? 0.0 : 1e-6 * (double)(v->utime - s->last);
     for (int32_t j = 0; j < s->info.markers; j++)
         s->sd[j] = -1.0;
     keypoints_filter_begin(&s->filter);
@@ -77,7 +78,7 @@ static int32_t take(lift_service *s, keypoints_view *v)
             continue;
         s->uv[2 * j] = (double)k.u;
         s->uv[2 * j + 1] = (double)k.v;
-        s->sd[j] = keypoints_view_sd(&k, s->config.sd);
+        s->sd[j] = keypoints_view_independent_sd(&k, s->config.sd, step);
     }
     return known;
 }

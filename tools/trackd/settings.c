@@ -171,7 +171,7 @@ static int make_table(settings *s, option *table)
          FLAG(keypoints_term)},
         {"keypoints-sd", 0, "PX",
          "standard deviation of a keypoint with confidence 1, including how the detector's joints differ\n"
-         "        from the model's, default 4 pixels",
+         "        from the model's, default 4 pixels; not for messages that state it (tracks2_t)",
          OPTION_FLOAT, &s->keypoints_sd, 0.01, 1000},
         {"moving-camera", 0, "",
          "the camera moves: GAIT_CAMERA_<i> has its pose at the time of each message, between which it is\n"
@@ -189,7 +189,7 @@ static int make_table(settings *s, option *table)
         {"lift-stature", 0, "M",
          "stature of the person to lift, default the mean of the training set, metres", OPTION_FLOAT,
          &s->lift_stature, 0.5, 2.5},
-        {"lift-sd", 0, "PX", "standard deviation of a keypoint with confidence 1, default 3 pixels",
+        {"lift-sd", 0, "PX", "standard deviation of a keypoint with confidence 1, default 3 pixels; likewise",
          OPTION_FLOAT, &s->lift_sd, 0.01, 1000},
         {"lift-lag", 0, "N", "frames by which GAIT_LIFT is delayed, default 5", INT(lift_lag, 0, 64)},
         {"version", 0, "", "print the version and whether JPEG frames are supported", FLAG(version)},

@@ -122,5 +122,9 @@ class LiveDetector:
         last = one.keypoints[-1]
         frame, time = np.array(one.frames[-1:]), np.array(one.times[-1:])
         raw = Keypoints(frame, time, tuple(JOINTS), last.uv[None], last.confidence[None])
-        uv = profile.corrected(raw, self._network).uv[0]
-        return tracks_message(list(JOINTS), uv, image.utime, frame_number(image), last.confidence)
+        found = profile.corrected(raw, self._network)
+        assert found.frame_sd is not None and found.lasting_sd is not None
+        correlation = profile.changing_sd(raw, self._network)[1]
+        errors = np.stack([found.frame_sd[0], found.lasting_sd[0], correlation], axis=1)
+        number = frame_number(image)
+        return tracks_message(list(JOINTS), found.uv[0], image.utime, number, last.confidence, errors=errors)

@@ -108,9 +108,17 @@ def frame_number(image: Any) -> int:
 
 
 def tracks_message(
-    names: Sequence[str], uv: ArrayLike, utime: int, frame: int = -1, confidence: ArrayLike = 1.0
+    names: Sequence[str],
+    uv: ArrayLike,
+    utime: int,
+    frame: int = -1,
+    confidence: ArrayLike = 1.0,
+    *,
+    errors: ArrayLike | None = None,
 ) -> Any:
     """Make a ``tracks_t``, joints located in one picture, from any detector's points.
+
+    With `errors` it is a ``tracks2_t``, which states them.
 
     Parameters
     ----------
@@ -124,16 +132,22 @@ def tracks_message(
         Its running number at the source; negative: none.
     confidence : array_like that broadcasts to (J,)
         From 0, not seen, to 1.
+    errors : array_like of shape (J, 3), optional
+        Standard deviation of all errors of the picture and of the part of them that lasts, pixels; seconds
+        in which the rest counts as one observation.
     """
     points = np.asarray(uv, float)
     visible = np.isfinite(points).all(axis=1)
     confidences = np.where(visible, np.broadcast_to(confidence, len(points)), 0.0)
-    message = gaitmsg.tracks_t()
+    message = gaitmsg.tracks_t() if errors is None else gaitmsg.tracks2_t()
     message.utime, message.frame, message.ntracks = utime, frame, len(points)
     for name, (u, v), c in zip(names, np.where(visible[:, None], points, 0.0), confidences, strict=True):
-        track = gaitmsg.track_t()
+        track = gaitmsg.track_t() if errors is None else gaitmsg.track2_t()
         track.name, track.u, track.v, track.confidence = name, float(u), float(v), float(c)
         message.tracks.append(track)
+    if errors is not None:
+        for track, (sd, lasting, correlation) in zip(message.tracks, np.asarray(errors, float), strict=True):
+            track.sd, track.lasting_sd, track.correlation = float(sd), float(lasting), float(correlation)
     return message
 
 
