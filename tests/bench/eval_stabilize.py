@@ -4,7 +4,7 @@
     eval_stabilize.py [--only NAME...] [--record]
 
 never: --stabilize off; moving: --stabilize auto, which leaves alone what stands still; always: the same,
-told that every camera moves.  Where auto finds that the camera stands still it is the same as never, and is
+with every camera taken to move.  Where auto finds that the camera stands still it is the same as never, and is
 not run; where it finds that it moves, always is the same as moving.  Clips of `gait simulate` are kept in
 build/eval-stabilize.
 """
@@ -39,7 +39,7 @@ ALWAYS = (
 )
 _READING = """\
 The arm `auto` of `make eval-real` (camera given, detector on). never, moving, always: --stabilize off; auto;
-auto, told that every camera moves. good, wrong under `tracking`: as there, joints in the picture by the
+auto, with every camera taken to move. good, wrong under `tracking`: as there, joints in the picture by the
 camera of each frame. one camera: good frames if the joints are drawn by the one camera that was given, as a
 program does that knows no other. Clips of which auto finds that the camera stands still have the same track
 by it as by off. Simulated: `gait simulate --preset P --moving KIND`."""

@@ -100,7 +100,7 @@ def test_joints_are_the_models_of_the_person_in_view_longest(rigged):
     found = profile.corrected(raw, "full")
     np.testing.assert_allclose([(t.u, t.v) for t in tracks], found.uv[0], atol=1e-3)
     np.testing.assert_allclose([t.confidence for t in tracks], CONFIDENCE, atol=1e-6)
-    # The doubt of gait track and gait lift, which read the same keypoints from a film.
+    # Errors as in gait track and gait lift, which read the same keypoints from a film.
     np.testing.assert_allclose([t.sd for t in tracks], keypoint_noise(found)[0].sd, rtol=1e-6)
     np.testing.assert_allclose([t.lasting_sd for t in tracks], found.lasting_sd[0], rtol=1e-6)
     of_joint = [profile.load("full").joint(name).correlation_s for name in JOINTS]
