@@ -4,8 +4,8 @@
     eval_stabilize.py [--only NAME...] [--record]
 
 never: --stabilize off; moving: --stabilize auto, which leaves alone what stands still; always: the same,
-with every camera taken to move.  Where auto finds that the camera stands still it is the same as never, and is
-not run; where it finds that it moves, always is the same as moving.  Clips of `gait simulate` are kept in
+with every camera taken to move.  Where auto finds that the camera stands still it is the same as never, and
+is not run; where it finds that it moves, always is the same as moving.  Clips of `gait simulate` are kept in
 build/eval-stabilize.
 """
 
