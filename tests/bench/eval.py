@@ -9,7 +9,8 @@
     make eval ARGS='--folder DIR'              any folder of clips (video.mp4 camera.json truth.csv ...)
     make eval ARGS='--simulated DIR'           hard cases: made in DIR if absent, then evaluated
 
-A development clip's subject is left out of learning.  A start from the truth has noise drawn by the seed.
+A development clip's subject is left out of learning.  A start from the truth has noise drawn by the seed;
+auto is `gait track` as it is, images the same without the detector.
 Writes results.json, results.csv and index.html (overlays, plots; failures first) into build/eval.
 """
 
@@ -33,7 +34,7 @@ import eval_page
 import eval_simulated
 import eval_table
 import eval_wanted
-from eval_plan import Arm, Clip, Job, main_arms, varied_arms
+from eval_plan import INITS, Arm, Clip, Job, main_arms, varied_arms
 from eval_run import Result, run
 from facts import facts
 
@@ -52,7 +53,7 @@ def arguments() -> argparse.Namespace:
     )
     add = parser.add_argument
     add("--modes", nargs="+", choices=("default", "paper"), default=["default", "paper"], help="(both)")
-    add("--init", nargs="+", choices=("truth", "auto"), default=["truth", "auto"], help="(both)")
+    add("--init", nargs="+", choices=INITS, default=INITS, help="(all)")
     add("--seeds", type=int, metavar="N", help="runs of a clip in each arm (3; default mode from auto 4)")
     add("--clips", nargs="+", metavar="NAME", help="names of clips (all, and outdoor)")
     add("--folder", type=Path, metavar="DIR", help="evaluate the clips in DIR instead")

@@ -61,7 +61,8 @@ class Arm:
     ----------
     name : str
     init : str
-        ``truth`` (with noise drawn by the seed) or ``auto``.
+        ``truth`` (with noise drawn by the seed), ``auto`` (as ``gait track`` does by itself) or ``images``
+        (the same without the detector).
     mode : str
         ``default`` or ``paper``.
     background : str
@@ -103,17 +104,27 @@ class Job:
         words = f"{self.clip.name}.{self.arm.name}.{self.seed}"
         return "".join(c if c.isalnum() or c in "._+-" else "_" for c in words)
 
+    @property
+    def track(self) -> Path:
+        """File of the track."""
+        return self.folder / f"{self.stem}.csv"
+
 
 BASE = "default/truth"
+INITS = ("truth", "auto", "images")
 
 
 def main_arms(modes: Sequence[str], inits: Sequence[str], seeds: int | None) -> list[Arm]:
-    """Each mode from each kind of start: 3 seeds, 4 for the default mode from ``auto``."""
-    usual = {("default", "auto"): 4}
+    """Each mode from each kind of start: 3 seeds, 4 for the default mode without a start given.
+
+    Paper mode uses no detector, so its ``images`` would repeat its ``auto``.
+    """
+    usual = {("default", "auto"): 4, ("default", "images"): 4}
     return [
         Arm(f"{mode}/{init}", init=init, mode=mode, seeds=seeds or usual.get((mode, init), 3))
         for mode in modes
         for init in inits
+        if (mode, init) != ("paper", "images")
     ]
 
 

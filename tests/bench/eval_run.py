@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import json
-import time
 from collections.abc import Iterator
 from dataclasses import dataclass, field
 from typing import Any
@@ -27,7 +26,10 @@ from gait.io.track_file import Track, TrackWriter, read_track, read_truth
 from gait.io.video import Frame, Image, median_plate, read_plate
 from gait.motion.evaluate import evaluate
 from gait.motion.footfalls import Strikes, strikes_of
-from gait.track.box_start import BoxStart, find_start
+from gait.track.box_start import BoxStart
+from gait.track.clip import track_scene
+from gait.track.options import ClipOptions
+from gait.track.scene import Scene, first_state
 
 
 @dataclass
@@ -73,7 +75,7 @@ class _Kept:
 
     estimates: dict[int, Estimate] = field(default_factory=dict)
     nees: list[float] = field(default_factory=list)
-    steps: list[float] = field(default_factory=list)
+    step_ms: float = 0.0
 
 
 def run(job: Job) -> Result:
@@ -90,23 +92,15 @@ def _run(job: Job) -> Result:
     clip, arm = job.clip, job.arm
     video = Thinned(clip, arm.every)
     camera, model = Camera.read(str(clip.camera), video.size), Model(job.model)
-    plate = _plate(job, video)
-    config = TrackerConfig.default(Mode[arm.mode.upper()], seed=job.seed, **dict(arm.changes))
-    tracker = Tracker(model, camera, config, background=plate)
-    begun = time.perf_counter()
-    start = _start(job, video, camera, plate, model)
-    kept = _follow(job, video, tracker, start, BoxStart(camera, plate, model, clip.height))
-    seconds = time.perf_counter() - begun
-    track = read_track(job.folder / f"{job.stem}.csv")
+    kept = _from_truth(job, video, camera, model) if arm.init == "truth" else _as_gait_track(job)
+    track = read_track(job.track)
     result = _judge(job, track, camera)
     phase_sd = np.array([kept.estimates[n].sd.phase for n in track.frame.tolist()])
     result.measures |= {
         "frames": len(track.frame),
         "first": int(track.frame[0]),
         "nees": float(np.median(kept.nees)) if kept.nees else None,
-        "step_ms": {"median": float(np.median(kept.steps)), "p99": float(np.percentile(kept.steps, 99))},
-        "wall_fps": len(kept.steps) / seconds,
-        "digest": f"{tracker.digest():016x}",
+        "step_ms": {"median": kept.step_ms},
         **eval_measures.phase_interval(result.series, phase_sd),
     }
     if job.pictures:
@@ -121,38 +115,63 @@ def _plate(job: Job, video: Video) -> Image | None:
     return median_plate(video) if choice == "auto" else read_plate(job.clip.plate, video.size)
 
 
-def _start(job: Job, video: Video, camera: Camera, plate: Image | None, model: Model) -> Start:
-    """As `gait track --init auto` or `--init FILE.json` would start."""
-    clip, arm = job.clip, job.arm
-    if arm.init == "auto":
-        return find_start(video, camera, plate, model, first=clip.first, stop=clip.stop, height=clip.height)
-    path = job.folder / f"{job.stem}.init.json"
-    path.write_text(json.dumps(noisy_start(clip, job.seed, arm.stature_error)))
-    return Start.read(path, model)
-
-
-def _follow(job: Job, video: Video, tracker: Tracker, start: Start, auto_start: BoxStart) -> _Kept:
-    """Track into the run's CSV file; a person who is lost is looked for, as in `gait track`."""
-    model, kept = tracker.model, _Kept()
-    uncertainty = eval_measures.Uncertainty(job.clip.truth, model) if job.arm.mode == "default" else None
-    rows = TrackWriter(
-        job.folder / f"{job.stem}.csv", model.info.components, model.joint_names, model.angle_names
+def _as_gait_track(job: Job) -> _Kept:
+    """Track as ``gait track --init auto`` does: with the detector, backwards from the start as well."""
+    clip, arm, kept = job.clip, job.arm, _Kept()
+    plate = str(clip.plate) if arm.background == "plate" and clip.plate else "none"
+    options = ClipOptions(
+        video=str(clip.video),
+        camera=str(clip.camera),
+        output=str(job.track),
+        model=str(job.model),
+        background="auto" if arm.background == "auto" else plate,
+        height=clip.height,
+        mode=Mode[arm.mode.upper()],
+        seed=job.seed,
+        start=clip.first,
+        stop=clip.stop,
+        detector="full" if arm.init == "auto" else "none",
+        quiet=True,
     )
-    with rows:
-        for frame in video.frames(start.frame, job.clip.stop):
+    scene = Scene.read(options)
+    figures = track_scene(
+        options,
+        scene,
+        first_state(options, scene),
+        lambda frame, estimate: kept.estimates.__setitem__(frame.number, estimate),
+    )
+    kept.step_ms = figures["step_ms"]["median"]
+    return kept
+
+
+def _from_truth(job: Job, video: Video, camera: Camera, model: Model) -> _Kept:
+    """Track into the run's CSV file from the true state with noise; a lost person is looked for."""
+    clip, arm, kept = job.clip, job.arm, _Kept()
+    plate = _plate(job, video)
+    config = TrackerConfig.default(Mode[arm.mode.upper()], seed=job.seed, **dict(arm.changes))
+    tracker = Tracker(model, camera, config, background=plate)
+    auto_start = BoxStart(camera, plate, model, clip.height)
+    path = job.track.with_suffix(".init.json")
+    path.write_text(json.dumps(noisy_start(clip, job.seed, arm.stature_error)))
+    start = Start.read(path, model)
+    uncertainty = eval_measures.Uncertainty(clip.truth, model) if arm.mode == "default" else None
+    steps = []
+    with TrackWriter(job.track, model.info.components, model.joint_names, model.angle_names) as rows:
+        for frame in video.frames(start.frame, clip.stop):
             if frame.number == start.frame:
                 tracker.start(start.mean, start.sd, frame.utime)
             estimate = tracker.step(frame.image, frame.utime)
             rows.write(frame, estimate)
             kept.estimates[frame.number] = estimate
-            kept.steps.append(1000 * tracker.step_seconds)
+            steps.append(1000 * tracker.step_seconds)
             if uncertainty is not None and uncertainty.wants(frame.number):
                 kept.nees.append(uncertainty.nees(frame.number, estimate, *tracker.particles()))
             anew = auto_start.find_lost(frame, estimate.status)
             if anew is not None:
                 tracker.start(anew.mean, anew.sd, frame.utime)
-    if not kept.steps:
+    if not steps:
         raise UserError(f"{video.path}: no frame from {start.frame} on")
+    kept.step_ms = float(np.median(steps))
     return kept
 
 

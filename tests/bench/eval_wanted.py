@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass, replace
+from functools import partial
 from typing import Any
 
 import numpy as np
@@ -14,6 +15,7 @@ from eval_table import MEDIAPIPE
 Rows = list[dict[str, Any]]
 TOWARD = "toward300"
 AUTO = "default/auto"
+STARTS = {AUTO: "auto", "default/images": "without the detector"}
 
 
 @dataclass(frozen=True)
@@ -124,24 +126,24 @@ def _phase(rows: Rows) -> Verdict:
     return Verdict(measure, wanted, reached, bool(clips[worst] <= 1.5 and flipped == 0))
 
 
-def _locked(rows: Rows) -> Verdict:
-    measure, wanted = "auto: phase locked within 1 s", "all"
-    runs = _of(rows, AUTO, None)
+def _locked(rows: Rows, arm: str) -> Verdict:
+    measure, wanted = f"{STARTS[arm]}: phase locked within 1 s", "all"
+    runs = _of(rows, arm, None)
     if not runs:
-        return _nothing(measure, wanted, "--modes default --init auto")
+        return _nothing(measure, wanted, "--modes default")
     good = sum(row["locked"] is True for row in runs)
     return Verdict(measure, wanted, f"{good} of {len(runs)}", good == len(runs))
 
 
-def _side(rows: Rows) -> Verdict:
+def _side(rows: Rows, arm: str) -> Verdict:
     measure = (
-        "auto: right leg right under tracking in most frames after a second, or ambiguous; wrong: over 5 % "
-        "of them under tracking"
+        f"{STARTS[arm]}: right leg right under tracking in most frames after a second, or ambiguous; wrong: "
+        "over 5 % of them under tracking"
     )
     wanted = ">= 95 %; wrong in <= 1 run of 28"
-    runs = _of(rows, AUTO, None)
+    runs = _of(rows, arm, None)
     if not runs:
-        return _nothing(measure, wanted, "--modes default --init auto")
+        return _nothing(measure, wanted, "--modes default")
     counts = {side: sum(row["side"] == side for row in runs) for side in ("right", "open", "wrong")}
     silent = len(runs) - counts["right"] - counts["open"]
     reached = f"right {counts['right']}, ambiguous {counts['open']}, wrong or failed {silent} of {len(runs)}"
@@ -238,6 +240,7 @@ def _dev(rows: Rows) -> Rows:
 
 
 _CHECKS: list[Callable[[Rows], Verdict]] = [
-    *(_root, _abs, _stature, _lost, _phase, _locked, _side, _coverage, _no_plate, _outdoor, _events, _slower),
-    _mediapipe,
+    *(_root, _abs, _stature, _lost, _phase),
+    *(partial(check, arm=arm) for arm in STARTS for check in (_locked, _side)),
+    *(_coverage, _no_plate, _outdoor, _events, _slower, _mediapipe),
 ]

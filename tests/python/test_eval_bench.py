@@ -112,9 +112,9 @@ def test_marks_count_the_near_leg_and_the_clear_joints(tmp_path):
 
 def test_every_wanted_line_passes_on_good_runs_and_fails_on_bad_ones():
     clips = ("a", "b", "toward300_08", "outdoor")
-    arms = (eval_plan.BASE, eval_wanted.AUTO, "stature +5 %", "background none", "every 2", "every 3")
+    arms = (eval_plan.BASE, *eval_wanted.STARTS, "stature +5 %", "background none", "every 2", "every 3")
     good = [row(clip, seed, arm) for arm in arms for clip in clips for seed in (1, 2, 3)]
-    assert [v.passed for v in eval_wanted.verdicts(good)][:-1] == [True] * 12
+    assert [v.passed for v in eval_wanted.verdicts(good)][:-1] == [True] * 14
     assert eval_wanted.missed(good) == []
     bad = {
         "root-aligned": {"root_mm": 66.0},
@@ -122,8 +122,9 @@ def test_every_wanted_line_passes_on_good_runs_and_fails_on_bad_ones():
         "wrong stature": {"px": 4.0, "arm": "stature +5 %"},
         "lost frames": {"lost2_pct": 30.0},
         "phase error": {"flips_pct": 1.0},
-        "phase locked": {"locked": False, "arm": eval_wanted.AUTO},
-        "right leg": {"side": "wrong", "arm": eval_wanted.AUTO},
+        "auto: phase locked": {"locked": False, "arm": eval_wanted.AUTO},
+        "auto: right leg": {"side": "wrong", "arm": eval_wanted.AUTO},
+        "detector: right leg": {"side": "wrong", "arm": "default/images"},
         "coverage": {"cover90": 0.1},
         "no background": {"root_mm": 45.0, "arm": "background none"},
         "px to near": {"near_px": 11.5},
