@@ -110,6 +110,16 @@ def test_paper_mode_has_the_values_that_the_search_froze():
     assert {name: paper[name] for name in frozen} == pytest.approx(frozen, rel=1e-3)
 
 
+def test_a_person_is_held_by_the_last_frames_alone_and_marks_by_hand_may_be_farther_off():
+    marked = list(range(0, 51, 6))  # of these 42 and 48 are among the last ten
+    near = np.array([50.0] * 7 + [11.0, 7.0])
+    for errors, held in ((near, (True, True)), (near + 3.0, (False, True)), (near + 8.0, (False, False))):
+        tail = tracking._tail(marked, errors)
+        assert len(tail) == 2
+        assert tuple(tracking.followed(tail, 100.0, by_hand) for by_hand in (False, True)) == held
+    assert not tracking.followed(tracking._tail(marked[:7], near[:7]), 1e6, True)  # nothing to judge by
+
+
 ADDED = (  # settings that change from rung to rung, with the mode and the model of the rung
     *(set(ladder.UNSEARCHED), {"model", "components"}, {"model"}, set(ladder._RELAXING)),
     *(set(ladder._TURNING), {"particles"}, {"resample_ess"}),
