@@ -1,4 +1,4 @@
-"""gait-trackd --person: one tracker for each of several people in a stream, told apart by their keypoints."""
+"""gait-trackd --person: one tracker for each of several people in a stream, distinguished by their keypoints."""
 
 from dataclasses import replace
 from functools import cache
@@ -87,7 +87,7 @@ def test_people_who_cross_keep_their_trackers(streams):
 
 
 def test_a_person_who_comes_back_has_the_same_number(streams):
-    """Away for 8.5 s, in which nobody is tracked."""
+    """Away for 8.5 s, in which no person is tracked."""
     for person in (1, 2):
         gone = range(WALK + FPS // 2 + 1, 1000 if person == 1 else BACK)
         away = [e for e in streams[0][person] if e.frame in gone]

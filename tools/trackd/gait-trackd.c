@@ -64,6 +64,7 @@ typedef struct parts { /* optional ones */
     lift_service lift;
     keypoint_cue cue;
     pose_path path;
+    further further;
 } parts;
 
 /* The second service, if requested. */
@@ -105,6 +106,9 @@ static bool load(service *s, const settings *want, parts *p, workers *threads, s
         p->path = (pose_path){.turn_sd = want->pose_turn_sd / 57.29578f, .place_sd = want->pose_place_sd};
         s->path = &p->path;
     }
+    if (!further_open(&p->further, want->further_streams, want->stream, why))
+        return false;
+    s->further = p->further.count ? &p->further : NULL;
     s->max_gap = (double)want->max_gap;
     s->max_pixels = want->max_pixels;
     s->camera_fixed = want->camera[0] != '\0';
@@ -141,6 +145,11 @@ static void print_summary(const service *s, bool live)
                s->cue->messages, s->cue->used, s->cue->late, s->cue->filter.left_out);
     if (s->path)
         printf(" poses_refused %" PRId64 " frames_without_pose %" PRId64, s->path->refused, s->path->unknown);
+    for (int i = 0; s->further && i < s->further->count; i++) {
+        const further_camera *const each = &s->further->camera[i];
+        printf(" stream_%d_used %" PRId64 " stream_%d_missing %" PRId64, each->stream, each->used,
+               each->stream, each->missing);
+    }
     if (s->lift)
         printf(" lift_frames %" PRId64 " lifted %" PRId64 " lift_rejected %" PRId64
                " lift_keypoints_left_out %" PRId64 " lift_ms median %.3f p99 %.3f",
@@ -264,6 +273,7 @@ int main(int argc, char **argv)
         workers_stop(&threads);
         service_close(&s);
         lift_service_close(&extra.lift);
+        further_close(&extra.further);
     }
     if (ok && quit == RELOAD) {
         sigprocmask(SIG_SETMASK, &call.unblocked, NULL);

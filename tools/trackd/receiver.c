@@ -7,6 +7,7 @@
 #include <errno.h>
 #include <poll.h>
 #include <stdio.h>
+#include <stdlib.h>
 #include <string.h>
 
 enum {
@@ -102,6 +103,44 @@ static void on_camera(const lcm_recv_buf_t *buf, const char *channel, void *user
     flush_complete(r);
 }
 
+/* The further camera of a channel. */
+static further_camera *further_of(const receiver *r, const char *channel)
+{
+    return further_find(r->service->further, atoi(strrchr(channel, '_') + 1));
+}
+
+static void on_further_frame(const lcm_recv_buf_t *buf, const char *channel, void *user)
+{
+    receiver *const r = user;
+    image_view v;
+    message why;
+    if (!open_view(r->service, buf, channel, &v))
+        return;
+    if (!further_take_frame(further_of(r, channel), &v, &why)) {
+        r->service->counts.rejected++;
+        service_complain(r->service, "%.40s: %.180s", channel, why.text);
+    }
+    flush_complete(r);
+}
+
+static void on_further_background(const lcm_recv_buf_t *buf, const char *channel, void *user)
+{
+    receiver *const r = user;
+    image_view v;
+    if (open_view(r->service, buf, channel, &v))
+        service_further_background(r->service, further_of(r, channel), &v);
+}
+
+static void on_further_camera(const lcm_recv_buf_t *buf, const char *channel, void *user)
+{
+    receiver *const r = user;
+    gaitmsg_camera_t msg;
+    if (gaitmsg_camera_t_decode(buf->data, 0, (int)buf->data_size, &msg) < 0)
+        service_complain(r->service, DAMAGED, channel);
+    else
+        service_further_camera(r->service, further_of(r, channel), &msg);
+}
+
 static void on_command(const lcm_recv_buf_t *buf, const char *channel, void *user)
 {
     receiver *const r = user;
@@ -123,6 +162,25 @@ static void on_status(const lcm_recv_buf_t *buf, const char *channel, void *user
     gaitmsg_status_t_decode_cleanup(&msg);
 }
 
+static bool subscribe_further(receiver *r, message *why)
+{
+    static const struct {
+        const char *channel;
+        lcm_msg_handler_t fn;
+    } kinds[] = {{"GAIT_CAMERA", on_further_camera},
+                 {"GAIT_BACKGROUND", on_further_background},
+                 {"GAIT_IMAGE", on_further_frame}};
+    const further *const f = r->service->further;
+    bool ok = true;
+    for (int i = 0; f && i < f->count; i++)
+        for (size_t k = 0; ok && k < sizeof kinds / sizeof *kinds; k++) {
+            char name[32];
+            snprintf(name, sizeof name, "%s_%d", kinds[k].channel, f->camera[i].stream);
+            ok = link_subscribe(r->others, name, kinds[k].fn, r, FRAMES_WAITING, why) != NULL;
+        }
+    return ok;
+}
+
 static bool subscribe(receiver *r, message *why)
 {
     int const camera = r->service->stream, person = r->service->out->person;
@@ -132,7 +190,7 @@ static bool subscribe(receiver *r, message *why)
     snprintf(name[2], sizeof name[2], "GAIT_BACKGROUND_%d", camera);
     snprintf(name[3], sizeof name[3], "GAIT_TRACKS_%d", camera);
     r->frames = link_subscribe(r->images, name[0], on_frame, r, FRAMES_WAITING, why);
-    return r->frames &&
+    return r->frames && subscribe_further(r, why) &&
            ((!r->service->lift && !r->service->cue) ||
             link_subscribe(r->others, link_channel(name[3], person, of_person[0]), on_keypoints, r,
                            OTHERS_WAITING, why)) &&

@@ -143,14 +143,30 @@ static bool start_usable(service *s, const gait_state *mean, const gait_state *s
     return false;
 }
 
+/* Backgrounds of further cameras that came before there was a tracker. */
+static void set_further_backgrounds(service *s)
+{
+    for (int i = 0; s->further && i < s->further->count; i++)
+        if (s->further->camera[i].background.data)
+            gait_tracker_set_background(s->track.tracker, 1 + i, &s->further->camera[i].background, NULL);
+}
+
 bool service_set_camera(service *s, const gait_camera *camera, message *why)
 {
+    s->first = *camera;
+    s->first_given = true;
+    if (s->further && further_unknown(s->further))
+        return true;
+    for (int i = 0; s->further && i < s->further->count; i++)
+        s->track.config.camera[1 + i] = s->further->camera[i].camera;
+    s->track.config.cameras = 1 + (s->further ? s->further->count : 0);
     s->track.memory_bytes -= s->hold.capacity;
     if (!tracking_set_camera(&s->track, camera, why) ||
-        ((s->cue || s->path) && !frame_hold_allocate(&s->hold, camera, why)) ||
+        ((s->cue || s->path || s->further) && !frame_hold_allocate(&s->hold, camera, why)) ||
         (s->lift && !lift_service_camera(s->lift, camera, why)))
         return false;
     s->track.memory_bytes += s->hold.capacity;
+    set_further_backgrounds(s);
     const tracking *const t = &s->track;
     bool const armed = s->start.armed;
     log_line("model %016" PRIx64 ", camera %dx%d, %d particles, %d thread%s, %s, %zu bytes (model %zu, "
@@ -218,6 +234,28 @@ void service_camera(service *s, const gaitmsg_camera_t *msg)
         rearm(s);
     if (!made)
         service_complain(s, "%s", why.text);
+}
+
+void service_further_camera(service *s, further_camera *c, const gaitmsg_camera_t *msg)
+{
+    bool const known = c->known;
+    message why;
+    bool ok = further_take_camera(c, msg, s->max_pixels, &why);
+    s->track.memory_bytes += ok && !known ? further_bytes(c) : 0;
+    if (ok && !known && s->first_given)
+        ok = service_set_camera(s, &s->first, &why);
+    if (!ok)
+        service_complain(s, "%s", why.text);
+}
+
+void service_further_background(service *s, further_camera *c, const image_view *v)
+{
+    message why;
+    if (!further_take_background(c, v, &why)) {
+        s->counts.rejected++;
+        service_complain(s, "%s", why.text);
+    } else if (s->track.tracker)
+        set_further_backgrounds(s);
 }
 
 bool service_pixels(service *s, const image_view *v, gait_image *out, message *why)

@@ -3,6 +3,7 @@
 #define TRACKD_SERVICE_H
 #include "convert.h"
 #include "frame_hold.h"
+#include "further.h"
 #include "gaitmsg_command_t.h"
 #include "gaitmsg_particles_t.h"
 #include "gaitmsg_status_t.h"
@@ -46,6 +47,9 @@ typedef struct service {
     lift_service *lift; /* the second service; NULL: not requested */
     keypoint_cue *cue;  /* a detector's keypoints for the tracker; NULL: not requested */
     pose_path *path;    /* poses of a camera that moves; NULL: it stands still */
+    further *further;   /* further cameras; NULL: there is one */
+    bool first_given;   /* the first camera, */
+    gait_camera first;  /* which waits for the others */
     frame_hold hold;    /* with one of them: the frame that waits */
     sink *out;          /* where messages go */
     int threads;
@@ -101,8 +105,11 @@ bool service_set_camera(service *s, const gait_camera *camera, message *why);
  * its messages, while the other was not, unless that is of a file. */
 void service_camera(service *s, const gaitmsg_camera_t *msg);
 void service_background(service *s, const image_view *v);
+/* The same of a further camera. */
+void service_further_camera(service *s, further_camera *c, const gaitmsg_camera_t *msg);
+void service_further_background(service *s, further_camera *c, const image_view *v);
 void service_command(service *s, const gaitmsg_command_t *msg);
-/* Whether a frame should wait for its keypoints, or for the pose of its camera. */
+/* Whether a frame should wait for its keypoints, for the pose of its camera or for frames of further cameras. */
 bool service_waits(const service *s, int64_t utime);
 /* A frame that arrived at `arrival_utime`; it is dropped if it is not the newest one. */
 void service_frame(service *s, const image_view *v, bool newest, int64_t arrival_utime);

@@ -245,6 +245,8 @@ static bool step(service *s, const image_view *v, int64_t received, int64_t birt
         return false;
     }
     compare_scene(s, &frame.image[0]);
+    if (s->further)
+        further_images(s->further, v->utime, &frame);
     if (s->cue)
         frame.keypoints[0] = keypoint_cue_use(s->cue, v->utime);
     if (s->path && pose_path_now(s->path, v->utime, &pose, &why))
@@ -310,7 +312,9 @@ static int idle_of(const service *s)
 static void set_lack(const service *s, int idle, message *why)
 {
     int const i = s->stream;
-    if (idle == SERVICE_IDLE_CAMERA)
+    if (idle == SERVICE_IDLE_CAMERA && s->first_given)
+        message_set(why, "no camera: announce it on GAIT_CAMERA_%d", further_unknown(s->further)->stream);
+    else if (idle == SERVICE_IDLE_CAMERA)
         message_set(why, "no camera: give --camera or announce it on GAIT_CAMERA_%d", i);
     else if (idle == SERVICE_IDLE_START)
         message_set(why, "no START: send it on GAIT_COMMAND, or run with --init");
@@ -356,7 +360,8 @@ bool service_waits(const service *s, int64_t utime)
     gait_camera_pose pose;
     message why;
     return (s->cue && !keypoint_cue_at(s->cue, utime)) ||
-           (s->path && pose_path_at(s->path, utime, &pose, &why) == POSE_LATER);
+           (s->path && pose_path_at(s->path, utime, &pose, &why) == POSE_LATER) ||
+           (s->further && further_waits(s->further, utime));
 }
 
 void service_frame(service *s, const image_view *v, bool newest, int64_t arrival_utime)

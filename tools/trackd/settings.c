@@ -131,6 +131,12 @@ static int make_table(settings *s, option *table)
         {"snapshot-s", 0, "S", "seconds between two snapshots, default 1", OPTION_FLOAT, &s->snapshot_s, 0.1,
          3600},
         {"stream", 0, "I", "number of the camera, default 0", INT(stream, 0, 30)},
+        {"further-streams", 0, "I,J",
+         "numbers of further cameras, up to three, that see the same person at the same time: their frames\n"
+         "        are taken with the frame of --stream nearest in time; a frame waits for them until the "
+         "next\n"
+         "        one arrives, and does without those that are missing",
+         TEXT(further_streams)},
         {"person", 0, "N",
          "of several people track person N, with the keypoints on GAIT_TRACKS_<i>_<N>, and answer on\n"
          "        GAIT_ESTIMATE_<N> and so on: all channels but those of the camera end in _<N>",
@@ -254,6 +260,10 @@ static bool check_dependencies(const settings *s, message *why)
         {"pose-turn-sd", "moving-camera", s->pose_turn_sd > 0, s->moving_camera},
         {"pose-place-sd", "moving-camera", s->pose_place_sd > 0, s->moving_camera},
         {"lift", "a camera that stands still", s->lift, !s->moving_camera},
+        {"further-streams", "a camera that stands still", s->further_streams[0], !s->moving_camera},
+        {"further-streams", "a background on GAIT_BACKGROUND_<i>, not --background", s->further_streams[0],
+         !s->background[0]},
+        {"snapshot", "a single camera", s->snapshot[0], !s->further_streams[0]},
         {"background", "a camera that stands still", s->background[0], !s->moving_camera},
     };
     for (size_t i = 0; i < sizeof pair / sizeof *pair; i++)

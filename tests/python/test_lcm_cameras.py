@@ -1,0 +1,103 @@
+"""gait-trackd --further-streams: frames of several cameras of one person, as far as they come."""
+
+import re
+from dataclasses import replace
+from functools import cache
+
+import lcm_rig as rig
+import numpy as np
+import pytest
+
+from gait.bindings.config import TrackerConfig
+from gait.camera.camera import Camera
+from gait.lcm.messages import camera_message, image_message
+from gait.track.tracker import Tracker
+
+FRAMES, LATE = 24, 9_000  # microseconds by which the second camera's frames are later
+SIDE = Camera.looking((4.0, 0.5, 1.2), (0.0, 0.0, 0.9), (160, 120), 140.0)
+
+
+@cache
+def side(frame):
+    """What the second camera sees."""
+    ids = rig.model().render(SIDE, rig.person(frame))
+    colours = np.random.default_rng(2).integers(0, 255, (256, 3), np.uint8)
+    return np.where(ids[..., None] > 0, colours[ids], rig.plate())
+
+
+def second(frame):
+    return "GAIT_IMAGE_3", image_message(side(frame), rig.utime(frame) + LATE, frame)
+
+
+def opening():
+    return [
+        ("GAIT_CAMERA_3", camera_message(SIDE, rig.utime(0))),
+        ("GAIT_BACKGROUND_3", image_message(rig.plate(), rig.utime(0), -1)),
+        *rig.opening(),
+    ]
+
+
+def play(tmp_path, events, *options):
+    return rig.play(rig.write_log(tmp_path / "a.log", events), "-n", 300, *options)
+
+
+def used(outcome):
+    """Frames of the first camera with and without one of the second."""
+    return tuple(map(int, re.search(r"stream_3_used (\d+) stream_3_missing (\d+)", outcome.printed).groups()))
+
+
+def error(outcome):
+    """Mean distance of the joints in the second half, metres."""
+    off = [
+        np.array([j.position for j in e.joints]) - rig.model().pose(rig.person(e.frame))[0]
+        for e in outcome.estimates[FRAMES // 2 :]
+    ]
+    return float(np.linalg.norm(off, axis=2).mean())
+
+
+def in_message(camera):
+    return replace(camera, R=camera.R.astype(np.float32), t=camera.t.astype(np.float32))
+
+
+def by_python(there):
+    """Digest of the library that is given the same; `there`: frames that the second camera has."""
+    tracker = Tracker(
+        rig.model(),
+        [in_message(rig.CAMERA), in_message(SIDE)],
+        TrackerConfig.default(particles=300),
+        background=[rig.plate(), rig.plate()],
+    )
+    tracker.start(rig.person(0), rig.SD, rig.utime(0))
+    for i in range(FRAMES):
+        tracker.step([rig.picture(i), side(i) if i in there else None], rig.utime(i))
+    return f"{tracker.digest():016x}"
+
+
+@pytest.mark.parametrize("missing", [(), range(8, 14)])
+def test_two_streams_are_one_tracker(missing, tmp_path):
+    """The digest is the library's with two cameras, whichever frame comes first, and if some do not come."""
+    both = [
+        event for i in range(FRAMES) for event in (*rig.frames(i, i + 1), *([second(i)] * (i not in missing)))
+    ]
+    outcome = play(tmp_path, [*opening(), *both], "--further-streams", 3)
+    assert used(outcome) == (FRAMES - len(missing), len(missing))
+    assert outcome.frames == FRAMES and outcome.digest == by_python(set(range(FRAMES)) - set(missing))
+    if not missing:
+        before = [event for i in range(FRAMES) for event in (second(i), *rig.frames(i, i + 1))]
+        assert play(tmp_path, [*opening(), *before], "--further-streams", 3).digest == outcome.digest
+        alone = play(tmp_path, [*opening(), *both])
+        assert error(outcome) < min(0.05, error(alone))
+
+
+def test_the_tracker_waits_for_all_cameras_and_says_which(tmp_path):
+    events = [*rig.opening(), *rig.frames(0, 4)]
+    outcome = play(tmp_path, events, "--further-streams", 3)
+    assert outcome.code == 1 and outcome.words.count("announce it on GAIT_CAMERA_3") == 2
+    late = play(tmp_path, [*events, *opening(), *rig.frames(4, 8), second(7)], "--further-streams", 3)
+    assert used(late) == (1, 3)
+
+
+@pytest.mark.parametrize("streams", ["0", "1,1", "1,", "x", "31", "1,2,3,4"])
+def test_numbers_that_are_no_further_cameras_are_refused(streams):
+    done = rig.run(*rig.command("--further-streams", streams, "--url", "file:///nothing")[1:])
+    assert done.code == 1 and "up to 3 numbers of other cameras" in done.words

@@ -1,0 +1,50 @@
+/* further.h - cameras besides the first: their frames wait here for the frame of the first camera of the same time. */
+#ifndef TRACKD_FURTHER_H
+#define TRACKD_FURTHER_H
+#include "gaitmsg_camera_t.h"
+#include "image_view.h"
+
+enum {
+    FURTHER_MOST = GAIT_MAX_CAMERAS - 1,
+    FURTHER_PAST = 4,      /* frames of a camera that are kept */
+    FURTHER_APART = 100000 /* microseconds: frames further apart are never of one time */
+};
+
+typedef struct further_camera {
+    int stream; /* its number */
+    bool known; /* announced */
+    gait_camera camera;
+    uint8_t *pixels;       /* of the background, then of the frames */
+    gait_image background; /* data NULL: none */
+    gait_image frame[FURTHER_PAST];
+    int64_t utime[FURTHER_PAST]; /* of the frames, a ring by their number; -1: none */
+    int64_t frames;              /* that arrived */
+    int64_t used, missing;       /* frames of the first camera with and without one of this camera */
+} further_camera;
+
+typedef struct further {
+    int count;
+    further_camera camera[FURTHER_MOST];
+    int64_t before; /* capture time of the first camera's frame before; -1: none */
+} further;
+
+/* Numbers of cameras, separated by commas; false unless they are 1 to FURTHER_MOST, none twice and none `first`. */
+bool further_open(further *f, const char *streams, int first, message *why);
+void further_close(further *f);
+/* Memory of its pictures. */
+size_t further_bytes(const further_camera *c);
+/* The camera with this number. */
+further_camera *further_find(further *f, int stream);
+/* The first that has not been announced; NULL: all have. */
+const further_camera *further_unknown(const further *f);
+/* Take a camera when it is announced first; one that differs later is refused. */
+bool further_take_camera(further_camera *c, const gaitmsg_camera_t *in, int32_t max_pixels, message *why);
+/* Copy a background or a frame; it must have the camera's size. */
+bool further_take_background(further_camera *c, const image_view *v, message *why);
+bool further_take_frame(further_camera *c, const image_view *v, message *why);
+/* Whether a frame of the first camera should wait: another camera's frame of its time may still come. */
+bool further_waits(const further *f, int64_t utime);
+/* Images nearest in time to a frame of the first camera, at most half an interval between its frames away; a camera
+ * without one has no image. */
+void further_images(further *f, int64_t utime, gait_frame *frame);
+#endif
