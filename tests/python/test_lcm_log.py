@@ -7,7 +7,8 @@ import lcm_rig as rig
 import numpy as np
 import pytest
 
-from gait.lcm.link import gaitmsg
+from gait.errors import UserError
+from gait.lcm.link import gaitmsg, open_lcm
 from gait.lcm.messages import camera_message, command_message, image_message
 
 STOP, RESET = gaitmsg.command_t.STOP, gaitmsg.command_t.RESET
@@ -399,3 +400,20 @@ def test_reset_puts_the_init_file_in_force_again(tmp_path):
         tmp_path, [*rig.opening()[:2], *rig.frames(0, 3), reset, *rig.frames(3, 6)], "--init", init
     )
     assert [m.step for m in outcome.estimates] == [0, 1, 2, 0, 1, 2] and outcome.frames == 3
+
+
+@pytest.mark.parametrize(
+    "url, words",
+    [
+        ("file://{}/notes.txt", "notes.txt: is no LCM log; make one with gait record"),
+        ("file://{}/none.log", "none.log: no such LCM log; make one with gait record"),
+        ("file://{}", "is a folder; give the LCM log itself"),
+        ("udpm://10.0.0.1:7667", "10.0.0.1:7667: LCM needs a multicast address, .*; give udpm://239"),
+        ("udpm://239.255.76.67", "needs a multicast address, .*, and a port; give udpm://239"),
+        ("udpm://239.255.76.67:99999?ttl=0", "and a port; give udpm://239"),
+    ],
+)
+def test_what_is_no_network_and_no_log_is_refused_with_what_works(url, words, tmp_path):
+    (tmp_path / "notes.txt").write_text("of no messages\n")
+    with pytest.raises(UserError, match=words):
+        open_lcm(url.format(tmp_path))

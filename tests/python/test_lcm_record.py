@@ -75,7 +75,8 @@ def test_an_interrupted_recording_is_whole(estimates, tmp_path, number, flowing)
 
 @pytest.mark.parametrize("option", ["-o", "--log"])
 def test_a_missing_folder_is_named_before_listening(tmp_path, option):
-    files = {"-o": tmp_path / "t.csv", "--log": tmp_path / "e.log"} | {option: tmp_path / "none" / "x"}
+    files = {"-o": tmp_path / "t.csv", "--log": tmp_path / "e.log"}
+    files[option] = tmp_path / "none" / files[option].name
     words = [word for pair in files.items() for word in pair]
     done = rig.gait("record", "--url", f"file://{tmp_path}/absent.log", *words)
     assert done.returncode == 1 and done.stderr.count("\n") == 1

@@ -16,6 +16,7 @@ import lcm_rig as rig
 import numpy as np
 import pytest
 
+from gait.cli import main
 from gait.errors import UserError
 from gait.lcm.link import LogWriter, private_url
 from gait.lcm.messages import camera_message, estimate_of
@@ -136,6 +137,25 @@ def test_save_reports_when_nothing_came(tmp_path):
     done = rig.gait("view", "--url", f"file://{empty}?speed=0", "--save", tmp_path / "v.png", "--quiet")
     assert done.returncode == 1 and "no estimate" in done.stderr and done.stderr.count("\n") == 1
     assert [p.name for p in tmp_path.iterdir()] == ["empty.log"]
+
+
+@pytest.mark.parametrize(
+    "words, code, message",
+    [
+        (["--save", "{}/v.txt"], 2, "v.txt: is a name of another kind; give one that ends in .jpg"),
+        (["--save", "{}/none/v.png"], 1, "none does not exist"),
+        (["--record-to", "{}/a.file"], 1, "a.file: is a file; give the name of a folder"),
+        (["--stream", "2", "--stream", "2"], 2, "--stream 2: is given twice; give each once"),
+    ],
+)
+def test_wrong_names_are_refused_before_listening(words, code, message, tmp_path, capsys):
+    (tmp_path / "a.file").touch()
+    try:
+        found = main(["view", *(word.format(tmp_path) for word in words)])
+    except SystemExit as stop:
+        found = stop.code
+    printed = capsys.readouterr()
+    assert found == code and message in printed.err and not printed.out
 
 
 def test_a_page_gets_each_estimate_and_the_state_of_the_tracker(log):

@@ -15,8 +15,8 @@ from typing import TYPE_CHECKING
 
 from gait.cli import values
 from gait.cli.signals import Interruptible
-from gait.errors import UserError
-from gait.io.files import replacing
+from gait.errors import UsageError, UserError
+from gait.io.files import replacing, require_folder
 from gait.lcm.link import lcm_url
 from gait.progress import note
 
@@ -41,7 +41,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Add the command's options."""
     values.add_url(parser)
     add, port, stream = parser.add_argument, values.whole(0, 65535), values.whole(*values.STREAM)
-    add("--save", metavar="PNG", help="write one picture and end")
+    add("--save", type=values.named(*values.PICTURES), metavar="PNG", help="write one picture and end")
     add(
         "--patience",
         type=values.seconds,
@@ -64,7 +64,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         help="number of a person (gait-trackd --person), or LCM on which a tracker publishes (its --out); "
         "once for each (default: the one on --url)",
     )
-    add("--record-to", default=".", metavar="FOLDER", help="folder of recordings (default: this one)")
+    add("--record-to", metavar="FOLDER", help="folder of recordings, made if need be (default: this one)")
     values.add_camera(parser, " of the first --stream (default: from GAIT_CAMERA_<i>)", scale=True)
     values.add_model(parser, "model that is tracked")
 
@@ -74,7 +74,13 @@ def run(args: argparse.Namespace) -> int:
     from gait.bindings.model import Model
     from gait.camera.camera import Camera
 
-    streams = tuple(dict.fromkeys(args.stream or [0]))
+    streams = tuple(args.stream or [0])
+    for option, given in (("--stream", streams), ("--person", args.person or ())):
+        for each in given:
+            if given.count(each) > 1:
+                raise UsageError(f"{option} {each}: is given twice; give each once")
+    if args.record_to:
+        require_folder(args.record_to)
     cameras = {streams[0]: Camera.read(args.camera)} if args.camera else {}
     model, url = Model(args.model), lcm_url(args.url)
     if args.save:
@@ -91,7 +97,7 @@ def _serve(
     from gait.live.server import Page
 
     people = args.person or []
-    page = Page(args.port, streams, url, args.record_to, [one.url for one in answers(url, people)])
+    page = Page(args.port, streams, url, args.record_to or ".", [one.url for one in answers(url, people)])
     try:
         feed = Feed(
             url, streams, model, cameras, page.show, page.report, args.scale_camera, page.watched, people
@@ -131,5 +137,4 @@ def _save(
         if not pictures:
             why = feed.damage or "is gait-trackd tracking on this URL?"
             raise UserError(f"no estimate with its frame and camera came; {why}")
-        if not cv2.imwrite(str(path), pictures[0]):
-            raise UserError(f"{args.save}: cannot be written as an image; give a name that ends in .png")
+        cv2.imwrite(str(path), pictures[0])

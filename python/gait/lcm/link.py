@@ -13,11 +13,14 @@ import time
 from collections.abc import Iterator, Sequence
 from importlib import import_module
 from io import BufferedWriter, FileIO
+from ipaddress import ip_address
 from pathlib import Path
 from types import ModuleType
 from typing import Any
+from urllib.parse import urlsplit
 
 from gait.errors import UsageError, UserError
+from gait.io.files import require_file
 
 _HERE = Path(__file__).resolve().parent
 _PLACES = (_HERE.parent / "lib", _HERE.parents[2] / "build" / "lcm" / "python")
@@ -55,6 +58,8 @@ class _OnUse:
 gaitmsg = _OnUse()
 
 PREFIX = "file://"
+MULTICAST = "udpm://"
+_FORM = "udpm://239.255.76.67:7667?ttl=0"
 _SYNC = 0xEDA1DA01
 _HEAD = struct.Struct(">Iqqii")  # sync, number, time, lengths of channel and data
 _LONGEST = 1000  # bytes of a channel's name at which LCM stops
@@ -180,26 +185,45 @@ def open_lcm(url: str | None = None) -> lcm.LCM:
     """
     generated()
     wanted = lcm_url(url)
-    path, mode = log_of(wanted)
-    if is_log(wanted) and mode == "r" and os.path.isfile(path):
+    (path, mode), damage = log_of(wanted), None
+    if is_log(wanted) and mode == "r":
+        require_log(path)
         damage, beyond = _scan(path)
         if beyond:  # liblcm would take memory for what the event states
             raise UserError(f"{wanted}: {damage}")
+    _require_group(wanted)
     try:
         with muted_stderr():
             return lcm.LCM(wanted)
     except RuntimeError:
         if is_log(wanted):
-            raise UserError(f"{wanted}: {_fault_of(wanted)}") from None
-        remedy = ROUTE_REMEDY if "udpm://" in wanted else "give udpm://ADDRESS:PORT or file:///PATH?speed=0"
+            why = damage or "cannot open this log; give file:///PATH?speed=0 (mode=w to write)"
+            raise UserError(f"{wanted}: {why}") from None
+        remedy = ROUTE_REMEDY if wanted.startswith(MULTICAST) else f"give {_FORM}, or file:///PATH?speed=0"
         raise UserError(f"{wanted}: cannot open LCM; {remedy}") from None
 
 
-def _fault_of(url: str) -> str:
-    """Describe why a log cannot be opened."""
-    path, mode = log_of(url)
-    damage = break_of(path) if mode == "r" and os.path.isfile(path) else None
-    return damage or "cannot open this log; give file:///PATH?speed=0 (mode=w to write)"
+def _require_group(url: str) -> None:
+    """Refuse a network that is none: an address without multicast, or no port."""
+    if not url.startswith(MULTICAST) or not url.removeprefix(MULTICAST).partition("?")[0]:
+        return  # liblcm has a network of its own where none is named
+    try:
+        parts = urlsplit(url)
+        sound = ip_address(parts.hostname or "").is_multicast and bool(parts.port)
+    except ValueError:
+        sound = False
+    if not sound:
+        why = "needs a multicast address, 224.0.0.0 to 239.255.255.255, and a port"
+        raise UserError(f"{url}: LCM {why}; give {_FORM}")
+
+
+def require_log(path: str | os.PathLike[str]) -> None:
+    """Raise UserError unless a file begins as LCM's logs do."""
+    remedy = "make one with gait record --log or lcm-logger"
+    require_file(path, "LCM log", remedy)
+    with open(path, "rb") as file:
+        if file.read(4) != _SYNC.to_bytes(4, "big"):
+            raise UserError(f"{path}: is no LCM log; {remedy}")
 
 
 def listener(url: str) -> lcm.LCM:
@@ -273,7 +297,7 @@ def receive_buffer() -> int:
 def buffer_warning(url: str) -> str | None:
     """One line if the kernel will not grant the receive buffer that `url` asks for."""
     granted = receive_buffer()
-    if not url.startswith("udpm://") or granted >= _RMEM_ENOUGH:
+    if not url.startswith(MULTICAST) or granted >= _RMEM_ENOUGH:
         return None
     return (
         f"the kernel grants a receiver {granted} bytes, too few for uncompressed frames: some will be lost; "

@@ -5,7 +5,6 @@ from __future__ import annotations
 import time
 from contextlib import ExitStack, closing
 from dataclasses import dataclass, field
-from pathlib import Path
 from typing import Any
 
 import lcm
@@ -17,7 +16,7 @@ from gait.errors import UserError
 from gait.io.files import replacing
 from gait.io.track_file import TrackWriter
 from gait.io.video import Frame
-from gait.lcm.link import LogWriter, break_of, handle, is_log, listener, log_of, now
+from gait.lcm.link import LogWriter, break_of, handle, is_log, listener, log_of, now, require_log
 from gait.lcm.messages import estimate_after, estimate_of
 from gait.progress import durations
 
@@ -271,8 +270,7 @@ def read_run(path: str) -> Run:
 
     Only the first stream counts: a frame number that does not increase begins another.
     """
-    if not Path(path).is_file():
-        raise UserError(f"{path}: no such LCM log; make one with gait record --log or lcm-logger")
+    require_log(path)
     messages: list[Any] = []
     remark, damage = None, None
     arrived: list[int] = []

@@ -89,6 +89,10 @@ class Recording:
 def _unused(folder: Path, endings: Sequence[str]) -> list[Path]:
     """Make empty files of names that no file has, one for each ending."""
     stem = time.strftime("gait-%Y%m%d-%H%M%S")
+    try:
+        folder.mkdir(parents=True, exist_ok=True)
+    except OSError as error:
+        raise UserError(f"{folder}: cannot be made: {error.strerror}") from None
     for k in range(100):
         paths = [folder / f"{stem}{f'-{k}' if k else ''}{ending}.log" for ending in endings]
         try:
