@@ -26,6 +26,8 @@ from gait.io import keypoints_file
 from gait.io.keypoints_file import Keypoints
 from gait.io.track_file import read_estimates
 from gait.io.video import Video
+from gait.lift.keypoints.corrections import Correction, Edits, read_edits
+from gait.lift.run import load_prior
 
 WRONG = range(24, 40)  # frames in which the detector has lost a foot
 FOOT = ("r_ankle", "r_toe", "r_heel")
@@ -284,9 +286,9 @@ def test_the_film_comes_in_ranges_and_bad_requests_are_refused(clip, server):
         assert answer.status == 206 and len(answer.read()) == 10
     pull = {"do": "pull", "frame": 3, "joint": "l_knee", "uv": [1, 2]}
     for wrong, words in (
-        ({"frame": 99}, "frame 99"),
-        ({"joint": "tail"}, "no such joint"),
-        ({"uv": [1]}, "is missing"),
+        ({"frame": 99}, "frame is 99"),
+        ({"joint": "tail"}, "joint is 'tail'"),
+        ({"uv": [1]}, "uv has shape 1"),
         ({"uv": [1e9, 0]}, "far outside"),
         ({"do": "fly"}, "unknown"),
         ({"do": "pin", "joint": "l_heel", "uv": [240, -150]}, "above the horizon; click where"),
@@ -298,6 +300,27 @@ def test_the_film_comes_in_ranges_and_bad_requests_are_refused(clip, server):
     assert post(server.url, "redo", {})[0] == 409
     assert post(server.url, "edit", pull, origin="http://evil.example")[0] == 403
     assert json.loads((clip[0] / "clip/video.mp4.studio/corrections.json").read_text()) == {"corrections": []}
+
+
+def test_what_is_saved_can_be_read(clip, server):
+    """No request puts into the file what the next start would refuse."""
+    folder, saved = clip[0], clip[0] / "clip/video.mp4.studio/corrections.json"
+    pull = {"do": "pull", "frame": 30, "joint": "r_toe", "uv": [200.123456, 150], "sd_px": 2}
+    assert post(server.url, "edit", pull)[0] == 200
+    known = load_prior(None, print), range(FRAMES), Video(folder / "clip/video.mp4").size
+    assert read_edits(saved, *known) == Edits((Correction(30, "r_toe", (200.12, 150.0), 2.0),))
+    before, near = saved.read_bytes(), {"frame": 40, "joint": "r_heel", "uv": [200, 150], "sd_px": 2}
+    requests = [("edit", {"do": do} | near) for do in ("pull", "pin")]
+    requests += [("edit", {"do": "swap", "first": 3, "last": 5})]
+    requests += [("edit", {"do": "hide", "first": 3, "last": 5, "joint": "r_toe"})]
+    requests += [("edit", {"do": "remove", "list": "corrections", "index": 0})]
+    requests += [("start", {"frame": 3, "from": [200, 150], "to": [210, 150]})]
+    for path, request in requests:
+        for key in request.keys() - {"do"}:
+            for wrong in (True, "3", -9, 1e300, None, [True, 3], ["2", "3"], [], {}):
+                status, text = post(server.url, path, request | {key: wrong})
+                assert status == 409, (request, key, wrong, text)
+    assert saved.read_bytes() == before
 
 
 def test_fits_every_width_light_and_dark(server):
@@ -341,6 +364,25 @@ def test_pictures_are_corrected_as_the_batch_command_does(clip):
     command = [sys.executable, "-m", "gait", *words, "--quiet"]
     subprocess.run(command, cwd=folder / "pictures", check=True, capture_output=True)
     assert (folder / "pictures/batch.csv").read_bytes() == exported
+
+
+def test_a_refused_start_leaves_nothing(clip, capsys, tmp_path, monkeypatch):
+    monkeypatch.setenv("GAIT_WEB", str(browser.FETCHED))
+    shutil.copy(clip[0] / "clip/video.mp4", tmp_path)
+    (tmp_path / "c.json").write_text('{"hidden": [{"first": true, "last": 5, "joint": "r_toe"}]}')
+    film, camera = str(tmp_path / "video.mp4"), ["--camera", str(clip[0] / "clip/camera.json")]
+    words = [
+        *camera,
+        "--keypoints",
+        str(clip[0] / "keypoints.csv"),
+        "--corrections",
+        str(tmp_path / "c.json"),
+    ]
+    assert main(["studio", film, *words, "--port", "0", "--no-browser", "--quiet"]) == 1
+    assert "hidden entry 1: first is not a number" in capsys.readouterr().err
+    assert main(["studio", film, *camera, "--start", str(FRAMES - 1), "--port", "0", "--quiet"]) == 1
+    assert f"only 1 frame of {FRAMES} left, from {FRAMES - 1} on" in capsys.readouterr().err
+    assert sorted(path.name for path in tmp_path.iterdir()) == ["c.json", "video.mp4"]
 
 
 def test_usage_is_one_line(capsys, tmp_path, monkeypatch):

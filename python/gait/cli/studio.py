@@ -62,7 +62,12 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "--background", metavar="PNG|auto|none", help="the empty scene, with --placement (default: auto)"
     )
-    parser.add_argument("--corrections", metavar="C.json", help="file of the corrections, read and written")
+    parser.add_argument(
+        "--corrections",
+        type=values.named(".json"),
+        metavar="C.json",
+        help="file of the corrections, read and written",
+    )
     parser.add_argument(
         "-m", "--model", metavar="M.gait", help="model with a segment prior (default: the shipped one)"
     )
@@ -89,23 +94,27 @@ def run(args: argparse.Namespace) -> int:
         parts.load(part)
     # Imported here, as they load numpy, OpenCV and the server.
     from gait.io.files import require_writable
+    from gait.io.video import Video
     from gait.studio import server
     from gait.studio.session import Session
-    from gait.studio.source import Wanted, open_source
+    from gait.studio.source import Wanted, folder_of, open_source
     from gait.web import serve
 
     if args.corrections:
         require_writable(args.corrections)
-    own = serve.listen(args.port)
     wanted = Wanted(**{each.name: getattr(args, each.name) for each in fields(Wanted)})
-    source = open_source(wanted, lambda words: note(words, args.quiet), args.quiet)
-    session = Session(source)
-    url = serve.address(own)
-    figures = {"url": url, "corrections": str(source.corrections)}
-    print(json.dumps(figures) if args.json else f"{url}  (corrections in {source.corrections})", flush=True)
-    if not args.no_browser:
-        _open(url)
-    server.run(session, own)
+    video = Video(args.video)
+    with serve.listen(args.port) as own:
+        with folder_of(video) as folder:
+            source = open_source(wanted, video, folder, lambda words: note(words, args.quiet), args.quiet)
+            session = Session(source)
+        url = serve.address(own)
+        figures = {"url": url, "corrections": str(source.corrections)}
+        words = f"{url}  (corrections in {source.corrections})"
+        print(json.dumps(figures) if args.json else words, flush=True)
+        if not args.no_browser:
+            _open(url)
+        server.run(session, own)
     return 0
 
 

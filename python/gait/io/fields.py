@@ -15,6 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from gait.errors import UserError, unreadable
+from gait.io.files import require_file
 
 _LAST_FRAME = 2**53  # larger whole numbers are not exact as floating point
 
@@ -85,6 +86,8 @@ class Fields:
         if value is None:
             raise self.fail(key, "is null", remedy)
         try:
+            if any(isinstance(each, bool | str) for each in _leaves(value)):  # which NumPy takes for numbers
+                raise TypeError
             return np.asarray(value, dtype=np.float64)
         except (TypeError, ValueError, OverflowError):
             raise self.fail(key, "is not an array of numbers", remedy) from None
@@ -103,6 +106,15 @@ class Fields:
         return Fields(f"{self.where}: {key}", value)
 
 
+def _leaves(value: Any) -> Iterator[Any]:
+    """Yield what lists within lists hold."""
+    if isinstance(value, list | tuple):
+        for each in value:
+            yield from _leaves(each)
+    else:
+        yield value
+
+
 def _double(number: float) -> float:
     """Nearest floating-point number; whole ones too large for any are infinite."""
     try:
@@ -113,8 +125,7 @@ def _double(number: float) -> float:
 
 def read_json(path: str | os.PathLike[str], what: str) -> Fields:
     """Read a JSON object. `what`: what the file is, for messages: ``"camera"``."""
-    if not Path(path).is_file():
-        raise UserError(f"{path}: no such {what} file; check the name")
+    require_file(path, f"{what} file")
     data = json_object(
         path, f"mend it or write the {what} anew", f"{what} files are objects of keys in braces"
     )

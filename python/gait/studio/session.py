@@ -14,7 +14,7 @@ import zipfile
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import replace
 from pathlib import Path
-from typing import Any
+from typing import Any, TypeVar
 
 import numpy as np
 import numpy.typing as npt
@@ -23,11 +23,12 @@ from gait import extras
 from gait.camera.camera import write_camera
 from gait.errors import UserError
 from gait.export import files as exports
+from gait.io.fields import Fields
 from gait.io.files import replacing
 from gait.lift.keypoints.corrections import (
-    FEET,
     Correction,
     Edits,
+    EntryReader,
     FloorPin,
     Hidden,
     Swap,
@@ -40,11 +41,12 @@ from gait.studio.source import Source
 from gait.web.motion_data import frames, rounded
 
 Floats = npt.NDArray[np.float64]
+Point = TypeVar("Point", Correction, FloorPin)
 
+LEAST_SD, MOST_SD = 0.3, 50.0  # pixels, of a point given by hand
 MOST_UNDONE = 500  # edits that can be undone
 LEAST_WAY = 0.05  # metres over the floor that show a direction
 ARROW = 0.7  # metres, of the arrow that shows it
-LEAST_SD, MOST_SD = 0.3, 50.0  # pixels, of a point given by hand
 
 
 class NotSavedError(UserError):
@@ -62,6 +64,9 @@ class Session:
     def __init__(self, source: Source) -> None:
         self.source, self._lift = source, source.lift
         self._lock = threading.RLock()
+        used = range(int(source.lift.frames[0]), int(source.lift.frames[-1]) + 1)
+        self._known = source.prior, used, source.video.size
+        self._reader = EntryReader(*self._known)
         self.edits = self._read()
         self._undo: list[Edits] = []
         self._redo: list[Edits] = []
@@ -147,7 +152,9 @@ class Session:
             camera, shown = self._lift.camera, self._solved.shown
             if camera is None:
                 raise UserError("a start is a place on the floor of a calibrated camera; give --camera")
-            frame, ends = self._frame(action), [self._pixel(action, key) for key in ("from", "to")]
+            asked = Fields("the start", action)
+            frame = self._reader.frame(asked, "frame")
+            ends = [self._reader.pixel(asked, key) for key in ("from", "to")]
             here, ahead = camera.on_plane(np.array(ends), 0.0)
             way = ahead - here
             if not np.linalg.norm(way) > LEAST_WAY:
@@ -186,14 +193,13 @@ class Session:
     def _after(self, action: dict[str, Any]) -> Edits:
         """Edits with one more, or one less."""
         kind, edits = action.get("do"), self.edits
+        asked = Fields("the correction", {key: value for key, value in action.items() if key != "do"})
         if kind == "pull":
-            new = Correction(self._frame(action), self._joint(action), self._pixel(action), self._sd(action))
+            new = _tidy(self._reader.correction(asked))
             kept = tuple(c for c in edits.corrections if (c.frame, c.joint) != (new.frame, new.joint))
             return replace(edits, corrections=(*kept, new))
         if kind == "pin":
-            pin = FloorPin(self._frame(action), self._joint(action), self._pixel(action), self._sd(action))
-            if not pin.joint.endswith(FEET):
-                raise UserError(f"{pin.joint}: only a toe, heel or ankle stands on the floor")
+            pin = _tidy(self._reader.pin(asked))
             if (
                 self._lift.camera is not None
                 and np.isnan(self._lift.camera.on_plane(np.array(pin.uv), 0.0)).any()
@@ -202,52 +208,18 @@ class Session:
             others = tuple(p for p in edits.floor if (p.frame, p.joint) != (pin.frame, pin.joint))
             return replace(edits, floor=(*others, pin))
         if kind == "hide":
-            return replace(edits, hidden=(*edits.hidden, Hidden(*self._range(action), self._joint(action))))
+            return replace(edits, hidden=(*edits.hidden, self._reader.hidden(asked)))
         if kind == "swap":
-            return replace(edits, swapped=(*edits.swapped, Swap(*self._range(action))))
+            return replace(edits, swapped=(*edits.swapped, self._reader.swap(asked)))
         if kind == "remove":
-            key, index = str(action.get("list")), action.get("index")
-            listed = getattr(edits, key, None) if key in edits.as_json() else None
-            if listed is None or not isinstance(index, int) or not 0 <= index < len(listed):
-                raise UserError("there is no such correction")
+            key = str(asked.get("list", "reload the page"))
+            listed = getattr(edits, key) if key in edits.as_json() else ()
+            index = asked.integer("index", 0, len(listed) - 1, "there is no such correction")
             rest: dict[str, Any] = {key: (*listed[:index], *listed[index + 1 :])}
             return replace(edits, **rest)
         if kind == "clear":
             return Edits()
         raise UserError(f"the page asked for {kind!r}, which is unknown; reload it")
-
-    def _frame(self, action: dict[str, Any], key: str = "frame") -> int:
-        frame = action.get(key)
-        if not isinstance(frame, int) or frame not in self._lift.frames:
-            raise UserError(f"frame {frame}: is not among those that are lifted; choose another")
-        return frame
-
-    def _range(self, action: dict[str, Any]) -> tuple[int, int]:
-        first, last = sorted((self._frame(action, "first"), self._frame(action, "last")))
-        return first, last
-
-    def _joint(self, action: dict[str, Any]) -> str:
-        joint = action.get("joint")
-        if joint not in self._solved.shown.names:
-            raise UserError(f"{joint}: no such joint")
-        return str(joint)
-
-    def _pixel(self, action: dict[str, Any], key: str = "uv") -> tuple[float, float]:
-        found = action.get(key)
-        size = self.source.video.size
-        if (
-            not isinstance(found, list)
-            or len(found) != 2
-            or not all(isinstance(x, int | float) for x in found)
-        ):
-            raise UserError("the place in the picture is missing")
-        if any(not -n <= x <= 2 * n for x, n in zip(found, size, strict=True)):
-            raise UserError("the place is far outside of the picture")
-        return round(float(found[0]), 2), round(float(found[1]), 2)
-
-    def _sd(self, action: dict[str, Any]) -> float:
-        sd = action.get("sd_px")
-        return round(min(max(float(sd), LEAST_SD), MOST_SD), 2) if isinstance(sd, int | float) else 1.0
 
     def _change(self, wanted: Edits, undo: list[Edits], redo: list[Edits]) -> dict[str, Any]:
         """Save other edits, solve what they move, and ask for the whole; a refused edit changes nothing."""
@@ -307,12 +279,10 @@ class Session:
     # ---- files
 
     def _read(self) -> Edits:
-        path, known = self.source.corrections, self._lift.frames
+        path = self.source.corrections
         if not path.exists():
             return Edits()
-        edits = read_edits(
-            path, self.source.prior, range(int(known[0]), int(known[-1]) + 1), self.source.video.size
-        )
+        edits = read_edits(path, *self._known)
         try:
             self._lift.check(edits)
         except UserError as error:
@@ -392,6 +362,12 @@ def _zipped(*paths: Path) -> Path:
         for path in paths:
             archive.write(path, path.name)
     return found
+
+
+def _tidy(point: Point) -> Point:
+    """Round a point given by hand to what a hand can give."""
+    u, v = (round(x, 2) for x in point.uv)
+    return replace(point, uv=(u, v), sd_px=round(min(max(point.sd_px, LEAST_SD), MOST_SD), 2))
 
 
 def _touched(old: Edits, new: Edits) -> range | None:

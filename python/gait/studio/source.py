@@ -10,7 +10,8 @@ import fcntl
 import json
 import os
 import shlex
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager, suppress
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -40,6 +41,7 @@ from gait.track.walk_camera import calibrate_film, find_people, note_camera
 Floats = npt.NDArray[np.float64]
 
 LARGEST = 1280  # pixels of the longer side of the film that browsers get
+DETECTED = "keypoints.csv"  # what the detector found, in the folder beside the film
 KEYFRAMES = 8  # frames from one that is shown alone to the next: seeking decodes no more
 LEAST_SD = 1.0  # pixels, of a track's joints
 WITHOUT_PERSON = ("init", "lost")  # statuses of frames whose joints are not used
@@ -99,21 +101,19 @@ class Source:
     model_words: list[str]
 
 
-def open_source(wanted: Wanted, warn: Warn, quiet: bool) -> Source:
-    """Find or read everything; what takes long is kept in the folder beside the film.
+def open_source(wanted: Wanted, video: Video, folder: Path, warn: Warn, quiet: bool) -> Source:
+    """Find or read everything; what takes long is kept in the `folder` beside the film (`folder_of`).
 
     Raises
     ------
     UserError
         One line that names the file at fault.
     """
-    video = Video(wanted.video)
     camera = Camera.read(wanted.camera, video.size, wanted.scale_camera) if wanted.camera else None
     if camera is not None and wanted.camera is not None:
         camera.check_place(wanted.camera)
     if video.broken and (wanted.keypoints or wanted.track):  # the detector and the pictures warn themselves
         warn(video.broken)
-    folder = _folder(video)
     prior = lift_run.load_prior(wanted.model, warn)
     lift: Lift
     if wanted.placement:
@@ -183,10 +183,14 @@ def _calibration(wanted: Wanted, video: Video, keypoints: Keypoints, quiet: bool
     return found
 
 
-def _folder(video: Video) -> Path:
-    """Folder beside the film, of this process alone: two of them would write over each other."""
-    path = Path(video.path)
-    folder = path.with_name(f"{path.name}.studio")
+@contextmanager
+def folder_of(video: Video) -> Iterator[Path]:
+    """Folder beside the film, of this process alone: two of them would write over each other.
+
+    If the block refuses the start, a folder that was not there before keeps only what the detector found.
+    """
+    folder = video.path.with_name(f"{video.path.name}.studio")
+    before = folder.exists()
     try:
         folder.mkdir(exist_ok=True)
         lock = os.open(folder / ".lock", os.O_RDWR | os.O_CREAT | os.O_CLOEXEC, 0o644)
@@ -197,12 +201,31 @@ def _folder(video: Video) -> Path:
         raise UserError(
             f"{folder}: {error.strerror}; copy the film to a folder that can be written"
         ) from error
-    return folder
+    try:
+        yield folder
+    except UserError:
+        if not before:
+            _tidy(folder)
+        raise
+
+
+def _tidy(folder: Path) -> None:
+    """Remove all but the detector's keypoints, and the folder if there are none."""
+    found = folder / DETECTED
+    for file in set(folder.iterdir()) - ({found, _mark(found)} if _mark(found).exists() else set()):
+        file.unlink()
+    with suppress(OSError):  # there are
+        folder.rmdir()
+
+
+def _mark(path: Path) -> Path:
+    """File that states what a kept file was made from."""
+    return path.with_name(f".{path.name}.json")
 
 
 def _kept(path: Path, video: Video, make: Callable[[Path], None], **how: int | None) -> Path:
     """Make a file unless it was made from this film before, in the same way."""
-    mark = path.with_name(f".{path.name}.json")
+    mark = _mark(path)
     state = Path(video.path).stat()
     source = {"film": Path(video.path).name, "bytes": state.st_size, "changed": state.st_mtime_ns} | how
     try:
@@ -259,7 +282,7 @@ def _detected(
         keypoints_file.write(target, people[id])
 
     walks = int(height is not None)
-    return str(_kept(folder / "keypoints.csv", video, detect, start=start, stop=stop, walks=walks))
+    return str(_kept(folder / DETECTED, video, detect, start=start, stop=stop, walks=walks))
 
 
 def keypoints_of_track(path: str, camera: Camera) -> Keypoints:

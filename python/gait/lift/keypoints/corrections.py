@@ -110,38 +110,48 @@ def _plain(entry: dict[str, Any]) -> dict[str, Any]:
     return {key: list(value) if isinstance(value, tuple) else value for key, value in entry.items()}
 
 
-class _Reader:
-    """Entries of a file: frames that exist, joints that the prior has, pixels near the picture."""
+class EntryReader:
+    """Entries of a file, and of the requests that become such: only what can be read is ever saved.
+
+    Frames are those that exist, joints those of the prior, pixels near the picture.
+    """
 
     def __init__(self, prior: SegmentPrior, frames: range, size: Size) -> None:
         self._prior, self._frames, self._size = prior, frames, size
 
     def correction(self, fields: Fields) -> Correction:
+        """Read an entry of ``corrections``."""
         fields.only(("frame", "joint", "uv", "sd_px"))
-        return Correction(self._frame(fields, "frame"), self._joint(fields), self._uv(fields), _sd(fields))
+        return Correction(
+            self.frame(fields, "frame"), self._joint(fields), self.pixel(fields, "uv"), _sd(fields)
+        )
 
     def hidden(self, fields: Fields) -> Hidden:
+        """Read an entry of ``hidden``."""
         fields.only(("first", "last", "joint"))
         return Hidden(*self._range(fields), self._joint(fields))
 
     def swap(self, fields: Fields) -> Swap:
+        """Read an entry of ``swapped``."""
         fields.only(("first", "last"))
         return Swap(*self._range(fields))
 
     def pin(self, fields: Fields) -> FloorPin:
+        """Read an entry of ``floor``."""
         fields.only(("frame", "joint", "uv", "sd_px"))
         joint = self._joint(fields)
         if not joint.endswith(FEET):
             raise fields.fail("joint", f"is {joint!r}", "only a toe, heel or ankle stands on the floor")
-        return FloorPin(self._frame(fields, "frame"), joint, self._uv(fields), _sd(fields))
+        return FloorPin(self.frame(fields, "frame"), joint, self.pixel(fields, "uv"), _sd(fields))
 
     def _range(self, fields: Fields) -> tuple[int, int]:
-        first, last = self._frame(fields, "first"), self._frame(fields, "last")
+        first, last = self.frame(fields, "first"), self.frame(fields, "last")
         if last < first:
             raise fields.fail("last", f"is {last}, before first ({first})", "give the first frame as first")
         return first, last
 
-    def _frame(self, fields: Fields, key: str) -> int:
+    def frame(self, fields: Fields, key: str) -> int:
+        """Give the number of a frame under a key."""
         frames = self._frames
         remedy = f"give a frame that is used, {frames[0]} to {frames[-1]}, or other --start and --stop"
         return fields.integer(key, frames[0], frames[-1], remedy)
@@ -152,12 +162,13 @@ class _Reader:
             raise fields.fail("joint", f"is {joint!r}", f"use one of {' '.join(self._prior.names)}")
         return str(joint)
 
-    def _uv(self, fields: Fields) -> tuple[float, float]:
+    def pixel(self, fields: Fields, key: str) -> tuple[float, float]:
+        """Column and row under a key."""
         size = self._size
-        u, v = fields.array("uv", (2,), "give column and row, pixels")
+        u, v = fields.array(key, (2,), "give column and row, pixels")
         if any(not -n <= x <= 2 * n for x, n in zip((u, v), size, strict=True)):
             what = f"is ({u:g}, {v:g}), far outside a picture of {size[0]}x{size[1]}"
-            raise fields.fail("uv", what, "give column and row, pixels")
+            raise fields.fail(key, what, "give column and row, pixels")
         return float(u), float(v)
 
 
@@ -167,11 +178,11 @@ def _sd(fields: Fields) -> float:
     return fields.number("sd_px", 1e-3, FURTHEST, "give a standard deviation in pixels")
 
 
-_LISTS: dict[str, Callable[[_Reader, Fields], Any]] = {
-    "corrections": _Reader.correction,
-    "hidden": _Reader.hidden,
-    "swapped": _Reader.swap,
-    "floor": _Reader.pin,
+_LISTS: dict[str, Callable[[EntryReader, Fields], Any]] = {
+    "corrections": EntryReader.correction,
+    "hidden": EntryReader.hidden,
+    "swapped": EntryReader.swap,
+    "floor": EntryReader.pin,
 }
 _REMEDY = 'give {"corrections": [{"frame": 12, "joint": "l_knee", "uv": [x, y]}]}'
 Entry = TypeVar("Entry", Correction, FloorPin)
@@ -193,7 +204,7 @@ def read_edits(
     data.only(tuple(_LISTS))
     if not any(key in data for key in _LISTS):
         data.get("corrections", _REMEDY)
-    reader = _Reader(prior, frames, size)
+    reader = EntryReader(prior, frames, size)
     found: dict[str, tuple[Any, ...]] = {}
     for key, read in _LISTS.items():
         listed = data.get(key, _REMEDY) if key in data else []
