@@ -199,7 +199,6 @@ def test_wrong_usage(words, expected, capsys):
     [
         (["absent.png", "-o", "l.json"], "absent.png: no such picture"),
         (["absent.mp4", "-o", "l.json"], "absent.mp4: no such video file"),
-        (["--print-board", "board.svg"], "board.svg: unknown kind of board; use .pdf or .png"),
     ],
 )
 def test_files_that_are_not_there(words, expected, capsys, tmp_path, monkeypatch):

@@ -253,8 +253,8 @@ def test_unusable_toml_cameras_are_refused(old, new, words, tmp_path):
         ("cam.json", "{", "not valid JSON"),
         ("cam.json", "[1]", "holds no JSON object"),
         ("cam.yaml", "{{{{", "not a YAML file"),
-        ("cam.txt", "", "neither cameras.txt of COLMAP nor"),
-        ("cam.ini", "", "unknown camera suffix; use .json"),
+        ("cam.txt", "", "is empty, so it is no camera file"),
+        ("cam.ini", "f=1", "unknown camera suffix; use .json"),
         ("none.json", None, "no such camera file"),
     ],
 )

@@ -174,7 +174,7 @@ def test_a_mark_is_moved_by_keys_and_removed(tmp_path):
         (["--page", "a.mp4", "p.csv"], 2, "leave out POINTS.csv"),
         (["--page", "a.mp4", "--lens", "l.json", "--fov", "60"], 2, "leave out --lens or --fov"),
         (["--frame", "3", "p.csv", "--lens", "l.json"], 2, "--frame: is for --page"),
-        (["--page", "absent.png"], 1, "absent.png: is no picture that can be read"),
+        (["--page", "absent.png"], 1, "absent.png: no such picture"),
         (["--page", "absent.mp4"], 1, "absent.mp4: no such video file"),
     ],
 )
@@ -194,7 +194,7 @@ def test_a_lens_of_another_size_is_refused(tmp_path, capsys):
         "--lens",
         str(tmp_path / "lens.json"),
         "-o",
-        str(tmp_path / "c"),
+        str(tmp_path / "c.json"),
     ]
     assert main(["camera", *words]) == 1
     assert "calibrated for 1280x720, the video is 640x480" in capsys.readouterr().err

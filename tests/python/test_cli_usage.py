@@ -1,5 +1,6 @@
 """The command line itself: help, versions, options out of their range, exit codes."""
 
+import argparse
 import json
 import os
 import re
@@ -15,7 +16,7 @@ import pytest
 import gait
 from gait.bindings import abi
 from gait.bindings.config import TrackerConfig
-from gait.cli import COMMANDS, _joined, _parser, main, values
+from gait.cli import COMMANDS, _joined, _parser, main, parser_of, values
 
 
 @pytest.mark.parametrize(
@@ -29,6 +30,25 @@ def test_usage_errors_exit_2(words, capsys):
     err = capsys.readouterr().err
     assert caught.value.code == 2 and err.count("\n") == 1
     assert re.match(rf"gait{' ' + words[0] if words and words[0] in COMMANDS else ''}: error: ", err)
+
+
+OUTPUTS = {"output", "overlay", "camera_out", "cameras_out", "trc", "log", "print_board", "save"}
+
+
+def test_outputs_of_another_kind_are_refused_before_anything_is_read():
+    """A page in a .pdf, or a camera in a .txt, would be written and then read by nothing."""
+    elsewhere = ("learn", "export")  # with all that they are given, and by the kinds that are written
+    outputs = [
+        (command, action)
+        for command in COMMANDS
+        for action in parser_of(command)._actions
+        if action.dest in OUTPUTS and action.metavar != "DIR" and command not in elsewhere
+    ]
+    assert len(outputs) > 15
+    for command, output in outputs:
+        with pytest.raises(argparse.ArgumentTypeError, match="a.xyz: is a name of another kind"):
+            assert output.type, f"gait {command} --{output.dest} takes any name"
+            output.type("a.xyz")
 
 
 def test_the_version_is_that_of_package_and_library(capsys):

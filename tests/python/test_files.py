@@ -8,7 +8,20 @@ import sys
 import pytest
 
 from gait.errors import UserError
-from gait.io.files import filling, replacing, require_folder, require_writable
+from gait.io.files import filling, replacing, require_file, require_folder, require_writable
+
+
+def test_files_to_read_are_files_that_hold_something(tmp_path):
+    (tmp_path / "empty").touch()
+    (tmp_path / "full").write_text("x")
+    require_file(tmp_path / "full", "video file")
+    for path, words in (
+        (tmp_path, "is a folder; give the video file itself"),
+        (tmp_path / "none", "no such video file; check the name"),
+        (tmp_path / "empty", "is empty, so it is no video file"),
+    ):
+        with pytest.raises(UserError, match=f"{path}: {words}"):
+            require_file(path, "video file")
 
 
 def test_a_link_stays_and_its_file_is_written(tmp_path):

@@ -203,7 +203,7 @@ def test_a_standing_person_has_no_heading(tmp_path):
 @pytest.mark.parametrize(
     "count, words",
     [
-        (1, "only 1 frame to track, and a walk takes more: give a film of a second or longer"),
+        (1, "only 1 frame to track, and a walk takes more: give a second or longer, by --start"),
         (5, "only 5 frames to track, --init auto needs 8; give --init FILE"),
     ],
 )

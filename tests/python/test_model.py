@@ -150,7 +150,7 @@ BAD = {
     "format 2.0, this package reads 1.x": damaged(lambda b: struct.pack_into("<H", b, 8, 2)),
     "checksum differs, the file is damaged": damaged(lambda b: b.__setitem__(2000, b[2000] ^ 1)),
     "header states .* bytes, the file has 500": read_blob(None)[:500],
-    "not a .gait model; make one with": b"",
+    "not a .gait model; make one with": b"model",
     "CHNM: missing": blob.encode({"MEAN": np.zeros((1, 1), np.float32)}),
 }
 

@@ -120,10 +120,9 @@ def test_places_that_cannot_be_written(name, words, tmp_path):
         pass
 
 
-@pytest.mark.parametrize("content", [b"", b"not a video at all" * 100])
-def test_unreadable_video_is_one_clear_line(content, tmp_path):
+def test_unreadable_video_is_one_clear_line(tmp_path):
     path = tmp_path / "broken.mp4"
-    path.write_bytes(content)
+    path.write_bytes(b"not a video at all" * 100)
     with pytest.raises(UserError, match="broken.mp4: cannot be read as video .*; give a file") as caught:
         Video(path)
     assert "\n" not in str(caught.value)

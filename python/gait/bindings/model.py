@@ -20,6 +20,7 @@ from gait.camera.camera import Camera
 from gait.camera.path import CameraPose
 from gait.errors import GaitError, UserError
 from gait.io.blob import decode
+from gait.io.files import require_file
 
 Array = NDArray[np.float64]
 
@@ -244,8 +245,7 @@ def read_blob(path: str | os.PathLike[str] | None) -> bytes:
         if not shipped.is_file():
             raise UserError(f"gait/data/{name}.gait: the package was built without its model; run make model")
         return shipped.read_bytes()
-    if not Path(path).is_file():
-        raise UserError(f"{path}: no such model file; make one with gait learn")
+    require_file(path, "model file", "make one with gait learn")
     contents = Path(path).read_bytes()
     decode(contents, str(path))
     return contents

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, replace
-from pathlib import Path
 
 import cv2
 import numpy as np
@@ -13,6 +12,7 @@ from numpy.typing import NDArray
 from gait.camera.board import Board, Grey, blur, other_board
 from gait.camera.camera import Camera
 from gait.errors import UserError
+from gait.io.files import require_file
 from gait.io.video import Video
 
 Array = NDArray[np.float64]
@@ -134,8 +134,7 @@ def calibrate_pictures(paths: Sequence[str], board: Board, progress: Callable[[i
 
 def read_picture(path: str) -> Grey:
     """Grey picture of a file, turned as it asks."""
-    if not Path(path).is_file():
-        raise UserError(f"{path}: no such picture; check the name")
+    require_file(path, "picture")
     grey = cv2.imread(path, cv2.IMREAD_GRAYSCALE)
     if grey is None:
         raise UserError(f"{path}: is no picture that can be read; give JPEG or PNG, or one film")

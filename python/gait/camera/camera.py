@@ -21,6 +21,7 @@ from gait.camera import other_files
 from gait.camera.lens import AGREE, agreeing
 from gait.errors import UserError
 from gait.io.fields import Fields, parsing, read_json
+from gait.io.files import require_file
 from gait.io.opencv_file import read_storage
 
 if sys.version_info >= (3, 11):
@@ -320,8 +321,7 @@ def read_camera(
         One line naming file, key and remedy.
     """
     file, name = _split(str(path))
-    if not Path(file).is_file():
-        raise UserError(f"{file}: no such camera file; check the name")
+    require_file(file, "camera file")
     suffix, stated = Path(file).suffix.lower(), True
     if suffix == ".json":
         camera = _from_json(file, placed)

@@ -138,7 +138,8 @@ def read_text(path: str, name: str | None) -> Entries:
     rows = [line.split() for line in lines if line.strip() and not line.startswith("#")]
     if not rows or not all(len(row) > 4 and row[1] in {*_COLMAP, *_COLMAP_OTHERS} for row in rows):
         raise UserError(
-            f"{path}: neither cameras.txt of COLMAP nor a calibration of Qualisys; use one of these"
+            f"{path}: holds no camera; give a JSON camera file, or as text cameras.txt of COLMAP or a "
+            "calibration of Qualisys"
         )
     return _colmap(path, rows, name)
 

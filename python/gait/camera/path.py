@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 from gait.camera.camera import Camera
 from gait.errors import UserError
 from gait.io.fields import table_rows
+from gait.io.files import require_file
 
 Array = NDArray[np.float64]
 
@@ -209,10 +210,9 @@ def write_path(path: Path, at: Sequence[float], poses: Sequence[CameraPose], *, 
 
 def _read_table(path: str) -> tuple[list[str], Array, list[int]]:
     """Names of the columns in use, their numbers (N, columns), and the line of each row."""
+    require_file(path, "file of camera poses")
     try:
         rows = table_rows(Path(path).read_text(encoding="utf-8-sig"))
-    except FileNotFoundError:
-        raise UserError(f"{path}: no such file of camera poses; check the name") from None
     except (OSError, UnicodeDecodeError, csv.Error):
         raise UserError(f"{path}: is not text; give CSV with time, r11 to r33, tx, ty, tz") from None
     rows = [(line, cells) for line, cells in rows if any(cell.strip() for cell in cells)]

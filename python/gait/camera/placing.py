@@ -14,6 +14,7 @@ from numpy.typing import NDArray
 from gait.camera.camera import Camera
 from gait.errors import UserError
 from gait.io.fields import table_rows
+from gait.io.files import require_file
 
 Array = NDArray[np.float64]
 
@@ -52,6 +53,7 @@ def read_points(path: str | os.PathLike[str]) -> Points:
     UserError
         One line naming file, line and remedy.
     """
+    require_file(path, "file of points")
     try:
         rows = [row for row in table_rows(Path(path).read_text(encoding="utf-8-sig")) if row[1]]
     except OSError as error:

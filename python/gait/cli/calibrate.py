@@ -18,14 +18,13 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from gait.cli import values
-from gait.errors import UsageError, UserError
+from gait.errors import UsageError
 from gait.io.files import replacing, require_outputs
 from gait.progress import progress
 
 if TYPE_CHECKING:
     from gait.camera.calibrating import Lens
 
-_BOARDS = (".pdf", ".png")
 PAPERS = ("a4", "letter", "a3")
 
 EXAMPLES = """\
@@ -39,14 +38,19 @@ examples:
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Add the command's options."""
     parser.add_argument("input", nargs="*", metavar="FILM|PICTURE", help="one film, or pictures of one size")
-    parser.add_argument("-o", "--output", metavar="LENS.json", help="the lens")
+    parser.add_argument("-o", "--output", type=values.named(".json"), metavar="LENS.json", help="the lens")
     parser.add_argument(
         "--board",
         default="charuco",
         metavar="charuco|NxM",
         help="the printed board with markers (default), or the inner corners of a chessboard, as 9x6",
     )
-    parser.add_argument("--print-board", metavar="B.pdf|B.png", help="write the board to print, true to size")
+    parser.add_argument(
+        "--print-board",
+        type=values.named(".pdf", ".png"),
+        metavar="B.pdf|B.png",
+        help="write the board to print, true to size",
+    )
     parser.add_argument(
         "--paper", choices=PAPERS, default="a4", help="paper of --print-board, landscape (default: a4)"
     )
@@ -78,8 +82,6 @@ def _print(args: argparse.Namespace, board: Any) -> int:
     from gait.camera.board import print_board
 
     kind = Path(args.print_board).suffix.lower()
-    if kind not in _BOARDS:
-        raise UserError(f"{args.print_board}: unknown kind of board; use {' or '.join(_BOARDS)}")
     require_outputs((args.print_board,), ())
     with replacing(args.print_board) as temporary:
         side = print_board(temporary, kind, board, args.paper)

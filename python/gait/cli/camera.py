@@ -26,7 +26,7 @@ from typing import TYPE_CHECKING, Any
 
 from gait.cli import values
 from gait.errors import UsageError, UserError
-from gait.io.files import replacing, require_outputs
+from gait.io.files import replacing, require_file, require_outputs
 from gait.progress import note
 
 if TYPE_CHECKING:
@@ -51,7 +51,9 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Add the command's options."""
     parser.add_argument("points", nargs="?", metavar="POINTS.csv", help="u,v,x,y[,z] of each point")
     parser.add_argument("--lens", metavar="FILE", help=values.CAMERA)
-    parser.add_argument("-o", "--output", required=True, metavar="CAMERA.json", help="the camera")
+    parser.add_argument(
+        "-o", "--output", required=True, type=values.named(".json"), metavar="CAMERA.json", help="the camera"
+    )
     add = parser.add_argument_group("by clicking on the floor").add_argument
     add("--page", metavar="VIDEO|PICTURE", help="open a page on which marks of the floor are clicked")
     add("--scale-camera", action="store_true", help="the film is resized: scale a lens of another resolution")
@@ -121,9 +123,10 @@ def _pictures(args: argparse.Namespace) -> tuple[Callable[[int], Any], tuple[int
     from gait.io.video import Video
 
     if Path(args.page).suffix.lower() in values.PICTURES:
-        image = cv2.imread(args.page) if Path(args.page).is_file() else None
+        require_file(args.page, "picture")
+        image = cv2.imread(args.page)
         if image is None:
-            raise UserError(f"{args.page}: is no picture that can be read; check the name")
+            raise UserError(f"{args.page}: is no picture that can be read; give JPEG or PNG, or a film")
         size = image.shape[1], image.shape[0]
         return lambda number: image, size, 1, args.fov
     video = Video(args.page)

@@ -37,7 +37,9 @@ examples:
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Add the command's options."""
     parser.add_argument("video", nargs="?", metavar="VIDEO", help="video file")
-    parser.add_argument("-o", "--output", metavar="KEYPOINTS.csv", help="the keypoints")
+    parser.add_argument(
+        "-o", "--output", type=values.named(".csv"), metavar="KEYPOINTS.csv", help="the keypoints"
+    )
     parser.add_argument("--fetch", action="store_true", help="download the weights (38 MB) and check them")
     parser.add_argument(
         "--network", choices=list(weights.LANDMARKS), default="full", help="landmark network (default: full)"
@@ -103,7 +105,7 @@ def run(args: argparse.Namespace) -> int:
     from gait.detect.people import detect, height, main_person, require_length, require_person
 
     video = Video(args.video)
-    require_length(video)
+    require_length(video, range(video.count))
     note(video.broken or "", args.quiet or not video.broken)
     with progress("detecting", video.count, args.quiet) as update:
         people = detect(video, args.network, args.people, update=update)

@@ -93,7 +93,12 @@ def _add_common(parser: argparse.ArgumentParser) -> None:
         "input", metavar="KEYPOINTS|VIDEO", help="2-D keypoints, or a video in which they are found"
     )
     parser.add_argument(
-        "-o", "--output", required=True, metavar="OUT.csv", help="positions and standard deviations, metres"
+        "-o",
+        "--output",
+        required=True,
+        type=values.named(".csv"),
+        metavar="OUT.csv",
+        help="positions and standard deviations, metres",
     )
     parser.add_argument(
         "-m", "--model", metavar="M.gait", help="model with a segment prior (default: the shipped one)"
@@ -121,6 +126,7 @@ def _add_common(parser: argparse.ArgumentParser) -> None:
     )
     parser.add_argument(
         "--overlay",
+        type=values.named(*values.FILMS),
         metavar="O.mp4",
         help="draw the cylinder figure into the video; of keypoints, into --video",
     )
@@ -171,7 +177,7 @@ def _add_keypoints(group: argparse._ArgumentGroup) -> None:
     )
     for option, help in switches:
         add(option, action="store_true", help=help)
-    add("--trc", metavar="O.trc", help="also write the positions for OpenSim")
+    add("--trc", type=values.named(".trc"), metavar="O.trc", help="also write the positions for OpenSim")
     values.add_person(group)
     add(
         "--fps",
@@ -189,7 +195,12 @@ def _add_keypoints(group: argparse._ArgumentGroup) -> None:
 def _add_video(group: argparse._ArgumentGroup) -> None:
     """Add the options that only a video has."""
     values.add_fov(group)
-    group.add_argument("--camera-out", metavar="CAM.json", help="also write the camera, found or given")
+    group.add_argument(
+        "--camera-out",
+        type=values.named(".json"),
+        metavar="CAM.json",
+        help="also write the camera, found or given",
+    )
     values.add_stabilize(group, default=None)
     group.add_argument(
         "--start",
@@ -407,14 +418,12 @@ def _lift_pictures(args: argparse.Namespace) -> tuple[dict[str, Any], str]:
     """Lift the pictures of a video; the summary, and in words."""
     from gait.body.skeleton import JOINTS
     from gait.io.track_file import write_lifted
-    from gait.io.video import Video, require_video_name  # OpenCV and PyAV, which keypoints do not need
+    from gait.io.video import Video  # OpenCV and PyAV, which keypoints do not need
     from gait.lift import run as lift_run
     from gait.lift.keypoints.corrections import read_corrections
     from gait.lift.video import run as video_run
     from gait.track.walk_camera import find_people
 
-    if args.overlay:
-        require_video_name(args.overlay)
     warn = warner(args.quiet)
     prior, calibration = lift_run.load_prior(args.model, warn), None
     if args.height:
@@ -510,12 +519,8 @@ def _check(args: argparse.Namespace, video: bool) -> None:
     smooth = args.method in (None, "smooth")
     if args.fps and args.video:
         raise UsageError("--fps and --video exclude each other; give one of them")
-    if args.overlay:
-        from gait.io.video import require_video_name
-
-        if not (video or args.video):
-            raise UsageError("--overlay: give the --video in which the keypoints were found")
-        require_video_name(args.overlay)
+    if args.overlay and not (video or args.video):
+        raise UsageError("--overlay: give the --video in which the keypoints were found")
     if args.overlay and args.orthographic and args.stabilize == "auto":
         raise UsageError("--overlay: of a camera that turns needs its lens; give --camera or --height")
     if args.camera and args.orthographic:

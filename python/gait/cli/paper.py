@@ -34,7 +34,14 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     add = parser.add_argument
     add("--mocap", nargs="+", action="extend", default=[], metavar="SRC",
         help="motion files or folders of them, as for gait learn")  # fmt: skip
-    add("-o", "--output", required=True, metavar="PAGE.html", help="the page")
+    add(
+        "-o",
+        "--output",
+        required=True,
+        type=values.named(*values.PAGES),
+        metavar="PAGE.html",
+        help="the page",
+    )
     add("--video", metavar="VIDEO", help="clip of figures 6 and 7")
     values.add_camera(parser, ", of the clip", scale=True)
     add("--init", metavar="INIT.json", help="where the person is at first, as for gait track")

@@ -34,14 +34,19 @@ examples:
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Add the command's options."""
     add = parser.add_argument
-    add("-o", "--output", required=True, metavar="OUT.csv", help="the track")
+    add("-o", "--output", required=True, type=values.named(".csv"), metavar="OUT.csv", help="the track")
     values.add_url(parser)
     add("--frames", type=values.whole(1), metavar="N", help="end after N estimates")
     add("--until-idle", type=values.seconds, metavar="S", help="end when none has come for S seconds")
     add("--patience", type=values.seconds, metavar="S", help="fail if none has come at all after S seconds")
     add("--person", type=values.whole(1, 8), metavar="N", help="of several people the one with this number")
     add("--lagged", action="store_true", help="each frame as estimated some frames later (gait-trackd --lag)")
-    add("--log", metavar="E.log", help="also write the messages to an LCM log, for gait report")
+    add(
+        "--log",
+        type=values.named(".log"),
+        metavar="E.log",
+        help="also write the messages to an LCM log, for gait report",
+    )
 
 
 def run(args: argparse.Namespace) -> int:

@@ -35,7 +35,14 @@ examples:
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Add the command's options."""
     values.add_model(parser)
-    parser.add_argument("-o", "--output", required=True, metavar="OUT.png", help="the picture")
+    parser.add_argument(
+        "-o",
+        "--output",
+        required=True,
+        type=values.named(*values.PICTURES),
+        metavar="OUT.png",
+        help="the picture",
+    )
     values.add_camera(parser, " (default: a built-in view)")
     add = parser.add_mutually_exclusive_group().add_argument
     share = values.between(0, 1, "a share of the stride")
@@ -63,10 +70,7 @@ def run(args: argparse.Namespace) -> int:
         camera = Camera.read(args.camera) if args.camera else default_view(state)
         picture = draw_standing(model, state, camera)
     with replacing(args.output) as temporary:
-        try:
-            cv2.imwrite(str(temporary), picture)
-        except cv2.error:
-            raise UserError(f"{args.output}: unknown image suffix; use .png or .jpg") from None
+        cv2.imwrite(str(temporary), picture)
     return 0
 
 

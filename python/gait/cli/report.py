@@ -35,8 +35,19 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     add("--track", metavar="OUT.csv", help="with a log: the track, from gait record")
     add("--video", metavar="VIDEO", help="the clip that was tracked (always needed)")
     values.add_camera(parser, " (default: camera.json beside the track or the film)", scale=True)
-    add("-o", "--output", metavar="R.html", help="the page (default: RUN.html)")
-    add("--overlay", metavar="O.mp4", help="also draw the estimates into the video")
+    add(
+        "-o",
+        "--output",
+        type=values.named(*values.PAGES),
+        metavar="R.html",
+        help="the page (default: RUN.html)",
+    )
+    add(
+        "--overlay",
+        type=values.named(*values.FILMS),
+        metavar="O.mp4",
+        help="also draw the estimates into the video",
+    )
     add("--truth", metavar="TRUTH.csv", help="true motion, to report errors against")
     add("--draws", metavar="D.npz", help="motions from gait track --smooth --draws")
     values.add_model(parser, "model that was tracked")

@@ -80,9 +80,19 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         help="where a camera that moves is: time or frame; r11 to r33, tx, ty, tz (world to camera) or x, y, "
         "z, qx, qy, qz, qw (camera to world); turn_sd_deg, place_sd_m if not exact; --camera is its lens",
     )
-    add("--camera-out", metavar="CAM.json", help="also write the camera, found or given")
-    add("--cameras-out", metavar="CAMERAS.csv", help="also write each frame's camera, for one that moves")
-    add("-o", "--output", required=True, metavar="OUT.csv", help="the track")
+    add(
+        "--camera-out",
+        type=values.named(".json"),
+        metavar="CAM.json",
+        help="also write the camera, found or given",
+    )
+    add(
+        "--cameras-out",
+        type=values.named(".csv"),
+        metavar="CAMERAS.csv",
+        help="also write each frame's camera, for one that moves",
+    )
+    add("-o", "--output", required=True, type=values.named(".csv"), metavar="OUT.csv", help="the track")
     values.add_model(parser)
     values.add_clip(parser, "track")
     values.add_filter(parser, threads=1)
@@ -122,15 +132,28 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         f"the model's included (default: {KEYPOINTS_SD:g})",
     )
     values.add_stabilize(parser, default="off")
-    add("--overlay", metavar="O.mp4", help="also draw the estimates into the video")
+    add(
+        "--overlay",
+        type=values.named(*values.FILMS),
+        metavar="O.mp4",
+        help="also draw the estimates into the video",
+    )
     add(
         "--smooth", action="store_true", help="estimate each frame from the whole clip, later frames included"
     )
     add(
-        "--draws", metavar="D.npz", help="with --smooth: also write the sampled motions for gait report track"
+        "--draws",
+        type=values.named(".npz"),
+        metavar="D.npz",
+        help="with --smooth: also write the sampled motions for gait report track",
     )
-    add("--report", metavar="R.html", help="also write a page with verdict, film, figure, gait and angles")
-    add("--trc", metavar="O.trc", help="also write the joints for OpenSim (y up)")
+    add(
+        "--report",
+        type=values.named(*values.PAGES),
+        metavar="R.html",
+        help="also write a page with verdict, film, figure, gait and angles",
+    )
+    add("--trc", type=values.named(".trc"), metavar="O.trc", help="also write the joints for OpenSim (y up)")
 
 
 def run(args: argparse.Namespace) -> int:

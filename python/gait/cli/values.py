@@ -14,6 +14,8 @@ THREADS = (1, 256)  # GAIT_POOL_MAX
 SEED = (0, (1 << 64) - 1)
 STREAM = (0, 30)
 PICTURES = (".jpg", ".jpeg", ".png", ".bmp", ".tif", ".tiff", ".webp")
+PAGES = (".html", ".htm")
+FILMS = (".mp4", ".mkv", ".mov")  # that are written
 CAMERA = "camera file: JSON, OpenCV YAML or XML, FILE.toml:NAME, or of another tool"
 
 
@@ -77,6 +79,19 @@ def norm_age(text: str) -> float:
     value = _number(text)
     if not 20 <= value < 80:  # as gait.motion.norms.AGES
         raise ArgumentTypeError(f"{text}: norms are known from 20 to 79 years; leave it out")
+    return value
+
+
+def named(*endings: str) -> Callable[[str], str]:
+    """Names of outputs of one kind, by the ending; an empty one is refused with the other outputs."""
+
+    def value(text: str) -> str:
+        if text and not text.lower().endswith(endings):
+            raise ArgumentTypeError(
+                f"{text}: is a name of another kind; give one that ends in {' or '.join(endings)}"
+            )
+        return text
+
     return value
 
 

@@ -308,11 +308,15 @@ def height(keypoints: Keypoints) -> float:
     return float(np.median(np.ptp(v, axis=1)))
 
 
-def require_length(video: Video) -> None:
-    """Refuse a picture, or a video too short to find people in."""
-    if video.count < _LEAST_FRAMES:
-        frames = "1 frame" if video.count == 1 else f"{video.count} frames"
-        raise UserError(f"{video.path}: has only {frames}; give a video of a second or more")
+def require_length(video: Video, frames: range) -> None:
+    """Refuse a picture, or a video of whose frames too few are used to find people in."""
+    if len(frames) >= _LEAST_FRAMES:
+        return
+    few = "1 frame" if len(frames) == 1 else f"{len(frames)} frames"
+    if len(frames) < video.count:
+        of = f"only {few} of {video.count} left, from {frames.start} on"
+        raise UserError(f"{video.path}: {of}; give a second or more by --start and --stop")
+    raise UserError(f"{video.path}: has only {few}; give a video of a second or more")
 
 
 def require_person(people: dict[int, Keypoints], video: Video) -> None:

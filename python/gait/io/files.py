@@ -117,6 +117,20 @@ def _is_left(temporary: Path) -> bool:
         os.close(descriptor)
 
 
+def require_file(path: str | os.PathLike[str], what: str, remedy: str = "check the name") -> None:
+    """Raise UserError unless `path` is a file that is not empty.
+
+    `what`: what it should be, for messages; `remedy`: where there is no such file.
+    """
+    file = Path(path)
+    if file.is_dir():
+        raise UserError(f"{path}: is a folder; give the {what} itself")
+    if not file.is_file():
+        raise UserError(f"{path}: no such {what}; {remedy}")
+    if file.stat().st_size == 0:
+        raise UserError(f"{path}: is empty, so it is no {what}; copy or make it anew")
+
+
 def require_writable(path: str | os.PathLike[str]) -> None:
     """Raise UserError if a file cannot be put at `path`; for long work, call it before the work.
 

@@ -20,7 +20,7 @@ from gait.bindings.estimate import Estimate
 from gait.body.skeleton import EVAL15, JOINTS
 from gait.errors import UserError
 from gait.io.fields import frame_numbers
-from gait.io.files import replacing
+from gait.io.files import replacing, require_file
 from gait.io.video import Frame
 
 Array = NDArray[np.float64]
@@ -269,8 +269,7 @@ class _Table:
 
     def __init__(self, path: str | os.PathLike[str], what: str) -> None:
         self.path, self.what = path, what
-        if not Path(path).is_file():
-            raise UserError(f"{path}: no such {what} file; check the name")
+        require_file(path, f"{what} file")
         try:
             with open(path, newline="", encoding="utf-8-sig") as file:
                 lines = list(csv.reader(file))

@@ -20,7 +20,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from gait.errors import UserError
-from gait.io.files import replacing
+from gait.io.files import replacing, require_file
 
 if TYPE_CHECKING:
     import av
@@ -95,8 +95,7 @@ class Video:
         import av
 
         self.path = Path(path)
-        if not self.path.is_file():
-            raise UserError(f"{self.path}: no such video file; check the name")
+        require_file(self.path, "video file")
         try:
             self._probe()
         except av.error.FFmpegError as exc:
@@ -222,12 +221,6 @@ def _times(stamps: list[int | None], unit: float, fps: float) -> NDArray[np.floa
     return (known - known[:1]) * unit
 
 
-def require_video_name(path: str | os.PathLike[str]) -> None:
-    """Raise UserError if the suffix of `path` is of no container that `VideoWriter` writes."""
-    if Path(path).suffix.lower() not in _CONTAINERS:
-        raise UserError(f"{path}: unknown video suffix; use one of {' '.join(_CONTAINERS)}")
-
-
 class VideoWriter:
     """H.264 file that every player and browser shows; appears under its name when closed without error.
 
@@ -264,7 +257,8 @@ class VideoWriter:
         keyframes: int | None = None,
     ) -> None:
         self.path = Path(path)
-        require_video_name(path)
+        if self.path.suffix.lower() not in _CONTAINERS:
+            raise UserError(f"{path}: unknown video suffix; use one of {' '.join(_CONTAINERS)}")
         self._rate = Fraction(fps).limit_denominator(1001)
         self._options = {"crf": str(crf), "preset": preset} | _SAME_BITS
         if bits_per_second is not None:
@@ -385,8 +379,7 @@ def read_plate(path: str | os.PathLike[str], size: tuple[int, int]) -> Image:
     """Read the empty scene from an image file, BGR, and check its (width, height)."""
     import cv2
 
-    if not Path(path).is_file():
-        raise UserError(f"{path}: no such background image; give an image file, auto or none")
+    require_file(path, "background image", "give an image file, auto or none")
     plate = cv2.imread(str(path), cv2.IMREAD_COLOR_BGR)
     if plate is None:
         raise UserError(f"{path}: cannot be read as an image; give a PNG or JPEG of the empty scene")

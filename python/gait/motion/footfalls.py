@@ -20,7 +20,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from gait.errors import UserError
 from gait.io.fields import Fields, read_json
-from gait.io.files import replacing
+from gait.io.files import replacing, require_file
 from gait.io.track_file import Joints, Track
 
 Array = NDArray[np.float64]
@@ -315,8 +315,7 @@ class Draws:
     @staticmethod
     def read(path: str | os.PathLike[str], track: Track) -> Draws:
         """Read a file of `write` that must be of the same frames as `track`."""
-        if not Path(path).is_file():
-            raise UserError(f"{path}: no such file of draws; gait track --smooth --draws writes it")
+        require_file(path, "file of draws", "gait track --smooth --draws writes it")
         try:
             with np.load(path, allow_pickle=False) as stored:
                 arrays = {name: stored[name] for name in _ARRAYS}

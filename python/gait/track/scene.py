@@ -449,7 +449,7 @@ def _detect(options: ClipOptions, video: Video, frames: range) -> tuple[dict[int
     from gait.detect import people as detector  # here, as it loads the networks' runtime
 
     if not options.camera:
-        detector.require_length(video)
+        detector.require_length(video, frames)
     with progress("detecting", len(frames), options.quiet) as update:
         everyone = options.people is not None
         people = detector.detect(

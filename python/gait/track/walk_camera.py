@@ -30,9 +30,10 @@ def find_people(video: Video, quiet: bool, first: int = 0, stop: int | None = No
     """
     from gait.detect.people import by_size, detect, require_length, require_person  # loads the runtime
 
-    require_length(video)
+    frames = video.span(first, stop)
+    require_length(video, frames)
     note(video.broken or "", quiet or not video.broken)
-    with progress("detecting", len(video.span(first, stop)), quiet) as update:
+    with progress("detecting", len(frames), quiet) as update:
         people = detect(video, first=first, stop=stop, update=update)
     require_person(people, video)
     return {id: keypoints_file.as_filed(people[id]) for id in by_size(people)}
