@@ -330,7 +330,11 @@ def test_a_url_to_publish_on_that_lcm_refuses(tmp_path):
     ("url", "remedy", "of_python"),
     [
         ("nonsense://", "; give udpm://ADDRESS:PORT or file:///PATH?speed=0", ""),
-        ("udpm://999.1.1.1:7667", "ip route add 224.0.0.0/4 dev lo", "; give udpm://239.255.76.67:7667?ttl=0"),
+        (
+            "udpm://999.1.1.1:7667",
+            "ip route add 224.0.0.0/4 dev lo",
+            "; give udpm://239.255.76.67:7667?ttl=0",
+        ),
     ],
 )
 def test_a_url_that_lcm_refuses(url, remedy, of_python):

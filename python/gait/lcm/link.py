@@ -199,7 +199,11 @@ def open_lcm(url: str | None = None) -> lcm.LCM:
         if is_log(wanted):
             why = damage or "cannot open this log; give file:///PATH?speed=0 (mode=w to write)"
             raise UserError(f"{wanted}: {why}") from None
-        remedy = ROUTE_REMEDY if wanted.startswith(MULTICAST) else "give udpm://ADDRESS:PORT or file:///PATH?speed=0"
+        remedy = (
+            ROUTE_REMEDY
+            if wanted.startswith(MULTICAST)
+            else "give udpm://ADDRESS:PORT or file:///PATH?speed=0"
+        )
         raise UserError(f"{wanted}: cannot open LCM; {remedy}") from None
 
 
