@@ -53,9 +53,10 @@ def main() -> int:
     parser.add_argument("--only", nargs="+", metavar="NAME", help="names of clips (all)")
     parser.add_argument("--record", action="store_true")
     args = parser.parse_args()
-    clips = read_clips(ROOT.parent / "shared/data/real", None)
-    clips += [from_truth(_made(*names)) for names in SIMULATED]
-    clips = [clip for clip in clips if not args.only or clip.folder.name in args.only]
+    clips = read_clips(ROOT.parent / "shared/data/real", args.only)
+    clips += [
+        from_truth(_made(*names)) for names in SIMULATED if not args.only or "_".join(names) in args.only
+    ]
     rows: list[list[object]] = []
     with progress("eval-stabilize", len(clips)) as update:
         for done, clip in enumerate(clips, 1):

@@ -1,101 +1,114 @@
 #!/usr/bin/env python3
-"""Errors of the tracker by the weight of its keypoint term, on the development clips.
+"""Tracks by the weight of the keypoint term, on rendered and on real films, with the detector's own joints.
 
-    keypoints_weight.py [CLIP...]
+    keypoints_weight.py [--only NAME...] [--record]
 
-The keypoints are the true joints with errors of a detector's kind: one of each joint that lasts and one that
-changes from frame to frame, shares of the person's height in the picture.  Their standard deviation is known,
-as that of a profiled detector is.  Models leave out the person's subject.
+Each film is searched by the detector once, as `gait track` does it, and tracked from the automatic start with
+each weight.  The development clips are judged by the true joints, with models that leave out the person's
+subject; films of real people by heel strikes counted in the pictures, and by joints that a person checked.
 """
 
 from __future__ import annotations
 
-import json
+import argparse
 import sys
 import tempfile
 from pathlib import Path
+from unittest.mock import patch
 
 import eval_clips
 import numpy as np
 import table
-from eval_plan import Clip
 from facts import facts
+from real_clip import Clip, from_truth, read_clips, score
 
-from gait.bindings.abi import Term
 from gait.bindings.config import TrackerConfig
-from gait.bindings.frame import FrameKeypoints
-from gait.bindings.initial import Start
-from gait.bindings.model import Model
 from gait.body.skeleton import EVAL15
-from gait.camera.camera import Camera
-from gait.io.track_file import read_truth
-from gait.io.video import Video, background
+from gait.io.track_file import Track, read_estimates, read_truth
 from gait.motion.evaluate import root_errors
 from gait.progress import progress
-from gait.track.tracker import Tracker
+from gait.track.clip import ClipOptions, track_scene
+from gait.track.scene import Scene, first_state
 
+ROOT = Path(__file__).resolve().parents[2]
 WEIGHTS = (0.0, 2.0, 8.0, 32.0)
-LASTS, CHANGES = 0.015, 0.01  # person's heights
-FRAMES, PARTICLES, SEED = 60, 2000, 1
+_READING = """\
+`gait track`, all defaults but the weight; 0: pictures alone, but for the start. Keypoints are those of the
+detector (full), with the errors of its profile. Rendered clips: root-aligned and absolute error of 15 joints,
+median over the frames, mm. All: good frames and wrong ones under `tracking` as in `make eval-real`, against
+true joints or, of real films, joints that a person checked, which come from such a detector as well; heel
+strikes: median distance from the true ones or from those counted in the pictures. Default: {default:g}."""
 
 
 def main() -> int:
-    """Track and publish the table."""
+    """Track and print; publish if asked to."""
+    parser = argparse.ArgumentParser(
+        description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
+    )
+    parser.add_argument("--only", nargs="+", metavar="NAME", help="names of clips (all)")
+    parser.add_argument("--record", action="store_true")
+    args = parser.parse_args()
     if eval_clips.absent():
         return 0
-    clips, paths = eval_clips.people(sys.argv[1:] or None)
-    rows = []
-    with progress("clips", len(clips)) as update:
-        for done, clip in enumerate(clips, 1):
-            model = Model(paths[str(clip.subject)])
-            rows += [[clip.name, weight, *_errors(clip, model, weight)] for weight in WEIGHTS]
+    wanted = [(clip, "real") for clip in read_clips(ROOT.parent / "shared/data/real", args.only)]
+    folders = sorted((eval_clips.DATA / "eval" / "dev").iterdir())
+    rendered = [folder.name for folder in folders if not args.only or folder.name in args.only]
+    models: dict[str, str] = {}
+    if rendered:
+        clips, paths = eval_clips.people(rendered)
+        models = {one.name: str(paths[one.subject]) for one in clips if one.subject}
+        wanted = [(from_truth(one.folder), "rendered") for one in clips] + wanted
+    rows: list[list[object]] = []
+    with progress("keypoints-weight", len(wanted)) as update:
+        for done, (clip, kind) in enumerate(wanted, 1):
+            rows += _rows(clip, kind, models.get(clip.folder.name))
             update(done)
-    for weight in WEIGHTS:
-        mean = np.mean([row[2:] for row in rows if row[1] == weight], axis=0)
-        rows.append(["mean", weight, *mean.tolist()])
-    note = (
-        f"{facts('tests/bench/keypoints_weight.py')}\n\n"
-        f"The first {FRAMES} frames from a start near the truth, {PARTICLES} particles; keypoints off by "
-        f"{100 * LASTS:g} % of the person's height that last and {100 * CHANGES:g} % that change. "
-        "Root-aligned and absolute error of 15 joints, median over frames, mm. Weight 0: pictures alone; "
-        "the default is 8."
-    )
-    table.publish(
-        "keypoints_weight", "Weight of the keypoint term", ["clip", "weight", "root mm", "abs mm"], rows, note
-    )
+    for kind in dict.fromkeys(kind for _, kind in wanted):
+        for weight in WEIGHTS:
+            same = [row[3:] for row in rows if row[1:3] == [kind, weight]]
+            rows.append(["mean", kind, weight, *np.mean(np.array(same, float), axis=0).tolist()])
+    head = ["clip", "film", "weight", "root mm", "abs mm", "good %", "wrong", "strikes: frames off",
+            "stride rate %"]  # fmt: skip
+    default = TrackerConfig.default().keypoints_weight
+    note = f"{facts('tests/bench/keypoints_weight.py')}\n\n{_READING.format(default=default)}"
+    if args.record:
+        table.publish("keypoints_weight", "Weight of the keypoint term", head, rows, note)
+    else:
+        table.show("Weight of the keypoint term", head, rows)
     return 0
 
 
-def _errors(clip: Clip, model: Model, weight: float) -> list[float]:
-    """Median root-aligned and absolute error, mm."""
-    truth, video = read_truth(str(clip.truth)), Video(clip.video)
-    camera = Camera.read(str(clip.camera), video.size)
-    places = np.stack([truth.places[name] for name in EVAL15], axis=1)
-    uv = camera.project(places.reshape(-1, 3)).reshape(*places.shape[:2], 2)
-    tall = np.ptp(uv[..., 1], axis=1)
-    rng = np.random.default_rng(SEED)
-    off = LASTS * rng.normal(size=(1, len(EVAL15), 2)) + CHANGES * rng.normal(size=uv.shape)
-    uv, sd = uv + tall[:, None, None] * off, np.hypot(LASTS, CHANGES) * tall
-    plate = background(str(clip.plate) if clip.plate else "auto", video)
-    config = TrackerConfig.default(particles=PARTICLES, keypoints_weight=weight)
-    config = config.replace(terms=config.terms | Term.KEYPOINTS)
-    tracker = Tracker(model, camera, config, background=plate)
+def _rows(clip: Clip, kind: str, model: str | None) -> list[list[object]]:
+    """Row of each weight."""
+    plain, rows = TrackerConfig.default, []
     with tempfile.TemporaryDirectory() as folder:
-        init = Path(folder) / "init.json"
-        init.write_text(json.dumps(eval_clips.noisy_start(clip, SEED, 0.0)))
-        start = Start.read(str(init), model)
-    found, rows = [], []
-    for frame in video.frames(start.frame, start.frame + FRAMES):
-        if not found:
-            tracker.start(start.mean, start.sd, frame.utime)
-        row = int(np.searchsorted(truth.frame, frame.number))
-        joints = FrameKeypoints(EVAL15, uv[row], float(sd[row]))
-        now = tracker.step(frame.image, frame.utime, joints)
-        found.append([now.joint(name) for name in EVAL15])
-        rows.append(row)
-    true = places[rows]
-    apart = 1000 * np.linalg.norm(np.array(found) - true, axis=2).mean(axis=1)
-    return [float(np.median(root_errors(np.array(found), true))), float(np.median(apart))]
+        out = str(Path(folder) / "track.csv")
+        options = ClipOptions(str(clip.video), str(clip.folder / "camera.json"), out, model, quiet=True)
+        scene = Scene.read(options)
+        start = first_state(options, scene)
+        for weight in WEIGHTS:
+
+            def weighted(*words: object, weight: float = weight, **more: object) -> TrackerConfig:
+                return plain(*words, **more).replace(keypoints_weight=weight)  # type: ignore[arg-type]
+
+            with patch.object(TrackerConfig, "default", weighted):
+                track_scene(options, scene, start)
+            track = read_estimates(out)
+            cameras = dict.fromkeys(track.frame.tolist(), scene.camera)
+            found = score(clip, track, cameras)
+            errors = _errors(clip, track) if kind == "rendered" else [np.nan, np.nan]
+            rows.append([clip.folder.name, kind, weight, *errors, 100 * found.share["good"], found.wrong,
+                         found.strike_error, 100 * found.stride_error])  # fmt: skip
+    return rows
+
+
+def _errors(clip: Clip, track: Track) -> list[float]:
+    """Median root-aligned and absolute error, mm."""
+    truth = read_truth(clip.folder / "truth.csv")
+    rows = np.searchsorted(truth.frame, track.frame)
+    found, true = (np.stack([joints.places[name] for name in EVAL15], axis=1) for joints in (track, truth))
+    apart = 1000 * np.linalg.norm(found - true[rows], axis=2).mean(axis=1)
+    return [float(np.median(values)) for values in (root_errors(found, true[rows]), apart)]
 
 
 if __name__ == "__main__":

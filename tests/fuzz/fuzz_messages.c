@@ -6,6 +6,7 @@
 #include "../unit/toy_segment.h"
 
 #include "gaitmsg_image_t.h"
+#include "gaitmsg_tracks2_t.h"
 #include "gaitmsg_tracks_t.h"
 
 static void start(service *s, lift_service *lift, keypoint_cue *cue, pose_path *path, sink *out,
@@ -56,6 +57,7 @@ int LLVMFuzzerTestOneInput(const uint8_t *data, size_t size)
         {on_frame, __gaitmsg_image_t_get_hash},      {on_camera, __gaitmsg_camera_t_get_hash},
         {on_background, __gaitmsg_image_t_get_hash}, {on_keypoints, __gaitmsg_tracks_t_get_hash},
         {on_command, __gaitmsg_command_t_get_hash},  {on_status, __gaitmsg_status_t_get_hash},
+        {on_keypoints, __gaitmsg_tracks2_t_get_hash},
     };
     enum { HANDLERS = sizeof handlers / sizeof *handlers, TYPE = 8 };
     fuzz_bytes b = {data, size};
