@@ -54,9 +54,9 @@ int LLVMFuzzerTestOneInput(const uint8_t *data, size_t size)
         lcm_msg_handler_t call;
         int64_t (*type)(void);
     } handlers[] = {
-        {on_frame, __gaitmsg_image_t_get_hash},      {on_camera, __gaitmsg_camera_t_get_hash},
-        {on_background, __gaitmsg_image_t_get_hash}, {on_keypoints, __gaitmsg_tracks_t_get_hash},
-        {on_command, __gaitmsg_command_t_get_hash},  {on_status, __gaitmsg_status_t_get_hash},
+        {on_frame, __gaitmsg_image_t_get_hash},       {on_camera, __gaitmsg_camera_t_get_hash},
+        {on_background, __gaitmsg_image_t_get_hash},  {on_keypoints, __gaitmsg_tracks_t_get_hash},
+        {on_command, __gaitmsg_command_t_get_hash},   {on_status, __gaitmsg_status_t_get_hash},
         {on_keypoints, __gaitmsg_tracks2_t_get_hash},
     };
     enum { HANDLERS = sizeof handlers / sizeof *handlers, TYPE = 8 };
