@@ -24,6 +24,8 @@ if TYPE_CHECKING:
     from gait.bindings.state import State
     from gait.camera.camera import Camera
     from gait.camera.path import CameraPath, CameraPose
+    from gait.detect.people import PeopleDetector
+    from gait.io.keypoints_file import Keypoints
     from gait.io.video import Frame, Video, VideoWriter, background
     from gait.track.tracker import Tracker
 
@@ -35,12 +37,14 @@ _HOME = {
     "Flag": "bindings.abi",
     "Frame": "io.video",
     "FrameKeypoints": "bindings.frame",
+    "Keypoints": "io.keypoints_file",
     "LiftConfig": "bindings.config",
     "LiftedFrame": "bindings.lifter",
     "Lifter": "bindings.lifter",
     "Mode": "bindings.abi",
     "Model": "bindings.model",
     "ModelInfo": "bindings.model",
+    "PeopleDetector": "detect.people",
     "Start": "bindings.initial",
     "State": "bindings.state",
     "Term": "bindings.abi",
@@ -52,7 +56,7 @@ _HOME = {
     "background": "io.video",
 }
 
-_OF_VIDEO = ("Video", "VideoWriter", "background")
+_OF_VIDEO = ("PeopleDetector", "Video", "VideoWriter", "background")
 
 __all__ = [
     "Camera",
@@ -65,6 +69,7 @@ __all__ = [
     "GaitArgumentError",
     "GaitError",
     "GaitLimitError",
+    "Keypoints",
     "LibraryError",
     "LiftConfig",
     "LiftedFrame",
@@ -72,6 +77,7 @@ __all__ = [
     "Mode",
     "Model",
     "ModelInfo",
+    "PeopleDetector",
     "Start",
     "State",
     "Term",

@@ -27,6 +27,18 @@ sys.path.insert(
 os.environ["GAIT_WEIGHTS"] = str(Path(__file__).parent)  # a folder without weights
 
 
+@pytest.fixture
+def fetched(monkeypatch):
+    """Let the detector find the weights that `make setup` fetched; their folder."""
+    from gait.detect import weights  # here, after the settings above
+
+    folder = Path(sys.prefix) / "share/gait/weights"
+    if not all((folder / one.file).is_file() for one in (weights.PERSON, *weights.LANDMARKS.values())):
+        pytest.skip("the detector's weights are absent: gait detect --fetch")
+    monkeypatch.setenv("GAIT_WEIGHTS", str(folder))
+    return folder
+
+
 # Files whose few tests take long begin first, so that no processor waits at the end.
 FIRST = [
     f"test_{name}.py" for name in ("learn_dask", "docs", "learn_report", "example", "learn_jobs", "initial")

@@ -1,6 +1,5 @@
 import json
 import subprocess
-import sys
 from pathlib import Path
 
 import cv2
@@ -15,7 +14,6 @@ from gait.io.keypoints_file import Keypoints, read
 from gait.io.video import Frame
 from gait.track.keypoint_start import find_keypoint_start
 
-FETCHED = Path(sys.prefix) / "share/gait/weights"
 REAL = Path(__file__).parents[3] / "shared/data/real"
 RED, BLUE = (40, 40, 220), (220, 40, 40)
 
@@ -56,14 +54,6 @@ class Stage:
             image[50:180, max(int(place) - 20, 0) : int(place) + 20] = RED if name.startswith("red") else BLUE
         found = self.detector.step(Frame(number, number / 25, image))
         return {one.id: float(person.uv[:, 0].mean()) for one, person in found}
-
-
-@pytest.fixture
-def fetched(monkeypatch):
-    """Let the detector find the weights that `make setup` fetched."""
-    if not all((FETCHED / w.file).is_file() for w in (weights.PERSON, weights.LANDMARKS["full"])):
-        pytest.skip("the detector's weights are absent: gait detect --fetch")
-    monkeypatch.setenv("GAIT_WEIGHTS", str(FETCHED))
 
 
 @pytest.fixture

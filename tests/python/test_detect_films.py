@@ -1,8 +1,6 @@
 """People in made films: in portrait, filling the picture, small; films without a person to be found."""
 
 import json
-import sys
-from pathlib import Path
 
 import cv2
 import numpy as np
@@ -15,19 +13,13 @@ from gait.detect.people import detect
 from gait.io.keypoints_file import read
 from gait.io.track_file import read_track
 
-FETCHED = Path(sys.prefix) / "share/gait/weights"
 FRAMES, SIZE = 12, (640, 480)
 MATRIX = 44  # bytes from the name of an MP4 file's track header to its matrix
 TURNS = {0: (1, 0, 0, 1), 90: (0, 1, -1, 0), 180: (-1, 0, 0, -1), 270: (0, -1, 1, 0)}
 """Entries a, b, c, d of the matrix by the degrees that players turn the picture clockwise."""
 
 
-@pytest.fixture(autouse=True)
-def fetched(monkeypatch):
-    """Let the detector find the weights that `make setup` fetched."""
-    if not all((FETCHED / w.file).is_file() for w in (weights.PERSON, weights.LANDMARKS["lite"])):
-        pytest.skip("the detector's weights are absent: gait detect --fetch")
-    monkeypatch.setenv("GAIT_WEIGHTS", str(FETCHED))
+pytestmark = pytest.mark.usefixtures("fetched")
 
 
 @pytest.fixture(scope="module")
@@ -200,12 +192,14 @@ def test_an_empty_file_is_no_film(command, tmp_path, capsys):
 
 @pytest.mark.parametrize("command", COMMANDS)
 @pytest.mark.parametrize("fault", ["cut off", "of the other network"])
-def test_wrong_weights_are_refused(fault, command, walk, tmp_path, tmp_path_factory, monkeypatch, capsys):
+def test_wrong_weights_are_refused(
+    fault, command, walk, fetched, tmp_path, tmp_path_factory, monkeypatch, capsys
+):
     folder = tmp_path_factory.mktemp("weights")
     full, lite = (weights.LANDMARKS[name].file for name in ("full", "lite"))
-    (folder / weights.PERSON.file).symlink_to(FETCHED / weights.PERSON.file)
+    (folder / weights.PERSON.file).symlink_to(fetched / weights.PERSON.file)
     for name, other in ((full, lite), (lite, full)):
-        data = (FETCHED / other).read_bytes() if fault != "cut off" else (FETCHED / name).read_bytes()[:-9]
+        data = (fetched / other).read_bytes() if fault != "cut off" else (fetched / name).read_bytes()[:-9]
         (folder / name).write_bytes(data)
     monkeypatch.setenv("GAIT_WEIGHTS", str(folder))
     film(tmp_path / "film.mp4", walk[1][:4])

@@ -325,6 +325,15 @@ def test_the_tracker_of_the_python_page_follows_the_person(beside):
     assert re.fullmatch(r"\d+ bytes, digest [0-9a-f]{16}", last)
 
 
+def test_the_detector_of_the_python_page_finds_a_knee(beside, fetched):
+    rows, truth = output_of("howto/python.md", "PeopleDetector", beside)
+    assert {row.split()[0] for row in rows} == {"1"} and len(rows) > len(truth) / 2
+    knee = [[float(row[f"l_knee_{axis}"]) for axis in "uv"] for row in truth]
+    off = [np.hypot(*np.array(row.split()[2:], float) - knee[int(row.split()[1])]) for row in rows]
+    assert np.nanmedian(off) < 8  # of a person about 150 pixels tall
+    assert Path("keypoints.csv").stat().st_size > 1000
+
+
 def test_the_lifter_of_the_python_page_follows_a_knee(beside):
     rows, truth = output_of("howto/python.md", "lifter.push", beside)
     knee = [[float(row[f"l_knee_{axis}"]) for axis in "xyz"] for row in truth]

@@ -1,8 +1,6 @@
 """gait detect --lcm: frames come in over LCM, and the joints found in them go out."""
 
 import re
-import sys
-from pathlib import Path
 
 import cv2
 import lcm_rig as rig
@@ -11,7 +9,7 @@ import pytest
 
 from gait import Camera, Video, cli
 from gait.bindings.initial import Start
-from gait.detect import profile, weights
+from gait.detect import profile
 from gait.detect.networks import JOINTS, Crop, Person
 from gait.detect.people import Followed
 from gait.errors import UserError
@@ -107,12 +105,8 @@ def test_joints_are_the_models_of_the_person_in_view_longest(rigged):
     np.testing.assert_allclose([t.correlation for t in tracks], of_joint, rtol=1e-6)
 
 
-def test_the_tracker_uses_the_joints_of_every_second_frame(tmp_path, monkeypatch):
+def test_the_tracker_uses_the_joints_of_every_second_frame(tmp_path, monkeypatch, fetched):
     """A simulated walk through the networks, and both streams through gait-trackd."""
-    fetched = Path(sys.prefix) / "share/gait/weights"
-    if not all((fetched / w.file).is_file() for w in (weights.PERSON, weights.LANDMARKS["lite"])):
-        pytest.skip("the detector's weights are absent: gait detect --fetch")
-    monkeypatch.setenv("GAIT_WEIGHTS", str(fetched))
     clip = tmp_path / "clip"
     assert cli.main(["simulate", "-o", str(clip), "--frames", "8", "--size", "480x360", "--quiet"]) == 0
     video = Video(clip / "video.mp4")

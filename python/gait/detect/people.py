@@ -10,7 +10,7 @@ A person who comes back gets the old id if place and colours agree.
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 
 import cv2
@@ -98,7 +98,9 @@ class Followed:
 
 
 class PeopleDetector:
-    """Finds and follows people in the frames of one camera.
+    """Finds people and their 2-D joints in the frames of one camera, and follows them.
+
+    The networks are fetched by ``gait detect --fetch``.
 
     Parameters
     ----------
@@ -121,6 +123,7 @@ class PeopleDetector:
     """
 
     def __init__(self, network: str = "full", most: int = _MOST, everyone: bool = False) -> None:
+        self._network = network
         self._find = PersonNetwork()
         self._landmarks = LandmarkNetwork(network)
         self._most, self._everyone = most, everyone
@@ -128,7 +131,19 @@ class PeopleDetector:
         self.people: list[Followed] = []
 
     def step(self, frame: Frame) -> list[tuple[Followed, Person]]:
-        """Find the people of the next frame; people not returned were not found in it."""
+        """Find the people of the next frame; people not returned were not found in it.
+
+        Parameters
+        ----------
+        frame : Frame
+            As of `gait.Video`; number and time must increase.
+
+        Returns
+        -------
+        list of (Followed, Person)
+            Who it is, with an `id`, and the detector's joints in this frame: `uv` (16, 2), pixels, and
+            `confidence` (16,), in the order of the names of `keypoints`.
+        """
         found: list[tuple[Followed, Person]] = []
         near = {one.id: self._others_near(one, frame.time) for one in self.people if not one.lost}
         located = [
@@ -148,6 +163,27 @@ class PeopleDetector:
             self._scanned = frame.time
             self._scan(frame, found)
         return found
+
+    def keypoints(self, times: Mapping[int, float] | Array, correct: bool = True) -> dict[int, Keypoints]:
+        """Give the keypoints of everyone found so far.
+
+        Parameters
+        ----------
+        times : mapping of int to float, or ndarray
+            Seconds of each frame by its number, such as ``Video.times``.
+        correct : bool
+            Move the joints to where the model has them, and give their errors (`gait.detect.profile`).
+
+        Returns
+        -------
+        people : dict of int to Keypoints
+            By id, from the first to the last frame of each person, NaN where not found; people found in fewer
+            than three frames are left out.
+        """
+        people = {one.id: _keypoints(one, times) for one in self.people if len(one.frames) >= _LEAST_FRAMES}
+        if not correct:
+            return people
+        return {id: profile.corrected(found, self._network) for id, found in people.items()}
 
     def _others_near(self, one: Followed, time: float) -> list[Followed]:
         """Others, in view or hidden for a moment, who may be taken for a person."""
@@ -264,15 +300,13 @@ def detect(
     update : callable, optional
         Called with the number of frames done.
     correct : bool
-        Move the joints to where the model has them, and give their errors (`gait.detect.profile`).
+        As in `PeopleDetector.keypoints`, which gives what is returned.
     everyone : bool
         Search all of the picture for small people although some were found.
 
     Returns
     -------
     people : dict of int to Keypoints
-        Keypoints by id, from the first to the last frame of each person; people found in fewer than three
-        frames are left out.
 
     Raises
     ------
@@ -286,11 +320,10 @@ def detect(
         times[frame.number] = frame.time
         if update is not None:
             update(frame.number - first + 1)
-    people = {one.id: _keypoints(one, times) for one in detector.people if len(one.frames) >= _LEAST_FRAMES}
-    return {id: profile.corrected(found, network) for id, found in people.items()} if correct else people
+    return detector.keypoints(times, correct)
 
 
-def _keypoints(one: Followed, times: dict[int, float]) -> Keypoints:
+def _keypoints(one: Followed, times: Mapping[int, float] | Array) -> Keypoints:
     """Keypoints of a person, NaN in frames where the person was not found."""
     frames = np.arange(one.frames[0], one.frames[-1] + 1)
     uv = np.full((len(frames), len(JOINTS), 2), np.nan)
