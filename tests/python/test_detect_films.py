@@ -187,7 +187,7 @@ def test_a_film_of_noise_shows_no_person(command, tmp_path, capsys):
 def test_an_empty_file_is_no_film(command, tmp_path, capsys):
     (tmp_path / "film.mp4").write_bytes(b"")
     line = refused(capsys, tmp_path, *commands(tmp_path, "film.mp4")[command])
-    assert "film.mp4: cannot be read as video" in line and "give a file that ffmpeg plays" in line
+    assert "film.mp4: is empty, so it is no video file; copy or make it anew" in line
 
 
 @pytest.mark.parametrize("command", COMMANDS)
