@@ -1,8 +1,8 @@
 #!/usr/bin/env python3
 """hygiene.py ROOT: what git tracks is source, carries one version and names no machine.
 
-Warnings only: a source of more than 700 lines, other than a public header, and a recorded result whose commit is
-not in this history (a rebase after the recording has left it behind).
+Warnings only: a source of more than 700 lines, other than a public header, and a recorded result whose commit
+is not in this history (a rebase after the recording has left it behind).
 """
 
 import fnmatch

@@ -9,6 +9,7 @@ from html import escape
 
 import matplotlib
 from matplotlib.axes import Axes
+from matplotlib.backends.backend_svg import FigureCanvasSVG
 from matplotlib.figure import Figure
 
 from gait.report.colours import BLUE, DARK, GREY, ORANGE
@@ -18,43 +19,23 @@ Painter = Callable[[Axes], None]
 _LARGE, _NARROW = 10.4, 3.7  # inches: of a screen or paper, and of a telephone
 _LEFT, _RIGHT, _TOP, _BOTTOM = 0.75, 0.15, 0.35, 0.5  # inches beside the axes of a plot over time
 _PANEL = (3.2, 2.2)  # inches of one of many panels
+_BESIDE_PANEL = (0.62, 0.08, 0.28, 0.46)  # inches left, right, above and below the axes of a panel
 _VARIABLES = {BLUE: "left", ORANGE: "right", DARK: "middle", GREY: "faint", "#000000": "ink"}
-
-
-def svg_figure(
-    rows: Sequence[Sequence[Painter]],
-    size: tuple[float, float],
-    font: float = 8,
-    legend: bool = False,
-    label: str = "",
-) -> str:
-    """Draw rows of axes, each by its painter.
-
-    `size`: width and height, inches; `font`: points; `legend`: show one legend above all axes, that of the
-    first; `label`: what the drawing shows, for those who cannot see it.
-    """
-    with _settings(font):
-        figure = Figure(figsize=size, layout="constrained")
-        grid = figure.add_gridspec(len(rows), max(len(row) for row in rows))
-        for i, row in enumerate(rows):
-            for k, paint in enumerate(row):
-                _painted(figure.add_subplot(grid[i, k]), paint, font)
-        if legend:
-            handles, labels = figure.axes[0].get_legend_handles_labels()
-            figure.legend(handles, labels, loc="outside upper center", ncols=len(labels), frameon=False)
-        return _text(figure, label)
 
 
 def panels(painters: Sequence[Painter], label: str) -> str:
     """Draw many small axes, which the page puts into as many columns as fit."""
-    cells = "".join(svg_figure([[paint]], _PANEL, 8.5, label=label) for paint in painters)
+    left, right, top, bottom = _BESIDE_PANEL
+    width, height = _PANEL
+    place = (left / width, bottom / height, 1 - (left + right) / width, 1 - (top + bottom) / height)
+    cells = "".join(_drawn(paint, _PANEL, 8.5, label, place) for paint in painters)
     return f'<div class="panels">{cells}</div>'
 
 
 def for_screen_and_telephone(paint: Painter, height: float, label: str, narrow: float | None = None) -> str:
     """Draw axes for a screen or paper and again for a telephone; heights in inches."""
-    large = svg_figure([[paint]], (_LARGE, height), 10, label=label)
-    small = svg_figure([[paint]], (_NARROW, narrow or height), 8.5, label=label)
+    large = _drawn(paint, (_LARGE, height), 10, label)
+    small = _drawn(paint, (_NARROW, narrow or height), 8.5, label)
     return f'<div class="plot-large">{large}</div><div class="plot-narrow">{small}</div>'
 
 
@@ -78,6 +59,20 @@ def time_plot(paint: Painter, span: tuple[float, float], height: float, title: s
     return f'<div class="over-time" data-from="{span[0]:.6f}" data-to="{span[1]:.6f}">{"".join(parts)}</div>'
 
 
+def _drawn(
+    paint: Painter,
+    size: tuple[float, float],
+    font: float,
+    label: str,
+    place: tuple[float, float, float, float] | None = None,
+) -> str:
+    """Draw axes on a figure of `size` inches; `place`: left, bottom, width and height as shares of it."""
+    with _settings(font):
+        figure = Figure(figsize=size, layout=None if place else "constrained")
+        _painted(figure.add_axes(place) if place else figure.add_subplot(), paint, font)
+        return _text(figure, label)
+
+
 def _settings(font: float) -> AbstractContextManager[None]:
     return matplotlib.rc_context(
         {"svg.fonttype": "none", "svg.hashsalt": "gait", "font.size": font, "axes.edgecolor": "#000000"}
@@ -98,6 +93,11 @@ def _text(figure: Figure, label: str) -> str:
     """Return the SVG with the page's colours, so that it is readable on dark pages too."""
     file = io.StringIO()
     nothing = dict.fromkeys(("Date", "Creator", "Format", "Type"))
+    engine = figure.get_layout_engine()
+    if engine is not None:  # lays out here, as saving would draw everything twice for it
+        FigureCanvasSVG(figure)
+        engine.execute(figure)
+        figure.set_layout_engine(None)
     figure.savefig(file, format="svg", metadata=nothing, transparent=True)
     text = file.getvalue()[file.getvalue().index("<svg") :]
     for hexadecimal, name in _VARIABLES.items():
