@@ -263,12 +263,14 @@ def draw_bush(
     lit = np.clip(out @ sun + 0.25 * rng.standard_normal(len(out)), 0, 1)
     tilt = rng.uniform(0, 180, len(out))
     slim = rng.uniform(0.35, 0.8, len(out))
-    for i in order:
-        centre = (round(float(uv[i, 0]) * 16), round(float(uv[i, 1]) * 16))
-        axes = (max(round(size[i] * 16), 8), max(round(size[i] * slim[i] * 16), 8))
-        for layer, light in ((ambient, AMBIENT * shade[i]), (direct, SUN * lit[i])):
-            colour = tuple(float(c) for c in bush.colour * light)
-            cv2.ellipse(layer, centre, axes, tilt[i], 0, 360, colour, -1, cv2.LINE_8, 4)
+    fixed = 16  # steps a pixel in the fixed point of OpenCV
+    at = np.rint(uv * fixed).astype(int)
+    half = np.maximum(np.rint(np.stack([size * fixed, size * slim * fixed], axis=1)), 8).astype(int)
+    sky, sunshine = (bush.colour * light[:, None] for light in (AMBIENT * shade, SUN * lit))
+    leaves = (values[order].tolist() for values in (at, half, tilt, sky, sunshine))
+    for centre, axes, turn, *colours in zip(*leaves, strict=True):
+        for layer, colour in zip((ambient, direct), colours, strict=True):
+            cv2.ellipse(layer, centre, axes, turn, 0, 360, colour, -1, cv2.LINE_8, 4)
 
 
 _SAMPLES = 2  # rays per pixel, each way; 1 in a clip of a camera that moves, which casts them for each frame
