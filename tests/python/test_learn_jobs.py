@@ -291,7 +291,7 @@ def test_a_full_disk_is_one_line_with_its_remedy(walks, monkeypatch):
 
 STATUS = Path("/proc/self/status")
 MOST = 0.05  # MB per cycle; a cycle's values alone are 0.03 MB, and they are used in a dozen ways
-COPIES = 18, 36  # of six recordings: enough cycles for the components' fixed memory to be in use
+COPIES = 18, 27  # of six recordings: enough cycles for the components' fixed memory to be in use
 
 CHILD = """
 import json, sys
@@ -337,7 +337,7 @@ def test_memory_grows_little_with_the_cycles(tmp_path):
         motion = {"period": 110.0 + 6 * i, "offset": 13.0 * i, "swing": 0.85 + 0.05 * i, "seed": i}
         files.write_toy(tmp_path / f"{i // 2:02}", f"{i // 2:02}_{i % 2:02}", frames=400, **motion)
     (few, small), (many, large) = (peak(tmp_path, copies) for copies in COPIES)
-    assert many >= 2 * few > 700
+    assert many >= 1.5 * few > 500
     assert large - small <= MOST * (many - few), f"{few} cycles: {small:.0f} MB, {many}: {large:.0f} MB"
 
 
