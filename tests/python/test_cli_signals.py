@@ -12,47 +12,51 @@ import pytest
 from drawn_person import camera, wall, write
 
 from gait import Video
+from gait.cli.signals import Interruptible
 from gait.io.track_file import read_track
 
 PATIENCE = 120.0  # seconds for what takes a few, on a machine busy with other things
 MODEL = resources.files("gait") / "data" / "walk.gait"
 
 
-@pytest.fixture(scope="module")
-def clip(tmp_path_factory):
-    """Video of a wall, long enough that no run tracks it to its end; its camera and a start."""
-    folder = tmp_path_factory.mktemp("clip")
-    write(folder / "video.mp4", [wall()] * 900)
-    (folder / "camera.json").write_text(json.dumps(camera().to_dict()))
-    (folder / "init.json").write_text(json.dumps({"frame": 0, "pelvis": [0, 0]}))
-    return folder
-
-
 @pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM, signal.SIGHUP])
-def test_track_keeps_the_rows_that_are_finished(clip, tmp_path, number):
+def test_signals_that_end_a_command_interrupt_it(number):
+    with pytest.raises(KeyboardInterrupt), Interruptible():
+        signal.raise_signal(number)
+
+
+def test_track_keeps_the_rows_that_are_finished(tmp_path):
+    """A clip of a wall, long enough that no run tracks it to its end."""
+    clip = tmp_path / "clip"
+    clip.mkdir()
+    write(clip / "video.mp4", [wall()] * 900)
+    (clip / "camera.json").write_text(json.dumps(camera().to_dict()))
+    (clip / "init.json").write_text(json.dumps({"frame": 0, "pelvis": [0, 0]}))
+    output = tmp_path / "output"
+    output.mkdir()
     words = ["track", clip / "video.mp4", "--camera", clip / "camera.json", "--init", clip / "init.json"]
     words += ["--background", "none", "--particles", "500"]
-    words += ["-o", tmp_path / "t.csv", "--overlay", tmp_path / "o.mp4"]
+    words += ["-o", output / "t.csv", "--overlay", output / "o.mp4"]
     process = subprocess.Popen(
         [sys.executable, "-m", "gait", *map(str, words)], stderr=subprocess.PIPE, text=True
     )
     try:
         deadline = time.monotonic() + PATIENCE
-        while sum(path.stat().st_size > 0 for path in tmp_path.iterdir()) < 2:  # both have been begun
+        while sum(path.stat().st_size > 0 for path in output.iterdir()) < 2:  # both have been begun
             assert process.poll() is None and time.monotonic() < deadline
             time.sleep(0.01)
-        process.send_signal(number)
+        process.send_signal(signal.SIGTERM)
         _, printed = process.communicate(timeout=PATIENCE)
     finally:
         process.kill()
         process.communicate()
     assert process.returncode == 1 and printed.endswith("gait track: interrupted\n")
-    left = sorted(path.name for path in tmp_path.iterdir())
+    left = sorted(path.name for path in output.iterdir())
     assert left == ["o.unfinished.mp4", "t.unfinished.csv"]
     for name in left:
         assert f"; what had been written is in {name}\n" in printed
-    rows = len(read_track(tmp_path / "t.unfinished.csv").frame)
-    assert 1 <= rows < 900 and abs(Video(tmp_path / "o.unfinished.mp4").count - rows) <= 1
+    rows = len(read_track(output / "t.unfinished.csv").frame)
+    assert 1 <= rows < 900 and abs(Video(output / "o.unfinished.mp4").count - rows) <= 1
 
 
 def test_a_reader_that_leaves_is_no_error_of_ours():
