@@ -3,10 +3,10 @@
 
     eval_stabilize.py [--only NAME...] [--record]
 
-never: --stabilize off; moving: --stabilize auto, which leaves alone what stands still; always: the same,
-with every camera taken to move.  Where auto finds that the camera stands still it is the same as never, and
-is not run; where it finds that it moves, always is the same as moving.  Clips of `gait simulate` are kept in
-build/eval-stabilize.
+never: --stabilize off, with a background and without; moving: --stabilize auto, which leaves alone what
+stands still; always: the same, with every camera taken to move.  Where auto finds that the camera stands
+still it is the same as never, and never is not run; where it finds that it moves, always is the same as
+moving.  Clips of `gait simulate` are kept in build/eval-stabilize.
 """
 
 from __future__ import annotations
@@ -20,7 +20,7 @@ import numpy as np
 import table
 from eval_real import OUT, Result, run
 from facts import facts
-from real_clip import Clip, from_truth, read_cameras, read_clips, score
+from real_clip import Clip, errors_in_space, from_truth, read_cameras, read_clips, score
 
 from gait import Camera, Video
 from gait.io.track_file import read_estimates
@@ -42,7 +42,7 @@ The arm `auto` of `make eval-real` (camera given, detector on). never, moving, a
 auto, with every camera taken to move. good, wrong under `tracking`: as there, joints in the picture by the
 camera of each frame. one camera: good frames if the joints are drawn by the one camera that was given, as a
 program does that knows no other. Clips of which auto finds that the camera stands still have the same track
-by it as by off. Simulated: `gait simulate --preset P --moving KIND`."""
+by it as by off. Simulated: `gait simulate --preset P --moving KIND`, with errors of 15 joints in space."""
 
 
 def main() -> int:
@@ -66,7 +66,7 @@ def main() -> int:
         same = [row[3:-1] for row in rows if tuple(row[1:3]) == kind and not row[-1]]
         rows.append(["mean", *kind, *np.nanmean(np.array(same, float), axis=0).tolist(), ""])
     head = ["clip", "camera", "stabilised", "good %", "one camera, good %", "tracking", "wrong",
-            "error % of height", "stride rate %", "CPU s", "failed"]  # fmt: skip
+            "error % of height", "stride rate %", "root mm", "abs mm", "CPU s", "failed"]  # fmt: skip
     note = f"{facts('tests/bench/eval_stabilize.py')}\n\n{_READING}"
     if args.record:
         table.publish("eval_stabilize", "Stabilising", head, rows, note)
@@ -88,22 +88,25 @@ def _rows(clip: Clip) -> list[list[object]]:
     auto = _row(clip, "moving", run(clip, "auto", AUTO))
     cameras = _cameras(clip)
     if len({camera.R.tobytes() for camera in cameras.values()}) > 1:
-        return [_row(clip, "never", run(clip, "auto", [])), auto]
+        plain = _row(clip, "never", run(clip, "auto", []))
+        return [plain, _row(clip, "never, no background", run(clip, "nobg", []), "nobg"), auto]
     auto[1:3] = "still", "never, moving"
     always = _row(clip, "always", run(clip, "auto", AUTO, ALWAYS))
     always[1] = "still"
     return [auto, always]
 
 
-def _row(clip: Clip, arm: str, found: Result) -> list[object]:
-    """Cells of a run on a clip whose camera moves."""
-    own, one = found.score, 0.0
+def _row(clip: Clip, arm: str, found: Result, start: str = "auto") -> list[object]:
+    """Cells of a run, by the arm `start` of eval-real, on a clip whose camera moves."""
+    own, one, errors = found.score, 0.0, [np.nan, np.nan]
     if not found.failed:
-        track, given = read_estimates(OUT / f"{clip.folder.name}_auto.csv"), _given(clip)
+        track, given = read_estimates(OUT / f"{clip.folder.name}_{start}.csv"), _given(clip)
+        if (clip.folder / "truth.csv").is_file():
+            errors = errors_in_space(clip, track, np.isin(track.frame, list(clip.reference)))
         one = score(clip, track, dict.fromkeys(track.frame.tolist(), given)).share["good"]
     return [
         *(clip.folder.name, "moves", arm, 100 * own.share["good"], 100 * one, own.tracking, own.wrong),
-        *(100 * own.error, 100 * own.stride_error, found.cpu, found.failed),
+        *(100 * own.error, 100 * own.stride_error, *errors, found.cpu, found.failed),
     ]
 
 

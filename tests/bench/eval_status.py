@@ -21,11 +21,9 @@ import numpy as np
 import table
 from eval_real import OUT, run
 from facts import facts
-from real_clip import Clip, from_truth
+from real_clip import Clip, errors_in_space, from_truth
 
-from gait.body.skeleton import EVAL15
 from gait.io.track_file import Track, read_estimates, read_truth
-from gait.motion.evaluate import root_errors
 from gait.progress import progress
 from gait.simulate.clip import simulate
 from gait.simulate.scenario import PRESETS
@@ -89,37 +87,28 @@ def _row(clip: Clip) -> list[object]:
     status = Counter(one for one, frame in zip(track.status, track.frame, strict=True)
                      if int(frame) in clip.reference)  # fmt: skip
     score = found.score
+    rows = np.array([one == "tracking" for one in track.status]) & np.isin(track.frame, list(clip.reference))
     return [
         name,
         *(round(100 * status[one] / len(clip.reference)) for one in STATUSES),
         *(round(100 * score.share[kind]) for kind in ("good", "swap", "off")),
         100 * score.wrong / score.tracking if score.tracking else None,
-        *_errors(clip, track),
+        *errors_in_space(clip, track, rows),
+        _heading(clip, track, rows),
         100 * score.stride_error,
         "",
     ]
 
 
-def _errors(clip: Clip, track: Track) -> list[float | None]:
-    """Median root-aligned and absolute error, mm, and error of the heading, degrees, under `tracking`."""
+def _heading(clip: Clip, track: Track, rows: np.ndarray) -> float:
+    """Median error of the direction of the hips, degrees, over `rows` of the track."""
     truth = read_truth(clip.folder / "truth.csv")
-    rows = np.array([status == "tracking" for status in track.status])
-    rows &= np.isin(track.frame, list(clip.reference))
     if not rows.any():
-        return [None] * 3
-    true_rows = np.searchsorted(truth.frame, track.frame[rows])
-    found, true = (
-        np.stack([joints.places[name][at] for name in EVAL15], axis=1)
-        for joints, at in ((track, rows), (truth, true_rows))
-    )
-    across, true_across = (
-        joints[:, EVAL15.index("r_hip"), :2] - joints[:, EVAL15.index("l_hip"), :2]
-        for joints in (found, true)
-    )
-    turn = np.arctan2(*across.T) - np.arctan2(*true_across.T)
-    apart = 1000 * np.linalg.norm(found - true, axis=2).mean(axis=1)
-    off = np.degrees(np.abs(np.angle(np.exp(1j * turn))))
-    return [float(np.median(values)) for values in (root_errors(found, true), apart, off)]
+        return np.nan
+    places = ((track, rows), (truth, np.searchsorted(truth.frame, track.frame[rows])))
+    found, true = (joints.places["r_hip"][at, :2] - joints.places["l_hip"][at, :2] for joints, at in places)
+    turn = np.arctan2(*found.T) - np.arctan2(*true.T)
+    return float(np.degrees(np.median(np.abs(np.angle(np.exp(1j * turn))))))
 
 
 if __name__ == "__main__":

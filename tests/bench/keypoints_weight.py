@@ -20,12 +20,10 @@ import eval_clips
 import numpy as np
 import table
 from facts import facts
-from real_clip import Clip, from_truth, read_clips, score
+from real_clip import Clip, errors_in_space, from_truth, read_clips, score
 
 from gait.bindings.config import TrackerConfig
-from gait.body.skeleton import EVAL15
-from gait.io.track_file import Track, read_estimates, read_truth
-from gait.motion.evaluate import root_errors
+from gait.io.track_file import read_estimates
 from gait.progress import progress
 from gait.track.clip import ClipOptions, track_scene
 from gait.track.scene import Scene, first_state
@@ -96,19 +94,11 @@ def _rows(clip: Clip, kind: str, model: str | None) -> list[list[object]]:
             track = read_estimates(out)
             cameras = dict.fromkeys(track.frame.tolist(), scene.camera)
             found = score(clip, track, cameras)
-            errors = _errors(clip, track) if kind == "rendered" else [np.nan, np.nan]
+            known = np.isin(track.frame, list(clip.reference))
+            errors = errors_in_space(clip, track, known) if kind == "rendered" else [np.nan] * 2
             rows.append([clip.folder.name, kind, weight, *errors, 100 * found.share["good"], found.wrong,
                          found.strike_error, 100 * found.stride_error])  # fmt: skip
     return rows
-
-
-def _errors(clip: Clip, track: Track) -> list[float]:
-    """Median root-aligned and absolute error, mm."""
-    truth = read_truth(clip.folder / "truth.csv")
-    rows = np.searchsorted(truth.frame, track.frame)
-    found, true = (np.stack([joints.places[name] for name in EVAL15], axis=1) for joints in (track, truth))
-    apart = 1000 * np.linalg.norm(found - true[rows], axis=2).mean(axis=1)
-    return [float(np.median(values)) for values in (root_errors(found, true[rows]), apart)]
 
 
 if __name__ == "__main__":

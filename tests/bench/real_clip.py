@@ -13,8 +13,10 @@ import cv2
 import numpy as np
 
 from gait import Camera, Video
+from gait.body.skeleton import EVAL15
 from gait.io import keypoints_file
 from gait.io.track_file import Track, read_truth
+from gait.motion.evaluate import root_errors
 from gait.motion.footfalls import strikes_of
 from gait.report.drawing import draw_bones
 
@@ -233,6 +235,19 @@ def _timing(clip: Clip, track: Track) -> tuple[float, float]:
     ]
     strike_error = float(np.median(late)) * clip.fps / stride_hz if late else np.nan
     return stride_hz / clip.stride_hz - 1 if clip.stride_hz else np.nan, strike_error
+
+
+def errors_in_space(clip: Clip, track: Track, rows: np.ndarray) -> list[float]:
+    """Root-aligned and absolute error of 15 true joints, mm: medians over `rows` of the track."""
+    truth = read_truth(clip.folder / "truth.csv")
+    if not rows.any():
+        return [np.nan, np.nan]
+    found, true = (
+        np.stack([joints.places[name][at] for name in EVAL15], axis=1)
+        for joints, at in ((track, rows), (truth, np.searchsorted(truth.frame, track.frame[rows])))
+    )
+    apart = 1000 * np.linalg.norm(found - true, axis=2).mean(axis=1)
+    return [float(np.median(values)) for values in (root_errors(found, true), apart)]
 
 
 def project(track: Track, row: int, camera: Camera) -> Points:
