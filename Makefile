@@ -92,7 +92,7 @@ UNIT := $(patsubst tests/unit/%.c,$(B)/unit/%,$(sort $(wildcard tests/unit/test_
 TOOLS := $(BIN)/gait-trackd
 LIBS := $(B)/libgait.so $(B)/libgait.a
 
-.PHONY: help setup lock lib tools test built check unit python-test demo model paper bench bench-lift detector-profile eval eval-camera eval-cameras eval-gait eval-moving eval-real eval-learn eval-lift eval-paper eval-people eval-studio mutants asan tsan unit-threads fuzz fuzz-run fuzz-long fuzz-targets golden-check \
+.PHONY: help setup lock lib tools test built check unit python-test demo model paper bench bench-lift detector-profile eval eval-body eval-camera eval-cameras eval-gait eval-moving eval-real eval-learn eval-lift eval-paper eval-people eval-studio mutants asan tsan unit-threads fuzz fuzz-run fuzz-long fuzz-targets golden-check \
         docs screenshots sbom lint format wheel sdist wheel-check install install-daemon uninstall clean
 
 help: ## list the targets
@@ -416,6 +416,9 @@ eval-people: setup lib ## several people in one clip, each beside the same perso
 
 eval-cameras: setup lib ## tracks with one and with two cameras: tests/bench/results/cameras.md
 	@$(PY) tests/bench/eval_cameras.py $(ARGS)
+
+eval-body: setup lib ## tracks of people whose limbs were measured: tests/bench/results/body.md
+	@$(PY) tests/bench/eval_body.py $(ARGS)
 
 detector-profile: setup lib ## learn how the detector's joints differ from the model's, on rendered walks (or CLIPS=) *
 	@$(PY) tests/bench/detector_profile.py $(CLIPS)

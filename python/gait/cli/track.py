@@ -95,6 +95,12 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     add("-o", "--output", required=True, type=values.named(".csv"), metavar="OUT.csv", help="the track")
     values.add_model(parser)
     values.add_clip(parser, "track")
+    add(
+        "--body",
+        metavar="BODY.json",
+        help="what was measured of the person, instead of --height: stature_m, and any of leg_m, arm_m or "
+        "their parts, hip_width_m, shoulder_width_m",
+    )
     values.add_filter(parser, threads=1)
     values.add_seed(parser, "the random numbers")
     add(
@@ -158,6 +164,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 def run(args: argparse.Namespace) -> int:
     """Track and report."""
+    from gait.body.measured import MeasuredBody
     from gait.track.clip import ClipOptions, track_clip
     from gait.track.people import track_people
 
@@ -169,15 +176,17 @@ def run(args: argparse.Namespace) -> int:
         raise UsageError("--keypoints-sd: needs --keypoints")
     if args.person and not args.keypoints:
         raise UsageError("--person: needs --keypoints")
+    if args.body and args.height is not None:
+        raise UsageError("--height: --body has the stature; leave out one of them")
     if args.people is not None:
         alone = {"--init": args.init != "auto", "--keypoints": args.keypoints, "--mode": args.mode == "paper"}
-        alone["--detector none"] = args.detector == "none"
+        alone |= {"--detector none": args.detector == "none", "--body": args.body is not None}
         for option, given in alone.items():
             if given:
                 raise UsageError(f"--people: finds everyone by the detector; leave out {option}")
     films = args.video
     cameras = _cameras(args)
-    if not args.camera and args.height is None:
+    if not (args.camera or args.height or args.body):
         raise UsageError("give --camera CAM, or --height M for a camera that is found from the walk")
     if not args.camera and args.init != "auto":
         raise UsageError("--init: needs --camera, in whose world it is")
@@ -195,13 +204,24 @@ def run(args: argparse.Namespace) -> int:
         raise UsageError("--fov: is for a camera that is found; leave out --camera or --fov")
     require_outputs(
         (args.output, args.camera_out, args.cameras_out, args.overlay, args.trc, args.draws, args.report),
-        (*films, *cameras, args.model, args.camera_path, args.init, args.background, args.keypoints),
+        (
+            *films,
+            *cameras,
+            args.model,
+            args.camera_path,
+            args.init,
+            args.background,
+            args.keypoints,
+            args.body,
+        ),
     )
+    body = MeasuredBody.read(args.body) if args.body else None
     if args.report:
         import gait.report.run_page  # noqa: F401  a package that it needs is missed before the long work
 
     given = {name: getattr(args, name) for name in ClipOptions.__dataclass_fields__ if name != "further"}
     given |= {"mode": Mode[args.mode.upper()], "keypoints_sd": args.keypoints_sd or KEYPOINTS_SD}
+    given |= {"body": body, "height": args.height if body is None else body.stature}
     given |= {"video": films[0], "camera": cameras[0] if cameras else None}
     given["further"] = tuple(zip(films[1:], cameras[1:], strict=True)) if films[1:] else ()
     if args.people is None:

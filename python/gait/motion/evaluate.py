@@ -37,7 +37,7 @@ def static_pose(model: dict[str, Any], truth: Joints, names: Sequence[str] = EVA
     """
     joints = _poses(model, _PHASES, stature(model, truth), names=names).mean(axis=0)
     joints -= joints[HIPS].mean(axis=0)
-    turned = np.einsum("nij,pj->npi", _turns(truth), joints)
+    turned = np.einsum("nij,pj->npi", body_axes(truth), joints)
     return np.asarray(turned + _hip_midpoint(truth)[:, None])
 
 
@@ -57,7 +57,7 @@ def free_run(
     stride = (truth.time[-1] - truth.time[0]) / (advance[-1] - advance[0])
     joints = _poses(model, cycles[0] + advance, size, 1 / stride, names)
     joints += size * root_path(model, cycles[0] + advance, 1 / stride)[:, None]
-    joints = np.einsum("ij,npj->npi", _turns(truth, stride)[first], joints)
+    joints = np.einsum("ij,npj->npi", body_axes(truth, stride)[first], joints)
     return np.asarray(joints - joints[first, HIPS].mean(axis=0) + _hip_midpoint(truth)[first])
 
 
@@ -94,8 +94,8 @@ def root_path(model: dict[str, Any], cycles: Array, rate: float = 0.0) -> Array:
     return np.stack([np.interp(cycles, fine, path) for path in (forward, sway, height)], axis=1)
 
 
-def _turns(truth: Joints, stride: float = STRIDE) -> Array:
-    """Rotations (n, 3, 3) from x forward, y left, z up to the world."""
+def body_axes(truth: Joints, stride: float = STRIDE) -> Array:
+    """Give rotations (n, 3, 3) from x forward, y left, z up to the world."""
     forward = walking_direction(truth, stride)
     up = np.broadcast_to([0.0, 0.0, 1.0], forward.shape)
     return np.stack([forward, np.cross(up, forward), up], axis=2)

@@ -3,8 +3,12 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import TYPE_CHECKING
 
 from gait.bindings.abi import Mode
+
+if TYPE_CHECKING:
+    from gait.body.measured import MeasuredBody
 
 KEYPOINTS_SD = 4.0  # pixels
 
@@ -39,6 +43,8 @@ class ClipOptions:
         A file, ``auto``, or for the background ``none``.
     height : float, optional
         The person's stature, metres.
+    body : MeasuredBody, optional
+        The person's measured body, with the stature of `height`.
     mode : Mode
     particles : int, optional
     seed, threads : int
@@ -72,6 +78,7 @@ class ClipOptions:
     init: str = "auto"
     background: str = "auto"
     height: float | None = None
+    body: MeasuredBody | None = None
     further: tuple[tuple[str, str], ...] = ()
     offsets: tuple[float, ...] | None = None
     scale_camera: bool = False

@@ -14,6 +14,7 @@ from gait.bindings.frame import FrameKeypoints
 from gait.bindings.initial import OUTSIDE, Start
 from gait.bindings.model import Model
 from gait.bindings.start_fit import StartFit
+from gait.body.measured import model_of
 from gait.camera.camera import Camera, read_camera
 from gait.camera.path import CameraPath, CameraPose, stand_still
 from gait.detect import weights
@@ -148,7 +149,8 @@ class Scene:
         video = Video(options.video)
         frames = video.span(options.start or 0, options.stop)
         camera, poses = _cameras(options, video, frames)
-        model = Model(options.model or ("paper" if options.mode == Mode.PAPER else "walk"))
+        name = options.model or ("paper" if options.mode == Mode.PAPER else "walk")
+        model = Model(name if options.body is None else model_of(options.body, name))
         if starts and camera is not None and options.init != "auto":
             _read_start(options, video, camera, poses, model)  # refused before the work on the whole clip
         _require_detector(options)

@@ -36,6 +36,7 @@ def settings(options: ClipOptions, scene: Scene, particles: int) -> dict[str, st
         "picture": f"{scene.video.width} × {scene.video.height} px, {scene.video.fps:.4g} frames per second",
         "stature given": "not given" if options.height is None else f"{options.height:.2f} m",
         "model": "the package's" if options.model is None else options.model,
+        "body measured": "no" if options.body is None else options.body.source,
         "settings": "of the paper" if options.mode == Mode.PAPER else "default",
         "estimates": "from the whole film (smoothed)" if options.smooth else "from the frames up to each",
         "particles": f"{particles}, random numbers from seed {options.seed}",
