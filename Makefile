@@ -274,10 +274,11 @@ $(B)/unit/%: tests/unit/%.c $(OBJ) Makefile $(MADE) | $(B)/unit/
 	$(call log,CC   $<)$(CC) -std=c11 -D_POSIX_C_SOURCE=200809L $(COMMON:-O3=-O1) -MT $@ -MF $@.d $(CWARN) -pthread -Ilibgait/include -iquote libgait/src $(CFLAGS) \
 	    $(LDFLAGS) -o $@ $< $(OBJ) -lm
 
-# A process for each processor; the tests of a file stay together, they share what is slow to make.
+# A process for each processor and one more, as tests of programs that run side by side wait for them; the tests of a
+# file stay together, they share what is slow to make.
 # What their many processes import is compiled once, also where the caller's environment forbids it.
 COMPILED_ONCE := PYTHONDONTWRITEBYTECODE= PYTHONPYCACHEPREFIX='$(abspath build/pycache)'
-PYTEST_AT_ONCE := -n logical --maxprocesses 8 --dist loadfile --no-loadscope-reorder
+PYTEST_AT_ONCE = -n $(shell expr $$(getconf _NPROCESSORS_ONLN) + 1) --maxprocesses 8 --dist loadfile --no-loadscope-reorder
 python-test: setup lib tools ## Python tests (ARGS='-k blob' to choose)
 	@$(COMPILED_ONCE) $(PY) -m pytest -q -c python/pyproject.toml --rootdir . $(PYTEST_AT_ONCE) tests/python $(ARGS)
 
