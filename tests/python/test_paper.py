@@ -167,7 +167,7 @@ def test_the_plot_of_the_ladder_has_each_rungs_own_cycle():
     assert free == [without[ladder.FREE[rung.model]] for rung in ladder.RUNGS]
 
 
-def test_the_page_holds_every_figure_and_needs_no_other_file(walks, tmp_path, monkeypatch, capsys):
+def test_the_page_holds_every_figure_and_needs_no_other_file(walks, learning, tmp_path, monkeypatch, capsys):
     """A whole run on toy walks and a small rendered clip."""
     small = replace(PRESETS[clips.PRESET], size=(320, 240), frames=16)
     monkeypatch.setitem(PRESETS, clips.PRESET, small)
@@ -181,6 +181,7 @@ def test_the_page_holds_every_figure_and_needs_no_other_file(walks, tmp_path, mo
     monkeypatch.setattr(lifting, "FRAMES", 14)
     monkeypatch.setattr(recordings, "ECLECTIC", 4)
     monkeypatch.setattr(recordings, "cores", lambda: 1)
+    monkeypatch.setattr(ormoneit, "learn", lambda *_: learning)  # of the same walks
     monkeypatch.setattr(Drawing, "png", lambda self: b"PNG")  # Matplotlib takes a second for each
     page = tmp_path / "a.html"
     assert main(["paper", "--mocap", str(walks), "-o", str(page), "--quiet", "--json"]) == 0
