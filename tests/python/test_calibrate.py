@@ -185,7 +185,7 @@ def test_a_lens_is_no_camera_yet(shown, tmp_path, capsys):
         (["a.png"], "give a film or pictures and -o LENS.json"),
         (["a.png", "-o", "l.json", "--board", "9"], "--board 9: give charuco"),
         (["a.png", "-o", "l.json", "--board", "2x9"], "--board 2x9: give charuco"),
-        (["a.png", "b.mp4", "-o", "l.json"], "give one film, or pictures alone"),
+        (["a.png", "b.mp4", "-o", "l.json"], "give one film, or only pictures"),
         (["a.png", "--print-board", "b.pdf"], "leave out the film"),
     ],
 )

@@ -181,9 +181,9 @@ def test_trc_and_sd(folder, capsys):
         (["--camera", "no.json"], 1, "no.json"),
         (["--floor-sd", "0.1"], 2, "goes with --camera and --method smooth"),
         (["--camera", "cam.json", "--floor-sd", "0.1", "--method", "blend"], 2, "--method smooth"),
-        (["--start", "0"], 2, "--start is for a video, and t.csv holds keypoints"),
+        (["--start", "0"], 2, "--start is for a video, and t.csv contains keypoints"),
         (["--overlay", "o.mp4"], 2, "--overlay: give the --video in which the keypoints were found"),
-        (["--placement", "cam.json"], 2, "--placement is for a video, and t.csv holds keypoints"),
+        (["--placement", "cam.json"], 2, "--placement is for a video, and t.csv contains keypoints"),
         (["-o", "t.csv"], 1, "t.csv: is read by this command; give the output another name"),
         (["--trc", "./out.csv"], 1, "./out.csv: two outputs have this name"),
         (["-o", ""], 1, "name is empty"),
@@ -237,7 +237,7 @@ def test_tracks_that_cannot_be(folder, capsys, change, words):
 def test_options_of_keypoints_and_of_pictures(folder, capsys):
     (folder / "clip.mp4").touch()
     assert main(["lift", "clip.mp4", "-m", "m.gait", "-o", "out.csv"]) == 2
-    assert "--height M for a camera that is found" in capsys.readouterr().err
+    assert "--height M to estimate the camera" in capsys.readouterr().err
     assert main(["lift", "clip.mp4", "-o", "out.csv", "--placement", "p.json", "--method", "smooth"]) == 2
     assert "--method is for keypoints" in capsys.readouterr().err
     assert main(["lift", "absent", "-o", "out.csv", "--method", "smooth"]) == 1
@@ -384,7 +384,7 @@ def test_an_impossible_stature_is_refused(folder, capsys, monkeypatch, stature):
     lift = motion.lift
     monkeypatch.setattr(motion, "lift", lambda *args: replace(lift(*args), stature=stature))
     assert main(["lift", "t.csv", "-m", "m.gait", "--camera", "cam.json", "-o", "out.csv"]) == 1
-    assert f"t.csv: the person came out {stature:.3g} m tall; check the camera" in capsys.readouterr().err
+    assert f"t.csv: the estimated stature is {stature:.3g} m; check the camera" in capsys.readouterr().err
     assert not (folder / "out.csv").exists()
 
 
@@ -406,4 +406,4 @@ def test_the_summary_is_in_plain_words():
     }
     printed = lift._text(figures)
     assert "1 point a frame" in printed and "1e-" not in printed and "converged after 6" in printed
-    assert "least certain in a segment seen alone: l_toe l_heel l_ankle 81 mm (4 % in depth)" in printed
+    assert "least certain in a single segment: l_toe l_heel l_ankle 81 mm (4 % in depth)" in printed

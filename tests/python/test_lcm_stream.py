@@ -293,7 +293,7 @@ def test_a_report_of_a_log_that_breaks_off_shows_what_came_before(folder, record
     files += ["--camera", folder / "camera.json"]
     done = rig.gait("report", cut, *files, "-o", page, "--quiet")
     assert done.returncode == 1 and done.stderr.count("\n") == 1
-    assert "breaks off at byte" in done.stderr and f"{page} shows what came before" in done.stderr
+    assert "breaks off at byte" in done.stderr and f"{page} shows the part before" in done.stderr
     assert "<svg" in page.read_text()
 
 

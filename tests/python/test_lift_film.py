@@ -1,4 +1,4 @@
-"""gait lift of a film: keypoints by the detector, the camera given or found from the walk."""
+"""gait lift of a film: keypoints by the detector, the camera given or estimated from the walk."""
 
 import csv
 import json
@@ -114,17 +114,17 @@ def test_a_placement_in_the_picture_is_put_on_the_floor():
 @pytest.mark.parametrize(
     ("words", "text"),
     [
-        ([], "give --camera CAM, or --height M for a camera that is found from the walk"),
-        (["--fov", "60"], "--fov: is for a camera that is found from the walk"),
+        ([], "give --camera CAM, or --height M to estimate the camera from the walk"),
+        (["--fov", "60"], "--fov: is for a camera estimated from the walk"),
         (
             ["--camera", "camera.json", "--height", "1.7", "--fov", "60"],
-            "--fov: is for a camera that is found",
+            "--fov: is for an estimated camera",
         ),
         (["--camera-out", "c.json"], "--camera-out: there is no camera"),
         (["--height", "1.7", "--background", "none"], "--background needs --placement"),
         (
             ["--height", "1.7", "--placement", "p.json", "--camera", "camera.json"],
-            "--height: the placement has",
+            "--height: the placement gives",
         ),
         (["--height", "1.7", "--placement", "p.json", "--method", "blend"], "--method is for keypoints"),
         (["--height", "1.7", "--start", "9", "--stop", "9"], "must be greater than --start"),

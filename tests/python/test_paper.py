@@ -75,7 +75,7 @@ def test_removed_blocks_are_filled_better_than_by_the_mean(learning):
 @pytest.mark.parametrize(
     ("words", "expected"),
     [
-        (["--camera", "c.json"], "holds walks; --camera is of a clip"),
+        (["--camera", "c.json"], "with walks; --camera is for a clip"),
         (
             ["--mocap", "absent", "--video", "v.mp4", "--camera", "c.json", "--init", "i.json"],
             "absent: no such file or folder; check the name; c.json: no such camera file",

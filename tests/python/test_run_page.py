@@ -110,7 +110,7 @@ def test_a_page_of_a_part_of_the_film_states_the_same_as_the_tracker(folder, cap
     # Its camera has a world of its own, in which the camera.json beside it is not.
     track = read_track(folder / "part.csv")
     np.testing.assert_allclose(track.camera_change[-1], track.time[-1] * CHANGE, atol=1e-6)
-    assert "camera was found from the walk; to see the figure" in capsys.readouterr().err
+    assert "camera was estimated from the walk; to see the figure" in capsys.readouterr().err
 
 
 def test_a_track_without_any_sure_frame_is_warned_of():
@@ -176,7 +176,7 @@ def test_without_a_camera_or_the_parts_the_page_names_how_to_get_the_figure(
     [
         (["run.csv", "--track", "run.csv"], "--track: goes with a log"),
         (["walk.mp4"], "walk.mp4: is a film, not a track; track it first"),
-        (["camera.json"], "camera.json: is no track OUT.csv; with a log, give --track as well"),
+        (["camera.json"], "camera.json: is not a track OUT.csv; with a log, also give --track"),
         (["run.csv", "--camera", "none.json"], "none.json: no such camera file"),
         (["run.csv", "--truth", "none.csv"], "none.csv: no such truth file"),
         (["run.csv", "-o", "walk.mp4"], "walk.mp4: is read by this command"),

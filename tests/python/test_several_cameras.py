@@ -183,7 +183,7 @@ def test_a_second_camera_shows_how_far_the_person_is(tmp_path, monkeypatch, caps
         (["--camera", "a.json", "--camera", "b.json", "--offsets", "0,1"], "--offsets: 2 for 1 further"),
         (["--camera", "a.json", "--camera", "b.json", "--people", "all"], "--people: is for one film"),
         (["--camera", "three.toml"], "--camera: 3 for 2 films"),
-        (["--camera", "three.toml", "--offsets", "soon"], "'soon' is no list of seconds"),
+        (["--camera", "three.toml", "--offsets", "soon"], "'soon' is not a list of seconds"),
     ],
 )
 def test_films_cameras_and_offsets_must_match(words, message, tmp_path, monkeypatch, capsys):

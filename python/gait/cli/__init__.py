@@ -36,30 +36,28 @@ class Command(NamedTuple):
 
 COMMANDS = {
     "learn": Command("learn", "learn a cyclic model from motion capture", ("mocap",)),
-    "info": Command("info", "show what a model holds"),
-    "doctor": Command("doctor", "check this machine and name the remedy of every fault"),
+    "info": Command("info", "show what a model contains"),
+    "doctor": Command("doctor", "check this machine, with a remedy for every fault"),
     "track": Command("track", "track a walking person in a video file", ("video",)),
     "eval": Command("evaluate", "compare a track with the truth", ("video",)),
     "detect": Command("detect", "find the 2-D keypoints of the people in a video", ("video",)),
     "lift": Command("lift", "lift a video, or 2-D keypoints, to 3-D motion", ("video", "mocap")),
     "studio": Command(
-        "studio", "correct the motion in a video by hand, on a page", ("video", "mocap", "studio")
+        "studio", "correct the motion in a video by hand, on a web page", ("video", "mocap", "studio")
     ),
     "render": Command("render", "draw a pose or a model", ("video",)),
     "calibrate": Command("calibrate", "calibrate the lens of a camera with a printed board", ("video",)),
-    "camera": Command(
-        "camera", "find where a camera stands, from points on the ground or a walk", ("video",)
-    ),
-    "simulate": Command("simulate", "make a test clip of a walking person with exact truth", ("video",)),
+    "camera": Command("camera", "estimate a camera from points on the ground or a walk", ("video",)),
+    "simulate": Command("simulate", "make a test clip of a walking person with ground truth", ("video",)),
     "capture": Command("capture", "send the frames of a video or a camera over LCM", ("video", "lcm")),
     "record": Command("record", "record the estimates of gait-trackd into a track file", ("video", "lcm")),
     "demo": Command(
-        "demo", "run capture, tracker and recorder on a clip and report", ("video", "lcm", "report")
+        "demo", "run capture, tracker and recorder on a clip, and report", ("video", "lcm", "report")
     ),
     "batch": Command("batch", "track or lift many clips by a project file", ("video",)),
-    "export": Command("export", "write a track or a motion in the format of another tool"),
+    "export": Command("export", "convert a track or a motion to another tool's format"),
     "report": Command(
-        "report", "make one page of a run: verdict, film, figure, gait, angles", ("video", "report")
+        "report", "make a one-page report of a run: verdict, film, figure, gait, angles", ("video", "report")
     ),
     "report track": Command(
         "report_track", "measure the gait parameters of a track, with plots", ("video", "report")
@@ -68,9 +66,9 @@ COMMANDS = {
         "report_lift", "draw figures of the segment prior and of lifting", ("video", "report", "mocap")
     ),
     "paper": Command(
-        "paper", "make every figure of the two papers from motion capture", ("video", "report", "mocap")
+        "paper", "reproduce every figure of the two papers from motion capture", ("video", "report", "mocap")
     ),
-    "completion": Command("completion", "print a script that completes words in a shell"),
+    "completion": Command("completion", "print a shell completion script"),
     "view": Command("view", "watch the estimates of gait-trackd in a browser", ("video", "lcm", "studio")),
 }
 """Commands in the order of ``gait --help``."""
@@ -144,7 +142,7 @@ def _parser(words: Sequence[str]) -> argparse.ArgumentParser:
     """Parser of the command named first in `words`; without one it lists the commands and imports none."""
     parser = _Parser(
         prog="gait",
-        description="Learn how people walk from motion capture and track them in calibrated video.",
+        description="Learn how people walk from motion capture, and track them in video.",
     )
     parser.add_argument(
         "--version", action=_Version, nargs=0, help="print the versions of package and library"
@@ -173,7 +171,7 @@ def _fill(parser: argparse.ArgumentParser, command: Command) -> None:
     module.add_arguments(parser)
     if getattr(module, "JSON", True):
         _offer(parser, "--json", "print the figures as JSON")
-    _offer(parser, "--quiet", "print no notes and no progress")
+    _offer(parser, "--quiet", "suppress notes and progress")
     parser.set_defaults(run=module.run)
 
 

@@ -1,6 +1,6 @@
-"""Track or lift many clips by a project file, several at a time, and summarise them.
+"""Track or lift the clips of a project file, several at a time, and summarise them.
 
-PROJECT.toml names the clips and what to make of each; paths are relative to it:
+PROJECT.toml lists the clips and the outputs of each; paths are relative to it:
 
   [defaults]                    # for all clips; each may have its own
   height = 1.75                 # metres; or camera = "camera.json"
@@ -11,14 +11,14 @@ PROJECT.toml names the clips and what to make of each; paths are relative to it:
   [[clip]]
   keypoints = "ben.json"
   make = ["lift", "mot"]
-  options = ["--fps", "30"]     # further words of gait track or gait lift
+  options = ["--fps", "30"]     # further options of gait track or gait lift
 
 make: track or lift; overlay and report of a track; trc c3d bvh mot parquet rrd mcap.
 
-Every clip has a folder in DIR, and processes of its own: one that is damaged or crashes is a failed row of
-the summary and ends nothing else.  The same command resumes: clips that are done with the same settings,
-files and version are not made again, failed ones are.  DIR/summary.csv (and .parquet, with PyArrow) has one
-row per clip, DIR/index.html links to all files.  Ends with 1 if a clip failed.
+Every clip has its own folder in DIR and its own processes: one that is damaged or crashes becomes a failed
+row of the summary, and the others continue.  Run the same command again to resume: it skips clips that are
+done with the same settings, files and version, and retries failed ones.  DIR/summary.csv (and .parquet, with
+PyArrow) has one row per clip, DIR/index.html links to all files.  The exit code is 1 if a clip failed.
 """
 
 from __future__ import annotations

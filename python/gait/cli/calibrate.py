@@ -5,9 +5,9 @@ films: the same lens, size of picture and zoom, without stabilisation.  Move slo
 corner of the picture, tilted by 30 degrees to all four sides, near and far.  Half a minute is enough.  Either
 the board or the camera may move.  The size of the board does not matter for the lens.
 
-The command takes the sharp frames of different poses by itself, prints how far the corners are from where the
-calibrated lens shows them, and which poses are missing.  A calibration that would mislead is refused.
-LENS.json is a camera file without the camera's place, which gait camera adds.
+The command picks sharp frames of different poses, prints the reprojection error of the corners, and lists
+missing poses.  It rejects an unreliable calibration.  LENS.json is a camera file without the camera's
+position, which gait camera adds.
 """
 
 from __future__ import annotations
@@ -101,7 +101,7 @@ def _calibrate(args: argparse.Namespace, board: Any) -> Lens:
         with progress("searching for the board", len(args.input), args.quiet) as update:
             return calibrate_pictures(args.input, board, update)
     if len(args.input) > 1:
-        raise UsageError("give one film, or pictures alone")
+        raise UsageError("give one film, or only pictures")
     video = Video(args.input[0])
     with progress("searching for the board", video.count, args.quiet) as update:
         return calibrate_film(video, board, update)

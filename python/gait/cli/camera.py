@@ -1,18 +1,18 @@
-"""Find where a camera stands, from a person who walks or from measured points.
+"""Estimate a camera from a walking person or from measured points.
 
---page shows a frame of the film on a page of this machine, on which you click marks of the floor and type the
-distances that you measured between them (or their x and y); the floor's grid is drawn over the picture as you
-go.  Without --lens, --fov and a focal length in the file it is found from the marks too.
+--page shows a frame of the film on a local web page, where you click marks on the floor and type the measured
+distances between them (or their x and y).  The floor's grid is drawn over the picture as you go.  Without
+--lens, --fov and a focal length in the file, the marks also determine the focal length.
 
---walk finds the whole camera, focal length included, from a person of known stature who walks on a level
+--walk estimates the whole camera, including focal length, from a person of known stature who walks on a level
 floor in full view: a VIDEO, in which gait detect finds the joints, or its KEYPOINTS.csv with --size.  The
-world has the origin on the floor below the camera, z up, and the camera looks along y.  A walk towards or
-away from the camera determines it best; the command reports what the walk leaves open.  Square pixels and a
-lens without distortion are assumed, with the optical axis through the middle of the picture.
+world has its origin on the floor below the camera and z up; the camera looks along y.  A walk towards or away
+from the camera determines it best; the command reports what the walk does not determine.  Square pixels, no
+lens distortion and a central principal point are assumed.
 
-POINTS.csv has the columns u,v (pixels) and x,y[,z] (metres; z is up and 0 on the ground, where it may be
-left out).  Give four points or more that are far apart and not on one line.  --lens names a calibration of
-the lens: the YAML or XML of OpenCV's calibration, or a camera file of gait, whose position is ignored.
+POINTS.csv has the columns u,v (pixels) and x,y[,z] (metres; z is up, and 0 by default for points on the
+ground).  Give at least four points, far apart and not on one line.  --lens names a calibrated lens: the YAML
+or XML of OpenCV's calibration, or a libgait camera file, whose position is ignored.
 """
 
 from __future__ import annotations
@@ -55,13 +55,13 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         "-o", "--output", required=True, type=values.named(".json"), metavar="CAMERA.json", help="the camera"
     )
     add = parser.add_argument_group("by clicking on the floor").add_argument
-    add("--page", metavar="VIDEO|PICTURE", help="open a page on which marks of the floor are clicked")
+    add("--page", metavar="VIDEO|PICTURE", help="open a page to click marks on the floor")
     add("--scale-camera", action="store_true", help="the film is resized: scale a lens of another resolution")
-    add("--frame", type=values.whole(0), metavar="F", help="frame shown at first (default: 0)")
+    add("--frame", type=values.whole(0), metavar="F", help="frame to show first (default: 0)")
     add("--port", type=values.whole(0, 65535), default=8040, metavar="P",
-        help="port of the page on this machine (default: 8040; 0: any)")  # fmt: skip
+        help="port of the page (default: 8040; 0: any)")  # fmt: skip
     add = parser.add_argument_group("from a walk").add_argument
-    add("--walk", metavar="VIDEO|KEYPOINTS.csv", help="a person who walks")
+    add("--walk", metavar="VIDEO|KEYPOINTS.csv", help="a walking person")
     add("--height", type=values.stature, metavar="M", help="the person's stature in metres")
     add("--size", type=_size, metavar="WxH", help="size of the picture in pixels, with KEYPOINTS.csv")
     values.add_fov(parser)
@@ -86,7 +86,7 @@ def _on_page(args: argparse.Namespace) -> int:
     if args.points or args.walk or args.height or args.size:
         raise UsageError("--page: leave out POINTS.csv, --walk, --height and --size")
     if args.lens and args.fov:
-        raise UsageError("--fov: the lens has its focal length; leave out --lens or --fov")
+        raise UsageError("--fov: the lens gives the focal length; leave out --lens or --fov")
     require_outputs((args.output,), (args.page, args.lens))
     picture, size, frames, fov = _pictures(args)
     first = args.frame or 0
@@ -126,7 +126,7 @@ def _pictures(args: argparse.Namespace) -> tuple[Callable[[int], Any], tuple[int
         require_file(args.page, "picture")
         image = cv2.imread(args.page)
         if image is None:
-            raise UserError(f"{args.page}: is no picture that can be read; give JPEG or PNG, or a film")
+            raise UserError(f"{args.page}: cannot be read as a picture; give JPEG or PNG, or a film")
         size = image.shape[1], image.shape[0]
         return lambda number: image, size, 1, args.fov
     video = Video(args.page)
@@ -169,7 +169,7 @@ def _from_walk(args: argparse.Namespace) -> int:
     from gait.bindings.model import Model
 
     if args.points or args.lens:
-        raise UsageError("--walk finds the camera by itself; leave out POINTS.csv and --lens")
+        raise UsageError("--walk estimates the whole camera; leave out POINTS.csv and --lens")
     if args.height is None:
         raise UsageError("--walk: needs --height M, the person's stature in metres")
     require_outputs((args.output,), (args.walk,))
@@ -194,7 +194,7 @@ def _calibrate(args: argparse.Namespace, model: Model) -> Calibration:
         _check_size(args, keypoints)
         return calibrate(keypoints, args.size, model, args.height, fov=args.fov, where=args.walk)
     if args.size:
-        raise UsageError("--size: is for KEYPOINTS.csv; a video has its own")
+        raise UsageError("--size: is for KEYPOINTS.csv; a video has its own size")
     video = Video(args.walk)
     people = find_people(video, args.quiet)
     return calibrate_film(video, people, model, args.height, args.fov, args.quiet)[1]
@@ -208,7 +208,7 @@ def _check_size(args: argparse.Namespace, keypoints: Keypoints) -> None:
     outside = keypoints.outside(args.size)
     if outside > _OUTSIDE:
         raise UserError(
-            f"{args.walk}: {outside:.0%} of the points lie outside of --size {width}x{height}; give the "
+            f"{args.walk}: {outside:.0%} of the points are outside --size {width}x{height}; give the "
             "size of the video in which they were found"
         )
     u, v = np.nanquantile(keypoints.uv, 0.999, axis=(0, 1))

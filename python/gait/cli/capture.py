@@ -1,15 +1,15 @@
 """Send the frames of a video file, a camera or a network stream over LCM, as a camera in the field would.
 
-A file is sent at the rate at which it was recorded, stamped as if recorded from now on.
-Each frame carries its number, so that a receiver can count what it missed.  Calibration and empty scene are
-announced at the start and every two seconds.  With --init the tracker gets a START for the right frame.
+A file is sent at its recorded rate, with time stamps that start now.  Each frame has its number, so that
+receivers can count missed frames.  Calibration and empty scene are announced at the start and every two
+seconds.  With --init the tracker gets a START for the right frame.
 
---wait makes sure that a tracker listens: the stream begins when gait-trackd has confirmed the camera, the
-empty scene and START.  Without it the stream begins at once.
+--wait makes sure that a tracker is listening: the stream begins when gait-trackd has confirmed the camera,
+the empty scene and START.  Without it the stream begins at once.
 
---url file:///PATH.log?mode=w writes an LCM log instead, which gait-trackd plays without loss.
+--url file:///PATH.log?mode=w writes an LCM log instead, which gait-trackd replays without loss.
 
-A stream (RTSP, HTTP) that breaks off is connected again within seconds; frames are stamped as they arrive.
+If a stream (RTSP, HTTP) breaks, the command reconnects within seconds; frames are stamped as they arrive.
 
 The command ends after the last frame, or when interrupted (Ctrl-C, SIGTERM), never within a frame.
 """
@@ -57,7 +57,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     add(
         "--camera-path",
         metavar="POSES.csv",
-        help="of a file: poses of a camera that moves, sent with the frames for gait-trackd --moving-camera",
+        help="with a file: poses of a moving camera, sent with the frames for gait-trackd --moving-camera",
     )
     values.add_clip(parser, "send", init="none", background="none")
     parser.set_defaults(init=None, start=0)
@@ -110,7 +110,7 @@ def _require_sense(args: argparse.Namespace, url: str) -> None:
     if not is_log(url):
         return
     if args.wait > 0:
-        raise UsageError(f"--wait: no tracker listens to the log {url}; leave it out")
+        raise UsageError(f"--wait: no tracker listens to the log {url}; leave out --wait")
     require_unread(
         log_of(url)[0], (args.source, args.camera, args.camera_path, args.background, args.init, args.model)
     )
@@ -205,12 +205,10 @@ def _moving(args: argparse.Namespace, source: FileSource | DeviceSource) -> tupl
 
     if not args.camera or not isinstance(source, FileSource) or args.loop or args.init == "auto":
         raise UsageError(
-            "--camera-path: needs --camera, the lens, and a file, without --loop and --init auto"
+            "--camera-path: needs --camera for the lens, and a file without --loop and --init auto"
         )
     if args.background != "none":
-        raise UsageError(
-            "--camera-path: the empty scene of a camera that moves is not sent; --background none"
-        )
+        raise UsageError("--camera-path: a moving camera has no empty scene to send; give --background none")
     frames = source.video.span(args.start, args.stop)
     lens = read_camera(args.camera, source.size, placed=False, scale=args.scale_camera)
     poses = CameraPath.read(args.camera_path).at_times(

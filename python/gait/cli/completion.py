@@ -1,7 +1,7 @@
-"""Print a script that completes the words of gait in a shell: commands, options and their choices.
+"""Print a shell completion script for gait: commands, options and choices.
 
-The script holds all words, so completing starts no Python.  Other words are completed as files.  Put it into
-~/.local/share/bash-completion/completions/gait, or source it in ~/.zshrc.
+The script contains all words, so completion does not start Python.  Other words are completed as files.  Put
+it into ~/.local/share/bash-completion/completions/gait, or source it in ~/.zshrc.
 """
 
 from __future__ import annotations

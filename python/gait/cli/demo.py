@@ -1,13 +1,13 @@
-"""Track a clip as in the field: capture, tracker and recorder are processes that talk over LCM.
+"""Track a clip as in the field: capture, tracker and recorder are separate processes that talk over LCM.
 
 gait capture streams the clip at its true frame rate, gait-trackd tracks it, and gait record collects the
 estimates.  Writes track.csv, estimates.log, overlay.mp4 and report.html; prints the error against the truth
-(where it is known), the frame rate, the latency from capture to the received estimate, and the frames
-dropped.
+(if known), the frame rate, the latency from capture to the received estimate, and the number of dropped
+frames.
 
-Without --video a clip of a walking person is rendered, with truth.  With it, camera.json, init.json,
-background.png and truth.csv beside the video are used unless given.  Where this machine has no multicast
-route the same processes run one after the other through an LCM log file; no latency is measured then.
+Without --video a clip of a walking person is rendered, with ground truth.  With it, camera.json, init.json,
+background.png and truth.csv beside the video are used unless given.  If this machine has no multicast route,
+the same processes run one after the other through an LCM log file, without measuring latency.
 """
 
 from __future__ import annotations

@@ -1,12 +1,12 @@
 """Find the 2-D joints of people in a video with a landmark network.
 
-Writes the keypoints of one person: the one in view longest and tallest, or --person ID.  The file is what
-gait lift takes.  The network's weights are fetched once: gait detect --fetch.
+Writes the keypoints of one person: the one in view longest and tallest, or --person ID.  gait lift reads the
+file.  Download the network's weights once: gait detect --fetch.
 
---lcm locates the joints in frames that arrive over LCM (GAIT_IMAGE_<i>), in as many as the machine has time
-for, and sends them: those of person N on GAIT_TRACKS_<i>_<N>, which gait-trackd --person N takes, and on
-GAIT_TRACKS_<i>, for gait-trackd --keypoints-term and --lift, those of the person seen longest.  Numbers are
-from 1 to --people; a person out of view for ten seconds may lose the number to another.  Ctrl-C ends it.
+--lcm detects joints in frames that arrive over LCM (GAIT_IMAGE_<i>), in as many as the machine can process,
+and sends them: those of person N on GAIT_TRACKS_<i>_<N> for gait-trackd --person N, and those of the person
+in view longest on GAIT_TRACKS_<i> for gait-trackd --keypoints-term and --lift.  Numbers are 1 to --people; a
+person who is out of view for ten seconds may lose the number to another.  Ctrl-C ends it.
 """
 
 from __future__ import annotations

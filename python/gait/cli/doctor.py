@@ -1,8 +1,8 @@
-"""Check what the package needs of this machine, and name the remedy of every fault.
+"""Check that this machine has what the package needs, with a remedy for every fault.
 
-Checked are the C library and its ABI, the shipped model, the CPU, the detector's weights, optional packages,
-LCM's multicast route and receive buffer, the daemon, cameras, and the disk.  ok is fine, note is missing but
-not always needed, fault must be mended.  Ends with 1 if there is a fault.
+Checks the C library and its ABI, the shipped model, the CPU, the detector's weights, optional packages, LCM's
+multicast route and receive buffer, the daemon, cameras, and the disk.  ok is fine, note is missing but not
+always needed, fault must be fixed.  The exit code is 1 if there is a fault.
 """
 
 from __future__ import annotations

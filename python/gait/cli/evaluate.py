@@ -1,16 +1,16 @@
 """Compare a track, or lifted motion, with the truth.
 
-Prints over the frames that both files have, with the meaning of each line:
-  the 3-D error of 15 joints in mm, as they are and after aligning the hip midpoints (the pose);
+Prints, over the frames in both files, with an explanation of each line:
+  the 3-D error of 15 joints in mm, unaligned and after aligning the hip midpoints (the pose);
   the share of frames that are far off or lost;
-  the error of the phase, with swaps of left and right counted separately;
+  the phase error, with swaps of left and right counted separately;
   the distance in the picture;
-  how often the 50 % and 90 % intervals cover the truth;
-  the pose error of two rivals that use no image: the mean pose at the true place, and the mean stride that
-  runs on from the true start.
+  how often the 50 % and 90 % intervals contain the truth;
+  the pose error of two baselines without images: the mean pose at the true position, and the mean stride
+  continued from the true start.
 
-Heel strikes come from meta.json beside the truth.  Without it they are found in the truth, where a heel is
-furthest ahead of the pelvis.
+Heel strikes come from meta.json beside the truth, or else from the truth, where a heel is furthest in front
+of the pelvis.
 """
 
 from __future__ import annotations
@@ -39,7 +39,7 @@ examples:
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Add the command's options."""
-    parser.add_argument("track", metavar="OUT.csv", help="what gait track or gait lift wrote")
+    parser.add_argument("track", metavar="OUT.csv", help="output of gait track or gait lift")
     parser.add_argument("--truth", required=True, metavar="TRUTH.csv", help="frame, time and <joint>_x _y _z")
     values.add_camera(parser, ", for the error in pixels (default: camera.json beside the truth)")
     values.add_model(parser, "model of the baselines")

@@ -1,15 +1,15 @@
-"""Write a track, a lifted motion or an LCM log in the format of another tool, which the suffix of FILE names.
+"""Convert a track, a lifted motion or an LCM log to another tool's format; the suffix of FILE selects it.
 
   .trc      joints as markers, metres, y up (OpenSim)
   .c3d      joints in millimetres, z up, with heel strikes and toe-offs as events; extra mocap
   .bvh      a skeleton of constant lengths fitted to the joints, centimetres, y up (Blender)
-  .mot      its joint angles for OpenSim, and beside it FILE.osim, the model of the person's size
+  .mot      its joint angles for OpenSim, and the scaled model in FILE.osim
   .parquet  all columns of the table; extra parquet
   .rrd      joints, bones and state for the Rerun viewer; extra rerun
-  .mcap     the same for Foxglove; of an LCM log every message at its time; extra mcap
+  .mcap     the same for Foxglove; for an LCM log every message at its time; extra mcap
             with --ros2 messages of ROS 2: TF and bodies of REP 155; extra ros2
 
-World axes are those of the track but for .trc, .mot and .bvh, where x is the track's y, y its z and z its x.
+World axes are the track's, except in .trc, .mot and .bvh, where x is the track's y, y its z and z its x.
 """
 
 from __future__ import annotations

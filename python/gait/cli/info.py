@@ -1,4 +1,4 @@
-"""Print what a model holds: source, sizes, statistics, checksum, and the acknowledgement that it asks for."""
+"""Print what a model contains: source, sizes, statistics, checksum, and the acknowledgement it requires."""
 
 from __future__ import annotations
 

@@ -3,13 +3,13 @@
 Sources are files or folders of them: .amc with its .asf beside it, .bvh, .c3d, .trc, and .csv of joint
 positions or angles, separated by ',', ';' (with decimal commas) or tabs.  Each recording is retargeted to the
 default skeleton and cut into cycles by its own period; functional principal components of all cycles give the
-mean curves and the ways in which people differ (Ormoneit and others, 2000).  In a folder, files that cannot
-be used are left out with one line each.  gait info lists the sequences of a model, --report shows everything.
+mean curves and the variation between people (Ormoneit and others, 2000).  In a folder, files that cannot be
+used are skipped with one line each.  gait info lists the sequences of a model; --report shows everything.
 
-Only the cycles of the recordings are in memory; their signals are on disk, in the folder that TMPDIR names.
-The model does not depend on --jobs or --dask, nor on the CPU if it is x86-64.  The workers of a Dask cluster
-(pip install 'libgait[dask]') need the same version of the package and the files under the same paths; start
-them with dask worker --preload-nanny gait.reproducible.
+Only the cycles of the recordings are in memory; their signals are on disk, in the folder TMPDIR.  The model
+does not depend on --jobs or --dask, nor on the x86-64 CPU.  The workers of a Dask cluster (pip install
+'libgait[dask]') need the same package version and the files under the same paths; start them with
+dask worker --preload-nanny gait.reproducible.
 
 Columns of .csv and marker names of .c3d and .trc are described in libgait/doc/reference/files.md.
 """
@@ -66,26 +66,26 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 
 def _add_recordings(group: argparse._ArgumentGroup) -> None:
-    """Add which files are read, who is in them, and where their markers and joints are."""
+    """Add which files to read, who is in them, and where their markers and joints are."""
     _add_globs(
         group,
         "--exclude",
-        "leave out files whose path ends like this, such as 'cmu_walk/02/*', and folders of that name",
+        "skip files whose path ends like this, such as 'cmu_walk/02/*', and folders of that name",
     )
     group.add_argument(
         "--subjects",
         choices=SUBJECT_RULES,
         default=SUBJECT_RULES[0],
-        help="which files are of one person. prefix: those whose names begin alike up to '_'. folder: those "
-        "of one folder. file: each alone. auto (the default): prefix, but folder for files without '_', and "
-        "for all files if a prefix occurs in several folders, such as Anna/walk_01 and Ben/walk_01. Lengths "
-        "of limbs are measured from all recordings of a person with markers",
+        help="which files belong to one person. prefix: those with the same name up to '_'. folder: those "
+        "in one folder. file: each file. auto (the default): prefix, but folder for files without '_', and "
+        "for all files if a prefix occurs in several folders, such as Anna/walk_01 and Ben/walk_01. Limb "
+        "lengths are estimated from all recordings of a person with markers",
     )
     _add_globs(
         group,
         "--generic-lengths",
-        "in files whose path ends like this limbs have not the person's lengths, as where a skeleton is "
-        "the same for several people: learn only the motion from them",
+        "files whose path ends like this do not have the person's limb lengths, for example because several "
+        "people share a skeleton: learn only the motion from them",
     )
     group.add_argument(
         "--fps",
@@ -97,7 +97,7 @@ def _add_recordings(group: argparse._ArgumentGroup) -> None:
         "--markers",
         type=Path,
         metavar="MAP.json",
-        help="where the markers of .c3d and .trc sit on the body",
+        help="positions of the markers of .c3d and .trc on the body",
     )
     group.add_argument(
         "--joints",
@@ -110,15 +110,15 @@ def _add_recordings(group: argparse._ArgumentGroup) -> None:
         group,
         "--static",
         "static trials (.c3d, .trc): people standing with markers at knees and ankles that recordings "
-        "may lack. Each gives its person's (--subjects) limb lengths and the places of all markers, also of "
-        "clusters with unknown labels",
+        "may lack. Each gives its person's (--subjects) limb lengths and the positions of all markers, "
+        "including clusters with unknown labels",
         metavar="FILE",
     )
     group.add_argument(
         "--zeros-missing",
         action="store_true",
-        help="three or more exact zeros in a row are missing data, for systems that write 0 for what they "
-        "did not see (empty cells of .csv, and points of .c3d and .trc at the origin, always are missing)",
+        help="treat three or more exact zeros in a row as missing data, for systems that write 0 for missing "
+        "points (empty cells of .csv, and points of .c3d and .trc at the origin, are always missing)",
     )
     group.add_argument(
         "--no-trim", action="store_true", help="keep starts, stops and turns at the ends of recordings"
@@ -131,12 +131,12 @@ def _add_globs(group: argparse._ArgumentGroup, option: str, help: str, metavar: 
 
 
 def _add_model(group: argparse._ArgumentGroup) -> None:
-    """Add which motion is learnt, and how."""
+    """Add which motion to learn, and how."""
     group.add_argument(
         "--activity",
         default="walk",
         metavar="NAME",
-        help="name of the motion; walk refuses runs and run refuses walks (default: walk)",
+        help="name of the motion; walk rejects runs and run rejects walks (default: walk)",
     )
     group.add_argument(
         "--class",
@@ -144,28 +144,27 @@ def _add_model(group: argparse._ArgumentGroup) -> None:
         action="append",
         default=[],
         metavar="NAME[=SRC]",
-        help="also hold this class of motion, so that gait track follows changes; may be repeated. stand and "
-        "backwards are made from the walk; run is learnt from the runs among the sources, or like any other "
-        "NAME from the recordings of SRC, or taken from SRC if that is a model. With a model of walking as "
-        "the only source, the classes are added to it",
+        help="add this motion class, so that gait track follows changes; may be repeated. stand and "
+        "backwards are derived from the walk; run is learnt from the runs among the sources, or like any "
+        "other NAME from the recordings in SRC, or copied from SRC if that is a model. With a walking model "
+        "as the only source, the classes are added to it",
     )
     group.add_argument(
         "--components",
         type=lambda text: _auto_or(text, MOST_COMPONENTS),
         metavar="auto|N",
-        help=f"number of components, the ways to differ from the mean walk, from 1 to {MOST_COMPONENTS}. "
-        f"auto: as many as predict held-out data best. By default {DEFAULT_COMPONENTS} "
-        f"({PAPER_COMPONENTS} with --prior paper), or two less than "
-        "there are cycles if that is fewer",
+        help=f"number of components of the variation about the mean walk, 1 to {MOST_COMPONENTS}. auto: the "
+        f"number that predicts held-out data best. Default: {DEFAULT_COMPONENTS} ({PAPER_COMPONENTS} with "
+        "--prior paper), or two less than the number of cycles if that is fewer",
     )
     group.add_argument(
         "--prior",
         choices=PRIORS,
         default=PRIORS[0],
-        help="people (the default): also allow for people who were not recorded, with lengths of limbs and "
-        "postures of their own. paper: as in Ormoneit and others (2000): 19 angles, 5 components, gaps "
-        "filled by an iterated SVD, trunk and ankles rigid, one body for all (its whole periods: "
-        "--period-mode literal)",
+        help="people (the default): allow for people who were not recorded, with other limb lengths and "
+        "postures. paper: as in Ormoneit and others (2000): 19 angles, 5 components, gaps filled by an "
+        "iterated SVD, trunk and ankles rigid, the same body for everyone (for the paper's whole periods, "
+        "add --period-mode literal)",
     )
     group.add_argument(
         "--period-mode",
@@ -177,15 +176,15 @@ def _add_model(group: argparse._ArgumentGroup) -> None:
 
 
 def _add_segments(group: argparse._ArgumentGroup) -> None:
-    """Add what the segment prior is learnt from, and its size."""
+    """Add the source of the segment prior, and its size."""
     usual = SegmentOptions()
     group.add_argument(
         "--segments",
         choices=SEGMENT_SOURCES,
         default=usual.source,
-        help="what it is learnt from. learnt (default): the recordings of the cyclic model; all: whole "
-        "recordings, also those that the cyclic model refuses; none: no segment prior; only: as all, but "
-        "without a cyclic model, so that gait track cannot use the file",
+        help="source of the prior. learnt (default): the recordings of the cyclic model; all: whole "
+        "recordings, including those that the cyclic model rejects; none: no segment prior; only: like all, "
+        "but without a cyclic model, so that gait track cannot use the file",
     )
     numbers = (
         ("frames", "F", FRAMES, f"frames of a segment (default: {usual.frames})"),
@@ -198,15 +197,15 @@ def _add_segments(group: argparse._ArgumentGroup) -> None:
     group.add_argument(
         "--segment-headings",
         choices=list(SEGMENT_HEADINGS),
-        help="free (default): gait lift finds the heading. 2: every segment also rotated by 90 degrees, as "
-        "in the paper; 8: by each 45 degrees; headings in the world are then part of the prior",
+        help="free (default): gait lift estimates the heading. 2: every segment also rotated by 90 degrees, "
+        "as in the paper; 8: by each multiple of 45 degrees; the prior then includes headings in the world",
     )
     group.add_argument(
         "--segment-mixture",
         type=lambda text: _auto_or(text, MIXTURE[1]),
         metavar="auto|K",
-        help=f"Gaussians in the segment prior (default: {usual.mixture}); auto: as many as predict people "
-        "left out best",
+        help=f"Gaussians in the segment prior (default: {usual.mixture}); auto: the number that predicts "
+        "people left out best",
     )
     group.add_argument(
         "--segment-markers",

@@ -2,22 +2,22 @@
 
 KEYPOINTS.csv has the columns frame,time,<joint>_u,<joint>_v and optionally <joint>_c: pixels (u to the
 right, v down, pixel centres at integers) and a confidence from 0 to 1, which divides the standard deviation.
-Empty cells mean "not seen".  Joints are those of the model's segment prior (gait info M.gait).  The prior
-over short segments of motion supplies the depth and the joints that are not seen (Leventon and Freeman 1998).
+Empty cells are missing points.  Joints are those of the model's segment prior (gait info M.gait).  The prior
+over short segments of motion supplies the depth and the missing joints (Leventon and Freeman 1998).
 
 Keypoints of other tools are recognised by their content: a folder of OpenPose, JSON of COCO, AlphaPose,
-MMPose or MediaPipe, CSV or HDF5 of DeepLabCut or SLEAP, TRC in pixels of Sports2D or Pose2Sim.  Times come
-from --video or --fps where the file has none.
+MMPose or MediaPipe, CSV or HDF5 of DeepLabCut or SLEAP, TRC in pixels of Sports2D or Pose2Sim.  If the file
+has no times, they come from --video or --fps.
 
-A VIDEO instead of keypoints is searched for a person who walks (see gait detect).  Without --camera the
-camera is found from the walk, given the person's stature (see gait camera --walk); the standard deviations in
-OUT.csv include its uncertainty.  With --placement the pictures themselves are lifted, without a detector: see
-the options under "from a video's pictures".
+In a VIDEO the joints of a walking person are detected first (see gait detect).  Without --camera the camera
+is estimated from the walk, given the person's stature (see gait camera --walk); the standard deviations in
+OUT.csv include its uncertainty.  With --placement the images themselves are lifted, without a detector: see
+the options under "from a video's images".
 
 Views: with --camera the result is in the camera's world.  --orthographic looks from far away along an axis of
 a world with z up; the scale comes from the person's stature unless --metres-per-unit gives it.  Without
 either, the camera is assumed to be level and far away (looking along y), with a slowly changing scale.
-Neither determines the position along the line of sight; the lowest foot is put on the floor.
+Neither determines the position along the line of sight; the lowest foot is placed on the floor.
 
 OUT.csv: frame,time and for each joint _x,_y,_z (metres) and _sx,_sy,_sz (posterior standard deviations).
 """
@@ -54,15 +54,14 @@ examples:
   gait lift walk.mp4 --camera camera.json --placement init.json -o motion.csv --suggest 5
 """
 FILES = """\
-P.json gives where the person roughly is in one frame; with --camera in the format of gait track --init:
+P.json gives the person's rough position in one frame.  With --camera it has the format of gait track --init:
   {"frame": 64, "pelvis": [-0.1, 5.5, 0.9], "heading_rad": -1.57, "stature_m": 1.65}
-and without a camera, or with one that is found from the walk (--height), in pixels; the result is then in the
-picture's axes (x to the right, y away, z up):
+Without a camera, or with one that is estimated from the walk (--height), it is in pixels; the result is then
+in the picture's axes (x to the right, y away, z up):
   {"frame": 64, "pelvis_px": [1376, 734], "height_px": 415, "heading_rad": 3.14, "stature_m": 1.65}
-"phase" (of walking; 0: right heel strike, 0.5: left heel strike) determines which leg is in front; without it
-a person seen from the side may come out with left and right swapped.
-C.json gives positions of joints (or other markers of the model) and optionally their standard deviation
-(default: 4 pixels):
+"phase" (of walking; 0: right heel strike, 0.5: left heel strike) determines which leg is in front; without
+it, left and right may be swapped for a person seen from the side.  C.json gives positions of joints (or other
+markers of the model) and optionally their standard deviation (default: 4 pixels):
   {"corrections": [{"frame": 70, "joint": "l_knee", "uv": [1285.5, 812], "sd_px": 5}]}
 """
 
@@ -84,13 +83,13 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     _add_common(parser)
     _add_keypoints(parser.add_argument_group("from keypoints"))
     _add_video(parser.add_argument_group("from a video"))
-    _add_pictures(parser.add_argument_group("from a video's pictures", FILES))
+    _add_pictures(parser.add_argument_group("from a video's images", FILES))
 
 
 def _add_common(parser: argparse.ArgumentParser) -> None:
-    """Add the files, the camera and the person, and what is written besides."""
+    """Add the files, the camera, the person, and further outputs."""
     parser.add_argument(
-        "input", metavar="KEYPOINTS|VIDEO", help="2-D keypoints, or a video in which they are found"
+        "input", metavar="KEYPOINTS|VIDEO", help="2-D keypoints, or a video in which to detect them"
     )
     parser.add_argument(
         "-o",
@@ -104,41 +103,41 @@ def _add_common(parser: argparse.ArgumentParser) -> None:
         "-m", "--model", metavar="M.gait", help="model with a segment prior (default: the shipped one)"
     )
     values.add_camera(
-        parser, "; without it the camera of a VIDEO is found from the walk, given --height", scale=True
+        parser, "; without it the camera of a VIDEO is estimated from the walk, given --height", scale=True
     )
     parser.add_argument(
         "--height",
         type=values.stature,
         metavar="M",
-        help="the person's stature in metres (default: unknown, near that of the people learnt from)",
+        help="the person's stature in metres (default: unknown, near the mean of the training data)",
     )
     parser.add_argument(
-        "--all-markers", action="store_true", help="write all markers of the prior, not its joints alone"
+        "--all-markers", action="store_true", help="write all markers of the prior, not only its joints"
     )
     parser.add_argument(
-        "--corrections", metavar="C.json", help="what was corrected by hand, as gait studio writes it"
+        "--corrections", metavar="C.json", help="corrections by hand, as gait studio writes them"
     )
     parser.add_argument(
         "--suggest",
         type=values.whole(0),
         metavar="N",
-        help="name the N corrections that would help most (default: 0)",
+        help="list the N corrections that would help most (default: 0)",
     )
     parser.add_argument(
         "--overlay",
         type=values.named(*values.FILMS),
         metavar="O.mp4",
-        help="draw the cylinder figure into the video; of keypoints, into --video",
+        help="draw the cylinder figure into the video (into --video, if the input is keypoints)",
     )
 
 
 def _add_keypoints(group: argparse._ArgumentGroup) -> None:
-    """Add the view, the estimator and the repairs of keypoints, and what another tool's file lacks."""
+    """Add the view, the estimator, the repairs of keypoints, and what another tool's file may lack."""
     add = group.add_argument
     add(
         "--orthographic",
         metavar="AXIS",
-        help="without a camera: the view is from far away along x, y, z, -x, -y, -z or X,Y,Z",
+        help="without a camera: view from far away along x, y, z, -x, -y, -z or X,Y,Z",
     )
     add(
         "--metres-per-unit",
@@ -168,12 +167,15 @@ def _add_keypoints(group: argparse._ArgumentGroup) -> None:
         "but without the prior of the modes (least squares), for comparison",
     )
     switches = (
-        ("--no-contact", "smooth: do not keep feet on the ground in place"),
-        ("--no-bones", "smooth: do not keep the lengths of bones constant"),
-        ("--balance", "smooth: draw the place where the ground pushes into the polygon of the standing feet"),
-        ("--ignore-unknown", "leave out points that the model does not know"),
+        ("--no-contact", "smooth: let feet on the floor slide"),
+        ("--no-bones", "smooth: let bone lengths change"),
+        (
+            "--balance",
+            "smooth: prefer motions whose ground force acts within the polygon of the standing feet",
+        ),
+        ("--ignore-unknown", "ignore points that the model does not know"),
         ("--keep-sides", "do not undo swaps of left and right"),
-        ("--keep-spikes", "keep spikes: points far from where they were a frame before and after"),
+        ("--keep-spikes", "keep spikes: points far from their positions a frame before and after"),
     )
     for option, help in switches:
         add(option, action="store_true", help=help)
@@ -188,7 +190,7 @@ def _add_keypoints(group: argparse._ArgumentGroup) -> None:
     add(
         "--video",
         metavar="VIDEO",
-        help="video in which another tool found the keypoints: gives the times of its frames and its size",
+        help="video in which another tool found the keypoints: gives frame times and size",
     )
 
 
@@ -199,7 +201,7 @@ def _add_video(group: argparse._ArgumentGroup) -> None:
         "--camera-out",
         type=values.named(".json"),
         metavar="CAM.json",
-        help="also write the camera, found or given",
+        help="also write the camera, estimated or given",
     )
     values.add_stabilize(group, default=None)
     group.add_argument(
@@ -216,18 +218,18 @@ def _add_video(group: argparse._ArgumentGroup) -> None:
 def _add_pictures(group: argparse._ArgumentGroup) -> None:
     """Add the options of a lift without a detector."""
     group.add_argument(
-        "--placement", metavar="P.json", help="where the person roughly is in one frame; lifts the pictures"
+        "--placement", metavar="P.json", help="rough position of the person in one frame; lifts the images"
     )
     group.add_argument(
         "--background",
         metavar="PNG|auto|none",
-        help="the empty scene, whose edges the sensors ignore: an image; auto (default), the median of the "
-        "clip; or none",
+        help="empty scene, whose edges the sensors ignore: an image, auto (default) for the median of the "
+        "clip, or none",
     )
     group.add_argument(
         "--alone",
         action="store_true",
-        help="estimate segments one after the other, as in the paper (default: together)",
+        help="estimate segments one after the other, as in the paper (default: jointly)",
     )
 
 
@@ -296,8 +298,8 @@ def _lift_keypoints(args: argparse.Namespace, video: bool) -> tuple[dict[str, An
         warn(words)
     if not video and args.height and not (args.camera or args.orthographic):
         warn(
-            f"no camera: the way over the floor is unknown; gait camera --walk {args.input} --size WxH "
-            f"--height {args.height:g} -o camera.json finds it from the walk"
+            f"no camera, so the path over the floor is unknown; gait camera --walk {args.input} --size WxH "
+            f"--height {args.height:g} -o camera.json estimates one from the walk"
         )
     if isinstance(lifted.view, Perspective) and calibration is None:
         fault = contradiction(lifted.view.camera, keypoints, _walking_model(args), args.height)
@@ -347,7 +349,7 @@ def _find_keypoints(
     from gait.track.walk_camera import find_people
 
     if not (args.camera or args.orthographic or args.height):
-        raise UsageError("give --camera CAM, or --height M for a camera that is found from the walk")
+        raise UsageError("give --camera CAM, or --height M to estimate the camera from the walk")
     video = Video(args.input)
     if args.camera:
         Camera.read(args.camera, video.size, args.scale_camera).check_place(args.camera)
@@ -364,7 +366,7 @@ def _find_keypoints(
 
 
 def _turns(args: argparse.Namespace, video: Video, people: dict[int, Keypoints]) -> Turns | None:
-    """Find how the camera turns; None if it stands still."""
+    """Estimate how the camera turns; None if it is static."""
     from gait.camera.camera import Camera
     from gait.io.video import sample_frames
     from gait.track.stabilise import find_turns
@@ -378,7 +380,7 @@ def _turns(args: argparse.Namespace, video: Video, people: dict[int, Keypoints])
 def _calibrate(
     args: argparse.Namespace, video: Video, people: dict[int, Keypoints]
 ) -> tuple[int, Calibration]:
-    """Find who walks and the camera from that walk, and report it."""
+    """Find who walks, estimate the camera from that walk, and report it."""
     from gait.track.walk_camera import calibrate_film, note_camera
 
     id, found = calibrate_film(video, people, _walking_model(args), args.height, args.fov, args.quiet)
@@ -387,7 +389,7 @@ def _calibrate(
 
 
 def _walking_model(args: argparse.Namespace) -> Model:
-    """Model with curves of walking: the model's own or, if it has a segment prior alone, the shipped ones."""
+    """Model with curves of walking: the given one or, if it has only a segment prior, the shipped one."""
     from gait.bindings.model import Model, read_blob
     from gait.io.blob import decode
 
@@ -396,7 +398,7 @@ def _walking_model(args: argparse.Namespace) -> Model:
 
 
 def _write_camera(args: argparse.Namespace, calibration: Calibration | None) -> None:
-    """Write the camera, found or given, if asked to."""
+    """Write the camera, estimated or given, if asked to."""
     from gait.camera.camera import read_camera, write_camera
 
     if args.camera_out:
@@ -415,7 +417,7 @@ def _scaled(args: argparse.Namespace) -> tuple[int, int] | None:
 
 
 def _lift_pictures(args: argparse.Namespace) -> tuple[dict[str, Any], str]:
-    """Lift the pictures of a video; the summary, and in words."""
+    """Lift the images of a video; the summary, and in words."""
     from gait.body.skeleton import JOINTS
     from gait.io.track_file import write_lifted
     from gait.io.video import Video  # OpenCV and PyAV, which keypoints do not need
@@ -472,16 +474,16 @@ def _options(args: argparse.Namespace) -> Options:
 
 
 def _require_own(args: argparse.Namespace, video: bool) -> None:
-    """Refuse options that would have no effect."""
+    """Reject options that would have no effect."""
     useless: tuple[str, ...]
     if not video:
-        useless, why = _ONLY_VIDEO, f"is for a video, and {args.input} holds keypoints"
+        useless, why = _ONLY_VIDEO, f"is for a video, and {args.input} contains keypoints"
     elif args.placement:
-        useless, why = _ONLY_KEYPOINTS, "is for keypoints, and --placement for the pictures of a video"
+        useless, why = _ONLY_KEYPOINTS, "is for keypoints, and --placement for the images of a video"
     else:
         useless, why = (
             _ONLY_PICTURES,
-            "needs --placement, where the person roughly is in one frame",
+            "needs --placement, the person's rough position in one frame",
         )
     given = bool(args.camera or args.orthographic)
     for option in useless:
@@ -489,40 +491,40 @@ def _require_own(args: argparse.Namespace, video: bool) -> None:
         if value is not None and value is not False:
             raise UsageError(f"--{option.replace('_', '-')} {why}")
     if video and args.placement and args.camera and args.height:
-        raise UsageError("--height: the placement has the stature; leave it out, or --camera")
+        raise UsageError("--height: the placement gives the stature; leave out --height or --camera")
     if args.scale_camera and not ((video or args.video) and args.camera):
         raise UsageError("--scale-camera: is for the --camera of a VIDEO (or --video), whose size it takes")
     if args.fov and (given or not args.height):
-        raise UsageError("--fov: is for a camera that is found from the walk, with --height and no --camera")
+        raise UsageError("--fov: is for a camera estimated from the walk, with --height and no --camera")
     if args.camera_out and not (args.camera or (args.height and not given)):
         raise UsageError("--camera-out: there is no camera; give --camera, or --height for one from the walk")
 
 
 def _require_person(args: argparse.Namespace, found: Motion) -> None:
-    """Refuse an estimate that no person can be."""
+    """Reject an estimate that cannot be a person."""
     import numpy as np
 
     from gait.bindings.state import state_range
 
     if not np.isfinite(found.error).any():
-        raise UserError(f"{args.input}: the estimate lies behind the camera; check the camera and the names")
+        raise UserError(f"{args.input}: the estimate is behind the camera; check the camera and the names")
     low, high = state_range("stature")
     if not low <= found.stature <= high:
         view = "the camera (metres; R, t: world to camera)" if args.camera else "the direction of view"
         raise UserError(
-            f"{args.input}: the person came out {found.stature:.3g} m tall; check {view} and the names"
+            f"{args.input}: the estimated stature is {found.stature:.3g} m; check {view} and the names"
         )
 
 
 def _check(args: argparse.Namespace, video: bool) -> None:
-    """Refuse options that do not go together."""
+    """Reject options that exclude each other."""
     smooth = args.method in (None, "smooth")
     if args.fps and args.video:
         raise UsageError("--fps and --video exclude each other; give one of them")
     if args.overlay and not (video or args.video):
         raise UsageError("--overlay: give the --video in which the keypoints were found")
     if args.overlay and args.orthographic and args.stabilize == "auto":
-        raise UsageError("--overlay: of a camera that turns needs its lens; give --camera or --height")
+        raise UsageError("--overlay: a turning camera needs its lens; give --camera or --height")
     if args.camera and args.orthographic:
         raise UsageError("--camera and --orthographic exclude each other; give one of them")
     if args.metres_per_unit and not args.orthographic:
@@ -567,7 +569,7 @@ def _summary(args: argparse.Namespace, keypoints: Keypoints, found: Motion) -> d
 
 
 def _segments(left: Uncertain, names: tuple[str, ...]) -> dict[str, Any]:
-    """Medians over segments, each alone: volume, the displacements least certain and what they move most."""
+    """Medians over single segments: volume, the least certain displacements and what they move most."""
     import numpy as np
 
     most = np.argsort(-left.shares, axis=1, kind="stable")[:, :MOVED]
@@ -606,7 +608,7 @@ def _left(segments: dict[str, Any]) -> str:
     for mode in modes:
         moved = "the whole body" if mode["rigid"] > WHOLE else " ".join(mode["joints"])
         each.append(f"{moved} {mode['sd_mm']:.0f} mm ({100 * mode['in_depth']:.0f} % in depth)")
-    words = f"least certain in a segment seen alone: {', '.join(each)}"
+    words = f"least certain in a single segment: {', '.join(each)}"
     unknown = modes[0]["sd_mm"] > UNKNOWN_MM
     return words + "; the first is the person's distance, which the view does not determine" * bool(unknown)
 
@@ -616,7 +618,7 @@ def _video_text(summary: dict[str, Any]) -> str:
     lines = [
         f"{summary['frames']} frames in {summary['segments']} segments, median sd {summary['sd_mm']:.0f} mm",
         f"{c['given']} corrections ({c['per_frame']:.2f} per frame), {c['needed']} of them more than "
-        f"{c['within_px']:.0f} px from where the picture alone puts the joint",
+        f"{c['within_px']:.0f} px from the estimate without corrections",
         f"{c['wanted']} more ({c['wanted_per_frame']:.2f} per frame) would bring every joint within "
         f"{c['within_px']:.0f} px",
         f"figure: stature {figure['stature_m']:.2f} m, {figure['residual_mm']:.0f} mm from the markers",

@@ -1,14 +1,15 @@
-"""Make every figure, table and experiment of both papers from motion capture, as one page.
+"""Reproduce every figure, table and experiment of both papers from motion capture, on one page.
 
-The papers are Ormoneit and others (2000), whose model of walking gait learn and gait track follow, and
-Leventon and Freeman (1998), whose prior over segments gait lift follows.  Each figure is made by the paper's
-own algorithm (literal) and by the package (ours), with what the paper states (theirs), a verdict, and what
-the paper leaves open.  The page needs no other file; --json prints its statements.
+The papers are Ormoneit and others (2000), the basis of gait learn and gait track, and Leventon and Freeman
+(1998), the basis of gait lift.  Each figure is made by the paper's algorithm (literal) and by the package
+(ours), with the paper's result (theirs), a verdict, and what the paper does not specify.  The page is
+self-contained; --json prints its statements.
 
-Motion capture is as for gait learn: the first paper needs three walks of two strides; the second takes up to
-ten motions, first those that are no walks.  Figures 6 and 7 need a clip of a person who walks for 51 frames
-from the frame of --init, better 100.  Without one a walk is rendered.  --corrections are joints marked by
-hand, as for gait lift; the second paper has about one a frame.  Every fifth is left out, to judge by.
+Motion capture is as for gait learn: the first paper needs three walks of two strides; the second uses up to
+ten motions, preferring those that are not walks.  Figures 6 and 7 need a clip of a person who walks for 51
+frames, better 100, from the frame of --init.  Without one a walk is rendered.  --corrections are joints
+marked by hand, as for gait lift; the second paper has about one per frame.  Every fifth is kept for
+evaluation.
 """
 
 from __future__ import annotations
@@ -44,11 +45,12 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     )
     add("--video", metavar="VIDEO", help="clip of figures 6 and 7")
     values.add_camera(parser, ", of the clip", scale=True)
-    add("--init", metavar="INIT.json", help="where the person is at first, as for gait track")
-    add("--background", metavar="IMAGE", help="the empty scene: a picture, auto (the default) or none")
+    add("--init", metavar="INIT.json", help="first state, as for gait track")
+    add("--background", metavar="IMAGE", help="empty scene: a picture, auto (the default) or none")
     add("--corrections", metavar="C.json",
-        help="joints marked by hand in the clip, as for gait lift: figure 6 is judged by all of them, figure "
-             "7 uses four of five and is judged by the fifth (default: none, and no verdict)")  # fmt: skip
+        help="joints marked by hand in the clip, as for gait lift: figure 6 is evaluated on all of them, "
+             "figure 7 uses four of five and is evaluated on the fifth (default: none, and no "
+             "verdict)")  # fmt: skip
 
 
 def run(args: argparse.Namespace) -> int:
@@ -56,9 +58,9 @@ def run(args: argparse.Namespace) -> int:
     given = {name: vars(args)[name] for name in CLIP if vars(args)[name] is not None}
     wrong = []
     if not args.mocap:
-        wrong.append("--mocap SRC is missing; give a folder of motion capture that holds walks")
+        wrong.append("--mocap SRC is missing; give a folder of motion capture with walks")
     if given and not args.video:
-        wrong.append(f"--{next(iter(given))} is of a clip; give it with --video")
+        wrong.append(f"--{next(iter(given))} is for a clip; give it with --video")
     if args.scale_camera and not args.camera:
         wrong.append("--scale-camera: is for a --camera")
     if args.video and not {"camera", "init"} <= given.keys():

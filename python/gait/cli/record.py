@@ -1,14 +1,14 @@
 """Record the estimates of gait-trackd from LCM into a track file.
 
-Ends after --frames estimates, when none has come for --until-idle seconds, at the end of a log, when another
-stream begins (its frame numbers start again), or when interrupted (Ctrl-C, SIGTERM, SIGHUP); the file is
-complete in every case.  It also ends, as a failure, when two trackers use one URL.
+Ends after --frames estimates, after --until-idle seconds without any, at the end of a log, when another
+stream begins (its frame numbers restart), or when interrupted (Ctrl-C, SIGTERM, SIGHUP); the file is complete
+in every case.  It also ends, as a failure, when two trackers use one URL.
 
-The figures are: frames written; frames the tracker dropped; estimates lost on the way here; the duration of a
-step; the latency from capture to arrival here.
+The figures are: frames written; frames dropped by the tracker; estimates lost in transit; the duration of a
+step; the latency from capture to arrival.
 
-To record everything, frames included, use lcm-logger (in the same environment): lcm-logger -l URL FILE.log;
-play it with gait-trackd --url file://FILE.log?speed=0.
+To record everything, including frames, use lcm-logger (in the same environment): lcm-logger -l URL FILE.log;
+replay it with gait-trackd --url file://FILE.log?speed=0.
 """
 
 from __future__ import annotations
@@ -37,10 +37,10 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     add("-o", "--output", required=True, type=values.named(".csv"), metavar="OUT.csv", help="the track")
     values.add_url(parser)
     add("--frames", type=values.whole(1), metavar="N", help="end after N estimates")
-    add("--until-idle", type=values.seconds, metavar="S", help="end when none has come for S seconds")
-    add("--patience", type=values.seconds, metavar="S", help="fail if none has come at all after S seconds")
-    add("--person", type=values.whole(1, 8), metavar="N", help="of several people the one with this number")
-    add("--lagged", action="store_true", help="each frame as estimated some frames later (gait-trackd --lag)")
+    add("--until-idle", type=values.seconds, metavar="S", help="end after S seconds without an estimate")
+    add("--patience", type=values.seconds, metavar="S", help="fail if there is no estimate within S seconds")
+    add("--person", type=values.whole(1, 8), metavar="N", help="of several people, the one with this number")
+    add("--lagged", action="store_true", help="record the lagged estimate of each frame (gait-trackd --lag)")
     add(
         "--log",
         type=values.named(".log"),

@@ -1,11 +1,11 @@
-"""Draw a pose of a walking model, or everything the model has learned.
+"""Draw a pose of a walking model, or all its components.
 
 Without --strip: one person at --phase or in the state of --state, seen by --camera or by a built-in one.
 With --strip: a sheet with the mean cycle and each principal component at -2, 0 and +2 standard deviations
 at eight phases, from the right side.
 
 The JSON of --state may have phase, stride_hz, stature, heading, pitch, roll (radians), pelvis [x, y, z] and
-coef [c1, c2, ...].  The rest is that of the average person, standing on the ground at the origin.
+coef [c1, c2, ...].  Missing values are those of the average person, standing on the ground at the origin.
 """
 
 from __future__ import annotations
@@ -63,7 +63,7 @@ def run(args: argparse.Namespace) -> int:
     model = Model(args.model)
     if args.strip:
         if args.camera:
-            raise UserError("--camera: --strip has its own view; leave one of them out")
+            raise UserError("--camera: --strip has its own view; leave out one of them")
         picture = draw_sheet(model)
     else:
         state = _state(args, model)

@@ -1,9 +1,9 @@
-"""Make one page of a run: verdict, film with the figure drawn into it, turning figure, gait, angles, errors.
+"""Make a one-page report of a run: verdict, film with the figure, 3-D figure, gait, angles, errors.
 
-RUN is a track of gait track, or the log that gait record --log (or lcm-logger) wrote; with a log, --track
-names the track recorded beside it, and the page also shows dropped frames and latency.  The camera is
+RUN is a track from gait track, or a log from gait record --log (or lcm-logger).  With a log, --track names
+the track that was recorded with it, and the page also shows dropped frames and latency.  The camera is
 --camera, or camera.json beside the track or the film; without one the film is shown without the figure.  With
---truth the errors of gait eval are printed as well.  The page is one file that needs nothing else.
+--truth the errors of gait eval are printed too.  The page is one self-contained file.
 """
 
 from __future__ import annotations
@@ -33,7 +33,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         "source", metavar="RUN", help="OUT.csv from gait track, or E.log from gait record --log or lcm-logger"
     )
     add("--track", metavar="OUT.csv", help="with a log: the track, from gait record")
-    add("--video", metavar="VIDEO", help="the clip that was tracked (always needed)")
+    add("--video", metavar="VIDEO", help="the clip that was tracked (required)")
     values.add_camera(parser, " (default: camera.json beside the track or the film)", scale=True)
     add(
         "-o",
@@ -52,7 +52,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     add("--draws", metavar="D.npz", help="motions from gait track --smooth --draws")
     values.add_model(parser, "model that was tracked")
     values.add_norms(parser)
-    add("--replayed", action="store_true", help="of a log: not tracked live, show no latency")
+    add("--replayed", action="store_true", help="with a log: not tracked live, show no latency")
 
 
 def run(args: argparse.Namespace) -> int:
@@ -70,9 +70,9 @@ def run(args: argparse.Namespace) -> int:
         raise UsageError("give --video VIDEO, the clip that was tracked")
     is_track = suffix == ".csv"
     if is_track and args.track:
-        raise UsageError("--track: goes with a log; RUN is a track already")
+        raise UsageError("--track: goes with a log; RUN is already a track")
     if not is_track and not args.track:
-        raise UsageError(f"{args.source}: is no track OUT.csv; with a log, give --track as well")
+        raise UsageError(f"{args.source}: is not a track OUT.csv; with a log, also give --track")
     values.require_age(args.age, args.sex)
     output = args.output or str(Path(args.source).with_suffix(".html"))
     inputs = (args.source, args.track, args.video, args.camera, args.truth, args.draws, args.model)
@@ -106,5 +106,5 @@ def run(args: argparse.Namespace) -> int:
         lines += [f"warning: {verdict.warning()}"] if verdict.warning() else []
         print("\n".join(lines + ([as_text(measures)] if measures is not None else [])))
     if damage:
-        raise UserError(f"{args.source}: {damage}; {output} shows what came before")
+        raise UserError(f"{args.source}: {damage}; {output} shows the part before")
     return 0

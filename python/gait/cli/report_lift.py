@@ -71,11 +71,11 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "--mocap",
         metavar="FILE",
-        help="recording (.amc .bvh .c3d .trc .csv) to look at (default: a draw from the prior)",
+        help="recording (.amc .bvh .c3d .trc .csv) to view (default: a draw from the prior)",
     )
     parser.add_argument("--clip", metavar="KEYPOINTS.csv", help="2-D keypoints of a clip, as for gait lift")
     parser.add_argument(
-        "--camera", metavar="CAM", help="the clip's calibration (default: seen level and from far away)"
+        "--camera", metavar="CAM", help="the clip's calibration (default: a level view from far away)"
     )
     parser.add_argument(
         "--method", choices=METHODS, help=f"how the clip is lifted, as in gait lift (default: {METHODS[0]})"
@@ -90,9 +90,9 @@ def run(args: argparse.Namespace) -> int:
     from gait.report.page import Page
 
     if args.camera and not args.clip:
-        raise UsageError("--camera is of a clip; give its keypoints with --clip")
+        raise UsageError("--camera is for a clip; give its keypoints with --clip")
     if args.method and not args.clip:
-        raise UsageError("--method is of a clip; give its keypoints with --clip")
+        raise UsageError("--method is for a clip; give its keypoints with --clip")
     require_folder(args.output)
     prior = SegmentPrior.load(args.model)
     lifted = _clip(args, prior) if args.clip else None

@@ -1,12 +1,12 @@
 """Measure the gait parameters of a track, with their uncertainty, against the norm of a model.
 
-Writes into DIR: report.html (one file that needs nothing else: the page of gait report without the film),
-parameters.json, strides.csv, events.csv and curves.csv.  Heel strikes are where the heel is furthest ahead of
-the pelvis, toe-offs where the toe is furthest behind it.
+Writes into DIR: report.html (the self-contained page of gait report, without the film), parameters.json,
+strides.csv, events.csv and curves.csv.  A heel strike is where the heel is furthest in front of the pelvis, a
+toe-off where the toe is furthest behind it.
 
-With the draws of gait track --smooth --draws the standard deviations come from whole motions.  They
-describe how certain the tracker is given the model and the camera.  Errors of the model and the camera,
-such as a stature that is wrong by a few per cent, come on top.
+With the draws of gait track --smooth --draws, the standard deviations come from whole motions.  They assume
+that model and camera are correct: errors of these, such as a stature that is wrong by a few per cent, come on
+top.
 """
 
 from __future__ import annotations

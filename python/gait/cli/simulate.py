@@ -1,11 +1,11 @@
-"""Make a test clip of a walking person, with the exact truth.
+"""Make a test clip of a walking person, with ground truth.
 
-Writes video.mp4, background.png (the empty scene; of a camera that moves poses.csv instead, for gait track
---camera-path), camera.json, truth.csv (joints in metres and pixels),
-init.json (the truth at frame 0 with some error, to start a tracker), meta.json (heel strikes, stature and how
-the clip was made) and contact.jpg into DIR; of further people truth_2.csv, init_2.json, meta_2.json and so
-on; of further cameras video_2.mp4, background_2.png, camera_2.json and so on (the pixels in truth.csv are of
-the first).  The same options and seed give the same pictures.
+Writes into DIR: video.mp4, background.png (the empty scene; for a moving camera poses.csv instead, for gait
+track --camera-path), camera.json, truth.csv (joints in metres and pixels), init.json (the truth at frame 0
+with some error, to start a tracker), meta.json (heel strikes, stature and how the clip was made) and
+contact.jpg; for further people truth_2.csv, init_2.json, meta_2.json and so on; for further cameras
+video_2.mp4, background_2.png, camera_2.json and so on (pixels in truth.csv are those of the first).  The same
+options and seed give the same pictures.
 
 presets (other options change them):
   demo     side view, left to right, 4 s
@@ -14,8 +14,8 @@ presets (other options change them):
   toward   5 s straight towards the camera
   pole     at 45 degrees, a pole hides the person for a while, strong background
   stopping, standing, backwards, turning
-           at 45 degrees (turning: from the side): walks, stops and walks on; stands; walks backwards; goes
-           round a corner
+           at 45 degrees (turning: side view): walks, stops and walks on; stands; walks backwards; turns a
+           corner
   slow, fast, limping, stick, crutches
            0.6 m/s from the side; 1.9 m/s; spares the left leg; walks with a stick or with forearm crutches
 """
@@ -60,10 +60,12 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "--preset", choices=PRESETS, default="demo", help="scenario to start from (default: demo)"
     )
-    parser.add_argument("--view", choices=VIEWS, help="where the camera is")
-    parser.add_argument("--direction", choices=DIRECTIONS, help="to the right or to the left of the picture")
+    parser.add_argument("--view", choices=VIEWS, help="direction of view")
     parser.add_argument(
-        "--motion", choices=MOTIONS, help="stop: walk, stop, stand and walk on; turn: go round a corner"
+        "--direction", choices=DIRECTIONS, help="walk left to right (lr) or right to left (rl)"
+    )
+    parser.add_argument(
+        "--motion", choices=MOTIONS, help="stop: walk, stop, stand and walk on; turn: turn a corner"
     )
     parser.add_argument(
         "--asymmetry",
@@ -73,17 +75,20 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     )
     parser.add_argument("--aid", choices=AIDS, help="walk with a stick or with forearm crutches")
     parser.add_argument(
-        "--body", choices=BODIES, help="drawn: proportions of the people that the model was learnt from"
+        "--body",
+        choices=BODIES,
+        help="drawn: proportions drawn from the people that the model was learnt from",
     )
     parser.add_argument(
         "--moving",
         choices=MOVING,
-        help="a robot follows the person at 1 m, a camera is turned to them, or a hand holds it",
+        help="follow: a robot follows the person at 1 m; pan: the camera turns to them; shake: it is "
+        "hand-held",
     )
     parser.add_argument(
         "--people",
         choices=COMPANY,
-        help="another person comes the other way, three walk abreast, or a faster person overtakes",
+        help="a second person comes the other way, three walk abreast, or a faster person overtakes",
     )
     parser.add_argument(
         "--cameras",
@@ -112,7 +117,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         "--gait",
         "--model",
         metavar=f"M.gait|{GENERATOR}",
-        help="walk the curves of a model, or a normative gait",
+        help="walk like a model, or with a normative gait",
     )
 
 

@@ -1,18 +1,18 @@
-"""Correct the motion in a video by hand, on a page of this machine.
+"""Correct the motion in a video by hand, on a local web page.
 
-The page shows the film with the figure over it, a 3-D view that turns, and curves with their 90 % intervals.
-Drag a joint to where it is: the motion around it is solved again at once.  Every correction is saved as it is
-made, in VIDEO.studio/corrections.json unless --corrections names another file; gait lift --corrections gives
-the same motion from it.  Leventon and Freeman (1998) correct motions so in section 4.
+The page shows the film with the figure over it, a 3-D view, and curves with their 90 % intervals.  Drag a
+joint to its true position, and the motion around it is updated at once.  Every correction is saved
+immediately, in VIDEO.studio/corrections.json unless --corrections names another file; gait lift --corrections
+gives the same motion from it.  This is the tool of Leventon and Freeman (1998), section 4.
 
-The person's joints come from the detector, from --keypoints, or from --track, what gait track wrote; with
---placement the pictures themselves are lifted, without a detector.  With --camera the motion is in the
-camera's world and feet can be put on its floor; with --height the camera is found from the walk; without
-either it is assumed to be level and far away.  The camera has to stand still: a film whose camera turns is
-lifted by gait lift --stabilize auto.
+The person's joints come from the detector, from --keypoints, or from --track, the output of gait track.  With
+--placement the images themselves are lifted, without a detector.  With --camera the motion is in the camera's
+world and feet can be put on its floor; with --height the camera is estimated from the walk; without either it
+is assumed to be level and far away.  The camera must be static: for a turning camera use gait lift
+--stabilize auto.
 
-The folder VIDEO.studio beside the video keeps what takes long to make.  The page can be opened from this
-machine alone.  Ctrl-C ends the command; nothing is lost.
+The folder VIDEO.studio beside the video stores intermediate results.  Only this machine can open the page.
+Ctrl-C ends the command; nothing is lost.
 """
 
 from __future__ import annotations
@@ -43,7 +43,10 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("video", nargs="?", metavar="VIDEO", help="video file")
     values.add_camera(parser, "; without it see --height", scale=True)
     parser.add_argument(
-        "--height", type=values.stature, metavar="M", help="the person's stature in metres; finds the camera"
+        "--height",
+        type=values.stature,
+        metavar="M",
+        help="the person's stature in metres; estimates the camera",
     )
     values.add_fov(parser)
     parser.add_argument(
@@ -53,14 +56,14 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         "--stop", type=values.whole(0), metavar="F", help="first frame not to use (default: to the end)"
     )
     parser.add_argument("--keypoints", metavar="K.csv", help="2-D keypoints instead of the detector's")
-    parser.add_argument("--track", metavar="OUT.csv", help="what gait track wrote, instead of keypoints")
+    parser.add_argument("--track", metavar="OUT.csv", help="output of gait track, instead of keypoints")
     parser.add_argument(
         "--placement",
         metavar="P.json",
-        help="where the person roughly is in one frame; lifts the pictures themselves, as gait lift does",
+        help="rough position of the person in one frame; lifts the images themselves, as gait lift does",
     )
     parser.add_argument(
-        "--background", metavar="PNG|auto|none", help="the empty scene, with --placement (default: auto)"
+        "--background", metavar="PNG|auto|none", help="empty scene, with --placement (default: auto)"
     )
     parser.add_argument(
         "--corrections",
@@ -76,7 +79,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     )
     parser.add_argument("--no-browser", action="store_true", help="do not open the page, print its address")
     parser.add_argument(
-        "--fetch", action="store_true", help="download the parts of pages (3 MB) and check them"
+        "--fetch", action="store_true", help="download components of web pages (3 MB) and check them"
     )
 
 
@@ -126,18 +129,18 @@ def _check(args: argparse.Namespace) -> None:
     if args.background and not args.placement:
         raise UsageError("--background: goes with --placement")
     if args.camera and args.height and given and given[0] != "keypoints":
-        raise UsageError(f"--height: the {given[0]} has the stature; leave it out, or --camera")
+        raise UsageError(f"--height: the {given[0]} gives the stature; leave out --height or --camera")
     if args.keypoints and args.height and not args.camera:
         raise UsageError(
             f"--keypoints: needs a camera: run gait camera --walk {args.keypoints} --size WxH --height "
             f"{args.height:g} -o camera.json, then give --camera camera.json"
         )
     if args.fov and (args.camera or not args.height):
-        raise UsageError("--fov: is for a camera that is found from the walk, with --height and no --camera")
+        raise UsageError("--fov: is for a camera estimated from the walk, with --height and no --camera")
     for option in ("start", "stop"):
         if getattr(args, option) is not None and args.keypoints:
             raise UsageError(
-                f"--{option}: the frames are those of --keypoints; cut that file, or leave it out"
+                f"--{option}: --keypoints defines the frames; cut that file, or leave out --{option}"
             )
     if args.stop is not None:
         values.require_order(args.start or 0, args.stop)
@@ -152,4 +155,4 @@ def _open(url: str) -> None:
     try:
         webbrowser.open(url)
     except webbrowser.Error as error:
-        raise UserError(f"{url}: no browser ({error}); open it by hand, with --no-browser") from error
+        raise UserError(f"{url}: no browser ({error}); give --no-browser and open it yourself") from error

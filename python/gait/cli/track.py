@@ -1,33 +1,33 @@
 """Track a walking person in a video file.
 
-Without --camera the camera is found from the walk, given the person's stature (see gait camera --walk); the
-standard deviations in OUT.csv include its uncertainty.
+Without --camera the camera is estimated from the walk, given the person's stature (see gait camera --walk).
+The standard deviations in OUT.csv include its uncertainty.
 
 The first state comes from --init: a JSON file with the person's position and phase, or auto.  auto fits a
 second of walking to the detector's keypoints (or those of --keypoints), which also gives the phase and
-distinguishes left from right.  Without keypoints that fit, it compares a second of frames with the
-background; this gives position, stature and heading but not the phase.  If the network did not run, and there
-is no background or no person stands out against it, OpenCV's people detector is used, which is less exact.
-For the start from images the person must be in full view, feet included.  Of several people, one who walks is
-preferred.  A long shadow misplaces the start.
+distinguishes left from right.  If no keypoints fit, it compares a second of frames with the background, which
+gives position, stature and heading but not the phase.  If the network did not run, and there is no background
+or no person stands out against it, OpenCV's people detector is used, which is less accurate.  For a start
+from images the person must be in full view, feet included.  Of several people, one who walks is preferred.  A
+long shadow misplaces the start.
 
-After a start without a phase the status is init for about a second and then ambiguous until the images decide
-between left and right.
+After a start without a phase the status is init for about a second, and then ambiguous until the images
+decide between left and right.
 
-The person is tracked backwards from the start as well.  A lost person is searched for near the last place.
-With keypoints the track continues from the next second in which the same person walks; without them it starts
+The person is also tracked backwards from the start.  A lost person is searched for near the last position.
+With keypoints the track resumes at the next second in which the same person walks; without them it starts
 anew with a person who walks in full view for a second (not with --smooth).
 
-Several films of the same walk, by cameras that stand still, locate the person much better than one.  OUT.csv
-has the frames of the first film, in which the start is found; of the others those nearest in time are used.
-When they began is found from the person's motion unless --offsets gives it.
+Several films of the same walk from static cameras locate the person much better than one.  OUT.csv has the
+frames of the first film, which also gives the start; the nearest frames in time of the others are used.
+Their time offsets are estimated from the person's motion unless --offsets gives them.
 
 --keypoints adds joints that a detector has found in the frames, in the formats that gait lift reads.  Joints
-that the model does not have are left out; frames may be missing.
+that the model does not have are ignored; frames may be missing.
 
 OUT.csv has one row per frame: frame, time (s), status (init, tracking, ambiguous or lost), phase of the
 stride (0 at the right heel strike), stride rate, heading, stature, speed; effective sample size, log
-evidence; scores of the components; each joint's place in the world (_x _y _z, metres) and its standard
+evidence; scores of the components; each joint's position in the world (_x _y _z, metres) and its standard
 deviation (_sx _sy _sz); angles (_deg); standard deviations of phase, rate, heading, stature and scores.
 """
 
@@ -62,8 +62,8 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     add("video", nargs="+", metavar="VIDEO", help="any file that FFmpeg reads; several: see above")
     values.add_camera(
         parser,
-        "; without it the camera is found from the walk, which needs --height; of several films one for each "
-        "in their order, or a TOML file with as many cameras",
+        "; without it the camera is estimated from the walk, which needs --height; for several films one for "
+        "each in their order, or a TOML file with as many cameras",
         scale=True,
         several=True,
     )
@@ -71,26 +71,26 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         "--offsets",
         type=_offsets,
         metavar="S[,S]",
-        help="when each further film began, seconds after the first (default: found from the motion)",
+        help="how many seconds after the first each further film began (default: estimated from the motion)",
     )
     values.add_fov(parser)
     add(
         "--camera-path",
         metavar="POSES.csv",
-        help="where a camera that moves is: time or frame; r11 to r33, tx, ty, tz (world to camera) or x, y, "
-        "z, qx, qy, qz, qw (camera to world); turn_sd_deg, place_sd_m if not exact; --camera is its lens",
+        help="poses of a moving camera: time or frame; r11 to r33, tx, ty, tz (world to camera) or x, y, z, "
+        "qx, qy, qz, qw (camera to world); turn_sd_deg, place_sd_m if not exact; --camera gives its lens",
     )
     add(
         "--camera-out",
         type=values.named(".json"),
         metavar="CAM.json",
-        help="also write the camera, found or given",
+        help="also write the camera, estimated or given",
     )
     add(
         "--cameras-out",
         type=values.named(".csv"),
         metavar="CAMERAS.csv",
-        help="also write each frame's camera, for one that moves",
+        help="also write the camera of each frame, if it moves",
     )
     add("-o", "--output", required=True, type=values.named(".csv"), metavar="OUT.csv", help="the track")
     values.add_model(parser)
@@ -113,29 +113,30 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         "--detector",
         choices=["auto", "full", "lite", "heavy", "none"],
         default="auto",
-        help="network that finds joints, for the start and as a cue (default: auto, full if fetched)",
+        help="network that detects joints, for the start and as a likelihood term (default: auto: full if "
+        "downloaded)",
     )
     add(
         "--keypoints",
         "--tracks",
         metavar="KEYPOINTS",
-        help="2-D joints found in the frames, used beside the images",
+        help="2-D joints found in the frames, used besides the images",
     )
     values.add_person(parser)
     add(
         "--people",
         type=_people,
         metavar="N",
-        help="track several people: all who walk, or the N (up to 8) in view longest and tallest; each "
-        "has files of their own, OUT-1.csv and so on, --overlay shows all",
+        help="track several people: all who walk, or the N (up to 8) in view longest and tallest; each gets "
+        "separate files, OUT-1.csv and so on; --overlay shows all",
     )
     add(
         "--keypoints-sd",
         "--tracks-sd",
         type=values.positive,
         metavar="PX",
-        help=f"their standard deviation at full confidence, the difference between the detector's joints and "
-        f"the model's included (default: {KEYPOINTS_SD:g})",
+        help="standard deviation of keypoints at full confidence, including the difference between the "
+        f"detector's joints and the model's (default: {KEYPOINTS_SD:g})",
     )
     values.add_stabilize(parser, default="off")
     add(
@@ -145,7 +146,9 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         help="also draw the estimates into the video",
     )
     add(
-        "--smooth", action="store_true", help="estimate each frame from the whole clip, later frames included"
+        "--smooth",
+        action="store_true",
+        help="estimate each frame from the whole clip, including later frames",
     )
     add(
         "--draws",
@@ -183,25 +186,23 @@ def run(args: argparse.Namespace) -> int:
         alone |= {"--detector none": args.detector == "none", "--body": args.body is not None}
         for option, given in alone.items():
             if given:
-                raise UsageError(f"--people: finds everyone by the detector; leave out {option}")
+                raise UsageError(f"--people: needs the detector to find everyone; leave out {option}")
     films = args.video
     cameras = _cameras(args)
     if not (args.camera or args.height or args.body):
-        raise UsageError("give --camera CAM, or --height M for a camera that is found from the walk")
+        raise UsageError("give --camera CAM, or --height M to estimate the camera from the walk")
     if not args.camera and args.init != "auto":
-        raise UsageError("--init: needs --camera, in whose world it is")
+        raise UsageError("--init: needs --camera, which defines its world")
     if args.camera_path and not args.camera:
-        raise UsageError("--camera-path: needs --camera, the lens")
+        raise UsageError("--camera-path: needs --camera for the lens")
     if args.camera_path and args.stabilize == "auto":
-        raise UsageError("--stabilize: finds the poses that --camera-path gives; leave out one of them")
+        raise UsageError("--stabilize: estimates the poses that --camera-path gives; leave out one of them")
     if args.camera_path and args.background not in ("auto", "none"):
-        raise UsageError(
-            "--background: is of a camera that stands still; with --camera-path give auto or none"
-        )
+        raise UsageError("--background: an image needs a static camera; with --camera-path give auto or none")
     if args.scale_camera and not args.camera:
         raise UsageError("--scale-camera: needs --camera")
     if args.camera and args.fov:
-        raise UsageError("--fov: is for a camera that is found; leave out --camera or --fov")
+        raise UsageError("--fov: is for an estimated camera; leave out --camera or --fov")
     require_outputs(
         (args.output, args.camera_out, args.cameras_out, args.overlay, args.trc, args.draws, args.report),
         (
@@ -217,7 +218,7 @@ def run(args: argparse.Namespace) -> int:
     )
     body = MeasuredBody.read(args.body) if args.body else None
     if args.report:
-        import gait.report.run_page  # noqa: F401  a package that it needs is missed before the long work
+        import gait.report.run_page  # noqa: F401  so that a missing package is reported before the long work
 
     given = {name: getattr(args, name) for name in ClipOptions.__dataclass_fields__ if name != "further"}
     given |= {"mode": Mode[args.mode.upper()], "keypoints_sd": args.keypoints_sd or KEYPOINTS_SD}
@@ -235,7 +236,7 @@ def run(args: argparse.Namespace) -> int:
 
 
 def _cameras(args: argparse.Namespace) -> list[str]:
-    """Camera file of each film; none if the camera is to be found."""
+    """Camera file of each film; none if the camera is to be estimated."""
     films = len(args.video)
     if films > MAX_CAMERAS:
         raise UsageError(f"{films} films; give at most {MAX_CAMERAS}")
@@ -255,7 +256,7 @@ def _cameras(args: argparse.Namespace) -> list[str]:
 
     cameras = [name for given in args.camera or () for name in camera_names(given)]
     if len(cameras) != films:
-        raise UsageError(f"--camera: {len(cameras)} for {films} films; give one for each, in one world")
+        raise UsageError(f"--camera: {len(cameras)} for {films} films; give one for each, all in one world")
     if args.offsets is not None and len(args.offsets) != films - 1:
         raise UsageError(f"--offsets: {len(args.offsets)} for {films - 1} further films; give one for each")
     return cameras
@@ -266,9 +267,9 @@ def _offsets(text: str) -> tuple[float, ...]:
     try:
         seconds = tuple(float(part) for part in text.split(","))
     except ValueError:
-        raise argparse.ArgumentTypeError(f"{text!r} is no list of seconds, such as 0.5,-1.2") from None
+        raise argparse.ArgumentTypeError(f"{text!r} is not a list of seconds, such as 0.5,-1.2") from None
     if not all(math.isfinite(one) for one in seconds):
-        raise argparse.ArgumentTypeError(f"{text!r} has a number that is not finite")
+        raise argparse.ArgumentTypeError(f"{text!r} contains a number that is not finite")
     return seconds
 
 

@@ -125,8 +125,8 @@ def add_fov(parser: _ActionsContainer) -> None:
         "--fov",
         type=between(2, 150, "degrees"),
         metavar="DEG",
-        help="horizontal field of view of a camera that is found from the walk (default: from the focal "
-        "length that a telephone wrote into the file; else unknown, near 65 along the longer side)",
+        help="horizontal field of view of a camera that is estimated from the walk (default: from the focal "
+        "length that a phone wrote into the file; else unknown, near 65 along the longer side)",
     )
 
 
@@ -136,17 +136,17 @@ def add_stabilize(parser: _ActionsContainer, default: str | None) -> None:
         "--stabilize",
         choices=["auto", "off"],
         default=default,
-        help="auto: find how a camera turns; joints are in the scene's frame: that of the first frame if "
-        "a camera is given, or else that of the frame that is named (default: off)",
+        help="auto: estimate how the camera turns; joints are then in the scene's frame: that of the first "
+        "frame if a camera is given, or else of the frame that the command names (default: off)",
     )
 
 
 def add_norms(parser: ArgumentParser) -> None:
     """Add what the norm of the comfortable speed depends on."""
     parser.add_argument(
-        "--age", type=norm_age, metavar="YEARS", help="of the person, for the norm of the speed (20 to 79)"
+        "--age", type=norm_age, metavar="YEARS", help="age of the person, for the norm of speed (20 to 79)"
     )
-    parser.add_argument("--sex", choices=("f", "m"), help="of the person, with --age (default: both sexes)")
+    parser.add_argument("--sex", choices=("f", "m"), help="sex of the person, with --age (default: both)")
 
 
 def require_age(age: float | None, sex: str | None) -> None:
@@ -161,7 +161,7 @@ def add_model(parser: ArgumentParser, what: str = "walking model") -> None:
         "-m",
         "--model",
         metavar="M.gait",
-        help=f"{what}: a file, or one of the package by its name: walk (default; paper mode: paper), paper, "
+        help=f"{what}: a file, or a model of the package: walk (default; in paper mode paper), paper or "
         "classes",
     )
 
@@ -202,8 +202,8 @@ def add_person(parser: _ActionsContainer) -> None:
     parser.add_argument(
         "--person",
         metavar="ID",
-        help="who of several people in a file of another tool: a track, individual or number, as the note "
-        "that lists them names it (default: the one who is seen most)",
+        help="which of several people in another tool's file: a track, individual or number from the note "
+        "that lists them (default: the one who is seen most)",
     )
 
 
@@ -222,7 +222,8 @@ def add_filter(parser: ArgumentParser, threads: int) -> None:
         type=whole(*THREADS),
         default=threads,
         metavar="T",
-        help=f"threads of the tracker, up to {THREADS[1]}; do not change the result (default: {threads})",
+        help=f"threads of the tracker, up to {THREADS[1]}; the result does not depend on them "
+        f"(default: {threads})",
     )
 
 

@@ -1,8 +1,8 @@
-"""Watch a tracker at work, in a browser on this machine.
+"""Watch a running tracker, in a browser on this machine.
 
-Serves a page and prints its address: each estimate of gait-trackd drawn into its own frame, the figure in
-space, status, rate, latency and drops, and plots of the last 20 seconds.  The page can be held, a picture
-saved, and all messages recorded into an LCM log.  With --save the first finished picture is written to a PNG
+Serves a page and prints its address.  The page shows each estimate of gait-trackd drawn into its frame, the
+figure in space, status, rate, latency and drops, and plots of the last 20 seconds.  It can be paused, save a
+picture, and record all messages into an LCM log.  With --save the first complete picture is written to a PNG
 file instead, and the command ends.
 """
 
@@ -47,7 +47,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         type=values.seconds,
         default=30.0,
         metavar="S",
-        help="seconds that --save waits (default: 30)",
+        help="how many seconds --save waits (default: 30)",
     )
     add("--port", type=port, default=0, metavar="N", help="port of the page (default: any free one)")
     add(
@@ -55,17 +55,17 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         type=stream,
         action="append",
         metavar="I",
-        help="number of a camera, once for each (default: 0)",
+        help="number of a camera; repeat for several (default: 0)",
     )
     add(
         "--person",
         action="append",
         metavar="N|URL",
-        help="number of a person (gait-trackd --person), or LCM on which a tracker publishes (its --out); "
-        "once for each (default: the one on --url)",
+        help="number of a person (gait-trackd --person), or LCM URL on which a tracker publishes (its --out); "
+        "repeat for each person (default: the one on --url)",
     )
-    add("--record-to", metavar="FOLDER", help="folder of recordings, made if need be (default: this one)")
-    values.add_camera(parser, " of the first --stream (default: from GAIT_CAMERA_<i>)", scale=True)
+    add("--record-to", metavar="FOLDER", help="folder for recordings, created if needed (default: the current one)")
+    values.add_camera(parser, ", for the first --stream (default: from GAIT_CAMERA_<i>)", scale=True)
     values.add_model(parser, "model that is tracked")
 
 
@@ -136,5 +136,5 @@ def _save(
             pass
         if not pictures:
             why = feed.damage or "is gait-trackd tracking on this URL?"
-            raise UserError(f"no estimate with its frame and camera came; {why}")
+            raise UserError(f"received no estimate with its frame and camera; {why}")
         cv2.imwrite(str(path), pictures[0])

@@ -64,7 +64,7 @@ class TrackWriter:
     frames : range, optional
         That were to be tracked, if that is known; reasons of `Estimate` are then written too.
     camera_change : callable, optional
-        Gives `Track.camera_change` at a time in seconds, of a camera that was found from the walk.
+        Gives `Track.camera_change` at a time in seconds, of a camera that was estimated from the walk.
     person : int, optional
         Number of the person, of several in a clip.
     """
@@ -186,7 +186,7 @@ class Track(Joints):
     #: Why a clip's rules made each frame ambiguous, empty where the tracker itself decided; none: not stated.
     reason: list[str] = field(default_factory=list)
     #: (n, 3, 4) change of the pelvis' x and y, metres, and of the heading, radians, with each of four
-    #: independent parts of the uncertainty of a camera that was found from the walk, each of one sd and
+    #: independent parts of the uncertainty of a camera that was estimated from the walk, each of one sd and
     #: common to all frames; None where the camera was given.
     camera_change: Array | None = None
 

@@ -178,7 +178,7 @@ class Demo:
     start, stop, particles : int, optional
         As for gait capture and gait-trackd.
     quiet : bool
-        Print no notes and no progress.
+        Suppress notes and progress.
     """
 
     output: Path

@@ -51,7 +51,7 @@ class Request:
     size : (int, int), optional
         Of the video: a camera of another resolution is resized to it.
     calibration : Calibration, optional
-        Camera found from the walk instead; its uncertainty is added to the standard deviations.
+        Camera estimated from the walk instead; its uncertainty is added to the standard deviations.
     axis : str, optional
         Direction of such a view; level and with a slowly changing scale if left out.
     metres : float, optional

@@ -9,7 +9,7 @@ independent in every frame would claim too much for means over strides and too l
   each side for itself.  Cancels in strides, but not in steps, width, clearance or symmetry, and a mean over
   strides does not reduce it;
 - what wanders within a stride;
-- the camera, where it was found from the walk: common to all frames.
+- the camera, where it was estimated from the walk: common to all frames.
 
 Motions drawn from the posterior (`Draws`) have all of that but what the model cannot express; that is the
 difference to the standard deviations of the track, and counts as the person's.

@@ -10,7 +10,7 @@ HEAD = ("", "median", "mean", "9 of 10 frames below")
 _LETTERS = 34  # letters of a row's words on the terminal
 
 OTHER_WORLD = (
-    "the track's camera was found from the walk, so its world is not the truth's: compare the pose, not "
+    "the track's camera was estimated from the walk, so its world is not the truth's: compare the pose, not "
     "places, pixels or intervals"
 )
 """Of a track with `gait.io.track_file.Track.camera_change`."""

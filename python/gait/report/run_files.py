@@ -53,7 +53,7 @@ class RunFiles:
     age, sex : optional
         Of the person, years and ``f`` or ``m``, for the norm of the speed.
     quiet : bool
-        Print no notes and no progress.
+        Suppress notes and progress.
     """
 
     track: str
@@ -198,13 +198,16 @@ def _draw(
 def _camera(files: RunFiles, track: Track) -> tuple[str | None, str]:
     """Camera that was given, or the file beside the track or the clip; and a remark, if it was not given.
 
-    A camera that was found from the walk has a world of its own, which no other file's camera shares.
+    A camera that was estimated from the walk has a world of its own, which no other file's camera shares.
     """
     if files.camera is not None:
         return files.camera, ""
     if track.camera_change is not None:
         remedy = "give the file of gait track --camera-out as --camera"
-        return None, f"the track's camera was found from the walk; to see the figure in the film, {remedy}"
+        return (
+            None,
+            f"the track's camera was estimated from the walk; to see the figure in the film, {remedy}",
+        )
     beside = [Path(name).with_name("camera.json") for name in (files.track, files.video)]
     path = next((str(one) for one in beside if one.is_file()), None)
     if path is None:

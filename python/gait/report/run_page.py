@@ -227,7 +227,7 @@ def _data(run: Run, film: PageFilm, statuses: list[str], whole: bool) -> dict[st
 
 
 def _is_vague(track: Track) -> bool:
-    """Whether the places are uncertain by more than a hand, as where the camera was found from the walk."""
+    """Whether positions are uncertain by more than a hand, for example with an estimated camera."""
     sd = np.stack(list(track.sd.values()))
     return bool(np.median(sd.max(axis=2)) > _VAGUE)
 

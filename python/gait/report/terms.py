@@ -120,7 +120,7 @@ SHARES = {
 
 CONVENTIONS = (
     "The world has z up and the floor at z = 0; x and y are those of the camera file, or, where the "
-    "camera was found from the walk, y points away from the camera and x to its right.",
+    "camera was estimated from the walk, y points away from the camera and x to its right.",
     "The phase of a stride runs from 0 at the right heel strike to 1 (100 %) at the next. Curves of the "
     "left side begin at the left heel strike.",
     "Heel strikes are where the heel is furthest ahead of the pelvis, toe-offs where the toe is furthest "

@@ -22,7 +22,8 @@ class ClipOptions:
     video, output : str
         The clip and the track to write.
     camera : str, optional
-        Its camera file; the camera is found from the walk if left out, which needs `height` and keypoints.
+        Its camera file; the camera is estimated from the walk if left out, which needs `height` and
+        keypoints.
     further : tuple of (str, str)
         Film and camera file of each further camera, in the world of the first.
     offsets : tuple of float, optional
@@ -68,7 +69,7 @@ class ClipOptions:
     smooth : bool
         Estimate every frame from the whole clip.
     quiet : bool
-        Print no notes and no progress.
+        Suppress notes and progress.
     """
 
     video: str

@@ -96,7 +96,7 @@ def _camera(options: ClipOptions, scene: Scene) -> str:
             if options.camera_path
             else str(options.camera)
         )
-    return f"found from the walk and the stature of {options.height:.2f} m"
+    return f"estimated from the walk and the stature of {options.height:.2f} m"
 
 
 def _keypoints(options: ClipOptions, scene: Scene) -> str:

@@ -1,4 +1,4 @@
-"""The camera of a film, found from the walk in it: what `gait camera`, `gait track` and `gait lift` share."""
+"""The camera of a film, estimated from the walk in it, for `gait camera`, `gait track` and `gait lift`."""
 
 from __future__ import annotations
 

@@ -48,7 +48,7 @@ class Request:
     scale_camera : bool
         Whether a camera of another resolution is resized to the video's.
     calibration : Calibration, optional
-        Camera found from the walk instead; its uncertainty is added to the standard deviations.
+        Camera estimated from the walk instead; its uncertainty is added to the standard deviations.
     height : float, optional
         Stature by which it was found, metres.
     background : str
@@ -133,20 +133,20 @@ def open_clip(request: Request, prior: SegmentPrior, warn: Warn, quiet: bool) ->
 
 
 def _on_floor(request: Request, placement: Placement, prior: SegmentPrior) -> Placement:
-    """Placement in the world of a camera found from the walk: the pelvis in the picture, at its height."""
+    """Placement in the world of an estimated camera: the pelvis in the picture, at its height."""
     assert request.calibration is not None and request.height is not None
     pelvis = request.height * prior.mean[0, 0, prior.index(["pelvis"])[0], 2]
     ground = request.calibration.camera.on_plane(np.array(placement.pelvis_px), pelvis)[:2]
     if not np.isfinite(ground).all():
         raise UserError(
-            f"{request.placement}: pelvis_px is above the horizon of the camera found from the walk; give "
-            "the pelvis in the picture"
+            f"{request.placement}: pelvis_px is above the horizon of the camera estimated from the walk; "
+            "give the pelvis in the picture"
         )
     return replace(placement, ground=ground, stature=request.height)
 
 
 def widened(request: Request, fit: ClipFit) -> ClipFit:
-    """Add the uncertainty of a camera that was found from the walk to an estimate's standard deviations."""
+    """Add the uncertainty of an estimated camera to the standard deviations."""
     if request.calibration is None:
         return fit
     return replace(fit, sd=request.calibration.joint_sd(fit.time, fit.places, fit.sd))
