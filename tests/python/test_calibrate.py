@@ -160,7 +160,7 @@ def test_a_lens_that_changes_is_refused(shown, tmp_path, capsys):
 
 def test_flat_poses_leave_the_focal_length_open(tmp_path, capsys):
     names = pictures(tmp_path, 8, tilt=0.01, noise=6.0, far=(2.5, 3.2))
-    assert "leave the focal length open" in fault(names, capsys, tmp_path / "l.json")
+    assert "do not determine the focal length" in fault(names, capsys, tmp_path / "l.json")
 
 
 def test_a_picture_that_does_not_fit_is_left_out(shown, tmp_path, capsys):
@@ -209,7 +209,7 @@ def test_files_that_are_not_there(words, expected, capsys, tmp_path, monkeypatch
 
 def test_a_file_that_is_no_picture(tmp_path, capsys):
     (tmp_path / "a.png").write_text("no picture")
-    assert "a.png: is no picture that can be read" in fault([tmp_path / "a.png"], capsys, tmp_path / "l.json")
+    assert "a.png: cannot be read as a picture" in fault([tmp_path / "a.png"], capsys, tmp_path / "l.json")
 
 
 @pytest.mark.parametrize(("name", "paper"), [("charuco", "a4"), ("9x6", "letter"), ("charuco", "a3")])

@@ -251,7 +251,7 @@ def test_unusable_toml_cameras_are_refused(old, new, words, tmp_path):
     "name, text, words",
     [
         ("cam.json", "{", "not valid JSON"),
-        ("cam.json", "[1]", "holds no JSON object"),
+        ("cam.json", "[1]", "contains no JSON object"),
         ("cam.yaml", "{{{{", "not a YAML file"),
         ("cam.txt", "", "is empty, so it is no camera file"),
         ("cam.ini", "f=1", "unknown camera suffix; use .json"),
@@ -300,7 +300,7 @@ def test_brackets_too_deep_to_read_are_one_line(tmp_path):
     deep = "[" * 100_000
     for name, text in (("cam.json", deep), ("cam.toml", f"matrix = {deep}")):
         (tmp_path / name).write_text(text)
-        with pytest.raises(UserError, match=f"{name}: not valid (JSON|TOML) .brackets within"):
+        with pytest.raises(UserError, match=f"{name}: not valid (JSON|TOML) .brackets nested"):
             Camera.read(str(tmp_path / name))
 
 

@@ -145,7 +145,7 @@ REFUSED = {
     ),
     "text": (lambda p: written(p / "a.txt", "hello world\n"), "holds no camera; give a JSON camera file"),
     "yaml": (lambda p: written(p / "a.yaml", "a: [1, 2\n"), "not a YAML file"),
-    "list": (lambda p: written(p / "a.yaml", "- 1\n- 2\n"), "holds no camera"),
+    "list": (lambda p: written(p / "a.yaml", "- 1\n- 2\n"), "contains no camera"),
     "xml": (lambda p: written(p / "a.qca.txt", "<calibration>\n<cameras>\n"), "not an XML file"),
 }
 

@@ -47,7 +47,7 @@ def test_too_few_distances_are_counted():
     with pytest.raises(UserError, match="give 1 more distance between 5 marks"):
         coordinates(5, few)
     lonely = {pair: metres for pair, metres in FAR.items() if 4 not in pair} | {(0, 4): FAR[0, 4]}
-    with pytest.raises(UserError, match="two distances or more to mark 5"):
+    with pytest.raises(UserError, match="at least two distances to mark 5"):
         coordinates(5, lonely)
 
 

@@ -67,7 +67,7 @@ HEAD = "time,r11,r12,r13,r21,r22,r23,r31,r32,r33,tx,ty,tz"
         (["time,x,y,z"], "first line must name time or frame, and r11 to r33"),
         ([HEAD], "has no pose"),
         ([HEAD, "0,1,0,0,0,0,-1,0,1,0,x,0,5"], "line 2: tx is 'x'; give a number"),
-        ([HEAD, "0,1,0,0,0,0,-1,0,0.5,0,0,0,5"], "line 2: r11 to r33 are no rotation"),
+        ([HEAD, "0,1,0,0,0,0,-1,0,0.5,0,0,0,5"], "line 2: r11 to r33 are not a rotation"),
         ([HEAD, LINE.format(time=0, x=0), LINE.format(time=0, x=0)], "line 3: time does not increase"),
         (
             [HEAD, LINE.format(time=0, x=0), LINE.format(time=0.1, x=0)],

@@ -76,7 +76,7 @@ def test_the_blob_names_its_classes(model: gait.Model) -> None:
 
 def test_classes_that_do_not_fit_are_refused() -> None:
     walk, three = blob.read(SHIPPED), classes()
-    with pytest.raises(UserError, match="give each a name of its own"):
+    with pytest.raises(UserError, match="give each its own name"):
         join(walk, [*three, three[1]])
     with pytest.raises(UserError, match="class limp: has no curves, and no class 'trot'"):
         join(walk, [*three, MotionClass("limp", source="trot")])
@@ -117,11 +117,11 @@ def test_classes_are_added_to_a_model(tmp_path: Path, capsys: pytest.CaptureFixt
     ("given", "words"),
     [
         (["limp"], "--class limp: give recordings"),
-        (["stand", "stand"], "--class stand: give each class a name of its own"),
-        (["walk"], "--class walk: give each class a name of its own, not walk"),
+        (["stand", "stand"], "--class stand: give each class its own name"),
+        (["walk"], "--class walk: give each class its own name, not walk"),
         (
             ["backwards=here"],
-            "--class backwards=here: backwards is made from the walk in reverse",
+            "--class backwards=here: backwards is derived from the walk",
         ),
     ],
 )

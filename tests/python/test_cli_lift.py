@@ -215,7 +215,7 @@ def test_options_out_of_range(folder, capsys, option, words):
     ("change", "words"),
     [
         (lambda t: replace(t, time=t.time + 1e6 * (t.frame > 8)), "line 11: 1e+06 s after the frame before"),
-        (lambda t: replace(t, time=t.time * 1e-9), "u.csv: time goes on by 5e-11 from frame to frame"),
+        (lambda t: replace(t, time=t.time * 1e-9), "u.csv: time increases by 5e-11 per frame"),
         (lambda t: replace(t, uv=t.uv * 1e9), "give a number of at most 1e+06"),
         (lambda t: Keypoints(t.frame[:1], t.time[:1], t.names, t.uv[:1], t.confidence[:1]), "has one frame"),
     ],
@@ -326,7 +326,7 @@ def test_few_joints_are_reported(folder, capsys, monkeypatch):
     for shows, view in ((True, "camera"), (False, "camera"), (False, "none")):
         monkeypatch.setattr(size, "shows_distance", lambda keypoints, shows=shows: shows)
         assert main([*command, *VIEWS[view]]) == 0
-        reported = "hips and ankles, which determine the distance, are hardly seen" in capsys.readouterr().err
+        reported = "which determine the distance, are hardly visible" in capsys.readouterr().err
         assert reported == (view == "camera" and not shows)
 
 
@@ -363,7 +363,7 @@ def test_a_prior_of_few_recordings_is_reported(folder, capsys, recordings, repor
     prior = replace(toy_prior(FRAMES, MARKERS, 4, seed=5), recordings=recordings)
     (folder / "few.gait").write_bytes(toy_blob(prior))
     assert main(["lift", "t.csv", "-m", "few.gait", "--camera", "cam.json", "-o", "out.csv"]) == 0
-    assert ("standard deviations may come out too small" in capsys.readouterr().err) == reported
+    assert ("standard deviations may be too small" in capsys.readouterr().err) == reported
 
 
 @pytest.mark.parametrize("mark", [";", "\t"])

@@ -144,7 +144,7 @@ def test_a_start_outside_of_the_picture_is_refused(scene, capsys):
     init = json.loads((scene / "init.json").read_text())
     (scene / "far.json").write_text(json.dumps(init | {"pelvis": [100, 100, 1]}))
     assert track(scene, "--init", scene / "far.json", "--stop", 2) == 1
-    assert "far.json: the start is outside of the picture; check pelvis" in capsys.readouterr().err
+    assert "far.json: the start is outside the picture; check pelvis" in capsys.readouterr().err
     assert track(scene, "--init", scene / "init.json", "--stop", 2) == 0
 
 
@@ -221,7 +221,7 @@ def test_tracks_of_other_frames_are_refused(scene, tracks, capsys):
     late = [text[0], *(f"{i + 700}{row[row.index(',') :]}" for i, row in enumerate(text[1:]))]
     (scene / "late.csv").write_text("\n".join(late) + "\n")
     assert track(scene, "--keypoints", scene / "late.csv", out="fault.csv") == 1
-    assert "late.csv: has no frame that is tracked; number frames as in the" in capsys.readouterr().err
+    assert "late.csv: has none of the tracked frames; number frames as in the" in capsys.readouterr().err
     assert not (scene / "fault.csv").exists()
 
 

@@ -144,7 +144,7 @@ def test_absent_weights_name_the_remedy(tmp_path, monkeypatch):
 def test_damaged_weights_are_refused(tmp_path, monkeypatch):
     monkeypatch.setenv("GAIT_WEIGHTS", str(tmp_path))
     (tmp_path / weights.PERSON.file).write_bytes(b"another network")
-    with pytest.raises(UserError, match="is damaged or of another version; delete it"):
+    with pytest.raises(UserError, match="is damaged or has another version; delete it"):
         weights.load(weights.PERSON)
 
 
@@ -159,7 +159,7 @@ def test_a_picture_is_no_film(command, tmp_path, capsys):
     cv2.imwrite(str(tmp_path / "picture.png"), np.zeros((64, 64, 3), np.uint8))
     out = tmp_path / ("out.json" if "camera" in command else "out.csv")
     assert cli.main([*command, str(tmp_path / "picture.png"), "-o", str(out)]) == 1
-    assert "picture.png: has only 1 frame; give a video of a second or more" in capsys.readouterr().err
+    assert "picture.png: has only 1 frame; give a video of at least a second" in capsys.readouterr().err
     assert not out.exists()
 
 
@@ -176,7 +176,7 @@ def test_a_package_that_cannot_be_had_is_one_line(tmp_path, monkeypatch):
 
 def test_weights_that_are_there_already_are_reported(fetched, capsys):
     assert cli.main(["detect", "--fetch"]) == 0
-    assert "everything is there already: pose_detection.tflite" in capsys.readouterr().err
+    assert "already there: pose_detection.tflite" in capsys.readouterr().err
 
 
 @pytest.mark.parametrize("words", [[], ["VIDEO"], ["-o", "k.csv"]])

@@ -172,7 +172,7 @@ def test_two_frames_and_a_picture_are_no_film(name, command, walk, tmp_path, cap
         cv2.imwrite(str(tmp_path / name), walk[1][0])
     count = "2 frames" if name == "two.mp4" else "1 frame"
     line = refused(capsys, tmp_path, *commands(tmp_path, name)[command])
-    assert f"{name}: has only {count}; give a video of a second or more" in line
+    assert f"{name}: has only {count}; give a video of at least a second" in line
 
 
 @pytest.mark.parametrize("command", COMMANDS)
@@ -204,4 +204,4 @@ def test_wrong_weights_are_refused(
     monkeypatch.setenv("GAIT_WEIGHTS", str(folder))
     film(tmp_path / "film.mp4", walk[1][:4])
     line = refused(capsys, tmp_path, *commands(tmp_path, "film.mp4")[command])
-    assert "is damaged or of another version; delete it" in line
+    assert "is damaged or has another version; delete it" in line

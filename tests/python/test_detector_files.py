@@ -273,7 +273,7 @@ def test_times_come_from_the_video_the_rate_or_the_file_and_else_are_asked_for(t
         read(path, fps=None, times=times[:10])
     timed = mediapipe(tmp_path / "a.json", "time")
     assert np.allclose(read(timed, fps=None, size=SIZE)[0].time, WALK.time)
-    with pytest.raises(UserError, match="shares of the picture's width and height; give --video"):
+    with pytest.raises(UserError, match="fractions of the picture's width and height; give --video"):
         read(timed)
 
 
@@ -303,9 +303,9 @@ def test_points_that_are_not_visible_are_left_out(tmp_path):
 
 UNKNOWN = {
     "hand": ([{"image_id": "1.jpg", "keypoints": [1.0, 2.0, 0.5] * 21}], "has 21 points without names"),
-    "no_person": ({"version": 1.3, "people": []}, "has no number|holds no person"),
-    "no_list": ({"people": 3}, "people is no list|no number"),
-    "numbers": ([[1, 2], [3, 4]], "holds no person"),
+    "no_person": ({"version": 1.3, "people": []}, "has no number|contains no person"),
+    "no_list": ({"people": 3}, "people is not a list|no number"),
+    "numbers": ([[1, 2], [3, 4]], "JSON without people"),
     "landmark": ([{"landmarks": [{"x": "a", "y": 1}]}], "no numbers x and y"),
     "image": (
         {"images": [], "annotations": [{"image_id": 3, "keypoints": [1, 2, 2]}]},
@@ -319,7 +319,7 @@ UNKNOWN = {
         [{"image_id": 1, "keypoints": [1.0] * 51}, {"image_id": 2, "keypoints": [1.0] * 78}],
         "17 points and 26",
     ),
-    "unlike": ({"images": 5, "annotations": []}, "in no known layout"),
+    "unlike": ({"images": 5, "annotations": []}, "in an unknown layout"),
 }
 
 

@@ -42,7 +42,7 @@ READ = {
 REFUSED = {
     "yolo": (
         json.dumps([{"name": "person", "class": 0, "keypoints": {"x": [1], "y": [2]}}]),
-        "JSON of Ultralytics",
+        "JSON from Ultralytics",
     ),
     "sleap": ("track,frame_idx,score\n0,1,2\n", "SLEAP without columns"),
     "dlc": ("scorer,D,D\nbodyparts,nose,nose\n0,1,2\n", "DeepLabCut without its line coords"),

@@ -301,7 +301,7 @@ def test_lifted_motion_is_compared_without_status_and_phase(tmp_path):
 def test_a_model_of_segments_alone_is_refused_by_name(tmp_path):
     path = tmp_path / "segments.gait"
     blob.write(path, segment_fit.sections(toy_prior(4, 3, 2, 1)))
-    with pytest.raises(UserError, match="segments.gait: holds no cyclic model; learn it without"):
+    with pytest.raises(UserError, match="segments.gait: contains no cyclic model; learn it without"):
         read_cyclic(path)
 
 

@@ -97,7 +97,7 @@ def test_the_skeleton_of_constant_lengths_is_at_the_joints(walk):
 def test_bvh_is_read_by_another_reader(walk, tmp_path, capsys):
     bvhio = pytest.importorskip("bvhio", reason="bvhio is not installed: extra dev")
     path = export(walk, tmp_path, ".bvh")
-    assert "lacks 1 frames, which repeat the one before" in capsys.readouterr().err
+    assert "lacks 1 frames, which repeat the previous frame" in capsys.readouterr().err
     fitted = angles.fit(motion.read(walk.path).places)
     turns, origins, _ = fitted.pose(walk.kept)
     root = bvhio.readAsHierarchy(str(path))
@@ -309,7 +309,7 @@ def test_rerun(walk, tmp_path):
 @pytest.mark.parametrize(
     ("name", "out", "words"),
     [
-        ("walk.csv", "a.fbx", "not a format that is written; use one of .trc .c3d"),
+        ("walk.csv", "a.fbx", "not a supported format; use one of .trc .c3d"),
         ("none.csv", "a.trc", "no such"),
         ("short.csv", "a.c3d", "has one frame"),
         ("uneven.csv", "a.bvh", "no constant rate"),

@@ -140,9 +140,9 @@ FAULTS = [
     ({"sd": 0.1}, "sd is not a table of keys"),
     ({"heading": 0.1}, "heading is not a known key; use frame pelvis heading_rad"),
     ("{'phase': 1}", "not valid JSON"),
-    ("3", "holds no JSON object"),
-    ("[" * 100_000, r"not valid JSON \(brackets within brackets, too deep to read\); mend it"),
-    ('{"frame": ' + "1" * 5000 + "}", "not valid JSON .*; mend it"),
+    ("3", "contains no JSON object"),
+    ("[" * 100_000, r"not valid JSON \(brackets nested too deeply\); correct it"),
+    ('{"frame": ' + "1" * 5000 + "}", "not valid JSON .*; correct it"),
 ]
 
 
@@ -203,7 +203,7 @@ def test_a_standing_person_has_no_heading(tmp_path):
 @pytest.mark.parametrize(
     "count, words",
     [
-        (1, "only 1 frame to track, and a walk takes more: give a second or longer, by --start"),
+        (1, "only 1 frame to track; give at least a second, by --start"),
         (5, "only 5 frames to track, --init auto needs 8; give --init FILE"),
     ],
 )

@@ -68,9 +68,9 @@ HEAD = "frame,time,pelvis_u,pelvis_v"
         (f"{HEAD}\n0,0,1,2\n1.5,1,1,2\n", "line 3: frame is 1.5; it must be whole"),
         (f"{HEAD}\n0,0,1,2\n1e30,1,1,2\n", "frame is 1e+30; it must be whole numbers that increase, at most"),
         (f"{HEAD}\n0,0,1,-2e6\n", "line 2: pelvis_v is '-2e6'; give a number of at most 1e+06"),
-        (f"{HEAD}\n0,0,1,2\n1,1e-9,1,2\n", "time goes on by 1e-09 from frame to frame; give seconds"),
-        (f"{HEAD}\n0,0,1,2\n1,33.3,1,2\n", "time goes on by 33.3 from frame to frame; give seconds"),
-        (f"{HEAD}\n0,0,1,2\n1,1,1,2\n", "time goes on by 1 from frame to frame; give seconds"),
+        (f"{HEAD}\n0,0,1,2\n1,1e-9,1,2\n", "time increases by 1e-09 per frame; give seconds"),
+        (f"{HEAD}\n0,0,1,2\n1,33.3,1,2\n", "time increases by 33.3 per frame; give seconds"),
+        (f"{HEAD}\n0,0,1,2\n1,1,1,2\n", "time increases by 1 per frame; give seconds"),
         (f"{HEAD}\n0,0,1,2\n1,0,1,2\n", "line 3: time does not increase"),
         (f"{HEAD}\n0,,1,2\n", "line 2: time is empty"),
         (f"{HEAD}\n0,0,,\n", "no point is seen"),
@@ -129,7 +129,7 @@ def test_times_of_the_video_are_accepted(every, first):
 
 @pytest.mark.parametrize("rate", [0.5, 0.9, 1.2, 2.0])
 def test_frames_that_number_something_else_are_refused(rate):
-    with pytest.raises(UserError, match=r"t.csv: time goes on by .* s a frame, the video by 0.03333 s"):
+    with pytest.raises(UserError, match=r"t.csv: time increases by .* s a frame, the video by 0.03333 s"):
         counted(np.arange(30), rate * TIMES[:30]).compare_times("t.csv", TIMES)
 
 

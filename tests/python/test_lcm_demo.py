@@ -104,7 +104,7 @@ def test_a_second_demo_in_the_same_folder_keeps_out(folder, tmp_path):
 @pytest.mark.parametrize(
     ("words", "printed", "code"),
     [
-        (["--camera", "c.json"], "--camera: belongs to a clip of your own; give --video", 2),
+        (["--camera", "c.json"], "--camera: is for your own clip; also give --video", 2),
         (["--height", "17"], "17: is not a stature", 2),
         (["--particles", "5"], "5: give a whole number from 16 to 1048576", 2),
         (["--video", "{}/none.mp4"], "none.mp4: no such video file", 1),

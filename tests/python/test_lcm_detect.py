@@ -146,7 +146,7 @@ def test_the_tracker_uses_the_joints_of_every_second_frame(tmp_path, monkeypatch
 
 
 def test_a_log_cannot_be_answered(tmp_path):
-    with pytest.raises(UserError, match="answers on a network, not in a log"):
+    with pytest.raises(UserError, match="needs a network, not a log"):
         detect.LiveDetector(f"file://{tmp_path}/x.log", 0, "full", 8)
 
 

@@ -112,7 +112,7 @@ def test_two_trackers_on_one_url_are_reported(estimates, tmp_path, case):
     done, frames = record(tmp_path, order)
     assert done.returncode == 1 and "two trackers publish on this URL" in done.stderr
     assert done.stderr.splitlines()[1:] == [done.stderr.splitlines()[-1]], done.stderr
-    assert frames == list(range(len(frames))) and f"before that showed: {len(frames)})" in done.stderr
+    assert frames == list(range(len(frames))) and f"before this was noticed: {len(frames)})" in done.stderr
 
 
 def test_another_stream_that_begins_is_reported(estimates, tmp_path):
@@ -141,7 +141,7 @@ def test_damaged_messages_are_left_out_and_reported(estimates, tmp_path):
     figures = json.loads(done.stdout)
     assert figures["damaged"] == 3 and len(read_track(tmp_path / "t.csv").frame) == COUNT
     run = read_run(str(log))
-    assert len(run.frame) == COUNT and "a message is left out" in run.remark
+    assert len(run.frame) == COUNT and "a message is skipped" in run.remark
 
 
 def test_a_log_played_again_is_another_stream(estimates, tmp_path):
@@ -161,7 +161,7 @@ def test_the_log_that_is_listened_to_stays_as_it_is(estimates, tmp_path):
     log = rig.write_log(tmp_path / "in.log", [("GAIT_ESTIMATE", e) for e in estimates])
     before = log.read_bytes()
     for words, code, error in (
-        (["--url", f"file://{log}?mode=w", "-o", tmp_path / "t.csv"], 2, "only read; leave ?mode= out"),
+        (["--url", f"file://{log}?mode=w", "-o", tmp_path / "t.csv"], 2, "only read here; leave out ?mode="),
         (["--url", f"file://{log}", "-o", tmp_path / "t.csv", "--log", log], 1, "is read by this command"),
     ):
         done = rig.gait("record", *words)
@@ -173,10 +173,7 @@ def test_a_log_that_breaks_off_is_reported_and_recorded_as_far_as_it_goes(estima
     log = rig.write_log(tmp_path / "in.log", [("GAIT_ESTIMATE", e) for e in estimates])
     log.write_bytes(log.read_bytes()[:-100])
     done = rig.gait("record", "--url", f"file://{log}?speed=0", "-o", tmp_path / "t.csv", "--quiet")
-    assert (
-        done.returncode == 1
-        and f"breaks off at byte {log_end(log, COUNT - 1)}, messages before" in done.stderr
-    )
+    assert done.returncode == 1 and f"ends at byte {log_end(log, COUNT - 1)}, messages before" in done.stderr
     assert done.stderr.count("\n") == 1 and len(read_track(tmp_path / "t.csv").frame) == COUNT - 1
 
 
@@ -214,7 +211,7 @@ def test_a_log_cut_in_its_first_message_is_called_damaged(tmp_path):
         cut.write_bytes(whole.read_bytes()[:size])
         done = rig.gait("record", "--url", f"file://{cut}?speed=0", "-o", tmp_path / "t.csv", "--quiet")
         assert done.returncode == 1 and "cut.log" in done.stderr and done.stderr.count("\n") == 1
-        assert "damaged or breaks off at byte 0" in done.stderr
+        assert "damaged or ends at byte 0" in done.stderr
 
 
 @pytest.mark.parametrize("option", ["--frames", "--until-idle", "--patience"])

@@ -214,7 +214,7 @@ def test_a_start_outside_of_the_picture_is_reported(folder, tmp_path):
     (tmp_path / "far.json").write_text(json.dumps(init | {"pelvis": [100, 100, 1]}))
     words = [*capture_options(folder)[:-1], tmp_path / "far.json", "--rate", "max"]
     done = rig.gait("capture", *words, "--url", f"file://{tmp_path / 'far.log'}?mode=w")
-    assert done.returncode == 0 and "far.json: the start is outside of the picture; check" in done.stderr
+    assert done.returncode == 0 and "far.json: the start is outside the picture; check" in done.stderr
 
 
 # ---- record and report ----
@@ -293,7 +293,7 @@ def test_a_report_of_a_log_that_breaks_off_shows_what_came_before(folder, record
     files += ["--camera", folder / "camera.json"]
     done = rig.gait("report", cut, *files, "-o", page, "--quiet")
     assert done.returncode == 1 and done.stderr.count("\n") == 1
-    assert "breaks off at byte" in done.stderr and f"{page} shows the part before" in done.stderr
+    assert "ends at byte" in done.stderr and f"{page} shows the part before" in done.stderr
     assert "<svg" in page.read_text()
 
 

@@ -74,7 +74,7 @@ def test_frames_go_on_after_the_stream_broke_off(camera, capsys):
     assert 2 <= start <= 6 and len(camera.times) == 4
     assert found[start].time - found[start - 1].time < 5.0
     printed = capsys.readouterr().err
-    assert "broke off; connecting again" in printed and "back after" in printed
+    assert "connection lost; reconnecting" in printed and "back after" in printed
     assert "secret" not in printed
 
 

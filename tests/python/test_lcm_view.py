@@ -279,7 +279,7 @@ def test_options_out_of_their_range_are_usage_errors(words):
 def test_a_log_is_only_read(log):
     before = log[0].read_bytes()
     done = rig.gait("view", "--url", f"file://{log[0]}?mode=w", "--save", log[0].with_suffix(".png"))
-    assert done.returncode == 2 and "only read; leave ?mode= out" in done.stderr
+    assert done.returncode == 2 and "only read here; leave out ?mode=" in done.stderr
     assert log[0].read_bytes() == before
 
 
@@ -360,9 +360,9 @@ def spoilt(message, **changes):
         ({"status": 77}, {}, "status 77 is unknown"),
         ({"speed": float("nan")}, {}, "not finite"),
         ({"ess": float("inf")}, {}, "not finite"),
-        ({}, {"width": 0, "height": 0}, "0x0 pixels are no picture"),
-        ({}, {"width": -160}, "-160x120 pixels are no picture"),
-        ({}, {"height": -1}, "160x-1 pixels are no picture"),
+        ({}, {"width": 0, "height": 0}, "0x0 pixels are not a picture"),
+        ({}, {"width": -160}, "-160x120 pixels are not a picture"),
+        ({}, {"height": -1}, "160x-1 pixels are not a picture"),
         ({}, {"width": 80}, "a picture of 80x120, the camera's is 160x120"),
         ({}, {"height": 60}, "a picture of 160x60"),
         ({}, {"row_stride": 0}, "row_stride or size too small"),

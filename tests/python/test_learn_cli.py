@@ -123,7 +123,7 @@ def test_exclude_matches_the_tail_of_the_path(walks):
         (["{walks}/nowhere"], "no such file or folder"),
         (["{walks}", "--markers", "{walks}/no.json"], "no.json: No such file or directory; check the name"),
         (["{walks}/01/01.asf"], "a skeleton without motion; name the .amc files"),
-        (["{walks}/notes.txt"], "not learnt from; convert it to .amc .bvh"),
+        (["{walks}/notes.txt"], "not supported; convert it to .amc .bvh"),
         (["{walks}/02/02_99.amc"], r"02_99.amc:3: 2 numbers, expected 6"),
         (["{walks}/01/01_01.amc", "--components", "5"], "too few for 5 components; add recordings"),
         (["{walks}", "--components", "5", "-o", "{walks}/no/where.gait"], "does not exist; create it"),
@@ -221,7 +221,7 @@ def test_people_without_arms_are_reported(walks, tmp_path, capsys):
             lines.append(",".join([f"{t / 100:.2f}", *(f"{row[ANGLES.index(a)]:.3f}" for a in some)]))
         (tmp_path / f"{'ab'[k]}_1.csv").write_text("\n".join(lines) + "\n")
     assert run("learn", tmp_path, "-o", tmp_path / "m.gait", "--components", 1) == 0
-    assert "1 person never shows l_shoulder or r_shoulder: filled in from" in capsys.readouterr().err
+    assert "1 person never shows l_shoulder or r_shoulder: estimated from" in capsys.readouterr().err
 
 
 def test_columns_of_info_widen_for_long_names():

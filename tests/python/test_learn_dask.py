@@ -102,7 +102,7 @@ def test_a_bad_file_named_by_itself_stops_the_run(walks, scheduler):
 
 
 def test_a_file_that_workers_do_not_see_is_named_with_the_remedy(walks, scheduler, tmp_path):
-    with pytest.raises(UserError, match="absent.amc: a worker does not see .* under the same path"):
+    with pytest.raises(UserError, match="absent.amc: a worker cannot access .* under the same path"):
         load.load_all([(tmp_path / "absent.amc", True)], LearnOptions(dask=scheduler))
 
 

@@ -256,7 +256,7 @@ def test_what_no_recording_shows_is_reported(tmp_path, capsys):
     model = tmp_path / "legs.gait"
     assert gait.cli.main(["learn", str(tmp_path / "legs.csv"), "-o", str(model)]) == 0
     lines = capsys.readouterr().err.splitlines()
-    line = next(x for x in lines if x.endswith("these stay in the rest pose"))
+    line = next(x for x in lines if x.endswith("they stay in the rest pose"))
     assert "l_shoulder" in line and "torso" in line and "l_hip" not in line
     assert gait.cli.main(["info", str(model)]) == 0
     line = next(x for x in capsys.readouterr().out.splitlines() if x.startswith("never observed"))

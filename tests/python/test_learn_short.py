@@ -82,9 +82,7 @@ def test_short_trials_of_one_person_are_that_persons_cycles(trials, tmp_path, ca
     assert cli.main(words) == 0
     printed = capsys.readouterr()
     assert "4 sequences of 2 subjects (11 13)" in printed.out
-    assert (
-        "12_01.amc: the trial is too short alone: 1.23 cycles (at least 1.5); add more trials" in printed.err
-    )
+    assert "12_01.amc: the trial is too short by itself: 1.23 cycles (at least 1.5); add more" in printed.err
 
 
 def test_a_short_trial_named_by_itself_is_an_error(trials):
@@ -92,7 +90,7 @@ def test_a_short_trial_named_by_itself_is_an_error(trials):
     made = sequence.load(path)
     assert made.short and made.period.frames == pytest.approx(110, rel=0.03)
     assert made.cycles < period.CYCLES
-    with pytest.raises(UserError, match="too short alone"):
+    with pytest.raises(UserError, match="too short by itself"):
         load.load_all([(path, False), (trials / "13/13_01.amc", True)], LearnOptions(jobs=1))
 
 

@@ -146,10 +146,10 @@ def test_a_pin_stands_where_the_pixel_shows_the_floor():
     found = pins(keypoints(), Edits(floor=(pin,)), CAMERA, PRIOR)
     assert found.place[0, :2] == pytest.approx(foot[:2], abs=1e-6) and 0 < found.place[0, 2] < 0.15
     assert found.row.tolist() == [9]
-    with pytest.raises(UserError, match="needs the floor of a calibrated camera"):
+    with pytest.raises(UserError, match="needs a calibrated camera"):
         pins(keypoints(), Edits(floor=(pin,)), None, PRIOR)
     above = Edits(floor=(replace(pin, uv=(300.0, 5.0)),))
-    with pytest.raises(UserError, match="l_heel in frame 9 is at no point of the floor"):
+    with pytest.raises(UserError, match="l_heel in frame 9 is not on the floor"):
         pins(keypoints(), above, CAMERA, PRIOR)
 
 

@@ -240,7 +240,7 @@ def test_without_a_camera_the_person_is_placed_in_the_picture(tmp_path):
         ({"frame": 1, "joint": "tail", "uv": [1, 2]}, "joint is 'tail'"),
         ({"frame": 1, "joint": "l_knee", "uv": [1]}, "uv has shape"),
         ({"frame": 1, "joint": "l_knee", "uv": [1, 2], "sd_px": 0}, "sd_px is 0"),
-        ([1, 2], "no object of keys"),
+        ([1, 2], "not an object of keys"),
     ],
 )
 def test_a_wrong_correction_is_named(tmp_path, entry, words):

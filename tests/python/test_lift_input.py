@@ -80,7 +80,7 @@ def test_minus_one_is_refused_as_zero_is(folder, capsys):
     save("u.csv", uv)
     code, printed = lift(capsys, "u.csv")
     assert code == 1 and printed.count("\n") == 1
-    assert "u.csv: line 5: l_elbow is at exactly -1, -1, as detectors put" in printed
+    assert "u.csv: line 5: l_elbow is at exactly -1, -1, as detectors write" in printed
 
 
 @pytest.mark.parametrize(
@@ -91,7 +91,7 @@ def test_points_at_one_place_are_reported(folder, capsys, joints, place, reporte
     uv[5:20, :joints] = place, place
     assert (shared_place(uv) is not None) == reported
     save("u.csv", uv)
-    words = f"{15 * joints} points are at exactly {place:g}, {place:g}: if the detector"
+    words = f"{15 * joints} points are at exactly {place:g}, {place:g}: if these are"
     assert (words in lift(capsys, "u.csv", "cam.json")[1]) == reported
 
 
@@ -114,7 +114,7 @@ def test_an_unusual_stature_is_reported(folder, capsys, monkeypatch):
     ):
         monkeypatch.setattr(motion, "lift", lambda *args, s=stature: replace(lifted(*args), stature=s))
         believed = 1.72 if options else usual
-        words = f"{stature:.2f} m tall, where {believed:.2f} was expected: check the camera's focal length"
+        words = f"stature is {stature:.2f} m, expected {believed:.2f}: check the camera's focal length"
         printed = lift(capsys, "t.csv", "cam.json", *options)[1]
         assert (words in printed) == reported and ("m tall" in printed) == reported
 
@@ -154,7 +154,7 @@ def test_a_change_of_person_is_reported(folder, capsys, stop, where):
     uv[10:stop, :, 0] += 250
     save("u.csv", uv)
     printed = lift(capsys, "u.csv")[1]
-    assert f"most points jump at once: the keypoints change to another person {where}; keep" in printed
+    assert f"most points jump at once: the keypoints switch to another person {where}; keep" in printed
 
 
 def test_outliers_are_no_other_person(folder):

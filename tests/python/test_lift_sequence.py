@@ -387,7 +387,7 @@ def test_numbers_out_of_range_are_refused_in_one_line(monkeypatch):
     keypoints = Keypoints(np.arange(12), np.arange(12) / 20.0, prior.names[:3], uv, np.ones((12, 3)))
     view = Perspective(Camera.looking((0, -4, 1.5), (0, 0, 0.9), (640, 480), 600))
     for method in ("smooth", "blend"):
-        with pytest.raises(UserError, match="no motion that the model knows"):
+        with pytest.raises(UserError, match="not fit any motion that the model knows"):
             motion.lift(prior, keypoints, view, Options(method=method), prior.names)
 
 

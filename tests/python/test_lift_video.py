@@ -262,8 +262,8 @@ def test_faults_are_named(files, tmp_path, refused):
     (tmp_path / "behind.json").write_text(json.dumps(behind))
     assert "behind the camera" in refused(*camera, "--placement", tmp_path / "behind.json")
     for place, words in (
-        ([-246, -426], "px tall in a picture of 640x480; give the place and stature"),
-        ([3.74, 5.28], "px tall in a picture of 640x480; give the place and stature"),
+        ([-246, -426], "px tall in a picture of 640x480; give position and stature"),
+        ([3.74, 5.28], "px tall in a picture of 640x480; give position and stature"),
         ([-4.5, 3.0], "of a picture of 640x480; place the person where the picture shows some of it"),
     ):
         (tmp_path / "far.json").write_text(json.dumps(behind | {"pelvis": place}))

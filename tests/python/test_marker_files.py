@@ -126,10 +126,10 @@ def test_a_mapping_may_start_from_a_set_and_drop_markers(tmp_path):
     ("text", "words"),
     [
         ("{", r"map.json: not valid JSON"),
-        ("[1]", r"map.json: holds no JSON object"),
+        ("[1]", r"map.json: contains no JSON object"),
         pytest.param(
             '{"markers": ' + "[" * 100_000,
-            r"map.json: not valid JSON \(brackets within .*; correct it",
+            r"map.json: not valid JSON \(brackets nested .*; correct it",
             id="deep",
         ),
         ('{"marker": {}}', r"map.json: unknown key 'marker'; the keys are set and markers"),

@@ -59,7 +59,7 @@ def test_norms_know_their_limits():
     assert comfortable(79.9, "m") == (1.330, 0.196)
     mean, sd = comfortable(25)
     assert mean == pytest.approx(1.4) and 0.153 < sd < 0.175
-    with pytest.raises(UserError, match="age 80: norms of the speed are known from 20 to 79 years"):
+    with pytest.raises(UserError, match="age 80: norms of speed are known from 20 to 79 years"):
         comfortable(80)
     slow, usual, fast = (rate_at(MODEL, speed, 1.7)[0] for speed in (0.6, 1.29, 1.9))
     assert slow < usual < fast and usual == pytest.approx(float(MODEL["GAIT"][0]), rel=0.02)

@@ -123,7 +123,7 @@ def test_a_clip_is_lifted_in_one_thread_as_gait_lift_does_it(folder, monkeypatch
         assert main(["report", "lift", "-m", "m.gait", "-o", "r", "--clip", "t.csv"]) == 0
     threads, used = observed[0]
     assert threads == {1} and not used.visible[6, 3] and used.visible.sum() == used.visible.size - 1
-    assert "left out, far from" in capsys.readouterr().err
+    assert "dropped, far from" in capsys.readouterr().err
 
 
 def test_an_interruption_leaves_nothing(folder, capsys, monkeypatch):

@@ -125,7 +125,7 @@ def lifted(source, target):
             "x.csv: has no whole stride in",
         ),
         (lambda here: cut(here / "walk.csv", here / "x.csv", 3), "x.csv: has fewer than three frames; track"),
-        (lambda here: lifted(here / "walk.csv", here / "x.csv"), "x.csv: has joints alone, as gait lift"),
+        (lambda here: lifted(here / "walk.csv", here / "x.csv"), "x.csv: has only joints, as from gait lift"),
         (lambda here: (here / "x.csv").write_text("frame\n"), "x.csv: has no rows"),
         (lambda here: (here / "x.csv").unlink(missing_ok=True), "x.csv: no such track file"),
     ],

@@ -91,8 +91,8 @@ def test_the_verdict_counts_what_is_tracked_unsure_and_missing(folder):
     found = verdict_of(read_track(folder / "run.csv"), FRAMES)
     assert found.counts == {"init": 3, "tracking": 73, "ambiguous": 4, "lost": 4}
     assert re.fullmatch(
-        r"Tracked 77 of 90 frames, [12] whole strides?, 1\.\d\d m/s; unsure in 4 frames; lost in 4 frames; "
-        "still settling in 3 frames; not found in 6 frames",
+        r"Tracked 77 of 90 frames, [12] whole strides?, 1\.\d\d m/s; uncertain in 4 frames; "
+        "lost in 4 frames; still settling in 3 frames; not found in 6 frames",
         found.sentence(),  # without why, which this file does not hold
     )
     assert found.statuses() == (
@@ -106,7 +106,7 @@ def test_a_page_of_a_part_of_the_film_states_the_same_as_the_tracker(folder, cap
     assert main([str(word) for word in words]) == 0
     lead = re.search('<p class="lead">(.*?)</p>', (folder / "part.html").read_text())[1]
     assert "Tracked 75 of 80 frames" in lead and lead.endswith("not found in 2 frames.")
-    assert f"unsure in 4 frames: legs cross (2), {LEGS} (2)" in lead
+    assert f"uncertain in 4 frames: legs cross (2), {LEGS} (2)" in lead
     # Its camera has a world of its own, in which the camera.json beside it is not.
     track = read_track(folder / "part.csv")
     np.testing.assert_allclose(track.camera_change[-1], track.time[-1] * CHANGE, atol=1e-6)
@@ -146,13 +146,13 @@ def test_the_page_states_the_verdict_first_and_no_raw_names(folder, whole):
     body = re.sub(r"<script.*?</script>|<style.*?</style>|<svg.*?</svg>", "", page, flags=re.S).replace(
         str(folder), ""
     )
-    for heading in ("Gait", "Footfalls", "Angles over the stride", "Way over the floor", "Uncertainty",
+    for heading in ("Gait", "Footfalls", "Angles over the stride", "Path over the floor", "Uncertainty",
                     "Error against the truth", "Camera and files", "Conventions"):  # fmt: skip
         assert f"<h2>{heading}</h2>" in body
     assert not re.search(r"\b(abs|root\w*|proc|static|free|\w+_mm|torso_\w|\w+_deg)\b", body)
     assert 'abbr title="Mean distance of 15 joints' in body
     assert "start, background, particles" in body and "not in these files" in body
-    assert "as large as the one tracked, 320 × 240 pixels" in body
+    assert "has the size of the tracked one, 320 × 240 pixels" in body
     film = Video(folder / "o.mp4")
     assert (film.size, film.count) == ((320, 240), FRAMES)  # frames without an estimate too
 
@@ -167,7 +167,7 @@ def test_without_a_camera_or_the_parts_the_page_names_how_to_get_the_figure(
     assert main([str(word) for word in words]) == 0
     assert "no camera is known, so the film is shown without the figure; give" in capsys.readouterr().err
     page = (tmp_path / "run.html").read_text(encoding="utf-8")
-    assert "The figure that turns is not in this page: run gait studio --fetch" in page
+    assert "The 3-D figure is not in this page: run gait studio --fetch" in page
     assert 'id="run-figure"' not in page and "echarts" not in page and len(page) < 2e6
 
 

@@ -97,9 +97,7 @@ def test_a_wrong_size_of_keypoints_is_noticed(tmp_path, capsys):
     path = keypoints(tmp_path / "k.csv", walk)
     words = ["camera", "--walk", path, "--height", "1.7", "-o", str(tmp_path / "c.json")]
     assert main([*words, "--size", "640x360"]) == 1
-    assert (
-        "of the points are outside --size 640x360; give the size of the video" in capsys.readouterr().err
-    )
+    assert "of the points are outside --size 640x360; give the size of the video" in capsys.readouterr().err
     main([*words, "--size", "1920x1080"])
     assert "upper left 1208x600 of --size 1920x1080: is that the size" in capsys.readouterr().err
     main([*words, "--size", "1280x720"])

@@ -126,7 +126,7 @@ def test_whole_recordings_alone_give_a_blob_that_tracks_nothing(walks, tmp_path,
     assert set(blob.read(path)) == {"META", *TAGS}
     assert run("info", path) == 0 and "segment prior" in capsys.readouterr().out
     with pytest.raises(
-        UserError, match=r"only.gait: holds no cyclic model; learn it without --segments only"
+        UserError, match=r"only.gait: contains no cyclic model; learn it without --segments only"
     ):
         Model(path)
 
@@ -161,10 +161,10 @@ def test_recorded_markers_need_files_that_have_them(walks, tmp_path, capsys):
     path = tmp_path / "m.gait"
     words = ("learn", walks, "-o", path, "--segment-markers", "recorded", "--segments")
     assert run(*words, "only", "--jobs", 1) == 1
-    assert "holds no recorded markers; leave out --segment-markers" in capsys.readouterr().err
+    assert "has no recorded markers; leave out --segment-markers" in capsys.readouterr().err
     assert not path.exists()
     assert run(*words, "learnt", "--components", 2, "--jobs", 1) == 0
-    assert "no segment prior: the recordings hold 0 segments" in capsys.readouterr().err
+    assert "no segment prior: the recordings contain 0 segments" in capsys.readouterr().err
     assert not set(TAGS) & set(blob.read(path))
 
 

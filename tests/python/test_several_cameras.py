@@ -219,4 +219,4 @@ def test_only_the_first_film_has_to_show_the_start(tmp_path, monkeypatch, capsys
     assert main([*words, "--particles", "100", "-o", "t.csv"]) == 0, capsys.readouterr().err
     alone = ["track", "video_2.mp4", "--camera", "away.json", *words[words.index("--init") :], "-o", "u.csv"]
     assert main(alone) == 1
-    assert "the start is outside of the picture" in capsys.readouterr().err
+    assert "the start is outside the picture" in capsys.readouterr().err

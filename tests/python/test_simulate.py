@@ -401,7 +401,7 @@ def test_the_command_reports_what_it_made(tmp_path: Path, capsys: pytest.Capture
         (["--noise", "-1"], "--noise -1"),
         (["--speed", "nan"], "--speed nan"),
         (["--asymmetry", "45"], "--asymmetry 45: give a value from -30 to 30"),
-        (["--motion", "backwards", "--aid", "stick"], "--motion backwards: goes without"),
+        (["--motion", "backwards", "--aid", "stick"], "--motion backwards: cannot be combined"),
     ],
 )
 def test_bad_values_are_one_line(

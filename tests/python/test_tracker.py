@@ -172,7 +172,7 @@ def test_an_exception_in_a_task_runner_is_raised_after_the_call():
 
 
 def test_a_runner_that_forgets_tasks_is_reported():
-    with pytest.raises(RuntimeError, match="tasks not called"):
+    with pytest.raises(RuntimeError, match="without calling"):
         started(tasks=lambda task, count: task(0)).step(FRAMES[0], 0)
 
 

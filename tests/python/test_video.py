@@ -107,7 +107,7 @@ def test_what_fails_in_the_encoder_is_raised(tmp_path, monkeypatch):
 
 def test_frames_of_another_size_are_refused(tmp_path):
     with (
-        pytest.raises(ValueError, match="32x24 in a video of another size"),
+        pytest.raises(ValueError, match="32x24 in a video with another size"),
         VideoWriter(tmp_path / "out.mp4", 30) as writer,
     ):
         writer.write(pattern(0))
@@ -161,7 +161,7 @@ def test_sound_alone_is_no_video(tmp_path):
     with wave.open(str(path), "wb") as sound:
         sound.setparams((1, 2, 8000, 0, "NONE", ""))
         sound.writeframes(bytes(1600))
-    with pytest.raises(UserError, match="tone.wav: holds no video stream"):
+    with pytest.raises(UserError, match="tone.wav: has no video stream"):
         Video(path)
 
 

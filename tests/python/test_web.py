@@ -73,7 +73,7 @@ def test_parts_that_were_not_fetched_are_named_with_the_remedy(tmp_path, monkeyp
 def test_damaged_parts_are_refused(tmp_path, monkeypatch):
     monkeypatch.setenv("GAIT_WEB", str(tmp_path))
     (tmp_path / parts.THREE.file).write_text("alert(1)")
-    with pytest.raises(UserError, match="is damaged or of another version"):
+    with pytest.raises(UserError, match="is damaged or has another version"):
         parts.load(parts.THREE)
 
 
@@ -148,5 +148,5 @@ def test_a_request_holds_finite_numbers_alone(body):
 
     with ThreadPoolExecutor(1) as pool:  # this thread may have the loop of an open Chromium
         asked = pool.submit(asyncio.run, serve.json_object(Sent(), 10_000))
-        with pytest.raises(serve.RequestError, match="no object"):
+        with pytest.raises(serve.RequestError, match="not an object"):
             asked.result()

@@ -109,7 +109,7 @@ def read(path: str | os.PathLike[str]) -> list[Clip]:
         text = Path(path).read_bytes()
     except OSError as error:
         raise unreadable(path, error) from error
-    with parsing(str(path), "TOML", "mend it"):
+    with parsing(str(path), "TOML", "correct it"):
         data = tomllib.loads(text.decode("utf-8-sig"))
     whole = Fields(str(path), data)
     whole.only(("defaults", "clip"))
@@ -122,14 +122,14 @@ def read(path: str | os.PathLike[str]) -> list[Clip]:
     for i, entry in enumerate(entries, 1):
         where = f"{path}: clip {i}"
         if not isinstance(entry, dict):
-            raise UserError(f"{where}: is no table; begin it with [[clip]]")
+            raise UserError(f"{where}: is not a table; begin it with [[clip]]")
         fields = Fields(where, entry)
         clip = _clip(fields, common, folder, named=True)
         _require(fields, clip)
         clips.append(clip)
     twice = next((clip.name for clip in clips if sum(other.name == clip.name for other in clips) > 1), None)
     if twice is not None:
-        raise UserError(f"{path}: two clips are named {twice}; give each a name of its own")
+        raise UserError(f"{path}: two clips are named {twice}; give each its own name")
     return clips
 
 
@@ -160,7 +160,7 @@ def _require(fields: Fields, clip: Clip) -> None:
     if not re.fullmatch(r"[\w][\w .+-]*", clip.name):
         raise fields.fail("name", f"is {clip.name!r}", "give letters, digits, spaces and . _ + -")
     if not clip.lifted and not clip.video:
-        raise fields.fail("video", "is missing", "give the file, or make lift of keypoints")
+        raise fields.fail("video", "is missing", "give the file, or make lift from keypoints")
     if not clip.video and not clip.keypoints:
         raise fields.fail("video", "and keypoints are missing", "give one of them")
     if clip.lifted and {"track", "overlay", "report"} & set(clip.make):
@@ -179,7 +179,7 @@ def _text(fields: Fields, name: str) -> str:
 def _words(fields: Fields, name: str, known: tuple[str, ...] | None) -> tuple[str, ...]:
     value = fields.get(name, "give a list of words")
     if not isinstance(value, list) or not all(isinstance(word, str) for word in value):
-        raise fields.fail(name, "is no list of words", 'give it as ["track", "report"]')
+        raise fields.fail(name, "is not a list of words", 'give it as ["track", "report"]')
     wrong = [word for word in value if known is not None and word not in known]
     if wrong:
         raise fields.fail(name, f"has {wrong[0]!r}", f"use {' '.join(known or ())}")

@@ -17,7 +17,7 @@ from gait.io.fields import Fields, read_json
 # Standard deviations of values that an init file gives without any.
 DEFAULT_SD = {"pelvis": 0.05, "heading_rad": 0.1, "phase": 0.05, "stride_hz": 0.05, "stature_m": 0.03}
 KEYS = ("frame", *DEFAULT_SD, "sd")
-OUTSIDE = "the start is outside of the picture; check pelvis and camera"
+OUTSIDE = "the start is outside the picture; check pelvis and camera"
 
 SCALARS = {  # key in the file: attribute of State, remedy
     "heading_rad": ("heading", "give the walking direction about z in radians, 0 = along +x"),
@@ -134,8 +134,8 @@ def _place(fields: Fields, sds: Fields, model: Model, mean: State, sd: State) ->
         mean.pelvis[:known] = fields.array("pelvis", (known,), remedy)
         far = state_range("pelvis")[1]
         if (np.abs(mean.pelvis) > far).any():
-            what = f"is further than {far:g} m from the origin"
-            raise fields.fail("pelvis", what, "lay the world's origin near the scene")
+            what = f"is more than {far:g} m from the origin"
+            raise fields.fail("pelvis", what, "put the world's origin near the scene")
         sd.pelvis[:] = DEFAULT_SD["pelvis"]
     if known == 2:
         mean.pelvis[2] = model.pelvis_height(mean)

@@ -113,7 +113,7 @@ def call(name: str, *arguments: Any) -> int:
     function = getattr(library(), name)  # first: it describes the structures
     for kind, value in zip(function.argtypes, arguments, strict=False):
         if isinstance(value, int) and getattr(kind, "_type_", "") in _WHOLE and kind(value).value != value:
-            raise ValueError(f"{name}: {value} does not fit {8 * ctypes.sizeof(kind)} bits; give less")
+            raise ValueError(f"{name}: {value} does not fit in {8 * ctypes.sizeof(kind)} bits; give less")
     error = abi.Error()
     return check(function(*arguments, error), error)
 

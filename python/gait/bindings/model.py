@@ -27,7 +27,7 @@ Array = NDArray[np.float64]
 #: Models of the package by name: of people, the default; of Ormoneit and others (2000), for paper mode; of
 #: people of several laboratories who walk, stand, walk backwards and run.
 SHIPPED = ("walk", "paper", "classes")
-NOT_CYCLIC = "holds no cyclic model; learn it without --segments only"
+NOT_CYCLIC = "contains no cyclic model; learn it without --segments only"
 
 
 @dataclass(frozen=True)

@@ -132,7 +132,7 @@ class SegmentPrior:
         missing = [tag for tag in TAGS if tag not in sections]
         if missing:
             what = "segment prior" if len(missing) == len(TAGS) else f"section {missing[0]} of the prior"
-            raise UserError(f"{name}: holds no {what}; learn it with gait learn ... --segments learnt")
+            raise UserError(f"{name}: contains no {what}; learn it with gait learn ... --segments learnt")
         try:  # the library checks shapes, counts, signs and values
             load(blob.encode({tag: sections[tag] for tag in TAGS}))
         except GaitError as exc:

@@ -60,7 +60,9 @@ def slope_of(sections: Mapping[str, Any], name: str = "model") -> Floats | None:
         return None
     terms, phases = len(sections["PACE"]), sections["CURV"].shape[1]
     if terms % 2 == 0 or terms >= phases:
-        raise UserError(f"{name}: section PACE has {terms} rows, no Fourier series; learn the model again")
+        raise UserError(
+            f"{name}: section PACE has {terms} rows, which is not a Fourier series; learn the model again"
+        )
     return np.asarray(waves(terms, phases).T @ np.asarray(sections["PACE"], float))
 
 

@@ -123,7 +123,7 @@ def calibrate_pictures(paths: Sequence[str], board: Board, progress: Callable[[i
                 turned = ", turned by 90 degrees" if grey.shape == size else ""
                 raise UserError(
                     f"{path}: is {grey.shape[1]}x{grey.shape[0]}{turned}, and {paths[0]} is "
-                    f"{size[0]}x{size[1]}; calibrate each size alone"
+                    f"{size[0]}x{size[1]}; calibrate each size separately"
                 )
             progress(done)
             yield path, grey
@@ -137,7 +137,7 @@ def read_picture(path: str) -> Grey:
     require_file(path, "picture")
     grey = cv2.imread(path, cv2.IMREAD_GRAYSCALE)
     if grey is None:
-        raise UserError(f"{path}: is no picture that can be read; give JPEG or PNG, or one film")
+        raise UserError(f"{path}: cannot be read as a picture; give JPEG or PNG, or one film")
     return np.asarray(grey, np.uint8)
 
 
@@ -275,21 +275,23 @@ def _require_good(where: str, board: Board, lens: Lens) -> None:
     if lens.rms > limit:
         worst = lens.views[int(lens.error.argmax())].name
         fault = (
-            f"corners are {lens.rms:.2f} px from where one lens would show them, worst in {worst}; use "
+            f"the reprojection error of the corners is {lens.rms:.2f} px, worst in {worst}; use "
             "a flat board, one zoom, no stabilisation, and move slowly"
         )
     elif lens.focal_sd > _FOCAL_SD * camera.fx or min(np.ptp(tilts, axis=0)) < _LEAST_TILT:
         fault = (
-            "the poses leave the focal length open; tilt the board by 30 degrees to all four sides: upper, "
-            "lower, left and right edge nearer"
+            "the poses do not determine the focal length; tilt the board by 30 degrees to all four sides: "
+            "upper, lower, left and right edge nearer"
         )
     elif off > _OFF_MIDDLE:
         fault = (
-            f"the middle of the lens comes out at ({camera.cx:.0f}, {camera.cy:.0f}) of {camera.width}x"
+            f"the estimated principal point is ({camera.cx:.0f}, {camera.cy:.0f}) of {camera.width}x"
             f"{camera.height}; show the board tilted and in all corners, in pictures that are not cropped"
         )
     elif _folds(camera):
-        fault = "the lens comes out folding back in the corners; show the board in the corners of the picture"
+        fault = (
+            "the estimated distortion folds back in the corners; show the board in the corners of the picture"
+        )
     if fault:
         raise UserError(f"{where}: {fault}")
 
@@ -308,7 +310,7 @@ def _require_one_focal(where: str, board: Board, lens: Lens) -> None:
     if abs(first - second) > _CHANGED * lens.camera.fx + 3 * sd:
         raise UserError(
             f"{where}: the focal length changes from {first:.0f} px in the earlier pictures to {second:.0f} "
-            "px in the later ones; film with one zoom, and with the focus locked"
+            "px in the later ones; film with one zoom and with locked focus"
         )
 
 

@@ -513,7 +513,7 @@ def _refuse_other_lenses(fields: Fields, others: Mapping[str, Any]) -> None:
         elif not np.any(value):
             continue
         else:
-            what = "describes a lens in a way that is not known"
+            what = "describes an unknown kind of lens"
         raise fields.fail(
             key, what, "lenses have k1 k2 p1 p2 [k3]: undistort the video, or calibrate with them"
         )

@@ -70,7 +70,7 @@ def _require_enough(count: int, pairs: NDArray[np.int64]) -> None:
         raise UserError(f"marks: give {more} between {count} marks")
     few = [k for k in range(count) if (pairs == k).sum() < 2]
     if few:
-        raise UserError(f"marks: give two distances or more to mark {few[0] + 1}")
+        raise UserError(f"marks: give at least two distances to mark {few[0] + 1}")
 
 
 def _require_agreement(pairs: NDArray[np.int64], lengths: Array, off: Array) -> None:
@@ -145,7 +145,7 @@ def place_unknown(
     """
     if len(uv) < _FEWEST:
         raise UserError(
-            f"marks: {len(uv)} do not determine the focal length; give {_FEWEST} or more, --lens or --fov"
+            f"marks: {len(uv)} do not determine the focal length; give at least {_FEWEST}, or --lens or --fov"
         )
 
     def lens(log_focal: float) -> Camera:
@@ -166,7 +166,7 @@ def place_unknown(
     if sd > _UNSURE or at_end:
         raise UserError(
             "marks: do not determine the focal length; give --lens (gait calibrate) or --fov, or add marks "
-            "far nearer and farther"
+            "much nearer and farther"
         )
     return camera, off, used, sd
 

@@ -51,17 +51,17 @@ def read_plain_yaml(path: str, name: str | None) -> Entries:
         data = yaml.safe_load(Path(path).read_text(encoding="utf-8-sig"))
     except (yaml.YAMLError, UnicodeDecodeError, ValueError, RecursionError) as error:
         raise UserError(
-            f"{path}: not a YAML file ({' '.join(str(error).split())[:80]}); write it anew"
+            f"{path}: not a YAML file ({' '.join(str(error).split())[:80]}); write it again"
         ) from None
     if not isinstance(data, dict) or not data:
-        raise UserError(f"{path}: holds no camera; use YAML of OpenCV, Kalibr or ROS")
+        raise UserError(f"{path}: contains no camera; use YAML of OpenCV, Kalibr or ROS")
     chain = {
         str(key): value for key, value in data.items() if isinstance(value, Mapping) and "intrinsics" in value
     }
     if chain:
         return _kalibr(path, chain, name)
     if name is not None:
-        raise UserError(f"{path}: holds one camera, not {name}; leave the name out")
+        raise UserError(f"{path}: contains one camera, not {name}; leave out the name")
     ros = "distortion_model" in data and ("k" in data or "K" in data)
     return _ros(path, data) if ros else {str(key): _matrix(value) for key, value in data.items()}
 
@@ -120,7 +120,7 @@ def _ros(path: str, data: Mapping[str, Any]) -> Entries:
         raise UserError(f"{path}: binning or roi is set; give the camera_info of full pictures")
     values = np.asarray(plain["k"], float)
     if values.size != 9:
-        raise UserError(f"{path}: k has {values.size} numbers, not 9; write the message anew")
+        raise UserError(f"{path}: k has {values.size} numbers, not 9; write the message again")
     return {
         "camera_matrix": values.reshape(3, 3).tolist(),
         "image_width": plain.get("width"),
@@ -161,7 +161,7 @@ def _colmap(path: str, rows: list[list[str]], name: str | None) -> Entries:
         pose = [float(value) for value in picture[1:8]] if picture else []
     except ValueError:
         raise UserError(
-            f"{path}: camera {row[0]} has not {len(_COLMAP[row[1]].split())} parameters"
+            f"{path}: camera {row[0]} does not have {len(_COLMAP[row[1]].split())} parameters"
         ) from None
     fx, fy = values.get("fx", values.get("f", 0.0)), values.get("fy", values.get("f", 0.0))
     entries = _pinhole(
@@ -217,7 +217,7 @@ def read_qualisys(path: str, name: str | None) -> Entries:
     camera = _choose(path, found, name)
     if camera.get("viewrotation", "0") not in ("0", ""):
         turned = camera.get("viewrotation")
-        raise UserError(f"{path}: viewrotation is {turned}; export it with pictures that are not turned")
+        raise UserError(f"{path}: viewrotation is {turned}; export it with unrotated pictures")
     place, lens = _attributes(path, camera, "transform"), _attributes(path, camera, "intrinsic")
     view, most = _attributes(path, camera, "fov_video"), _attributes(path, camera, "fov_video_max")
     try:

@@ -120,7 +120,7 @@ class CameraPath:
         if len(late):
             raise UserError(
                 f"{path}: line {lines[late[0] + 1]}: {'frame' if by_frame else 'time'} does not increase; "
-                "sort the rows, one for each moment"
+                "sort the rows, one for each time"
             )
         for name in set(_LENS) & set(names):
             if np.ptp(table[:, names.index(name)]) > 1e-3 * abs(table[0, names.index(name)]):
@@ -174,7 +174,7 @@ class CameraPath:
         turned = float(np.linalg.norm(_turn(left.R, then.R)))
         if max(moved, turned) > _FASTEST * seconds:
             raise UserError(
-                f"{where} the camera jumps by {moved:.3g} m and {np.degrees(turned):.3g} degrees; give one "
+                f"{where} the camera jumps {moved:.3g} m and {np.degrees(turned):.3g} degrees; give one "
                 "path, in metres"
             )
 
@@ -224,7 +224,7 @@ def _read_table(path: str) -> tuple[list[str], Array, list[int]]:
             "qz, qw"
         )
     if len(rows) < 2:
-        raise UserError(f"{path}: has no pose; give a row for each moment")
+        raise UserError(f"{path}: has no pose; give a row for each time")
     wanted = {*placed, *_SD_COLUMNS, *_LENS, "time" if "time" in head else "frame"}
     where = [(name, at) for at, name in enumerate(head) if name in wanted]
     table = [[_number(path, line, cells, at, name) for name, at in where] for line, cells in rows[1:]]
@@ -252,12 +252,12 @@ def _poses(path: str, names: list[str], table: Array, lines: list[int]) -> tuple
         turns, shifts = columns(_ROTATION).reshape(-1, 3, 3), columns(_MATRIX[9:])
         wrong = np.abs(turns @ turns.swapaxes(1, 2) - np.eye(3)).max(axis=(1, 2)) > _ROTATED
         wrong |= np.linalg.det(turns) < 0
-        what = "r11 to r33 are no rotation; give that from world to camera, row by row"
+        what = "r11 to r33 are not a rotation; give the one from world to camera, row by row"
     else:
         quaternions, places = columns(_QUATERNION[3:]), columns(_QUATERNION[:3])
         length = np.linalg.norm(quaternions, axis=1)
         wrong = np.abs(length - 1) > _ROTATED
-        what = "qx qy qz qw have not the length 1; give the turn from camera to world"
+        what = "qx qy qz qw do not have length 1; give the rotation from camera to world"
         turns = _matrices(quaternions[~wrong]) if not wrong.any() else np.zeros((len(table), 3, 3))
         shifts = -np.einsum("nij,nj->ni", turns, places)
     if wrong.any():

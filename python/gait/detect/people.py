@@ -348,8 +348,8 @@ def require_length(video: Video, frames: range) -> None:
     few = "1 frame" if len(frames) == 1 else f"{len(frames)} frames"
     if len(frames) < video.count:
         of = f"only {few} of {video.count} left, from {frames.start} on"
-        raise UserError(f"{video.path}: {of}; give a second or more by --start and --stop")
-    raise UserError(f"{video.path}: has only {few}; give a video of a second or more")
+        raise UserError(f"{video.path}: {of}; give at least a second by --start and --stop")
+    raise UserError(f"{video.path}: has only {few}; give a video of at least a second")
 
 
 def require_person(people: dict[int, Keypoints], video: Video) -> None:

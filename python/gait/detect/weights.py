@@ -9,7 +9,7 @@ from __future__ import annotations
 
 from gait.io.published import Published, Store
 
-FETCH = "run gait detect --fetch once, with a network"
+FETCH = "run gait detect --fetch once, with a network connection"
 """What a user does to get the weights."""
 
 _WHEEL, _NPM = "mediapipe==0.10.21", "@mediapipe/pose@0.5.1675469404"

@@ -39,7 +39,7 @@ def write(
     """
     suffix = Path(target).suffix.lower()
     if suffix not in SUFFIXES:
-        raise UserError(f"{target}: not a format that is written; use one of {' '.join(SUFFIXES)}")
+        raise UserError(f"{target}: not a supported format; use one of {' '.join(SUFFIXES)}")
     if ros2 and suffix != ".mcap":
         raise UsageError(f"--ros2: is for .mcap, not for {target}")
     if suffix in (".bvh", ".mot"):
@@ -88,7 +88,7 @@ def _fitted(source: str, target: str, suffix: str, report: Callable[[str], None]
     with replacing(target) as file:
         if suffix == ".bvh":
             if lacking := bvh.write(file, found, fitted):
-                report(f"{source}: lacks {lacking} frames, which repeat the one before")
+                report(f"{source}: lacks {lacking} frames, which repeat the previous frame")
         else:
             opensim.write_mot(file, found, fitted)
     if suffix in BESIDE:

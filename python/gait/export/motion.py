@@ -52,12 +52,12 @@ def read(path: str | os.PathLike[str]) -> Motion:
     track = read_estimates(path)
     frame, time = track.frame, track.time
     if len(frame) < 2:
-        raise UserError(f"{path}: has one frame; give a motion of two or more")
+        raise UserError(f"{path}: has one frame; give a motion of at least two")
     rate = round(float((frame[-1] - frame[0]) / (time[-1] - time[0])), 3)  # times are rounded, too
     late = (time - time[0]) * rate - (frame - frame[0])
     if not np.abs(late).max() < _OFF:
         raise UserError(
-            f"{path}: frames have no constant rate: frame {frame[int(np.abs(late).argmax())]} is "
+            f"{path}: the frame rate is not constant: frame {frame[int(np.abs(late).argmax())]} is "
             f"{np.abs(late).max():.1f} steps off; formats other than .parquet need equal steps"
         )
     places = np.full((int(frame[-1] - frame[0]) + 1, len(JOINTS), 3), np.nan)

@@ -146,6 +146,6 @@ def _section(blob: bytes, at: int, name: str) -> tuple[str, Array]:
         raise UserError(f"{name}: section {tag} has an unknown type or shape; learn the model again")
     dtype, items = DTYPES[code], d0 * d1 * d2 * d3
     if offset % ALIGN or offset + size > len(blob) or size != items * dtype.itemsize:
-        raise UserError(f"{name}: section {tag} lies outside the file; learn the model again")
+        raise UserError(f"{name}: section {tag} is outside the file; learn the model again")
     array = np.frombuffer(blob, dtype, items, offset).reshape(dims[:rank])
     return tag, array

@@ -99,7 +99,8 @@ def one_person(
     if detected.shares:
         if clip.size is None:
             raise UserError(
-                f"{path}: has shares of the picture's width and height; give --video or --camera for its size"
+                f"{path}: has fractions of the picture's width and height; give --video or --camera for its "
+                "size"
             )
         uv = uv * clip.size - 0.5  # pixel centres at integers
     names = tuple(joints[i] for i in used)
@@ -167,7 +168,7 @@ def _choose(path: str | os.PathLike[str], people: dict[str, list[Detection]], cl
     visible = {name: [d for d in chain if _visible(d.points).any()] for name, chain in people.items()}
     weight = {name: sum(_extent(d.points) for d in chain) for name, chain in visible.items() if chain}
     if not weight:
-        raise UserError(f"{path}: no point of a person is seen in any frame")
+        raise UserError(f"{path}: no point of a person is visible in any frame")
     ranked = sorted(weight, key=lambda name: -weight[name])
     listed = ", ".join(f"{name} ({len(visible[name])} frames)" for name in ranked[:_NAMED])
     listed += f" and {len(ranked) - _NAMED} more" * (len(ranked) > _NAMED)
@@ -191,12 +192,14 @@ def _times(path: str | os.PathLike[str], frame: NDArray[np.int64], detected: Det
         if frame[0] < 0 or frame[-1] >= len(clip.times):
             raise UserError(
                 f"{path}: has frames {frame[0]} to {frame[-1]}, the video 0 to {len(clip.times) - 1}; "
-                "are they of this video?"
+                "are they from this video?"
             )
         return np.asarray(clip.times, float)[frame]
     if clip.fps is None and detected.times:
         return np.array([detected.times[number] for number in frame.tolist()])
     fps = clip.fps or detected.fps
     if fps is None:
-        raise UserError(f"{path}: has no times; give --fps HZ, or --video VIDEO that the points are from")
+        raise UserError(
+            f"{path}: has no times; give --fps HZ, or --video VIDEO in which the points were found"
+        )
     return frame / fps

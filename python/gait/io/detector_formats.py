@@ -67,7 +67,7 @@ def reader_of(path: str | os.PathLike[str]) -> Reader | None:
     text = head.decode("utf-8", "replace").lstrip("\ufeff \t\r\n").replace("\r", "")
     if re.match(r"\{|\[\s*[\[{\"\d\]-]", text):
         if _YOLO.search(text):
-            raise UserError(f"{path}: is JSON of Ultralytics YOLO; {_CSV}")
+            raise UserError(f"{path}: is JSON from Ultralytics YOLO; {_CSV}")
         return detector_json.read_json_file
     if "\0" in text or _OWN.match(text):
         return None

@@ -39,7 +39,7 @@ def read_folder(folder: str | os.PathLike[str]) -> Detections:
     for file in files:
         frame = _frame_of(file.name, str(file))
         if frame in before:
-            raise UserError(f"{file}: is frame {frame} as is {before[frame]}; give a folder of one video")
+            raise UserError(f"{file}: is frame {frame}, like {before[frame]}; give a folder of one video")
         before[frame] = file.name
         data = _load(file)
         if not isinstance(data, Mapping) or "people" not in data:
@@ -62,7 +62,7 @@ def read_json_file(path: str | os.PathLike[str]) -> Detections:
         return _any(where, data, Path(path).name)
     except (KeyError, TypeError, ValueError, AttributeError, IndexError, OverflowError) as error:
         what = f"{type(error).__name__}: {error}"
-        raise UserError(f"{where}: JSON in no known layout ({what}); write the file anew") from None
+        raise UserError(f"{where}: JSON in an unknown layout ({what}); write the file anew") from None
 
 
 def _any(where: str, data: Any, name: str) -> Detections:
@@ -77,13 +77,13 @@ def _any(where: str, data: Any, name: str) -> Detections:
         names = _mmpose_names(data.get("meta_info"))
         frames = next((data[key] for key in _LISTS if isinstance(data.get(key), list)), None)
         if frames is None:
-            raise UserError(f"{where}: no list of frames or people; give a file of a pose detector")
+            raise UserError(f"{where}: not a list of frames or people; give a file of a pose detector")
         return _frames(where, frames, names, first="meta_info" in data)
     if isinstance(data, list) and data and all(isinstance(v, Mapping) and "image_id" in v for v in data):
         return _layout(where, [_result(where, i, entry) for i, entry in enumerate(data)])
     if isinstance(data, list) and data:
         return _frames(where, data, ())
-    raise UserError(f"{where}: JSON that holds no people; give a file of a pose detector")
+    raise UserError(f"{where}: JSON without people; give a file of a pose detector")
 
 
 def _load(path: str | os.PathLike[str]) -> Any:
@@ -99,7 +99,7 @@ def _frame_of(name: str, where: str) -> int:
     """Frame number in a file's name: its last number."""
     numbers = re.findall(r"\d+", re.sub(r"_keypoints|\.[a-zA-Z]\w*$", "", name))
     if not numbers:
-        raise UserError(f"{where}: {name} has no number of a frame in its name; name it as NAME_000012")
+        raise UserError(f"{where}: {name} has no frame number in its name; name it like NAME_000012")
     return int(numbers[-1])
 
 
@@ -109,20 +109,22 @@ def _triples(where: str, values: Any) -> Array:
         points = np.asarray(values, np.float64)
         return points.reshape(-1, 3)
     except (TypeError, ValueError):
-        raise UserError(f"{where}: keypoints are no list of u, v, confidence; write the file anew") from None
+        raise UserError(
+            f"{where}: keypoints are not a list of u, v, confidence; write the file anew"
+        ) from None
 
 
 def _one_width(where: str, width: int, person: Detection) -> int:
     """Return the number of points of every person, who must all have as many."""
     if width and len(person.points) != width:
-        raise UserError(f"{where}: people have {width} points and {len(person.points)}; give one layout")
+        raise UserError(f"{where}: people have {width} points and {len(person.points)}; use one layout")
     return len(person.points)
 
 
 def _layout(where: str, found: list[Detection], names: Sequence[str] = (), **more: Any) -> Detections:
     """Return detections of people who all have as many points."""
     if not found:
-        raise UserError(f"{where}: holds no person")
+        raise UserError(f"{where}: contains no person")
     width = 0
     for person in found:
         width = _one_width(where, width, person)
@@ -131,7 +133,7 @@ def _layout(where: str, found: list[Detection], names: Sequence[str] = (), **mor
 
 def _openpose(where: str, people: Any, frame: int) -> Iterator[Detection]:
     if not isinstance(people, list):
-        raise UserError(f"{where}: people is no list; write the file anew")
+        raise UserError(f"{where}: people is not a list; write the file anew")
     for person in people:
         if not isinstance(person, Mapping) or _OPENPOSE not in person:
             raise UserError(f"{where}: a person has no {_OPENPOSE}; write 2-D keypoints")
@@ -200,7 +202,7 @@ def _frames(where: str, frames: list[Any], names: Sequence[str], first: bool = F
     shares = False
     numbers = [_number(entry, i) for i, entry in enumerate(frames)]
     if not all(isinstance(number, int) for number in numbers):
-        raise UserError(f"{where}: a frame's number is no whole number; write the file anew")
+        raise UserError(f"{where}: a frame number is not a whole number; write the file anew")
     numbered = all(isinstance(entry, Mapping) and "frame_id" in entry for entry in frames)
     offset = int(first and numbered and min(numbers) > 0)
     for number, entry in zip(numbers, frames, strict=True):
@@ -269,5 +271,5 @@ def _landmarks(where: str, landmarks: list[Any]) -> Array:
     except (KeyError, TypeError, ValueError, AttributeError):
         raise UserError(f"{where}: a landmark has no numbers x and y; write the file anew") from None
     if np.abs(points[:, :2]).max() > 10:
-        raise UserError(f"{where}: landmarks are not shares of the picture; write normalised landmarks")
+        raise UserError(f"{where}: landmarks are not fractions of the picture; write normalised landmarks")
     return points

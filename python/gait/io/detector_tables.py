@@ -78,7 +78,7 @@ def read_h5(path: str | os.PathLike[str]) -> Detections:
             if "tracks" in file and "node_names" in file:
                 return _sleap(path, file)
             if "instances" in file and "points" in file or "pred_points" in file:
-                raise UserError(f"{path}: is a project of SLEAP; export it as analysis HDF5 or CSV")
+                raise UserError(f"{path}: is a SLEAP project; export it as analysis HDF5 or CSV")
             for group in file.values():
                 if isinstance(group, h5py.Group) and "pandas_type" in group.attrs:
                     return _pandas(path, group)
@@ -86,7 +86,7 @@ def read_h5(path: str | os.PathLike[str]) -> Detections:
         raise UserError(f"{path}: not a readable HDF5 file ({error}); export it again") from None
     except (KeyError, ValueError, TypeError, IndexError) as error:
         raise UserError(f"{path}: damaged HDF5 file ({error}); export it again") from None
-    raise UserError(f"{path}: HDF5 of neither DeepLabCut nor SLEAP; give one of theirs, or CSV")
+    raise UserError(f"{path}: HDF5 from neither DeepLabCut nor SLEAP; give one of these, or CSV")
 
 
 def read_pixel_trc(path: str | os.PathLike[str]) -> Detections:
@@ -97,14 +97,16 @@ def read_pixel_trc(path: str | os.PathLike[str]) -> Detections:
     labels, points, rate, numbered = read_trc_table(Path(path), dict.fromkeys([*METRES, "px"], 1.0))
     times = np.array([time for _, time in numbered])
     if not np.isfinite(times).all():
-        raise UserError(f"{path}: column Time is not filled; export the file again")
+        raise UserError(f"{path}: column Time is empty; export the file again")
     flat = points[..., 2]
     visible = np.isfinite(points[..., :2]).all(axis=2) & (points[..., :2] != 0).any(axis=2)
     if not visible.any():
         raise UserError(f"{path}: no point is seen in any frame")
     span = float(np.ptp(points[..., :2][visible], axis=0).max())
     if np.nan_to_num(flat).any() or span <= _PIXELS:
-        raise UserError(f"{path}: holds 3-D positions; keypoints are pixels without depth, as of Sports2D")
+        raise UserError(
+            f"{path}: contains 3-D positions; keypoints are pixels without depth, as from Sports2D"
+        )
     frame = np.round(times * rate).astype(int)
     found = [Detection(int(k), "0", np.column_stack([uv[:, :2], ok]))
              for k, uv, ok in zip(frame, points, visible, strict=True)]  # fmt: skip
@@ -142,7 +144,7 @@ def _row_frame(path: str | os.PathLike[str], index: Sequence[str]) -> int:
     """Frame of a row: its number, or the last number in the name of its picture."""
     numbers = re.findall(r"\d+", re.sub(r"\.[a-zA-Z]\w*$", "", index[-1] or index[0]))
     if not numbers:
-        raise UserError(f"{path}: a row is named {index[0][:40]!r}, which has no number of a frame")
+        raise UserError(f"{path}: a row is named {index[0][:40]!r}, which has no frame number")
     return int(numbers[-1])
 
 

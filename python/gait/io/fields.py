@@ -127,7 +127,7 @@ def read_json(path: str | os.PathLike[str], what: str) -> Fields:
     """Read a JSON object. `what`: what the file is, for messages: ``"camera"``."""
     require_file(path, f"{what} file")
     data = json_object(
-        path, f"mend it or write the {what} anew", f"{what} files are objects of keys in braces"
+        path, f"correct it, or write the {what} again", f"{what} files are objects of keys in braces"
     )
     return Fields(str(path), data)
 
@@ -162,7 +162,7 @@ def json_of(
     with parsing(name, "JSON", remedy):
         data = json.loads(text.decode("utf-8-sig"), object_pairs_hook=pairs)
     if not isinstance(data, dict):
-        raise UserError(f"{name}: holds no JSON object; {form}")
+        raise UserError(f"{name}: contains no JSON object; {form}")
     return data
 
 
@@ -175,7 +175,7 @@ def parsing(name: str, kind: str, remedy: str) -> Iterator[None]:
     try:
         yield
     except RecursionError:
-        why = "brackets within brackets, too deep to read"
+        why = "brackets nested too deeply"
         raise UserError(f"{name}: not valid {kind} ({why}); {remedy}") from None
     except ValueError as error:  # syntax, encoding, or a number of thousands of digits
         raise UserError(f"{name}: not valid {kind} ({error}); {remedy}") from None

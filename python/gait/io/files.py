@@ -52,7 +52,7 @@ def replacing(path: str | os.PathLike[str], partial: Callable[[Path], bool] | No
         _flush(target.parent)
     except BaseException as error:
         if partial is not None and _ends_early(error) and partial(temporary):
-            _keep(temporary, target, "not finished; what had been written")
+            _keep(temporary, target, "not finished; what was written")
         if not isinstance(error, OSError):
             raise
         if error.errno not in FULL and error.filename != str(temporary):
@@ -85,7 +85,7 @@ def _recover(target: Path) -> None:
         if left.stat().st_size == 0:
             left.unlink(missing_ok=True)
             continue
-        _keep(left, target, "a command that wrote it was killed; what it had written")
+        _keep(left, target, "the command that wrote it was killed; what it wrote")
 
 
 def _keep(left: Path, target: Path, what: str) -> None:

@@ -94,7 +94,7 @@ class Keypoints:
         if self.visible.any(axis=0).sum() > 1 and extent <= sd:
             raise UserError(
                 f"{path}: all u and v lie within {extent:.3g}, less than their noise of {sd:g}; give pixels, "
-                "not shares of the picture, or the noise in their unit"
+                "not fractions of the picture, or the noise in their unit"
             )
 
     def compare_times(self, path: str | os.PathLike[str], times: Array) -> str:
@@ -111,8 +111,8 @@ class Keypoints:
         if not abs(rate - 1) <= RATE_OFF:
             step = float(shown[-1] - shown[0]) / float(np.ptp(self.frame[shared]))
             raise UserError(
-                f"{path}: time goes on by {rate * step:.4g} s a frame, the video by {step:.4g} s; frame must "
-                "number the video's frames, from 0"
+                f"{path}: time increases by {rate * step:.4g} s a frame, the video by {step:.4g} s; frame "
+                "must number the video's frames, from 0"
             )
         late = own - shown
         if not np.abs(late).max() > TIME_OFF * interval:
@@ -124,13 +124,13 @@ class Keypoints:
     def require_motion(self, path: str | os.PathLike[str]) -> None:
         """Raise UserError unless this is one interval of two frames or more."""
         if len(self.time) < 2:
-            raise UserError(f"{path}: has one frame; lifting is of motion, give two or more")
+            raise UserError(f"{path}: has one frame; lifting needs motion, so give at least two")
         gap = np.diff(self.time)
         if gap.max() > LONGEST_GAP:
             line = int(gap.argmax()) + 3
             raise UserError(
-                f"{path}: line {line}: {gap.max():.3g} s after the frame before; lift what is before and "
-                f"after a gap of more than {LONGEST_GAP:g} s by itself"
+                f"{path}: line {line}: {gap.max():.3g} s after the frame before; lift the parts before and "
+                f"after a gap of more than {LONGEST_GAP:g} s separately"
             )
 
     def standard_deviations(self, sd: float) -> Array:
@@ -188,7 +188,7 @@ def read(
     if (reader := reader_of(path)) is not None:
         return _read_foreign(path, reader, known, clip)
     if clip.given:
-        raise UserError(f"{path}: is of one person and has times; leave out --person and --fps")
+        raise UserError(f"{path}: has one person and times; leave out --person and --fps")
     head, rows = _table(path)
     columns = {name: i for i, name in enumerate(head)}
     for name in ("frame", "time"):
@@ -196,7 +196,7 @@ def read(
             raise UserError(f"{path}: column {name} is missing; keypoints are frame,time,<joint>_u,<joint>_v")
     points = list(dict.fromkeys(name[:-2] for name in head if name[-2:] in ("_u", "_v")))
     if not points:
-        raise UserError(f"{path}: no columns <joint>_u,<joint>_v; name them by joint, such as l_knee_u")
+        raise UserError(f"{path}: has no columns <joint>_u,<joint>_v; name them by joint, such as l_knee_u")
     for name in points:
         for axis in "uv":
             if f"{name}_{axis}" not in columns:
@@ -209,7 +209,7 @@ def read(
         )
     names = [name for name in points if name in known]
     if not names:
-        raise UserError(f"{path}: no point of the model; rename them to {' '.join(known)}")
+        raise UserError(f"{path}: has no point of the model; rename them to {' '.join(known)}")
     numbers = _Numbers(path, columns, rows)
     frame, time = frame_numbers(path, numbers.required("frame")), numbers.required("time")
     _require_seconds(path, time)
@@ -222,7 +222,7 @@ def read(
     confidence = np.stack([numbers.confidence(f"{name}_c") for name in names], axis=1)
     uv[confidence < LEAST_CONFIDENCE] = np.nan
     if not np.isfinite(uv).any():
-        raise UserError(f"{path}: no point is seen in any frame; fill _u and _v")
+        raise UserError(f"{path}: no point is visible in any frame; fill _u and _v")
     refuse_sentinels(path, names, uv)
     sd, lasting_sd = (
         np.stack([numbers.standard_deviation(f"{name}_{error}") for name in names], axis=1)
@@ -234,7 +234,7 @@ def read(
     if not lasting_s > 0:
         raise UserError(f"{path}: line 2: lasting_s is {lasting_s:g}; give seconds above 0")
     if not 0 <= repeated <= 1:
-        raise UserError(f"{path}: line 2: repeated is {repeated:g}; give a share from 0 to 1")
+        raise UserError(f"{path}: line 2: repeated is {repeated:g}; give a fraction from 0 to 1")
     return Keypoints(frame, time, tuple(names), uv, confidence, sd, lasting_sd, lasting_s, repeated), ignored
 
 
@@ -245,7 +245,7 @@ def _require_seconds(path: str | os.PathLike[str], time: Array) -> None:
         raise UserError(f"{path}: line {line}: time does not increase; give seconds")
     step = float(np.median(np.diff(time))) if len(time) > 1 else SHORTEST_STEP
     if not SHORTEST_STEP <= step < LONGEST_STEP:
-        what = f"time goes on by {step:g} from frame to frame"
+        what = f"time increases by {step:g} per frame"
         raise UserError(f"{path}: {what}; give seconds, not milliseconds or frames")
 
 
@@ -260,7 +260,7 @@ def _read_foreign(
         raise UserError(f"{path}: no point of the model; its points are {' '.join(names)}")
     uv, confidence = uv[:, kept], confidence[:, kept]
     if not (np.abs(uv[np.isfinite(uv)]) <= FURTHEST).all():
-        raise UserError(f"{path}: a point is more than {FURTHEST:g} pixels off; write the file anew")
+        raise UserError(f"{path}: a point is more than {FURTHEST:g} pixels off; write the file again")
     uv[confidence < LEAST_CONFIDENCE] = np.nan
     if not np.isfinite(uv).any():
         raise UserError(f"{path}: no point has a confidence of {LEAST_CONFIDENCE:g} or more")
@@ -372,7 +372,7 @@ def _table(path: str | os.PathLike[str]) -> tuple[list[str], list[list[str]]]:
     head = [name.strip() for name in lines[0]]
     twice = next((name for name in head if head.count(name) > 1), None)
     if twice is not None:
-        raise UserError(f"{path}: column {twice} is there twice; remove one")
+        raise UserError(f"{path}: column {twice} appears twice; remove one")
     for number, row in enumerate(lines[1:], 2):
         if len(row) != len(head):
             raise UserError(f"{path}: line {number} has {len(row)} cells, the header {len(head)}")
@@ -393,7 +393,7 @@ def refuse_sentinels(path: str | os.PathLike[str], names: Sequence[str], uv: Arr
         t, j = np.argwhere(wrong)[0]
         raise UserError(
             f"{path}: line {t + 2}: {names[j]} is at exactly {uv[t, j, 0]:g}, {uv[t, j, 1]:g}, as detectors "
-            f"put what they do not see; leave both cells empty, or give {names[j]}_c 0"
+            f"write missing points; leave both cells empty, or give {names[j]}_c 0"
         )
 
 

@@ -32,7 +32,7 @@ def read_storage(path: str) -> dict[str, Any]:
         raise broken from None
     twice = next((name for name in names if names.count(name) > 1), None)
     if twice is not None:
-        raise UserError(f"{path}: {twice} is there twice; remove one")
+        raise UserError(f"{path}: {twice} appears twice; remove one")
     data = {name: _value(path, name, storage.getNode(name)) for name in names}
     storage.release()
     return data

@@ -20,7 +20,7 @@ _ARRAYS = {
 class _Plain(pickle.Unpickler):
     def find_class(self, module: str, name: str) -> Any:
         if (module, name) not in _ARRAYS:
-            raise ValueError(f"holds an object {module}.{name}")
+            raise ValueError(f"contains an object {module}.{name}")
         return super().find_class(module, name)
 
 

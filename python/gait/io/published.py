@@ -78,7 +78,7 @@ class Store:
         """
         named = os.environ.get(self.variable)
         if named and not Path(named).is_dir():
-            raise UserError(f"{self.variable}: {named} is no folder; unset it, or {self.remedy}")
+            raise UserError(f"{self.variable}: {named} is not a folder; unset it, or {self.remedy}")
         return next((f / wanted.file for f in self.folders() if (f / wanted.file).is_file()), None)
 
     def load(self, wanted: Published) -> bytes:
@@ -98,7 +98,7 @@ class Store:
             )
         data = path.read_bytes()
         if hashlib.sha256(data).hexdigest() != wanted.sha256:
-            raise UserError(f"{path}: is damaged or of another version; delete it and {self.remedy}")
+            raise UserError(f"{path}: is damaged or has another version; delete it and {self.remedy}")
         return data
 
     def fetch(self, report: Callable[[str], None]) -> Path:
@@ -123,14 +123,14 @@ class Store:
         """
         folder = self._writable_folder()
         if all(_is_whole(folder / each.file, each) for each in self.files):
-            report(f"everything is there already: {', '.join(each.file for each in self.files)}")
+            report(f"already there: {', '.join(each.file for each in self.files)}")
         for package in dict.fromkeys(each.package for each in self.files):
             wanted = [w for w in self.files if w.package == package and not _is_whole(folder / w.file, w)]
             if not wanted:
                 continue
             npm = "==" not in package
             if npm and not shutil.which("npm"):
-                report(f"no npm here: {' and '.join(w.file for w in wanted)} are left out")
+                report(f"npm is not installed: {' and '.join(w.file for w in wanted)} skipped")
                 continue
             report(f"downloading {package}")
             with tempfile.TemporaryDirectory() as temporary:
@@ -147,7 +147,7 @@ class Store:
                 continue
             if os.access(folder, os.W_OK):
                 return folder
-        raise UserError(f"{self.folders()[-1]}: cannot be written; set {self.variable} to a folder that can")
+        raise UserError(f"{self.folders()[-1]}: is not writable; set {self.variable} to a folder that is")
 
 
 def _is_whole(path: Path, wanted: Published) -> bool:

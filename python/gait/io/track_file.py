@@ -218,7 +218,7 @@ def read_track(path: str | os.PathLike[str]) -> Track:
     """Read what ``gait track`` wrote."""
     table = _Table(path, "track")
     if _has_no_state(table):
-        raise UserError(f"{path}: has joints alone, as gait lift writes them; give a track of gait track")
+        raise UserError(f"{path}: has only joints, as from gait lift; give a track from gait track")
     status = table.column("status")
     for line, word in enumerate(status, 2):
         if word not in STATUSES:
@@ -285,7 +285,7 @@ class _Table:
             if len(row) != len(names):
                 raise UserError(
                     f"{path}: line {number} has {len(row)} cells, the header {len(names)}; "
-                    "cut off? write it anew"
+                    "cut off? write it again"
                 )
         self.rows = dict(zip(names, zip(*rows, strict=True), strict=True))
 
@@ -315,7 +315,7 @@ class _Table:
             i, axis = np.argwhere(sd < 0)[0]
             cell = f"{joint}_s{'xyz'[axis]} is {sd[i, axis]:g}"
             raise UserError(
-                f"{self.path}: line {i + 2}: {cell}; a standard deviation is 0 or more, write the file anew"
+                f"{self.path}: line {i + 2}: {cell}; a standard deviation is 0 or more, write the file again"
             )
         return sd
 

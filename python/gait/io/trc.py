@@ -72,12 +72,12 @@ def _require_consistent(
     """Refuse labels that are not unique, frames that are not all there, and times that fall."""
     twice = next((label for label in labels if labels.count(label) > 1), None)
     if twice is not None:
-        raise UserError(f"{path}:4: label {quoted(twice)} is there twice; rename or remove one")
+        raise UserError(f"{path}:4: label {quoted(twice)} appears twice; rename or remove one")
     promised = head.get("NumFrames", str(len(times)))
     if promised != str(len(times)):
         raise UserError(
-            f"{path}:3: NumFrames is {promised} but {len(times)} frames are there; fetch the file "
-            "again or correct it"
+            f"{path}:3: NumFrames is {promised} but {len(times)} frames are there; get the file again or "
+            "correct it"
         )
     late = next((k for k in range(1, len(times)) if times[k][1] <= times[k - 1][1]), None)
     if late is not None:
@@ -99,7 +99,7 @@ def _require_rate(path: Path, rate: float, times: list[tuple[int, float]]) -> No
         )
     if abs(measured / rate - 1) > _RATE_OFF:
         raise UserError(
-            f"{path}: DataRate is {rate:g} per second, but column Time goes on by {1 / measured:.4g} s, "
+            f"{path}: DataRate is {rate:g} per second, but column Time increases by {1 / measured:.4g} s, "
             f"{measured:.4g} per second; correct one of them, or give --fps"
         )
 

@@ -143,7 +143,7 @@ class Video:
 
         with av.open(str(self.path)) as container:
             if not container.streams.video:
-                raise UserError(f"{self.path}: holds no video stream; give a file with pictures")
+                raise UserError(f"{self.path}: has no video stream; give a file with pictures")
             stream = container.streams.video[0]
             self.fps = float(stream.average_rate or stream.guessed_rate or 30)
             unit = float(stream.time_base or 0)
@@ -157,11 +157,11 @@ class Video:
             self.broken = None
             if len(packets) + more < stated:
                 found = f"breaks off after frame {self.count} of {stated}"
-                self.broken = f"{self.path}: {found}; copy it anew if the rest is wanted"
+                self.broken = f"{self.path}: {found}; copy it again if you need the rest"
         for _, _, frame in self._decode(1):
             self.height, self.width = self._upright(frame, "gray").shape
             return
-        raise UserError(f"{self.path}: holds no frame that can be decoded; convert it with ffmpeg first")
+        raise UserError(f"{self.path}: has no frame that can be decoded; convert it with ffmpeg first")
 
     def _decode(self, stop: int | None) -> Iterator[tuple[int, float, av.VideoFrame]]:
         """Yield index, time and raw frame; times missing or not increasing are set by the frame rate."""
@@ -196,8 +196,8 @@ class Video:
         across = x[0] == 0  # whether the picture's columns become rows
         if sorted(map(abs, (*x, *y))) != [0, 0, 1, 1] or across != (y[1] == 0):
             raise UserError(
-                f"{self.path}: its display matrix {x + y} is no turn by 90 degrees and no mirroring; convert "
-                "it with ffmpeg"
+                f"{self.path}: its display matrix {x + y} is neither a rotation by 90 degrees nor a "
+                "mirroring; convert it with ffmpeg"
             )
         if across:
             image = np.swapaxes(image, 0, 1)
@@ -206,7 +206,7 @@ class Video:
 
     def no_frame(self, first: int) -> UserError:
         """Make (not raise) the error of a file whose frames from `first` on are damaged or not there."""
-        return UserError(f"{self.path}: no frame from {first} on can be decoded; convert it anew")
+        return UserError(f"{self.path}: no frame from {first} on can be decoded; convert it again")
 
     def _unreadable(self, exc: av.error.FFmpegError) -> UserError:
         reason = exc.strerror or type(exc).__name__
@@ -304,7 +304,7 @@ class VideoWriter:
         height, width = image.shape[:2]
         self._size = self._size or (width, height)
         if (width, height) != self._size:
-            raise ValueError(f"{self.path}: frame of {width}x{height} in a video of another size")
+            raise ValueError(f"{self.path}: frame of {width}x{height} in a video with another size")
         self._waiting.put(image)
 
     def _encode_all(self) -> None:
@@ -385,7 +385,9 @@ def read_plate(path: str | os.PathLike[str], size: tuple[int, int]) -> Image:
         raise UserError(f"{path}: cannot be read as an image; give a PNG or JPEG of the empty scene")
     height, width = plate.shape[:2]
     if (width, height) != tuple(size):
-        raise UserError(f"{path}: is {width}x{height}, the video {size[0]}x{size[1]}; take both alike")
+        raise UserError(
+            f"{path}: is {width}x{height}, the video {size[0]}x{size[1]}; give both in the same size"
+        )
     return np.asarray(plate, np.uint8)
 
 

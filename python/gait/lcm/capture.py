@@ -100,7 +100,7 @@ class DeviceSource:
             pixels = cv2.cvtColor(image, cv2.COLOR_BGR2GRAY) if self._grey else image
             yield Frame(number, seconds, np.asarray(pixels, np.uint8))
             number += 1
-        raise UserError(f"{self._name}: gives no more frames; is it unplugged?")
+        raise UserError(f"{self._name}: sends no more frames; is it unplugged?")
 
 
 def is_device(name: str) -> bool:
@@ -383,7 +383,7 @@ class Publisher:
             question()
             if self._listen(_ASK, answered):
                 return
-        heard = f"; its status: {self._status.text}" if self._status else "; none was heard"
+        heard = f"; its status: {self._status.text}" if self._status else "; no status was received"
         raise UserError(
             f"no tracker {what} after {patience:g} s{heard}; start gait-trackd on the same URL first"
         )

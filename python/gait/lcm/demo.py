@@ -246,9 +246,7 @@ class Demo:
         if self.video is None:
             for name in _BESIDE:
                 if getattr(self, name) not in (None, "auto", "none"):
-                    raise UsageError(
-                        f"--{name}: belongs to a clip of your own; give --video too (make demo VIDEO=)"
-                    )
+                    raise UsageError(f"--{name}: is for your own clip; also give --video (make demo VIDEO=)")
             return
         size = Video(self.video).size
         clip = self._complete()

@@ -81,7 +81,7 @@ class LiveDetector:
 
     def __init__(self, url: str, stream: int, network: str, people: int) -> None:
         if is_log(url):
-            raise UserError(f"--url {url}: --lcm answers on a network, not in a log; use gait detect VIDEO")
+            raise UserError(f"--url {url}: --lcm needs a network, not a log; use gait detect VIDEO")
         self._network, self._detector = network, PeopleDetector(network, people)
         self._numbers = Numbers(people)
         self._lcm = open_lcm(url)

@@ -97,7 +97,7 @@ def _scan(path: str | os.PathLike[str]) -> tuple[str | None, bool]:
             at, events = end, events + 1
     if at == size:
         return None, False
-    return f"the log is damaged or breaks off at byte {at}, messages before: {events}", beyond
+    return f"the log is damaged or ends at byte {at}, messages before: {events}", beyond
 
 
 class LogWriter:
@@ -233,7 +233,7 @@ def require_log(path: str | os.PathLike[str]) -> None:
 def listener(url: str) -> lcm.LCM:
     """Connect to listen, which leaves a log as it is."""
     if is_log(url) and log_of(url)[1] != "r":
-        raise UsageError(f"--url {url}: a log to listen to is only read; leave ?mode= out")
+        raise UsageError(f"--url {url}: a log is only read here; leave out ?mode=")
     return open_lcm(url)
 
 
@@ -244,7 +244,7 @@ def publisher(url: str) -> lcm.LCM | LogWriter:
     generated()
     path, mode = log_of(url)
     if mode not in ("w", "a"):
-        raise UsageError(f"--url {url}: gives no log to write; add ?mode=w (new) or ?mode=a (at its end)")
+        raise UsageError(f"--url {url}: names no log to write; add ?mode=w (new) or ?mode=a (at its end)")
     return LogWriter(path, mode)
 
 

@@ -53,7 +53,7 @@ def estimate_after(data: bytes, channel: str, before: Any = None) -> Any:
     if not message.joints:
         raise UserError(f"{channel}: an estimate without joints")
     if before is not None and _holds(message) != _holds(before):
-        raise UserError(f"{channel}: an estimate of other joints than those before")
+        raise UserError(f"{channel}: an estimate with other joints than before")
     return message
 
 
@@ -161,7 +161,7 @@ def picture(message: Any) -> Image:
     """
     kind = type(message)
     if not all(1 <= side <= MAX_PIXELS for side in (message.width, message.height)):
-        raise UserError(f"image: {message.width}x{message.height} pixels are no picture")
+        raise UserError(f"image: {message.width}x{message.height} pixels are not a picture")
     if message.pixelformat == kind.PIXEL_FORMAT_MJPEG:
         try:
             image = cv2.imdecode(np.frombuffer(message.data, np.uint8), cv2.IMREAD_UNCHANGED)
@@ -170,7 +170,7 @@ def picture(message: Any) -> Image:
         if image is None or image.dtype != np.uint8 or image.shape[2:] not in ((), (3,)):
             raise UserError("image: JPEG frame cannot be decoded")
         if image.shape[:2] != (message.height, message.width):
-            raise UserError("image: JPEG frame of another size than its message states")
+            raise UserError("image: JPEG frame with another size than its message states")
         return np.asarray(image, np.uint8)
     channels = {kind.PIXEL_FORMAT_GRAY: 1, kind.PIXEL_FORMAT_RGB: 3, kind.PIXEL_FORMAT_BGR: 3}
     depth = channels.get(message.pixelformat)

@@ -118,7 +118,7 @@ class Recorder:
         ------
         UserError
             If nothing came at all, within `patience` seconds where that is given; no file is written then.
-            If two trackers publish at once, or a log breaks off; the file then holds what came before.
+            If two trackers publish at once, or a log breaks off; the file then contains the part before.
         """
         begun = time.monotonic()
         with ExitStack() as self._stack:
@@ -140,8 +140,8 @@ class Recorder:
                 )
         if self._two:
             raise UserError(
-                f"{self._output}: two trackers publish on this URL; end one of them (frames in the file, "
-                f"all from before that showed: {len(self.figures.utime)})"
+                f"{self._output}: two trackers publish on this URL; stop one of them (frames in the file, "
+                f"all from before this was noticed: {len(self.figures.utime)})"
             )
         if ended and not self._live:
             self._require_whole()
@@ -176,7 +176,7 @@ class Recorder:
         path = log_of(self._url)[0]
         fault = break_of(path)
         if fault:
-            raise UserError(f"{path}: {fault}; {self._output} holds what came before")
+            raise UserError(f"{path}: {fault}; {self._output} contains the part before")
 
     def _goes_on(self, previous: Any, message: Any) -> bool:
         """Whether an estimate continues the stream of the one before; if not, note why."""
@@ -280,7 +280,7 @@ def read_run(path: str) -> Run:
         try:
             message = estimate_after(event.data, path, messages[0] if messages else None)
         except UserError as fault:
-            damage = damage or f"a message is left out: {fault}"
+            damage = damage or f"a message is skipped: {fault}"
             continue
         if messages and message.frame <= messages[-1].frame:
             remark = f"another stream begins with frame {message.frame}; only the first is used"
@@ -289,7 +289,7 @@ def read_run(path: str) -> Run:
         arrived.append(event.timestamp)
     if not messages:
         why = damage or break_of(path) or "record while gait-trackd is tracking"
-        raise UserError(f"{path}: holds no GAIT_ESTIMATE message; {why}")
+        raise UserError(f"{path}: contains no GAIT_ESTIMATE message; {why}")
     utime = np.array([m.utime for m in messages], np.int64)
     return Run(
         frame=np.array([m.frame for m in messages], np.int64),

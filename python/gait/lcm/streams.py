@@ -62,7 +62,7 @@ class StreamSource(DeviceSource):
                     if (frame.width, frame.height) != self.size:
                         now, before = (f"{w}x{h}" for w, h in ((frame.width, frame.height), self.size))
                         raise UserError(
-                            f"{self._name}: came back with {now} pixels instead of {before}; begin anew"
+                            f"{self._name}: came back with {now} pixels instead of {before}; start again"
                         )
                     image = np.asarray(frame.to_ndarray(format="gray" if self._grey else "bgr24"), np.uint8)
                     yield Frame(number, time.monotonic() - self._opened, image)
@@ -80,7 +80,7 @@ class StreamSource(DeviceSource):
 
     def _again(self) -> Iterator[av.VideoFrame]:
         """Connect until a frame arrives."""
-        note(f"{self._name}: broke off; connecting again", self._quiet)
+        note(f"{self._name}: connection lost; reconnecting", self._quiet)
         lost, waits = time.monotonic(), chain(_WAITS, iter(lambda: _WAITS[-1], None))
         while True:
             time.sleep(next(waits))

@@ -64,15 +64,15 @@ def check(options: LearnOptions, note: Note) -> None:
         raise UsageError("--report draws the cyclic model; leave it out, or --segments only")
     if options.activity.lower() not in verdict.NAMES:
         names = ", ".join(verdict.NAMES)
-        note(f"--activity {options.activity}: none of {names}: any cyclic motion is learnt")
+        note(f"--activity {options.activity}: none of {names}: any cyclic motion is accepted")
     output, report = Path(os.path.realpath(options.output)), options.report
     if output.suffix.lower() in (*SUFFIXES, ".asf"):
         raise UsageError(
-            f"-o {options.output}: is named like a recording; name the model M.gait, and sources before -o"
+            f"-o {options.output}: has the name of a recording; name the model M.gait, and sources before -o"
         )
     read = [*options.sources, *options.static, *([str(options.markers.path)] if options.markers else [])]
     if any(os.path.realpath(path) == str(output) for path in read if path):
-        raise UsageError(f"-o {options.output}: is also read; name the model otherwise")
+        raise UsageError(f"-o {options.output}: is also an input; give the model another name")
     if report and output in ((folder := Path(os.path.realpath(report))), *folder.parents):
         raise UsageError(f"--report {report}: the model goes to {options.output}; name another folder")
     require_writable(options.output)
@@ -87,7 +87,7 @@ def _load(options: LearnOptions, corpus: Corpus, note: Note) -> load.Loaded:
     trials = {os.path.realpath(name) for name in options.static}
     files = [file for file in files if os.path.realpath(file[0]) not in trials]
     if not files:
-        raise UserError("--static: takes all files; name the recordings of motion as sources")
+        raise UserError("--static: names all files; give the recordings of motion as sources")
     markers, notes = options.markers, RunNotes()
     if markers and not any(path.suffix.lower() in points.SUFFIXES for path, _ in files):
         note(f"--markers {markers.path}: not used: no file is a {' or '.join(points.SUFFIXES)}")
@@ -115,7 +115,7 @@ def _hints(options: LearnOptions, notes: RunNotes) -> Iterator[str]:
         absent = [repr(name) for name in options.markers.named if plain(name) not in notes.labels]
         if absent:
             names = ", ".join(absent[:MOST_NAMES]) + (" ..." if len(absent) > MOST_NAMES else "")
-            yield f"--markers {options.markers.path}: no file has a marker {names}; check the spelling"
+            yield f"--markers {options.markers.path}: no file has the marker {names}; check the spelling"
     if notes.zeros:
         path, zeros = notes.zeros[0]
         yield f"{path}: exactly 0: {zeros}{_more(notes.zeros)}; if that is missing data, give --zeros-missing"
@@ -126,7 +126,7 @@ def _hints(options: LearnOptions, notes: RunNotes) -> Iterator[str]:
     belts = [(path, speed) for path, speed in notes.belts if speed]
     if belts:
         path, speed = belts[0]
-        yield f"{path}: on a treadmill{_more(belts)}: moved at the belt's {speed:.2f} m/s, by the feet"
+        yield f"{path}: on a treadmill{_more(belts)}: shifted at the belt's {speed:.2f} m/s, by the feet"
     if still := [path for path, speed in notes.belts if not speed]:
         words = "stays in place, and the feet do not slide at one speed"
         yield f"{still[0]}: {words}{_more(still)}: learnt without the speed of a belt"

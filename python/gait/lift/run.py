@@ -131,8 +131,8 @@ def load_prior(model: str | None, warn: Warn) -> SegmentPrior:
     if 0 < prior.recordings < FEW:
         count = "one recording" if prior.recordings == 1 else f"{prior.recordings} recordings"
         warn(
-            f"{model}: learnt from {count}, too few to show how people differ: standard deviations may come "
-            "out too small; learn it from more"
+            f"{model}: learnt from {count}, too few to learn how people differ: standard deviations may be "
+            "too small; learn it from more"
         )
     return prior
 
@@ -147,7 +147,7 @@ def lift_file(path: str, prior: SegmentPrior, request: Request, warn: Warn, quie
     """
     keypoints, ignored = keypoints_file.read(path, prior.names, request.ignore_unknown, request.clip)
     if ignored:
-        warn(f"left out, unknown to the model: {' '.join(ignored)}")
+        warn(f"ignored, unknown to the model: {' '.join(ignored)}")
     return lift_keypoints(path, keypoints, prior, request, warn, quiet)
 
 
@@ -211,16 +211,15 @@ def _check(path: str, keypoints: Keypoints, sd: float, warn: Warn) -> None:
     if found := keypoints_file.shared_place(keypoints.uv):
         (u, v), count = found
         warn(
-            f"{count} points are at exactly {u:g}, {v:g}: if the detector puts points there that it does not "
-            "see, leave the cells empty"
+            f"{count} points are at exactly {u:g}, {v:g}: if these are missing points, leave the cells empty"
         )
     if changes := noise.person_changes(keypoints)[:MOST_NAMED]:
         places = [
             f"at frame {first}" if last is None else f"in frames {first} to {last}" for first, last in changes
         ]
         warn(
-            f"most points jump at once: the keypoints change to another person {', '.join(places)}; keep one "
-            "person's points only"
+            f"most points jump at once: the keypoints switch to another person {', '.join(places)}; keep "
+            "only one person's points"
         )
 
 
@@ -234,8 +233,8 @@ def measured_noise(keypoints: Keypoints, warn: Warn) -> float:
     if not shake > SHAKY * usual:
         return usual
     warn(
-        f"the points jitter by {shake:.2g} from frame to frame: used as their noise instead of {usual:g} "
-        "(--pixel-sd)"
+        f"the points jitter by {shake:.2g} from frame to frame: this is used as their noise instead of "
+        f"{usual:g} (--pixel-sd)"
     )
     return shake
 
@@ -252,7 +251,7 @@ def _view(keypoints: Keypoints, request: Request, warn: Warn) -> View:
             picture = "{}x{}".format(*camera.size)
             warn(
                 f"{outside:.0%} of the points lie outside the camera's {picture} picture: is "
-                f"{request.camera} the calibration of this video?"
+                f"{request.camera} the calibration for this video?"
             )
         return Perspective(camera)
     middle = np.nanmedian(keypoints.uv, axis=(0, 1))  # outliers do not move it
@@ -310,7 +309,7 @@ def _without_spikes(
         named = ", ".join(f"{name} in frame {frame}" for frame, name in spikes[:MOST_NAMED])
         more = f" and {len(spikes) - MOST_NAMED} more" if len(spikes) > MOST_NAMED else ""
         warn(
-            f"left out, far from where they were a frame before and after: {named}{more}"
+            f"dropped, far from their positions a frame before and after: {named}{more}"
             + " (--keep-spikes)" * hint
         )
     left_out = [{"frame": frame, "point": name} for frame, name in spikes]
@@ -343,18 +342,18 @@ def warnings_of(lifted: Lifted, prior_stature: float) -> list[str]:
     off = abs(found.stature - believed) / sd if found.steps else 0.0  # segments alone do not estimate it
     lens = "the camera's focal length" if camera else "--metres-per-unit"
     reasons = {
-        "hips and ankles, which determine the distance, are hardly seen: the person may be metres nearer or "
-        "further away": camera and not size.shows_distance(keypoints),
+        "hips and ankles, which determine the distance, are hardly visible: the person may be metres "
+        "nearer or further away": camera and not size.shows_distance(keypoints),
         f"outliers, down-weighted because they are far from their predictions: {outliers}": bool(outliers),
         f"{lost:.0%} of the points seem wrong, which is too many: do not rely on the result": lost > TOO_MANY,
         f"the points jitter by {shake:.2g} from frame to frame, not {options.pixel_sd:g}: "
         f"try --pixel-sd {shake:.2g}": shake > SHAKY * options.pixel_sd and found.wider > 1,
         f"the motion is unlike those learnt: the prior was widened {found.wider:g} times": found.wider > 1,
         "the smoother fails for such motions: segments are estimated alone (--method blend)": found.alone,
-        f"the person came out {found.stature:.2f} m tall, where {believed:.2f} was expected: check {lens}, "
+        f"the estimated stature is {found.stature:.2f} m, expected {believed:.2f}: check {lens}, "
         "time (the frame rate) and --height": off > UNUSUAL,
         f"the size was taken from the bones ({found.resized:.2f} times the fit's): the motion is unlike "
-        "those learnt, or the camera is wrong; standard deviations are wide, do not rely on the places": (
+        "those learnt, or the camera is wrong; standard deviations are wide, do not rely on the positions": (
             found.resized != 1
         ),
         f"the estimate did not converge in {found.steps} iterations: do not rely on it": not found.settled,

@@ -140,7 +140,7 @@ class Feed:
         self.url, self._scale, self.people = url, scale, answers(url, people)
         urls = list(dict.fromkeys([url, *(one.url for one in self.people)]))
         if len(urls) > 1 and any(map(is_log, urls)):
-            raise UsageError("--person URL: is for trackers that run; give the numbers of people in a log")
+            raise UsageError("--person URL: is for live trackers; give the numbers of people in a log")
         self._links, self._log = {name: listener(name) for name in urls}, is_log(url)
         self._model, self._show, self._report, self._watched = model, show, report, watched
         self._views = {stream: _View({}, stream in cameras) for stream in streams}
@@ -217,7 +217,7 @@ class Feed:
             view.use(view.camera.for_size(found), self._model)
         if found != view.size:
             size, own = ("{}x{}".format(*pair) for pair in (found, view.size))
-            raise UserError(f"a picture of {size}, the camera's is {own}; give its --camera")
+            raise UserError(f"a picture of {size}, the camera's is {own}; give the right --camera")
         return pixels
 
     def _on_image(self, stream: int, channel: str, data: bytes) -> None:
@@ -236,7 +236,7 @@ class Feed:
         estimate = estimate_of(message)
         if estimate.joint_names != self._model.joint_names:
             raise UserError(
-                f"{channel}: an estimate of other joints than the model's; give the model tracked"
+                f"{channel}: an estimate of other joints than the model's; give the model that is tracked"
             )
         if not _plausible(estimate):
             raise UserError(f"{channel}: an estimate with numbers that are not finite")

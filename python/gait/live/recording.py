@@ -47,7 +47,7 @@ class Recording:
         self, url: str, people: Sequence[str], folder: str | Path, failed: Callable[[], None]
     ) -> None:
         if is_log(url):
-            raise UserError(f"{url}: is a log already; copy the file")
+            raise UserError(f"{url}: is already a log; copy the file")
         further = {name: f"-person-{k}" for k, name in enumerate(people, 1) if name != url}
         self.paths = _unused(Path(folder), ["", *further.values()])
         self.fault: str | None = None
@@ -101,6 +101,6 @@ def _unused(folder: Path, endings: Sequence[str]) -> list[Path]:
         except FileExistsError:
             continue
         except OSError as error:
-            raise UserError(f"{path}: cannot be made: {error.strerror}") from None
+            raise UserError(f"{path}: cannot be created: {error.strerror}") from None
         return paths
-    raise UserError(f"{folder}: has all names of logs of this second")
+    raise UserError(f"{folder}: has logs of every possible name for this second")

@@ -145,7 +145,7 @@ def comfortable(age: float, sex: str | None = None) -> tuple[float, float]:
     """
     low, high = AGES
     if not low <= age < high + 1:
-        raise UserError(f"age {age:g}: norms of the speed are known from {low} to {high} years; leave it out")
+        raise UserError(f"age {age:g}: norms of speed are known from {low} to {high} years; leave it out")
     rows = np.array([SPEED[s][int(age) // 10 - 2] for s in (SEXES if sex is None else (sex,))])
     mean = rows[:, 0].mean()
     return float(mean), float(np.sqrt(np.mean(rows[:, 1] ** 2 + (rows[:, 0] - mean) ** 2)))

@@ -96,8 +96,8 @@ class Parameters:
         if not left_out:
             return text
         unsure = left_out - self.slowing
-        why = [f"{unsure} unsure"] * bool(unsure)
-        why += [f"{self.slowing} in which the person starts or stops"] * bool(self.slowing)
+        why = [f"{unsure} uncertain"] * bool(unsure)
+        why += [f"{self.slowing} while starting or stopping"] * bool(self.slowing)
         return f"{text} (not counted: {', '.join(why)})"
 
     def summary(self) -> dict[str, dict[str, Any]]:

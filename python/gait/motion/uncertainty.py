@@ -67,8 +67,10 @@ def draw_contacts(
             drawn[side].append(contacts(motion, found[-1], side, stride))
     source = "the standard deviations of each frame, whose errors last"
     if draws is not None:
-        source = f"{len(found)} motions drawn from the posterior, and what the model cannot express"
-    source += "" if track.camera_change is None else "; errors of the camera are common to all frames"
+        source = (
+            f"{len(found)} motions drawn from the posterior, plus the variation that the model cannot express"
+        )
+    source += "" if track.camera_change is None else "; camera errors are common to all frames"
     return {side: stack(drawn[side]) for side in SIDES}, _event_sd(found), source
 
 

@@ -10,7 +10,7 @@ import numpy as np
 from gait.io.track_file import STATUSES, Track
 from gait.motion.parameters import Parameters, measured
 
-LEGS = "either leg may be the right one by the pictures"
+LEGS = "the images do not show which leg is the right one"
 """Why the tracker itself leaves left and right open."""
 _MOVES = 0.25  # share of the strides' speed that the pelvis moves at least, unless the person walks in place
 _SECONDS = 0.5  # of a track from which places give a speed
@@ -59,14 +59,14 @@ class Verdict:
         return self.total - sum(self.counts.values())
 
     def sentence(self) -> str:
-        """State in one sentence what was tracked, how the person walked, and what is unsure."""
+        """State in one sentence what was tracked, how the person walked, and what is uncertain."""
         parts = [f"Tracked {self.tracked} of {count_of(self.total, 'frame')}"]
         parts.append(count_of(self.strides, "whole stride") if self.strides else "no whole stride")
         if self.speed is not None:
             parts.append(f"{self.speed:.2f} m/s" + (" in place" if self.in_place else ""))
         text = ", ".join(parts)
         if self.counts["ambiguous"]:
-            what = "left and right unsure" if set(self.why) == {LEGS} else "unsure"
+            what = "left and right uncertain" if set(self.why) == {LEGS} else "uncertain"
             text += f"; {what} in {count_of(self.counts['ambiguous'], 'frame')}"
             why = [f"{reason} ({count})" for reason, count in self.why.items()]
             text += f": {', '.join(why if len(why) > 1 else self.why)}" if why else ""
@@ -85,8 +85,8 @@ class Verdict:
         if self.counts["tracking"]:
             return None
         return (
-            "no frame has status tracking, so do not rely on this track: look at it with --overlay, check "
-            "--camera and --init, or let the detector help (gait detect --fetch)"
+            "no frame has status tracking, so do not rely on this track: view it with --overlay, check "
+            "--camera and --init, or use the detector (gait detect --fetch)"
         )
 
 

@@ -78,7 +78,7 @@ def add_errors(page: Page, track: Track, errors: Comparison) -> None:
     if track.camera_change is not None:
         page.words(f"{OTHER_WORLD[0].upper()}{OTHER_WORLD[1:]}.", "warning")
     shares, explained = share_rows(errors.measures)
-    page.table("How far intervals and status can be believed", shares, explained)
+    page.table("How reliable intervals and status are", shares, explained)
     page.html(time_plot(lambda axes: _paint_errors(axes, track, errors), time_span(track), 2.8, "Error, mm"))
     if errors.phase is not None:
         title = "Phase, estimate minus truth, % of the stride"
@@ -88,7 +88,7 @@ def add_errors(page: Page, track: Track, errors: Comparison) -> None:
 def _paint_errors(axes: Axes, track: Track, errors: Comparison) -> None:
     tint(axes, track)
     axes.plot(errors.time, errors.abs_mm, color=BLUE, label="joints in space")
-    axes.plot(errors.time, errors.root_mm, color=ORANGE, ls="--", label="pose, hips laid together")
+    axes.plot(errors.time, errors.root_mm, color=ORANGE, ls="--", label="pose, hips aligned")
     axes.set(ylim=(0, None))
     axes.legend(loc="best")
 

@@ -35,8 +35,8 @@ _WORDS = {
 }
 _LEGEND = (
     ("Dial: phase of the stride, top: right heel strike", None),
-    ("Its coloured arc: where the phase is with 95 %", None),
-    ("Ellipses: where wrists and ankles are with 90 %", None),
+    ("Its coloured arc: 95 % interval of the phase", None),
+    ("Ellipses: 90 % regions of wrists and ankles", None),
     ("Left side of the body", "left"),
     ("Right side of the body", "right"),
 )

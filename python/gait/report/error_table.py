@@ -11,7 +11,7 @@ _LETTERS = 34  # letters of a row's words on the terminal
 
 OTHER_WORLD = (
     "the track's camera was estimated from the walk, so its world is not the truth's: compare the pose, not "
-    "places, pixels or intervals"
+    "positions, pixels or intervals"
 )
 """Of a track with `gait.io.track_file.Track.camera_change`."""
 
@@ -66,5 +66,5 @@ def as_text(m: Measures) -> str:
     ]
     lines += [f"{words:{_LETTERS}}{value:>8}" for words, value in shares.items()]
     status = ", ".join(f"{word} {share:.1%}" for word, share in m["status"].items() if share)
-    lines += [f"{'Status':{_LETTERS}} {status}", "", "What these words mean:"]
+    lines += [f"{'Status':{_LETTERS}} {status}", "", "What these terms mean:"]
     return "\n".join([*lines, *(f"  {words}: {meaning}" for words, meaning in (errors | explained).items())])

@@ -55,7 +55,7 @@ class PageFilm:
         (w, h), (a, b) = self.captured, self.size
         megabytes = f"{3 * len(self.data) / 4e6:.1f} MB"
         if (a, b) == (w + w % 2, h + h % 2):
-            return f"The film in this page is as large as the one tracked, {w} × {h} pixels ({megabytes})."
+            return f"The film in this page has the size of the tracked one, {w} × {h} pixels ({megabytes})."
         return f"The film in this page was scaled down from {w} × {h} to {a} × {b} pixels ({megabytes})."
 
 

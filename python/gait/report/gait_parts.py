@@ -35,8 +35,8 @@ def add_gait(page: Page, track: Track, parameters: Parameters, cycles: Mapping[s
     page.grid("Gait", HEAD, parameter_rows(parameters), tips)
     if parameters.all_unsure:
         page.words(
-            "In every stride there are frames that are unsure. The values are means over "
-            "these strides all the same: right and left may be swapped.",
+            "Every stride has uncertain frames. The values are means over these strides anyway: left and "
+            "right may be swapped.",
             "warning",
         )
     page.words(
@@ -47,7 +47,7 @@ def add_gait(page: Page, track: Track, parameters: Parameters, cycles: Mapping[s
     page.figure("Footfalls", footfall_plot(track, parameters))
     page.words(
         "Bars: the foot is on the floor. Ticks: heel strikes (above) and toe-offs (below), two sd to each "
-        "side. Tinted: unsure (yellow) or lost (red).",
+        "side. Tinted: uncertain (yellow) or lost (red).",
         "faint",
     )
     page.figure("Stride by stride", stride_plot(track, parameters))
@@ -62,8 +62,8 @@ def add_norms(page: Page, norms: Sequence[Compared]) -> None:
     tips = {words: terms.NORMS[source] for source, words in _SOURCES.items()} | terms.COLUMNS
     page.grid("Beside norms", NORM_HEAD, norm_rows(norms), tips)
     page.words(
-        "Mean ± standard deviation. Outside is what is more than two standard deviations of the norm away; "
-        "the per cent are the probability of that, given the uncertainty of this track.",
+        "Mean ± standard deviation. A value is outside if it is more than two standard deviations from the "
+        "norm; the percentage is the probability of that, given the uncertainty of this track.",
         "faint",
     )
 
@@ -114,7 +114,7 @@ _KEY = (
 def _meaning(names: list[str]) -> str:
     rows = [terms.angle(name) for name in names]
     items = "".join(f"<dt>{name} ({positive})</dt><dd>{words}</dd>" for name, positive, words in rows)
-    return f'<details class="terms"><summary>What is measured</summary><dl>{items}</dl></details>'
+    return f'<details class="terms"><summary>What the quantities mean</summary><dl>{items}</dl></details>'
 
 
 def footfall_plot(track: Track, parameters: Parameters) -> str:

@@ -95,7 +95,7 @@ class Page:
         if tips:
             terms = "".join(f"<dt>{escape(k)}</dt><dd>{escape(v)}</dd>" for k, v in tips.items())
             self._parts.append(
-                f'<details class="terms"><summary>What these words mean</summary><dl>{terms}</dl></details>'
+                f'<details class="terms"><summary>What these terms mean</summary><dl>{terms}</dl></details>'
             )
 
 

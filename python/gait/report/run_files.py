@@ -212,7 +212,7 @@ def _camera(files: RunFiles, track: Track) -> tuple[str | None, str]:
     path = next((str(one) for one in beside if one.is_file()), None)
     if path is None:
         return None, "no camera is known, so the film is shown without the figure; give --camera"
-    return path, f"camera: {path}, found beside it; --camera gives another"
+    return path, f"camera: {path}, found beside the track or film; --camera gives another"
 
 
 def _facts(files: RunFiles, video: Video, path: str | None, camera: Camera | None) -> dict[str, str]:
@@ -221,7 +221,7 @@ def _facts(files: RunFiles, video: Video, path: str | None, camera: Camera | Non
         "film": f"{files.video}, {video.width} × {video.height} px, {video.count} frames, "
         f"{video.fps:.4g} per second",
         "camera": "not given" if path is None else path,
-        "start, background, particles": "not in these files; the page of gait track --report shows them",
+        "start, background, particles": "not in these files; see the page of gait track --report",
     }
     if camera is not None:
         rows |= camera_facts(camera)

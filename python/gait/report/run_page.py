@@ -109,14 +109,14 @@ def run_page(run: Run) -> str:
     if run.film is not None and modules.available():
         drawing = '<h2>Angles over time</h2><div id="run-curves"></div>'
         page.html(f'<section class="screen-only">{drawing}</section>')
-    page.figure("Way over the floor", way_plot(run.track, run.parameters, run.errors))
+    page.figure("Path over the floor", way_plot(run.track, run.parameters, run.errors))
     page.heading("Pace")
     page.html(_number_plot(run.track, "stride_hz", 120.0, "Cadence, steps per minute"))
     page.html(_number_plot(run.track, "speed_m_s", 1.0, "Speed, m/s"))
     page.figure("Uncertainty", uncertainty_plot(run.track))
     page.words(
-        "Standard deviation of places in the world, the mean over the three axes. If the camera was found "
-        "from the walk, its uncertainty is in it.",
+        "Standard deviation of positions in the world, mean over the three axes. It includes the "
+        "uncertainty of a camera that was estimated from the walk.",
         "faint",
     )
     if run.errors is not None:
@@ -148,9 +148,7 @@ def _add_film(page: Page, run: Run, film: PageFilm) -> None:
         f"Drag the figure to turn it; space plays, arrow keys step. {film.note()}", "faint screen-only"
     )
     if not whole:
-        page.words(
-            f"The figure that turns is not in this page: {parts.FETCH}, then make the page again", "faint"
-        )
+        page.words(f"The 3-D figure is not in this page: {parts.FETCH}, then make the page again", "faint")
     page.html(modules.inlined_json("run-data", _data(run, film, statuses, whole)))
     page.html(f'<script type="text/plain" id="run-film">{film.data}</script>')
     page.html(f'<script type="module">\n{modules.own("run.js")}</script>')
@@ -158,7 +156,7 @@ def _add_film(page: Page, run: Run, film: PageFilm) -> None:
 
 _LEGEND = (
     "In the film: the dial is the phase of the stride, with the right heel strike at the top and a coloured "
-    "arc where the phase is with 95 %; ellipses hold wrists and ankles with 90 %; left is blue, right "
+    "arc for its 95 % interval; ellipses are 90 % regions of wrists and ankles; left is blue, right is "
     "orange; the figure is faded where the person was lost."
 )
 
@@ -275,7 +273,7 @@ def way_plot(track: Track, parameters: Parameters | None, errors: Comparison | N
 
     share = float((high - low)[up] / (high - low)[across])
     heights = (min(9.4 * share + 1.2, 7.0), min(3.0 * share + 1.3, 4.5))
-    return for_screen_and_telephone(paint, heights[0], "The way over the floor, seen from above", heights[1])
+    return for_screen_and_telephone(paint, heights[0], "The path over the floor, seen from above", heights[1])
 
 
 def _number_plot(track: Track, name: str, scale: float, title: str) -> str:
@@ -311,4 +309,4 @@ def uncertainty_plot(track: Track) -> str:
         axes.set(ylim=(0, None))
         axes.legend(loc="best")
 
-    return time_plot(paint, time_span(track), 2.4, "Standard deviation of places, mm")
+    return time_plot(paint, time_span(track), 2.4, "Standard deviation of positions, mm")

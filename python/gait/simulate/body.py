@@ -98,7 +98,7 @@ def _learnt(model: Mapping[str, Any], rng: np.random.Generator) -> dict[str, flo
     """Draw the proportions that a model describes, in statures."""
     count = len(model.get("PROP", ()))
     if not count:
-        raise UserError("--body drawn: the package's model has no proportions of people; use --body table")
+        raise UserError("--body drawn: the package's model has no proportions; use --body table")
     scores = np.clip(rng.standard_normal(count), -2, 2)
     channels = len(unpack_names(model["CHNM"]))
     places = dict(

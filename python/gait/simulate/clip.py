@@ -345,7 +345,7 @@ def _folder(folder: str | os.PathLike[str], names: Iterable[str]) -> Path:
     except (FileExistsError, NotADirectoryError):
         raise UserError(f"{target}: is a file; give the name of a folder") from None
     except OSError as exc:
-        raise UserError(f"{target}: cannot be made ({exc.strerror}); choose another place") from None
+        raise UserError(f"{target}: cannot be created ({exc.strerror}); choose another place") from None
     for name in names:
         require_writable(target / name)
     return target

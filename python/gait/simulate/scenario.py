@@ -85,20 +85,22 @@ class Scenario:
         if self.body not in BODIES:
             raise UsageError(f"--body {self.body}: unknown; use table or drawn")
         if (self.asymmetry or self.aid != "none") and self.motion == "backwards":
-            raise UsageError("--motion backwards: goes without --asymmetry and --aid; leave them out")
+            raise UsageError(
+                "--motion backwards: cannot be combined with --asymmetry and --aid; leave them out"
+            )
         if self.moving not in MOVING:
             raise UsageError(f"--moving {self.moving}: unknown; use one of {' '.join(MOVING)}")
         if self.moving != "none" and (self.pole or self.motion == "stand"):
-            raise UsageError("--moving: is for a person who walks, without a pole")
+            raise UsageError("--moving: needs a walking person and no --pole")
         if self.people not in COMPANY:
             raise UsageError(f"--people {self.people}: unknown; use one of {' '.join(COMPANY)}")
         alone = self.pole or self.moving != "none" or self.motion != "walk" or self.view == "circle"
         if self.people != "one" and alone:
-            raise UsageError("--people: walk straight on before a camera that stands still, without a pole")
+            raise UsageError("--people: needs straight walks, a static camera and no --pole")
         if not 1 <= self.cameras <= MOST_CAMERAS:
             raise UsageError(f"--cameras {self.cameras}: give 1 to {MOST_CAMERAS}")
         if self.cameras > 1 and (self.moving != "none" or self.pole):
-            raise UsageError("--cameras: stand still, without a pole; leave out --moving and --pole")
+            raise UsageError("--cameras: must be static; leave out --moving and --pole")
         for name, (low, high) in _LIMITS.items():
             value = getattr(self, name)
             if value is not None and not low <= value <= high:

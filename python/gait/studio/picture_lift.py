@@ -50,9 +50,9 @@ class PictureLift:
     """
 
     without = {
-        "hide": "Nothing is detected where pictures are lifted, so nothing can be hidden; drag the joint",
-        "swap": "Nothing is detected where pictures are lifted, so there are no sides to swap; drag the legs",
-        "pin": "Feet are pinned where detected points are lifted; here drag the foot to the floor",
+        "hide": "There are no detected joints to hide when images are lifted; drag the joint",
+        "swap": "There are no detected joints to swap when images are lifted; drag the legs",
+        "pin": "Feet can only be pinned when keypoints are lifted; drag the foot to the floor instead",
     }
 
     def __init__(self, clip: ClipSegments, request: Request, more: list[str]) -> None:
@@ -70,7 +70,9 @@ class PictureLift:
     def check(self, edits: Edits) -> None:
         """Refuse what is for keypoints alone."""
         if edits.hidden or edits.swapped or edits.floor:
-            raise UserError("only corrections of joints go with pictures; remove the others")
+            raise UserError(
+                "only corrections of joints are possible when images are lifted; remove the others"
+            )
 
     def whole(self, edits: Edits) -> Solved:
         """Fit the clip with corrections."""

@@ -20,7 +20,7 @@ from gait.studio.shown import Lift, Solved
 Answer = Callable[[int, "Solved | str"], None]
 LAST = -1
 """Number of the answer that no other follows, because the process has ended."""
-ENDED = "the process that solves the whole motion has ended; corrections are saved, start gait studio again"
+ENDED = "the process that solves the whole motion has died; corrections are saved, start gait studio again"
 
 
 def _serve(pipe: Connection, lift: Lift) -> None:

@@ -151,14 +151,14 @@ class Session:
         with self._lock:
             camera, shown = self._lift.camera, self._solved.shown
             if camera is None:
-                raise UserError("a start is a place on the floor of a calibrated camera; give --camera")
+                raise UserError("a start is on the floor of a calibrated camera; give --camera")
             asked = Fields("the start", action)
             frame = self._reader.frame(asked, "frame")
             ends = [self._reader.pixel(asked, key) for key in ("from", "to")]
             here, ahead = camera.on_plane(np.array(ends), 0.0)
             way = ahead - here
             if not np.linalg.norm(way) > LEAST_WAY:
-                raise UserError("drag over the floor, from under the person to where they walk")
+                raise UserError("drag over the floor, from below the person in the direction of walking")
             begin: dict[str, Any] = {
                 "frame": frame,
                 "pelvis": rounded(here[:2]),
@@ -204,7 +204,7 @@ class Session:
                 self._lift.camera is not None
                 and np.isnan(self._lift.camera.on_plane(np.array(pin.uv), 0.0)).any()
             ):
-                raise UserError("no floor is seen there, above the horizon; click where the foot stands")
+                raise UserError("there is no floor above the horizon; click where the foot stands")
             others = tuple(p for p in edits.floor if (p.frame, p.joint) != (pin.frame, pin.joint))
             return replace(edits, floor=(*others, pin))
         if kind == "hide":
@@ -248,7 +248,9 @@ class Session:
         try:
             near = self._lift.near(wanted, touched)
         except np.linalg.LinAlgError:
-            self.fault = "the motion cannot be solved near this correction; it waits for the whole"
+            self.fault = (
+                "the motion near this correction cannot be solved; it will follow with the whole clip"
+            )
             return {}
         if near is None:
             return {}
@@ -298,7 +300,7 @@ class Session:
             with replacing(self.source.corrections) as temporary:
                 temporary.write_text(json.dumps(edits.as_json(), indent=1) + "\n", encoding="utf-8")
         except OSError as error:
-            why = f"not saved: {error.strerror}; mend that, then correct again"
+            why = f"not saved: {error.strerror}; fix that, then correct again"
             raise NotSavedError(f"{self.source.corrections}: {why}") from error
 
     def export(self, kind: str) -> Path:
@@ -312,12 +314,12 @@ class Session:
             If the whole is not solved yet, or there is no such file.
         """
         if kind not in EXPORTS:
-            raise UserError(f"{kind}: no such export")
+            raise UserError(f"{kind}: unknown export")
         with self._lock:
             if self.refining:
-                raise UserError("the whole motion is still being solved; wait a moment")
+                raise UserError("the whole motion is still being computed; wait a moment")
             if self.fault:
-                raise UserError(f"the last corrections are not in the whole motion: {self.fault}")
+                raise UserError(f"the last corrections are not yet in the whole motion: {self.fault}")
             solved, folder = self._solved, self.source.folder
         path = folder / EXPORTS[kind]
         if kind == "camera":

@@ -72,7 +72,9 @@ class Shown:
         return float(np.median(v.max(axis=1) - v.min(axis=1)))
 
 
-NO_CAMERA = "needs a camera: start gait studio with --camera, or with --height, which finds it from the walk"
+NO_CAMERA = (
+    "needs a camera: start gait studio with --camera, or with --height, which estimates it from the walk"
+)
 
 
 @dataclass(frozen=True)

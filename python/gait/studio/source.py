@@ -196,10 +196,10 @@ def folder_of(video: Video) -> Iterator[Path]:
         lock = os.open(folder / ".lock", os.O_RDWR | os.O_CREAT | os.O_CLOEXEC, 0o644)
         fcntl.flock(lock, fcntl.LOCK_EX | fcntl.LOCK_NB)  # until the process ends
     except BlockingIOError:
-        raise UserError(f"{folder}: another gait studio has this film open; use or end that one") from None
+        raise UserError(f"{folder}: another gait studio has this film open; use or close that one") from None
     except OSError as error:
         raise UserError(
-            f"{folder}: {error.strerror}; copy the film to a folder that can be written"
+            f"{folder}: {error.strerror}; copy the film to a writable folder"
         ) from error
     try:
         yield folder
@@ -248,8 +248,8 @@ def _keypoints(
     elif wanted.track:
         if camera is None:
             raise UserError(
-                f"{wanted.track}: give the --camera that it was tracked with; "
-                "gait track --camera-out writes one that was found"
+                f"{wanted.track}: give the --camera that it was tracked with; gait track --camera-out writes "
+                "an estimated one"
             )
         path = str(folder / "track.csv")
         found, span = keypoints_of_track(wanted.track, camera), video.span(wanted.start or 0, wanted.stop)

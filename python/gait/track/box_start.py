@@ -28,7 +28,7 @@ _PROBES = 6  # frames of a clip, of which one must show a person
 _STEP = 0.1  # seconds from one fit to the next
 _GOES_ON = 1.5  # seconds after a first window in which a person walks, who may only have begun to
 _STAYS = (
-    "--init auto found a person who stays in place and none who walks along the floor; give --init FILE.json "
+    "--init auto found a person who stays in place but none who walks along the floor; give --init FILE.json "
     f"or use the detector ({weights.FETCH})"
 )
 _STATURE_SD = 0.03  # metres, of one that the user gives
@@ -248,7 +248,7 @@ def _no_person(few: int, misplaced: list[float]) -> str:
     """Explain why there is no start, and what to do."""
     if few == 1:
         return (
-            "only 1 frame to track, and a walk takes more: give a second or longer, by --start and --stop too"
+            "only 1 frame to track; give at least a second, by --start and --stop too"
         )
     if few < _ENOUGH:
         return f"only {few} frames to track, --init auto needs {_ENOUGH}; give --init FILE.json"
@@ -257,7 +257,7 @@ def _no_person(few: int, misplaced: list[float]) -> str:
     tall = np.nanmedian(misplaced) if np.isfinite(misplaced).any() else np.nan
     what = f"makes {tall:.2g} m tall" if tall > 0 else "puts upside down"
     if np.isnan(misplaced).mean() > 0.5:
-        what = "puts above the horizon"
+        what = "places above the horizon"
     return (
         f"--init auto found a person in {len(misplaced)} frames that the camera {what}; "
         "check the camera's height and tilt, or give --init FILE.json"

@@ -62,7 +62,7 @@ def contradiction(given: Camera, keypoints: Keypoints, model: Model, height: flo
     except UserError:
         return None
     return (
-        f"{what}; check its focal length ({given.fx:.0f} px) and place ({given.centre[2]:.2f} m high): "
+        f"{what}; check its focal length ({given.fx:.0f} px) and position ({given.centre[2]:.2f} m high): "
         f"{fits.describe()[0]}"
     )
 
@@ -120,7 +120,7 @@ def _other_way_up(given: Camera, walk: Keypoints, model: Model) -> str | None:
         return f"the frames are turned by {turn} against it; turn the video back, or calibrate it as it is"
     up = given.up_axis()
     if up != "z" and _fits(given.with_up(up), walk, model):
-        return f"the walk fits with {up} of its world up; turn R and t so that z is up, the floor at z = 0"
+        return f"the walk fits with {up} of its world up; rotate R and t so that z is up, the floor at z = 0"
     return None
 
 

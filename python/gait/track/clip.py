@@ -29,7 +29,7 @@ from gait.track.tracker import Tracker
 
 __all__ = ["KEYPOINTS_SD", "ClipOptions", "track_clip"]
 
-_HARDLY_FOLLOWED = "the person was lost nearly all the time; check --camera and --init by an --overlay"
+_HARDLY_FOLLOWED = "the person was lost nearly all the time; check --camera and --init with --overlay"
 
 
 def track_clip(options: ClipOptions) -> dict[str, Any]:

@@ -25,7 +25,7 @@ _SETTLED = 0.2  # seconds of `tracking` after which they are known
 _SETTLES = 4.0  # seconds from a start in which that is waited for
 _DRAWS = 3  # of particles that must agree
 _SAME_SIDE = 0.2  # strides between the phases of draws that agree
-_DISAGREE = "repeated starts do not agree on it"
+_DISAGREE = "repeated starts disagree about left and right"
 
 FindStart = Callable[[int, int, float], Start | None]
 """First start in the frames first <= number < stop, of a person of a stature [m]; None: there is none."""

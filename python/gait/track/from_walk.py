@@ -224,8 +224,8 @@ def _calibrate(
     found = _result(best, size)
     if found.sd[0] > _OPEN:
         raise UserError(
-            f"{where}: its walk leaves the focal length open; film a walk towards or away from the camera, "
-            "or give --camera"
+            f"{where}: the walk does not determine the focal length; film a walk towards or away from the "
+            "camera, or give --camera"
         )
     return found
 

@@ -126,7 +126,7 @@ def _offset(scene: Scene, other: Scene, given: float | None) -> tuple[int, Offse
     if given is not None:
         return other.person, Offset(given, np.nan, True)
     raise UserError(
-        f"{other.video.path}: when it began against {scene.video.path} does not follow from the person's "
+        f"{other.video.path}: its time offset from {scene.video.path} cannot be estimated from the person's "
         "motion; give --offsets, the seconds by which each further film began later, and check the cameras"
     )
 
@@ -138,7 +138,7 @@ def _words(given: float | None, offset: Offset) -> str:
         when = (
             f"began {abs(offset.seconds):.3f} s {'after' if offset.seconds > 0 else 'before'} the first film"
         )
-    how = "as given" if given is not None else "by the person's motion"
+    how = "as given" if given is not None else "estimated from the person's motion"
     return (
         when
         + f", {how}"

@@ -112,7 +112,7 @@ def _starts(options: ClipOptions, scene: Scene) -> dict[int, Start]:
         if found is None or not found.hypotheses[0].walks:
             note(f"person {id} is not tracked: no second in which they walk in full view", options.quiet)
         else:
-            starts[id] = replace(found, source="the joints found in the pictures")
+            starts[id] = replace(found, source="the joints detected in the images")
     if not starts:
         raise UserError(f"{options.video}: no one walks in full view for a second; check the camera")
     return starts

@@ -17,9 +17,9 @@ from gait.track.person_shapes import PersonShapes
 _DEPARTURE = 0.6  # metres in a second by which the pelvis may leave the path of strides and heading
 _BEYOND = 4.0  # standard deviations from which a stature is implausible
 _LEAST_SD = 0.05  # metres, of a stature
-_ELSEWHERE = "the person found in the picture does not agree"
-_NO_WALK = "the way does not follow from the strides, or the stature is unusual"
-_UNSEEN = "the pictures hardly show the person"
+_ELSEWHERE = "the person detected in the image does not match"
+_NO_WALK = "the path does not match the strides, or the stature is unusual"
+_UNSEEN = "the images hardly show the person"
 
 
 class Plausibility:

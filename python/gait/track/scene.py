@@ -237,7 +237,8 @@ def _find_motion(
     if options.stabilize == "off":
         if samples and not options.camera_path and moves(camera, samples, people, given):
             note(
-                "the camera moves during the clip: --stabilize auto finds its turns, --camera-path takes it",
+                "the camera moves during the clip: --stabilize auto estimates its rotation, --camera-path "
+                "gives its poses",
                 options.quiet,
             )
         return None
@@ -253,7 +254,7 @@ def _calibrate(
         remedy = (
             "leave out --detector none, or give --camera" if options.detector == "none" else weights.FETCH
         )
-        raise UserError(f"{video.path}: without --camera keypoints of a walk are needed: {remedy}")
+        raise UserError(f"{video.path}: without --camera the keypoints of a walk are needed: {remedy}")
     from gait.detect.people import by_size  # here, as it loads the networks' runtime
 
     assert options.height is not None
@@ -285,7 +286,7 @@ def _read_start(
     stop = video.count if options.stop is None else min(options.stop, video.count)
     if start.frame >= stop:
         raise UserError(
-            f"{options.init}: frame is {start.frame}, the frames to track end at {stop - 1}; give one"
+            f"{options.init}: frame is {start.frame}, the frames to track end at {stop - 1}; give one of them"
         )
     there = poses[start.frame].camera(camera) if start.frame in poses else camera
     if not there.shows(model.pose(start.mean)[0]):
@@ -381,7 +382,7 @@ def _find_first_state(options: ClipOptions, scene: Scene) -> Start:
         )
         _check_camera(options, scene)
         if found is not None:
-            return replace(found, source="the joints found in the pictures")
+            return replace(found, source="the joints detected in the images")
     found = find_start(
         scene.video,
         camera,
@@ -393,7 +394,7 @@ def _find_first_state(options: ClipOptions, scene: Scene) -> Start:
         shapes=not _detects(options),  # slow, and needless where the detector found no person
         shapes_first=finds_shapes(options),  # a median may show people
     )
-    return replace(found, source="where the pictures show a person")
+    return replace(found, source="the shape of a person in the images")
 
 
 def _in_reference(scene: Scene) -> Keypoints | None:
@@ -421,8 +422,8 @@ def require_scene(options: ClipOptions, scene: Scene, first: int) -> None:
         return
     if one_is_grey(frame.image, plate):
         raise UserError(
-            f"{options.background}: one of it and {scene.video.path} is grey, the other in colour; "
-            "give both in the same colours"
+            f"{options.background}: either it or {scene.video.path} is grey, the other in colour; give both "
+            "in the same colours"
         )
     if not StartFit(scene.model, scene.camera).other_scene(frame.image, plate):
         return
@@ -533,11 +534,11 @@ def _read_keypoints(options: ClipOptions, video: Video, model: Model, frames: ra
     clip = Clip(options.person, times=video.times, size=video.size, quiet=options.quiet)
     read, ignored = keypoints_file.read(options.keypoints, model.joint_names, ignore_unknown=True, clip=clip)
     if ignored:
-        note(f"left out: {' '.join(ignored)}", options.quiet)
+        note(f"ignored: {' '.join(ignored)}", options.quiet)
     read.require_extent(options.keypoints, options.keypoints_sd)
     if not any(frame in frames for frame in read.frame.tolist()):
         raise UserError(
-            f"{options.keypoints}: has no frame that is tracked; number frames as in the video, from 0"
+            f"{options.keypoints}: has none of the tracked frames; number frames as in the video, from 0"
         )
     if words := read.compare_times(options.keypoints, video.times):
         note(f"{options.keypoints}: {words}", options.quiet)

@@ -38,7 +38,9 @@ def settings(options: ClipOptions, scene: Scene, particles: int) -> dict[str, st
         "model": "the package's" if options.model is None else options.model,
         "body measured": "no" if options.body is None else options.body.source,
         "settings": "of the paper" if options.mode == Mode.PAPER else "default",
-        "estimates": "from the whole film (smoothed)" if options.smooth else "from the frames up to each",
+        "estimates": "each frame from the whole film (smoothed)"
+        if options.smooth
+        else "each frame from the frames before it",
         "particles": f"{particles}, random numbers from seed {options.seed}",
     }
 

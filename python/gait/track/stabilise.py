@@ -120,7 +120,7 @@ def find_motion(
             update(frame.number)
     found = np.isfinite([view.residual for view in views])
     if found.mean() < _MOSTLY or motion.scale * np.median([v.residual for v in views]) > _TRAVELS:
-        return None, "the camera moves along, or the scene has too little texture to show how it turns"
+        return None, "the camera travels, or the scene has too little texture to show how it turns"
     reference = -1 if plate is not None else 0 if first else _middle(views)
     if reference >= 0:
         back = views[reference].inverse()
@@ -145,13 +145,13 @@ def find_turns(
     with progress("camera's motion", video.count, quiet) as update:
         motion, why = find_motion(video, camera, samples, people, plate, update, first=first)
     if why:
-        note(f"{why}; its motion is not used: give its poses with --camera-path", quiet)
+        note(f"{why}; its motion is ignored: give its poses with --camera-path", quiet)
     if motion is None:
         return None
     place = "the background" if plate is not None else f"frame {motion.reference}"
     note(
-        f"the camera turned by up to {motion.furthest():.0f} px: frames are stabilised on {place}, for which "
-        "camera and places hold",
+        f"the camera turned by up to {motion.furthest():.0f} px: frames are stabilised to {place}, to which "
+        "camera and positions refer",
         quiet,
     )
     return motion

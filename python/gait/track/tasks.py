@@ -56,7 +56,7 @@ class PythonTasks:
             nonlocal running
             with changed:
                 if ended:  # the frame that the task belongs to is gone
-                    raise RuntimeError("a task was called after its runner had returned")
+                    raise RuntimeError("a task was called after its runner returned")
                 left.remove(i)  # a second call for the same i is an error of the runner, and raises here
                 running += 1
             try:
@@ -75,7 +75,7 @@ class PythonTasks:
             ended = True
             changed.wait_for(lambda: running == 0)
         if left and failure is None:
-            failure = RuntimeError(f"task runner returned with {len(left)} of {count} tasks not called")
+            failure = RuntimeError(f"task runner returned without calling {len(left)} of {count} tasks")
         for i in sorted(left):
             function(context, i)
         if failure is not None:

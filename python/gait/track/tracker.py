@@ -62,7 +62,7 @@ class Tracker:
         tasks: int | Runner | TaskSource = 1,
     ) -> None:
         if not isinstance(model, Model):
-            raise ValueError(f"model: {model!r} is no gait.Model; give gait.Model(FILE)")
+            raise ValueError(f"model: {model!r} is not a gait.Model; give gait.Model(FILE)")
         self.model = model
         self.cameras = _camera_list(cameras)
         self._tasks, config = _task_source(tasks), config or TrackerConfig.default()

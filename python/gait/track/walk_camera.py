@@ -63,12 +63,12 @@ def expected_fov(video: Video, fov: float | None, quiet: bool) -> tuple[float | 
         return fov, GIVEN_FOV_SD
     mm = equivalent_mm(tag)
     if mm is None:
-        note(f"{video.path}: states a focal length of {tag[:20]!r}, which is none: not used", quiet)
+        note(f"{video.path}: states a focal length of {tag[:20]!r}, which is not one: ignored", quiet)
         return None, GIVEN_FOV_SD
     fov = view_across(mm, video.size)
     note(
         f"{video.path}: states a focal length of {mm:g} mm (35 mm film), a view of {fov:.0f} deg across: "
-        f"taken as known within {100 * _TAG_SD:.0f} % (--fov overrides it)",
+        f"used as known to within {100 * _TAG_SD:.0f} % (--fov overrides it)",
         quiet,
     )
     return fov, _TAG_SD

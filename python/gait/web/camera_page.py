@@ -122,7 +122,7 @@ class _Page:
         except UserError as error:
             return JSONResponse({"fault": str(error).removeprefix("marks: ")})
         except OSError as error:
-            return JSONResponse({"fault": f"{self._scene.output} is not written: {error.strerror}"})
+            return JSONResponse({"fault": f"{self._scene.output} was not written: {error.strerror}"})
         del found["camera"]
         return JSONResponse(found)
 

@@ -7,7 +7,7 @@ from __future__ import annotations
 
 from gait.io.published import Published, Store
 
-FETCH = "run gait studio --fetch once, with a network"
+FETCH = "run gait studio --fetch once, with a network connection"
 """What a user does to get the parts."""
 
 _WHEEL = "nicegui==2.24.2"
@@ -32,7 +32,7 @@ ECHARTS = Published(
 STORE = Store(
     "web",
     "GAIT_WEB",
-    "the parts of pages",
+    "components of web pages",
     FETCH,
     (THREE, ORBIT, ECHARTS),
     f"""From {_WHEEL} (MIT, LICENSE):

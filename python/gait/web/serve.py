@@ -51,10 +51,10 @@ class Guard:
         origin = headers.get("origin")
         safe = scope.get("method") in ("GET", "HEAD")
         if headers.get("host") not in self._hosts:
-            await PlainTextResponse("gait serves this machine alone\n", 403)(scope, receive, send)
+            await PlainTextResponse("gait serves only this machine\n", 403)(scope, receive, send)
             return
         if not (origin in self._origins or (origin is None and safe)):
-            await PlainTextResponse("gait answers its own page alone\n", 403)(scope, receive, send)
+            await PlainTextResponse("gait answers only its own page\n", 403)(scope, receive, send)
             return
 
         async def guarded(message: Message) -> None:
@@ -140,7 +140,7 @@ async def json_object(request: Request, most: int) -> dict[str, Any]:
     except (ValueError, RecursionError):
         found = None
     if not isinstance(found, dict):
-        raise RequestError("the request is no object; reload the page")
+        raise RequestError("the request is not an object; reload the page")
     return found
 
 

@@ -47,7 +47,7 @@ def join(first: Sections, classes: Sequence[MotionClass]) -> dict[str, blob.Arra
     """
     names = [c.name for c in classes]
     if len(set(names)) < len(names) or len(names) > MAX_CLASSES:
-        raise UserError(f"classes {' '.join(names)}: give each a name of its own, at most {MAX_CLASSES}")
+        raise UserError(f"classes {' '.join(names)}: give each its own name, at most {MAX_CLASSES}")
     out = {tag: array for tag, array in first.items() if tag[:2] != "CL" and not tag[3].isdigit()}
     info = np.zeros((len(classes), 4), np.int32)
     changes = np.zeros((len(classes), len(classes), 4), np.float32)

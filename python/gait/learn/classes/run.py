@@ -77,16 +77,14 @@ def _parsed(options: LearnOptions) -> dict[str, str]:
     for text in options.classes:
         name, _, source = text.partition("=")
         if not name or name in wanted or name == options.activity:
-            raise UsageError(f"--class {text}: give each class a name of its own, not {options.activity}")
+            raise UsageError(f"--class {text}: give each class its own name, not {options.activity}")
         if name == BACKWARDS and source:
-            raise UsageError(
-                f"--class {text}: backwards is made from the walk in reverse; leave out ={source}"
-            )
+            raise UsageError(f"--class {text}: backwards is derived from the walk; leave out ={source}")
         if not source and (name not in (*DERIVED, RUN) or (name == RUN and adds_to_a_model(options))):
             raise UsageError(f"--class {text}: give recordings, --class {name}=FOLDER")
         wanted[name] = source
     if options.segments.source == "only":
-        raise UsageError("--class: not with --segments only, which makes no cyclic model")
+        raise UsageError("--class: cannot be used with --segments only, which learns no cyclic model")
     return wanted
 
 
@@ -115,7 +113,7 @@ def _learnt(name: str, source: str, options: LearnOptions, note: Note, run: Run)
         except NothingLeft as exc:
             if source:
                 raise
-            note(f"class {name}: left out, none of the recordings is a {name} ({exc})")
+            note(f"class {name}: skipped, none of the recordings is a {name} ({exc})")
             return None
         except UserError as exc:
             raise UserError(f"class {name}: {exc}") from None

@@ -159,7 +159,7 @@ def _as_named(outcome: Prepared | None, path: Path) -> Prepared:
     """Return the outcome as if the file had been read under its name here."""
     if outcome is None:
         raise UserError(
-            f"{path}: a worker does not see {path.absolute()}; put the files where all workers find them "
+            f"{path}: a worker cannot access {path.absolute()}; put the files where all workers find them "
             "under the same path"
         )
     if outcome.refused:

@@ -35,7 +35,7 @@ from gait.learn.solve.skeleton_fit import NO_INFORMATION, PEOPLE, LengthInformat
 Files = list[tuple[Path, bool]]  #: paths, and whether each was found in a folder
 
 USED = " (its segments are used nevertheless)"
-ONLY = "for gait lift alone give --segments only: all also needs recordings for a cyclic model"
+ONLY = "for gait lift only, give --segments only: all also needs recordings for a cyclic model"
 NOT_YET = np.zeros((0, 0))  # channels of a sequence until they are read back from disk
 SAME_PERSON = np.log(10)  # names are right about persons ten times as often as they are wrong
 MOST_NAMES = 4  # of files in a line
@@ -159,8 +159,8 @@ def _lonely(sequences: list[Sequence]) -> dict[str, str]:
     """Return names of trials too short to be learnt without others of the person, and a line about each."""
     count = Counter(s.subject for s in sequences)
     return {
-        s.name: f"{s.source}: the trial is too short alone: {s.cycles:.2f} cycles (at least {CYCLES}); add "
-        f"more trials of {s.subject!r} (gait learn has --subjects), or leave it out"
+        s.name: f"{s.source}: the trial is too short by itself: {s.cycles:.2f} cycles (at least {CYCLES}); "
+        f"add more trials of {s.subject!r} (gait learn has --subjects), or leave it out"
         for s in sequences
         if s.short and count[s.subject] == 1
     }
@@ -271,7 +271,7 @@ def _other_lengths(person: str, bodies: list[list[Path]]) -> list[str]:
     most = max(bodies, key=len, default=[])
     return [
         f"{' '.join(map(str, files[:MOST_NAMES]))}{' ...' * (len(files) > MOST_NAMES)}: limb lengths differ "
-        f"from {most[0]}, which is also taken for {person!r}; measured separately. "
+        f"from {most[0]}, which also counts as {person!r}; measured separately. "
         "If these are two people, give each a folder (gait learn has --subjects)"
         for files in bodies
         if files is not most

@@ -32,7 +32,7 @@ def find(
         if source.is_dir():
             inside = sorted(_inside(source, closed))
             if not inside:
-                raise UserError(f"{source}: no motion files ({_kinds()}) in this folder; name another one")
+                raise UserError(f"{source}: no motion files ({_kinds()}) in this folder; name another folder")
             for path in inside:
                 found.setdefault(os.path.abspath(path), (path, True))
         elif not source.is_file():
@@ -41,7 +41,7 @@ def find(
             raise UserError(f"{source}: is a skeleton without motion; name the .amc files beside it")
         elif source.suffix.lower() not in SUFFIXES:
             raise UserError(
-                f"{source}: {source.suffix or 'no suffix'} is not learnt from; convert it to {_kinds()}"
+                f"{source}: {source.suffix or 'no suffix'} is not supported; convert it to {_kinds()}"
             )
         else:
             found[os.path.abspath(source)] = source, False
@@ -51,7 +51,7 @@ def find(
             warn(f"--exclude {glob}: no file's path ends like this")
     kept = [(p, inside) for p, inside in found.values() if not any(matches(p, glob) for glob in globs)]
     if not kept:
-        raise UserError(f"--exclude {' '.join(globs)}: leaves none of {len(found)} files; exclude less")
+        raise UserError(f"--exclude {' '.join(globs)}: leaves none of {len(found)} files; exclude fewer")
     return kept, closed
 
 

@@ -156,7 +156,7 @@ def _too_long(angles: Floats, fps: float, options: LearnOptions) -> str:
     if not verdict.legs(angles, frames) >= verdict.LEGS:
         return ""
     return (
-        f"strides of {frames / fps:.2f} s are longer than {longest:.3g} s, which are not looked for (see "
+        f"strides of {frames / fps:.2f} s are longer than {longest:.3g} s, which is the longest allowed (see "
         f"--fps unless it is {fps:g} frames per second)"
     )
 

@@ -111,7 +111,7 @@ def judge(
         if kind:
             evidence += _footing(feet, kind)
     if kind and yaw is not None and np.isfinite(yaw).any():
-        words = "it goes backwards, or left and right are swapped"
+        words = "the walk is backwards, or left and right are swapped"
         evidence.append(Evidence("ahead", float(np.nanmean(np.cos(yaw))), AHEAD, words=words))
     return Verdict(known, tuple(evidence))
 
@@ -132,7 +132,7 @@ def _repeating_steps(angles: Floats, found: Period) -> list[Evidence]:
     cycles, alike = len(angles) / found.frames, stride.step_repeats(angles, found.frames)
     return [
         Evidence("cycles", cycles, stride.SHORTEST, words="the trial is too short"),
-        Evidence("repeats", alike, REPEATS, words="left and right do not repeat each other"),
+        Evidence("repeats", alike, REPEATS, words="left and right steps do not match"),
     ]
 
 

@@ -128,7 +128,7 @@ def read_skeleton(path: Path) -> Skeleton:
             here.append((line, words))
     for name in (":units", ":root", ":bonedata", ":hierarchy"):
         if name not in sections:
-            raise UserError(f"{path}: section {name} is missing; the .asf is incomplete, fetch it again")
+            raise UserError(f"{path}: section {name} is missing; the .asf is incomplete, get it again")
     units = {words[0].lower(): (line, words[1:]) for line, words in sections[":units"]}
     degrees = _degrees(path, *units.get("angle", (0, ["deg"])))
     length = units.get("length", (0, ["1"]))

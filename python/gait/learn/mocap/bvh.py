@@ -55,7 +55,7 @@ class _Words:
     def next(self, expected: str | None = None) -> str:
         self.line, word = next(self.words, (self.line, ""))
         if not word:
-            raise UserError(f"{self.path}:{self.line}: the file ends too early; fetch it again")
+            raise UserError(f"{self.path}:{self.line}: the file ends too early; get it again")
         if expected and word.upper() != expected:
             raise UserError(
                 f"{self.path}:{self.line}: {quoted(word)} instead of {expected}; restore the file"

@@ -293,7 +293,7 @@ def _unique(path: Path, pairs: list[tuple[str, Any]]) -> dict[str, Any]:
     keys = [key for key, _ in pairs]
     twice = next((key for key in keys if keys.count(key) > 1), None)
     if twice is not None:
-        raise UserError(f"{path}: {twice!r} is there twice; remove one")
+        raise UserError(f"{path}: {twice!r} appears twice; remove one")
     return dict(pairs)
 
 

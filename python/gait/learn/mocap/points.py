@@ -73,7 +73,7 @@ def read_c3d(path: Path, fps: float | None = None) -> tuple[list[str], Floats, f
     if not (np.isfinite(rate) and rate > 0):
         raise UserError(f"{path}: {rate} frames per second; set POINT:RATE")
     if points.shape[1] < header.frames:
-        raise UserError(f"{path}: {points.shape[1]} of {header.frames} frames are there; fetch it again")
+        raise UserError(f"{path}: {points.shape[1]} of {header.frames} frames are there; get it again")
     return labels, np.swapaxes(points, 0, 1) * METRES[units.lower()], rate
 
 

@@ -139,10 +139,10 @@ def read_angles(path: Path, fps: float | None = None, zeros_missing: bool = Fals
     columns = _columns(table.names, ANGLES + ROOTS)
     lacking = next((name for name in LEGS if name not in columns), None)
     if lacking is not None:
-        raise UserError(f"{path}:1: no column {lacking}_deg or {lacking}_rad; add it, or leave the file out")
+        raise UserError(f"{path}:1: no column {lacking}_deg or {lacking}_rad; add it, or leave out the file")
     twice = next((name for name, found in columns.items() if len(found) > 1), None)
     if twice is not None:
-        raise UserError(f"{path}:1: {twice} is there as {' and '.join(columns[twice])}; remove one")
+        raise UserError(f"{path}:1: {twice} appears as {' and '.join(columns[twice])}; remove one")
     values = _in_radians(table, {name: found[0] for name, found in columns.items()})
     columned, zeros = {name: column[:, None] for name, column in values.items()}, ""
     if zeros_missing:
@@ -157,7 +157,7 @@ def read_angles(path: Path, fps: float | None = None, zeros_missing: bool = Fals
     _require_plausible(path, columns, values)
     empty = next((name for name in LEGS if not np.isfinite(values[name]).any()), None)
     if empty is not None:
-        raise UserError(f"{path}: column {columns[empty][0]} is empty; leave the file out")
+        raise UserError(f"{path}: column {columns[empty][0]} is empty; leave out the file")
     missing = np.full(len(table.values), np.nan)
     angles, root = (np.stack([values.get(n, missing) for n in names], axis=1) for names in (ANGLES, ROOTS))
     stature = table["stature_m"] if "stature_m" in table.names else missing
@@ -224,7 +224,7 @@ def read(path: Path, fps: float | None = None) -> Table:
         raise UserError(f"{path}:1: no column 'time'; the header must be frame,time,... (or give --fps)")
     twice = next((name for name in names if name and names.count(name) > 1), None)
     if twice is not None:
-        raise UserError(f"{path}:1: column {quoted(twice)} is there twice; remove one")
+        raise UserError(f"{path}:1: column {quoted(twice)} appears twice; remove one")
     values = np.array([_numbers(row, names, path, line) for line, row in rows])
     require_frames(path, len(values))
     lines = [line for line, _ in rows]

@@ -199,7 +199,7 @@ def pace_slope(filled: Floats, subject: Indices, paces: Floats, terms: int = TER
     channel = int(np.abs(slope).sum(axis=0).argmax())
     if np.abs(slope[:, channel]).sum() > STEEPEST:
         raise UserError(
-            f"{CHANNELS[channel]}: recordings of one person differ more than walks at two rates do; "
+            f"{CHANNELS[channel]}: recordings of one person differ more than walks at two rates can; "
             "remove turns of 360 degrees from the angles, or leave recordings out with --exclude"
         )
     return np.asarray(waves(terms, filled.shape[1]).T @ slope)

@@ -124,16 +124,16 @@ def notes(learned: Learned, options: LearnOptions) -> Iterator[str]:
     if options.components is None and kept < usual:
         yield f"{cycles} cycles allow {_count(kept, 'component')} instead of {usual}"
     if parts := model.unobserved(learned):
-        yield f"no recording shows {_words(parts)}: these stay in the rest pose"
+        yield f"no recording shows {_words(parts)}: they stay in the rest pose"
     if not learned.alignment.converged:
         passes = len(learned.alignment.objective)
         yield f"the alignment did not converge in {passes} passes; leave out recordings unlike the others"
     count, channels = people.never_shown(learned.cycles.mask, learned.row_subject)
     if names := model.parts(channels):
         shows = "person never shows" if count == 1 else "people never show"
-        yield f"{count} {shows} {_words(names)}: filled in from the others"
+        yield f"{count} {shows} {_words(names)}: estimated from the others"
     if made_up := made_up_channels(learned.cycles.visible):
-        yield f"no recording shows {' or '.join(made_up)}: taken from the motion of the legs"
+        yield f"no recording shows {' or '.join(made_up)}: computed from the motion of the legs"
 
 
 def require_filled(learned: Learned) -> None:
@@ -148,7 +148,7 @@ def require_filled(learned: Learned) -> None:
         what = f"{count} of {len(learned.subjects)} people ({who}) never show {_words(names)}"
         remedy = "leave some of them out with --exclude, add people who do"
     else:
-        what, remedy = "too little is observed of the cycles", "add recordings"
+        what, remedy = "too little of the cycles is observed", "add recordings"
     raise UserError(
         f"the filling of gaps did not converge in {passes} passes: {what}; {remedy}, or ask for fewer than "
         f"{kept} --components"

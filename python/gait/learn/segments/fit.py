@@ -48,8 +48,8 @@ def fit(recordings: Sequence[Recorded], wanted: SegmentOptions) -> SegmentPrior:
     if real < FEWEST:
         seconds = wanted.frames / wanted.fps
         raise UserError(
-            f"the recordings hold {real} segments of {seconds:g} s, fewer than {FEWEST}; add recordings, "
-            "or leave the prior out (--segments none)"
+            f"the recordings contain {real} segments of {seconds:g} s, fewer than {FEWEST}; add recordings, "
+            "or leave out the prior (--segments none)"
         )
     modes = min(wanted.modes, max(1, real // EACH))
     found = basis(filled(table.rows, modes), len(table.names))

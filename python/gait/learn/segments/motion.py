@@ -97,9 +97,9 @@ def of(
             pose, names = _pose_of_body(body, measures), MARKERS
             places = pose.places() + ((body.joints["pelvis"] - floor) / stature)[:, None]
     if wanted.markers == "recorded" and (not names or pose is not None):
-        raise UserError(f"{path}: holds no recorded markers; leave out --segment-markers recorded")
+        raise UserError(f"{path}: has no recorded markers; leave out --segment-markers recorded")
     if np.isfinite(hips).all(axis=(1, 2)).sum() < 2:
-        raise UserError(f"{path}: the hips are hardly visible; leave the file out")
+        raise UserError(f"{path}: the hips are hardly visible; leave out the file")
     sampled = resample(np.concatenate([places, hips], axis=1), read.fps, wanted.fps)
     places, left, right = sampled[:, :-2], sampled[:, -2], sampled[:, -1]
     heading = np.arctan2(right[:, 0] - left[:, 0], left[:, 1] - right[:, 1])

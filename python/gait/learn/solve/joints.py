@@ -66,13 +66,15 @@ def from_joints(path: Path, places: dict[str, Floats], fps: float) -> Body:
     lacking = tuple(joint for joint in JOINTS if joint not in columns)
     needed = next((joint for joint in NEEDED if joint in lacking), None)
     if needed is not None:
-        raise UserError(f"{path}: no joint {needed!r}; name one of its columns so, or leave the file out")
+        raise UserError(
+            f"{path}: no joint {needed!r}; give one of its columns this name, or leave out the file"
+        )
     frames = len(next(iter(places.values())))
     joints = {joint: bridged(places[columns[joint]], fps) for joint in columns}
     joints |= {joint: np.full((frames, 3), np.nan) for joint in lacking}
     empty = next((joint for joint in NEEDED if not np.isfinite(joints[joint]).any()), None)
     if empty is not None:
-        raise UserError(f"{path}: no values for joint {empty!r}; leave the file out")
+        raise UserError(f"{path}: no values for joint {empty!r}; leave out the file")
     hips, shoulders = (joints[f"l_{part}"] - joints[f"r_{part}"] for part in ("hip", "shoulder"))
     joints["pelvis"] = (joints["l_hip"] + joints["r_hip"]) / 2
     lateral = {"head": unit(shoulders)}

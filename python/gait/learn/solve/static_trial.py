@@ -52,7 +52,7 @@ class Calibration:
 def calibrate(path: Path, options: LearnOptions) -> Calibration:
     """Fit the skeleton to a static trial; UserError if its known markers do not determine the legs."""
     if path.suffix.lower() not in points.SUFFIXES:
-        raise UserError(f"--static {path}: is no {' or '.join(points.SUFFIXES)}; give the trial's markers")
+        raise UserError(f"--static {path}: is not {' or '.join(points.SUFFIXES)}; give the trial's markers")
     labels, places, fps = points.read(path, options.fps)
     rows = np.unique(np.linspace(0, len(places) - 1, FRAMES).round().astype(int))
     places = places[rows]

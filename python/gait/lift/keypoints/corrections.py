@@ -141,7 +141,7 @@ class EntryReader:
         fields.only(("frame", "joint", "uv", "sd_px"))
         joint = self._joint(fields)
         if not joint.endswith(FEET):
-            raise fields.fail("joint", f"is {joint!r}", "only a toe, heel or ankle stands on the floor")
+            raise fields.fail("joint", f"is {joint!r}", "only a toe, heel or ankle can stand on the floor")
         return FloorPin(self.frame(fields, "frame"), joint, self.pixel(fields, "uv"), _sd(fields))
 
     def _range(self, fields: Fields) -> tuple[int, int]:
@@ -153,7 +153,7 @@ class EntryReader:
     def frame(self, fields: Fields, key: str) -> int:
         """Give the number of a frame under a key."""
         frames = self._frames
-        remedy = f"give a frame that is used, {frames[0]} to {frames[-1]}, or other --start and --stop"
+        remedy = f"give a frame in the range used, {frames[0]} to {frames[-1]}, or other --start and --stop"
         return fields.integer(key, frames[0], frames[-1], remedy)
 
     def _joint(self, fields: Fields) -> str:
@@ -214,7 +214,7 @@ def read_edits(
         for number, entry in enumerate(listed, 1):
             what = f"{path}: {_called(key)} {number}"
             if not isinstance(entry, dict):
-                raise UserError(f"{what} is no object of keys; {_REMEDY}")
+                raise UserError(f"{what} is not an object of keys; {_REMEDY}")
             entries.append(read(reader, Fields(what, entry)))
         found[key] = tuple(entries)
     edits = Edits(**found)
@@ -247,7 +247,7 @@ def read_corrections(
     edits = read_edits(path, prior, range(first, stop), size)
     other = next((key for key in _LISTS if key != "corrections" and getattr(edits, key)), None)
     if other:
-        raise UserError(f"{path}: {other} is for keypoints, and pictures are lifted; remove it")
+        raise UserError(f"{path}: {other} is for keypoints, but images are lifted; remove it")
     return list(edits.corrections)
 
 
@@ -374,13 +374,13 @@ def pins(keypoints: Keypoints, edits: Edits, camera: Camera | None, prior: Segme
     if not edits.floor:
         return None
     if camera is None:
-        raise UserError("floor: needs the floor of a calibrated camera; give --camera, or remove the entries")
+        raise UserError("floor: needs a calibrated camera; give --camera, or remove the entries")
     rows_of = {int(frame): row for row, frame in enumerate(keypoints.frame)}
     row, place, sd = [], [], []
     for pin in edits.floor:
         at = camera.on_plane(np.array(pin.uv), 0.0)
         if pin.frame not in rows_of or not np.isfinite(at).all():
-            raise UserError(f"floor: {pin.joint} in frame {pin.frame} is at no point of the floor; remove it")
+            raise UserError(f"floor: {pin.joint} in frame {pin.frame} is not on the floor; remove it")
         beside = camera.on_plane(np.array(pin.uv) + [0.0, pin.sd_px], 0.0)
         along = float(np.linalg.norm(beside - at)) if np.isfinite(beside).all() else FLOOR_SD
         index = prior.index([pin.joint])[0]

@@ -225,7 +225,7 @@ def without_prior(
         if left:
             raise UserError(
                 f"the points seen in a segment determine {count - left} of {count} modes, and the likelihood "
-                "alone determines nothing about the others; give more points, or use --method blend"
+                "alone does not determine the others; give more points, or use --method blend"
             )
     return [flat.solve(each) for each in chosen]
 

@@ -128,7 +128,7 @@ def require_metres(
     away, height = float((camera.fx + camera.fy) / 2 * lengths[0]), float(camera.centre[2])
     if abs(height) > HIGH * away + stature + 3 * options.floor_sd:
         raise UserError(
-            f"the camera stands {height:.0f} m over the floor but sees a person {away:.2g} m away: give its "
+            f"the camera is {height:.0f} m above the floor but sees a person {away:.2g} m away: give its "
             "t in metres (R, t: world to camera, z up, floor at z = 0)"
         )
 
@@ -142,11 +142,13 @@ def require_visible(found: list[list[Explanation]], grid: Grid, keypoints: Keypo
                 f"{1 / step:.2g} frames per second with points are too few to follow a motion; give "
                 f"{np.ceil(1 / LONGEST_GAP):.0f} or more (and check time: seconds)"
             )
-        raise UserError(f"fewer than {FEWEST} points are seen in every segment; give more of the keypoints")
+        raise UserError(f"fewer than {FEWEST} points are visible in every segment; give more keypoints")
     empty = next((s for s, choices in enumerate(found) if not choices), None)
     if alone and empty is not None:
         at = grid.time[empty * grid.frames]
-        raise UserError(f"next to nothing is seen from {at:.2f} s on; use --method smooth across the gap")
+        raise UserError(
+            f"almost no points are visible from {at:.2f} s on; use --method smooth across the gap"
+        )
 
 
 def require_size(places: Floats, prior: SegmentPrior, stature: float) -> None:
@@ -154,7 +156,7 @@ def require_size(places: Floats, prior: SegmentPrior, stature: float) -> None:
     ratio = _extent(places) / (stature * _extent(prior.mean[0]))
     if not SIZES[0] < ratio < SIZES[1]:
         raise Unlike(
-            f"the estimate came out {ratio:.2f} times a person's size: the motion is unlike the model's, or "
+            f"the estimate is {ratio:.2f} times a person's size: the motion is unlike the model's, or "
             "the camera wrong (R, t: world to camera, t in metres?); learn a model with such motions, or use "
             "--method blend"
         )
@@ -300,8 +302,8 @@ def _numbers_in_range() -> Iterator[None]:
         yield
     except (np.linalg.LinAlgError, GaitError):
         raise Unlike(
-            "the keypoints look like no motion that the model knows; check the camera, the points' names and "
-            "that v points down"
+            "the keypoints do not fit any motion that the model knows; check the camera, the points' names "
+            "and that v points down"
         ) from None
 
 

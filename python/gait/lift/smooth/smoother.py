@@ -349,7 +349,7 @@ class Problem:
         guess = self.at_video(state.places)[:, self.visible.markers]
         observed = rows_of(self.view, self.points, near[:, self.visible.markers], scale, guess)
         if not len(observed.frame):
-            raise np.linalg.LinAlgError("no point is before the lens")
+            raise np.linalg.LinAlgError("no point is in front of the camera")
         factors = None
         if isinstance(self.view, Parallel) and self.view.scaled:
             observed, factors = scale_free(observed, near[:, self.visible.markers], scale)

@@ -126,7 +126,7 @@ def _in_picture(fields: Fields) -> dict[str, Any]:
     if "pelvis_px" not in fields:
         raise fields.fail("pelvis_px", "is missing", "give the pelvis in the picture, or --camera")
     u, v = fields.array("pelvis_px", (2,), "give column and row of the pelvis, pixels")
-    height = fields.number("height_px", 10.0, FURTHEST, "give how many pixels the person is high")
+    height = fields.number("height_px", 10.0, FURTHEST, "give the height of the person in pixels")
     return {"pelvis_px": (float(u), float(v)), "height_px": height}
 
 

@@ -158,7 +158,7 @@ def poor_correlation(request: Request, fit_correlation: float) -> str:
     return (
         f"{request.video}: the sensors hardly show the person (correlation with the stick figure "
         f"{fit_correlation:.2f}, {HELD:g} before a known background): the figure may have lost the person, "
-        f"and standard deviations are widened; check with --overlay and give {remedy}"
+        f"so standard deviations are widened; check with --overlay and give {remedy}"
     )
 
 
@@ -206,7 +206,7 @@ def _film(
     pelvis = np.append(placement.ground, placement.stature * prior.mean[0, 0, prior.index(["pelvis"])[0], 2])
     if not view.visible(pelvis):
         raise UserError(
-            f"{request.placement}: pelvis is behind the camera; give its place in the camera's world"
+            f"{request.placement}: pelvis is behind the camera; give its position in the camera's world"
         )
     height = placement.stature * view.scale(pelvis)
     _require_in_picture(request.placement, video, view.project(pelvis)[0], height)
@@ -228,7 +228,7 @@ def _require_in_picture(path: str, video: Video, pelvis: Floats, height: float) 
     wide, high = video.size
     if not SMALLEST <= height <= LARGEST * high:
         raise UserError(
-            f"{path}: the person would be {height:.3g} px tall in a picture of {wide}x{high}; give the place "
+            f"{path}: the person would be {height:.3g} px tall in a picture of {wide}x{high}; give position "
             f"and stature, or height_px, of a person of {SMALLEST:g} to {LARGEST * high:g} px"
         )
     if (np.maximum(-pelvis, pelvis - (wide - 1, high - 1)) > height / 2).any():
