@@ -75,5 +75,5 @@ def test_the_scene_of_another_camera_is_reported_once(tmp_path):
 
 def test_search_and_detection_are_reported(tmp_path):
     words = track(tmp_path, [*SCENE, *empty(0, 20), *later(range(45), 20)]).words
-    assert words.count("looking for a person who walks in full view") == 1
+    assert words.count("searching for a person who walks in full view") == 1
     assert words.count("person found at frame") == 1 and "differs" not in words

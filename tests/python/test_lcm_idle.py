@@ -56,12 +56,12 @@ def test_another_daemon_on_the_same_url_is_reported():
     rig.need_multicast()
     url = private_url()
     with rig.daemon(url) as (listener, finish), rig.daemon(url) as (_, finish_second):
-        listener.until(lambda: "another gait-trackd answers" in listener.last.text, "the report")
+        listener.until(lambda: "another gait-trackd uses" in listener.last.text, "the report")
         heard = len(listener.statuses)
         listener.until(lambda: len(listener.statuses) > heard + 6, "statuses of both")
         second = finish_second()
-        assert "another gait-trackd answers on this URL" in second.words
-        assert "another gait-trackd answers on this URL" in finish().words
+        assert "another gait-trackd uses on this URL" in second.words
+        assert "another gait-trackd uses on this URL" in finish().words
 
 
 def test_live_it_reports_where_it_listens_and_what_it_lacks():

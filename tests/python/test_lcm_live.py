@@ -199,7 +199,7 @@ def test_junk_does_not_flood_the_log_and_the_status(url):
         words, seconds = finish().words, time.monotonic() - begun
         assert len(listener.statuses) <= 25 * seconds + 3
         assert 10 <= words.count("damaged message") <= 10 * (seconds + 2)
-        assert sum(map(int, re.findall(r"(\d+) more lines, not written", words))) > 50
+        assert sum(map(int, re.findall(r"(\d+) more lines suppressed", words))) > 50
 
 
 def test_two_daemons_on_one_url_are_reported_by_both(url):

@@ -203,7 +203,7 @@ def test_a_camera_of_a_file_is_not_replaced(tmp_path):
     file = tmp_path / "camera.json"
     file.write_text(json.dumps(rig.CAMERA.scaled(0.5).to_dict()))
     outcome = announced(tmp_path, 20, "--camera", file)
-    assert outcome.frames == 0 and "that of --camera was announced and is ignored" in outcome.words
+    assert outcome.frames == 0 and "that of --camera was announced; it is ignored" in outcome.words
 
 
 def test_a_camera_with_too_many_pixels_is_refused_before_it_takes_memory(tmp_path):

@@ -92,7 +92,7 @@ def test_frames_in_gaps_and_breaks_are_predicted_and_late_poses_left_out(tmp_pat
     flagged = {one.frame: bool(one.flags & Flag.NO_IMAGE) for one in outcome.estimates}
     assert flagged == {0: False, 1: False, 2: False, 3: False, 10: True, 25: False, 26: False, 27: False}
     assert counts == (1, 1)
-    assert "out of order" in outcome.words and "no pose of the camera for 0.70 s" in outcome.words
+    assert "out of order" in outcome.words and "no camera pose for 0.70 s" in outcome.words
 
 
 def test_equal_poses_give_the_bits_of_a_still_camera(tmp_path):

@@ -85,7 +85,7 @@ def test_a_snapshot_of_another_camera_is_not_used(tmp_path):
     url = followed(tmp_path)
     (tmp_path / "camera.json").write_text(json.dumps(rig.CAMERA.scaled(0.5).to_dict()))
     with rig.daemon(url, *options(tmp_path, "--camera", tmp_path / "camera.json")) as (_, finish):
-        assert "of another camera than --camera" in finish().words
+        assert "for a camera other than --camera" in finish().words
 
 
 def test_a_folder_that_cannot_be_written_is_reported_once(tmp_path):
@@ -142,7 +142,7 @@ def test_a_service_manager_is_reported_and_settings_are_read_again(tmp_path, man
         feed(listener, 5, 7)
         outcome = finish()
         assert manager() == "STOPPING=1"
-    assert outcome.code == 0 and "settings are not read again" in outcome.words
+    assert outcome.code == 0 and "settings were not reloaded" in outcome.words
     assert "--particles many: give a whole number" in outcome.words
 
 

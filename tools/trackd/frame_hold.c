@@ -10,7 +10,7 @@ bool frame_hold_allocate(frame_hold *h, const gait_camera *camera, message *why)
     free(h->frame);
     *h = (frame_hold){.capacity = (size_t)camera->width * (size_t)camera->height * 3 + BESIDE_PIXELS};
     h->frame = malloc(h->capacity);
-    return h->frame || message_set(why, "not enough memory for a frame of %zu bytes that waits", h->capacity);
+    return h->frame || message_set(why, "not enough memory for a waiting frame of %zu bytes", h->capacity);
 }
 
 void frame_hold_close(frame_hold *h)

@@ -166,7 +166,7 @@ static bool check_result(const char *path, const service *s, message *why)
     if (s->tracked > 0 || (s->lift && s->lift->lifted > 0))
         return true;
     if (s->arrived == 0 && keypoints == 0)
-        return message_set(why, "%.120s: no frames on GAIT_IMAGE_%d%s; --stream chooses another camera", path,
+        return message_set(why, "%.120s: no frames on GAIT_IMAGE_%d%s; --stream selects another camera", path,
                            s->stream, s->lift ? " and no keypoints of a known camera" : "");
     if (s->arrived == 0)
         return message_set(why, "%.80s: none of its %" PRId64 " messages of keypoints was lifted: %.110s",
@@ -200,7 +200,7 @@ static bool run(receiver *r, const invocation *call, message *why)
         manager_report(quit == RELOAD ? "RELOADING=1" : "STOPPING=1");
         if (quit != RELOAD || settings_read(&again, call->argc, call->argv, &bad) == OPTION_OK)
             return true;
-        log_line("settings are not read again: %s", bad.text);
+        log_line("settings were not reloaded: %s", bad.text);
         manager_report("READY=1");
         quit = 0;
     }
@@ -278,7 +278,7 @@ int main(int argc, char **argv)
     if (ok && quit == RELOAD) {
         sigprocmask(SIG_SETMASK, &call.unblocked, NULL);
         execvp(argv[0], argv);
-        ok = message_set(&why, "%.200s: cannot be started again: %s", argv[0], strerror(errno));
+        ok = message_set(&why, "%.200s: cannot be restarted: %s", argv[0], strerror(errno));
     }
     if (!ok)
         log_line("%s", why.text);

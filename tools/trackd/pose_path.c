@@ -16,7 +16,7 @@ bool pose_path_add(pose_path *p, int64_t utime, const gait_camera *camera, messa
     int64_t const last = p->count > 0 ? pose_at(p, p->count - 1)->utime : INT64_MIN;
     if (p->count > 0 && utime <= last && utime > last - POSE_PATH_SET_BACK) {
         p->refused += utime < last; /* the same pose again is no fault */
-        return utime == last || message_set(why, "a pose of the camera arrived out of order and is left out; "
+        return utime == last || message_set(why, "a camera pose arrived out of order and was dropped; "
                                                  "stamp GAIT_CAMERA_<i> in order");
     }
     if (utime <= last)
@@ -94,7 +94,7 @@ static bool between(const timed_pose *a, const timed_pose *b, int64_t utime, gai
     for (int k = 0; k < 3; k++)
         way[k] = b->centre[k] - a->centre[k];
     if (b->utime - a->utime > POSE_PATH_GAP)
-        return message_set(why, "no pose of the camera for %.2f s: its frames are not used", seconds);
+        return message_set(why, "no camera pose for %.2f s: its frames are not used", seconds);
     if (length(way) > FASTEST * seconds || length(turn) > FASTEST * seconds)
         return message_set(why, "the camera jumped by %.2f m and %.0f degrees: frames between are not used",
                            length(way), length(turn) * 57.29578);
@@ -124,7 +124,7 @@ pose_answer pose_path_at(const pose_path *p, int64_t utime, gait_camera_pose *ou
     if (b->utime == utime)
         return POSE_KNOWN;
     if (i == first) {
-        message_set(why, "a frame is older than the first pose of the camera; announce poses before frames");
+        message_set(why, "a frame is older than the first camera pose; send poses before frames");
         return POSE_UNKNOWN;
     }
     return between(pose_at(p, i - 1), b, utime, out, why) ? POSE_KNOWN : POSE_UNKNOWN;
@@ -139,9 +139,8 @@ bool pose_path_now(pose_path *p, int64_t utime, gait_camera_pose *out, message *
         *out = last->sent;
         known = true;
     } else if (answer == POSE_LATER)
-        message_set(why,
-                    "no pose of the camera for a frame: send GAIT_CAMERA_<i> with the time of each frame, or "
-                    "twice a second and more often");
+        message_set(why, "no camera pose for a frame: send GAIT_CAMERA_<i> with the time of each frame, or "
+                         "at least twice a second");
     p->unknown += !known;
     return known;
 }

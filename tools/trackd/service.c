@@ -28,7 +28,7 @@ static bool may_log(service *s)
     int64_t const now = clock_monotonic();
     if (now - s->lines_since >= SECOND) {
         if (s->lines_left_out > 0)
-            log_line("%d more lines, not written", s->lines_left_out);
+            log_line("%d more lines suppressed", s->lines_left_out);
         s->lines_since = now;
         s->lines = s->lines_left_out = 0;
     }
@@ -62,7 +62,7 @@ static void set_idle(service *s)
         service_set_state(s, GAITMSG_STATUS_T_READY,
                           !s->seek ? "waiting for START"
                           : s->track.background.data || s->cue
-                              ? "waiting for a person who walks in, or for START"
+                              ? "waiting for a walking person, or for START"
                               : "waiting for the background to detect a person, or for START");
 }
 
@@ -223,7 +223,7 @@ void service_camera(service *s, const gaitmsg_camera_t *msg)
     }
     if (known && !replaces(s, &camera, msg->utime < 0 ? 0 : msg->utime)) {
         service_complain(
-            s, s->camera_fixed ? "a different camera from that of --camera was announced and is ignored"
+            s, s->camera_fixed ? "a camera other than that of --camera was announced; it is ignored"
                                : "a different camera from the one in use was announced: it replaces that one "
                                  "after 10 seconds in which only it is announced");
         return;
@@ -433,7 +433,7 @@ void service_send_estimate(service *s, const image_view *v, const gait_estimate 
         send_particles(s, v);
 }
 
-#define ANOTHER_DAEMON "another gait-trackd answers on this URL; stop it, or give each its own --url"
+#define ANOTHER_DAEMON "another gait-trackd uses this URL; stop it, or give each its own --url"
 
 void service_status(service *s, const gaitmsg_status_t *msg)
 {

@@ -90,7 +90,7 @@ static void leave(service *s)
 /* What happens after tracking has stopped. */
 static const char *next_start(const service *s)
 {
-    return s->seek ? "looking for a person again" : "send START";
+    return s->seek ? "searching for a person again" : "send START";
 }
 
 /* Whether this frame can follow the last one.  Too long a pause stops the tracker, and so does a clock set back as far, for
@@ -319,7 +319,7 @@ static void set_lack(const service *s, int idle, message *why)
     else if (idle == SERVICE_IDLE_START)
         message_set(why, "no START: send it on GAIT_COMMAND, or run with --init");
     else if (idle == SERVICE_IDLE_SCENE && s->path)
-        message_set(why, "--init auto needs keypoints to find a person before a camera that moves: run with "
+        message_set(why, "--init auto needs keypoints to find a person with a moving camera: run with "
                          "--keypoints-term, or send START on GAIT_COMMAND");
     else if (idle == SERVICE_IDLE_SCENE)
         message_set(why,
@@ -342,7 +342,7 @@ static void log_idle(service *s)
     s->idle = idle;
     set_lack(s, idle, &why);
     if (idle == SERVICE_IDLE_SEARCHING)
-        log_line("looking for a person who walks in full view");
+        log_line("searching for a person who walks in full view");
     else if (idle != SERVICE_IDLE_NOT)
         log_line("frames arrive, but %s", why.text);
 }

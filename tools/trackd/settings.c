@@ -98,35 +98,34 @@ static int make_table(settings *s, option *table)
 {
     const option own[] = {
         {"model", 'm', "FILE",
-         "model (.gait) made by `gait learn`, or a folder: its walk.gait, in paper mode its paper.gait;\n"
-         "        required",
+         "model (.gait) from `gait learn`, or a folder with walk.gait (in paper mode paper.gait); required",
          TEXT(model)},
         {"camera", 0, "FILE",
-         "camera JSON; without it the camera arrives on GAIT_CAMERA_<i> from `gait capture`, which\n"
-         "        also reads OpenCV YAML/XML and TOML",
+         "camera JSON; without it the camera comes on GAIT_CAMERA_<i> from `gait capture`, which also\n"
+         "        reads OpenCV YAML/XML and TOML",
          TEXT(camera)},
         {"background", 0, "FILE", "empty scene, PGM or PPM; without it GAIT_BACKGROUND_<i>",
          TEXT(background)},
         {"init", 0, "FILE|auto",
-         "state of the person at one frame (JSON); auto, the default: start when a person has walked\n"
-         "        through the empty scene in full view for a second, and again after losing them; with\n"
-         "        either, a START on GAIT_COMMAND also starts the tracker",
+         "state of the person in one frame (JSON); auto, the default: start when a person has walked\n"
+         "        through the empty scene in full view for a second, and again after losing them; a START\n"
+         "        on GAIT_COMMAND always starts the tracker, too",
          TEXT(init)},
         {"url", 0, "URL",
-         "LCM to listen on, default $LCM_DEFAULT_URL or " LINK_DEFAULT_URL ";\n"
-         "        file://LOG?speed=0 plays a log without dropping frames and then ends",
+         "LCM URL to listen on, default $LCM_DEFAULT_URL or " LINK_DEFAULT_URL ";\n"
+         "        file://LOG?speed=0 plays a log without dropping frames, and then ends",
          TEXT(url)},
         {"out", 0, "URL",
-         "LCM to publish on, default --url; when playing a log: nothing, or file://NEW?mode=w, or\n"
-         "        ?mode=a to append",
+         "LCM URL to publish on, default --url; when playing a log: none by default, or file://NEW?mode=w\n"
+         "        (?mode=a to append)",
          TEXT(out)},
         {"config", 0, "FILE",
          "TOML: lines `name = value` with the long names of these options; the command line takes\n"
          "        precedence",
          TEXT(config)},
         {"snapshot", 0, "FILE",
-         "live, with --init auto: keep the state of the tracker in FILE while a person is followed, and go\n"
-         "        on with it at the next start; a folder in memory, such as /run, spares the disk",
+         "live, with --init auto: save the state of the tracker in FILE while a person is followed, and\n"
+         "        resume from it at the next start; a folder in memory, such as /run, spares the disk",
          TEXT(snapshot)},
         {"snapshot-s", 0, "S", "seconds between two snapshots, default 1", OPTION_FLOAT, &s->snapshot_s, 0.1,
          3600},
@@ -153,8 +152,8 @@ static int make_table(settings *s, option *table)
          "        depend on timing; default: constant",
          INT(adapt_particles, 16, 1 << 20)},
         {"max-pixels", 0, "N",
-         "most pixels of a picture: a camera message that announces more is refused, so that it cannot\n"
-         "        take the memory; default 16777216",
+         "largest number of pixels of an image; a camera message with more is rejected, so that it\n"
+         "        cannot exhaust memory; default 16777216",
          INT(max_pixels, 1, CAMERA_PIXELS * CAMERA_PIXELS)},
         {"threads", 't', "N",
          "threads, default 1, which is also the default of --tasks; results do not depend on it",
@@ -164,36 +163,35 @@ static int make_table(settings *s, option *table)
          "        that the CPU has; results do not depend on it",
          INT(cpu_mask, 0, GAIT_CPU_BASE | GAIT_CPU_AVX2 | GAIT_CPU_AVX512)},
         {"max-gap", 0, "S",
-         "longest pause between frames, default 2 seconds: a pause longer than --max-dt is bridged by\n"
-         "        predictions of at most --max-dt each; after a longer pause, or when the clock is set back "
-         "as\n"
-         "        far, the tracker stops: --init auto looks for a person again, --init FILE waits for a "
-         "START",
+         "longest pause between frames, default 2 seconds. Pauses longer than --max-dt are bridged by\n"
+         "        predictions of at most --max-dt each. After a pause longer than S, or if the clock is set\n"
+         "        back by more, the tracker stops: --init auto searches again, --init FILE waits for START",
          OPTION_FLOAT, &s->max_gap, 0, 60},
         {"particles-channel", 0, "", "publish every particle on GAIT_PARTICLES", FLAG(particles_channel)},
         {"keypoints-term", 0, "",
-         "also use a detector's 2-D keypoints, GAIT_TRACKS_<i> with the capture time of the frame; a frame\n"
-         "        waits for its keypoints until the next one arrives",
+         "also use a detector's 2-D keypoints, from GAIT_TRACKS_<i> with the capture time of the frame; a\n"
+         "        frame waits for its keypoints until the next frame arrives",
          FLAG(keypoints_term)},
         {"keypoints-sd", 0, "PX",
-         "standard deviation of a keypoint with confidence 1, including how the detector's joints differ\n"
-         "        from the model's, default 4 pixels; not for messages that state it (tracks2_t)",
+         "standard deviation of a keypoint with confidence 1, including the difference between the\n"
+         "        detector's joints and the model's, default 4 pixels; not for messages that state it\n"
+         "        (tracks2_t)",
          OPTION_FLOAT, &s->keypoints_sd, 0.01, 1000},
         {"moving-camera", 0, "",
-         "the camera moves: GAIT_CAMERA_<i> has its pose at the time of each message, between which it is\n"
-         "        interpolated; a frame waits for its pose until the next one arrives",
+         "the camera moves: each message on GAIT_CAMERA_<i> gives its pose at that time; poses are\n"
+         "        interpolated, and a frame waits for its pose until the next frame arrives",
          FLAG(moving_camera)},
-        {"pose-turn-sd", 0, "DEG", "standard deviation of the direction of these poses, default 0 degrees",
+        {"pose-turn-sd", 0, "DEG", "standard deviation of the rotation of these poses, default 0 degrees",
          OPTION_FLOAT, &s->pose_turn_sd, 0, 10},
-        {"pose-place-sd", 0, "M", "standard deviation of their places, default 0 metres", OPTION_FLOAT,
+        {"pose-place-sd", 0, "M", "standard deviation of their positions, default 0 metres", OPTION_FLOAT,
          &s->pose_place_sd, 0, 1},
         {"lift", 0, "",
-         "also lift 2-D keypoints, GAIT_TRACKS_<i>, to 3-D joints with standard deviations on GAIT_LIFT,\n"
-         "        by the segment prior of the model",
+         "also lift 2-D keypoints from GAIT_TRACKS_<i> to 3-D joints with standard deviations on\n"
+         "        GAIT_LIFT, with the segment prior of the model",
          FLAG(lift)},
-        {"lift-model", 0, "FILE", "model with that segment prior, default --model", TEXT(lift_model)},
+        {"lift-model", 0, "FILE", "model with the segment prior, default --model", TEXT(lift_model)},
         {"lift-stature", 0, "M",
-         "stature of the person to lift, default the mean of the training set, metres", OPTION_FLOAT,
+         "stature of the person to lift in metres, default the mean of the training data", OPTION_FLOAT,
          &s->lift_stature, 0.5, 2.5},
         {"lift-sd", 0, "PX", "standard deviation of a keypoint with confidence 1, default 3 pixels; likewise",
          OPTION_FLOAT, &s->lift_sd, 0.01, 1000},
@@ -228,10 +226,9 @@ void settings_help(void)
         "(GAIT_ESTIMATE), smoothed estimates a few frames later (GAIT_ESTIMATE_LAG), the time, length and\n"
         "speed of each stride (GAIT_STRIDE), and GAIT_STATUS once a second.  Live, only the newest frame is\n"
         "tracked; the others are counted as dropped.\n"
-        "Accepts the commands START, STOP and RESET on GAIT_COMMAND.  SIGINT, SIGTERM or SIGHUP end the "
-        "program\n"
-        "with a summary; under a service manager SIGHUP reads --config again.  Exit codes: 0 ok, 1 failed,\n"
-        "2 usage.\n\n");
+        "Accepts the commands START, STOP and RESET on GAIT_COMMAND.  SIGINT, SIGTERM or SIGHUP end the\n"
+        "program with a summary; under a service manager SIGHUP reads --config again.  Exit codes: 0\n"
+        "success, 1 failure, 2 wrong usage.\n\n");
     options_help(table, count);
 }
 
@@ -240,7 +237,7 @@ static gait_mode mode(const settings *s)
     return strcmp(s->mode, "paper") == 0 ? GAIT_MODE_PAPER : GAIT_MODE_DEFAULT;
 }
 
-/* Refuse an option that has no effect without another one. */
+/* Reject an option that has no effect without another one. */
 static bool check_dependencies(const settings *s, message *why)
 {
     struct {
@@ -259,12 +256,12 @@ static bool check_dependencies(const settings *s, message *why)
         {"person", "keypoints-term", s->person > 0, s->keypoints_term},
         {"pose-turn-sd", "moving-camera", s->pose_turn_sd > 0, s->moving_camera},
         {"pose-place-sd", "moving-camera", s->pose_place_sd > 0, s->moving_camera},
-        {"lift", "a camera that stands still", s->lift, !s->moving_camera},
-        {"further-streams", "a camera that stands still", s->further_streams[0], !s->moving_camera},
+        {"lift", "a static camera", s->lift, !s->moving_camera},
+        {"further-streams", "a static camera", s->further_streams[0], !s->moving_camera},
         {"further-streams", "a background on GAIT_BACKGROUND_<i>, not --background", s->further_streams[0],
          !s->background[0]},
         {"snapshot", "a single camera", s->snapshot[0], !s->further_streams[0]},
-        {"background", "a camera that stands still", s->background[0], !s->moving_camera},
+        {"background", "a static camera", s->background[0], !s->moving_camera},
     };
     for (size_t i = 0; i < sizeof pair / sizeof *pair; i++)
         if (pair[i].given && !pair[i].there)
@@ -342,15 +339,16 @@ option_result settings_read(settings *s, int argc, char **argv, message *why)
     if (result != OPTION_OK)
         return result;
     bool const ok =
-        (s->model[0] || s->version || message_set(why, "--model FILE is required; `gait learn` makes one")) &&
+        (s->model[0] || s->version ||
+         message_set(why, "--model FILE is required; make one with `gait learn`")) &&
         (strcmp(s->mode, "paper") == 0 || strcmp(s->mode, "default") == 0 ||
          message_set(why, "--mode %.100s: give default or paper", s->mode)) &&
         (strncmp(link_url(s->url), "memq://", 7) != 0 ||
          message_set(why, "--url memq://: works only within one process; give udpm:// or file://")) &&
         (s->budget_ms == 0 || !link_is_log(link_url(s->url)) ||
-         message_set(why, "--budget-ms: a log is played without dropping frames; leave it out")) &&
+         message_set(why, "--budget-ms: a log is played without dropping frames; leave out --budget-ms")) &&
         (!s->snapshot[0] || !link_is_log(link_url(s->url)) ||
-         message_set(why, "--snapshot: a log is played from its start; leave it out")) &&
+         message_set(why, "--snapshot: a log is played from its start; leave out --snapshot")) &&
         check_dependencies(s, why) && choose_model(s, why) && check_logs(s, why) &&
         (s->adapt_particles <= s->tracker.particles ||
          message_set(why, "--adapt-particles %d: at most the %d of --particles", (int)s->adapt_particles,

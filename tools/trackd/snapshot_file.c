@@ -143,7 +143,7 @@ static bool fits(const service *s, const file_bytes *file, head *h, message *why
     if (h->stream != s->stream)
         return message_set(why, "of --stream %d", (int)h->stream);
     if (s->camera_fixed && !convert_same_camera(&h->camera, &s->track.config.camera[0]))
-        return message_set(why, "of another camera than --camera");
+        return message_set(why, "for a camera other than --camera");
     return camera_check(&h->camera, s->max_pixels, why);
 }
 

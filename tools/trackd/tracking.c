@@ -131,7 +131,7 @@ bool tracking_set_camera(tracking *t, const gait_camera *camera, message *why)
         status = gait_start_init(t->block + padded(bytes), start_bytes, t->model, &start, &t->start, &err);
     if (status != GAIT_OK) {
         drop_camera(t);
-        return message_set(why, "cannot make the tracker: %s (%s)", err.text, gait_result_name(status));
+        return message_set(why, "cannot create the tracker: %s (%s)", err.text, gait_result_name(status));
     }
     t->plate = t->block + before;
     t->pixels = t->plate + picture;
@@ -169,7 +169,7 @@ bool tracking_set_background(tracking *t, const gait_image *plate, message *why)
         memcpy(t->plate + (size_t)y * row, plate->data + (ptrdiff_t)y * plate->stride, row);
     t->background = (gait_image){t->plate, plate->width, plate->height, (int32_t)row, plate->format};
     gait_result const status = gait_tracker_set_background(t->tracker, 0, &t->background, NULL);
-    return status == GAIT_OK || message_set(why, "background refused: %s", gait_result_name(status));
+    return status == GAIT_OK || message_set(why, "background rejected: %s", gait_result_name(status));
 }
 
 bool tracking_start(tracking *t, const gait_state *mean, const gait_state *sd, int64_t utime, message *why)
