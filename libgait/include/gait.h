@@ -1,17 +1,16 @@
 /* gait.h - libgait: track walking people in calibrated video, in fixed memory, with the same bits on every run.
- *
- * Units: metres, radians, seconds, pixels; a name ending in utime is microseconds (as in LCM).  Matrices are
+  * Units: metres, radians, seconds, pixels; names ending in utime are in microseconds (as in LCM).  Matrices are
  * row-major.  World: right-handed, z up, ground z = 0.  Image row 0 is the top; pixel centres are at integers.
- * Memory: the library never allocates.  Ask gait_*_bytes(), give gait_*_init() that many bytes aligned to
- * GAIT_ALIGN; they must outlive the object and not move.  There is nothing to free.
+ * Memory: the library never allocates.  Call gait_*_bytes(), and give gait_*_init() that many bytes, aligned to
+ * GAIT_ALIGN.  They must outlive the object and must not move.  There is nothing to free.
  * Threads: a gait_model is immutable and may be shared; any other object takes one call at a time.
  * Results depend on input, configuration and seed - not on threads, addresses, time or CPU features.
- * Errors: a function returning gait_result gives GAIT_OK, or a negative error and then leaves its outputs alone.  Its
- * last parameter, `err`, may be NULL; on failure it receives one line of text.
+ * Errors: a function that returns gait_result returns GAIT_OK, or a negative error and then leaves its outputs
+ * unchanged.  Its last parameter, `err`, may be NULL; on failure it receives one line of text.
  *
- * Contents: errors, images and cameras, models, the tracker; then, for advanced use, resources, other calls of the
- * tracker, and the description of every struct that bindings read.  Lifting is in gait_lift.h,
- * threads are in gait_pool.h. */
+ * Contents: errors, images and cameras, models, the tracker; then, for advanced use, instruction sets, further calls
+ * of the tracker, and a description of every struct for bindings.  Lifting is in gait_lift.h, the automatic start in
+ * gait_start.h, threads in gait_pool.h. */
 #ifndef GAIT_H
 #define GAIT_H
 #include <stddef.h>
@@ -21,15 +20,15 @@
 #define GAIT_VERSION_MINOR 1
 #define GAIT_VERSION_PATCH 0
 #define GAIT_VERSION (GAIT_VERSION_MAJOR * 10000 + GAIT_VERSION_MINOR * 100 + GAIT_VERSION_PATCH)
-#define GAIT_ABI 9          /* SONAME; raised by any incompatible change below, struct layout included */
-#define GAIT_FORMAT_MAJOR 1 /* model blob: another major is refused, */
+#define GAIT_ABI 9          /* SONAME; raised by any incompatible change below, including struct layout */
+#define GAIT_FORMAT_MAJOR 1 /* model blob: another major is rejected, */
 #define GAIT_FORMAT_MINOR 0 /* sections added by a newer minor are skipped */
 
 #define GAIT_ALIGN 64          /* bytes, of models and of all memory given to the library */
 #define GAIT_MAX_JOINTS 32     /* points of the skeleton whose positions are reported */
 #define GAIT_MAX_ANGLES 32     /* joint angles */
 #define GAIT_MAX_COMPONENTS 16 /* principal components of the cyclic model */
-#define GAIT_MAX_PROPORTIONS 8 /* ways in which limbs differ in length */
+#define GAIT_MAX_PROPORTIONS 8 /* components of the variation of limb lengths */
 #define GAIT_MAX_CLASSES 8     /* classes of motion in a model */
 #define GAIT_MAX_CAMERAS 4
 
@@ -48,13 +47,13 @@
 extern "C" {
 #endif
 
-/* How structs are written here: each is a table with one row per field.  Declaration, defaults, range checks, bindings
- * and the help of the tools are all made from the rows, so each fact is stated once.  A row is one of
+/* Each struct is written as a table with one row per field.  Declaration, defaults, range checks, bindings and the help
+ * of the tools are all generated from the rows, so each fact is stated once.  A row is one of
  *     FIELD("meaning", type, name, [array], "unit")
  *     RANGE("meaning", type, name, [array], "unit", lowest, highest)
  *     SETTING("meaning", type, name, [array], "unit", default, lowest, highest)
  *     PAPER("meaning", type, name, [array], "unit", default, default of GAIT_MODE_PAPER, lowest, highest)
- * with an empty [array] for a single value, and NAN where no range is checked. */
+ * with an empty [array] for a single value, and NAN if no range is checked. */
 #define GAIT_DECLARE(meaning, type, name, array, ...) type name array;
 #define GAIT_VALUES(...) {__VA_ARGS__} /* default of an array */
 
@@ -90,7 +89,7 @@ GAIT_API uint32_t    gait_abi(void);
 /* ---- images, cameras, poses -------------------------------------------------------------------------- */
 typedef GAIT_ENUM(gait_pixel_format) { GAIT_GREY8 = 1, GAIT_RGB8 = 2, GAIT_BGR8 = 3 } gait_pixel_format;
 
-/* A picture that the caller owns. */
+/* An image owned by the caller. */
 #define GAIT_IMAGE_FIELDS(FIELD)                                                                                      \
     FIELD("Pixels, first row first; NULL: no image.",                                                                 \
           const uint8_t *, data, , "")                                                                                \
@@ -128,7 +127,7 @@ typedef struct gait_image { GAIT_IMAGE_FIELDS(GAIT_DECLARE) } gait_image;
 
 typedef struct gait_camera { GAIT_CAMERA_FIELDS(GAIT_DECLARE) } gait_camera;
 
-/* State of a person: everything that places and poses the body.  gait_tracker_start() checks the ranges. */
+/* State of a person: position and pose of the body.  gait_tracker_start() checks the ranges. */
 #define GAIT_STATE_FIELDS(RANGE)                                                                                      \
     RANGE("Phase of the stride in [0, 1); 0: right heel strike.",                                                     \
           float, phase, , "strides", 0, 1)                                                                            \
@@ -138,9 +137,9 @@ typedef struct gait_camera { GAIT_CAMERA_FIELDS(GAIT_DECLARE) } gait_camera;
           float, stature, , "metres", 0.5, 2.5)                                                                       \
     RANGE("Walking direction about world z; 0: along +x.",                                                            \
           float, heading, , "radians", -7, 7)                                                                         \
-    RANGE("Tilt of the pelvis about its lateral axis beyond the model's own.",                                        \
+    RANGE("Tilt of the pelvis about its lateral axis relative to the model's.",                                       \
           float, pitch, , "radians", -10, 10)                                                                         \
-    RANGE("Tilt of the pelvis about its forward axis beyond the model's own.",                                        \
+    RANGE("Tilt of the pelvis about its forward axis relative to the model's.",                                       \
           float, roll, , "radians", -10, 10)                                                                          \
     RANGE("Rate of change of the heading; poses do not depend on it.",                                                \
           float, turn_rate, , "radians per second", -10, 10)                                                          \
@@ -167,11 +166,11 @@ typedef struct gait_state { GAIT_STATE_FIELDS(GAIT_DECLARE) } gait_state;
 typedef struct gait_pose { GAIT_POSE_FIELDS(GAIT_DECLARE) } gait_pose;
 
 /* ---- models ------------------------------------------------------------------------------------------ */
-/* An immutable view of a blob, used where it lies.  A blob holds a cyclic model, to track with, a segment prior, to
- * lift with, or both. */
+/* An immutable view of a blob, which is used in place.  A blob contains a cyclic model (for tracking), a segment prior
+ * (for lifting), or both. */
 typedef struct gait_model gait_model;
 
-/* What a model holds. */
+/* Contents of a model. */
 #define GAIT_MODEL_INFO_FIELDS(FIELD)                                                                                 \
     FIELD("Reported points of the skeleton.",                                                                         \
           int32_t, joints, , "")                                                                                      \
@@ -193,13 +192,13 @@ typedef struct gait_model gait_model;
           float, stride_length, , "statures")                                                                         \
     FIELD("Stride length: standard deviation between subjects.",                                                      \
           float, stride_length_sd, , "statures")                                                                      \
-    FIELD("1, or 0 for a segment prior alone, with which nothing can be tracked; all above is then 0.",               \
+    FIELD("1; 0: only a segment prior, no tracking; all fields above are then 0.",                                    \
           int32_t, cyclic, , "")                                                                                      \
-    FIELD("Bit i: angle i is of the trunk or an arm, where posture differs most between people.",                     \
+    FIELD("Bit i: angle i belongs to the trunk or an arm, where posture varies most.",                                \
           uint32_t, posture_angles, , "mask")                                                                         \
     FIELD("Classes of motion.",                                                                                       \
           int32_t, classes, , "")                                                                                     \
-    FIELD("Way of the phase: 1 forwards, -1 backwards, 0 standing still.",                                            \
+    FIELD("Direction of the phase: 1 forwards, -1 backwards, 0 standing.",                                            \
           int32_t, direction, , "")                                                                                   \
     FIELD("Hash of the blob; snapshots carry it.",                                                                    \
           uint64_t, digest, , "")
@@ -214,7 +213,7 @@ GAIT_API gait_result gait_model_get_info(const gait_model *m, gait_model_info *o
 GAIT_API const char *gait_model_joint_name(const gait_model *m, int32_t joint); /* NULL: out of range */
 GAIT_API const char *gait_model_angle_name(const gait_model *m, int32_t angle); /* NULL: out of range */
 GAIT_API const char *gait_model_limb_name(const gait_model *m, int32_t limb);   /* NULL: out of range */
-/* Name of a class of motion; of a blob without names "walk".  NULL: out of range. */
+/* Name of a class of motion; "walk" for a blob without names.  NULL: out of range. */
 GAIT_API const char *gait_model_class_name(const gait_model *m, int32_t motion_class);
 /* The same model with the statistics of one of its classes, for gait_model_get_info(); NULL: out of range. */
 GAIT_API const gait_model *gait_model_of_class(const gait_model *m, int32_t motion_class);
@@ -222,28 +221,28 @@ GAIT_API const gait_model *gait_model_of_class(const gait_model *m, int32_t moti
 GAIT_API gait_result gait_model_angle_mask(const gait_model *m, const char *names, uint32_t *mask, gait_error *err);
 /* Pose of a state: curves (Ormoneit et al. 2000, eq. 3), then forward kinematics. */
 GAIT_API gait_result gait_model_pose(const gait_model *m, const gait_state *s, gait_pose *out, gait_error *err);
-/* Height of the pelvis over the ground that the model predicts for s, metres; s->pelvis is not read. */
+/* Height of the pelvis above the ground that the model predicts for s, metres; s->pelvis is not read. */
 GAIT_API gait_result gait_model_pelvis_height(const gait_model *m, const gait_state *s, float *out, gait_error *err);
-/* Draw a state with the model's own radii: every pixel of ids (width x height of the camera, ids_stride bytes per row)
- * becomes 0 or limb index + 1, the nearest limb in front.  The camera is taken as an ideal pinhole. */
+/* Draw a state with the model's radii: every pixel of ids (width x height of the camera, ids_stride bytes per row)
+ * becomes 0, or 1 + the index of the nearest limb.  The camera is treated as an ideal pinhole. */
 GAIT_API gait_result gait_render(const gait_model *m, const gait_camera *cam, const gait_state *s, uint8_t *ids,
                                  int32_t ids_stride, gait_error *err);
 
 /* ---- tracker (Ormoneit et al. 2000) ------------------------------------------------------------------ */
 typedef struct gait_tracker gait_tracker;
-/* Two sets of defaults: those of this library, and the likelihood and dynamics of the paper. */
+/* Two sets of defaults: the library's, and the likelihood and dynamics of the paper. */
 typedef GAIT_ENUM(gait_mode) { GAIT_MODE_DEFAULT = 0, GAIT_MODE_PAPER = 1 } gait_mode;
 
 /* Terms of the likelihood. */
-#define GAIT_TERM_TEXTURE    0x1u  /* the previous frame's texture moved by each particle, eqs. 10-13 */
-#define GAIT_TERM_SILHOUETTE 0x2u  /* foreground against the body, both ways; needs a background */
+#define GAIT_TERM_TEXTURE    0x1u  /* texture of the previous frame, moved by each particle, eqs. 10-13 */
+#define GAIT_TERM_SILHOUETTE 0x2u  /* foreground outside and background inside the body; needs a background */
 #define GAIT_TERM_EDGES      0x4u  /* image gradient along the limbs' outlines */
 #define GAIT_TERM_TEMPLATE   0x8u  /* running appearance of each limb */
-#define GAIT_TERM_KEYPOINTS  0x10u /* joints found in the images by a detector, gait_frame keypoints */
+#define GAIT_TERM_KEYPOINTS  0x10u /* joints that a detector found in the images, gait_frame keypoints */
 #define GAIT_TERMS_DEFAULT (GAIT_TERM_TEXTURE | GAIT_TERM_SILHOUETTE | GAIT_TERM_EDGES | GAIT_TERM_TEMPLATE)
 
-/* Where the library finds threads: run() calls fn(ctx, i) exactly once for each i in [0, count), in any order, on any
- * threads, and returns when all have returned.  run NULL: the calling thread does the work. */
+/* Source of threads: run() calls fn(ctx, i) exactly once for each i in [0, count), in any order, on any threads, and
+ * returns when all calls have returned.  run NULL: the calling thread does the work. */
 typedef void gait_task_fn(void *ctx, int32_t task);
 typedef void gait_run_fn(void *user, gait_task_fn *fn, void *ctx, int32_t count);
 #define GAIT_TASKS_FIELDS(FIELD)                                                                                      \
@@ -261,13 +260,13 @@ typedef struct gait_tasks { GAIT_TASKS_FIELDS(GAIT_DECLARE) } gait_tasks;
           uint64_t, struct_size, , "bytes")                                                                           \
     FIELD("Set of defaults, set by gait_tracker_default().",                                                          \
           gait_mode, mode, , "")                                                                                      \
-    PAPER("Particles: states that the filter carries.  Time grows in proportion.",                                    \
+    PAPER("Number of particles.  Time is proportional to it.",                                                        \
           int32_t, particles, , "", 2000, 10000, 16, 1 << 20)                                                         \
     SETTING("Seed of the random numbers.",                                                                            \
           uint64_t, seed, , "", 1, NAN, NAN)                                                                          \
     SETTING("Cameras that see the person.",                                                                           \
           int32_t, cameras, , "", 1, 1, GAIT_MAX_CAMERAS)                                                             \
-    SETTING("Pieces of a step that can run at once, as many as exec has threads; each takes 0.1 MB if exec is set.",  \
+    SETTING("Parts of a step that can run in parallel, one per thread of exec; each takes 0.1 MB if exec is set.",    \
           int32_t, tasks, , "", 8, 1, 256)                                                                            \
     SETTING("Frames that gait_tracker_lagged() can go back; 0: none.",                                                \
           int32_t, lag, , "frames", 5, 0, 64)                                                                         \
@@ -275,14 +274,14 @@ typedef struct gait_tasks { GAIT_TASKS_FIELDS(GAIT_DECLARE) } gait_tasks;
           uint32_t, terms, , "mask", GAIT_TERMS_DEFAULT, GAIT_TERM_TEXTURE, NAN, NAN)                                 \
     FIELD("The cameras; the first `cameras` are used.",                                                               \
           gait_camera, camera, [GAIT_MAX_CAMERAS], "")                                                                \
-    FIELD("Where threads come from; results do not depend on it.",                                                    \
+    FIELD("Source of threads; results do not depend on it.",                                                          \
           gait_tasks, exec, , "")                                                                                     \
     SETTING("Limb radii as a multiple of the model's; clothes widen them.",                                           \
           float, girth, , "", 1, 0.5, 2)                                                                              \
     SETTING("Longest accepted interval between two frames.",                                                          \
           float, max_dt, , "seconds", 0.5, 1e-3, 10)                                                                  \
-    /* ---- advanced settings: which parts of the model vary ---- */                                                  \
-    PAPER("Angles whose posture varies, bit i: angle i; -1: those of gait_model_info posture_angles.",                \
+    /* ---- advanced settings: parts of the model that vary ---- */                                                   \
+    PAPER("Angles whose posture varies; bit i: angle i; -1: gait_model_info posture_angles.",                         \
           int64_t, offset_angles, , "mask", -1, 0, -1, UINT32_MAX)                                                    \
     PAPER("During acquisition, until left and right are known, particles are doubled up to this number.",             \
           int32_t, acquisition_particles, , "", 4000, 0, 0, 1 << 20)                                                  \
@@ -311,7 +310,7 @@ typedef struct gait_tasks { GAIT_TASKS_FIELDS(GAIT_DECLARE) } gait_tasks;
           float, evidence_time, , "seconds", 0.1, 0, 0, 1e6)                                                          \
     PAPER("Time constant after which particles no longer depend on one ancestor; 0: no rejuvenation.",                \
           float, rejuvenation_time, , "seconds", 1.5, 0, 0, 1e6)                                                      \
-    PAPER("What the model cannot express, added in quadrature to the reported joint_sd.",                             \
+    PAPER("Model error, added in quadrature to the reported joint_sd.",                                               \
           float, joint_sd_model, , "statures", 0.015, 0, 0, 1)                                                        \
     /* ---- advanced settings: dynamics (eqs. 5-9): standard deviations of random walks, time constants ---- */       \
     PAPER("Random walk of the phase.",                                                                                \
@@ -350,22 +349,22 @@ typedef struct gait_tasks { GAIT_TASKS_FIELDS(GAIT_DECLARE) } gait_tasks;
           float, offset_noise, , "standard deviations per sqrt(second)", 0.58, 0, 100)                                \
     SETTING("Random walk of the proportions' scores, which return to a standard deviation of 1.",                     \
           float, proportion_noise, , "standard deviations per sqrt(second)", 0.15, 0, 100)                            \
-    SETTING("Share of each stride that a belt takes back: 0 on the floor, 1 on a treadmill.",                         \
+    SETTING("Share of each stride that a belt cancels: 0 on the floor, 1 on a treadmill.",                            \
           double, belt, , "", 0, 0, 1)                                                                                \
     SETTING("1: frames come in reverse order, as from a file; utime still increases from frame to frame.",            \
           double, reverse, , "", 0, 0, 1)                                                                             \
-    /* ---- paper mode: what eqs. 10-12 leave to be determined ---- */                                                \
+    /* ---- paper mode: parameters that eqs. 10-12 do not specify ---- */                                             \
     SETTING("Paper mode: density of the image of a hidden limb, p_occluded of eq. 12.",                               \
           float, occluded_density, , "1 per grey level", 0.01, 0x1p-20, 1)                                            \
-    SETTING("Paper mode: by how much the surface of a limb changes from frame to frame (eq. 11).",                    \
+    SETTING("Paper mode: change of a limb's surface from frame to frame (eq. 11).",                                   \
           float, surface_sd, , "grey levels", 14, 0, 255)                                                             \
     SETTING("Paper mode: growth of the variance of surface_sd with the squared tangent of the angle to the image.",   \
           float, surface_tilt, , "", 0.99, 0, 1e3)                                                                    \
     SETTING("Paper mode: surface points compared on a limb that faces the camera, n_s of eq. 10.",                    \
           int32_t, limb_points, , "", 16, 2, 16)                                                                      \
-    SETTING("Paper mode: lost where the picture under the body stayed rather than moved, by so much more; 0: never.", \
+    SETTING("Paper mode: lost if the image under the body more likely stayed than moved, by so much; 0: never.",      \
           float, stayed_nats, , "nats", 2.5, 0, 1e6)                                                                  \
-    PAPER("Share of a start's standard deviation of the scores with which they are drawn.",                           \
+    PAPER("Factor on the standard deviation of the scores when a start draws them.",                                  \
           float, coef_start, , "", 1, 0.3, 0, 1)
 
 typedef struct gait_tracker_config {
@@ -378,25 +377,25 @@ typedef struct gait_tracker_config {
           float, u, , "pixels")                                                                                       \
     FIELD("Row in the image as captured (distorted).",                                                                \
           float, v, , "pixels")                                                                                       \
-    FIELD("Standard deviation, with what separates the detector's joint from the model's; not positive: unobserved.", \
+    FIELD("Standard deviation, including that between the detector's joint and the model's; <= 0: unobserved.",       \
           float, sd, , "pixels")
 
 typedef struct gait_keypoint { GAIT_KEYPOINT_FIELDS(GAIT_DECLARE) } gait_keypoint;
 
-/* Where a camera is in one frame. */
+/* Pose of a camera in one frame. */
 #define GAIT_CAMERA_POSE_FIELDS(RANGE)                                                                                \
     RANGE("Rotation from world to camera, row-major.",                                                                \
           float, R, [9], "", -2, 2)                                                                                   \
     RANGE("World origin in camera coordinates.",                                                                      \
           float, t, [3], "metres", -1e4, 1e4)                                                                         \
-    RANGE("Standard deviation of its direction, about each axis; 0: exact.",                                          \
+    RANGE("Standard deviation of the rotation about each axis; 0: exact.",                                            \
           float, turn_sd, , "radians", 0, 1)                                                                          \
-    RANGE("Standard deviation of each coordinate of its place; 0: exact.",                                            \
+    RANGE("Standard deviation of each coordinate of its position; 0: exact.",                                         \
           float, place_sd, , "metres", 0, 10)
 
 typedef struct gait_camera_pose { GAIT_CAMERA_POSE_FIELDS(GAIT_DECLARE) } gait_camera_pose;
 
-/* What is observed at one time.  Fields left at 0 are not given. */
+/* Observations at one time.  A field of 0 is not given. */
 #define GAIT_FRAME_FIELDS(FIELD)                                                                                      \
     FIELD("Size of this struct in the caller's header; 0: this one.",                                                 \
           uint64_t, struct_size, , "bytes")                                                                           \
@@ -404,17 +403,17 @@ typedef struct gait_camera_pose { GAIT_CAMERA_POSE_FIELDS(GAIT_DECLARE) } gait_c
           int64_t, utime, , "microseconds")                                                                           \
     FIELD("Image of each camera; data NULL: that camera missed this frame.",                                          \
           gait_image, image, [GAIT_MAX_CAMERAS], "")                                                                  \
-    FIELD("The model's joints in order, for GAIT_TERM_KEYPOINTS; NULL: none.  Read if the camera has an image.",      \
+    FIELD("The model's joints in order, for GAIT_TERM_KEYPOINTS; NULL: none.  Used if the camera has an image.",      \
           const gait_keypoint *, keypoints, [GAIT_MAX_CAMERAS], "")                                                   \
-    FIELD("Where each camera is in this frame; NULL: where the config puts it.  The state stays in the world.",       \
+    FIELD("Pose of each camera in this frame; NULL: the config's.  The state stays in world coordinates.",            \
           const gait_camera_pose *, pose, [GAIT_MAX_CAMERAS], "")                                                     \
-    FIELD("Empty scene as each camera sees it in this frame; data NULL: that of gait_tracker_set_background().",      \
+    FIELD("Empty scene seen by each camera in this frame; data NULL: that of gait_tracker_set_background().",         \
           gait_image, background, [GAIT_MAX_CAMERAS], "")
 
 typedef struct gait_frame { GAIT_FRAME_FIELDS(GAIT_DECLARE) } gait_frame;
 
-/* INIT: the track is settling.  AMBIGUOUS: left and right are open, two hypotheses fit about equally, or the person may
- * face the other way.  LOST: the images do not support the person any more. */
+/* INIT: the track is settling.  AMBIGUOUS: left and right are unknown, two hypotheses fit about equally, or the person
+ * may face the other way.  LOST: the images no longer support the estimate. */
 typedef GAIT_ENUM(gait_track_status) {
     GAIT_TRACK_INIT = 0, GAIT_TRACK_TRACKING = 1, GAIT_TRACK_AMBIGUOUS = 2, GAIT_TRACK_LOST = 3
 } gait_track_status;
@@ -422,9 +421,9 @@ typedef GAIT_ENUM(gait_track_status) {
 #define GAIT_EST_RESAMPLED  0x1u
 #define GAIT_EST_NO_IMAGE   0x2u /* prediction only */
 #define GAIT_EST_DEGENERATE 0x4u /* effective sample size below 2 */
-#define GAIT_EST_UNSUPPORTED 0x8u /* the images do not show the person where the estimate is */
+#define GAIT_EST_UNSUPPORTED 0x8u /* the images do not show a person at the estimate */
 
-/* What the tracker knows after a frame. */
+/* Estimate after a frame. */
 #define GAIT_ESTIMATE_FIELDS(FIELD)                                                                                   \
     FIELD("Capture time.",                                                                                            \
           int64_t, utime, , "microseconds")                                                                           \
@@ -438,9 +437,9 @@ typedef GAIT_ENUM(gait_track_status) {
           gait_state, sd, , "")                                                                                       \
     FIELD("Particle with the largest weight.",                                                                        \
           gait_state, best, , "")                                                                                     \
-    FIELD("Joints: posterior mean (paper mode: without root motion).  Angles: of the dominant hypothesis.",           \
+    FIELD("Joints: posterior mean (paper mode: without root motion).  Angles: dominant hypothesis.",                  \
           gait_pose, pose, , "")                                                                                      \
-    FIELD("Standard deviation of the joints, with joint_sd_model and, of a single camera, the uncertainty of size.",  \
+    FIELD("Standard deviation of the joints, with joint_sd_model and, for a single camera, uncertainty of size.",     \
           float, joint_sd, [GAIT_MAX_JOINTS][3], "metres")                                                            \
     FIELD("Effective sample size after weighting.",                                                                   \
           float, ess, , "particles")                                                                                  \
@@ -454,45 +453,45 @@ typedef GAIT_ENUM(gait_track_status) {
           gait_track_status, status, , "")                                                                            \
     FIELD("Events of this step, GAIT_EST_*.",                                                                         \
           uint32_t, flags, , "mask")                                                                                  \
-    FIELD("Most probable class of motion, that of the mean.",                                                         \
+    FIELD("Most probable class of motion, the mean's.",                                                               \
           int32_t, motion_class, , "")                                                                                \
     FIELD("Probability of each class of motion; unused ones are 0.",                                                  \
           float, class_probability, [GAIT_MAX_CLASSES], "")
 
 typedef struct gait_estimate { GAIT_ESTIMATE_FIELDS(GAIT_DECLARE) } gait_estimate;
 
-/* Fill the first cfg_bytes of a config with the defaults; use gait_tracker_default(), which gives them their size. */
+/* Fill the first cfg_bytes of a config with the defaults; called by gait_tracker_default(), which knows the size. */
 GAIT_API void gait_tracker_fill(gait_tracker_config *cfg, size_t cfg_bytes, gait_mode mode);
 static inline void gait_tracker_default(gait_tracker_config *cfg, gait_mode mode)
 {
     gait_tracker_fill(cfg, sizeof *cfg, mode);
 }
 
-/* A config of an older, shorter gait.h is accepted; the fields that it lacks have their defaults. */
+/* A config from an older, shorter gait.h is accepted; the fields that it lacks get their defaults. */
 GAIT_API gait_result gait_tracker_bytes(const gait_model *m, const gait_tracker_config *cfg, size_t *bytes,
                                         gait_error *err);
 GAIT_API gait_result gait_tracker_init(void *mem, size_t mem_bytes, const gait_model *m,
                                        const gait_tracker_config *cfg, gait_tracker **out, gait_error *err);
-/* Empty scene of one camera as captured (distorted), where the config puts it: in a frame of another pose it does not
- * count.  Its pixels are borrowed until it is replaced or the tracker is done.  plate NULL: none; without one the
- * silhouette term has no effect.  Snapshots do not hold it. */
+/* Empty scene of one camera as captured (distorted), at the pose in the config; it is not used for frames with another
+ * pose.  Its pixels are borrowed until it is replaced or the tracker is no longer used.  plate NULL: none; the
+ * silhouette term then has no effect.  Snapshots do not contain it. */
 GAIT_API gait_result gait_tracker_set_background(gait_tracker *t, int32_t camera, const gait_image *plate,
                                                  gait_error *err);
-/* Broad prior: phase uniform, stride rate and stature of people in general, heading unknown, pelvis at the origin. */
+/* Broad prior: uniform phase, average stride rate and stature, unknown heading, pelvis at the origin. */
 GAIT_API gait_result gait_tracker_prior(const gait_model *m, gait_state *mean, gait_state *sd, gait_error *err);
-/* Draw the particles from independent normals; a phase or heading whose sd is a half turn or more is uniform.  Means
- * are in the ranges of gait_state, standard deviations in [0, 10]. */
+/* Draw the particles from independent normals; a phase or heading with an sd of half a turn or more is uniform.  Means
+ * must be in the ranges of gait_state, standard deviations in [0, 10]. */
 GAIT_API gait_result gait_tracker_start(gait_tracker *t, const gait_state *mean, const gait_state *sd, int64_t utime,
                                         gait_error *err);
-/* One frame: resample, rejuvenate, predict, weight, estimate.  A first frame at the start's time is not moved. */
+/* One frame: resample, rejuvenate, predict, weight, estimate.  A first frame at the start's time is not predicted. */
 GAIT_API gait_result gait_tracker_step(gait_tracker *t, const gait_frame *frame, gait_estimate *out, gait_error *err);
-/* Estimate of the frame `back` steps ago in [0, config lag] given every frame since, by today's weights of its
- * particles' descendants; 0: the present.  GAIT_ERR_STATE: fewer steps since the start.  ess counts the ancestors that
- * are left; a status of LOST stays, others depend on the hypothesis weight as known now. */
+/* Estimate of the frame `back` steps ago, in [0, config lag], given every frame since: its particles have the present
+ * weights of their descendants.  0: the present frame.  GAIT_ERR_STATE: fewer steps since the start.  ess counts the
+ * remaining ancestors; a status of LOST stays, others depend on the present hypothesis weight. */
 GAIT_API gait_result gait_tracker_lagged(gait_tracker *t, int32_t back, gait_estimate *out, gait_error *err);
 
 /* ---- advanced: instruction sets ---------------------------------------------------------------------- */
-/* The best set that both the CPU and config cpu_mask have is used. */
+/* The tracker uses the best set that both the CPU and config cpu_mask have. */
 #define GAIT_CPU_BASE   0x1u /* of every CPU of the architecture: SSE2, NEON */
 #define GAIT_CPU_AVX2   0x2u /* and POPCNT, BMI2 */
 #define GAIT_CPU_AVX512 0x4u /* F, BW, DQ, VL, VBMI, VPOPCNTDQ, BITALG */
@@ -500,20 +499,20 @@ GAIT_API uint32_t    gait_cpu_features(void);      /* GAIT_CPU_* of this CPU and
 GAIT_API const char *gait_cpu_name(uint32_t mask); /* what cpu_mask gives here: "scalar", "base", "avx2" or "avx512" */
 
 /* ---- advanced: particles, snapshots, replay ---------------------------------------------------------- */
-/* Continue with another number of particles in [16, config particles], drawn in the next step by their weights.  While
- * two left/right hypotheses compete the change waits.  A start keeps it. */
+/* Continue with another number of particles in [16, config particles], drawn by weight in the next step.  The change
+ * waits while there are two left/right hypotheses.  A start keeps it. */
 GAIT_API gait_result gait_tracker_set_particles(gait_tracker *t, int32_t particles, gait_error *err);
 /* Copy up to cap particles with normalised weights; returns how many there are, or a negative gait_result. */
 GAIT_API int32_t     gait_tracker_particles(const gait_tracker *t, gait_state *s, float *weight, int32_t cap,
                                             gait_error *err);
-/* Move n states by dt seconds in [0, config max_dt] as the dynamics at present do, with random numbers of their own:
- * possible successors, no image seen.  The same call between the same steps gives the same. */
+/* Predict n states by dt seconds, in [0, config max_dt], with the present dynamics and separate random numbers, without
+ * an image.  The same call between the same steps gives the same result. */
 GAIT_API gait_result gait_tracker_predict(const gait_tracker *t, gait_state *s, int32_t n, double dt, gait_error *err);
-/* Hash of the whole state: equal after equal input, on any machine. */
+/* Hash of the whole state: the same after the same input, on any machine. */
 GAIT_API uint64_t    gait_tracker_digest(const gait_tracker *t);
-/* Copy the whole state to mem, of cap bytes; mem NULL: give its size alone. */
+/* Copy the whole state to mem, of cap bytes; mem NULL: only return its size. */
 GAIT_API gait_result gait_tracker_save(const gait_tracker *t, void *mem, size_t cap, size_t *bytes, gait_error *err);
-/* Take over a state saved by a tracker of the same model and configuration; a failure leaves this one as it was. */
+/* Restore a state saved by a tracker with the same model and configuration; a failure leaves the tracker unchanged. */
 GAIT_API gait_result gait_tracker_restore(gait_tracker *t, const void *mem, size_t bytes, gait_error *err);
 
 /* ---- advanced: description of the structs ------------------------------------------------------------ */

@@ -1,9 +1,9 @@
 /* gait_lift.h - 3-D motion from 2-D keypoints, by a prior over segments of motion (Leventon and Freeman 1998).
  *
- * A segment is F frames of J markers: stature x (mean + sum_i alpha_i mode_i), turned by a heading about z and put at a
- * place on the ground; alpha ~ N(0, I), learnt from motion capture (gait learn --segments).  Which markers a frame
- * shows, and how well, may change from frame to frame.  Arrays are doubles, [F][J][...] by frame.  Rules of memory,
- * threads, errors and of the tables below are those of gait.h. */
+ * A segment is F frames of J markers: stature x (mean + sum_i alpha_i mode_i), rotated by a heading about z and placed
+ * on the ground; alpha ~ N(0, I), learnt from motion capture (gait learn --segments).  The visible markers and their
+ * noise may change from frame to frame.  Arrays are doubles, [F][J][...] by frame.  The rules of gait.h on memory,
+ * threads, errors and tables apply. */
 #ifndef GAIT_LIFT_H
 #define GAIT_LIFT_H
 #include "gait.h"
@@ -21,7 +21,7 @@ extern "C" {
 typedef struct gait_lift gait_lift;
 typedef GAIT_ENUM(gait_projection) { GAIT_LIFT_PERSPECTIVE = 0, GAIT_LIFT_ORTHOGRAPHIC = 1 } gait_projection;
 
-/* What the segment prior of a model holds. */
+/* Contents of a model's segment prior. */
 #define GAIT_LIFT_INFO_FIELDS(FIELD)                                                                                  \
     FIELD("Markers, J.",                                                                                              \
           int32_t, markers, , "")                                                                                     \
@@ -29,7 +29,7 @@ typedef GAIT_ENUM(gait_projection) { GAIT_LIFT_PERSPECTIVE = 0, GAIT_LIFT_ORTHOG
           int32_t, frames, , "frames")                                                                                \
     FIELD("Frames from one segment to the next.",                                                                     \
           int32_t, hop, , "frames")                                                                                   \
-    FIELD("0: heading is unknown; 2, 8: so many turned copies were learnt, axes are the world's.",                    \
+    FIELD("0: heading is unknown; 2, 8: number of rotated copies learnt, axes are the world's.",                      \
           int32_t, headings, , "")                                                                                    \
     FIELD("Gaussians of the mixture.",                                                                                \
           int32_t, components, , "")                                                                                  \
@@ -37,7 +37,7 @@ typedef GAIT_ENUM(gait_projection) { GAIT_LIFT_PERSPECTIVE = 0, GAIT_LIFT_ORTHOG
           int32_t, modes, , "")                                                                                       \
     FIELD("Frame rate of a segment.",                                                                                 \
           float, fps, , "frames per second")                                                                          \
-    FIELD("Mean stature of the people learnt from.",                                                                  \
+    FIELD("Mean stature of the training data.",                                                                       \
           float, stature, , "metres")                                                                                 \
     FIELD("Hash of the model's blob.",                                                                                \
           uint64_t, digest, , "")
@@ -50,25 +50,25 @@ typedef struct gait_lift_info { GAIT_LIFT_INFO_FIELDS(GAIT_DECLARE) } gait_lift_
           uint32_t, struct_size, , "bytes")                                                                           \
     FIELD("View: `camera` and keypoints in pixels (default), or orthographic: `axis` and keypoints in metres.",       \
           gait_projection, projection, , "")                                                                          \
-    SETTING("Stature; 0: the mean of the people learnt from.",                                                        \
+    SETTING("Stature; 0: the mean of the training data.",                                                             \
           double, stature, , "metres", 0, 0, 10)                                                                      \
-    SETTING("Its standard deviation; 0: exactly known; -1: 0.04, or 0.09 if stature is 0.",                           \
+    SETTING("Its standard deviation; 0: exact; -1: 0.04, or 0.09 if stature is 0.",                                   \
           double, stature_sd, , "metres", -1, -1, 1)                                                                  \
-    SETTING("Standard deviation of an observation where none is given.",                                              \
+    SETTING("Standard deviation of an observation if none is given.",                                                 \
           double, sd, , "pixels or metres", 3, 1e-9, 1e9)                                                             \
-    SETTING("Expected place of the pelvis in the first frame; z: of the floor.",                                      \
+    SETTING("Expected position of the pelvis in the first frame; z: of the floor.",                                   \
           double, place, [3], "metres", GAIT_VALUES(0, 0, 0), -1e6, 1e6)                                              \
-    SETTING("Its standard deviation; 0: exactly there.",                                                              \
+    SETTING("Its standard deviation; 0: exact.",                                                                      \
           double, place_sd, [3], "metres", GAIT_VALUES(10, 10, 0.03), 0, 1e6)                                         \
     SETTING("Expected heading of the body in the first frame about z; 0: along +x.",                                  \
           double, heading, , "radians", 0, -100, 100)                                                                 \
-    SETTING("Its standard deviation; 0: exactly `heading`; -1: unknown, or 0 for priors with turned copies.",         \
+    SETTING("Its standard deviation; 0: exact; -1: unknown, or 0 for priors with rotated copies.",                    \
           double, heading_sd, , "radians", -1, -1, 10)                                                                \
     SETTING("Orthographic view: directions of u and v in the world, orthonormal.",                                    \
           double, axis, [2][3], "", GAIT_VALUES({1, 0, 0}, {0, 0, 1}), NAN, NAN)                                      \
     FIELD("Perspective view: the camera, its t within 1e4 metres along each axis.",                                   \
           gait_camera, camera, , "")                                                                                  \
-    SETTING("Stream: frames that an estimate waits for later ones; -1: no stream.",                                   \
+    SETTING("Stream: number of later frames that an estimate waits for; -1: no stream.",                              \
           int32_t, lag, , "frames", 5, -1, 64)                                                                        \
     /* ---- advanced settings ---- */                                                                                 \
     SETTING("Stream: bit j: marker j is estimated.",                                                                  \
@@ -78,11 +78,11 @@ typedef struct gait_lift_info { GAIT_LIFT_INFO_FIELDS(GAIT_DECLARE) } gait_lift_
     SETTING("Standard deviation of the change of heading from segment to segment.",                                   \
           double, turn_sd, , "radians", 0.3, 1e-6, 10)                                                                \
     SETTING("Stream: a segment with a larger chi-square per observation is ambiguous and, if its heading is unknown," \
-            " searched for anew; 0: never.",                                                                          \
+            " searched again; 0: never.",                                                                             \
           double, fit_threshold, , "", 9, 0, 1e9)                                                                     \
-    SETTING("Stream: frame rate up to which there is memory.",                                                        \
+    SETTING("Stream: highest frame rate, for which memory is reserved.",                                              \
           double, max_rate, , "frames per second", 60, 1, 1000)                                                       \
-    SETTING("Stream: longest pause before it starts anew.",                                                           \
+    SETTING("Stream: longest pause; after a longer one it restarts.",                                                 \
           double, max_gap, , "seconds", 0.5, 1e-3, 60)                                                                \
     SETTING("Iteration ends when no unknown changes by more.",                                                        \
           double, tolerance, , "standard deviations", 1e-9, 0, 1)                                                     \
@@ -95,21 +95,21 @@ typedef struct gait_lift_config { GAIT_LIFT_CONFIG_FIELDS(GAIT_DECLARE, GAIT_DEC
 
 /* GAIT_ERR_ARG: the model has no segment prior. */
 GAIT_API gait_result gait_lift_get_info(const gait_model *m, gait_lift_info *out, gait_error *err);
-/* Fill the first cfg_bytes of a config with the defaults; use gait_lift_default(), which gives them their size. */
+/* Fill the first cfg_bytes of a config with the defaults; called by gait_lift_default(), which knows the size. */
 GAIT_API void gait_lift_fill(gait_lift_config *cfg, size_t cfg_bytes);
 static inline void gait_lift_default(gait_lift_config *cfg)
 {
     gait_lift_fill(cfg, sizeof *cfg);
 }
 
-/* The model must outlive the lifter.  A config of an older, shorter gait_lift.h is accepted. */
+/* The model must outlive the lifter.  A config from an older, shorter gait_lift.h is accepted. */
 GAIT_API gait_result gait_lift_bytes(const gait_model *m, const gait_lift_config *cfg, size_t *bytes, gait_error *err);
 GAIT_API gait_result gait_lift_init(void *mem, size_t mem_bytes, const gait_model *m, const gait_lift_config *cfg,
                                     gait_lift **out, gait_error *err);
 GAIT_API const char *gait_lift_marker_name(const gait_lift *l, int32_t marker); /* NULL: out of range */
 
 /* ---- one segment ------------------------------------------------------------------------------------- */
-/* What the observations of one segment determine. */
+/* Result of fitting one segment. */
 #define GAIT_LIFT_FIT_FIELDS(FIELD)                                                                                   \
     FIELD("log p(observations), of the best heading and component.",                                                  \
           double, log_evidence, , "nats")                                                                             \
@@ -121,17 +121,17 @@ GAIT_API const char *gait_lift_marker_name(const gait_lift *l, int32_t marker); 
           double, heading, , "radians")                                                                               \
     FIELD("Its standard deviation.",                                                                                  \
           double, heading_sd, , "radians")                                                                            \
-    FIELD("Place of the pelvis in the first frame; z: of the floor.",                                                 \
+    FIELD("Position of the pelvis in the first frame; z: of the floor.",                                              \
           double, place, [3], "metres")                                                                               \
     FIELD("Posterior probability of the component in (0, 1].",                                                        \
           double, share, , "")                                                                                        \
     FIELD("Gaussian of the mixture.",                                                                                 \
           int32_t, component, , "")                                                                                   \
-    FIELD("Numbers observed: 2 for each marker seen.",                                                                \
+    FIELD("Numbers observed: 2 per visible marker.",                                                                  \
           int32_t, observed, , "")                                                                                    \
     FIELD("Iterations taken.",                                                                                        \
           int32_t, iterations, , "")                                                                                  \
-    FIELD("1, or 0: max_iterations came first.",                                                                      \
+    FIELD("1; 0: stopped at max_iterations.",                                                                         \
           int32_t, converged, , "")
 
 typedef struct gait_lift_fit { GAIT_LIFT_FIT_FIELDS(GAIT_DECLARE) } gait_lift_fit;
@@ -140,35 +140,35 @@ typedef struct gait_lift_fit { GAIT_LIFT_FIT_FIELDS(GAIT_DECLARE) } gait_lift_fi
  * not positive, or its uv is NaN, beyond 1e6 or, in perspective, exactly (0, 0) or (-1, -1), as detectors write it. */
 GAIT_API gait_result gait_lift_segment(gait_lift *l, const double *uv, const double *sd, gait_lift_fit *out,
                                        gait_error *err);
-/* The same with outliers down-weighted: a point beyond four standard deviations of the fit keeps little influence.
- * weighted [F][J] receives the standard deviations in effect, above `sd` for outliers.  If outliers may have misled the
- * search it is repeated with all points down-weighted at first. */
+/* The same with outliers down-weighted: a point more than four standard deviations from the fit has little influence.
+ * weighted [F][J] receives the effective standard deviations, above `sd` for outliers.  If outliers may have misled
+ * the search, it is repeated with all points down-weighted at first. */
 GAIT_API gait_result gait_lift_segment_robust(gait_lift *l, const double *uv, const double *sd, double *weighted,
                                               gait_lift_fit *out, gait_error *err);
-/* Expect the person of the following segments at another place and heading than the config's; heading_sd as there.
- * GAIT_ERR_STATE: the lifter was not made for an unknown heading. */
+/* Expect the person of the following segments at this position and heading instead of the config's; heading_sd as
+ * there.  GAIT_ERR_STATE: the lifter was not initialised for an unknown heading. */
 GAIT_API gait_result gait_lift_expect(gait_lift *l, const double place[3], double heading, double heading_sd,
                                       gait_error *err);
 /* The rest of this section is about the last gait_lift_segment(); GAIT_ERR_STATE: there is none.
  * Posterior mean [F][J][3] and standard deviation [F][J][3] (may be NULL), metres, world. */
 GAIT_API gait_result gait_lift_positions(gait_lift *l, double *mean, double *sd, gait_error *err);
-/* The unknowns [n], n = gait_lift_unknowns(), prior N(0, 1) each: modes, place x y z, stature and heading if they are
- * unknown; and their covariance [n][n] (may be NULL). */
+/* The unknowns [n], n = gait_lift_unknowns(), each with prior N(0, 1): modes, position x y z, and stature and heading
+ * if unknown; and their covariance [n][n] (may be NULL). */
 GAIT_API int32_t     gait_lift_unknowns(const gait_lift *l);
 GAIT_API gait_result gait_lift_posterior(gait_lift *l, double *mean, double *covariance, gait_error *err);
-/* Factor for standard deviations of a motion as far from the prior's mean as this one: above 1 if its modes are larger
- * than the prior expects, below 1 if they are smaller.  In an orthographic view, with heading and size known, errors
- * then follow about Student's t of ten degrees of freedom: 90 % are within 1.81.  Takes milliseconds. */
+/* Factor for the standard deviations of this motion: above 1 if its modes are larger than the prior expects, below 1
+ * if they are smaller.  In an orthographic view with known heading and size, errors in scaled standard deviations
+ * follow approximately Student's t with ten degrees of freedom: 90 % are within 1.81.  Takes milliseconds. */
 GAIT_API gait_result gait_lift_scale(gait_lift *l, double *scale, gait_error *err);
-/* The observations alone: least-squares fit of minimum norm [F][J][3] (fig. 5c). */
+/* Estimate from the observations only: least-squares fit of minimum norm [F][J][3] (fig. 5c). */
 GAIT_API gait_result gait_lift_least_squares(gait_lift *l, double *mean, gait_error *err);
 /* The `count` most uncertain displacements [count][F][J][3], one standard deviation long, metres, and their standard
  * deviations [count] over all markers (fig. 6). */
 GAIT_API gait_result gait_lift_uncertain(gait_lift *l, int32_t count, double *mode, double *sd, gait_error *err);
 
 /* ---- a stream of frames ------------------------------------------------------------------------------ */
-#define GAIT_LIFT_UNOBSERVED 0x1u /* no observation in the segments behind this estimate: it is the prior's */
-#define GAIT_LIFT_POOR_FIT   0x2u /* a segment behind it exceeds fit_threshold (the first: half) or was refitted */
+#define GAIT_LIFT_UNOBSERVED 0x1u /* no observation in the segments of this estimate: it is the prior's */
+#define GAIT_LIFT_POOR_FIT   0x2u /* a segment of it exceeds fit_threshold (the first: half) or was refitted */
 
 /* Estimate of one frame of a stream, `lag` frames ago. */
 #define GAIT_LIFT_FRAME_FIELDS(FIELD)                                                                                 \
@@ -178,7 +178,7 @@ GAIT_API gait_result gait_lift_uncertain(gait_lift *l, int32_t count, double *mo
           uint64_t, frame, , "")                                                                                      \
     FIELD("Heading of the body.",                                                                                     \
           double, heading, , "radians")                                                                               \
-    FIELD("Chi-square per observation of the segments behind it.",                                                    \
+    FIELD("Chi-square per observation of its segments.",                                                              \
           double, chi2_per_observation, , "")                                                                         \
     FIELD("TRACKING; AMBIGUOUS with GAIT_LIFT_POOR_FIT; INIT before the first whole segment, when all below is 0.",   \
           gait_track_status, status, , "")                                                                            \
@@ -186,14 +186,14 @@ GAIT_API gait_result gait_lift_uncertain(gait_lift *l, int32_t count, double *mo
           uint32_t, flags, , "mask")                                                                                  \
     FIELD("Posterior mean of the markers in the world; 0 for those not in config report.",                            \
           double, marker, [GAIT_MAX_MARKERS][3], "metres")                                                            \
-    FIELD("Standard deviation, wider by the root of a chi2_per_observation above 1.",                                 \
+    FIELD("Standard deviation, times the root of a chi2_per_observation above 1.",                                    \
           double, sd, [GAIT_MAX_MARKERS][3], "metres")
 
 typedef struct gait_lift_frame { GAIT_LIFT_FRAME_FIELDS(GAIT_DECLARE) } gait_lift_frame;
 
-/* Add one frame: uv [J][2], sd [J] or NULL; utime must increase.  Segments begin every hop / fps seconds from the first
- * frame on; each frame is added to those that cover its time, at its own time (linear between their frames).  Points
- * far from their prediction are down-weighted. */
+/* Add one frame: uv [J][2], sd [J] or NULL; utime must increase.  Segments begin every hop / fps seconds from the
+ * first frame on; each frame is added, at its own time (linear between their frames), to the segments that contain
+ * it.  Points far from their prediction are down-weighted. */
 GAIT_API gait_result gait_lift_push(gait_lift *l, int64_t utime, const double *uv, const double *sd, gait_error *err);
 /* Estimate of the frame `lag` frames before the last one pushed.  GAIT_ERR_STATE: fewer frames since the start. */
 GAIT_API gait_result gait_lift_estimate(gait_lift *l, gait_lift_frame *out, gait_error *err);
@@ -201,20 +201,20 @@ GAIT_API gait_result gait_lift_estimate(gait_lift *l, gait_lift_frame *out, gait
 GAIT_API void        gait_lift_reset(gait_lift *l);
 
 /* ---- advanced: many segments with the same visibility ------------------------------------------------ */
-/* Orthographic view, heading known, component 0.  gait_lift_fix() computes the gain for sd [F][J]; gait_lift_batch()
- * then takes uv [count][F][J][2] to mean [count][F][J][3]; standard deviations are those of gait_lift_positions(). */
+/* Orthographic view, known heading, component 0.  gait_lift_fix() computes the gain for sd [F][J]; gait_lift_batch()
+ * then maps uv [count][F][J][2] to mean [count][F][J][3]; standard deviations are those of gait_lift_positions(). */
 GAIT_API gait_result gait_lift_fix(gait_lift *l, const double *sd, gait_error *err);
 GAIT_API gait_result gait_lift_batch(gait_lift *l, int32_t count, const double *uv, double *mean, gait_error *err);
 
 /* ---- advanced: outliers in sequences of 2-D points ---------------------------------------------------- */
-/* Tools for sequences of 2-D points, without a lifter.  Both return how many points they found.
- * Spikes: points far off the line through the same point's neighbours in time, by its own noise and acceleration; their
- * sd [frames][points] becomes -1.  time [frames] increases; uv [frames][points][2]; scratch [2 frames]. */
+/* Tools for sequences of 2-D points, without a lifter.  Both return how many points they found.  Spikes: points far
+ * from the line through the same point's neighbours in time, relative to its noise and acceleration; their sd
+ * [frames][points] becomes -1.  time [frames] increases; uv [frames][points][2]; scratch [2 frames]. */
 GAIT_API int32_t gait_lift_remove_spikes(int32_t frames, int32_t points, const double *time, const double *uv, double *sd,
                                          double *scratch);
-/* Outliers: points of one frame whose distance from their prediction, squared, in standard deviations, is above 16 and
- * above 9 times the frame's median; sd [points] grows with it, so that their pull falls with its third power.
- * scratch [points]. */
+/* Outliers: points of one frame whose squared distance from their prediction, in standard deviations, is above 16 and
+ * above 9 times the frame's median; sd [points] grows with it, so that their influence falls with the third power of
+ * the distance.  scratch [points]. */
 GAIT_API int32_t gait_lift_weight_outliers(int32_t points, const double *square, double *sd, double *scratch);
 
 #ifdef __cplusplus

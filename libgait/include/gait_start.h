@@ -1,11 +1,11 @@
 /* gait_start.h - the automatic start: where a person is and how they walk, from a second of observations.
  *
- * A walk is fitted to keypoints of one person, as a 2-D detector finds them, or to boxes around people: found by a
- * detector, or by gait_start_find_boxes() against the empty scene.  The camera stands still or its pose is given with
- * gait_start_set_pose(); a person walks straight on at an even pace, or stays in place.  From keypoints every
- * direction, phase and side is tried; boxes give place, direction and stature, and leave the phase open.  The answers
- * are a few weighted hypotheses, each ready for gait_tracker_start_hypotheses().
- * Conventions, units, memory and errors are those of gait.h. */
+ * A walk is fitted to one person's 2-D keypoints, or to boxes around people, from a detector or from
+ * gait_start_find_boxes(), which compares images with the empty scene.  The camera is static, or its pose is given
+ * with gait_start_set_pose(); a person walks straight at constant speed, or stays in place.  With keypoints every
+ * direction, phase and side is tried; boxes give position, direction and stature, but not the phase.  The results are
+ * a few weighted hypotheses for gait_tracker_start_hypotheses().  Conventions, units, memory and errors are those of
+ * gait.h. */
 #ifndef GAIT_START_H
 #define GAIT_START_H
 #include "gait.h"
@@ -13,13 +13,13 @@
 extern "C" {
 #endif
 
-#define GAIT_START_MAX_FRAMES 64    /* frames of keypoints, and of boxes, that are kept; the oldest are dropped */
-#define GAIT_START_MAX_PEOPLE 4     /* people in boxes who are followed at a time */
+#define GAIT_START_MAX_FRAMES 64    /* frames of keypoints, and of boxes, that are stored; the oldest are dropped */
+#define GAIT_START_MAX_PEOPLE 4     /* people followed at a time, by boxes */
 #define GAIT_START_MAX_HYPOTHESES 8 /* that gait_start_solve() returns, at most */
 
 typedef struct gait_start gait_start;
 
-/* Settings of a start.  gait_start_default() fills them; change what you need, the camera always. */
+/* Settings of a start.  gait_start_default() fills them; set the camera, and change what you need. */
 #define GAIT_START_CONFIG_FIELDS(SETTING, FIELD)                                                                      \
     FIELD("Size of this struct in the caller's header, set by gait_start_default().",                                 \
           uint32_t, struct_size, , "bytes")                                                                           \
@@ -29,10 +29,10 @@ typedef struct gait_start gait_start;
           float, stature, , "metres", 0, 0, 2.5)                                                                      \
     SETTING("Its standard deviation; 0: that of the model's adults.",                                                 \
           float, stature_sd, , "metres", 0, 0, 1)                                                                     \
-    SETTING("Difference between the model's joints and the detector's: standard deviation, fraction of the person's"  \
-            " height in the picture.",                                                                                \
+    SETTING("Standard deviation of the difference between the model's joints and the detector's, fraction of the"     \
+            " person's height in the image.",                                                                         \
           float, joint_sd, , "", 0.025f, 0.001, 1)                                                                    \
-    SETTING("Errors of a detector last: frames nearer together than this count as one.",                              \
+    SETTING("Correlation time of a detector's errors: closer frames count as one.",                                   \
           float, error_time, , "seconds", 0.25f, 0, 10)                                                               \
     SETTING("Time that the boxes of a person must cover.",                                                            \
           float, box_time, , "seconds", 1, 0.3, 1.4)                                                                  \
@@ -52,11 +52,11 @@ typedef struct gait_start_config { GAIT_START_CONFIG_FIELDS(GAIT_DECLARE, GAIT_D
 
 typedef struct gait_box { GAIT_BOX_FIELDS(GAIT_DECLARE) } gait_box;
 
-/* One answer. */
+/* One result. */
 #define GAIT_HYPOTHESIS_FIELDS(FIELD)                                                                                 \
-    FIELD("State at the time asked for; fields that are not fitted are 0.",                                           \
+    FIELD("State at the requested time; fields that are not fitted are 0.",                                           \
           gait_state, mean, , "")                                                                                     \
-    FIELD("Its standard deviations; those of fields that are not fitted are the model's prior.",                      \
+    FIELD("Its standard deviations; the model's prior for fields that are not fitted.",                               \
           gait_state, sd, , "")                                                                                       \
     FIELD("Speed along the heading.",                                                                                 \
           float, speed, , "metres per second")                                                                        \
@@ -73,7 +73,7 @@ typedef struct gait_box { GAIT_BOX_FIELDS(GAIT_DECLARE) } gait_box;
 
 typedef struct gait_hypothesis { GAIT_HYPOTHESIS_FIELDS(GAIT_DECLARE) } gait_hypothesis;
 
-/* Fill the first cfg_bytes of a config with the defaults; use gait_start_default(), which gives them their size. */
+/* Fill the first cfg_bytes of a config with the defaults; called by gait_start_default(), which knows the size. */
 GAIT_API void gait_start_fill(gait_start_config *cfg, size_t cfg_bytes);
 static inline void gait_start_default(gait_start_config *cfg)
 {
@@ -84,42 +84,42 @@ static inline void gait_start_default(gait_start_config *cfg)
 GAIT_API gait_result gait_start_bytes(const gait_model *m, const gait_start_config *cfg, size_t *bytes, gait_error *err);
 GAIT_API gait_result gait_start_init(void *mem, size_t mem_bytes, const gait_model *m, const gait_start_config *cfg,
                                      gait_start **out, gait_error *err);
-/* Where the camera is in the frames and boxes given from now on, instead of where the config puts it; its standard
- * deviations are not used. */
+/* Pose of the camera for the frames and boxes from now on, instead of the config's; its standard deviations are not
+ * used. */
 GAIT_API gait_result gait_start_set_pose(gait_start *s, const gait_camera_pose *pose, gait_error *err);
 /* One frame: the model's joints in order, as in gait_frame; utime must increase. */
 GAIT_API gait_result gait_start_add(gait_start *s, int64_t utime, const gait_keypoint *keypoints, gait_error *err);
-/* One frame: boxes around people, the most certain first; utime must increase.  Boxes that make a person shorter than
- * 1.2 m or taller than 2.4 m are left out; the others are matched to the people of earlier frames by place. */
+/* One frame: boxes around people, the most certain first; utime must increase.  Boxes of people shorter than 1.2 m or
+ * taller than 2.4 m are ignored; the others are matched by position to the people of earlier frames. */
 GAIT_API gait_result gait_start_add_boxes(gait_start *s, int64_t utime, const gait_box *boxes, int32_t count,
                                           gait_error *err);
 /* Person-sized regions in which a frame differs from the empty scene, the largest first, at most `capacity`; both
- * images are of the camera's size.  Regions that touch the border are left out. */
+ * images must have the camera's size.  Regions that touch the border are ignored. */
 GAIT_API gait_result gait_start_find_boxes(gait_start *s, const gait_image *frame, const gait_image *background,
                                            gait_box *out, int32_t capacity, int32_t *count, gait_error *err);
-/* 1 if half of the frame differs from the background, so that it shows another scene or the camera has moved. */
+/* 1 if half of the frame differs from the background: it shows another scene, or the camera has moved. */
 GAIT_API gait_result gait_start_other_scene(gait_start *s, const gait_image *frame, const gait_image *background,
                                             int32_t *other, gait_error *err);
-/* Stature of the person in a box, who stands where the ray of the foot meets the floor, metres; NAN if it does not meet
- * the floor: the camera is impossible, or the box is above the horizon. */
+/* Stature of the person in a box, metres, if they stand where the ray of the foot meets the floor; NAN if it does not:
+ * the camera is impossible, or the box is above the horizon. */
 GAIT_API gait_result gait_start_box_stature(const gait_start *s, const gait_box *box, float *stature, gait_error *err);
 /* Forget the frames. */
 GAIT_API void        gait_start_reset(gait_start *s);
 /* Fit the keypoints or, if there are too few, the boxes of each person, and return at most `capacity` hypotheses for
  * the moment `utime`, the most probable first.
- * GAIT_ERR_STATE: too few frames show hips and ankles, four or more over 0.3 s, or a box of one person, eight or more
- * over config box_time.  GAIT_ERR_NUMERIC: nothing fits. */
+  * GAIT_ERR_STATE: too few frames; needed are four with hips and ankles over 0.3 s, or eight with a box of the same
+ * person over config box_time.  GAIT_ERR_NUMERIC: nothing fits. */
 GAIT_API gait_result gait_start_solve(gait_start *s, int64_t utime, gait_hypothesis *out, int32_t capacity,
                                       int32_t *count, gait_error *err);
-/* Start a tracker from the hypotheses of gait_start_solve(), the most probable first: each gives particles in proportion
- * to its probability, and the images of the next frames decide between them, and against an empty scene.
- * Until they have decided the status is GAIT_TRACK_INIT.  Left out are hypotheses that are a hundred times less probable
- * than the first, are of another place in the image, or differ in `in_place`.  Ranges as for gait_tracker_start();
- * count is in [1, GAIT_START_MAX_HYPOTHESES]. */
+/* Start a tracker from the hypotheses of gait_start_solve(), the most probable first: each gives particles in
+ * proportion to its probability.  The images of the next frames decide between them, and whether a person is there at
+ * all; until then the status is GAIT_TRACK_INIT.  Hypotheses are ignored if they are a hundred times less probable
+ * than the first, elsewhere in the image, or differ from it in `in_place`.  Ranges as for gait_tracker_start(); count
+ * must be in [1, GAIT_START_MAX_HYPOTHESES]. */
 GAIT_API gait_result gait_tracker_start_hypotheses(gait_tracker *t, const gait_hypothesis *hypotheses, int32_t count,
                                                    int64_t utime, gait_error *err);
-/* 1: a walk that fits the observations, good enough to start with.  0: the person may be standing, the direction may be
- * unknown, or the observations may be of something else. */
+/* 1: a walk that fits the observations well enough for a start.  0: the person may be standing, the direction may be
+ * unknown, or the observations may show something else. */
 GAIT_API int32_t     gait_hypothesis_walks(const gait_hypothesis *h);
 
 #ifdef __cplusplus

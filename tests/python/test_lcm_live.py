@@ -203,7 +203,7 @@ def test_junk_does_not_flood_the_log_and_the_status(url):
 
 
 def test_two_daemons_on_one_url_are_reported_by_both(url):
-    words = "another gait-trackd answers on this URL"
+    words = "another gait-trackd uses this URL"
     with rig.daemon(url) as (listener, finish), rig.daemon(url, "--particles", 80) as (_, finish_other):
 
         def reporting():
