@@ -93,7 +93,7 @@ def test_entries_about_no_lens_do_not_matter(tmp_path):
         (matrix("K", np.diag([300.0, 300, 1])), "camera_matrix and K differ"),
         (matrix("rvec", [[0.1, 0.2, 0.3]]), "R and rvec differ"),
         ("image_size: [ 800, 600 ]\n", "image_size differs"),
-        ("camera_matrix: 3\n", "camera_matrix is there twice"),
+        ("camera_matrix: 3\n", "camera_matrix appears twice"),
     ],
 )
 def test_two_statements_that_differ_are_refused(entry, words, tmp_path):

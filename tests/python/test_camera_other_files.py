@@ -137,11 +137,11 @@ REFUSED = {
     ),
     "colmap_count": (
         lambda p: colmap(p / "cameras.txt", "OPENCV", LENS[:3]),
-        "camera 1 has not 8 parameters",
+        "camera 1 does not have 8 parameters",
     ),
     "opencap_object": (
         lambda p: foreign_pickle(p / "a.pickle"),
-        "not a camera of OpenCap .holds an object pathlib",
+        "not a camera of OpenCap .contains an object pathlib",
     ),
     "text": (lambda p: written(p / "a.txt", "hello world\n"), "holds no camera; give a JSON camera file"),
     "yaml": (lambda p: written(p / "a.yaml", "a: [1, 2\n"), "not a YAML file"),

@@ -103,7 +103,7 @@ def scene(folder, lens=TRUE):
         ({"uv": UV[:3].tolist()}, "click 1 more mark on"),
         ({"uv": UV[:4].tolist(), "xy": [[0, 0]] * 3}, "give x and y of every mark"),
         ({"uv": UV[:4].tolist(), "xy": [[0, None]] * 4}, "give numbers of metres for every mark"),
-        ({"uv": UV[:4].tolist(), "xy": [[0, 0], [1, 0], [2, 0], [3, 0]]}, "x, y, z lie on a line"),
+        ({"uv": UV[:4].tolist(), "xy": [[0, 0], [1, 0], [2, 0], [3, 0]]}, "x, y, z are on a line"),
         ({"uv": UV[:4].tolist(), "distances": [[0, 1, -2]]}, "give distances in metres, above 0"),
         ({"uv": UV[:4].tolist(), "distances": [[0, 9, 2]]}, "give distances in metres, above 0"),
         ({"uv": UV[:4].tolist(), "distances": 3}, "give distances in metres, above 0"),

@@ -74,7 +74,7 @@ HEAD = "time,r11,r12,r13,r21,r22,r23,r31,r32,r33,tx,ty,tz"
             "from 0 to 0.1 s, but frame 1 is at 0.3",
         ),
         ([HEAD, LINE.format(time=0, x=0), LINE.format(time=1, x=0)], "poses are 1.00 s apart"),
-        ([HEAD, LINE.format(time=0, x=0), LINE.format(time=0.4, x=9)], "jumps by 9 m"),
+        ([HEAD, LINE.format(time=0, x=0), LINE.format(time=0.4, x=9)], "jumps 9 m"),
         (
             [HEAD + ",turn_sd_deg", LINE.format(time=0, x=0) + ",-1"],
             "turn_sd_deg is '-1'; give a number of 0",

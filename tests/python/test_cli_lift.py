@@ -346,7 +346,7 @@ def test_uncertain_results_are_reported(folder, capsys, monkeypatch):
     names = read("t.csv", toy_prior(FRAMES, MARKERS, 4, seed=5).names)[0].names
     assert f"far from their predictions: {names[3]} in 4 frames\n" in printed.err
     assert (
-        "the points jitter by 5 from frame to frame: used as their noise instead of 3 (--pixel-sd)\n"
+        "the points jitter by 5 from frame to frame: this is used as their noise instead of 3 (--pixel-sd)\n"
         in printed.err
     )
     assert "segments are estimated alone" in printed.err and "widened 2 times" in printed.err

@@ -54,7 +54,7 @@ def test_track_keeps_the_rows_that_are_finished(tmp_path):
     left = sorted(path.name for path in output.iterdir())
     assert left == ["o.unfinished.mp4", "t.unfinished.csv"]
     for name in left:
-        assert f"; what had been written is in {name}\n" in printed
+        assert f"; what was written is in {name}\n" in printed
     rows = len(read_track(output / "t.unfinished.csv").frame)
     assert 1 <= rows < 900 and abs(Video(output / "o.unfinished.mp4").count - rows) <= 1
 

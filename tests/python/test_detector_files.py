@@ -303,9 +303,9 @@ def test_points_that_are_not_visible_are_left_out(tmp_path):
 
 UNKNOWN = {
     "hand": ([{"image_id": "1.jpg", "keypoints": [1.0, 2.0, 0.5] * 21}], "has 21 points without names"),
-    "no_person": ({"version": 1.3, "people": []}, "has no number|contains no person"),
-    "no_list": ({"people": 3}, "people is not a list|no number"),
-    "numbers": ([[1, 2], [3, 4]], "JSON without people"),
+    "no_person": ({"version": 1.3, "people": []}, "has no frame number|contains no person"),
+    "no_list": ({"people": 3}, "people is not a list|no frame number"),
+    "numbers": ([[1, 2], [3, 4]], "contains no person"),
     "landmark": ([{"landmarks": [{"x": "a", "y": 1}]}], "no numbers x and y"),
     "image": (
         {"images": [], "annotations": [{"image_id": 3, "keypoints": [1, 2, 2]}]},
@@ -357,7 +357,7 @@ def test_no_object_of_a_pickle_is_made(tmp_path):
     path = dlc_h5(tmp_path / "a.h5", "table")
     with h5py.File(path, "r+") as file:
         file["df_with_missing"].attrs["non_index_axes"] = np.bytes_(pickle.dumps(Clip, protocol=0))
-    with pytest.raises(UserError, match="holds an object gait.io.detections.Clip"):
+    with pytest.raises(UserError, match="contains an object gait.io.detections.Clip"):
         read(path)
 
 

@@ -312,7 +312,7 @@ def test_rerun(walk, tmp_path):
         ("walk.csv", "a.fbx", "not a supported format; use one of .trc .c3d"),
         ("none.csv", "a.trc", "no such"),
         ("short.csv", "a.c3d", "has one frame"),
-        ("uneven.csv", "a.bvh", "no constant rate"),
+        ("uneven.csv", "a.bvh", "rate is not constant"),
         ("text.csv", "a.parquet", "rows of different lengths"),
     ],
 )

@@ -71,7 +71,7 @@ def test_what_is_worth_keeping_is_kept_if_the_command_is_ended(tmp_path, capsys,
             raise end
         kept = [] if not worth or isinstance(end, ValueError) else ["a.unfinished.csv"]
         assert sorted(p.name for p in tmp_path.iterdir()) == ["a.csv", *kept] and path.read_text() == "old"
-        assert ("not finished; what had been written is in" in capsys.readouterr().err) == bool(kept)
+        assert ("not finished; what was written is in" in capsys.readouterr().err) == bool(kept)
 
 
 def test_what_else_fails_beside_a_file_keeps_its_name(tmp_path):
@@ -204,4 +204,4 @@ def test_what_a_killed_command_left_is_named_and_kept(tmp_path, capsys):
     assert path.read_text() == "first"
     assert (tmp_path / "a.unfinished.csv").read_text() == "an hour of work"
     assert {p.name for p in tmp_path.iterdir()} == {"a.csv", "a.unfinished.csv"}
-    assert "was killed; what it had written is in a.unfinished.csv" in capsys.readouterr().err
+    assert "was killed; what it wrote is in a.unfinished.csv" in capsys.readouterr().err

@@ -98,7 +98,7 @@ def test_phase_one_is_phase_zero(init):
 
 @pytest.mark.parametrize("place", [[1.1e4, 0], [0, -1e6, 0.9], [0, 0, 2e4]])
 def test_a_pelvis_beyond_ten_kilometres_is_refused(place, init):
-    with pytest.raises(UserError, match=r"pelvis is further than 10000 m from the origin; lay"):
+    with pytest.raises(UserError, match=r"pelvis is more than 10000 m from the origin; put"):
         Start.read(init(FULL | {"pelvis": place}), MODEL)
 
 
@@ -354,7 +354,7 @@ def test_a_wrong_camera_is_reported_from_most_frames(tmp_path):
     up = np.array([[1, 0, 0], [0, 0.5, -0.866], [0, 0.866, 0.5]])
     upward = replace(camera(), R=up, t=-up @ camera().centre)
     with pytest.raises(
-        UserError, match=r"found a person in \d+ frames that the camera puts above the horizon"
+        UserError, match=r"found a person in \d+ frames that the camera places above the horizon"
     ):
         find_start(Video(tmp_path / "walk.mp4"), upward, wall(), MODEL)
 

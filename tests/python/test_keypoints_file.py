@@ -73,8 +73,8 @@ HEAD = "frame,time,pelvis_u,pelvis_v"
         (f"{HEAD}\n0,0,1,2\n1,1,1,2\n", "time increases by 1 per frame; give seconds"),
         (f"{HEAD}\n0,0,1,2\n1,0,1,2\n", "line 3: time does not increase"),
         (f"{HEAD}\n0,,1,2\n", "line 2: time is empty"),
-        (f"{HEAD}\n0,0,,\n", "no point is seen"),
-        (f"{HEAD},pelvis_u\n0,0,1,2,3\n", "pelvis_u is there twice"),
+        (f"{HEAD}\n0,0,,\n", "no point is visible"),
+        (f"{HEAD},pelvis_u\n0,0,1,2,3\n", "pelvis_u appears twice"),
         (f"{HEAD},pelvis_c\n0,0,1,2,7\n", "pelvis_c is 7; give it from 0 to 1"),
     ],
 )

@@ -256,7 +256,7 @@ def test_help_lists_every_option():
 def test_help_states_what_an_option_does_when_it_is_not_given_or_too_small():
     printed = " ".join(rig.run("--help").printed.split())
     assert "auto, the default: start when a person has walked" in printed
-    assert "a pause longer than --max-dt is bridged by predictions of at most --max-dt each" in printed
+    assert "Pauses longer than --max-dt are bridged by predictions of at most --max-dt each" in printed
     assert "--init FILE waits for START" in printed
     assert "more than a second old, or in the future, counts from its arrival" in printed
 

@@ -49,7 +49,7 @@ def test_a_track_that_begins_prints_nothing(tmp_path):
 def test_a_stop_by_a_pause_is_reported_once(tmp_path):
     later = [("GAIT_IMAGE_0", rig.frame_message(i, utime=rig.utime(i + 300))) for i in range(3, 6)]
     words, outcome = printed(tmp_path, [*rig.opening(), *rig.frames(0, 3), *later], "--init", "auto")
-    assert words == [] and outcome.words.count("stopped; looking for a person again") == 1
+    assert words == [] and outcome.words.count("stopped; searching for a person again") == 1
 
 
 def test_another_daemon_on_the_same_url_is_reported():
@@ -60,8 +60,8 @@ def test_another_daemon_on_the_same_url_is_reported():
         heard = len(listener.statuses)
         listener.until(lambda: len(listener.statuses) > heard + 6, "statuses of both")
         second = finish_second()
-        assert "another gait-trackd uses on this URL" in second.words
-        assert "another gait-trackd uses on this URL" in finish().words
+        assert "another gait-trackd uses this URL" in second.words
+        assert "another gait-trackd uses this URL" in finish().words
 
 
 def test_live_it_reports_where_it_listens_and_what_it_lacks():

@@ -284,7 +284,7 @@ def test_labels_of_no_marker_and_a_mapping_without_markers_are_reported(amc, tmp
     marked = [tmp_path / "1_1.c3d", tmp_path / "2_1.c3d"]
     err = printed(capsys, *marked, *words)
     assert err.count("--markers") == 1
-    assert f"--markers {mapping}: no file has a marker 'Wand_L', 'LKN'; check the spelling\n" in err
+    assert f"--markers {mapping}: no file has the marker 'Wand_L', 'LKN'; check the spelling\n" in err
     assert "Wand_L" not in printed(capsys, *marked, *words, "--quiet")
     err = printed(capsys, amc, *words)
     assert (

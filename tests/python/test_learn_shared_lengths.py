@@ -174,7 +174,7 @@ def test_a_stranger_is_reported_and_measured_apart():
     found, (line,) = share(files)
     assert [f.recordings if f else None for f in found] == [None, 2, 2]
     assert np.exp(found[1].log_scales[0]) == pytest.approx(1.8, rel=1e-3)
-    assert line.startswith("a.c3d: limb lengths differ from b.c3d, which is also taken for 'Anna'")
+    assert line.startswith("a.c3d: limb lengths differ from b.c3d, which also counts as 'Anna'")
     assert "\n" not in line and "--subjects" in line
 
 

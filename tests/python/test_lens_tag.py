@@ -140,4 +140,4 @@ def test_the_tag_is_a_prior_and_the_users_view_wins(tmp_path, capsys):
     assert expected_fov(video, 50.0, quiet=False)[0] == 50.0
     assert not capsys.readouterr().err
     assert expected_fov(Video(film(tmp_path / "b.mov", "-1.00mm")), None, quiet=False)[0] is None
-    assert "states a focal length of '-1.00mm', which is none" in capsys.readouterr().err
+    assert "states a focal length of '-1.00mm', which is not one" in capsys.readouterr().err

@@ -118,7 +118,7 @@ def test_a_placement_in_the_picture_is_put_on_the_floor():
         (["--fov", "60"], "--fov: is for a camera estimated from the walk"),
         (
             ["--camera", "camera.json", "--height", "1.7", "--fov", "60"],
-            "--fov: is for an estimated camera",
+            "--fov: is for a camera estimated from the walk",
         ),
         (["--camera-out", "c.json"], "--camera-out: there is no camera"),
         (["--height", "1.7", "--background", "none"], "--background needs --placement"),

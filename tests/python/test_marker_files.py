@@ -144,7 +144,7 @@ def test_a_mapping_may_start_from_a_set_and_drop_markers(tmp_path):
         ('{"markers": {"A": {"segment": "head", "at": [0, 0, 40]}}}', r"A: at is .*in statures"),
         ('{"markers": {"A": {"segment": "head", "sd": NaN}}}', r"A: sd is \[NaN\]"),
         ('{"markers": {"A": {"segment": "head", "sd": true}}}', r"A: sd is \[true\]"),
-        ('{"markers": {"A": "c7", "A": "t10"}}', r"map.json: 'A' is there twice"),
+        ('{"markers": {"A": "c7", "A": "t10"}}', r"map.json: 'A' appears twice"),
     ],
 )
 def test_malformed_mappings_are_one_line(tmp_path, text, words):
@@ -222,7 +222,7 @@ def test_a_reader_that_hangs_is_ended(tmp_path, monkeypatch):
         (lambda s: s.replace("DataRate\t", "Rate\t", 1), "a.trc: not a .trc header of five lines"),
         (lambda s: s.replace("\n 120.0", "\n 0", 1), "a.trc:3: DataRate is '0'; write the frames per second"),
         (lambda s: "\n".join(s.split("\n")[:7]), r"a.trc: too few frames \(1\)"),
-        (lambda s: s.replace("\tRANK", "\tLANK"), "a.trc:4: label 'LANK' is there twice"),
+        (lambda s: s.replace("\tRANK", "\tLANK"), "a.trc:4: label 'LANK' appears twice"),
         (lambda s: s.replace(" 240\t", " 999\t"), "a.trc:3: NumFrames is 999 but 240 frames are there"),
         (lambda s: s.replace("\n100\t", "\n100\t-"), "a.trc:106: the times do not increase"),
         (lambda s: s.rstrip("\n") + "\t1\t2\n", r"a.trc:246: \d+ cells where 53 belong"),

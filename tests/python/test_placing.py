@@ -97,8 +97,8 @@ def test_command_names_points_that_do_not_fit(tmp_path, capsys):
         (["u,v,x,y", *["1,2,0,zero"] * 4], "line 2: y is 'zero'; give a number of metres"),
         (["u,v,x,y", *["1,nan,0,0"] * 4], "line 2: v is 'nan'; give a number of pixels"),
         (["u,v,x,y", *["1,2,0"] * 4], "line 2: y is ''"),
-        (["u,v,x,y", *[f"{k * k},{k},{k},{k}" for k in range(5)]], "x, y, z lie on a line"),
-        (["u,v,x,y", *[f"{k},{k},{k * k},{k}" for k in range(5)]], "u, v lie on a line"),
+        (["u,v,x,y", *[f"{k * k},{k},{k},{k}" for k in range(5)]], "x, y, z are on a line"),
+        (["u,v,x,y", *[f"{k},{k},{k * k},{k}" for k in range(5)]], "u, v are on a line"),
     ],
 )
 def test_faults_of_the_points_are_one_line(tmp_path, capsys, rows, words):

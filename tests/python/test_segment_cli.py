@@ -150,7 +150,7 @@ def test_all_needs_a_cyclic_model_and_names_what_does_not(walks, tmp_path, capsy
     printed = capsys.readouterr().err.rstrip()
     assert "04_01.amc: not learnt as 'walk'" in printed and "used nevertheless" not in printed
     assert printed.endswith(
-        "; for gait lift alone give --segments only: all also needs recordings for a cyclic model"
+        "; for gait lift only, give --segments only: all also needs recordings for a cyclic model"
     )
     assert run(*words, "only") == 0 and path.exists()
     assert run(*words, "learnt") == 1

@@ -96,7 +96,7 @@ def test_a_runner_that_returns_early_leaves_no_late_calls(early):
     late[0].join(60)
     assert sorted(called) == [0, 1, 2]
     assert len(refused) == (early == "queued")
-    with pytest.raises(RuntimeError, match="task runner returned with"):
+    with pytest.raises(RuntimeError, match="task runner returned without"):
         tasks.reraise()
 
 

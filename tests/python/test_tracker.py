@@ -317,7 +317,7 @@ def test_settings_beyond_the_capacity_of_the_library_are_named(change, words):
 @pytest.mark.parametrize(
     ("words", "options", "printed"),
     [
-        (("x.gait", VIEW), {}, r"model: 'x.gait' is no gait.Model; give gait.Model\(FILE\)"),
+        (("x.gait", VIEW), {}, r"model: 'x.gait' is not a gait.Model; give gait.Model\(FILE\)"),
         ((MODEL, None), {}, "cameras: None; give a gait.Camera or a list of them"),
         ((MODEL, [VIEW, "c.json"]), {}, "give a gait.Camera or a list"),
         ((MODEL, VIEW), {"tasks": 1.5}, "tasks: 1.5; give a number of threads, a callable or a pool"),

@@ -14,7 +14,7 @@ from gait.bindings.state import Array, State
 
 @dataclass(frozen=True)
 class Estimate:
-    """What the tracker believes after a frame.
+    """Estimate of the tracker after a frame.
 
     Attributes
     ----------
@@ -29,19 +29,19 @@ class Estimate:
     ess : float
         Effective number of particles.
     phase_r : float
-        How sure the phase is, [0, 1].
+        Certainty of the phase, [0, 1].
     hypothesis_weight : float
         Weight of the dominant left/right hypothesis, [0, 1].
     speed : float
         Metres per second along the ground.
     mean, sd, best : State
-        Of the dominant mode; standard deviation over all particles; heaviest particle.
+        Mean of the dominant hypothesis; standard deviation over all particles; heaviest particle.
     joints : ndarray of shape (P, 3)
         Posterior mean of the joints in the world, metres.
     joint_sd : ndarray of shape (P, 3)
         Posterior standard deviation, metres.
     angles : ndarray of shape (A,)
-        Radians, of the dominant mode.
+        Radians, of the dominant hypothesis.
     joint_names : tuple of str
         Names of the P joints.
     reason : str

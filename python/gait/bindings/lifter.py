@@ -86,7 +86,7 @@ class LiftedFrame:
     frame : int
         Frames pushed before it since the start.
     status : TrackStatus
-        TRACKING, AMBIGUOUS where what is seen does not fit, INIT before a first whole segment.
+        TRACKING; AMBIGUOUS if the observations do not fit; INIT before the first whole segment.
     flags : LiftFlag
     heading : float
         Radians.
@@ -107,19 +107,19 @@ class LiftedFrame:
 
 
 class Lifter:
-    """Lifts 2-D tracks of markers in memory of fixed size.
+    """Lifts 2-D keypoints with fixed memory.
 
     Parameters
     ----------
     source : Model, path or bytes, optional
-        Blob with a segment prior; the model of the package if left out or None.
+        Blob with a segment prior; the shipped model by default.
     view : Camera, or array_like of shape (2, 3)
-        Calibrated camera, tracks in pixels; or the directions of u and v in the world of an orthographic
-        view, tracks in metres.  It must be given: ``Lifter(view=camera)``.
+        Calibrated camera, with keypoints in pixels; or the directions of u and v in the world for an
+        orthographic view, with keypoints in metres.  Required: ``Lifter(view=camera)``.
     config : LiftConfig, optional
-        The library's defaults if left out; stature and lag are in it.
+        Settings such as stature and lag; the library's defaults if left out.
     **settings
-        None: they belong into the config.
+        Not accepted: settings belong in `config`.
 
     Attributes
     ----------
@@ -132,17 +132,17 @@ class Lifter:
     Raises
     ------
     TypeError
-        If there is no view or it is none, or settings are not in the config.
+        If the view is missing or invalid, or settings are not in the config.
     UserError
         If the file cannot be read.
     GaitError
-        If the blob holds no sound segment prior, or a setting is out of its range; later, if a method is
-        called before the one that it needs.
+        If the blob has no valid segment prior, or a setting is out of range; later, if a method is called
+        before the one that it needs.
 
     Notes
     -----
-    Observations are arrays of doubles; a marker whose `sd` is not a positive number, or whose `uv` is NaN,
-    was not seen.  Same input and configuration give the same bits.
+    Observations are arrays of doubles; a marker is missing if its `sd` is not a positive number or its `uv`
+    is NaN.  The same input and configuration give the same bits.
     """
 
     def __init__(
@@ -210,7 +210,7 @@ class Lifter:
         -------
         fit : Fit
         weighted : (F, J)
-            Standard deviations that count: larger than `sd` for outliers.
+            Effective standard deviations: larger than `sd` for outliers.
         """
         points, sds = self._observations(uv, sd, *self._shape)
         c, weighted = abi.LiftFitC(), np.empty(self._shape)
@@ -218,7 +218,7 @@ class Lifter:
         return _fit(c), weighted
 
     def expect(self, place: ArrayLike, heading: float = 0.0, heading_sd: float = -1.0) -> None:
-        """Expect the person of the following segments at another place (3,) and heading than the config's.
+        """Expect the person of the following segments at this position (3,) and heading, not the config's.
 
         A `heading_sd` of -1 leaves the heading unknown.  The lifter must have been made so.
         """
@@ -238,14 +238,14 @@ class Lifter:
         return mean, covariance
 
     def scale(self) -> float:
-        """Factor for standard deviations of a motion as far from the prior's mean as the last segment.
+        """Factor for the standard deviations of the last segment.
 
-        Above 1 where its modes are larger than the prior expects, below 1 where they are smaller (the
-        likeliest scale of the modes' variances, with an inverse gamma prior).  In an orthographic view,
-        with heading and size known, errors over standard deviations so scaled follow about Student's t of ten
-        degrees of freedom: 90 % are within 1.81.  With a camera the uncertainty of size and place is included
-        and does not shrink with the motion: do not multiply by less than 1.  Takes milliseconds; GaitError
-        after `fix`.
+        Above 1 if its modes are larger than the prior expects, below 1 if they are smaller (the most probable
+        scale of the modes' variances, with an inverse gamma prior).  In an orthographic view with known
+        heading and size, errors divided by the scaled standard deviations follow approximately Student's t
+        with ten degrees of freedom: 90 % are within 1.81.  With a camera, the standard deviations include the
+        uncertainty of size and position, which does not shrink with the motion: do not multiply by less than
+        1.  Takes milliseconds; GaitError after `fix`.
         """
         scale = ctypes.c_double()
         self._call("scale", scale)

@@ -63,7 +63,7 @@ def load(source: str | os.PathLike[str] | bytes | None) -> LoadedModel:
 
 @dataclass(frozen=True)
 class ModelInfo:
-    """What a model holds.
+    """Contents of a model.
 
     Attributes
     ----------
@@ -72,7 +72,7 @@ class ModelInfo:
     components : int
         Principal components of the cyclic motion.
     proportions : int
-        Ways in which limbs differ in length at the same stature.
+        Components of the variation of limb lengths at the same stature.
     phases : int
         Samples per stride of its curves.
     limbs : int
@@ -82,13 +82,13 @@ class ModelInfo:
     stride_length, stride_length_sd : float
         Fractions of stature, likewise.
     cyclic : int
-        1, or 0 for a blob that holds a segment prior alone.
+        1; 0 for a blob with only a segment prior.
     posture_angles : int
-        Bit i: angle i is of trunk or arms, whose posture differs most between people.
+        Bit i: angle i belongs to the trunk or an arm, where posture varies most.
     classes : int
         Classes of motion.
     direction : int
-        Way of the phase: 1 forwards, -1 backwards, 0 standing still.
+        Direction of the phase: 1 forwards, -1 backwards, 0 standing.
     digest : int
         Hash of the blob.
     """

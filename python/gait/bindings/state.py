@@ -28,7 +28,7 @@ def state_range(name: str) -> tuple[float, float]:
 
 @dataclass
 class State:
-    """Everything that places and poses a person; also used for the standard deviations of those values.
+    """Position and pose of a person; also used for the standard deviations of these values.
 
     Attributes
     ----------
@@ -41,7 +41,7 @@ class State:
     heading : float
         Walking direction about world z, radians; 0 = along +x.
     pitch, roll : float
-        Tilt of the pelvis beyond the model's own, radians.
+        Tilt of the pelvis relative to the model's, radians.
     pelvis : ndarray of shape (3,)
         Pelvis joint in the world, metres.
     coef : ndarray of shape (q,)

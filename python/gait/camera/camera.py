@@ -107,7 +107,7 @@ class Camera:
 
     @property
     def centre(self) -> Array:
-        """Place of the lens in the world, shape (3,), metres."""
+        """Position of the lens in the world, shape (3,), metres."""
         return np.asarray(-self.R.T @ self.t)
 
     def depth(self, points: ArrayLike) -> Array:
@@ -133,7 +133,7 @@ class Camera:
         return bool(((uv >= 0) & (uv < self.size)).all(axis=-1).any())
 
     def rays(self, pixels: ArrayLike) -> Array:
-        """Look along pixels (..., 2): unit directions (..., 3) in the world from `centre`."""
+        """Rays through pixels (..., 2): unit directions (..., 3) in the world from `centre`."""
         import cv2  # as in project()
 
         uv = np.asarray(pixels, np.float64)
@@ -175,7 +175,7 @@ class Camera:
         return ("-" if up[k] < 0 else "") + "xyz"[k]
 
     def with_up(self, axis: str) -> Camera:
-        """Camera in the world turned so that `axis`, as of `up_axis`, becomes z."""
+        """Camera in the world rotated so that `axis`, as from `up_axis`, becomes z."""
         k = "xyz".index(axis[-1])
         up = (-1.0 if axis.startswith("-") else 1.0) * np.eye(3)[k]
         first = np.eye(3)[k - 2]
@@ -204,7 +204,7 @@ class Camera:
         raise UserError(f"{made}, another aspect{cut}; calibrate for this video or undo its crop")
 
     def same_aspect(self, size: tuple[int, int]) -> bool:
-        """Whether pictures of `size` may show the same as this camera's, resized; to a pixel."""
+        """Whether pictures of `size` may be this camera's, resized, to within a pixel."""
         return abs(self.height * size[0] / self.width - size[1]) < 1
 
     def for_size(self, size: tuple[int, int]) -> Camera:

@@ -81,7 +81,7 @@ def stand_still(poses: Sequence[CameraPose]) -> bool:
 
 @dataclass(frozen=True)
 class CameraPath:
-    """Poses of one camera in the order of time, as a robot or a tracker of the camera gives them.
+    """Poses of one camera over time, as from a robot.
 
     Attributes
     ----------
@@ -104,7 +104,7 @@ class CameraPath:
         """Read a CSV file with a row for each pose.
 
         Columns: ``time`` (seconds of the video) or ``frame``; ``r11`` to ``r33`` and ``tx ty tz`` (world to
-        camera), or ``x y z qx qy qz qw`` (place of the lens, and the turn from camera to world);
+        camera), or ``x y z qx qy qz qw`` (position of the lens, and rotation from camera to world);
         optionally ``turn_sd_deg`` and ``place_sd_m``.  Others are ignored, but ``fx fy cx cy`` must not
         change.
 
@@ -130,7 +130,7 @@ class CameraPath:
     def at_times(self, times: Sequence[float] | Array, first: int = 0) -> list[CameraPose]:
         """Poses at the times of frames, seconds; `first` is the number of the first one.
 
-        Turns are interpolated along the shortest way, places of the lens along the line between them.
+        Rotations are interpolated along the shortest path, positions of the lens linearly.
 
         Raises
         ------

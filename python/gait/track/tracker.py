@@ -25,7 +25,7 @@ from gait.track.tasks import PythonTasks, Runner, TaskSource, threads
 
 
 class Tracker:
-    """Particle filter in memory of fixed size.
+    """Particle filter with fixed memory.
 
     Parameters
     ----------
@@ -34,7 +34,7 @@ class Tracker:
     config : TrackerConfig, optional
         The library's defaults if left out.
     background : image, or sequence of image or None, optional
-        Empty scene as each camera sees it; copied.
+        Empty scene seen by each camera; copied.
     tasks : int, callable or TaskSource
         Number of threads; or a callable that runs tasks (see `gait.track.tasks.Runner`); or a pool.
 
@@ -49,7 +49,7 @@ class Tracker:
 
     Notes
     -----
-    Same input, configuration and seed give the same bits, whatever `tasks` is.
+    The same input, configuration and seed give the same bits for any `tasks`.
     """
 
     def __init__(
@@ -85,7 +85,7 @@ class Tracker:
         return Tracker(self.model, self.cameras, config, background=plates, tasks=self._tasks or 1)
 
     def set_background(self, plate: Image | None, camera: int = 0) -> None:
-        """Copy the empty scene of one camera as captured, (h, w) or (h, w, 3) BGR; None takes it away."""
+        """Copy the empty scene of one camera as captured, (h, w) or (h, w, 3) BGR; None removes it."""
         view = None
         if plate is not None:
             plate = np.array(plate, order="C")
@@ -110,15 +110,15 @@ class Tracker:
         self.start_stature_sd = sd.stature / max(mean.stature, LEAST_STATURE)
 
     def start_hypotheses(self, hypotheses: Sequence[Hypothesis], utime: int = 0) -> None:
-        """Draw the particles from hypotheses of an automatic start, as many from each as it is probable.
+        """Draw the particles from hypotheses of an automatic start, in proportion to their probabilities.
 
-        Until images have decided between them, and against an empty scene, the status is ``INIT``.
+        Until images have decided between them and confirmed a person, the status is ``INIT``.
 
         Parameters
         ----------
         hypotheses : sequence of Hypothesis
-            The most probable first; those of another place in the image than the first, or of a walk in place
-            beside one along a path, are left out.
+            The most probable first; ignored are those elsewhere in the image, or that differ from the first
+            in walking in place.
         utime : int
             Time of the first frame, microseconds.
         """
@@ -136,7 +136,7 @@ class Tracker:
         poses: CameraPose | Sequence[CameraPose | None] | None = None,
         backgrounds: Image | Sequence[Image | None] | None = None,
     ) -> Estimate:
-        """Take in one frame and estimate.
+        """Process one frame and estimate.
 
         Parameters
         ----------
@@ -145,12 +145,12 @@ class Tracker:
         utime : int
             Capture time, microseconds; must increase.
         keypoints : FrameKeypoints, or sequence of FrameKeypoints or None, optional
-            Found in each camera's picture; they count if ``config.terms`` has ``Term.KEYPOINTS``.
+            Found in each camera's image; used if ``config.terms`` has ``Term.KEYPOINTS``.
         poses : CameraPose, or sequence of CameraPose or None, optional
-            Where each camera is in this frame, if it moves; otherwise it is where it was made.
+            Pose of each camera in this frame, if it moves; otherwise the pose of its `Camera`.
         backgrounds : image, or sequence of image or None, optional
-            The empty scene as each camera sees it in this frame.  That of `set_background` counts only in
-            frames in which the camera is where it was made.
+            The empty scene seen by each camera in this frame.  That of `set_background` is only used at
+            the original pose.
         """
         images, plates = (
             [None if image is None else np.ascontiguousarray(image) for image in per_camera(pictures)]
@@ -200,14 +200,14 @@ class Tracker:
         return Estimate.from_c(out, self.model)
 
     def particles(self) -> tuple[NDArray[np.void], NDArray[np.float32]]:
-        """All particles: structured array (N,) with the fields of ``gait_state``, and their weights (N,)."""
+        """All particles, a structured array (N,) with the fields of ``gait_state``, and weights (N,)."""
         count = self._call("particles", None, None, 0)
         states, weights = (abi.StateC * count)(), np.zeros(count, np.float32)
         self._call("particles", states, weights, count)
         return np.ctypeslib.as_array(states), weights
 
     def predict(self, states: NDArray[np.void], seconds: float) -> NDArray[np.void]:
-        """Where states may be after an interval, without seeing an image: one draw of the dynamics for each.
+        """Predict states over an interval without an image: one draw of the dynamics for each.
 
         Parameters
         ----------
@@ -226,13 +226,13 @@ class Tracker:
         return out
 
     def digest(self) -> int:
-        """Hash of the whole state: equal after equal input, whatever the threads or the machine."""
+        """Hash of the whole state: the same after the same input, with any threads and on any machine."""
         return int(library().gait_tracker_digest(self._handle))
 
     def save(self) -> bytes:
         """Copy of the whole state, for `restore` into a tracker of the same model and configuration.
 
-        Empty scenes are not in it: give the other tracker its own (`set_background`).
+        It does not contain empty scenes: give the other tracker its own (`set_background`).
         """
         size = ctypes.c_size_t()
         self._call("save", None, 0, size)
@@ -241,7 +241,7 @@ class Tracker:
         return memory[: size.value].tobytes()
 
     def restore(self, snapshot: bytes) -> None:
-        """Take over a state from `save`; a failure leaves this one as it was."""
+        """Restore a state from `save`; a failure leaves the tracker unchanged."""
         memory = aligned(len(snapshot))
         memory[:] = np.frombuffer(snapshot, np.uint8)
         self._call("restore", memory, len(snapshot))
