@@ -150,7 +150,9 @@ def test_damaged_weights_are_refused(tmp_path, monkeypatch):
 
 def test_a_folder_of_weights_that_is_none_is_refused(tmp_path, monkeypatch, capsys):
     monkeypatch.setenv("GAIT_WEIGHTS", str(tmp_path / "nowhere"))
-    with pytest.raises(UserError, match="GAIT_WEIGHTS: .*nowhere is not a folder; unset it, or run gait detect"):
+    with pytest.raises(
+        UserError, match="GAIT_WEIGHTS: .*nowhere is not a folder; unset it, or run gait detect"
+    ):
         weights.find(weights.PERSON)
 
 

@@ -89,7 +89,7 @@ def test_two_streams_are_one_tracker(missing, tmp_path):
         assert error(outcome) < min(0.05, error(alone))
 
 
-def test_the_tracker_waits_for_all_cameras_and_says_which(tmp_path):
+def test_the_tracker_waits_for_all_cameras_and_reports_which(tmp_path):
     events = [*rig.opening(), *rig.frames(0, 4)]
     outcome = play(tmp_path, events, "--further-streams", 3)
     assert outcome.code == 1 and outcome.words.count("announce it on GAIT_CAMERA_3") == 2

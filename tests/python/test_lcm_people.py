@@ -1,4 +1,4 @@
-"""gait-trackd --person: one tracker for each of several people in a stream, distinguished by their keypoints."""
+"""gait-trackd --person: one tracker for each of several people, distinguished by their keypoints."""
 
 from dataclasses import replace
 from functools import cache

@@ -15,9 +15,10 @@ bool further_open(further *f, const char *streams, int first, message *why)
         bool const number =
             end != at && (*end == '\0' || (*end == ',' && end[1])) && stream >= 0 && stream <= 30;
         if (!number || stream == first || further_find(f, (int)stream) || f->count == FURTHER_MOST)
-            return message_set(
-                why, "--further-streams %.40s: give up to %d numbers of other cameras than --stream, as 1,2",
-                streams, FURTHER_MOST);
+            return message_set(why,
+                               "--further-streams %.40s: give at most %d numbers of cameras other than "
+                               "--stream, such as 1,2",
+                               streams, FURTHER_MOST);
         f->camera[f->count++].stream = (int)stream;
         at = *end ? end + 1 : end;
     }

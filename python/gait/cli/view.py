@@ -64,7 +64,11 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         help="number of a person (gait-trackd --person), or URL on which a tracker publishes (its --out); "
         "repeat for each person (default: the one on --url)",
     )
-    add("--record-to", metavar="FOLDER", help="folder for recordings, created if needed (default: the current one)")
+    add(
+        "--record-to",
+        metavar="FOLDER",
+        help="folder for recordings, created if needed (default: the current one)",
+    )
     values.add_camera(parser, ", for the first --stream (default: from GAIT_CAMERA_<i>)", scale=True)
     values.add_model(parser, "model that is tracked")
 

@@ -198,9 +198,7 @@ def folder_of(video: Video) -> Iterator[Path]:
     except BlockingIOError:
         raise UserError(f"{folder}: another gait studio has this film open; use or close that one") from None
     except OSError as error:
-        raise UserError(
-            f"{folder}: {error.strerror}; copy the film to a writable folder"
-        ) from error
+        raise UserError(f"{folder}: {error.strerror}; copy the film to a writable folder") from error
     try:
         yield folder
     except UserError:

@@ -247,9 +247,7 @@ def _finders(
 def _no_person(few: int, misplaced: list[float]) -> str:
     """Explain why there is no start, and what to do."""
     if few == 1:
-        return (
-            "only 1 frame to track; give at least a second, by --start and --stop too"
-        )
+        return "only 1 frame to track; give at least a second, by --start and --stop too"
     if few < _ENOUGH:
         return f"only {few} frames to track, --init auto needs {_ENOUGH}; give --init FILE.json"
     if len(misplaced) < _ENOUGH:
