@@ -102,5 +102,5 @@ def test_a_runner_that_returns_early_leaves_no_late_calls(early):
 
 @pytest.mark.parametrize("count", [2**32 + 2, -(2**31) - 1, 2**63])
 def test_whole_numbers_that_do_not_fit_are_refused(count):
-    with pytest.raises(ValueError, match=f"{count} does not fit 32 bits"):
+    with pytest.raises(ValueError, match=f"{count} does not fit in 32 bits"):
         make("pool", count)

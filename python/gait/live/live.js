@@ -18,7 +18,7 @@ if (start.parts) {
   curves = new Curves(element('curves'), { times: [], curves: start.curves });
   curves.show(-1); // no cursor: the plots end now
 } else {
-  element('scene').innerHTML = '<p class="none">The figure and the plots need parts that were not fetched: run gait studio --fetch once, with a network.</p>';
+  element('scene').innerHTML = '<p class="none">The figure and the plots need components that were not downloaded: run gait studio --fetch once, with a network connection.</p>';
 }
 
 let waiting = [], drawn = null;
@@ -142,7 +142,7 @@ function explain(text) {
       : `Start gait-trackd --url ${start.url} --out ${url}, and gait capture for a film or camera.`];
   element('waiting').replaceChildren(...lines.map((line) => Object.assign(document.createElement('p'), { textContent: line })));
 }
-setInterval(() => { if (quiet() && !element('waiting').textContent) explain('No estimates come.'); }, 500);
+setInterval(() => { if (quiet() && !element('waiting').textContent) explain('No estimates arrive.'); }, 500);
 
 // ---- pictures: the newest is fetched when the one before is there ----
 const images = new Map();

@@ -87,7 +87,7 @@ function build() {
   canvas.addEventListener('pointercancel', () => { panning = null; drop(); });
   canvas.addEventListener('contextmenu', remove);
   canvas.setAttribute('role', 'application');
-  canvas.setAttribute('aria-label', 'The figure over the film. Choose a joint and press Alt with an arrow key to move it.');
+  canvas.setAttribute('aria-label', 'The figure over the film. Select a joint and press Alt with an arrow key to move it.');
   canvas.tabIndex = 0;
 }
 
@@ -254,7 +254,7 @@ function lists(saved = 'saved') {
   at('undo').disabled = !data.undo;
   at('redo').disabled = !data.redo;
   at('proposals').replaceChildren(...data.proposals.map((p, k) => row(
-    button(`${words(p.joint)}, frame ${p.frame} · ${p.px.toFixed(0)} px`, 'Go there and choose the joint', () => propose(k)))));
+    button(`${words(p.joint)}, frame ${p.frame} · ${p.px.toFixed(0)} px`, 'Go there and select the joint', () => propose(k)))));
   const entries = [];
   const add = (list, index, text, frame, joint) => entries.push({ frame, item: row(
     button(text, 'Go there', () => go(frame, joint)),
@@ -488,7 +488,7 @@ function go(frame, joint) {
 }
 
 function propose(k) {
-  if (!data.proposals.length) return say('Nothing is left to propose.', 2);
+  if (!data.proposals.length) return say('There are no more suggestions.', 2);
   proposal = k % data.proposals.length;
   const { frame, joint } = data.proposals[proposal];
   go(frame, joint);
@@ -501,7 +501,7 @@ function choose(name) {
   if (!allowed(name)) return;
   tool = name;
   for (const each of ['pull', 'pin', 'start']) at(`tool-${each}`).setAttribute('aria-pressed', each === name);
-  if (name === 'start') say('Drag over the floor, from under the person to where they walk.', 3);
+  if (name === 'start') say('Drag over the floor, from below the person in the direction of walking.', 3);
   if (name === 'pin') say('Click the floor where a heel, toe or ankle stands.', 3);
 }
 

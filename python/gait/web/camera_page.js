@@ -47,13 +47,13 @@ const radio = (value, text) => {
 const save = make('button', { type: 'button', className: 'primary', textContent: `Write ${about.output}`, disabled: true });
 const clear = make('button', { type: 'button', textContent: 'Start again' });
 const help = make('ol', {},
-  make('li', { textContent: 'Click four marks or more on the floor, far apart. Drag moves a mark, the wheel zooms; arrow keys move the chosen one by half a pixel, Delete removes it.' }),
-  make('li', { textContent: 'Type the distances that you measured between them.' }),
+  make('li', { textContent: 'Click at least four marks on the floor, far apart. Drag to move a mark, use the wheel to zoom; arrow keys move the selected mark by half a pixel, Delete removes it.' }),
+  make('li', { textContent: 'Type the measured distances between them.' }),
   make('li', { textContent: 'The blue grid must lie on the floor, the pole must be as high as a person. Then write the file.' }));
 document.getElementById('page').append(
   make('section', { className: 'view', ariaLabel: 'Picture' }, film),
   make('section', { className: 'side', ariaLabel: 'Marks' },
-    make('h1', { textContent: `Where does the camera of ${about.name} stand?` }), help, verdict, make('div', { className: 'row' }, save, clear),
+    make('h1', { textContent: `Where is the camera of ${about.name}?` }), help, verdict, make('div', { className: 'row' }, save, clear),
     make('fieldset', {}, make('legend', { textContent: 'I measured' }),
       make('div', { className: 'row' }, radio('distances', 'distances between marks'), radio('positions', 'positions x, y'))),
     table, make('p', { className: 'faint', textContent: about.lens })));

@@ -32,7 +32,7 @@ export class Scene {
     const canvas = this.renderer.domElement;
     canvas.tabIndex = 0;
     canvas.setAttribute('role', 'img');
-    canvas.setAttribute('aria-label', 'The figure in space. Drag turns it, the wheel zooms, the right button moves it.');
+    canvas.setAttribute('aria-label', 'The figure in space. Drag to turn it, use the wheel to zoom and the right button to move it.');
     element.append(canvas);
     this.scene = new THREE.Scene();
     this.scene.add(new THREE.HemisphereLight(0xffffff, 0x777777, 2.4));
@@ -227,7 +227,7 @@ export class Scene {
     };
     add('30°', 'View from 30 degrees above the floor', () => this.lookFrom(30));
     add('Side', 'View from the camera’s side', () => this.lookFrom(5, 90));
-    add('Camera', 'View as the camera does', () => this.lookFrom(8, 0));
+    add('Camera', 'View from the camera', () => this.lookFrom(8, 0));
     add('Top', 'View from above', () => this.lookFrom(88, 0));
     for (const [name, text] of [['cylinders', 'Body'], ['ellipsoids', 'Uncertainty'], ['trajectory', 'Way']]) {
       const button = add(text, `Show or hide: ${text.toLowerCase()}`, () => {
