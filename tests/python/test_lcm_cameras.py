@@ -100,4 +100,4 @@ def test_the_tracker_waits_for_all_cameras_and_reports_which(tmp_path):
 @pytest.mark.parametrize("streams", ["0", "1,1", "1,", "x", "31", "1,2,3,4"])
 def test_numbers_that_are_no_further_cameras_are_refused(streams):
     done = rig.run(*rig.command("--further-streams", streams, "--url", "file:///nothing")[1:])
-    assert done.code == 1 and "up to 3 numbers of other cameras" in done.words
+    assert done.code == 1 and "at most 3 numbers of cameras other than" in done.words
