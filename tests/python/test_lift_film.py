@@ -92,7 +92,7 @@ def test_the_users_view_is_used(lift):
 
 
 def test_a_view_from_far_away_needs_no_camera(lift):
-    _, figures, notes = lift("--orthographic", "y", "--height", STATURE)
+    _, figures, notes = lift("--orthographic", "y", "--height", STATURE, "--method", "blend")
     assert "camera" not in figures and "camera from the walk" not in notes
 
 
