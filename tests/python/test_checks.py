@@ -323,34 +323,38 @@ def checkout(tmp_path):
     return tmp_path
 
 
-@pytest.mark.parametrize(
-    ("name", "content", "words"),
-    [
-        ("build/a.c", b"int x;\n", "made by the build"),
-        ("python/gait/a.so", b"x", "made by the build"),
-        ("clip.mp4", b"x", "data"),
-        ("tests/truth.csv", b"frame,time\n", "data"),
-        ("a.bin", b"a\0b", "binary"),
-        ("large.txt", b"x\n" * 200_000, "over 300000"),
-        ("lcm_types/a.h", b"/* THIS IS AN AUTOMATICALLY" + b" GENERATED FILE */\n", "generated"),
-        ("a.md", b"look into /ho" + b"me/alice/gait\n", "a.md:1: path"),
-        ("a.h", b"/* as in spe" + b"c 1.6 */\n", "a.h:1: refers to"),
-        ("b.md", b"see interfaces" + b".md\n", "b.md:1: refers to"),
-        ("c.md", b"by issue" + b" 3\n", "c.md:1: refers to"),
-        ("d.md", b"# D\n[a](libgait/src/a.c) [b](b.c)\n", "d.md: link to b.c"),
-        ("e.md", b"# E\n## The [O 3], of `e`\n[a](#the-o-3-of-e) [b](#f)\n", "e.md: link to #f"),
-        ("a.py", b"x = 1 \n", "blank at the end"),
-        ("b.py", b"x = 1", "no newline"),
-        ("errors.sto", b"x = 1\n", "data does not belong"),
-        ("python/gait/_version.py", b'__version__ = "1.1.2"\n', "gait.h has 1.1.1"),
-        ("libgait/doc/changelog.md", b"| 0 | first |\n", "no row for ABI 1"),
-    ],
+STRAY = (
+    ("build/a.c", b"int x;\n", "made by the build"),
+    ("python/gait/a.so", b"x", "made by the build"),
+    ("clip.mp4", b"x", "data"),
+    ("tests/truth.csv", b"frame,time\n", "data"),
+    ("a.bin", b"a\0b", "binary"),
+    ("large.txt", b"x\n" * 200_000, "over 300000"),
+    ("lcm_types/a.h", b"/* THIS IS AN AUTOMATICALLY" + b" GENERATED FILE */\n", "generated"),
+    ("a.md", b"look into /ho" + b"me/alice/gait\n", "a.md:1: path"),
+    ("a.h", b"/* as in spe" + b"c 1.6 */\n", "a.h:1: refers to"),
+    ("b.md", b"see interfaces" + b".md\n", "b.md:1: refers to"),
+    ("c.md", b"by issue" + b" 3\n", "c.md:1: refers to"),
+    ("d.md", b"# D\n[a](libgait/src/a.c) [b](b.c)\n", "d.md: link to b.c"),
+    ("e.md", b"# E\n## The [O 3], of `e`\n[a](#the-o-3-of-e) [b](#f)\n", "e.md: link to #f"),
+    ("a.py", b"x = 1 \n", "blank at the end"),
+    ("b.py", b"x = 1", "no newline"),
+    ("errors.sto", b"x = 1\n", "data does not belong"),
+    ("python/gait/_version.py", b'__version__ = "1.1.2"\n', "gait.h has 1.1.1"),
+    ("libgait/doc/changelog.md", b"| 0 | first |\n", "no row for ABI 1"),
 )
-def test_hygiene_sees_what_does_not_belong(checkout, name, content, words):
-    (checkout / name).parent.mkdir(parents=True, exist_ok=True)
-    (checkout / name).write_bytes(content)
-    subprocess.run(["git", "-C", checkout, "add", "-f", name], check=True)
-    assert fails(run("hygiene.py", checkout), words)
+
+
+def test_hygiene_sees_what_does_not_belong(checkout):
+    for name, content, _ in STRAY:
+        (checkout / name).parent.mkdir(parents=True, exist_ok=True)
+        (checkout / name).write_bytes(content)
+    subprocess.run(["git", "-C", checkout, "add", "-f", *(name for name, *_ in STRAY)], check=True)
+    done = run("hygiene.py", checkout)
+    found = done.stdout.splitlines()
+    for name, _, words in STRAY:
+        assert any(line.startswith(name) and words in line for line in found), name
+    assert done.returncode == 1 and {line.split(":")[0] for line in found} == {name for name, *_ in STRAY}
 
 
 def test_hygiene_warns_of_a_long_source(checkout):
@@ -396,24 +400,27 @@ def test_unit_runner_counts_a_crash_and_a_silent_exit(tmp_path, script, want):
     assert (done.returncode, done.stdout.splitlines()[-1]) == (want[0], f"C tests: {want[1]}")
 
 
-@pytest.mark.parametrize(
-    ("name", "text", "words"),
-    [
-        ("a.c", "int add_mingle(void);\n", "a.c:1: 'mingle': write rejuvenate"),
-        ("a.py", "x = 1\n\n\nclass OldWalkers:\n    pass\n", "a.py:4: 'walkers'"),
-        ("a.md", "The points say that nobody is there.\n", "a.md:1: 'nobody'"),
-        ("a.md", "Its deviation is 2 m.\n", "standard deviation"),
-        ("a.h", "extern int seen_area;\n", "a.h:1: 'seen'"),
-        ("spotter.c", "int x;\n", "spotter.c:0: 'spotter'"),
-        ("a.md", "The search is given up.\n", "'given up'"),
-    ],
+PRIVATE = (
+    ("b.c", "int add_mingle(void);\n", "b.c:1: 'mingle': write rejuvenate"),
+    ("a.py", "x = 1\n\n\nclass OldWalkers:\n    pass\n", "a.py:4: 'walkers'"),
+    ("a.md", "The points say that nobody is there.\n", "a.md:1: 'nobody'"),
+    ("b.md", "Its deviation is 2 m.\n", "standard deviation"),
+    ("a.h", "extern int seen_area;\n", "a.h:1: 'seen'"),
+    ("spotter.c", "int x;\n", "spotter.c:0: 'spotter'"),
+    ("c.md", "The search is given up.\n", "'given up'"),
 )
-def test_words_sees_a_private_word(checkout, name, text, words):
+
+
+def test_words_sees_a_private_word(checkout):
     clean = "/* as seen from a standard\n * deviation; np.eye(3), odd number */\nint track_loss;\n"
     (checkout / "a.c").write_text(clean)
     subprocess.run(["git", "-C", checkout, "add", "a.c"], check=True)
     assert run("words.py", checkout).returncode == 0
-    (checkout / name).write_text(text)
-    subprocess.run(["git", "-C", checkout, "add", name], check=True)
-    assert fails(run("words.py", checkout, name), words)
+    for name, text, _ in PRIVATE:
+        (checkout / name).write_text(text)
+    subprocess.run(["git", "-C", checkout, "add", "."], check=True)
+    found = run("words.py", checkout)
+    for name, _, words in PRIVATE:
+        assert any(line.startswith(name) and words in line for line in found.stdout.splitlines()), name
+    assert fails(found) and fails(run("words.py", checkout, "a.md"), "a.md:1")
     assert run("words.py", checkout, "libgait").returncode == 0
