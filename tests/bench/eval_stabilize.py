@@ -1,8 +1,9 @@
 #!/usr/bin/env python3
 """Tracks of real films, and of simulated cameras that move, with and without `--stabilize auto`.
 
-    eval_stabilize.py [--only NAME...] [--record]
+    eval_stabilize.py [--only NAME...] [--turns] [--record]
 
+--turns: no tracks; how far the cameras of the real films turn, and what that is at the person.
 never: --stabilize off, with a background and without; moving: --stabilize auto, which leaves alone what
 stands still; always: the same, with every camera taken to move.  Where auto finds that the camera stands
 still it is the same as never, and never is not run; where it finds that it moves, always is the same as
@@ -13,6 +14,7 @@ from __future__ import annotations
 
 import argparse
 import sys
+from collections.abc import Iterable
 from dataclasses import replace
 from pathlib import Path
 
@@ -23,10 +25,13 @@ from facts import facts
 from real_clip import Clip, errors_in_space, from_truth, read_cameras, read_clips, score
 
 from gait import Camera, Video
+from gait.io.keypoints_file import Keypoints
 from gait.io.track_file import read_estimates
+from gait.io.video import sample_frames
 from gait.progress import progress
 from gait.simulate.clip import simulate
 from gait.simulate.scenario import PRESETS
+from gait.track.stabilise import find_motion
 
 ROOT = Path(__file__).resolve().parents[2]
 FOLDER = ROOT / "build" / "eval-stabilize"
@@ -37,6 +42,12 @@ ALWAYS = (
     "import sys; from gait.cli import main; from gait.track import stabilise; "
     "stabilise._still = lambda *_: False; sys.exit(main(sys.argv[1:]))",
 )
+GOOD = 0.09  # person's heights up to which legs are in place in `make eval-real`
+TALL = 0.9  # of a person's height, from ears to toes
+_TURNS = """\
+How far the camera of each film of `make eval-real` turns from its first frame, as `--stabilize auto` finds it
+with the camera given, and how far a person in the scene's frame is then drawn beside the one in the picture
+by a program that knows that camera alone: shares of the person's height, in the frames that are judged."""
 _READING = """\
 The arm `auto` of `make eval-real` (camera given, detector on). never, moving, always: --stabilize off; auto;
 auto, with every camera taken to move. good, wrong under `tracking`: as there, joints in the picture by the
@@ -51,9 +62,23 @@ def main() -> int:
         description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
     )
     parser.add_argument("--only", nargs="+", metavar="NAME", help="names of clips (all)")
+    parser.add_argument("--turns", action="store_true", help="measure turns alone")
     parser.add_argument("--record", action="store_true")
     args = parser.parse_args()
     clips = read_clips(ROOT.parent / "shared/data/real", args.only)
+    publish = table.publish if args.record else _show
+    if args.turns:
+        head = [
+            "clip",
+            "camera",
+            "turns px",
+            "median % of height",
+            "most %",
+            f"over {100 * GOOD:g} % of it %",
+        ]
+        note = f"{facts('tests/bench/eval_stabilize.py --turns')}\n\n{_TURNS}"
+        publish("eval_stabilize_turns", "Turns of the cameras of real films", head, map(_turns, clips), note)
+        return 0
     clips += [
         from_truth(_made(*names)) for names in SIMULATED if not args.only or "_".join(names) in args.only
     ]
@@ -68,11 +93,30 @@ def main() -> int:
     head = ["clip", "camera", "stabilised", "good %", "one camera, good %", "tracking", "wrong",
             "error % of height", "stride rate %", "root mm", "abs mm", "CPU s", "failed"]  # fmt: skip
     note = f"{facts('tests/bench/eval_stabilize.py')}\n\n{_READING}"
-    if args.record:
-        table.publish("eval_stabilize", "Stabilising", head, rows, note)
-    else:
-        table.show("Stabilising", head, rows)
+    publish("eval_stabilize", "Stabilising", head, rows, note)
     return 0
+
+
+def _show(name: str, title: str, head: list[str], rows: Iterable[list[object]], note: str) -> None:
+    table.show(title, head, rows)
+
+
+def _turns(clip: Clip) -> list[object]:
+    """Row of a film: how its camera turns, and how far that moves the person, by the checked joints."""
+    video, given = Video(clip.video), _given(clip)
+    names = tuple(sorted(set.intersection(*map(set, clip.reference.values()))))
+    frames = np.array(sorted(clip.reference))
+    uv = np.array([[clip.reference[frame][name] for name in names] for frame in frames.tolist()])
+    people = {1: Keypoints(frames, frames / clip.fps, names, uv, np.ones(uv.shape[:2]))}
+    motion, why = find_motion(video, given, sample_frames(video), people, first=True)
+    if motion is None:
+        return [clip.folder.name, "does not only turn" if why else "still", None, None, None, None]
+    moved = np.hypot(*(motion.in_reference(people[1]).uv - uv).T)
+    height = np.ptp(uv[..., 1], axis=1) / TALL
+    off = np.nanmedian(moved, axis=0) / height
+    off = off[(frames >= clip.first) & (frames <= clip.last)]
+    shares = 100 * np.array([np.nanmedian(off), np.nanmax(off), np.mean(off > GOOD)])
+    return [clip.folder.name, "turns", motion.furthest(), *shares.tolist()]
 
 
 def _made(preset: str, moving: str) -> Path:
