@@ -40,9 +40,8 @@ def fetched(monkeypatch):
 
 
 # Files whose few tests take long begin first, so that no processor waits at the end.
-FIRST = [
-    f"test_{name}.py" for name in ("learn_dask", "docs", "learn_report", "example", "learn_jobs", "initial")
-]
+LONG = "docs initial learn_dask learn_jobs learn_report lift_robust paper studio"
+FIRST = [f"test_{name}.py" for name in LONG.split()]
 
 
 def pytest_collection_modifyitems(items):
