@@ -1,4 +1,4 @@
-"""Learn how people walk from motion capture and track them in calibrated video.
+"""Learn how people walk from motion capture, and track them in video.
 
 The names below load what they need when first used, so ``import gait`` is quick and learning works without
 the C library.

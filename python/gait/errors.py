@@ -1,4 +1,4 @@
-"""Exceptions of the package: what a user can mend, and what the C library refused."""
+"""Exceptions of the package: errors that a user can fix, and errors of the C library."""
 
 from __future__ import annotations
 

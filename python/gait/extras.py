@@ -1,4 +1,4 @@
-"""Optional packages: which extra of libgait brings them, and the message when they are missing."""
+"""Optional packages: the extra of libgait that installs each, and the message when one is missing."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""A project file (TOML): clips, what is common to them, and what to make of each."""
+"""A project file (TOML): clips, common settings, and the outputs of each clip."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Run the clips of a project: each in processes of its own, several at a time, none of them twice."""
+"""Run the clips of a project, several at a time: each in its own processes, and none of them twice."""
 
 from __future__ import annotations
 

@@ -1,1 +1,1 @@
-"""Objects of the C library as Python's: model, state, start, what is observed, estimate, lifter."""
+"""Objects of the C library in Python: model, state, start, observations, estimate, lifter."""

@@ -1,4 +1,4 @@
-"""Settings of the C library's objects: names, defaults, ranges and meanings are those of the library."""
+"""Settings of the C library's objects, with the library's names, defaults, ranges and descriptions."""
 
 from __future__ import annotations
 

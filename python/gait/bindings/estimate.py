@@ -1,4 +1,4 @@
-"""What a tracker believes after a frame."""
+"""Estimate of a tracker after a frame."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""What the tracker is given of one moment, as the C library takes it: pictures, and joints found in them."""
+"""Input of the tracker at one time, for the C library: images, and joints detected in them."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Find and load libgait, check that it is this package's, and turn its status codes into exceptions."""
+"""Find and load libgait, check that it belongs to this package, and turn its error codes into exceptions."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""3-D motion from 2-D tracks by the C library: one segment, many at once, or a stream.
+"""3-D motion from 2-D keypoints by the C library: one segment, many at once, or a stream.
 
 After Leventon and Freeman (1998).  The prior is that of `gait.bindings.segment_prior.SegmentPrior`;
 tests/reference has the same inference in numpy and proves it.

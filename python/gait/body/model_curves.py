@@ -1,4 +1,4 @@
-"""Curves of a cyclic model in numpy, for many states at once, and how they follow the stride rate.
+"""Curves of a cyclic model in numpy, for many states at once, and their dependence on the stride rate.
 
 A model's angles and root motion are a mean and principal components over the stride (Ormoneit 2000, eq. 3).
 In models with section PACE the mean depends on the pace: how much faster than the mean a person walks.

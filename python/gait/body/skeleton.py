@@ -1,6 +1,6 @@
 """The default skeleton as data, and forward kinematics in numpy for learning, before there is a model.
 
-The C library poses learned models; both are held to each other by tests.
+The C library poses learnt models; tests compare both.
 
 Frames, rotations and signs are those of libgait/doc/model-format.md.  Lengths are fractions of stature,
 angles radians; body axes x forward, y left, z up.

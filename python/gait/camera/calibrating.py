@@ -1,4 +1,4 @@
-"""The lens of a camera from a board seen in many poses (Zhang 2000, by OpenCV), and whether to believe it."""
+"""Calibrate a lens from a board in many poses (Zhang 2000, by OpenCV), and check the result."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Calibrated camera: where a point of the world falls in the picture, and which ray a pixel looks along.
+"""Calibrated camera: projection of world points to pixels, and rays of pixels.
 
 Files: the project's JSON, OpenCV FileStorage YAML/XML, the TOML of Pose2Sim, anipose and FreeMoCap, and those
 of `gait.camera.other_files`.

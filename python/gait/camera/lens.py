@@ -1,4 +1,4 @@
-"""Lenses with other terms than k1 k2 p1 p2 k3: replaced by a lens that has these, where one agrees."""
+"""Lenses with terms other than k1 k2 p1 p2 k3, approximated by a lens with these where one agrees."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Where a camera is from moment to moment: poses, their files, and the poses between them."""
+"""Poses of a camera over time: files, and interpolation."""
 
 from __future__ import annotations
 

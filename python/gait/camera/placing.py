@@ -1,4 +1,4 @@
-"""Where a camera stands, from points whose place in the world and in the picture are known."""
+"""Extrinsics of a camera from points with known positions in the world and in the picture."""
 
 from __future__ import annotations
 

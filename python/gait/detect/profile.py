@@ -1,4 +1,4 @@
-"""How a detector's joints differ from the model's: where they lie, and how much and how long they err.
+"""How a detector's joints differ from the model's: offsets, and size and duration of errors.
 
 A detector has learnt hips, ankles and toes from pictures; those of the model are centres of joints.  A
 profile gives the difference of each joint as a sum of vectors between keypoints of the person:

@@ -1,7 +1,7 @@
 """Weights of the detector: files of two published packages.
 
-The networks are those of BlazePose (Bazarevsky and others 2020), by Google, licence Apache-2.0.  They lie
-inside the Python package ``mediapipe`` and the npm package ``@mediapipe/pose``, which are downloaded but not
+The networks are those of BlazePose (Bazarevsky and others 2020), by Google, licence Apache-2.0.  They come
+from the Python package ``mediapipe`` and the npm package ``@mediapipe/pose``, which are downloaded but not
 installed.
 """
 

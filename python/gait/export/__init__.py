@@ -1,1 +1,1 @@
-"""Motion in the formats of other tools: one module for each format, `motion` for what all of them need."""
+"""Motion in other tools' formats: one module per format, and `motion` for their common input."""

@@ -1,4 +1,4 @@
-"""Files of other tools, by their suffix."""
+"""Other tools' files, by suffix."""
 
 from __future__ import annotations
 

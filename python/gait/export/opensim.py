@@ -1,4 +1,4 @@
-"""OpenSim: a model (.osim) of the person's size and its coordinates over time (.mot).
+"""OpenSim: a model (.osim) scaled to the person, and its coordinates over time (.mot).
 
 The ground is that of .trc files: x_trc = y, y_trc = z (up), z_trc = x.  Bodies have x forwards, y up, z to
 the right.

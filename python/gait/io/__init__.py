@@ -1,1 +1,1 @@
-"""Files: what all readers and writers share, and the formats that know nothing of walking."""
+"""Files: common parts of readers and writers, and formats that are independent of walking."""

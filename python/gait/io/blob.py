@@ -1,6 +1,6 @@
 """Read and write model blobs (`.gait`, format 1.0): a container of named arrays (model-format.md).
 
-The container knows nothing of walking; what the sections mean is `gait.body.skeleton` and `gait.learn`.
+The container is independent of walking; `gait.body.skeleton` and `gait.learn` define the sections.
 """
 
 from __future__ import annotations

@@ -1,4 +1,4 @@
-"""Keypoint files of other tools, recognised by their content: read, or refused by name."""
+"""Keypoint files of other tools, recognised by content: read, or rejected by name."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Files: text read as lines; outputs complete or not at all, written beside their place, then renamed."""
+"""Files: text read as lines; outputs complete or absent, written to a temporary file and then renamed."""
 
 from __future__ import annotations
 

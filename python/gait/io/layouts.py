@@ -1,4 +1,4 @@
-"""Which keypoints of other tools are joints of the model, by the layout's number of points or by name."""
+"""Mapping of other tools' keypoints to joints of the model, by number of points or by name."""
 
 from __future__ import annotations
 

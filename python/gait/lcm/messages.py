@@ -1,4 +1,4 @@
-"""Between the objects of this package and the messages of ``gaitmsg``."""
+"""Conversion between objects of this package and messages of ``gaitmsg``."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Cameras that send a stream over the network: RTSP, HTTP and whatever else FFmpeg opens by a URL."""
+"""Cameras that send a stream over the network: RTSP, HTTP and other URLs that FFmpeg opens."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Films of a tracked clip: the overlay video, and the smaller one that a report has inside."""
+"""Films of a tracked clip: the overlay video, and the smaller one embedded in a report."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""The frame of all reports: one HTML file that needs nothing else, readable on a telephone and on paper."""
+"""The frame of all reports: one self-contained HTML file for screens, phones and paper."""
 
 from __future__ import annotations
 

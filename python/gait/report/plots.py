@@ -1,4 +1,4 @@
-"""Plots as SVG text for pages that need nothing else, in the colours of their style, light or dark."""
+"""Plots as SVG text for self-contained pages, in the colours of their style, light or dark."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""The page of a run from its files: the track, the film, and what else there is of camera and truth."""
+"""The page of a run from its files: the track, the film, and camera and truth if available."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""The page of a run: verdict, film and turning figure, gait, way, uncertainty, errors, settings."""
+"""The page of a run: verdict, film and 3-D figure, gait, path, uncertainty, errors, settings."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Words of reports that a clinician knows, each with its explanation: angles, gait parameters, errors."""
+"""Terms of reports, familiar to clinicians, with explanations: angles, gait parameters, errors."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Make a clip: pictures and exact truth, written to a folder."""
+"""Make a clip: images and ground truth, written to a folder."""
 
 from __future__ import annotations
 

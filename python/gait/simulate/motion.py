@@ -1,4 +1,4 @@
-"""What a person does in a clip beside walking on: stops, stands, walks backwards, turns.
+"""Motions of a person in a clip other than walking straight: stopping, standing, walking backwards, turning.
 
 A stop slows the gait's clock until both feet are on the ground, while steps get shorter, so that the feet
 come together; a start is the same in reverse.  Backwards is a walk whose time runs backwards.

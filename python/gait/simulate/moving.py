@@ -1,4 +1,4 @@
-"""Cameras that move while a person walks: the exact camera of each frame."""
+"""Moving cameras: the exact camera of each frame."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Everything of one clip before its pictures: people, walks, camera, scene."""
+"""All parts of a clip before rendering: people, walks, camera, scene."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""What a walking person looks like: the cut, colours and patterns of the clothes, skin, hair, face."""
+"""Appearance of a walking person: cut, colours and patterns of the clothes, skin, hair, face."""
 
 from __future__ import annotations
 

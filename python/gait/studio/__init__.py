@@ -1,4 +1,4 @@
-"""The interactive tool of Leventon and Freeman (1998), section 4, as a page of this machine.
+"""The interactive tool of Leventon and Freeman (1998), section 4, as a local web page.
 
 - `source`: what is corrected: film, keypoints, camera, and the folder beside the film.
 - `curves`: angles, phase, and where the motion is uncertain.

@@ -1,4 +1,4 @@
-"""The film lifted from 2-D keypoints with corrections: as `gait lift KEYPOINTS --corrections` does."""
+"""Lift the film from 2-D keypoints with corrections, as `gait lift KEYPOINTS --corrections` does."""
 
 from __future__ import annotations
 

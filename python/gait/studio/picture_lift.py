@@ -1,4 +1,4 @@
-"""The film lifted from its pictures with corrections: as `gait lift VIDEO --placement --corrections` does."""
+"""Lift the film from its images with corrections, as `gait lift VIDEO --placement --corrections` does."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""The whole motion, solved in a process of its own so that the page is never kept waiting.
+"""Solve the whole motion in a separate process, so that the page never waits.
 
 The newest corrections win: while one is solved, those that arrive are kept until the last of them is taken.
 """

@@ -1,4 +1,4 @@
-"""What the page shows of a motion, whatever it was lifted from, and the JSON object that it is sent as."""
+"""The data of a motion that the page shows, and the JSON object that carries them."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""What the studio corrects: a film, the keypoints of a person in it, the view, and a folder beside the film.
+"""Input of the studio: a film, the keypoints of a person in it, the view, and a folder beside the film.
 
 The folder ``walk.studio`` beside ``walk.mp4`` holds what takes long to make or must not be lost: keypoints
 of the detector or of a track, film.mp4, which every browser plays frame by frame, and corrections.json.

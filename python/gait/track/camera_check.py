@@ -1,4 +1,4 @@
-"""Whether a camera that is given fits the walk in the picture, and what would fit."""
+"""Check whether a given camera fits the walk in the picture, and what would fit."""
 
 from __future__ import annotations
 

@@ -2,7 +2,7 @@
 
 Corners of a key frame are tracked into later frames (pyramidal Lucas-Kanade).  A camera that turns about its
 lens moves them as the homography K' Q K^-1, whatever their distance.  Three angles and a zoom are fitted with
-Tukey's weights, so that people and things that move do not count.
+Tukey's weights, so that moving people and objects do not count.
 """
 
 from __future__ import annotations

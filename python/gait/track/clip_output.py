@@ -1,4 +1,4 @@
-"""Write the results of a tracked clip: its files, and the figures of the report."""
+"""Write the results of a tracked clip: files, and figures of the report."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Follow one person through a clip, backwards from the start as well, and on after a loss."""
+"""Follow one person through a clip, also backwards from the start, and again after a loss."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Further cameras that film the same walk: read, and brought to the time of the first one."""
+"""Further cameras that film the same walk, synchronised with the first one."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Where a track starts, from the keypoints of a clip: the first second in which a person walks.
+"""The start of a track from the keypoints of a clip: the first second in which a person walks.
 
 Windows of a second are fitted one after the other (`gait.bindings.start_fit`), so a person who first stands,
 or who comes into view late, is found as soon as they walk.

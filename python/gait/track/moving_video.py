@@ -1,4 +1,4 @@
-"""A clip of a camera that moves: each frame with the camera's pose and, if it only turns, the empty scene.
+"""A clip from a moving camera: each frame with the camera's pose and, if it only turns, the empty scene.
 
 Where the camera stays in one place, a picture of the whole scene is made of the clip's frames, their median
 in each direction that they show, and each frame is given what its camera would see of it.

@@ -1,4 +1,4 @@
-"""What ``gait track`` tracks and writes."""
+"""Inputs and outputs of ``gait track``."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""What other people in a clip do to the images of one: they hide the person, and are foreground themselves.
+"""Effects of other people in a clip on the images of one: they hide the person, and are foreground.
 
 Where another person covers the picture, the empty scene given to the tracker is changed so that a body there
 costs as much as none: foreground that is another person's is not missed, and a person behind them is hidden

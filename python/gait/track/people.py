@@ -1,6 +1,6 @@
-"""Track several people of a clip, each with a tracker of their own.
+"""Track several people in a clip, each with a separate tracker.
 
-The detector finds who is who, also where people cross.  Each person is tracked as if alone, with two
+The detector identifies people, even when they cross.  Each person is tracked as if alone, with two
 differences: keypoints of the others are left out, and where the others are in the picture it counts neither
 as the person nor as the empty scene (`gait.track.other_people`).
 """

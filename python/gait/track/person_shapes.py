@@ -1,4 +1,4 @@
-"""Whether a person's shape is seen where the tracked person is estimated to be, for clips without keypoints.
+"""Check whether a person's shape is found at the estimate, for clips without keypoints.
 
 A figure in about the right place may still be a wrong one, when edges of the scene or a median background
 with people in it support it; the shape then shows its feet or head elsewhere.

@@ -1,4 +1,4 @@
-"""What `gait track` reports at its end: the verdict, what was used, and the page of the run."""
+"""The final report of `gait track`: the verdict, the inputs used, and the page of the run."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""What tracking needs to know of a clip: video, camera, empty scene, keypoints of people, first state."""
+"""Inputs of tracking for a clip: video, camera, empty scene, keypoints of people, first state."""
 
 from __future__ import annotations
 

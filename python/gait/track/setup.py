@@ -1,4 +1,4 @@
-"""What a clip was tracked with and where the results went, in words: start, background, camera, files."""
+"""Descriptions of the inputs and outputs of a tracked clip: start, background, camera, files."""
 
 from __future__ import annotations
 

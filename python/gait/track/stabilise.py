@@ -1,4 +1,4 @@
-"""Find how the camera of a clip turns, for which no poses are given.
+"""Estimate how the camera of a clip without poses turns.
 
 The track is in the scene's frame: the world of the reference frame, for which the camera given holds.
 """

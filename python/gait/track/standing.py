@@ -1,4 +1,4 @@
-"""Who stands takes no strides: phase, stride rate and speed are left open until strides begin.
+"""Standing people take no strides: phase, stride rate and speed stay undefined until strides begin.
 
 A model of walking alone follows a person who stands, or takes a half step from there, with a phase that moves
 on slowly.  A person stands where for `_STILL` seconds neither ankle moves in the picture against the hips and

@@ -1,4 +1,4 @@
-"""By how much one film of a walk is later than another, from the joints found in both.
+"""Time offset between two films of a walk, from the joints detected in both.
 
 The two directions in which two cameras see one joint at one time meet: the second lies in the plane through
 both cameras and the first (the epipolar constraint).  With the films shifted against each other, joints that

@@ -1,4 +1,4 @@
-"""A walk as the camera sees it: where the joints are expected, and how probable camera and walk are.
+"""Measurement model of a walk: expected joints in the image, and the probability of camera and walk.
 
 `WalkingBody` has the joints of the cyclic model, linear in its scores and proportions; `WalkModel` places it
 on a path, projects it and compares it with keypoints.  The parameters are one vector: camera (log focal

@@ -1,4 +1,4 @@
-"""Where the fit of camera and walk begins: what is expected of a camera, and first cameras and walks.
+"""Start of the fit of camera and walk: the prior of a camera, and initial cameras and walks.
 
 For each of several focal lengths tilt and height follow from hips and ankles as upright sticks; the automatic
 start is fitted with that camera to a second of the walk.

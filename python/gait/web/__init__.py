@@ -1,4 +1,4 @@
-"""What pages share: fetched parts, modules of our own, and serving them on this machine.
+"""Common parts of web pages: downloaded components, our own modules, and the local server.
 
 - `parts`: three.js and ECharts, fetched once like the detector's weights.
 - `modules`: scene.js, film.js, curves.js and style.css; a page's head, with them served or written into it.

@@ -1,4 +1,4 @@
-"""A page on which the marks of a floor are clicked and their distances typed: where the camera stands."""
+"""A page for clicking marks on the floor and typing their distances, to place the camera."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Modules of our pages, and the head of a page: with them served beside it, or written into it.
+"""JavaScript modules of our pages, and the head of a page: with modules served, or embedded.
 
 The modules import each other and their parts by plain names (``three``, ``gait/scene.js``), so the same files
 work in both kinds of page; an import map has their places.  There is no bundler.

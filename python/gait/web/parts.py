@@ -1,6 +1,6 @@
-"""Parts of pages by others: three.js draws the turning figure, ECharts the curves.
+"""Third-party components of web pages: three.js draws the 3-D figure, ECharts the curves.
 
-They lie inside the Python package ``nicegui``, which is downloaded but not installed.
+They come from the Python package ``nicegui``, which is downloaded but not installed.
 """
 
 from __future__ import annotations

@@ -1,4 +1,4 @@
-"""A server for this machine alone: loopback, Host and Origin checked, nothing outside the page's files."""
+"""A local server: loopback only, Host and Origin checked, nothing outside the page's files."""
 
 from __future__ import annotations
 

@@ -1,1 +1,1 @@
-"""Files of a run: finding them, whose they are, and their preparation in processes or on a cluster."""
+"""Files of a run: finding them, identifying subjects, and preparing them in processes or on a cluster."""

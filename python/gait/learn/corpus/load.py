@@ -1,4 +1,4 @@
-"""The files of a run, read and prepared; files in folders that cannot be used are left out.
+"""The files of a run, read and prepared; unusable files in folders are skipped.
 
 One body serves all recordings of a person with markers: what they show of the length scales adds up, together
 with what is known of people (the optimum of a joint fit, by one Gauss-Newton step).  The places of markers
