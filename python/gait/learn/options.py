@@ -1,4 +1,4 @@
-"""The options of one learning run: made once by the command, passed down unchanged."""
+"""The options of one learning run: created once by the command, passed down unchanged."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""What the live page shows: estimates drawn into their own frames, and numbers beside them.
+"""Content of the live page: estimates drawn into their own frames, and numbers.
 
 A tracker follows one person.  Several people are trackers that listen on one URL, from which frames come, and
 publish each on channels of its own there (``gait-trackd --person``), or on a URL of its own.

@@ -1,4 +1,4 @@
-"""All messages of some URLs into LCM logs, from one press of a button to the next."""
+"""Record all messages of some URLs into LCM logs, from one press of a button to the next."""
 
 from __future__ import annotations
 

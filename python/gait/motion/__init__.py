@@ -1,1 +1,1 @@
-"""Known and tracked motion: its files, footfalls and parameters, and its errors against the truth."""
+"""True and tracked motion: footfalls and parameters, and errors against the truth."""

@@ -1,4 +1,4 @@
-"""Where and when the feet of a walking person meet and leave the ground, and how sure that is.
+"""When and where the feet of a walking person touch and leave the ground, with uncertainties.
 
 Heel strikes are where the heel is furthest ahead of the pelvis along the walking direction, toe-offs where
 the toe is furthest behind it (Zeni et al. 2008, Gait & Posture 27:710).

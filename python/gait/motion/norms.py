@@ -1,4 +1,4 @@
-"""Gait parameters beside norms: people of the model at this pace, and comfortable speeds by age and sex.
+"""Gait parameters compared with norms: people of the model at this pace, and normal speeds by age and sex.
 
 The norm by pace is drawn from the model: people as those that it was learnt from, with components, lasting
 offsets and proportions by their standard deviations, who walk at the stride rate and stature of the track.

@@ -1,4 +1,4 @@
-"""Gait parameters and joint-angle cycles of a track, each with its uncertainty, and the files they go into.
+"""Gait parameters and joint-angle cycles of a track, with uncertainties, and their files.
 
 Contacts of the feet are drawn from the posterior (`gait.motion.uncertainty`) and every parameter is computed
 again from each draw; its standard deviation is that over the draws.

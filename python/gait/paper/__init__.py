@@ -1,1 +1,1 @@
-"""Every figure and experiment of the two papers by their own algorithms, beside those of this package."""
+"""Every figure and experiment of the two papers, by their algorithms and by those of this package."""

@@ -1,4 +1,4 @@
-"""What the page states about one figure or experiment, and the page itself."""
+"""Entry of the page for one figure or experiment, and the page itself."""
 
 from __future__ import annotations
 

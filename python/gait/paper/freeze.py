@@ -1,4 +1,4 @@
-"""The freeze on the static background: which term of eqs. 10 to 13 prefers it, with pictures.
+"""The freeze on a static background: which term of eqs. 10 to 13 prefers it, with pictures.
 
 The terms are taken from the tracker's own log-likelihood.  On an even grey picture no limb differs from what
 it was (E = 0), so that q, p_occluded and sigma(alpha) are left; with tilt 0 all limbs have one sigma.  E of a

@@ -1,4 +1,4 @@
-"""What each later addition buys: from the paper's tracker to the package's, one step after the other."""
+"""The gain of each later addition, from the paper's tracker to the package's, step by step."""
 
 from __future__ import annotations
 

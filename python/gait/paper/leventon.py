@@ -1,4 +1,4 @@
-"""Segments as in Leventon and Freeman (1998), by the letter: one Gaussian of 50 modes and its posterior.
+"""Segments literally as in Leventon and Freeman (1998): one Gaussian of 50 modes and its posterior.
 
 A segment is 10 frames of 37 markers at 20 per second, in metres: z up, the pelvis of its first frame over the
 origin, the heading as recorded.  The camera looks along y, so that x and z are seen and y is the depth.

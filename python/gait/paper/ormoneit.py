@@ -1,4 +1,4 @@
-"""Learning as in Ormoneit and others (2000), by the letter and by the package, on the same walks."""
+"""Learning as in Ormoneit and others (2000), literally and by the package, on the same walks."""
 
 from __future__ import annotations
 

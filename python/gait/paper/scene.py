@@ -1,4 +1,4 @@
-"""The first frames of a clip whose truth is known, in memory: what runs on them, and how far off it is."""
+"""The first frames of a clip with known truth, in memory: runs of trackers on them, and their errors."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Verdicts of the page: each follows from numbers, begins with its kind, and can come out otherwise."""
+"""Verdicts of the page: each follows from numbers and begins with its kind."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Colours of what is drawn: left sides of bodies are blue, right ones orange, on paper and over pictures."""
+"""Colours of drawings: left sides of bodies are blue, right ones orange, on paper and over pictures."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""A track beside the truth: errors frame by frame, and the part of a report that shows them."""
+"""A track compared with the truth: errors frame by frame, and the part of a report that shows them."""
 
 from __future__ import annotations
 

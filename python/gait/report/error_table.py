@@ -1,4 +1,4 @@
-"""Errors against a truth in words: rows for the page of a run, the same as text for the terminal."""
+"""Errors against the truth in words: rows for the page of a run, and the same text for the terminal."""
 
 from __future__ import annotations
 

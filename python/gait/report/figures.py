@@ -1,4 +1,4 @@
-"""Figures of reports: what those of learning and lifting share."""
+"""Figures of reports: common parts of learning and lifting."""
 
 from __future__ import annotations
 

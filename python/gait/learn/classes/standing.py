@@ -1,4 +1,4 @@
-"""Standing still, from the walk: the legs as in mid-stance but under the hips, everything else as on average.
+"""Standing derived from the walk: legs as in mid-stance but under the hips, everything else average.
 
 Few recordings show people who stand, but every walk shows where its skeleton has a straight leg, a level
 foot and hanging arms, whatever zeros its angles have.  How people stand differs: components, in units of

@@ -1,4 +1,4 @@
-"""The process that starts the workers: it imports what they need while this one goes on."""
+"""The process that starts the workers: it imports what they need while this process continues."""
 
 from __future__ import annotations
 

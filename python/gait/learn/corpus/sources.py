@@ -1,4 +1,4 @@
-"""Which files to learn from, what they are called and who is in them."""
+"""The files to learn from, their names and their subjects."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""The task done with each file, in any process: a file to a sequence and its markers, or to an error.
+"""The task for each file, in any process: from a file to a sequence and its markers, or to an error.
 
 Before that, files of markers are measured whose person has several (`gait.learn.corpus.load.shared_lengths`).
 """

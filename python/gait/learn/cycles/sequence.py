@@ -1,4 +1,4 @@
-"""One learning sequence: a recording read, its steady part levelled, retargeted, timed and judged."""
+"""One learning sequence: a recording, whose steady part is levelled, retargeted, timed and checked."""
 
 from __future__ import annotations
 

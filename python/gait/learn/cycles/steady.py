@@ -1,4 +1,4 @@
-"""The steady part of a recording: starts, stops and turns are cut off by what the motion itself shows.
+"""The steady part of a recording: starts, stops and turns are detected in the motion and cut off.
 
 Three measures are constant in steady motion whatever the phase: how fast the joints turn, over half a cycle
 (one step); how far the pelvis travels in a step; and how far it turns in a whole cycle.  The longest interval

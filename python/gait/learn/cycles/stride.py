@@ -1,4 +1,4 @@
-"""The period of strides: that of the motion, or the multiple of it at which the legs take turns.
+"""The period of strides: that of the motion, or the multiple at which the legs alternate.
 
 A cycle fitted to a recording hardly longer than itself scores well at twice the stride, because noise, turns
 and changes of speed are then part of it; and where the trunk outvotes the legs, at half of it.  What a stride

@@ -1,4 +1,4 @@
-"""Whether a recording is cyclic and shows the activity to be learnt: the evidence, and the reasons in words.
+"""Check that a recording is cyclic and shows the activity to be learnt: evidence, and reasons in words.
 
 A runner has both feet off the ground at times, or the pelvis is lowest where that of a walk is highest: over
 the standing leg.

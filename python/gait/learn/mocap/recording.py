@@ -1,4 +1,4 @@
-"""A recorded skeleton as the file readers return it (z up, metres), and the checks that all readers share."""
+"""A recorded skeleton from a file reader (z up, metres), and the checks common to all readers."""
 
 from __future__ import annotations
 

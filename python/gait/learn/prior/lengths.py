@@ -1,4 +1,4 @@
-"""How people of one stature differ in their proportions: sections PROP and SHFT of a blob.
+"""Variation of proportions between people of the same stature: sections PROP and SHFT of a blob.
 
 One factor scales the lengths of each frame of the skeleton (its points, its limbs, the origins of its
 children); shoulders also move by themselves, because they do not follow the neck.  The sections are the

@@ -1,4 +1,4 @@
-"""A prior over how people walk that reaches those who were not recorded.
+"""A prior over people's walks that also covers people who were not recorded.
 
 The paper's components (`components`) describe the recorded cycles as well as possible.  With few subjects
 that is not what a new person needs, so the completed cycles are analysed again: each also mirrored (left and

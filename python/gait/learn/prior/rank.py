@@ -1,4 +1,4 @@
-"""The number of components: as many as predict held-out entries best."""
+"""The number of components that predicts held-out entries best."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""The figures of `gait learn --report`: periods, alignment, cycles, and what is left of each subject."""
+"""The figures of `gait learn --report`: periods, alignment, cycles, and residuals of each subject."""
 
 from __future__ import annotations
 

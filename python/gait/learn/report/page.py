@@ -1,4 +1,4 @@
-"""The report of `gait learn`: figures as PNG and one page that has them all."""
+"""The report of `gait learn`: figures as PNG, and one page with all of them."""
 
 from __future__ import annotations
 

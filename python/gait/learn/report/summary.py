@@ -1,4 +1,4 @@
-"""A learned model in figures and in words, and what its user should know about it."""
+"""A learnt model in figures and in words, and notes for its user."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Segments of recordings: motions on disk, cut and normalised when they are learnt from."""
+"""Segments of recordings: motions on disk, cut and normalised for learning."""
 
 from __future__ import annotations
 

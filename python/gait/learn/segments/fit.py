@@ -1,4 +1,4 @@
-"""The segment prior: segments to mean, modes, what lies outside them, and its uncertainty.
+"""The segment prior: from segments to mean, modes, residual variance, and its uncertainty.
 
 The rest of the learning works in the main directions of all segments (`Basis`), where it is cheap.  The
 residuals of the people learnt from are too small for another person, so a factor of their variance is fitted

@@ -1,4 +1,4 @@
-"""Joint centres of Acclaim skeletons brought to anatomical ones, where marker fits and ISB have them.
+"""Joint centres of Acclaim skeletons, moved to the anatomical ones of marker fits and ISB.
 
 ISB (Wu and others 2002, 2005) and marker fits put the knee midway between the epicondyles, the ankle midway
 between the malleoli, the shoulder at the head of the humerus.  The skeletons of the CMU database, which is

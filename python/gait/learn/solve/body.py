@@ -1,4 +1,4 @@
-"""Bodies: the joints and axes that the default skeleton needs, and how bones of recordings give them."""
+"""Bodies: the joints and axes that the default skeleton needs, from the bones of recordings."""
 
 from __future__ import annotations
 

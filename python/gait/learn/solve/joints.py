@@ -1,4 +1,4 @@
-"""Bodies from joint positions alone: .csv as tracks and truth have it, .trc of joint centres.
+"""Bodies from joint positions: .csv like tracks and truth files, .trc of joint centres.
 
 Such files have no orientations: the pelvis is taken as level across the hips, and the hinge of a limb as
 across the bent limb, or across the body while the limb is straight.  Rotations about a limb's own axis are

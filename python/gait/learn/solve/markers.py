@@ -1,4 +1,4 @@
-"""Bodies from markers on the skin: the skeleton fitted to them stands for the person.
+"""Bodies from markers on the skin, by fitting the skeleton to them.
 
 What the markers of a frame do not determine is missing there: a joint, an axis or the pelvis is NaN where its
 standard deviation by the fit's covariance is too large.  Nothing is interpolated.

@@ -1,4 +1,4 @@
-"""Files to bodies: which reader takes which kind of file."""
+"""From files to bodies: the reader of each file format."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Static trials: a person who stands with markers that the recordings of motion do not have.
+"""Static trials: a standing person with markers that the motion recordings lack.
 
 Laboratories mark knees and ankles while a person stands, then take those markers off and follow clusters of
 others.  The skeleton fitted to the static trial gives the person's lengths and the places of all markers in

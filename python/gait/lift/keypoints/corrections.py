@@ -1,4 +1,4 @@
-"""What a person corrects by hand, and keypoints with it.
+"""Corrections by hand, and their effect on keypoints.
 
 The file (JSON), in which every list may be absent::
 

@@ -1,4 +1,4 @@
-"""Noise of 2-D keypoints: points that a detector put elsewhere for a frame or two, and how much all shake.
+"""Noise of 2-D keypoints: spikes that last a frame or two, and jitter.
 
 Where 2-D keypoints change from one person to another: most points jump alike from one frame to the next.
 """

@@ -1,4 +1,4 @@
-"""Which correction would help most: the one after which all joints are surest in the picture, one by one.
+"""Suggested corrections: each is the one that makes all joints most certain in the picture.
 
 Greedy: the correction that is expected to take most from the total variance of all joints is taken, as if it
 were made, and so on.  What is close in time and of the same joint is not suggested again.

@@ -1,4 +1,4 @@
-"""Left and right points that may have been swapped, by how they go on from frame to frame.
+"""Left and right points that may have been swapped, from their motion between frames.
 
 A detector that takes one leg for the other swaps two points.  Their difference then changes its sign
 at once, where that of a body goes on as it did.  For every pair the signs are sought that let it go on best:

@@ -1,4 +1,4 @@
-"""Every segment of a sequence alone, by the C library's lifter, and the most probable course through them.
+"""Every segment of a sequence separately, by the C library's lifter, and the most probable path through them.
 
 A segment seen from far away fits nearly as well when it is mirrored in depth.  So all distinct headings that
 explain a segment are kept, and its neighbours decide which it is (Viterbi over the explanations).

@@ -1,4 +1,4 @@
-"""Balance as a soft constraint: the ground pushes where feet stand.
+"""Balance as a soft constraint: the ground's force acts where feet stand.
 
 The force of the ground acts within the polygon of the standing feet.  For an inverted pendulum it acts at
 z = c - h / g c'', of the body's centre of mass c, which is h above the feet; while a person stands still it

@@ -1,4 +1,4 @@
-"""The segment prior over a whole sequence: a Markov chain of half segments, given what lasts.
+"""The segment prior over a whole sequence: a Markov chain of half segments, given the lasting unknowns.
 
 Frames of the prior's rate are cut into blocks of half a segment.  Two neighbouring blocks are a segment, so
 that the prior gives p(first, second) and, by division, p(second | first): the sequence has the density p(X_0,

@@ -1,4 +1,4 @@
-"""A lifted motion that is solved again near a correction, in a fraction of the time of the whole.
+"""Solve a lifted motion again near a correction, in a fraction of the time of the whole.
 
 What changes is near: blocks around the corrected frames are solved given those further away and what lasts,
 from the estimate that there is.  It is the linear problem of the whole, so that solving that as well moves

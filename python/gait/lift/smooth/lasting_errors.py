@@ -1,4 +1,4 @@
-"""Errors of a detector that last: numbers of their own beside the motion.
+"""Lasting errors of a detector, estimated along with the motion.
 
 A detector that takes a point for the ankle does so in the next frame too.  Such an error is no new evidence
 in later frames; taken for noise of each frame it would have to be so large that the figure could hardly

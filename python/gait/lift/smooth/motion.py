@@ -1,4 +1,4 @@
-"""What comes of lifting keypoints.
+"""The result of lifting keypoints.
 
 What lifting refuses: keypoints that show too little, and estimates that are no person.
 

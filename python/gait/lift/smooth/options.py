@@ -1,4 +1,4 @@
-"""How keypoints are lifted."""
+"""Options of lifting keypoints."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Size of a motion that its prior does not know: by the bones, not by the fit.
+"""Size of a motion unlike the prior: from the bones, not from the fit.
 
 A motion unlike those learnt fits best as a small body near the lens, where what does not fit is few metres.
 A change of size about the lens leaves the picture as it is; so the size may be taken from the bones, whose

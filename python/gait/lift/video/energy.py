@@ -1,4 +1,4 @@
-"""The stick figure as the sensors would see it: blurred line segments, with exact slopes.
+"""The stick figure seen by the sensors: blurred line segments, with exact derivatives.
 
 A stick is a line of strength 1 per pixel of its length, convolved with the sensors' Gaussian blur of standard
 deviation s.  At a sensor it gives  exp(-d^2 / 2 s^2) (Phi((L - u) / s) - Phi(-u / s))  where u and d are the

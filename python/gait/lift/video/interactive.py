@@ -1,4 +1,4 @@
-"""A clip that is solved again for other corrections, in a fraction of the time of the whole.
+"""Solve a clip again for other corrections, in a fraction of the time of the whole.
 
 What the sensors read is kept as it was linearised at the estimate; the corrections alone are new.  It is one
 step of the whole's own descent.

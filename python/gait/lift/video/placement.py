@@ -1,4 +1,4 @@
-"""Where the person is in a clip at first, given by the user.
+"""The person's position in one frame of a clip, given by the user.
 
 Placement (JSON), with a camera, in the form of ``gait track --init``::
 
