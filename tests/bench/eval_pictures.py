@@ -35,7 +35,8 @@ def pictures(
     for frame in video.frames(min(numbers), max(numbers) + 1):
         if frame.number in numbers:
             estimate, known = estimates[frame.number], _known(result, model, camera, frame.number)
-            canvas = overlay.body(frame.image, estimate.mean)
+            posed = np.isfinite(estimate.mean.phase)  # a person who stands has joints alone
+            canvas = overlay.body(frame.image, estimate.mean) if posed else frame.image.copy()
             overlay.skeleton(canvas, estimate.joints)
             shown = np.vstack([camera.project(estimate.joints), known])
             picture, place = _crop(canvas, shown[np.isfinite(shown).all(axis=1)])
@@ -79,7 +80,7 @@ def _known(result: Result, model: Model, camera: Camera, number: int) -> Array:
 
 
 def _crop(canvas: Image, shown: Array) -> tuple[Image, Callable[[Array], Array]]:
-    """Picture of the surroundings of the points `seen`, and what takes pixels there."""
+    """Picture of the surroundings of the points `shown`, and what takes pixels there."""
     height, width = canvas.shape[:2]
     low, high = np.clip([shown.min(axis=0), shown.max(axis=0)], 0, [width - 1, height - 1])
     tall = max(_SPACE * float((high - low)[1]), _SPACE * float((high - low)[0]) * HEIGHT / WIDTH, 60.0)
