@@ -1,4 +1,4 @@
-# libgait: `make help` lists the targets.  Settings that stay (CC=clang, PREFIX=...) go into Makefile.local.
+# libgait: `make help` lists the targets.  Put permanent settings (CC=clang, PREFIX=...) into Makefile.local.
 MAKEFLAGS += -r
 .SUFFIXES:
 .DELETE_ON_ERROR:
@@ -124,7 +124,7 @@ $(error what runs on $(MACHINE) is not tested here: `make lib tools CC=$(CC)` bu
 endif
 
 # ---- python environment --------------------------------------------------------------------------------------
-setup: $(READY) ## make .venv with the packages of python/lock.txt (once; later builds work offline)
+setup: $(READY) ## create .venv with the packages of python/lock.txt (once; later builds work offline)
 
 # The stamp comes last: without it the environment is made anew, with an old one only changed packages are fetched.
 $(READY): python/lock.txt python/pyproject.toml
@@ -152,7 +152,7 @@ $(READY): python/lock.txt python/pyproject.toml
 # Python and CPU.
 LOCK := $(VENV)/bin/uv pip compile --quiet --universal --generate-hashes --no-header --no-annotate \
         --no-emit-package libgait --constraint python/constraints.txt
-lock: setup ## python/lock.txt and lock-docs.txt from constraints.txt, with a network
+lock: setup ## generate python/lock.txt and lock-docs.txt from constraints.txt (needs a network)
 	$(PIP_INSTALL) uv
 	$(LOCK) --python-version 3.10 python/pyproject.toml --extra dev --output-file python/lock.txt
 	printf '%s\n' mkdocs-material mkdocstrings-python latex2mathml | $(LOCK) \
@@ -253,7 +253,7 @@ WITH_TOOLS = $(CC) -std=c11 -D_POSIX_C_SOURCE=200809L $(COMMON:-O3=-O1) -MT $@ -
     -o $@ $< $(B)/libtrackd.a $(OBJ) $(B)/libgaitmsg.a $(call lcm_libs,$(@D)) $(JPEG_LIBS) -lm
 
 # ---- tests ---------------------------------------------------------------------------------------------------
-test: built check unit python-test ## everything below that can fail
+test: built check unit python-test ## all tests and checks below
 
 # As many compilers at a time as there are processors, unless make has a -j option.
 JOBS = $(if $(filter -j% --jobserver%,$(MAKEFLAGS)),,-j$(shell getconf _NPROCESSORS_ONLN))
@@ -263,7 +263,7 @@ built:
 check: lib ## symbols, heap, threads, globals, size, layers, stack, recursion, headers, hygiene
 	@B=$(B) CC='$(CC)' CXX='$(CXX)' tests/check/run.sh
 
-unit: $(UNIT) fuzz-targets ## C tests, and the kept inputs of the fuzz targets
+unit: $(UNIT) fuzz-targets ## C tests, and the stored inputs of the fuzz targets
 	@tests/unit/run.sh $(UNIT) $(FUZZ)
 
 # Linked with the objects, so that tests can call internal functions.  Their own code is compiled in a third of the time.
@@ -279,7 +279,7 @@ $(B)/unit/%: tests/unit/%.c $(OBJ) Makefile $(MADE) | $(B)/unit/
 # What their many processes import is compiled once, also where the caller's environment forbids it.
 COMPILED_ONCE := PYTHONDONTWRITEBYTECODE= PYTHONPYCACHEPREFIX='$(abspath build/pycache)'
 PYTEST_AT_ONCE = -n $(shell expr $$(getconf _NPROCESSORS_ONLN) + 1) --maxprocesses 8 --dist loadfile --no-loadscope-reorder
-python-test: setup lib tools ## Python tests (ARGS='-k blob' to choose)
+python-test: setup lib tools ## Python tests (ARGS='-k blob' to select)
 	@$(COMPILED_ONCE) $(PY) -m pytest -q -c python/pyproject.toml --rootdir . $(PYTEST_AT_ONCE) tests/python $(ARGS)
 
 asan: ## C tests under the address and undefined-behaviour sanitizers
@@ -333,7 +333,7 @@ MORE = $(MOCAP)/../more
 WALKING := btk/b2 gaitalytics/g1 bvhtoolbox opensim/p2 opensim/p4 mcgill cmu_more/c12 cmu_more/c15 cmu_more/c46
 RUNNING := run_cmu
 LEARN_CLASSES = $(VENV)/bin/gait learn --subjects folder --segments none
-model: setup lib ## learn the models of the package, of people and the paper's, from MOCAP= *
+model: setup lib ## learn the shipped models from MOCAP= *
 	$(VENV)/bin/gait learn $(MOCAP) -o python/gait/data/walk.gait $(ARGS)
 	$(VENV)/bin/gait learn $(MOCAP) --prior paper --segments none -o python/gait/data/paper.gait $(ARGS)
 	@mkdir -p build
@@ -343,7 +343,7 @@ model: setup lib ## learn the models of the package, of people and the paper's, 
 
 PAPER_MOCAP ?= $(MOCAP) ../shared/data/mocap/cmu_misc
 PAPER_CLIP ?= $(wildcard ../shared/data/video/outdoor)
-paper: setup lib ## every figure of both papers, theirs, literal and ours: build/paper/paper.html (PAPER_MOCAP=, PAPER_CLIP=; ARGS=--record) *
+paper: setup lib ## every figure of both papers, published, literal and ours: build/paper/paper.html (PAPER_MOCAP=, PAPER_CLIP=; ARGS=--record) *
 	@for each in $(PAPER_MOCAP); do test -e $$each || { echo "paper: no motion capture in $$each: give folders with" \
 	    'PAPER_MOCAP="..."; a clip is the folder PAPER_CLIP, or one is rendered' >&2; exit 1; }; done
 	@mkdir -p build/paper
@@ -387,7 +387,7 @@ bench: $(B)/bench/step | $(READY) ## speed by particles, threads, instruction se
 bench-lift: $(B)/bench/lift | $(READY) ## time lifting a frame, a segment, by instruction set (ARGS='-m MODEL.gait'; --record)
 	@$(BENCH_RUN) --target bench-lift --title 'Speed of lifting' $(call BENCH_PAGE,bench_lift) $< $(filter-out --record,$(ARGS))
 
-eval: setup lib ## errors on the clips beside what is wanted of them *
+eval: setup lib ## errors on the clips, compared with their targets *
 	@$(PY) tests/bench/eval.py $(ARGS)
 
 # Other packages to compare with, in an environment of their own; without a network they are left out.
@@ -397,43 +397,43 @@ $(PEERS): tests/bench/requirements-peers.txt | $(READY)
 	    $(@D)/bin/pip install --quiet --disable-pip-version-check -r $< && touch $@ || \
 	    { rm -rf $(@D); echo 'eval-learn: other packages cannot be installed and are left out' >&2; }
 
-eval-learn: setup lib $(PEERS) ## learning beside other packages: tests/bench/results/learn.md *
+eval-learn: setup lib $(PEERS) ## learning compared with other packages: tests/bench/results/learn.md *
 	@$(PY) tests/bench/eval_learn.py $(MOCAP) $(ARGS)
 
-eval-real: setup lib ## tracks of real people's films beside joints checked by a person (ARGS='--arms auto --record')
+eval-real: setup lib ## tracks of films of real people, compared with joints checked by hand (ARGS='--arms auto --record')
 	@$(PY) tests/bench/eval_real.py $(ARGS)
 
-eval-paper: setup lib ## paper mode at its best, and what each addition to it buys: paper_mode.md, paper_ladder.md *
+eval-paper: setup lib ## paper mode at its best, and the gain of each addition: paper_mode.md, paper_ladder.md *
 	@$(PY) tests/bench/paper_ladder.py $(ARGS)
 
-eval-camera: setup lib ## cameras found from walks, and tracks with them: tests/bench/results/camera_walk.md *
+eval-camera: setup lib ## cameras estimated from walks, and tracks with them: tests/bench/results/camera_walk.md *
 	@$(PY) tests/bench/camera_walk.py $(ARGS)
 
-eval-moving: setup lib ## tracks from cameras that move beside a still one: tests/bench/results/moving.md
+eval-moving: setup lib ## tracks from moving cameras, compared with a static one: tests/bench/results/moving.md
 	@$(PY) tests/bench/eval_moving.py $(ARGS)
 
-eval-people: setup lib ## several people in one clip, each beside the same person alone: tests/bench/results/people.md
+eval-people: setup lib ## several people in one clip, compared with each alone: tests/bench/results/people.md
 	@$(PY) tests/bench/eval_people.py $(ARGS)
 
 eval-cameras: setup lib ## tracks with one and with two cameras: tests/bench/results/cameras.md
 	@$(PY) tests/bench/eval_cameras.py $(ARGS)
 
-eval-body: setup lib ## tracks of people whose limbs were measured: tests/bench/results/body.md
+eval-body: setup lib ## tracks of people with measured limbs: tests/bench/results/body.md
 	@$(PY) tests/bench/eval_body.py $(ARGS)
 
-detector-profile: setup lib ## learn how the detector's joints differ from the model's, on rendered walks (or CLIPS=) *
+detector-profile: setup lib ## learn the differences between the detector's joints and the model's, on rendered walks (or CLIPS=) *
 	@$(PY) tests/bench/detector_profile.py $(CLIPS)
 
-mutants: setup ## change each equation of both papers once: a test about its meaning has to notice
+mutants: setup ## change each equation of both papers once: a test of its meaning must fail
 	@$(PY) tests/bench/mutants.py $(ARGS)
 
-eval-gait: setup lib ## what a gait lab compares: footfalls, parameters, angles, their intervals: eval_gait.md *
+eval-gait: setup lib ## gait analysis: footfalls, parameters, angles, their intervals: eval_gait.md *
 	@$(PY) tests/bench/eval_gait.py $(ARGS)
 
 eval-lift: setup lib ## lifting of held-out motion, clips and a real motion: tests/bench/results/lift.md *
 	@$(PY) tests/bench/eval_lift.py $(ARGS)
 
-eval-studio: setup lib ## corrections by hand, proposed and random, and the time each takes: tests/bench/results/studio.md *
+eval-studio: setup lib ## corrections by hand, suggested and random, and the time each takes: tests/bench/results/studio.md *
 	@$(PY) tests/bench/studio_corrections.py
 
 # ---- packages ------------------------------------------------------------------------------------------------
@@ -457,7 +457,7 @@ sdist: build/lcm/.stamp ## source package that builds without a network, in buil
 	@cd python && ../$(PY) -c 'from scikit_build_core.build import build_sdist; build_sdist("../build/wheel")' >/dev/null
 	@echo build/wheel/libgait-$(VERSION).tar.gz
 
-wheel-check: wheel sdist lib ## both packages in fresh environments without a compiler (fetches dependencies)
+wheel-check: wheel sdist lib ## install both packages in fresh environments without a compiler (downloads dependencies)
 	@GAIT_WHEEL=$(abspath build/wheel/$(WHEEL)) GAIT_SDIST=$(abspath build/wheel/libgait-$(VERSION).tar.gz) \
 	    $(PY) -m pytest -q -c python/pyproject.toml --rootdir . tests/python/test_wheel.py $(ARGS)
 
@@ -479,7 +479,7 @@ screenshots: setup lib ## the figures of the pages and the tutorial's pictures, 
 C_FILES := $(sort $(wildcard libgait/doc/*.c libgait/src/*/*.[ch] libgait/src/*/*.cpp tests/unit/*.[ch] tests/bench/*.[ch] tests/fuzz/*.[ch] tests/python/*.c \
            tools/trackd/*.[ch]))
 SBOM := build/sbom
-sbom: setup ## what the product consists of, with versions, hashes and licences (CycloneDX): build/sbom/libgait.cdx.json
+sbom: setup ## all components with versions, hashes and licences (CycloneDX): build/sbom/libgait.cdx.json
 	@mkdir -p $(SBOM)
 	@test -x $(SBOM)/venv/bin/cyclonedx-py || { $(PYTHON) -m venv $(SBOM)/venv && \
 	    $(SBOM)/venv/bin/pip install --quiet --disable-pip-version-check 'cyclonedx-bom==7.5.0'; }
@@ -497,7 +497,7 @@ lint: setup ## clang-format, ruff, mypy; clang-tidy where it is installed
 	    clang-tidy --quiet $(filter libgait/src/%.c,$(C_FILES)) -- -std=c11 -Ilibgait/include -iquote libgait/src; \
 	else echo 'lint: no clang-tidy, skipped' >&2; fi
 
-format: setup ## rewrite in the house style
+format: setup ## format all code
 	@$(VENV)/bin/clang-format -i $(C_FILES)
 	@$(VENV)/bin/ruff format --config python/pyproject.toml python tests
 
@@ -538,7 +538,7 @@ install-daemon: tools $(MANUAL)
 	    > '$(DESTDIR)$(PREFIX)/lib/systemd/system/gait-trackd.service'
 	install -m 644 build/man/*.1 '$(DESTDIR)$(PREFIX)/share/man/man1/'
 
-uninstall: ## remove what install put there
+uninstall: ## remove what install installed
 	cd '$(DESTDIR)$(LIBDIR)' && rm -rf libgait.so.$(ABI) libgait.so libgait.a pkgconfig/gait.pc cmake/gait
 	cd '$(DESTDIR)$(INCLUDEDIR)' && rm -f $(notdir $(HEADERS))
 	test ! -d '$(DESTDIR)$(PREFIX)/share/gait' || { cd '$(DESTDIR)$(PREFIX)' && rm -rf bin/gait-trackd lib/gait share/gait \
