@@ -189,21 +189,20 @@ def lens_of(size: tuple[int, int], focal: float) -> Camera:
     return Camera(width, height, focal, focal, (width - 1) / 2, (height - 1) / 2, np.eye(3), np.zeros(3))
 
 
-def floor_lines(camera: Camera, xy: Array, step: float = 1.0, beyond: float = 3.0) -> list[list[list[float]]]:
-    """Lines of a grid on the floor round the marks, as they appear in the picture.
+def floor_lines(camera: Camera, xy: Array) -> list[list[list[float]]]:
+    """Lines of a grid on the floor round the marks, up to 3 m from them, as they appear in the picture.
 
     Parameters
     ----------
     camera : Camera
     xy : ndarray of shape (n, 2)
-    step, beyond : float
-        Metres between lines, and of floor beyond the marks.
 
     Returns
     -------
     list
         Lines of [u, v], pixels.
     """
+    step, beyond = 1.0, 3.0  # metres
     low = np.floor((xy.min(axis=0) - beyond) / step) * step
     high = np.ceil((xy.max(axis=0) + beyond) / step) * step
     while ((high - low) / step).max() > 60:

@@ -104,13 +104,12 @@ def require_order(start: int, stop: int) -> None:
 def add_camera(
     parser: ArgumentParser,
     note: str = "",
-    required: bool = False,
     scale: bool = False,
     several: bool = False,
 ) -> None:
     """Add ``--camera``, with `several` one for each film, and, with `scale`, ``--scale-camera``."""
     action = "append" if several else "store"
-    parser.add_argument("--camera", required=required, action=action, metavar="CAM", help=CAMERA + note)
+    parser.add_argument("--camera", action=action, metavar="CAM", help=CAMERA + note)
     if scale:
         parser.add_argument(
             "--scale-camera",

@@ -161,11 +161,10 @@ class Part:
     bones: Ints
     blend: Array  #: (n,) share of the second bone
 
-    def bind(self, first: str, second: str | None = None, blend: ArrayLike = 0.0) -> Part:
-        """Fix every vertex to one bone, or blend it (n,) from `first` to its child `second`."""
-        pair = [BONE_INDEX[first], BONE_INDEX[second or first]]
-        self.bones = np.tile(np.array(pair, np.int32), (len(self.vertices), 1))
-        self.blend = np.broadcast_to(np.asarray(blend, np.float64), (len(self.vertices),)).copy()
+    def bind(self, bone: str) -> Part:
+        """Fix every vertex to one bone."""
+        self.bones = np.full((len(self.vertices), 2), BONE_INDEX[bone], np.int32)
+        self.blend = np.zeros(len(self.vertices))
         return self
 
     def bind_chain(self, bones: list[str], body: Anatomy, direction: ArrayLike, width: float) -> Part:

@@ -13,7 +13,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from gait.learn.arrays import Floats, Mask, by_rows, stored
-from gait.learn.cycles.fourier import HARMONICS, decode, encode_all, fourier_basis
+from gait.learn.cycles.fourier import decode, encode_all, fourier_basis
 from gait.learn.prior.imputation import Filling, complete, right_singular
 
 Fill = Callable[[Floats, Mask, int, Floats], Filling]
@@ -35,12 +35,10 @@ class Components(Filling):
         return self.mean + np.einsum("rk,ktm->rtm", self.scores[rows], self.curves)
 
 
-def fit(
-    values: Floats, mask: Mask, components: int, harmonics: int = HARMONICS, fill: Fill = complete
-) -> Components:
+def fit(values: Floats, mask: Mask, components: int, fill: Fill = complete) -> Components:
     """Fill missing entries of values (R, T, M), then compute mean curves, components and scores by an SVD."""
     rows, samples, channels = values.shape
-    basis, whole = fourier_basis(samples, harmonics), bool(mask.all())
+    basis, whole = fourier_basis(samples), bool(mask.all())
     if whole:
         copy = stored((values[part] for part in by_rows(values)), values.shape[1:])
         filling = Filling(copy, [], [], 0.0, converged=True)

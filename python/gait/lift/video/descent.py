@@ -92,14 +92,12 @@ def _ends(energy: Energy, state: Floats, link: Link) -> tuple[tuple[Floats, Floa
     return first, last
 
 
-def descend(
-    chain: Sequence[Energy], link: Link | None, states: Floats, rounds: int = ROUNDS
-) -> tuple[Floats, float]:
+def descend(chain: Sequence[Energy], link: Link | None, states: Floats) -> tuple[Floats, float]:
     """Find states (B, n) of least energy near a start; also the energy."""
     states, now = states.copy(), normal(chain, link, states)
     least, damping, most = DAMPING
     diagonal = np.einsum("bii->bi", now.diagonal).copy()
-    for _ in range(rounds):
+    for _ in range(ROUNDS):
         trial = _stepped(chain, states, now, damping * diagonal)
         then = None if trial is None else normal(chain, link, trial)
         if trial is not None and then is not None and then.cost < now.cost:
