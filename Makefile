@@ -57,9 +57,10 @@ OPT_sanitize := -O1 -fsanitize=address,undefined,float-cast-overflow -fno-saniti
 OPT_thread   := -O1 -fsanitize=thread -fno-omit-frame-pointer
 OPT_fuzz     := $(OPT_sanitize) -fsanitize=fuzzer-no-link
 CXX_FLAGS    += $(if $(filter fuzz,$(config)),-fno-sanitize=function) # needs the C++ runtime
+OPT_coverage := -O0 --coverage -fprofile-abs-path
 OPT ?= $(OPT_$(config))
 ifeq ($(OPT),)
-$(error unknown config=$(config): use release, debug, sanitize, thread or fuzz)
+$(error unknown config=$(config): use release, debug, sanitize, thread, fuzz or coverage)
 endif
 GCC   := $(if $(findstring clang,$(shell $(CC) --version 2>/dev/null)),,gcc)
 TIGHT := $(if $(GCC),$(GCC_TIGHT))
@@ -92,7 +93,7 @@ UNIT := $(patsubst tests/unit/%.c,$(B)/unit/%,$(sort $(wildcard tests/unit/test_
 TOOLS := $(BIN)/gait-trackd
 LIBS := $(B)/libgait.so $(B)/libgait.a
 
-.PHONY: help setup lock lib tools test built check unit python-test demo model paper bench bench-lift detector-profile eval eval-body eval-camera eval-cameras eval-gait eval-moving eval-real eval-learn eval-lift eval-paper eval-people eval-studio mutants asan tsan unit-threads fuzz fuzz-run fuzz-long fuzz-targets golden-check \
+.PHONY: help setup lock lib tools test built check unit python-test demo model paper bench size bench-lift detector-profile eval eval-body eval-camera eval-cameras eval-gait eval-moving eval-real eval-learn eval-lift eval-paper eval-people eval-studio mutants asan tsan coverage unit-threads fuzz fuzz-run fuzz-long fuzz-targets golden-check \
         docs screenshots sbom lint format wheel sdist wheel-check install install-daemon uninstall clean
 
 help: ## list the targets
@@ -101,7 +102,7 @@ help: ## list the targets
 	@echo; awk -F ':.*## ' '/^[a-z-]+:.*## / { printf "  %-14s %s\n", $$1, $$2 }' $(firstword $(MAKEFILE_LIST))
 	@echo; echo '* needs the data beside the repository (../shared/data); without it, tests that need some are skipped'
 	@echo 'targets eval* fail if a bound is missed; bench, bench-lift print MISSED: rates depend on the host'
-	@echo 'config=release|debug|sanitize|thread|fuzz (now $(config)), werror=1: warnings are errors'
+	@echo 'config=release|debug|sanitize|thread|fuzz|coverage (now $(config)), werror=1: warnings are errors'
 
 # What the objects were built with; when it changes they are rebuilt.
 MADE_WITH := CC=$(CC) CXX=$(CXX) OPT=$(OPT) CFLAGS=$(CFLAGS) CXXFLAGS=$(CXXFLAGS) LDFLAGS=$(LDFLAGS)$(if $(SYSROOT), SYSROOT=$(SYSROOT))
@@ -290,6 +291,17 @@ THREADED := $(patsubst %,$(B)/unit/test_%,pool task determinism)
 unit-threads: $(THREADED)
 	@tests/unit/run.sh $^
 
+COVERED := $(wildcard tests/python/test_lcm_*.py)
+coverage: setup ## branches that the tests of library and daemon take (ARGS='--all --least-library 97')
+	@rm -f $$(find build/coverage -name '*.gcda' 2>/dev/null)
+	@$(MAKE) --no-print-directory config=coverage CC=gcc tools
+	@LIMIT=3600 $(MAKE) --no-print-directory config=coverage CC=gcc unit
+	@$(COMPILED_ONCE) GAIT_TRACKD='$(abspath build/coverage/bin/gait-trackd)' $(PY) -m pytest -q -c python/pyproject.toml \
+	    --rootdir . $(PYTEST_AT_ONCE) $(COVERED)
+	@$(PY) tests/check/coverage.py build/coverage $(ARGS)
+
+SANITIZED := $(if $(call has,clang),config=fuzz CC=clang,config=sanitize)
+
 tsan: ## C tests of threads under the thread sanitizer
 	@LIMIT=1200 $(MAKE) --no-print-directory config=thread unit-threads
 
@@ -310,7 +322,7 @@ fuzz-run: $(FUZZ)
 RUNS ?= 2000
 SEED ?= $(shell date +%s)
 fuzz: ## damaged models, snapshots, frames, messages, files ... under the sanitizers (RUNS=2000 SEED=, else a fresh one)
-	@$(MAKE) --no-print-directory $(if $(call has,clang),config=fuzz CC=clang,config=sanitize) SEED=$(SEED) fuzz-run
+	@$(MAKE) --no-print-directory $(SANITIZED) fuzz-run
 
 fuzz-long: setup ## 10^6 executions of each (ARGS='--runs N --record')
 	@$(MAKE) --no-print-directory config=fuzz CC=clang fuzz-targets
@@ -383,6 +395,15 @@ BENCH_RUN = $(PY) tests/bench/bench.py --cc '$(CC)'
 bench: $(B)/bench/step | $(READY) ## speed by particles, threads, instruction set and stage; detector (ARGS='-s 40 --runs 7'; --record)
 	@$(BENCH_RUN) $(call BENCH_PAGE,bench) --csv $(BENCH_CSV) $< $(filter-out --record,$(ARGS))
 	@$(PY) tests/bench/detector_speed.py $(filter --record,$(ARGS))
+
+$(B)/bench/size: $(B)/bench/size.o $(OBJ)
+	$(call log,LD   $@)$(CC) $(OPT) $(LDFLAGS) -o $@ $^ -lm -pthread
+
+size: $(B)/bench/size lib ## bytes of the default tracker, and of libgait.so's code and constants, by part
+	@$< python/gait/data/walk.gait
+	@for folder in $(sort $(notdir $(patsubst %/,%,$(SRC_DIRS)))); do \
+	    size $(B)/src/$$folder/*.o | awk -v part=$$folder 'NR > 1 { n += $$1 } END { printf "libgait.so: %-40s %9d\n", part, n }'; done
+	@tests/check/size.sh $(B)/libgait.so 409600
 
 bench-lift: $(B)/bench/lift | $(READY) ## time lifting a frame, a segment, by instruction set (ARGS='-m MODEL.gait'; --record)
 	@$(BENCH_RUN) --target bench-lift --title 'Speed of lifting' $(call BENCH_PAGE,bench_lift) $< $(filter-out --record,$(ARGS))

@@ -27,12 +27,12 @@ LONGEST = 4096  # bytes of an input
 KEPT_BYTES, KEPT_FILES = 2048, 40  # most of a kept input, and of one target
 
 
-def fuzz(name: str, runs: int, seed: int) -> list[int]:
-    """Run one target; branches reached, executions a second, most memory in MB, faults."""
+def fuzz(name: str, runs: int, seed: int, seconds: int) -> list[int]:
+    """Run one target; executions, branches reached, executions a second, most memory in MB, faults."""
     found = FOUND / name
     found.mkdir(parents=True, exist_ok=True)
-    options = {"runs": runs, "seed": seed, "max_len": LONGEST, "timeout": 60, "print_final_stats": 1}
-    words = [f"-{key}={value}" for key, value in options.items()]
+    options = {"runs": runs, "seed": seed, "max_total_time": seconds, "max_len": LONGEST, "timeout": 60}
+    words = [f"-{key}={value}" for key, value in options.items()] + ["-print_final_stats=1"]
     began = time.monotonic()
     done = subprocess.run(
         [str(BUILT / f"fuzz_{name}"), *words, f"-artifact_prefix={ROOT}/build/fuzz/", found, CORPUS / name],
@@ -75,6 +75,7 @@ def main() -> int:
     """Fuzz, print; 1 if anything was found."""
     options = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawTextHelpFormatter)
     options.add_argument("--runs", type=int, default=1_000_000)
+    options.add_argument("--seconds", type=int, default=0, help="most time for each; 0: without a bound")
     options.add_argument("--seed", type=int, default=1)
     options.add_argument("--only", action="append", metavar="NAME")
     options.add_argument("--keep", action="store_true")
@@ -82,7 +83,7 @@ def main() -> int:
     args = options.parse_args()
     rows = []
     for name in args.only or sorted(folder.name for folder in CORPUS.iterdir()):
-        rows.append([name, *fuzz(name, args.runs, args.seed)])
+        rows.append([name, *fuzz(name, args.runs, args.seed, args.seconds)])
         print(*rows[-1], flush=True)
         if args.keep:
             keep(name)
@@ -90,7 +91,8 @@ def main() -> int:
     title = "Fuzzing"
     note = (
         f"{facts('tests/bench/fuzz_long.py --record')}\n\nlibFuzzer on clang's address and "
-        f"undefined-behaviour sanitizers, one process, seed {args.seed}, inputs of at most {LONGEST} bytes; "
+        f"undefined-behaviour sanitizers, one process, seed {args.seed}, {args.runs} executions or "
+        f"{args.seconds or 'any number of'} seconds, inputs of at most {LONGEST} bytes; "
         "a fault is a report of a sanitizer, a target that aborts because a promise is broken, 60 s for one "
         "input, or 2 GB of memory."
     )

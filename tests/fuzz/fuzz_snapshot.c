@@ -2,6 +2,10 @@
 #include "fuzz.h"
 #include "base/hash.h"
 
+#include "../unit/toy_classes.h"
+
+#include <stdbool.h>
+
 enum { BODY_AT = 48, HASH_AT = 40 };
 
 /* The checksum of what follows the header, so that the checks behind it are reached. */
@@ -13,32 +17,46 @@ static void repair(uint8_t *data, size_t size)
     memcpy(data + HASH_AT, &hash, sizeof hash);
 }
 
+enum { KINDS = 3 }; /* plain, with classes of motion, in paper mode */
+
+static struct saved {
+    gait_tracker *tracker;
+    uint8_t *good, *work;
+    size_t bytes;
+} saved[KINDS];
+
+static void prepare(struct saved *s, int kind)
+{
+    gait_tracker_config config = fuzz_config();
+    const gait_model *const model = kind == 1 ? toy_classes_model() : toy_model();
+    gait_state mean, sd;
+    void *memory;
+    config.mode = kind == 2 ? GAIT_MODE_PAPER : GAIT_MODE_DEFAULT;
+    s->tracker = fuzz_tracker(model, &config, &memory);
+    gait_tracker_prior(model, &mean, &sd, NULL);
+    gait_tracker_start(s->tracker, &mean, &sd, 0, NULL);
+    fuzz_steps(s->tracker, 0, 3);
+    gait_tracker_save(s->tracker, NULL, 0, &s->bytes, NULL);
+    s->good = fuzz_memory(s->bytes);
+    s->work = fuzz_memory(s->bytes);
+    gait_tracker_save(s->tracker, s->good, s->bytes, &s->bytes, NULL);
+}
+
 int LLVMFuzzerTestOneInput(const uint8_t *data, size_t size)
 {
-    static gait_tracker *tracker;
-    static uint8_t *good, *work;
-    static size_t bytes;
-    void *memory;
     fuzz_bytes b = {data, size};
-    if (!tracker) {
-        gait_tracker_config const config = fuzz_config();
-        gait_state mean, sd;
-        tracker = fuzz_tracker(toy_model(), &config, &memory);
-        gait_tracker_prior(toy_model(), &mean, &sd, NULL);
-        gait_tracker_start(tracker, &mean, &sd, 0, NULL);
-        fuzz_steps(tracker, 0, 3);
-        gait_tracker_save(tracker, NULL, 0, &bytes, NULL);
-        good = fuzz_memory(bytes);
-        work = fuzz_memory(bytes);
-        gait_tracker_save(tracker, good, bytes, &bytes, NULL);
-    }
-    memcpy(work, good, bytes);
-    size_t const left = fuzz_damage(work, bytes, &b);
-    repair(work, left);
-    uint8_t *const copy = fuzz_copy(work, left);
-    if (gait_tracker_restore(tracker, copy, left, NULL) == GAIT_OK)
-        fuzz_steps(tracker, 200000, 2);
-    else if (size < 8) /* not damaged */
+    int const kind = fuzz_take(&b) % KINDS;
+    struct saved *const s = &saved[kind];
+    if (!s->tracker)
+        prepare(s, kind);
+    memcpy(s->work, s->good, s->bytes);
+    bool const damaged = b.left >= 8;
+    size_t const left = fuzz_damage(s->work, s->bytes, &b);
+    repair(s->work, left);
+    uint8_t *const copy = fuzz_copy(s->work, left);
+    if (gait_tracker_restore(s->tracker, copy, left, NULL) == GAIT_OK)
+        fuzz_steps(s->tracker, 200000, 2);
+    else if (!damaged)
         abort();
     free(copy);
     return 0;

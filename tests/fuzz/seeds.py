@@ -96,7 +96,7 @@ def main() -> int:
     settings = "model = 'walk.gait' # of the shop\nseed = 5\n\nphase-noise=0.2\nlift = yes\n"
     seeds = {
         "model": [bytes([choice]) + bytes(8) for choice in range(6)],
-        "snapshot": [b"", bytes(16)],
+        "snapshot": [bytes([kind]) for kind in range(3)],
         "frame": [random.integers(9, 255, 900, np.uint8).tobytes() for _ in range(4)],
         "lift": [random.integers(9, 200, 300, np.uint8).tobytes() for _ in range(4)],
         "start": [bytes(range(9, 200)) * 20],

@@ -244,6 +244,104 @@ static void test_scale(void)
     CHECK(gait_lift_scale(l, &last, NULL) == GAIT_ERR_STATE); /* a gain has no motion */
 }
 
+/* A point 80 pixels off moves a fit, and hardly moves a robust one, which gives it a larger standard deviation. */
+static void test_robust(void)
+{
+    static double weighted[TOY_SEGMENT];
+    gait_lift_config const c = toy_lift_config(GAIT_LIFT_PERSPECTIVE);
+    gait_lift *const l = toy_lift_open(&c);
+    double const place[3] = {0.2, 0.1, 0.0};
+    double error[2];
+    gait_lift_fit fit;
+    set_all_sds(2.0);
+    toy_draw(&toy_lift_prior, 0, 4, 0.3, place, X);
+    toy_lift_see(&c, (const double (*)[3])X, TOY_SEGMENT, 1.0, 4, uv);
+    uv[2 * 13] += 80.0;
+    CHECK(gait_lift_segment(l, uv, sds, &fit, NULL) == GAIT_OK);
+    CHECK(gait_lift_positions(l, mean, NULL, NULL) == GAIT_OK);
+    error[0] = toy_distance(mean + 3 * 13, X[13]);
+    CHECK(gait_lift_segment_robust(l, uv, sds, weighted, &fit, NULL) == GAIT_OK);
+    CHECK(gait_lift_positions(l, mean, NULL, NULL) == GAIT_OK);
+    error[1] = toy_distance(mean + 3 * 13, X[13]);
+    CHECK(error[1] < 0.5 * error[0]);
+    for (int i = 0; i < TOY_SEGMENT; i++)
+        CHECK(i == 13 ? weighted[i] > 4.0 * sds[i] : weighted[i] >= sds[i] && weighted[i] < 2.0 * sds[i]);
+}
+
+/* Unobserved, the person is where they are expected and the unknowns have their prior; observed, less is unknown. */
+static void test_expected_and_unknown(void)
+{
+    enum { N = TOY_MODES + 4 };
+    static double theta[N], covariance[N * N];
+    gait_lift_config c = toy_lift_config(GAIT_LIFT_PERSPECTIVE);
+    double const place[3] = {1.5, -0.5, 0.0};
+    gait_lift_fit fit;
+    gait_lift *l = toy_lift_open(&c);
+    CHECK(gait_lift_expect(l, place, 0.7, 0.0, NULL) == GAIT_ERR_ARG);
+    CHECK(gait_lift_expect(l, place, 0.7, -0.5, NULL) == GAIT_ERR_ARG);
+    CHECK(gait_lift_expect(l, place, 0.7, 0.2, NULL) == GAIT_OK && gait_lift_unknowns(l) == N);
+    set_all_sds(-1.0);
+    CHECK(gait_lift_segment(l, uv, sds, &fit, NULL) == GAIT_OK && fit.observed == 0);
+    CHECK_NEAR(fit.place[0], 1.5, 1e-9);
+    CHECK_NEAR(fit.place[1], -0.5, 1e-9);
+    CHECK_NEAR(fit.heading, 0.7, 1e-9);
+    CHECK(gait_lift_posterior(l, theta, covariance, NULL) == GAIT_OK);
+    for (int i = 0; i < N * N; i++)
+        CHECK_NEAR(covariance[i], i % (N + 1) == 0, 1e-9);
+    set_all_sds(2.0);
+    toy_draw(&toy_lift_prior, 0, 2, 0.7, place, X);
+    toy_lift_see(&c, (const double (*)[3])X, TOY_SEGMENT, 1.0, 2, uv);
+    CHECK(gait_lift_segment(l, uv, sds, &fit, NULL) == GAIT_OK);
+    CHECK(gait_lift_posterior(l, theta, covariance, NULL) == GAIT_OK);
+    for (int i = 0; i < N; i++) {
+        CHECK(covariance[i * (N + 1)] > 0.0 && covariance[i * (N + 1)] < 0.5);
+        for (int k = 0; k < i; k++)
+            CHECK_NEAR(covariance[i * N + k], covariance[k * N + i], 1e-9);
+    }
+    CHECK(gait_lift_posterior(l, theta, NULL, NULL) == GAIT_OK);
+    c.heading_sd = 0.2; /* the heading is known */
+    l = toy_lift_open(&c);
+    CHECK(gait_lift_expect(l, place, 0.7, 0.2, NULL) == GAIT_ERR_STATE);
+}
+
+/* Every call refuses what is not there. */
+static void test_nothing(void)
+{
+    gait_lift_config const c = toy_lift_config(GAIT_LIFT_PERSPECTIVE);
+    gait_lift *const l = toy_lift_open(&c);
+    gait_lift_info info;
+    gait_lift_fit fit;
+    gait_lift_frame frame;
+    double x[3] = {0.0};
+    size_t bytes = 0;
+    gait_lift_default(NULL);
+    gait_lift_reset(NULL);
+    for (int k = 0; k < 2; k++) { /* without a lifter, and without a place for the answer or an argument */
+        gait_lift *const at = k ? l : NULL;
+        double *const to = k ? NULL : x;
+        CHECK(gait_lift_segment(at, to, sds, &fit, NULL) == GAIT_ERR_ARG);
+        CHECK(gait_lift_segment_robust(at, x, NULL, to, &fit, NULL) == GAIT_ERR_ARG);
+        CHECK(gait_lift_segment_robust(at, to, NULL, x, &fit, NULL) == GAIT_ERR_ARG);
+        CHECK(gait_lift_segment_robust(at, x, NULL, x, k ? NULL : &fit, NULL) == GAIT_ERR_ARG);
+        CHECK(gait_lift_expect(at, to, 0.0, 0.1, NULL) == GAIT_ERR_ARG);
+        CHECK(gait_lift_positions(at, to, NULL, NULL) == GAIT_ERR_ARG);
+        CHECK(gait_lift_posterior(at, to, NULL, NULL) == GAIT_ERR_ARG);
+        CHECK(gait_lift_scale(at, to, NULL) == GAIT_ERR_ARG);
+        CHECK(gait_lift_least_squares(at, to, NULL) == GAIT_ERR_ARG);
+        CHECK(gait_lift_uncertain(at, 1, to, x, NULL) == GAIT_ERR_ARG);
+        CHECK(gait_lift_uncertain(at, 1, x, to, NULL) == GAIT_ERR_ARG);
+        CHECK(gait_lift_fix(at, to, NULL) == GAIT_ERR_ARG);
+        CHECK(gait_lift_batch(at, 1, to, x, NULL) == GAIT_ERR_ARG);
+        CHECK(gait_lift_push(at, 1, to, NULL, NULL) == GAIT_ERR_ARG);
+        CHECK(gait_lift_estimate(at, k ? NULL : &frame, NULL) == GAIT_ERR_ARG);
+        CHECK(gait_lift_get_info(k ? toy_lift_model : NULL, k ? NULL : &info, NULL) == GAIT_ERR_ARG);
+        CHECK(gait_lift_bytes(toy_lift_model, k ? &c : NULL, k ? NULL : &bytes, NULL) == GAIT_ERR_ARG);
+        CHECK(gait_lift_remove_spikes(1, 1, x, x, x, to) == 0 || k == 0);
+        CHECK(gait_lift_weight_outliers(1, x, x, to) == 0 || k == 0);
+    }
+    CHECK(gait_lift_unknowns(NULL) == GAIT_ERR_ARG && !gait_lift_marker_name(NULL, 0));
+}
+
 static void test_arguments(void)
 {
     gait_lift_config const good = toy_lift_config(GAIT_LIFT_PERSPECTIVE);
@@ -314,6 +412,9 @@ int main(void)
     test_batch();
     test_uncertain();
     test_scale();
+    test_robust();
+    test_expected_and_unknown();
+    test_nothing();
     test_arguments();
     test_world_axes();
     return CHECK_DONE();
