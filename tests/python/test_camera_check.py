@@ -189,7 +189,15 @@ def test_a_difference_within_the_uncertainty_of_the_estimate_is_not_reported(mon
 def test_gait_lift_reports_it(tmp_path, capsys):
     write(tmp_path / "k.csv", keypoints(view()))
     write_camera(tmp_path / "wrong.json", view(focal=1500.0))
-    words = [tmp_path / "k.csv", "--camera", tmp_path / "wrong.json", "--height", STATURE, "--method", "blend"]
+    words = [
+        tmp_path / "k.csv",
+        "--camera",
+        tmp_path / "wrong.json",
+        "--height",
+        STATURE,
+        "--method",
+        "blend",
+    ]
     assert main(["lift", *map(str, words), "-o", str(tmp_path / "out.csv")]) == 0
     report = capsys.readouterr().err
     assert f"{tmp_path / 'wrong.json'}: the person appears" in report

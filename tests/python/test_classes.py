@@ -95,7 +95,7 @@ def test_learn_makes_classes_and_info_shows_them(tmp_path: Path, capsys: pytest.
     assert figures["bytes"] == out.stat().st_size and figures["classes"][0]["cycles"] >= 4
     assert main(["info", str(out)]) == 0
     printed = capsys.readouterr().out
-    assert "class stand: made from the walk, stands still, 4 components" in printed
+    assert "class stand: derived from the walk, stands still, 4 components" in printed
     assert "class backwards: the curves of walk in reverse" in printed
     assert gait.Model(out).classes == ("walk", "stand", "backwards")
 

@@ -68,13 +68,13 @@ def test_weights_that_are_missing_or_damaged(monkeypatch, tmp_path):
     found = lines(doctor.check_weights)
     assert (
         found[0]
-        == "fault weights people: are not on this machine; run gait detect --fetch once, with a network"
+        == "fault weights people: are not installed; run gait detect --fetch once, with a network connection"
     )
     assert [line.split()[0] for line in found] == ["fault", "fault", "note", "note"]
     (tmp_path / "pose_detection.tflite").write_bytes(b"damaged")
     first = lines(doctor.check_weights)[0]
     assert first.startswith("fault weights people: ") and first.endswith(
-        "run gait detect --fetch once, with a network"
+        "run gait detect --fetch once, with a network connection"
     )
 
 
@@ -105,9 +105,7 @@ def test_a_message_that_is_lost(monkeypatch):
         handle_timeout = staticmethod(lambda _: 0)
 
     monkeypatch.setattr(link, "open_lcm", lambda url: Deaf)
-    assert lines(doctor.check_network)[0].startswith(
-        "fault lcm route: a multicast message does not come back"
-    )
+    assert lines(doctor.check_network)[0].startswith("fault lcm route: a multicast message does not return")
 
 
 @pytest.mark.parametrize(

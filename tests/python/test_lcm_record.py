@@ -137,7 +137,7 @@ def test_damaged_messages_are_left_out_and_reported(estimates, tmp_path):
         writer.publish("GAIT_ESTIMATE", e.encode())
     writer.close()
     done = rig.gait("record", "--url", f"file://{log}?speed=0", "-o", tmp_path / "t.csv", "--json")
-    assert done.returncode == 0 and "messages left out: 3, first: GAIT_ESTIMATE: not a" in done.stderr
+    assert done.returncode == 0 and "messages skipped: 3, first: GAIT_ESTIMATE: not a" in done.stderr
     figures = json.loads(done.stdout)
     assert figures["damaged"] == 3 and len(read_track(tmp_path / "t.csv").frame) == COUNT
     run = read_run(str(log))

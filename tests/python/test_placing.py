@@ -85,7 +85,7 @@ def test_command_names_points_that_do_not_fit(tmp_path, capsys):
     assert main(["camera", *arguments]) == 0
     out, err = capsys.readouterr()
     assert "5 points" in out and "above the ground" in out
-    assert "points.csv: missed by" in err and "check line" in err
+    assert "points.csv: reprojection error" in err and "check line" in err
 
 
 @pytest.mark.parametrize(

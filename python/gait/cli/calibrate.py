@@ -141,7 +141,11 @@ def _text(path: str, s: dict[str, Any]) -> str:
     lines = [
         f"{s['used']} of {s['pictures']} pictures used"
         + (f", {s['blurred']} too blurred" if s["blurred"] else "")
-        + (f"; left out, as they do not fit the others: {', '.join(s['left_out'])}" if s["left_out"] else "")
+        + (
+            f"; ignored, because they do not fit the others: {', '.join(s['left_out'])}"
+            if s["left_out"]
+            else ""
+        )
     ]
     names = [f"{Path(name).name} {error:.2f} px" for name, error in s["error_px"].items()]
     cell = max(map(len, names)) + 2

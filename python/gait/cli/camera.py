@@ -99,9 +99,9 @@ def _on_page(args: argparse.Namespace) -> int:
         )
     elif fov is not None:
         lens = lens_of(size, 0.5 * size[0] / math.tan(math.radians(0.5 * fov)))
-        words = f"A lens without distortion that shows {fov:.0f} degrees; gait calibrate makes it exact."
+        words = f"An ideal lens with a field of view of {fov:.0f} degrees; gait calibrate makes it exact."
     else:
-        lens, words = None, "The focal length is found from five marks or more; --lens makes it exact."
+        lens, words = None, "The focal length is estimated from at least five marks; --lens makes it exact."
     scene = Scene(Path(args.page).name, size, frames, picture, lens, words, args.output, first)
     own = serve.listen(args.port)
     note(f"gait camera: open {serve.address(own)} (Ctrl-C ends it)", args.quiet)
@@ -152,7 +152,8 @@ def _from_points(args: argparse.Namespace) -> int:
     _write(args.output, camera)
     worst, rms = int(off.argmax()), float(np.sqrt((off**2).mean()))
     if rms > _LARGE:
-        text = f"{args.points}: missed by {rms:.1f} px rms; check line {points.line[worst]} and the lens"
+        line = points.line[worst]
+        text = f"{args.points}: reprojection error {rms:.1f} px rms; check line {line} and the lens"
         note(text, args.quiet)
     if args.json:
         place_m = camera.centre.tolist()
@@ -214,7 +215,7 @@ def _check_size(args: argparse.Namespace, keypoints: Keypoints) -> None:
     u, v = np.nanquantile(keypoints.uv, 0.999, axis=(0, 1))
     if u < _FILLED * width and v < _FILLED * height:
         note(
-            f"{args.walk}: all points lie in the upper left {u:.0f}x{v:.0f} of --size {width}x{height}: is "
+            f"{args.walk}: all points are in the upper left {u:.0f}x{v:.0f} of --size {width}x{height}: is "
             "that the size of the video in which they were found?",
             args.quiet,
         )

@@ -78,7 +78,7 @@ def _live(args: argparse.Namespace) -> int:
         while True:
             detector.handle(_TURN)
     if detector.damage:
-        note(f"gait detect: left out: {detector.damage}", args.quiet)
+        note(f"gait detect: skipped: {detector.damage}", args.quiet)
     counts = {"frames": detector.frames, "found": detector.found}
     print(json.dumps(counts) if args.json else "{frames} frames, a person in {found}".format(**counts))
     return 0

@@ -72,7 +72,7 @@ def check_library() -> Iterator[Finding]:
     kernels = loaded.gait_cpu_name(0xFFFFFFFF).decode()
     text = f"{os.cpu_count()} cores, kernels {kernels}"
     if kernels in ("scalar", "base"):
-        slow = "no AVX2: a step takes two to four times as long; give fewer --particles where frames are late"
+        slow = "no AVX2: a step takes two to four times as long; give fewer --particles if frames are late"
         yield Finding("cpu", "note", text, slow)
     else:
         yield Finding("cpu", "ok", text)
@@ -113,7 +113,7 @@ def check_weights() -> Iterator[Finding]:
         optional = name in ("lite", "heavy")
         if not weights.find(file):
             state = "note" if optional else "fault"
-            yield Finding(f"weights {name}", state, "are not on this machine", weights.FETCH)
+            yield Finding(f"weights {name}", state, "are not installed", weights.FETCH)
             continue
         try:
             weights.load(file)
@@ -137,9 +137,9 @@ def check_network() -> Iterator[Finding]:
         yield Finding("lcm", "fault", text, remedy)
         return
     if not _comes_back(link):
-        yield Finding("lcm route", "fault", "a multicast message does not come back", link.ROUTE_REMEDY)
+        yield Finding("lcm route", "fault", "a multicast message does not return", link.ROUTE_REMEDY)
     else:
-        yield Finding("lcm route", "ok", "a multicast message comes back")
+        yield Finding("lcm route", "ok", "a multicast message returns")
     granted = link.receive_buffer()
     if warning := link.buffer_warning(link.DEFAULT_URL):
         text, _, remedy = warning.partition(": some will be lost; ")
@@ -172,7 +172,7 @@ def check_daemon() -> Iterator[Finding]:
     place = shutil.which("gait-trackd") or (str(_DAEMON) if _DAEMON.is_file() else None)
     if place is None:
         yield Finding(
-            "gait-trackd", "note", "is not here", "run make tools in the sources, for tracking live"
+            "gait-trackd", "note", "is not here", "for live tracking, run make tools in the sources"
         )
         return
     try:
@@ -196,14 +196,14 @@ def check_cameras() -> Iterator[Finding]:
     cameras = sorted(_DEVICES.glob("video*"))
     if not cameras:
         yield Finding(
-            "camera", "note", "no camera at /dev/video*", "gait capture takes files and streams, too"
+            "camera", "note", "no camera at /dev/video*", "gait capture also takes files and streams"
         )
     for camera in cameras:
         if os.access(camera, os.R_OK | os.W_OK):
             yield Finding("camera", "ok", str(camera))
         else:
             remedy = "add yourself to its group: sudo usermod -aG video $USER, then log in again"
-            yield Finding("camera", "fault", f"{camera} may not be read", remedy)
+            yield Finding("camera", "fault", f"{camera} cannot be read", remedy)
 
 
 def check_disk() -> Iterator[Finding]:

@@ -87,8 +87,8 @@ def text(name: str, s: Mapping[str, Any]) -> str:
     if gait:
         lines += [
             "{stride_hz:.3f} +- {stride_hz_sd:.3f} strides/s, varying by {stride_time_cv:.1%}".format(**gait)
-            + (", which the mean cycle follows" if "PACE" in s["sections"] else ""),
-            "stride of {stride_length:.3f} +- {stride_length_sd:.3f} statures".format(**gait),
+            + (", on which the mean cycle depends" if "PACE" in s["sections"] else ""),
+            "stride length {stride_length:.3f} +- {stride_length_sd:.3f} statures".format(**gait),
         ]
     if "sequences" in meta:
         lines += sequence_lines(meta["sequences"]["rows"])
@@ -135,7 +135,7 @@ def _classes(sections: Mapping[str, Any]) -> list[dict[str, Any]]:
 
 def _class_line(one: Mapping[str, Any]) -> str:
     """One class in words."""
-    what = f"of {one['cycles']} cycles" if one["cycles"] else "made from the walk"
+    what = f"of {one['cycles']} cycles" if one["cycles"] else "derived from the walk"
     if one["curves_of"] != one["name"]:
         what = f"the curves of {one['curves_of']} in reverse"
     moves = f"{one['stride_hz']:.2f} strides/s, " if one["direction"] else "stands still, "

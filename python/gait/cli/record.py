@@ -72,7 +72,7 @@ def run(args: argparse.Namespace) -> int:
         note(f"gait record: ended, as {recorder.other}; record it into another file", args.quiet)
     figures = recorder.summary()
     if recorder.damage:
-        note(f"gait record: messages left out: {figures['damaged']}, first: {recorder.damage}", args.quiet)
+        note(f"gait record: messages skipped: {figures['damaged']}, first: {recorder.damage}", args.quiet)
     print(json.dumps(figures) if args.json else text(figures))
     return 0
 
@@ -81,7 +81,7 @@ def text(figures: dict[str, Any]) -> str:
     """Lay the figures out for people."""
     lines = [
         f"{figures['frames']} frames, {figures['dropped']} dropped by the tracker, "
-        f"{figures['lost']} estimates lost on the way",
+        f"{figures['lost']} estimates lost in transit",
         _times("step", figures["step_ms"]),
     ]
     if figures["latency_ms"]:

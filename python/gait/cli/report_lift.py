@@ -45,19 +45,19 @@ examples:
 """
 
 FIGURES = 5  # besides that of a clip
-_FROM = "Mean distance of the markers from where they truly are"
+_FROM = "Mean distance of the markers from their true positions"
 _WORDS = {
-    "mean_mm": ("error of the mean motion", " mm", f"{_FROM}, if the view is not looked at."),
+    "mean_mm": ("error of the mean motion", " mm", f"{_FROM}, without using the view."),
     "likelihood_mm": (
         "error of the likelihood alone",
         " mm",
         f"{_FROM}, by least squares without the prior.",
     ),
-    "bayes_mm": ("error of the Bayesian estimate", " mm", f"{_FROM}, by the view and the prior."),
+    "bayes_mm": ("error of the Bayesian estimate", " mm", f"{_FROM}, from the view and the prior."),
     "log10_volume_ratio": (
         "volume of the posterior over the prior, log10",
         "",
-        "How much the view narrows down the motion: -3 is to a thousandth.",
+        "How much the view restricts the motion: -3 means to a thousandth.",
     ),
 }
 
