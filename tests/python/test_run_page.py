@@ -179,7 +179,7 @@ def test_without_a_camera_or_the_parts_the_page_names_how_to_get_the_figure(
         (["camera.json"], "camera.json: is not a track OUT.csv; with a log, also give --track"),
         (["run.csv", "--camera", "none.json"], "none.json: no such camera file"),
         (["run.csv", "--truth", "none.csv"], "none.csv: no such truth file"),
-        (["run.csv", "-o", "walk.mp4"], "walk.mp4: is read by this command"),
+        (["run.csv", "--overlay", "walk.mp4"], "walk.mp4: is read by this command"),
         (["long.csv"], "long.csv: has frame 189, walk.mp4 ends at 89; give the film that was tracked"),
     ],
 )
