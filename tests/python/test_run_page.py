@@ -8,6 +8,7 @@ import re
 from dataclasses import replace
 
 import accessibility
+import av
 import browser
 import numpy as np
 import pytest
@@ -17,8 +18,10 @@ from walking_track import walking_track
 from gait import Estimate, Flag, Frame, Model, State, TrackStatus, Video
 from gait.bindings.model import read_blob
 from gait.cli import main
+from gait.errors import UserError
 from gait.io import blob
 from gait.io.track_file import TrackWriter, read_track
+from gait.io.video import VideoWriter
 from gait.motion.verdict import LEGS, verdict_of
 from gait.report.film import page_size
 
@@ -111,6 +114,27 @@ def test_a_page_of_a_part_of_the_film_states_the_same_as_the_tracker(folder, cap
     track = read_track(folder / "part.csv")
     np.testing.assert_allclose(track.camera_change[-1], track.time[-1] * CHANGE, atol=1e-6)
     assert "camera was estimated from the walk; to see the figure" in capsys.readouterr().err
+
+
+def test_another_film_is_recognised(folder, tmp_path, capsys):
+    """A copy in another container is the same film; one that was coded anew may be; other times are not."""
+    film = Video(folder / "walk.mp4")
+    pictures = [frame.image for frame in film.frames()]
+    write(tmp_path / "anew.mp4", [np.roll(picture, 40, axis=1) for picture in pictures])
+    with VideoWriter(tmp_path / "slow.mp4", FPS / 2) as slow:
+        for picture in pictures:
+            slow.write(picture)
+    with av.open(folder / "walk.mp4") as old, av.open(tmp_path / "copy.mkv", "w") as new:
+        stream = new.add_stream_from_template(old.streams.video[0])
+        for packet in old.demux(video=0):
+            if packet.dts is not None:
+                packet.stream = stream
+                new.mux(packet)
+    track = replace(read_track(folder / "run.csv"), film=film.digest)
+    assert track.compare_film("run.csv", Video(tmp_path / "copy.mkv")) == ""
+    assert "anew.mp4: is another file than" in track.compare_film("run.csv", Video(tmp_path / "anew.mp4"))
+    with pytest.raises(UserError, match="slow.mp4: is not the film that was tracked: its frame"):
+        track.compare_film("run.csv", Video(tmp_path / "slow.mp4"))
 
 
 def test_a_track_without_any_sure_frame_is_warned_of():

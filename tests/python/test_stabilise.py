@@ -12,8 +12,10 @@ from walking_keypoints import MODEL, walk_at
 from gait import Camera, Video
 from gait.camera.camera import write_camera
 from gait.cli import main
+from gait.errors import UserError
 from gait.io.keypoints_file import Keypoints
 from gait.io.video import VideoWriter, sample_frames
+from gait.studio.source import require_still
 from gait.track import walk_camera
 from gait.track.camera_motion import View
 from gait.track.moving_video import MovingVideo, map_pixels, panorama_of
@@ -129,3 +131,15 @@ def test_stabilising_is_for_videos(tmp_path, capsys):
     words = ["lift", str(tmp_path / "k.csv"), "-o", str(tmp_path / "o.csv"), "--stabilize", "auto"]
     assert main(words) == 2
     assert "--stabilize is for a video" in capsys.readouterr().err
+
+
+def test_the_studio_refuses_a_camera_that_turns_and_reports_one_that_shakes(tmp_path):
+    noted: list[str] = []
+    require_still(film(tmp_path / "still.mp4", views(0.0, 0.0)), CAMERA, people(), noted.append)
+    assert not noted
+    require_still(film(tmp_path / "shaken.mp4", views(0.0, 0.01)), CAMERA, people(), noted.append)
+    assert len(noted) == 1 and "shaken.mp4: its camera turns by up to" in noted[0]
+    with pytest.raises(
+        UserError, match="panned.mp4: its camera turns by up to .*; lift it by gait lift --stab"
+    ):
+        require_still(film(tmp_path / "panned.mp4", views(0.3, 0.0)), CAMERA, people(), noted.append)

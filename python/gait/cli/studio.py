@@ -7,9 +7,9 @@ gives the same motion from it.  This is the tool of Leventon and Freeman (1998),
 
 The person's joints come from the detector, from --keypoints, or from --track, the output of gait track.  With
 --placement the images themselves are lifted, without a detector.  With --camera the motion is in the camera's
-world and feet can be put on its floor; with --height the camera is estimated from the walk; without either it
-is assumed to be level and far away.  The camera must be static: for a turning camera use gait lift
---stabilize auto.
+world and feet can be put on its floor; with --height alone the camera is estimated from the walk; without
+either it is assumed to be level and far away.  The camera must be static: a film whose camera turns by more
+than a tenth of the picture is refused; gait lift --stabilize auto lifts it.
 
 The folder VIDEO.studio beside the video stores intermediate results.  Only this machine can open the page.
 Ctrl-C ends the command; nothing is lost.
@@ -46,7 +46,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         "--height",
         type=values.stature,
         metavar="M",
-        help="the person's stature in metres; estimates the camera",
+        help="the person's stature in metres; without --camera it also estimates the camera",
     )
     values.add_fov(parser)
     parser.add_argument(

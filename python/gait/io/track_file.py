@@ -21,7 +21,7 @@ from gait.body.skeleton import EVAL15, JOINTS
 from gait.errors import UserError
 from gait.io.fields import frame_numbers
 from gait.io.files import replacing, require_file
-from gait.io.video import Frame
+from gait.io.video import Frame, Video
 
 Array = NDArray[np.float64]
 
@@ -37,6 +37,7 @@ STATUSES = ("init", "tracking", "ambiguous", "lost")
 
 CLASS_COLUMN = "motion_class"
 CLIP_COLUMNS = ("reason", "first_frame", "last_frame")
+FILM_COLUMN = "film"
 CAMERA_COLUMNS = tuple(f"camera_{k}_{what}" for k in range(1, 5) for what in ("x", "y", "heading"))
 
 
@@ -67,6 +68,8 @@ class TrackWriter:
         Gives `Track.camera_change` at a time in seconds, of a camera that was estimated from the walk.
     person : int, optional
         Number of the person, of several in a clip.
+    film : str, optional
+        `Video.digest` of the film that is tracked.
     """
 
     def __init__(
@@ -79,6 +82,7 @@ class TrackWriter:
         frames: range | None = None,
         camera_change: Callable[[float], Array] | None = None,
         person: int | None = None,
+        film: str | None = None,
     ) -> None:
         self.path = path
         missing = [name for name in JOINTS if name not in joint_names]
@@ -91,8 +95,9 @@ class TrackWriter:
         self._header = header(components, angle_names, classes)
         self._header += CLIP_COLUMNS if frames is not None else ()
         self._header += CAMERA_COLUMNS if camera_change is not None else ()
-        self._person = [] if person is None else [person]
-        self._header += ["person"] * len(self._person)
+        self._last = {"person": person, FILM_COLUMN: film}
+        self._last = {name: value for name, value in self._last.items() if value is not None}
+        self._header += self._last
         self._stack = ExitStack()
 
     def __enter__(self) -> TrackWriter:
@@ -125,7 +130,7 @@ class TrackWriter:
             + [f"{value:.4f}" for value in estimate.class_probability[: self._classes]]
             + self._of_clip(estimate)
             + self._of_camera(frame.time)
-            + self._person
+            + [*self._last.values()]
         )
 
     def _of_clip(self, estimate: Estimate) -> list[object]:
@@ -189,10 +194,32 @@ class Track(Joints):
     #: independent parts of the uncertainty of a camera that was estimated from the walk, each of one sd and
     #: common to all frames; None where the camera was given.
     camera_change: Array | None = None
+    #: `Video.digest` of the film that was tracked; empty: not stated.
+    film: str = ""
 
     def eval15_sd(self) -> Array:
         """Return the standard deviations of EVAL15, shape (n, 15, 3)."""
         return np.stack([self.sd[name] for name in EVAL15], axis=1)
+
+    def compare_film(self, path: str | os.PathLike[str], video: Video) -> str:
+        """Describe a film that need not be the one tracked, or ''; `path` is that of the track, for messages.
+
+        UserError if its frames are shown at other times, so that it cannot be.
+        """
+        if self.film in ("", video.digest):
+            return ""
+        shared = self.frame < video.count
+        shown, own = video.times[self.frame[shared]], self.time[shared]
+        if (late := np.abs(own - shown)).size and late.max() > 0.5 / video.fps:
+            k = int(late.argmax())
+            raise UserError(
+                f"{video.path}: is not the film that was tracked: its frame {self.frame[shared][k]} is at "
+                f"{shown[k]:.2f} s, in {path} at {own[k]:.2f} s; give that film"
+            )
+        return (
+            f"{video.path}: is another file than the one that was tracked; unless it is a copy coded anew, "
+            f"give the film of {path}"
+        )
 
 
 def read_truth(path: str | os.PathLike[str]) -> Joints:
@@ -244,6 +271,7 @@ def _track(table: _Table, status: list[str], phase: Array) -> Track:
         frames=_frames(table) if set(CLIP_COLUMNS) <= table.rows.keys() else None,
         reason=table.column("reason") if "reason" in table.rows else [],
         camera_change=_camera_change(table) if set(CAMERA_COLUMNS) <= table.rows.keys() else None,
+        film=table.column(FILM_COLUMN)[0] if FILM_COLUMN in table.rows else "",
     )
 
 

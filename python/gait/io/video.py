@@ -5,6 +5,7 @@ PyAV and OpenCV are imported where they are used, so that pictures can be tracke
 
 from __future__ import annotations
 
+import hashlib
 import os
 import platform
 from collections.abc import Callable, Collection, Iterator, Sequence
@@ -84,6 +85,8 @@ class Video:
         When they are shown, seconds since the first, by the file's index.
     broken : str or None
         In words, if the file ends before all the frames that it states.
+    digest : str
+        Of the sizes of its coded pictures: copies in other containers have the same, other films do not.
 
     Raises
     ------
@@ -151,6 +154,7 @@ class Video:
             stamps = [p.pts for p in packets if not p.is_discard]
             self.count = len(stamps)
             self.times = _times(stamps, unit, self.fps)
+            self.digest = hashlib.sha256(",".join(str(p.size) for p in packets).encode()).hexdigest()[:16]
             stated, more = stream.frames, 0
             if not stated and container.duration and len(container.streams) == 1:  # sound may last longer
                 stated, more = round(container.duration * 1e-6 * self.fps), _END

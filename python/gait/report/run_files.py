@@ -97,6 +97,8 @@ def write_report(
             f"{files.track}: has frame {track.frame[-1]}, {files.video} ends at {video.count - 1}; give the "
             "film that was tracked"
         )
+    other = track.compare_film(files.track, video)
+    note(other, files.quiet or not other)
     path, remark = _camera(files, track)
     camera = None if path is None else Camera.read(path, video.size, files.scale_camera)
     draws = Draws.read(files.draws, track) if files.draws else None
@@ -119,7 +121,7 @@ def write_report(
         times=video.times[film.frames.start : film.frames.stop],
         camera=camera,
         errors=errors,
-        notes=[video.broken] if video.broken else [],
+        notes=[words for words in (video.broken, other) if words],
         facts={**(facts or {}), "Camera and files": _facts(files, video, path, camera)},
         drawings=dict(drawings or {}),
     )

@@ -26,7 +26,7 @@ from gait.io import keypoints_file
 from gait.io.files import replacing
 from gait.io.keypoints_file import Keypoints
 from gait.io.track_file import read_track
-from gait.io.video import FAST, Video, VideoWriter
+from gait.io.video import FAST, Video, VideoWriter, sample_frames
 from gait.lift import run as lift_run
 from gait.lift.run import Request, Warn
 from gait.lift.smooth.options import Options
@@ -36,12 +36,14 @@ from gait.studio.keypoint_lift import KeypointLift
 from gait.studio.picture_lift import PictureLift
 from gait.studio.shown import Lift
 from gait.track.from_walk import Calibration
-from gait.track.walk_camera import calibrate_film, find_people, note_camera
+from gait.track.stabilise import find_motion, moves
+from gait.track.walk_camera import calibrate_film, expected_camera, find_people, note_camera
 
 Floats = npt.NDArray[np.float64]
 
 LARGEST = 1280  # pixels of the longer side of the film that browsers get
 DETECTED = "keypoints.csv"  # what the detector found, in the folder beside the film
+FURTHEST_TURN = 0.1  # of the picture's width, by which a camera turns that counts as still
 KEYFRAMES = 8  # frames from one that is shown alone to the next: seeking decodes no more
 LEAST_SD = 1.0  # pixels, of a track's joints
 WITHOUT_PERSON = ("init", "lost")  # statuses of frames whose joints are not used
@@ -137,7 +139,8 @@ def _keypoint_lift(
     warn: Warn,
     quiet: bool,
 ) -> KeypointLift:
-    path, keypoints = _keypoints(wanted, video, camera, folder, prior, quiet)
+    path, keypoints = _keypoints(wanted, video, camera, folder, prior, warn, quiet)
+    require_still(video, camera or expected_camera(video, wanted.fov), {0: keypoints}, warn)
     request = Request(
         options=Options(stature=wanted.height),
         camera=wanted.camera,
@@ -147,6 +150,25 @@ def _keypoint_lift(
     )
     prepared = lift_run.prepare(path, keypoints, prior, request, warn, quiet)
     return KeypointLift(path, prior, prepared, request, wanted.video, wanted.more())
+
+
+def require_still(video: Video, camera: Camera, people: dict[int, Keypoints], warn: Warn) -> None:
+    """Refuse a film whose camera turns far: corrections are of one picture of the scene; report small motion.
+
+    Parameters are as for `gait.track.stabilise.find_motion`.
+    """
+    samples = sample_frames(video)
+    if not moves(camera, samples, people):
+        return
+    motion, _ = find_motion(video, camera, samples, people)
+    far = 0.0 if motion is None else motion.furthest()
+    if far > FURTHEST_TURN * video.width:
+        raise UserError(
+            f"{video.path}: its camera turns by up to {far:.0f} px, and gait studio corrects films of one "
+            "that stands still; lift it by gait lift --stabilize auto"
+        )
+    how = f"turns by up to {far:.0f} px" if far else "moves"
+    warn(f"{video.path}: its camera {how}, which counts as motion of the person")
 
 
 def _pictures(
@@ -238,7 +260,13 @@ def _kept(path: Path, video: Video, make: Callable[[Path], None], **how: int | N
 
 
 def _keypoints(
-    wanted: Wanted, video: Video, camera: Camera | None, folder: Path, prior: SegmentPrior, quiet: bool
+    wanted: Wanted,
+    video: Video,
+    camera: Camera | None,
+    folder: Path,
+    prior: SegmentPrior,
+    warn: Warn,
+    quiet: bool,
 ) -> tuple[str, Keypoints]:
     """Keypoints given, of a track, or found by the detector; and the file that has them."""
     if wanted.keypoints:
@@ -250,6 +278,8 @@ def _keypoints(
                 "an estimated one"
             )
         path = str(folder / "track.csv")
+        if other := read_track(wanted.track).compare_film(wanted.track, video):
+            warn(other)
         found, span = keypoints_of_track(wanted.track, camera), video.span(wanted.start or 0, wanted.stop)
         rows = slice(*np.searchsorted(found.frame, [span.start, span.stop]))
         keypoints_file.write(path, found.part(rows))

@@ -129,7 +129,7 @@ def write(
         rows = TrackWriter(
             options.output, model.info.components, model.joint_names, model.angle_names, model.classes,
             span, None if scene.calibration is None else scene.calibration.change_at,
-            scene.person if scene.outlines else None,
+            scene.person if scene.outlines else None, video.digest,
         )  # fmt: skip
         if options.camera_out:
             write_camera(stack.enter_context(replacing(options.camera_out)), scene.camera)

@@ -31,7 +31,7 @@ class SeveralVideos(Video):
 
     def __init__(self, video: Video, others: Sequence[Video], offsets: Sequence[float]) -> None:
         self.path, self.fps, self.count, self.times = video.path, video.fps, video.count, video.times
-        self.broken = video.broken
+        self.broken, self.digest = video.broken, video.digest
         self.width, self.height = video.size
         self._video, self._others = video, others
         self._partners = [

@@ -96,7 +96,7 @@ class MovingVideo(Video):
         self, video: Video, lens: Camera, poses: Mapping[int, CameraPose], panorama: Panorama | None = None
     ) -> None:
         self.path, self.fps, self.count, self.times = video.path, video.fps, video.count, video.times
-        self.broken = video.broken
+        self.broken, self.digest = video.broken, video.digest
         self.width, self.height = video.size
         self._video, self._lens, self.poses, self.panorama = video, lens, poses, panorama
 
