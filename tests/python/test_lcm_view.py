@@ -6,6 +6,7 @@ import subprocess
 import time
 import urllib.error
 import urllib.request
+from copy import deepcopy
 from dataclasses import replace
 from pathlib import Path
 from types import SimpleNamespace
@@ -105,6 +106,24 @@ def test_several_people_are_drawn_into_one_frame(log, monkeypatch):
     np.testing.assert_array_equal(
         shown[-1], Overlay(rig.model(), rig.CAMERA).draw_people(rig.picture(2), people)
     )
+
+
+def test_cameras_that_run_by_themselves_are_drawn_with_the_frame_nearest_in_time(log, tmp_path):
+    """A second camera 9 ms late, of which one frame is missing, beside one of 33 ms a frame."""
+    events = [*rig.opening(), ("GAIT_CAMERA_1", camera_message(rig.CAMERA, rig.utime(0)))]
+    for i, (frame, estimate) in enumerate(zip(rig.frames(0, 6), log[1], strict=True)):
+        late = deepcopy(frame[1])
+        late.utime += 9000
+        events += [frame, *([("GAIT_IMAGE_1", late)] if i != 3 else []), ("GAIT_ESTIMATE", estimate)]
+    path, shown = rig.write_log(tmp_path / "two.log", events), []
+    feed = Feed(f"file://{path}?speed=0", [0, 1], rig.model(), {}, lambda k, image: shown.append((k, image)))
+    while feed.handle(1.0):
+        pass
+    second = [image for k, image in shown if k == 1]
+    assert [k for k, _ in shown].count(0) == 6 and len(second) == 4  # the first shows no interval yet
+    overlay = Overlay(rig.model(), rig.CAMERA)
+    estimate = replace(estimate_of(log[1][5]), utime=rig.utime(5) - rig.utime(0))
+    np.testing.assert_array_equal(second[-1], overlay.draw(rig.picture(5), estimate, 5))
 
 
 def test_damaged_messages_are_passed_over(log, tmp_path):

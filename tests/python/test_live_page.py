@@ -1,10 +1,13 @@
 """The live page in a real Chromium: numbers, figure, plots, pause, what is missing, recording."""
 
 import time
+import urllib.request
 
 import accessibility
 import browser
+import cv2
 import lcm_rig as rig
+import numpy as np
 import pytest
 
 from gait.lcm.link import private_url
@@ -94,6 +97,22 @@ def test_pause_holds_the_page(live, reports):
         page.click("#pause")
         send(live, reports, [5])
         browser.until(page, f"live.scene.data.times.at(-1) === {reports[0][5]['time']}")
+
+
+def test_a_snapshot_saves_the_picture_that_is_shown(live, reports, tmp_path):
+    with browser.opened() as page:
+        page.goto(live.address)
+        browser.until(page, "window.live !== undefined")
+        send(live, reports, [2])
+        browser.until(page, "document.querySelector('#pictures img').naturalWidth === 160")
+        with page.expect_download() as download:
+            page.click("#snapshot")
+        assert download.value.suggested_filename == "gait-camera-0.png"
+        download.value.save_as(tmp_path / "saved.png")
+    with urllib.request.urlopen(f"{live.address}frame/0.jpg") as answer:
+        shown = cv2.imdecode(np.frombuffer(answer.read(), np.uint8), cv2.IMREAD_COLOR_BGR)
+    saved = cv2.imread(str(tmp_path / "saved.png"))
+    assert saved.shape == shown.shape and np.abs(saved.astype(int) - shown).mean() < 2  # two JPEG decoders
 
 
 def test_several_people_have_numbers_and_figures_of_their_own(reports, tmp_path, monkeypatch):

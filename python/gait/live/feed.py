@@ -9,7 +9,7 @@ from __future__ import annotations
 import time
 from collections import deque
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from functools import partial
 from typing import Any, NamedTuple
 
@@ -29,6 +29,7 @@ from gait.web.motion_data import curve, motion_data, rounded
 
 _KEPT = 64  # frames that wait for their estimate, at most, and their bytes
 _KEPT_BYTES = 100_000_000
+_RECENT = 9  # frames that show a camera's interval
 _QUEUED = 8  # frames that wait in LCM
 _FURTHEST = 1e6  # metres, or anything else that is drawn
 _LONGEST = 0.5  # seconds without a drawing while messages wait, or a tracker does not answer
@@ -46,6 +47,35 @@ class _View:
     size: tuple[int, int] = (0, 0)
     overlay: Overlay | None = None
     camera: Camera | None = None
+    recent: deque[int] = field(default_factory=lambda: deque(maxlen=_RECENT))
+
+    def add(self, image: Any) -> None:
+        """Keep a frame until its estimate comes."""
+        self.frames[image.utime] = image
+        self.recent.append(image.utime)
+        while len(self.frames) > _KEPT or sum(len(one.data) for one in self.frames.values()) > _KEPT_BYTES:
+            del self.frames[next(iter(self.frames))]
+
+    def nearest(self, utime: int) -> int | None:
+        """Time of the frame of a moment: of cameras that run by themselves, half an interval off at most."""
+        found = min(self.frames, key=lambda one: abs(one - utime), default=None)
+        return found if found is not None and abs(found - utime) <= self._apart() else None
+
+    def take(self, utime: int) -> Any | None:
+        """Give the frame of a moment, if there is one, and forget it and those before."""
+        found = self.nearest(utime)
+        image = None if found is None else self.frames[found]
+        self.forget(utime if found is None else found + self._apart() + 1)
+        return image
+
+    def forget(self, utime: int) -> None:
+        """Forget frames of moments before this one."""
+        for old in [one for one in self.frames if one < utime - self._apart()]:
+            del self.frames[old]
+
+    def _apart(self) -> int:
+        """Half an interval between frames, microseconds."""
+        return int(np.median(np.abs(np.diff(self.recent)))) // 2 if len(self.recent) > 1 else 0
 
     def use(self, camera: Camera, model: Model) -> None:
         self.overlay, self.size, self.camera = Overlay(model, camera), camera.size, camera
@@ -188,18 +218,15 @@ class Feed:
         whole = [utime for utime, found in self._answers.items() if working <= found.keys()]
         newest = max(whole or (self._answers if late else ()), default=None)
         if newest is not None:
-            self._forget(lambda utime: utime < newest)
+            self._answers = {utime: found for utime, found in self._answers.items() if utime >= newest}
+            for view in self._views.values():
+                view.forget(newest)
         return newest
-
-    def _forget(self, old: Callable[[int], bool]) -> None:
-        for table in (self._answers, *(view.frames for view in self._views.values())):
-            for utime in [utime for utime in table if old(utime)]:
-                del table[utime]
 
     def _draw(self, utime: int) -> None:
         found, self._drawn = self._answers[utime], time.monotonic()
-        images = {stream: view.frames.get(utime) for stream, view in self._views.items()}
-        self._forget(lambda other: other <= utime)
+        images = {stream: view.take(utime) for stream, view in self._views.items()}
+        self._answers = {other: answer for other, answer in self._answers.items() if other > utime}
         for stream, view in self._views.items():
             if images[stream] is not None and view.overlay is not None:
                 pixels = self._fitting(images[stream], view)
@@ -221,10 +248,7 @@ class Feed:
         return pixels
 
     def _on_image(self, stream: int, channel: str, data: bytes) -> None:
-        message, frames = decode(gaitmsg.image_t, data, channel), self._views[stream].frames
-        frames[message.utime] = message
-        while len(frames) > _KEPT or sum(len(one.data) for one in frames.values()) > _KEPT_BYTES:
-            del frames[next(iter(frames))]
+        self._views[stream].add(decode(gaitmsg.image_t, data, channel))
 
     def _on_camera(self, stream: int, channel: str, data: bytes) -> None:
         view = self._views[stream]
@@ -245,7 +269,7 @@ class Feed:
         estimate = replace(estimate, utime=message.utime - self._origin)
         if self._report:
             self._report("sample", self._sample(person, estimate, message))
-        if any(message.utime in view.frames for view in self._views.values()):
+        if any(view.nearest(message.utime) is not None for view in self._views.values()):
             self._answers.setdefault(message.utime, {})[person] = estimate, message.frame
 
     def _sample(self, person: int, estimate: Estimate, message: Any) -> dict[str, Any]:
