@@ -19,6 +19,10 @@ a world with z up; the scale comes from the person's stature unless --metres-per
 either, the camera is assumed to be level and far away (looking along y), with a slowly changing scale.
 Neither determines the position along the line of sight; the lowest foot is placed on the floor.
 
+Several views of one person, each with a --camera in one world, are lifted together, in the frames of the
+first: the distance no longer comes from the person's size.  When their films began is estimated from the
+motion unless --offsets gives it.
+
 OUT.csv: frame,time and for each joint _x,_y,_z (metres) and _sx,_sy,_sz (posterior standard deviations).
 """
 
@@ -31,6 +35,7 @@ from collections.abc import Callable
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from gait.bindings.abi import MAX_CAMERAS
 from gait.cli import values
 from gait.errors import UsageError, UserError
 from gait.io.files import replacing, require_outputs
@@ -51,6 +56,7 @@ EXAMPLES = """\
 examples:
   gait lift walk.mp4 --height 1.75 -o motion.csv --camera-out camera.json
   gait lift keypoints.csv --camera camera.json -o motion.csv
+  gait lift left.csv right.csv --camera calibration.toml -o motion.csv
   gait lift walk.mp4 --camera camera.json --placement init.json -o motion.csv --suggest 5
 """
 FILES = """\
@@ -72,6 +78,10 @@ _ONLY_KEYPOINTS = (
 )
 _ONLY_PICTURES = ("background", "alone")
 _ONLY_VIDEO = ("placement", *_ONLY_PICTURES, "start", "stop", "fov", "camera_out", "stabilize")
+_ONLY_ONE_VIEW = (
+    *("placement", "orthographic", "metres_per_unit", "stabilize", "corrections", "suggest", "balance"),
+    *("video", "fov", "scale_camera", "camera_out"),
+)
 PIXEL_SD, FLOOR_SD = Options.pixel_sd, Options.floor_sd  # pixels, metres
 MOVED = 3  # joints named that a displacement moves most
 WHOLE = 0.5  # share of a displacement's energy from which it moves the whole body
@@ -89,7 +99,10 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 def _add_common(parser: argparse.ArgumentParser) -> None:
     """Add the files, the camera, the person, and further outputs."""
     parser.add_argument(
-        "input", metavar="KEYPOINTS|VIDEO", help="2-D keypoints, or a video in which to detect them"
+        "input",
+        nargs="+",
+        metavar="KEYPOINTS|VIDEO",
+        help="2-D keypoints, or a video in which to detect them; several: of one person, by several cameras",
     )
     parser.add_argument(
         "-o",
@@ -103,7 +116,17 @@ def _add_common(parser: argparse.ArgumentParser) -> None:
         "-m", "--model", metavar="M.gait", help="model with a segment prior (default: the shipped one)"
     )
     values.add_camera(
-        parser, "; without it the camera of a VIDEO is estimated from the walk, given --height", scale=True
+        parser,
+        "; without it the camera of a VIDEO is estimated from the walk, given --height; of several views one "
+        "for each in their order, or a TOML file with as many cameras",
+        scale=True,
+        several=True,
+    )
+    parser.add_argument(
+        "--offsets",
+        type=values.offsets,
+        metavar="S[,S]",
+        help="how many seconds after the first each further film began (default: estimated from the motion)",
     )
     parser.add_argument(
         "--height",
@@ -235,24 +258,50 @@ def _add_pictures(group: argparse._ArgumentGroup) -> None:
 
 def run(args: argparse.Namespace) -> int:
     """Lift keypoints or a video."""
-    from gait.io.detector_formats import reader_of
-
-    suffix = Path(args.input).suffix.lower()
-    video = suffix not in (".csv", ".tsv", ".txt") and bool(suffix or args.placement)
-    if video and not set("%:") & set(args.input) and not Path(args.input).exists():
-        raise UserError(f"{args.input}: no such file; check the name")
-    if Path(args.input).exists() and reader_of(args.input) is not None:
-        video = False
+    _take_views(args)
+    video = _is_video(args.input, bool(args.placement))
     _require_own(args, video)
     if args.stop is not None:
         values.require_order(args.start or 0, args.stop)
     require_outputs(
         (args.output, args.trc, args.overlay, args.camera_out),
-        (args.input, args.model, args.camera, args.placement, args.corrections, args.background, args.video),
+        (args.input, args.model, args.camera, args.placement, args.corrections, args.background, args.video)
+        + tuple(file for view in args.further for file in view),
     )
     summary, text = _lift_pictures(args) if args.placement else _lift_keypoints(args, video)
     print(json.dumps(summary) if args.json else text)
     return 0
+
+
+def _take_views(args: argparse.Namespace) -> None:
+    """Set `input` and `camera` to those of the first view, and `further` to those of the others."""
+    inputs = args.input
+    if len(inputs) == 1:
+        if args.offsets is not None:
+            raise UsageError("--offsets: is for further films")
+        args.input, args.camera, args.further = inputs[0], (args.camera or [None])[-1], []
+        return
+    if len(inputs) > MAX_CAMERAS:
+        raise UsageError(f"{len(inputs)} views; give at most {MAX_CAMERAS}")
+    if args.method not in (None, "smooth"):
+        raise UsageError(f"--method {args.method}: is for one view; of several use smooth")
+    for option in _ONLY_ONE_VIEW:
+        if getattr(args, option) not in (None, False, "off"):
+            raise UsageError(f"--{option.replace('_', '-')}: is for one view; leave it out, or lift one view")
+    cameras = values.cameras_of(args.camera, args.offsets, len(inputs))
+    args.input, args.camera = inputs[0], cameras[0]
+    args.further = list(zip(inputs[1:], cameras[1:], strict=True))
+
+
+def _is_video(path: str, pictures: bool) -> bool:
+    """Whether a file is a video, not keypoints; without a suffix only if its `pictures` are to be lifted."""
+    from gait.io.detector_formats import reader_of
+
+    suffix = Path(path).suffix.lower()
+    video = suffix not in (".csv", ".tsv", ".txt") and bool(suffix or pictures)
+    if video and not set("%:") & set(path) and not Path(path).exists():
+        raise UserError(f"{path}: no such file; check the name")
+    return video and not (Path(path).exists() and reader_of(path) is not None)
 
 
 def warner(quiet: bool) -> Callable[[str], None]:
@@ -288,7 +337,14 @@ def _lift_keypoints(args: argparse.Namespace, video: bool) -> tuple[dict[str, An
         stabilised=args.stabilize == "auto",
         corrections=args.corrections,
     )
-    if keypoints is None:
+    if args.further:
+        views = [(args.input, keypoints, args.camera)]
+        for path, camera in args.further:
+            own = argparse.Namespace(**{**vars(args), "input": path, "camera": camera})
+            found_in = _find_keypoints(own, prior)[0] if _is_video(path, False) else None
+            views.append((path, found_in, camera))
+        lifted = lift_run.lift_views(views, args.offsets, prior, request, warn, args.quiet)
+    elif keypoints is None:
         lifted = lift_run.lift_file(args.input, prior, request, warn, args.quiet)
     else:
         lifted = lift_run.lift_keypoints(args.input, keypoints, prior, request, warn, args.quiet)
@@ -551,7 +607,7 @@ def _summary(args: argparse.Namespace, keypoints: Keypoints, found: Motion) -> d
     return {
         "frames": len(keypoints.frame),
         "method": args.method or METHODS[0],
-        "markers": {"visible": list(keypoints.names), "estimated": list(found.names)},
+        "markers": {"visible": list(dict.fromkeys(keypoints.names)), "estimated": list(found.names)},
         "visible_share": float(keypoints.visible.mean()),
         "reprojection_px": float(np.nanmedian(found.error)),
         "sd_mm": 1000 * float(np.median(found.sd)),

@@ -124,7 +124,7 @@ def _clip(args: argparse.Namespace, prior: SegmentPrior) -> tuple[Keypoints, Mot
         Options(args.method or METHODS[0]), camera=args.camera, ignore_unknown=True, hints=False
     )
     found = lift_run.lift_file(args.clip, prior, request, warner(args.quiet), args.quiet)
-    return found.keypoints, found.motion, found.view
+    return found.keypoints, found.motion, found.view.alone()
 
 
 def _drawings(

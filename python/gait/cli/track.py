@@ -35,7 +35,6 @@ from __future__ import annotations
 
 import argparse
 import json
-import math
 from typing import Any
 
 from gait.bindings.abi import MAX_CAMERAS, Mode
@@ -69,7 +68,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     )
     add(
         "--offsets",
-        type=_offsets,
+        type=values.offsets,
         metavar="S[,S]",
         help="how many seconds after the first each further film began (default: estimated from the motion)",
     )
@@ -252,25 +251,7 @@ def _cameras(args: argparse.Namespace) -> list[str]:
     for option, given in alone.items():
         if given:
             raise UsageError(f"{option}: is for one film; leave it out, or track one film")
-    from gait.camera.camera import camera_names  # here, so that --help answers at once
-
-    cameras = [name for given in args.camera or () for name in camera_names(given)]
-    if len(cameras) != films:
-        raise UsageError(f"--camera: {len(cameras)} for {films} films; give one for each, all in one world")
-    if args.offsets is not None and len(args.offsets) != films - 1:
-        raise UsageError(f"--offsets: {len(args.offsets)} for {films - 1} further films; give one for each")
-    return cameras
-
-
-def _offsets(text: str) -> tuple[float, ...]:
-    """Read seconds, separated by commas."""
-    try:
-        seconds = tuple(float(part) for part in text.split(","))
-    except ValueError:
-        raise argparse.ArgumentTypeError(f"{text!r} is not a list of seconds, such as 0.5,-1.2") from None
-    if not all(math.isfinite(one) for one in seconds):
-        raise argparse.ArgumentTypeError(f"{text!r} contains a number that is not finite")
-    return seconds
+    return values.cameras_of(args.camera, args.offsets, films)
 
 
 def _people(text: str) -> int:

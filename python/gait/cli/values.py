@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
+import math
 from argparse import ArgumentParser, ArgumentTypeError, _ActionsContainer
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 
 from gait.bindings.abi import Mode
 from gait.bindings.config import TrackerConfig
@@ -116,6 +117,29 @@ def add_camera(
             action="store_true",
             help="the video is resized: scale a camera that was calibrated at another resolution",
         )
+
+
+def offsets(text: str) -> tuple[float, ...]:
+    """Read seconds, separated by commas."""
+    try:
+        seconds = tuple(float(part) for part in text.split(","))
+    except ValueError:
+        raise ArgumentTypeError(f"{text!r} is not a list of seconds, such as 0.5,-1.2") from None
+    if not all(math.isfinite(one) for one in seconds):
+        raise ArgumentTypeError(f"{text!r} contains a number that is not finite")
+    return seconds
+
+
+def cameras_of(given: Sequence[str] | None, offsets: Sequence[float] | None, films: int) -> list[str]:
+    """Camera file of each of several films, of those `given`; refuse `offsets` that are not one for each."""
+    from gait.camera.camera import camera_names  # here, so that --help answers at once
+
+    cameras = [name for file in given or () for name in camera_names(file)]
+    if len(cameras) != films:
+        raise UsageError(f"--camera: {len(cameras)} for {films} films; give one for each, all in one world")
+    if offsets is not None and len(offsets) != films - 1:
+        raise UsageError(f"--offsets: {len(offsets)} for {films - 1} further films; give one for each")
+    return cameras
 
 
 def add_fov(parser: _ActionsContainer) -> None:

@@ -78,6 +78,15 @@ class Keypoints:
             columns[name] = None if values is None else values[rows]
         return replace(self, **columns)
 
+    def among(self, points: NDArray[np.bool_]) -> Keypoints:
+        """Keypoints of some points (J,)."""
+        named = zip(self.names, points, strict=True)
+        columns: dict[str, Any] = {"names": tuple(name for name, own in named if own)}
+        for name in ("uv", "confidence", "sd", "lasting_sd", "frame_sd", "by_hand"):
+            values = getattr(self, name)
+            columns[name] = None if values is None else values[:, points]
+        return replace(self, **columns)
+
     def visible_frames(self) -> set[int]:
         """Return the numbers of the frames in which any point is seen."""
         return set(self.frame[self.visible.any(axis=1)].tolist())

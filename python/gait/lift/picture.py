@@ -26,7 +26,7 @@ NEAR_S = 0.35  # seconds from a correction of the same joint within which anothe
 
 def views(lifted: Lifted) -> list[View]:
     """View of each frame: the camera, or one from far away whose scale may change."""
-    motion, view = lifted.motion, lifted.view
+    motion, view = lifted.motion, lifted.view.alone()
     assert motion.uv is not None
     if isinstance(view, Perspective):
         return [CameraView(view.camera)] * len(motion.places)

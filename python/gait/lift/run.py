@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass, field, replace
 from typing import Any
@@ -17,13 +17,15 @@ from gait.io.detections import Clip
 from gait.io.keypoints_file import Keypoints
 from gait.lift.keypoints import noise, swaps
 from gait.lift.keypoints.corrections import Edits, corrected, pins, read_edits
-from gait.lift.segment.view import Parallel, Perspective, View, looking_along
+from gait.lift.keypoints.joined import joined
+from gait.lift.segment.view import AnyView, Parallel, Perspective, Several, View, looking_along
 from gait.lift.smooth import motion, size
 from gait.lift.smooth.motion import Motion
 from gait.lift.smooth.options import Options
 from gait.progress import progress
 from gait.reproducible import one_thread
 from gait.track.from_walk import Calibration
+from gait.track.synchronise import find_offset
 
 FEW = 4  # recordings; with two of one person, intervals of other people's walks covered as little as 70 %
 MOST_NAMED = 5  # spikes, changes of person
@@ -94,7 +96,7 @@ class Prepared:
     """Keypoints as they are lifted, before any correction by hand; see `Lifted`."""
 
     keypoints: Keypoints
-    view: View
+    view: AnyView
     options: Options
     repairs: dict[str, Any]
 
@@ -118,7 +120,7 @@ class Lifted:
     """
 
     keypoints: Keypoints
-    view: View
+    view: AnyView
     options: Options
     motion: Motion
     repairs: dict[str, Any] = field(default_factory=dict)
@@ -163,6 +165,64 @@ def lift_keypoints(
         edits = read_edits(request.corrections, prior, frames, **size)
     prepared = prepare(path, keypoints, prior, request, warn, quiet)
     return lift_prepared(path, prepared, edits, prior, request, quiet)
+
+
+def lift_views(
+    views: Sequence[tuple[str, Keypoints | None, str]],
+    offsets: Sequence[float] | None,
+    prior: SegmentPrior,
+    request: Request,
+    warn: Warn,
+    quiet: bool,
+) -> Lifted:
+    """Lift the keypoints of several cameras at once, in the frames of the first.
+
+    Parameters
+    ----------
+    views : sequence of (str, Keypoints or None, str)
+        File, its keypoints if they were not read from it, and the file of the camera.
+    offsets : sequence of float, optional
+        When each film but the first began, seconds after the first; found from the motion if left out.
+
+    Raises
+    ------
+    UserError
+        One line that names the file.
+    """
+    prepared: list[Prepared] = []
+    cameras: list[Camera] = []
+    began: list[float] = []
+    for number, (path, keypoints, camera) in enumerate(views):
+
+        def named(words: str, path: str = path) -> None:
+            warn(f"{path}: {words}")
+
+        if keypoints is None:
+            keypoints, _ = keypoints_file.read(path, prior.names, request.ignore_unknown, request.clip)
+        one = prepare(path, keypoints, prior, replace(request, camera=camera), named, quiet)
+        assert isinstance(one.view, Perspective)
+        if number:
+            given = None if offsets is None else offsets[number - 1]
+            found = find_offset(prepared[0].keypoints, cameras[0], one.keypoints, one.view.camera, given)
+            if given is None and (found is None or not found.certain):
+                raise UserError(
+                    f"{path}: when it began against {views[0][0]} does not follow from the person's motion; "
+                    "give --offsets, by how many seconds each further film began later, and check the cameras"
+                )
+            began.append(found.seconds if given is None and found is not None else given or 0.0)
+            missed = "" if found is None else f", and rays miss each other by {found.mismatch:.1f} degrees"
+            named(f"began {began[-1]:.3f} s after the first{missed}")
+        prepared.append(one)
+        cameras.append(one.view.camera)
+    together, camera_of = joined([one.keypoints for one in prepared], began)
+    repairs = {
+        "swapped": sum(one.repairs["swapped"] for one in prepared),
+        "spikes": sum(one.repairs["spikes"] for one in prepared),
+        "offsets_s": began,
+    }
+    options = replace(request.options, pixel_sd=max(one.options.pixel_sd for one in prepared))
+    whole = Prepared(together, Several(tuple(cameras), camera_of), options, repairs)
+    return lift_prepared(views[0][0], whole, Edits(), prior, request, quiet)
 
 
 def prepare(
@@ -334,7 +394,7 @@ def warnings_of(lifted: Lifted, prior_stature: float) -> list[str]:
         Of the people learnt from, metres.
     """
     found, keypoints, options = lifted.motion, lifted.keypoints, lifted.options
-    camera = isinstance(lifted.view, Perspective)
+    camera = not isinstance(lifted.view, Parallel)
     far = float(np.nanmedian(found.error)) / options.pixel_sd
     outliers, shake = _named_outliers(found, keypoints.names), noise.shake(keypoints)
     lost = _share_lost(found, keypoints, int(lifted.repairs["spikes"]))

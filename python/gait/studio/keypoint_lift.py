@@ -116,7 +116,7 @@ class KeypointLift:
         lifted: Lifted = solved.lifted
         self._names, self._near = lifted.motion.names, None
         if lifted.motion.state is not None:
-            known = self._prior, lifted.view, lifted.options, lifted.keypoints.names
+            known = self._prior, lifted.view.alone(), lifted.options, lifted.keypoints.names
             with one_thread():
                 self._near = Interactive(*known, lifted.motion)
 

@@ -49,6 +49,10 @@ class Observations:
         """Frames start to stop."""
         return Observations(self.uv[start:stop], self.sd[start:stop])
 
+    def where(self, known: npt.NDArray[np.bool_]) -> Observations:
+        """Leave out markers that are not `known` (J,)."""
+        return Observations(self.uv, np.where(known, self.sd, np.inf))
+
     def among(self, index: npt.NDArray[np.intp], count: int) -> Observations:
         """Take them for the markers `index` among `count`, of which the others were not seen."""
         frames = len(self.uv)

@@ -34,6 +34,10 @@ class Perspective:
         """Right, down and ahead in the world, rows of (3, 3)."""
         return np.asarray(self.camera.R)
 
+    def alone(self, camera: int = 0) -> Perspective:
+        """View of one camera: this one."""
+        return self
+
     def project(self, places: Floats, lengths: Floats) -> Floats:
         """Pixels (T, J, 2) of places (T, J, 3)."""
         return self.camera.project(places)
@@ -71,6 +75,10 @@ class Parallel:
         """Whether the scale is unknown."""
         return self.metres is None
 
+    def alone(self, camera: int = 0) -> Parallel:
+        """View of one camera: this one."""
+        return self
+
     def metric(self, observed: Observations, lengths: Floats) -> Observations:
         """Observations in metres from the origin if a unit of the picture has `lengths` (T,) metres."""
         return Observations(
@@ -102,7 +110,39 @@ class Parallel:
         return np.asarray(np.interp(np.arange(len(ratio)), known, _smoothed(ratio[known])))
 
 
+@dataclass(frozen=True, eq=False)
+class Several:
+    """Views of several calibrated cameras at once: each point belongs to one of them.
+
+    Attributes
+    ----------
+    cameras : tuple of Camera
+        In one world.
+    of_point : (P,)
+        Number of each point's camera.
+    """
+
+    cameras: tuple[Camera, ...]
+    of_point: npt.NDArray[np.intp]
+    scaled = False
+    grounded = True
+
+    def alone(self, camera: int = 0) -> Perspective:
+        """View of one of the cameras."""
+        return Perspective(self.cameras[camera])
+
+    def project(self, places: Floats, lengths: Floats) -> Floats:
+        """Pixels (T, P, 2) of the points' places (T, P, 3), each in its own camera's picture."""
+        uv = np.empty((*places.shape[:-1], 2))
+        for number, camera in enumerate(self.cameras):
+            own = self.of_point == number
+            uv[:, own] = camera.project(places[:, own])
+        return uv
+
+
 View = Perspective | Parallel
+AnyView = View | Several
+"""View of one camera, or those of several at once."""
 
 
 def _extent(points: Floats) -> float:

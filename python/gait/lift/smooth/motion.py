@@ -29,7 +29,7 @@ from gait.lift.keypoints.observations import LONGEST_GAP, Grid, Observations, in
 from gait.lift.keypoints.swaps import Reading
 from gait.lift.segment import explain
 from gait.lift.segment.explain import FEWEST, Explanation, SegmentFit, SegmentLifter, Uncertain
-from gait.lift.segment.view import Parallel, Perspective, View
+from gait.lift.segment.view import AnyView, Parallel, Perspective, Several, View
 from gait.lift.smooth import size, smoother, soft_constraints
 from gait.lift.smooth.chain import Freedom, Prior, blended, in_turn
 from gait.lift.smooth.options import Options
@@ -192,7 +192,7 @@ class _Sequence:
 
     prior: SegmentPrior
     keypoints: Keypoints
-    view: View
+    view: AnyView
     options: Options
     grid: Grid
     update: Callable[[int], None] = lambda done: None
@@ -203,11 +203,20 @@ class _Sequence:
         """Which marker of the prior each keypoint is."""
         return self.prior.index(self.keypoints.names)
 
+    def alone(self) -> tuple[_Sequence, View]:
+        """Give what one camera alone sees: of several the one that sees most points."""
+        if not isinstance(self.view, Several):
+            return self, self.view
+        counts = np.bincount(self.view.of_point, self.keypoints.visible.sum(axis=0))
+        number = int(counts.argmax())
+        own, view = self.keypoints.among(self.view.of_point == number), self.view.alone(number)
+        return replace(self, keypoints=own, view=view), view
+
 
 def lift(
     prior: SegmentPrior,
     keypoints: Keypoints,
-    view: View,
+    view: AnyView,
     options: Options,
     names: tuple[str, ...],
     update: Callable[[int], None] = lambda done: None,
@@ -226,18 +235,19 @@ def lift(
     if options.method != "smooth":
         return _lift(of)
     best = _widest_needed(of)
-    return _unlike(of, best) if best.wider > 1 or not best.settled else best
+    several = isinstance(view, Several)  # segments alone have one view
+    return _unlike(of, best) if (best.wider > 1 or not best.settled) and not several else best
 
 
 def problem_of(
-    prior: SegmentPrior, keypoints: Keypoints, view: View, options: Options, pins: Pins | None
+    prior: SegmentPrior, keypoints: Keypoints, view: AnyView, options: Options, pins: Pins | None
 ) -> tuple[Observed, Freedom]:
     """Give what the smoother sees of keypoints, and what a sequence of a restricted prior may do."""
     of = _Sequence(prior, keypoints, view, options, Grid.over(keypoints.time, prior), pins=pins)
     return _observed(of), _freedom(of)
 
 
-def require(prior: SegmentPrior, keypoints: Keypoints, view: View, options: Options) -> None:
+def require(prior: SegmentPrior, keypoints: Keypoints, view: AnyView, options: Options) -> None:
     """Refuse a prior of too short segments, and a camera that is not in metres."""
     if prior.frames < 4:
         raise UserError(f"the model's segments have {prior.frames} frames; lifting needs 4 or more")
@@ -337,9 +347,10 @@ def _lifter(prior: SegmentPrior, view: View, options: Options) -> SegmentLifter:
 
 def _task(of: _Sequence, displacements: int | None, lifter: SegmentLifter | None = None) -> _Task:
     """Estimate each segment alone with so many displacements (`solve`), by `lifter` where it is at hand."""
-    prior, keypoints, view, options, grid = of.prior, of.keypoints, of.view, of.options, of.grid
+    one, view = of.alone()
+    prior, keypoints, options, grid = one.prior, one.keypoints, one.options, one.grid
     points = Observations(keypoints.uv, keypoints.errors(options.pixel_sd))
-    sampled = resampled(points, keypoints.time, grid.time).among(of.markers, len(prior.names))
+    sampled = resampled(points, keypoints.time, grid.time).among(one.markers, len(prior.names))
     stature, stature_sd = believed_stature(options, prior.stature)
     lengths = np.ones(len(grid.time))
     if isinstance(view, Parallel):
@@ -389,12 +400,13 @@ class Evidence:
         The points.
     """
 
-    def __init__(self, prior: SegmentPrior, names: tuple[str, ...], view: View, options: Options) -> None:
+    def __init__(self, prior: SegmentPrior, names: tuple[str, ...], view: AnyView, options: Options) -> None:
         self._view, self._options = view, replace(options, method="smooth")
         self._prior = prior.restricted(tuple(n for n in prior.names if n in {*names, *smoother.HIPS}))
 
     @cached_property
     def _lifter(self) -> SegmentLifter:
+        assert not isinstance(self._view, Several)  # sides are of one camera's keypoints
         return _lifter(self._prior, self._view, self._options)
 
     @cached_property
@@ -452,12 +464,12 @@ def _lift(of: _Sequence) -> Motion:
         found.steps,
         found.settled,
         found.log_volume_ratio,
-        explain.summarise(task.fits, of.view),
+        explain.summarise(task.fits, of.alone()[1]),
         found.evidence,
         found.chi2_per_observation,
         resized=sized.factor,
         outliers=found.outliers,
-        uv=of.view.project(sized.places, found.lengths),
+        uv=of.view.alone().project(sized.places, found.lengths),
         state=found.state,
         covariance=sized.covariance,
     )
@@ -476,7 +488,7 @@ def _sized(of: _Sequence, found: Lifted | Motion | size.Resized, chi2: float) ->
     """
     prior, view, options = of.prior, of.view, of.options
     fitted = size.Resized(found.places, found.sd, found.rooted_sd, covariance=found.covariance)
-    if isinstance(view, Parallel) or not options.bones:
+    if not isinstance(view, Perspective) or not options.bones:
         return size.widened(fitted, chi2)
     stature, stature_sd = believed_stature(options, prior.stature)
     own = float(np.hypot(stature_sd / stature, size.PROPORTION_SD))
@@ -515,7 +527,7 @@ def _alone(of: _Sequence, task: _Task) -> Motion:
         steps=0,
         settled=True,
         log_volume_ratio=float(np.mean([fit.log10_volume for fit in fits])),
-        uncertain=explain.summarise(fits, of.view),
+        uncertain=explain.summarise(fits, of.alone()[1]),
         uv=of.view.project(placed, scale),
     )
 

@@ -18,14 +18,14 @@ right . X - u l = 0 and down . X - v l = 0, with the noise sd l.  Near a guess t
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, fields, replace
 
 import numpy as np
 import numpy.typing as npt
 
 from gait.camera.camera import Camera
 from gait.lift.keypoints.observations import Observations
-from gait.lift.segment.view import Perspective, View
+from gait.lift.segment.view import AnyView, Perspective, Several
 
 Floats = npt.NDArray[np.float64]
 
@@ -131,7 +131,7 @@ def scale_free(rows: Rows, places: Floats, lengths: Floats) -> tuple[Rows, Float
     return rows, -at / lengths[rows.frame, None]
 
 
-def rows_of(view: View, observed: Observations, places: Floats, lengths: Floats, guess: Floats) -> Rows:
+def rows_of(view: AnyView, observed: Observations, places: Floats, lengths: Floats, guess: Floats) -> Rows:
     """Rows of observations in a view.
 
     Parameters
@@ -143,4 +143,10 @@ def rows_of(view: View, observed: Observations, places: Floats, lengths: Floats,
     """
     if isinstance(view, Perspective):
         return perspective(observed, view.camera, places, guess)
+    if isinstance(view, Several):
+        each = [
+            perspective(observed.where(view.of_point == number), camera, places, guess)
+            for number, camera in enumerate(view.cameras)
+        ]
+        return Rows(*(np.concatenate([getattr(one, f.name) for one in each]) for f in fields(Rows)))
     return orthographic(view.metric(observed, lengths), view.axes[:2])

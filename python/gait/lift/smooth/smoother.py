@@ -19,7 +19,7 @@ from scipy.linalg import block_diag
 from gait.bindings.lifter import weight_outliers
 from gait.bindings.segment_prior import SegmentPrior
 from gait.lift.keypoints.observations import Grid, Observations, interpolated
-from gait.lift.segment.view import Parallel, View
+from gait.lift.segment.view import AnyView, Parallel
 from gait.lift.smooth import block_arrowhead, soft_constraints
 from gait.lift.smooth.balance import balance as keep_balance
 from gait.lift.smooth.block_arrowhead import Information
@@ -148,7 +148,7 @@ class Lifted:
 def smooth(
     prior: SegmentPrior,
     observed: Observed,
-    view: View,
+    view: AnyView,
     freedom: Freedom,
     start: Start,
     *,
@@ -168,7 +168,7 @@ def smooth(
 
 
 def evidence(
-    prior: Prior, observed: Observed, view: View, freedom: Freedom, begun: Start | State
+    prior: Prior, observed: Observed, view: AnyView, freedom: Freedom, begun: Start | State
 ) -> tuple[float, Floats, State]:
     """Logarithm of the density of what is seen, but for a constant, after the steps without constraints.
 
@@ -250,7 +250,7 @@ class Problem:
         self,
         prior: SegmentPrior,
         observed: Observed,
-        view: View,
+        view: AnyView,
         freedom: Freedom,
         start: Start | State,
         contact: bool = False,

@@ -1,0 +1,94 @@
+"""Keypoints of one person in the films of several cameras as points of one table."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from gait.io.keypoints_file import Keypoints
+
+Array = NDArray[np.float64]
+
+_GAP = 0.15  # seconds between frames from which points between them are not known
+
+
+def joined(views: Sequence[Keypoints], offsets: Sequence[float]) -> tuple[Keypoints, NDArray[np.intp]]:
+    """Bring the points of several films to the frames of the first.
+
+    Parameters
+    ----------
+    views : sequence of Keypoints
+        Of each camera.
+    offsets : sequence of float
+        When each film but the first began, seconds after the first.
+
+    Returns
+    -------
+    keypoints : Keypoints
+        The points of the first camera, of the second and so on; names repeat.  Between two frames of their
+        own film points lie on the line.
+    camera : (P,)
+        Number of each point's camera.
+    """
+    first = views[0]
+    moved = [first, *(_at(one, first.time - began) for one, began in zip(views[1:], offsets, strict=True))]
+    columns: dict[str, Any] = {
+        name: _stacked([getattr(one, name) for one in moved], moved) for name in _COLUMNS
+    }
+    together = replace(
+        first,
+        names=tuple(name for one in moved for name in one.names),
+        uv=np.concatenate([one.uv for one in moved], axis=1),
+        confidence=np.hstack([one.confidence for one in moved]),
+        repeated=max(one.repeated for one in moved),
+        lasting_s=min(one.lasting_s for one in moved),
+        **columns,
+    )
+    return together, np.repeat(np.arange(len(moved)), [len(one.names) for one in moved])
+
+
+_COLUMNS = ("sd", "lasting_sd", "frame_sd", "by_hand")
+
+
+def _stacked(columns: Sequence[Array | None], views: Sequence[Keypoints]) -> Array | None:
+    if all(one is None for one in columns):
+        return None
+    return np.hstack(
+        [
+            np.full(view.confidence.shape, np.nan) if one is None else one
+            for one, view in zip(columns, views, strict=True)
+        ]
+    )
+
+
+def _at(keypoints: Keypoints, times: Array) -> Keypoints:
+    """Keypoints at other times (T,), seconds of their film."""
+    after = np.searchsorted(keypoints.time, times).clip(1, len(keypoints.time) - 1)
+    begin, end = keypoints.time[after - 1], keypoints.time[after]
+    share = (times - begin) / (end - begin)
+    share = np.where(np.abs(share) < 1e-6, 0.0, np.where(np.abs(share - 1) < 1e-6, 1.0, share))
+    known = (share >= 0) & (share <= 1) & (end - begin < _GAP)
+
+    def between(values: Array) -> Array:
+        weight = share.reshape(-1, *[1] * (values.ndim - 1))
+        earlier, later = values[after - 1], values[after]
+        mixed = earlier + weight * (later - earlier)
+        mixed = np.where(weight == 0, earlier, np.where(weight == 1, later, mixed))  # also if one is NaN
+        return np.where(known.reshape(weight.shape), mixed, np.nan)
+
+    columns: dict[str, Any] = {}
+    for name in _COLUMNS:
+        values = getattr(keypoints, name)
+        columns[name] = None if values is None else between(values)
+    return replace(
+        keypoints,
+        frame=np.arange(len(times)),
+        time=times,
+        uv=between(keypoints.uv),
+        confidence=np.nan_to_num(between(keypoints.confidence)),
+        **columns,
+    )

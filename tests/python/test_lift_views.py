@@ -1,0 +1,81 @@
+"""gait lift with keypoints of several cameras: the distance comes from them, not from the person's size."""
+
+import json
+
+import numpy as np
+import pytest
+import walking_keypoints as walking
+
+from gait.camera.camera import Camera, write_camera
+from gait.cli import main
+from gait.io.keypoints_file import write
+from gait.io.track_file import read_estimates
+
+SIDE = Camera.looking((6.0, 5.0, 1.6), (0.3, 5.5, 0.9), walking.SIZE, 1000.0)
+LATE = 0.4  # seconds by which the second film began later
+
+
+@pytest.fixture(scope="module")
+def place(tmp_path_factory):
+    """Keypoints of a walk towards a camera, as it and another from the side see them; a tall person."""
+    folder = tmp_path_factory.mktemp("views")
+    for name, camera, seed in (("a", walking.view(), 1), ("b", SIDE, 2)):
+        write_camera(folder / f"{name}.json", camera)
+        found = walking.keypoints(camera, stature=1.95, noise=3.0, seed=seed)
+        write(folder / f"{name}.csv", found)
+        late = found.part(slice(6, None))
+        write(folder / f"{name}_late.csv", type(found)(late.frame - 6, late.time - LATE, *found_rest(late)))
+    return folder
+
+
+def found_rest(keypoints):
+    return keypoints.names, keypoints.uv, keypoints.confidence
+
+
+def lift(place, *views, options=()):
+    """Lift; errors of the joints, mm: in the world, and with the hips' midpoints laid on each other."""
+    files = [str(place / f"{name}.csv") for name in views]
+    cameras = [word for name in views for word in ("--camera", str(place / f"{name[0]}.json"))]
+    out = place / "out.csv"
+    assert main(["lift", *files, *cameras, "-o", str(out), "--quiet", *options]) == 0
+    found = read_estimates(out)
+    truth = np.array([walking.walk_at(t, stature=1.95) for t in found.time])
+    names = list(walking.MODEL.joint_names)
+    joints = [name for name in walking.NAMES if name in found.places]
+    places = np.stack([found.places[name] for name in joints], axis=1)
+    right = truth[:, [names.index(name) for name in joints]]
+    hips = [joints.index(f"{side}_hip") for side in "lr"]
+    off = [places - right, places - right - (places - right)[:, hips].mean(axis=1, keepdims=True)]
+    sd = np.stack([found.sd[name] for name in joints], axis=1)
+    inside = float((np.abs(off[0]) < 1.645 * sd).mean())
+    return *(1000 * np.median(np.linalg.norm(one, axis=2)) for one in off), inside
+
+
+def test_two_views_are_nearer_than_one(place, capsys):
+    alone, rooted, _ = lift(place, "a")
+    both, both_rooted, inside = lift(place, "a", "b")
+    assert both < 0.3 * alone and both < 25 and both_rooted < rooted
+    assert 0.8 < inside < 0.99
+    capsys.readouterr()
+    lift(place, "a", "b_late", options=["--json"])
+    (began,) = json.loads(capsys.readouterr().out)["offsets_s"]
+    assert began == pytest.approx(LATE, abs=0.04)
+    late, _, _ = lift(place, "a", "b_late", options=["--offsets", f"{LATE}"])
+    assert late < 1.3 * both
+
+
+@pytest.mark.parametrize(
+    ("options", "words"),
+    [
+        (["--camera", "a.json"], "--camera: 1 for 2 films"),
+        (["--method", "blend"], "--method blend: is for one view"),
+        (["--orthographic", "x"], "--orthographic: is for one view"),
+        (["--offsets", "0.1,0.2"], "--offsets: 2 for 1 further films"),
+    ],
+)
+def test_what_does_not_go_with_several_views_is_a_usage_error(place, options, words, monkeypatch, capsys):
+    monkeypatch.chdir(place)
+    cameras = [] if "--camera" in options else ["--camera", "a.json", "--camera", "b.json"]
+    assert main(["lift", "a.csv", "b.csv", *cameras, *options, "-o", "x.csv"]) == 2
+    err = capsys.readouterr().err
+    assert words in err and err.count("\n") == 1 and not (place / "x.csv").exists()
