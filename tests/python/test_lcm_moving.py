@@ -120,7 +120,7 @@ def test_capture_announces_the_pose_of_each_frame(tmp_path):
 @pytest.mark.parametrize(
     ("words", "fault"),
     [
-        (["--moving-camera", "--lift"], "--lift needs a camera that stands still"),
+        (["--moving-camera", "--lift"], "--lift needs a static camera"),
         (["--pose-turn-sd", 1], "--pose-turn-sd needs --moving-camera"),
     ],
 )

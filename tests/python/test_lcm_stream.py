@@ -52,9 +52,11 @@ def test_which_url_is_in_force(monkeypatch):
     assert link.lcm_url() == "memq://" and link.lcm_url("file://x") == "file://x"
 
 
-@pytest.mark.parametrize("url", ["nonsense://", "file:///no/such/log?speed=0"])
-def test_a_refused_url_is_one_error_and_nothing_on_stderr(url, capfd):
-    with pytest.raises(UserError, match="cannot open"):
+@pytest.mark.parametrize(
+    ("url", "words"), [("nonsense://", "cannot open"), ("file:///no/such/log?speed=0", "no such LCM log")]
+)
+def test_a_refused_url_is_one_error_and_nothing_on_stderr(url, words, capfd):
+    with pytest.raises(UserError, match=words):
         link.open_lcm(url)
     assert capfd.readouterr().err == ""
 

@@ -146,7 +146,7 @@ def test_points_of_no_use_are_left_out_and_counted(tmp_path: Path) -> None:
     outcome, printed = play(tmp_path, events)
     assert outcome.digest == clean.digest and printed == (FRAMES, FRAMES, 0)
     assert f" keypoints_left_out {2 * FRAMES} " in outcome.printed
-    assert outcome.words.count("'nose' is left out: the model does not know it") == 1
+    assert outcome.words.count("'nose' is ignored: the model does not know it") == 1
     assert outcome.words.count("names it twice") == 1
 
 
