@@ -46,7 +46,7 @@ def test_outputs_of_another_kind_are_refused_before_anything_is_read():
     ]
     assert len(outputs) > 15
     for command, output in outputs:
-        with pytest.raises(argparse.ArgumentTypeError, match="a.xyz: is a name of another kind"):
+        with pytest.raises(argparse.ArgumentTypeError, match="a.xyz: has the wrong suffix"):
             assert output.type, f"gait {command} --{output.dest} takes any name"
             output.type("a.xyz")
 

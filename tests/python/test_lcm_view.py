@@ -161,7 +161,7 @@ def test_save_reports_when_nothing_came(tmp_path):
 @pytest.mark.parametrize(
     "words, code, message",
     [
-        (["--save", "{}/v.txt"], 2, "v.txt: is a name of another kind; give one that ends in .jpg"),
+        (["--save", "{}/v.txt"], 2, "v.txt: has the wrong suffix; give a name that ends in .jpg"),
         (["--save", "{}/none/v.png"], 1, "none does not exist"),
         (["--record-to", "{}/a.file"], 1, "a.file: is a file; give the name of a folder"),
         (["--stream", "2", "--stream", "2"], 2, "--stream 2: is given twice; give each once"),

@@ -89,7 +89,7 @@ def named(*endings: str) -> Callable[[str], str]:
     def value(text: str) -> str:
         if text and not text.lower().endswith(endings):
             raise ArgumentTypeError(
-                f"{text}: is a name of another kind; give one that ends in {' or '.join(endings)}"
+                f"{text}: has the wrong suffix; give a name that ends in {' or '.join(endings)}"
             )
         return text
 
