@@ -7,6 +7,7 @@ import signal
 import subprocess
 import sys
 import threading
+import warnings
 from pathlib import Path
 
 import numpy as np
@@ -34,8 +35,11 @@ if words[0] == "track":
         os.abort() if "crash" in words[1] else sys.exit(1)
     while "slow" in words[1] and not log.with_name("GO").exists():
         time.sleep(0.01)
-    Path(words[words.index("-o") + 1]).write_text("frame\\n")
-    print(json.dumps({"frames": 3, "tracking": 2, "digest": "x"}))
+    out, one = Path(words[words.index("-o") + 1]), {"frames": 3, "tracking": 2, "digest": "x"}
+    people = "12" if "--people" in words else ""
+    for path in [out.with_name(f"track-{k}.csv") for k in people] or [out]:
+        path.write_text("frame\\n")
+    print(json.dumps({"people": dict.fromkeys(people, one), "others": []} if people else one))
 elif words[:2] == ["report", "track"]:
     folder = Path(words[words.index("-o") + 1])
     folder.mkdir(exist_ok=True)
@@ -112,6 +116,46 @@ def test_one_damaged_clip_never_ends_the_rest(place):
         and "5 clips, 3 failed" in page
         and "http" not in page.split("<body")[1]
     )
+
+
+GROUP = '[[clip]]\nvideo = "a.mp4"\npeople = "all"\nheight = 1.7\nmake = ["track", "report", "c3d"]\n'
+
+
+def test_several_people_have_rows_and_files_of_their_own(place):
+    clips = clips_of(place, GROUP)
+    for _ in range(2):
+        rows = runner(place).run(clips, 1, lambda _: None)
+        assert [(row["name"], row["person"], row["tracking"], row["state"]) for row in rows] == [
+            ("a", 1, 2, DONE),
+            ("a", 2, 2, DONE),
+        ]
+    assert calls(place).count(f"track {place}/a.mp4") == 1
+    made = {file.name for file in (place / "out/a").iterdir()}
+    assert {"track-1.csv", "track-2.csv", "track-2.c3d", "report-1", "report-2"} <= made
+    write_summary(place / "out", rows)
+    page = (place / "out/index.html").read_text()
+    assert "a, person 2" in page and 'href="a/report-2/report.html"' in page
+
+
+def test_a_cluster_runs_the_same_project(place, monkeypatch):
+    distributed = pytest.importorskip("distributed", reason="Dask is not installed: extra dask")
+    from gait.batch import cluster
+    from gait.learn.corpus import cluster as connection
+
+    monkeypatch.setattr(connection, "CONNECT", 120.0)
+    clips, reported, fake = clips_of(place, PROJECT), [], (sys.executable, str(place / "fake.py"))
+    one = {"n_workers": 1, "threads_per_worker": 1, "processes": False, "protocol": "tcp"}
+    with (
+        warnings.catch_warnings(),
+        distributed.LocalCluster(**one, dashboard_address=None, silence_logs=50) as local,
+    ):
+        warnings.simplefilter("ignore")  # those of distributed are not ours to mend
+        rows = cluster.run(place / "out", clips, local.scheduler_address, reported.append, fake)
+    states = [DONE, FAILED, FAILED, FAILED, DONE]
+    assert [row["state"] for row in rows] == states and len(reported) == 5
+    assert "none.mp4: No such file" in rows[3]["error"] and rows[1]["error"] == "gait track: bad.mp4: damaged"
+    again = runner(place).run(clips, 1, lambda _: None)
+    assert again[0] == rows[0] and calls(place).count(f"track {place}/a.mp4") == 1  # done on the cluster
 
 
 def test_what_is_done_is_not_made_again_and_what_changed_is(place):
@@ -192,6 +236,8 @@ def test_an_interrupt_ends_the_commands(place):
             "[[clip]]\nvideo = 'a.mp4'\nheight = 1.7\nmake = ['lift', 'report']\n",
             "make has lift beside track",
         ),
+        ("[[clip]]\nvideo = 'a.mp4'\nheight = 1.7\npeople = 9\n", "people is 9, outside"),
+        ("[[clip]]\nvideo = 'a.mp4'\nheight = 1.7\npeople = 2\nmake = ['lift']\n", "people is beside lift"),
         ("[[clip]\n", "not valid TOML"),
     ],
 )

@@ -23,7 +23,7 @@ else:
 EXPORTS = ("trc", "c3d", "bvh", "mot", "parquet", "rrd", "mcap")
 MADE = ("track", "lift", "overlay", "report", *EXPORTS)
 _FILES = ("video", "keypoints", "camera")
-_KEYS = ("subject", "height", "person", "start", "stop", "make", "options", *_FILES)
+_KEYS = ("subject", "height", "person", "people", "start", "stop", "make", "options", *_FILES)
 
 
 @dataclass(frozen=True)
@@ -37,6 +37,7 @@ class Clip:
     subject: str = ""  #: who walks, for the summary
     height: float | None = None  #: metres
     person: str | None = None  #: of several in `keypoints`
+    people: str | None = None  #: track so many people, or all
     start: int | None = None
     stop: int | None = None
     make: tuple[str, ...] = ("track", "report")
@@ -58,13 +59,19 @@ class Clip:
         state = [asdict(self), [(file.st_size, file.st_mtime_ns) for file in files], __version__]
         return hashlib.sha256(json.dumps(state).encode()).hexdigest()
 
-    def commands(self, folder: Path) -> list[list[str]]:
-        """Words of the gait commands that make its files in a folder, in their order."""
+    def command(self, folder: Path) -> list[str]:
+        """Words of the gait command that makes the file in a folder that all others are made of."""
         result = str(folder / self.result)
-        found = [self._lift(result) if self.lifted else self._track(result, folder)]
+        return self._lift(result) if self.lifted else self._track(result, folder)
+
+    def further(self, folder: Path, person: str | None) -> list[list[str]]:
+        """Words of the gait commands that make the others, of one person if the clip is of several."""
+        ending = "" if person is None else f"-{person}"
+        stem = self.result.partition(".")[0] + ending
+        result = str(folder / f"{stem}.csv")
+        found = []
         if "report" in self.make and not self.lifted:
-            found.append(["report", "track", result, "-o", str(folder / "report"), "--json"])
-        stem = self.result.partition(".")[0]
+            found.append(["report", "track", result, "-o", str(folder / f"report{ending}"), "--json"])
         for suffix in EXPORTS:
             if suffix in self.make:
                 found.append(["export", result, "-o", str(folder / f"{stem}.{suffix}"), "--json"])
@@ -93,7 +100,8 @@ class Clip:
         return [*words, *self.options]
 
     def _common(self) -> list[str]:
-        given = {name: getattr(self, name) for name in ("camera", "height", "person", "start", "stop")}
+        names = ("camera", "height", "person", "people", "start", "stop")
+        given = {name: getattr(self, name) for name in names}
         return [
             word for name, value in given.items() if value is not None for word in (f"--{name}", str(value))
         ]
@@ -141,6 +149,12 @@ def _clip(fields: Fields, common: Clip, folder: Path, named: bool = False) -> Cl
         if name in fields:
             given[name] = _text(fields, name)
     given |= {name: str(folder / given[name]) for name in _FILES if name in given}
+    if "people" in fields:
+        given["people"] = (
+            "all"
+            if fields.get("people", "") == "all"
+            else str(fields.integer("people", 1, 8, 'give a number, or "all"'))
+        )
     if "height" in fields:
         given["height"] = fields.number("height", 0.3, 3.0, "give metres")
     for name in ("start", "stop"):
@@ -165,6 +179,8 @@ def _require(fields: Fields, clip: Clip) -> None:
         raise fields.fail("video", "and keypoints are missing", "give one of them")
     if clip.lifted and {"track", "overlay", "report"} & set(clip.make):
         raise fields.fail("make", "has lift beside track, overlay or report", "make a clip of each")
+    if clip.people and (clip.lifted or clip.keypoints):
+        raise fields.fail("people", "is beside lift or keypoints", "several people are tracked in a video")
     if not clip.camera and clip.height is None and not (clip.lifted and clip.keypoints):
         raise fields.fail("camera", "and height are missing", "give one of them, here or in [defaults]")
 

@@ -48,51 +48,59 @@ class Runner:
     def run(self, clips: Sequence[Clip], jobs: int, report: Callable[[Row], None]) -> list[Row]:
         """Run clips, at most `jobs` at a time; return their rows in the order of the project.
 
-        `report` gets each row when its clip has ended.  An interrupt ends the commands that run; what is done
-        stays done.
+        A clip of several people has a row for each.  `report` gets each row when its clip has ended.  An
+        interrupt ends the commands that run; what is done stays done.
         """
-        rows: dict[str, Row] = {}
+        rows: dict[str, list[Row]] = {}
         with ThreadPoolExecutor(jobs) as pool:
-            waiting = {pool.submit(self._clip, clip): clip for clip in clips}
+            waiting = {pool.submit(self.one, clip): clip for clip in clips}
             try:
                 for future in as_completed(waiting):
-                    row = future.result()
-                    rows[waiting[future].name] = row
-                    report(row)
+                    rows[waiting[future].name] = future.result()
+                    for row in future.result():
+                        report(row)
             except BaseException:
                 self._end()
                 pool.shutdown(wait=True, cancel_futures=True)
                 raise
-        return [rows[clip.name] for clip in clips]
+        return [row for clip in clips for row in rows[clip.name]]
 
-    def _clip(self, clip: Clip) -> Row:
-        """Run one clip unless it is done already; return its row of the summary."""
+    def one(self, clip: Clip) -> list[Row]:
+        """Run one clip unless it is done already; return its row of the summary, or that of each person."""
         folder = self.output / clip.name
-        row: Row = {"name": clip.name, "subject": clip.subject, "input": clip.video or clip.keypoints}
         try:
             key = clip.key()
             if (before := self._recorded(folder, key)) is not None:
                 return before
             folder.mkdir(parents=True, exist_ok=True)
             began = time.monotonic()
-            for command in clip.commands(folder):
-                row |= _figures(command[0], self._command(command))
-            row |= {"state": DONE, "error": "", "seconds": round(time.monotonic() - began, 1)}
+            found = self._command(clip.command(folder))
+            people = {None: found} if clip.people is None else found["people"]
+            rows = [self._row(clip, folder, person, own) for person, own in people.items()]
+            rows = [row | {"seconds": round(time.monotonic() - began, 1)} for row in rows]
             with replacing(folder / RECORD) as file:
-                file.write_text(json.dumps({"key": key, "row": row}, indent=1) + "\n", encoding="utf-8")
+                file.write_text(json.dumps({"key": key, "rows": rows}, indent=1) + "\n", encoding="utf-8")
         except OSError as error:
-            row |= {"state": FAILED, "error": f"{error.filename}: {error.strerror}"}
+            return [failed(clip, f"{error.filename}: {error.strerror}")]
         except _Failed as error:
-            row |= {"state": FAILED, "error": str(error)}
-        return row
+            return [failed(clip, str(error))]
+        return rows
 
-    def _recorded(self, folder: Path, key: str) -> Row | None:
-        """Return the row of a clip that was done with the same settings, files and version."""
+    def _row(self, clip: Clip, folder: Path, person: str | None, found: Any) -> Row:
+        """Make what follows from a track or a motion; return its row."""
+        row = _begun(clip) | ({} if person is None else {"person": int(person)})
+        row |= _figures("lift" if clip.lifted else "track", found)
+        for command in clip.further(folder, person):
+            row |= _figures(command[0], self._command(command))
+        return row | {"state": DONE, "error": ""}
+
+    def _recorded(self, folder: Path, key: str) -> list[Row] | None:
+        """Return the rows of a clip that was done with the same settings, files and version."""
         try:
             record = json.loads((folder / RECORD).read_text(encoding="utf-8"))
         except (OSError, ValueError):
             return None
-        return record["row"] if isinstance(record, dict) and record.get("key") == key else None
+        return record["rows"] if isinstance(record, dict) and record.get("key") == key else None
 
     def _command(self, words: Sequence[str]) -> Any:
         """Run a command to its end; return the JSON that it prints.  _Failed with its last line."""
@@ -132,6 +140,15 @@ class Runner:
                 process.wait(_GRACE)
             except subprocess.TimeoutExpired:
                 process.kill()
+
+
+def _begun(clip: Clip) -> Row:
+    return {"name": clip.name, "subject": clip.subject, "input": clip.video or clip.keypoints}
+
+
+def failed(clip: Clip, error: str) -> Row:
+    """Row of a clip that failed, for a reason in one line."""
+    return _begun(clip) | {"state": FAILED, "error": error}
 
 
 class _Failed(Exception):
@@ -186,7 +203,7 @@ def _page(output: Path, rows: Sequence[Row]) -> str:
     page = Page("Clips", lead)
     head = "".join(f"<th scope=col>{escape(text)}</th>" for text in ("clip", *_SHOWN.values(), "files"))
     body = "".join(
-        f"<tr><th scope=row>{escape(row['name'])}</th>"
+        f"<tr><th scope=row>{escape(row['name'])}{f', person {n}' if (n := row.get('person')) else ''}</th>"
         + "".join(f"<td>{escape(_shown(row, name))}</td>" for name in _SHOWN)
         + f"<td>{_links(output, row)}</td></tr>"
         for row in rows
@@ -207,8 +224,8 @@ def _links(output: Path, row: Mapping[str, Any]) -> str:
     """Links to the files of a clip that is done."""
     if row["state"] != DONE:
         return ""
-    folder = output / row["name"]
-    files = [folder / "report" / "report.html", *sorted(folder.iterdir())]
+    folder, of_person = output / row["name"], f"-{row['person']}" if "person" in row else ""
+    files = [folder / f"report{of_person}" / "report.html", *sorted(folder.iterdir())]
     shown = [file for file in files if file.is_file() and file.name != RECORD]
     names = [os.path.relpath(file, output) for file in shown]
     return " ".join(f'<a href="{escape(name)}">{escape(Path(name).name)}</a>' for name in names)

@@ -9,6 +9,9 @@ PROJECT.toml lists the clips and the outputs of each; paths are relative to it:
   [[clip]]
   video = "anna.mp4"            # name = "anna" (default: the file's), subject, keypoints, person, start, stop
   [[clip]]
+  video = "group.mp4"
+  people = "all"                # or how many: tracks several, each with files and a row of their own
+  [[clip]]
   keypoints = "ben.json"
   make = ["lift", "mot"]
   options = ["--fps", "30"]     # further options of gait track or gait lift
@@ -29,6 +32,7 @@ import os
 from pathlib import Path
 
 from gait.cli import values
+from gait.errors import UsageError
 from gait.io.files import require_folder
 from gait.progress import note
 
@@ -36,6 +40,7 @@ EXAMPLES = """\
 examples:
   gait batch project.toml -o results
   gait batch project.toml -o results --jobs 8
+  gait batch project.toml -o results --dask tcp://192.168.0.7:8786
 """
 
 
@@ -43,13 +48,14 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Add the command's options."""
     parser.add_argument("project", metavar="PROJECT.toml", help="the clips")
     parser.add_argument("-o", "--output", required=True, metavar="DIR", help="folder for all results")
-    jobs = max(1, (os.cpu_count() or 1) // 2)
     parser.add_argument(
-        "--jobs",
-        type=values.whole(1, 256),
-        default=jobs,
-        metavar="N",
-        help=f"clips at a time (default: {jobs})",
+        "--jobs", type=values.whole(1, 256), metavar="N", help=f"clips at a time (default: {_usual_jobs()})"
+    )
+    parser.add_argument(
+        "--dask",
+        metavar="SCHEDULER",
+        help="run the clips on a Dask cluster, such as tcp://host:8786; its workers need all files, and DIR, "
+        "under the same paths",
     )
 
 
@@ -58,6 +64,8 @@ def run(args: argparse.Namespace) -> int:
     from gait.batch import project
     from gait.batch.run import FAILED, Runner, write_summary  # needs its extras before any clip is run
 
+    if args.dask and args.jobs:
+        raise UsageError("--jobs is for this machine and --dask for a cluster; give one of them")
     clips = project.read(args.project)
     require_folder(args.output)
     output = Path(args.output)
@@ -67,7 +75,12 @@ def run(args: argparse.Namespace) -> int:
         error = f": {row['error']}" if row["error"] else ""
         note(f"{row['name']}: {row['state']}{error}", args.quiet)
 
-    rows = Runner(output).run(clips, args.jobs, report)
+    if args.dask:
+        from gait.batch import cluster  # what it needs is of the extra
+
+        rows = cluster.run(output, clips, args.dask, report)
+    else:
+        rows = Runner(output).run(clips, args.jobs or _usual_jobs(), report)
     names = write_summary(output, rows)
     failed = sum(row["state"] == FAILED for row in rows)
     if args.json:
@@ -75,3 +88,7 @@ def run(args: argparse.Namespace) -> int:
     else:
         print(f"{len(rows)} clips, {failed} failed; {', '.join(str(output / name) for name in names)}")
     return int(failed > 0)
+
+
+def _usual_jobs() -> int:
+    return max(1, (os.cpu_count() or 1) // 2)

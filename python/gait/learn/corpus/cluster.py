@@ -58,8 +58,8 @@ def prepared(tasks: Sequence[Task], address: str) -> Generator[Prepared, None, N
     UserError if dask is not installed, nothing answers, or workers have other versions or do not see the
     files.
     """
-    with _connected(address) as client:
-        _require_packages(client, address)
+    with connected(address) as client:
+        require_packages(client, address)
         wanted = _environment()
         ahead = AHEAD * max(1, sum(client.nthreads().values()))
         waiting, flying = deque(tasks), deque[tuple[Path, "Future"]]()
@@ -95,8 +95,8 @@ def _run(task: Task, wanted: dict[str, str]) -> Prepared | Mismatch | None:
 
 
 @contextmanager
-def _connected(address: str) -> Iterator[Client]:
-    """Connect to a scheduler that answers and has a worker."""
+def connected(address: str) -> Iterator[Client]:
+    """Connect to a scheduler that answers and has a worker.  UserError if there is none, or no dask."""
     if not ADDRESS.fullmatch(address):
         raise UsageError(f"--dask {address}: is not an address; give one such as tcp://192.168.0.7:8786")
     if lacking := extras.remedy("--dask", ["dask"]):
@@ -122,7 +122,7 @@ def _connected(address: str) -> Iterator[Client]:
         log.setLevel(before)
 
 
-def _require_packages(client: Client, address: str) -> None:
+def require_packages(client: Client, address: str) -> None:
     """Refuse workers without a package or with another version; they might not even unpickle a task."""
     for package in SAME:
         for worker, there in client.run(metadata.version, package, on_error="return").items():
