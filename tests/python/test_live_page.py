@@ -174,6 +174,15 @@ def test_a_browser_connects_again_to_another_gait_view(live, reports, tmp_path):
             again.close()
 
 
+def test_the_page_ends_without_an_error_under_an_open_browser(live, capfd):
+    with browser.opened(strict=False) as page:
+        page.goto(live.address)
+        browser.until(page, "window.live !== undefined")
+        live.close()
+        browser.until(page, "document.querySelector('#status').textContent === 'gait view is not there'")
+    assert capfd.readouterr().err == ""
+
+
 def test_the_record_button_makes_a_log(live, tmp_path):
     rig.need_multicast()
     with browser.opened() as page:

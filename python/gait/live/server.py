@@ -24,7 +24,7 @@ from gait.web import modules, serve
 _HERE = Path(__file__).parent
 _FILES = ("live.js", "live.css")
 _MOST = 16  # browsers at a time
-_ALIVE = 5.0  # seconds after which a quiet stream shows that it is there
+_ALIVE = 0.5  # seconds after which a quiet stream shows that it is there, or ends with the server
 _QUALITY = 80  # of JPEG pictures
 
 
@@ -196,7 +196,7 @@ class Page:
     def _events(self, request: Request) -> Response:
         async def lines() -> AsyncIterator[bytes]:
             counts = dict.fromkeys(self._topics, 0)
-            while True:
+            while not serve.ending(request):
                 waits = [asyncio.ensure_future(self.hub.newer(name, counts[name], _ALIVE)) for name in counts]
                 await asyncio.wait(waits, return_when=asyncio.FIRST_COMPLETED)
                 for wait in waits:

@@ -84,7 +84,7 @@ class _Endpoints:
 
     async def _versions(self, request: Request) -> AsyncIterator[str]:
         reported, quiet = -1, 0.0
-        while not await request.is_disconnected():
+        while not (serve.ending(request) or await request.is_disconnected()):
             if self._session.version != reported:
                 reported, quiet = self._session.version, 0.0
                 yield f"data: {reported}\n\n"

@@ -23,6 +23,7 @@ from gait.errors import UserError
 from gait.web import modules
 
 HOST = "127.0.0.1"
+STREAMS_END = 3  # seconds that streams of events have when the server ends
 _NAMES = (HOST, "localhost", "[::1]")
 _POLICY = (
     "default-src 'self'; script-src {scripts}; style-src 'self' 'unsafe-inline'; img-src 'self' blob: data:; "
@@ -203,7 +204,17 @@ def background(app: ASGIApp, own: socket.socket) -> tuple[uvicorn.Server, thread
     return server, thread
 
 
+def ending(request: Request) -> bool:
+    """Whether the server ends, so that a stream of events has to."""
+    return bool(request.scope["ending"]())
+
+
 def _server(app: ASGIApp) -> uvicorn.Server:
-    return uvicorn.Server(
-        uvicorn.Config(app, log_level="error", access_log=False, lifespan="off", timeout_graceful_shutdown=1)
+    async def informed(scope: Scope, receive: Receive, send: Send) -> None:
+        await app(dict(scope) | {"ending": lambda: server.should_exit}, receive, send)
+
+    config = uvicorn.Config(
+        informed, log_level="error", access_log=False, lifespan="off", timeout_graceful_shutdown=STREAMS_END
     )
+    server = uvicorn.Server(config)
+    return server
