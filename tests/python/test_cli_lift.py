@@ -185,7 +185,6 @@ def test_trc_and_sd(folder, capsys):
         (["--overlay", "o.mp4"], 2, "--overlay: give the --video in which the keypoints were found"),
         (["--placement", "cam.json"], 2, "--placement is for a video, and t.csv contains keypoints"),
         (["-o", "t.csv"], 1, "t.csv: is read by this command; give the output another name"),
-        (["--trc", "./out.csv"], 1, "./out.csv: two outputs have this name"),
         (["-o", ""], 1, "name is empty"),
     ],
 )

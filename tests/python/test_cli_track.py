@@ -99,7 +99,7 @@ def test_track_evaluate_and_every_output(scene, capsys):
     assert main(["eval", str(scene / "out.csv"), "--truth", str(scene / "truth.csv")]) == 0
     table = capsys.readouterr().out
     assert re.search(r"Far off or lost +0\.0% of 20 frames\n", table)
-    assert re.search(r"Pose, mm( +\d+){3}\n", table) and "  Pose, mm: The same after the" in table
+    assert re.search(r"Pose, mm( +\d+){3}\n", table) and "  Pose, mm: The same after aligning" in table
     assert not re.search(r"\b(abs|root\w*|proc|static|free|p90)\b", table)
 
 
@@ -213,7 +213,7 @@ def test_tracks_of_a_detector_help(scene, tracks, capsys):
     _, vague = root_error(scene, capsys, "--keypoints", tracks, "--keypoints-sd", 40)
     assert vague not in (plain, found)
     assert track(scene, "--keypoints", tracks) == 0
-    assert "left out: nose\n" in capsys.readouterr().err
+    assert "ignored: nose\n" in capsys.readouterr().err
 
 
 def test_tracks_of_other_frames_are_refused(scene, tracks, capsys):
