@@ -188,7 +188,7 @@ def words(rows: list[list[object]], developed: list[str]) -> tuple[str, bool]:
         f"shoulders known to {1000 * TAPE_SD:.0f} mm as well (`gait track --body`); detector, camera and "
         "background; means over the seeds. *without constant*: less what is constant for each joint in the "
         "body's frame, as no estimate of the person could do better; *without its part in the picture*: less "
-        "what of this one view shows. Medians of the clips, mm "
+        "the share of it that this one view shows. Medians of the clips, mm "
         f"(wanted on the development clips: root {WANTED[0]:.0f}, none above {WANTED[1]:.0f}):\n\n"
     )
     return text + "\n".join(parts), missed
