@@ -89,8 +89,8 @@ def test_a_wrong_table_under_a_right_checksum_never_crashes(at, value):
         (24, struct.pack("<Q", 10), "header states 10 bytes"),
         (64 + 4, struct.pack("<I", 9), "AAAA has an unknown type"),
         (64 + 8, struct.pack("<I", 1), "AAAA has an unknown type or shape"),
-        (64 + 32, struct.pack("<Q", 1 << 40), "AAAA lies outside"),
-        (64 + 40, struct.pack("<Q", 28), "AAAA lies outside"),
+        (64 + 32, struct.pack("<Q", 1 << 40), "AAAA is outside"),
+        (64 + 40, struct.pack("<Q", 28), "AAAA is outside"),
         (112, b"AAAA", "AAAA occurs twice"),
     ],
 )

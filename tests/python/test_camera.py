@@ -232,7 +232,7 @@ def test_missing_toml_keys_name_the_camera(line, words, tmp_path):
 @pytest.mark.parametrize(
     "old, new, words",
     [
-        ("fisheye = false", "fisheye = true\nxi = 1.2", "xi describes a lens"),
+        ("fisheye = false", "fisheye = true\nxi = 1.2", "xi describes an unknown kind of lens"),
         ("[ 640, 480]", "[ 640.5, 480]", "size is .*whole"),
         ("700.0, 0.0, 321.0", "700.0, 3.0, 321.0", "matrix has skew"),
         ("700.0, 0.0, 321.0", "-700.0, 0.0, 321.0", "matrix has a focal length that is not positive"),
