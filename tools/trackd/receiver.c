@@ -154,12 +154,11 @@ static void on_command(const lcm_recv_buf_t *buf, const char *channel, void *use
 static void on_status(const lcm_recv_buf_t *buf, const char *channel, void *user)
 {
     receiver *const r = user;
-    gaitmsg_status_t msg;
+    gaitmsg_status_t msg = {0};
     (void)channel;
-    if (gaitmsg_status_t_decode(buf->data, 0, (int)buf->data_size, &msg) < 0)
-        return; /* of another version */
-    service_status(r->service, &msg);
-    gaitmsg_status_t_decode_cleanup(&msg);
+    if (gaitmsg_status_t_decode(buf->data, 0, (int)buf->data_size, &msg) >= 0) /* else of another version */
+        service_status(r->service, &msg);
+    gaitmsg_status_t_decode_cleanup(&msg); /* of a damaged one, the text that came before the damage */
 }
 
 static bool subscribe_further(receiver *r, message *why)
