@@ -398,8 +398,8 @@ static void read_marker(const lift_table *t, const segment_posterior *b, const r
     find_effects(t, b, &to->axes, &m, own, P, &by);
     for (int32_t a = 0; a < 3; a++) {
         float *const v = t->V + t->prior.modes * to->width + a * to->columns + r;
-        /* a point observed all but exactly leaves 0, or what rounding makes of it */
-        to->sd[a * to->columns + r] = P[a][a] > 0.0 ? lift_residual(t, b, j) * P[a][a] : 0.0;
+        /* a point observed all but exactly leaves 0, or a little less by rounding; what is no number stays so */
+        to->sd[a * to->columns + r] = P[a][a] < 0.0 ? 0.0 : lift_residual(t, b, j) * P[a][a];
         for (int32_t i = 0; i < 3; i++)
             M[3 * a + i][r % CHOLESKY_LANES] = by.M[a][i];
         for (int32_t i = 0; i < t->n - t->prior.modes; i++)
