@@ -44,23 +44,35 @@ def ran(*command, **options):
     return done.stdout
 
 
+def run_tests(copy, *tests):
+    """Run tests on the package in the copy."""
+    env = {"PYTHONPATH": str(copy / "python"), "GAIT_LIBRARY": str(ROOT / "build/release/libgait.so")}
+    command = (sys.executable, "-m", "pytest", "-q", "-p", "no:cacheprovider")
+    ran(*command, *tests, cwd=copy, env=os.environ | env)
+
+
+def copied(folder, copy):
+    """Copy a folder of the sources."""
+    shutil.copytree(ROOT / folder, copy / folder, ignore=shutil.ignore_patterns("__pycache__"))
+
+
 @pytest.mark.parametrize("title", ["Add a command", "Add a file format"])
 def test_the_python_examples_pass_their_tests(title, tmp_path):
-    ignored = shutil.ignore_patterns("__pycache__")
-    shutil.copytree(ROOT / "python/gait", tmp_path / "python/gait", ignore=ignored)
+    copied("python/gait", tmp_path)
     changed = follow([step for step in section(title) if step.file or step.edit], tmp_path)
     tests = [path for path in changed if path.name.startswith("test_")]
-    library = ROOT / "build/release/libgait.so"
-    env = os.environ | {"PYTHONPATH": str(tmp_path / "python"), "GAIT_LIBRARY": str(library)}
-    ran(sys.executable, "-m", "pytest", "-q", "-p", "no:cacheprovider", *tests, cwd=tmp_path, env=env)
+    run_tests(tmp_path, *tests)
     config = ["--config", ROOT / "python/pyproject.toml"]
     ran(ROOT / ".venv/bin/ruff", "check", *config, *[p for p in changed if p not in tests], cwd=tmp_path)
 
 
-def test_the_likelihood_term_compiles(tmp_path):
-    for name in ("src", "include"):
-        shutil.copytree(ROOT / "libgait" / name, tmp_path / "libgait" / name)
+def test_the_likelihood_term_compiles_and_python_knows_it(tmp_path):
+    for folder in ("libgait/src", "libgait/include", "python/gait"):
+        copied(folder, tmp_path)
     changed = follow([step for step in section("Add a likelihood term") if step.file or step.edit], tmp_path)
     include = [f"-I{tmp_path}/libgait/include", "-iquote", tmp_path / "libgait/src"]
     for path in {path for path in changed if path.suffix == ".c"}:
         ran("cc", *FLAGS, *include, "-fsyntax-only", path)
+    (tmp_path / "tests/python").mkdir(parents=True)
+    test = shutil.copy(ROOT / "tests/python/test_abi.py", tmp_path / "tests/python")
+    run_tests(tmp_path, test, "-k", "enumerations")
