@@ -160,6 +160,32 @@ static void test_elsewhere(void)
     CHECK(careful >= 2);
 }
 
+/* Mean x of the particles that are redrawn when the person has been lost for a second. */
+static double sought_at(double belt)
+{
+    gait_tracker *const t = begin();
+    gait_estimate e;
+    double sum = 0.0;
+    int redrawn = 0;
+    t->cfg.belt = belt;
+    show(t, 0, 0, &e);
+    t->core->utime += 1000000;
+    track_loss_redraw(t, 0);
+    for (int32_t i = 0; i < t->cfg.particles; i += 8, redrawn++)
+        sum += (double)particle_get(&t->particles, i).f[F_X];
+    toy_tracker_free(t);
+    return sum / redrawn;
+}
+
+/* A person on a belt is sought where they were lost, on the floor a second's walk ahead. */
+static void test_belt(void)
+{
+    double const ahead = (double)(toy_walk(1.0f).pelvis[0] - toy_walk(0.0f).pelvis[0]);
+    double const belt = sought_at(1.0), floor_x = sought_at(0.0);
+    CHECK_NEAR(belt, (double)toy_walk(0.0f).pelvis[0], 0.2);
+    CHECK_NEAR((floor_x - belt) / ahead, 1.0, 0.1);
+}
+
 /* From a side the image supports the estimate and not the same turned by 180 degrees; from in front it supports neither.
  * The running mean decides, and recovers. */
 static void test_front_back(void)
@@ -247,6 +273,7 @@ int main(void)
     test_hidden_in_part();
     test_something_else();
     test_elsewhere();
+    test_belt();
     test_front_back();
     test_the_bound();
     return CHECK_DONE();

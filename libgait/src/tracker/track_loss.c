@@ -33,8 +33,7 @@ static void search_region(const gait_tracker *t, float gap, gait_state *mean, ga
     const state_layout *const of = last_layout(t);
     float sn, cs;
     *mean = particle_to_state(of, last);
-    float const way = in_walking_time(t, gap) * particle_speed(of, last) * (float)of->model->direction,
-                far = f_min(0.1f + 0.4f * gap, 1.5f);
+    float const way = way_of_walk(t, of, last, gap), far = f_min(0.1f + 0.4f * gap, 1.5f);
     m_sincos_one(mean->heading, &sn, &cs);
     mean->pelvis[0] += way * cs;
     mean->pelvis[1] += way * sn;

@@ -254,6 +254,14 @@ static inline float in_walking_time(const gait_tracker *t, float seconds)
     return t->cfg.reverse > 0.0 ? -seconds : seconds;
 }
 
+/* Metres along its heading that a body moves in so many seconds if it walks on; a belt cancels its share. */
+static inline float way_of_walk(const gait_tracker *t, const state_layout *of, const particle_state *from,
+                                float seconds)
+{
+    return (1.0f - (float)t->cfg.belt) * in_walking_time(t, seconds) * particle_speed(of, from) *
+           (float)of->model->direction;
+}
+
 /* Seconds since an image last supported the estimate. */
 static inline float seconds_unsupported(const gait_tracker *t)
 {

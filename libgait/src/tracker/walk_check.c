@@ -9,11 +9,10 @@ static const int64_t TOO_LATE = 400000; /* from which the walk since is not pred
 static particle_state walk_on(const gait_tracker *t, const particle_state *from, float seconds)
 {
     particle_state p = *from;
-    float const walked = in_walking_time(t, seconds);
-    float const way = (1.0f - (float)t->cfg.belt) * walked * particle_speed(&t->layout, from);
+    float const way = way_of_walk(t, &t->layout, from, seconds);
     float sn, cs;
     m_sincos_one(from->f[F_HEADING], &sn, &cs);
-    p.f[F_PHASE] = m_wrap1(from->f[F_PHASE] + walked * from->f[F_RATE]);
+    p.f[F_PHASE] = m_wrap1(from->f[F_PHASE] + in_walking_time(t, seconds) * from->f[F_RATE]);
     p.f[F_X] += way * cs;
     p.f[F_Y] += way * sn;
     return p;
