@@ -33,4 +33,4 @@ float like_edges_along(const like_body *b, float *chance)
     return (float)t.response / all;
 }
 
-const like_term like_edges = {"edges", GAIT_TERM_EDGES, log_likelihood, support};
+const like_term like_edges = {GAIT_TERM_EDGES, log_likelihood, support};

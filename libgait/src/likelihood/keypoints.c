@@ -45,4 +45,4 @@ static float support(const like_body *b)
     return b->features->keypoints.count ? cost(STRANGE * STRANGE) - mean_cost(b) : 0.0f;
 }
 
-const like_term like_keypoints = {"keypoints", GAIT_TERM_KEYPOINTS, log_likelihood, support};
+const like_term like_keypoints = {GAIT_TERM_KEYPOINTS, log_likelihood, support};

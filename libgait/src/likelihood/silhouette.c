@@ -65,4 +65,4 @@ like_parts like_silhouette_parts(const like_body *b)
     return (like_parts){nats * (float)b->covered, nats * (float)(b->features->foreground_total - b->covered)};
 }
 
-const like_term like_silhouette = {"silhouette", GAIT_TERM_SILHOUETTE, log_likelihood, support};
+const like_term like_silhouette = {GAIT_TERM_SILHOUETTE, log_likelihood, support};

@@ -44,4 +44,4 @@ static float log_likelihood(const like_body *b)
     return both < enough ? unknown : -(float)cost / (float)(both * LIKE_COST_ONE);
 }
 
-const like_term like_template = {"template", GAIT_TERM_TEMPLATE, log_likelihood, NULL};
+const like_term like_template = {GAIT_TERM_TEMPLATE, log_likelihood, NULL};

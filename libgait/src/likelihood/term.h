@@ -139,7 +139,6 @@ typedef struct like_edge_tally {
 } like_edge_tally;
 
 typedef struct like_term {
-    const char *name;
     uint32_t flag;                               /* GAIT_TERM_* */
     float (*log_likelihood)(const like_body *b); /* nats, without its weight */
     float (*support)(const like_body *b);        /* log likelihood ratio against no person; NULL: none */

@@ -16,4 +16,4 @@ static float log_likelihood(const like_body *b)
     return log[b->lane];
 }
 
-const like_term like_texture = {"texture", GAIT_TERM_TEXTURE, log_likelihood, NULL};
+const like_term like_texture = {GAIT_TERM_TEXTURE, log_likelihood, NULL};
