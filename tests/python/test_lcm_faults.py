@@ -85,7 +85,7 @@ def test_files_that_are_not_there(tmp_path):
         ({"width": 16200}, ["camera.json: width is 16200, outside [1, 16000]"]),
         ({"R": [[1, 0, 0], [0, 1, 0]]}, ["R has 6 numbers, not 9"]),
         ({"R": [[1, 0, 0], [0, 1, 0], [0, 0, -1]]}, ["R is not a rotation"]),
-        ({"R": [[2, 0, 0], [0, 1, 0], [0, 0, 1]]}, ["R is not a rotation"]),
+        ({"R": [[1.001, 0, 0], [0, 1, 0], [0, 0, 1]]}, ["R is not a rotation"]),
         ({"t": [1, 2]}, ["t has 2 numbers", "metres"]),
         ({"t": [1, None, 2]}, ["t is not numeric"]),
         ({"distortion": [1, 2, 3]}, ["distortion", "0, 4 or 5"]),

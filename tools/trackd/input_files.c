@@ -62,20 +62,20 @@ bool pnm_read(const char *path, file_bytes *bytes, gait_image *out, message *why
 }
 
 /* ---- cameras ---- */
-static double dot(const float *a, const float *b)
+static float dot(const float *a, const float *b)
 {
-    return (double)a[0] * b[0] + (double)a[1] * b[1] + (double)a[2] * b[2];
+    return a[0] * b[0] + a[1] * b[1] + a[2] * b[2];
 }
 
 bool camera_rotation_ok(const gait_camera *camera)
 {
     const float *const a = camera->R, *const b = a + 3, *const c = a + 6;
     float const cross[3] = {a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]};
-    double const fault[] = {dot(a, a) - 1, dot(b, b) - 1, dot(a, b), dot(cross, c) - 1};
-    double worst = 0;
+    float const fault[] = {dot(a, a) - 1, dot(b, b) - 1, dot(c, c) - 1, dot(a, b), dot(a, c), dot(b, c)};
+    bool ok = dot(cross, c) > 0;
     for (size_t i = 0; i < sizeof fault / sizeof *fault; i++)
-        worst = fmax(worst, fabs(fault[i]));
-    return worst < 3e-3;
+        ok = ok && fabsf(fault[i]) <= 1e-3f;
+    return ok;
 }
 
 static bool read_pixels(const fields *f, const char *key, int32_t *out, message *why)

@@ -12,7 +12,7 @@ bool pnm_read(const char *path, file_bytes *bytes, gait_image *out, message *why
 enum { CAMERA_PIXELS = 16000 }; /* in each direction, the limit of the library */
 
 bool camera_file_read(const char *path, gait_camera *out, message *why);
-/* The rows of R must be orthogonal, of length 1 and right-handed, to three digits. */
+/* The rows of R must be orthogonal and of length 1 to 1e-3, as in the library, and right-handed. */
 bool camera_rotation_ok(const gait_camera *camera);
 
 /* ---- where the person is at one frame, by the project's init JSON; same rules as python/gait/bindings/initial.py. */

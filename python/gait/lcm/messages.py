@@ -22,7 +22,7 @@ from gait.lcm.link import gaitmsg
 _FRAME_KEY = "frame"
 _UNKNOWN = math.nan
 _FURTHEST = 1e9  # of a camera's numbers
-_ROTATION = 3e-3  # by which the rows of a rotation in single precision may miss
+_ROTATION = 1e-3  # by which the rows of a rotation may miss, as in the library
 
 
 def decode(kind: Any, data: bytes, channel: str) -> Any:
@@ -212,9 +212,9 @@ def camera_of(message: Any) -> Camera:
     numbers = np.array([*plain.values(), *message.R, *message.t, *message.distortion], float)
     sized = all(1 <= plain[side] <= MAX_PIXELS for side in ("width", "height"))
     if not (sized and (np.abs(numbers) < _FURTHEST).all() and min(plain["fx"], plain["fy"]) > 0):
-        raise UserError("camera: size, focal lengths or other numbers out of range")
+        raise UserError("camera: size, focal lengths or other numbers out of range; send pixels and metres")
     if np.abs(turn @ turn.T - np.eye(3)).max() > _ROTATION or np.linalg.det(turn) < 0:
-        raise UserError("camera: R is not a rotation")
+        raise UserError("camera: R is not a rotation; send orthogonal rows of length 1")
     return Camera(
         **plain, R=turn, t=np.array(message.t, float), distortion=np.array(message.distortion, float)
     )
