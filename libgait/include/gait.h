@@ -30,6 +30,7 @@
 #define GAIT_MAX_COMPONENTS 16 /* principal components of the cyclic model */
 #define GAIT_MAX_PROPORTIONS 8 /* components of the variation of limb lengths */
 #define GAIT_MAX_CLASSES 8     /* classes of motion in a model */
+#define GAIT_MAX_PIXELS 16000  /* width and height of a camera's images */
 #define GAIT_MAX_CAMERAS 4
 
 #if defined(__GNUC__)
@@ -254,7 +255,6 @@ typedef void gait_run_fn(void *user, gait_task_fn *fn, void *ctx, int32_t count)
 typedef struct gait_tasks { GAIT_TASKS_FIELDS(GAIT_DECLARE) } gait_tasks;
 
 /* Settings of a tracker.  gait_tracker_default() fills them; change what you need. */
-/* SETTING: default, low, high.  PAPER: default, paper mode, low, high. */
 #define GAIT_TRACKER_CONFIG_FIELDS(SETTING, PAPER, FIELD)                                                             \
     FIELD("Size of this struct in the caller's header, set by gait_tracker_default().",                               \
           uint64_t, struct_size, , "bytes")                                                                           \
@@ -343,7 +343,7 @@ typedef struct gait_tasks { GAIT_TASKS_FIELDS(GAIT_DECLARE) } gait_tasks;
           float, coef_time, , "seconds", 4.5, 0, 0, 1e6)                                                              \
     PAPER("Random walk of the stature, in standard deviations of the start.",                                         \
           float, stature_noise, , "standard deviations per sqrt(second)", 0.2, 0, 0, 100)                             \
-    PAPER("The same while settling.",                                                                                 \
+    PAPER("Random walk of the stature while it settles, in standard deviations of the start.",                        \
           float, stature_noise_start, , "standard deviations per sqrt(second)", 2, 0, 0, 100)                         \
     SETTING("Random walk of the posture offsets, which return to the spread among people.",                           \
           float, offset_noise, , "standard deviations per sqrt(second)", 0.58, 0, 100)                                \

@@ -63,7 +63,7 @@ def test_enumerations_and_limits_equal_the_header():
     ours |= {f"GAIT_EST_{f.name}": f for f in abi.Flag}
     ours |= {"GAIT_ABI": abi.ABI, "GAIT_ALIGN": abi.ALIGN, "GAIT_MAX_JOINTS": abi.MAX_JOINTS}
     ours |= {"GAIT_MAX_ANGLES": abi.MAX_ANGLES, "GAIT_MAX_CAMERAS": abi.MAX_CAMERAS}
-    ours |= {"GAIT_MAX_COMPONENTS": abi.MAX_COMPONENTS}
+    ours |= {"GAIT_MAX_COMPONENTS": abi.MAX_COMPONENTS, "GAIT_MAX_PIXELS": abi.MAX_PIXELS}
     assert {name: values.get(name) for name in ours} == ours
     families = r"GAIT_(ERR|MODE|TERM|TRACK|EST)_\w+"
     assert {name for name in values if re.fullmatch(families, name)} <= ours.keys()

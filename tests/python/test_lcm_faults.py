@@ -137,7 +137,7 @@ def test_json_that_is_none(tmp_path, text, words):
     fails(options(tmp_path, "--camera", file), file, words)
 
 
-@pytest.mark.parametrize("name", ["c.toml", "c.toml:cam_01", "c.yaml", "c.yml", "c.xml"])
+@pytest.mark.parametrize("name", ["c.toml", "c.toml:cam_01", "c.yml", "c.txt", "c.pickle:cam_01"])
 def test_a_camera_for_gait_capture(tmp_path, name):
     (tmp_path / name.partition(":")[0]).write_text("[cam_01]\n")
     fails(options(tmp_path, "--camera", tmp_path / name), name, "JSON only", "gait capture --camera", "LCM")

@@ -237,8 +237,8 @@ static void check_camera(int camera)
             float const margin = i == 0 ? (k > 8 ? -0.4f : 0.1f) : i == 1 ? 0.03f : 0.06f;
             float const nearer = f_max(sum[k][0][i], sum[k][2][i]);
             if (!(sum[k][1][i] > nearer + margin))
-                fprintf(stderr, "camera %d, term %#x: %s displaced scores %g, true %g\n", camera, terms[i]->flag,
-                        shift[k].name, (double)nearer, (double)sum[k][1][i]);
+                fprintf(stderr, "camera %d, term %#x: %s displaced scores %g, true %g\n", camera,
+                        terms[i]->flag, shift[k].name, (double)nearer, (double)sum[k][1][i]);
             CHECK(sum[k][1][i] > nearer + margin);
         }
 }

@@ -63,9 +63,9 @@ bool convert_same_camera(const gait_camera *a, const gait_camera *b)
 
 bool camera_check(const gait_camera *c, int32_t max_pixels, message *why)
 {
-    if (c->width < 1 || c->height < 1 || c->width > CAMERA_PIXELS || c->height > CAMERA_PIXELS)
+    if (c->width < 1 || c->height < 1 || c->width > GAIT_MAX_PIXELS || c->height > GAIT_MAX_PIXELS)
         return message_set(why, "camera with a size of %dx%d; send 1 to %d", c->width, c->height,
-                           CAMERA_PIXELS);
+                           GAIT_MAX_PIXELS);
     if (c->width * c->height > max_pixels)
         return message_set(why, "camera with %dx%d pixels, more than the %d of --max-pixels", c->width,
                            c->height, max_pixels);

@@ -8,8 +8,6 @@
 #include <string.h>
 
 /* ---- images ---- */
-enum { MAX_PIXELS = 1 << 14 };
-
 /* Next number of the header; space and comments before it are skipped.  -1: none. */
 static int32_t header_number(const unsigned char **at)
 {
@@ -24,7 +22,7 @@ static int32_t header_number(const unsigned char **at)
     if (*s < '0' || *s > '9')
         return -1;
     for (; *s >= '0' && *s <= '9'; s++)
-        value = value > MAX_PIXELS ? value : value * 10 + (*s - '0');
+        value = value > GAIT_MAX_PIXELS ? value : value * 10 + (*s - '0');
     *at = s;
     return value;
 }
@@ -38,8 +36,8 @@ static bool parse_pnm(const char *path, const file_bytes *bytes, gait_image *out
     out->format = bytes->data[1] == '5' ? GAIT_GREY8 : GAIT_RGB8;
     out->width = header_number(&at);
     out->height = header_number(&at);
-    if (header_number(&at) != 255 || out->width < 1 || out->height < 1 || out->width > MAX_PIXELS ||
-        out->height > MAX_PIXELS)
+    if (header_number(&at) != 255 || out->width < 1 || out->height < 1 || out->width > GAIT_MAX_PIXELS ||
+        out->height > GAIT_MAX_PIXELS)
         return message_set(why, "%s: damaged header, or not 8 bits per sample; write it again", path);
     out->data = at + 1;
     out->stride = out->width * (out->format == GAIT_GREY8 ? 1 : 3);
@@ -82,7 +80,7 @@ static bool read_pixels(const fields *f, const char *key, int32_t *out, message 
 {
     int64_t value = 0;
     bool const ok =
-        fields_whole(f, key, &value, 1, CAMERA_PIXELS, "give the size of the video in whole pixels", why);
+        fields_whole(f, key, &value, 1, GAIT_MAX_PIXELS, "give the size of the video in whole pixels", why);
     *out = (int32_t)value;
     return ok;
 }
@@ -136,7 +134,7 @@ static bool parse_camera(const fields *f, gait_camera *c, message *why)
 /* Kinds of file that `gait capture` reads and this program does not. */
 static bool is_foreign(const char *path)
 {
-    static const char *const endings[] = {".toml", ".yaml", ".yml", ".xml"};
+    static const char *const endings[] = {".toml", ".yaml", ".yml", ".xml", ".txt", ".pickle", ".pkl"};
     const char *const folder = strrchr(path, '/'), *const name = folder ? folder + 1 : path;
     size_t const length = strcspn(name, ":"); /* FILE.toml:name chooses a camera */
     for (size_t i = 0; i < sizeof endings / sizeof *endings; i++) {

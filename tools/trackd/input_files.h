@@ -9,8 +9,6 @@
 bool pnm_read(const char *path, file_bytes *bytes, gait_image *out, message *why);
 
 /* ---- the project's camera JSON; other formats reach the daemon through `gait capture`. */
-enum { CAMERA_PIXELS = 16000 }; /* in each direction, the limit of the library */
-
 bool camera_file_read(const char *path, gait_camera *out, message *why);
 /* The rows of R must be orthogonal and of length 1 to 1e-3, as in the library, and right-handed. */
 bool camera_rotation_ok(const gait_camera *camera);

@@ -154,7 +154,7 @@ static int make_table(settings *s, option *table)
         {"max-pixels", 0, "N",
          "largest number of pixels of an image; a camera message with more is rejected, so that it\n"
          "        cannot exhaust memory; default 16777216",
-         INT(max_pixels, 1, CAMERA_PIXELS * CAMERA_PIXELS)},
+         INT(max_pixels, 1, GAIT_MAX_PIXELS * GAIT_MAX_PIXELS)},
         {"threads", 't', "N",
          "threads, default 1, which is also the default of --tasks; results do not depend on it",
          INT(threads, 1, GAIT_POOL_MAX)},

@@ -3,7 +3,6 @@
 #include "api/fields.h"
 #include "image/camera.h"
 #include "image/view.h"
-#include "raster/rast.h"
 
 gait_result check_camera(const gait_camera *c, int32_t index, gait_error *err)
 {
@@ -12,9 +11,9 @@ gait_result check_camera(const gait_camera *c, int32_t index, gait_error *err)
         return base_fail(
             err, GAIT_ERR_ARG, (int)index,
             "camera %d: size and focal lengths must be positive, R a rotation, all numbers finite", number);
-    if (c->width > RAST_LIMIT || c->height > RAST_LIMIT)
+    if (c->width > GAIT_MAX_PIXELS || c->height > GAIT_MAX_PIXELS)
         return base_fail(err, GAIT_ERR_LIMIT, (int)index, "camera %d: %d x %d pixels, at most %d each way",
-                         number, (int)c->width, (int)c->height, RAST_LIMIT);
+                         number, (int)c->width, (int)c->height, GAIT_MAX_PIXELS);
     return GAIT_OK;
 }
 

@@ -8,7 +8,7 @@
 
 enum {
     RAST_MAX_VERTICES = 8,
-    RAST_LIMIT = 16000 /* coordinates are clamped to +- this many pixels */
+    RAST_LIMIT = GAIT_MAX_PIXELS /* coordinates are clamped to +- this many pixels */
 };
 
 typedef struct rast_spans { /* rows first <= y < last; row y covers begin[y - top] <= x < end[y - top], */

@@ -17,6 +17,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from gait.bindings.abi import MAX_PIXELS
 from gait.camera import other_files
 from gait.camera.lens import AGREE, agreeing
 from gait.errors import UserError
@@ -243,7 +244,6 @@ class Camera:
         return plain | {"R": self.R.tolist(), "t": self.t.tolist(), "distortion": self.distortion.tolist()}
 
 
-MAX_PIXELS = 1 << 14
 LONGEST_LENS = 1000  #: focal length over the width of the picture; the longest made have a few hundred
 
 _JSON_KEYS = ("width", "height", "fx", "fy", "cx", "cy", "R", "t", "distortion", "note")

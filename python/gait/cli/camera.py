@@ -223,7 +223,7 @@ def _check_size(args: argparse.Namespace, keypoints: Keypoints) -> None:
 
 def _size(text: str) -> tuple[int, int]:
     """Width and height as 1280x720."""
-    from gait.camera.camera import MAX_PIXELS
+    from gait.bindings.abi import MAX_PIXELS
 
     width, cross, height = text.lower().partition("x")
     if not cross or not (width.isdigit() and height.isdigit()):

@@ -11,10 +11,10 @@ import cv2
 import numpy as np
 from numpy.typing import ArrayLike
 
-from gait.bindings.abi import MAX_ANGLES, MAX_COMPONENTS, Flag, TrackStatus
+from gait.bindings.abi import MAX_ANGLES, MAX_COMPONENTS, MAX_PIXELS, Flag, TrackStatus
 from gait.bindings.estimate import Estimate
 from gait.bindings.state import POSE_SCALARS, State
-from gait.camera.camera import MAX_PIXELS, Camera
+from gait.camera.camera import Camera
 from gait.errors import UserError
 from gait.io.video import Image
 from gait.lcm.link import gaitmsg

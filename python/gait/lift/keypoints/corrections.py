@@ -23,6 +23,7 @@ from typing import Any, TypeVar
 import numpy as np
 import numpy.typing as npt
 
+from gait.bindings.abi import MAX_PIXELS
 from gait.bindings.segment_prior import SegmentPrior
 from gait.camera.camera import Camera
 from gait.errors import UserError
@@ -32,6 +33,7 @@ from gait.io.keypoints_file import FURTHEST, Keypoints
 Floats = npt.NDArray[np.float64]
 Size = tuple[int, int]
 
+_LARGEST = MAX_PIXELS, MAX_PIXELS  # picture that a camera may have
 CLICK_SD = 4.0  # pixels, unless the correction gives it
 ERRS_FOR = 0.25  # seconds in which the correlation of a detector's error with itself falls to 1/e
 FLOOR_SD = 0.02  # metres, of a foot that stands at a point of the floor
@@ -189,7 +191,7 @@ Entry = TypeVar("Entry", Correction, FloorPin)
 
 
 def read_edits(
-    path: str | os.PathLike[str], prior: SegmentPrior, frames: range, size: Size = (16384, 16384)
+    path: str | os.PathLike[str], prior: SegmentPrior, frames: range, size: Size = _LARGEST
 ) -> Edits:
     """Read a corrections file: of some frames, each joint of one pulled or pinned at most once.
 
@@ -238,7 +240,7 @@ def _require_single(path: str | os.PathLike[str], what: str, does: str, entries:
 
 
 def read_corrections(
-    path: str | os.PathLike[str], prior: SegmentPrior, stop: int, first: int = 0, size: Size = (16384, 16384)
+    path: str | os.PathLike[str], prior: SegmentPrior, stop: int, first: int = 0, size: Size = _LARGEST
 ) -> list[Correction]:
     """Read a file that has nothing but corrections, as the pictures of a video take them.
 
