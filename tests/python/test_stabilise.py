@@ -19,6 +19,8 @@ from gait.studio.source import require_still
 from gait.track import walk_camera
 from gait.track.camera_motion import View
 from gait.track.moving_video import MovingVideo, map_pixels, panorama_of
+from gait.track.options import ClipOptions
+from gait.track.scene import Scene
 from gait.track.stabilise import find_motion, moves
 
 CAMERA = Camera.looking((0.0, -6.0, 1.5), (0.0, 0.0, 1.0), (320, 240), 270.0)
@@ -91,6 +93,19 @@ def test_a_camera_that_stands_still_is_left_alone(tmp_path):
     video = film(tmp_path / "v.mp4", [View(np.eye(3))] * FRAMES)
     assert find_motion(video, CAMERA, sample_frames(video), people()) == (None, "")
     assert not moves(CAMERA, sample_frames(video), people())
+
+
+@pytest.mark.parametrize(("shake", "kept"), [(0.0, True), (0.02, False)])
+def test_the_median_of_a_camera_that_moves_is_no_background(tmp_path, capsys, shake, kept):
+    """Although it counts as static, as it does by default."""
+    film(tmp_path / "v.mp4", views(0.0, shake))
+    write_camera(tmp_path / "camera.json", CAMERA)
+    options = ClipOptions(
+        str(tmp_path / "v.mp4"), str(tmp_path / "camera.json"), str(tmp_path / "t.csv"), detector="none"
+    )
+    read = Scene.read(options)
+    assert (read.plate is not None) == kept and read.moved != kept
+    assert ("its median is no background" in capsys.readouterr().err) != kept
 
 
 def test_a_scene_without_texture_is_reported(tmp_path):

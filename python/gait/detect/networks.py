@@ -1,7 +1,7 @@
 """The two networks of BlazePose: boxes of people in a picture, and the landmarks of one person in a crop.
 
-Both run in LiteRT (package ``ai-edge-litert``).  Without it the landmark network runs in OpenCV, four times
-slower with the same numbers, and OpenCV's detector of upright people replaces the person network, which
+Both run in LiteRT (package ``ai-edge-litert``).  Without it the landmark network runs in OpenCV, about half
+as fast with the same numbers, and OpenCV's detector of upright people replaces the person network, which
 OpenCV cannot read.
 """
 

@@ -79,6 +79,8 @@ class Scene:
         The same walk as further cameras filmed it; `video` has their frames, too.
     began : tuple of str
         When each of these films began, in words.
+    moved : bool
+        Whether the camera moves although it counts as static.
     """
 
     video: Video
@@ -95,6 +97,7 @@ class Scene:
     outlines: dict[int, Outline] = field(default_factory=dict)
     further: tuple[Scene, ...] = ()
     began: tuple[str, ...] = ()
+    moved: bool = False
 
     @property
     def moving(self) -> MovingVideo | None:
@@ -167,14 +170,18 @@ class Scene:
                 people, person = _detect(options, video, frames)
             if beside is not None:
                 samples, plate = beside.result()
-        motion = None if poses else _find_motion(options, video, camera, samples, people, given)
+        moved = options.stabilize == "off" and _moves(options, video, camera, samples, people)
+        motion = None
+        if options.stabilize != "off" and not poses:
+            lens, first = camera or expected_camera(video, options.fov), camera is not None
+            motion = find_turns(video, lens, samples, people, given, options.quiet, first=first)
         calibration = None
         if camera is None:
             person, calibration = _calibrate(options, video, model, people, motion)
             camera = calibration.camera
         if motion is not None:
             poses = motion.poses(camera)
-        plate = plate if given is None else given
+        plate = (None if moved else plate) if given is None else given
         if poses:
             wanted = options.background != "none"
             panorama = panorama_of(samples, camera, poses, given) if wanted else None
@@ -187,7 +194,9 @@ class Scene:
             sure = {id: found.by_frame(options.keypoints_sd) for id, found in people.items()}
         else:
             sure = {id: keypoint_noise(found) for id, found in people.items()}
-        return Scene(video, camera, model, plate, motion, frames, people, person, sure, calibration)
+        return Scene(
+            video, camera, model, plate, motion, frames, people, person, sure, calibration, moved=moved
+        )
 
 
 def _cameras(
@@ -224,26 +233,24 @@ def _sample(
     return samples, median([frame.image for frame in samples]) if static else None
 
 
-def _find_motion(
+def _moves(
     options: ClipOptions,
     video: Video,
     camera: Camera | None,
     samples: list[Frame],
     people: dict[int, Keypoints],
-    given: Image | None,
-) -> Motion | None:
-    """Find how the camera turns, if asked to; None if it stands still or does not only turn."""
-    camera = camera or expected_camera(video, options.fov)
-    if options.stabilize == "off":
-        if samples and not options.camera_path and moves(camera, samples, people, given):
-            note(
-                "the camera moves during the clip: --stabilize auto estimates its rotation, --camera-path "
-                "gives its poses",
-                options.quiet,
-            )
-        return None
-    first = options.camera is not None
-    return find_turns(video, camera, samples, people, given, options.quiet, first=first)
+) -> bool:
+    """Whether a camera that counts as static moves in the samples of the background; if so, say so."""
+    if not samples or options.camera_path:
+        return False
+    if not moves(camera or expected_camera(video, options.fov), samples, people):
+        return False
+    note(
+        "the camera moves during the clip, so its median is no background: --stabilize auto estimates its "
+        "rotation, --camera-path gives its poses",
+        options.quiet,
+    )
+    return True
 
 
 def _calibrate(

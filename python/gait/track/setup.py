@@ -88,6 +88,8 @@ def _background(options: ClipOptions, scene: Scene, used: bool) -> str:
     median = f"the median of {SAMPLES} frames of the film"
     if not used and scene.poses and not one_place(list(scene.poses.values())):
         return "none: the camera travels"
+    if scene.moved:
+        return "none: the camera moves"
     return median if used else f"none: {median} shows the person"
 
 
