@@ -240,7 +240,7 @@ def _moves(
     samples: list[Frame],
     people: dict[int, Keypoints],
 ) -> bool:
-    """Whether a camera that counts as static moves in the samples of the background; if so, say so."""
+    """Whether a camera that counts as static moves in the samples of the background, with a note."""
     if not samples or options.camera_path:
         return False
     if not moves(camera or expected_camera(video, options.fov), samples, people):
