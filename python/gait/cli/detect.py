@@ -14,7 +14,7 @@ from __future__ import annotations
 import argparse
 import contextlib
 import json
-import sys
+from functools import partial
 
 from gait.cli import values
 from gait.cli.signals import Interruptible
@@ -90,7 +90,7 @@ def run(args: argparse.Namespace) -> int:
     from gait.io.video import Video
 
     if args.fetch:
-        folder = weights.fetch(lambda line: args.quiet or print(line, file=sys.stderr))
+        folder = weights.fetch(partial(note, quiet=args.quiet))
         print(json.dumps({"folder": str(folder)}) if args.json else f"weights in {folder}")
         if not args.video:
             return 0

@@ -30,8 +30,7 @@ from __future__ import annotations
 
 import argparse
 import json
-import sys
-from collections.abc import Callable
+from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -40,6 +39,7 @@ from gait.cli import values
 from gait.errors import UsageError, UserError
 from gait.io.files import replacing, require_outputs
 from gait.lift.smooth.options import METHODS, Options
+from gait.progress import note
 
 if TYPE_CHECKING:
     from gait.bindings.model import Model
@@ -304,11 +304,6 @@ def _is_video(path: str, pictures: bool) -> bool:
     return video and not (Path(path).exists() and reader_of(path) is not None)
 
 
-def warner(quiet: bool) -> Callable[[str], None]:
-    """Print warnings to stderr, unless quiet."""
-    return lambda words: None if quiet else print(words, file=sys.stderr)
-
-
 def _lift_keypoints(args: argparse.Namespace, video: bool) -> tuple[dict[str, Any], str]:
     """Lift keypoints of a file, or found in a video; the summary, and in words."""
     from gait.io.track_file import write_lifted
@@ -318,7 +313,7 @@ def _lift_keypoints(args: argparse.Namespace, video: bool) -> tuple[dict[str, An
     from gait.track.camera_check import contradiction
 
     _check(args, video)
-    warn = warner(args.quiet)
+    warn = partial(note, quiet=args.quiet)
     prior = lift_run.load_prior(args.model, warn)
     keypoints, calibration, turns = _find_keypoints(args, prior) if video else (None, None, None)
     request = lift_run.Request(
@@ -357,9 +352,12 @@ def _lift_keypoints(args: argparse.Namespace, video: bool) -> tuple[dict[str, An
             f"no camera, so the path over the floor is unknown; gait camera --walk {args.input} --size WxH "
             f"--height {args.height:g} -o camera.json estimates one from the walk"
         )
-    if isinstance(lifted.view, Perspective) and calibration is None:
-        fault = contradiction(lifted.view.camera, keypoints, _walking_model(args), args.height)
-        warn(f"{args.camera}: {fault}") if fault else None
+    if (
+        isinstance(lifted.view, Perspective)
+        and calibration is None
+        and (fault := contradiction(lifted.view.camera, keypoints, _walking_model(args), args.height))
+    ):
+        warn(f"{args.camera}: {fault}")
     write_lifted(args.output, keypoints.frame, keypoints.time, found.names, found.places, found.sd)
     if args.trc:
         write_trc(args.trc, found.names, keypoints.time, found.places, _rate(keypoints))
@@ -482,7 +480,7 @@ def _lift_pictures(args: argparse.Namespace) -> tuple[dict[str, Any], str]:
     from gait.lift.video import run as video_run
     from gait.track.walk_camera import find_people
 
-    warn = warner(args.quiet)
+    warn = partial(note, quiet=args.quiet)
     prior, calibration = lift_run.load_prior(args.model, warn), None
     if args.height:
         video = Video(args.input)

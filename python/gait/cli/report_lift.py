@@ -13,16 +13,16 @@ import argparse
 import html
 import json
 from collections.abc import Iterator
+from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from gait.cli import values
-from gait.cli.lift import warner
 from gait.errors import UsageError, UserError
 from gait.io.files import filling, require_folder
 from gait.learn.options import SegmentOptions
 from gait.lift.smooth.options import METHODS, Options
-from gait.progress import progress
+from gait.progress import note, progress
 
 if TYPE_CHECKING:
     import numpy as np
@@ -123,7 +123,7 @@ def _clip(args: argparse.Namespace, prior: SegmentPrior) -> tuple[Keypoints, Mot
     request = lift_run.Request(
         Options(args.method or METHODS[0]), camera=args.camera, ignore_unknown=True, hints=False
     )
-    found = lift_run.lift_file(args.clip, prior, request, warner(args.quiet), args.quiet)
+    found = lift_run.lift_file(args.clip, prior, request, partial(note, quiet=args.quiet), args.quiet)
     return found.keypoints, found.motion, found.view.alone()
 
 

@@ -19,8 +19,8 @@ from __future__ import annotations
 
 import argparse
 import json
-import sys
 from dataclasses import fields
+from functools import partial
 
 from gait.cli import values
 from gait.errors import UsageError, UserError
@@ -86,7 +86,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 def run(args: argparse.Namespace) -> int:
     """Fetch, or serve until interrupted."""
     if args.fetch:
-        folder = parts.fetch(lambda line: args.quiet or print(line, file=sys.stderr))
+        folder = parts.fetch(partial(note, quiet=args.quiet))
         print(json.dumps({"folder": str(folder)}) if args.json else f"parts of pages in {folder}")
         if not args.video:
             return 0
@@ -109,7 +109,7 @@ def run(args: argparse.Namespace) -> int:
     video = Video(args.video)
     with serve.listen(args.port) as own:
         with folder_of(video) as folder:
-            source = open_source(wanted, video, folder, lambda words: note(words, args.quiet), args.quiet)
+            source = open_source(wanted, video, folder, partial(note, quiet=args.quiet), args.quiet)
             session = Session(source)
         url = serve.address(own)
         figures = {"url": url, "corrections": str(source.corrections)}
