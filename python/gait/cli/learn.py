@@ -18,8 +18,8 @@ from __future__ import annotations
 
 import argparse
 import json
-import sys
 from dataclasses import fields
+from functools import partial
 from pathlib import Path
 
 from gait.cli import values
@@ -39,6 +39,7 @@ from gait.learn.options import (
     LearnOptions,
     SegmentOptions,
 )
+from gait.progress import note
 
 EXAMPLES = """\
 examples:
@@ -243,18 +244,8 @@ def run(args: argparse.Namespace) -> int:
     from gait.learn.classes import run as classes
     from gait.learn.report import summary
 
-    def note(line: str) -> None:
-        if not args.quiet:
-            print(line, file=sys.stderr)
-
-    one = learning.run
-    figures = classes.learn(options, note, one) if options.classes else one(options, note)
-    if options.classes and classes.adds_to_a_model(options):
-        names = " ".join(each["name"] for each in figures["classes"])
-        print(
-            json.dumps(figures) if args.json else f"{args.output}: {figures['bytes']} bytes, classes {names}"
-        )
-        return 0
+    learn = classes.learn if options.classes else learning.run
+    figures = learn(options, partial(note, quiet=args.quiet))
     print(json.dumps(figures) if args.json else summary.text(args.output, figures))
     return 0
 

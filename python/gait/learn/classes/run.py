@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import json
 import tempfile
-from collections.abc import Callable, Mapping
+from collections.abc import Mapping
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
@@ -16,9 +16,7 @@ from gait.learn.classes import standing
 from gait.learn.classes.join import Change, MotionClass, join
 from gait.learn.corpus.load import NothingLeft
 from gait.learn.options import LearnOptions, SegmentOptions
-
-Note = Callable[[str], None]
-Run = Callable[[LearnOptions, Note], dict[str, Any]]
+from gait.learn.run import Note, run
 
 WALK, STAND, BACKWARDS, RUN = "walk", "stand", "backwards", "run"
 DERIVED = STAND, BACKWARDS  # made from the walk
@@ -34,8 +32,8 @@ CHANGES: dict[str, dict[str, Change]] = {
 OTHER = Change(0.1)  # of a class of the user's, to and from the walk and standing
 
 
-def learn(options: LearnOptions, note: Note, run: Run) -> dict[str, Any]:
-    """Learn the walk by `run`, then each of ``options.classes``, and write one blob.
+def learn(options: LearnOptions, note: Note) -> dict[str, Any]:
+    """Learn the walk, then each of ``options.classes``, and write one blob.
 
     A class is ``stand`` or ``backwards``, made from the walk; or ``NAME=SRC``, learnt from those recordings
     or taken from a model (``.gait``); or ``run``, learnt from the runs among the sources.  Returns the
@@ -53,7 +51,7 @@ def learn(options: LearnOptions, note: Note, run: Run) -> dict[str, Any]:
     for name, source in wanted.items():
         if name in DERIVED and not source:
             classes.append(_derived(name, walk, options.activity))
-        elif (learnt := _learnt(name, source, options, note, run)) is not None:
+        elif (learnt := _learnt(name, source, options, note)) is not None:
             classes.append(learnt)
     names = [one.name for one in classes]
     classes = [replace(one, changes=_changes(one.name, names)) for one in classes]
@@ -94,7 +92,7 @@ def _derived(name: str, walk: Mapping[str, blob.Array], activity: str) -> Motion
     return MotionClass(BACKWARDS, -1, source=activity)
 
 
-def _learnt(name: str, source: str, options: LearnOptions, note: Note, run: Run) -> MotionClass | None:
+def _learnt(name: str, source: str, options: LearnOptions, note: Note) -> MotionClass | None:
     """Learn a class from recordings, or take it from a model; None if none of the sources is of it."""
     if Path(source).suffix == ".gait":
         return _counted(MotionClass(name, own=read_cyclic(source)), None)

@@ -88,8 +88,10 @@ def _rounded(values: Floats) -> list[float | None]:
 
 
 def text(path: str, s: dict[str, Any]) -> str:
-    """Format the figures for people; a segment prior alone has fewer."""
+    """Format the figures for people; a segment prior alone, and classes alone, have fewer."""
     written = f"{path}: {s['bytes']} bytes, checksum {s['crc32']}"
+    if "sequences" not in s and "classes" in s:  # added to a model
+        return f"{path}: {s['bytes']} bytes, classes {' '.join(each['name'] for each in s['classes'])}"
     if "sequences" not in s:
         return f"{segment_summary.text(s['segments'])}\n{written}"
     explained = " ".join(f"{100 * v:.0f}" for v in s["variance_explained"])
