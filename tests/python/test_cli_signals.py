@@ -12,8 +12,8 @@ import pytest
 from drawn_person import camera, wall, write
 
 from gait import Video
-from gait.cli.signals import Interruptible
 from gait.io.track_file import read_track
+from gait.signals import Interruptible
 
 PATIENCE = 120.0  # seconds for what takes a few, on a machine busy with other things
 MODEL = resources.files("gait") / "data" / "walk.gait"

@@ -20,7 +20,6 @@ import mocap_files as files
 import numpy as np
 import pytest
 
-from gait.cli.signals import Interruptible
 from gait.errors import UserError
 from gait.learn import arrays
 from gait.learn.arrays import ArrayFile
@@ -28,6 +27,7 @@ from gait.learn.corpus import forkserver, load, processes, sources
 from gait.learn.corpus.stage import Task
 from gait.learn.options import LearnOptions
 from gait.learn.prior import rank
+from gait.signals import Interruptible
 
 
 @pytest.fixture(scope="module")

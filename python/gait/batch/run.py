@@ -17,9 +17,9 @@ from pathlib import Path
 from typing import Any
 
 from gait.batch.project import Clip
-from gait.ending import die_with_parent
 from gait.io.files import replacing
 from gait.report.page import Page, movable
+from gait.signals import die_with_parent
 
 DONE, FAILED = "done", "failed"
 RECORD = "done.json"  #: in the folder of a clip that is done

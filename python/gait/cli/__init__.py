@@ -22,8 +22,8 @@ from typing import NamedTuple, NoReturn
 
 from gait import extras, reproducible
 from gait._version import __version__
-from gait.cli.signals import Interruptible
 from gait.errors import GaitError, UsageError, UserError
+from gait.signals import Interruptible
 
 
 class Command(NamedTuple):

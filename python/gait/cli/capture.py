@@ -24,11 +24,11 @@ from itertools import chain
 from typing import TYPE_CHECKING
 
 from gait.cli import values
-from gait.cli.signals import Interruptible
 from gait.errors import UsageError, UserError
 from gait.io.files import require_unread
 from gait.lcm.link import buffer_warning, is_log, lcm_url, log_of
 from gait.progress import note, progress
+from gait.signals import Interruptible
 
 if TYPE_CHECKING:
     from gait.bindings.initial import Start

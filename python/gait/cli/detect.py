@@ -17,11 +17,11 @@ import json
 from functools import partial
 
 from gait.cli import values
-from gait.cli.signals import Interruptible
 from gait.detect import weights
 from gait.errors import UsageError, UserError
 from gait.io.files import require_outputs
 from gait.progress import note, progress
+from gait.signals import Interruptible
 
 _TURN = 0.1  # seconds that one call waits for a message
 

@@ -19,10 +19,10 @@ import signal
 from typing import Any
 
 from gait.cli import values
-from gait.ending import ending_signals
 from gait.io.files import require_outputs
 from gait.lcm.link import is_log, lcm_url, log_of
 from gait.progress import note
+from gait.signals import ending_signals
 
 EXAMPLES = """\
 examples:

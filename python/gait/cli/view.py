@@ -14,11 +14,11 @@ import time
 from typing import TYPE_CHECKING
 
 from gait.cli import values
-from gait.cli.signals import Interruptible
 from gait.errors import UsageError, UserError
 from gait.io.files import replacing, require_folder
 from gait.lcm.link import lcm_url
 from gait.progress import note
+from gait.signals import Interruptible
 
 if TYPE_CHECKING:
     from gait.bindings.model import Model

@@ -19,7 +19,6 @@ from typing import Any
 from gait.bindings.initial import Start
 from gait.bindings.model import Model
 from gait.camera.camera import Camera
-from gait.ending import die_with_parent
 from gait.errors import UsageError, UserError
 from gait.io.fields import read_json
 from gait.io.files import require_folder
@@ -31,6 +30,7 @@ from gait.lcm.report import write_report
 from gait.motion.evaluate import Measures
 from gait.progress import note
 from gait.report.run_files import RunFiles
+from gait.signals import die_with_parent
 
 _GRACE = 5.0  # seconds that a process may take to end when asked
 _TURN = 0.05  # seconds between two looks

@@ -25,7 +25,7 @@ from gait.motion.norms import beside_norms
 from gait.motion.parameters import measured
 from gait.motion.verdict import Verdict, verdict_of
 from gait.progress import note, progress
-from gait.report.camera_words import camera_facts
+from gait.report.camera_facts import camera_facts
 from gait.report.comparison import compare
 from gait.report.drawing import LEGEND_SECONDS, Overlay
 from gait.report.film import Films, PageFilm

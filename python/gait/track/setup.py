@@ -10,7 +10,7 @@ from gait.bindings.abi import Mode
 from gait.bindings.initial import Start
 from gait.camera.path import one_place
 from gait.io.video import SAMPLES
-from gait.report.camera_words import camera_facts
+from gait.report.camera_facts import camera_facts
 from gait.track.options import ClipOptions
 from gait.track.scene import Scene
 

@@ -12,7 +12,7 @@ from itertools import islice
 from multiprocessing import forkserver, resource_tracker
 from multiprocessing.context import BaseContext
 
-from gait.ending import ending_signals
+from gait.signals import ending_signals
 
 STAGE = "gait.learn.corpus.stage"  # what workers run; by name, to avoid importing it here
 WORTH = 4 << 20  # bytes of recordings that take longer to read than workers to start (0.6 s per MB)
