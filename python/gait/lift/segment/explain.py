@@ -23,7 +23,7 @@ Floats = npt.NDArray[np.float64]
 
 FEWEST = 4  # points that must be seen of a segment for an estimate of its own
 STARTS = 8  # headings all round from which an unknown one is searched for
-START_SD = 0.4  # radians from a start: half of the distance between two
+START_SD = round(np.pi / STARTS, 1)  # radians from a start: half of the distance between two
 SAME = 0.2  # radians: explanations that are nearer are one
 TURN_SD = 0.7  # radians by which the heading changes in half a segment
 GROUND_SD = 10.0  # metres, of the place on the ground
