@@ -23,8 +23,6 @@ if TYPE_CHECKING:
 
 JSON = False
 
-_RANGES = {"phase": (0.0, 1.0), "stride_hz": (0.1, 4.0), "stature": (0.5, 2.5)}
-
 EXAMPLES = """\
 examples:
   gait render --phase 0.25 -o pose.png
@@ -76,7 +74,7 @@ def run(args: argparse.Namespace) -> int:
 
 def _state(args: argparse.Namespace, model: Model) -> State:
     """State of --phase or --state; on the ground at the origin unless placed."""
-    from gait.bindings.state import POSE_SCALARS, State
+    from gait.bindings.state import POSE_SCALARS, State, state_range
     from gait.io.fields import Fields, read_json
 
     state = State(stride_hz=model.info.stride_hz)
@@ -86,8 +84,7 @@ def _state(args: argparse.Namespace, model: Model) -> State:
     fields.only((*POSE_SCALARS, "pelvis", "coef"))
     for name in POSE_SCALARS:
         if name in fields:
-            low, high = _RANGES.get(name, (-7.0, 7.0))
-            setattr(state, name, fields.number(name, low, high, "see gait render --help"))
+            setattr(state, name, fields.number(name, *state_range(name), "see gait render --help"))
     if "coef" in fields:
         remedy = "give a list of scores in standard deviations"
         count = fields.count("coef", remedy)
