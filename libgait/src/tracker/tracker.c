@@ -14,10 +14,9 @@
 #include "tracker/track_loss.h"
 #include "tracker/walk_check.h"
 
-static const float KNOWN_PHASE_SD = 0.2f; /* strides: a start with less determines which leg is which */
-static const float SETTLE_TIME = 1.0f;    /* seconds after a start in which several modes are normal */
-static const float PHASE_DEPARTURE =
-    0.2f; /* strides from the predicted phase above which the track is ambiguous */
+static const float KNOWN_PHASE_SD = 0.2f;  /* strides: a start with less determines which leg is which */
+static const float SETTLE_TIME = 1.0f;     /* seconds after a start in which several modes are normal */
+static const float PHASE_DEPARTURE = 0.2f; /* strides from the predicted phase: more are ambiguous */
 static const double DEGENERATE_ESS = 2.0;
 static const float IMPROBABLE = 0.01f; /* hypotheses so much less probable than the first are left out */
 static const float OTHER_CLASS = 0.1f; /* probability at a start of all classes together, alike */
@@ -262,8 +261,8 @@ static uint32_t cameras_seeing(const gait_tracker *t)
 
 /* Record whether the frame supports the estimate.  When the person is found again, left and right are open unless the
  * phase is as predicted. */
-static void update_track_loss(gait_tracker *t, float dt, bool lost, const state_layout *of,
-                              const particle_state *mean)
+static void check_estimate(gait_tracker *t, float dt, bool lost, const state_layout *of,
+                           const particle_state *mean)
 {
     tracker_core *const core = t->core;
     hypotheses_state *const h = &core->hypotheses;
@@ -352,7 +351,7 @@ void tracker_step(gait_tracker *t, const gait_frame *frame, gait_estimate *out)
     particle_state const place = particle_set_place(&t->particles, t->filter.weight);
     bool const has_image = features_step(t, frame, &place) > 0;
     pose_error_correct(t);
-    likelihood_step(t); /* without an image: only the joints */
+    likelihood_step(t); /* without an image it only computes the joints */
     if (has_image)
         track_loss_bound(t);
     pf_summary s = has_image ? hypotheses_update(t, dt)
@@ -366,14 +365,14 @@ void tracker_step(gait_tracker *t, const gait_frame *frame, gait_estimate *out)
     particle_state const mean = estimate_particles(t, s.best, &e);
     if (has_image) {
         walk_check_update(t, &mean);
-        update_track_loss(t, dt, lost, &t->layouts[e.motion_class], &mean);
+        check_estimate(t, dt, lost, &t->layouts[e.motion_class], &mean);
     }
     if (hypotheses_agree(t, e.hypothesis_weight))
         hypotheses_settle(t);
-    bool const degenerate = s.degenerate || s.ess < DEGENERATE_ESS;
+    bool const few = s.degenerate || s.ess < DEGENERATE_ESS; /* particles that count */
     e.status = s.degenerate ? GAIT_TRACK_LOST : status_of(t, dt, &e);
     e.flags = (resampled ? GAIT_EST_RESAMPLED : 0) | (has_image ? 0 : GAIT_EST_NO_IMAGE) |
-              (has_image && degenerate ? GAIT_EST_DEGENERATE : 0) |
+              (has_image && few ? GAIT_EST_DEGENERATE : 0) |
               (has_image && core->support_utime != core->utime ? GAIT_EST_UNSUPPORTED : 0);
     e.ess = (float)s.ess;
     e.log_evidence = s.log_evidence;
