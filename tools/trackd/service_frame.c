@@ -7,8 +7,8 @@
 
 enum {
     FIT_PERIOD = 100000, /* microseconds between two fits of the automatic start */
-    AWAY =
-        1000000, /* microseconds without keypoints after which one of several people who is lost has left */
+    /* microseconds without keypoints after which one of several people who is lost has left */
+    AWAY = 1000000,
     LONGEST_GAP = 1 << 20 /* frames; a number further away begins another count */
 };
 

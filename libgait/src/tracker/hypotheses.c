@@ -7,16 +7,15 @@
 #include <string.h>
 
 static const float ACQUISITION_TIME = 0.5f; /* seconds until the phase is known modulo half a stride */
-static const float REFIT_TIME =
-    0.4f; /* seconds in which both hypotheses find their own best before evidence counts */
+/* Seconds in which both hypotheses find their own best before evidence counts. */
+static const float REFIT_TIME = 0.4f;
 static const float AGREED = 0.9f; /* weight of one mode from which a start's hypotheses are decided */
 static const float JITTER_SCORE = 0.5f, JITTER_HEADING = 0.1f, JITTER_RATE = 0.02f,
                    JITTER_PHASE = 0.05f; /* sd */
-static const double REPORT_LOG_ODDS =
-    4.5; /* from which left and right are reported as known: probability 0.99 */
-static const double MERGE_LOG_ODDS = 9.0; /* from which the other hypothesis is dropped */
-static const double PROOF =
-    3.0; /* against the person of an automatic start, until images show one: probability 0.95 */
+/* From these left and right are reported as known (probability 0.99), and the other hypothesis is dropped. */
+static const double REPORT_LOG_ODDS = 4.5, MERGE_LOG_ODDS = 9.0;
+/* Log odds against the person of an automatic start, until images show one: probability 0.95. */
+static const double PROOF = 3.0;
 
 /* ---- stages ---- */
 static float seconds_in_stage(const gait_tracker *t)

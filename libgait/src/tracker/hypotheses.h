@@ -41,8 +41,8 @@ void hypotheses_merge(gait_tracker *t);
 /* Whether the hypotheses of a start agree by now: this weight is in one mode. */
 bool hypotheses_agree(const gait_tracker *t, float weight);
 
-/* Whether acquisition has lasted long enough, or the person walks on after standing still; and lay the particles out as two hypotheses.  The weights must be even, as after
- * resampling.  Clears the templates. */
+/* Whether acquisition has lasted long enough, or the person walks on after standing still; and lay the particles out as
+ * two hypotheses.  The weights must be even, as after resampling.  Clears the templates. */
 bool hypotheses_acquired(const gait_tracker *t);
 void hypotheses_split(gait_tracker *t);
 

@@ -8,7 +8,7 @@
 #include "tracker/tracker_state.h"
 
 /* The running margin of left and right after this frame: negative where more than a quarter of the keypoints' evidence
- * lately is for the mirror image.  restart: the person has just been found; of: the class of
- * the estimate.  Who stands still has no left and right that could be swapped. */
+ * lately is for the mirror image.  restart: the person has just been found; of: the class of the estimate.  Who stands
+ * still has no left and right that could be swapped. */
 float left_right_update(gait_tracker *t, bool restart, const state_layout *of, const particle_state *mean);
 #endif

@@ -7,8 +7,8 @@
 void likelihood_step(gait_tracker *t);
 
 typedef struct body_evidence { /* of one body, over all cameras */
-    float
-        support; /* log-likelihood with the body less that of an empty scene, nats; exactly 0 if no term applies */
+    /* Log-likelihood with the body less that of an empty scene, nats; exactly 0 if no term applies. */
+    float support;
     float by_keypoints; /* share of the keypoints in support */
     like_parts parts;   /* foreground explained and left over, nats */
     float chance;       /* foreground that a body explains by chance, nats */
@@ -29,7 +29,8 @@ float likelihood_of_keypoints(gait_tracker *t, const state_layout *of, const par
 /* Make the templates ready to be compared with this frame; likelihood_step() does so too. */
 void likelihood_templates(gait_tracker *t);
 
-/* After that: log-likelihood in camera c of the particles index[0 .. lanes), whose bodies and points are in w; changes no particle. */
+/* After that: log-likelihood in camera c of the particles index[0 .. lanes), whose bodies and points are in w; changes
+ * no particle. */
 void likelihood_particles(gait_tracker *t, int32_t c, const int32_t *index, int32_t lanes,
                           likelihood_scratch *w, float nats[BLOCK]);
 

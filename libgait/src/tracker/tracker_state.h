@@ -51,15 +51,15 @@ typedef struct walk_check {
     int64_t age;      /* its time since the start, microseconds */
     uint32_t cameras; /* bit c: camera c has surface samples of it; 0: there is none yet */
     int32_t judged;   /* whether nats is known */
-    float
-        nats; /* log-likelihood ratio of its surface having walked on over having stayed, mean of the last two */
+    /* Log-likelihood ratio of its surface having walked on over having stayed, mean of the last two. */
+    float nats;
     particle_state body;
 } walk_check;
 /* Ranges of particles, each of one class of motion, those of the second hypothesis after those of the first. */
 enum { MAX_STRATA = 2 * GAIT_MAX_CLASSES };
-enum {
-    CLASS_SHARE = 8
-}; /* every class has at least one in so many of the particles that one class would have */
+/* Every class has at least one in so many of the particles that one class would have. */
+enum { CLASS_SHARE = 8 };
+
 typedef struct strata {
     int32_t count;
     int32_t first[MAX_STRATA + 1];
@@ -67,8 +67,8 @@ typedef struct strata {
 } strata;
 
 typedef struct class_state { /* of a model with several classes (class_strata.h) */
-    int64_t resampled,
-        still; /* microseconds since the start: last resampling; since when standing still is reported */
+    /* Microseconds since the start: last resampling; since when standing still is reported. */
+    int64_t resampled, still;
     int32_t reported, supported; /* class of the last estimate, and of core.last_supported */
     int32_t open_sides;          /* the person stood still: left and right are to be split */
     uint32_t known;              /* bit c: there are scores of the person in class c */
@@ -134,12 +134,12 @@ struct gait_tracker {
     like_setup *like;
     /* Mutable state: one block of memory from core to state_end. */
     tracker_core *core;
-    like_patch *
-        texture; /* n x cameras x limbs: surface samples of the particles; of their ancestors until the likelihood
-                          * step replaces them.  NULL: no term needs them */
+    /* n x cameras x limbs: surface samples of the particles; of their ancestors until the likelihood step replaces them.
+     * NULL: no term needs them. */
+    like_patch *texture;
     pf filter;
-    int16_t *template
-        [2][GAIT_MAX_CAMERAS]; /* appearance under each hypothesis; with one hypothesis only the first */
+    /* Appearance under each hypothesis; with one hypothesis only the first. */
+    int16_t *template[2][GAIT_MAX_CAMERAS];
     particle_history history;
     walk_check *walk_check;       /* NULL: not in paper mode */
     like_patch *walk_check_patch; /* cameras x limbs: the surface of its body */
@@ -154,20 +154,20 @@ struct gait_tracker {
         float *explained; /* after the likelihood step: foreground that each particle explains, nats; */
         float *loglik;    /* after track_loss_bound(): the log-likelihood that moves the weights */
     };
-    float *
-        joint; /* points x 3 x n, metres: of the particles, or of the ancestors that fixed_lag_estimate() gathers */
+    /* Points x 3 x n, metres: of the particles, or of the ancestors that fixed_lag_estimate() gathers. */
+    float *joint;
     float *rows;             /* until the particles have moved: rejuvenation_rows(); in the memory of joint */
     features_scratch planes; /* until the features are complete; in the memory of joint */
     state_layout *layouts;   /* of every class; constant */
     mirror *mirror;          /* the same */
     strata *next;            /* with several classes: of the particles after resampling */
-    uint8_t *
-        in_mode; /* n: 1 for particles of the dominant mode; until they have moved: class of their ancestors */
+    /* n: 1 for particles of the dominant mode; until they have moved: class of their ancestors. */
+    uint8_t *in_mode;
     like_patch *estimate_patch; /* cameras x limbs: surface samples of the estimate */
-    int8_t *template_ring
-        [2][GAIT_MAX_CAMERAS]; /* limbs x LIKE_RING: the templates as this frame is compared with them */
-    likelihood_scratch *work;  /* tasks, or 1 without threads */
-    lag_scratch lag;           /* ancestor and weight: in the memory of the work of all tasks but the first */
+    /* limbs x LIKE_RING: the templates as this frame is compared with them. */
+    int8_t *template_ring[2][GAIT_MAX_CAMERAS];
+    likelihood_scratch *work; /* tasks, or 1 without threads */
+    lag_scratch lag;          /* ancestor and weight: in the memory of the work of all tasks but the first */
 };
 
 /* Place a tracker in memory; NULL if the arena only counts or overflows.  run: the kernels to use; NULL: when counting. */
