@@ -50,7 +50,7 @@ if TYPE_CHECKING:
     from gait.lift.segment.explain import Uncertain
     from gait.lift.smooth.motion import Motion
     from gait.track.from_walk import Calibration
-    from gait.track.stabilise import Motion as Turns
+    from gait.track.stabilise import CameraTurns
 
 EXAMPLES = """\
 examples:
@@ -395,7 +395,7 @@ def _clip(args: argparse.Namespace) -> Clip:
 
 def _find_keypoints(
     args: argparse.Namespace, prior: SegmentPrior
-) -> tuple[Keypoints, Calibration | None, Turns | None]:
+) -> tuple[Keypoints, Calibration | None, CameraTurns | None]:
     """Find the keypoints of the person in a video, the camera unless the view is given, and how it turns."""
     from gait.camera.camera import Camera
     from gait.io.video import Video  # PyAV, and below OpenCV, which files of keypoints do not need
@@ -419,7 +419,7 @@ def _find_keypoints(
     return people[id], calibration, turns
 
 
-def _turns(args: argparse.Namespace, video: Video, people: dict[int, Keypoints]) -> Turns | None:
+def _turns(args: argparse.Namespace, video: Video, people: dict[int, Keypoints]) -> CameraTurns | None:
     """Estimate how the camera turns; None if it is static."""
     from gait.camera.camera import Camera
     from gait.io.video import sample_frames

@@ -17,7 +17,7 @@ from gait.lift.video.figure import Figure, write_overlay
 from gait.lift.video.fit_clip import ENOUGH
 from gait.lift.video.sensors import CameraView, FlatView, View
 from gait.track.moving_video import map_pixels
-from gait.track.stabilise import Motion
+from gait.track.stabilise import CameraTurns
 
 Floats = npt.NDArray[np.float64]
 
@@ -120,12 +120,14 @@ def suggestions(lifted: Lifted, most: int) -> list[Suggestion]:
     return suggest(posteriors, joints, near, enough, most)
 
 
-def draw_overlay(path: str, video: Video, lifted: Lifted, quiet: bool, turns: Motion | None = None) -> None:
+def draw_overlay(
+    path: str, video: Video, lifted: Lifted, quiet: bool, turns: CameraTurns | None = None
+) -> None:
     """Write a video with the cylinder figure and the corrections drawn into it.
 
     Parameters
     ----------
-    turns : Motion, optional
+    turns : CameraTurns, optional
         Of the calibrated camera, against which the keypoints were stabilised.
     """
     motion, frame, by_frame = lifted.motion, lifted.keypoints.frame, views(lifted)

@@ -27,7 +27,7 @@ _LEAST_WINDOW = 0.3  # the same in a short clip, at least
 _PROBES = 6  # frames of a clip, of which one must show a person
 _STEP = 0.1  # seconds from one fit to the next
 _GOES_ON = 1.5  # seconds after a first window in which a person walks, who may only have begun to
-_STAYS = (
+_ONLY_STANDING = (
     "--init auto found a person who stays in place but none who walks along the floor; give --init FILE.json "
     f"or use the detector ({weights.FETCH})"
 )
@@ -183,11 +183,11 @@ def find_start(
         If no person is in full view for long enough.
     """
     misplaced: list[float] = []
-    few = min(video.count, video.count if stop is None else stop) - first
-    window = float(np.clip(0.8 * few / video.fps, _LEAST_WINDOW, _WINDOW))
+    count = min(video.count, video.count if stop is None else stop) - first
+    window = float(np.clip(0.8 * count / video.fps, _LEAST_WINDOW, _WINDOW))
     standing: Start | None = None
     for finder in _finders(camera, plate, model, height, window, shapes, shapes_first):
-        if not finder.worth(video, first, first + few):
+        if not finder.worth(video, first, first + count):
             continue
         walking, stands = _search(finder, video.frames(first, stop))
         if walking is not None:
@@ -196,7 +196,7 @@ def find_start(
         misplaced += finder.misplaced
     if standing is not None and plate is not None and not shapes_first:
         return standing
-    words = _no_person(few, misplaced) if standing is None else _STAYS
+    words = _no_person(count, misplaced) if standing is None else _ONLY_STANDING
     raise UserError(f"{video.path}: {words}")
 
 
@@ -244,12 +244,12 @@ def _finders(
     yield from (finder for finder in order if finder is not None)
 
 
-def _no_person(few: int, misplaced: list[float]) -> str:
+def _no_person(count: int, misplaced: list[float]) -> str:
     """Explain why there is no start, and what to do."""
-    if few == 1:
+    if count == 1:
         return "only 1 frame to track; give at least a second, by --start and --stop too"
-    if few < _ENOUGH:
-        return f"only {few} frames to track, --init auto needs {_ENOUGH}; give --init FILE.json"
+    if count < _ENOUGH:
+        return f"only {count} frames to track, --init auto needs {_ENOUGH}; give --init FILE.json"
     if len(misplaced) < _ENOUGH:
         return f"--init auto found no person in full view for {_ENOUGH} frames; give --init FILE.json"
     tall = np.nanmedian(misplaced) if np.isfinite(misplaced).any() else np.nan

@@ -110,10 +110,10 @@ def _follower(
 ) -> Follower:
     """Make a follower that finds a lost person by keypoints or, without any, in the pictures."""
 
-    def find_start(first: int, stop: int, stature: float) -> Start | None:
+    def find_again(first: int, stop: int, stature: float) -> Start | None:
         if not scene.people or not isinstance(keypoints, PersonKeypoints):
             return None
-        return _find_start(scene, keypoints, first, stop, stature)
+        return _find_again(scene, keypoints, first, stop, stature)
 
     auto_start = None
     if not options.smooth and not scene.people:
@@ -124,14 +124,14 @@ def _follower(
         scene.video,
         keypoints,
         plausibility,
-        find_start,
+        find_again,
         auto_start,
         one_pass=options.smooth,
         plate_of=scene.plate_of(),
     )
 
 
-def _find_start(
+def _find_again(
     scene: Scene, keypoints: PersonKeypoints, first: int, stop: int, stature: float
 ) -> Start | None:
     """Find the person by their keypoints or, if these show no walk, of a person who may be the same."""

@@ -27,7 +27,7 @@ _DRAWS = 3  # of particles that must agree
 _SAME_SIDE = 0.2  # strides between the phases of draws that agree
 _DISAGREE = "repeated starts disagree about left and right"
 
-FindStart = Callable[[int, int, float], Start | None]
+FindAgain = Callable[[int, int, float], Start | None]
 """First start in the frames first <= number < stop, of a person of a stature [m]; None: there is none."""
 
 
@@ -59,7 +59,7 @@ class Follower:
     keypoints : PersonKeypoints or PersonShapes
     plausibility : Plausibility
         Of its estimates.
-    find_start : FindStart
+    find_again : FindAgain
         Finds the person anew after a loss, and where they were in view before.
     auto_start : BoxStart, optional
         Finds a lost person in the pictures.
@@ -81,7 +81,7 @@ class Follower:
         video: Video,
         keypoints: PersonKeypoints | PersonShapes,
         plausibility: Plausibility,
-        find_start: FindStart,
+        find_again: FindAgain,
         auto_start: BoxStart | None = None,
         *,
         one_pass: bool = False,
@@ -89,7 +89,7 @@ class Follower:
     ) -> None:
         self._tracker, self._video, self._keypoints = tracker, video, keypoints
         self._plausibility = plausibility
-        self._find_start, self._auto_start, self._one_pass = find_start, auto_start, one_pass
+        self._find_again, self._auto_start, self._one_pass = find_again, auto_start, one_pass
         self._plate_of = plate_of
         self._uncertain = False  # which leg is which
         self.step_seconds: list[float] = []
@@ -119,7 +119,7 @@ class Follower:
             was_lost, lost = lost, contradicted or now.status == TrackStatus.LOST
             if lost and not was_lost:
                 stop = frames.stop if following is None else following.frame
-                found = self._find_start(frame.number + 1, stop, now.mean.stature)
+                found = self._find_again(frame.number + 1, stop, now.mean.stature)
                 if found is not None:
                     following, more = self._earlier(found, frame.number + 1)
                     before |= more
@@ -184,7 +184,7 @@ class Follower:
         stop = min(before, default=start.frame)
         if stop - first < _LEAST_BEFORE * self._video.fps:
             return start, before
-        found = self._find_start(first, stop, start.mean.stature)
+        found = self._find_again(first, stop, start.mean.stature)
         if found is None:
             return start, before
         found, more = self._earlier(found, first)

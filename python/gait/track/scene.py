@@ -32,7 +32,7 @@ from gait.track.keypoint_start import find_keypoint_start, keypoint_noise
 from gait.track.moving_video import MovingVideo, map_pixels, panorama_of
 from gait.track.options import ClipOptions
 from gait.track.other_people import OtherPeople, Outline
-from gait.track.stabilise import Motion, find_turns, moves
+from gait.track.stabilise import CameraTurns, find_turns, moves
 from gait.track.walk_camera import calibrate_film, expected_camera, note_camera
 
 Array = NDArray[np.float64]
@@ -59,7 +59,7 @@ class Scene:
     model : Model
     plate : image or None
         The empty scene; of a camera that moves in `video`.
-    motion : Motion or None
+    motion : CameraTurns or None
         How the camera turns, if that was found in the clip.
     frames : range
         Frames to track.
@@ -87,7 +87,7 @@ class Scene:
     camera: Camera
     model: Model
     plate: Image | None
-    motion: Motion | None
+    motion: CameraTurns | None
     frames: range
     people: dict[int, Keypoints]
     person: int
@@ -254,7 +254,7 @@ def _moves(
 
 
 def _calibrate(
-    options: ClipOptions, video: Video, model: Model, people: dict[int, Keypoints], motion: Motion | None
+    options: ClipOptions, video: Video, model: Model, people: dict[int, Keypoints], motion: CameraTurns | None
 ) -> tuple[int, Calibration]:
     """Find the camera from a walk, and the id of the person who walks."""
     if not people:

@@ -28,7 +28,7 @@ _TRAVELS = 1.0  # pixels of a picture 640 wide: median residual from which the c
 
 
 @dataclass(frozen=True)
-class Motion:
+class CameraTurns:
     """What is known of the camera's motion in a clip.
 
     Attributes
@@ -85,7 +85,7 @@ def find_motion(
     update: Callable[[int], None] | None = None,
     *,
     first: bool = False,
-) -> tuple[Motion | None, str]:
+) -> tuple[CameraTurns | None, str]:
     """Measure how the camera turns.
 
     Parameters
@@ -104,7 +104,7 @@ def find_motion(
 
     Returns
     -------
-    motion : Motion or None
+    motion : CameraTurns or None
         None if the camera stands still or does not only turn.
     why : str
         In words, why its motion is not known; empty otherwise.
@@ -125,7 +125,7 @@ def find_motion(
     if reference >= 0:
         back = views[reference].inverse()
         views = [view.after(back) for view in views]
-    return Motion(camera, views, reference), ""
+    return CameraTurns(camera, views, reference), ""
 
 
 def find_turns(
@@ -137,7 +137,7 @@ def find_turns(
     quiet: bool,
     *,
     first: bool,
-) -> Motion | None:
+) -> CameraTurns | None:
     """Find the turns of a clip's camera, and report them; None if it stands still or does not only turn.
 
     Parameters are as for `find_motion`.
