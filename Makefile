@@ -268,7 +268,7 @@ unit: $(UNIT) fuzz-targets ## C tests, and the stored inputs of the fuzz targets
 	@tests/unit/run.sh $(UNIT) $(FUZZ)
 
 # Linked with the objects, so that tests can call internal functions.  Their own code is compiled in a third of the time.
-$(B)/unit/test_tool_%: tests/unit/test_tool_%.c $(OBJ) $(B)/libtrackd.a $(B)/libgaitmsg.a Makefile $(MADE) | $(B)/unit/
+$(B)/unit/test_trackd_%: tests/unit/test_trackd_%.c $(OBJ) $(B)/libtrackd.a $(B)/libgaitmsg.a Makefile $(MADE) | $(B)/unit/
 	$(call log,CC   $<)$(WITH_TOOLS)
 
 $(B)/unit/%: tests/unit/%.c $(OBJ) Makefile $(MADE) | $(B)/unit/
