@@ -45,7 +45,6 @@ EXAMPLES = """\
 examples:
   gait learn recordings/ -o model.gait --report report
   gait learn walk_01.trc walk_02.trc -o model.gait --markers map.json
-  gait learn ../shared/data/mocap/cmu_walk -o python/gait/data/walk.gait    # the model in the package
   gait learn walks runs -o all.gait --class stand --class backwards --class run
 """
 

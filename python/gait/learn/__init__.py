@@ -13,4 +13,5 @@ above it:
 - `corpus`: the files of a run, read and prepared in processes or on a cluster.
 - `report`: figures, words and page of a learned model.
 - `run`.
+- `classes`: one run for each class of motion, and all of them in one blob.
 """
