@@ -134,4 +134,4 @@ def test_options_that_contradict_a_path_are_refused(clip, capsys):
     assert track(clip, *path, "--background", str(clip / "contact.jpg")) == 2
     assert track(clip, "--camera-path", str(clip / "none.csv")) == 1
     words = capsys.readouterr().err
-    assert "leave out one of them" in words and "stands still" in words and "no such file" in words
+    assert "leave out one of them" in words and "static camera" in words and "no such file" in words

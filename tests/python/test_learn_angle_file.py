@@ -152,7 +152,7 @@ def test_what_a_track_writes_has_its_joints_and_its_angles_but_not_what_was_lost
         ),
         (
             lambda s: s.replace("neck_y_deg", "neck_x_rad"),
-            "a.csv:1: neck_x is there as neck_x_deg and neck_x_rad",
+            "a.csv:1: neck_x appears as neck_x_deg and neck_x_rad",
         ),
         (lambda s: s.replace("neck_y_deg", "neck_x_deg"), "a.csv:1: column 'neck_x_deg' appears twice"),
         (lambda s: s.replace("\n50,", "\n50,,"), "a.csv:52: 27 cells instead of 26"),

@@ -334,7 +334,7 @@ def test_a_walk_goes_where_the_pelvis_faces():
         yaw[:50] = np.nan
         assert verdict.judge(angles, found, None, "walk", yaw).accepted == accepted
         assert verdict.judge(angles, found, None, "sidestep", yaw).accepted
-    assert "goes backwards" in verdict.judge(angles, found, None, "walk", yaw).reason
+    assert "is backwards" in verdict.judge(angles, found, None, "walk", yaw).reason
     assert verdict.judge(angles, found, None, "walk", np.full(len(angles), np.nan)).accepted
 
 

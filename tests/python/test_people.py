@@ -76,7 +76,7 @@ def test_people_who_cross_keep_their_numbers(crossing, tmp_path, monkeypatch, ca
         assert rows.frame.tolist() == list(range(FRAMES)) and "lost" not in rows.status
         mine = np.stack([rows.places[MODEL.joint_names[k]] for k in order], axis=1)
         assert np.linalg.norm(mine - truth[:, order], axis=2).mean(axis=1).max() < 0.25
-    assert (tmp_path / "t-4.csv").read_text().splitlines()[0].endswith(",person")
+    assert "person" in (tmp_path / "t-4.csv").read_text().splitlines()[0].split(",")
 
 
 def test_a_start_takes_the_person_who_walks(crossing):

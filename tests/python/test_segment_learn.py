@@ -291,7 +291,7 @@ def test_too_few_segments_are_an_error(motion):
     with Corpus() as corpus:
         corpus.put("a_1", "a", None, short)
         recordings = corpus.recordings()
-    with pytest.raises(UserError, match="hold 1 segments of 0.5 s, fewer than 8; add recordings"):
+    with pytest.raises(UserError, match="contain 1 segments of 0.5 s, fewer than 8; add recordings"):
         fit.fit(recordings, SegmentOptions())
 
 
@@ -358,10 +358,10 @@ def test_markers_are_found_by_name():
 
 def test_blob_without_prior_explains_how_to_learn_it(tmp_path):
     """A cyclic model without the sections, or with a part of them."""
-    with pytest.raises(UserError, match=r"x.gait: holds no segment prior; learn it with gait learn"):
+    with pytest.raises(UserError, match=r"x.gait: contains no segment prior; learn it with gait learn"):
         SegmentPrior.from_sections({}, "x.gait")
     parts = {k: v for k, v in sections(toy_prior()).items() if k != "SGSD"}
-    with pytest.raises(UserError, match="holds no section SGSD"):
+    with pytest.raises(UserError, match="contains no section SGSD"):
         SegmentPrior.from_sections(parts, "x.gait")
 
 

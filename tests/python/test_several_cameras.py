@@ -83,6 +83,7 @@ class _Film(Video):
             None,
         )
         self.width = self.height = 2
+        self.digest = ""
 
     def frames(self, start=0, stop=None, *, grey=False):
         for number, time in list(enumerate(self.times))[start:stop]:

@@ -139,7 +139,7 @@ def test_a_static_trial_without_known_knees_is_named(laboratory, tmp_path):
     write_trc(tmp_path / "static.trc", labels, points)
     with pytest.raises(UserError, match=r"--static .*static.trc: no known marker .* at hips, knees"):
         static_trial.calibrate(tmp_path / "static.trc", LearnOptions())
-    with pytest.raises(UserError, match=r"--static .*a.amc: is no .c3d or .trc"):
+    with pytest.raises(UserError, match=r"--static .*a.amc: is not .c3d or .trc"):
         static_trial.calibrate(tmp_path / "a.amc", LearnOptions())
 
 

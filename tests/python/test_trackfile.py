@@ -149,7 +149,7 @@ def spoil(path, change):
         ),
         (
             lambda s: s.__setitem__(2, s[2] + ",1"),
-            "line 3 has 163 cells, the header 162; cut off. write it anew",
+            "line 3 has 163 cells, the header 162; cut off. write it again",
         ),
         (
             lambda s: s.__setitem__(3, s[3].replace("0.200000", "nan", 1)),

@@ -65,7 +65,7 @@ def test_text_cannot_end_a_script():
 def test_parts_that_were_not_fetched_are_named_with_the_remedy(tmp_path, monkeypatch):
     monkeypatch.setenv("GAIT_WEB", str(tmp_path))
     with pytest.raises(
-        UserError, match="three.module.js: the parts of pages are not in .*gait studio --fetch"
+        UserError, match="three.module.js: components of web pages are not in .*gait studio --fetch"
     ):
         modules.inlined_head()
 
