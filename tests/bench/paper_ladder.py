@@ -165,7 +165,8 @@ def paper_row(found: Climbed) -> list[Any]:
 def ladder_row(name: str, median: dict[str, float], found: list[Climbed]) -> list[Any]:
     """Return the row of a rung: median of the clips, gain, each clip's median and range over the seeds."""
     known = {*found[0].runs, *found[0].filmed}
-    gain = round(ladder.own_free(median, name) - median[name], 1) if name in known else None
+    errors = {one: [each.error(one) for each in found] for one in (name, ladder.own_cycle(name))}
+    gain = round(ladder.gain(errors, name), 1) if name in known else None
     cells = list[Any]()
     for each in found:
         roots = each.roots(name)
@@ -193,8 +194,8 @@ Frames 0 to 50 (outdoor: from the first frame in full view), 10,000 particles, m
 components without the clip's subject; the start is the truth with noise (pelvis 3 cm, phase 0.03, rate 0.03
 per second, heading 0.05 rad), outdoor the clip's own. Settings are those of
 [search_paper](search_paper.md); chosen without development clips. Held: {CRITERION}. Wanted: held in 9 of
-10, at less than the error of the free-running cycle, on every clip; reached on {reached(found)}, outdoors by
-what is held alone.
+10, at less than the error of the free-running cycle, on every clip; reached on {reached(found)}; outdoors
+only holding counts.
 Lost: runs that are reported as lost in some frame, of those that leave the person (right) and of
 those that hold it (wrong); in all {reported(runs, held=False)} and {reported(runs, held=True)}. root mm:
 root-aligned, median over the frames and then over the seeds. free: the mean cycle of the same model running
@@ -229,8 +230,8 @@ hypotheses of left and right, and more particles at first, act in the last row o
 over the frames that the track has.
 Static pose (of the model of people) and free-running cycles need no image.
 Gain: how far a rung is below the free-running cycle of its own model, which is all that the images give it;
-medians of the clips. The cycles start from the exact truth, the rungs from the truth with noise (pelvis 3 cm,
-phase 0.03, rate 0.03 per second, heading 0.05 rad), so the comparison favours no image. Outdoors there is no
+median of the clips' differences. The cycles start from the exact truth, the rungs from the truth with noise
+(pelvis 3 cm, phase 0.03, rate 0.03 per second, heading 0.05 rad), so the comparison favours no image. Outdoors there is no
 truth in space; [paper_mode](paper_mode.md) has that clip.
 
 ![the ladder](paper_ladder.svg)"""

@@ -184,7 +184,8 @@ that of the free-running cycle, the mean of the clips; runs that leave the perso
 reported as lost; score: that ratio and the share of the runs that leave, as in the search. Than taken: by
 how much the score differs from the first row's, run by run from the same starts and random numbers, and the
 95 % interval of that for other seeds on these clips, one row at a time. sigma: that
-of eq. 11, in grey levels, where a reading changes how much it counts the best of three by a seed of its own.
+of eq. 11, in grey levels, where a reading changes how much it counts the best of three, chosen with a
+separate seed.
 A constant sigma is no reading: the paper has it increase with narrow angles, in a form that it leaves open.
 
 The two readings of the sum in eq. 11 are one likelihood with two sigmas, but for the noise of a pixel: the

@@ -254,7 +254,8 @@ def about(search: Search, counts: str) -> str:
 Frozen as the defaults of paper mode: the best of {tried} settings in
 [search_paper_runs](search_paper_runs.md), by the mean over six clips of the root-aligned error over that of
 the free-running cycle plus the share of runs that leave the person. All are tried with one seed, the best
-{AGAIN} again with {len(MORE)} others, which alone decide between them.
+{AGAIN} again with {len(MORE)} others, which alone decide between them.  phase_noise and n_s ended at a
+bound of the search.
 The clips (480 x 360, {FRAMES + 1} frames used) are made by `gait simulate` with the
 gaits of people {people}, who are neither in the model nor in a development clip.  The noise of a pixel (3
 grey levels) is not searched, since only its sum with sigma counts."""

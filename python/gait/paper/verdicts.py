@@ -97,16 +97,16 @@ def tracking(held: Sequence[int], seeds: int, ratio: float, unnoticed: Sequence[
     )
 
 
-def without_image(paper: tuple[float, float], ours: tuple[float, float]) -> str:
-    """Ladder: errors of the paper's filter and of ours, mm, each with that of what needs no image."""
+def without_image(paper: float, ours: float) -> str:
+    """Ladder: gain of the paper's filter and of ours over what needs no image, mm, medians of the views."""
     return (
         "no counterpart: against its own mean cycle, running on from the exact truth without any image, "
-        f"the paper's likelihood {_against(*paper)}, the default {_against(*ours)}"
+        f"the paper's likelihood {_gains(paper)}, the default {_gains(ours)}, on the median of the views"
     )
 
 
-def _against(error: float, none: float) -> str:
-    return f"{'gains' if error < none else 'loses'} {abs(none - error):.0f} of {none:.0f} mm"
+def _gains(gain: float) -> str:
+    return f"{'gains' if gain > 0 else 'loses'} {abs(gain):.0f} mm"
 
 
 def held(runs: Sequence[int], seeds: int, errors: Sequence[float], none: Sequence[float]) -> str:
@@ -120,7 +120,7 @@ def held(runs: Sequence[int], seeds: int, errors: Sequence[float], none: Sequenc
     if both == len(runs):
         return "reproduced: the person is held in every view, nearer than without any image"
     words = f"held in {sum(stays)} of {len(runs)} views, nearer than without any image in {sum(nearer)}"
-    return f"{'reproduced in part' if any(stays) else 'not reproduced'}: {words}, both in {both}"
+    return f"{'reproduced in part' if both else 'not reproduced'}: {words}, both in {both}"
 
 
 def at_rest(gains: Sequence[Sequence[float]]) -> str:
@@ -152,7 +152,9 @@ def synthesis(left: float, needed: int) -> str:
 def spectrum(ratios: Sequence[float]) -> str:
     """Fig. 3: posterior over prior variance of each mode."""
     count = sum(ratio < SHRUNK for ratio in ratios)
-    words = f"{count} of {len(ratios)} variances shrink below {SHRUNK:.2f}, as the paper's volume implies"
+    words = (
+        f"{count} of {len(ratios)} variances shrink below {SHRUNK:.2f}, the paper's mean ratio"
+    )
     return f"{'reproduced' if count > 0.5 * len(ratios) else 'not reproduced'}: {words}"
 
 
