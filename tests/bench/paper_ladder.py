@@ -231,8 +231,8 @@ over the frames that the track has.
 Static pose (of the model of people) and free-running cycles need no image.
 Gain: how far a rung is below the free-running cycle of its own model, which is all that the images give it;
 median of the clips' differences. The cycles start from the exact truth, the rungs from the truth with noise
-(pelvis 3 cm, phase 0.03, rate 0.03 per second, heading 0.05 rad), so the comparison favours no image. Outdoors there is no
-truth in space; [paper_mode](paper_mode.md) has that clip.
+(pelvis 3 cm, phase 0.03, rate 0.03 per second, heading 0.05 rad), so the comparison favours no image.
+Outdoors there is no truth in space; [paper_mode](paper_mode.md) has that clip.
 
 ![the ladder](paper_ladder.svg)"""
 
