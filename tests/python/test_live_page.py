@@ -83,6 +83,36 @@ def test_the_page_waits_and_then_shows_a_tracker(live, reports):
         accessibility.check(page)
 
 
+OUTSIDE = """[...document.querySelectorAll('.panel, header')].flatMap((panel) => {
+  const box = panel.getBoundingClientRect();
+  return [...panel.querySelectorAll('*'), ...(panel.matches('header') ? [] : [panel])].filter((each) => {
+    const own = each.getBoundingClientRect();
+    const others = [...document.querySelectorAll('.panel, header')].filter((other) => !other.contains(each));
+    return own.width && own.height && (own.left < box.left - 1 || own.right > box.right + 1
+      || own.top < box.top - 1 || own.bottom > box.bottom + 1 || others.some((other) => {
+        const its = other.getBoundingClientRect();
+        return own.left < its.right - 1 && own.right > its.left + 1
+          && own.top < its.bottom - 1 && own.bottom > its.top + 1;
+      }));
+  }).map((each) => `${each.tagName} ${each.id} of ${panel.id || panel.className}`);
+})"""  # what lies outside its panel, or over another
+
+
+@pytest.mark.parametrize("width", [1280, 390])
+def test_everything_stays_in_its_panel_when_the_film_has_ended(live, reports, width):
+    with browser.opened(width) as page:
+        page.goto(live.address)
+        browser.until(page, "window.live !== undefined")
+        live.show(0, np.zeros((720, 1280, 3), np.uint8))
+        live.report("sample", reports[0][5])
+        browser.until(page, "document.querySelector('#pictures img').naturalWidth === 1280")
+        browser.until(page, "live.curves.data.times.length > 0")
+        browser.until(page, "document.querySelector('#waiting').textContent")
+        assert page.evaluate(OUTSIDE) == []
+        image = page.locator("#pictures img").bounding_box()
+        assert image["height"] > 150 and image["width"] > 300
+
+
 def test_pause_holds_the_page(live, reports):
     with browser.opened() as page:
         page.goto(live.address)

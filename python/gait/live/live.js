@@ -158,7 +158,7 @@ for (const stream of start.streams) {
   image.hidden = true;
   figure.append(image);
   if (start.streams.length > 1) figure.append(Object.assign(document.createElement('figcaption'), { textContent: `camera ${stream}` }));
-  element('pictures').append(figure);
+  element('images').append(figure);
   images.set(stream, image);
 }
 
