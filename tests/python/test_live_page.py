@@ -62,9 +62,17 @@ def test_the_page_waits_and_then_shows_a_tracker(live, reports):
         assert reports[2].url in page.inner_text("#waiting")
         live.report(
             "health",
-            {"person": 0, "state": "waiting", "text": "waiting for a camera", "dropped": 2, "particles": 9},
+            {
+                "person": 0,
+                "state": "waiting",
+                "text": "waiting for a camera",
+                "frames": 0,
+                "dropped": 2,
+                "particles": 9,
+            },
         )
         browser.until(page, "document.querySelector('#text').textContent === 'waiting for a camera'")
+        assert "Start gait capture" in page.inner_text("#waiting")  # the tracker runs already
         send(live, reports, range(6))
         browser.until(page, "live.scene.data.times.length > 2 && live.curves.data.times.length > 2")
         last = reports[0][5]
@@ -108,6 +116,17 @@ def test_everything_stays_in_its_panel_when_the_film_has_ended(live, reports, wi
         browser.until(page, "document.querySelector('#pictures img').naturalWidth === 1280")
         browser.until(page, "live.curves.data.times.length > 0")
         browser.until(page, "document.querySelector('#waiting').textContent")
+        health = {
+            "person": 0,
+            "state": "running",
+            "text": "tracking",
+            "frames": 6,
+            "dropped": 0,
+            "particles": 9,
+        }
+        live.report("health", health)
+        browser.until(page, "document.querySelector('#waiting').textContent.includes('film has ended')")
+        assert "Start" not in page.inner_text("#waiting")
         assert page.evaluate(OUTSIDE) == []
         image = page.locator("#pictures img").bounding_box()
         assert image["height"] > 150 and image["width"] > 300

@@ -9,7 +9,7 @@ const start = await (await fetch('/state')).json();
 let scene, curves, paused = false, recording = Boolean(start.recording.path);
 let chosen = 0; // person whose numbers and plots are shown
 const PHASE = start.curves.findIndex((curve) => curve.name === 'phase');
-const people = start.people.map((one) => ({ ...one, last: 0, body: null }));
+const people = start.people.map((one) => ({ ...one, last: 0, heard: -Infinity, health: null, body: null }));
 
 // ---- figure and plots, where their parts were fetched ----
 if (start.parts) {
@@ -123,6 +123,7 @@ function onSample(one) {
 }
 
 function onHealth(one) {
+  Object.assign(people[one.person], { health: one, heard: performance.now() });
   if (one.person !== chosen) return;
   element('text').textContent = one.state === 'running' && one.text === 'tracking' ? '' : one.text;
   show('dropped here', String(one.dropped));
@@ -132,14 +133,22 @@ function onHealth(one) {
 
 // ---- what is missing ----
 const quiet = () => performance.now() - people[chosen].last > QUIET_MS;
+/** What to do about missing estimates; empty where the state of the tracker explains them. */
+function remedy() {
+  const { url, channel, name, health, heard } = people[chosen];
+  if (performance.now() - heard < QUIET_MS) {
+    if (!health.frames) return 'Start gait capture for a film or camera.';
+    return health.state === 'running' ? 'No frames arrive any more: the film has ended or the camera stopped.' : '';
+  }
+  if (channel !== 'GAIT_ESTIMATE') return `Start gait-trackd --person ${name} --keypoints-term, gait detect --lcm, and gait capture for a film or camera.`;
+  return url === start.url ? 'Start gait-trackd on the same URL (--url, or LCM_DEFAULT_URL), and gait capture for a film or camera.'
+    : `Start gait-trackd --url ${start.url} --out ${url}, and gait capture for a film or camera.`;
+}
 function explain(text) {
   if (paused) return;
   setStatus('', 'waiting');
-  const images = `GAIT_IMAGE_${start.streams.join(', GAIT_IMAGE_')} on ${start.url}`, { url, channel, name } = people[chosen];
-  const lines = [text, `Listening for ${channel} ${url === start.url ? '' : `on ${url} `}and ${images}.`,
-    channel !== 'GAIT_ESTIMATE' ? `Start gait-trackd --person ${name} --keypoints-term, gait detect --lcm, and gait capture for a film or camera.`
-      : url === start.url ? 'Start gait-trackd on the same URL (--url, or LCM_DEFAULT_URL), and gait capture for a film or camera.'
-      : `Start gait-trackd --url ${start.url} --out ${url}, and gait capture for a film or camera.`];
+  const images = `GAIT_IMAGE_${start.streams.join(', GAIT_IMAGE_')} on ${start.url}`, { url, channel } = people[chosen];
+  const lines = [text, `Listening for ${channel} ${url === start.url ? '' : `on ${url} `}and ${images}.`, remedy()].filter(Boolean);
   element('waiting').replaceChildren(...lines.map((line) => Object.assign(document.createElement('p'), { textContent: line })));
 }
 setInterval(() => { if (quiet() && !element('waiting').textContent) explain('No estimates arrive.'); }, 500);
