@@ -353,10 +353,10 @@ def test_pictures_are_corrected_as_the_batch_command_does(clip):
     pull = {"do": "pull", "frame": 20, "joint": "l_ankle", "uv": target, "sd_px": 1.0}
     near = post(server.url, "edit", pull)[1]
     assert math.dist(near["uv"][near["rows"].index(20)][joint], target) < 0.5 * before
-    while (state := json.loads(get(server.url, "state")))["refining"]:
-        time.sleep(0.1)
+    exported = get(server.url, "export/csv")  # waits for the whole motion
+    state = json.loads(get(server.url, "state"))
+    assert not state["refining"]
     assert math.dist(state["uv"][20][joint], target) < 0.5 * before and state["fault"] == ""
-    exported = get(server.url, "export/csv")
     (folder / "overlay.mp4").write_bytes(get(server.url, "export/mp4"))
     assert Video(folder / "overlay.mp4").count == 60
     assert server.end(signal.SIGINT) == 0

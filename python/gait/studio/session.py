@@ -44,6 +44,7 @@ Floats = npt.NDArray[np.float64]
 Point = TypeVar("Point", Correction, FloorPin)
 
 LEAST_SD, MOST_SD = 0.3, 50.0  # pixels, of a point given by hand
+LONGEST_WAIT = 60.0  # seconds, of an export for the whole motion
 MOST_UNDONE = 500  # edits that can be undone
 LEAST_WAY = 0.05  # metres over the floor that show a direction
 ARROW = 0.7  # metres, of the arrow that shows it
@@ -63,7 +64,7 @@ class Session:
 
     def __init__(self, source: Source) -> None:
         self.source, self._lift = source, source.lift
-        self._lock = threading.RLock()
+        self._lock = threading.Condition()  # notified when the whole is solved
         used = range(int(source.lift.frames[0]), int(source.lift.frames[-1]) + 1)
         self._known = source.prior, used, source.video.size
         self._reader = EntryReader(*self._known)
@@ -271,6 +272,7 @@ class Session:
             if not isinstance(found, str):
                 self._use(found)
             self.version += 1
+            self._lock.notify_all()
 
     def _use(self, solved: Solved) -> None:
         """Show a motion and go on from it."""
@@ -306,18 +308,18 @@ class Session:
     def export(self, kind: str) -> Path:
         """Write what a command writes of the whole motion: a format of `gait export`, ``csv`` or ``mp4``.
 
-        ``camera`` gives the camera, found or given.
+        ``camera`` gives the camera, found or given.  Waits while the whole is being solved.
 
         Raises
         ------
         UserError
-            If the whole is not solved yet, or there is no such file.
+            If the whole is not solved in time, or there is no such file.
         """
         if kind not in EXPORTS:
             raise UserError(f"{kind}: unknown export")
         with self._lock:
-            if self.refining:
-                raise UserError("the whole motion is still being computed; wait a moment")
+            if not self._lock.wait_for(lambda: not self.refining, LONGEST_WAIT):
+                raise UserError("the whole motion is still being computed; export it later")
             if self.fault:
                 raise UserError(f"the last corrections are not yet in the whole motion: {self.fault}")
             solved, folder = self._solved, self.source.folder
