@@ -1,12 +1,14 @@
 """Marks on the floor: their distances, the page to click them on, and the camera that comes of them."""
 
 import json
+import signal
 
 import accessibility
 import browser
 import cv2
 import numpy as np
 import pytest
+import uvicorn
 
 from gait import Camera, UserError
 from gait.camera.camera import read_camera
@@ -198,3 +200,15 @@ def test_a_lens_of_another_size_is_refused(tmp_path, capsys):
     ]
     assert main(["camera", *words]) == 1
     assert "calibrated for 1280x720, the video is 640x480" in capsys.readouterr().err
+
+
+def test_a_page_that_the_user_ends_is_no_failure(tmp_path, monkeypatch):
+    cv2.imwrite(str(tmp_path / "a.png"), np.zeros((480, 640, 3), np.uint8))
+
+    def ended(server, sockets):
+        sockets[0].close()
+        signal.raise_signal(signal.SIGTERM)
+
+    monkeypatch.setattr(uvicorn.Server, "run", ended)
+    words = ["--page", str(tmp_path / "a.png"), "-o", str(tmp_path / "c.json"), "--port", "0"]
+    assert main(["camera", *words]) == 0
