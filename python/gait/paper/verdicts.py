@@ -152,9 +152,7 @@ def synthesis(left: float, needed: int) -> str:
 def spectrum(ratios: Sequence[float]) -> str:
     """Fig. 3: posterior over prior variance of each mode."""
     count = sum(ratio < SHRUNK for ratio in ratios)
-    words = (
-        f"{count} of {len(ratios)} variances shrink below {SHRUNK:.2f}, the paper's mean ratio"
-    )
+    words = f"{count} of {len(ratios)} variances shrink below {SHRUNK:.2f}, the paper's mean ratio"
     return f"{'reproduced' if count > 0.5 * len(ratios) else 'not reproduced'}: {words}"
 
 
