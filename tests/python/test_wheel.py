@@ -108,7 +108,7 @@ def test_a_missing_extra_is_one_line(numpy_alone, tmp_path):
         "capture": "capture walk.mp4",
         "record": "record -o track.csv",
         "demo": "demo walk.mp4 -o out",
-        "report": "report walk.mp4 --video walk.mp4 --track track.csv -o out",
+        "report": "report walk.mp4 --video walk.mp4 --track track.csv -o out.html",
         "report track": "report track track.csv",
         "report lift": "report lift -o out",
         "paper": "paper --mocap walks -o paper.html",
