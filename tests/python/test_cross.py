@@ -10,23 +10,20 @@ import pytest
 
 MACHINE = "aarch64-linux-gnu"
 DAEMON = rig.ROOT / f"build/{MACHINE}-release/bin/gait-trackd"
-SYSROOT = Path(os.environ.get("SYSROOT", "/"))
+SYSROOT = os.environ.get("SYSROOT")
 
 
 def test_the_daemon_for_another_cpu_gives_the_same_bits(tmp_path, monkeypatch):
     for program in (f"{MACHINE}-gcc", f"{MACHINE}-g++", "qemu-aarch64"):
         if not shutil.which(program):
             pytest.skip(f"no {program}")
-    libraries = SYSROOT / "usr/lib" / MACHINE
+    if SYSROOT is None:
+        pytest.skip("set SYSROOT to a folder with GLib for that CPU")
+    libraries = Path(SYSROOT) / "usr/lib" / MACHINE
     if not (libraries / "libglib-2.0.so.0").exists():
-        pytest.skip(f"no {libraries}/libglib-2.0.so.0: install libglib2.0-0:arm64 or set SYSROOT")
+        pytest.skip(f"no {libraries}/libglib-2.0.so.0")
     env = {k: v for k, v in os.environ.items() if not k.startswith("MAKE") and k not in ("CC", "CXX")}
-    make = [
-        "make",
-        "tools",
-        f"CC={MACHINE}-gcc",
-        *([f"SYSROOT={SYSROOT}"] if "SYSROOT" in os.environ else []),
-    ]
+    make = ["make", "tools", f"CC={MACHINE}-gcc", f"SYSROOT={SYSROOT}"]
     done = subprocess.run(make, cwd=rig.ROOT, env=env, capture_output=True, text=True, timeout=900)
     assert done.returncode == 0, done.stderr
 
