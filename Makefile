@@ -203,6 +203,7 @@ LCM_TYPES := $(sort $(wildcard lcm_types/*.lcm))
 # JPEG frames need libjpeg's headers; without them gait-trackd reports that it cannot decode JPEG.
 ifndef FOREIGN
 LCM := $(SITE)
+$(LCM)/lib/liblcm.so: | $(READY) ; # of its package
 JPEG_LIBS := $(shell pkg-config --libs libjpeg 2>/dev/null)
 JPEG_CFLAGS := $(if $(JPEG_LIBS),-DHAVE_LIBJPEG $(shell pkg-config --cflags libjpeg))
 else
