@@ -1,6 +1,7 @@
 #define _GNU_SOURCE /* ppoll */
 #include "receiver.h"
 
+#include "byte_reader.h"
 #include "lcm_link.h"
 #include "manager.h"
 
@@ -154,11 +155,11 @@ static void on_command(const lcm_recv_buf_t *buf, const char *channel, void *use
 static void on_status(const lcm_recv_buf_t *buf, const char *channel, void *user)
 {
     receiver *const r = user;
-    gaitmsg_status_t msg = {0};
+    byte_reader bytes = {buf->data, buf->data_size, true};
+    int64_t const type = bytes_int(&bytes, 8), utime = bytes_int(&bytes, 8);
     (void)channel;
-    if (gaitmsg_status_t_decode(buf->data, 0, (int)buf->data_size, &msg) >= 0) /* else of another version */
-        service_status(r->service, &msg);
-    gaitmsg_status_t_decode_cleanup(&msg); /* of a damaged one, the text that came before the damage */
+    if (bytes.ok && type == __gaitmsg_status_t_get_hash()) /* else of another version */
+        service_status(r->service, utime);
 }
 
 static bool subscribe_further(receiver *r, message *why)

@@ -435,10 +435,10 @@ void service_send_estimate(service *s, const image_view *v, const gait_estimate 
 
 #define ANOTHER_DAEMON "another gait-trackd uses this URL; stop it, or give each its own --url"
 
-void service_status(service *s, const gaitmsg_status_t *msg)
+void service_status(service *s, int64_t utime)
 {
     for (int i = 0; i < SERVICE_SENT; i++)
-        if (s->sent[i] == msg->utime)
+        if (s->sent[i] == utime)
             return;
     if (strcmp(s->complaint.text, ANOTHER_DAEMON) !=
         0) /* else two daemons would answer each other without end */

@@ -127,7 +127,7 @@ void service_send_estimate(service *s, const image_view *v, const gait_estimate 
 /* Go on with the person of a restored tracker, which followed them until such a frame. */
 void service_resume(service *s, int64_t utime, int64_t frame);
 void service_send_status(service *s);
-/* A status that was heard: one that this service did not send is another daemon's, which is reported. */
-void service_status(service *s, const gaitmsg_status_t *msg);
+/* A status that was heard, sent at `utime`: one that this service did not send is another daemon's, which is reported. */
+void service_status(service *s, int64_t utime);
 uint64_t service_digest(const service *s); /* 0 before the camera is known */
 #endif

@@ -312,8 +312,9 @@ static int idle_of(const service *s)
 static void set_lack(const service *s, int idle, message *why)
 {
     int const i = s->stream;
-    if (idle == SERVICE_IDLE_CAMERA && s->first_given)
-        message_set(why, "no camera: announce it on GAIT_CAMERA_%d", further_unknown(s->further)->stream);
+    const further_camera *const unknown = s->first_given && s->further ? further_unknown(s->further) : NULL;
+    if (idle == SERVICE_IDLE_CAMERA && unknown)
+        message_set(why, "no camera: announce it on GAIT_CAMERA_%d", unknown->stream);
     else if (idle == SERVICE_IDLE_CAMERA)
         message_set(why, "no camera: give --camera or announce it on GAIT_CAMERA_%d", i);
     else if (idle == SERVICE_IDLE_START)
