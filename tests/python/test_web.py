@@ -8,6 +8,8 @@ from concurrent.futures import ThreadPoolExecutor
 import browser
 import numpy as np
 import pytest
+from starlette.responses import StreamingResponse
+from starlette.routing import Route
 
 from gait.errors import UserError
 from gait.web import modules, parts, serve
@@ -131,6 +133,26 @@ def test_only_this_machines_own_page_is_answered(fetched):
         assert ask(url, "/web/three.module.js")[0] == 200
         for path in ("/web/serve.py", "/web/..%2fserve.py", "/web/../parts.py", "/etc/passwd"):
             assert ask(url, path)[0] == 404
+
+
+def test_an_unread_answer_ends_with_the_server(fetched, monkeypatch):
+    monkeypatch.setattr(serve, "STREAMS_END", 0)
+
+    async def endless():
+        while True:
+            yield bytes(1 << 20)
+
+    own = serve.listen(0)
+    port = own.getsockname()[1]
+    film = Route("/film", lambda request: StreamingResponse(endless()))
+    server, thread = serve.background(serve.application("<main>hello</main>", "t", [film], port), own)
+    asked = http.client.HTTPConnection("127.0.0.1", port, timeout=30)
+    asked.request("GET", "/film")
+    assert asked.getresponse().status == 200
+    server.should_exit = True
+    thread.join(30)
+    assert not thread.is_alive() and not server.server_state.connections
+    asked.close()
 
 
 def test_a_port_that_is_taken_is_one_line():

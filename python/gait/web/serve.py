@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import asyncio
 import contextlib
 import html
 import json
@@ -216,5 +217,15 @@ def _server(app: ASGIApp) -> uvicorn.Server:
     config = uvicorn.Config(
         informed, log_level="error", access_log=False, lifespan="off", timeout_graceful_shutdown=STREAMS_END
     )
-    server = uvicorn.Server(config)
+    server = _Server(config)
     return server
+
+
+class _Server(uvicorn.Server):
+    """Closes what is left of its connections when it ends."""
+
+    async def shutdown(self, sockets: list[socket.socket] | None = None) -> None:
+        await super().shutdown(sockets)
+        for connection in list(self.server_state.connections):  # whose answers did not end in time
+            connection.transport.abort()
+        await asyncio.sleep(0)  # in which they close
