@@ -52,7 +52,7 @@ int main(int argc, char **argv)
         {"log-likelihoods", t->loglik_raw},
         {"joints, rows of rejuvenation, image planes (shared)", t->joint},
         {"rules and mirrors of the classes", t->layouts},
-        {"mode, surface of the estimate", t->in_mode},
+        {"dominant particles, surface of the estimate", t->dominant},
         {"scratch of a task and of the fixed lag", t->work},
         {"", (const char *)memory + bytes},
     };

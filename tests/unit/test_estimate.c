@@ -338,7 +338,7 @@ static void test_sums(void)
             double *const to = out[k >= 0];
             const double *const w = weight + off;
             guarded const g = guard_fill(memory[k >= 0], (size_t)n);
-            to[0] = run->estimate_mode(v[0] + off, v[1] + off, w, n, n / 2, g.begin);
+            to[0] = run->estimate_dominant(v[0] + off, v[1] + off, w, n, n / 2, g.begin);
             run->estimate_moments(v[2] + off, w, g.begin, n, 0.25, to + 1);
             run->estimate_resultant(v[1] + off, 1.5f, w, g.begin, n, to + 4);
             run->estimate_rotations(v[0] + off, v[1] + off, v[2] + off, w, g.begin, n, to + 8);

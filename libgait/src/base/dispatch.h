@@ -14,7 +14,7 @@ enum { BLOCK = 16 }; /* bodies or particles that a kernel works on at once, one 
 
 typedef float body_lanes[BLOCK];
 
-/* Types of higher folders, which the file of a kernel includes. */
+/* Types of higher folders, whose headers the file of each kernel includes. */
 struct dynamics_step;
 struct edge_cell;
 struct edge_rows;
@@ -38,98 +38,103 @@ struct view_planes;
 struct particle_block;
 
 /* Result, name, parameters. */
-#define KERNELS(K)                                                                                           \
-    /* Upper triangle of A += W'W, A and W of ld columns (base/cholesky.h) */                                \
-    K(void, cholesky_rank, (double *A, int32_t ld, const double *W, int32_t rows))                           \
-    /* A = U'U, n rows, U may be A; column n becomes U^-T b and the residual; false: not definite */         \
-    K(bool, cholesky_factor, (const double *A, double *U, int32_t n, int32_t ld))                            \
-    /* Z = U^-T Z, `width` columns (a multiple of CHOLESKY_LANES), cholesky_padded(n) rows of ldz */         \
-    K(void, cholesky_forward,                                                                                \
-      (const double *U, int32_t n, int32_t ld, double *Z, int32_t ldz, int32_t width))                       \
-    /* V = U^-T V with floats, ld x width (of CHOLESKY_FLOATS), followed by ld x ld floats of scratch */     \
-    K(void, cholesky_forward_float, (const double *U, int32_t n, int32_t ld, float *V, int32_t width))       \
-    /* x[j] += sum_i theta[i] mode[i * stride + j], j < width */                                             \
-    K(void, lift_sum,                                                                                        \
-      (double *x, int32_t width, const float *mode, size_t stride, const double *theta, int32_t modes))      \
-    /* A marker's modes between two frames, out = w0 s0 + w1 s1 (3 x lanes); where theta moves it */         \
-    K(void, lift_shape,                                                                                      \
-      (double *out, const float *s0, const float *s1, double w0, double w1, int32_t lanes,                   \
-       const double *theta, int32_t modes, double moved[3]))                                                 \
-    /* w[i] = g . shape[.][i], i < lanes */                                                                  \
-    K(void, lift_row, (double *w, const double *shape, int32_t lanes, const double g[3]))                    \
-    /* One coordinate of eight markers, modes x 8: out = w0 s0 + w1 s1; where theta moves each */            \
-    K(void, lift_eight,                                                                                      \
-      (double *out, const float *s0, const float *s1, double w0, double w1, const double *theta,             \
-       int32_t modes, double moved[8]))                                                                      \
-    /* v[i * stride + a * apart + r] = M[a][.][r] . shape[.][i][r], a < 3, i < modes, r < 8 */               \
-    K(void, lift_turn,                                                                                       \
-      (float *v, size_t stride, size_t apart, const double *shape, int32_t modes, double M[9][8]))           \
-    /* x[j] += sum_i Z[i * stride + j]^2, j < width, of CHOLESKY_LANES */                                    \
-    K(void, lift_squares, (double *x, int32_t width, const float *Z, size_t stride, int32_t rows))           \
-    /* Every channel at each lane's phase from the first `components` scores (Ormoneit et al., eq. 3). */    \
-    K(void, kin_curves,                                                                                      \
-      (const struct gait_model *m, const struct kin_input *in, int32_t components,                           \
-       struct kin_channels *out))                                                                            \
-    /* Every frame in the world; the first `proportions` scores of limb lengths apply. */                    \
-    K(void, kin_pose,                                                                                        \
-      (const struct gait_model *m, const struct kin_channels *ch, const struct kin_input *in,                \
-       int32_t proportions, struct kin_body *out))                                                           \
-    /* A captured frame resampled to the working image, and its feature maps. */                             \
-    K(void, view_rows,                                                                                       \
-      (const struct view_map *map, const gait_camera *cam, const gait_image *im, int32_t begin, int32_t end, \
-       const struct view_planes *out))                                                                       \
-    K(void, view_inside, (const struct view_map *map, const gait_camera *cam, uint64_t (*inside)[2]))        \
-    K(void, view_grey, (const struct view_planes *in, int32_t begin, int32_t end, uint8_t *grey))            \
-    K(void, features_foreground,                                                                             \
-      (struct features * f, const struct view_planes *im, const struct view_planes *plate))                  \
-    K(void, features_edges, (const uint8_t *grey, struct edge_cell *out, struct edge_rows *s))               \
-    K(void, features_contrast, (const uint8_t *grey, int8_t *out))                                           \
-    K(void, features_pairs, (const int8_t *surface, uint16_t *pairs))                                        \
-    /* A block of particles over one interval. */                                                            \
-    K(void, dynamics_move,                                                                                   \
-      (const struct dynamics_step *s, int32_t first, const struct particle_block *from,                      \
-       struct particle_block *to))                                                                           \
-    /* Sums over weighted particles, d = v - about: w d, w d^2 and, over those in use, w d; cosines and */   \
-    /* sines over all and those in use; who is near the best, and their weight; products of quaternions. */  \
-    K(void, estimate_moments,                                                                                \
-      (const float *v, const double *weight, const uint8_t *use, int32_t n, double about, double out[3]))    \
-    K(void, estimate_resultant,                                                                              \
-      (const float *angle, float turn, const double *weight, const uint8_t *use, int32_t n, double out[4]))  \
-    K(double, estimate_mode,                                                                                 \
-      (const float *phase, const float *heading, const double *weight, int32_t n, int32_t best,              \
-       uint8_t *use))                                                                                        \
-    K(void, estimate_rotations,                                                                              \
-      (const float *heading, const float *pitch, const float *roll, const double *weight,                    \
-       const uint8_t *use, int32_t n, double out[16]))                                                       \
-    /* hidden[i] = log(exp(visible[i]) + exp(base + hidden[i])) */                                           \
-    K(void, track_loss_join, (const float *visible, float base, int32_t n, float *hidden))                   \
-    /* Outlines of the limbs of a block of bodies in one camera's working image. */                          \
-    K(void, outline_project,                                                                                 \
-      (const struct limb_geometry *limbs, int32_t count, const struct kin_body *body,                        \
-       const gait_camera *cam, const struct view_map *map, struct outline_block *out))                       \
-    /* Outlines as lines in the grid, with the depth order of the limbs; then masks of one body. */          \
-    K(void, layers_prepare,                                                                                  \
-      (const struct outline_block *outline, const struct limb_geometry *limbs, int32_t count,                \
-       struct layers_block *out))                                                                            \
-    K(void, layers_draw, (const struct layers_block *block, int32_t lane, struct layers *out))               \
-    K(void, silhouette_count,                                                                                \
-      (const struct features *f, const struct grid_mask *whole, int32_t *area, int32_t *covered))            \
-    /* Surface points of a block of bodies in a camera, samples of one body, and their comparison. */        \
-    K(void, surface_pose,                                                                                    \
-      (const struct like_setup *s, const gait_camera *cam, const struct view_map *map,                       \
-       const struct kin_body *body, struct like_pose *out))                                                  \
-    K(void, surface_sample,                                                                                  \
-      (const struct like_setup *s, const struct features *f, const struct like_pose *pose, int32_t lane,     \
-       const struct layers *drawn, struct like_patch *out))                                                  \
-    K(void, texture_costs, (const struct like_body *b, int32_t (*cost)[16]))                                 \
-    K(void, texture_logs,                                                                                    \
-      (const struct like_setup *s, const struct outline_block *outline, const int32_t (*cost)[16],           \
-       float *restrict log))                                                                                 \
-    K(int64_t, template_cost, (const struct like_body *b))                                                   \
-    /* Sides of the limbs of a block of bodies, and the gradient along those of one body. */                 \
-    K(void, edges_prepare,                                                                                   \
-      (const struct outline_block *outline, const struct limb_geometry *limbs, int32_t count,                \
-       struct like_outline *out))                                                                            \
+#define KERNELS(K)                                                                                              \
+    /* Upper triangle of A += W'W, A and W of ld columns (base/cholesky.h) */                                   \
+    K(void, cholesky_rank, (double *A, int32_t ld, const double *W, int32_t rows))                              \
+    /* A = U'U, n rows, U may be A; column n becomes U^-T b and the residual; false: not definite */            \
+    K(bool, cholesky_factor, (const double *A, double *U, int32_t n, int32_t ld))                               \
+    /* Z = U^-T Z, `width` columns (a multiple of CHOLESKY_LANES), cholesky_padded(n) rows of ldz */            \
+    K(void, cholesky_forward,                                                                                   \
+      (const double *U, int32_t n, int32_t ld, double *Z, int32_t ldz, int32_t width))                          \
+    /* V = U^-T V with floats, ld x width (of CHOLESKY_FLOATS), followed by ld x ld floats of scratch */        \
+    K(void, cholesky_forward_float, (const double *U, int32_t n, int32_t ld, float *V, int32_t width))          \
+    /* x[j] += sum_i theta[i] mode[i * stride + j], j < width */                                                \
+    K(void, lift_sum,                                                                                           \
+      (double *x, int32_t width, const float *mode, size_t stride, const double *theta, int32_t modes))         \
+    /* A marker's modes between two frames, out = w0 s0 + w1 s1 (3 x lanes); moved: it, by modes times theta */ \
+    K(void, lift_shape,                                                                                         \
+      (double *out, const float *s0, const float *s1, double w0, double w1, int32_t lanes,                      \
+       const double *theta, int32_t modes, double moved[3]))                                                    \
+    /* w[i] = g . shape[.][i], i < lanes */                                                                     \
+    K(void, lift_row, (double *w, const double *shape, int32_t lanes, const double g[3]))                       \
+    /* The same for one coordinate of eight markers, out: modes x 8 */                                          \
+    K(void, lift_eight,                                                                                         \
+      (double *out, const float *s0, const float *s1, double w0, double w1, const double *theta,                \
+       int32_t modes, double moved[8]))                                                                         \
+    /* v[i * stride + a * apart + r] = M[a][.][r] . shape[.][i][r], a < 3, i < modes, r < 8 */                  \
+    K(void, lift_turn,                                                                                          \
+      (float *v, size_t stride, size_t apart, const double *shape, int32_t modes, double M[9][8]))              \
+    /* x[j] += sum_i Z[i * stride + j]^2, j < width, of CHOLESKY_LANES */                                       \
+    K(void, lift_squares, (double *x, int32_t width, const float *Z, size_t stride, int32_t rows))              \
+    /* Every channel at each lane's phase from the first `components` scores (Ormoneit et al., eq. 3). */       \
+    K(void, kin_curves,                                                                                         \
+      (const struct gait_model *m, const struct kin_input *in, int32_t components,                              \
+       struct kin_channels *out))                                                                               \
+    /* Every frame in the world; the first `proportions` scores of limb lengths apply. */                       \
+    K(void, kin_pose,                                                                                           \
+      (const struct gait_model *m, const struct kin_channels *ch, const struct kin_input *in,                   \
+       int32_t proportions, struct kin_body *out))                                                              \
+    /* A captured frame resampled to the working image, and its feature maps. */                                \
+    K(void, view_rows,                                                                                          \
+      (const struct view_map *map, const gait_camera *cam, const gait_image *im, int32_t begin, int32_t end,    \
+       const struct view_planes *out))                                                                          \
+    K(void, view_inside, (const struct view_map *map, const gait_camera *cam, uint64_t (*inside)[2]))           \
+    K(void, view_grey, (const struct view_planes *in, int32_t begin, int32_t end, uint8_t *grey))               \
+    K(void, features_foreground,                                                                                \
+      (struct features * f, const struct view_planes *im, const struct view_planes *plate))                     \
+    K(void, features_edges, (const uint8_t *grey, struct edge_cell *out, struct edge_rows *s))                  \
+    K(void, features_contrast, (const uint8_t *grey, int8_t *out))                                              \
+    K(void, features_pairs, (const int8_t *surface, uint16_t *pairs))                                           \
+    /* A block of particles over one interval. */                                                               \
+    K(void, dynamics_move,                                                                                      \
+      (const struct dynamics_step *s, int32_t first, const struct particle_block *from,                         \
+       struct particle_block *to))                                                                              \
+    /* Weighted sums over particles.  dominant: 1 for particles of the dominant hypothesis. */                  \
+    /* With d = v - about: of d, of d^2, and of d over the dominant hypothesis */                               \
+    K(void, estimate_moments,                                                                                   \
+      (const float *v, const double *weight, const uint8_t *dominant, int32_t n, double about,                  \
+       double out[3]))                                                                                          \
+    /* Of cosine and sine, over all and over the dominant hypothesis */                                         \
+    K(void, estimate_resultant,                                                                                 \
+      (const float *angle, float turn, const double *weight, const uint8_t *dominant, int32_t n,                \
+       double out[4]))                                                                                          \
+    /* Mark the particles near the best one; returns their weight */                                            \
+    K(double, estimate_dominant,                                                                                \
+      (const float *phase, const float *heading, const double *weight, int32_t n, int32_t best,                 \
+       uint8_t *dominant))                                                                                      \
+    /* Outer products of the quaternions, over the dominant hypothesis */                                       \
+    K(void, estimate_rotations,                                                                                 \
+      (const float *heading, const float *pitch, const float *roll, const double *weight,                       \
+       const uint8_t *dominant, int32_t n, double out[16]))                                                     \
+    /* hidden[i] = log(exp(visible[i]) + exp(base + hidden[i])) */                                              \
+    K(void, track_loss_join, (const float *visible, float base, int32_t n, float *hidden))                      \
+    /* Outlines of the limbs of a block of bodies in one camera's working image. */                             \
+    K(void, outline_project,                                                                                    \
+      (const struct limb_geometry *limbs, int32_t count, const struct kin_body *body,                           \
+       const gait_camera *cam, const struct view_map *map, struct outline_block *out))                          \
+    /* Outlines as lines in the grid, with the depth order of the limbs; then masks of one body. */             \
+    K(void, layers_prepare,                                                                                     \
+      (const struct outline_block *outline, const struct limb_geometry *limbs, int32_t count,                   \
+       struct layers_block *out))                                                                               \
+    K(void, layers_draw, (const struct layers_block *block, int32_t lane, struct layers *out))                  \
+    K(void, silhouette_count,                                                                                   \
+      (const struct features *f, const struct grid_mask *whole, int32_t *area, int32_t *covered))               \
+    /* Surface points of a block of bodies in a camera, samples of one body, and their comparison. */           \
+    K(void, surface_pose,                                                                                       \
+      (const struct like_setup *s, const gait_camera *cam, const struct view_map *map,                          \
+       const struct kin_body *body, struct like_pose *out))                                                     \
+    K(void, surface_sample,                                                                                     \
+      (const struct like_setup *s, const struct features *f, const struct like_pose *pose, int32_t lane,        \
+       const struct layers *drawn, struct like_patch *out))                                                     \
+    K(void, texture_costs, (const struct like_body *b, int32_t (*cost)[16]))                                    \
+    K(void, texture_logs,                                                                                       \
+      (const struct like_setup *s, const struct outline_block *outline, const int32_t (*cost)[16],              \
+       float *restrict log))                                                                                    \
+    K(int64_t, template_cost, (const struct like_body *b))                                                      \
+    /* Sides of the limbs of a block of bodies, and the gradient along those of one body. */                    \
+    K(void, edges_prepare,                                                                                      \
+      (const struct outline_block *outline, const struct limb_geometry *limbs, int32_t count,                   \
+       struct like_outline *out))                                                                               \
     K(void, edges_count, (const struct like_body *b, struct like_edge_tally *out))
 
 /* The instruction sets of this build, best last, each with the bit that a CPU mask must have. */

@@ -4,14 +4,15 @@
 #include <string.h>
 
 static const float RESAMPLE_TIME = 0.1f; /* seconds after which particles may change class in any case */
-static const float LEAVING = 0.5f;       /* most of a particle's weight that changes class at once */
-static const double MATTERS = 0.05;      /* probability from which a class's effective sample size counts */
+static const float LEAVING = 0.5f;       /* largest share of a particle's weight that changes class at once */
+static const double MATTERS = 0.05; /* probability of a class from which its effective sample size counts */
 static const int64_t STILL_TIME =
     500000;                         /* microseconds of standing still after which either leg may go first */
-static const float SCORE_SD = 0.5f; /* of scores that the person is known to have in a class */
+static const float SCORE_SD = 0.5f; /* of a person's scores in a class in which they have been seen before */
 
 /* ---- ranges ---- */
-/* Append ranges of n particles from `first` on, in units of `unit`: each class has the least, the rest is by probability. */
+/* Append ranges of n particles from `first` on, in multiples of `unit`: each class gets the minimum, and the rest is shared
+ * by probability. */
 static void share_out(const gait_tracker *t, const double *probability, int32_t first, int32_t n,
                       int32_t unit, strata *s)
 {
@@ -95,7 +96,7 @@ bool class_strata_due(const gait_tracker *t)
     return false;
 }
 
-/* Probability that particle i changes from class m in this time, to[class][i]; staying included. */
+/* Probability that particle i is in each class after this time, to[class][i], if it is now in class m. */
 static void change_probability(const gait_tracker *t, const gait_model *m, int32_t i, float seconds,
                                float *to, size_t n)
 {
@@ -116,7 +117,7 @@ void class_strata_resample(gait_tracker *t, int32_t begin, int32_t end, int32_t 
     const strata *const then = tracker_strata(t);
     pf *const f = &t->filter;
     size_t const all = (size_t)f->n;
-    float *const to = t->joint; /* classes x f->n; not needed until the likelihood step, nor is lag.weight */
+    float *const to = t->joint; /* classes x f->n; like lag.weight free until the likelihood step */
     double *const weight = t->lag.weight, total[GAIT_MAX_CLASSES];
     float const seconds = seconds_since(t, t->core->start_utime + t->classes->resampled);
     double now[GAIT_MAX_CLASSES] = {0.0};
@@ -150,7 +151,7 @@ void class_strata_resample(gait_tracker *t, int32_t begin, int32_t end, int32_t 
 void class_strata_origins(gait_tracker *t, const strata *then)
 {
     for (int32_t i = 0; i < t->filter.n; i++)
-        t->in_mode[i] = (uint8_t)then->motion_class[stratum_at(then, t->filter.parent[i])];
+        t->origin[i] = (uint8_t)then->motion_class[stratum_at(then, t->filter.parent[i])];
 }
 
 void class_strata_enter(const gait_tracker *t, uint32_t counter, int32_t first, int32_t lanes,
@@ -166,11 +167,11 @@ void class_strata_enter(const gait_tracker *t, uint32_t counter, int32_t first, 
                            .score_sd = s->known >> to & 1u ? SCORE_SD : 1.0f};
     for (int32_t lane = 0; lane < lanes; lane++) {
         particle_state one;
-        if (t->in_mode[first + lane] == to)
+        if (t->origin[first + lane] == to)
             continue;
         for (int32_t f = 0; f < t->particles.fields; f++)
             one.f[f] = p->f[f][lane];
-        class_change_enter(&e, t->in_mode[first + lane], first + lane, &one);
+        class_change_enter(&e, t->origin[first + lane], first + lane, &one);
         for (int32_t f = 0; f < t->particles.fields; f++)
             p->f[f][lane] = one.f[f];
     }

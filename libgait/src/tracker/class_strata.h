@@ -10,23 +10,23 @@
 #define GAIT_TRACKER_CLASS_STRATA_H
 #include "tracker/tracker_state.h"
 
-/* Begin: the current particles are laid out by these probabilities, with weights to match. */
+/* Lay out the current particles in ranges by these probabilities, with weights to match. */
 void class_strata_begin(gait_tracker *t, const double *probability);
 
 /* Whether the classes need a resampling. */
 bool class_strata_due(const gait_tracker *t);
 
-/* Resample particles begin .. end - 1 as one hypothesis into n from `begin` on: parents, weights and t->next.  u: common
- * offset, as of pf_draw(). */
+/* Resample particles begin .. end - 1, one hypothesis, into n particles from `begin` on: sets parents, weights and t->next.
+ * u: common offset, as in pf_draw(). */
 void class_strata_resample(gait_tracker *t, int32_t begin, int32_t end, int32_t n, uint32_t u);
 
-/* The particles were dealt to two hypotheses: their strata, and weights that sum to share[h] in hypothesis h. */
+/* After particles were dealt to two hypotheses: set their strata, and weights that sum to share[h] in hypothesis h. */
 void class_strata_split(gait_tracker *t, const double share[2]);
 
-/* Class of each new particle's ancestor, to t->in_mode; `then`: strata of the generation before. */
+/* Set t->origin, the class of each new particle's ancestor; `then`: strata of the generation before. */
 void class_strata_origins(gait_tracker *t, const strata *then);
 
-/* Particles from `first` on, all of one class: those whose ancestor was of another enter it. */
+/* Of the particles from `first` on, all of one class, those whose ancestor was of another class enter this one. */
 void class_strata_enter(const gait_tracker *t, uint32_t counter, int32_t first, int32_t lanes,
                         particle_block *p);
 
@@ -36,6 +36,6 @@ void class_strata_probability(const strata *s, const double *weight, double out[
 /* The most probable class, and its heaviest particle in the hypothesis of particle *best. */
 int32_t class_strata_best(const strata *s, const double *weight, int32_t *best);
 
-/* Record what was estimated of this frame; left and right are open after standing still. */
+/* Record the estimate of this frame; after standing still, left and right are open. */
 void class_strata_report(gait_tracker *t, const particle_state *mean, gait_estimate *e);
 #endif

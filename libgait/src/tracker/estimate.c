@@ -13,7 +13,7 @@ static const float MEASURED_STATURE_REL_SD = 0.01f;
 
 typedef struct moments { /* of one number per particle */
     double mean, var;
-    double mode; /* mean over the dominant mode */
+    double dominant; /* mean over the dominant hypothesis */
 } moments;
 
 typedef struct sums {
@@ -21,14 +21,14 @@ typedef struct sums {
     const kernels *run;
     const weighted_particles *of;
     int32_t best;
-    double mass; /* weight of the dominant mode */
+    double weight; /* of the dominant hypothesis */
     moments field[F_MAX], joint[3 * GAIT_MAX_JOINTS];
-    double phase[4], heading[4]; /* mean cosine and sine: over all, then over the mode */
-    double rotation[16];         /* sum of the outer products of quaternions over the mode */
+    double phase[4], heading[4]; /* mean cosine and sine: over all, then over the dominant hypothesis */
+    double rotation[16];         /* sum of the outer products of quaternions over the dominant hypothesis */
 } sums;
 
 /* ---- sums over the particles ---- */
-/* A field of the particles; gathered, if it must be, in one of three arrays. */
+/* A field of the particles; those of an index are gathered in one of three arrays. */
 static const float *column(const sums *s, int32_t f, int32_t array)
 {
     float *const gathered = s->t->lag.column[array];
@@ -44,14 +44,14 @@ static moments moments_of(const sums *s, const float *v)
 {
     double const about = (double)v[s->best];
     double sum[3];
-    s->run->estimate_moments(v, s->of->weight, s->t->in_mode, s->of->n, about, sum);
+    s->run->estimate_moments(v, s->of->weight, s->t->dominant, s->of->n, about, sum);
     double const square = sum[1] - sum[0] * sum[0];
-    return (moments){about + sum[0], square > 0.0 ? square : 0.0, about + sum[2] / s->mass};
+    return (moments){about + sum[0], square > 0.0 ? square : 0.0, about + sum[2] / s->weight};
 }
 
 static void mean_direction(const sums *s, int32_t f, float turn, double out[4])
 {
-    s->run->estimate_resultant(column(s, f, 0), turn, s->of->weight, s->t->in_mode, s->of->n, out);
+    s->run->estimate_resultant(column(s, f, 0), turn, s->of->weight, s->t->dominant, s->of->n, out);
 }
 
 enum {
@@ -73,7 +73,7 @@ static void sums_range(void *ctx, int32_t begin, int32_t end, int32_t task)
             mean_direction(s, F_HEADING, 1.0f, s->heading);
         else if (k == SUM_ROTATION)
             s->run->estimate_rotations(column(s, F_HEADING, 0), column(s, F_PITCH, 1), column(s, F_ROLL, 2),
-                                       s->of->weight, s->t->in_mode, s->of->n, s->rotation);
+                                       s->of->weight, s->t->dominant, s->of->n, s->rotation);
         else if (k < joints)
             s->field[k - SUM_FIELDS] = moments_of(s, column(s, k - SUM_FIELDS, 0));
         else
@@ -101,7 +101,7 @@ static float circular_sd(const double cos_sin[2])
     return __builtin_sqrtf(f_max(-2.0f * m_log(f_max(resultant_length(cos_sin), 1e-6f)), 0.0f));
 }
 
-/* Chordal mean of Rz(heading) Ry(pitch) Rx(roll) over the mode, as the three angles. */
+/* Chordal mean of Rz(heading) Ry(pitch) Rx(roll) over the dominant hypothesis, as the three angles. */
 static void mean_rotation(const sums *s, particle_state *p)
 {
     float q[4];
@@ -111,7 +111,7 @@ static void mean_rotation(const sums *s, particle_state *p)
     p->f[F_ROLL] = m_atan2(2.0f * (q[0] * q[1] + q[2] * q[3]), 1.0f - 2.0f * (q[1] * q[1] + q[2] * q[2]));
 }
 
-/* Standard deviation of the person's size, and with one camera of the distance, as a fraction of them. */
+/* Standard deviation of the person's size, and so of the distance from a single camera, as a fraction of both. */
 static float size_rel_sd(const gait_tracker *t)
 {
     float const measured = MEASURED_STATURE_REL_SD, start = t->core->stature_sd_ratio;
@@ -164,32 +164,32 @@ static void report_sd(const sums *s, float stature, gait_estimate *out)
         out->sd.offset[layout->angle[k]] = sd.f[state_layout_offset(layout) + k];
 }
 
-static particle_state mode_mean(const sums *s)
+static particle_state dominant_mean(const sums *s)
 {
     particle_state mean = {{0}};
     for (int32_t f = 0; f < s->of->all.fields; f++)
-        mean.f[f] = (float)s->field[f].mode;
+        mean.f[f] = (float)s->field[f].dominant;
     mean.f[F_PHASE] = m_wrap1(m_atan2((float)s->phase[3], (float)s->phase[2]) / TWO_PI_F);
     mean_rotation(s, &mean);
     return mean;
 }
 
-/* The particles of the class that are near the best one. */
-static void mark_mode(sums *s, int32_t motion_class)
+/* Mark the particles of the class that are near the best one. */
+static void mark_dominant(sums *s, int32_t motion_class)
 {
     const weighted_particles *const p = s->of;
-    uint8_t *const in_mode = s->t->in_mode;
+    uint8_t *const dominant = s->t->dominant;
     const float *const phase = column(s, F_PHASE, 0), *const heading = column(s, F_HEADING, 1);
     if (!p->strata) {
-        s->mass = s->run->estimate_mode(phase, heading, p->weight, p->n, s->best, in_mode);
+        s->weight = s->run->estimate_dominant(phase, heading, p->weight, p->n, s->best, dominant);
         return;
     }
-    memset(in_mode, 0, (size_t)p->n);
+    memset(dominant, 0, (size_t)p->n);
     for (int32_t k = 0; k < p->strata->count; k++) {
         int32_t const first = p->strata->first[k], count = p->strata->first[k + 1] - first;
         if (p->strata->motion_class[k] == motion_class && count > 0)
-            s->mass += s->run->estimate_mode(phase + first, heading + first, p->weight + first, count,
-                                             s->best - first, in_mode + first);
+            s->weight += s->run->estimate_dominant(phase + first, heading + first, p->weight + first, count,
+                                                   s->best - first, dominant + first);
     }
 }
 
@@ -210,9 +210,9 @@ particle_state estimate_weighted(const gait_tracker *t, const weighted_particles
     gait_pose pose;
     int32_t const motion_class = p->strata ? p->strata->motion_class[stratum_at(p->strata, best)] : 0;
     const state_layout *const layout = &t->layouts[motion_class];
-    mark_mode(&s, motion_class);
+    mark_dominant(&s, motion_class);
     sum_up(&s);
-    particle_state const mean = mode_mean(&s);
+    particle_state const mean = dominant_mean(&s);
     particle_state const heaviest = particle_get(&p->all, p->index ? p->index[best] : best);
     report_joints(&s, mean.f[F_STATURE], out);
     report_sd(&s, mean.f[F_STATURE], out);
@@ -224,7 +224,7 @@ particle_state estimate_weighted(const gait_tracker *t, const weighted_particles
     if (model_pose_state(t->model, &posed, &pose) == GAIT_OK)
         memcpy(out->pose.angle, pose.angle, sizeof pose.angle);
     out->phase_r = resultant_length(s.phase);
-    out->hypothesis_weight = (float)s.mass;
+    out->hypothesis_weight = (float)s.weight;
     out->speed = particle_speed(layout, &mean);
     report_classes(p, motion_class, out);
     return mean;

@@ -3,7 +3,7 @@
 #define GAIT_TRACKER_ESTIMATE_H
 #include "tracker/tracker_state.h"
 
-#define DOMINANT_MASS 0.7f /* weight from which the dominant mode alone is the estimate */
+#define DOMINANT_WEIGHT 0.7f /* weight of the dominant hypothesis from which its mean is a good estimate */
 
 typedef struct weighted_particles { /* their joints are in t->joint */
     particle_set all;
@@ -13,12 +13,11 @@ typedef struct weighted_particles { /* their joints are in t->joint */
     const strata *strata; /* of these n; NULL: one class */
 } weighted_particles;
 
-/* Means, standard deviations, dominant mode and joints; best: the heaviest particle, with several classes that of the most
- * probable one.  Returns the mean of the dominant
- * mode, which t->in_mode marks. */
+/* Means, standard deviations, dominant hypothesis and joints.  best: the heaviest particle, with several classes that of the
+ * most probable one.  Returns the mean of the dominant hypothesis, whose particles t->dominant marks. */
 particle_state estimate_weighted(const gait_tracker *t, const weighted_particles *p, int32_t best,
                                  gait_estimate *out);
 
-/* The same of the current particles. */
+/* The same for the current particles. */
 particle_state estimate_particles(const gait_tracker *t, int32_t best, gait_estimate *out);
 #endif

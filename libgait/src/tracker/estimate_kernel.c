@@ -1,5 +1,5 @@
 /* Weighted sums over the particles: CHUNK running sums, each of every CHUNK-th particle, added up in order at the end, so
- * that all instruction sets give the same bits.  Particles outside of the mode are multiplied by 0: for a conditional gcc 12
+ * that all instruction sets give the same bits.  Particles that are not dominant are multiplied by 0: for a conditional gcc 12
  * generates masked loads, with AVX2 under the wrong mask.  With a CHUNK below 32 gcc unrolls the inner loops before it
  * vectorises, which is slower. */
 #include "base/dispatch.h"
@@ -11,7 +11,7 @@ enum { CHUNK = 64 };
 typedef struct tail { /* the particles after the last whole CHUNK, filled up with weights of 0 */
     float v[3][CHUNK];
     double weight[CHUNK];
-    uint8_t in_mode[CHUNK];
+    uint8_t dominant[CHUNK];
 } tail;
 
 KERNEL_ROW double total(const double *lane)
@@ -22,9 +22,9 @@ KERNEL_ROW double total(const double *lane)
     return sum;
 }
 
-/* in_mode may be NULL. */
+/* dominant may be NULL. */
 KERNEL_ROW tail tail_of(int32_t n, int32_t count, const float *const v[], const double *weight,
-                        const uint8_t *in_mode)
+                        const uint8_t *dominant)
 {
     int32_t const first = n - n % CHUNK;
     tail rest;
@@ -32,14 +32,14 @@ KERNEL_ROW tail tail_of(int32_t n, int32_t count, const float *const v[], const 
     for (int32_t k = 0; k < count; k++)
         memcpy(rest.v[k], v[k] + first, (size_t)(n - first) * sizeof(float));
     memcpy(rest.weight, weight + first, (size_t)(n - first) * sizeof(double));
-    if (in_mode)
-        memcpy(rest.in_mode, in_mode + first, (size_t)(n - first));
+    if (dominant)
+        memcpy(rest.dominant, dominant + first, (size_t)(n - first));
     return rest;
 }
 
 /* ---- moments ---- */
 KERNEL_ROW void moments_add(const float *restrict v, const double *restrict weight,
-                            const uint8_t *restrict in_mode, int32_t n, double about,
+                            const uint8_t *restrict dominant, int32_t n, double about,
                             double (*restrict sum)[CHUNK])
 {
     for (int32_t i = 0; i < n; i += CHUNK)
@@ -47,17 +47,17 @@ KERNEL_ROW void moments_add(const float *restrict v, const double *restrict weig
             double const d = (double)v[i + lane] - about, wd = weight[i + lane] * d;
             sum[0][lane] += wd;
             sum[1][lane] += wd * d;
-            sum[2][lane] += (double)in_mode[i + lane] * wd;
+            sum[2][lane] += (double)dominant[i + lane] * wd;
         }
 }
 
-void KERNEL(estimate_moments)(const float *v, const double *weight, const uint8_t *in_mode, int32_t n,
+void KERNEL(estimate_moments)(const float *v, const double *weight, const uint8_t *dominant, int32_t n,
                               double about, double out[3])
 {
-    tail const rest = tail_of(n, 1, &v, weight, in_mode);
+    tail const rest = tail_of(n, 1, &v, weight, dominant);
     double sum[3][CHUNK] = {{0.0}};
-    moments_add(v, weight, in_mode, n - n % CHUNK, about, sum);
-    moments_add(rest.v[0], rest.weight, rest.in_mode, CHUNK, about, sum);
+    moments_add(v, weight, dominant, n - n % CHUNK, about, sum);
+    moments_add(rest.v[0], rest.weight, rest.dominant, CHUNK, about, sum);
     for (int32_t k = 0; k < 3; k++)
         out[k] = total(sum[k]);
 }
@@ -71,12 +71,12 @@ KERNEL_ROW void terms_add(const float (*restrict term)[CHUNK], int32_t count, co
             sum[k][lane] += weight[lane] * (double)term[k][lane];
 }
 
-/* The weights of the particles in the mode. */
-KERNEL_ROW void mode_weights(const double *restrict weight, const uint8_t *restrict in_mode,
-                             double *restrict out)
+/* The weights of the particles of the dominant hypothesis, 0 for the others. */
+KERNEL_ROW void dominant_weights(const double *restrict weight, const uint8_t *restrict dominant,
+                                 double *restrict out)
 {
     for (int32_t lane = 0; lane < CHUNK; lane++)
-        out[lane] = (double)in_mode[lane] * weight[lane];
+        out[lane] = (double)dominant[lane] * weight[lane];
 }
 
 KERNEL_ROW void directions(const float *restrict angle, float turn, float (*restrict out)[CHUNK])
@@ -85,33 +85,33 @@ KERNEL_ROW void directions(const float *restrict angle, float turn, float (*rest
         m_sincos(turn * angle[lane], &out[1][lane], &out[0][lane]);
 }
 
-static void resultant_add(const float *angle, float turn, const double *weight, const uint8_t *in_mode,
+static void resultant_add(const float *angle, float turn, const double *weight, const uint8_t *dominant,
                           int32_t n, double (*sum)[CHUNK])
 {
     float cs[2][CHUNK];
-    double mode_weight[CHUNK];
+    double dominant_weight[CHUNK];
     for (int32_t i = 0; i < n; i += CHUNK) {
         directions(angle + i, turn, cs);
-        mode_weights(weight + i, in_mode + i, mode_weight);
+        dominant_weights(weight + i, dominant + i, dominant_weight);
         terms_add((const float (*)[CHUNK])cs, 2, weight + i, sum);
-        terms_add((const float (*)[CHUNK])cs, 2, mode_weight, sum + 2);
+        terms_add((const float (*)[CHUNK])cs, 2, dominant_weight, sum + 2);
     }
 }
 
-void KERNEL(estimate_resultant)(const float *angle, float turn, const double *weight, const uint8_t *in_mode,
+void KERNEL(estimate_resultant)(const float *angle, float turn, const double *weight, const uint8_t *dominant,
                                 int32_t n, double out[4])
 {
-    tail const rest = tail_of(n, 1, &angle, weight, in_mode);
+    tail const rest = tail_of(n, 1, &angle, weight, dominant);
     double sum[4][CHUNK] = {{0.0}};
-    resultant_add(angle, turn, weight, in_mode, n - n % CHUNK, sum);
-    resultant_add(rest.v[0], turn, rest.weight, rest.in_mode, CHUNK, sum);
+    resultant_add(angle, turn, weight, dominant, n - n % CHUNK, sum);
+    resultant_add(rest.v[0], turn, rest.weight, rest.dominant, CHUNK, sum);
     for (int32_t k = 0; k < 4; k++)
         out[k] = total(sum[k]);
 }
 
-/* All angles in one array before they are wrapped: of m_wrap_pi of a difference gcc makes branches. */
+/* All differences are stored before they are wrapped: for m_wrap_pi of a difference gcc generates branches. */
 KERNEL_ROW void near_to(const float *restrict phase, const float *restrict heading, float phase0,
-                        float heading0, uint8_t *restrict in_mode)
+                        float heading0, uint8_t *restrict dominant)
 {
     float const near_phase = 0.15f * TWO_PI_F, near_heading = 0.5f;
     float off[2 * CHUNK];
@@ -122,29 +122,30 @@ KERNEL_ROW void near_to(const float *restrict phase, const float *restrict headi
     for (int32_t i = 0; i < 2 * CHUNK; i++)
         off[i] = fabsf(m_wrap_pi(off[i]));
     for (int32_t i = 0; i < CHUNK; i++)
-        in_mode[i] = (uint8_t)(m_less(off[i], near_phase) & m_less(off[CHUNK + i], near_heading) & 1u);
+        dominant[i] = (uint8_t)(m_less(off[i], near_phase) & m_less(off[CHUNK + i], near_heading) & 1u);
 }
 
-KERNEL_ROW void mass_add(const double *restrict weight, const uint8_t *restrict in_mode, double *restrict sum)
+KERNEL_ROW void weight_add(const double *restrict weight, const uint8_t *restrict dominant,
+                           double *restrict sum)
 {
     for (int32_t lane = 0; lane < CHUNK; lane++)
-        sum[lane] += (double)in_mode[lane] * weight[lane];
+        sum[lane] += (double)dominant[lane] * weight[lane];
 }
 
-double KERNEL(estimate_mode)(const float *phase, const float *heading, const double *weight, int32_t n,
-                             int32_t best, uint8_t *in_mode)
+double KERNEL(estimate_dominant)(const float *phase, const float *heading, const double *weight, int32_t n,
+                                 int32_t best, uint8_t *dominant)
 {
     const float *const angles[] = {phase, heading};
     double sum[CHUNK] = {0.0};
     int32_t const whole = n - n % CHUNK;
     tail rest = tail_of(n, 2, angles, weight, NULL);
     for (int32_t i = 0; i < whole; i += CHUNK) {
-        near_to(phase + i, heading + i, phase[best], heading[best], in_mode + i);
-        mass_add(weight + i, in_mode + i, sum);
+        near_to(phase + i, heading + i, phase[best], heading[best], dominant + i);
+        weight_add(weight + i, dominant + i, sum);
     }
-    near_to(rest.v[0], rest.v[1], phase[best], heading[best], rest.in_mode);
-    mass_add(rest.weight, rest.in_mode, sum);
-    memcpy(in_mode + whole, rest.in_mode, (size_t)(n - whole));
+    near_to(rest.v[0], rest.v[1], phase[best], heading[best], rest.dominant);
+    weight_add(rest.weight, rest.dominant, sum);
+    memcpy(dominant + whole, rest.dominant, (size_t)(n - whole));
     return total(sum);
 }
 
@@ -177,25 +178,25 @@ KERNEL_ROW void pairs_of(const float *restrict heading, const float *restrict pi
 }
 
 static void rotations_add(const float *heading, const float *pitch, const float *roll, const double *weight,
-                          const uint8_t *in_mode, int32_t n, double (*sum)[CHUNK])
+                          const uint8_t *dominant, int32_t n, double (*sum)[CHUNK])
 {
     float pair[PAIRS][CHUNK];
-    double mode_weight[CHUNK];
+    double dominant_weight[CHUNK];
     for (int32_t i = 0; i < n; i += CHUNK) {
         pairs_of(heading + i, pitch + i, roll + i, pair);
-        mode_weights(weight + i, in_mode + i, mode_weight);
-        terms_add((const float (*)[CHUNK])pair, PAIRS, mode_weight, sum);
+        dominant_weights(weight + i, dominant + i, dominant_weight);
+        terms_add((const float (*)[CHUNK])pair, PAIRS, dominant_weight, sum);
     }
 }
 
 void KERNEL(estimate_rotations)(const float *heading, const float *pitch, const float *roll,
-                                const double *weight, const uint8_t *in_mode, int32_t n, double out[16])
+                                const double *weight, const uint8_t *dominant, int32_t n, double out[16])
 {
     static const uint8_t place[16] = {0, 1, 2, 3, 1, 4, 5, 6, 2, 5, 7, 8, 3, 6, 8, 9};
-    tail const rest = tail_of(n, 3, (const float *const[]){heading, pitch, roll}, weight, in_mode);
+    tail const rest = tail_of(n, 3, (const float *const[]){heading, pitch, roll}, weight, dominant);
     double sum[PAIRS][CHUNK] = {{0.0}};
-    rotations_add(heading, pitch, roll, weight, in_mode, n - n % CHUNK, sum);
-    rotations_add(rest.v[0], rest.v[1], rest.v[2], rest.weight, rest.in_mode, CHUNK, sum);
+    rotations_add(heading, pitch, roll, weight, dominant, n - n % CHUNK, sum);
+    rotations_add(rest.v[0], rest.v[1], rest.v[2], rest.weight, rest.dominant, CHUNK, sum);
     for (int32_t k = 0; k < 16; k++)
         out[k] = total(sum[place[k]]);
 }

@@ -91,7 +91,7 @@ static void camera_features(gait_tracker *t, int32_t c, const gait_frame *frame,
 {
     camera_state *const s = &t->camera[c];
     features_job j = {.t = t, .c = c, .image = frame->image[c]};
-    bool const own = frame->background[c].data != NULL; /* of this frame alone */
+    bool const own = frame->background[c].data != NULL; /* a background for this frame alone */
     const gait_image *const empty = own ? &frame->background[c] : &s->background;
     if (!move_region(t, c, predicted))
         j.image.data = NULL;
@@ -110,7 +110,7 @@ static void camera_features(gait_tracker *t, int32_t c, const gait_frame *frame,
     take_keypoints(t, c, frame->keypoints[c], &s->features.keypoints);
 }
 
-/* Put a camera where it is in this frame. */
+/* Set a camera to its pose in this frame. */
 static void place_camera(gait_tracker *t, int32_t c, const gait_camera_pose *pose)
 {
     camera_state *const s = &t->camera[c];

@@ -3,7 +3,7 @@
 #define GAIT_TRACKER_FEATURES_STEP_H
 #include "tracker/tracker_state.h"
 
-/* Put each camera where it is in this frame, move its region to the predicted particle and compute its features.
- * Returns the number of cameras that have an image of it. */
+/* Set each camera to its pose in this frame, move its region to the predicted particle and compute its features.  Returns
+ * the number of cameras that have an image. */
 int32_t features_step(gait_tracker *t, const gait_frame *frame, const particle_state *predicted);
 #endif

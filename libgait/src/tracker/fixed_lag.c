@@ -78,12 +78,12 @@ static void place_joints(gait_tracker *t, const weighted_particles *p, const sta
     }
 }
 
-/* A track that was lost stays lost; otherwise left and right count as they are known now. */
+/* A track that was lost stays lost; otherwise the status depends on what is known now of left and right. */
 static gait_track_status lagged_status(const gait_tracker *t, gait_track_status then, float hypothesis_weight)
 {
     if (then == GAIT_TRACK_LOST)
         return then;
-    if (hypothesis_weight >= DOMINANT_MASS && !hypotheses_open(t))
+    if (hypothesis_weight >= DOMINANT_WEIGHT && !hypotheses_open(t))
         return GAIT_TRACK_TRACKING;
     return then == GAIT_TRACK_INIT ? then : GAIT_TRACK_AMBIGUOUS;
 }

@@ -5,7 +5,7 @@
 #define GAIT_TRACKER_FIXED_LAG_H
 #include "tracker/tracker_state.h"
 
-/* Record the current generation's ancestors and what its estimate reports. */
+/* Record the ancestors of the current generation, and what its estimate reports. */
 void fixed_lag_record(gait_tracker *t, const gait_estimate *e);
 
 /* Steps that fixed_lag_estimate() can go back now; -1: none. */

@@ -5,11 +5,11 @@
 
 static const float SIDE_VIEW = 0.3f; /* least sine of the angle between heading and viewing direction */
 static const float EDGE_SHARE =
-    0.5f; /* share of the edge strength beyond chance that must speak for the front */
+    0.5f; /* share of the edge strength beyond chance by which the front must be better */
 static const float AVERAGE_TIME = 1.0f; /* seconds over which the score is averaged */
-static const float FIRST_SCORE = 0.03f; /* the average to begin with */
+static const float FIRST_SCORE = 0.03f; /* initial value of the average */
 
-/* From in front or behind a turn by 180 degrees changes little. */
+/* Seen from in front or behind, a turn by 180 degrees changes little. */
 static bool viewed_from_side(const gait_camera *c, const particle_state *p)
 {
     float to[3], sn, cs;
@@ -62,7 +62,7 @@ float front_back_score(gait_tracker *t, const state_layout *of, const particle_s
     return cameras > 0.0f ? sum / cameras : 0.0f;
 }
 
-/* When only parts of the body are visible, the edges of the occluder are no evidence. */
+/* While only parts of the body are visible, the score is not updated: the edges of the occluder are no evidence. */
 float front_back_update(gait_tracker *t, bool restart, const state_layout *of, const particle_state *mean)
 {
     float const before = t->core->front_back_margin;

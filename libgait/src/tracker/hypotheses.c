@@ -7,14 +7,15 @@
 #include <string.h>
 
 static const float ACQUISITION_TIME = 0.5f; /* seconds until the phase is known modulo half a stride */
-/* Seconds in which both hypotheses find their own best before evidence counts. */
+/* Seconds in which both hypotheses adapt to the images before evidence counts. */
 static const float REFIT_TIME = 0.4f;
-static const float AGREED = 0.9f; /* weight of one mode from which a start's hypotheses are decided */
+static const float AGREED =
+    0.9f; /* weight of the dominant hypothesis from which those of a start are decided */
 static const float JITTER_SCORE = 0.5f, JITTER_HEADING = 0.1f, JITTER_RATE = 0.02f,
                    JITTER_PHASE = 0.05f; /* sd */
-/* From these left and right are reported as known (probability 0.99), and the other hypothesis is dropped. */
+/* Log odds from which left and right are reported as known (probability 0.99), and the other hypothesis is dropped. */
 static const double REPORT_LOG_ODDS = 4.5, MERGE_LOG_ODDS = 9.0;
-/* Log odds against the person of an automatic start, until images show one: probability 0.95. */
+/* Initial log odds against the person of an automatic start (probability 0.95), until images show one. */
 static const double PROOF = 3.0;
 
 /* ---- stages ---- */
@@ -31,7 +32,7 @@ static void enter(gait_tracker *t, int32_t stage)
                                              .log_odds = t->core->found ? 0.0 : t->core->hypotheses.log_odds};
 }
 
-/* Share of its log-likelihood by which a frame counts, so many seconds after the last one: errors of the image terms are
+/* Share of its log-likelihood that a frame contributes, so many seconds after the last one: errors of the image terms are
  * correlated over config evidence_time. */
 static float evidence_share(const gait_tracker *t, float seconds)
 {
@@ -238,7 +239,7 @@ bool hypotheses_resample(gait_tracker *t, uint32_t counter)
 }
 
 /* ---- split ---- */
-/* Who stands still has no phase. */
+/* A person who stands still has no phase. */
 static bool still(const gait_tracker *t, int32_t particle)
 {
     return layout_at(t, particle)->model->direction == 0;
@@ -281,7 +282,7 @@ static particle_state other_hypothesis(const gait_tracker *t, const particle_sta
     return to;
 }
 
-/* A hypothesis must find its own best heading, gait and phase, not those that suited the other one. */
+/* Spread heading, gait and phase, so that a hypothesis finds its own and does not keep those that suited the other. */
 static void jitter(const gait_tracker *t, int32_t i, particle_state *p)
 {
     float n[4];
@@ -338,7 +339,7 @@ static void split_range(void *ctx, int32_t begin, int32_t end, int32_t task)
     }
 }
 
-/* The odds begin even whatever the acquisition made of left and right. */
+/* The odds begin even, whatever acquisition favoured. */
 void hypotheses_split(gait_tracker *t)
 {
     split_job j = {.t = t, .particles = t->particles, .phase = half_phase(t)};
@@ -376,7 +377,7 @@ static double log_add(double a, double b)
     return top + m_log64(m_exp64(a - top) + m_exp64(b - top));
 }
 
-/* Log evidence for the second hypothesis over the first of this frame: without the silhouette for the odds, and of all
+/* Log evidence of this frame for the second hypothesis over the first: without the silhouette, for the odds, and of all
  * terms. */
 static void update_odds(gait_tracker *t, float dt, double without_silhouette, double all)
 {
@@ -388,7 +389,7 @@ static void update_odds(gait_tracker *t, float dt, double without_silhouette, do
         h->log_odds += share * without_silhouette;
 }
 
-/* The more probable hypothesis, or while that is open the one that has explained the last frames better. */
+/* The more probable hypothesis; while that is open, the one that has explained the last frames better. */
 static int32_t reported_hypothesis(const hypotheses_state *h)
 {
     return h->log_odds > 1.0 || (h->log_odds > -1.0 && h->recent_log_ratio > 0.0);

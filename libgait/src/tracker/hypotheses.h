@@ -11,7 +11,7 @@
  *
  * Stages: after a start with an open phase HYPOTHESES_ACQUISITION finds the phase modulo half a stride, HYPOTHESES_TWO
  * decides between left and right, HYPOTHESES_ONE tracks.  After a start from several hypotheses with known phases,
- * HYPOTHESES_ACQUISITION finds the right one and HYPOTHESES_ONE follows. */
+ * HYPOTHESES_ACQUISITION finds the correct one and HYPOTHESES_ONE follows. */
 #ifndef GAIT_TRACKER_HYPOTHESES_H
 #define GAIT_TRACKER_HYPOTHESES_H
 #include "tracker/tracker_state.h"
@@ -19,7 +19,7 @@
 /* The phase is open: begin acquisition (in paper mode there is only one hypothesis). */
 void hypotheses_acquire(gait_tracker *t);
 
-/* Several hypotheses that know left and right: begin acquisition of the right one. */
+/* Several hypotheses of a start, in which left and right are known: begin acquisition of the correct one. */
 void hypotheses_compare(gait_tracker *t);
 
 /* Left and right are known: one hypothesis. */
@@ -31,18 +31,18 @@ void hypotheses_settle(gait_tracker *t);
 void hypotheses_require_proof(gait_tracker *t);
 bool hypotheses_prove(gait_tracker *t, float dt, float nats);
 
-/* The person is lost: treat the particles as one set, redrawn as such. */
+/* The person is lost: treat the particles as one set, some of which will be redrawn. */
 void hypotheses_drop(gait_tracker *t);
 
-/* Whether the odds decide between the two; and drop the less probable one. */
+/* Whether the odds decide between the two hypotheses; drop the less probable one. */
 bool hypotheses_decided(const gait_tracker *t);
 void hypotheses_merge(gait_tracker *t);
 
-/* Whether the hypotheses of a start agree by now: this weight is in one mode. */
+/* Whether the hypotheses of a start agree by now.  weight: of the dominant hypothesis. */
 bool hypotheses_agree(const gait_tracker *t, float weight);
 
-/* Whether acquisition has lasted long enough, or the person walks on after standing still; and lay the particles out as
- * two hypotheses.  The weights must be even, as after resampling.  Clears the templates. */
+/* Whether acquisition has lasted long enough, or the person walks on after standing still; lay the particles out as two
+ * hypotheses.  The weights must be even, as after resampling.  Clears the templates. */
 bool hypotheses_acquired(const gait_tracker *t);
 void hypotheses_split(gait_tracker *t);
 

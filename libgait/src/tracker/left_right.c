@@ -3,8 +3,9 @@
 #include "tracker/likelihood_step.h"
 
 static const float AVERAGE_TIME = 1.5f; /* seconds over which the score is averaged */
-static const float FIRST_SCORE = 1.0f;  /* the average to begin with */
-static const float WORSE = 3.0f; /* weight of what is for the mirror image: it is open from a quarter on */
+static const float FIRST_SCORE = 1.0f;  /* initial value of the average */
+static const float WORSE =
+    3.0f; /* weight of evidence for the mirror image: a quarter of it leaves left and right open */
 
 /* How much better the keypoints fit the body than its mirror image half a stride later, in units of the term's cost. */
 static float left_right_score(gait_tracker *t, const state_layout *of, const particle_state *p)

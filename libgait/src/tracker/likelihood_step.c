@@ -38,7 +38,7 @@ like_body likelihood_body(const gait_tracker *t, int32_t c, int32_t hypothesis, 
 /* ---- bodies before a camera whose pose is uncertain ---- */
 typedef struct alignment {
     float by[3][BLOCK],
-        nats[BLOCK]; /* metres, world; log-likelihood of the error of the pose that it takes */
+        nats[BLOCK]; /* metres, world; log-likelihood of the error of the pose that this implies */
 } alignment;
 
 /* Displacement of each body of the block, across the view, to where the person appears: the error of the pose that is
@@ -136,7 +136,7 @@ static void block_in_camera(gait_tracker *t, int32_t c, int32_t begin, int32_t l
     if (aligned)
         displace(t, &a, w);
     likelihood_outline(t, c, w);
-    if (lanes < BLOCK) /* empty lanes are summed too, though the sums are not used: let them be defined */
+    if (lanes < BLOCK) /* empty lanes are summed too: their sums are not used but must be defined */
         memset(&w->terms, 0, sizeof w->terms);
     for (int32_t lane = 0; lane < lanes; lane++)
         particle_in_camera(t, c, begin + lane, lane, w);

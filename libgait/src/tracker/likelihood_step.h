@@ -9,24 +9,24 @@ void likelihood_step(gait_tracker *t);
 typedef struct body_evidence { /* of one body, over all cameras */
     /* Log-likelihood with the body less that of an empty scene, nats; exactly 0 if no term applies. */
     float support;
-    float by_keypoints; /* share of the keypoints in support */
-    like_parts parts;   /* foreground explained and left over, nats */
+    float by_keypoints; /* part of `support` that comes from the keypoints, nats */
+    like_parts parts;   /* foreground explained and missed, nats */
     float chance;       /* foreground that a body explains by chance, nats */
 } body_evidence;
 
-/* Of one body, of the class of layout `of`.  Writes its surface samples to t->estimate_patch. */
+/* Evidence for one body, of the class of layout `of`.  Writes its surface samples to t->estimate_patch. */
 body_evidence likelihood_of_particle(gait_tracker *t, const state_layout *of, const particle_state *p);
 
 /* Surface samples of a body, cameras x limbs; returns the cameras that have an image, as bits. */
 uint32_t likelihood_sample(gait_tracker *t, const particle_state *p, like_patch *samples);
 
-/* Texture log-likelihood of a body, if its surface was `then` in an earlier frame of these cameras. */
+/* Texture log-likelihood of a body whose surface samples were `then` in an earlier frame of these cameras. */
 float likelihood_since(gait_tracker *t, const particle_state *p, uint32_t cameras, const like_patch *then);
 
 /* Support of one body by the keypoints of all cameras, in units of the term's cost; 0 without keypoints. */
 float likelihood_of_keypoints(gait_tracker *t, const state_layout *of, const particle_state *p);
 
-/* Make the templates ready to be compared with this frame; likelihood_step() does so too. */
+/* Prepare the templates for comparison with this frame; likelihood_step() does so too. */
 void likelihood_templates(gait_tracker *t);
 
 /* After that: log-likelihood in camera c of the particles index[0 .. lanes), whose bodies and points are in w; changes

@@ -4,7 +4,7 @@
 #include "likelihood/likelihood.h"
 #include "tracker/likelihood_step.h"
 
-static const float FINEST = 0.5f; /* working pixels: last step of the search */
+static const float FINEST = 0.5f; /* working pixels: step at which the search ends */
 
 typedef struct sample { /* a block of particles, spread over those of one class */
     int32_t lanes, index[BLOCK];

@@ -18,8 +18,8 @@ static size_t state_bytes(const gait_tracker *t)
     return (size_t)(t->state_end - (unsigned char *)t->core);
 }
 
-/* The configuration without what does not change results: threads, tasks and instruction sets.  Nor does it matter where
- * the cameras are in this frame. */
+/* Digest of the configuration without what does not change results (threads, tasks, instruction sets), and with the
+ * cameras as the caller configured them, wherever they are in this frame. */
 static uint64_t config_digest(const gait_tracker *t)
 {
     gait_tracker_config c = t->cfg;

@@ -5,15 +5,16 @@
 #include <string.h>
 
 static const float PATIENCE = 0.33f;     /* seconds without support after which the person is lost */
-static const float PHASE_TIME = 1.5f;    /* seconds for which the phase of a lost person can be predicted */
+static const float PHASE_TIME = 1.5f;    /* seconds over which the phase of a lost person can be predicted */
 static const float PHASE_WITHIN = 0.15f; /* strides from the prediction that count as agreement */
 static const float LOG_HIDDEN = -4.0f;   /* log probability of being hidden in a frame */
-static const float PARTS_MOST = 3.0f;    /* nats by which visible parts can raise it at most */
+static const float PARTS_MOST = 3.0f;    /* nats by which visible parts can raise that at most */
 static const float UNUSUAL_COST = 3.0f;  /* nats per nat of foreground left unexplained beyond the usual */
 static const float PARTS_ENOUGH = 1.0f;  /* nats for a person who is visible in part */
-static const float RISE = 60.0f, FALL = 10.0f; /* frames in which the usual unexplained foreground follows */
+static const float RISE = 60.0f,
+                   FALL = 10.0f;      /* time constants of the usual unexplained foreground, frames */
 static const double ELSEWHERE = 0.01; /* probability in a frame that a lost person is not where predicted */
-enum { REDRAWN = 8 };                 /* one particle in so many is redrawn */
+enum { REDRAWN = 8 };                 /* one particle in eight is redrawn */
 
 bool track_loss_is_lost(const gait_tracker *t)
 {
@@ -93,8 +94,8 @@ static int32_t likeliest(const gait_tracker *t)
     return best;
 }
 
-/* Every particle's bound is the empty scene's log-likelihood, plus that of being hidden, plus what its visible parts
- * explain: in t->explained, which becomes t->loglik element by element. */
+/* The lower bound of a particle is the log-likelihood of the empty scene, plus that of being hidden, plus what its visible
+ * parts explain.  It is computed in t->explained, which becomes t->loglik element by element. */
 void track_loss_bound(gait_tracker *t)
 {
     int32_t const n = t->cfg.particles, best = likeliest(t);
@@ -135,7 +136,7 @@ track_loss_verdict track_loss_check(gait_tracker *t, bool lost, const state_layo
     float const gap = seconds_unsupported(t);
     body_evidence const e = likelihood_of_particle(t, of, mean);
     float const unusual = e.parts.missed - core->usual_unexplained;
-    bool const whole = e.support >= 0.0f && walk_check_passes(t); /* also if no term applies */
+    bool const whole = e.support >= 0.0f && walk_check_passes(t); /* support is 0 if no term applies */
     bool const part = !whole && !lost && core->found &&
                       parts_evidence(e.parts.explained - e.chance, unusual) > PARTS_ENOUGH;
     track_loss_verdict v = {.support = whole  ? SUPPORT_WHOLE

@@ -1,11 +1,11 @@
 /* track_loss.h - notice that the images no longer support the track, and search for the person again.
  *
- * A frame does not support the estimate if it is explained better without the body than with it.  Nothing changes until
- * that has lasted for a while: an occluded person is tracked as predicted, because the likelihood of being hidden bounds
- * that of every particle from below.  After that some particles are redrawn in every frame from a region around the last
- * supported place that grows with time (after augmented Monte-Carlo localisation; Thrun, Burgard and Fox 2005, 8.3.3).
- * The transition is then a mixture of following and of being elsewhere; more particles are drawn from the second
- * component than its probability, with correspondingly smaller weights. */
+ * A frame does not support the estimate if it is explained better without the body than with it.  For a while that changes
+ * nothing: an occluded person is tracked as predicted, because the likelihood of being hidden bounds that of every particle
+ * from below.  After that, in every frame, some particles are redrawn from a region around the last supported place that
+ * grows with time (as in augmented Monte-Carlo localisation; Thrun, Burgard and Fox 2005, 8.3.3).  The transition is then a
+ * mixture of walking on and of being elsewhere; more particles are drawn from the second component than its probability
+ * warrants, with correspondingly smaller weights. */
 #ifndef GAIT_TRACKER_TRACK_LOSS_H
 #define GAIT_TRACKER_TRACK_LOSS_H
 #include "tracker/tracker_state.h"
@@ -24,7 +24,7 @@ typedef struct track_loss_verdict {
     float by_images;            /* log-likelihood ratio of the images alone against an empty scene, nats */
     float usual_unexplained;    /* new value of the state's */
     bool phase_as_predicted;    /* the phase follows from that of the last supported estimate */
-    bool phase_expired;         /* that one is too old to predict from */
+    bool phase_expired;         /* that estimate is too old to predict from */
 } track_loss_verdict;
 
 /* Whether the frame supports the estimate, of the class of layout `of`.  Writes the estimate's surface samples to t->estimate_patch. */

@@ -14,13 +14,16 @@
 #include "tracker/track_loss.h"
 #include "tracker/walk_check.h"
 
-static const float KNOWN_PHASE_SD = 0.2f;  /* strides: a start with less determines which leg is which */
-static const float SETTLE_TIME = 1.0f;     /* seconds after a start in which several modes are normal */
-static const float PHASE_DEPARTURE = 0.2f; /* strides from the predicted phase: more are ambiguous */
+static const float KNOWN_PHASE_SD = 0.2f; /* strides: a start with less determines which leg is which */
+static const float SETTLE_TIME = 1.0f; /* seconds after a start in which no dominant hypothesis is normal */
+static const float PHASE_DEPARTURE =
+    0.2f; /* strides from the predicted phase above which a track is ambiguous */
 static const double DEGENERATE_ESS = 2.0;
-static const float IMPROBABLE = 0.01f; /* hypotheses so much less probable than the first are left out */
-static const float OTHER_CLASS = 0.1f; /* probability at a start of all classes together, alike */
-static const float BESIDE = 0.25f;     /* statures by which hypotheses that compete may stand side by side */
+static const float IMPROBABLE =
+    0.01f; /* hypotheses are left out below this share of the first one's probability */
+static const float OTHER_CLASS = 0.1f; /* probability at a start that is divided equally among all classes */
+static const float BESIDE =
+    0.25f; /* statures by which competing hypotheses may be side by side in an image */
 
 /* Whether another hypothesis competes with the first: it is not improbable, walks on the floor or on a belt as that one
  * does, and is beside it in no image, so that one region of each shows both. */
@@ -37,8 +40,8 @@ static bool competes(const gait_tracker *t, const gait_hypothesis *first, const 
     return same;
 }
 
-/* A state of another class that looks much the same: who walks backwards turns round, with the other leg ahead, but not
- * where no image distinguishes front and back, since nearly all people walk forwards. */
+/* A state of another class that appears much the same.  From forwards to backwards the person turns round, with the other
+ * leg ahead; but not where no image distinguishes front and back, since nearly all people walk forwards. */
 static gait_state as_class(const gait_tracker *t, const gait_state *s, int32_t motion_class)
 {
     gait_state to = *s;
@@ -130,19 +133,20 @@ typedef struct move_job {
     dynamics_step step[GAIT_MAX_CLASSES];
 } move_job;
 
-/* Particles are rejuvenated after resampling, within their hypothesis; not while they have no single mode, because
- * a mean of two modes is in neither. */
-static rejuvenation rejuvenation_of(const gait_tracker *t, bool resampled, bool modes_known, uint32_t counter)
+/* Particles are rejuvenated after resampling, within their hypothesis.  Not during acquisition or while the person is lost:
+ * a mean of particles in two places is in neither. */
+static rejuvenation rejuvenation_of(const gait_tracker *t, bool resampled, bool hypotheses_known,
+                                    uint32_t counter)
 {
     rejuvenation r = {.fields = t->particles.fields,
                       .row = t->rows,
                       .parent = t->filter.parent,
                       .n = t->filter.n,
                       .split = hypotheses_boundary(t),
-                      .origin = t->classes ? t->in_mode : NULL,
+                      .origin = t->classes ? t->origin : NULL,
                       .seed = t->cfg.seed,
                       .frame = counter};
-    if (modes_known && resampled)
+    if (hypotheses_known && resampled)
         rejuvenation_set(&r, seconds_since(t, t->core->rejuvenation_utime), t->cfg.rejuvenation_time);
     return r;
 }
@@ -213,7 +217,7 @@ static void predict(gait_tracker *t, float dt, const rejuvenation *r, uint32_t c
                     t->cfg.particles, BLOCK, move_range, &j);
 }
 
-/* Move those of the states that are of one class. */
+/* Move the states that are of one class. */
 static void predict_class(const gait_tracker *t, gait_state *s, int32_t n, float dt, int32_t motion_class)
 {
     dynamics d = tracker_dynamics(t, motion_class);
@@ -299,7 +303,7 @@ static gait_track_status status_of(const gait_tracker *t, float dt, const gait_e
         return GAIT_TRACK_LOST;
     if (hypotheses_acquiring(t) || !core->found)
         return GAIT_TRACK_INIT;
-    if (e->hypothesis_weight < DOMINANT_MASS)
+    if (e->hypothesis_weight < DOMINANT_WEIGHT)
         return seconds_since(t, core->start_utime) < SETTLE_TIME ? GAIT_TRACK_INIT : GAIT_TRACK_AMBIGUOUS;
     bool const sides_open = !still && (hypotheses_open(t) || core->left_right_margin < 0.0f);
     bool const open = sides_open || core->front_back_margin < 0.0f || departs;
@@ -328,18 +332,18 @@ void tracker_step(gait_tracker *t, const gait_frame *frame, gait_estimate *out)
     if (hypotheses_decided(t))
         hypotheses_merge(t);
     if (lost)
-        core->ess = 0.0; /* redrawn particles have less weight than the others */
+        core->ess = 0.0; /* forces resampling: redrawn particles have less weight than the others */
     bool const resampled = core->frame > 0 && hypotheses_resample(t, counter);
 
     /* Rejuvenate and predict.  Particles that are split or redrawn have no samples of their ancestors' surface. */
-    bool const modes_known = h->stage != HYPOTHESES_ACQUISITION && !lost;
+    bool const hypotheses_known = h->stage != HYPOTHESES_ACQUISITION && !lost;
     bool const split = hypotheses_acquired(t);
-    /* Two hypotheses go on as predicted for a while, and the paper's filter always. */
+    /* Nothing is redrawn while there are two hypotheses, and never in the paper's filter. */
     bool const redraw = lost && h->stage != HYPOTHESES_TWO && !split && t->cfg.mode != GAIT_MODE_PAPER;
     if (split || redraw)
         core->sampled_cameras = 0;
-    rejuvenation const r = rejuvenation_of(t, resampled, modes_known, counter);
-    if (resampled || !modes_known)
+    rejuvenation const r = rejuvenation_of(t, resampled, hypotheses_known, counter);
+    if (resampled || !hypotheses_known)
         core->rejuvenation_utime = core->utime;
     predict(t, dt, &r, counter);
     if (split)
@@ -369,7 +373,7 @@ void tracker_step(gait_tracker *t, const gait_frame *frame, gait_estimate *out)
     }
     if (hypotheses_agree(t, e.hypothesis_weight))
         hypotheses_settle(t);
-    bool const few = s.degenerate || s.ess < DEGENERATE_ESS; /* particles that count */
+    bool const few = s.degenerate || s.ess < DEGENERATE_ESS; /* particles with weight */
     e.status = s.degenerate ? GAIT_TRACK_LOST : status_of(t, dt, &e);
     e.flags = (resampled ? GAIT_EST_RESAMPLED : 0) | (has_image ? 0 : GAIT_EST_NO_IMAGE) |
               (has_image && few ? GAIT_EST_DEGENERATE : 0) |

@@ -4,7 +4,7 @@
 #include "gait_start.h"
 #include "tracker/tracker_state.h"
 
-/* Draw the particles from hypotheses of a person's state, as many from each as it is probable; arguments as for
+/* Draw the particles from hypotheses of a person's state, from each in proportion to its probability; arguments as for
  * gait_tracker_start_hypotheses(), already checked.  sure: no proof of a person is required, as after
  * gait_tracker_start(). */
 void tracker_start(gait_tracker *t, const gait_hypothesis *h, int32_t count, bool sure, int64_t utime);

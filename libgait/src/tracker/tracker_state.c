@@ -45,7 +45,7 @@ static void layout_state(arena *a, gait_tracker *t)
     t->state_end = TAKE(a, unsigned char, 1);
 }
 
-/* One block serves in turn the rows for rejuvenation, the planes that features are made from, and the joints. */
+/* One block of memory serves in turn the rows for rejuvenation, the resampled planes of a frame, and the joints. */
 static void layout_joints(arena *a, gait_tracker *t)
 {
     arena size = {.cap = SIZE_MAX, .solid = true};
@@ -126,7 +126,7 @@ static void layout_work(arena *a, gait_tracker *t)
     t->layouts = TAKE(a, state_layout, t->model->classes);
     t->mirror = TAKE(a, mirror, t->model->classes);
     t->next = TAKE(a, strata, 1);
-    t->in_mode = TAKE(a, uint8_t, t->cfg.particles);
+    t->dominant = TAKE(a, uint8_t, t->cfg.particles);
     if (uses_texture(&t->cfg))
         t->estimate_patch = TAKE(a, like_patch, (size_t)cameras * limbs);
     for (int32_t c = 0; c < 2 * cameras && uses_texture(&t->cfg); c++)
@@ -141,7 +141,7 @@ static int32_t acquisition_count(const gait_tracker *t)
     return i_max(target, i_min(twice, t->cfg.acquisition_particles));
 }
 
-/* Particles of all classes where one class has so many: whole blocks of each class in each of two hypotheses. */
+/* Particles of all classes together if one class needs `one`: whole blocks of each class in each of two hypotheses. */
 static int32_t of_all_classes(const gait_tracker *t, int32_t one)
 {
     int32_t const classes = t->model->classes, unit = 2 * BLOCK;

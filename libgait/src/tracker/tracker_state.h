@@ -16,22 +16,23 @@ typedef struct hypotheses_state {
     int32_t stage;
     int32_t left_right_known; /* left and right have been decided before */
     int64_t since;            /* when the stage began, microseconds */
-    /* Until the person is found: of a person over no person, at most 0.  HYPOTHESES_TWO: of the second hypothesis over
-     * the first. */
+    /* Of the second hypothesis over the first (HYPOTHESES_TWO); before the images have proven an automatic start: of a
+     * person over no person, at most 0. */
     double log_odds;
-    double recent_log_ratio; /* of the hypotheses over the last few frames and for all terms, nats */
+    double recent_log_ratio; /* the second over the first, all terms, over the last few frames, nats */
 } hypotheses_state;
 
 /* Saved and hashed in this order, followed by the arrays of gait_tracker up to state_end. */
 typedef struct tracker_core {
     int64_t utime, start_utime;
-    int64_t support_utime;      /* when an image last supported the estimate */
-    int64_t rejuvenation_utime; /* when the particles were last rejuvenated, or last had no single mode */
-    uint64_t frame;             /* steps since start */
+    int64_t support_utime; /* when an image last supported the estimate */
+    int64_t
+        rejuvenation_utime; /* of the last rejuvenation, or of the last step in acquisition or while lost */
+    uint64_t frame;         /* steps since start */
     int32_t started;
     int32_t generation;       /* slot of the history that holds the current particles */
     uint32_t sampled_cameras; /* bit c: there are surface samples of camera c's previous frame */
-    int32_t found; /* since the start images have supported the estimate, and shown that a person is there */
+    int32_t found; /* since the start, images have supported the estimate and proven that a person is there */
     int32_t partly_hidden;   /* the last image supports only parts of the body */
     float stature_sd_ratio;  /* standard deviation of stature at the start, fraction of the stature */
     float usual_unexplained; /* foreground that the estimate usually leaves unexplained, nats */
@@ -50,14 +51,14 @@ typedef struct tracker_core {
 typedef struct walk_check {
     int64_t age;      /* its time since the start, microseconds */
     uint32_t cameras; /* bit c: camera c has surface samples of it; 0: there is none yet */
-    int32_t judged;   /* whether nats is known */
+    int32_t judged;   /* 1: nats is known */
     /* Log-likelihood ratio of its surface having walked on over having stayed, mean of the last two. */
     float nats;
     particle_state body;
 } walk_check;
 /* Ranges of particles, each of one class of motion, those of the second hypothesis after those of the first. */
 enum { MAX_STRATA = 2 * GAIT_MAX_CLASSES };
-/* Every class has at least one in so many of the particles that one class would have. */
+/* Every class has at least one in CLASS_SHARE of the particles that a single class would have. */
 enum { CLASS_SHARE = 8 };
 
 typedef struct strata {
@@ -70,7 +71,7 @@ typedef struct class_state { /* of a model with several classes (class_strata.h)
     /* Microseconds since the start: last resampling; since when standing still is reported. */
     int64_t resampled, still;
     int32_t reported, supported; /* class of the last estimate, and of core.last_supported */
-    int32_t open_sides;          /* the person stood still: left and right are to be split */
+    int32_t open_sides;          /* 1: the person stood still, so left and right will be split */
     uint32_t known;              /* bit c: there are scores of the person in class c */
     float score[GAIT_MAX_CLASSES][GAIT_MAX_COMPONENTS];
 } class_state;
@@ -82,8 +83,8 @@ typedef struct camera_state {
     bool plate_stale;
     bool moved;              /* in this frame the camera is not where the config puts it */
     float turn_sd, place_sd; /* of its pose: radians, metres */
-    float shift_sd;          /* of the image by an error of its pose, pixels; 0: none */
-    float aim[2];            /* with one: where the predicted pelvis is before that shift, ideal pixels */
+    float shift_sd; /* of the shift of its image by an error of its pose, pixels; 0: the pose is exact */
+    float aim[2];   /* if it is not: where the predicted pelvis is before that shift, ideal pixels */
 } camera_state;
 
 typedef struct likelihood_scratch { /* one per task; its arrays are as long as the model's limbs and points */
@@ -95,7 +96,7 @@ typedef struct likelihood_scratch { /* one per task; its arrays are as long as t
     layers *layers;
     like_block terms;
     float (*points)[3][BLOCK];
-    float (*home)[3][BLOCK]; /* origins of the frames, then points, where a displaced body is put back to */
+    float (*home)[3][BLOCK]; /* origins of the frames, then points, of a body before it was displaced */
 } likelihood_scratch;
 
 typedef struct generation_record { /* what an estimate reports of its frame as a whole */
@@ -118,8 +119,8 @@ typedef struct particle_history {
 } particle_history;
 
 typedef struct lag_scratch { /* of fixed_lag_estimate() */
-    int32_t *ancestor;       /* capacity: those with descendants today, */
-    double *weight;          /* capacity: and the weight of these descendants */
+    int32_t *ancestor;       /* capacity: those that have descendants among the current particles */
+    double *weight;          /* capacity: total weight of these descendants */
     float *column[3]; /* capacity: the ancestors' values of a field; the memory of the log-likelihoods */
 } lag_scratch;
 
@@ -159,12 +160,14 @@ struct gait_tracker {
     float *rows;             /* until the particles have moved: rejuvenation_rows(); in the memory of joint */
     features_scratch planes; /* until the features are complete; in the memory of joint */
     state_layout *layouts;   /* of every class; constant */
-    mirror *mirror;          /* the same */
-    strata *next;            /* with several classes: of the particles after resampling */
-    /* n: 1 for particles of the dominant mode; until they have moved: class of their ancestors. */
-    uint8_t *in_mode;
+    mirror *mirror;          /* of every class; constant */
+    strata *next;            /* with several classes: ranges of the particles after resampling */
+    union {                  /* one array of n: */
+        uint8_t *origin;     /* until the particles have moved: class of their ancestors; */
+        uint8_t *dominant;   /* from the estimate on: 1 for particles of the dominant hypothesis */
+    };
     like_patch *estimate_patch; /* cameras x limbs: surface samples of the estimate */
-    /* limbs x LIKE_RING: the templates as this frame is compared with them. */
+    /* limbs x LIKE_RING: the templates in the form of template_ring(), for this frame. */
     int8_t *template_ring[2][GAIT_MAX_CAMERAS];
     likelihood_scratch *work; /* tasks, or 1 without threads */
     lag_scratch lag;          /* ancestor and weight: in the memory of the work of all tasks but the first */
@@ -175,7 +178,7 @@ gait_tracker *tracker_layout(arena *a, const gait_model *m, const gait_tracker_c
                              const kernels *run);
 void tracker_clear(gait_tracker *t);
 
-/* From now on this many particles are in use. */
+/* Set the number of particles in use. */
 void tracker_set_count(gait_tracker *t, int32_t particles);
 
 /* Set target_particles, which the saved state records. */
@@ -254,7 +257,7 @@ static inline float in_walking_time(const gait_tracker *t, float seconds)
     return t->cfg.reverse > 0.0 ? -seconds : seconds;
 }
 
-/* Metres along its heading that a body moves in so many seconds if it walks on; a belt cancels its share. */
+/* Distance along its heading that a body covers in so many seconds if it walks on, metres; a belt cancels its share. */
 static inline float way_of_walk(const gait_tracker *t, const state_layout *of, const particle_state *from,
                                 float seconds)
 {
@@ -268,7 +271,7 @@ static inline float seconds_unsupported(const gait_tracker *t)
     return seconds_since(t, t->core->support_utime);
 }
 
-/* Running mean over so many seconds after this frame's score; 0 is no score. */
+/* Update a running mean over so many seconds by this frame's score; a score of 0 changes nothing. */
 static inline float running_mean(const gait_tracker *t, float before, float score, float seconds)
 {
     float const share = f_min(seconds_unsupported(t) / seconds, 1.0f);

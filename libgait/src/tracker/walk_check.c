@@ -2,8 +2,9 @@
 #include "base/fmath.h"
 #include "tracker/likelihood_step.h"
 
-static const int64_t APART = 200000;    /* microseconds between the frames compared */
-static const int64_t TOO_LATE = 400000; /* from which the walk since is not predicted well enough */
+static const int64_t APART = 200000; /* microseconds between the frames compared */
+static const int64_t TOO_LATE =
+    400000; /* microseconds over which a walk is no longer predicted well enough */
 
 /* Where a body is after so many seconds of walking on as it did. */
 static particle_state walk_on(const gait_tracker *t, const particle_state *from, float seconds)

@@ -150,7 +150,7 @@ class Overlay:
         self._lens = _lens_map(camera) if camera.distortion.any() else None
 
     def draw(self, image: Image, estimate: Estimate, frame: int, *, legend: bool = False) -> Image:
-        """Return a BGR picture: frame, body of the dominant mode, mean joints, 90 % ellipses, panel.
+        """Return a BGR picture: frame, body of the dominant hypothesis, mean joints, 90 % ellipses, panel.
 
         The figure of a lost person is faded and has no body.  `legend`: explain what is drawn.
         """

@@ -40,7 +40,7 @@ _WIDTH = 1.5  # of the kernel, in standard deviations of the successors
 _GROUP = (0.25, 0.8)  # strides and radians within which motions and particles belong together
 _NEAR = (0.15, 0.5)  # strides and radians around a hypothesis, as in estimate.c
 _SIZE_SD = 0.01  # share to which pictures determine the size, as in estimate.c
-_SURE = 0.7  # least mass of the hypothesis under `tracking`
+_SURE = 0.7  # least weight of the dominant hypothesis under `tracking`, DOMINANT_WEIGHT of estimate.h
 
 
 class Spool:
@@ -324,7 +324,7 @@ def smoothed(
     joints : ndarray of shape (M, P, 3)
     angles : ndarray of shape (M, A)
     """
-    use, mass = _dominant(states)
+    use, weight = _dominant(states)
     mean, sd = State(coef=np.zeros(model.info.components), offset=np.zeros(model.info.angles)), State()
     for name in ("stride_hz", "stature", "pitch", "roll", "turn_rate"):
         setattr(mean, name, float(states[name][use].mean()))
@@ -344,10 +344,10 @@ def smoothed(
     phase_r = float(np.abs(np.exp(2j * np.pi * states["phase"]).mean()))
     return replace(
         then,
-        status=_status(then.status, mass),
+        status=_status(then.status, weight),
         ess=float(len(states)),
         phase_r=phase_r,
-        hypothesis_weight=mass,
+        hypothesis_weight=weight,
         speed=then.speed * _pace(then.mean, mean),
         mean=mean,
         sd=sd,
@@ -380,8 +380,8 @@ def _circular(values: Array, use: NDArray[np.bool_], turn: float) -> tuple[float
     return float(mean * turn), float(sd * turn)
 
 
-def _status(then: TrackStatus, mass: float) -> TrackStatus:
+def _status(then: TrackStatus, weight: float) -> TrackStatus:
     """Status of a smoothed frame: lost frames stay lost, ambiguity is judged anew from the motions."""
-    if then == TrackStatus.LOST or (mass < _SURE and then == TrackStatus.INIT):
+    if then == TrackStatus.LOST or (weight < _SURE and then == TrackStatus.INIT):
         return then
-    return TrackStatus.TRACKING if mass >= _SURE else TrackStatus.AMBIGUOUS
+    return TrackStatus.TRACKING if weight >= _SURE else TrackStatus.AMBIGUOUS
