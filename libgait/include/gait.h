@@ -1,5 +1,6 @@
 /* gait.h - libgait: track walking people in calibrated video, in fixed memory, with the same bits on every run.
-  * Units: metres, radians, seconds, pixels; names ending in utime are in microseconds (as in LCM).  Matrices are
+ *
+ * Units: metres, radians, seconds, pixels; names ending in utime are in microseconds (as in LCM).  Matrices are
  * row-major.  World: right-handed, z up, ground z = 0.  Image row 0 is the top; pixel centres are at integers.
  * Memory: the library never allocates.  Call gait_*_bytes(), and give gait_*_init() that many bytes, aligned to
  * GAIT_ALIGN.  They must outlive the object and must not move.  There is nothing to free.
@@ -21,8 +22,8 @@
 #define GAIT_VERSION_PATCH 0
 #define GAIT_VERSION (GAIT_VERSION_MAJOR * 10000 + GAIT_VERSION_MINOR * 100 + GAIT_VERSION_PATCH)
 #define GAIT_ABI 9          /* SONAME; raised by any incompatible change below, including struct layout */
-#define GAIT_FORMAT_MAJOR 1 /* model blob: another major is rejected, */
-#define GAIT_FORMAT_MINOR 0 /* sections added by a newer minor are skipped */
+#define GAIT_FORMAT_MAJOR 1 /* of model blobs: one with another major version is rejected */
+#define GAIT_FORMAT_MINOR 0 /* sections that a newer minor version adds are skipped */
 
 #define GAIT_ALIGN 64          /* bytes, of models and of all memory given to the library */
 #define GAIT_MAX_JOINTS 32     /* points of the skeleton whose positions are reported */
@@ -66,7 +67,7 @@ typedef GAIT_ENUM(gait_result) { /* values never change their meaning */
     GAIT_ERR_MEMORY  = -3, /* memory too small or not aligned to GAIT_ALIGN */
     GAIT_ERR_LIMIT   = -4, /* whole number or size outside its documented range: particles 0, lag -1, 17000 pixels */
     GAIT_ERR_MAGIC   = -5, /* not a libgait blob or snapshot */
-    GAIT_ERR_VERSION = -6, /* format major or snapshot layout is not the one this build reads */
+    GAIT_ERR_VERSION = -6, /* model format or snapshot of a version that this library does not read */
     GAIT_ERR_CORRUPT = -7, /* checksum, bounds or cross-reference check failed */
     GAIT_ERR_STATE   = -8, /* call out of order: step before start, time running backwards */
     GAIT_ERR_NUMERIC = -9  /* numbers out of range while lifting; the tracker sets GAIT_EST_DEGENERATE instead */
@@ -193,7 +194,7 @@ typedef struct gait_model gait_model;
           float, stride_length, , "statures")                                                                         \
     FIELD("Stride length: standard deviation between subjects.",                                                      \
           float, stride_length_sd, , "statures")                                                                      \
-    FIELD("1; 0: only a segment prior, no tracking; all fields above are then 0.",                                    \
+    FIELD("1: can track; 0: has only a segment prior, and all fields above are 0.",                                   \
           int32_t, cyclic, , "")                                                                                      \
     FIELD("Bit i: angle i belongs to the trunk or an arm, where posture varies most.",                                \
           uint32_t, posture_angles, , "mask")                                                                         \

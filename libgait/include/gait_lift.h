@@ -131,7 +131,7 @@ GAIT_API const char *gait_lift_marker_name(const gait_lift *l, int32_t marker); 
           int32_t, observed, , "")                                                                                    \
     FIELD("Iterations taken.",                                                                                        \
           int32_t, iterations, , "")                                                                                  \
-    FIELD("1; 0: stopped at max_iterations.",                                                                         \
+    FIELD("1: converged; 0: stopped at max_iterations.",                                                              \
           int32_t, converged, , "")
 
 typedef struct gait_lift_fit { GAIT_LIFT_FIT_FIELDS(GAIT_DECLARE) } gait_lift_fit;

@@ -325,7 +325,7 @@ def test_a_curve_and_its_series_are_the_same():
 @pytest.mark.parametrize("rows", [20, 120, 121])
 def test_what_is_no_series_is_refused_by_both(rows):
     made = {**SHIPPED, "PACE": np.zeros((rows, 30), np.float32)}
-    with pytest.raises(GaitError, match=r"PACE: its rows are no Fourier series"):
+    with pytest.raises(GaitError, match=r"PACE: its rows are not a Fourier series"):
         Model(blob.encode(made))
     with pytest.raises(UserError, match=r"PACE has \d+ rows.*learn the model again"):
         ModelCurves(made)

@@ -1,7 +1,7 @@
 #include "base/arena.h"
 
-/* Under AddressSanitizer every block is followed by bytes that must not be touched.  gcc defines a macro, clang has a
- * feature. */
+/* Under AddressSanitizer every block is followed by bytes that must not be touched.  gcc and clang announce it
+ * in different ways. */
 #if defined(__has_feature)
 #if __has_feature(address_sanitizer)
 #define ARENA_RED_ZONES

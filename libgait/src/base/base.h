@@ -16,7 +16,7 @@
 #define GAIT_ASSERT(x) assert(x)
 #endif
 
-/* Called at most a few times a frame, in a file whose other functions are compiled for speed: compiled for size. */
+/* Compiles a function for size, in a file that is compiled for speed: it is called at most a few times a frame. */
 #ifdef __GNUC__
 #define COLD __attribute__((cold))
 #else

@@ -3,7 +3,7 @@
 #include "base/fmath.h"
 #include "base/simd_f64.h"
 
-/* Sum of u[j] v[j] over j < count, a multiple of CHOLESKY_LANES, in as many independent chains. */
+/* Sum of u[j] v[j] over j < count, a multiple of CHOLESKY_LANES, as CHOLESKY_LANES independent sums. */
 static double dot(const double *u, const double *v, int32_t count)
 {
     simd_f64 sum[CHOLESKY_LANES / SIMD_F64] = {{0.0}};

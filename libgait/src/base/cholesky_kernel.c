@@ -69,7 +69,7 @@ static bool factor_corner(double *A, int32_t ld, int32_t n)
 
 bool KERNEL(cholesky_factor)(const double *A, double *U, int32_t n, int32_t ld)
 {
-    for (int32_t i = 0; i < ld; i += ROWS) { /* row n, of y, may be the first of the last block */
+    for (int32_t i = 0; i < ld; i += ROWS) { /* the last block may begin with row n, which holds y */
         double *const corner = U + (size_t)i * (size_t)(ld + 1);
         int32_t const rows = n - i < ROWS ? n - i : ROWS;
         update(A, U, ld, i, i, i + ROWS, -1.0, U, ld, U, ld, i, NULL);

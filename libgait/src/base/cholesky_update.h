@@ -26,7 +26,7 @@ static void UPDATE(const NUMBER *B, NUMBER *C, int32_t ldc, int32_t i, int32_t f
         EACH_ROW(k) a[k] *= sign;
         __asm__(
             ""
-            : "+m"(corner)); /* otherwise the compiler widens all of it first and reads it back from memory */
+            : "+m"(corner)); /* keeps the compiler from converting the whole block first, through memory */
         if (T)
             EACH_ROW(p)
             {

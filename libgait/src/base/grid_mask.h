@@ -18,10 +18,8 @@ typedef struct grid_mask {
     _Alignas(
         GAIT_ALIGN) uint64_t word[GRID_WORDS][GRID_SIZE + GRID_SPARE]; /* from column, and from column + 64 */
     int32_t first, last, column, width; /* width: 64, or 128 from column 0 on */
-    /* For lookups: the last of 64 columns; 2 first - 1; 2 (last - first). small: 64 columns and at most
-     * GRID_SMALL rows, the first of which begins a cache line. */
-    int32_t edge, half, halves;
-    bool small;
+    int32_t edge, half, halves; /* for lookups: the last of 64 columns; 2 first - 1; 2 (last - first) */
+    bool small; /* 64 columns and at most GRID_SMALL rows, the first of which begins a cache line */
 } grid_mask;
 
 /* Set the rows and columns of a mask and the values derived from them. */

@@ -34,7 +34,7 @@ struct gait_pool {
     job now;
     atomic_uint number; /* of the job */
     atomic_uint busy;   /* helpers that work on it */
-    atomic_int next;    /* task to hand out */
+    atomic_int next;    /* next task to hand out */
 };
 
 enum { SPINS = 20000 }; /* 0.4 to 0.5 ms, shared among all helpers: there may be more of them than cores */

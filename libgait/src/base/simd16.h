@@ -11,8 +11,8 @@ enum { SIMD16 = 16 };
 #if defined(__AVX2__)
 #include <immintrin.h>
 
-/* A gather without a mask would depend on the old value of its register. The scale is part of the
- * instruction. */
+/* With a mask, even a full one, a gather does not wait for the old value of its register. The scale must be a
+ * constant. */
 static inline __m256i simd16_lookup8(const void *table, int32_t bytes, __m256i index, __m256i take)
 {
     __m256i const none = _mm256_setzero_si256();

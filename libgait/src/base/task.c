@@ -10,7 +10,7 @@ typedef struct work {
     void *ctx;
     int32_t items, tasks;
     int32_t part, share;        /* items of each */
-    atomic_int next[TASK_MOST]; /* share to hand out, of each part */
+    atomic_int next[TASK_MOST]; /* next share to hand out, of each part */
 } work;
 
 /* Take shares of one part until none is left. */

@@ -2,10 +2,10 @@
 #include "base/rng.h"
 
 static const float STEPS = 2.0f; /* both legs change class alike: phases count modulo half a stride */
-static const float ANY = 4.0f;   /* sd of a phase, strides: as good as uniform */
-static const float JITTER_HEADING = 0.1f; /* sd, radians: who changes class often turns a little */
-static const float RATE_SD = 0.07f;       /* relative; at least that of the people learnt from */
-static const float POSTURE_SHARE = 0.3f;  /* of the posture's sd, by which it moves at once */
+static const float ANY = 4.0f;   /* sd of a phase, strides: in effect uniform */
+static const float JITTER_HEADING = 0.1f; /* sd, radians: people who change class often turn a little */
+static const float RATE_SD = 0.07f;       /* relative; that of the people learnt from, if it is larger */
+static const float POSTURE_SHARE = 0.3f;  /* of the posture's sd: by this the posture changes at once */
 
 float class_change_rate(const gait_model *m, int32_t to, float phase, float stride_hz)
 {

@@ -10,8 +10,8 @@ typedef struct class_entry {    /* how particles begin in a class */
     const state_layout *layout; /* of the class */
     uint64_t seed;
     uint32_t frame;     /* counter of the random numbers */
-    const float *score; /* scores of the person in that class, */
-    float score_sd;     /* and their standard deviation */
+    const float *score; /* scores of the person in that class */
+    float score_sd;     /* their standard deviation */
 } class_entry;
 
 /* Particle i, until now of class `from`. */

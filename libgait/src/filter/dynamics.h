@@ -1,5 +1,5 @@
-/* dynamics.h - motion model: the temporal prior of Ormoneit et al. (2000), eqs. 5-9, as resolved in the
- * design document. */
+/* dynamics.h - motion model: the temporal prior of Ormoneit et al. (2000), eqs. 5-9, with the
+ * details of doc/method.md. */
 #ifndef GAIT_FILTER_DYNAMICS_H
 #define GAIT_FILTER_DYNAMICS_H
 #include "base/fmath.h"

@@ -1,4 +1,4 @@
-/* One interval of BLOCK particles, one per lane: eqs. 5-9 as resolved in the design document. */
+/* One interval of BLOCK particles, one per lane: eqs. 5-9 with the details of doc/method.md. */
 #include "filter/dynamics.h"
 #include "base/fmath.h"
 #include "base/dispatch.h"
@@ -102,8 +102,8 @@ KERNEL_ROW void walk(const dynamics_step *s, const particle_block *restrict from
         to->f[F_HEADING][lane] = m_wrap_pi(heading[lane]);
 }
 
-/* Now and then a particle draws a new turn rate, half of the time 0. With a turn rate that diffused by the
- * same amount all the time, swaying hips would pass for turning. a and b are normal, so (a, b) is a point
+/* Now and then a particle draws a new turn rate, half of the time 0. If the turn rate diffused all the time instead,
+ * swaying hips would be taken for turning. a and b are normal, so (a, b) is a point
  * with an exponentially distributed square and a uniform direction. */
 KERNEL_ROW void take_turns(const dynamics_step *s, const float *restrict a, const float *restrict b,
                            const float *restrict n, const float *restrict x, float *restrict out)

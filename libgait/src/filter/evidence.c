@@ -3,7 +3,7 @@
 
 enum { CHUNK = 64 };               /* particles whose exponentials are computed at once */
 static const double NONE = -1e300; /* log of 0 */
-static const double ENOUGH = 0.2;  /* share of the particles that must keep weight */
+static const double ENOUGH = 0.2;  /* effective sample size that must remain, as a share of the particles */
 static const float LEAST = 0.05f;  /* smallest power */
 
 double evidence_of(const pf *p, const float *loglik)

@@ -187,7 +187,7 @@ particle_state particle_set_place(const particle_set *p, const double *weight)
 
 typedef struct block { /* the fields of BLOCK particles */
     kin_input in;
-    float turn[BLOCK]; /* no pose depends on it */
+    float turn[BLOCK]; /* the turn rate, on which no pose depends */
     float offset[GAIT_MAX_ANGLES][BLOCK];
 } block;
 

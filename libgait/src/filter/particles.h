@@ -5,10 +5,10 @@
 #include "model/kinematics.h"
 #include <string.h>
 
-/* One float array per field. (X, Y) is the smooth path over the ground and Z the height of the ground under
- * the person; the pelvis follows from the model's sway and height (ROOT_*). */
 #define LEAST_STATURE 0.3f /* metres: the smallest stature of a particle */
 
+/* One float array per field. (X, Y) is the smooth path over the ground and Z the height of the ground under
+ * the person; the pelvis follows from the model's sway and height (ROOT_*). */
 enum {
     F_PHASE,
     F_RATE,
@@ -38,15 +38,15 @@ static inline float *field(const particle_set *p, int32_t f)
 typedef struct state_layout {
     const gait_model *model; /* of one class of motion */
     const kernels *run;
-    int32_t components, proportions; /* scores of a particle, */
-    int32_t curve_components;        /* and those that the curves of this class have: the first */
-    int32_t offsets;                 /* number of angles with a posture offset, */
-    int32_t angle[GAIT_MAX_ANGLES];  /* and their indices */
+    int32_t components, proportions; /* numbers of scores of a particle */
+    int32_t curve_components;        /* the first ones, which the curves of this class have */
+    int32_t offsets;                 /* number of angles with a posture offset */
+    int32_t angle[GAIT_MAX_ANGLES];  /* their indices */
     bool plain_root;   /* paper mode: no root motion within the stride, pelvis at its mean height */
     float mean_height; /* statures */
 } state_layout;
 
-/* Of the first class. */
+/* The layout of the first class. */
 state_layout state_layout_init(const gait_model *m, const gait_tracker_config *cfg, const kernels *run);
 
 /* The same fields with the curves of another class. */

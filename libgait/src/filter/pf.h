@@ -33,8 +33,7 @@ int32_t pf_heaviest(const pf *p);
 void pf_draw(const double *weight, int32_t n, uint64_t *cumulative, int32_t count, uint32_t u,
              int32_t *parent);
 
-/* Ancestor indices by systematic resampling: |children - n w| < 1. u is the common offset in 2^-32 of a
- * step. */
+/* Ancestor indices by systematic resampling: |children - n w| < 1. u is the common offset, in 2^-32 of a step. */
 void pf_resample_systematic(pf *p, uint32_t u);
 
 /* The same for another number of particles, which becomes p->n; the arrays must have the capacity. */

@@ -1,8 +1,8 @@
 /* rejuvenation.h - moves particles after resampling so that they do not depend on one ancestor (kernel
  * shrinkage).
  *
- * Most particles of a second ago have no descendants. A few are the ancestors of all, so that all would have
- * their depth, stature and posture. After resampling every state therefore becomes
+ * Most particles of a second ago have no descendants. A few are the ancestors of all, so all would have their
+ * depth, stature and posture. Therefore every state becomes, after resampling,
  *
  * | x' = x + a (m - x) + sqrt(a (1 - a)) (j - k)
  *
@@ -18,9 +18,9 @@ typedef struct rejuvenation { /* parameters for one frame */
     const int32_t *parent; /* n: drawn by weight */
     int32_t n, split;      /* from `split` on particles are another hypothesis, rejuvenated separately */
     const uint8_t
-        *origin; /* with several classes of motion: class of each particle's ancestor, else NULL; then only */
-    int32_t begin;        /* particles begin .. n - 1 are rejuvenated together, */
-    int32_t motion_class; /* those whose ancestors were of this class as they are now */
+        *origin; /* NULL: one class; otherwise the class of each particle's ancestor.  Then only particles */
+    int32_t begin;        /* begin .. n - 1 are rejuvenated together, those whose ancestors were of */
+    int32_t motion_class; /* this class, which is also theirs */
     uint64_t seed;
     uint32_t frame;      /* counter of the random numbers */
     float shrink, noise; /* a and sqrt(a (1 - a)); 0: no change */

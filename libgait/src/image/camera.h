@@ -29,7 +29,7 @@ static inline void camera_distort(const gait_camera *c, float u, float v, float 
  * for lenses within their image. */
 void camera_ideal(const gait_camera *c, const double distorted[2], double ideal[2]);
 
-/* The same camera at another place. */
+/* The same camera with another pose. */
 static inline gait_camera camera_placed(const gait_camera *c, const float R[9], const float t[3])
 {
     gait_camera out = *c;

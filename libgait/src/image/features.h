@@ -31,18 +31,18 @@ typedef struct features {
     bool has_foreground; /* and a background plate */
     edge_cell *edge;     /* VIEW_PIXELS */
     int8_t *surface; /* VIEW_PIXELS: values of surface samples: local contrast, or grey - 128 in paper mode */
-    uint16_t *pairs; /* VIEW_PIXELS: each value with the one below it in the high byte */
+    uint16_t *pairs; /* VIEW_PIXELS: each value, and in the high byte the one below it */
     int32_t foreground_total; /* sum of the foreground over the grid, FOREGROUND_ONE = 1 */
     uint64_t (*foreground)[GRID_SIZE][GRID_WORDS]; /* FOREGROUND_PLANES bit planes of the probability */
-    uint64_t (*inside)[GRID_WORDS];                /* cells inside the camera's image, */
-    view_map inside_map;                           /* computed for this place of the region */
+    uint64_t (*inside)[GRID_WORDS];                /* cells inside the camera's image */
+    view_map inside_map;                           /* region for which `inside` was computed */
     /* The planes of foreground, then inside, in words that begin at each multiple of GRID_STEP columns, as
      * grid_mask's. */
     uint64_t (*words)[FOREGROUND_PLANES + 1][GRID_SIZE]; /* GRID_STARTS */
     features_keypoints keypoints;
 } features;
 
-enum { EDGE_SIZE_ROWS = 32, EDGE_SMOOTH_ROWS = 4 }; /* rows in each ring, by row modulo this */
+enum { EDGE_SIZE_ROWS = 32, EDGE_SMOOTH_ROWS = 4 }; /* rows of each ring: row y is at y modulo this */
 
 typedef struct
     edge_rows { /* rings of rows of the edge tensor: gradient size, smoothed once, smoothed twice */
@@ -59,7 +59,7 @@ typedef struct features_scratch { /* shared by the cameras */
 features features_layout(arena *a);
 features_scratch features_scratch_layout(arena *a);
 
-/* Begin a new frame, or a time without a frame (im->data NULL), in the region f->map; sets f->has_image. */
+/* Begin a frame in the region f->map, or a step without an image (im->data NULL); sets f->has_image. */
 void features_begin(features *f, const gait_image *im, features_scratch *s);
 
 /* Resample one of FEATURES_BANDS parts of the frame's planes and grey levels. Parts may run in parallel. */

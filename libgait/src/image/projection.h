@@ -22,8 +22,7 @@ void projection_ideal(const projection *e, const double uv[2], double ideal[2]);
 /* Rows of a point, linearised at `about` (exact if orthographic). */
 void projection_rows_near(const projection *e, const double ideal[2], const double about[3],
                           projection_rows *out);
-/* Rows of a point of which only a rough depth is known: they state that it lies on the ray through the
- * pixel. */
+/* Rows of a point whose depth is known only roughly: they place it on the ray through the pixel. */
 void projection_rows_ray(const projection *e, const double ideal[2], double depth, projection_rows *out);
 /* Whiten the rows: sd is the noise of the observation, `residual` the variance of each coordinate of the
  * point. Returns the square root of the determinant of the noise covariance. */

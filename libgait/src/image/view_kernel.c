@@ -72,7 +72,7 @@ static void bilinear_degenerate(const gait_image *im, int32_t step, const places
             row[c][i] = tap_bilinear(im, step, c, at->u[i], at->v[i]);
 }
 
-/* The last row and column are reached with weight FRACTION from the ones before. */
+/* A position in the last row or column is interpolated from the one before, with weight FRACTION. */
 static void locate(const gait_image *im, int32_t step, const places *at, taps *restrict t)
 {
     int32_t const right = im->width - 1, low = im->height - 1;
@@ -214,7 +214,7 @@ static int32_t run_end(const places *corner, int32_t begin, int32_t *low, int32_
     return end;
 }
 
-/* at: source positions; replaced by the corners of their boxes. */
+/* at: source positions on entry; receives the corners of their boxes. */
 KERNEL_ROW void box_row(const gait_image *im, int32_t step, int32_t side, places *at, uint8_t *const row[3])
 {
     box const b = box_of(im, side);

@@ -5,7 +5,7 @@
 #include "image/camera.h"
 #include "base/fmath.h"
 
-#define STRANGE 8.0f /* standard deviations at which a joint is as likely as without a person */
+#define STRANGE 8.0f /* standard deviations at which a keypoint is as likely as without a person */
 #define BEHIND  1e6f /* squared standard deviations of a joint behind the camera */
 #define ANOTHER 4.0f /* nats: minus the log probability that the keypoints are not of this person */
 
@@ -15,8 +15,8 @@ static float cost(float square)
     return 3.0f * m_log(1.0f + 0.25f * square);
 }
 
-/* Mean cost of the joints that were found.  It has an upper limit, because the detector may have found another person, or
- * jumped: keypoints that far from a body, as a whole, do not attract it. */
+/* Mean cost of the joints that were found.  It has an upper limit, because the detector may have found another person or
+ * be wrong altogether: keypoints that are so far from a body do not attract it. */
 static float mean_cost(const like_body *b)
 {
     const features_keypoints *const found = &b->features->keypoints;

@@ -27,8 +27,8 @@ static void surface_point(const limb_geometry *g, float z, float angle, float po
         normal[k] /= __builtin_sqrtf(norm);
 }
 
-/* Whether a point is among those compared: `points` of the LIKE_HALF that face the camera, wherever these begin, on
- * every side and at every height. */
+/* Whether a point is compared.  They are chosen so that of the LIKE_HALF points that face the camera, whichever these
+ * are, `points` are compared, spread over all directions and heights. */
 static bool compared(int32_t i, int32_t points)
 {
     int32_t const at = i ^ (i >> 2 & 1); /* neighbouring directions take different rows */
@@ -36,7 +36,8 @@ static bool compared(int32_t i, int32_t points)
     return order < points;
 }
 
-/* Points on rings at the middles of equal parts of the limb.  Those that are not compared never face the camera. */
+/* Points on rings at the middles of equal parts of the limb.  Those that are not compared count as facing away from every
+ * camera. */
 static void surface_init(const limb_geometry *g, int32_t points, like_surface *out)
 {
     for (int32_t i = 0; i < LIKE_RING; i++) {

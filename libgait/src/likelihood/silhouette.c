@@ -31,8 +31,8 @@ static float density_outside(const like_body *b)
     return outside > 0 ? (float)(b->features->foreground_total - b->covered) / (float)outside : 0.0f;
 }
 
-/* Without a person all foreground is missed and no background is inside the body.  Where most of the image is
- * foreground, as after the camera has moved, any body would gain by that: what it gains by chance does not count. */
+/* Without a person all foreground is missed and no background is inside the body.  If most of the image is foreground, as
+ * after the camera has moved, any body would explain some of it, so what it explains by chance does not count. */
 static float support(const like_body *b)
 {
     if (!b->features->has_foreground)

@@ -130,7 +130,7 @@ static inline void place(const like_surface *s, const like_pose_limb *pose, int3
         float const x = (X0 * px[i] + X1 * py[i] + X2 * pz[i] + S0) * inv;
         float const y = (Y0 * px[i] + Y1 * py[i] + Y2 * pz[i] + S1) * inv;
         float const away = nx * E0 + ny * E1 + nz * E2 + s->outward[j];
-        /* Floats that are not negative are ordered as their bits; negative ones have greater bits. */
+        /* Non-negative floats are ordered like their bits; the bits of negative ones are greater. */
         int32_t const shown = -((away < graze) & (u_max(m_bits(x), m_bits(y)) < m_bits(end)));
         out->shown[i] = shown;
         out->u[i] = shown ? (int32_t)x : 0;

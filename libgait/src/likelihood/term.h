@@ -21,14 +21,14 @@ enum {
     LIKE_RING = LIKE_SAMPLES + LIKE_HALF, /* once around and half again, so that every half is contiguous */
     LIKE_COSTS = 256,                     /* entries of a cost table */
     LIKE_COST_ONE = 256,                  /* 1 nat in the robust cost table */
-    LIKE_COUNT_ONE = 1 << 24 /* added to every entry, so that a sum of costs also counts the points */
+    LIKE_COUNT_ONE = 1 << 24 /* added to every entry, so that a sum of costs also contains their number */
 };
 
-/* The visibility of a point of an outline is read this far on the way to the limb's middle. */
+/* Whether a point of an outline is visible is read at this share of the way to the limb's middle. */
 #define LIKE_INWARD 0.3f
 
-/* Fixed points on one limb, statures, the same for every particle. The normals of points 2 d and 2 d + 1
- * have direction d; direction d + LIKE_AZIMUTHS is the opposite one. */
+/* Surface points of one limb, statures, the same for every particle. The normals of points 2 d and 2 d + 1 have
+ * direction d; direction d + LIKE_AZIMUTHS is the opposite one. */
 typedef struct like_surface {
     float point[3][LIKE_RING];
     float normal[3][LIKE_RING];
@@ -97,8 +97,8 @@ typedef struct like_setup { /* constant while a tracker lives */
     const kernels *run;
     int32_t limbs;
     bool paper;  /* use eqs. 10-13 literally */
-    int32_t few; /* points visible in both frames below which a limb counts as occluded */
-    float all;   /* and from which all of it is visible */
+    int32_t few; /* a limb with fewer points that are visible in both frames counts as occluded */
+    float all;   /* one with so many counts as fully visible */
     float log_occluded;
     float surface_var, tilt; /* eq. 11: of the difference of two frames; grey levels squared */
     uint32_t terms;          /* GAIT_TERM_* */

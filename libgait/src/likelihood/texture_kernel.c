@@ -16,7 +16,8 @@ typedef struct rows { /* samples of each limb */
 #ifdef SIMD16_BYTES
 static void compare_all(rows *r, int32_t limbs, const like_costs *cost, int32_t *sum)
 {
-    for (int32_t l = limbs; l % SIMD16_BYTES != 0; l++) { /* their sums are not read */
+    for (int32_t l = limbs; l % SIMD16_BYTES != 0;
+         l++) { /* fill up the last group; these sums are not read */
         r->now[l] = r->now[0];
         r->then[l] = r->then[0];
     }
@@ -48,8 +49,8 @@ static void compare_all(const rows *r, int32_t limbs, const like_costs *cost, in
 }
 #endif
 
-/* The ancestor's half may begin at another direction: its samples are copied between hidden ones and read
- * from where `now` begins. */
+/* The ancestor's half may begin at another direction: its samples are copied into an array that is hidden elsewhere,
+ * and read from where `now` begins. */
 static void compare_limbs(const like_patch *now, const like_patch *then, int32_t limbs,
                           const like_costs *cost, int32_t *sum)
 {

@@ -7,7 +7,8 @@
 #include "base/grid_mask.h"
 
 #if defined(__AVX512F__)
-#define HIDE_ANY KERNEL_ROW /* most masks are small: inlining this would only use registers */
+#define HIDE_ANY                                                                                             \
+    KERNEL_ROW /* rarely used, since most masks are small: inlining it would only cost registers */
 #else
 #define HIDE_ANY static inline
 #endif

@@ -15,8 +15,8 @@ typedef struct kin_input {
     float heading[BLOCK];                          /* radians */
     float pitch[BLOCK], roll[BLOCK];               /* radians, added to the model's own */
     float pelvis[3][BLOCK];                        /* metres, world */
-    float coef[GAIT_MAX_COMPONENTS][BLOCK];        /* score standard deviations */
-    float proportion[GAIT_MAX_PROPORTIONS][BLOCK]; /* the same */
+    float coef[GAIT_MAX_COMPONENTS][BLOCK];        /* standard deviations */
+    float proportion[GAIT_MAX_PROPORTIONS][BLOCK]; /* standard deviations */
 } kin_input;
 
 typedef struct kin_channels {

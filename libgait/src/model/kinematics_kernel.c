@@ -26,8 +26,7 @@ void KERNEL(kin_curves)(const gait_model *m, const kin_input *in, int32_t compon
         return;
     }
     for (int32_t first = 0; first < m->channels; first += PART) {
-        int32_t const from =
-            i_min(first, m->channels - PART); /* the last part begins within the one before */
+        int32_t const from = i_min(first, m->channels - PART); /* the last part overlaps the one before */
         for (int32_t lane = 0; lane < BLOCK; lane++)
             curves_part(m, in->phase[lane], in->pace[lane], &in->coef[0][lane], BLOCK, components, from, PART,
                         acc[lane] + from);

@@ -92,7 +92,7 @@ static void read_pace(sections *r, const class_tags *tags, gait_model *m)
     m->pace_series = sections_floats(r, tag, 2, dims);
     sections_require(r, m->stride_hz_sd > 0.0f, tag, "needs an sd of the stride rate in GAIT");
     sections_require(r, dims[0] % 2 == 1 && dims[0] < (uint32_t)m->phases, tag,
-                     "its rows are no Fourier series");
+                     "its rows are not a Fourier series");
     for (int32_t c = 0; r->status == GAIT_OK && c < m->channels; c++) {
         float sum = 0.0f;
         for (uint32_t i = 0; i < dims[0]; i++)
@@ -128,7 +128,7 @@ static void read_frames(sections *r, gait_model *m)
     sections_require(r, memcmp(m->frame_info, first, sizeof first) == 0, "FRMI",
                      "frame 0 must be the root: +3 root_yaw, +2 root_pitch, +1 root_roll");
     for (int32_t k = 0; k < 3; k++)
-        sections_require(r, m->frame_origin[k] == 0.0f, "FRMF", "frame 0 must lie at 0");
+        sections_require(r, m->frame_origin[k] == 0.0f, "FRMF", "the origin of frame 0 must be 0");
     for (int32_t f = 1; r->status == GAIT_OK && f < m->frames; f++) {
         const int32_t *const info = m->frame_info + FRAME_INFO * f;
         sections_require(r, info[0] >= 0 && info[0] < f, "FRMI", "a parent does not come before its child");
@@ -163,8 +163,8 @@ static void read_shifts(sections *r, gait_model *m)
     for (uint32_t k = 0; r->status == GAIT_OK && k < dims[0]; k++)
         for (uint32_t i = 0; i < 3 * dims[1]; i++) {
             float const by = fabsf(m->shift[3 * dims[1] * k + i]);
-            sections_require(r, by <= LARGEST_PROPORTION, "SHFT", "moves an origin by more than a tenth");
-            sections_require(r, i >= 3 || by == 0.0f, "SHFT", "frame 0 must lie at 0");
+            sections_require(r, by <= LARGEST_PROPORTION, "SHFT", "moves an origin by more than 10 %");
+            sections_require(r, i >= 3 || by == 0.0f, "SHFT", "the origin of frame 0 must be 0");
         }
 }
 
@@ -234,11 +234,11 @@ static void read_class(sections *r, gait_model *m, int32_t k)
     gait_model *const own = &m[k];
     *own = m[0];
     if (blob_has(&r->b, tag.curves)) {
-        sections_require(r, source == k, "CLIN", "a class has curves, but another source");
+        sections_require(r, source == k, "CLIN", "a class with curves must be its own source");
         read_motion(r, &tag, own);
     } else {
         sections_require(r, source < k && m->class_info[CLASS_INFO * source + CLASS_SOURCE] == source, "CLIN",
-                         "a class has no curves, nor an earlier source");
+                         "a class without curves needs an earlier source");
         if (r->status == GAIT_OK)
             *own = m[source];
     }
@@ -276,7 +276,7 @@ static void read_classes(sections *r, gait_model *m)
     }
     if (r->status == GAIT_OK)
         sections_require(r, m->class_info[CLASS_DIRECTION] == 1 && m->class_info[CLASS_SOURCE] == 0, "CLIN",
-                         "the first class must be forwards, with CURV");
+                         "the first class must walk forwards and be its own source");
     if (r->status == GAIT_OK)
         read_changes(r, m);
     for (int32_t k = 1; r->status == GAIT_OK && k < m->classes; k++)
@@ -307,8 +307,9 @@ gait_result model_need_cyclic(const gait_model *m, gait_error *err)
 {
     if (m->cyclic)
         return GAIT_OK;
-    return base_fail(err, GAIT_ERR_ARG, -1,
-                     "the model has no cyclic part: learn it without --segments only to track with it");
+    return base_fail(
+        err, GAIT_ERR_ARG, -1,
+        "the model has no cyclic part, which tracking needs: learn it without `--segments only`");
 }
 
 int32_t model_find_angle(const gait_model *m, const char *name, size_t length)

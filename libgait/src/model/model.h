@@ -37,7 +37,7 @@ struct gait_model {
     /* p x (F + 1): relative change of the lengths in each frame, then of the pelvis's height, per standard
      * deviation; NULL if p is 0 */
     const float *proportion;
-    const float *shift; /* p x F x 3: shift of each frame's origin in its parent, in addition; may be NULL */
+    const float *shift; /* p x F x 3: further shift of each frame's origin in its parent; may be NULL */
 
     float stride_hz, stride_hz_sd;         /* strides per second: mean, sd between subjects */
     float stride_cv;                       /* variation of the stride time within a subject */
@@ -58,7 +58,7 @@ struct gait_model {
 
     uint64_t digest; /* FNV-1a of the blob */
 
-    /* Classes of motion: walking, standing ... (doc/method.md).  Each has a view of its own, equal to this one but for
+    /* Classes of motion: walking, standing ... (doc/method.md).  Each has its own view, which differs from this one in
      * curves, statistics and direction; the first is the model itself. */
     int32_t classes;                                     /* at least 1 */
     int32_t motion_class;                                /* of this view */
@@ -93,6 +93,6 @@ int32_t model_find_angle(const gait_model *m, const char *name, size_t length);
 /* Mask of the angles of trunk and arms whose posture differs most between people. */
 uint32_t model_posture_angles(const gait_model *m);
 
-/* Place a copy of the views m in the arena, and their pace_curve. NULL when counting or on overflow. */
+/* Copy the views m into the arena and compute their pace_curve. NULL when counting or on overflow. */
 gait_model *model_layout(arena *a, const gait_model *m);
 #endif

@@ -1,4 +1,4 @@
-/* sections.h - reads the sections of a blob one by one. The first fault is kept; it names its section. */
+/* sections.h - reads the sections of a blob one by one. Only the first fault is kept; it names its section. */
 #ifndef GAIT_MODEL_SECTIONS_H
 #define GAIT_MODEL_SECTIONS_H
 #include "model/blob.h"

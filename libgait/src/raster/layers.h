@@ -15,8 +15,8 @@ typedef struct layers {
 
 /* A convex polygon in the grid, for each body of a block: the cells in rows top <= y < end that are right of
  * all its left lines and left of all its right lines. Lines continue beyond the corners. The column of a
- * line, relative to the first column of the body, is at + slope y; right lines are stored with the opposite
- * sign, so that on both sides the greatest value counts. */
+ * line, relative to the first column of the body, is at + slope y; right lines are stored with opposite signs,
+ * so that on both sides the greatest value decides. */
 typedef struct layers_limb {
     float line[BLOCK][4 * LAYERS_LINES]; /* (at left, at right, slope left, slope right) of each line */
     int32_t top[BLOCK], end[BLOCK];      /* no rows if behind the camera */

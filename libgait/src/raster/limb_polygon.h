@@ -90,8 +90,7 @@ static inline void cone_polygon(const limb_projection *p, limb_polygon *out)
     image_vector(p, &s1, sag, b);
     float const a1[2] = {a[0] * g->a1, a[1] * g->a1}, b1[2] = {b[0] * g->b1, b[1] * g->b1};
     float const w0 = support(a0, b0, -ey, ex), w1 = support(a1, b1, -ey, ex);
-    /* A foreshortened limb shows the ellipse at its end: most of the depth of that ellipse is added to the
-     * quadrilateral. */
+    /* A foreshortened limb shows the ellipse at its end, so the quadrilateral is extended by most of it. */
     float const e0 = 0.7f * support(a0, b0, ex, ey), e1 = 0.7f * support(a1, b1, ex, ey);
     put(out, 0, s0.x - ex * e0 - ey * w0, s0.y - ey * e0 + ex * w0);
     put(out, 1, s1.x + ex * e1 - ey * w1, s1.y + ey * e1 + ex * w1);

@@ -28,8 +28,8 @@ typedef struct outline_lanes { /* the same for BLOCK bodies */
     float depth[BLOCK], cos_tilt[BLOCK];
 } outline_lanes;
 
-/* Limbs come last here and in the structs made from this one, because a tracker has memory only for the
- * limbs of its model. */
+/* Here and in similar structs the limbs come last, because a tracker has memory only for the limbs of its
+ * model. */
 typedef struct outline_block {
     outline_lanes limb[MODEL_MAX_LIMBS];
 } outline_block;

@@ -11,8 +11,9 @@ enum {
     RAST_LIMIT = GAIT_MAX_PIXELS /* coordinates are clamped to +- this many pixels */
 };
 
-typedef struct rast_spans { /* rows first <= y < last; row y covers begin[y - top] <= x < end[y - top], */
-    int32_t first, last;    /* or nothing if begin >= end */
+/* Rows first <= y < last; row y covers begin[y - top] <= x < end[y - top], or nothing if begin >= end. */
+typedef struct rast_spans {
+    int32_t first, last;
     int16_t begin[GRID_SIZE], end[GRID_SIZE];
 } rast_spans;
 
