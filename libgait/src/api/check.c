@@ -8,9 +8,7 @@ gait_result check_camera(const gait_camera *c, int32_t index, gait_error *err)
 {
     int const number = index < 0 ? 0 : (int)index;
     if (!camera_valid(c))
-        return base_fail(
-            err, GAIT_ERR_ARG, (int)index,
-            "camera %d: size and focal lengths must be positive, R a rotation, all numbers finite", number);
+        return base_fail(err, GAIT_ERR_ARG, (int)index, "camera %d: " CHECK_CAMERA, number);
     if (c->width > GAIT_MAX_PIXELS || c->height > GAIT_MAX_PIXELS)
         return base_fail(err, GAIT_ERR_LIMIT, (int)index, "camera %d: %d x %d pixels, at most %d each way",
                          number, (int)c->width, (int)c->height, GAIT_MAX_PIXELS);

@@ -56,8 +56,8 @@ enum { COUNT = sizeof ROWS / sizeof *ROWS };
 #define LIMITS_OF(T, ...)                                                      __VA_ARGS__
 static const limit LIMITS[] = {STRUCTS(LIMITS_OF, NO_LIMIT, LIMIT, LIMIT_SETTING, LIMIT_PAPER)};
 
-/* The words of all rows one after another: name, type, array, unit and meaning of each, a NUL after each.  Without
- * pointers to them the library needs no relocations. */
+/* Name, type, array, unit and meaning of all rows in one string, each followed by a NUL.  Without pointers to them the
+ * library needs no relocations. */
 #define STRING(x)                               #x
 #define WORDS(name, type, array, unit, meaning) name "\0" type "\0" array "\0" unit "\0" meaning
 #define MEMBER(meaning, type, name, array, ...) MEMBER_OF_5(meaning, type, name, array, __VA_ARGS__, )

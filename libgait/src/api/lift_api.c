@@ -1,4 +1,5 @@
 /* lift_api.c - public functions of the lifter: check the arguments, then call down. */
+#include "api/check.h"
 #include "api/fields.h"
 #include "api/kernels.h"
 #include "base/cpu.h"
@@ -40,7 +41,7 @@ static bool orthonormal(const double axis[2][3])
            within(product[2], -1e-9, 1e-9);
 }
 
-/* Along each axis: further away, single precision cannot resolve the ray of a pixel. */
+/* Whether t is within 10 km along each axis: beyond, single precision cannot resolve the ray of a pixel. */
 static bool near(const float t[3])
 {
     return within((double)t[0], -1e4, 1e4) && within((double)t[1], -1e4, 1e4) &&
@@ -60,10 +61,9 @@ static gait_result check_config(const gait_lift_config *c, gait_error *err)
         : c->heading_sd < 0.0 && c->heading_sd != -1.0 ? "heading_sd is neither -1 nor in [0, 10] radians"
         : !cpu_mask_valid(c->cpu_mask)                 ? "cpu_mask is not ~0u or a set of GAIT_CPU_*"
         : !perspective && !orthonormal(c->axis)        ? "axis is not two unit vectors at right angles"
-        : perspective && !camera_valid(&c->camera)
-            ? "camera is not valid: size, focal lengths and a rotation R are needed"
-        : perspective && !near(c->camera.t) ? "camera is not within 10 km: t is in metres"
-                                            : NULL;
+        : perspective && !camera_valid(&c->camera)     ? "camera: " CHECK_CAMERA
+        : perspective && !near(c->camera.t)            ? "camera is not within 10 km: t is in metres"
+                                                       : NULL;
     return bad ? base_fail(err, GAIT_ERR_ARG, -1, "lift config: %s", bad) : GAIT_OK;
 }
 
@@ -75,7 +75,7 @@ static gait_result need_prior(const gait_model *m, gait_error *err)
                      "the model holds no segment prior: learn it with gait learn ... --segments learnt");
 }
 
-/* Check a config, which may be of an older header, and complete it. */
+/* Check a config, which may come from an older header, and complete it. */
 static gait_result open_config(const gait_model *m, const gait_lift_config *given, gait_lift_config *cfg,
                                gait_error *err)
 {
@@ -159,7 +159,7 @@ static size_t points_of(const lift_table *t)
     return (size_t)t->prior.frames * (size_t)t->prior.markers;
 }
 
-/* Public figures of the last fit. */
+/* The public result of the last fit. */
 static void describe_fit(const gait_lift *l, const lift_outcome *found, gait_lift_fit *out)
 {
     const lift_table *const t = &l->table;

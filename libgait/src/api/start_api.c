@@ -32,12 +32,12 @@ static gait_result check(const gait_model *m, const gait_start_config *c, gait_e
         s = fields_check("gait_start_config", c, "start config: ", err);
     if (s != GAIT_OK)
         return s;
-    const char *const bad =
-        !cpu_mask_valid(c->cpu_mask)              ? "cpu_mask is not ~0u or a set of GAIT_CPU_*"
-        : c->stature != 0.0f && c->stature < 0.5f ? "stature is neither 0 nor in [0.5, 2.5] metres"
-        : !camera_valid(&c->camera) ? "camera is not valid: size, focal lengths and a rotation R are needed"
-        : !start_knows(m)           ? "the model has no joints l_hip r_hip l_ankle r_ankle head_top"
-                                    : NULL;
+    const char *const bad = !cpu_mask_valid(c->cpu_mask) ? "cpu_mask is not ~0u or a set of GAIT_CPU_*"
+                            : c->stature != 0.0f && c->stature < 0.5f
+                                ? "stature is neither 0 nor in [0.5, 2.5] metres"
+                            : !camera_valid(&c->camera) ? "camera: " CHECK_CAMERA
+                            : !start_knows(m) ? "the model has no joints l_hip r_hip l_ankle r_ankle head_top"
+                                              : NULL;
     return bad ? base_fail(err, GAIT_ERR_ARG, -1, "start config: %s", bad) : GAIT_OK;
 }
 

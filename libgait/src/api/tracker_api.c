@@ -14,7 +14,7 @@
 #define USUAL_OF_TWO(meaning, type, name, array, unit, value, paper, low, high) .name = (type)(value),
 #define SET_PAPER(meaning, type, name, array, unit, value, paper, low, high)    full.name = (type)(paper);
 #define NO_DEFAULT(...)
-#define MOST_SD 10.0 /* of any number of a start */
+#define MOST_SD 10.0 /* of any field of a start's state */
 
 void gait_tracker_fill(gait_tracker_config *cfg, size_t cfg_bytes, gait_mode mode)
 {
@@ -29,7 +29,7 @@ void gait_tracker_fill(gait_tracker_config *cfg, size_t cfg_bytes, gait_mode mod
         memcpy(cfg, &full, (size_t)full.struct_size);
 }
 
-/* Check a config, which may be of an older header, and complete it. */
+/* Check a config, which may come from an older header, and complete it. */
 static gait_result open_config(const gait_model *m, const gait_tracker_config *given,
                                gait_tracker_config *cfg, gait_error *err)
 {
@@ -196,7 +196,7 @@ gait_result gait_tracker_start_hypotheses(gait_tracker *t, const gait_hypothesis
     return GAIT_OK;
 }
 
-/* Everything about one camera in a frame. */
+/* Check everything in a frame that concerns one camera. */
 static gait_result check_view(const gait_tracker *t, int32_t c, const gait_frame *frame, gait_error *err)
 {
     gait_result s = GAIT_OK;

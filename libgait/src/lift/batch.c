@@ -21,7 +21,7 @@ static double dot3(const double a[3], const double b[3])
     return a[0] * b[0] + a[1] * b[1] + a[2] * b[2];
 }
 
-/* Observations of the prior's mean, and each marker's own share of the residuals. */
+/* Observations of the prior's mean, and the share of each residual that is due to the marker itself. */
 static void set_base(const lift_table *t, lift_gain *g, const segment_posterior *b, const double *sd)
 {
     g->axes = lift_axes_prior(t, b);
@@ -92,7 +92,7 @@ static void add_point(const double *row, int32_t ld, double u, double v, double 
         theta[k] = (theta[k] + u * row[k]) + v * row[ld + k];
 }
 
-/* Transform x to the world and move it towards the observation by the marker's own share. */
+/* Transform x to the world and move it towards the observation by the marker's share of the residual. */
 static void place_point(const lift_table *t, const lift_axes *axes, const double *uv, double keep, double *x)
 {
     double world[3];

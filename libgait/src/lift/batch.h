@@ -5,10 +5,10 @@
 #include "lift/segment_posterior.h"
 
 typedef struct lift_gain {
-    double *row;    /* F x J x 2 x ld: theta by the observations less `base` */
-    double *base;   /* F x J x 2: observations of the prior's mean */
-    double *keep;   /* F x J: share of the residual that is the marker's own; negative: not observed */
-    double *theta;  /* n */
+    double *row;   /* F x J x 2 x ld: the gain; theta = sum of row (observation - base) */
+    double *base;  /* F x J x 2: observations of the prior's mean */
+    double *keep;  /* F x J: share of the residual that is due to the marker itself; negative: not observed */
+    double *theta; /* n */
     lift_axes axes; /* of the prior */
     bool ready;
 } lift_gain;

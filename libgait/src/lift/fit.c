@@ -4,7 +4,7 @@
 
 #include <string.h>
 
-enum { SCOUT_PASSES = 5 }; /* of each trial, before the better ones are followed to the end */
+enum { SCOUT_PASSES = 5 }; /* of every trial, before the best ones are refined to the end */
 
 static int32_t starts_of(const lift_table *t)
 {
@@ -133,7 +133,7 @@ static bool refine(const lift_table *t, const lift_window *w, segment_posterior 
         out->converged = linear || (!rough && change(t, b, before) < t->cfg.tolerance);
         follow_heading(t, b);
     }
-    if (!out->converged) { /* squares at theta, not those predicted by the linear problem */
+    if (!out->converged) { /* chi2 at theta, not as predicted by the linear problem */
         retreat(t, b, before, heading, 1.0);
         b->log_noise = noise;
         b->U[t->n * (t->ld + 1)] = lowest - noise;
@@ -149,7 +149,7 @@ static void load_trial(const lift_table *t, const lift_trial *from, segment_post
     b->turn_sd = t->cfg.heading_sd < 0.0 ? (double)PI_F : t->cfg.heading_sd;
 }
 
-/* Follow a trial for some passes and keep the result. */
+/* Refine a trial by some passes and keep the result. */
 static bool follow(const lift_table *t, lift_search *s, const lift_window *w, segment_posterior *b,
                    lift_trial *trial, bool first, lift_outcome *out)
 {

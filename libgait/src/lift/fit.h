@@ -4,11 +4,11 @@
 #define GAIT_LIFT_FIT_H
 #include "lift/segment_posterior.h"
 
-/* From which an unknown heading is searched for, 45 degrees apart: each starts a local search, so that one more or
- * less finds the same optimum.  What is promised is that the heading is found, wherever it points. */
+/* Headings from which the search for an unknown one starts, 45 degrees apart.  Each start is refined, so their number
+ * hardly matters: what must hold is that the heading is found wherever it points. */
 enum { LIFT_HEADINGS = 8 };
 
-typedef struct lift_trial { /* a component and a heading, as far as they were followed */
+typedef struct lift_trial { /* a component and a heading, refined from one start */
     int32_t component;
     double evidence; /* with the component's weight, nats */
     double heading;
@@ -37,6 +37,6 @@ void lift_search_layout(arena *a, const lift_table *t, lift_search *s);
 /* Fit b to the window; b->place is the prior's.  false: numbers out of range. */
 bool lift_fit(const lift_table *t, lift_search *s, const lift_window *w, segment_posterior *b,
               lift_outcome *out);
-/* Fit b again from where it is, the standard deviations of the window having changed. */
+/* Continue the fit from b after the standard deviations of the window have changed. */
 bool lift_fit_again(const lift_table *t, lift_search *s, const lift_window *w, segment_posterior *b);
 #endif

@@ -1,4 +1,4 @@
-/* Positions by modes.  The source fixes the order of each sum, so that the number of lanes does not change a bit. */
+/* Positions from modes.  The source fixes the order of each sum, so the bits do not depend on the number of lanes. */
 #include "base/cholesky.h"
 #include "base/simd_f64.h"
 
@@ -22,7 +22,8 @@ void KERNEL(lift_sum)(double *x, int32_t width, const float *mode, size_t stride
     }
 }
 
-/* The modes of one coordinate between two frames into `to`; the sum of to[i] theta[i] in eight chains. */
+/* Interpolate the modes of one coordinate between two frames into `to`; returns the sum of to[i] theta[i], added up as
+ * eight independent sums. */
 static inline double between(double *to, const float *s0, const float *s1, double w0, double w1,
                              int32_t lanes, const double *theta, int32_t modes)
 {
@@ -60,7 +61,7 @@ void KERNEL(lift_row)(double *w, const double *shape, int32_t lanes, const doubl
                        (g0 * simd_f64_load(x + i) + g1 * simd_f64_load(y + i)) + g2 * simd_f64_load(z + i));
 }
 
-/* Eight numbers between two frames into `to`. */
+/* Interpolate eight numbers between two frames into `to`. */
 static inline simd_f64 mixed(double *to, const float *s0, const float *s1, double w0, double w1)
 {
     simd_f64 const x = w0 * simd_f64_load_float(s0) + w1 * simd_f64_load_float(s1);

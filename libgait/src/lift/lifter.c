@@ -1,8 +1,8 @@
 #include "lift/lifter.h"
 
-#define KNOWN_STATURE_SD  0.04 /* metres, of a given stature: shoes, posture, marker positions */
-#define FURTHEST          1e6  /* pixels or metres; points further off count as not observed */
+#define KNOWN_STATURE_SD  0.04 /* metres, of a given stature: shoes, posture, positions of markers */
 #define PEOPLE_STATURE_SD 0.09 /* metres, among people */
+#define FURTHEST          1e6  /* pixels or metres; points further away count as not observed */
 
 gait_lift *lifter_layout(arena *a, const segment_prior *prior, const gait_lift_config *cfg,
                          const kernels *run)
@@ -46,7 +46,7 @@ void lifter_take(const gait_lift *l, size_t points, const double *uv, const doub
     for (size_t i = 0; i < points; i++) {
         double const u = uv[2 * i], v = uv[2 * i + 1];
         bool const none = t->projection.perspective && u == v &&
-                          (u == 0.0 || u == -1.0); /* detectors' sign of "not observed" */
+                          (u == 0.0 || u == -1.0); /* how detectors mark "not observed" */
         bool const there = fabs(u) <= FURTHEST && fabs(v) <= FURTHEST && !none;
         to_sd[i] = there ? (sd ? sd[i] : t->cfg.sd) : -1.0;
         to_uv[2 * i] = to_uv[2 * i + 1] = 0.0;

@@ -13,14 +13,14 @@ struct gait_lift {
     lift_robust robust;
     lift_gain gain;
     lift_stream stream;
-    bool any_heading;      /* made for an unknown heading */
-    bool fitted, windowed; /* there is a posterior; it is of observations, not of a gain */
+    bool any_heading;      /* initialised for an unknown heading */
+    bool fitted, windowed; /* there is a posterior; it is of observations, not of gait_lift_fix() */
 };
 
 /* Place everything; NULL when counting or if the arena is too small. */
 gait_lift *lifter_layout(arena *a, const segment_prior *prior, const gait_lift_config *cfg,
                          const kernels *run);
-/* Convert observations of `points` markers: ideal pixels, a standard deviation each; sd NULL: the config's. */
+/* Convert observations of `points` markers to ideal pixels with a standard deviation each; sd NULL: the config's. */
 void lifter_take(const gait_lift *l, size_t points, const double *uv, const double *sd, double *to_uv,
                  double *to_sd);
 #endif

@@ -6,22 +6,23 @@
 
 enum {
     FEWEST = 5, /* observations of a point from which spikes can be found */
-    REFITS = 4, /* at most, while the set of outliers changes */
+    REFITS = 4, /* most fits after the first, while the number of outliers changes */
     ROWS_MOST = (2 * GAIT_MAX_MARKERS + CHOLESKY_FLOATS - 1) / CHOLESKY_FLOATS * CHOLESKY_FLOATS
 };
 
-static const double SPIKE = 8.0;         /* standard deviations from the line */
-static const double MEDIAN_SD = 1.4826;  /* standard deviation over median distance */
-static const double LINE_VARIANCE = 1.5; /* of a point off the middle of its neighbours, over its own */
-static const double FAR = 4.0; /* standard deviations; fewer than one correct point in 1000 is as far */
+static const double SPIKE = 8.0;        /* standard deviations from the line */
+static const double MEDIAN_SD = 1.4826; /* standard deviation over median distance */
+static const double LINE_VARIANCE =
+    1.5;                       /* of a point's distance from the middle of its neighbours, over its own */
+static const double FAR = 4.0; /* standard deviations; fewer than one correct point in 1000 is so far away */
 static const double FAR_MEDIAN = 3.0; /* times the median of the frame's points */
 static const double POOR_FIT = 4.0;   /* chi2 per observation from which outliers may have misled a search */
 static const double ROUGH =
-    8.0; /* times the points' standard deviations: the difference between people's motions */
+    8.0; /* factor of the points' standard deviations that allows for unusual motions in a rough fit */
 
-/* Squared distance of a point in frame f from the line through its positions in frames a and b, as it would be half way
- * between two neighbours `step` away: where the neighbours are further away, or on one side, noise and acceleration
- * count for more. */
+/* Squared distance of a point in frame f from the line through its positions in frames a and b, scaled to that of a point
+ * half way between two neighbours `step` away: with neighbours further away, or on one side, noise and acceleration have
+ * more effect. */
 static double off_line(const double *time, const double *uv, int32_t stride, int32_t a, int32_t f, int32_t b,
                        double step)
 {
@@ -37,9 +38,9 @@ static double off_line(const double *time, const double *uv, int32_t stride, int
     return sum / (motion > noise ? motion : noise);
 }
 
-/* The observation that is the spike, where that of squared distance number k is the largest.  At an end either of the
- * two outer points may be it: both are equally far off, but only the inner one puts the third off too, by half as
- * far. */
+/* The observation that is the spike, if squared distance number k is the largest.  At an end of the track either of the
+ * two outer points may be it: both are equally far from the line, but only the inner one also affects the third point,
+ * by half as much. */
 static int32_t spike_of(const double *square, int32_t count, int32_t k)
 {
     double const off = square[k] / 16.0;
@@ -120,7 +121,7 @@ static double largest(const double *square, int32_t rows)
     return most;
 }
 
-/* Squares of the rows become those of the points, which come first. */
+/* Replace the squares of the rows by those of the points, two rows each, at the front. */
 static void join(int32_t rows, const double *variance, double *square)
 {
     for (int32_t r = 0; r < rows; r += 2)
@@ -152,7 +153,7 @@ int32_t lift_weight_frame(const lift_table *t, const segment_posterior *b, doubl
     return outliers;
 }
 
-/* Weight the points of a window by a fit to them; returns how many are outliers. */
+/* Set the standard deviations of a window's points by a fit to them; returns how many are outliers. */
 static int32_t weight_window(const lift_table *t, const lift_window *w, const lift_robust *r,
                              const segment_posterior *b)
 {
@@ -166,7 +167,7 @@ static int32_t weight_window(const lift_table *t, const lift_window *w, const li
     return outliers;
 }
 
-/* Search by all points, of `times` their standard deviations, and refit while the outliers change. */
+/* Search with all points, their standard deviations multiplied by `times`, and refit while the outliers change. */
 static bool fit_from(const lift_table *t, lift_search *s, const lift_window *w, const lift_robust *r,
                      double times, segment_posterior *b, lift_outcome *out, int32_t *outliers)
 {
@@ -191,7 +192,7 @@ bool lift_fit_robust(const lift_table *t, lift_search *s, const lift_window *w, 
         return ok;
     double const usual = lift_evidence(t, b);
     ok = fit_from(t, s, w, r, ROUGH, b, out, outliers);
-    if (ok && lift_evidence(t, b) < usual) /* there is no memory to keep both */
+    if (ok && lift_evidence(t, b) < usual) /* the first fit was overwritten: there is memory for one */
         ok = fit_from(t, s, w, r, 1.0, b, out, outliers);
     return ok;
 }

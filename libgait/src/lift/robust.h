@@ -1,11 +1,10 @@
-/* robust.h - fits that a detector's wrong points do not lead astray.
+/* robust.h - fits that the outliers of a detector do not mislead.
  *
- * Spikes, points that are elsewhere for a frame or two, are left out before anything is known of the
- * motion.  Points that are wrong for longer, on the other leg or on another person, are down-weighted by a
- * fit: beyond four standard deviations a point's own standard deviation grows with the square of its distance
- * from the prediction, so that its influence falls with the third power.  Nearer points keep theirs.  Where
- * half of a frame's points are off, as in a motion that the prior does not know, the limit is three times
- * their median distance. */
+ * Spikes, points that are elsewhere for a frame or two, are left out before anything is known of the motion.  Points
+ * that are wrong for longer, on the other leg or on another person, are down-weighted after a fit: beyond four standard
+ * deviations from the prediction a point's own standard deviation grows with the square of the distance, so that its
+ * influence falls with the third power.  Nearer points keep theirs.  If half of a frame's points are far away, as in a
+ * motion unlike those learnt, the limit is three times their median distance. */
 #ifndef GAIT_LIFT_ROBUST_H
 #define GAIT_LIFT_ROBUST_H
 #include "lift/fit.h"
@@ -16,7 +15,7 @@
  * x frames. Returns how many points were left out. */
 int32_t lift_remove_spikes(int32_t frames, int32_t points, const double *time, const double *uv, double *sd,
                            double *scratch);
-/* Enlarge sd of the points of a frame that are far from their prediction.  square: squared distances over the
+/* Enlarge sd of the points of a frame that are far from their prediction.  square: squared distances divided by the
  * variance; scratch: points.  Returns how many points are outliers. */
 int32_t lift_weight_points(int32_t points, const double *square, double *sd, double *scratch);
 /* Standard deviations sd (J) for the points observed in a frame, by a posterior's prediction.  known: the
@@ -31,9 +30,9 @@ typedef struct lift_robust {
     double *position;  /* J x 3, scratch */
 } lift_robust;
 
-/* Fit b to the points of a window, w->sd being r->sd, with outliers of the fit down-weighted.  If outliers
- * may have misled the search it is repeated with all points at first weighted down; the more probable fit is
- * kept.  false: numbers out of range. */
+/* Fit b to the points of a window, with outliers of the fit down-weighted; w->sd must be r->sd.  If outliers may have
+ * misled the search, it is repeated with all points down-weighted at first, and the more probable fit is kept.  false:
+ * numbers out of range. */
 bool lift_fit_robust(const lift_table *t, lift_search *s, const lift_window *w, const lift_robust *r,
                      segment_posterior *b, lift_outcome *out, int32_t *outliers);
 #endif

@@ -112,7 +112,7 @@ lift_axes lift_axes_prior(const lift_table *t, const segment_posterior *b)
     return axes_at(t, b->heading, b->place);
 }
 
-/* By theta. */
+/* Axes at the present theta. */
 static lift_axes axes_now(const lift_table *t, const segment_posterior *b)
 {
     double place[3];
@@ -136,7 +136,7 @@ typedef struct lift_marker { /* linearised about theta, statures */
     double grown;            /* factor of the modes */
 } lift_marker;
 
-/* Marker j displaced by `moved` by the modes: its parts, and in x its position in the body. */
+/* Marker j, which the modes displace by `moved`: its parts in r, its position in the body in x. */
 static void displaced_marker(const lift_table *t, const segment_posterior *b, const lift_moment *m, int32_t j,
                              const double moved[3], lift_marker *r, double x[3])
 {
@@ -154,7 +154,7 @@ static void displaced_marker(const lift_table *t, const segment_posterior *b, co
     }
 }
 
-/* Marker j by theta: its modes in t->shape, its position in the body in x. */
+/* Marker j at the present theta: its modes in t->shape, its position in the body in x. */
 static void marker_at(const lift_table *t, const segment_posterior *b, const lift_moment *m, int32_t j,
                       lift_marker *r, double x[3])
 {
@@ -223,7 +223,7 @@ int32_t lift_rows(const lift_table *t, segment_posterior *b, double at, const li
 {
     lift_moment const m = lift_find_moment(t, at);
     adding const a = {.prior = lift_axes_prior(t, b), .now = axes_now(t, b), .depth = depth};
-    double det = 1.0; /* one logarithm for many factors */
+    double det = 1.0; /* product of many factors, to take one logarithm */
     int32_t rows = 0;
     for (int32_t j = 0; j < t->prior.markers; j++) {
         lift_marker r;
@@ -398,7 +398,7 @@ static void read_marker(const lift_table *t, const segment_posterior *b, const r
     find_effects(t, b, &to->axes, &m, own, P, &by);
     for (int32_t a = 0; a < 3; a++) {
         float *const v = t->V + t->prior.modes * to->width + a * to->columns + r;
-        /* a point observed all but exactly leaves 0, or a little less by rounding; what is no number stays so */
+        /* of a point observed almost exactly 0 remains, or by rounding a little less; NaN stays NaN */
         to->sd[a * to->columns + r] = P[a][a] < 0.0 ? 0.0 : lift_residual(t, b, j) * P[a][a];
         for (int32_t i = 0; i < 3; i++)
             M[3 * a + i][r % CHOLESKY_LANES] = by.M[a][i];
@@ -437,7 +437,8 @@ void lift_read(const lift_table *t, const segment_posterior *b, const lift_query
                   .mean = mean,
                   .sd = sd ? variance : NULL};
     to.width = cholesky_padded_float(3 * to.columns);
-    int32_t const clean = to.width > 3 * to.columns ? 0 : t->prior.modes; /* rows of which all is written */
+    int32_t const clean =
+        to.width > 3 * to.columns ? 0 : t->prior.modes; /* rows that are written completely */
     memset(t->V + clean * to.width, 0, (size_t)((t->ld - clean) * to.width) * sizeof *t->V);
     for (int32_t r = 0; r < q->count; r += CHOLESKY_LANES)
         read_eight(t, b, &to, q, r);

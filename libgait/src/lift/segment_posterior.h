@@ -2,9 +2,10 @@
  *
  * Leventon and Freeman (1998), eqs. 5 and 6 in information form: (I + G'R^-1 G) theta = G'R^-1 (y - P m).
  * Unknowns theta ~ N(0, 1): k modes, place x y z, and, unless they are known, stature and heading, each divided by
- * its standard deviation.  A stature off by a share s moves every marker by s of its position in the body.  With a
- * camera that position includes the modes, so that a small body near the lens pays as much for them as a large one
- * far away; in a parallel view, which has no such choice, it is the mean's, and the model stays linear. */
+ * its standard deviation.  If the stature is wrong by a share s, every marker moves by s times its position in the body.
+ * With a perspective camera that position includes the modes, so that they are as probable for a small body near the lens
+ * as for a large one far away; in an orthographic view, which cannot confuse the two, it is that of the mean, and the
+ * model stays linear. */
 #ifndef GAIT_LIFT_SEGMENT_POSTERIOR_H
 #define GAIT_LIFT_SEGMENT_POSTERIOR_H
 #include "base/arena.h"
@@ -14,8 +15,8 @@
 
 typedef struct segment_posterior { /* of one component of the prior */
     int32_t component;
-    int32_t observed;       /* numbers: two a point */
-    double heading;         /* about which the turn is linearised, radians */
+    int32_t observed;       /* numbers observed: two per point */
+    double heading;         /* about which the model is linearised, radians */
     double centre, turn_sd; /* prior of the heading */
     double place[3];        /* prior mean of the place, metres */
     double log_noise;       /* log of the determinant of the noise */
@@ -41,11 +42,11 @@ typedef struct lift_table { /* what all segments of a lifter share */
     int32_t lanes;    /* modes padded */
     int32_t columns;  /* J padded */
     int32_t width;    /* 3 columns padded */
-    int32_t reported; /* markers of the config's report, the first of: */
+    int32_t reported; /* number of markers in the config's `report`, the first of `order` */
     int32_t order[GAIT_MAX_MARKERS];
     int32_t trunk[4]; /* right and left hip, right and left shoulder; -1: not in the prior */
     double stature, gamma;
-    double growth; /* standard deviation of the stature, as a share of it */
+    double growth; /* standard deviation of the stature, relative to it */
     float *row;    /* K x F x J x 3 x lanes: modes, side by side */
     float *column; /* K x F x columns / 8 x 3 x k x 8: the same, eight markers of `order` side by side */
     double *W;     /* 2 J x ld: white rows of a frame */
@@ -112,8 +113,8 @@ typedef struct lift_residuals { /* of the markers observed in a frame */
 /* Normal equations of the prior alone. */
 void lift_clear(const lift_table *t, segment_posterior *b);
 /* White rows t->W of a frame at moment `at`, in frames [0, F - 1]; returns how many.  They are linearised about guess
- * (J x 3, read only where observed); NULL: about theta; depth > 0: about a rough depth alone.  residuals may be
- * NULL. */
+ * (J x 3, read only where observed); if it is NULL, about theta, or with depth > 0 about nothing but that rough depth.
+ * residuals may be NULL. */
 int32_t lift_rows(const lift_table *t, segment_posterior *b, double at, const lift_observations *observed,
                   const double *guess, double depth, const lift_residuals *residuals);
 /* The same, added to the equations. */
@@ -127,9 +128,10 @@ double lift_evidence(const lift_table *t, const segment_posterior *b);
 double lift_chi2(const lift_table *t, const segment_posterior *b);
 
 typedef struct lift_query {
-    double at;                         /* moment, frames */
-    int32_t count;                     /* markers, the first of t->order */
-    const lift_observations *observed; /* of that very moment, for the part outside the modes; NULL: none */
+    double at;     /* moment, frames */
+    int32_t count; /* markers, the first of t->order */
+    const lift_observations
+        *observed; /* at exactly that moment, for the part outside the modes; NULL: none */
 } lift_query;
 
 /* Posterior mean (count x 3) and standard deviation (may be NULL) of markers at a moment. */

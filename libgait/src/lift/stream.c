@@ -6,8 +6,9 @@
 
 static const double SLOWEST = 10.0; /* frames per second down to which `lag` frames are kept */
 static const double MANY_OUTLIERS =
-    0.25;                        /* share of a segment's numbers from which it is the segment that is wrong */
-static const double FIRST = 0.5; /* of the fit threshold, for the first segment: no other one confirms it */
+    0.25; /* share of outliers among a segment's numbers from which the segment is wrong, not the points */
+static const double FIRST =
+    0.5; /* factor of the fit threshold for the first segment, which no other one confirms */
 
 static stream_segment *segment_at(const lift_stream *s, int64_t index)
 {
@@ -25,7 +26,7 @@ static size_t ring_index(const lift_stream *s, uint64_t frame)
     return (size_t)(frame % (uint64_t)s->past.capacity);
 }
 
-/* Observations of a frame, outliers down-weighted. */
+/* Observations of a frame, with outliers down-weighted. */
 static lift_observations weighted_frame(const lift_table *t, const lift_stream *s, uint64_t frame)
 {
     size_t const i = ring_index(s, frame), J = (size_t)t->prior.markers;
@@ -102,8 +103,8 @@ static double turn_of(const lift_table *t, const segment_posterior *b, const dou
     return (double)m_atan2((float)(a[0] * c[1] - a[1] * c[0]), (float)(a[0] * c[0] + a[1] * c[1]));
 }
 
-/* Prior of component c of the next segment, from the segment before at its frame `hop`: heading turned by as much as
- * the body has turned, the body's middle where it will be.  spare: J x 3. */
+/* Prior of component c of the next segment, from the segment before at its frame `hop`: the heading turned as far as the
+ * body has turned, the body's middle where it is then.  spare: J x 3. */
 static void continue_from(const lift_table *t, const segment_posterior *before, int32_t c,
                           segment_posterior *next, double *spare)
 {
@@ -197,7 +198,7 @@ static void add_frame(const lift_table *t, const lift_stream *s, stream_segment 
         segment->outliers += lift_observed_at(&raw, j) && observed.sd[j] > raw.sd[j] ? 2 : 0;
 }
 
-/* Weight the points of the newest frame by a segment's prediction of them, which s->guess receives. */
+/* Set the standard deviations of the newest frame's points by a segment's prediction, which s->guess receives. */
 static void weight_frame(const lift_table *t, lift_stream *s, const stream_segment *segment)
 {
     uint64_t const frame = s->pushed - 1;
@@ -239,13 +240,13 @@ static void guess_frame(const lift_table *t, lift_stream *s, const stream_segmen
         memcpy(s->guess + 3 * marker[r], s->mean + 3 * r, 3 * sizeof *s->mean);
 }
 
-/* Are so many points outliers that the segment must be wrong? */
+/* Whether so many points are outliers that the segment must be wrong. */
 static bool mostly_outliers(const stream_segment *segment)
 {
     return segment->outliers > MANY_OUTLIERS * segment->posterior[segment->best].observed;
 }
 
-/* Begin segment `index` where the one before it will be, and add the frames that fall into it. */
+/* Begin segment `index` where the one before it predicts the body, and add the frames that it covers. */
 static bool open_segment(const lift_table *t, lift_stream *s, int64_t index)
 {
     const stream_segment *const before = segment_at(s, index - 1);
@@ -262,7 +263,7 @@ static bool open_segment(const lift_table *t, lift_stream *s, int64_t index)
     return solve_segment(t, segment);
 }
 
-/* Begin all segments whose time has come. */
+/* Begin all segments that start before or at the newest frame. */
 static bool open_segments(const lift_table *t, lift_stream *s)
 {
     double const now = time_of(s, s->pushed - 1);
@@ -272,7 +273,7 @@ static bool open_segments(const lift_table *t, lift_stream *s)
     return ok;
 }
 
-/* Does a segment contradict the observations, and may it be searched for anew?  share: of the fit threshold. */
+/* Whether a segment contradicts the observations and may be searched for again.  share: factor of the fit threshold. */
 static bool contradicts(const lift_table *t, const stream_segment *segment, double share)
 {
     const segment_posterior *const b = &segment->posterior[segment->best];
@@ -281,8 +282,8 @@ static bool contradicts(const lift_table *t, const stream_segment *segment, doub
     return wrong && t->cfg.fit_threshold > 0.0 && t->cfg.heading_sd < 0.0;
 }
 
-/* The search for segment `index`: a robust fit to all the frames that fall into it, whatever its posterior was.
- * false: numbers out of range. */
+/* Search for segment `index`: a robust fit to all frames that it covers, independent of its posterior so far.  false:
+ * numbers out of range. */
 static bool refit_segment(const lift_table *t, lift_search *search, lift_stream *s, int64_t index)
 {
     size_t const J = (size_t)t->prior.markers;
@@ -304,7 +305,7 @@ static bool refit_segment(const lift_table *t, lift_search *search, lift_stream 
     memcpy(b->place, t->cfg.place, sizeof b->place);
     if (!lift_fit_robust(t, search, &w, &s->robust, b, &outcome, &outliers))
         return false;
-    const double *sd = w.sd; /* the frames keep the weights of their points */
+    const double *sd = w.sd; /* the frames keep the standard deviations of this fit */
     for (uint64_t f = oldest_frame(s); f < s->pushed; f++)
         if (covers(s, index, time_of(s, f))) {
             memcpy(s->past.sd + ring_index(s, f) * J, sd, J * sizeof *sd);
@@ -319,12 +320,12 @@ static bool refit_segment(const lift_table *t, lift_search *search, lift_stream 
     segment->index = index;
     segment->best = c;
     segment->outliers = 2 * outliers;
-    segment->closed = true; /* the other components are not followed in this segment */
+    segment->closed = true; /* the other components are not continued in this segment */
     return true;
 }
 
-/* A segment is over.  Without observations: start anew with the next person.  If it does not fit: search for it, and
- * begin those after it again. */
+/* Close a segment that has ended.  If it has no observations, the stream starts anew with the next person; if it does not
+ * fit, it is searched for, and those after it begin again. */
 static bool close_segment(const lift_table *t, lift_search *search, lift_stream *s, stream_segment *segment)
 {
     segment->closed = true;
@@ -342,8 +343,8 @@ static bool close_segment(const lift_table *t, lift_search *search, lift_stream 
     return ok;
 }
 
-/* Add the newest frame to the segments it falls into.  The oldest predicts the points, about which all segments are
- * linearised, and decides which are outliers. */
+/* Add the newest frame to the segments that cover it.  The oldest of them predicts the points and decides which are
+ * outliers; all segments are linearised about that prediction. */
 static bool follow(const lift_table *t, lift_search *search, lift_stream *s)
 {
     uint64_t const frame = s->pushed - 1;
@@ -356,7 +357,7 @@ static bool follow(const lift_table *t, lift_search *search, lift_stream *s)
         if (!covers(s, i, now)) {
             ok = close_segment(t, search, s, segment);
             if (s->origin < 0 || s->poor_fit)
-                return ok; /* begun anew: the frame has been added, or there is no person */
+                return ok; /* the segments began again, with this frame, or the stream did, without a person */
             continue;
         }
         if (first)
@@ -368,8 +369,8 @@ static bool follow(const lift_table *t, lift_search *search, lift_stream *s)
     return ok;
 }
 
-/* Fit the first segment, once it is complete; a poor fit is flagged.  If most points are outliers it begins with the
- * next frame instead. */
+/* Fit the first segment once it is complete; a poor fit is flagged.  If too many points are outliers, the segment begins
+ * with the next frame instead. */
 static bool begin(const lift_table *t, lift_search *search, lift_stream *s)
 {
     if (time_of(s, s->pushed - 1) < s->span - 1e-9)
@@ -456,7 +457,7 @@ static void blend_segment(const lift_table *t, const lift_stream *s, const strea
     mix(t, s->mean, s->sd, weight / b->total, out);
 }
 
-/* The frame `lag` frames ago, or the first that a segment still kept covers. */
+/* The frame `lag` frames ago, or the first one that is covered by a segment still kept. */
 static uint64_t frame_of(const lift_table *t, const lift_stream *s)
 {
     int64_t const kept = oldest_segment(s);

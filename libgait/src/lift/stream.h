@@ -1,7 +1,8 @@
 /* stream.h - lifting frame after frame.
  *
- * Segments begin at the ticks of a grid, each where the one before it will be.  Every frame is added to the segments it
- * falls into, and an estimate blends those that cover a moment.  A segment that does not fit is searched for anew. */
+ * Segments begin at regular intervals, each where the one before it predicts the body.  Every frame is added to the
+ * segments that cover it, and an estimate blends the segments that cover a moment.  A segment that does not fit is
+ * searched for again. */
 #ifndef GAIT_LIFT_STREAM_H
 #define GAIT_LIFT_STREAM_H
 #include "lift/robust.h"
@@ -9,7 +10,7 @@
 typedef struct stream_segment {
     int64_t index;                /* it begins at index x hop / fps */
     int32_t best;                 /* component of the largest evidence */
-    bool closed;                  /* no frame will be added any more */
+    bool closed;                  /* no more frames will be added */
     int32_t outliers;             /* numbers observed that are down-weighted */
     segment_posterior *posterior; /* K */
 } stream_segment;
@@ -29,21 +30,21 @@ typedef struct lift_stream {
     lift_robust robust;        /* its standard deviations */
     double *scratch;           /* 2 x past.capacity */
     double *guess, *mean, *sd; /* J x 3 */
-    double *new_uv, *new_sd;   /* the frame that comes in */
+    double *new_uv, *new_sd;   /* the frame being pushed */
     double span, step; /* seconds: from a segment's first frame to its last; to the next segment's first */
-    /* from here on cleared by a reset */
+    /* cleared by a reset, from here on: */
     uint64_t pushed; /* frames since the start */
-    int64_t origin;  /* utime of the first segment; -1: no person was observed yet */
+    int64_t origin;  /* utime of the first segment; -1: no person has been observed yet */
     int64_t last;    /* utime of the last frame */
-    int64_t next;    /* index of the next segment; 0: none was fitted yet */
-    bool poor_fit;   /* the last segment was searched for anew, or the first fits badly */
+    int64_t next;    /* index of the next segment; 0: none has been fitted yet */
+    bool poor_fit;   /* the last segment was searched for again, or the first one fits poorly */
 } lift_stream;
 
 void lift_stream_layout(arena *a, const lift_table *t, lift_stream *s);
 void lift_stream_reset(lift_stream *s);
-/* One frame, ideal pixels.  false: numbers out of range; the stream has started anew. */
+/* One frame, ideal pixels.  false: numbers out of range; the stream was reset. */
 bool lift_stream_push(const lift_table *t, lift_search *search, lift_stream *s, int64_t utime,
                       const lift_observations *observed);
-/* The frame `lag` frames before the last, or the earliest that is still covered.  false: not so many frames yet. */
+/* The frame `lag` frames before the last, or the earliest that is still covered.  false: there are too few frames. */
 bool lift_stream_estimate(const lift_table *t, const lift_stream *s, gait_lift_frame *out);
 #endif

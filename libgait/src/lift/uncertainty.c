@@ -47,13 +47,13 @@ void lift_least_squares(const lift_table *t, const lift_window *w, const segment
     for (int32_t i = 0; i < n; i++)
         length[i] = sqrt(S[i * (ld + 1)]);
     fit.A = S;
-    fit.centre = fit.heading; /* the turn takes no part */
+    fit.centre = fit.heading; /* the heading is not fitted */
     memset(S, 0, (size_t)ld * (size_t)ld * sizeof *S);
     for (int32_t f = 0; f < w->frames; f++) {
         lift_observations const observed = {.uv = w->uv + (size_t)f * J * 2, .sd = w->sd + (size_t)f * J};
         lift_add(&plain, &fit, w->at[f], &observed, NULL, 0.0);
     }
-    double *const y = t->W; /* free again: n numbers */
+    double *const y = t->W; /* no longer needed; n numbers */
     for (int32_t i = 0; i < n; i++) {
         double const unit = length[i] > 0.0 ? 1.0 / length[i] : 0.0;
         y[i] = S[i * ld + t->n] * unit;

@@ -16,7 +16,7 @@ void lift_uncertain(const lift_table *t, const segment_posterior *b, segment_pos
                     double *mode, double *sd);
 /* Covariance of theta, n x n. */
 void lift_covariance(const lift_table *t, const segment_posterior *b, segment_posterior *spare, double *Q);
-/* How much further the motion is from the prior's mean than the prior expects.  With s^2 ~ LIFT_FREEDOM / chi^2(LIFT_FREEDOM)
- * a priori and modes ~ N(0, s^2), but noise and residual as they are: the likeliest s^2. spare is overwritten. */
+/* How much further the motion is from the prior's mean than the prior expects: the most probable s, for modes ~ N(0, s^2),
+ * s^2 ~ LIFT_FREEDOM / chi^2(LIFT_FREEDOM) a priori, and unchanged noise and residual.  spare is overwritten. */
 double lift_scale(const lift_table *t, const segment_posterior *b, segment_posterior *spare);
 #endif

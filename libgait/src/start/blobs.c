@@ -4,11 +4,12 @@
 enum {
     LEAST_STEP = 14,   /* smallest change that counts, grey levels */
     NOISE_STEPS = 5,   /* the same in robust standard deviations of the image noise */
-    ANOTHER = 18,      /* change of half of an image that means another scene, grey levels */
+    ANOTHER = 18,      /* change of half of an image from which it shows another scene, grey levels */
     GAP = 3,           /* cells of low contrast that may interrupt a body */
     LEAST_HEIGHT = 15, /* of a person, cells */
-    PEOPLE_PART = 2, /* unless one changed cell in so many belongs to a person, the background does not fit */
-    MOST_CELLS = 320 /* each way */
+    PEOPLE_PART =
+        2, /* if fewer than half of the changed cells belong to people, the background does not fit */
+    MOST_CELLS = 320 /* in each direction */
 };
 
 /* Bin of a histogram that holds the median. */

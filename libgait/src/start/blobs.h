@@ -5,7 +5,7 @@
 #include "gait_start.h"
 
 typedef struct blob_finder {
-    int32_t step, width, height; /* pixels a cell; cells, 320 at most each way */
+    int32_t step, width, height; /* pixels per cell; cells, at most 320 in each direction */
     int16_t *change;             /* largest change of a channel, grey levels */
     int16_t *smooth;             /* mean over neighbours, quarters of a grey level */
     uint8_t *mask;               /* 1: differs, 2: also belongs to a region already examined */

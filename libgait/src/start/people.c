@@ -3,10 +3,10 @@
 
 #include <string.h>
 
-static const double SHORTEST = 1.2, TALLEST = 2.4; /* metres by foot and head ray, which shadows lengthen */
-static const double BLUR = 0.25;                   /* heights by which a foot point may jump */
-static const double FASTEST = 2.0;                 /* heights per second */
-static const double STANDS = 0.5; /* probability of a person who stays, against one who walks */
+static const double SHORTEST = 1.2, TALLEST = 2.4; /* metres; shadows make people appear taller */
+static const double BLUR = 0.25;   /* heights by which a foot point may move by errors alone */
+static const double FASTEST = 2.0; /* heights per second */
+static const double STANDS = 0.5;  /* probability of a person who stays, against one who walks */
 
 start_view start_view_of(const gait_camera *c)
 {
@@ -51,7 +51,7 @@ double people_stature(const gait_camera *c, const start_box *b)
     return above + above * flat / -foot[2] * head[2] / head_flat;
 }
 
-/* Distance of a box from a person's last one, as a share of how far the person can have walked since. */
+/* Distance of a box from a person's last one, relative to how far the person can have walked since. */
 static double far_from(const start_person *p, int64_t utime, const start_box *b)
 {
     int32_t const last = (p->count - 1) % GAIT_START_MAX_FRAMES;

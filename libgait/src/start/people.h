@@ -1,4 +1,4 @@
-/* people.h - boxes of several people, each given to a person by its place in the picture, and the hypotheses of all. */
+/* people.h - boxes of several people, matched to people by their place in the image, and the hypotheses of all people. */
 #ifndef GAIT_START_PEOPLE_H
 #define GAIT_START_PEOPLE_H
 #include "base/base.h"
@@ -44,9 +44,9 @@ double people_stature(const gait_camera *c, const start_box *b);
 /* Boxes of a frame, the most certain first. */
 void people_add(start_people *p, const gait_camera *c, int64_t utime, const gait_box *boxes, int32_t count);
 
-/* Merge the hypotheses of one person, who is in so many frames, into the n of other people, at most
- * GAIT_START_MAX_HYPOTHESES, the most probable first; returns how many there are.  A person who walks, or is in more
- * frames, is more probable. */
+/* Merge the hypotheses of one person, who is in `frames` frames, into the n hypotheses of other people: at most
+ * GAIT_START_MAX_HYPOTHESES, the most probable first; returns how many there are.  People who walk, or are in more frames,
+ * are more probable. */
 int32_t people_merge(gait_hypothesis *all, int32_t n, gait_hypothesis *own, int32_t count, int32_t frames);
 
 /* Make the probabilities sum to 1; returns n. */

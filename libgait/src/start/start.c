@@ -6,14 +6,14 @@
 
 enum { LEAST_FRAMES = 4, LEAST_BOXES = 8 };
 
-static const double LEAST_SPAN = 0.3;   /* seconds */
+static const double LEAST_SPAN = 0.3;   /* seconds that keypoints must cover */
 static const double LEG = 0.49;         /* from hip to ankle, statures */
-static const double BOX_MISS = 0.01;    /* of heights, by hair, shoes and blur */
+static const double BOX_MISS = 0.01;    /* error of a box due to hair, shoes and blur, heights */
 static const float FITS = 1.8f;         /* chi-square per coordinate up to which a walk fits */
 static const float LEAST_RATE = 0.3f;   /* strides per second; a person who stands fits a very slow walk */
 static const float LEAST_SPEED = 0.25f; /* metres per second of a person who walks, from keypoints */
 static const float BOX_SPEED = 0.4f;    /* the same from boxes */
-static const float LIKELY = 0.25f;      /* least probability of the person in boxes to start with */
+static const float LIKELY = 0.25f;      /* least probability of a hypothesis from boxes to start with */
 
 static int32_t find_point(const gait_model *m, const char *name)
 {
@@ -137,8 +137,8 @@ static bool stands_still(const gait_start *s, int32_t frames)
     return same;
 }
 
-/* Put the place on the floor below the hips, at the distance at which the legs have their usual length, seen from the
- * camera in the middle of the frames; returns the person's height, pixels. */
+/* Estimate the place on the floor: below the hips, at the distance at which the legs have their usual length, as seen from
+ * the camera of the middle frame.  Returns the person's height in the image, pixels. */
 static double rough_place(const gait_start *s, start_problem *p)
 {
     double leg[START_FITTED], u[START_FITTED], v[START_FITTED];
@@ -253,7 +253,7 @@ static int32_t solve_problem(gait_start *s, int64_t utime, gait_hypothesis *out,
     return n;
 }
 
-/* Hypotheses of everyone in the boxes. */
+/* Hypotheses of all people in the boxes. */
 static int32_t solve_people(gait_start *s, int64_t utime, gait_hypothesis *out, int32_t capacity)
 {
     start_scratch *const w = s->scratch;

@@ -15,17 +15,19 @@ static const double PLACE_SD = 3.0;  /* metres, about where the length of the le
 static const double IN_PLACE = 8.0;  /* twice the log odds of walking along a path over walking in place */
 static const double DEGREES = 4.0;   /* of freedom of the keypoints' errors */
 static const double BEHIND = 1e3;    /* standard deviations for joints behind the camera */
-static const double LEAD = 0.1; /* statures by which the lower foot is nearer to the camera than the body */
+static const double LEAD =
+    0.1; /* statures by which the foot that is lower in the image is nearer than the body */
 static const double FOOT_SD = 0.06;  /* metres by which all foot points of a person may be off */
 static const double BOX_PLACE = 0.1; /* metres by which shadows and clothes move all boxes of a person */
 static const double COURSE = 0.15;   /* radians: people do not walk exactly where their box moves */
-static const double OPEN = 0.3;      /* information on a heading that boxes leave open, per square radian */
-static const float OPEN_SD = 0.9f;   /* radians of standard deviation from which a heading is unknown */
-static const float BUILD_SHARE = 0.25f;    /* of the sd of scores and posture, while the phase is unknown */
-static const float SPEEDS_UP = 0.4f;       /* sd of the rate, as a share of what it is below the usual one */
+static const double OPEN = 0.3; /* information that boxes get on heading and phase, which they leave open */
+static const float OPEN_SD = 0.9f; /* standard deviation from which a heading counts as unknown, radians */
+static const float BUILD_SHARE =
+    0.25f;                           /* factor of the sd of scores and posture while the phase is unknown */
+static const float SPEEDS_UP = 0.4f; /* sd of a rate below the usual one, as a share of the difference */
 static const float LEAST_PLACE_SD = 0.05f; /* metres */
 
-/* Steps of the differences that stand for derivatives. */
+/* Steps of the finite differences that replace derivatives. */
 static const double STEP[N] = {0.02, 0.02, 0.03, 0.03, 0.01, 0.01, 0.01, 0.01, 0.1, 0.1, 0.1};
 
 /* States of up to BLOCK candidates at a moment. */
@@ -57,8 +59,8 @@ gait_camera start_camera(const gait_start *s, int32_t k)
     return camera_placed(&s->cfg.camera, v->R, v->t);
 }
 
-/* Two rows of residuals of one lane: of a point X and where it is found, down-weighted so that their squares are
- * Student's t costs. */
+/* Two rows of residuals of one lane, between the projection of a point X and (u, v), down-weighted so that their squares
+ * are Student's t costs. */
 static void point_residuals(const gait_start *s, const gait_camera *cam, const float X[3], double u, double v,
                             double weight, int32_t row, int32_t lane)
 {
@@ -205,7 +207,7 @@ static bool solve_step(const gait_start *s, double damping, double step[LD])
     if (!s->run->cholesky_factor(w->U, w->U, N, LD))
         return false;
     cholesky_solve(w->U, N, LD, step);
-    for (int32_t i = 0; i < N; i++) { /* no further than the derivatives hold */
+    for (int32_t i = 0; i < N; i++) { /* no further than the linearisation is valid */
         double const most = 30.0 * STEP[i];
         step[i] = step[i] > most ? most : step[i] < -most ? -most : step[i];
     }
@@ -284,7 +286,7 @@ static int32_t propose(const gait_start *s)
     return n;
 }
 
-/* Whether two proposals have led to the same answer. */
+/* Whether two candidates have converged to the same solution. */
 static bool same(const start_candidate *a, const start_candidate *b, bool boxes)
 {
     if (boxes && a->in_place && b->in_place)
@@ -329,8 +331,8 @@ static float root(double variance)
     return __builtin_sqrtf(f_max((float)variance, 0.0f));
 }
 
-/* Keypoints are less exact than their scatter suggests, because errors of a detector last.  A person who has just begun
- * to walk will soon be faster. */
+/* Widen standard deviations.  Keypoints are less exact than their scatter suggests, because a detector's errors last, and
+ * a person who has just begun to walk will soon be faster. */
 static void widen(const gait_start *s, gait_hypothesis *h)
 {
     h->sd.phase = f_max(h->sd.phase, 0.03f);

@@ -38,7 +38,7 @@ _Static_assert((int)START_UNKNOWNS < (int)BLOCK, "a block of bodies holds a cand
 typedef struct start_candidate {
     double theta[START_UNKNOWNS];
     double cost; /* squared residuals with the prior's, and twice the prior's odds of the mode */
-    double chi2; /* squared residuals of the keypoints, before errors that last are counted as one */
+    double chi2; /* squared residuals of the keypoints, without the factor for errors that last */
     bool in_place;
 } start_candidate;
 
@@ -46,7 +46,7 @@ typedef struct start_problem {           /* the observations that all candidates
     const start_person *person;          /* whose boxes are fitted; NULL: keypoints are */
     int32_t frames, frame[START_FITTED]; /* in the ring */
     double at[START_FITTED];             /* seconds from the middle */
-    double share;                        /* of a frame's residuals, as their errors last */
+    double share;                        /* factor of a frame's squared residuals, because errors last */
     int32_t observations;
     double place[2];
     int64_t middle;
@@ -67,12 +67,12 @@ typedef struct start_keypoint { /* of one joint in one frame: ideal pixels; sd 0
     double u, v, sd;
 } start_keypoint;
 
-struct gait_start { /* observations and what is known of the person */
+struct gait_start { /* observations, and what is known about the person */
     const gait_model *model;
     const kernels *run;
     gait_start_config cfg; /* camera: as it is now */
     state_layout layout;
-    gait_state prior_sd;      /* where nothing is known about the person */
+    gait_state prior_sd;      /* of what is not known about the person */
     int32_t hip[2], ankle[2]; /* points of the model */
     double crown;             /* height of head_top over the floor while walking, statures */
     int32_t count; /* frames of keypoints added, of which the last GAIT_START_MAX_FRAMES are kept */
