@@ -1,5 +1,6 @@
 /* fuzz_files.c - what gait-trackd reads beside models: camera, start, configuration, background, snapshot, JPEG frame. */
 #define _GNU_SOURCE /* memfd_create */
+#include "../../tools/trackd/cameras.h"
 #include "../../tools/trackd/input_files.h"
 #include "../../tools/trackd/settings.h"
 #include "../../tools/trackd/snapshot_file.h"

@@ -1,9 +1,6 @@
 #include "convert.h"
 
-#include "input_files.h"
-
 #include <math.h>
-#include <stddef.h>
 #include <string.h>
 
 _Static_assert(sizeof((gaitmsg_state_t *)0)->coef == sizeof((gait_state *)0)->coef,
@@ -46,53 +43,6 @@ bool convert_state_message(const gaitmsg_state_t *in, const gait_state *unknown,
         out->coef[i] = known(in->coef[i], unknown->coef[i]);
     for (int i = 0; i < in->noffset; i++)
         out->offset[i] = known(in->offset[i], unknown->offset[i]);
-    return true;
-}
-
-bool convert_same_camera(const gait_camera *a, const gait_camera *b)
-{
-    enum { BEGIN = offsetof(gait_camera, fx), NUMBERS = (sizeof *a - BEGIN) / sizeof(float) };
-    float x[NUMBERS], y[NUMBERS];
-    memcpy(x, (const char *)a + BEGIN, sizeof x);
-    memcpy(y, (const char *)b + BEGIN, sizeof y);
-    bool same = a->width == b->width && a->height == b->height;
-    for (int k = 0; k < NUMBERS; k++)
-        same = same && fabsf(x[k] - y[k]) <= 1e-5f * fmaxf(1.0f, fabsf(x[k]));
-    return same;
-}
-
-bool camera_check(const gait_camera *c, int32_t max_pixels, message *why)
-{
-    if (c->width < 1 || c->height < 1 || c->width > GAIT_MAX_PIXELS || c->height > GAIT_MAX_PIXELS)
-        return message_set(why, "camera with a size of %dx%d; send 1 to %d", c->width, c->height,
-                           GAIT_MAX_PIXELS);
-    if (c->width * c->height > max_pixels)
-        return message_set(why, "camera with %dx%d pixels, more than the %d of --max-pixels", c->width,
-                           c->height, max_pixels);
-    if (!(c->fx > 0) || !(c->fy > 0))
-        return message_set(why, "camera with focal lengths %g and %g; send pixels", (double)c->fx,
-                           (double)c->fy);
-    return camera_rotation_ok(c) ||
-           message_set(why, "camera whose R is not a rotation; send orthogonal rows of length 1");
-}
-
-bool convert_camera_message(const gaitmsg_camera_t *in, int32_t max_pixels, gait_camera *out, message *why)
-{
-    gait_camera c = {.width = in->width,
-                     .height = in->height,
-                     .fx = (float)in->fx,
-                     .fy = (float)in->fy,
-                     .cx = (float)in->cx,
-                     .cy = (float)in->cy};
-    for (int i = 0; i < 9; i++)
-        c.R[i] = (float)in->R[i];
-    for (int i = 0; i < 3; i++)
-        c.t[i] = (float)in->t[i];
-    for (int i = 0; i < 5; i++)
-        c.distortion[i] = (float)in->distortion[i];
-    if (!camera_check(&c, max_pixels, why))
-        return false;
-    *out = c;
     return true;
 }
 

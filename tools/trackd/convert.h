@@ -2,7 +2,6 @@
 #ifndef TRACKD_CONVERT_H
 #define TRACKD_CONVERT_H
 #include "gait.h"
-#include "gaitmsg_camera_t.h"
 #include "gaitmsg_estimate_t.h"
 #include "gaitmsg_state_t.h"
 #include "common.h"
@@ -18,11 +17,6 @@ void convert_state(const gait_state *in, const gait_model_info *info, gaitmsg_st
 /* Fields that are not numbers become those of `unknown`; components and offsets beyond the message's are 0. */
 bool convert_state_message(const gaitmsg_state_t *in, const gait_state *unknown, gait_state *out,
                            message *why);
-/* Whether a camera that was sent or saved can be used; not with more than `max_pixels` of width times height. */
-bool camera_check(const gait_camera *camera, int32_t max_pixels, message *why);
-bool convert_camera_message(const gaitmsg_camera_t *in, int32_t max_pixels, gait_camera *out, message *why);
-/* Equal up to rounding, which differs between files and messages, and readers may orthogonalise R. */
-bool convert_same_camera(const gait_camera *a, const gait_camera *b);
 /* All but frame, step, dropped, receive_utime, step_us and tracker_digest, which are the caller's. */
 void convert_estimate(const gait_model *model, const gait_model_info *info, const gait_estimate *in,
                       estimate_message *out);

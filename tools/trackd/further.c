@@ -1,6 +1,6 @@
 #include "further.h"
 
-#include "convert.h"
+#include "cameras.h"
 #include "gaitmsg_image_t.h"
 
 #include <stdlib.h>
@@ -61,10 +61,10 @@ size_t further_bytes(const further_camera *c)
 bool further_take_camera(further_camera *c, const gaitmsg_camera_t *in, int32_t max_pixels, message *why)
 {
     gait_camera camera;
-    if (!convert_camera_message(in, max_pixels, &camera, why))
+    if (!camera_from_message(in, max_pixels, &camera, why))
         return false;
     if (c->known)
-        return convert_same_camera(&camera, &c->camera) ||
+        return camera_same(&camera, &c->camera) ||
                message_set(why, "another camera on GAIT_CAMERA_%d than before is ignored; start anew with it",
                            c->stream);
     c->camera = camera;

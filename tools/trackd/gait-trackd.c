@@ -1,4 +1,5 @@
 /* gait-trackd - track a person in frames that arrive over LCM.  `gait-trackd --help` is the manual. */
+#include "trackd/cameras.h"
 #include "trackd/input_files.h"
 #include "trackd/image_view.h"
 #include "trackd/lcm_link.h"

@@ -186,7 +186,7 @@ bool service_set_camera(service *s, const gait_camera *camera, message *why)
 /* Whether a camera that differs from the one in use has been announced alone for long enough to replace it. */
 static bool replaces(service *s, const gait_camera *camera, int64_t utime)
 {
-    if (s->other_since < 0 || utime < s->other_since || !convert_same_camera(camera, &s->other_camera)) {
+    if (s->other_since < 0 || utime < s->other_since || !camera_same(camera, &s->other_camera)) {
         s->other_camera = *camera;
         s->other_since = utime;
     }
@@ -199,7 +199,7 @@ static bool same_lens(const gait_camera *a, const gait_camera *b)
     gait_camera there = *a;
     memcpy(there.R, b->R, sizeof there.R);
     memcpy(there.t, b->t, sizeof there.t);
-    return convert_same_camera(&there, b);
+    return camera_same(&there, b);
 }
 
 void service_camera(service *s, const gaitmsg_camera_t *msg)
@@ -207,7 +207,7 @@ void service_camera(service *s, const gaitmsg_camera_t *msg)
     gait_camera camera;
     message why;
     bool const known = s->track.tracker != NULL;
-    if (!convert_camera_message(msg, s->max_pixels, &camera, &why)) {
+    if (!camera_from_message(msg, s->max_pixels, &camera, &why)) {
         service_complain(s, "%s", why.text);
         return;
     }
@@ -217,7 +217,7 @@ void service_camera(service *s, const gaitmsg_camera_t *msg)
         s->other_since = -1;
         if (known)
             return;
-    } else if (known && convert_same_camera(&camera, &s->track.config.camera[0])) {
+    } else if (known && camera_same(&camera, &s->track.config.camera[0])) {
         s->other_since = -1;
         return;
     }

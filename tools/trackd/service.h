@@ -1,6 +1,7 @@
 /* service.h - the tracker as a service: messages in, messages out, independent of the transport. */
 #ifndef TRACKD_SERVICE_H
 #define TRACKD_SERVICE_H
+#include "cameras.h"
 #include "convert.h"
 #include "frame_hold.h"
 #include "further.h"

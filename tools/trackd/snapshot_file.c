@@ -142,7 +142,7 @@ static bool fits(const service *s, const file_bytes *file, head *h, message *why
         return message_set(why, "not a snapshot of gait-trackd");
     if (h->stream != s->stream)
         return message_set(why, "of --stream %d", (int)h->stream);
-    if (s->camera_fixed && !convert_same_camera(&h->camera, &s->track.config.camera[0]))
+    if (s->camera_fixed && !camera_same(&h->camera, &s->track.config.camera[0]))
         return message_set(why, "for a camera other than --camera");
     return camera_check(&h->camera, s->max_pixels, why);
 }
