@@ -70,7 +70,7 @@ def test_a_snapshot_that_does_not_fit_is_not_used(tmp_path):
     cases = [((), b, "") for b in (*torn, *flipped)]
     cases += [
         (("--seed", 9), good, "snapshot of a tracker with another model or configuration"),
-        (("--stream", 1), good, "of --stream 0"),
+        (("--stream", 1), good, "for --stream 0"),
     ]
     for more, content, why in cases:
         (tmp_path / "state").write_bytes(content)

@@ -9,7 +9,7 @@
 typedef struct byte_reader {
     const uint8_t *at;
     size_t left;
-    bool ok; /* false: something lay beyond the end */
+    bool ok; /* false: a read went beyond the end */
 } byte_reader;
 
 /* `count` bytes of the message, or NULL beyond its end. */

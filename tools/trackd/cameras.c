@@ -47,7 +47,7 @@ static bool read_numbers(const fields *f, const char *key, float *out, int count
     return true;
 }
 
-/* 0, 4 or 5 numbers; an absent key is an ideal lens. */
+/* 0, 4 or 5 numbers; without the key the lens is ideal. */
 static bool read_distortion(const fields *f, float out[5], message *why)
 {
     const char *const remedy = "give k1 k2 p1 p2 [k3] (0, 4 or 5 numbers)";

@@ -56,7 +56,7 @@ void *aligned_memory(size_t bytes, const char *what, message *why)
 }
 
 /* ---- files ---- */
-/* Far more than any model, camera or image has: a device or a wrong file must not fill the memory. */
+/* Bytes, far more than any model, camera or image has: a device or a wrong file must not fill the memory. */
 enum { MAX_FILE = 1 << 28 };
 
 static bool read_stream(FILE *f, const char *path, const char *what, file_bytes *out, message *why)
@@ -65,8 +65,8 @@ static bool read_stream(FILE *f, const char *path, const char *what, file_bytes 
     if (fseek(f, 0, SEEK_END) == 0)
         size = ftell(f);
     if (size < 0 || size > MAX_FILE || fseek(f, 0, SEEK_SET) != 0)
-        return message_set(why, "%s: not a regular file of reasonable size; give the name of a %s file", path,
-                           what);
+        return message_set(why, "%s: not a regular file, or larger than 256 MiB; give the name of a %s file",
+                           path, what);
     out->data = aligned_memory((size_t)size + 1, path, why);
     if (!out->data)
         return false;

@@ -7,7 +7,7 @@
 #include <stdbool.h>
 #include <stddef.h>
 
-/* ---- one line that reports what went wrong, set where the fault is found. */
+/* ---- one line that reports a fault, set where it is found. */
 typedef struct message {
     char text[256];
 } message;
@@ -21,7 +21,7 @@ void log_line(const char *format, ...) __attribute__((format(printf, 1, 2)));
 int64_t clock_wall(void);      /* since the Unix epoch */
 int64_t clock_monotonic(void); /* from an arbitrary origin, unaffected by setting the date */
 
-/* ---- memory aligned to GAIT_ALIGN, as the library wants it; free() it.  NULL with `why` set: there is not enough. */
+/* ---- memory aligned to GAIT_ALIGN, as the library requires; free() it.  NULL, with `why` set, if there is not enough. */
 void *aligned_memory(size_t bytes, const char *what, message *why);
 
 /* ---- a whole file in memory. */
@@ -33,7 +33,7 @@ typedef struct file_bytes {
 /* `what` names the kind of file in the message: "model". */
 bool file_read(const char *path, const char *what, file_bytes *out, message *why);
 
-/* ---- a model read from its file, in memory that is taken once. */
+/* ---- a model read from its file, in memory that is allocated once. */
 typedef struct model_file {
     file_bytes blob;
     void *memory;

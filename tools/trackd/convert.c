@@ -8,7 +8,7 @@ _Static_assert(sizeof((gaitmsg_state_t *)0)->coef == sizeof((gait_state *)0)->co
 _Static_assert(sizeof((gaitmsg_state_t *)0)->offset == sizeof((gait_state *)0)->offset,
                "state_t holds every angle");
 
-/* Numbers that gait_state and state_t call alike. */
+/* Numbers with the same name in gait_state and state_t. */
 #define SCALARS(X) X(phase) X(stride_hz) X(stature) X(heading) X(pitch) X(roll)
 
 void convert_state(const gait_state *in, const gait_model_info *info, gaitmsg_state_t *out)

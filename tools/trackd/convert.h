@@ -17,7 +17,7 @@ void convert_state(const gait_state *in, const gait_model_info *info, gaitmsg_st
 /* Fields that are not numbers become those of `unknown`; components and offsets beyond the message's are 0. */
 bool convert_state_message(const gaitmsg_state_t *in, const gait_state *unknown, gait_state *out,
                            message *why);
-/* All but frame, step, dropped, receive_utime, step_us and tracker_digest, which are the caller's. */
+/* Sets all fields but frame, step, dropped, receive_utime, step_us and tracker_digest, which the caller sets. */
 void convert_estimate(const gait_model *model, const gait_model_info *info, const gait_estimate *in,
                       estimate_message *out);
 #endif

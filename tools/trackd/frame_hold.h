@@ -10,7 +10,7 @@ typedef struct frame_hold {
     int64_t utime, arrival;
 } frame_hold;
 
-/* Take the memory for a frame of a camera, instead of what was taken before. */
+/* Allocate memory for a frame of this camera, in place of what was allocated before. */
 bool frame_hold_allocate(frame_hold *h, const gait_camera *camera, message *why);
 void frame_hold_close(frame_hold *h);
 /* Hold a frame; false if it is too large. */

@@ -102,7 +102,7 @@ bool further_take_frame(further_camera *c, const image_view *v, message *why)
 {
     int const at = (int)(c->frames % FURTHER_PAST);
     if (!c->known)
-        return true; /* it is announced every few seconds */
+        return true; /* no fault: its camera is announced every few seconds */
     c->utime[at] = -1;
     if (!copy(c, v, 1 + at, &c->frame[at], why))
         return false;

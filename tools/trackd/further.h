@@ -35,14 +35,14 @@ void further_close(further *f);
 size_t further_bytes(const further_camera *c);
 /* The camera with this number. */
 further_camera *further_find(further *f, int stream);
-/* The first that has not been announced; NULL: all have. */
+/* The first camera that has not been announced; NULL: all have been. */
 const further_camera *further_unknown(const further *f);
-/* Take a camera when it is announced first; one that differs later is refused. */
+/* Take a camera when it is first announced; a different one is refused later. */
 bool further_take_camera(further_camera *c, const gaitmsg_camera_t *in, int32_t max_pixels, message *why);
-/* Copy a background or a frame; it must have the camera's size. */
+/* Copy a background or a frame, which must have the camera's size. */
 bool further_take_background(further_camera *c, const image_view *v, message *why);
 bool further_take_frame(further_camera *c, const image_view *v, message *why);
-/* Whether a frame of the first camera should wait: another camera's frame of its time may still come. */
+/* Whether a frame of the first camera should wait, because another camera's frame of that time may still arrive. */
 bool further_waits(const further *f, int64_t utime);
 /* Images nearest in time to a frame of the first camera, at most half an interval between its frames away; a camera
  * without one has no image. */

@@ -17,13 +17,13 @@
 #include <unistd.h>
 
 enum { QUIT = 1, RELOAD = 2 };
-static volatile sig_atomic_t quit;    /* one of these after a signal */
-static sig_atomic_t on_hangup = QUIT; /* a closed terminal; RELOAD: a service manager asks for it */
+static volatile sig_atomic_t quit;    /* 0 until a signal sets QUIT or RELOAD */
+static sig_atomic_t on_hangup = QUIT; /* SIGHUP from a closed terminal; RELOAD: under a service manager */
 
 static void on_signal(int number)
 {
-    quit =
-        number == SIGHUP && quit != QUIT ? on_hangup : QUIT; /* both may be delivered at once, in any order */
+    quit = number == SIGHUP && quit != QUIT ? on_hangup
+                                            : QUIT; /* QUIT wins if both are delivered, in any order */
 }
 
 /* Block the signals that end the program, also in threads that LCM starts; `unblocked` is the mask to wait with. */
@@ -43,7 +43,7 @@ static void set_signals(sigset_t *unblocked)
     }
     sigprocmask(SIG_BLOCK, &block, unblocked);
     signal(SIGPIPE, SIG_IGN);
-    signal(SIGXFSZ, SIG_IGN); /* too large a log is a write error */
+    signal(SIGXFSZ, SIG_IGN); /* a log that exceeds the limit is then a write error */
 }
 
 static bool read_background(service *s, const char *path, message *why)
@@ -61,14 +61,14 @@ static bool read_background(service *s, const char *path, message *why)
     return ok;
 }
 
-typedef struct parts { /* optional ones */
+typedef struct parts { /* optional parts of the service */
     lift_service lift;
     keypoint_cue cue;
     pose_path path;
     further further;
 } parts;
 
-/* The second service, if requested. */
+/* Open the lifter, if requested. */
 static bool load_lift(service *s, const settings *want, lift_service *lift, sink *out, message *why)
 {
     lift_settings const set = {.stature = want->lift_stature,
@@ -85,7 +85,7 @@ static bool load_lift(service *s, const settings *want, lift_service *lift, sink
     return true;
 }
 
-/* Model, start, camera and background, as far as the command line gives them. */
+/* Load model, start, camera and background, as far as the command line gives them. */
 static bool load(service *s, const settings *want, parts *p, workers *threads, sink *out, message *why)
 {
     gait_tracker_config config;
@@ -189,10 +189,11 @@ static bool check_log(const char *url, const service *s, message *why)
 typedef struct invocation { /* of the program */
     int argc;
     char **argv;
-    sigset_t unblocked; /* signal mask to wait with, and to begin with */
+    sigset_t unblocked; /* signal mask at the start, and while waiting */
 } invocation;
 
-/* Run until a signal ends the program; it goes on where settings that should be read again cannot be used. */
+/* Run until a signal ends the program or new settings are to be used; if these are not valid, continue with the present
+ * ones. */
 static bool run(receiver *r, const invocation *call, message *why)
 {
     static settings again;
@@ -208,7 +209,7 @@ static bool run(receiver *r, const invocation *call, message *why)
     return false;
 }
 
-/* Everything between the settings and the exit code. */
+/* Run the service with these settings, from opening its parts to the summary. */
 static bool serve(service *s, const settings *want, parts *p, workers *threads, const invocation *call,
                   message *why)
 {

@@ -60,8 +60,8 @@ bool pnm_read(const char *path, file_bytes *bytes, gait_image *out, message *why
 }
 
 /* ---- starts ---- */
-/* Numbers of the file beside the pelvis and their fields of gait_state, whose table has their ranges; sd is taken where
- * the file gives a value but no standard deviation. */
+/* Keys of the file besides the pelvis, with their fields of gait_state, whose table has the ranges.  sd: used if the file
+ * gives a value without a standard deviation, the same as in python/gait/bindings/initial.py. */
 static const struct {
     const char *key, *field, *remedy;
     double sd;
@@ -71,7 +71,7 @@ static const struct {
     {"stride_hz", "stride_hz", "give strides (two steps) per second, about 0.9", 0.05},
     {"stature_m", "stature", "give the person's height in metres", 0.03},
 };
-/* "sd" may hold the first five. */
+/* "sd" may contain the first five. */
 static const char *const known_keys[] = {"pelvis",    "heading_rad", "phase", "stride_hz",
                                          "stature_m", "frame",       "sd"};
 
@@ -122,7 +122,7 @@ static int count_of(const fields *f, int object, const char *key)
     return value < 0 ? 0 : json_numbers(&f->doc, value, NULL, 0);
 }
 
-/* Two coordinates are completed with the model's height of the pelvis, which depends on the rest of the state. */
+/* If only x and y are given, z is the model's height of the pelvis, which depends on the rest of the state. */
 static bool read_pelvis(const fields *f, int sds, const gait_model *model, init_state *io, message *why)
 {
     const char *const place = "give x and y (and z if known) of the pelvis in metres";

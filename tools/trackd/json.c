@@ -28,7 +28,7 @@ static void skip_space(parser *p)
         p->line += *p->at == '\n';
 }
 
-/* Skip space and one expected character. */
+/* Skip white space and one expected character. */
 static bool take(parser *p, char c)
 {
     skip_space(p);
@@ -259,7 +259,7 @@ bool fields_numbers(const fields *f, int object, const char *key, double *out, i
 {
     char name[64];
     int const value = json_find(&f->doc, object, key);
-    if (object > 0) /* its own key stands before it */
+    if (object > 0) /* its key precedes it */
         snprintf(name, sizeof name, "%.*s.%s", (int)f->node[object - 1].length, f->node[object - 1].text,
                  key);
     else

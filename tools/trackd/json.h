@@ -6,9 +6,8 @@
 #include <stddef.h>
 #include <stdint.h>
 
-/* ---- strict JSON (RFC 8259) into nodes of the caller; strings are checked but their escapes stay as they are.
- * NaN and Infinity, which JSON does not have, come through as NAN so that the reader of a key can refuse them by name.
- */
+/* ---- strict JSON (RFC 8259), parsed into the caller's nodes; strings are checked, but escapes are not replaced.  NaN and
+ * Infinity, which JSON does not have, become NAN, so that the reader of a key can reject them by name. */
 typedef enum json_type { JSON_NULL, JSON_BOOL, JSON_NUMBER, JSON_STRING, JSON_ARRAY, JSON_OBJECT } json_type;
 
 /* One value; its parts follow it.  An object's parts are key, value, key, value. */

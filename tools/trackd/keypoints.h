@@ -1,4 +1,5 @@
-/* keypoints.h - 2-D keypoints of a detector: read from an encoded gaitmsg.tracks_t or tracks2_t, and used as a term of the likelihood. */
+/* keypoints.h - 2-D keypoints of a detector: read from an encoded gaitmsg.tracks_t or tracks2_t, and used as a term of the
+ * likelihood. */
 #ifndef TRACKD_KEYPOINTS_H
 #define TRACKD_KEYPOINTS_H
 #include "byte_reader.h"
@@ -10,7 +11,7 @@
 typedef struct keypoints_view {
     int64_t utime, frame;
     int32_t count;
-    bool profiled;    /* the message states the errors of each */
+    bool profiled;    /* the message states the errors of each keypoint */
     byte_reader rest; /* keypoints not yet read */
 } keypoints_view;
 
@@ -20,11 +21,11 @@ typedef struct keypoint_view {
     float sd, lasting_sd, correlation; /* as in track2_t; sd -1: not stated */
 } keypoint_view;
 
-/* Checks keypoints: a model takes those it knows, each once per message, with a confidence from 0 to 1. */
+/* Selects the keypoints that are used: those that the model knows, each once per message, with a valid confidence. */
 typedef struct keypoints_filter {
-    int64_t left_out;             /* keypoints */
-    bool reported[3];             /* each reason once on stderr */
-    bool named[GAIT_MAX_MARKERS]; /* in this message */
+    int64_t left_out;             /* number of other keypoints */
+    bool reported[3];             /* reasons that have been reported on stderr */
+    bool named[GAIT_MAX_MARKERS]; /* joints that occurred in this message */
 } keypoints_filter;
 
 /* A new message begins. */
@@ -38,9 +39,10 @@ bool keypoints_view_open(keypoints_view *v, const void *message_bytes, size_t si
 bool keypoints_view_next(keypoints_view *v, keypoint_view *out);
 /* Standard deviation of a keypoint, pixels: as stated or, from `sd`, by its confidence.  -1: not seen. */
 double keypoints_view_sd(const keypoint_view *k, double sd);
-/* The same so large that frames `step` seconds apart count as independent, but for what lasts; 0: no frame before. */
+/* The same, increased so that frames `step` seconds apart can be treated as independent; the lasting part of the error is
+ * not increased.  step 0: there was no frame before. */
 double keypoints_view_independent_sd(const keypoint_view *k, double sd, double step);
-/* Report, as false, that no keypoint of a message is known. */
+/* Report that no keypoint of a message is known; returns false. */
 bool keypoints_view_unknown(message *why);
 
 /* ---- 2-D keypoints of a detector as a term of the tracker's likelihood.
@@ -60,12 +62,13 @@ typedef struct keypoint_cue {
     float sd; /* pixels, of a keypoint with confidence 1 */
     cue_keypoints past[KEYPOINT_CUE_PAST];
     keypoints_filter filter;
-    int64_t messages, used, late; /* messages that arrived; used by a frame; after their frame */
-    int64_t frame_utime;          /* of the last tracked frame; -1: none */
-    int64_t used_utime;           /* of the last that had keypoints */
+    int64_t messages, used,
+        late;            /* messages: that arrived; that a frame used; that arrived after their frame */
+    int64_t frame_utime; /* of the last tracked frame; -1: none */
+    int64_t used_utime;  /* of the last tracked frame that had keypoints */
 } keypoint_cue;
 
-/* `cue` is all zero before.  `model` must outlive it. */
+/* `model` must outlive `cue`. */
 void keypoint_cue_open(keypoint_cue *cue, const gait_model *model, int32_t joints, float sd);
 /* Tracking has stopped: accept keypoints of any time again. */
 void keypoint_cue_forget(keypoint_cue *cue);

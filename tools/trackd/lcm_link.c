@@ -80,7 +80,7 @@ static bool log_readable(const char *path, message *why)
 /* ---- connections ---- */
 #define ROUTE_REMEDY "if this machine has no multicast route: ip route add 224.0.0.0/4 dev lo (as root)"
 
-/* liblcm writes pages about a missing route to stderr; the daemon reports it in one line. */
+/* liblcm prints pages about a missing route to stderr, which the daemon reports in one line. */
 static int mute(void)
 {
     fflush(stderr);

@@ -13,7 +13,7 @@ int64_t log_scan(const char *path, message *why);
 /* ---- the LCM connections of a program. */
 enum { LINK_PATH = 1024, LINK_CHANNEL = 40 }; /* bytes of a log's name, of a channel's, with their ends */
 
-/* The channel of a person: GAIT_ESTIMATE is GAIT_ESTIMATE_2 of person 2; of person 0 as it is. */
+/* The channel of a person: for person 2 GAIT_ESTIMATE becomes GAIT_ESTIMATE_2, for person 0 it stays as it is. */
 const char *link_channel(const char *channel, int person, char name[LINK_CHANNEL]);
 
 /* The URL sets the receive buffer: with the system's default a 640x480 colour stream loses nine frames of ten. */
@@ -42,7 +42,8 @@ typedef struct sink {    /* all zero: no output */
 
 /* Open `url`; a log has ?mode=w (new) or a (append). */
 bool sink_open(sink *s, const char *url, message *why);
-/* Publish `size` bytes on the person's channel.  The first failure of LCM is reported on stderr; after one of a log nothing more is written. */
+/* Publish `size` bytes on the person's channel.  The first failure of LCM is reported on stderr; after a failure of a log
+ * nothing more is written. */
 void sink_publish(sink *s, const char *channel, const uint8_t *bytes, int size);
 /* Whether writing the log has failed, so that the program should end. */
 bool sink_ended(const sink *s, message *why);

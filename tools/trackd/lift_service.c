@@ -9,7 +9,7 @@
 
 enum {
     MESSAGE_BYTES = 1 << 14, /* more than an estimate of all markers takes */
-    BACK_US = 1000000,       /* keypoints older than the last ones by more restart the stream */
+    BACK_US = 1000000, /* keypoints that are older than the last ones by more than this restart the stream */
 };
 
 bool lift_service_open(lift_service *s, const char *model, const lift_settings *set, sink *out, message *why)
@@ -107,7 +107,7 @@ static bool send(lift_service *s, int64_t step_us, message *why)
     static uint8_t encoded[MESSAGE_BYTES];
     const gait_lift_frame *const e = &s->estimate;
     const lift_past *const past = past_of(s, e->utime);
-    bool const known = e->status != GAIT_TRACK_INIT; /* until then the joints are not known */
+    bool const known = e->status != GAIT_TRACK_INIT; /* in INIT there are no joints yet */
     gaitmsg_estimate_t m = {.utime = e->utime,
                             .frame = past->frame,
                             .step = (int64_t)e->frame,
@@ -138,7 +138,7 @@ static bool send(lift_service *s, int64_t step_us, message *why)
     return true;
 }
 
-/* Whether keypoints of this time can follow the last ones, if need be as a new stream. */
+/* Whether keypoints of this time can follow the last ones, if necessary as a new stream. */
 static bool in_time(lift_service *s, int64_t utime, message *why)
 {
     if (utime < 0 || (utime <= s->last && utime >= s->last - BACK_US))

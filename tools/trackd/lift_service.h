@@ -40,7 +40,7 @@ typedef struct lift_service {
     lift_past past[LIFT_SERVICE_PAST]; /* a ring by the number of frames */
 } lift_service;
 
-/* Read the segment prior of a blob and take all memory; s is all zero before. */
+/* Read the segment prior of a blob and allocate all memory; s must be all zero. */
 bool lift_service_open(lift_service *s, const char *model, const lift_settings *set, sink *out, message *why);
 void lift_service_close(lift_service *s);
 /* The first camera starts the service; another one restarts it. */

@@ -4,7 +4,7 @@
 #include <string.h>
 
 static const double FASTEST =
-    20.0; /* metres and radians per second: what is faster is a jump, not a motion */
+    20.0; /* metres or radians per second above which a change is a jump, not a motion */
 
 static const timed_pose *pose_at(const pose_path *p, int64_t index)
 {
@@ -15,7 +15,7 @@ bool pose_path_add(pose_path *p, int64_t utime, const gait_camera *camera, messa
 {
     int64_t const last = p->count > 0 ? pose_at(p, p->count - 1)->utime : INT64_MIN;
     if (p->count > 0 && utime <= last && utime > last - POSE_PATH_SET_BACK) {
-        p->refused += utime < last; /* the same pose again is no fault */
+        p->refused += utime < last; /* repeating a pose is no fault */
         return utime == last || message_set(why, "a camera pose arrived out of order and was dropped; "
                                                  "stamp GAIT_CAMERA_<i> in order");
     }
@@ -82,7 +82,7 @@ static double length(const double v[3])
     return sqrt(v[0] * v[0] + v[1] * v[1] + v[2] * v[2]);
 }
 
-/* Between two poses; false: across a gap or a jump. */
+/* Interpolate between two poses; false: there is a gap or a jump between them. */
 static bool between(const timed_pose *a, const timed_pose *b, int64_t utime, gait_camera_pose *out,
                     message *why)
 {
@@ -100,7 +100,7 @@ static bool between(const timed_pose *a, const timed_pose *b, int64_t utime, gai
                            length(way), length(turn) * 57.29578);
     *out = b->sent;
     if (memcmp(&a->sent, &b->sent, sizeof a->sent) == 0)
-        return true; /* with the same bits */
+        return true; /* exactly that pose */
     for (int k = 0; k < 3; k++) {
         turn[k] *= share;
         centre[k] = a->centre[k] + share * way[k];

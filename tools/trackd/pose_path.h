@@ -5,10 +5,11 @@
 #include "gait.h"
 
 enum {
-    POSE_PATH_KEPT = 256,        /* poses; the oldest are forgotten */
-    POSE_PATH_GAP = 500000,      /* microseconds between two poses, beyond which none is known between them */
-    POSE_PATH_LATE = 100000,     /* for which the last pose holds, if the next one does not arrive in time */
-    POSE_PATH_SET_BACK = 2000000 /* from which an earlier pose means that the clock was set back */
+    POSE_PATH_KEPT = 256,    /* poses; the oldest are forgotten */
+    POSE_PATH_GAP = 500000,  /* microseconds: between poses further apart no pose is known */
+    POSE_PATH_LATE = 100000, /* microseconds for which the last pose is valid if the next one is late */
+    POSE_PATH_SET_BACK =
+        2000000 /* microseconds: a pose that is so much earlier means that the clock was set back */
 };
 
 typedef struct timed_pose {
@@ -32,8 +33,8 @@ typedef enum pose_answer {
 
 /* Take a pose.  false: it is not after the last one; one that is far before it begins a path anew. */
 bool pose_path_add(pose_path *p, int64_t utime, const gait_camera *camera, message *why);
-/* Pose at a time, between its neighbours: turned along the shortest way, moved along the line. */
+/* Pose at a time, interpolated between its neighbours: shortest rotation, straight line. */
 pose_answer pose_path_at(const pose_path *p, int64_t utime, gait_camera_pose *out, message *why);
-/* The same for a frame that does not wait: the last pose holds for POSE_PATH_LATE. */
+/* The same for a frame that does not wait: the last pose is valid for POSE_PATH_LATE. */
 bool pose_path_now(pose_path *p, int64_t utime, gait_camera_pose *out, message *why);
 #endif

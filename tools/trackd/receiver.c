@@ -35,7 +35,7 @@ static bool newest(const receiver *r)
     return r->log || lcm_subscription_get_queue_size(r->frames) == 0;
 }
 
-/* Track the frame that waits, if any. */
+/* Track the waiting frame, if there is one. */
 static void flush_held(receiver *r)
 {
     frame_hold *const hold = &r->service->hold;
@@ -46,7 +46,7 @@ static void flush_held(receiver *r)
     hold->bytes = 0;
 }
 
-/* Track it if all that it waits for has arrived. */
+/* Track the waiting frame if everything that it waits for has arrived. */
 static void flush_complete(receiver *r)
 {
     const frame_hold *const hold = &r->service->hold;
@@ -158,7 +158,7 @@ static void on_status(const lcm_recv_buf_t *buf, const char *channel, void *user
     byte_reader bytes = {buf->data, buf->data_size, true};
     int64_t const type = bytes_int(&bytes, 8), utime = bytes_int(&bytes, 8);
     (void)channel;
-    if (bytes.ok && type == __gaitmsg_status_t_get_hash()) /* else of another version */
+    if (bytes.ok && type == __gaitmsg_status_t_get_hash()) /* otherwise it is of another version */
         service_status(r->service, utime);
 }
 
@@ -221,7 +221,7 @@ void receiver_close(receiver *r)
     *r = (receiver){0};
 }
 
-/* Handle waiting messages, all others before the next frame; false when the connection has ended. */
+/* Handle waiting messages, all others before a frame; false when the connection has ended. */
 static bool serve(receiver *r)
 {
     int more = 0;

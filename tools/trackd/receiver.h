@@ -6,8 +6,8 @@
 
 #include <signal.h>
 
-/* Live, images have a connection of their own, drained to the newest frame, so that commands are never behind them;
- * a log is one connection, played in order and without loss. */
+/* Live, images have a separate connection, of which only the newest frame is used, so that commands never wait behind
+ * images.  A log is one connection, played in order and without loss. */
 typedef struct receiver {
     service *service;
     lcm_t *images, *others; /* the same for a log */

@@ -21,7 +21,7 @@ void service_set_state(service *s, int8_t state, const char *text)
         message_set(&s->text, "%s", text);
 }
 
-/* Whether this second may have one more line of log; those that it may not are counted. */
+/* Whether one more line may be logged in this second; suppressed lines are counted. */
 static bool may_log(service *s)
 {
     enum { LINES_A_SECOND = 10, SECOND = 1000000 };
@@ -51,7 +51,7 @@ void service_complain(service *s, const char *format, ...)
     s->text = s->complaint = line;
 }
 
-/* The state while nothing is tracked: what the service waits for. */
+/* Set the state while nothing is tracked: what the service waits for. */
 static void set_idle(service *s)
 {
     if (!s->track.tracker)
@@ -72,7 +72,7 @@ static void want_all(service *s)
     gait_tracker_set_particles(s->track.tracker, s->wanted, NULL);
 }
 
-/* The state at the start of the program. */
+/* Return to the state at the start of the program. */
 static void rearm(service *s)
 {
     memset(&s->counts, 0, sizeof s->counts);
@@ -91,7 +91,7 @@ static void rearm(service *s)
     set_idle(s);
 }
 
-/* Memory for the particle cloud, taken once; acquisition may use more particles than tracking. */
+/* Allocate memory for the particle cloud, once; acquisition may use more particles than tracking. */
 static bool open_particles(service *s, message *why)
 {
     const gait_tracker_config *const c = &s->track.config;
@@ -132,8 +132,8 @@ void service_close(service *s)
     tracking_close(&s->track);
 }
 
-/* Whether the tracker accepts such a start, which begins with its frame.  Before there is a tracker the check waits for the
- * camera. */
+/* Whether the tracker accepts such a start, which takes effect at its frame.  Without a tracker, before a camera is known,
+ * it is not checked. */
 static bool start_usable(service *s, const gait_state *mean, const gait_state *sd)
 {
     message why;
@@ -143,7 +143,7 @@ static bool start_usable(service *s, const gait_state *mean, const gait_state *s
     return false;
 }
 
-/* Backgrounds of further cameras that came before there was a tracker. */
+/* Give the tracker the backgrounds of further cameras that arrived before it existed. */
 static void set_further_backgrounds(service *s)
 {
     for (int i = 0; s->further && i < s->further->count; i++)
@@ -193,7 +193,7 @@ static bool replaces(service *s, const gait_camera *camera, int64_t utime)
     return !s->camera_fixed && utime - s->other_since >= SERVICE_CAMERA_SILENT; /* both are 0 or more */
 }
 
-/* Whether two cameras differ at most in where they are. */
+/* Whether two cameras differ at most in their poses. */
 static bool same_lens(const gait_camera *a, const gait_camera *b)
 {
     gait_camera there = *a;
@@ -300,7 +300,7 @@ static void command_start(service *s, const gaitmsg_command_t *msg)
 void service_command(service *s, const gaitmsg_command_t *msg)
 {
     if (msg->id != 0 && msg->id == s->command_id)
-        return; /* repeated, because the sender has not yet seen its effect */
+        return; /* repeated by a sender that has not yet seen its effect */
     s->command_id = msg->id;
     s->news = true;
     if (msg->command == GAITMSG_COMMAND_T_START) {
@@ -441,7 +441,7 @@ void service_status(service *s, int64_t utime)
         if (s->sent[i] == utime)
             return;
     if (strcmp(s->complaint.text, ANOTHER_DAEMON) !=
-        0) /* else two daemons would answer each other without end */
+        0) /* report it once: otherwise two daemons would answer each other without end */
         service_complain(s, ANOTHER_DAEMON);
     else
         s->text = s->complaint;

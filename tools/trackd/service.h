@@ -49,10 +49,10 @@ typedef struct service {
     keypoint_cue *cue;  /* a detector's keypoints for the tracker; NULL: not requested */
     pose_path *path;    /* poses of a camera that moves; NULL: it stands still */
     further *further;   /* further cameras; NULL: there is one */
-    bool first_given;   /* the first camera, */
-    gait_camera first;  /* which waits for the others */
-    frame_hold hold;    /* with one of them: the frame that waits */
-    sink *out;          /* where messages go */
+    bool first_given;   /* the first camera is known and waits for the others */
+    gait_camera first;
+    frame_hold hold; /* the frame that waits for keypoints, a pose or further cameras */
+    sink *out;       /* where messages go */
     int threads;
     int stream;               /* number of the camera, [0, 30] */
     int32_t max_pixels;       /* of a camera that is announced */
@@ -62,7 +62,7 @@ typedef struct service {
     bool has_init;
     init_state init; /* of --init FILE */
     start_trigger start;
-    bool compared;  /* the background with a frame */
+    bool compared;  /* the background has been compared with a frame */
     bool seek;      /* start automatically, and again when the person is lost */
     int64_t fitted; /* capture time of the last frame at which the automatic start was solved */
     int8_t state;   /* GAITMSG_STATUS_T_* */
@@ -82,7 +82,7 @@ typedef struct service {
     int32_t wanted;           /* particles requested last; 0 before there is a tracker */
     size_t pool_bytes;        /* of the threads */
     double max_gap;           /* longest pause that is bridged by prediction, seconds */
-    int idle;                 /* SERVICE_IDLE_*: reported last */
+    int idle;                 /* SERVICE_IDLE_* that was reported last */
     message text, complaint;  /* text of the status; last complaint on stderr */
     int64_t lines_since;      /* monotonic microseconds; lines of log are counted from here for a second */
     int32_t lines, lines_left_out;
@@ -102,11 +102,12 @@ bool service_open(service *s, sink *out, int stream, int threads, const init_sta
 void service_close(service *s);
 
 bool service_set_camera(service *s, const gait_camera *camera, message *why);
-/* With a path: a pose, if the lens is that of the camera in use.  One that differs from the camera in use replaces it after it has been announced for SERVICE_CAMERA_SILENT, by the times of
- * its messages, while the other was not, unless that is of a file. */
+/* A camera was announced.  With a path it is a pose, if the lens is that of the camera in use.  A camera that differs from
+ * the one in use replaces it, unless that is from a file, after only it has been announced for SERVICE_CAMERA_SILENT by the
+ * times of the messages. */
 void service_camera(service *s, const gaitmsg_camera_t *msg);
 void service_background(service *s, const image_view *v);
-/* The same of a further camera. */
+/* The same for a further camera. */
 void service_further_camera(service *s, further_camera *c, const gaitmsg_camera_t *msg);
 void service_further_background(service *s, further_camera *c, const image_view *v);
 void service_command(service *s, const gaitmsg_command_t *msg);
@@ -125,7 +126,7 @@ void service_lack(const service *s, message *why);
 /* GAIT_ESTIMATE, GAIT_ESTIMATE_LAG, GAIT_STRIDE and GAIT_PARTICLES of a frame that was tracked. */
 void service_send_estimate(service *s, const image_view *v, const gait_estimate *e, int64_t received,
                            int64_t step_us);
-/* Go on with the person of a restored tracker, which followed them until such a frame. */
+/* Continue with the person of a restored tracker, who was followed up to this frame. */
 void service_resume(service *s, int64_t utime, int64_t frame);
 void service_send_status(service *s);
 /* A status that was heard, sent at `utime`: one that this service did not send is another daemon's, which is reported. */

@@ -9,10 +9,10 @@ enum {
     FIT_PERIOD = 100000, /* microseconds between two fits of the automatic start */
     /* microseconds without keypoints after which one of several people who is lost has left */
     AWAY = 1000000,
-    LONGEST_GAP = 1 << 20 /* frames; a number further away begins another count */
+    LONGEST_GAP = 1 << 20 /* frames; a number that is further away begins a new count */
 };
 
-/* Count the frames that never arrived, by the gap in their numbers. */
+/* Count the frames that did not arrive, by the gap in their numbers. */
 static void count_gap(service *s, const image_view *v)
 {
     if (v->frame < 0)
@@ -24,7 +24,7 @@ static void count_gap(service *s, const image_view *v)
     s->last_frame = follows && v->frame < s->last_frame ? s->last_frame : v->frame;
 }
 
-/* Whether this frame has arrived before, or has been counted as one that never did. */
+/* Whether this frame has arrived before, or has been counted as one that did not arrive. */
 static bool is_repeated(const service *s, const image_view *v)
 {
     bool const numbered = v->frame >= 0 && s->last_frame >= 0;
@@ -33,7 +33,7 @@ static bool is_repeated(const service *s, const image_view *v)
             (v->frame == s->last_frame || (v->frame < s->last_frame && v->utime < s->last_arrived)));
 }
 
-/* Stop tracking for a reason that has just been reported. */
+/* Stop tracking; the reason is reported by the caller. */
 static void stop(service *s)
 {
     service_set_state(s, GAITMSG_STATUS_T_READY, NULL);
@@ -50,7 +50,7 @@ static void run(service *s, const image_view *v, int64_t utime)
     s->last_arrived = v->utime;
     s->missed = false;
     s->steps = 0;
-    memset(s->past, 0xff, sizeof s->past); /* no step has such a number */
+    memset(s->past, 0xff, sizeof s->past); /* a number that no step has */
     s->meter.running = false;
     service_set_state(s, GAITMSG_STATUS_T_RUNNING, "tracking");
 }
@@ -93,8 +93,8 @@ static const char *next_start(const service *s)
     return s->seek ? "searching for a person again" : "send START";
 }
 
-/* Whether this frame can follow the last one.  Too long a pause stops the tracker, and so does a clock set back as far, for
- * which it would otherwise wait. */
+/* Whether this frame can follow the last one.  Too long a pause stops the tracker, and so does a clock that was set back by
+ * as much, because otherwise the tracker would wait until it has caught up. */
 static bool in_time(service *s, const image_view *v)
 {
     double const pause = 1e-6 * ((double)v->utime - (double)s->last_utime); /* cannot overflow */
@@ -129,8 +129,8 @@ static void compare_scene(service *s, const gait_image *frame)
             s->stream);
 }
 
-/* Add the keypoints of a frame and what differs from the background in it; false: there are neither, or the clock was
- * set back. */
+/* Give the automatic start the keypoints of a frame and the regions that differ from the background; false: there are
+ * neither, or the clock was set back. */
 static bool observe(service *s, int64_t utime, const gait_image *frame)
 {
     gait_start *const start = s->track.start;
@@ -177,7 +177,7 @@ static bool try_auto_start(service *s, const image_view *v, const gait_image *fr
     return true;
 }
 
-/* No person is tracked: start with one who walks in. */
+/* While no person is tracked: start with one who walks. */
 static bool start_with_first(service *s, const image_view *v)
 {
     gait_image frame;
@@ -252,7 +252,7 @@ static bool step(service *s, const image_view *v, int64_t received, int64_t birt
     if (s->path && pose_path_now(s->path, v->utime, &pose, &why))
         frame.pose[0] = &pose;
     else if (s->path) {
-        frame.image[0].data = NULL; /* from an unknown place: predict */
+        frame.image[0].data = NULL; /* the camera's pose is unknown: only predict */
         service_complain(s, "%s", why.text);
     }
     gait_result status = bridge(s, v->utime, &estimate, &err);
@@ -308,7 +308,7 @@ static int idle_of(const service *s)
                                                                                : SERVICE_IDLE_SCENE;
 }
 
-/* What is missing in such a state. */
+/* State what is missing. */
 static void set_lack(const service *s, int idle, message *why)
 {
     int const i = s->stream;
@@ -378,7 +378,7 @@ void service_frame(service *s, const image_view *v, bool newest, int64_t arrival
     if (s->state != GAITMSG_STATUS_T_RUNNING)
         return;
     s->last_arrived = v->utime;
-    bool const due = !repeated || s->missed; /* counts as dropped unless it is tracked */
+    bool const due = !repeated || s->missed; /* to be counted as dropped unless it is tracked */
     s->counts.dropped -= repeated && s->missed;
     s->missed = !(fresh(s, newest, birth, now) && in_time(s, v) && step(s, v, now, birth)) && due;
     s->counts.dropped += s->missed;

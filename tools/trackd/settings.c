@@ -306,7 +306,7 @@ static option_result parse(settings *s, const option *table, int count, int argc
     return options_parse(table, count, argc, argv, why);
 }
 
-/* In place of a folder of models, the mode's. */
+/* If --model is a folder, choose the model of the mode in it. */
 static bool choose_model(settings *s, message *why)
 {
     char folder[OPTION_TEXT];

@@ -19,7 +19,8 @@ typedef struct settings { /* 0 or empty: not given, unless noted */
     gait_tracker_config tracker; /* with the defaults of the mode; tasks 0: not given */
 } settings;
 
-/* Command line, then configuration file, then defaults; checked for consistency. */
+/* Read the settings: the command line wins over the configuration file, which wins over the defaults.  Checked for
+ * consistency. */
 option_result settings_read(settings *s, int argc, char **argv, message *why);
 /* Print the help to stdout. */
 void settings_help(void);

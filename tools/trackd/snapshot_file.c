@@ -12,8 +12,8 @@
 #include <string.h>
 #include <unistd.h>
 
-/* What the service knows beside the tracker, whose state follows; read by the daemon that wrote it only: same machine,
- * same version of the library. */
+/* What the service knows besides the tracker, whose state follows.  Only a daemon on the same machine, with the same version
+ * of the library, reads it. */
 typedef struct head {
     char magic[8];
     gait_camera camera;
@@ -24,7 +24,7 @@ typedef struct head {
 static const char MAGIC[8] = "GAITTRD1";
 
 /* ---- writing ---- */
-/* The whole file in memory of its own; NULL: there is not enough. */
+/* The whole file in allocated memory; NULL: there is not enough. */
 static unsigned char *encode(const service *s, size_t *bytes)
 {
     head h = {.stream = s->stream, .utime = s->last_utime, .frame = s->last_frame};
@@ -57,7 +57,7 @@ static bool write_all(int file, const unsigned char *data, size_t bytes)
     return true;
 }
 
-/* The folder of a file, to be closed; -1: none. */
+/* Open the folder of a file; -1: it cannot be opened. */
 static int open_folder(const char *path)
 {
     char folder[OPTION_TEXT];
@@ -66,12 +66,13 @@ static int open_folder(const char *path)
     return open(folder, O_RDONLY | O_DIRECTORY | O_CLOEXEC);
 }
 
-/* Write beside the file, then rename; 0 or an errno.  After a loss of power the old or the new one is there, complete. */
+/* Write beside the file, then rename; returns 0 or an errno.  After a loss of power the old or the new file is there,
+ * complete. */
 static int replace(const char *path, const unsigned char *data, size_t bytes)
 {
     char beside[OPTION_TEXT + 16];
     snprintf(beside, sizeof beside, "%s.%d", path, (int)getpid());
-    unlink(beside); /* of a process that was killed and had this number */
+    unlink(beside); /* left by a process that was killed and had this number */
     int const file = open(beside, O_WRONLY | O_CREAT | O_EXCL | O_CLOEXEC, 0600);
     if (file < 0)
         return errno;
@@ -141,7 +142,7 @@ static bool fits(const service *s, const file_bytes *file, head *h, message *why
     if (memcmp(h->magic, MAGIC, sizeof MAGIC) != 0)
         return message_set(why, "not a snapshot of gait-trackd");
     if (h->stream != s->stream)
-        return message_set(why, "of --stream %d", (int)h->stream);
+        return message_set(why, "for --stream %d", (int)h->stream);
     if (s->camera_fixed && !camera_same(&h->camera, &s->track.config.camera[0]))
         return message_set(why, "for a camera other than --camera");
     return camera_check(&h->camera, s->max_pixels, why);

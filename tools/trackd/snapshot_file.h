@@ -1,4 +1,4 @@
-/* snapshot_file.h - the tracker's state in a file, from which the next daemon goes on. */
+/* snapshot_file.h - the tracker's state in a file, from which the next daemon continues. */
 #ifndef TRACKD_SNAPSHOT_FILE_H
 #define TRACKD_SNAPSHOT_FILE_H
 #include "service.h"
@@ -10,9 +10,8 @@ typedef struct snapshot_file { /* all zero: not requested */
     bool failed;    /* writing has been reported as failed */
 } snapshot_file;
 
-/* Go on with the person that the tracker of the file followed, at the camera that it knew.  Without the file, or if it is of
- * another model, configuration, camera or number of the stream, the service starts as without it and one line on stderr
- * gives the reason. */
+/* Continue with the person and the camera of the file.  If it belongs to another model, configuration, camera or number of
+ * the stream, the service starts as without it, and one line on stderr gives the reason. */
 void snapshot_file_resume(const snapshot_file *f, service *s);
 /* Replace the file if a snapshot is due, or at once: completely or not at all.  While no person is tracked there is no
  * file.  A failure is reported once. */

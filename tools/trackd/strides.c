@@ -36,7 +36,7 @@ static int64_t utime_of(const stride_meter *m, const stride_point *p)
     return m->origin_utime + llround(1e6 * p->seconds);
 }
 
-/* Errors of the two ends are taken as independent. */
+/* Errors of the two ends are assumed to be independent. */
 static stride stride_of(const stride_meter *m, int side, const stride_point *end)
 {
     const stride_point *const start = &m->strike[side], *const other = &m->strike[1 - side];
@@ -66,7 +66,7 @@ static stride stride_of(const stride_meter *m, int side, const stride_point *end
     };
 }
 
-/* The foot struck at `p`: ends its stride, unless the phase only trembles about the strike. */
+/* The foot strikes at `p`, which ends its stride, unless the phase only fluctuates about the strike. */
 static bool strike(stride_meter *m, int side, const stride_point *p, double rate, stride *out)
 {
     bool const had = m->struck[side];

@@ -7,15 +7,16 @@
 
 enum { STRIDE_RIGHT, STRIDE_LEFT };
 
-typedef struct stride {                      /* from strike to strike of a foot */
-    int64_t utime, start_utime, other_utime; /* its end, its start, the other foot's strike between or -1 */
-    float end_sd, start_sd, other_sd;        /* standard deviations of these, seconds; of none -1 */
-    int side;                                /* STRIDE_RIGHT or STRIDE_LEFT */
-    bool sure;                               /* no frame was lost or ambiguous */
-    float time, time_sd;                     /* seconds */
-    float cadence, cadence_sd;               /* steps per minute */
-    float length, length_sd;                 /* way of the pelvis over the ground, metres */
-    float speed, speed_sd;                   /* metres per second */
+typedef struct stride { /* from strike to strike of a foot */
+    int64_t utime, start_utime,
+        other_utime;                  /* its end; its start; the other foot's strike in between, or -1 */
+    float end_sd, start_sd, other_sd; /* standard deviations of these times, seconds; or -1 */
+    int side;                         /* STRIDE_RIGHT or STRIDE_LEFT */
+    bool sure;                        /* no frame was lost or ambiguous */
+    float time, time_sd;              /* seconds */
+    float cadence, cadence_sd;        /* steps per minute */
+    float length, length_sd;          /* distance of the pelvis over the ground, metres */
+    float speed, speed_sd;            /* metres per second */
 } stride;
 
 typedef struct stride_point { /* of an estimate, or a strike between two of them */
@@ -34,7 +35,7 @@ typedef struct stride_meter {
     bool unsure[2]; /* a frame since that strike was lost or ambiguous */
 } stride_meter;
 
-/* Take in the next estimate.  True when a stride has ended: then it is in `out`.  A pause of half a
- * second, time running back or a jump of the phase begins anew. */
+/* Add the next estimate.  True if a stride has ended, which is then in `out`.  After a pause of half a second, a time
+ * before the last one, or a jump of the phase, the meter starts again. */
 bool stride_meter_add(stride_meter *m, const gait_estimate *e, stride *out);
 #endif

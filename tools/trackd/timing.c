@@ -44,15 +44,15 @@ int32_t histogram_quantile(const histogram *h, double share)
 
 /* ---- budget ---- */
 enum {
-    SAME_CLOCK_US = 1000000, /* a frame does not take longer to arrive */
+    SAME_CLOCK_US = 1000000, /* no frame takes longer to arrive, unless its source has another clock */
     CHECK_EVERY = 30,        /* steps between two checks of the dropped frames */
     SETTLE = 8,              /* steps until step_us reflects a changed number of particles */
-    FAR = 2,                 /* steps in a row longer than the limit that are not chance */
-    TOO_MANY = 3,            /* frames dropped between two checks */
+    FAR = 2,                 /* steps in a row longer than the limit from which it is not chance */
+    TOO_MANY = 3,            /* frames dropped between two checks from which the number is halved */
     CALM = 90,               /* fast steps in a row before the number doubles */
-    RETRY = 4,               /* frames refused only because of the last step's time before one is tried */
+    RETRY = 4,               /* frames refused because of the time of a step, before one is tried */
     TRIAL = 900,             /* steps after a doubling in which a reduction means that it failed */
-    PATIENCE = 32,           /* times CALM, the longest wait before a failed number is tried again */
+    PATIENCE = 32,           /* longest wait before a failed number is tried again, multiples of CALM */
 };
 
 void budget_reset(budget *b)
@@ -148,7 +148,7 @@ int32_t budget_stepped(budget *b, int64_t birth, int64_t now, int64_t step_us, i
         b->steps = b->dropped = 0;
     if (wanted != particles)
         b->calm = 0;
-    if (wanted < particles) { /* so that frames are not refused because of earlier steps */
+    if (wanted < particles) { /* frames should not be refused because of earlier steps */
         b->step_us = b->step_us * wanted / particles;
         b->slow = 0;
     }

@@ -44,13 +44,13 @@ typedef struct budget {
     int64_t late, over;   /* frames dropped for their age; estimates later than the limit */
 } budget;
 
-/* Keep only the limits. */
+/* Forget everything but the limits. */
 void budget_reset(budget *b);
 
-/* When the age of a frame begins: its capture, or its arrival if the source has another clock (a replay). */
+/* The time from which the age of a frame counts: its capture, or its arrival if the source has another clock (a replay). */
 int64_t budget_birth(int64_t capture_utime, int64_t arrival_utime);
 
-/* Whether a frame of this birth can still be tracked in time.  At least a quarter of the limit is left for transport, and
+/* Whether a frame whose age counts from `birth` can still be tracked in time.  At least a quarter of the limit is left for transport, and
  * after a few refusals in a row a frame no older than the limit is tried, so that some frames are tracked even if a step
  * takes longer. */
 bool budget_allows(budget *b, int64_t birth, int64_t now);
@@ -58,9 +58,9 @@ bool budget_allows(budget *b, int64_t birth, int64_t now);
 /* A frame was dropped because a newer one has arrived. */
 void budget_missed(budget *b);
 
-/* A frame was tracked.  Returns the number of particles to continue with: half if steps are slow or frames are dropped, what
- * fits into half of the limit after two steps longer than the limit, double after a while with time to spare, a longer
- * while if that number was too large last time. */
+/* A frame was tracked.  Returns the number of particles to continue with: half of it if steps are slow or frames are
+ * dropped; what fits into half of the limit after two steps longer than the limit; twice as many after a while with time to
+ * spare, a longer one if that number was too large last time. */
 int32_t budget_stepped(budget *b, int64_t birth, int64_t now, int64_t step_us, int32_t particles);
 
 /* Whether steps with this number of particles exceed the limit although it cannot be reduced; true only once. */

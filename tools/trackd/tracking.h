@@ -46,13 +46,13 @@ typedef struct tracking {
     size_t memory_bytes;                 /* all of these */
 } tracking;
 
-/* Load the model.  `config` is complete but for camera[0]. */
+/* Load the model.  `config` is complete except for camera[0]. */
 bool tracking_open(tracking *t, const char *model_path, const gait_tracker_config *config, message *why);
 void tracking_close(tracking *t);
-/* Allocate the block and make the tracker, instead of that of another camera, if there is one. */
+/* Allocate the block and create the tracker, in place of that of another camera, if there is one. */
 bool tracking_set_camera(tracking *t, const gait_camera *camera, message *why);
 /* Copy the background, unless it is already in use.  It must have the camera's size. */
 bool tracking_set_background(tracking *t, const gait_image *plate, message *why);
-/* Start from a state; an invalid one is refused and changes nothing. */
+/* Start from a state; an invalid one is rejected and changes nothing. */
 bool tracking_start(tracking *t, const gait_state *mean, const gait_state *sd, int64_t utime, message *why);
 #endif
