@@ -1,4 +1,4 @@
-/* daemon.h - for targets that call parts of gait-trackd: files that never touch a disk, and nothing on stderr but reports
+/* daemon.h - for targets that call parts of gait-trackd: files that are only in memory, and nothing on stderr but reports
  * of the sanitizers. */
 #ifndef FUZZ_DAEMON_H
 #define FUZZ_DAEMON_H

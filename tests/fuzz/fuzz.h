@@ -36,7 +36,7 @@ static inline uint32_t fuzz_word(fuzz_bytes *b)
     return word;
 }
 
-/* A number about the picture, now and then one that no picture has, or any float. */
+/* A number about as large as the picture, sometimes a special one or any float. */
 static inline float fuzz_number(fuzz_bytes *b)
 {
     static const float SPECIAL[] = {NAN, INFINITY, -INFINITY, 3e38f, -1e30f, 1e-38f, 0.0f, -1.0f};
@@ -52,7 +52,7 @@ static inline float fuzz_number(fuzz_bytes *b)
 }
 
 /* ---- memory ---- */
-/* Of `bytes` bytes or more, aligned to GAIT_ALIGN; free() it.  NULL: more than FUZZ_MEMORY. */
+/* At least `bytes` bytes, aligned to GAIT_ALIGN; free() them.  NULL: more than FUZZ_MEMORY. */
 static inline void *fuzz_memory(size_t bytes)
 {
     void *const at =
@@ -73,7 +73,8 @@ static inline uint8_t *fuzz_copy(const uint8_t *data, size_t size)
     return at;
 }
 
-/* Damage: all that is left of the input, each eight bytes another word at a place, or the end there; the new size. */
+/* Damage the data by the rest of the input: every eight bytes of it replace a word somewhere, or truncate the data there.
+ * Returns the new size. */
 static inline size_t fuzz_damage(uint8_t *data, size_t size, fuzz_bytes *b)
 {
     while (b->left >= 8 && size > 0) {
@@ -91,7 +92,7 @@ static inline size_t fuzz_damage(uint8_t *data, size_t size, fuzz_bytes *b)
 }
 
 /* ---- settings ---- */
-/* Give at most three fields of a struct other numbers; the rows of gait_field_at() name them. */
+/* Change at most three fields of a struct, which are found by gait_field_at(). */
 static inline void fuzz_settings(const char *of, void *at, fuzz_bytes *b)
 {
     for (uint8_t left = fuzz_take(b) % 4; left > 0; left--) {
@@ -131,7 +132,7 @@ static inline gait_tracker_config fuzz_config(void)
     return c;
 }
 
-/* Of a config, or NULL; free() the memory. */
+/* A tracker with this config, or NULL if it is rejected; free() the memory. */
 static inline gait_tracker *fuzz_tracker(const gait_model *model, const gait_tracker_config *c, void **memory)
 {
     gait_tracker *t = NULL;
@@ -149,7 +150,7 @@ static inline void fuzz_finite(const float *x, size_t count)
             abort();
 }
 
-/* An estimate that was given as GAIT_OK. */
+/* Check an estimate that was returned with GAIT_OK. */
 static inline void fuzz_check(const gait_estimate *e)
 {
     fuzz_finite(e->pose.joint[0], sizeof e->pose.joint / sizeof(float));
@@ -161,7 +162,7 @@ static inline void fuzz_check(const gait_estimate *e)
         abort();
 }
 
-/* Let it see some frames of a bright bar. */
+/* Track some frames of a bright bar. */
 static inline void fuzz_steps(gait_tracker *t, int64_t utime, int frames)
 {
     static uint8_t pixels[2][FUZZ_WIDTH * FUZZ_HEIGHT];

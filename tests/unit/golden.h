@@ -1,7 +1,7 @@
 /* golden.h - digests for tests/check/golden.sh, which compares compilers and optimisation levels.
  *
- * Prints `digest HAVE WANTED NAME` for each instruction set of this CPU, `skipped SET` for each that it does not have;
- * every set gives one line, so that golden.sh knows how many there must be. */
+ * Prints `digest HAVE WANTED NAME` for each instruction set of this CPU, and `skipped SET` for each that it does not have:
+ * one line for every set, so that golden.sh knows how many to expect. */
 #ifndef GOLDEN_H
 #define GOLDEN_H
 #include "gait.h"
@@ -16,7 +16,7 @@ static inline uint64_t golden_line(uint64_t have, uint64_t wanted, const char *n
     return have;
 }
 
-/* Lines of what `digest` makes of each mask (GAIT_CPU_*); returns how many are not as wanted. */
+/* Print a line for the digest with each mask (GAIT_CPU_*); returns how many digests differ from the wanted one. */
 static inline int golden_print(uint64_t (*digest)(uint32_t mask), uint64_t wanted, const char *name)
 {
     static const struct {
@@ -35,7 +35,8 @@ static inline int golden_print(uint64_t (*digest)(uint32_t mask), uint64_t wante
     return wrong;
 }
 
-/* main() of a test with one digest: all its tests and every mask, or with the argument `digest` only the lines. */
+/* main() of a test with one digest: runs all its tests and compares every mask; with the argument `digest` it only prints
+ * the lines. */
 static inline int golden_main(int argc, char **argv, void (*tests)(void), uint64_t (*digest)(uint32_t mask),
                               uint64_t wanted, const char *name)
 {

@@ -16,7 +16,7 @@ static inline const kernels *isa_scalar(void)
     return kernels_choose(0);
 }
 
-/* How many there are besides the scalar one. */
+/* Number of instruction sets besides the scalar one. */
 static inline int isa_count(void)
 {
     int n = 0;
@@ -33,14 +33,14 @@ static inline const kernels *isa_at(int k)
     return kernels_choose(bits & -bits);
 }
 
-enum { GUARD = 64 }; /* bytes each side */
+enum { GUARD = 64 }; /* bytes on each side */
 
-typedef struct guarded { /* memory with canaries about it */
+typedef struct guarded { /* memory between canaries */
     unsigned char *begin;
-    size_t bytes; /* of what lies between */
+    size_t bytes; /* without the canaries */
 } guarded;
 
-/* memory holds bytes + 2 GUARD; everything is marked. */
+/* memory has bytes + 2 GUARD bytes, all of which are set to the canary. */
 static inline guarded guard_fill(unsigned char *memory, size_t bytes)
 {
     memset(memory, 0xa5, bytes + 2 * GUARD);

@@ -1,4 +1,4 @@
-/* sanitized.h - is this compiled under the address sanitizer, or watched by that of threads?  Both are slow. */
+/* sanitized.h - whether this is compiled with the address or the thread sanitizer, which are slow. */
 #ifndef SANITIZED_H
 #define SANITIZED_H
 
@@ -20,7 +20,7 @@
 #define THREADS_WATCHED 0
 #endif
 
-/* Take memory back from an object, whose red zones the sanitizer still guards. */
+/* Make the memory of an object usable again: the sanitizer still guards its red zones. */
 #if SANITIZED
 #include <sanitizer/asan_interface.h>
 #define TAKE_BACK(memory, bytes) ASAN_UNPOISON_MEMORY_REGION(memory, bytes)

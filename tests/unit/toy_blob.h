@@ -1,4 +1,4 @@
-/* toy_blob.h - write a model file's container section by section, for tests; knows no section's meaning.
+/* toy_blob.h - write a model file's container section by section, for tests; it knows nothing about their contents.
  *
  *   toy_file f = toy_begin(buf, 2);                   clears buf, TOY_BYTES long, for two sections
  *   toy_section(&f, "ABCD", 3, 2, 5, 7, 1, floats);   f32 [5][7]
@@ -17,7 +17,7 @@ enum { TOY_BYTES = 32768 };
 typedef struct toy_file {
     unsigned char *at;
     size_t used;
-    uint32_t sections, announced; /* written; to be written */
+    uint32_t sections, announced; /* sections written so far; in total */
 } toy_file;
 
 static inline void toy_put(unsigned char *p, uint64_t v, int bytes)
@@ -38,14 +38,14 @@ static inline uint32_t toy_crc(const unsigned char *p, size_t n)
     return ~crc;
 }
 
-/* Make the checksum of a blob right after its bytes were changed. */
+/* Correct the checksum of a blob after its bytes were changed. */
 static inline void toy_seal(unsigned char *b, size_t bytes)
 {
     toy_put(b + 20, 0, 4);
     toy_put(b + 20, toy_crc(b, bytes), 4);
 }
 
-/* Start a blob of so many sections in buf, TOY_BYTES of which are cleared. */
+/* Begin a blob of so many sections in buf, whose first TOY_BYTES are cleared. */
 static inline toy_file toy_begin(unsigned char *buf, uint32_t sections)
 {
     memset(buf, 0, TOY_BYTES);
@@ -84,7 +84,7 @@ static inline void toy_section4(toy_file *f, const char *tag, uint32_t type, uin
     f->used = (f->used + bytes + 63) & ~(size_t)63;
 }
 
-/* The same of up to three. */
+/* The same with up to three dimensions. */
 static inline void toy_section(toy_file *f, const char *tag, uint32_t type, uint32_t rank, uint32_t d0,
                                uint32_t d1, uint32_t d2, const void *data)
 {

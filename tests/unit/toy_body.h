@@ -35,7 +35,7 @@ static inline toy_body *toy_body_new(int camera, int32_t mode)
     static toy_body v;
     arena a = {.base = memory, .cap = sizeof memory};
     gait_tracker_default(&v.cfg, (gait_mode)mode);
-    v.cfg.occluded_density = 0.0018f; /* numbers of its own */
+    v.cfg.occluded_density = 0.0018f; /* not the defaults, which may change */
     v.cfg.surface_sd = 8.0f;
     v.cfg.surface_tilt = 1.0f;
     v.cfg.limb_points = 16;
@@ -45,7 +45,7 @@ static inline toy_body *toy_body_new(int camera, int32_t mode)
     v.cfg.girth = 1.0f;
     v.cfg.missed_weight = 0.4f;
     v.rule = state_layout_init(toy_model(), &v.cfg, kernels_choose(~0u));
-    v.rule.plain_root = false; /* the truth has its sway */
+    v.rule.plain_root = false; /* the truth sways */
     v.cam = toy_camera(camera);
     v.f = features_layout(&a);
     v.scratch = features_scratch_layout(&a);

@@ -1,7 +1,7 @@
 /* toy_classes.h - the toy person walks, stands and walks backwards: a blob with three classes of motion.
  *
  *   const gait_model *m = toy_classes_model();
- *   size_t bytes = toy_classes_write(buf, &spec);     another blob, as the spec has it */
+ *   size_t bytes = toy_classes_write(buf, &spec);     a blob by this specification */
 #ifndef TOY_CLASSES_H
 #define TOY_CLASSES_H
 #include "toy_model.h"
@@ -13,9 +13,9 @@ typedef struct toy_classes_spec {
     char name[TOY_CLASSES][32];
     int32_t info[TOY_CLASSES][4];
     float change[TOY_CLASSES][TOY_CLASSES][4];
-    int curves;  /* whether CUR1 is there, */
-    int of;      /* and the number in its tags */
-    int partial; /* without SCS1 */
+    int curves;  /* 1: there is a section CUR1 */
+    int of;      /* number in its tags */
+    int partial; /* 1: section SCS1 is missing */
 } toy_classes_spec;
 
 static inline toy_classes_spec toy_classes_usual(void)
@@ -86,7 +86,7 @@ static inline size_t toy_classes_write(unsigned char *buf, const toy_classes_spe
     return toy_finish(&f);
 }
 
-/* Of a spec, in static memory of the call's own. */
+/* The model of a specification, in the given memory. */
 static inline const gait_model *toy_classes_make(const toy_classes_spec *s, unsigned char *data, void *mem,
                                                  size_t mem_bytes)
 {

@@ -1,4 +1,4 @@
-/* toy_error.h - an estimate against the scene's truth, and what any estimate must satisfy. */
+/* toy_error.h - errors of an estimate in the toy scene, and conditions that any estimate must satisfy. */
 #ifndef TOY_ERROR_H
 #define TOY_ERROR_H
 #include "toy_film.h"
@@ -6,7 +6,7 @@
 #include "check.h"
 
 typedef struct error {
-    double across, depth, phase, joint; /* metres, cycles; largest over the frames looked at */
+    double across, depth, phase, joint; /* metres; strides for the phase; the largest of all frames added */
     int status[4];
 } error;
 
@@ -27,7 +27,7 @@ static inline void measure_error(const gait_estimate *e, int n, error *out)
     out->joint = fmax(out->joint, joint);
 }
 
-/* What every estimate must satisfy. */
+/* Check conditions that every estimate must satisfy. */
 static inline void check_sane(const gait_tracker *t, const gait_estimate *e, const gait_tracker_config *cfg,
                               int steps)
 {

@@ -16,7 +16,7 @@ static inline void film_make(int cameras, int frames)
     }
 }
 
-/* A tracker of cfg with the walls as backgrounds, started at frame n. */
+/* A tracker with this config and the walls as backgrounds, started at frame n. */
 static inline gait_tracker *film_tracker(const gait_tracker_config *cfg, int n, float factor)
 {
     gait_tracker *const t = toy_tracker_new(cfg);
@@ -29,7 +29,7 @@ static inline gait_tracker *film_tracker(const gait_tracker_config *cfg, int n, 
     return t;
 }
 
-/* A tracker of cfg, started at frame 0 with so wide a phase. */
+/* A tracker with this config, started at frame 0 with this standard deviation of the phase. */
 static inline gait_tracker *film_uncertain(const gait_tracker_config *cfg, float phase_sd)
 {
     gait_tracker *const t = film_tracker(cfg, 0, 1.0f);
@@ -37,7 +37,7 @@ static inline gait_tracker *film_uncertain(const gait_tracker_config *cfg, float
     return t;
 }
 
-/* Frame n of every camera in use, but of those in `missing` (bits). */
+/* Step with frame n of all cameras in use except those in `missing` (bits). */
 static inline void film_step(gait_tracker *t, int cameras, int n, uint32_t missing, gait_estimate *e)
 {
     const uint8_t *shots[SCENE_CAMERAS] = {NULL};

@@ -1,8 +1,8 @@
-/* toy_films.h - films that together take a tracker through all that it does.
+/* toy_films.h - films that together exercise everything a tracker does.
  *
  *   gait_tracker_config cfg = films_config(FILMS_GIVEN);
  *   films_start(t, &cfg, n, factor);                  with backgrounds; acquisition always starts at frame 0
- *   gait_frame f = films_frame(&cfg, n, missing);     but of the cameras in `missing` (bits); valid until the next
+ *   gait_frame f = films_frame(&cfg, n, missing);     without the cameras in `missing` (bits); valid until the next
  *
  * Call film_make() first. */
 #ifndef TOY_FILMS_H
@@ -12,8 +12,8 @@
 enum {
     FILMS_USUAL,
     FILMS_PAPER,  /* texture alone, a multinomial draw at every frame, random walks */
-    FILMS_GIVEN,  /* all that a frame may bring: colours, a lens, joints that a detector found */
-    FILMS_SEARCH, /* the phase is unknown: more particles, two sides, a decision */
+    FILMS_GIVEN,  /* all that a frame may contain: colours, lens distortion, keypoints */
+    FILMS_SEARCH, /* the phase is unknown: acquisition, two hypotheses, a decision */
     FILMS
 };
 
@@ -48,7 +48,7 @@ static inline gait_tracker_config films_config(int film_kind)
     return cfg;
 }
 
-/* The settings determine the film, so that tests can change the others. */
+/* Whether a config is that of FILMS_GIVEN: a few settings determine the film, and tests can change the others. */
 static inline bool films_is_given(const gait_tracker_config *cfg)
 {
     return cfg->terms & GAIT_TERM_KEYPOINTS;
@@ -69,14 +69,14 @@ static inline gait_image films_coloured(const uint8_t *grey, int k, uint8_t *pix
                         .format = k ? GAIT_RGB8 : GAIT_BGR8};
 }
 
-/* The empty scene; it stays, since trackers look at it again. */
+/* The empty scene, in memory that stays valid, since trackers borrow it. */
 static inline gait_image films_wall(const gait_tracker_config *cfg, int k)
 {
     static uint8_t wall[SCENE_CAMERAS][3 * SCENE_PIXELS];
     return films_is_given(cfg) ? films_coloured(film_wall[k], k, wall[k]) : toy_image(film_wall[k]);
 }
 
-/* Joints of frame n, off by up to 2 pixels, some of them not seen. */
+/* Joints of frame n, with errors of up to 2 pixels, some of them unobserved. */
 static inline void films_detect(const gait_camera *cam, int n, gait_keypoint *out)
 {
     gait_state const truth = toy_walk((float)n / 30.0f);

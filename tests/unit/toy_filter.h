@@ -1,5 +1,5 @@
-/* toy_filter.h - a particle filter's weights in static memory, how well ranks fit a uniform law, and
- * FIGURE() for what a check measured: shown by FIGURES=1 build/release/unit/test_pf_... */
+/* toy_filter.h - a particle filter's weights in static memory, a test of ranks against the uniform distribution, and
+ * FIGURE() for what a check measured, which FIGURES=1 build/release/unit/test_pf_... prints. */
 #ifndef TOY_FILTER_H
 #define TOY_FILTER_H
 #include "filter/pf.h"
@@ -14,7 +14,7 @@
 
 enum { TOY_MOST = 10240 }; /* particles */
 
-/* Uniform weights, every particle its own ancestor; capacity for more; the next call takes the same memory. */
+/* Uniform weights, every particle its own ancestor, with capacity for more; every call uses the same memory. */
 static inline pf toy_filter(int32_t n)
 {
     static _Alignas(GAIT_ALIGN) unsigned char memory[TOY_MOST * 28 + 4 * GAIT_ALIGN];
@@ -27,7 +27,7 @@ static inline pf toy_filter(int32_t n)
     return p;
 }
 
-/* 32 random bits, for the common offset of a systematic resampling for one. */
+/* 32 random bits, such as the common offset of a systematic resampling. */
 static inline uint32_t toy_bits(uint64_t seed, uint32_t index)
 {
     uint32_t r[4];
@@ -43,9 +43,9 @@ static inline float toy_uniform(uint64_t seed, uint32_t index, uint32_t draw)
 }
 
 /* ---- ranks ---- */
-enum { RANKS = 20 }; /* of a truth among RANKS - 1 draws */
+enum { RANKS = 20 }; /* possible ranks of a truth among RANKS - 1 draws */
 
-/* Exceeded by chi square of 19 degrees of freedom with probability 0.01. */
+/* Chi-square with 19 degrees of freedom exceeds this with probability 0.01. */
 static const double RANKS_LIMIT = 36.19;
 
 /* Rank of a truth among the values of RANKS - 1 independent draws. */
@@ -57,7 +57,7 @@ static inline int ranks_of(const int32_t draw[RANKS - 1], const double *value, d
     return rank;
 }
 
-/* How far counts of ranks are from even. */
+/* Chi-square of counts of ranks against a uniform distribution. */
 static inline double ranks_chi2(const int32_t count[RANKS])
 {
     double total = 0.0, sum = 0.0;

@@ -11,7 +11,7 @@ static _Alignas(GAIT_ALIGN) unsigned char toy_lift_blob[TOY_BYTES], toy_lift_mem
 static toy_segments toy_lift_prior;
 static gait_model *toy_lift_model;
 
-/* The model of what toy_lift_prior holds. */
+/* Load toy_lift_prior as a model. */
 static inline void toy_lift_load(void)
 {
     static _Alignas(GAIT_ALIGN) unsigned char memory[1024];
@@ -31,7 +31,7 @@ static inline gait_lift_config toy_lift_config(int projection)
     gait_lift_config c;
     gait_lift_default(&c);
     c.projection = (gait_projection)projection;
-    c.stature_sd = 0.0; /* tests of it set it */
+    c.stature_sd = 0.0; /* set by the tests that need it */
     c.camera = (gait_camera){.width = 640,
                              .height = 480,
                              .fx = 500,
@@ -55,14 +55,14 @@ static inline gait_lift *toy_lift_open(const gait_lift_config *c)
     return l;
 }
 
-/* `count` points as that camera, or along x and z, sees them, with noise of `sd`. */
+/* Project `count` points into that camera, or onto x and z, with noise of `sd`. */
 static inline void toy_lift_see(const gait_lift_config *c, const double (*X)[3], int count, double sd,
                                 uint32_t seed, double *uv)
 {
     for (int i = 0; i < count; i++) {
         double const depth = X[i][1] + (double)c->camera.t[2];
         bool const pinhole = c->projection == GAIT_LIFT_PERSPECTIVE;
-        for (int a = 0; a < 2; a++) { /* the sum of 12 uniform numbers is normal enough */
+        for (int a = 0; a < 2; a++) { /* the sum of 12 uniform numbers is nearly normal */
             double noise = 0.0;
             for (int k = 0; k < 12; k++)
                 noise += 0.5 * toy_random(&seed);

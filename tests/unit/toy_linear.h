@@ -2,7 +2,7 @@
  * on it: x' = A x + N(0, Q), y = H x + N(0, R), x_0 ~ N(0, 0.3).
  *
  *   linear const s = linear_new(5);
- *   linear_world w = linear_start(&s, seed);        a truth, what is seen of it, and the exact posterior
+ *   linear_world w = linear_start(&s, seed);        a truth, its observations, and the exact posterior
  *   linear_filter f = linear_filter_new(&s, n, seed);
  *   double exact = linear_next(&w);                 the next step; log p(y | past)
  *   pf_summary sum = linear_filter_step(&f, &w);
@@ -120,7 +120,7 @@ static inline double linear_next(linear_world *w)
 
 /* ---- particles ---- */
 
-/* A new place for a particle from its ancestor's and standard normals; returns the log of its weight:
+/* Move a particle from its ancestor's state by standard normals; returns the log of its weight,
  * p(y | to) p(to | from) / q(to | from, y). */
 typedef double linear_move(const linear *s, const void *rule, const double *y, const float *from,
                            const float *z, float *to);
@@ -149,7 +149,7 @@ typedef struct linear_filter {
     linear_move *move;
     const void *rule;
     uint64_t seed;
-    double resample_ess, ess; /* resampled below this share of n */
+    double resample_ess, ess; /* share of n below which it resamples; of the last step */
     pf p;
     linear_particle *x, *next;
 } linear_filter;
@@ -189,7 +189,7 @@ static inline pf_summary linear_filter_step(linear_filter *f, const linear_world
     return sum;
 }
 
-/* ---- one against the other ---- */
+/* ---- particles against the exact posterior ---- */
 typedef struct linear_error {
     double square;     /* of the mean, in posterior standard deviations */
     double log_square; /* its logarithm */

@@ -4,12 +4,12 @@
  *   const void *blob = toy_model_blob(&bytes);  static, aligned, written once: T = 32, q = 2, about 20 kB
  *   const gait_model *m = toy_model();          the same, initialised in static memory
  *   gait_state s = toy_state(0.25f);            phase 0.25, 1.75 m, mean shape, at the origin, along +x
- *   toy_write(buf, 8, 0);                       another blob: 8 phases, no components; returns its size
+ *   toy_write(buf, 8, 0);                       a blob with 8 phases and no components; returns its size
  *
  * The skeleton is the default one of doc/model-format.md: 13 frames, 19 points, 13 limbs, 24 angles; names
  * and order too.  The mean cycle is exactly symmetric: half a stride later left and right have swapped.
  * Component 1 is stride size (+-12 % of every swing), component 2 posture (torso, elbows).  Curves are
- * multiples of 2^-16, so that they have the same bits whatever libm computed them. */
+ * multiples of 2^-16, so that their bits do not depend on the libm that computed them. */
 #ifndef TOY_MODEL_H
 #define TOY_MODEL_H
 #include "toy_blob.h"
@@ -143,7 +143,7 @@ static inline float toy_round(double x)
     return (float)(floor(x * 65536.0 + 0.5) / 65536.0);
 }
 
-/* Hip over the sole of one leg in its sagittal plane, statures. */
+/* Height of the hip over the sole of one leg, in its sagittal plane, statures. */
 static inline double toy_leg_height(const float *v, int side)
 {
     double const hip = v[TOY_HIP + side * TOY_PAIR], shank = hip - v[TOY_KNEE + side];
@@ -353,7 +353,7 @@ static inline const void *toy_model_blob(size_t *bytes)
     return buf;
 }
 
-/* A model of the standard blob in static memory; stops the test if the library refuses it. */
+/* The model of the standard blob, in static memory; stops the test if the library rejects it. */
 static inline const gait_model *toy_model(void)
 {
     static _Alignas(GAIT_ALIGN) unsigned char mem[1024];
@@ -378,7 +378,7 @@ static inline int32_t toy_find_point(const gait_model *m, const char *name)
     return -1;
 }
 
-/* Standing at the origin at the model's own pelvis height, 1.75 m, mean shape, heading +x. */
+/* A state at the origin, with the model's pelvis height: 1.75 m tall, mean shape, heading +x. */
 static inline gait_state toy_state(float phase)
 {
     gait_state s = {.phase = phase, .stride_hz = 0.92f, .stature = 1.75f};

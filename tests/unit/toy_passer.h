@@ -1,4 +1,5 @@
-/* toy_passer.h - 2-D points of a person who passes the camera again and again, with gaps, and all that is asked. */
+/* toy_passer.h - 2-D points of a person who passes the camera again and again, with gaps, and calls of every function of
+ * a lifter. */
 #ifndef TOY_PASSER_H
 #define TOY_PASSER_H
 #include "toy_lift.h"
@@ -7,9 +8,9 @@ enum {
     PASSER_RATE = 30,
     PASSER_WAY = 120,
     PASSER_GONE = 20
-}; /* frames a second, of a way, of its end unseen */
+}; /* frames per second; per pass; at the end of a pass without the person */
 
-/* Push frame `i`: a stiff body along x; each way starts where the first one did, a jump that does not fit. */
+/* Push frame `i`: a rigid body moves along x; each pass starts where the first one did, a jump that does not fit. */
 static inline gait_result passer_push(gait_lift *l, const gait_lift_config *c, int i)
 {
     double X[TOY_MARKERS][3], uv[TOY_MARKERS * 2], sd[TOY_MARKERS];
@@ -25,7 +26,7 @@ static inline gait_result passer_push(gait_lift *l, const gait_lift_config *c, i
     return gait_lift_push(l, (int64_t)i * 1000000 / PASSER_RATE, uv, sd, NULL);
 }
 
-/* Everything that is asked of one segment, drawn from the prior. */
+/* Call all functions of a segment, which is drawn from the prior. */
 static inline bool passer_segment(gait_lift *l, const gait_lift_config *c)
 {
     static double X[TOY_SEGMENT][3], uv[2 * TOY_SEGMENT], mean[3 * TOY_SEGMENT], sd[3 * TOY_SEGMENT];
@@ -42,8 +43,8 @@ static inline bool passer_segment(gait_lift *l, const gait_lift_config *c)
     return ok && gait_lift_least_squares(l, mean, NULL) == GAIT_OK;
 }
 
-/* A stream of `frames`, each asked for at once; false if a call failed or no person was tracked, in frames that fit and in
- * frames that do not, as after a jump. */
+/* A stream of `frames` with an estimate after each.  False if a call failed, or if the stream did not have estimates both
+ * in frames that fit and in frames that do not, as after a jump. */
 static inline bool passer_stream(gait_lift *l, const gait_lift_config *c, int frames)
 {
     int followed = 0, fits = 0;

@@ -1,4 +1,4 @@
-/* toy_prior.h - a dynamics without noise for tests to add theirs to, and sample moments against true ones. */
+/* toy_prior.h - dynamics without noise, to which tests add theirs, and a comparison of sample moments with true ones. */
 #ifndef TOY_PRIOR_H
 #define TOY_PRIOR_H
 #include "filter/dynamics.h"
@@ -33,7 +33,7 @@ static inline dynamics quiet(int32_t mode, uint64_t seed)
                       .stature_sd_ratio = 0.05f};
 }
 
-/* Particles first .. first + BLOCK - 1 over one interval of dt seconds at an age. */
+/* Move particles first .. first + BLOCK - 1 by one interval of dt seconds. */
 static inline void move_block(const dynamics *d, particle_state w[BLOCK], float dt, float age, uint32_t frame,
                               int32_t first)
 {
@@ -48,7 +48,7 @@ static inline void move_block(const dynamics *d, particle_state w[BLOCK], float 
             w[lane].f[f] = to.f[f][lane];
 }
 
-/* Particle i alone. */
+/* Move particle i alone. */
 static inline particle_state move_one(const dynamics *d, const particle_state *from, float dt, float age,
                                       uint32_t frame, int32_t i)
 {
@@ -72,7 +72,7 @@ static inline moments moments_of(const double *v, int n)
     return m;
 }
 
-/* Sample moments against the true ones, 4.5 standard errors; floats add a little. */
+/* Check that sample moments are within 4.5 standard errors of the true ones, and a little more for rounding. */
 static inline void check_moments(moments have, double mean, double sd, int n)
 {
     CHECK_NEAR(have.mean, mean, 4.5 * sd / sqrt(n) + 1e-5);

@@ -6,7 +6,7 @@
  *   toy_shot(0, n, grey);                     frame n at 30 per second, with sensor noise
  *   gait_frame f = toy_frame(n);              its time; images are the caller's
  *
- * Pictures are made of integers and of + - * / on floats: the same bits wherever the library has the same. */
+ * Pictures are computed with integers and + - * / of floats, so that they have the same bits everywhere. */
 #ifndef TOY_SCENE_H
 #define TOY_SCENE_H
 #include "image/camera.h"
@@ -70,7 +70,7 @@ static inline gait_state toy_walk(float seconds)
     return s;
 }
 
-/* Grey of a limb at a pixel: its own level, and bands along its axis that move with it. */
+/* Grey level of a limb at a pixel: a level for each limb, and bands across its axis that move with it. */
 static inline uint8_t toy_skin(int32_t limb, const float from[2], const float to[2], float x, float y)
 {
     float const dx = to[0] - from[0], dy = to[1] - from[1], len2 = dx * dx + dy * dy + 4.0f;
@@ -81,7 +81,7 @@ static inline uint8_t toy_skin(int32_t limb, const float from[2], const float to
     return (uint8_t)(level + toy_hash(band, (uint32_t)limb, across > 0.0f) % 40);
 }
 
-/* Draw a person of a model over an image; stops the test if the library refuses it. */
+/* Draw a person of a model over an image; stops the test if the library rejects it. */
 static inline void toy_paint_of(const gait_model *m, const gait_camera *cam, const gait_state *s,
                                 uint8_t *grey)
 {

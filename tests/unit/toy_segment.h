@@ -21,14 +21,14 @@ static inline double toy_random(uint32_t *state)
     return (double)(*state >> 8) / 8388608.0 - 1.0;
 }
 
-typedef struct toy_segments { /* what the blob holds */
+typedef struct toy_segments { /* contents of the blob */
     char name[TOY_MARKERS][32];
     int32_t count[8];
     float rate[8], weight[2], mean[2][TOY_SEGMENT][3], mode[2][TOY_MODES][TOY_SEGMENT][3];
     float sd[2][TOY_MODES], residual[2][TOY_MARKERS];
 } toy_segments;
 
-/* Mean of a marker at a moment: a narrow body as tall as 1 that walks along x while its limbs swing. */
+/* Mean of a marker at a moment: a narrow body of height 1 that walks along x while its limbs swing. */
 static inline void toy_marker_mean(int component, int frame, int j, float out[3])
 {
     float const side = j % 2 ? 0.11f : -0.11f, height = 0.1f * (float)(j + 1);
@@ -38,7 +38,7 @@ static inline void toy_marker_mean(int component, int frame, int j, float out[3]
     out[2] = height;
 }
 
-/* Modes smooth in time, of falling size, not orthogonal. */
+/* Fill in modes that are smooth in time, of decreasing size, and not orthogonal. */
 static inline void toy_segments_fill(toy_segments *s, int components, int headings)
 {
     static const char *const names[4] = {"pelvis", "l_hip", "r_hip", "l_shoulder"};
@@ -74,7 +74,7 @@ static inline void toy_segments_fill(toy_segments *s, int components, int headin
     }
 }
 
-/* Write them into buf (TOY_BYTES); returns the size of the blob. */
+/* Write the prior into buf (TOY_BYTES); returns the size of the blob. */
 static inline size_t toy_segments_write(unsigned char *buf, const toy_segments *s)
 {
     uint32_t const K = (uint32_t)s->count[3];

@@ -4,8 +4,8 @@
 #include "model/model.h"
 #include "toy_model.h"
 
-/* The toy model whose proportions also move the shoulders, section SHFT, and whose strides are the longer the
- * faster they follow each other, section PACE. */
+/* The toy model with proportions that also move the shoulders (section SHFT) and with strides that are longer at higher
+ * rates (section PACE). */
 static inline const gait_model *toy_shifted(void)
 {
     static float shift[TOY_PROPORTIONS][TOY_FRAMES][3];

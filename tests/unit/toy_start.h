@@ -10,7 +10,7 @@
 #include <stddef.h>
 #include <stdlib.h>
 
-/* Looks along +y. */
+/* A level camera that looks along +y. */
 static gait_camera level_camera(int32_t width, int32_t height, float f)
 {
     return (gait_camera){.width = width,
@@ -37,7 +37,7 @@ static gait_start *toy_start_new(gait_camera camera, uint32_t cpu_mask)
     return s; /* at the beginning of mem */
 }
 
-/* Hash of all hypotheses but their classes of motion, which are 0. */
+/* Hash of all hypotheses without their classes of motion, which are 0. */
 static uint64_t toy_hash_hypotheses(const gait_hypothesis h[GAIT_START_MAX_HYPOTHESES])
 {
     size_t const state = offsetof(gait_state, motion_class);

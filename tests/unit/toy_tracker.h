@@ -1,4 +1,4 @@
-/* toy_tracker.h - trackers of the toy person for tests, with numbers of their own instead of the library's defaults.
+/* toy_tracker.h - trackers of the toy person for tests, with settings that do not follow the library's defaults.
  *
  *   gait_tracker_config cfg = toy_config(1);         300 particles, all terms; change what the test needs
  *   gait_tracker *t = toy_tracker_new(&cfg);         in exactly the memory it asks for; stops the test on failure
@@ -89,7 +89,7 @@ static inline gait_tracker *toy_tracker_new(const gait_tracker_config *cfg)
 
 static inline void toy_tracker_free(gait_tracker *t)
 {
-    free(t); /* a tracker lies at the start of its memory */
+    free(t); /* a tracker is at the start of its memory */
 }
 
 /* Standard deviations of a start by hand, times `factor`. */
