@@ -38,7 +38,6 @@ WORDS = {
     "its tilt;": "tilt",
     "its roll;": "roll",
     "frames are turned": "frames",
-    "of its world up": "axes",
     "no walk on its floor": "no walk",
 }
 
@@ -58,8 +57,7 @@ def main() -> int:
         f"{facts('tests/bench/camera_check.py')}\n\nWhat is reported of a camera file that is right (the six "
         "rendered clips) or guessed (the films), and of one that is changed; the stature is given. refused: "
         "an error before the clip is read; stature: the person appears more than 12 % taller or shorter; "
-        "focal: the walk contradicts the focal length; frames, axes: turned frames, a world in which z is "
-        "not up. Empty: nothing."
+        "focal: the walk contradicts the focal length; frames: turned frames. Empty: nothing."
     )
     table.publish("camera_check", "Wrong cameras", head, rows, note)
     return 0

@@ -49,6 +49,7 @@ int LLVMFuzzerTestOneInput(const uint8_t *data, size_t size)
     cfg.camera = fuzz_camera();
     if (fuzz_take(&b) > 200)
         cfg.camera.t[0] = cfg.camera.distortion[0] = fuzz_number(&b);
+    gait_camera_check(&cfg.camera, NULL);
     if (gait_start_bytes(toy_model(), &cfg, &need, NULL) != GAIT_OK)
         return 0;
     memory = fuzz_memory(need);

@@ -86,6 +86,7 @@ def test_files_that_are_not_there(tmp_path):
         ({"R": [[1, 0, 0], [0, 1, 0]]}, ["R has 6 numbers, not 9"]),
         ({"R": [[1, 0, 0], [0, 1, 0], [0, 0, -1]]}, ["R is not a rotation"]),
         ({"R": [[1.001, 0, 0], [0, 1, 0], [0, 0, 1]]}, ["R is not a rotation"]),
+        ({"t": [100, 1600, 5000]}, ["lens 1600 m above the floor", "give R and t in metres"]),
         ({"t": [1, 2]}, ["t has 2 numbers", "metres"]),
         ({"t": [1, None, 2]}, ["t is not numeric"]),
         ({"distortion": [1, 2, 3]}, ["distortion", "0, 4 or 5"]),

@@ -1,10 +1,11 @@
 """gait-trackd states once why frames arrive and no person is tracked, and where it listens."""
 
 import lcm_rig as rig
+import numpy as np
 
 from gait.bindings.state import State
 from gait.lcm.link import gaitmsg, private_url
-from gait.lcm.messages import command_message
+from gait.lcm.messages import camera_message, command_message
 
 CAMERA, SCENE, START = rig.opening()
 NO_CAMERA = "frames arrive, but no camera"
@@ -62,6 +63,18 @@ def test_another_daemon_on_the_same_url_is_reported():
         second = finish_second()
         assert "another gait-trackd uses this URL" in second.words
         assert "another gait-trackd uses this URL" in finish().words
+
+
+def test_a_camera_that_cannot_be_is_refused_in_log_and_status():
+    rig.need_multicast()
+    nowhere = camera_message(rig.CAMERA, 1)
+    nowhere.R, nowhere.t = np.eye(3).ravel().tolist(), [0.0] * 3
+    fault = "GAIT_CAMERA_0: no standing person would be upright: lens 0 m above the floor, -y up; give R"
+    with rig.daemon(private_url()) as (listener, finish):
+        stream = [("GAIT_CAMERA_0", nowhere), *rig.frames(0, 1)]
+        listener.ask(stream, lambda s: s.state == s.WAITING and s.text.startswith(fault), "the refusal")
+        words = finish().words
+    assert words.count(f"gait-trackd: {fault}") == 1 and f"frames arrive, but no camera: {fault}" in words
 
 
 def test_live_it_reports_where_it_listens_and_what_it_lacks():

@@ -76,10 +76,34 @@ static void test_distort(void)
     CHECK_NEAR(v, 65.76774507, 1e-4);
 }
 
+/* In millimetres; at the origin with z ahead; y up, and -z up. */
+static void test_place(void)
+{
+    static const float TURNED[3][9] = {
+        {1, 0, 0, 0, 1, 0, 0, 0, 1}, {1, 0, 0, 0, -1, 0, 0, 0, -1}, {-1, 0, 0, 0, 0, 1, 0, 1, 0}};
+    static const char *const UP[3] = {"-y up", "+y up", "-z up"};
+    gait_camera c = toward_origin();
+    gait_error err;
+    CHECK(gait_camera_check(&c, NULL) == GAIT_OK);
+    c.t[1] = 1500.0f;
+    CHECK(gait_camera_check(&c, &err) == GAIT_ERR_ARG && strstr(err.text, "1500 m above the floor, +z up"));
+    for (int i = 0; i < 3; i++) {
+        c = toward_origin();
+        memcpy(c.R, TURNED[i], sizeof c.R);
+        if (i == 0)
+            memset(c.t, 0, sizeof c.t);
+        CHECK(gait_camera_check(&c, &err) == GAIT_ERR_ARG && strstr(err.text, UP[i]));
+        CHECK(strstr(err.text, "give R and t in metres, z up, floor z = 0"));
+    }
+    c.R[0] = NAN;
+    CHECK(gait_camera_check(&c, NULL) == GAIT_ERR_ARG && gait_camera_check(NULL, NULL) == GAIT_ERR_ARG);
+}
+
 int main(void)
 {
     test_project();
     test_valid();
+    test_place();
     test_distort();
     return CHECK_DONE();
 }

@@ -26,6 +26,12 @@ static bool check_rotation(const gait_camera *camera, const char *name, message 
                        name);
 }
 
+bool camera_can_be(const gait_camera *camera, const char *name, message *why)
+{
+    gait_error err;
+    return gait_camera_check(camera, &err) == GAIT_OK || message_set(why, "%.100s: %s", name, err.text);
+}
+
 /* ---- files ---- */
 static bool read_pixels(const fields *f, const char *key, int32_t *out, message *why)
 {
@@ -103,7 +109,8 @@ bool camera_file_read(const char *path, gait_camera *out, message *why)
                            "%.100s: gait-trackd reads JSON only; give this file to `gait capture --camera`, "
                            "which sends it over LCM, and no --camera here",
                            path);
-    bool const ok = fields_open(&f, path, "camera", why) && parse_camera(&f, &camera, why);
+    bool const ok = fields_open(&f, path, "camera", why) && parse_camera(&f, &camera, why) &&
+                    camera_can_be(&camera, path, why);
     fields_close(&f);
     if (ok)
         *out = camera;

@@ -3,6 +3,7 @@
 #include "cameras.h"
 #include "gaitmsg_image_t.h"
 
+#include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
 
@@ -61,7 +62,11 @@ size_t further_bytes(const further_camera *c)
 bool further_take_camera(further_camera *c, const gaitmsg_camera_t *in, int32_t max_pixels, message *why)
 {
     gait_camera camera;
+    char channel[24];
     if (!camera_from_message(in, max_pixels, &camera, why))
+        return false;
+    snprintf(channel, sizeof channel, "GAIT_CAMERA_%d", c->stream);
+    if (!camera_can_be(&camera, channel, why))
         return false;
     if (c->known)
         return camera_same(&camera, &c->camera) ||

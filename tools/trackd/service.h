@@ -83,6 +83,7 @@ typedef struct service {
     size_t pool_bytes;        /* of the threads */
     double max_gap;           /* longest pause that is bridged by prediction, seconds */
     int idle;                 /* SERVICE_IDLE_* that was reported last */
+    message refused;          /* why the camera that was announced last cannot be used */
     message text, complaint;  /* text of the status; last complaint on stderr */
     int64_t lines_since;      /* monotonic microseconds; lines of log are counted from here for a second */
     int32_t lines, lines_left_out;

@@ -315,6 +315,8 @@ static void set_lack(const service *s, int idle, message *why)
     const further_camera *const unknown = s->first_given && s->further ? further_unknown(s->further) : NULL;
     if (idle == SERVICE_IDLE_CAMERA && unknown)
         message_set(why, "no camera: announce it on GAIT_CAMERA_%d", unknown->stream);
+    else if (idle == SERVICE_IDLE_CAMERA && s->refused.text[0])
+        message_set(why, "no camera: %.200s", s->refused.text);
     else if (idle == SERVICE_IDLE_CAMERA)
         message_set(why, "no camera: give --camera or announce it on GAIT_CAMERA_%d", i);
     else if (idle == SERVICE_IDLE_START)

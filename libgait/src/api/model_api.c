@@ -2,6 +2,7 @@
 #include "api/check.h"
 #include "api/kernels.h"
 #include "base/cpu.h"
+#include "image/camera.h"
 #include "model/kinematics.h"
 #include "raster/render.h"
 
@@ -34,6 +35,14 @@ const char *gait_result_name(gait_result s)
         "GAIT_ERR_MAGIC", "GAIT_ERR_VERSION", "GAIT_ERR_CORRUPT", "GAIT_ERR_STATE",  "GAIT_ERR_NUMERIC"};
     uint32_t const i = 0u - (uint32_t)s;
     return i < sizeof names / sizeof *names ? names[i] : "unknown gait_result";
+}
+
+gait_result gait_camera_check(const gait_camera *camera, gait_error *err)
+{
+    if (!camera)
+        return base_null(err, "gait_camera_check");
+    gait_result const s = check_camera(camera, -1, err);
+    return s == GAIT_OK ? camera_check_place(camera, err) : s;
 }
 
 gait_result gait_model_bytes(const void *data, size_t data_bytes, size_t *bytes, gait_error *err)

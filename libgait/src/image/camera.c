@@ -59,3 +59,48 @@ void camera_ideal(const gait_camera *c, const double distorted[2], double ideal[
     ideal[0] = fx * x + cx;
     ideal[1] = fy * y + cy;
 }
+
+/* Whether somewhere in the picture a person on the floor is upright and tall enough to be tracked; lens: its place. */
+static bool shows_person(const gait_camera *c, const float lens[3])
+{
+    enum { ALONG = 9 };
+    const double LEAST_TALL = 20.0; /* pixels */
+    bool any = false;
+    for (int32_t i = 0; i < ALONG * ALONG; i++) {
+        double const foot[2] = {(double)(i % ALONG * (c->width - 1)) / (ALONG - 1),
+                                (double)(i / ALONG * (c->height - 1)) / (ALONG - 1)};
+        double ray[3];
+        float head[3] = {0.0f, 0.0f, 1.7f}, uv[2];
+        camera_ray(c, foot, ray);
+        for (int32_t k = 0; k < 2; k++)
+            head[k] = lens[k] - (float)((double)lens[2] * ray[k] / ray[2]);
+        if (ray[2] < 0.0 && camera_project(c, head, uv) > CAMERA_NEAR) {
+            double const tall = foot[1] - (double)uv[1];
+            any |= tall > LEAST_TALL && fabs(foot[0] - (double)uv[0]) < tall;
+        }
+    }
+    return any;
+}
+
+gait_result camera_check_place(const gait_camera *c, gait_error *err)
+{
+    const float LEAST = 0.05f, MOST = 200.0f; /* metres of a lens over the floor */
+    /* Downward part of the picture's downward direction; a camera with y up that looks along z would seem to look
+     * straight down. */
+    const float LEAST_DOWN = 0.17f;
+    const float *const down = c->R + 3;
+    float lens[3] = {0.0f, 0.0f, 0.0f};
+    int32_t axis = 0;
+    camera_to(c, lens, lens); /* from the lens to the origin */
+    for (int32_t k = 0; k < 3; k++) {
+        lens[k] = -lens[k];
+        axis = fabsf(down[k]) > fabsf(down[axis]) ? k : axis;
+    }
+    if (lens[2] >= LEAST && lens[2] <= MOST && down[2] < -LEAST_DOWN && shows_person(c, lens))
+        return GAIT_OK;
+    return base_fail(
+        err, GAIT_ERR_ARG, -1,
+        "no standing person would be upright: lens %.4g m above the floor, %c%c up; give R and t "
+        "in metres, z up, floor z = 0",
+        (double)lens[2] + 0.0, down[axis] > 0.0f ? '-' : '+', 'x' + axis);
+}

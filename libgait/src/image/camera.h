@@ -9,6 +9,9 @@
 /* True if size and focal lengths are positive, all numbers finite, and R orthonormal to 1e-3 with det R > 0. */
 bool camera_valid(const gait_camera *c);
 
+/* GAIT_ERR_ARG unless the place of a valid camera can be: see gait_camera_check(). */
+gait_result camera_check_place(const gait_camera *c, gait_error *err);
+
 /* True if some distortion coefficient is not 0. */
 bool camera_distorted(const gait_camera *c);
 
@@ -28,6 +31,15 @@ static inline void camera_distort(const gait_camera *c, float u, float v, float 
 /* The inverse: a pixel of the captured image to the ideal pixel, by fixed-point iteration, which converges
  * for lenses within their image. */
 void camera_ideal(const gait_camera *c, const double distorted[2], double ideal[2]);
+
+/* Direction of an ideal pixel's ray in the world, of length 1 along the optical axis. */
+static inline void camera_ray(const gait_camera *c, const double ideal[2], double ray[3])
+{
+    double const x = (ideal[0] - (double)c->cx) / (double)c->fx,
+                 y = (ideal[1] - (double)c->cy) / (double)c->fy;
+    for (int32_t k = 0; k < 3; k++)
+        ray[k] = (double)c->R[k] * x + (double)c->R[3 + k] * y + (double)c->R[6 + k];
+}
 
 /* The same camera with another pose. */
 static inline gait_camera camera_placed(const gait_camera *c, const float R[9], const float t[3])

@@ -27,23 +27,14 @@ bool people_box(const gait_camera *c, const gait_box *in, start_box *out)
     return true;
 }
 
-/* Direction of a pixel's ray in the world. */
-static void ray_of(const gait_camera *c, const double pixel[2], double ray[3])
-{
-    double const x = (pixel[0] - (double)c->cx) / (double)c->fx,
-                 y = (pixel[1] - (double)c->cy) / (double)c->fy;
-    for (int32_t k = 0; k < 3; k++)
-        ray[k] = (double)c->R[k] * x + (double)c->R[3 + k] * y + (double)c->R[6 + k];
-}
-
 double people_stature(const gait_camera *c, const start_box *b)
 {
     float lens[3];
     double foot[3], head[3];
     camera_to(c, (const float[3]){0.0f, 0.0f, 0.0f}, lens); /* the vector from the lens to the origin */
     double const above = -(double)lens[2];
-    ray_of(c, b->foot, foot);
-    ray_of(c, b->head, head);
+    camera_ray(c, b->foot, foot);
+    camera_ray(c, b->head, head);
     double const flat = sqrt(foot[0] * foot[0] + foot[1] * foot[1]),
                  head_flat = sqrt(head[0] * head[0] + head[1] * head[1]);
     if (!(above > 0.0 && foot[2] < 0.0 && head_flat > 0.0))

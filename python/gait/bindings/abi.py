@@ -297,6 +297,7 @@ FUNCTIONS: tuple[tuple[str, list[Any], Any], ...] = (
     ("gait_model_pose", [_HANDLE, _STATE, POINTER(PoseC), _ERR], _RESULT),
     ("gait_model_angle_mask", [_HANDLE, c_char_p, POINTER(c_uint32), _ERR], _RESULT),
     ("gait_model_pelvis_height", [_HANDLE, _STATE, POINTER(c_float), _ERR], _RESULT),
+    ("gait_camera_check", [POINTER(CameraC), _ERR], _RESULT),
     ("gait_render", [_HANDLE, POINTER(CameraC), _STATE, _ARRAY, c_int32, _ERR], _RESULT),
     ("gait_tracker_fill", [POINTER(TrackerConfigC), c_size_t, c_int32], None),
     ("gait_tracker_set_background", [_HANDLE, c_int32, POINTER(ImageView), _ERR], _RESULT),

@@ -20,7 +20,7 @@ from numpy.typing import ArrayLike, NDArray
 from gait.bindings.abi import MAX_PIXELS
 from gait.camera import other_files
 from gait.camera.lens import AGREE, agreeing
-from gait.errors import UserError
+from gait.errors import GaitArgumentError, UserError
 from gait.io.fields import Fields, parsing, read_json
 from gait.io.files import require_file
 from gait.io.opencv_file import read_storage
@@ -33,9 +33,6 @@ else:
 
 Array = NDArray[np.float64]
 Intrinsics = tuple[float, float, float, float]  # fx fy cx cy
-_LEAST_ABOVE, _MOST_ABOVE = 0.05, 200.0  # metres of a lens over the floor
-_UPSIDE_DOWN = 0.3  # upward part of the picture's downward direction
-_PERSON, _LEAST_TALL = 1.7, 20.0  # metres; pixels
 
 
 @dataclass(frozen=True, eq=False)
@@ -169,19 +166,6 @@ class Camera:
             cy=self.cy * factor + shift,
         )
 
-    def up_axis(self) -> str:
-        """Axis of the world that is nearest to up in the picture: x, y, z, -x, -y or -z."""
-        up = -self.R[1]
-        k = int(np.abs(up).argmax())
-        return ("-" if up[k] < 0 else "") + "xyz"[k]
-
-    def with_up(self, axis: str) -> Camera:
-        """Camera in the world rotated so that `axis`, as from `up_axis`, becomes z."""
-        k = "xyz".index(axis[-1])
-        up = (-1.0 if axis.startswith("-") else 1.0) * np.eye(3)[k]
-        first = np.eye(3)[k - 2]
-        return replace(self, R=self.R @ np.array([first, np.cross(up, first), up]).T)
-
     def check_size(self, where: str, size: tuple[int, int]) -> None:
         """Raise UserError unless the calibration is for frames of `size` (width, height)."""
         if self.size == tuple(size):
@@ -214,29 +198,13 @@ class Camera:
 
     def check_place(self, where: str) -> None:
         """Raise UserError unless people who stand on the floor, z = 0, would be upright in the picture."""
-        above, fault = float(self.centre[2]), ""
-        if above < _LEAST_ABOVE:
-            fault = f"its lens is {abs(above):.2f} m {'above' if above >= 0 else 'below'} the floor"
-        elif above > _MOST_ABOVE:
-            fault = f"its lens is {above:.4g} m above the floor; R and t are in metres, not millimetres"
-        elif self.R[1, 2] > _UPSIDE_DOWN or not self._shows_person():
-            fault = "no person standing on the floor would be upright in its picture"
-        if fault and (up := self.up_axis()) != "z":
-            fault += f", and {up} instead of z is up in its picture"
-        if fault:
-            raise UserError(
-                f"{where}: {fault}; give R and t from world to camera in metres, z up, the floor at z = 0 "
-                "(gait camera makes such a file)"
-            )
+        from gait.bindings.library import call
+        from gait.bindings.model import camera_c
 
-    def _shows_person(self) -> bool:
-        """Whether somewhere in the picture a person who stands on the floor is tall enough to be tracked."""
-        u, v = np.meshgrid(np.linspace(0, self.width - 1, 9), np.linspace(0, self.height - 1, 9))
-        floor = self.on_plane(np.stack([u, v], axis=-1).reshape(-1, 2))
-        floor = floor[np.isfinite(floor).all(axis=1)]
-        up = self.project(floor) - self.project(floor + [0.0, 0.0, _PERSON])
-        with np.errstate(invalid="ignore"):
-            return bool(((up[:, 1] > _LEAST_TALL) & (np.abs(up[:, 0]) < up[:, 1])).any())
+        try:
+            call("gait_camera_check", camera_c(self))
+        except GaitArgumentError as exc:
+            raise UserError(f"{where}: {exc.text} (gait camera makes such a file)") from None
 
     def to_dict(self) -> dict[str, Any]:
         """Return the keys of the JSON camera file."""

@@ -49,7 +49,7 @@ def contradiction(given: Camera, keypoints: Keypoints, model: Model, height: flo
         return None
     start = find_keypoint_start(walk, given, model)
     if start is None:
-        if words := _other_way_up(given, walk, model):
+        if words := _turned_frames(given, walk, model):
             return words
         what: str | None = "no walk on its floor, z = 0, fits the picture"
     else:
@@ -112,15 +112,12 @@ def _parameters(camera: Camera) -> Array:
     return np.array([np.log(focal), -np.arcsin(ahead[2]), roll, np.log(camera.centre[2])])
 
 
-def _other_way_up(given: Camera, walk: Keypoints, model: Model) -> str | None:
-    """Report frames that are turned against the camera, or a world whose z is not up, if the walk fits so."""
+def _turned_frames(given: Camera, walk: Keypoints, model: Model) -> str | None:
+    """Report frames that are turned against the camera, if the walk fits so."""
     quarters = round(_lean(given, walk) / 90) % 4
     if quarters and _fits(given, _turned(walk, given.size, -quarters), model):
         turn = {1: "90 degrees clockwise", 2: "180 degrees", 3: "90 degrees counter-clockwise"}[quarters]
         return f"the frames are turned by {turn} against it; turn the video back, or calibrate it as it is"
-    up = given.up_axis()
-    if up != "z" and _fits(given.with_up(up), walk, model):
-        return f"the walk fits with {up} of its world up; rotate R and t so that z is up, the floor at z = 0"
     return None
 
 
