@@ -23,7 +23,7 @@ from gait.io.keypoints_file import Keypoints
 _WINDOW = 1.0  # seconds of keypoints that are fitted
 _STEP = 0.2  # seconds from one window to the next
 _FITS_BEST = 4.0  # chi-square per coordinate up to which the best window is taken if no person walks in any
-_STATURE_SD = 0.05  # metres, of one that the user gives
+_STATURE_SD = 0.05  # metres, of one that the user gives; a detector's skeleton may have another size
 
 
 def keypoint_noise(keypoints: Keypoints) -> dict[int, FrameKeypoints]:
