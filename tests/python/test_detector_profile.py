@@ -12,6 +12,7 @@ from gait.detect.networks import JOINTS
 from gait.detect.weights import LANDMARKS
 from gait.errors import UserError
 from gait.io.keypoints_file import STRIDE, Keypoints, read, write
+from gait.track.keypoint_start import keypoint_noise
 
 sys.path.insert(0, str(Path(__file__).resolve().parents[1] / "bench"))
 
@@ -82,6 +83,8 @@ def test_errors_that_last_are_written_and_read(tmp_path):
         again.errors(3.0)[seen], np.hypot(again.changing(3.0), 5 * again.lasting_sd)[seen]
     )
     assert np.isinf(again.errors(3.0)[1, 3])
+    for mine, theirs in zip(keypoint_noise(again).values(), keypoint_noise(found).values(), strict=True):
+        np.testing.assert_allclose(mine.sd, theirs.sd, atol=6e-4)  # the tracker counts both alike
 
 
 def test_errors_that_come_again_in_every_stride_count_once_in_a_sequence():

@@ -135,7 +135,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         type=values.positive,
         metavar="PX",
         help="standard deviation of keypoints at full confidence, including the difference between the "
-        f"detector's joints and the model's (default: {KEYPOINTS_SD:g})",
+        f"detector's joints and the model's, where the file does not give theirs (default: {KEYPOINTS_SD:g})",
     )
     values.add_stabilize(parser, default="off")
     add(

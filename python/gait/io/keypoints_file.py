@@ -1,7 +1,7 @@
 """Files of 2-D joint keypoints: CSV ``frame,time,<joint>_u,<joint>_v[,<joint>_c]``.
 
-With a detector's errors ``<joint>_sd`` and ``<joint>_lasting_sd``, and in the first row ``lasting_s`` and
-``repeated``.
+With a detector's errors ``<joint>_sd``, ``<joint>_lasting_sd`` and ``<joint>_frame_sd``, and in the first row
+``lasting_s`` and ``repeated``.
 
 Empty cells are not seen.
 Columns may also be separated by tabs, or by semicolons with decimal commas.
@@ -21,7 +21,6 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from gait.bindings.frame import FrameKeypoints
 from gait.errors import UserError
 from gait.io.detections import Clip, one_person
 from gait.io.detector_formats import Reader, reader_of
@@ -173,10 +172,10 @@ class Keypoints:
         step = float(np.median(np.diff(self.time))) if len(self.time) > 1 else LASTS
         return np.hypot(self.changing(sd), np.nan_to_num(self.lasting_sd) * np.sqrt(max(LASTS / step, 1.0)))
 
-    def by_frame(self, sd: float) -> dict[int, FrameKeypoints]:
-        """Keypoints by frame, as the tracker takes them; `sd` as in `standard_deviations`."""
-        found = zip(self.frame.tolist(), self.uv, self.errors(sd), strict=True)
-        return {frame: FrameKeypoints(self.names, uv, sds) for frame, uv, sds in found}
+    def in_frame(self, sd: float) -> Array:
+        """Give `frame_sd` or, where it is unknown, `standard_deviations`."""
+        found = self.standard_deviations(sd)
+        return found if self.frame_sd is None else np.where(np.isfinite(self.frame_sd), self.frame_sd, found)
 
 
 def read(
@@ -233,18 +232,22 @@ def read(
     if not np.isfinite(uv).any():
         raise UserError(f"{path}: no point is visible in any frame; fill _u and _v")
     refuse_sentinels(path, names, uv)
-    sd, lasting_sd = (
+    sd, lasting_sd, frame_sd = (
         np.stack([numbers.standard_deviation(f"{name}_{error}") for name in names], axis=1)
         if any(f"{name}_{error}" in columns for name in names)
         else None
-        for error in ("sd", "lasting_sd")
+        for error in ("sd", "lasting_sd", "frame_sd")
     )
     lasting_s, repeated = numbers.first("lasting_s", np.inf), numbers.first("repeated", 0.0)
     if not lasting_s > 0:
         raise UserError(f"{path}: line 2: lasting_s is {lasting_s:g}; give seconds above 0")
     if not 0 <= repeated <= 1:
         raise UserError(f"{path}: line 2: repeated is {repeated:g}; give a fraction from 0 to 1")
-    return Keypoints(frame, time, tuple(names), uv, confidence, sd, lasting_sd, lasting_s, repeated), ignored
+    errors = {"sd": sd, "lasting_sd": lasting_sd, "frame_sd": frame_sd}
+    found = Keypoints(
+        frame, time, tuple(names), uv, confidence, lasting_s=lasting_s, repeated=repeated, **errors
+    )
+    return found, ignored
 
 
 def _require_seconds(path: str | os.PathLike[str], time: Array) -> None:
@@ -279,7 +282,7 @@ def _read_foreign(
 
 def write(path: str | os.PathLike[str], keypoints: Keypoints) -> None:
     """Write keypoints so that `read` gets them back (hundredths of a pixel)."""
-    errors = {"sd": keypoints.sd, "lasting_sd": keypoints.lasting_sd}
+    errors = {"sd": keypoints.sd, "lasting_sd": keypoints.lasting_sd, "frame_sd": keypoints.frame_sd}
     given = {name: values for name, values in errors.items() if values is not None}
     columns = ("u", "v", "c", *given)
     detector = {} if keypoints.lasting_sd is None else {"lasting_s": keypoints.lasting_s}

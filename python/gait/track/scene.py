@@ -190,10 +190,7 @@ class Scene:
             if calibration is None:
                 person = _who_starts(options, people, person, camera, model, frames, poses)
             _require_feet(people[person], video)
-        if options.keypoints:
-            sure = {id: found.by_frame(options.keypoints_sd) for id, found in people.items()}
-        else:
-            sure = {id: keypoint_noise(found) for id, found in people.items()}
+        sure = {id: keypoint_noise(found) for id, found in people.items()}
         return Scene(
             video, camera, model, plate, motion, frames, people, person, sure, calibration, moved=moved
         )
@@ -549,4 +546,4 @@ def _read_keypoints(options: ClipOptions, video: Video, model: Model, frames: ra
         )
     if words := read.compare_times(options.keypoints, video.times):
         note(f"{options.keypoints}: {words}", options.quiet)
-    return read
+    return replace(read, frame_sd=read.in_frame(options.keypoints_sd))
