@@ -18,6 +18,8 @@ from gait.errors import GaitError, UserError
 from gait.io import blob, track_file
 from gait.learn.classes import standing
 from gait.learn.classes.join import Change, MotionClass, join
+from gait.motion.verdict import verdict_of
+from gait.report.run_page import Run, run_page
 from gait.simulate.clip import simulate
 from gait.simulate.scenario import PRESETS, Scenario
 from gait.simulate.stage import set_stage
@@ -170,6 +172,8 @@ def test_estimates_and_track_files_have_the_classes(model: gait.Model, tmp_path:
     assert track.motion_class == ["stand"] * 3
     assert np.allclose(track.numbers["p_stand"], [one.class_probability[1] for one in found], atol=1e-4)
     assert track_file.header(2, (), ("walk",)) == track_file.header(2, ())
+    page = run_page(Run("classes", track, verdict_of(track)))
+    assert "Probability of each class of motion" in page and "backwards" in page
 
 
 TINY = {"size": (96, 72), "fps": 30.0, "noise": 0.0}

@@ -113,6 +113,9 @@ def run_page(run: Run) -> str:
     page.heading("Pace")
     page.html(_number_plot(run.track, "stride_hz", 120.0, "Cadence, steps per minute"))
     page.html(_number_plot(run.track, "speed_m_s", 1.0, "Speed, m/s"))
+    if run.track.motion_class:
+        page.heading("Motion")
+        page.html(_class_plot(run.track))
     page.figure("Uncertainty", uncertainty_plot(run.track))
     page.words(
         "Standard deviation of positions in the world, mean over the three axes. It includes the "
@@ -292,6 +295,19 @@ def _number_plot(track: Track, name: str, scale: float, title: str) -> str:
         axes.margins(y=0.2)
 
     return time_plot(paint, time_span(track), 1.9, title)
+
+
+def _class_plot(track: Track) -> str:
+    """Draw the probability of each class of motion over time, one above the other."""
+    shares = {name[2:]: values for name, values in track.numbers.items() if name.startswith("p_")}
+
+    def paint(axes: Axes) -> None:
+        tint(axes, track)
+        axes.stackplot(track.time, *shares.values(), labels=list(shares), alpha=0.7, lw=0)
+        axes.set(ylim=(0, 1))
+        axes.legend(loc="lower left", ncols=len(shares))
+
+    return time_plot(paint, time_span(track), 1.9, "Probability of each class of motion")
 
 
 def uncertainty_plot(track: Track) -> str:
