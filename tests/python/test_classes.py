@@ -102,6 +102,20 @@ def test_learn_makes_classes_and_info_shows_them(tmp_path: Path, capsys: pytest.
     assert gait.Model(out).classes == ("walk", "stand", "backwards")
 
 
+def test_a_class_of_one_cycle_is_refused_and_nothing_is_written(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    walks, out = mocap_files.write_trials(tmp_path / "walks", 4), tmp_path / "m.gait"
+    mocap_files.write_toy(tmp_path / "limp", "21_01", period=120.0, frames=200)
+    words = ["learn", str(walks), "-o", str(out), "--segments", "none", "--quiet", "--jobs", "1"]
+    assert main([*words, "--class", f"limp={tmp_path / 'limp'}"]) == 1
+    error = capsys.readouterr().err.splitlines()[-1]
+    assert error.startswith("gait learn: class limp: ") and error.endswith(
+        "add recordings, 3 cycles at least"
+    )
+    assert not out.exists()
+
+
 def test_classes_are_added_to_a_model(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     out = tmp_path / "m.gait"
     words = ["--class", "backwards", "--class", "stand", "--class", f"stroll={SHIPPED}"]

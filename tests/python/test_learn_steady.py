@@ -267,6 +267,18 @@ def test_of_two_walks_with_a_turn_between_the_longer_is_kept():
     assert found.frames == pytest.approx(PERIOD, rel=0.01)
 
 
+def test_of_a_walk_and_a_run_in_one_recording_the_longer_is_kept():
+    walk = g.outing(np.random.default_rng(6), TRIM_FPS, PERIOD, 6, stand=0, start=0, turn=0, stop=0)
+    length = len(walk.angles)
+    quick = np.arange(0, length // 2, 1.6).astype(int)
+    angles = np.concatenate([walk.angles, walk.angles[quick]])
+    place = np.concatenate([walk.place, walk.place[-1] + 2.5 * walk.place[quick]])
+    track = steady.RootPath(place, np.concatenate([walk.yaw, walk.yaw[quick]]))
+    kept, found = steady.steady_part(angles, TRIM_FPS, "refined", track)
+    assert kept.start == 0 and abs(kept.stop - length) < PERIOD / 2 and kept.after == "faster"
+    assert found.frames == pytest.approx(PERIOD, rel=0.01)
+
+
 def test_unseen_ends_are_cut():
     o = g.outing(np.random.default_rng(8), TRIM_FPS, PERIOD, 4, stand=0, start=0, turn=0, stop=0)
     o.angles[:60], o.angles[-45:] = np.nan, np.nan

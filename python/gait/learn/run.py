@@ -58,7 +58,7 @@ def run(options: LearnOptions, note: Note = lambda line: None) -> dict[str, Any]
         return summary.summary(learned, data, loaded.refused, prior, bool(options.report))
 
 
-def check(options: LearnOptions, note: Note) -> None:
+def check(options: LearnOptions, note: Note = lambda line: None) -> None:
     """Refuse before the work what would fail after it."""
     if options.report and options.segments.source == "only":
         raise UsageError("--report draws the cyclic model; leave it out, or --segments only")

@@ -16,7 +16,7 @@ from gait.learn.classes import standing
 from gait.learn.classes.join import Change, MotionClass, join
 from gait.learn.corpus.load import NothingLeft
 from gait.learn.options import LearnOptions, SegmentOptions
-from gait.learn.run import Note, run
+from gait.learn.run import Note, check, run
 
 WALK, STAND, BACKWARDS, RUN = "walk", "stand", "backwards", "run"
 DERIVED = STAND, BACKWARDS  # made from the walk
@@ -33,26 +33,31 @@ OTHER = Change(0.1)  # of a class of the user's, to and from the walk and standi
 
 
 def learn(options: LearnOptions, note: Note) -> dict[str, Any]:
-    """Learn the walk, then each of ``options.classes``, and write one blob.
+    """Learn each of ``options.classes`` that has recordings, then the walk, and write one blob.
 
     A class is ``stand`` or ``backwards``, made from the walk; or ``NAME=SRC``, learnt from those recordings
     or taken from a model (``.gait``); or ``run``, learnt from the runs among the sources.  Returns the
     figures of the walk, with those of the classes under ``classes``.  UsageError or UserError with one line
     if it cannot be done.
     """
-    wanted = _parsed(options)
+    wanted, alone = _parsed(options), replace(options, classes=())
+    if not adds_to_a_model(options):
+        check(alone)
+    learnt = {
+        name: _learnt(name, source, options, note)
+        for name, source in wanted.items()
+        if source or name not in DERIVED
+    }
     if adds_to_a_model(options):
         walk: Mapping[str, blob.Array] = read_cyclic(options.sources[0])
         figures: dict[str, Any] = {}
     else:
-        figures = run(replace(options, classes=()), note)
+        figures = run(alone, note)
         walk = blob.read(options.output)
     classes = [_counted(MotionClass(options.activity), walk)]
-    for name, source in wanted.items():
-        if name in DERIVED and not source:
-            classes.append(_derived(name, walk, options.activity))
-        elif (learnt := _learnt(name, source, options, note)) is not None:
-            classes.append(learnt)
+    for name in wanted:
+        one = learnt[name] if name in learnt else _derived(name, walk, options.activity)
+        classes += [one] if one is not None else []
     names = [one.name for one in classes]
     classes = [replace(one, changes=_changes(one.name, names)) for one in classes]
     data = blob.write(options.output, join(walk, classes))
