@@ -181,7 +181,7 @@ static gait_tracker *begin(const gait_tracker_config *cfg, const uint8_t *wall)
     return t;
 }
 
-/* Follow the film, in which nobody is seen while the person stops if `hidden`; at frame `save`, if any, another tracker
+/* Follow the film, in which the person is not seen while stopping if `hidden`; at frame `save`, if any, another tracker
  * goes on from a snapshot. */
 static outcome follow(const gait_tracker_config *cfg, int onwards, bool hidden, int save, int end)
 {
