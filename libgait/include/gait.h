@@ -130,8 +130,8 @@ typedef struct gait_image { GAIT_IMAGE_FIELDS(GAIT_DECLARE) } gait_image;
 typedef struct gait_camera { GAIT_CAMERA_FIELDS(GAIT_DECLARE) } gait_camera;
 
 /* GAIT_ERR_ARG, with the fault and its remedy, for a camera whose numbers are not valid, or in whose picture no person
- * who stands on the floor, z = 0, would be upright: in millimetres, below the floor, or with another axis up.  Trackers
- * take the second kind; ask before. */
+ * who stands on the floor, z = 0, would be upright, such as one in millimetres, below the floor, or with another axis up.
+ * Trackers accept the second kind, so check a camera before use. */
 GAIT_API gait_result gait_camera_check(const gait_camera *camera, gait_error *err);
 
 /* State of a person: position and pose of the body.  gait_tracker_start() checks the ranges. */

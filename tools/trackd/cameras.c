@@ -26,7 +26,7 @@ static bool check_rotation(const gait_camera *camera, const char *name, message 
                        name);
 }
 
-bool camera_can_be(const gait_camera *camera, const char *name, message *why)
+bool camera_plausible(const gait_camera *camera, const char *name, message *why)
 {
     gait_error err;
     return gait_camera_check(camera, &err) == GAIT_OK || message_set(why, "%.100s: %s", name, err.text);
@@ -110,7 +110,7 @@ bool camera_file_read(const char *path, gait_camera *out, message *why)
                            "which sends it over LCM, and no --camera here",
                            path);
     bool const ok = fields_open(&f, path, "camera", why) && parse_camera(&f, &camera, why) &&
-                    camera_can_be(&camera, path, why);
+                    camera_plausible(&camera, path, why);
     fields_close(&f);
     if (ok)
         *out = camera;

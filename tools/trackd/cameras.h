@@ -11,8 +11,8 @@ bool camera_file_read(const char *path, gait_camera *out, message *why);
 bool camera_from_message(const gaitmsg_camera_t *in, int32_t max_pixels, gait_camera *out, message *why);
 /* Whether a camera that was sent or saved can be used; not if width times height is more than `max_pixels`. */
 bool camera_check(const gait_camera *camera, int32_t max_pixels, message *why);
-/* Whether a valid camera can stand where it does: gait_camera_check().  `name` is its file or channel in the error. */
-bool camera_can_be(const gait_camera *camera, const char *name, message *why);
+/* Whether the pose of a valid camera is plausible, by gait_camera_check().  `name`: its file or channel, for the error. */
+bool camera_plausible(const gait_camera *camera, const char *name, message *why);
 /* Equal up to rounding, which differs between files and messages, and readers may orthogonalise R. */
 bool camera_same(const gait_camera *a, const gait_camera *b);
 #endif

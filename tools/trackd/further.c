@@ -66,7 +66,7 @@ bool further_take_camera(further_camera *c, const gaitmsg_camera_t *in, int32_t 
     if (!camera_from_message(in, max_pixels, &camera, why))
         return false;
     snprintf(channel, sizeof channel, "GAIT_CAMERA_%d", c->stream);
-    if (!camera_can_be(&camera, channel, why))
+    if (!camera_plausible(&camera, channel, why))
         return false;
     if (c->known)
         return camera_same(&camera, &c->camera) ||

@@ -202,14 +202,14 @@ static bool same_lens(const gait_camera *a, const gait_camera *b)
     return camera_same(&there, b);
 }
 
-/* The camera of a message.  It must be one that can stand where it does, unless it is a pose of a camera that moves. */
+/* The camera of a message.  Its pose must be plausible, unless it is one of the poses of a moving camera. */
 static bool take_camera(const service *s, const gaitmsg_camera_t *msg, gait_camera *out, message *why)
 {
     char channel[24];
     snprintf(channel, sizeof channel, "GAIT_CAMERA_%d", s->stream);
     return camera_from_message(msg, s->max_pixels, out, why) &&
            ((s->path && s->track.tracker && same_lens(out, &s->track.config.camera[0])) ||
-            camera_can_be(out, channel, why));
+            camera_plausible(out, channel, why));
 }
 
 void service_camera(service *s, const gaitmsg_camera_t *msg)

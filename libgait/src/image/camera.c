@@ -60,7 +60,8 @@ void camera_ideal(const gait_camera *c, const double distorted[2], double ideal[
     ideal[1] = fy * y + cy;
 }
 
-/* Whether somewhere in the picture a person on the floor is upright and tall enough to be tracked; lens: its place. */
+/* Whether somewhere in the picture a person on the floor would be upright and tall enough to be tracked; lens: position of
+ * the lens. */
 static bool shows_person(const gait_camera *c, const float lens[3])
 {
     enum { ALONG = 9 };
@@ -85,8 +86,8 @@ static bool shows_person(const gait_camera *c, const float lens[3])
 gait_result camera_check_place(const gait_camera *c, gait_error *err)
 {
     const float LEAST = 0.05f, MOST = 200.0f; /* metres of a lens over the floor */
-    /* Downward part of the picture's downward direction; a camera with y up that looks along z would seem to look
-     * straight down. */
+    /* Least downward component of the picture's downward direction: a camera in a world with y up, which looks along z,
+     * would seem to look straight down. */
     const float LEAST_DOWN = 0.17f;
     const float *const down = c->R + 3;
     float lens[3] = {0.0f, 0.0f, 0.0f};

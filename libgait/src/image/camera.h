@@ -9,7 +9,7 @@
 /* True if size and focal lengths are positive, all numbers finite, and R orthonormal to 1e-3 with det R > 0. */
 bool camera_valid(const gait_camera *c);
 
-/* GAIT_ERR_ARG unless the place of a valid camera can be: see gait_camera_check(). */
+/* GAIT_ERR_ARG unless the pose of a valid camera is plausible, as described at gait_camera_check(). */
 gait_result camera_check_place(const gait_camera *c, gait_error *err);
 
 /* True if some distortion coefficient is not 0. */
