@@ -1,4 +1,4 @@
-/* fuzz_files.c - what gait-trackd reads beside models: camera, start, configuration, background, snapshot, JPEG frame. */
+/* fuzz_files.c - what gait-trackd reads besides models: camera, start, configuration, background, snapshot, JPEG frame. */
 #define _GNU_SOURCE /* memfd_create */
 #include "../../tools/trackd/cameras.h"
 #include "../../tools/trackd/input_files.h"
@@ -55,7 +55,7 @@ static void jpeg(fuzz_bytes *b)
     free(pixels);
 }
 
-/* Whatever is read: a fault is one line. */
+/* Every fault is one line, whatever was read. */
 static void check_line(bool ok, const message *why)
 {
     if (!ok && (!why->text[0] || strchr(why->text, '\n')))
@@ -90,7 +90,7 @@ int LLVMFuzzerTestOneInput(const uint8_t *data, size_t size)
         gait_image image;
         bool const ok = pnm_read(file.path, &bytes, &image, &why);
         check_line(ok, &why);
-        if (ok) { /* all of its pixels are there */
+        if (ok) { /* all of its pixels can be read */
             free(fuzz_copy(image.data, (size_t)image.stride * (size_t)image.height));
             free(bytes.data);
         }

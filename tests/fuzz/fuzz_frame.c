@@ -8,7 +8,7 @@ static void fill_frame(gait_frame *frame, gait_image *image, fuzz_bytes *b, uint
 {
     *image =
         (gait_image){image->data, FUZZ_WIDTH, FUZZ_HEIGHT, FUZZ_WIDTH * 3, what % 8 ? GAIT_RGB8 : GAIT_GREY8};
-    if (what % 8 == 1) { /* refused, or else within its memory */
+    if (what % 8 == 1) { /* must be refused, or stay within its memory */
         image->width = (int32_t)fuzz_word(b);
         image->stride = (int32_t)fuzz_word(b);
     } else if (what % 8 == 2)

@@ -25,7 +25,7 @@ static void check_finite(const double *x, int count)
             abort();
 }
 
-/* The numbers of one frame or segment: most of them near, those of the input anywhere. */
+/* The numbers of one frame or segment: most are plausible, those from the input are arbitrary. */
 static void fill(double *uv, double *sd, int points, fuzz_bytes *b)
 {
     for (int i = 0; i < points; i++) {
@@ -76,7 +76,7 @@ int LLVMFuzzerTestOneInput(const uint8_t *data, size_t size)
     uint8_t const choice = fuzz_take(&b);
     gait_lift_default(&c);
     c.projection = choice & 1 ? GAIT_LIFT_ORTHOGRAPHIC : GAIT_LIFT_PERSPECTIVE;
-    c.heading_sd = choice % 16 == 2 ? -1.0 : 0.3; /* looking all round takes long */
+    c.heading_sd = choice % 16 == 2 ? -1.0 : 0.3; /* searching all headings takes long */
     c.max_iterations = 3;
     c.camera = fuzz_camera();
     fuzz_settings("gait_lift_config", &c, &b);

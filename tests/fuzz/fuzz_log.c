@@ -24,7 +24,7 @@ int LLVMFuzzerTestOneInput(const uint8_t *data, size_t size)
             abort();
         lcm_eventlog_free_event(e);
     }
-    if (read + damaged < events) /* liblcm leaves out an event that garbage follows */
+    if (read + damaged < events) /* liblcm drops an event that is followed by garbage */
         abort();
     lcm_eventlog_destroy(log);
     return 0;

@@ -69,12 +69,13 @@ int LLVMFuzzerTestOneInput(const uint8_t *data, size_t size)
     path = (pose_path){.turn_sd = 0.01f, .place_sd = 0.01f};
     start(&s, &lift, &cue, &path, &out, fuzz_take(&b));
     receiver r = {.service = &s, .log = true, .snapshot = &snapshot};
-    while (b.left > 0) { /* kind, length, and the message without its type, unless that is to be wrong */
+    while (b.left > 0) { /* kind, length, and the message, without its type unless that is to be wrong */
         uint8_t const kind = fuzz_take(&b);
         size_t const stated = (size_t)(fuzz_take(&b) << 8 | fuzz_take(&b)),
                      n = stated < b.left ? stated : b.left;
         int64_t const type = handlers[kind % 8 % HANDLERS].type();
-        uint8_t *const message_bytes = malloc(TYPE + n); /* ends where the message ends */
+        uint8_t *const message_bytes =
+            malloc(TYPE + n); /* ends with the message, so that an overrun is noticed */
         if (!message_bytes)
             abort();
         for (int i = 0; i < TYPE; i++)

@@ -52,7 +52,7 @@ static void lift(const gait_model *m, bool perspective)
     size_t bytes = 0;
     gait_lift_default(&c);
     c.projection = perspective ? GAIT_LIFT_PERSPECTIVE : GAIT_LIFT_ORTHOGRAPHIC;
-    c.heading_sd = 0.3; /* looking all round takes long */
+    c.heading_sd = 0.3; /* searching all headings takes long */
     c.max_iterations = 3;
     c.camera = fuzz_camera();
     if (gait_lift_bytes(m, &c, &bytes, NULL) != GAIT_OK)
@@ -78,7 +78,7 @@ int LLVMFuzzerTestOneInput(const uint8_t *data, size_t size)
     uint8_t const choice = fuzz_take(&b);
     size_t const left = fuzz_damage(made, write_model(made, choice % 3), &b);
     if (left >= 24)
-        toy_seal(made, left); /* else every one would be refused for its checksum */
+        toy_seal(made, left); /* otherwise all would be refused for their checksums */
     uint8_t *const blob = fuzz_copy(made, left);
     size_t bytes = 0;
     gait_model *m = NULL;

@@ -1,4 +1,4 @@
-/* fuzz_snapshot.c - a damaged snapshot is refused, or else the tracker goes on from it. */
+/* fuzz_snapshot.c - a damaged snapshot is refused, or else the tracker continues from it. */
 #include "fuzz.h"
 #include "base/hash.h"
 
@@ -8,7 +8,7 @@
 
 enum { BODY_AT = 48, HASH_AT = 40 };
 
-/* The checksum of what follows the header, so that the checks behind it are reached. */
+/* Correct the checksum of what follows the header, so that the later checks are reached. */
 static void repair(uint8_t *data, size_t size)
 {
     if (size <= BODY_AT || (size - BODY_AT) % 32)

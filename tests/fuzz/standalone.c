@@ -1,6 +1,6 @@
 /* standalone.c - run a fuzz target without clang: fuzz_NAME [-runs=N] [-seed=S] [CORPUS...]
- * Every file of the folders once, by default of tests/fuzz/corpus/NAME, then N damaged copies of them; libFuzzer, which
- * also watches the branches, takes the same arguments. */
+ * Runs every file of the folders once, by default of tests/fuzz/corpus/NAME, then N damaged copies of them.  libFuzzer,
+ * which also records branches, takes the same arguments. */
 #include "fuzz.h"
 
 #include <dirent.h>
@@ -27,7 +27,7 @@ static int by_name(const struct dirent **a, const struct dirent **b)
     return strcmp((*a)->d_name, (*b)->d_name);
 }
 
-/* Adds the files of a folder; their number is now. */
+/* Add the files of a folder; returns how many there are now. */
 static int read_folder(const char *folder, int count)
 {
     struct dirent **entry;
@@ -49,7 +49,7 @@ static int read_folder(const char *folder, int count)
     return count;
 }
 
-/* One fault: a flipped bit, a random byte, a nasty word, a piece of another input, a byte more, or a shorter input. */
+/* One fault: a flipped bit, a random byte, an extreme word, a piece of another input, an extra byte, or a shorter input. */
 static size_t damage(uint8_t *data, size_t size, const struct input *other, uint64_t *s)
 {
     static const uint32_t nasty[] = {0,          1,          0x7fffffff, 0x80000000, 0xffffffff, 0x7f800000,

@@ -1,4 +1,4 @@
-/* The field table against the header: every struct is there and its fields tile it without a hole. */
+/* The field table against the header: it has every struct, whose fields cover it without gaps. */
 #include "gait_start.h"
 #include "gait_lift.h"
 

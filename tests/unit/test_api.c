@@ -98,7 +98,7 @@ static void test_info(void)
     CHECK(!gait_model_limb_name(m, -1) && !gait_model_limb_name(m, TOY_LIMBS));
 }
 
-/* A state that is no state is refused, and the outputs stay as they were. */
+/* An invalid state is refused, and the outputs stay as they were. */
 static void test_state(void)
 {
     const gait_model *const m = toy_model();

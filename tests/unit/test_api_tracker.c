@@ -97,7 +97,7 @@ static void test_an_older_config(void)
     whole.proportion_noise = cut.proportion_noise;
     memset(&cut, 0xff, sizeof cut);
     gait_tracker_fill(&cut, older, GAIT_MODE_DEFAULT);
-    CHECK(cut.struct_size == older && isnan(cut.offset_noise)); /* not written past its end */
+    CHECK(cut.struct_size == older && isnan(cut.offset_noise)); /* nothing is written past its end */
     memcpy(&cut, &whole, older);
     cut.struct_size = older;
     CHECK(gait_tracker_init(memory[0], sizeof memory[0], toy_model(), &whole, &t[0], NULL) == GAIT_OK);
@@ -212,7 +212,7 @@ static void set_number(gait_state *s, size_t k, float value)
     memcpy((char *)s + k * sizeof value, &value, sizeof value);
 }
 
-/* A start that is finite but absurd gave estimates that are not numbers. */
+/* A finite but absurd start used to give estimates that were NaN. */
 static void test_absurd_starts(void)
 {
     static const struct {
@@ -258,7 +258,7 @@ static bool estimate_finite(const gait_estimate *e)
     return finite;
 }
 
-/* Put number k of the mean as far out as a start may have it, up or down. */
+/* Set number k of the mean to the limit of its range, upper or lower. */
 static void set_far(gait_tracker *t, gait_state *mean, const gait_state *sd, size_t k, float sign)
 {
     static const float far[] = {1e4f, 10.0f, 7.0f, 4.0f, 2.5f, 1.0f, 0.5f, 0.1f, 0.0f};
@@ -274,7 +274,7 @@ static void set_far(gait_tracker *t, gait_state *mean, const gait_state *sd, siz
     check_that(0, "a number has no range", __FILE__, __LINE__);
 }
 
-/* Whatever start is accepted, its estimates are numbers: one number after the other goes as far out as it may. */
+/* Every accepted start gives finite estimates, with each number at the limit of its range. */
 static void test_the_widest_starts_stay_finite(void)
 {
     gait_tracker_config cfg = toy_config(1);
@@ -339,7 +339,7 @@ static void test_background(void)
     toy_tracker_free(t);
 }
 
-/* Predictions depend on their place in the call alone, not on how many there are, and need usable states. */
+/* A prediction depends only on its index in the call, not on the number of states; invalid states are refused. */
 static void test_predict(void)
 {
     gait_tracker_config const cfg = toy_config(1);

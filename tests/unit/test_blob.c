@@ -50,13 +50,13 @@ static void test_truncated(void)
     int accepted = 0;
     size_t const end = payload_end(good);
     for (size_t n = 0; n < good_bytes; n++) {
-        void *exact; /* a block of its own, so that a sanitizer sees a byte too far */
+        void *exact; /* a block of exactly its size, so that a sanitizer notices an overrun */
         if (posix_memalign(&exact, GAIT_ALIGN, n + 1))
             abort();
         unsigned char *const at = exact;
         memcpy(at, good, n);
         accepted += open_and_use(at, n) == GAIT_OK;
-        if (n >= TABLE && n < end) { /* now with a header that owns up to it */
+        if (n >= TABLE && n < end) { /* now with a header that states the shorter length */
             toy_put(at + 24, n, 8);
             seal(at, n);
             accepted += open_and_use(at, n) == GAIT_OK;

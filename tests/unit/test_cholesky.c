@@ -1,4 +1,4 @@
-/* Symmetric systems against the products they are made of, and the kernels against the scalar one. */
+/* Symmetric systems against the products from which they were made, and the kernels against the scalar ones. */
 #include "api/kernels.h"
 #include "base/cholesky.h"
 
@@ -50,7 +50,7 @@ static void test_system(int32_t n)
     CHECK_NEAR(cholesky_log_det(U, n, ld), log_det, 1e-12);
 }
 
-/* Several right-hand sides at once are as each alone, with floats about so. */
+/* Several right-hand sides at once give the same as each alone; with floats approximately. */
 static void test_forward(int32_t n)
 {
     const kernels *const k = kernels_choose(~0u);

@@ -27,7 +27,7 @@ static void *begin(block *b, size_t bytes, size_t off)
 }
 
 typedef struct system {
-    block rank, factor, forward, about; /* what each kernel makes */
+    block rank, factor, forward, about; /* output of each kernel */
     bool definite;
 } system_of;
 
@@ -48,7 +48,7 @@ static shape shape_of(int32_t n)
                    .off = (size_t)n % OFFSETS};
 }
 
-/* As many rows of n + 1 numbers as there are, and what lies past them 0. */
+/* All rows of n + 1 numbers, followed by zeros. */
 static double *rows_of(const shape *s, block *b)
 {
     uint32_t seed = 3;

@@ -107,7 +107,7 @@ static void test_refused(void)
     CHECK(open_spec(&s, "CLIN") == GAIT_ERR_CORRUPT);
 }
 
-/* Other orders of the classes after the first are as good, and a class may be learnt from one cycle. */
+/* After the first the classes may be in any order, and a class may be learnt from one cycle. */
 static void test_another_order(void)
 {
     toy_classes_spec s = toy_classes_usual();
@@ -141,7 +141,7 @@ static const gait_model *model(void)
     return toy_classes_model();
 }
 
-/* Who walks to frame STOP, stands to frame GO and walks on, forwards or backwards. */
+/* A person who walks until frame STOP, stands until frame GO and walks on, forwards or backwards. */
 static gait_state truth(int n, int onwards)
 {
     float const before = (float)(n < STOP ? n : STOP) / 30.0f, after = (float)(n > GO ? n - GO : 0) / 30.0f;
@@ -181,8 +181,8 @@ static gait_tracker *begin(const gait_tracker_config *cfg, const uint8_t *wall)
     return t;
 }
 
-/* Follow the film, in which the person is not seen while stopping if `hidden`; at frame `save`, if any, another tracker
- * goes on from a snapshot. */
+/* Follow the film.  hidden: the person is occluded while stopping.  At frame `save`, if there is one, another tracker
+ * continues from a snapshot. */
 static outcome follow(const gait_tracker_config *cfg, int onwards, bool hidden, int save, int end)
 {
     static uint8_t wall[SCENE_PIXELS], shot[SCENE_PIXELS];

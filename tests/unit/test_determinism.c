@@ -1,5 +1,5 @@
-/* The same bits always: one golden digest, whatever the threads, the pieces, their order, the address, the instruction
- * set or a stop in between.
+/* The bits are always the same: one golden digest for any threads, tasks and order of tasks, any address and instruction
+ * set, and with a snapshot in between.
  *
  * With the argument `digest` it only prints those of every film (golden.h). */
 #include "gait_pool.h"
@@ -22,7 +22,7 @@ enum { SHOTS = 50, GAP = 30, GAP_END = 32, SAVE_AT = 25 };
 /* Under a sanitizer, many times as slow, every 2nd or 3rd number of threads must do; under that of threads nothing else. */
 enum { MOST_THREADS = 16, NEXT_THREADS = THREADS_WATCHED ? 3 : SANITIZED ? 2 : 1 };
 
-/* gait_tasks that does the last piece first. */
+/* gait_tasks that runs the last task first. */
 static void run_backwards(void *user, gait_task_fn *fn, void *ctx, int32_t count)
 {
     (void)user;
@@ -49,7 +49,7 @@ static uint64_t hash_part(const gait_estimate *e, size_t begin, size_t end, uint
     return hash;
 }
 
-/* All that is reported but the classes of motion: here there is one. */
+/* Hash everything that is reported except the classes of motion, of which there is one. */
 static uint64_t hash_estimate(const gait_estimate *e, uint64_t hash)
 {
     size_t const state[] = {offsetof(gait_estimate, mean), offsetof(gait_estimate, sd),
@@ -76,7 +76,8 @@ static uint64_t advance(const gait_tracker_config *cfg, gait_tracker *t, int fro
     return hash;
 }
 
-/* Digest of so many frames: state at the end and every estimate; save_at: saved, and continued by another tracker. */
+/* Digest of so many frames: of all estimates and of the state at the end.  save_at: step at which another tracker
+ * continues from a snapshot. */
 static uint64_t run_frames(const gait_tracker_config *cfg, int save_at, int frames)
 {
     gait_tracker *t = start(cfg, 0, 1.0f);
@@ -139,7 +140,7 @@ static int print_digests(void)
            golden_print(digest_search, GOLDEN_SEARCH, "search");
 }
 
-/* The film of the search has all its stages: more particles, two hypotheses, one of them dropped. */
+/* FILMS_SEARCH goes through all stages: acquisition with more particles, two hypotheses, one of them dropped. */
 static void test_search_is_decided(void)
 {
     gait_tracker_config const cfg = films_config(FILMS_SEARCH);
@@ -151,8 +152,8 @@ static void test_search_is_decided(void)
     toy_tracker_free(t);
 }
 
-/* Fewer and more pieces than the seven blocks of particles, on 1 .. 16 threads; the instruction set and a stop in between
- * change along. */
+/* Fewer and more tasks than the seven blocks of particles, on 1 .. 16 threads, with varying instruction sets and
+ * snapshots. */
 static void test_pieces_and_threads(void)
 {
     static const int32_t pieces[MOST_THREADS] = {256, 7, 2, 8, 5, 3, 64, 4, 1, 6, 9, 33, 16, 2, 48, 7};
@@ -171,7 +172,7 @@ static void test_pieces_and_threads(void)
     }
 }
 
-/* More particles than pieces: 69 blocks, so that 7 .. 256 pieces share them out differently. */
+/* More blocks, 69, than some numbers of tasks, so that 7 .. 256 tasks divide them differently. */
 static void test_a_crowd_in_pieces(void)
 {
     static const int32_t pieces[][2] = {{2, 2},   {5, 3},  {16, 4}, {23, 1},
@@ -192,7 +193,7 @@ static void test_a_crowd_in_pieces(void)
     }
 }
 
-/* Each set alone with every film; together the best of them counts, which one film shows. */
+/* Each instruction set alone with every film; of several the best is used, which one film is enough to show. */
 static void test_instruction_sets(void)
 {
     for (uint32_t mask = 0; mask < MASKS; mask++) {

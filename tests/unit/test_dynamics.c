@@ -45,7 +45,7 @@ static void test_pace(void)
         }
 }
 
-/* On a treadmill the belt takes back what a stride goes ahead. */
+/* On a treadmill the belt cancels the progress of a stride. */
 static void test_belt(void)
 {
     const gait_model *const m = toy_model();
@@ -165,7 +165,7 @@ static void test_paper_way(void)
 
 /* ---- motion with noise ---- */
 
-/* Fields of many particles after `seconds` in steps of dt; everyone starts alike. */
+/* Fields of many particles after `seconds` in steps of dt; all start from the same state. */
 static void sample_after(const dynamics *d, const particle_state *from, float dt, float seconds, float age,
                          double v[FIELDS][DRAWS])
 {
@@ -321,7 +321,7 @@ static void test_frame_rate(void)
     }
 }
 
-/* Rates are reflected at the ends of what people walk. */
+/* Rates are reflected at the limits of people's range. */
 static void test_reflect(void)
 {
     dynamics const d = quiet(GAIT_MODE_DEFAULT, 30);
@@ -358,7 +358,7 @@ static void test_settling(void)
     check_moments(moments_of(sampled[0][F_STATURE], DRAWS), 1.75, 1.75 * 0.05 * 0.02 * sqrt(0.1), DRAWS);
 }
 
-/* Turn rates: kept for a while, then others, half of them none, at any frame rate; not while the phase is searched. */
+/* Turn rates are kept for a while, then drawn anew, half of them 0, at any frame rate; but not during acquisition. */
 static void test_turn_rates(void)
 {
     static const float steps[] = {1.0f / 30.0f, 0.25f};
@@ -384,7 +384,7 @@ static void test_turn_rates(void)
     }
 }
 
-/* Who turns walks on a circle. */
+/* A person who turns walks on a circle. */
 static void test_circle(void)
 {
     dynamics d = quiet(GAIT_MODE_DEFAULT, 1);
@@ -427,7 +427,7 @@ static void test_independent(void)
         CHECK(f == F_TURN || (w.f[f] != frame.f[f] && w.f[f] != index.f[f] && w.f[f] != seed.f[f]));
 }
 
-/* Every instruction set moves every lane to the same bits, and writes only the fields there are. */
+/* Every instruction set gives the same bits in every lane, and writes only existing fields. */
 static void test_instruction_sets(void)
 {
     static _Alignas(GAIT_ALIGN) unsigned char memory[2][sizeof(particle_block) + 2 * GUARD];

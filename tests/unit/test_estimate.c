@@ -1,4 +1,4 @@
-/* What is reported of weighted particles, against direct sums in double precision. */
+/* The estimate of weighted particles, against direct sums in double precision. */
 #include "tracker/estimate.h"
 
 #include "kernel_check.h"
@@ -104,7 +104,7 @@ static void test_heading(void)
     }
 }
 
-/* No phase at all is no certainty, and still a phase. */
+/* With a uniform phase the certainty is 0, and the reported phase is still valid. */
 static void test_no_phase(void)
 {
     reset();
@@ -117,7 +117,7 @@ static void test_no_phase(void)
     CHECK_NEAR(e.hypothesis_weight, 11.0 / N, 0.051); /* within 0.15 of the best: 11 .. 13 of 40 */
 }
 
-/* ---- modes ---- */
+/* ---- the dominant hypothesis ---- */
 
 /* Two groups half a stride (or half a turn) apart: the mean is that of the group of the best particle. */
 static void test_modes(void)
@@ -314,8 +314,8 @@ static void test_fields(void)
     CHECK_NEAR(place.f[F_STATURE], mean[F_STATURE], 1e-6);
 }
 
-/* Sums of any number of particles at any address: every instruction set gives the same bits, the particles in use
- * is marked and nothing else written; and they are what plain sums are. */
+/* Sums of any number of particles at any address: every instruction set gives the same bits, marks the dominant particles
+ * and writes nothing else; and the sums equal plain ones. */
 static void test_sums(void)
 {
     enum { MOST = 300 };

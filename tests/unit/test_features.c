@@ -1,4 +1,4 @@
-/* Maps of one frame: foreground, edges and local contrast of pictures whose answer is known. */
+/* Maps of one frame: foreground, edges and local contrast of pictures for which they are known. */
 #include "api/kernels.h"
 #include "image/features.h"
 
@@ -72,7 +72,7 @@ static void test_no_change(void)
     }
 }
 
-/* The whole frame brighter or darker by an eighth is the same scene. */
+/* If the whole frame is brighter or darker by an eighth, it is the same scene. */
 static void test_exposure(void)
 {
     for (int32_t channels = 1; channels <= 3; channels += 2)

@@ -1,4 +1,4 @@
-/* What the cameras see of a frame: regions, plates, formats, and persons out of view. */
+/* Features of all cameras' frames: regions, plates, formats, and people out of view. */
 #include "tracker/features_step.h"
 
 #include "image/camera.h"

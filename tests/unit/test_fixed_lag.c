@@ -1,4 +1,4 @@
-/* The estimate of frames ago: against ancestors traced by hand, at its limits, saved and restored, and better. */
+/* Estimates of earlier frames: against ancestors traced by the test, at their limits, after a restore, and more certain. */
 #include "tracker/tracker.h"
 
 #include "toy_film.h"
@@ -7,7 +7,7 @@
 
 enum { SHOTS = 40, PARTICLES = 200 };
 
-typedef struct history { /* what the test itself writes down of each step */
+typedef struct history { /* what the test records of each step */
     gait_state state[SHOTS][PARTICLES];
     int32_t parent[SHOTS][PARTICLES];
     gait_estimate estimate[SHOTS];
@@ -82,11 +82,11 @@ static void test_ancestors(void)
         CHECK(memcmp(&past.mean, &e.mean, sizeof e.mean) == 0 && memcmp(&past.sd, &e.sd, sizeof e.sd) == 0);
         CHECK(memcmp(&past.pose, &e.pose, sizeof e.pose) == 0 && past.ess == e.ess);
     }
-    CHECK(fewer > SHOTS / 2); /* the film does thin the ancestors out */
+    CHECK(fewer > SHOTS / 2); /* there are indeed fewer and fewer ancestors */
     free(t);
 }
 
-/* Looking back changes nothing; a restored tracker looks back on the same. */
+/* Lagged estimates change nothing; a restored tracker gives the same ones. */
 static void test_kept(void)
 {
     gait_tracker_config const cfg = config(3);

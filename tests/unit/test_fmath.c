@@ -16,7 +16,8 @@ static void meet(sweep *s, double error, double at)
     }
 }
 
-/* The worst error must be below the bound, and not far below: then the sweep or the claim is no good. */
+/* The worst error must be below the bound, but not far below: otherwise the sweep misses something or the bound is too
+ * weak. */
 static void settle(const char *what, sweep s, double bound)
 {
     if (!(s.worst < bound && s.worst > bound / 3.0))
@@ -107,7 +108,7 @@ static void test_floor(void)
         CHECK(m_floor((float)t) == floorf((float)t) && m_round((float)t) == rintf((float)t));
 }
 
-/* What goes in from a broken particle must come out defined. */
+/* The numbers of a broken particle must give defined results. */
 static void test_extremes(void)
 {
     float const inf = HUGE_VALF, nan = nanf("");

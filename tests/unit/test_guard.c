@@ -1,4 +1,4 @@
-/* Nothing is allocated between the making of a tracker, or a lifter, and its end: a malloc in between aborts.
+/* Nothing is allocated during the life of a tracker or a lifter: a malloc in between aborts.
  *
  * The program's own malloc takes the C library's place, so that calls from anywhere in the process are seen. */
 #include "sanitized.h"
@@ -104,8 +104,8 @@ static gait_frame frame_of(const gait_tracker_config *cfg, int n)
     return f;
 }
 
-/* Everything that is done with a tracker: found, lost and started again, asked and stored; returns the stages (bits)
- * that left and right went through, 0 if anything failed. */
+/* Call everything that a tracker has, while the person is found, lost and found again; returns the stages of the left/right
+ * hypotheses that occurred (bits), 0 if a call failed. */
 static uint32_t work(gait_tracker *t, const gait_tracker_config *cfg)
 {
     gait_pose pose;
@@ -177,7 +177,7 @@ static void fall(int kind)
     _exit(0);
 }
 
-/* The guard would notice. */
+/* The guard does notice a malloc. */
 static void test_the_guard(void)
 {
     for (int kind = 0; kind < 3; kind++) {

@@ -22,7 +22,7 @@ static double weight_of(const gait_tracker *t, int32_t from, int32_t to)
     return sum;
 }
 
-/* Mean phase of a side, as a vector in double precision. */
+/* Mean phase of a hypothesis, as a vector in double precision. */
 static double phase_of(const gait_tracker *t, int32_t from)
 {
     const float *const phase = field(&t->particles, F_PHASE);
@@ -135,7 +135,7 @@ static void copy_into(gait_tracker *to, const gait_tracker *from)
     free(snapshot);
 }
 
-/* A search takes more particles, and gives them back when all is known; a copy made meanwhile goes on alike. */
+/* Acquisition uses more particles, until left and right are known; a snapshot taken meanwhile continues identically. */
 static void test_a_search_takes_more(void)
 {
     gait_tracker_config cfg = toy_config(1);
@@ -177,8 +177,8 @@ static void test_open_odds_are_ambiguous(void)
     toy_tracker_free(t);
 }
 
-/* A frame's log-likelihood counts by the time since the images last supported the estimate, also while a phase is
- * searched; in full at the start. */
+/* The share of a frame's log-likelihood depends on the time since images last supported the estimate, also during
+ * acquisition; at the start it is 1. */
 static void test_evidence_counts_by_time(void)
 {
     static const struct {

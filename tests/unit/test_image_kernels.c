@@ -19,7 +19,7 @@ static uint32_t noise(uint32_t i)
     return r[i % 4];
 }
 
-/* What pixels hold: noise, the largest gradients, black and white cells, flat with little noise, a ramp. */
+/* Kinds of pictures: noise, the largest gradients, black and white cells, flat with little noise, a ramp. */
 static void fill(uint8_t *out, size_t n, int32_t width, uint32_t kind)
 {
     for (size_t i = 0; i < n; i++) {

@@ -86,7 +86,7 @@ static void test_silhouette_count(void)
     }
 }
 
-/* The guard of the other kernels' tests sees a byte too much on either side. */
+/* The guard of the other kernels' tests notices a byte too many on either side. */
 static void test_guard(void)
 {
     unsigned char memory[10 + 2 * GUARD];

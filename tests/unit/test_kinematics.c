@@ -1,4 +1,4 @@
-/* Curves and forward kinematics against a plain double-precision twin, and against what the words mean. */
+/* Curves and forward kinematics against a plain double-precision version, and against the meaning of the angles. */
 #include "model/kinematics.h"
 #include "api/kernels.h"
 

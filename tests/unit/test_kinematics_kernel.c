@@ -48,7 +48,7 @@ static void test_bits(void)
     }
 }
 
-/* Models of fewer and more channels than are made at once: each as it is made alone. */
+/* Models with fewer and more channels than are computed at once: each channel equals the one computed alone. */
 static void test_channels(void)
 {
     kin_input const in = random_input(0);

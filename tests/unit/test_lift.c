@@ -83,7 +83,7 @@ static void test_coverage(int projection, double noise)
     CHECK_NEAR((double)within / count, 0.905, 0.03);
 }
 
-/* Points that are not sds are not read, and cost certainty. */
+/* Points whose sd marks them as unobserved are not read, and leave more uncertainty. */
 static void test_missing(void)
 {
     gait_lift_config const c = toy_lift_config(GAIT_LIFT_PERSPECTIVE);
@@ -151,7 +151,7 @@ static void test_mixture(void)
     toy_lift_learn(1, 0);
 }
 
-/* Many at once are as each alone. */
+/* Many segments at once give the same as each alone. */
 static void test_batch(void)
 {
     enum { MANY = 3 };
@@ -182,7 +182,7 @@ static void test_batch(void)
     CHECK(gait_lift_fix(toy_lift_open(&c), sds, NULL) == GAIT_ERR_STATE);
 }
 
-/* Depth is what an orthographic view leaves open: the least certain displacement is along it. */
+/* An orthographic view does not determine depth: the least certain displacement is along it. */
 static void test_uncertain(void)
 {
     static double mode[2][TOY_SEGMENT][3];
@@ -304,7 +304,7 @@ static void test_expected_and_unknown(void)
     CHECK(gait_lift_expect(l, place, 0.7, 0.2, NULL) == GAIT_ERR_STATE);
 }
 
-/* Every call refuses what is not there. */
+/* Every call refuses missing arguments. */
 static void test_nothing(void)
 {
     gait_lift_config const c = toy_lift_config(GAIT_LIFT_PERSPECTIVE);
@@ -389,7 +389,7 @@ static void test_arguments(void)
     CHECK(gait_lift_least_squares(l, mean, NULL) == GAIT_ERR_STATE);
 }
 
-/* A prior with turned copies lies in the axes of the world: its heading is not looked for. */
+/* A prior with rotated copies is in the axes of the world: its heading is not searched for. */
 static void test_world_axes(void)
 {
     toy_lift_learn(1, 8);

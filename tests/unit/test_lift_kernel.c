@@ -72,7 +72,7 @@ enum {
 };
 enum { SHAPE, MOVED, ROW, SHAPES, ALL_MOVED, SQUARES, PARTS };
 
-typedef struct shapes { /* what they make, each between canaries */
+typedef struct shapes { /* their outputs, each between canaries */
     _Alignas(64) unsigned char memory[PARTS][(3 * MOST_LANES * EIGHT + OFFSETS) * sizeof(double) + 2 * GUARD];
     _Alignas(64) unsigned char floats[(MOST_LANES * WIDTH + OFFSETS) * sizeof(float) + 2 * GUARD];
     guarded in[PARTS], turned_in;

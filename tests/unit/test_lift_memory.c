@@ -1,4 +1,4 @@
-/* The lifter keeps to the memory that it asks for: canaries before and behind, whatever filled it. */
+/* The lifter stays within the memory that it asks for: canaries on both sides, and any previous contents. */
 #include "gait.h"
 
 #include <stdbool.h>
@@ -79,7 +79,7 @@ static void test_canaries_of_a_batch(void)
           intact(outside + CANARY + need, sizeof outside - CANARY - need, 0x5a));
 }
 
-/* One byte less is refused; the need grows with what is asked for and not otherwise. */
+/* One byte less is refused; the size grows only with what is asked for. */
 static void test_sizes(void)
 {
     toy_lift_learn(1, 0);

@@ -179,7 +179,7 @@ static void test_report(void)
     }
 }
 
-/* Points far off, from the first segment on, are left out: nothing that is estimated goes with them. */
+/* Points that are far away from the first segment on are down-weighted: no estimate follows them. */
 static void test_wrong_points(double off)
 {
     gait_lift_config c = toy_lift_config(GAIT_LIFT_PERSPECTIVE);

@@ -1,4 +1,4 @@
-/* The edge term on made-up fields of edges, where the answer follows from the outline's direction alone. */
+/* The edge term on artificial fields of edges, where it depends only on the direction of the outline. */
 #include "toy_body.h"
 
 #include "check.h"

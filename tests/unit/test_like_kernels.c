@@ -1,5 +1,4 @@
-/* Kernels of surface and edges: every instruction set against the scalar one, and that one against points
- * looked at one by one. */
+/* Kernels of surface and edges: every instruction set against the scalar one, and that one against single points. */
 #include "kernel_check.h"
 #include "base/rng.h"
 #include "toy_body.h"
@@ -55,7 +54,7 @@ static void bodies(uint32_t round)
     }
 }
 
-/* One surface point of one lane as it was written down first: no half is left out. */
+/* One surface point of one lane in the simplest form, without leaving out half of the points. */
 static int8_t sample(int32_t l, int32_t i, int32_t lane)
 {
     const like_surface *const s = &v->setup.surface[l];
@@ -286,7 +285,7 @@ static like_edge_tally walk_limbs(int32_t lane)
     return t;
 }
 
-/* Corners in the image, about it, far off, all in one place, or no numbers at all. */
+/* Corners in the image, around it, far away, all in one place, or NaN. */
 static float corner(uint32_t round, uint32_t at)
 {
     static const float scale[] = {128.0f, 300.0f, 1e5f, 1e7f, 0.2f, 128.0f};

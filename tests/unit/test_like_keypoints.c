@@ -143,7 +143,7 @@ static void test_another_person(void)
     }
 }
 
-/* A detector that swaps the sides now and then is believed, one that does so half of the time is not. */
+/* A detector that swaps the sides now and then leaves left and right known, one that does so half of the time does not. */
 static void test_swapped_sides(void)
 {
     for (int swapped = 0; swapped <= 5; swapped++) {

@@ -99,7 +99,7 @@ static void test_foreground_everywhere(void)
     }
 }
 
-/* Without a plate the term is silent. */
+/* Without a plate the term is 0. */
 static void test_silent(void)
 {
     toy_body *const v = toy_body_new(0, GAIT_MODE_DEFAULT);

@@ -88,7 +88,7 @@ static void test_paper(void)
     CHECK(limb(GAIT_MODE_PAPER, 0.99, 16, 120) > (float)log(0.0018 * 0.01) - 0.01f);
 }
 
-/* The settings of eqs. 10-12: each enters where the equation has it. */
+/* Each setting of eqs. 10-12 has the effect that the equation states. */
 static void test_paper_settings(void)
 {
     gait_tracker_config cfg;
@@ -159,7 +159,7 @@ static void test_turned(void)
         }
 }
 
-/* Limbs add; without an ancestor the term is silent. */
+/* Limbs add up; without an ancestor the term is 0. */
 static void test_limbs(void)
 {
     float const one = limb(GAIT_MODE_DEFAULT, 0.9, 16, 7);

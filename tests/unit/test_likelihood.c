@@ -112,7 +112,7 @@ static void test_sample(void)
     CHECK(covered < seen / 20); /* a grid cell is coarser than a pixel */
 }
 
-/* ---- the configuration's numbers reach the terms ---- */
+/* ---- the settings reach the terms ---- */
 static void test_setup(void)
 {
     gait_tracker_config cfg = toy_body_new(0, GAIT_MODE_DEFAULT)->cfg;

@@ -1,4 +1,4 @@
-/* Evidence of a frame: every particle's log-likelihood against one worked out on its own. */
+/* Every particle's log-likelihood of a frame against one computed separately. */
 #include "tracker/likelihood_step.h"
 
 #include "toy_body.h"
@@ -180,7 +180,7 @@ static void test_missed_texture(void)
           memcmp(ll[0][1], ll[2][1], sizeof ll[0][1]) != 0);
 }
 
-/* The body that stands there is supported, one on the empty wall is not. */
+/* The body of the person is supported, one in front of the empty wall is not. */
 static void test_support(void)
 {
     gait_tracker *const t = tracker(2, 0, 0xf);

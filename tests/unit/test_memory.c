@@ -48,7 +48,7 @@ static void test_refused(void)
     free(memory);
 }
 
-/* The last task comes first and finds all the work. */
+/* An executor that runs the last task first, which finds all the work. */
 static void run_backwards(void *user, void (*task)(void *ctx, int32_t index), void *ctx, int32_t count)
 {
     (void)user;
@@ -138,7 +138,7 @@ static void test_tasks_and_lag(void)
         toy_tracker_free(t[k]);
 }
 
-/* The need grows with what is asked for and not otherwise; a start begins anew in the same memory. */
+/* The size grows only with what is asked for; a start begins anew in the same memory. */
 static void test_sizes(void)
 {
     gait_tracker_config cfg = toy_config(1);

@@ -1,4 +1,4 @@
-/* What the sections mean: a sound blob gives the views, each broken one an error that names its section. */
+/* The sections of a model: a valid blob gives the views, every broken one an error that names its section. */
 #include "model/model.h"
 
 #include "toy_model.h"
@@ -39,7 +39,7 @@ static void test_views(void)
     CHECK(m.curves[TOY_KNEE + 1] == toy_round(toy_interpolate(toy_curve[3].at, 0)));
 }
 
-/* The digest is of the bytes: any change shows. */
+/* The digest depends on every byte. */
 static void test_digest(void)
 {
     gait_model a, b;
@@ -63,7 +63,7 @@ static void test_sizes(void)
     CHECK(model_open(buf, bytes, &m, &err) == GAIT_ERR_CORRUPT && strstr(err.text, "CURV"));
 }
 
-/* One 32-bit word or byte of a section changed. */
+/* A change of one 32-bit word or byte of a section. */
 typedef struct patch {
     const char *tag;
     size_t word;

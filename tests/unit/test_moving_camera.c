@@ -146,7 +146,7 @@ static void test_background(void)
 
 /* Poses with errors of 1 degree: where their standard deviations are given, the shift of the image is found and the
  * person walks on. */
-/* Bodies are moved to where they appear and put back, so that the next camera and the next shift find them. */
+/* Displaced bodies are restored exactly, for the next camera and the next shift. */
 static void bodies_stay(gait_tracker *t)
 {
     likelihood_scratch *const w = &t->work[0];

@@ -1,4 +1,4 @@
-/* Limbs in the image: against the projection of their ends, of their surface, and against sizes known beforehand. */
+/* Limbs in the image: against the projections of their ends and surfaces, and against known sizes. */
 #include "raster/limb_polygon.h"
 
 #include "toy_draw.h"
@@ -230,7 +230,7 @@ static double outside(const limb_polygon *p, int n, const float at[2])
     return worst;
 }
 
-typedef struct fit { /* how well polygons hold their limbs */
+typedef struct fit { /* how well polygons cover their limbs */
     double out, beyond, off_axis;
     int points;
 } fit;

@@ -1,4 +1,4 @@
-/* Particles as fields: there and back to states, and their bodies against the kinematics of those states. */
+/* Particles as fields: conversion to states and back, and their bodies against the kinematics of those states. */
 #include "api/kernels.h"
 #include "filter/particles.h"
 

@@ -1,4 +1,4 @@
-/* Weights: exact and broken cases, and what resampling does to them. */
+/* Weights: exact cases, broken likelihoods, and resampling. */
 #include "toy_filter.h"
 
 static float uniform(uint32_t index, uint32_t draw)
@@ -62,7 +62,7 @@ static void test_equal(void)
         CHECK(p.parent[i] == i);
 }
 
-/* A likelihood that is not a number is no likelihood. */
+/* A likelihood that is NaN counts as 0. */
 static void test_broken(void)
 {
     enum { N = 8 };

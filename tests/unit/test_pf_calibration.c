@@ -1,5 +1,5 @@
 /* Simulation-based calibration (Talts et al. 2018): a truth drawn from the filter's own
- * model ranks uniformly among draws of the posterior given what is seen of it.  Here: a linear system. */
+ * model ranks uniformly among draws of the posterior given its observations.  Here: a linear system. */
 #include "toy_linear.h"
 
 enum { RUNS = 500, DIM = 4, STEPS = 8, N = 1000 };
@@ -30,7 +30,7 @@ static void linear_ranks(double claimed, double chi2[DIM])
         chi2[k] = ranks_chi2(count[k]);
 }
 
-/* Uniform; and a filter that trusts the observations twice as much as they deserve is found out. */
+/* Ranks are uniform, and are not for a filter that trusts the observations twice as much as it should. */
 static void test_linear(void)
 {
     double right[DIM], wrong[DIM], worst = 0.0;

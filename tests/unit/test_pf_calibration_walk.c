@@ -79,7 +79,7 @@ static void truth_start(const state_layout *rule, const gait_state *mean, const 
     x[F_Z] = trust * x[F_Z] + sqrt(trust) * s[F_Z];
 }
 
-/* Eqs. 5-9 of Ormoneit et al. as resolved in the design document. */
+/* Eqs. 5-9 of Ormoneit et al. with the details of doc/method.md. */
 static void truth_move(const gait_model *m, const double n[NORMALS], double *x)
 {
     double const own = (double)m->stride_hz, root = sqrt(DT);
@@ -145,7 +145,7 @@ static void crowd_start(crowd *c, const gait_state *mean)
         c->now[i] = dynamics_draw(&c->d, mean, &sd, i);
 }
 
-/* Next to nothing, so that chance ranks those who walk straight on, whose turn rates are equal. */
+/* Nearly 0: ranks people who walk straight on, whose turn rates are equal, at random. */
 static double lot(uint64_t run, int field, int32_t i)
 {
     float n[4];

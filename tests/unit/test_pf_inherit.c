@@ -1,4 +1,4 @@
-/* What belongs to particles follows them in place: ancestors as resampling gives them, any at all, rings of them, and
+/* Arrays of particles are replaced in place by their ancestors': ancestors from resampling, arbitrary ones, cycles, and
  * another number of particles before. */
 #include "filter/pf.h"
 #include "base/rng.h"

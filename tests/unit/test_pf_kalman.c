@@ -28,7 +28,7 @@ static void test_five(void)
            variance);
 }
 
-/* Resampled in every step, one dimension: the same with less at stake. */
+/* The same for one dimension, resampled in every step. */
 static void test_one(void)
 {
     linear const s = linear_new(1, 0.04);

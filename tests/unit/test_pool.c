@@ -1,4 +1,4 @@
-/* The pool calls every task once, whatever the number of threads, and returns only then; memory is the caller's. */
+/* The pool calls every task once for any number of threads, and returns after the last; memory is the caller's. */
 #include "gait_pool.h"
 
 #include "check.h"
@@ -42,7 +42,7 @@ static int calls[TASKS];
 static void count(void *ctx, int32_t task)
 {
     int *const round = ctx;
-    calls[task] += *round; /* each task is one thread's own: no lock, and a second call would show */
+    calls[task] += *round; /* without a lock, since a task runs on one thread; a second call would show */
 }
 
 static void test_every_task_once(int32_t threads)

@@ -1,4 +1,4 @@
-/* Particles drawn anew: mean and covariance remain, descent is forgotten, angles go the short way round. */
+/* Rejuvenation keeps mean and covariance, removes the dependence on ancestors, and wraps angles. */
 #include "filter/rejuvenation.h"
 #include "base/fmath.h"
 
@@ -15,7 +15,7 @@ typedef struct crowd {
 
 static float rows[N * (FIELDS + 3)];
 
-/* Normal particles; stature and place along x hang together.  Phases and headings lie across their ends. */
+/* Normal particles, with correlated stature and x; phases and headings lie on both sides of their wrap. */
 static particle_set normal_crowd(crowd *c)
 {
     particle_set const p = {.n = N, .fields = FIELDS, .value = c->value};
@@ -77,7 +77,7 @@ static double covariance(const crowd *c, int32_t f, int32_t g)
 
 static crowd first, second;
 
-/* Fifty times a twentieth of a second: what all are is as it was, who they were is forgotten. */
+/* After fifty times a twentieth of a second the moments are unchanged, and particles hardly depend on what they were. */
 static void test_mean_and_covariance_remain(void)
 {
     particle_set const from = normal_crowd(&first);
@@ -94,7 +94,7 @@ static void test_mean_and_covariance_remain(void)
     CHECK_NEAR(covariance(&first, F_STATURE, F_STATURE) / variance, 1.0, 0.15);
     CHECK_NEAR(covariance(&first, F_STATURE, F_X) / both, 1.0, 0.15);
     CHECK_NEAR(covariance(&first, F_COEF, F_COEF) / score, 1.0, 0.15);
-    double shared = 0.0; /* exp(-2.5) of who they were is left */
+    double shared = 0.0; /* a correlation of exp(-2.5) is left */
     for (int32_t i = 0; i < N; i++)
         shared += ((double)first.value[F_STATURE * N + i] - stature) *
                   ((double)start.value[F_STATURE * N + i] - stature);
@@ -129,7 +129,7 @@ static void test_others_are_drawn_by_weight(void)
         CHECK(second.value[F_STATURE * N + i] < 2.0f);
 }
 
-/* Two modes far apart stay what they are. */
+/* Two hypotheses far apart are not mixed. */
 static void test_hypotheses_are_rejuvenated_separately(void)
 {
     particle_set const from = normal_crowd(&first);

@@ -1,4 +1,4 @@
-/* gait_render: the picture that the layers draw, in bands of any image. */
+/* gait_render() against the layers, which draw the same picture, and across the seams of its bands. */
 #include "api/kernels.h"
 #include "raster/layers.h"
 #include "toy_draw.h"

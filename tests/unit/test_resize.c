@@ -72,7 +72,7 @@ static double total_weight(const gait_tracker *t)
     return sum;
 }
 
-/* Another tracker that goes on where this one, which is gone, was. */
+/* Another tracker that continues from this one, which is freed. */
 static gait_tracker *saved_and_restored(gait_tracker *t, const gait_tracker_config *cfg)
 {
     size_t bytes = 0;
@@ -127,7 +127,7 @@ static void test_down_and_up(void)
     CHECK(follow(3, false) == digest);
 }
 
-/* While left and right are open the two sides keep their particles. */
+/* While left and right are open the two hypotheses keep their particles. */
 static void test_waits_while_split(void)
 {
     gait_tracker_config const cfg = config(CAPACITY);
@@ -142,14 +142,14 @@ static void test_waits_while_split(void)
         film_step(t, 1, n, 0, &e);
         waited += n > 20 && count(t) == CAPACITY;
         CHECK_NEAR(total_weight(t), 1.0, 1e-4);
-        if (n == 20) /* the sides part after half a second */
+        if (n == 20) /* the hypotheses split after half a second */
             CHECK(gait_tracker_set_particles(t, 40, NULL) == GAIT_OK && count(t) == CAPACITY);
     }
     CHECK(waited > 3);
     toy_tracker_free(t);
 }
 
-/* Fewer particles, of which a search takes twice as many: what was asked for outlasts the search and a restore. */
+/* Acquisition uses twice the number of particles that was set, which is kept through acquisition and a restore. */
 static uint64_t search(int32_t store_at)
 {
     gait_tracker_config cfg = config(CAPACITY);

@@ -78,7 +78,7 @@ static void test_counts(void)
     CHECK(open_prior(toy_segments_write(buf, &toy), &p, &err) == GAIT_ERR_LIMIT);
 }
 
-/* A blob may hold segments alone: it can be lifted with; every use that needs the cyclic model explains itself. */
+/* A blob may contain only segments: it can be used for lifting, and calls that need the cyclic model report that. */
 static void test_no_cyclic_model(void)
 {
     static _Alignas(GAIT_ALIGN) unsigned char memory[1024];

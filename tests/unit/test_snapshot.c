@@ -1,4 +1,4 @@
-/* Saving and restoring: the same continuation, and nothing but an exact snapshot is taken. */
+/* Saving and restoring: the tracker continues identically, and only an undamaged snapshot is accepted. */
 #include "tracker/tracker.h"
 
 #include "toy_classes.h"
@@ -27,7 +27,7 @@ static unsigned char *save(const gait_tracker *t, size_t *bytes)
     return mem;
 }
 
-/* Does the pieces at once, like the library itself. */
+/* An executor that runs all tasks in the calling thread, like the library itself. */
 static void run_here(void *user, gait_task_fn *fn, void *ctx, int32_t count)
 {
     (void)user;
@@ -96,7 +96,7 @@ static void test_digest(void)
 static gait_tracker *target;
 static uint64_t target_digest;
 
-/* Refused with a reason, and the tracker goes on as if nothing had been. */
+/* Check that a snapshot is refused with a reason, and that the tracker is unchanged. */
 static void refuse(const unsigned char *mem, size_t bytes, gait_result want)
 {
     gait_error err = {0};
@@ -148,7 +148,7 @@ static void test_damage(void)
     free(kept);
 }
 
-/* One number where no tracker gets to, with a checksum that is right; the number is then as before. */
+/* Set one number to a value that no tracker reaches, with a correct checksum, check that it is refused, and restore it. */
 static void spoil(gait_tracker *t, void *field, const void *bad, size_t size)
 {
     unsigned char good[8];

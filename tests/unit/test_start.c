@@ -9,7 +9,7 @@
 
 enum { FRAMES = 26, JOINTS = TOY_POINTS };
 
-typedef struct walk { /* what the keypoints are made from */
+typedef struct walk { /* from which keypoints are generated */
     float heading, speed, rate, stature, phase, x, y;
     float noise;      /* pixels */
     float wrong;      /* share of keypoints that are somewhere else */
@@ -186,7 +186,7 @@ static void test_no_walk(void)
     walk w = usual();
     w.wrong = 1.0f;
     gait_hypothesis const h = find(&w);
-    CHECK(h.chi2_per_observation > 3.0f); /* the caller's sign that nothing fits */
+    CHECK(h.chi2_per_observation > 3.0f); /* from which the caller sees that nothing fits */
 }
 
 /* Drawn again and again, nine of ten truths lie within 1.64 standard deviations. */

@@ -62,7 +62,7 @@ static void test_particles_follow_the_probabilities(void)
     gait_tracker_config const cfg = config();
     gait_hypothesis h[] = {other_way(0.5f), truth(0.3f), half_stride(0.2f), half_stride(0.004f)};
     gait_tracker *t = begin(&cfg, h, 4);
-    CHECK(t->cfg.particles == cfg.acquisition_particles); /* as long as several compete */
+    CHECK(t->cfg.particles == cfg.acquisition_particles); /* while several compete */
     CHECK(abs(particles_of(t, &h[0]) - t->cfg.particles / 2) < 3);
     CHECK(abs(particles_of(t, &h[1]) - t->cfg.particles * 3 / 10) < 3);
     CHECK(abs(particles_of(t, &h[2]) - t->cfg.particles / 5) < 3);
@@ -92,7 +92,7 @@ static void test_one_is_a_start(void)
     toy_tracker_free(b);
 }
 
-/* The right hypothesis is the least probable one. */
+/* The correct hypothesis is the least probable one. */
 static void test_images_choose(void)
 {
     gait_tracker_config const cfg = config();

@@ -26,7 +26,7 @@ static void note(void *ctx, int32_t begin, int32_t end, int32_t task)
         r->hits[i]++;
 }
 
-/* An executor that runs the pieces backwards. */
+/* An executor that runs the tasks in reverse order. */
 static void backwards(void *user, gait_task_fn *fn, void *ctx, int32_t count)
 {
     ++*(int *)user;
@@ -47,7 +47,7 @@ static void *run_job(void *arg)
     return NULL;
 }
 
-/* An executor with a thread for every piece. */
+/* An executor with one thread per task. */
 static void threads(void *user, gait_task_fn *fn, void *ctx, int32_t count)
 {
     pthread_t id[MOST];

@@ -1,4 +1,4 @@
-/* Track loss and recovery: an empty scene, an occluded person, back where expected or elsewhere. */
+/* Track loss and recovery: an empty scene, an occluded person, reappearance where expected or elsewhere. */
 #include "tracker/track_loss.h"
 
 #include "tracker/front_back.h"
@@ -82,8 +82,8 @@ static const uint8_t *behind_post(int n, float x)
     return picture;
 }
 
-/* Behind a post beside which a leg or an arm is seen now and then: followed, and never called lost, though
- * the whole body has no support for longer than a person may be hidden. */
+/* A person behind a post, beside which a leg or an arm appears now and then, is followed and never reported as lost,
+ * although the whole body has no support for longer than a person may be hidden. */
 static void test_hidden_in_part(void)
 {
     gait_tracker *const t = begin();
@@ -133,8 +133,8 @@ static void test_something_else(void)
     toy_tracker_free(t);
 }
 
-/* Back further on and in another phase than predicted: found by searching, and then not simply believed where
- * that changes the phase.  Which of the two it is depends on the draws. */
+/* A person who reappears further on and in another phase than predicted is found by redrawn particles; if that changes the
+ * phase, left and right are open.  Whether it does depends on the draws. */
 static void test_elsewhere(void)
 {
     enum { SEEDS = 16 };
@@ -212,7 +212,7 @@ static void test_front_back(void)
     toy_tracker_free(t);
 }
 
-/* No particle counts as less likely than a hidden person. */
+/* The likelihood of no particle is below that of a hidden person. */
 static void test_the_bound(void)
 {
     gait_tracker *const t = begin();

@@ -1,4 +1,4 @@
-/* Which frames a latency budget lets through, and how the number of particles follows it. */
+/* Which frames a latency budget allows, and how the number of particles adapts to it. */
 #include "../../tools/trackd/timing.c"
 #include "check.h"
 
@@ -138,7 +138,7 @@ static int changes(budget *b, int32_t *particles, int32_t most, int steps)
     return count;
 }
 
-/* It doubled every three seconds for ever, and halved again a second later. */
+/* The number used to double every three seconds for ever, and to be halved a second later. */
 static void test_what_was_too_many_is_tried_less_and_less_often(void)
 {
     enum { SECOND = 30 };

@@ -140,7 +140,7 @@ static bool save(size_t at, int with)
     return !f.failed;
 }
 
-/* The data are on the disk before the name is theirs, and the name before anything is reported as written. */
+/* The data are on the disk before the file has its name, and the name is before anything is reported as written. */
 static void test_order(void)
 {
     CHECK(save(0, 0) && files() == 1);
@@ -206,7 +206,7 @@ static void test_torn(void)
     free(whole.data);
 }
 
-/* Leftovers of killed daemons go, those of running ones and other files stay. */
+/* Leftovers of killed daemons are removed; those of running ones and other files stay. */
 static void test_leftovers(void)
 {
     static const char *const names[] = {"2147483646", "1", "bak", "7x"};

@@ -1,10 +1,10 @@
-/* Strides from estimates: times and lengths of a known walk, trembling, missed strikes, uncertain, new starts. */
+/* Strides from estimates: times and lengths of a known walk, a fluctuating phase, missed strikes, uncertainty, restarts. */
 #include "../../tools/trackd/strides.c"
 #include "check.h"
 
 enum { FRAMES = 200, MOST = 20 };
 
-/* A walk of 0.8 strides a second and 1.25 m/s along a slanting way, at 25 frames a second. */
+/* A walk of 0.8 strides per second and 1.25 m/s along an oblique line, at 25 frames per second. */
 static gait_estimate walk(int n)
 {
     double const t = 0.04 * n;

@@ -1,4 +1,4 @@
-/* Where tracking begins and ends: first frames, refusals, loss, ambiguity, what is learned on the way. */
+/* The limits of tracking: first frames, refused frames, track loss, ambiguity, learnt appearance. */
 #include "tracker/tracker.h"
 
 #include "toy_error.h"
@@ -90,7 +90,7 @@ static void test_refusals(void)
     toy_tracker_free(t);
 }
 
-/* ---- loss ---- */
+/* ---- track loss ---- */
 
 /* A blank image: after a third of a second the person is lost, and the place becomes less and less certain. */
 static void test_occluded(void)
@@ -148,7 +148,7 @@ static void test_no_image(void)
     toy_tracker_free(t);
 }
 
-/* Phase unknown: no status of tracking before both sides have had their chance. */
+/* With an unknown phase the status is not `tracking` before both hypotheses have been compared. */
 static void test_unknown_phase(void)
 {
     gait_tracker_config cfg = toy_config(2);
@@ -170,7 +170,7 @@ static void test_unknown_phase(void)
     toy_tracker_free(t);
 }
 
-/* A share of the particles half a stride away: one mode must hold 70 % to be tracked. */
+/* With some particles half a stride away the status is `tracking` only if the dominant hypothesis has 70 %. */
 static void test_ambiguous(void)
 {
     static const struct {

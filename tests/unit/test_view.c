@@ -1,4 +1,4 @@
-/* The region of interest: where it goes, and what its pixels are taken from. */
+/* The region of interest: how it follows the person, and from where its pixels are resampled. */
 #include "image/view.h"
 
 #include "image/camera.h"
@@ -107,7 +107,7 @@ static void test_copy(void)
     }
 }
 
-/* Three channels stay apart. */
+/* Three channels are not mixed. */
 static void test_colour(void)
 {
     enum { W = 260, H = 258, STRIDE = 3 * W + 5 };
@@ -129,7 +129,7 @@ static void test_colour(void)
     }
 }
 
-/* A slanted plane of grey is resampled to the slanted plane, at every scale: nothing is shifted. */
+/* A ramp of grey levels is resampled to the same ramp at every scale: nothing is shifted. */
 static void test_ramp(void)
 {
     static const float scales[] = {2.0f, 1.37f, 1.0f, 0.83f, 0.61f, 0.47f, 0.31f, 0.24f};

@@ -1,4 +1,4 @@
-/* Paper mode notices that the picture under the body does not walk with it, and that it does again. */
+/* Paper mode notices when the surface under the body does not walk with it, and when it does again. */
 #include "tracker/tracker.h"
 #include "tracker/walk_check.h"
 
@@ -59,7 +59,8 @@ static void test_a_person_walks_with_the_body(void)
     CHECK(least > 15.0f && lost(status, 0, FRAMES) == 0); /* elsewhere the surface is not found again */
 }
 
-/* On the wall the likelihood is as high as ever; the check ends the track within a second, and begins it again. */
+/* On the wall the likelihood is as high as on the person; the check reports the track as lost within a second, and as found
+ * when the person is back. */
 static void test_a_wall_stays(void)
 {
     gait_tracker_config cfg = walking_on();
