@@ -196,13 +196,12 @@ class LiftConfig(Config):
 
     def to_c(self, view: Camera | ArrayLike) -> Any:
         """Make a ``gait_lift_config`` for a camera, or for the directions (2, 3) of u and v in the world."""
-        from gait.bindings.model import camera_c
         from gait.camera.camera import Camera
 
         c = self._filled(0)
         self._fill(c)
         if isinstance(view, Camera):
-            c.projection, c.camera = abi.Projection.PERSPECTIVE, camera_c(view)
+            c.projection, c.camera = abi.Projection.PERSPECTIVE, view.to_c()
         else:
             c.projection = abi.Projection.ORTHOGRAPHIC
             for row, axis in zip(c.axis, _axes(view), strict=True):

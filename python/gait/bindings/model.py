@@ -206,7 +206,7 @@ class Model:
     def render(self, camera: Camera, state: State) -> NDArray[np.uint8]:
         """Draw a hypothesis through an ideal lens: (height, width) of limb index + 1, or 0 for none."""
         ids = np.zeros((camera.height, camera.width), np.uint8)
-        call("gait_render", self.handle, camera_c(camera), state.to_c(), ids, camera.width)
+        call("gait_render", self.handle, camera.to_c(), state.to_c(), ids, camera.width)
         return ids
 
     def _read_info(self, handle: object) -> ModelInfo:
@@ -218,15 +218,6 @@ class Model:
 def pose_arrays(c: abi.PoseC, joints: int, angles: int) -> tuple[Array, Array]:
     """Copy a ``gait_pose`` to arrays (joints, 3) and (angles,)."""
     return np.array(c.joint, float)[:joints], np.array(c.angle[:angles], float)
-
-
-def camera_c(camera: Camera) -> abi.CameraC:
-    """Make a ``gait_camera``."""
-    library()  # describes the structures
-    c = abi.CameraC(camera.width, camera.height, camera.fx, camera.fy, camera.cx, camera.cy)
-    c.R[:], c.t[:] = camera.R.ravel().tolist(), camera.t.tolist()
-    c.distortion[:] = camera.distortion.tolist()
-    return c
 
 
 def pose_c(pose: CameraPose) -> abi.CameraPoseC:

@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from gait.bindings import abi
 from gait.bindings.frame import FrameKeypoints, image_view, keypoint_array
 from gait.bindings.library import call, library, make
-from gait.bindings.model import Model, camera_c, pose_c
+from gait.bindings.model import Model, pose_c
 from gait.bindings.state import State
 from gait.camera.camera import Camera
 from gait.camera.path import CameraPose
@@ -113,7 +113,7 @@ class StartFit:
     ) -> None:
         self._model, self._camera, config = model, camera, abi.StartConfigC()
         library().gait_start_fill(config, ctypes.sizeof(config))
-        config.camera = camera_c(camera)
+        config.camera = camera.to_c()
         config.stature = config.stature if stature is None else stature
         config.stature_sd = config.stature_sd if stature_sd is None else stature_sd
         config.box_time = config.box_time if box_time is None else box_time

@@ -17,7 +17,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from gait.bindings.abi import MAX_PIXELS
+from gait.bindings.abi import MAX_PIXELS, CameraC
 from gait.camera import other_files
 from gait.camera.lens import AGREE, agreeing
 from gait.errors import GaitArgumentError, UserError
@@ -199,12 +199,21 @@ class Camera:
     def check_place(self, where: str) -> None:
         """Raise UserError unless people who stand on the floor, z = 0, would be upright in the picture."""
         from gait.bindings.library import call
-        from gait.bindings.model import camera_c
 
         try:
-            call("gait_camera_check", camera_c(self))
+            call("gait_camera_check", self.to_c())
         except GaitArgumentError as exc:
             raise UserError(f"{where}: {exc.text} (gait camera makes such a file)") from None
+
+    def to_c(self) -> CameraC:
+        """Make a ``gait_camera``."""
+        from gait.bindings.library import library
+
+        library()  # describes the structures
+        c = CameraC(self.width, self.height, self.fx, self.fy, self.cx, self.cy)
+        c.R[:], c.t[:] = self.R.ravel().tolist(), self.t.tolist()
+        c.distortion[:] = self.distortion.tolist()
+        return c
 
     def to_dict(self) -> dict[str, Any]:
         """Return the keys of the JSON camera file."""

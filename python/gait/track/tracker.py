@@ -14,7 +14,7 @@ from gait.bindings.config import TrackerConfig
 from gait.bindings.estimate import Estimate
 from gait.bindings.frame import FrameKeypoints, capture_time, image_view, keypoint_array, per_camera
 from gait.bindings.library import aligned, call, library, make
-from gait.bindings.model import Model, camera_c, pose_c
+from gait.bindings.model import Model, pose_c
 from gait.bindings.start_fit import Hypothesis
 from gait.bindings.state import LEAST_STATURE, State
 from gait.camera.camera import Camera
@@ -260,7 +260,7 @@ class Tracker:
             raise UserError(f"cameras: {len(self.cameras)} given; use 1 to {abi.MAX_CAMERAS}")
         c.cameras = len(self.cameras)
         for i, camera in enumerate(self.cameras):
-            c.camera[i] = camera_c(camera)
+            c.camera[i] = camera.to_c()
         if self._tasks is not None:
             c.exec = self._tasks.struct
         return c
