@@ -227,6 +227,20 @@ def test_a_frame_number_far_away_begins_another_count(tmp_path):
     assert outcome.dropped == 2  # 106 and 107
 
 
+@pytest.mark.parametrize("time", [-(2**63), -1, 2**63 - 1])
+def test_a_time_that_is_none_stops_nothing(time, tmp_path):
+    start = rig.start(0)
+    start.utime = time
+    strangers = [
+        ("GAIT_IMAGE_0", image_message(rig.picture(1), time, 1)),
+        ("GAIT_COMMAND", start),
+    ]
+    plain = track(tmp_path, [*rig.opening(), *rig.frames(0, 4)])
+    outcome = track(tmp_path, [*rig.opening(), *rig.frames(0, 2), *strangers, *rig.frames(2, 4)])
+    assert f"time {time} is none; send microseconds since 1970" in outcome.words
+    assert (outcome.digest, outcome.rejected) == (plain.digest, 1)
+
+
 def test_a_camera_that_differs_by_rounding_is_the_same(tmp_path):
     again = camera_message(rig.CAMERA, 1)
     again.R = [x + 3e-8 for x in again.R]

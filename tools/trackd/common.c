@@ -3,6 +3,7 @@
 #include "gait.h"
 
 #include <errno.h>
+#include <inttypes.h>
 #include <stdarg.h>
 #include <stdio.h>
 #include <stdlib.h>
@@ -44,6 +45,12 @@ int64_t clock_wall(void)
 int64_t clock_monotonic(void)
 {
     return clock_us(CLOCK_MONOTONIC);
+}
+
+bool clock_check(int64_t utime, message *why)
+{
+    return (utime >= 0 && utime <= INT64_MAX / 2) ||
+           message_set(why, "time %" PRId64 " is none; send microseconds since 1970", utime);
 }
 
 /* ---- memory ---- */

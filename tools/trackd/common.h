@@ -20,6 +20,8 @@ void log_line(const char *format, ...) __attribute__((format(printf, 1, 2)));
 /* ---- clocks, microseconds. */
 int64_t clock_wall(void);      /* since the Unix epoch */
 int64_t clock_monotonic(void); /* from an arbitrary origin, unaffected by setting the date */
+/* Whether a time in a message is one: 0 or more, and so that sums and differences of two fit. */
+bool clock_check(int64_t utime, message *why);
 
 /* ---- memory aligned to GAIT_ALIGN, as the library requires; free() it.  NULL, with `why` set, if there is not enough. */
 void *aligned_memory(size_t bytes, const char *what, message *why);

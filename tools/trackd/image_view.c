@@ -123,7 +123,8 @@ bool image_view_open(image_view *v, const void *message_bytes, size_t size, mess
     v->frame = -1;
     for (int32_t left = bytes_int32(&r); r.ok && left > 0; left--)
         take_metadata(&r, v);
-    return r.ok || message_set(why, "damaged message: shorter than its lengths state");
+    return r.ok ? clock_check(v->utime, why)
+                : message_set(why, "damaged message: shorter than its lengths state");
 }
 
 bool image_view_pixels(const image_view *v, int32_t width, int32_t height, gait_image *out, message *why)

@@ -38,7 +38,8 @@ bool keypoints_view_open(keypoints_view *v, const void *message_bytes, size_t si
     v->rest = r;
     for (int32_t i = 0; r.ok && i < v->count; i++)
         read_keypoint(&r, v->profiled, &each);
-    return (r.ok && v->count >= 0) || message_set(why, "damaged message: shorter than its lengths state");
+    return r.ok && v->count >= 0 ? clock_check(v->utime, why)
+                                 : message_set(why, "damaged message: shorter than its lengths state");
 }
 
 bool keypoints_view_next(keypoints_view *v, keypoint_view *out)

@@ -14,6 +14,8 @@ static const timed_pose *pose_at(const pose_path *p, int64_t index)
 bool pose_path_add(pose_path *p, int64_t utime, const gait_camera *camera, message *why)
 {
     int64_t const last = p->count > 0 ? pose_at(p, p->count - 1)->utime : INT64_MIN;
+    if (!clock_check(utime, why))
+        return false;
     if (p->count > 0 && utime <= last && utime > last - POSE_PATH_SET_BACK) {
         p->refused += utime < last; /* repeating a pose is no fault */
         return utime == last || message_set(why, "a camera pose arrived out of order and was dropped; "

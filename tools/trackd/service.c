@@ -299,7 +299,8 @@ static void command_start(service *s, const gaitmsg_command_t *msg)
 {
     gait_state mean, sd;
     message why;
-    if (!convert_state_message(&msg->mean, &s->track.prior_mean, &mean, &why) ||
+    if (!clock_check(msg->utime, &why) ||
+        !convert_state_message(&msg->mean, &s->track.prior_mean, &mean, &why) ||
         !convert_state_message(&msg->sd, &s->track.prior_sd, &sd, &why)) {
         service_complain(s, "%s", why.text);
     } else if (start_usable(s, &mean, &sd)) {
