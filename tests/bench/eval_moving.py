@@ -5,7 +5,7 @@
 
 Simulated walks (gait simulate --moving), each started from its init file, without a detector: poses as they
 are, poses with errors that are drawn anew for each frame, with and without their standard deviations in the
-file, and turns that --stabilize finds.  Clips are kept in build/eval-moving.
+file, and what --stabilize finds.  Clips are kept in build/eval-moving.
 """
 
 from __future__ import annotations
@@ -68,8 +68,7 @@ def main() -> int:
             add(kind, "exact", folder, camera_path="poses.csv")
             add(kind, "noisy", folder, camera_path="noisy.csv")
             add(kind, "noisy, sd not given", folder, camera_path="unstated.csv")
-            if kind != "follow":
-                add(kind, "estimated", folder, stabilize="auto")
+            add(kind, "estimated", folder, stabilize="auto")
     rows, missed = [], False
     for (kind, arm), values in roots.items():
         still = np.median(roots[STILL.get(kind, kind), "still"])

@@ -21,7 +21,7 @@ from gait.track.camera_motion import View
 from gait.track.moving_video import MovingVideo, map_pixels, panorama_of
 from gait.track.options import ClipOptions
 from gait.track.scene import Scene
-from gait.track.stabilise import find_motion, moves
+from gait.track.stabilise import find_motion, find_travel, moves
 
 CAMERA = Camera.looking((0.0, -6.0, 1.5), (0.0, 0.0, 1.0), (320, 240), 270.0)
 PANORAMA = replace(CAMERA, width=800, height=600, cx=400.0, cy=300.0)
@@ -87,6 +87,51 @@ def test_the_turns_of_the_camera_are_found(tmp_path, pan, shake):
         assert np.hypot(*(found - wanted).T).max() < 1.0  # the zoom is no part of a pose
         moved = replace(people()[0], frame=np.array([frame.number]), uv=found[None, :2])
         assert motion.in_reference(moved).uv[0] == pytest.approx(pixels[:2], abs=0.7)
+
+
+def travelling(path, away: float, angle: float, floor: bool = True) -> tuple[Video, list[Camera]]:
+    """Write what a robot's camera sees that drives `away` metres and turns by `angle`: floor, sky, a box."""
+    rng, count = np.random.default_rng(4), 12
+    texture = cv2.resize(rng.integers(40, 220, (300, 300)).astype(np.uint8), (1800, 1800))
+    ways = np.linspace(0, 1, count)
+    lens = Camera.looking((0.0, -2.0, 1.0), (0.0, 0.0, 0.8), (320, 240), 200.0)
+    cameras = [
+        Camera.looking(
+            (0.2 * away * way, -2 + away * way, 1.0), (angle * way, away * way, 0.8), lens.size, 200.0
+        )
+        for way in ways
+    ]
+    grid = np.stack(np.meshgrid(np.arange(320.0), np.arange(240.0)), axis=-1)
+    with VideoWriter(path, 30, crf=6) as out:
+        for k, camera in enumerate(cameras):
+            rays = camera.rays(grid)
+            down = np.minimum(rays[..., 2:], -1e-3)
+            there = 60 * (camera.centre[:2] - camera.centre[2] * rays[..., :2] / down) + 900
+            sky = 300 * np.stack([np.arctan2(rays[..., 0], rays[..., 1]), rays[..., 2]], axis=-1) + 900
+            ground = rays[..., 2:] < -0.02
+            maps = np.where(ground, there, sky).astype(np.float32)
+            picture = cv2.remap(texture, *cv2.split(maps), cv2.INTER_LINEAR, borderMode=cv2.BORDER_WRAP)
+            if not floor:
+                picture[ground[..., 0]] = 120
+            picture[100:180, 130 + 2 * k : 170 + 2 * k] = 30
+            out.write(np.repeat(picture[..., None], 3, axis=2))
+    return Video(path), cameras
+
+
+def test_the_poses_of_a_camera_that_travels_over_a_floor_are_found(tmp_path, capsys):
+    """Although a box moves with the camera that is not known to be a person."""
+    video, cameras = travelling(tmp_path / "v.mp4", 0.8, 0.2)
+    poses = find_travel(video, cameras[0], sample_frames(video), {}, quiet=False)
+    assert len(poses) == len(cameras) and "the camera travelled up to 0.8 m" in capsys.readouterr().err
+    for number, camera in enumerate(cameras):
+        assert np.linalg.norm(poses[number].centre - camera.centre) < 0.02
+        assert np.degrees(np.linalg.norm(cv2.Rodrigues(poses[number].R @ camera.R.T)[0])) < 0.3
+
+
+@pytest.mark.parametrize(("away", "floor"), [(0.0, True), (0.8, False)])
+def test_a_camera_that_only_turns_or_sees_no_floor_has_no_path(tmp_path, away, floor):
+    video, cameras = travelling(tmp_path / "v.mp4", away, 0.2, floor)
+    assert find_travel(video, cameras[0], sample_frames(video), {}, quiet=True) == {}
 
 
 def test_a_camera_that_stands_still_is_left_alone(tmp_path):

@@ -159,7 +159,7 @@ def add_stabilize(parser: _ActionsContainer, default: str | None) -> None:
         "--stabilize",
         choices=["auto", "off"],
         default=default,
-        help="auto: estimate how the camera turns; joints are then in the scene's frame: that of the first "
+        help="auto: estimate how the camera moves; joints are then in the scene's frame: that of the first "
         "frame if a camera is given, or else of the frame that the command names (default: off)",
     )
 

@@ -23,18 +23,18 @@ Box = tuple[float, float, float, float]
 """Left, top, right, bottom, pixels."""
 
 _SIDE = 640  # pixels of the longer side of the pictures in which corners are tracked, at most
-_CELLS = 18  # cells along it; one corner from each, so that a thing with much texture has no larger share
+CELLS = 18  # cells along it; one corner from each, so that a thing with much texture has no larger share
 _EDGE = 8  # pixels from the picture's edge without corners
 _CORNER = 3e-4  # least smaller eigenvalue of a corner's gradients, as cornerMinEigenVal gives it
 _WINDOW, _LEVELS = (21, 21), 3  # of Lucas-Kanade
-_FEWEST = 20  # corners that agree, at least
+FEWEST = 20  # corners that agree, at least
 _STILL = 0.75  # pixels by which a corner of a still camera moves at most, from noise and compression
 _SHARE = 0.3  # of the corners that must agree, at least
 _AREA = 0.2  # over which they lie, against corners all over the picture, at least
 _FEW_LEFT = 0.5  # share of a key frame's corners below which a new key frame is taken
-_TUKEY, _SHARPEST, _BLUNTEST = 4.685, 0.15, 2.0  # standard deviations to weight 0; least and most sd, pixels
+TUKEY, SHARPEST, BLUNTEST = 4.685, 0.15, 2.0  # standard deviations to weight 0; least and most sd, pixels
 _ZOOM = 1e-4  # variance of the logarithm of the zoom
-_ITERATIONS, _COARSE = 20, 4  # of the fit; the first ones with the sd of all corners
+ITERATIONS, COARSE = 20, 4  # of the fit; the first ones with the sd of all corners
 
 
 @dataclass(frozen=True)
@@ -87,7 +87,7 @@ class CameraMotion:
     """
 
     def __init__(self, camera: Camera) -> None:
-        self.scale = min(1.0, _SIDE / max(camera.size))
+        self.scale = working_scale(camera)
         self._camera = replace(camera.scaled(self.scale), R=np.eye(3), t=np.zeros(3))
         self._last = self._key_view = UNMOVED
         self._key = self._previous = np.zeros((0, 0), np.uint8)
@@ -96,11 +96,11 @@ class CameraMotion:
 
     def start(self, image: Image, people: Iterable[Box] = ()) -> None:
         """Take the reference, (h, w) grey or (h, w, 3) BGR, with boxes of people in it."""
-        self._set_key(self._small(image), people, UNMOVED)
+        self._set_key(small_picture(image, self._camera), people, UNMOVED)
 
     def still(self, image: Image) -> bool:
         """Whether the camera looks as in the key frame."""
-        after = self._track(self._small(image), UNMOVED)
+        after = self._track(small_picture(image, self._camera), UNMOVED)
         if after is None:
             return False
         off = np.hypot(*(after - self._corners)[np.isfinite(after[:, 0])].T)
@@ -108,7 +108,7 @@ class CameraMotion:
 
     def step(self, image: Image, people: Iterable[Box] = ()) -> View:
         """Find the view of the next frame; where that fails it is the last one, with residual NaN."""
-        small = self._small(image)
+        small = small_picture(image, self._camera)
         found, visible = self._match(small)
         if visible < _FEW_LEFT:
             self._set_key(self._previous, self._people, self._last)
@@ -118,16 +118,10 @@ class CameraMotion:
         self._last, self._previous, self._people = view, small, people
         return replace(view, residual=view.residual / self.scale)
 
-    def _small(self, image: Image) -> Image:
-        grey = image if image.ndim == 2 else cv2.cvtColor(image, cv2.COLOR_BGR2GRAY)
-        if self.scale < 1:
-            grey = cv2.resize(grey, self._camera.size, interpolation=cv2.INTER_AREA)
-        return np.asarray(grey, np.uint8)
-
     def _set_key(self, small: Image, people: Iterable[Box], view: View) -> None:
         self._key, self._key_view = small, view
         self._previous, self._people = small, people
-        self._corners = _corners(small, self.scale * np.array(list(people)).reshape(-1, 4))
+        self._corners = find_corners(small, self.scale * np.array(list(people)).reshape(-1, 4))
 
     def _match(self, small: Image) -> tuple[View | None, float]:
         """View of a picture, if enough corners agree, and the share of them that are still visible."""
@@ -138,8 +132,8 @@ class CameraMotion:
         visible = np.isfinite(after[:, 0])
         places = after[visible].astype(float)
         view, agree = fit_view(self._camera, self._corners[visible].astype(float), places, guess)
-        enough = agree.sum() >= _FEWEST and self._everywhere(places[agree])
-        found = enough and agree.mean() > _SHARE and view.residual < _BLUNTEST
+        enough = agree.sum() >= FEWEST and self._everywhere(places[agree])
+        found = enough and agree.mean() > _SHARE and view.residual < BLUNTEST
         return view.after(self._key_view) if found else None, agree.sum() / len(after)
 
     def _everywhere(self, places: Array) -> bool:
@@ -149,7 +143,7 @@ class CameraMotion:
 
     def _track(self, small: Image, guess: View) -> NDArray[np.float32] | None:
         """Places (N, 2) of the key frame's corners, NaN where they are not visible; None if too few are."""
-        if len(self._corners) < _FEWEST:
+        if len(self._corners) < FEWEST:
             return None
         expected = map_pixels(self._corners.astype(float), self._camera, guess.camera(self._camera))
         places, found, _ = cv2.calcOpticalFlowPyrLK(
@@ -164,16 +158,29 @@ class CameraMotion:
         after = np.asarray(places[:, 0], np.float32)
         inside = ((after > 2) & (after < np.array(self._camera.size) - 3)).all(axis=1)
         after[(found[:, 0] == 0) | ~inside] = np.nan
-        return after if np.isfinite(after[:, 0]).sum() >= _FEWEST else None
+        return after if np.isfinite(after[:, 0]).sum() >= FEWEST else None
 
 
-def _corners(grey: Image, people: Array) -> NDArray[np.float32]:
+def working_scale(camera: Camera) -> float:
+    """Size of the pictures in which corners are tracked over that of a camera's."""
+    return min(1.0, _SIDE / max(camera.size))
+
+
+def small_picture(image: Image, camera: Camera) -> Image:
+    """Grey picture (h, w) of the size of `camera` from one (h, w) or (h, w, 3) BGR."""
+    grey = image if image.ndim == 2 else cv2.cvtColor(image, cv2.COLOR_BGR2GRAY)
+    if grey.shape[::-1] != camera.size:
+        grey = cv2.resize(grey, camera.size, interpolation=cv2.INTER_AREA)
+    return np.asarray(grey, np.uint8)
+
+
+def find_corners(grey: Image, people: Array) -> NDArray[np.float32]:
     """Best corner (N, 2) of each cell of a grid, not in boxes (K, 4) of people."""
     strength = cv2.cornerMinEigenVal(grey, 7)
     for left, top, right, bottom in np.maximum(people, 0).astype(int):
         strength[top:bottom, left:right] = 0
     inner = strength[_EDGE:-_EDGE, _EDGE:-_EDGE]
-    side = max(grey.shape) / _CELLS
+    side = max(grey.shape) / CELLS
     rows, columns = (np.arange(0, size, side).astype(int) for size in inner.shape)
     found = []
     for top in rows:
@@ -194,23 +201,23 @@ def fit_view(
     """
     rays, view, sd = replace(camera, R=np.eye(3), t=np.zeros(3)).rays(before), start, np.inf
     off = np.zeros(len(before))
-    for iteration in range(_ITERATIONS):
+    for iteration in range(ITERATIONS):
         expected, slope = _motion(rays, view, camera)
         miss = after - expected
         off = np.hypot(*miss.T)
-        near = off if iteration < _COARSE else off[off < _TUKEY * sd]
+        near = off if iteration < COARSE else off[off < TUKEY * sd]
         near_sd = float(np.median(near)) / 1.177 if len(near) else np.inf  # of two normal coordinates
-        sd = max(_SHARPEST, near_sd if iteration < _COARSE else min(sd, near_sd))
-        weight = np.square(np.clip(1 - np.square(off / (_TUKEY * sd)), 0, None))
+        sd = max(SHARPEST, near_sd if iteration < COARSE else min(sd, near_sd))
+        weight = np.square(np.clip(1 - np.square(off / (TUKEY * sd)), 0, None))
         normal = np.einsum("nki,n,nkj->ij", slope, weight, slope)
         right = np.einsum("nki,n,nk->i", slope, weight, miss)
         normal[3, 3] += 1 / _ZOOM
         right[3] -= np.log(view.zoom) / _ZOOM
         step = np.linalg.solve(normal + 1e-6 * np.eye(4), right)
         view = View(cv2.Rodrigues(step[:3])[0] @ view.turn, view.zoom * float(np.exp(step[3])), sd)
-        if iteration > _COARSE and np.abs(step).max() < 1e-7:
+        if iteration > COARSE and np.abs(step).max() < 1e-7:
             break
-    return view, off < _TUKEY * sd
+    return view, off < TUKEY * sd
 
 
 def _motion(rays: Array, view: View, camera: Camera) -> tuple[Array, Array]:

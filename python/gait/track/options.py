@@ -63,7 +63,7 @@ class ClipOptions:
     keypoints_sd : float
         Their standard deviation at full confidence, pixels.
     stabilize : str
-        ``auto``: find how the camera turns; ``off``: it stands still, or its poses are given.
+        ``auto``: find how the camera moves; ``off``: it stands still, or its poses are given.
     overlay, draws, trc, report : str, optional
         Further files to write.
     smooth : bool

@@ -32,7 +32,7 @@ from gait.track.keypoint_start import find_keypoint_start, keypoint_noise
 from gait.track.moving_video import MovingVideo, map_pixels, panorama_of
 from gait.track.options import ClipOptions
 from gait.track.other_people import OtherPeople, Outline
-from gait.track.stabilise import CameraTurns, find_turns, moves
+from gait.track.stabilise import CameraTurns, find_travel, find_turns, moves
 from gait.track.walk_camera import calibrate_film, expected_camera, note_camera
 
 Array = NDArray[np.float64]
@@ -174,7 +174,10 @@ class Scene:
         motion = None
         if options.stabilize != "off" and not poses:
             lens, first = camera or expected_camera(video, options.fov), camera is not None
-            motion = find_turns(video, lens, samples, people, given, options.quiet, first=first)
+            if first and given is None:
+                poses = find_travel(video, lens, samples, people, options.quiet)
+            if not poses:
+                motion = find_turns(video, lens, samples, people, given, options.quiet, first=first)
         calibration = None
         if camera is None:
             person, calibration = _calibrate(options, video, model, people, motion)

@@ -95,11 +95,9 @@ def _background(options: ClipOptions, scene: Scene, used: bool) -> str:
 
 def _camera(options: ClipOptions, scene: Scene) -> str:
     if scene.calibration is None:
-        return (
-            f"{options.camera}, moving as in {options.camera_path}"
-            if options.camera_path
-            else str(options.camera)
-        )
+        if options.camera_path:
+            return f"{options.camera}, moving as in {options.camera_path}"
+        return f"{options.camera}, in frame 0" if scene.poses else str(options.camera)
     return f"estimated from the walk and the stature of {options.height:.2f} m"
 
 

@@ -1,4 +1,4 @@
-"""Estimate how the camera of a clip without poses turns.
+"""Estimate how the camera of a clip without poses turns, or how it travels.
 
 The track is in the scene's frame: the world of the reference frame, for which the camera given holds.
 """
@@ -17,7 +17,8 @@ from gait.camera.path import CameraPose
 from gait.io.keypoints_file import Keypoints
 from gait.io.video import Frame, Image, Video
 from gait.progress import note, progress
-from gait.track.camera_motion import Box, CameraMotion, View, fit_view
+from gait.track.camera_motion import FEWEST, Box, CameraMotion, View, fit_view
+from gait.track.camera_travel import CameraTravel
 from gait.track.moving_video import map_pixels
 
 Array = NDArray[np.float64]
@@ -25,6 +26,7 @@ Array = NDArray[np.float64]
 _MARGIN = 0.15  # of a person's height, about the keypoints
 _MOSTLY = 0.8  # of the frames in which the camera must be found, or be still
 _TRAVELS = 1.0  # pixels of a picture 640 wide: median residual from which the camera does not only turn
+_AWAY = 0.15  # metres from the median place from which it does not, if the floor is seen
 
 
 @dataclass(frozen=True)
@@ -155,6 +157,49 @@ def find_turns(
         quiet,
     )
     return motion
+
+
+def find_travel(
+    video: Video, camera: Camera, samples: Sequence[Frame], people: Mapping[int, Keypoints], quiet: bool
+) -> dict[int, CameraPose]:
+    """Measure how the camera travels over the floor, and report it.
+
+    Parameters are as for `find_motion`; `camera` is that of the first frame, over the floor z = 0.
+
+    Returns
+    -------
+    poses : dict of int to CameraPose
+        By number of the frame; empty if it stands still or only turns, or where too little of the floor is
+        seen, in which case it is not known.
+    """
+    if not moves(camera, samples, people):
+        return {}
+    boxes, poses, on_floor = _boxes(people), {}, []
+    with progress("camera's path", video.count, quiet) as update:
+        travel: CameraTravel | None = None
+        for frame in video.frames(grey=True):
+            there = boxes.get(frame.number, ())
+            pose: CameraPose | None = CameraPose.of(camera)
+            if travel is None:
+                travel = CameraTravel(camera, frame.image, there)
+            else:
+                pose = travel.step(frame.image, there)
+                on_floor.append(travel.floor)
+            if pose is None:
+                return {}
+            poses[frame.number] = pose
+            update(frame.number)
+    centres = np.array([pose.centre for pose in poses.values()])
+    away = np.linalg.norm(centres - np.median(centres, axis=0), axis=1).max()
+    if away < _AWAY or np.mean(np.array(on_floor) >= FEWEST) < _MOSTLY:
+        return {}
+    far = float(np.linalg.norm(centres - centres[0], axis=1).max())
+    note(
+        f"the camera travelled up to {far:.1f} m from where it was in frame 0, to which camera and positions "
+        "refer: its poses are estimated from the floor, with errors that grow with the way",
+        quiet,
+    )
+    return poses
 
 
 def moves(
