@@ -19,6 +19,7 @@ from gait.lift.keypoints import noise
 from gait.lift.segment.explain import Uncertain
 from gait.lift.smooth import motion, size
 from gait.lift.smooth.options import METHODS
+from gait.lift.summary import least_certain
 
 FRAMES, MARKERS = 6, 12
 VIEWS = {"camera": ["--camera", "cam.json"], "flat": ["--orthographic", "y"], "none": []}
@@ -87,7 +88,7 @@ def test_states_what_segments_leave_uncertain(folder, capsys, view):
 def test_the_joints_that_a_displacement_moves_most_are_named():
     shares = np.array([[0.1, 0.2, 0.3, 0.4], [0.7, 0.1, 0.2, 0.0], [0.25, 0.25, 0.25, 0.25]])
     left = Uncertain(0.0, *np.zeros((3, 3)), shares)
-    found = lift._segments(left, ("head", "hip", "knee", "toe"))["least_certain"]
+    found = least_certain(left, ("head", "hip", "knee", "toe"))["least_certain"]
     assert [each["joints"] for each in found][:2] == [["toe", "knee", "hip"], ["head", "knee", "hip"]]
 
 

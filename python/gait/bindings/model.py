@@ -249,3 +249,9 @@ def read_cyclic(path: str | os.PathLike[str] | None) -> dict[str, Any]:
         raise UserError(f"{path}: {NOT_CYCLIC}")
     slope_of(sections, str(path))
     return sections
+
+
+def walking_model(path: str | os.PathLike[str] | None) -> Model:
+    """Model with curves of walking: the given one or, if it has only a segment prior, the shipped one."""
+    own = path is not None and "CURV" in decode(read_blob(path))
+    return Model(path if own else None)

@@ -42,15 +42,10 @@ from gait.lift.smooth.options import METHODS, Options
 from gait.progress import note
 
 if TYPE_CHECKING:
-    from gait.bindings.model import Model
     from gait.bindings.segment_prior import SegmentPrior
     from gait.io.detections import Clip
-    from gait.io.keypoints_file import Keypoints
-    from gait.io.video import Video
-    from gait.lift.segment.explain import Uncertain
-    from gait.lift.smooth.motion import Motion
+    from gait.lift.detected import Detected, Request
     from gait.track.from_walk import Calibration
-    from gait.track.stabilise import CameraTurns
 
 EXAMPLES = """\
 examples:
@@ -83,7 +78,6 @@ _ONLY_ONE_VIEW = (
     *("video", "fov", "scale_camera", "camera_out"),
 )
 PIXEL_SD, FLOOR_SD = Options.pixel_sd, Options.floor_sd  # pixels, metres
-MOVED = 3  # joints named that a displacement moves most
 WHOLE = 0.5  # share of a displacement's energy from which it moves the whole body
 UNKNOWN_MM = 1000.0  # a displacement less certain than that is the distance, in a view without perspective
 
@@ -306,16 +300,19 @@ def _is_video(path: str, pictures: bool) -> bool:
 
 def _lift_keypoints(args: argparse.Namespace, video: bool) -> tuple[dict[str, Any], str]:
     """Lift keypoints of a file, or found in a video; the summary, and in words."""
+    from gait.bindings.model import walking_model
     from gait.io.track_file import write_lifted
     from gait.io.trc import write_trc
     from gait.lift import run as lift_run
     from gait.lift.segment.view import Perspective
+    from gait.lift.summary import summary
     from gait.track.camera_check import contradiction
 
     _check(args, video)
     warn = partial(note, quiet=args.quiet)
     prior = lift_run.load_prior(args.model, warn)
-    keypoints, calibration, turns = _find_keypoints(args, prior) if video else (None, None, None)
+    in_video = _detect(args, prior, args.input, args.camera) if video else None
+    calibration = in_video.calibration if in_video else None
     request = lift_run.Request(
         options=_options(args),
         pixel_sd_given=args.pixel_sd is not None,
@@ -333,18 +330,17 @@ def _lift_keypoints(args: argparse.Namespace, video: bool) -> tuple[dict[str, An
         corrections=args.corrections,
     )
     if args.further:
-        views = [(args.input, keypoints, args.camera)]
+        views = [(args.input, in_video.keypoints if in_video else None, args.camera)]
         for path, camera in args.further:
-            own = argparse.Namespace(**{**vars(args), "input": path, "camera": camera})
-            found_in = _find_keypoints(own, prior)[0] if _is_video(path, False) else None
-            views.append((path, found_in, camera))
+            further = _detect(args, prior, path, camera) if _is_video(path, False) else None
+            views.append((path, further.keypoints if further else None, camera))
         lifted = lift_run.lift_views(views, args.offsets, prior, request, warn, args.quiet)
-    elif keypoints is None:
+    elif in_video is None:
         lifted = lift_run.lift_file(args.input, prior, request, warn, args.quiet)
     else:
-        lifted = lift_run.lift_keypoints(args.input, keypoints, prior, request, warn, args.quiet)
+        lifted = lift_run.lift_keypoints(args.input, in_video.keypoints, prior, request, warn, args.quiet)
     keypoints, found = lifted.keypoints, lifted.motion
-    _require_person(args, found)
+    lift_run.require_person(args.input, lifted, request)
     for words in lift_run.warnings_of(lifted, prior.stature):
         warn(words)
     if not video and args.height and not (args.camera or args.orthographic):
@@ -355,26 +351,51 @@ def _lift_keypoints(args: argparse.Namespace, video: bool) -> tuple[dict[str, An
     if (
         isinstance(lifted.view, Perspective)
         and calibration is None
-        and (fault := contradiction(lifted.view.camera, keypoints, _walking_model(args), args.height))
+        and (fault := contradiction(lifted.view.camera, keypoints, walking_model(args.model), args.height))
     ):
         warn(f"{args.camera}: {fault}")
     write_lifted(args.output, keypoints.frame, keypoints.time, found.names, found.places, found.sd)
     if args.trc:
-        write_trc(args.trc, found.names, keypoints.time, found.places, _rate(keypoints))
+        write_trc(args.trc, found.names, keypoints.time, found.places, keypoints.rate)
     _write_camera(args, calibration)
-    summary = _summary(args, keypoints, found) | lifted.repairs | {"pixel_sd": lifted.options.pixel_sd}
+    figures = summary(lifted)
     if args.overlay or args.suggest:
         from gait.io.video import Video  # OpenCV and PyAV, which keypoints alone do not need
         from gait.lift import picture
 
         if args.overlay:
             film = Video(args.input if video else args.video)
-            picture.draw_overlay(args.overlay, film, lifted, args.quiet, turns)
+            picture.draw_overlay(args.overlay, film, lifted, args.quiet, in_video.turns if in_video else None)
         if args.suggest:
             asked = picture.suggestions(lifted, args.suggest)
-            summary["suggest"] = [{"frame": s.frame, "joint": s.joint, "sd_px": s.sd_px} for s in asked]
-    summary |= {} if calibration is None else {"camera": calibration.figures()}
-    return summary, _text(summary)
+            figures["suggest"] = [{"frame": s.frame, "joint": s.joint, "sd_px": s.sd_px} for s in asked]
+    figures |= {} if calibration is None else {"camera": calibration.figures()}
+    return figures, _text(figures)
+
+
+def _detect(args: argparse.Namespace, prior: SegmentPrior, video: str, camera: str | None) -> Detected:
+    """Find the keypoints of the person in one of the videos, seen by one of the cameras."""
+    from gait.lift.detected import find_keypoints  # OpenCV and PyAV, which files of keypoints do not need
+
+    return find_keypoints(_request(args, video, camera), prior, args.quiet)
+
+
+def _request(args: argparse.Namespace, video: str, camera: str | None) -> Request:
+    from gait.lift import detected
+
+    return detected.Request(
+        video=video,
+        camera=camera,
+        model=args.model,
+        corrections=args.corrections,
+        scale_camera=args.scale_camera,
+        parallel=bool(args.orthographic),
+        height=args.height,
+        fov=args.fov,
+        start=args.start,
+        stop=args.stop,
+        stabilize=args.stabilize == "auto",
+    )
 
 
 def _clip(args: argparse.Namespace) -> Clip:
@@ -391,64 +412,6 @@ def _clip(args: argparse.Namespace) -> Clip:
     elif args.camera:
         size = Camera.read(args.camera).size
     return Clip(args.person, args.fps, times, size, args.quiet)
-
-
-def _find_keypoints(
-    args: argparse.Namespace, prior: SegmentPrior
-) -> tuple[Keypoints, Calibration | None, CameraTurns | None]:
-    """Find the keypoints of the person in a video, the camera unless the view is given, and how it turns."""
-    from gait.camera.camera import Camera
-    from gait.io.video import Video  # PyAV, and below OpenCV, which files of keypoints do not need
-    from gait.lift.keypoints.corrections import read_edits  # refused before the detector's work
-    from gait.track.walk_camera import find_people
-
-    if not (args.camera or args.orthographic or args.height):
-        raise UsageError("give --camera CAM, or --height M to estimate the camera from the walk")
-    video = Video(args.input)
-    if args.camera:
-        Camera.read(args.camera, video.size, args.scale_camera).check_place(args.camera)
-    if args.corrections:
-        read_edits(args.corrections, prior, video.span(args.start or 0, args.stop), video.size)
-    people = find_people(video, args.quiet, args.start or 0, args.stop)
-    turns = _turns(args, video, people) if args.stabilize == "auto" else None
-    if turns is not None:  # keypoints move to where the camera of one frame would see them
-        people = {id: turns.in_reference(keypoints) for id, keypoints in people.items()}
-    if args.camera or args.orthographic:
-        return next(iter(people.values())), None, turns
-    id, calibration = _calibrate(args, video, people)
-    return people[id], calibration, turns
-
-
-def _turns(args: argparse.Namespace, video: Video, people: dict[int, Keypoints]) -> CameraTurns | None:
-    """Estimate how the camera turns; None if it is static."""
-    from gait.camera.camera import Camera
-    from gait.io.video import sample_frames
-    from gait.track.stabilise import find_turns
-    from gait.track.walk_camera import expected_camera
-
-    given = Camera.read(args.camera, video.size, args.scale_camera) if args.camera else None
-    camera = given or expected_camera(video, args.fov)
-    return find_turns(video, camera, sample_frames(video), people, None, args.quiet, first=given is not None)
-
-
-def _calibrate(
-    args: argparse.Namespace, video: Video, people: dict[int, Keypoints]
-) -> tuple[int, Calibration]:
-    """Find who walks, estimate the camera from that walk, and report it."""
-    from gait.track.walk_camera import calibrate_film, note_camera
-
-    id, found = calibrate_film(video, people, _walking_model(args), args.height, args.fov, args.quiet)
-    note_camera(found, args.quiet)
-    return id, found
-
-
-def _walking_model(args: argparse.Namespace) -> Model:
-    """Model with curves of walking: the given one or, if it has only a segment prior, the shipped one."""
-    from gait.bindings.model import Model, read_blob
-    from gait.io.blob import decode
-
-    own = args.model and "CURV" in decode(read_blob(args.model))
-    return Model(args.model if own else None)
 
 
 def _write_camera(args: argparse.Namespace, calibration: Calibration | None) -> None:
@@ -474,19 +437,14 @@ def _lift_pictures(args: argparse.Namespace) -> tuple[dict[str, Any], str]:
     """Lift the images of a video; the summary, and in words."""
     from gait.body.skeleton import JOINTS
     from gait.io.track_file import write_lifted
-    from gait.io.video import Video  # OpenCV and PyAV, which keypoints do not need
     from gait.lift import run as lift_run
-    from gait.lift.keypoints.corrections import read_corrections
+    from gait.lift.detected import find_camera
     from gait.lift.video import run as video_run
-    from gait.track.walk_camera import find_people
 
     warn = partial(note, quiet=args.quiet)
     prior, calibration = lift_run.load_prior(args.model, warn), None
     if args.height:
-        video = Video(args.input)
-        if args.corrections:
-            read_corrections(args.corrections, prior, video.count, size=video.size)
-        calibration = _calibrate(args, video, find_people(video, args.quiet))[1]
+        calibration = find_camera(_request(args, args.input, None), prior, args.quiet)
     request = video_run.Request(
         video=args.input,
         placement=args.placement,
@@ -554,24 +512,10 @@ def _require_own(args: argparse.Namespace, video: bool) -> None:
         raise UsageError("--camera-out: there is no camera; give --camera, or --height for one from the walk")
 
 
-def _require_person(args: argparse.Namespace, found: Motion) -> None:
-    """Reject an estimate that cannot be a person."""
-    import numpy as np
-
-    from gait.bindings.state import state_range
-
-    if not np.isfinite(found.error).any():
-        raise UserError(f"{args.input}: the estimate is behind the camera; check the camera and the names")
-    low, high = state_range("stature")
-    if not low <= found.stature <= high:
-        view = "the camera (metres; R, t: world to camera)" if args.camera else "the direction of view"
-        raise UserError(
-            f"{args.input}: the estimated stature is {found.stature:.3g} m; check {view} and the names"
-        )
-
-
 def _check(args: argparse.Namespace, video: bool) -> None:
-    """Reject options that exclude each other."""
+    """Reject options that exclude each other, and a video without camera or stature."""
+    if video and not (args.camera or args.orthographic or args.height):
+        raise UsageError("give --camera CAM, or --height M to estimate the camera from the walk")
     smooth = args.method in (None, "smooth")
     if args.fps and args.video:
         raise UsageError("--fps and --video exclude each other; give one of them")
@@ -590,51 +534,6 @@ def _check(args: argparse.Namespace, video: bool) -> None:
     camera = args.camera or (args.height and video and not args.orthographic)
     if args.floor_sd and not (smooth and camera):
         raise UsageError("--floor-sd goes with --camera and --method smooth")
-
-
-def _rate(keypoints: Keypoints) -> float:
-    """Frames per second."""
-    time = keypoints.time
-    return float((len(time) - 1) / (time[-1] - time[0])) if len(time) > 1 else 1.0
-
-
-def _summary(args: argparse.Namespace, keypoints: Keypoints, found: Motion) -> dict[str, Any]:
-    """Figures of ``--json``."""
-    import numpy as np
-
-    return {
-        "frames": len(keypoints.frame),
-        "method": args.method or METHODS[0],
-        "markers": {"visible": list(dict.fromkeys(keypoints.names)), "estimated": list(found.names)},
-        "visible_share": float(keypoints.visible.mean()),
-        "reprojection_px": float(np.nanmedian(found.error)),
-        "sd_mm": 1000 * float(np.median(found.sd)),
-        "stature_m": found.stature if found.steps else None,  # not estimated by segments alone
-        "iterations": found.steps,
-        "settled": found.settled,
-        "log10_volume_ratio": found.log_volume_ratio,
-        "segments": _segments(found.uncertain, found.names),
-        "chi2_per_observation": chi2 if np.isfinite(chi2 := found.chi2_per_observation) else None,
-        "prior_widened": found.wider,
-        "segments_alone": found.alone,
-        "outliers": 0 if found.outliers is None else int(found.outliers.sum()),
-        "resized": found.resized,
-    }
-
-
-def _segments(left: Uncertain, names: tuple[str, ...]) -> dict[str, Any]:
-    """Medians over single segments: volume, the least certain displacements and what they move most."""
-    import numpy as np
-
-    most = np.argsort(-left.shares, axis=1, kind="stable")[:, :MOVED]
-    figures = {
-        "sd_mm": (1000 * left.sd).tolist(),
-        "in_depth": left.along.tolist(),
-        "rigid": left.rigid.tolist(),
-        "joints": [[names[j] for j in row] for row in most],
-    }
-    each = [dict(zip(figures, values, strict=True)) for values in zip(*figures.values(), strict=True)]
-    return {"log10_volume_ratio": left.log10_volume, "least_certain": each}
 
 
 def _text(s: dict[str, Any]) -> str:

@@ -68,6 +68,11 @@ class Keypoints:
         """Which points are seen, shape (T, J)."""
         return np.asarray(np.isfinite(self.uv).all(axis=2))
 
+    @property
+    def rate(self) -> float:
+        """Frames per second; 1 if there is one frame."""
+        return float((len(self.time) - 1) / (self.time[-1] - self.time[0])) if len(self.time) > 1 else 1.0
+
     def part(self, rows: slice) -> Keypoints:
         """Keypoints of some frames."""
         names = ("frame", "time", "uv", "confidence", "sd", "lasting_sd", "frame_sd", "by_hand")

@@ -10,6 +10,7 @@ from typing import Any
 import numpy as np
 
 from gait.bindings.segment_prior import SegmentPrior
+from gait.bindings.state import state_range
 from gait.camera.camera import Camera
 from gait.errors import UserError
 from gait.io import keypoints_file
@@ -383,6 +384,17 @@ def _naming(path: str) -> Iterator[None]:
         yield
     except UserError as error:
         raise type(error)(f"{path}: {error}") from None
+
+
+def require_person(path: str, lifted: Lifted, request: Request) -> None:
+    """Refuse an estimate that cannot be a person; the error names `path`."""
+    found = lifted.motion
+    if not np.isfinite(found.error).any():
+        raise UserError(f"{path}: the estimate is behind the camera; check the camera and the names")
+    low, high = state_range("stature")
+    if not low <= found.stature <= high:
+        view = "the camera (metres; R, t: world to camera)" if request.camera else "the direction of view"
+        raise UserError(f"{path}: the estimated stature is {found.stature:.3g} m; check {view} and the names")
 
 
 def warnings_of(lifted: Lifted, prior_stature: float) -> list[str]:

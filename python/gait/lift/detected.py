@@ -1,0 +1,120 @@
+"""The person in a video as `gait lift` finds them: keypoints by the detector, the camera from the walk."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+from gait.bindings.model import walking_model
+from gait.bindings.segment_prior import SegmentPrior
+from gait.camera.camera import Camera
+from gait.io.keypoints_file import Keypoints
+from gait.io.video import Video, sample_frames
+from gait.lift.keypoints.corrections import read_corrections, read_edits
+from gait.track.from_walk import Calibration
+from gait.track.stabilise import CameraTurns, find_turns
+from gait.track.walk_camera import calibrate_film, expected_camera, find_people, note_camera
+
+
+@dataclass(frozen=True)
+class Request:
+    """What to find.
+
+    Attributes
+    ----------
+    video : str
+        File.
+    camera, model, corrections : str, optional
+        Files. A camera is estimated if none is given, and corrections are only checked, before the work.
+    scale_camera : bool
+        Whether a camera of another resolution is resized to the video's.
+    parallel : bool
+        Whether the view is from far away, so that there is no camera to estimate.
+    height : float, optional
+        The person's stature, metres; an estimate of the camera needs it.
+    fov : float, optional
+        Horizontal field of view, degrees.
+    start, stop : int, optional
+        First frame to use, and the first not to use.
+    stabilize : bool
+        Whether to undo turns of the camera.
+    """
+
+    video: str
+    camera: str | None = None
+    model: str | None = None
+    corrections: str | None = None
+    scale_camera: bool = False
+    parallel: bool = False
+    height: float | None = None
+    fov: float | None = None
+    start: int | None = None
+    stop: int | None = None
+    stabilize: bool = False
+
+
+@dataclass(frozen=True)
+class Detected:
+    """What was found.
+
+    Attributes
+    ----------
+    keypoints : Keypoints
+        With `turns`, where the camera of one frame would see them.
+    calibration : Calibration, optional
+        The camera, if it was estimated.
+    turns : CameraTurns, optional
+        How the camera turns; None if it is static or was not asked for.
+    """
+
+    keypoints: Keypoints
+    calibration: Calibration | None = None
+    turns: CameraTurns | None = None
+
+
+def find_keypoints(request: Request, prior: SegmentPrior, quiet: bool) -> Detected:
+    """Find the keypoints of the person, and the camera unless the view is given.
+
+    Raises
+    ------
+    UserError
+        One line that names the file at fault.
+    """
+    video = Video(request.video)
+    if request.camera:
+        Camera.read(request.camera, video.size, request.scale_camera).check_place(request.camera)
+    if request.corrections:
+        read_edits(request.corrections, prior, video.span(request.start or 0, request.stop), video.size)
+    people = find_people(video, quiet, request.start or 0, request.stop)
+    turns = _turns(request, video, people, quiet) if request.stabilize else None
+    if turns is not None:
+        people = {id: turns.in_reference(keypoints) for id, keypoints in people.items()}
+    if request.camera or request.parallel:
+        return Detected(next(iter(people.values())), None, turns)
+    id, calibration = _calibrate(request, video, people, quiet)
+    return Detected(people[id], calibration, turns)
+
+
+def find_camera(request: Request, prior: SegmentPrior, quiet: bool) -> Calibration:
+    """Estimate the camera of a video whose images are lifted, from the walk in it; errors as above."""
+    video = Video(request.video)
+    if request.corrections:
+        read_corrections(request.corrections, prior, video.count, size=video.size)
+    return _calibrate(request, video, find_people(video, quiet), quiet)[1]
+
+
+def _turns(request: Request, video: Video, people: dict[int, Keypoints], quiet: bool) -> CameraTurns | None:
+    """Estimate how the camera turns; None if it is static."""
+    given = Camera.read(request.camera, video.size, request.scale_camera) if request.camera else None
+    camera = given or expected_camera(video, request.fov)
+    return find_turns(video, camera, sample_frames(video), people, None, quiet, first=given is not None)
+
+
+def _calibrate(
+    request: Request, video: Video, people: dict[int, Keypoints], quiet: bool
+) -> tuple[int, Calibration]:
+    """Find who walks, estimate the camera from that walk, and report it."""
+    assert request.height is not None
+    model = walking_model(request.model)
+    id, found = calibrate_film(video, people, model, request.height, request.fov, quiet)
+    note_camera(found, quiet)
+    return id, found
