@@ -5,6 +5,7 @@ Strides and events are matched by time; what the truth lacks is not judged, and 
 
 from __future__ import annotations
 
+import json
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -13,7 +14,7 @@ from numpy.typing import NDArray
 
 from gait.errors import UserError
 from gait.io.track_file import Joints
-from gait.motion.footfalls import NEAR, SIDES, Events, events_from_meta, find_events, same_events
+from gait.motion.footfalls import NEAR, SIDES, Events, find_events, same_events
 from gait.motion.parameters import (
     MIRRORED,
     QUANTITIES,
@@ -54,19 +55,17 @@ class Compared:
 
 def true_events(truth: Joints, meta: Path) -> Events:
     """Events in seconds: those that the file `meta` lists, if it is there and lists all, else the truth's."""
-    if meta.is_file():
-        listed = events_from_meta(meta)
-        if listed is not None:
-            rate = float((truth.frame[-1] - truth.frame[0]) / (truth.time[-1] - truth.time[0]))
-
-            def seconds(frames: Array) -> Array:
-                return np.asarray(truth.time[0] + (frames - truth.frame[0]) / rate)
-
-            return Events(
-                {side: seconds(times) for side, times in listed.strike.items()},
-                {side: seconds(times) for side, times in listed.off.items()},
-            )
-    return find_events(truth)
+    stated = json.loads(meta.read_text(encoding="utf-8")) if meta.is_file() else {}
+    listed = stated.get("events_video_frames", {})
+    names = {kind: {side: f"{side[0]}_{kind}" for side in SIDES} for kind in ("heel_strike", "toe_off")}
+    if not all(name in listed for each in names.values() for name in each.values()):
+        return find_events(truth)
+    rate = float((truth.frame[-1] - truth.frame[0]) / (truth.time[-1] - truth.time[0]))
+    strike, off = (
+        {side: truth.time[0] + (np.array(listed[name], float) - truth.frame[0]) / rate for side, name in each}
+        for each in (names["heel_strike"].items(), names["toe_off"].items())
+    )
+    return Events(strike, off)
 
 
 def gait_errors(parameters: Parameters, truth: Joints, events: Events) -> dict[str, Compared]:

@@ -192,18 +192,6 @@ class Contacts:
     clearance: Array
 
 
-def events_from_meta(path: str | os.PathLike[str]) -> Events | None:
-    """Events of the ``events_video_frames`` of a clip's meta.json, as frame numbers; None if it has none."""
-    events = read_json(path, "meta").table("events_video_frames", "give lists of events")
-    names = {f"{side[0]}_{event}" for side in SIDES for event in ("heel_strike", "toe_off")}
-    if any(name not in events for name in names):
-        return None
-    return Events(
-        {side: _times(events, f"{side[0]}_heel_strike") for side in SIDES},
-        {side: _times(events, f"{side[0]}_toe_off") for side in SIDES},
-    )
-
-
 def find_events(joints: Joints) -> Events:
     """Find the strikes and toe-offs of a motion of at least three frames."""
     ahead, pelvis = walking_direction(joints), joints.places["pelvis"]
