@@ -1,5 +1,5 @@
 #!/usr/bin/env python3
-"""Several people in one clip beside each of them alone in the same clip: numbers kept, errors, false tracks.
+"""Several people in one clip beside each of them alone: numbers kept, errors, false tracks, time.
 
     eval_people.py [--record] [--seeds 301-310] [--frames 54] [--jobs 1]
 
@@ -13,6 +13,7 @@ from __future__ import annotations
 
 import argparse
 import sys
+import time
 from concurrent.futures import ProcessPoolExecutor
 from dataclasses import replace
 from multiprocessing import get_context
@@ -42,6 +43,7 @@ FPS = 24.0
 NEAR = 0.5  # metres from a pelvis within which a track is of that person
 SWITCHED = 0.25  # seconds for which a track is nearer to another person than to its own
 WANTED = 1.15, 0.9  # median error to that of a person alone, share of crossings without a switch
+COST = 1.1  # CPU time together, of the sum of each alone, at most
 
 
 def main() -> int:
@@ -56,16 +58,18 @@ def main() -> int:
     cases = [("crossing", view, seed) for seed in range(first, last + 1) for view in ("side", "oblique")]
     cases += [(kind, view, first) for kind in ("abreast", "overtaking") for view in ("side", "oblique")]
     rows: list[list[object]] = []
-    kept = 0
+    kept, costs = 0, []
     with ProcessPoolExecutor(args.jobs, mp_context=get_context("spawn")) as pool:
-        for found, right in pool.map(measured, [scenario_of(*case, args.frames) for case in cases]):
+        for found, right, cost in pool.map(measured, [scenario_of(*case, args.frames) for case in cases]):
             rows += found
             kept += right
+            costs.append(cost)
     crossings = sum(kind == "crossing" for kind, _, _ in cases)
     ratios = [float(row[5]) for row in rows if str(row[0]).startswith("crossing")]  # type: ignore[arg-type]
     strays = sum(int(row[8]) for row in rows)  # type: ignore[call-overload]
     median = float(np.nanmedian(ratios))
-    missed = median > WANTED[0] or kept < WANTED[1] * crossings or strays > 0
+    cost = float(np.median(costs))
+    missed = median > WANTED[0] or kept < WANTED[1] * crossings or strays > 0 or cost > COST
     within = sum(ratio <= WANTED[0] for ratio in ratios)
     command = f"make eval-people ARGS='--record --seeds {args.seeds}'"
     note = (
@@ -78,7 +82,8 @@ def main() -> int:
         f"Crossings in which both were tracked and no number was switched: {kept} of {crossings} (wanted: "
         f"{WANTED[1]:.0%}). Median of together to alone over the people in crossings: {median:.2f} (wanted: "
         f"at most {WANTED[0]}); {within} of {len(ratios)} people are within that. Frames of `tracking` "
-        f"without a person: {strays} (wanted: 0)."
+        f"without a person: {strays} (wanted: 0). CPU time of the whole command together, of the sum of each "
+        f"alone: median over clips {cost:.2f}, at most {max(costs):.2f} (wanted: at most {COST})."
     )
     head = ["clip", "seed", "person", "together", "alone", "ratio", "lost", "switched", "false"]
     if args.record:
@@ -94,22 +99,26 @@ def scenario_of(kind: str, view: str, seed: int, frames: int) -> Scenario:
     return Scenario(people=kind, view=view, seed=seed, frames=frames, size=SIZE, fps=FPS)
 
 
-def measured(scenario: Scenario) -> tuple[list[list[object]], bool]:
-    """Make and track a clip: a row for each person, and whether it is a crossing in which all went right."""
+def measured(scenario: Scenario) -> tuple[list[list[object]], bool, float]:
+    """Make and track a clip: rows of people, whether it is a crossing in which all went right, cost."""
     folder, count = made(scenario), 1 + COMPANY[scenario.people]
-    own, switched, stray = compared(folder, tracked(folder), count)
+    began = time.process_time()
+    tracks = tracked(folder)
+    together = time.process_time() - began
+    began = time.process_time()
+    single = {k: alone_track(folder, k) for k in range(1, count + 1)}
+    cost = together / (time.process_time() - began)
+    own, switched, stray = compared(folder, tracks, count)
     rows: list[list[object]] = []
     for k in range(1, count + 1):
-        alone = error(folder, alone_track(folder, k), k)
-        together = error(folder, own[k], k) if k in own else float("nan")
+        alone = error(folder, single[k], k)
+        among = error(folder, own[k], k) if k in own else float("nan")
         lost = own[k].status.count("lost") if k in own else None
         kind = f"{scenario.people}, {scenario.view}"
         stray_here = stray if k == 1 else 0
-        rows.append(
-            [kind, scenario.seed, k, together, alone, together / alone, lost, int(switched), stray_here]
-        )
+        rows.append([kind, scenario.seed, k, among, alone, among / alone, lost, int(switched), stray_here])
         print(*rows[-1], file=sys.stderr, flush=True)
-    return rows, scenario.people == "crossing" and not switched and len(own) == count
+    return rows, scenario.people == "crossing" and not switched and len(own) == count, cost
 
 
 def made(scenario: Scenario) -> Path:
