@@ -43,6 +43,7 @@ _INVERSE, _INVERSE_SD = 0.1, 0.3  # 1/m: inverse distance of other landmarks bef
 _NEAREST = 5.0  # 1/m: largest inverse distance
 _DRIFT = 3.0  # pixels: sd of a tracked corner over the time for which it is seen
 _MISSES = 2  # frames in which a landmark may not fit
+_TURN_SD, _PLACE_SD = np.radians(0.25), 0.01  # of a pose: about as far off as those of simulated robots
 
 
 @dataclass
@@ -151,7 +152,9 @@ class CameraTravel:
         raised = _Landmarks.at(self._camera, visible.pixels[wrong & floor], floor=False)
         self._landmarks = visible.where(~wrong).and_(raised)
         self._add(boxes)
-        return CameraPose.of(self._camera) if sd < BLUNTEST and fits.sum() >= FEWEST else None
+        if sd > BLUNTEST or fits.sum() < FEWEST:
+            return None
+        return CameraPose(self._camera.R, self._camera.t, float(_TURN_SD), _PLACE_SD)
 
     def _boxes(self, people: Iterable[Box]) -> Array:
         return self._scale * np.array(list(people), float).reshape(-1, 4)
@@ -243,8 +246,8 @@ def _fit(
         miss = np.where(ahead[:, None], pixels - expected, 1e3)
         slope[~ahead], by_inverse[~ahead] = 0.0, 0.0
         unit = sd if np.isfinite(sd) else 1.0
-        spread = by_inverse[:, :, None] * by_inverse[:, None] * visible.variance[:, None, None]
-        precision = np.linalg.inv(unit**2 * np.eye(2) + spread)
+        covariance = by_inverse[:, :, None] * by_inverse[:, None] * visible.variance[:, None, None]
+        precision = np.linalg.inv(unit**2 * np.eye(2) + covariance)
         off = unit * np.sqrt(np.einsum("nk,nkl,nl->n", miss, precision, miss))
         near = off if iteration < COARSE else off[off < TUKEY * sd]
         near_sd = float(np.median(near)) / 1.177 if len(near) else np.inf  # of two normal coordinates
