@@ -47,7 +47,7 @@ HEAD = ("case", "frames", "dropped", "step ms", "tracker's CPU ms a frame", "lat
 
 
 def main() -> int:
-    """Measure all cases, print, and record if asked to; 1 if clients cost frames."""
+    """Measure all cases, print, and record if asked to; 1 if browsers cost frames."""
     options = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawTextHelpFormatter)
     options.add_argument("--seconds", type=float, default=20.0)
     options.add_argument("--clients", type=int, default=10)
@@ -70,12 +70,13 @@ def main() -> int:
     head = [*HEAD, "pictures/s of a camera and browser", "cores busy"]
     note = f"{facts('tests/bench/live_view.py --record')}\n\n{args.seconds:.0f} s at {RATE} frames a second, "
     note += "640 x 480; a frame is dropped where the tracker answered none. Chromium is headless and has no "
-    note += "graphics card: it draws each page's figure on the cores that track and send."
+    note += "graphics card: it draws each page's figure on the cores that track and send. It has an ordinary "
+    note += "user's priority; as root it would raise itself above the tracker."
     if args.record:
         table.publish("live_view", "The live page beside a tracker", head, rows, note)
     else:
         table.show("The live page beside a tracker", head, rows)
-    return int(rows[2][2] > rows[0][2] + 3)
+    return int(max(row[2] for row in rows) > rows[0][2] + 3)
 
 
 class Case:
@@ -151,9 +152,8 @@ def chromium(address: str, count: int) -> Iterator[list[Any]]:
     """Pages of a headless Chromium, each of which counts the pictures that it has shown."""
     from playwright.sync_api import sync_playwright
 
-    words = ["--no-sandbox", "--use-angle=swiftshader", "--enable-unsafe-swiftshader"]
     with sync_playwright() as playwright:
-        browser = playwright.chromium.launch(executable_path=shutil.which("chromium"), args=words)
+        browser = playwright.chromium.launch(executable_path=ordinary_chromium(), args=["--no-sandbox"])
         tabs = [browser.new_page(viewport={"width": 1280, "height": 720}) for _ in range(count)]
         for tab in tabs:
             tab.set_default_timeout(120_000)
@@ -162,6 +162,14 @@ def chromium(address: str, count: int) -> Iterator[list[Any]]:
             tab.evaluate(COUNT)
         yield tabs
         browser.close()
+
+
+def ordinary_chromium() -> str:
+    """Chromium without root's right to raise its priority above the tracker's, which no user's browser has."""
+    program = CLIP.parent / "chromium"
+    program.write_text('#!/bin/sh\nexec setpriv --bounding-set=-sys_nice chromium "$@"\n', encoding="ascii")
+    program.chmod(0o755)
+    return str(program) if os.geteuid() == 0 else str(shutil.which("chromium"))
 
 
 def busy() -> float:

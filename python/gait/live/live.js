@@ -1,19 +1,22 @@
 // The live page: pictures, figure, numbers and plots of the tracker as it runs.
 const element = (id) => document.getElementById(id);
-const DRAW_MS = 200; // between two drawings of the plots
+const DRAW_MS = 250; // between two drawings of the plots
+const FIGURE_MS = 200; // between two drawings of the figure where the processor draws it
 const GAP = 1; // seconds without an estimate that no line crosses
+const KEPT = 1200; // samples
 const QUIET_MS = 3000; // without an estimate the page reports that there is none
 const TEXT = { tracking: 'tracking', ambiguous: 'ambiguous', lost: 'lost', init: 'settling' };
 
 const start = await (await fetch('/state')).json();
-let scene, curves, paused = false, recording = Boolean(start.recording.path);
+let scene, curves, software = false, shown = 0, paused = false, recording = Boolean(start.recording.path);
 let chosen = 0; // person whose numbers and plots are shown
 const PHASE = start.curves.findIndex((curve) => curve.name === 'phase');
 const people = start.people.map((one) => ({ ...one, last: 0, heard: -Infinity, health: null, body: null }));
 
 // ---- figure and plots, where their parts were fetched ----
 if (start.parts) {
-  const [{ Scene }, { Curves }] = await Promise.all([import('gait/scene.js'), import('gait/curves.js')]);
+  const [{ Scene, SOFTWARE }, { Curves }] = await Promise.all([import('gait/scene.js'), import('gait/curves.js')]);
+  software = SOFTWARE;
   scene = new Scene(element('scene'), { ...start, times: [], points: [], sd: [] });
   curves = new Curves(element('curves'), { times: [], curves: start.curves });
   curves.show(-1); // no cursor: the plots end now
@@ -34,6 +37,7 @@ function broken(samples) {
 }
 
 function draw() {
+  if (document.hidden) return;
   const found = broken(waiting);
   waiting = [];
   if (paused || !curves || !found.length) return;
@@ -42,7 +46,7 @@ function draw() {
     curves: start.curves.map((curve, k) => ({ id: curve.id, values: found.map((one) => one.values[k]) })),
   }, Math.round(start.seconds * Math.max(5, found.at(-1).rate ?? 30)));
   scene.append({});
-  const data = scene.data, extra = data.times.length - 1200;
+  const data = scene.data, extra = data.times.length - KEPT;
   if (extra > 0) for (const key of ['times', 'points', 'sd']) data[key].splice(0, extra);
 }
 setInterval(draw, DRAW_MS);
@@ -114,11 +118,14 @@ function onSample(one) {
   show('frame', one.frame < 0 ? '–' : String(one.frame));
   element('hand').setAttribute('transform', `rotate(${360 * one.phase})`);
   waiting.push(one);
+  if (waiting.length > KEPT) waiting.shift(); // while the page is hidden
   if (!scene) return;
   const data = scene.data;
   data.times.push(one.time);
   data.points.push(one.points);
   data.sd.push(one.sd);
+  if (software && person.last - shown < FIGURE_MS) return;
+  shown = person.last;
   scene.show(data.times.length - 1);
 }
 
@@ -173,7 +180,7 @@ for (const stream of start.streams) {
 
 function onPicture(stream) {
   const image = images.get(stream);
-  if (!image || paused) return;
+  if (!image || paused || document.hidden) return;
   image.newer = image.busy;
   if (image.busy) return;
   image.busy = true;

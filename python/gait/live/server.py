@@ -1,4 +1,4 @@
-"""Browsers get the newest of everything: pictures, estimates, the state of the tracker."""
+"""Browsers get the newest pictures, all estimates, the state of the tracker; less often on a busy machine."""
 
 from __future__ import annotations
 
@@ -6,6 +6,8 @@ import asyncio
 import contextlib
 import json
 import threading
+import time
+from collections import deque
 from collections.abc import AsyncIterator, Callable, Sequence
 from pathlib import Path
 from typing import Any
@@ -26,6 +28,11 @@ _FILES = ("live.js", "live.css")
 _MOST = 16  # browsers at a time
 _ALIVE = 0.5  # seconds after which a quiet stream shows that it is there, or ends with the server
 _QUALITY = 80  # of JPEG pictures
+_KEPT = 64  # samples that a slow browser gets late, at most
+_FASTEST = 1 / 60  # seconds between messages to a browser
+_SLOWEST = 0.2  # the same at first and on a busy machine, times the number of browsers
+_MEASURED = 0.5  # seconds over which idle time is measured
+_BUSY, _IDLE = 0.15, 0.3  # share of idle time below which messages become rarer, above which more frequent
 
 
 def _picture(stream: int) -> str:
@@ -37,8 +44,45 @@ def _described(recording: Recording) -> dict[str, Any]:
     return {"path": ", ".join(map(str, recording.paths)), "fault": recording.fault}
 
 
+class Pace:
+    """Time between messages to a browser: longer while the cores have no idle time, so that tracking comes first.
+
+    Browsers on this machine draw on the cores that track.
+    """
+
+    def __init__(self) -> None:
+        self._interval = self._slowest = _SLOWEST
+        self._at, self._before = 0.0, (0, 0)
+
+    def interval(self) -> float:
+        """Seconds."""
+        now = time.monotonic()
+        if now - self._at > _MEASURED:
+            found = _idle_time()
+            idle, total = (a - b for a, b in zip(found, self._before, strict=True))
+            self._at, self._before = now, found
+            self.adapt(idle / max(total, 1))
+        return self._interval
+
+    def adapt(self, idle: float) -> None:
+        """Follow the share of idle time."""
+        factor = 1.5 if idle < _BUSY else 0.8 if idle > _IDLE else 1.0
+        self._interval = min(max(factor * self._interval, _FASTEST), self._slowest)
+
+    def begin(self, browsers: int) -> None:
+        """Begin slowly, now that there are so many browsers."""
+        self._interval = self._slowest = _SLOWEST * max(browsers, 1)
+
+
+def _idle_time() -> tuple[int, int]:
+    """Idle time and all time of the cores, ticks."""
+    first = Path("/proc/stat").read_text(encoding="ascii").partition("\n")[0]
+    times = [int(word) for word in first.split()[1:9]]
+    return times[3] + times[4], sum(times)
+
+
 class Hub:
-    """The newest value of each topic, for any number of browsers.
+    """The newest values of each topic, for any number of browsers.
 
     `put` may be called in any thread; `newer` runs in the server's.  A browser that is slow misses values and
     delays no other.
@@ -46,15 +90,16 @@ class Hub:
 
     def __init__(self) -> None:
         self._loop: asyncio.AbstractEventLoop | None = None
-        self._newest: dict[str, tuple[int, Any]] = {}
+        self._newest: dict[str, tuple[int, deque[Any]]] = {}
         self._news: dict[str, asyncio.Event] = {}
         self._lock = threading.Lock()
 
-    def put(self, topic: str, value: Any) -> None:
-        """Make `value` the newest of its topic."""
+    def put(self, topic: str, value: Any, kept: int = 1) -> None:
+        """Make `value` the newest of its topic, of which so many are kept."""
         with self._lock:
-            count, _ = self._newest.get(topic, (0, None))
-            self._newest[topic] = (count + 1, value)
+            count, values = self._newest.get(topic, (0, deque(maxlen=kept)))
+            values.append(value)
+            self._newest[topic] = count + 1, values
             loop = self._loop
         if loop is not None and not loop.is_closed():
             loop.call_soon_threadsafe(self._wake, topic)
@@ -63,20 +108,19 @@ class Hub:
         if (event := self._news.pop(topic, None)) is not None:
             event.set()
 
-    def newest(self, topic: str) -> tuple[int, Any]:
-        """Count and value; 0 and None: there is none yet."""
+    def since(self, topic: str, than: int) -> tuple[int, list[Any]]:
+        """Count of values so far, and those that are kept of the later ones than that of a count."""
         with self._lock:
-            return self._newest.get(topic, (0, None))
+            count, values = self._newest.get(topic, (0, deque()))
+            return count, list(values)[max(len(values) - (count - than), 0) :]
 
-    async def newer(self, topic: str, than: int, seconds: float) -> tuple[int, Any]:
-        """Wait at most so long for a later value than that of the count; return the newest."""
+    async def newer(self, topic: str, than: int, seconds: float) -> None:
+        """Wait at most so long for a later value than that of the count."""
         self._loop = asyncio.get_running_loop()
         event = self._news.setdefault(topic, asyncio.Event())
-        if (found := self.newest(topic))[0] > than:
-            return found
-        with contextlib.suppress(asyncio.TimeoutError):
-            await asyncio.wait_for(event.wait(), seconds)
-        return self.newest(topic)
+        if self.since(topic, than)[0] <= than:
+            with contextlib.suppress(asyncio.TimeoutError):
+                await asyncio.wait_for(event.wait(), seconds)
 
 
 class Page:
@@ -113,7 +157,7 @@ class Page:
         self._topics += ["recording", *map(_picture, streams)]
         self._pictures: dict[int, Image] = {}
         self._jpeg: dict[int, tuple[int, bytes]] = {}
-        self._open = 0
+        self._open, self._pace, self._shown = 0, Pace(), 0.0
         own = serve.listen(port)
         self.address = serve.address(own)
         self._server, self._thread = serve.background(self._application(own.getsockname()[1]), own)
@@ -124,17 +168,18 @@ class Page:
 
     def show(self, stream: int, image: Image) -> None:
         """Make a picture the newest of its camera; browsers that are informed ask for it."""
-        self._pictures[stream] = image
+        self._pictures[stream], self._shown = image, time.monotonic()
         self.hub.put(_picture(stream), stream)
 
     def report(self, topic: str, value: dict[str, Any]) -> None:
         """Make a sample or the tracker's health the newest."""
         of_person = f"{topic} {value['person']}" if "person" in value else topic
-        self.hub.put(of_person, json.dumps(value, allow_nan=False, separators=(",", ":")))
+        text = json.dumps(value, allow_nan=False, separators=(",", ":"))
+        self.hub.put(of_person, text, _KEPT if topic == "sample" else 1)
 
     def watched(self) -> bool:
-        """Whether a browser shows the page."""
-        return self._open > 0
+        """Whether a browser shows the page, and it is time for a picture."""
+        return self._open > 0 and time.monotonic() - self._shown > self._pace.interval()
 
     def close(self) -> None:
         """Serve no more, and end a recording."""
@@ -183,7 +228,7 @@ class Page:
 
     def _frame(self, request: Request) -> Response:
         stream = request.path_params["stream"]
-        count = self.hub.newest(_picture(stream))[0]
+        count, _ = self.hub.since(_picture(stream), 0)
         if count == 0:
             return PlainTextResponse("no picture yet\n", 503 if stream in self._streams else 404)
         made, jpeg = self._jpeg.get(stream, (0, b""))
@@ -203,21 +248,24 @@ class Page:
                     wait.cancel()
                 text = b""
                 for name, before in counts.items():
-                    counts[name], value = self.hub.newest(name)
-                    if counts[name] > before:
+                    counts[name], values = self.hub.since(name, before)
+                    for value in values:
                         text += f"event: {name.split()[0]}\ndata: {value}\n\n".encode()
                 yield text or b": here\n\n"
+                await asyncio.sleep(self._pace.interval())
 
         if self._open >= _MOST:
             return PlainTextResponse("too many browsers\n", 503)
 
         async def counted() -> AsyncIterator[bytes]:
             self._open += 1
+            self._pace.begin(self._open)
             try:
                 async for part in lines():
                     yield part
             finally:
                 self._open -= 1
+                self._pace.begin(self._open)
 
         return StreamingResponse(
             counted(), media_type="text/event-stream", headers={"cache-control": "no-store"}

@@ -12,6 +12,9 @@ const UP = new THREE.Vector3(0, 1, 0); // axis of CYLINDER
 /** Colour of a custom property of style.css. */
 export const colour = (name) => getComputedStyle(document.documentElement).getPropertyValue(`--${name}`).trim();
 
+/** Whether there is no graphics card: the processor draws, and each picture costs it tens of milliseconds. */
+export const SOFTWARE = !document.createElement('canvas').getContext('webgl2', { failIfMajorPerformanceCaveat: true });
+
 export class Scene {
   /**
    * @param {HTMLElement} element  filled by the view
@@ -23,7 +26,7 @@ export class Scene {
     this.shown = { cylinders: true, ellipsoids: true, trajectory: true };
     this.index = 0;
     try {
-      this.renderer = new THREE.WebGLRenderer({ antialias: true });
+      this.renderer = new THREE.WebGLRenderer({ antialias: !SOFTWARE });
     } catch {
       element.innerHTML = '<p class="none">This browser has no WebGL: the 3-D view is off.</p>';
       this.setData(data);
@@ -64,9 +67,8 @@ export class Scene {
     const same = this.limbs && [data.bones, data.joints].join() === [this.data.bones, this.data.joints].join();
     this.data = data;
     if (!this.renderer) return;
-    this.#clear(this.ground);
-    this.#floor();
     if (!same) this.#build();
+    this.#floor();
     this.show(Math.min(this.index, data.times.length - 1));
   }
 
@@ -74,15 +76,16 @@ export class Scene {
   #build() {
     const { data } = this;
     this.#clear(this.figure);
+    this.cells = null; // the floor's colours, too
     this.scene.background = new THREE.Color(colour('panel'));
-    const solid = (side) => new THREE.MeshStandardMaterial({ color: colour(side), roughness: 0.7 });
+    const solid = (side) => new THREE.MeshLambertMaterial({ color: colour(side) });
     this.makeLimbs = () => ({
       parts: data.bone_sides.map((side) => this.#add(CYLINDER, solid(side))),
       balls: data.sides.map((side) => this.#add(SPHERE, solid(side))),
     });
     this.limbs = this.makeLimbs();
     this.others = [];
-    const glass = (side) => new THREE.MeshStandardMaterial({
+    const glass = (side) => new THREE.MeshLambertMaterial({
       color: colour(side), transparent: true, opacity: 0.22, depthWrite: false });
     this.clouds = data.sides.map((side) => this.#add(SPHERE, glass(side)));
   }
@@ -90,9 +93,7 @@ export class Scene {
   /** Append frames: an object with the keys by frame alone. */
   append(more) {
     for (const key of ['times', 'points', 'sd', 'uv', 'status']) if (more[key]) (this.data[key] ||= []).push(...more[key]);
-    if (!this.renderer) return;
-    this.#clear(this.ground);
-    this.#floor();
+    if (this.renderer) this.#floor();
   }
 
   /** Draw a frame, by its index. */
@@ -192,14 +193,18 @@ export class Scene {
     const [left, right] = xs.length ? [Math.min(...xs), Math.max(...xs)] : [0, 0];
     const [near, far] = ys.length ? [Math.min(...ys), Math.max(...ys)] : [0, 0];
     const cells = Math.min(200, Math.ceil(Math.max(right - left, far - near)) + 4);
-    const grid = new THREE.GridHelper(cells, cells, colour('line'), colour('grid'));
-    grid.rotation.x = Math.PI / 2;
-    grid.position.set(Math.round((left + right) / 2), Math.round((near + far) / 2), 0);
-    this.ground.add(grid);
-    const line = new THREE.BufferGeometry().setFromPoints(seen.map((p) => new THREE.Vector3(p[root][0], p[root][1], 0.005)));
-    this.way = new THREE.Line(line, new THREE.LineBasicMaterial({ color: colour('good') }));
-    this.way.visible = this.shown.trajectory;
-    this.ground.add(this.way);
+    if (this.cells !== cells) { // only then: new materials are compiled again
+      this.cells = cells;
+      this.#clear(this.ground);
+      this.grid = new THREE.GridHelper(cells, cells, colour('line'), colour('grid'));
+      this.grid.rotation.x = Math.PI / 2;
+      this.way = new THREE.Line(new THREE.BufferGeometry(), new THREE.LineBasicMaterial({ color: colour('good') }));
+      this.way.visible = this.shown.trajectory;
+      this.ground.add(this.grid, this.way);
+    }
+    this.grid.position.set(Math.round((left + right) / 2), Math.round((near + far) / 2), 0);
+    this.way.geometry.dispose();
+    this.way.geometry = new THREE.BufferGeometry().setFromPoints(seen.map((p) => new THREE.Vector3(p[root][0], p[root][1], 0.005)));
   }
 
   #add(geometry, material) {
@@ -242,7 +247,7 @@ export class Scene {
   #resize() {
     const { clientWidth: wide, clientHeight: high } = this.element;
     if (!wide || !high) return;
-    this.renderer.setPixelRatio(Math.min(devicePixelRatio, 2));
+    this.renderer.setPixelRatio(SOFTWARE ? 1 : Math.min(devicePixelRatio, 2));
     this.renderer.setSize(wide, high, false);
     this.camera.aspect = wide / high;
     this.camera.updateProjectionMatrix();
