@@ -12,7 +12,7 @@ import pytest
 
 from gait.lcm.link import private_url
 from gait.live.feed import Feed
-from gait.live.server import Page
+from gait.live.server import Hub, Pace, Page
 
 
 @pytest.fixture(scope="module")
@@ -248,3 +248,19 @@ def test_the_record_button_makes_a_log(live, tmp_path):
         browser.until(page, "document.querySelector('#message').textContent.startsWith('Recorded in')")
         page.wait_for_timeout(100)
     assert len(list(tmp_path.glob("gait-*.log"))) == 1
+
+
+def test_browsers_get_less_often_what_a_busy_machine_shows_and_miss_no_sample():
+    pace, hub = Pace(), Hub()
+    for _ in range(20):
+        pace.adapt(idle=0.8)
+    assert pace.current < 1 / 30
+    pace.begin(10)
+    for _ in range(20):
+        pace.adapt(idle=0.0)
+    assert pace.current == 2.0
+    for k in range(5):
+        hub.put("sample 0", k, kept=3)
+        hub.put("health 0", k)
+    assert hub.since("sample 0", 4) == (5, [4]) and hub.since("sample 0", 0) == (5, [2, 3, 4])
+    assert hub.since("health 0", 0) == (5, [4]) and hub.since("health 0", 5) == (5, [])

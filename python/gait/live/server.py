@@ -45,13 +45,18 @@ def _described(recording: Recording) -> dict[str, Any]:
 
 
 class Pace:
-    """Time between messages to a browser: longer while the cores have no idle time, so that tracking comes first.
+    """Time between messages to a browser: longer while no core is idle.
 
-    Browsers on this machine draw on the cores that track.
+    Browsers on this machine draw on the cores that track, and tracking comes first.
+
+    Attributes
+    ----------
+    current : float
+        Seconds.
     """
 
     def __init__(self) -> None:
-        self._interval = self._slowest = _SLOWEST
+        self.current = self._slowest = _SLOWEST
         self._at, self._before = 0.0, (0, 0)
 
     def interval(self) -> float:
@@ -62,16 +67,16 @@ class Pace:
             idle, total = (a - b for a, b in zip(found, self._before, strict=True))
             self._at, self._before = now, found
             self.adapt(idle / max(total, 1))
-        return self._interval
+        return self.current
 
     def adapt(self, idle: float) -> None:
         """Follow the share of idle time."""
         factor = 1.5 if idle < _BUSY else 0.8 if idle > _IDLE else 1.0
-        self._interval = min(max(factor * self._interval, _FASTEST), self._slowest)
+        self.current = min(max(factor * self.current, _FASTEST), self._slowest)
 
     def begin(self, browsers: int) -> None:
         """Begin slowly, now that there are so many browsers."""
-        self._interval = self._slowest = _SLOWEST * max(browsers, 1)
+        self.current = self._slowest = _SLOWEST * max(browsers, 1)
 
 
 def _idle_time() -> tuple[int, int]:
