@@ -26,7 +26,7 @@ Array = NDArray[np.float64]
 _MARGIN = 0.15  # of a person's height, about the keypoints
 _MOSTLY = 0.8  # of the frames in which the camera must be found, or be still
 _TRAVELS = 1.0  # pixels of a picture 640 wide: median residual from which the camera does not only turn
-_AWAY = 0.15  # metres from the median place from which it does not, if the floor is seen
+_AWAY = 0.15  # metres in a second from which it does not, if the floor is seen: more than a hand or an error
 
 
 @dataclass(frozen=True)
@@ -190,7 +190,8 @@ def find_travel(
             poses[frame.number] = pose
             update(frame.number)
     centres = np.array([pose.centre for pose in poses.values()])
-    away = np.linalg.norm(centres - np.median(centres, axis=0), axis=1).max()
+    second = min(max(1, round(video.fps)), len(centres) - 1)
+    away = np.linalg.norm(centres[second:] - centres[:-second], axis=1).max()
     if away < _AWAY or np.mean(np.array(on_floor) >= FEWEST) < _MOSTLY:
         return {}
     far = float(np.linalg.norm(centres - centres[0], axis=1).max())
