@@ -14,7 +14,7 @@ float root_channel(const gait_model *m, int32_t c, float phase, float pace, cons
 }
 
 /* The stride's length is the mean of its forward speed over the phase. */
-float particle_speed(const state_layout *r, const particle_state *p)
+COLD float particle_speed(const state_layout *r, const particle_state *p)
 {
     const gait_model *const m = r->model;
     float const pace = state_layout_pace(r, p->f[F_RATE]);

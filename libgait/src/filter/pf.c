@@ -3,7 +3,7 @@
 #include "base/rng.h"
 #include <string.h>
 
-pf pf_layout(arena *a, int32_t n)
+COLD pf pf_layout(arena *a, int32_t n)
 {
     pf p = {.n = n};
     p.log_weight = TAKE(a, double, n);
@@ -115,7 +115,7 @@ void pf_draw(const double *weight, int32_t n, uint64_t *cumulative, int32_t coun
     }
 }
 
-void pf_resize(pf *p, int32_t count, uint32_t u)
+COLD void pf_resize(pf *p, int32_t count, uint32_t u)
 {
     pf_draw(p->weight, p->n, p->cumulative, count, u, p->parent);
     p->n = count;
@@ -127,7 +127,7 @@ void pf_resample_systematic(pf *p, uint32_t u)
     pf_resize(p, p->n, u);
 }
 
-void pf_resample_multinomial(pf *p, uint64_t seed, uint32_t stream, uint32_t frame)
+COLD void pf_resample_multinomial(pf *p, uint64_t seed, uint32_t stream, uint32_t frame)
 {
     uint64_t const total = make_cumulative(p->weight, p->n, p->cumulative);
     for (int32_t i = 0; i < p->n; i++) {
@@ -157,7 +157,7 @@ static void swap(unsigned char *a, unsigned char *b, size_t bytes)
     }
 }
 
-void pf_inherit(pf *p, int32_t before, void *array, size_t bytes)
+COLD void pf_inherit(pf *p, int32_t before, void *array, size_t bytes)
 {
     unsigned char *const part = array;
     uint64_t *const waiting = p->cumulative,

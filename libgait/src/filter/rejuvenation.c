@@ -2,7 +2,7 @@
 #include "base/fmath.h"
 #include "base/rng.h"
 
-void rejuvenation_set(rejuvenation *m, float seconds, float time)
+COLD void rejuvenation_set(rejuvenation *m, float seconds, float time)
 {
     m->shrink = time > 0.0f ? 1.0f - m_exp(-seconds / time) : 0.0f;
     m->noise = __builtin_sqrtf(m->shrink * (1.0f - m->shrink));

@@ -77,7 +77,7 @@ COLD void lift_table_fill(lift_table *t)
             set_frame(t, c, f, row, column);
 }
 
-void segment_posterior_layout(arena *a, const lift_table *t, segment_posterior *b)
+COLD void segment_posterior_layout(arena *a, const lift_table *t, segment_posterior *b)
 {
     size_t const square = (size_t)t->ld * (size_t)t->ld;
     b->theta = TAKE(a, double, (size_t)t->ld);
@@ -107,7 +107,7 @@ static lift_axes axes_at(const lift_table *t, double heading, const double place
     return f;
 }
 
-lift_axes lift_axes_prior(const lift_table *t, const segment_posterior *b)
+COLD lift_axes lift_axes_prior(const lift_table *t, const segment_posterior *b)
 {
     return axes_at(t, b->heading, b->place);
 }
@@ -267,7 +267,7 @@ bool lift_solve(const lift_table *t, segment_posterior *b)
     return ok;
 }
 
-double lift_evidence(const lift_table *t, const segment_posterior *b)
+COLD double lift_evidence(const lift_table *t, const segment_posterior *b)
 {
     double const log_two_pi = 1.83787706640934548356, left = b->U[t->n * (t->ld + 1)];
     return -0.5 * (log_two_pi * b->observed + b->log_noise + left) - cholesky_log_det(b->U, t->n, t->ld);

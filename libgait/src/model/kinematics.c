@@ -34,7 +34,7 @@ void kin_points(const gait_model *m, const kin_body *b, float (*xyz)[3][BLOCK])
     }
 }
 
-bool kin_state_usable(const gait_model *m, const gait_state *s)
+COLD bool kin_state_usable(const gait_model *m, const gait_state *s)
 {
     const float place[10] = {s->phase, s->stride_hz, s->stature,   s->heading,   s->pitch,
                              s->roll,  s->pelvis[0], s->pelvis[1], s->pelvis[2], s->turn_rate};

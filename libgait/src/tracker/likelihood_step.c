@@ -190,7 +190,7 @@ void likelihood_step(gait_tracker *t)
 }
 
 /* ---- any body ---- */
-body_evidence likelihood_of_particle(gait_tracker *t, const state_layout *of, const particle_state *p)
+COLD body_evidence likelihood_of_particle(gait_tracker *t, const state_layout *of, const particle_state *p)
 {
     likelihood_scratch *const w = &t->work[0];
     body_evidence e = {.support = 0.0f};
@@ -214,7 +214,7 @@ body_evidence likelihood_of_particle(gait_tracker *t, const state_layout *of, co
     return e;
 }
 
-uint32_t likelihood_sample(gait_tracker *t, const particle_state *p, like_patch *samples)
+COLD uint32_t likelihood_sample(gait_tracker *t, const particle_state *p, like_patch *samples)
 {
     likelihood_scratch *const w = &t->work[0];
     uint32_t cameras = 0;
@@ -229,7 +229,7 @@ uint32_t likelihood_sample(gait_tracker *t, const particle_state *p, like_patch 
     return cameras;
 }
 
-float likelihood_since(gait_tracker *t, const particle_state *p, uint32_t cameras, const like_patch *then)
+COLD float likelihood_since(gait_tracker *t, const particle_state *p, uint32_t cameras, const like_patch *then)
 {
     likelihood_scratch *const w = &t->work[0];
     like_patch samples[MODEL_MAX_LIMBS];
@@ -246,7 +246,7 @@ float likelihood_since(gait_tracker *t, const particle_state *p, uint32_t camera
     return sum;
 }
 
-float likelihood_of_keypoints(gait_tracker *t, const state_layout *of, const particle_state *p)
+COLD float likelihood_of_keypoints(gait_tracker *t, const state_layout *of, const particle_state *p)
 {
     likelihood_scratch *const w = &t->work[0];
     float sum = 0.0f;
