@@ -4,6 +4,7 @@ import json
 from dataclasses import replace
 from types import SimpleNamespace
 
+import cv2
 import numpy as np
 import pytest
 from drawn_person import DATA, camera, clip, draw, state_at, wall, write
@@ -261,6 +262,38 @@ def test_two_people_who_pass_are_kept_apart(tmp_path):
     at, turned = (0.0, 0.0) if abs(found.mean.heading) < 1 else (1.5, np.pi)
     assert abs(found.mean.pelvis[1] - at) < 2.5 * found.sd.pelvis[1]
     assert abs((found.mean.heading - turned + np.pi) % (2 * np.pi) - np.pi) < 2 * found.sd.heading
+
+
+def in_mirror(view, state, i):
+    """The wall with a mirror in it, 1.5 m behind the path, which shows the person from the knees up."""
+    corners = view.project([[x, 1.5, z] for x, z in ((-2.5, 0.5), (2.5, 0.5), (2.5, 2.2), (-2.5, 2.2))])
+    glass = cv2.fillPoly(np.zeros(wall().shape[:2], np.uint8), [np.rint(corners).astype(np.int32)], 255)
+    pelvis = state.pelvis * [1, -1, 1] + [0, 3.0, 0]
+    image = replace(state, heading=-state.heading, phase=(state.phase + 0.5) % 1, pelvis=pelvis)
+    return np.where(glass[..., None] > 0, draw(MODEL, view, image, wall(), i), wall())
+
+
+def with_shadow(view, state, _):
+    """The wall with the person's shadow on the floor."""
+    joints, _ = MODEL.pose(state)
+    on_floor = joints * [1, 1, 0] + joints[:, 2:] * [0.45, 0.2, 0]
+    places = dict(zip(MODEL.joint_names, np.rint(view.project(on_floor)).astype(np.int32), strict=True))
+    shade = np.zeros(wall().shape[:2], np.uint8)
+    for chain in ("head_top neck pelvis", *(f"{s}_shoulder {s}_hip {s}_knee {s}_ankle" for s in "lr")):
+        cv2.polylines(shade, [np.array([places[name] for name in chain.split()])], False, 255, 9)
+    return np.where(shade[..., None] > 0, wall() * 0.55, wall()).astype(np.uint8)
+
+
+@pytest.mark.parametrize("scene", [in_mirror, with_shadow])
+def test_a_mirror_image_and_a_shadow_lose_against_the_person(tmp_path, scene):
+    view = camera(place=(-3.0, -5.5, 2.2))
+    states = [state_at(MODEL, SECTIONS, i / 30) for i in range(34)]
+    pictures = [draw(MODEL, view, state, scene(view, state, i), i) for i, state in enumerate(states)]
+    write(tmp_path / "scene.mp4", pictures)
+    found = find_start(Video(tmp_path / "scene.mp4"), view, wall(), MODEL)
+    off = found.mean.pelvis - states[found.frame].pelvis
+    assert (np.abs(off) < 2.5 * found.sd.pelvis).all() and abs(found.mean.heading) < 2 * found.sd.heading < 1
+    assert found.hypotheses[0].walks
 
 
 def test_the_automatic_start_takes_a_person_who_walks_in(tmp_path):
