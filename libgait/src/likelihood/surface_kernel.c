@@ -23,21 +23,23 @@ static void choose_half(const like_surface *s, body_lanes *restrict w, const flo
                         int32_t *restrict turn)
 {
     float const grazing = 0.2f; /* |n.v| below which a point is too close to the outline */
+    body_lanes m[3];            /* from the camera to the limb's middle, in the limb's frame, statures */
+    int32_t count[BLOCK] = {0}, last[BLOCK];
+    for (int32_t k = 0; k < 3; k++)
+        for (int32_t i = 0; i < BLOCK; i++) {
+            float const stature = 1.0f / scale[i];
+            w[LIKE_VIEW_ORIGIN + k][i] *= stature;
+            m[k][i] = w[LIKE_VIEW_ORIGIN + k][i] + s->middle[k];
+        }
+    for (int32_t d = 0; d < LIKE_AZIMUTHS; d++)
+        for (int32_t i = 0; i < BLOCK; i++) {
+            last[i] = s->side[0][d] * m[0][i] + s->side[1][d] * m[1][i] + s->side[2][d] * m[2][i] < 0.0f;
+            count[i] += last[i];
+        }
     for (int32_t i = 0; i < BLOCK; i++) {
-        float const stature = 1.0f / scale[i];
-        float e[3], m[3]; /* from the camera to the limb's frame and to its middle, in the frame, statures */
-        int32_t count = 0, last = 0;
-        for (int32_t k = 0; k < 3; k++) {
-            e[k] = stature * w[LIKE_VIEW_ORIGIN + k][i];
-            m[k] = e[k] + s->middle[k];
-            w[LIKE_VIEW_ORIGIN + k][i] = e[k];
-        }
-        for (int32_t d = 0; d < LIKE_AZIMUTHS; d++) {
-            last = s->side[0][d] * m[0] + s->side[1][d] * m[1] + s->side[2][d] * m[2] < 0.0f;
-            count += last;
-        }
-        turn[i] = first_direction(count, last);
-        w[LIKE_VIEW_GRAZE][i] = -grazing * __builtin_sqrtf(m[0] * m[0] + m[1] * m[1] + m[2] * m[2]);
+        turn[i] = first_direction(count[i], last[i]);
+        w[LIKE_VIEW_GRAZE][i] =
+            -grazing * __builtin_sqrtf(m[0][i] * m[0][i] + m[1][i] * m[1][i] + m[2][i] * m[2][i]);
     }
 }
 
