@@ -285,9 +285,9 @@ static void test_slivers(void)
 static void test_bits(void)
 {
     int32_t wrong = 0;
-    for (int32_t begin = 0; begin <= 200; begin++)
-        for (int32_t end = -200; end <= 64; end++) {
-            uint64_t const have = grid_bits(begin, end);
+    for (int32_t begin = 0; begin <= 64; begin++)
+        for (int32_t end = 0; end <= 64; end++) {
+            uint64_t const have = grid_from[begin] & ~grid_from[end];
             for (int32_t x = 0; x < 64; x++)
                 wrong += (have >> x & 1) != (uint64_t)(x >= begin && x < end);
         }

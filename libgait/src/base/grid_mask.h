@@ -35,13 +35,9 @@ static inline void grid_mask_frame(grid_mask *m, int32_t first, int32_t last, in
     m->small = (width == 64) & (last - first <= GRID_SMALL) & (first % 8 == 0);
 }
 
-/* Bits [begin, end) of a word, begin >= 0, end <= 64; none if begin >= end. No branch, so that loops
- * vectorise. */
-static inline uint64_t grid_bits(int32_t begin, int32_t end)
-{
-    uint64_t const ones = (uint64_t)(int64_t)-(int32_t)(begin < end);
-    return (ones >> ((uint32_t)(begin - end) & 63u)) << ((uint32_t)begin & 63u);
-}
+/* grid_from[k]: bits k and above of a word, none for 64. Bits [begin, end) are grid_from[begin] &
+ * ~grid_from[end], none if begin >= end. */
+extern const uint64_t grid_from[65];
 
 /* Index of the 32-bit half word of a mask that has the cell x columns right of the first column in row y. */
 static inline int32_t grid_half(int32_t x, int32_t y)

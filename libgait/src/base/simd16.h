@@ -10,7 +10,15 @@ enum { SIMD16 = 16 };
 
 #if defined(__AVX2__)
 #include <immintrin.h>
+#elif defined(__SSE2__) && !defined(KERNEL_SCALAR)
+#include <immintrin.h>
+#define SIMD16_SSE2
+#elif defined(__aarch64__) && !defined(KERNEL_SCALAR)
+#include <arm_neon.h>
+#define SIMD16_NEON
+#endif
 
+#if defined(__AVX2__)
 /* With a mask, even a full one, a gather does not wait for the old value of its register. The scale must be a
  * constant. */
 static inline __m256i simd16_lookup8(const void *table, int32_t bytes, __m256i index, __m256i take)
@@ -33,27 +41,35 @@ static inline __m512i simd16_lookup16(const void *table, int32_t bytes, __m512i 
 #pragma GCC diagnostic pop
 #endif
 
-/* out[i] = the word `bytes` (2 or 4) times index[i] into the table where take[i] is negative, elsewhere 0. */
+/* out[i] = the word `bytes` (2 or 4) times index[i] into the table, which has at least one, where take[i] is
+ * negative, elsewhere 0. */
+#if defined(__AVX2__)
 static inline void simd16_lookup_every(int32_t bytes, const void *table, const int32_t *index,
                                        const int32_t *take, int32_t *out)
 {
 #if defined(__AVX512F__)
     __mmask16 const on = _mm512_movepi32_mask(_mm512_loadu_si512(take));
     _mm512_storeu_si512(out, simd16_lookup16(table, bytes, _mm512_loadu_si512(index), on));
-#elif defined(__AVX2__)
+#else
     for (int32_t i = 0; i < SIMD16; i += 8)
         _mm256_storeu_si256((__m256i_u *)(out + i),
                             simd16_lookup8(table, bytes, _mm256_loadu_si256((const __m256i_u *)(index + i)),
                                            _mm256_loadu_si256((const __m256i_u *)(take + i))));
-#else
-    for (int32_t i = 0; i < SIMD16; i++) {
-        int32_t found = 0;
-        if (take[i] < 0)
-            memcpy(&found, (const char *)table + (ptrdiff_t)bytes * index[i], sizeof found);
-        out[i] = found; /* out may be index */
-    }
 #endif
 }
+#else /* word 0 is read where nothing is taken, which is cheaper than a branch; once per file, because long */
+static __attribute__((noinline, unused)) void
+simd16_lookup_every(int32_t bytes, const void *table, const int32_t *index, const int32_t *take, int32_t *out)
+{
+    int32_t at[SIMD16], found[SIMD16];
+    for (int32_t i = 0; i < SIMD16; i++)
+        at[i] = (index[i] & take[i] >> 31) << (bytes >> 1); /* times 2 or 4 */
+    for (int32_t i = 0; i < SIMD16; i++)
+        memcpy(&found[i], (const char *)table + at[i], sizeof found[i]);
+    for (int32_t i = 0; i < SIMD16; i++)
+        out[i] = found[i] & take[i] >> 31; /* out may be index */
+}
+#endif
 
 /* out[i] = table[index[i]] where take[i] is negative, elsewhere 0. */
 static inline void simd16_lookup(const void *table, const int32_t *index, const int32_t *take, int32_t *out)
@@ -89,6 +105,20 @@ static inline void words_store(int32_t *v, simd16_words w)
 }
 #define WORDS_OP(op) _mm256_##op
 #define WORDS_AND    _mm256_and_si256
+#elif defined(SIMD16_SSE2)
+#define SIMD16_WORDS 4
+typedef __m128i simd16_words;
+static inline simd16_words words_load(const int32_t *v)
+{
+    return _mm_loadu_si128((const __m128i_u *)v);
+}
+
+static inline void words_store(int32_t *v, simd16_words w)
+{
+    _mm_storeu_si128((__m128i_u *)v, w);
+}
+#define WORDS_OP(op) _mm_##op
+#define WORDS_AND    _mm_and_si128
 #endif
 
 #if defined(SIMD16_WORDS)
@@ -191,17 +221,19 @@ static inline void simd16_load(const float *in, float *restrict out)
 #endif
 }
 
-/* Bytes to words. Written out because in pieces the next instruction would wait for the stores. */
-static inline void simd16_widen(const int8_t *in, int32_t *out)
+/* out[i] is negative where bit column[i], modulo 32, of bits[i] is set. */
+static inline void simd16_bit(const int32_t *bits, const int32_t *column, int32_t *out)
 {
-#if defined(__AVX512F__)
-    _mm512_storeu_si512(out, _mm512_cvtepi8_epi32(_mm_loadu_si128((const __m128i_u *)in)));
-#elif defined(__AVX2__)
-    for (int32_t i = 0; i < SIMD16; i += 8)
-        _mm256_storeu_si256((__m256i_u *)(out + i), _mm256_cvtepi8_epi32(_mm_loadu_si64(in + i)));
+#if defined(SIMD16_SSE2) /* has no shift by lanes: powers of two are made as floats */
+    for (int32_t i = 0; i < SIMD16; i += SIMD16_WORDS) {
+        __m128i const power =
+            _mm_add_epi32(_mm_and_si128(words_load(column + i), _mm_set1_epi32(31)), _mm_set1_epi32(127));
+        __m128i const bit = _mm_cvttps_epi32(_mm_castsi128_ps(_mm_slli_epi32(power, 23))); /* 2^31: also */
+        words_store(out + i, _mm_cmpeq_epi32(_mm_and_si128(words_load(bits + i), bit), bit));
+    }
 #else
     for (int32_t i = 0; i < SIMD16; i++)
-        out[i] = in[i];
+        out[i] = (int32_t)((uint32_t)bits[i] << (~column[i] & 31));
 #endif
 }
 
@@ -291,10 +323,12 @@ static inline void simd16_duplicate(const float *eight, float *restrict out)
 }
 
 /* Rows of masks processed at once: as many as have their two ends in one register. */
-#if defined(__AVX2__) && !defined(__AVX512F__)
+#if defined(__AVX512F__)
+enum { SIMD16_ROWS = 8 };
+#elif defined(__AVX2__)
 enum { SIMD16_ROWS = 4 };
 #else
-enum { SIMD16_ROWS = 8 };
+enum { SIMD16_ROWS = 2 };
 #endif
 
 /* Draw one limb into rows of masks. The bits from the first to the second number of each pair (0 to 64) are
@@ -315,9 +349,16 @@ static inline void simd16_cover(const int32_t *span, uint64_t *restrict whole, u
     __m256i const nearer = _mm256_loadu_si256((const __m256i_u *)whole);
     _mm256_storeu_si256((__m256i_u *)whole, _mm256_or_si256(nearer, mine));
     _mm256_storeu_si256((__m256i_u *)visible, _mm256_andnot_si256(nearer, mine));
+#elif defined(SIMD16_NEON)
+    uint64x2_t const ones = vdupq_n_u64(~UINT64_C(0)), nearer = vld1q_u64(whole);
+    int64x2_t const both = vreinterpretq_s64_s32(vld1q_s32(span));
+    uint64x2_t const from = vshlq_u64(ones, vandq_s64(both, vdupq_n_s64(0xffffffff)));
+    uint64x2_t const mine = vbicq_u64(from, vshlq_u64(ones, vshrq_n_s64(both, 32)));
+    vst1q_u64(whole, vorrq_u64(nearer, mine));
+    vst1q_u64(visible, vbicq_u64(mine, nearer));
 #else
     for (int32_t i = 0; i < SIMD16_ROWS; i++) {
-        uint64_t const mine = grid_bits(span[2 * i], span[2 * i + 1]), nearer = whole[i];
+        uint64_t const mine = grid_from[span[2 * i]] & ~grid_from[span[2 * i + 1]], nearer = whole[i];
         whole[i] = nearer | mine;
         visible[i] = mine & ~nearer;
     }
@@ -352,6 +393,28 @@ static inline void simd16_transpose(const float (*restrict in)[SIMD16], float (*
                     _mm256_storeu_pd((double *)(void *)(out[b + i + 2 * k + 1] + a),
                                      _mm256_unpackhi_pd(low, high));
                 }
+        }
+#elif defined(SIMD16_SSE2) || defined(SIMD16_NEON)
+    for (int32_t a = 0; a < SIMD16; a += 4)
+        for (int32_t b = 0; b < SIMD16; b += 4) {
+#if defined(SIMD16_SSE2)
+            __m128 r0 = _mm_loadu_ps(in[a] + b), r1 = _mm_loadu_ps(in[a + 1] + b);
+            __m128 r2 = _mm_loadu_ps(in[a + 2] + b), r3 = _mm_loadu_ps(in[a + 3] + b);
+            _MM_TRANSPOSE4_PS(r0, r1, r2, r3);
+            _mm_storeu_ps(out[b] + a, r0);
+            _mm_storeu_ps(out[b + 1] + a, r1);
+            _mm_storeu_ps(out[b + 2] + a, r2);
+            _mm_storeu_ps(out[b + 3] + a, r3);
+#else
+            float32x4x2_t const r02 = vzipq_f32(vld1q_f32(in[a] + b), vld1q_f32(in[a + 2] + b));
+            float32x4x2_t const r13 = vzipq_f32(vld1q_f32(in[a + 1] + b), vld1q_f32(in[a + 3] + b));
+            float32x4x2_t const low = vzipq_f32(r02.val[0], r13.val[0]),
+                                high = vzipq_f32(r02.val[1], r13.val[1]);
+            vst1q_f32(out[b] + a, low.val[0]);
+            vst1q_f32(out[b + 1] + a, low.val[1]);
+            vst1q_f32(out[b + 2] + a, high.val[0]);
+            vst1q_f32(out[b + 3] + a, high.val[1]);
+#endif
         }
 #else
     for (int32_t b = 0; b < SIMD16; b++)

@@ -60,7 +60,7 @@ static void surface_init(const limb_geometry *g, int32_t points, like_surface *o
 
 static void cost_set(like_costs *c, int32_t difference, int32_t cost)
 {
-    c->one[difference] = LIKE_COUNT_ONE + cost;
+    c->one[difference] = difference == LIKE_COST_NONE ? 0 : LIKE_COUNT_ONE + cost;
     c->low[difference] = (uint8_t)(cost & 255);
     c->high[difference] = (uint8_t)(cost >> 8);
 }

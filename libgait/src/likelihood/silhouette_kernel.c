@@ -3,6 +3,7 @@
 #include "image/features.h"
 #include "base/dispatch.h"
 
+#if defined(__POPCNT__) || defined(KERNEL_SCALAR)
 void KERNEL(silhouette_count)(const features *f, const grid_mask *whole, int32_t *area, int32_t *covered)
 {
     int64_t cells = 0, part[FOREGROUND_PLANES] = {0}, sum = 0;
@@ -22,3 +23,45 @@ void KERNEL(silhouette_count)(const features *f, const grid_mask *whole, int32_t
     *area = (int32_t)cells * FOREGROUND_ONE;
     *covered = (int32_t)sum;
 }
+#else /* counts of bytes, which vector code adds and shifts as well as words */
+static inline uint64_t count_bytes(uint64_t v)
+{
+    v = v - ((v >> 1) & UINT64_C(0x5555555555555555));
+    v = (v & UINT64_C(0x3333333333333333)) + ((v >> 2) & UINT64_C(0x3333333333333333));
+    return (v + (v >> 4)) & UINT64_C(0x0f0f0f0f0f0f0f0f);
+}
+
+/* Bytes added in pairs. */
+static inline uint64_t pairs(uint64_t bytes)
+{
+    return (bytes & UINT64_C(0x00ff00ff00ff00ff)) + ((bytes >> 8) & UINT64_C(0x00ff00ff00ff00ff));
+}
+
+static inline int32_t sum_quarters(uint64_t v)
+{
+    return (int32_t)((v & 0xffff) + ((v >> 16) & 0xffff) + ((v >> 32) & 0xffff) + (v >> 48));
+}
+
+void KERNEL(silhouette_count)(const features *f, const grid_mask *whole, int32_t *area, int32_t *covered)
+{
+    *area = *covered = 0;
+    for (int32_t w = 0; 64 * w < whole->width; w++) {
+        const uint64_t (*const words)[GRID_SIZE] =
+            (const uint64_t (*)[GRID_SIZE])f->words[(whole->column + 64 * w) / GRID_STEP];
+        const uint64_t *const body = whole->word[w], *const inside = words[FOREGROUND_PLANES];
+        uint64_t cells = 0,
+                 sum = 0; /* GRID_SIZE rows of twice 8 (FOREGROUND_ONE) in a quarter: less than 2^16 */
+        for (int32_t y = whole->first; y < whole->last; y++) {
+            uint64_t const m = body[y] & inside[y];
+            uint64_t part = 0;
+#pragma GCC unroll 4
+            for (int32_t k = 0; k < FOREGROUND_PLANES; k++)
+                part += count_bytes(m & words[k][y]) << k;
+            cells += pairs(count_bytes(m));
+            sum += pairs(part);
+        }
+        *area += sum_quarters(cells) * FOREGROUND_ONE;
+        *covered += sum_quarters(sum);
+    }
+}
+#endif

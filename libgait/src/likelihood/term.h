@@ -20,7 +20,8 @@ enum {
     LIKE_HALF = LIKE_SAMPLES / 2, /* surface points on the half of a limb that faces the camera */
     LIKE_RING = LIKE_SAMPLES + LIKE_HALF, /* once around and half again, so that every half is contiguous */
     LIKE_COSTS = 256,                     /* entries of a cost table */
-    LIKE_COST_ONE = 256,                  /* 1 nat in the robust cost table */
+    LIKE_COST_NONE = LIKE_COSTS - 1, /* of a pair of samples that are not both visible: no cost, no count */
+    LIKE_COST_ONE = 256,             /* 1 nat in the robust cost table */
     LIKE_COUNT_ONE = 1 << 24 /* added to every entry, so that a sum of costs also contains their number */
 };
 
@@ -86,8 +87,8 @@ typedef struct like_patch {
     int8_t value[LIKE_HALF];
 } like_patch;
 
-/* Costs of differences between surface samples: with LIKE_COUNT_ONE added to each, and without it as two
- * bytes, of which a register holds many. */
+/* Costs of differences between surface samples: with LIKE_COUNT_ONE added to all but that of LIKE_COST_NONE,
+ * and without it as two bytes, of which a register holds many. */
 typedef struct like_costs {
     int32_t one[LIKE_COSTS];
     uint8_t low[LIKE_COSTS], high[LIKE_COSTS];

@@ -27,22 +27,21 @@ static void compare_all(rows *r, int32_t limbs, const like_costs *cost, int32_t 
 #else
 static inline int32_t compare(const int8_t *restrict a, const int8_t *restrict b, const int32_t *cost)
 {
-    int32_t x[LIKE_HALF], y[LIKE_HALF], difference[LIKE_HALF], both[LIKE_HALF], one[LIKE_HALF], sum = 0;
-    simd16_widen(a, x);
-    simd16_widen(b, y);
-#pragma GCC unroll 1
+    uint8_t difference[LIKE_HALF]; /* of two that are visible less than LIKE_COST_NONE */
+    int32_t sum = 0;
     for (int32_t i = 0; i < LIKE_HALF; i++) {
-        difference[i] = i_max(x[i] - y[i], y[i] - x[i]);
-        both[i] = -((x[i] != TEXTURE_HIDDEN) & (y[i] != TEXTURE_HIDDEN));
+        int8_t const x = a[i], y = b[i];
+        uint8_t const d = (uint8_t)(x > y ? x - y : y - x);
+        bool const hidden = (x == TEXTURE_HIDDEN) | (y == TEXTURE_HIDDEN);
+        difference[i] = hidden ? LIKE_COST_NONE : d;
     }
-    simd16_lookup(cost, difference, both, one);
-#pragma GCC unroll 1
+#pragma GCC unroll 8
     for (int32_t i = 0; i < LIKE_HALF; i++)
-        sum += one[i];
+        sum += cost[difference[i]];
     return sum;
 }
 
-static void compare_all(const rows *r, int32_t limbs, const like_costs *cost, int32_t *sum)
+static void compare_all(rows *r, int32_t limbs, const like_costs *cost, int32_t *sum)
 {
     for (int32_t l = 0; l < limbs; l++)
         sum[l] = compare(r->now[l], r->then[l], cost->one);

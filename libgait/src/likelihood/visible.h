@@ -16,7 +16,7 @@
 HIDE_ANY void hide_any(const grid_mask *mask, const int32_t *x, const int32_t *y, int32_t shift,
                        int32_t *restrict shown)
 {
-    int32_t column[SIMD16], at[SIMD16], bits[SIMD16];
+    int32_t column[SIMD16], at[SIMD16], bits[SIMD16], set[SIMD16];
     uint32_t const width = (uint32_t)mask->width, rows = (uint32_t)(mask->last - mask->first);
 #pragma GCC unroll 1
     for (int32_t i = 0; i < SIMD16; i++) {
@@ -26,9 +26,10 @@ HIDE_ANY void hide_any(const grid_mask *mask, const int32_t *x, const int32_t *y
         at[i] = grid_half(column[i], row);
     }
     simd16_lookup(mask->word, at, shown, bits);
+    simd16_bit(bits, column, set);
 #pragma GCC unroll 1
     for (int32_t i = 0; i < SIMD16; i++)
-        shown[i] &= (int32_t)((uint32_t)bits[i] << (~column[i] & 31));
+        shown[i] &= set[i];
 }
 
 #if defined(__AVX512F__)

@@ -194,7 +194,7 @@ void KERNEL(layers_prepare)(const outline_block *outline, const limb_geometry *l
 static inline int32_t cell_from(float x)
 {
     float const slack = 1.0f / 1024.0f; /* cells */
-    return i_clamp((int32_t)(x + (1.0f - slack)), 0, 64);
+    return i_max((int32_t)f_min(x + (1.0f - slack), 64.0f), 0);
 }
 
 /* The bits of one limb in one word, SIMD16_ROWS rows at once, each as a left and a right column. Arrays are
@@ -204,8 +204,8 @@ static inline __attribute__((always_inline)) void draw_limb(const float *line, i
                                                             uint64_t *restrict visible)
 {
     float at[LAYERS_LINES][2 * SIMD16_ROWS], slope[LAYERS_LINES][2 * SIMD16_ROWS], y[2 * SIMD16_ROWS];
+    float const from = (float)top, to = (float)end;
     int32_t const first = top / LAYERS_BAND * LAYERS_BAND;
-    int32_t row[2 * SIMD16_ROWS];
     simd16_repeat(line, 2 * SIMD16_ROWS, at[0]);
     simd16_repeat(line + 2, 2 * SIMD16_ROWS, slope[0]);
     simd16_repeat(line + 4, 2 * SIMD16_ROWS, at[1]);
@@ -216,10 +216,8 @@ static inline __attribute__((always_inline)) void draw_limb(const float *line, i
         simd16_repeat(line + 12, 2 * SIMD16_ROWS, at[3]);
         simd16_repeat(line + 14, 2 * SIMD16_ROWS, slope[3]);
     }
-    for (int32_t i = 0; i < 2 * SIMD16_ROWS; i++) {
-        row[i] = first - top + (i >> 1);
+    for (int32_t i = 0; i < 2 * SIMD16_ROWS; i++)
         y[i] = (float)(first + (i >> 1));
-    }
     for (int32_t strip = first; strip < end; strip += SIMD16_ROWS) {
         int32_t span[2 * SIMD16_ROWS];
         for (int32_t i = 0; i < 2 * SIMD16_ROWS; i++) {
@@ -228,8 +226,7 @@ static inline __attribute__((always_inline)) void draw_limb(const float *line, i
             x = f_max(at[1][i] + slope[1][i] * y[i], x);
             x = f_max(at[2][i] + slope[2][i] * y[i], x);
             x = lines > 3 ? f_max(at[3][i] + slope[3][i] * y[i], x) : x;
-            span[i] = (uint32_t)row[i] < (uint32_t)(end - top) ? cell_from(sign * x) : 0;
-            row[i] += SIMD16_ROWS;
+            span[i] = cell_from(sign * x) & -(int32_t)((y[i] >= from) & (y[i] < to));
             y[i] += (float)SIMD16_ROWS;
         }
         simd16_cover(span, whole + strip, visible + strip);
