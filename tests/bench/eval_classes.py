@@ -3,10 +3,12 @@
     make built && .venv/bin/python tests/bench/eval_classes.py [--seeds 3] [--record]
     .venv/bin/python tests/bench/eval_classes.py --only stopping backwards
 
-The clips are presets of `gait simulate`, with further seeds of the person, and those of `eval_simulated` for
-slow walks and runs.  Models are the package's: walk, and classes, which walks, stands, walks backwards and
-runs.  A start is the truth with the noise of `eval_clips`, without the class.  The time of a step is compared
-between the package's walk and the same walk with standing and walking backwards beside it.
+The clips are presets of `gait simulate`, with further seeds of the person, those of `eval_simulated` for slow
+walks and runs, and the development clips.  Models are the package's: walk; classes, which walks, stands,
+walks backwards and runs; and, where people only walk, the walk of classes alone, which is learnt from people
+of seven sources instead of CMU's.  A start is the truth with the noise of `eval_clips`, without the class.
+The time of a step is compared between the package's walk and the same walk with standing and walking
+backwards.
 """
 
 from __future__ import annotations
@@ -34,9 +36,12 @@ from facts import facts
 
 from gait import Camera, Model, Start, Tracker, TrackerConfig, Video
 from gait.bindings.abi import TrackStatus
+from gait.bindings.model import read_cyclic
 from gait.body.skeleton import EVAL15
+from gait.io import blob
 from gait.io.track_file import read_truth
 from gait.io.video import read_plate
+from gait.learn.classes.join import of_class
 from gait.motion.evaluate import coverage
 from gait.progress import progress
 from gait.simulate.clip import simulate
@@ -45,6 +50,8 @@ from gait.simulate.scenario import PRESETS, Scenario
 ROOT = Path(__file__).resolve().parents[2]
 OUT = ROOT / "build" / "eval-classes"
 MODELS = "walk", "classes"  # of the package
+ALONE = "walk of classes"
+RUNNING = "running"  # clip of eval_simulated
 HIPS = [EVAL15.index("l_hip"), EVAL15.index("r_hip")]
 FAR = 0.15  # metres, root-aligned: a wrong frame
 DELAY = 0.5  # seconds for which the class before a change may be reported
@@ -75,12 +82,16 @@ COLUMNS = (
     "wrong class %",
 )
 _READING = f"""\
-Clips of `gait simulate`; the start is the truth with noise and does not state the class, so people who stand
-or walk backwards are tracked as walking for the first frames.  root: error with the hips laid together,
-median over frames, then over seeds; abs: as it stands; in 90 %: share of the joints' coordinates in their
-90 % intervals, wanted {COVERED[0]} to {COVERED[1]}; far: of the frames under `tracking` those more than
-{1000 * FAR:.0f} mm off (root); wrong class: of the same frames those of another class, later than {DELAY} s
-after a change, wanted below {100 * WRONG:.0f} %; - : the model has one."""
+Clips of `gait simulate`, and the development clips (names with a number), whose people are among those that
+all models were learnt from; the start is the truth with noise and does not state the class, so people who
+stand or walk backwards are tracked as walking for the first frames.  {ALONE}: without its other
+classes.
+
+- root: error with the hips laid together, median over frames, then over seeds; abs: as it stands
+- in 90 %: share of the joints' coordinates in their 90 % intervals, wanted {COVERED[0]} to {COVERED[1]}
+- far: of the frames under `tracking` those more than {1000 * FAR:.0f} mm off (root)
+- wrong class: of the same frames those of another class, later than {DELAY} s after a change, wanted below
+  {100 * WRONG:.0f} %; - : the model has one"""
 
 CLIPS: dict[str, Scenario] = {
     **{name: PRESETS[name] for name in ("stopping", "standing", "backwards", "turning")},
@@ -125,7 +136,7 @@ def main() -> None:
     args = parser.parse_args()
     clips = _clips(args.only)
     runs: list[Run] = []
-    with progress("tracking", len(clips) * len(MODELS) * args.seeds) as update:
+    with progress("tracking", args.seeds * sum(len(MODELS) + _walks(clip) for clip in clips)) as update:
         for run in _runs(clips, args.seeds, args.jobs):
             runs.append(run)
             update(len(runs))
@@ -142,27 +153,43 @@ def main() -> None:
 def _clips(only: list[str] | None) -> list[Clip]:
     """Clips of the scenarios, made where they are missing, and the runner."""
     wanted = {name: case for name, case in CLIPS.items() if not only or name in only}
-    if not only or "running" in only:
+    if not only or RUNNING in only:
         OUT.mkdir(parents=True, exist_ok=True)
         wanted |= eval_simulated._running(OUT)
     for name, scenario in wanted.items():
         if not (OUT / name / "meta.json").is_file():
             with progress(f"making {name}", scenario.frames) as update:
                 simulate(scenario, OUT / name, update)
-    return [replace(clip, steady=False) if clip.steady else clip
-            for clip in eval_clips.folder_clips(OUT) if clip.name in wanted]  # fmt: skip
+    clips = [clip for clip in eval_clips.folder_clips(OUT) if clip.name in wanted]
+    if not eval_clips.absent():
+        clips += [
+            clip for clip in eval_clips.shared_clips(None) if clip.truth and (not only or clip.name in only)
+        ]
+    return [replace(clip, steady=False) for clip in clips]
 
 
 def _runs(clips: list[Clip], seeds: int, jobs: int) -> Iterator[Run]:
     """Every clip with every model, side by side."""
-    each = [(clip, name, seed) for clip in clips for name in MODELS for seed in range(1, seeds + 1)]
+    alone = OUT / f"{ALONE}.gait"
+    blob.write(alone, {tag: of for tag, of in read_cyclic("classes").items() if not of_class(tag)})
+    each = [
+        (clip, name, seed)
+        for clip in clips
+        for name in (*MODELS, *([str(alone)] if _walks(clip) else []))
+        for seed in range(1, seeds + 1)
+    ]
     with ProcessPoolExecutor(jobs, mp_context=get_context("spawn")) as pool:
         yield from pool.map(_run, *zip(*each, strict=True))
 
 
-def _run(clip: Clip, name: str, seed: int) -> Run:
+def _walks(clip: Clip) -> bool:
+    """Whether the person only walks forwards."""
+    return clip.name != RUNNING and (clip.name not in CLIPS or CLIPS[clip.name].motion in ("walk", "turn"))
+
+
+def _run(clip: Clip, source: str, seed: int) -> Run:
     """Track a clip from the truth with noise."""
-    model = Model(name)
+    model, name = Model(source), Path(source).stem
     video = Video(clip.video)
     camera = Camera.read(str(clip.camera), video.size)
     plate = read_plate(clip.plate, video.size) if clip.plate else None
@@ -211,7 +238,7 @@ def _classes(path: Path | None, count: int) -> list[str]:
     """True class of every frame."""
     assert path is not None
     with path.open(newline="", encoding="utf-8") as file:
-        usual = "run" if path.parent.name == "running" else "walk"
+        usual = "run" if path.parent.name == RUNNING else "walk"
         return [row.get("motion_class", usual) for row in csv.DictReader(file)][:count]
 
 

@@ -48,7 +48,7 @@ def join(first: Sections, classes: Sequence[MotionClass]) -> dict[str, blob.Arra
     names = [c.name for c in classes]
     if len(set(names)) < len(names) or len(names) > MAX_CLASSES:
         raise UserError(f"classes {' '.join(names)}: give each its own name, at most {MAX_CLASSES}")
-    out = {tag: array for tag, array in first.items() if tag[:2] != "CL" and not tag[3].isdigit()}
+    out = {tag: array for tag, array in first.items() if not of_class(tag)}
     info = np.zeros((len(classes), 4), np.int32)
     changes = np.zeros((len(classes), len(classes), 4), np.float32)
     for k, one in enumerate(classes):
@@ -62,6 +62,11 @@ def join(first: Sections, classes: Sequence[MotionClass]) -> dict[str, blob.Arra
     out["CLNM"] = blob.pack_names(names)
     out["CLIN"], out["CLSW"] = info, changes
     return out
+
+
+def of_class(tag: str) -> bool:
+    """Whether a section belongs to classes after the first, or lists them."""
+    return tag[:2] == "CL" or tag[3].isdigit()
 
 
 def _source(one: MotionClass, k: int, classes: Sequence[MotionClass]) -> int:
