@@ -155,7 +155,7 @@ def _clips(only: list[str] | None) -> list[Clip]:
     wanted = {name: case for name, case in CLIPS.items() if not only or name in only}
     if not only or RUNNING in only:
         OUT.mkdir(parents=True, exist_ok=True)
-        wanted |= eval_simulated._running(OUT)
+        wanted |= {name: replace(case, motion="run") for name, case in eval_simulated._running(OUT).items()}
     for name, scenario in wanted.items():
         if not (OUT / name / "meta.json").is_file():
             with progress(f"making {name}", scenario.frames) as update:
@@ -238,8 +238,7 @@ def _classes(path: Path | None, count: int) -> list[str]:
     """True class of every frame."""
     assert path is not None
     with path.open(newline="", encoding="utf-8") as file:
-        usual = "run" if path.parent.name == RUNNING else "walk"
-        return [row.get("motion_class", usual) for row in csv.DictReader(file)][:count]
+        return [row.get("motion_class", "walk") for row in csv.DictReader(file)][:count]
 
 
 def _time_of_three(clips: list[Clip]) -> str:

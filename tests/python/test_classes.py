@@ -23,6 +23,7 @@ from gait.report.run_page import Run, run_page
 from gait.simulate.clip import simulate
 from gait.simulate.scenario import PRESETS, Scenario
 from gait.simulate.stage import set_stage
+from gait.simulate.walk import TOE_OFF
 
 SHIPPED = Path(gait.__file__).parent / "data/walk.gait"
 
@@ -220,6 +221,21 @@ def test_backwards_moves_against_the_heading_and_turns_go_round() -> None:
     turn = set_stage(replace(PRESETS["turning"], **TINY))
     heading = np.unwrap(turn.walk.heading[turn.frames])
     assert 70 < abs(np.degrees(heading[-1] - heading[0])) < 85
+
+
+def test_a_run_flies_falls_and_does_not_slide() -> None:
+    stage = set_stage(Scenario(motion="run", frames=40, **TINY))  # type: ignore[arg-type]
+    clip = slice(stage.frames[0], stage.frames[-1])
+    timing, points = stage.walk.timing, stage.walk.points(clip)
+    feet = {side: timing.of_side(side)[clip] % 1 for side in "lr"}
+    flies = (feet["l"] > TOE_OFF) & (feet["r"] > TOE_OFF)
+    assert set(stage.classes) == {"run"} and 0.2 < flies.mean() < 0.3
+    fall = np.median(np.diff(points["pelvis"][:, 2], 2)[flies[1:-1]]) / timing.step**2
+    assert fall == pytest.approx(-9.81, rel=0.02)
+    for side, phase in feet.items():
+        flat = (phase > 0.15) & (phase < 0.35)
+        toe = np.diff(points[f"{side}_toe"], axis=0)[flat[1:] & flat[:-1]]
+        assert np.linalg.norm(toe, axis=1).max() < 1e-3 and points[f"{side}_toe"][:, 2].min() > 0
 
 
 def test_the_truth_names_the_class_where_it_is_not_always_a_walk(

@@ -18,6 +18,7 @@ presets (other options change them):
            corner
   slow, fast, limping, stick, crutches
            0.6 m/s from the side; 1.9 m/s; spares the left leg; walks with a stick or with forearm crutches
+  running  from the side, like the runners of the package's model
 """
 
 from __future__ import annotations
@@ -65,7 +66,10 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         "--direction", choices=DIRECTIONS, help="walk left to right (lr) or right to left (rl)"
     )
     parser.add_argument(
-        "--motion", choices=MOTIONS, help="stop: walk, stop, stand and walk on; turn: turn a corner"
+        "--motion",
+        choices=MOTIONS,
+        help="stop: walk, stop, stand and walk on; turn: turn a corner; run: as in --gait, or like the "
+        "package's runners",
     )
     parser.add_argument(
         "--asymmetry",

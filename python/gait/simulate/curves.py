@@ -11,6 +11,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import ArrayLike
 
+from gait.bindings.model import read_blob
 from gait.body.model_curves import pace, slope_of
 from gait.errors import UserError
 from gait.io import blob
@@ -139,17 +140,23 @@ def _calm(name: str) -> float:
 
 
 _ROOT = {"pelvis_yaw": "root_yaw", "pelvis_pitch": "root_pitch", "pelvis_roll": "root_roll"}
+_OF_CLASS = "CURV", "SCST", "GAIT", "PACE"
 _NEEDED = tuple(f"{side}_{name}" for side in "lr" for name in ("hip_flexion", "knee_flexion"))
 
 
-def curves_of_model(path: str, rng: np.random.Generator, cadence: float) -> Curves:
+def curves_of_model(path: str, rng: np.random.Generator, cadence: float, motion_class: str) -> Curves:
     """Return the curves of a person drawn from the model at `path`; strides differ as in the model.
 
     cadence : strides per second, which the mean cycle follows.
+    motion_class : the class whose curves they are, if the model has it, else the model's first.
 
     UserError if the file is not a sound model or lacks the legs' angles.
     """
-    sections = blob.read(path)
+    sections = blob.decode(read_blob(path), path)
+    names = blob.unpack_names(sections["CLNM"]) if "CLNM" in sections else []
+    if motion_class in names[1:]:
+        own = str(names.index(motion_class))
+        sections = sections | {tag: sections[tag[:3] + own] for tag in _OF_CLASS if tag[:3] + own in sections}
     for tag in ("CHNM", "CURV", "SCST"):
         if tag not in sections:
             raise UserError(

@@ -1,4 +1,4 @@
-"""Motions of a person in a clip other than walking straight: stopping, standing, walking backwards, turning.
+"""Motions in a clip other than walking straight: stopping, standing, walking backwards, turning, running.
 
 A stop slows the gait's clock until both feet are on the ground, while steps get shorter, so that the feet
 come together; a start is the same in reverse.  Backwards is a walk whose time runs backwards.
@@ -15,7 +15,7 @@ from scipy.ndimage import gaussian_filter1d
 from gait.simulate.geometry import Array
 from gait.simulate.walk import Timing, Walk, smoothstep
 
-WALK, STAND, BACKWARDS = "walk", "stand", "backwards"
+WALK, STAND, BACKWARDS, RUN = "walk", "stand", "backwards", "run"
 _RAMP = 0.8  # seconds from walking to standing
 _SHORTER = 0.3  # seconds before it in which steps begin to get shorter
 _BOTH_FEET = 0.06  # phase, modulo half a stride, with both feet on the ground
@@ -98,5 +98,5 @@ def reversed_in_time(walk: Walk) -> Walk:
 def classes(motion: str, stop: Pause | None, count: int) -> list[str]:
     """Class of motion at each of `count` steps of the time grid."""
     if stop is None:
-        return [BACKWARDS if motion == BACKWARDS else WALK] * count
+        return [motion if motion in (BACKWARDS, RUN) else WALK] * count
     return [WALK if moving else STAND for moving in (stop.share > _MOVES).tolist()]

@@ -20,7 +20,7 @@ from gait.simulate.geometry import Array, Ints
 from gait.simulate.moving import make_cameras
 from gait.simulate.scenario import GENERATOR, Scenario
 from gait.simulate.scene import Coats, Layout, Scene, build_scene, draw_layout
-from gait.simulate.walk import Path, Shaped, Walk, draw_timing, make_walk
+from gait.simulate.walk import RUN_TOE_OFF, TOE_OFF, Path, Shaped, Walk, draw_timing, make_walk
 from gait.simulate.wardrobe import Appearance, draw_appearance
 
 CIRCLE_RADIUS = 2.5
@@ -91,6 +91,7 @@ def _extent(points: Array, place: Array, rotation: Array) -> tuple[Array, Array]
     return flat.min(0), flat.max(0)
 
 
+_RUN = 2.5, 1.36  # m/s, strides/s
 _USUAL_SPEED, _USUAL_CADENCE, _USUAL_STATURE = 1.25, 0.92, 1.75  # m/s, strides/s, m
 _SURFACE = 0.10  # metres from a joint to the skin, hair or shoe around it
 _APART = (0.65, 0.95)  # metres between the paths of people who meet
@@ -169,10 +170,15 @@ def _cast(scenario: Scenario, path: Path) -> Stage:
     body = draw_anatomy(stature, rng, model)
     speed, cadence = pace(scenario, stature)
     rng = scenario.stream("gait")
-    generated = scenario.gait == GENERATOR
-    curves = normative(rng) if generated else curves_of_model(scenario.gait, rng, cadence)
+    runs, generated = scenario.motion == motion.RUN, scenario.gait == GENERATOR
+    if generated and not runs:
+        curves = normative(rng)
+    else:
+        source, kind = "classes" if generated else scenario.gait, motion.RUN if runs else motion.WALK
+        curves = curves_of_model(source, rng, cadence, kind)
     timing = draw_timing(cadence, scenario.fps, scenario.frames, len(curves.modes), rng)
-    timing = replace(timing, spared=scenario.asymmetry / 100)
+    toe_off = RUN_TOE_OFF if runs else TOE_OFF
+    timing = replace(timing, spared=scenario.asymmetry / 100, toe_off=toe_off)
     stop, shaped = motion.pause(timing, scenario.motion, scenario.frames), None
     if stop is not None:
         blend = partial(motion.posture, stop=stop, rng=scenario.stream("idle"))
@@ -251,6 +257,8 @@ def pace(scenario: Scenario, stature: float) -> tuple[float, float]:
     rng = scenario.stream("pace")
     usual = _USUAL_CADENCE * np.sqrt(_USUAL_STATURE / stature) * rng.uniform(0.97, 1.03)
     speed, cadence = scenario.speed, scenario.stride_hz
+    if scenario.motion == motion.RUN:
+        return speed or _RUN[0], cadence or _RUN[1]
     drawn = float(rng.uniform(1.12, 1.38))
     if speed is None:
         speed = drawn if cadence is None else _USUAL_SPEED * (cadence / usual) ** 2

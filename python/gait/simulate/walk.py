@@ -8,7 +8,7 @@ nor sink.
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -75,6 +75,7 @@ STRIDE_TIME_CV = 0.02
 # the other one stands longer by _LONG s; its knee yields less under load, by _STRAIGHT s, and its foot pushes
 # off less, by _WEAK s.
 _LATE, _AHEAD, _SHORT, _LONG, _STRAIGHT, _WEAK = 0.12, 0.65, 0.5, 0.25, 4.0, 1.0
+TOE_OFF, RUN_TOE_OFF = 0.625, 0.37  # share of the cycle, of walks and of runs
 MARGIN_STRIDES = 2  # whole strides simulated before and after the clip, so that no foot is planned at an edge
 
 
@@ -91,6 +92,7 @@ class Timing:
     usual_hz: float = 0.0
     #: Share by which the left leg is spared, negative the right one; see `Scenario.asymmetry`.
     spared: float = 0.0
+    toe_off: float = TOE_OFF  #: share of the cycle at which a foot leaves the ground; below a half: a run
 
     @property
     def stride_hz(self) -> float:
@@ -105,9 +107,9 @@ class Timing:
     def of_side(self, side: str) -> Array:
         """Return the unwrapped phase of a foot, whole at its own heel strikes, in swing from `TOE_OFF` on."""
         phase = self.phase + (0.5 - _LATE * self.spared if side == "l" else 0.0)
-        if not self.spared:
+        if not self.spared and self.toe_off == TOE_OFF:
             return phase
-        off = TOE_OFF * (1 - self.sparing(side) * (_SHORT if self.sparing(side) > 0 else _LONG))
+        off = self.toe_off * (1 - self.sparing(side) * (_SHORT if self.sparing(side) > 0 else _LONG))
         knots = np.array([0, 0.5 * off, off, 0.5 * (1 + off)])
         meant = np.array([0, 0.5 * TOE_OFF, TOE_OFF, 0.5 * (1 + TOE_OFF)])
         warp = PchipInterpolator(
@@ -137,8 +139,6 @@ def draw_timing(stride_hz: float, fps: float, frames: int, modes: int, rng: np.r
     scores = PchipInterpolator(strikes, np.clip(knots, -2, 2), extrapolate=True)(time)
     return Timing(time, np.asarray(phase, np.float64), np.asarray(scores, np.float64), per_frame)
 
-
-TOE_OFF = 0.625  # share of the cycle
 
 # pitch of the foot, degrees, toes up positive
 _PITCH_PHASE = (0, 0.03, 0.065, 0.10, 0.34, 0.43, 0.50, 0.56, 0.61, 0.66, 0.71, 0.77, 0.83, 0.88, 0.93, 0.97)
@@ -272,6 +272,7 @@ _LANDING = 0.90  # from this share of the cycle the swinging foot already binds 
 _SWAY = 0.012  # statures
 _SURGE = 0.05  # the pelvis is fastest in double support and slowest over the standing leg, share of the speed
 _HALF_WIDTH = 0.024  # of the step, statures
+_GRAVITY = 9.81  # m/s^2
 _LEAD = 0.010  # how far the pelvis is ahead of where the angles would have it over the feet, statures
 
 
@@ -334,7 +335,11 @@ def make_walk(
     plans = {side: _plan_foot(side, course, rng) for side in SIDES}
     sway = -_SWAY * body.stature * np.sin(2 * np.pi * (timing.phase - 0.02))
     ground = path.point(along, sway)
-    pelvis = np.column_stack([ground, _pelvis_height(ground, turn, plans, timing, body)])
+    runs = timing.toe_off < 0.5
+    height = (_running_height if runs else _pelvis_height)(ground, turn, plans, course)
+    pelvis = np.column_stack([ground, height])
+    if runs:
+        plans = {side: _carried(side, plan, pelvis, course) for side, plan in plans.items()}
     origins, turns = np.zeros((len(along), len(BONES), 3)), np.zeros((len(along), len(BONES), 3, 3))
     _set(origins, turns, "pelvis", pelvis, turn)
     for side in SIDES:
@@ -426,6 +431,8 @@ def _forward_speed(angles: dict[str, Array], timing: Timing, body: Anatomy, gain
         share = smoothstep(p, 0.0, 0.12) * (1 - smoothstep(p, 0.48, TOE_OFF))
         total += share * -np.gradient(still, timing.step)
         weight += share
+    if timing.toe_off < 0.5:
+        return np.full(len(total), total.sum() / weight.sum())
     speed = total / np.maximum(weight, 1e-3)
     surge = 1 + _SURGE * np.cos(4 * np.pi * (timing.phase - 0.02))
     return _smoothed(speed, 0.35, timing) * surge
@@ -501,10 +508,9 @@ def _footfalls(
     return falls
 
 
-def _pelvis_height(
-    ground: Array, turn: Array, plans: dict[str, _FootPlan], timing: Timing, body: Anatomy
-) -> Array:
+def _pelvis_height(ground: Array, turn: Array, plans: dict[str, _FootPlan], course: _Course) -> Array:
     """Return a smooth height of the pelvis (T,) at which the legs reach every planted foot, metres."""
+    timing, body = course.timing, course.body
     limit = np.full(len(ground), np.inf)
     for side, plan in plans.items():
         hip = apply(turn, body.rest[f"{side}_hip"])
@@ -518,6 +524,35 @@ def _pelvis_height(
     for _ in range(4):
         height -= _smoothed(np.maximum(height - limit, 0), 0.03, timing)
     return height
+
+
+def _running_height(ground: Array, turn: Array, plans: dict[str, _FootPlan], course: _Course) -> Array:
+    """Return the height of a runner's pelvis (T,), metres: legs bend by the angles, flight is free fall."""
+    body, step = course.body, course.timing.step
+    height, stands = np.zeros(len(ground)), np.zeros(len(ground), bool)
+    for side, plan in plans.items():
+        hip = apply(turn, body.rest[f"{side}_hip"])
+        aside = np.linalg.norm(plan.ankle[:, :2] - ground - hip[:, :2], axis=1)
+        knee, thigh, shank = course.angles[f"{side}_knee_flexion"], body["thigh"], body["shank"]
+        length = thigh**2 + shank**2 + 2 * thigh * shank * np.cos(knee)
+        up = np.sqrt(np.maximum(length - aside**2, 0))
+        stance = plan.phase % 1.0 < TOE_OFF
+        height[stance] = (plan.ankle[:, 2] + up - hip[:, 2])[stance]
+        stands |= stance
+    at = np.flatnonzero(stands)
+    height = np.interp(np.arange(len(ground)), at, height[at])
+    for a, b in zip(at, at[1:], strict=False):
+        inside = np.arange(a + 1, b)
+        height[inside] += 0.5 * _GRAVITY * step**2 * (inside - a) * (b - inside)
+    return _smoothed(height, 0.01, course.timing)
+
+
+def _carried(side: str, plan: _FootPlan, pelvis: Array, course: _Course) -> _FootPlan:
+    """Return the plan of a foot that the angles carry along with the pelvis (T, 3) while it swings."""
+    p = plan.phase % 1.0
+    window = smoothstep(p, TOE_OFF, TOE_OFF + 0.1) * (1 - smoothstep(p, 0.85, 1.0))
+    free = pelvis + apply(about(2, course.heading), _free_ankle(side, course.angles, course.body))
+    return replace(plan, ankle=plan.ankle + window[:, None] * (free - plan.ankle))
 
 
 def _bent(p: Array, yields: float) -> Array:
