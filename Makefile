@@ -344,7 +344,7 @@ MOCAP ?= ../shared/data/mocap/cmu_walk
 # People whose recordings may be shipped and show the whole body.
 MORE = $(MOCAP)/../more
 WALKING := btk/b2 gaitalytics/g1 bvhtoolbox opensim/p2 opensim/p4 mcgill cmu_more/c12 cmu_more/c15 cmu_more/c46
-RUNNING := run_cmu
+RUNNING := run_cmu run_rbds
 LEARN_CLASSES = $(VENV)/bin/gait learn --subjects folder --segments none
 model: setup lib ## learn the shipped models from MOCAP= *
 	$(VENV)/bin/gait learn $(MOCAP) -o python/gait/data/walk.gait $(ARGS)
