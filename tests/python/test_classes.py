@@ -117,6 +117,19 @@ def test_a_class_of_one_cycle_is_refused_and_nothing_is_written(
     assert not out.exists()
 
 
+def test_recorded_backward_walks_are_learnt_in_reversed_time(tmp_path: Path) -> None:
+    for folder, motion in (("walks", {}), ("backward", {"period": -120.0, "speed": -1.3})):
+        for k in range(3):
+            mocap_files.write_toy(tmp_path / folder, f"{k}_01", frames=400, offset=10.0 * k, **motion)
+    out, words = tmp_path / "m.gait", ["--segments", "none", "--quiet", "--jobs", "1"]
+    source = f"backwards={tmp_path / 'backward'}"
+    assert main(["learn", str(tmp_path / "walks"), "-o", str(out), *words, "--class", source]) == 0
+    model, sections = gait.Model(out), blob.read(out)
+    assert model.class_info(1).direction == -1
+    assert model.class_info(1).stride_length == pytest.approx(model.info.stride_length, rel=0.02)
+    assert np.degrees(np.abs(sections["CUR1"][0] - sections["CURV"][0]).max()) < 3
+
+
 def test_classes_are_added_to_a_model(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     out = tmp_path / "m.gait"
     words = ["--class", "backwards", "--class", "stand", "--class", f"stroll={SHIPPED}"]
@@ -137,8 +150,8 @@ def test_classes_are_added_to_a_model(tmp_path: Path, capsys: pytest.CaptureFixt
         (["stand", "stand"], "--class stand: give each class its own name"),
         (["walk"], "--class walk: give each class its own name, not walk"),
         (
-            ["backwards=here"],
-            "--class backwards=here: backwards is derived from the walk",
+            ["backwards=here.gait"],
+            "--class backwards=here.gait: give recordings, or nothing to derive it from the walk",
         ),
     ],
 )

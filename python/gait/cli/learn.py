@@ -145,9 +145,9 @@ def _add_model(group: argparse._ArgumentGroup) -> None:
         default=[],
         metavar="NAME[=SRC]",
         help="add this motion class, so that gait track follows changes; may be repeated. stand and "
-        "backwards are derived from the walk; run is learnt from the runs among the sources, or like any "
-        "other NAME from the recordings in SRC, or copied from SRC if that is a model. With a walking model "
-        "as the only source, the classes are added to it",
+        "backwards are derived from the walk, backwards also from the recordings in SRC; run is learnt from "
+        "the runs among the sources, or like any other NAME from the recordings in SRC, or copied from SRC "
+        "if that is a model. With a walking model as the only source, the classes are added to it",
     )
     group.add_argument(
         "--components",

@@ -73,6 +73,7 @@ class LearnOptions:
     segments: SegmentOptions = SegmentOptions(source="none")
     jobs: int = 1  #: processes that read files
     dask: str | None = None  #: scheduler of a Dask cluster that reads them instead
+    reverse: bool = False  #: learn recordings in reversed time
     classes: tuple[str, ...] = ()  #: further classes of motion, NAME or NAME=SOURCE
 
 

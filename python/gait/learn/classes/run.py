@@ -36,7 +36,8 @@ def learn(options: LearnOptions, note: Note) -> dict[str, Any]:
     """Learn each of ``options.classes`` that has recordings, then the walk, and write one blob.
 
     A class is ``stand`` or ``backwards``, made from the walk; or ``NAME=SRC``, learnt from those recordings
-    or taken from a model (``.gait``); or ``run``, learnt from the runs among the sources.  Returns the
+    (``backwards`` in reversed time, as a walk whose phase runs back) or taken from a model (``.gait``); or
+    ``run``, learnt from the runs among the sources.  Returns the
     figures of the walk, with those of the classes under ``classes``.  UsageError or UserError with one line
     if it cannot be done.
     """
@@ -81,8 +82,8 @@ def _parsed(options: LearnOptions) -> dict[str, str]:
         name, _, source = text.partition("=")
         if not name or name in wanted or name == options.activity:
             raise UsageError(f"--class {text}: give each class its own name, not {options.activity}")
-        if name == BACKWARDS and source:
-            raise UsageError(f"--class {text}: backwards is derived from the walk; leave out ={source}")
+        if name == BACKWARDS and Path(source).suffix == ".gait":
+            raise UsageError(f"--class {text}: give recordings, or nothing to derive it from the walk")
         if not source and (name not in (*DERIVED, RUN) or (name == RUN and adds_to_a_model(options))):
             raise UsageError(f"--class {text}: give recordings, --class {name}=FOLDER")
         wanted[name] = source
@@ -106,7 +107,8 @@ def _learnt(name: str, source: str, options: LearnOptions, note: Note) -> Motion
             options,
             sources=(source,) if source else options.sources,
             output=str(Path(folder) / "class.gait"),
-            activity=name,
+            activity=options.activity if name == BACKWARDS else name,
+            reverse=name == BACKWARDS,
             report=None,
             segments=SegmentOptions(source="none"),
             classes=(),
@@ -120,7 +122,7 @@ def _learnt(name: str, source: str, options: LearnOptions, note: Note) -> Motion
             return None
         except UserError as exc:
             raise UserError(f"class {name}: {exc}") from None
-        return _counted(MotionClass(name, own=blob.read(own.output)), None)
+        return _counted(MotionClass(name, -1 if own.reverse else 1, blob.read(own.output)), None)
 
 
 def _counted(one: MotionClass, walk: Mapping[str, blob.Array] | None) -> MotionClass:

@@ -71,6 +71,7 @@ def prepare(path: Path, read: Body | AngleTable, options: LearnOptions = DEFAULT
     A trial of hardly more than a stride is prepared by its steps (`Sequence.short`).  UserError if the motion
     is not cyclic, too short or of another activity.
     """
+    read = read.reversed() if options.reverse else read
     try:
         return _long(path, read, options)
     except UserError:

@@ -90,6 +90,12 @@ class AngleTable:
         root = None if self.root is None else self.root[start:stop]
         return replace(self, angles=self.angles[start:stop], root=root)
 
+    def reversed(self) -> AngleTable:
+        """Return the motion in reversed time."""
+        ahead = [-1.0 if name == "root_forward" else 1.0 for name in ROOTS]
+        root = None if self.root is None else self.root[::-1] * ahead
+        return replace(self, angles=self.angles[::-1], root=root)
+
 
 def holds_angles(path: Path) -> bool:
     """Whether a .csv has columns of angles, and not the positions of the legs' joints."""

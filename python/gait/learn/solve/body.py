@@ -76,9 +76,16 @@ class Body:
 
     def part(self, start: int, stop: int) -> Body:
         """Return frames start to stop."""
-        joints = {name: places[start:stop] for name, places in self.joints.items()}
-        lateral = {name: axes[start:stop] for name, axes in self.lateral.items()}
-        return replace(self, joints=joints, pelvis=self.pelvis[start:stop], lateral=lateral)
+        return self._at(slice(start, stop))
+
+    def reversed(self) -> Body:
+        """Return the motion in reversed time."""
+        return self._at(slice(None, None, -1))
+
+    def _at(self, frames: slice) -> Body:
+        joints = {name: places[frames] for name, places in self.joints.items()}
+        lateral = {name: axes[frames] for name, axes in self.lateral.items()}
+        return replace(self, joints=joints, pelvis=self.pelvis[frames], lateral=lateral)
 
 
 def from_bones(recording: Recording) -> Body:
