@@ -21,7 +21,7 @@
 #define GAIT_VERSION_MINOR 1
 #define GAIT_VERSION_PATCH 0
 #define GAIT_VERSION (GAIT_VERSION_MAJOR * 10000 + GAIT_VERSION_MINOR * 100 + GAIT_VERSION_PATCH)
-#define GAIT_ABI 9          /* SONAME; raised by any incompatible change below, including struct layout */
+#define GAIT_ABI 10         /* SONAME; raised by any incompatible change below, including struct layout */
 #define GAIT_FORMAT_MAJOR 1 /* of model blobs: one with another major version is rejected */
 #define GAIT_FORMAT_MINOR 0 /* sections that a newer minor version adds are skipped */
 

@@ -52,12 +52,14 @@ typedef struct gait_start_config { GAIT_START_CONFIG_FIELDS(GAIT_DECLARE, GAIT_D
 
 typedef struct gait_box { GAIT_BOX_FIELDS(GAIT_DECLARE) } gait_box;
 
-/* One result. */
+/* One result: normal distributions about a mean. */
 #define GAIT_HYPOTHESIS_FIELDS(FIELD)                                                                                 \
     FIELD("State at the requested time; fields that are not fitted are 0.",                                           \
           gait_state, mean, , "")                                                                                     \
     FIELD("Its standard deviations; the model's prior for fields that are not fitted.",                               \
           gait_state, sd, , "")                                                                                       \
+    FIELD("Correlation of phase, stride_hz, stature, heading, pelvis x and y; all 0: independent.",                  \
+          float, correlation, [6][6], "")                                                                             \
     FIELD("Speed along the heading.",                                                                                 \
           float, speed, , "metres per second")                                                                        \
     FIELD("Its standard deviation.",                                                                                  \

@@ -95,7 +95,7 @@ def test_another_library_is_refused():
 @pytest.mark.parametrize(
     "where, name, value, words",
     [
-        (abi, "ABI", 99, "ABI 9, this package needs 99"),
+        (abi, "ABI", 99, "ABI 10, this package needs 99"),
         (loader, "__version__", "9.9.9", "this package is 9.9.9"),
     ],
 )

@@ -33,7 +33,7 @@ static void test_draw(void)
         *state_number(&sd, k) = sds[k];
     sd.coef[5] = sd.offset[2] = 9.0f; /* not in use */
     for (int32_t i = 0; i < DRAWS; i++) {
-        particle_state const w = dynamics_draw(&d, &mean, &sd, i);
+        particle_state const w = dynamics_draw(&d, &mean, &sd, NULL, i);
         gait_state s = particle_to_state(&d.rule, &w);
         for (size_t k = 0; k < STATE_FIELDS; k++)
             v[k][i] = (double)*state_number(&s, k);
@@ -61,7 +61,7 @@ static void test_draw_exact(void)
         gait_state const sd = {0};
         mean.pelvis[2] += 0.13f;
         for (int32_t i = 0; i < 5; i++) {
-            particle_state const w = dynamics_draw(&d, &mean, &sd, i);
+            particle_state const w = dynamics_draw(&d, &mean, &sd, NULL, i);
             gait_state const s = particle_to_state(&d.rule, &w);
             CHECK(s.phase == mean.phase && s.stride_hz == mean.stride_hz && s.stature == mean.stature);
             for (int k = 0; k < 3; k++)
@@ -78,7 +78,7 @@ static void test_draw_level(void)
     gait_state mean = toy_state(0.3f), sd = {.pelvis = {0, 0, 0.04f}};
     mean.pelvis[2] += 0.06f;
     for (int32_t i = 0; i < DRAWS; i++)
-        v[i] = (double)dynamics_draw(&d, &mean, &sd, i).f[F_Z];
+        v[i] = (double)dynamics_draw(&d, &mean, &sd, NULL, i).f[F_Z];
     double const trust = 0.0009 / (0.0009 + 0.0016);
     check_moments(moments_of(v, DRAWS), 0.06 * trust, sqrt(trust) * 0.04, DRAWS);
 }
@@ -92,7 +92,7 @@ static void test_draw_broad(void)
     int32_t phase[16] = {0}, heading[16] = {0}, wrong = 0;
     double together = 0.0;
     for (int32_t i = 0; i < DRAWS; i++) {
-        particle_state const w = dynamics_draw(&d, &mean, &sd, i);
+        particle_state const w = dynamics_draw(&d, &mean, &sd, NULL, i);
         float const turn = m_wrap1(w.f[F_HEADING] / TWO_PI_F);
         wrong += !(w.f[F_PHASE] >= 0.0f && w.f[F_PHASE] < 1.0f);
         wrong += !(w.f[F_RATE] >= 0.476f && w.f[F_RATE] <= 2.5f && w.f[F_STATURE] >= 0.3f);

@@ -142,7 +142,7 @@ static void crowd_start(crowd *c, const gait_state *mean)
                      .proportion = {(float)start_sd[F_COEF + 2]}};
     sd.offset[OFFSET_ANGLE] = (float)start_sd[F_COEF + 3];
     for (int32_t i = 0; i < c->p.n; i++)
-        c->now[i] = dynamics_draw(&c->d, mean, &sd, i);
+        c->now[i] = dynamics_draw(&c->d, mean, &sd, NULL, i);
 }
 
 /* Nearly 0: ranks people who walk straight on, whose turn rates are equal, at random. */

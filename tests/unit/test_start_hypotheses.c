@@ -74,6 +74,30 @@ static void test_particles_follow_the_probabilities(void)
     toy_tracker_free(t);
 }
 
+/* Particles of one hypothesis have its correlation; one that is none is refused. */
+static void test_particles_are_correlated(void)
+{
+    enum { STATURE = 2, X = 4 };
+    gait_tracker_config const cfg = config();
+    gait_hypothesis h = truth(1.0f);
+    h.correlation[X][STATURE] = h.correlation[STATURE][X] = -0.8f;
+    gait_tracker *const t = begin(&cfg, &h, 1);
+    double sum = 0.0, x = 0.0, tall = 0.0;
+    for (int32_t i = 0; i < cfg.particles; i++) {
+        particle_state const p = particle_get(&t->particles, i);
+        double const dx = (double)((p.f[F_X] - h.mean.pelvis[0]) / h.sd.pelvis[0]),
+                     ds = (double)((p.f[F_STATURE] - h.mean.stature) / h.sd.stature);
+        sum += dx * ds;
+        x += dx * dx;
+        tall += ds * ds;
+    }
+    CHECK_NEAR(sum / sqrt(x * tall), -0.8, 0.15);
+    CHECK_NEAR(tall / cfg.particles, 1.0, 0.4);
+    h.correlation[X][STATURE] = 1.5f;
+    CHECK(gait_tracker_start_hypotheses(t, &h, 1, 0, NULL) == GAIT_ERR_ARG);
+    toy_tracker_free(t);
+}
+
 /* The same bits as a start by hand. */
 static void test_one_is_a_start(void)
 {
@@ -199,6 +223,7 @@ static uint64_t digest(uint32_t cpu_mask)
 static void tests(void)
 {
     test_particles_follow_the_probabilities();
+    test_particles_are_correlated();
     test_one_is_a_start();
     test_images_choose();
     test_no_person();

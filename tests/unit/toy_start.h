@@ -43,11 +43,11 @@ static uint64_t toy_hash_hypotheses(const gait_hypothesis h[GAIT_START_MAX_HYPOT
     size_t const state = offsetof(gait_state, motion_class);
     uint64_t hash = HASH_INIT;
     for (int k = 0; k < GAIT_START_MAX_HYPOTHESES; k++) {
-        const char *const end = (const char *)&h[k].speed;
         CHECK(h[k].mean.motion_class == 0 && h[k].sd.motion_class == 0);
         hash = hash_fnv1a(hash, &h[k].mean, state);
         hash = hash_fnv1a(hash, &h[k].sd, state);
-        hash = hash_fnv1a(hash, end, sizeof *h - offsetof(gait_hypothesis, speed));
+        size_t const rest = offsetof(gait_hypothesis, correlation);
+        hash = hash_fnv1a(hash, (const char *)&h[k] + rest, sizeof *h - rest);
     }
     return hash;
 }

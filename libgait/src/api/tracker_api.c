@@ -189,8 +189,14 @@ gait_result gait_tracker_start_hypotheses(gait_tracker *t, const gait_hypothesis
         gait_result const s = check_start(t->model, &h[k].mean, &h[k].sd, err);
         if (s != GAIT_OK)
             return s;
-        if (!(h[k].probability >= 0.0f && h[k].probability <= 1.0f))
-            return base_fail(err, GAIT_ERR_ARG, k, "hypothesis %d: probability is outside [0, 1]", (int)k);
+        bool fine = h[k].probability >= 0.0f && h[k].probability <= 1.0f;
+        for (int32_t i = 0; i < DYNAMICS_CORRELATED; i++)
+            for (int32_t j = 0; j < i; j++)
+                fine &= fabsf(h[k].correlation[i][j]) <= 1.0f;
+        if (!fine)
+            return base_fail(err, GAIT_ERR_ARG, k,
+                             "hypothesis %d: probability is outside [0, 1] or correlation outside [-1, 1]",
+                             (int)k);
     }
     tracker_start(t, h, count, false, utime);
     return GAIT_OK;

@@ -10,13 +10,40 @@ static void normals(const dynamics *d, uint32_t stream, uint32_t frame, int32_t 
         rng_normal4(d->seed, stream, frame, (uint32_t)i, (uint32_t)(k / 4), out + k);
 }
 
-particle_state dynamics_draw(const dynamics *d, const gait_state *mean, const gait_state *sd, int32_t i)
+void dynamics_root(const float C[DYNAMICS_CORRELATED][DYNAMICS_CORRELATED],
+                   float L[DYNAMICS_CORRELATED][DYNAMICS_CORRELATED])
+{
+    for (int32_t i = 0; i < DYNAMICS_CORRELATED; i++)
+        for (int32_t k = 0; k <= i; k++) {
+            float sum = i == k ? 1.0f : C[i][k];
+            for (int32_t j = 0; j < k; j++)
+                sum -= L[i][j] * L[k][j];
+            L[i][k] = i == k ? __builtin_sqrtf(f_max(sum, 1e-6f)) : sum / L[k][k];
+        }
+}
+
+/* Correlate independent normals, in place. */
+static void correlate(const float (*root)[DYNAMICS_CORRELATED], float *n)
+{
+    static const uint8_t of[DYNAMICS_CORRELATED] = {0, 2, 3, 1, 6, 7};
+    for (int32_t i = DYNAMICS_CORRELATED - 1; i >= 0; i--) {
+        float sum = 0.0f;
+        for (int32_t k = 0; k <= i; k++)
+            sum += root[i][k] * n[of[k]];
+        n[of[i]] = sum;
+    }
+}
+
+particle_state dynamics_draw(const dynamics *d, const gait_state *mean, const gait_state *sd,
+                             const float (*root)[DYNAMICS_CORRELATED], int32_t i)
 {
     float const level_sd = 0.03f; /* metres: uncertainty of the ground level about z = 0 */
     int32_t const q = d->rule.components;
     float n[NORMALS], u[4];
     gait_state s = *mean;
     normals(d, STREAM_START, 0, i, state_layout_fields(&d->rule), n);
+    if (root)
+        correlate(root, n);
     rng_uniform4(d->seed, STREAM_START, 1, (uint32_t)i, 0, u);
     s.phase = sd->phase >= 0.5f ? u[0] : m_wrap1(mean->phase + sd->phase * n[0]);
     if (d->rule.model->direction == 0)

@@ -22,8 +22,15 @@ typedef struct dynamics {
     float stature_sd_ratio; /* standard deviation of stature at the start, relative to it */
 } dynamics;
 
-/* Particle i of the prior: independent normal distributions about mean (gait_tracker_start). */
-particle_state dynamics_draw(const dynamics *d, const gait_state *mean, const gait_state *sd, int32_t i);
+enum { DYNAMICS_CORRELATED = 6 }; /* phase, stride_hz, stature, heading, pelvis x and y */
+
+/* Root L of a correlation matrix C, L L' = C. */
+void dynamics_root(const float C[DYNAMICS_CORRELATED][DYNAMICS_CORRELATED],
+                   float L[DYNAMICS_CORRELATED][DYNAMICS_CORRELATED]);
+/* Particle i of the prior: normal distributions about mean (gait_tracker_start), correlated by a root, or independent if
+ * that is NULL. */
+particle_state dynamics_draw(const dynamics *d, const gait_state *mean, const gait_state *sd,
+                             const float (*root)[DYNAMICS_CORRELATED], int32_t i);
 
 typedef struct relaxing { /* x -> keep x + noise n over an interval, n standard normal */
     float keep, noise;

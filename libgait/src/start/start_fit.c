@@ -344,18 +344,19 @@ static void widen(const gait_start *s, gait_hypothesis *h)
         h->sd.pelvis[k] = f_clamp(h->sd.pelvis[k], LEAST_PLACE_SD, 10.0f);
 }
 
-/* Widen the standard deviations of what boxes do not determine. */
-static void leave_open(const gait_start *s, const start_candidate *c, gait_hypothesis *h)
+/* Widen the standard deviations of what boxes do not determine; returns what this adds to the covariance of x and y. */
+static double leave_open(const gait_start *s, const start_candidate *c, gait_hypothesis *h)
 {
     h->mean.phase = 0.0f;
     h->sd.phase = s->prior_sd.phase;
     h->mean.pelvis[2] -= (float)c->theta[START_FLOOR]; /* an error of the boxes, not of the floor */
     float ray[3];
     camera_to(&s->cfg.camera, h->mean.pelvis, ray);
-    for (int32_t k = 0; k < 2; k++) { /* along the viewing ray */
-        double const share = (double)(ray[k] * ray[k] / (ray[0] * ray[0] + ray[1] * ray[1])),
-                     own = (double)h->sd.pelvis[k];
-        h->sd.pelvis[k] = f_max(root(own * own + share * BOX_PLACE * BOX_PLACE), LEAST_PLACE_SD);
+    double const along =
+        BOX_PLACE * BOX_PLACE / (double)(ray[0] * ray[0] + ray[1] * ray[1]); /* the viewing ray */
+    for (int32_t k = 0; k < 2; k++) {
+        double const own = (double)h->sd.pelvis[k];
+        h->sd.pelvis[k] = f_max(root(own * own + along * (double)(ray[k] * ray[k])), LEAST_PLACE_SD);
     }
     if (c->in_place) {
         h->mean.stride_hz = s->model->stride_hz;
@@ -370,21 +371,70 @@ static void leave_open(const gait_start *s, const start_candidate *c, gait_hypot
         h->sd.coef[k] = BUILD_SHARE * s->prior_sd.coef[k];
     for (int32_t k = 0; k < s->model->angles; k++)
         h->sd.offset[k] = BUILD_SHARE * s->prior_sd.offset[k];
+    return along * (double)(ray[0] * ray[1]);
+}
+
+/* Derivatives of what is described by the unknowns: state at a moment, in place of that in the middle of the frames, and
+ * the others as they are.  Afterwards rows (of U^-T) whose products are covariances. */
+static void describe_errors(const start_scratch *w, const start_candidate *c, double at, double row[N][LD])
+{
+    float sn, cs;
+    double const way = at * c->theta[START_SPEED];
+    m_sincos_one((float)c->theta[START_HEADING], &sn, &cs);
+    memset(row, 0, N * sizeof *row);
+    row[START_PHASE][START_RATE] = at;
+    row[START_X][START_SPEED] = at * (double)cs;
+    row[START_X][START_HEADING] = -way * (double)sn;
+    row[START_Y][START_SPEED] = at * (double)sn;
+    row[START_Y][START_HEADING] = way * (double)cs;
+    for (int32_t i = 0; i < N; i++) {
+        row[i][i] = 1.0;
+        cholesky_forward_vector(w->U, N, LD, row[i]);
+    }
+}
+
+static double product(const double *a, const double *b)
+{
+    double sum = 0.0;
+    for (int32_t i = 0; i < N; i++)
+        sum += a[i] * b[i];
+    return sum;
+}
+
+static float sd_of(const double *row)
+{
+    return root(product(row, row));
+}
+
+/* Correlation of the state, whose standard deviations have been widened, with `added` covariance of x and y. */
+static void correlate(const double row[N][LD], double added, gait_hypothesis *h)
+{
+    static const uint8_t of[DYNAMICS_CORRELATED] = {START_PHASE,   START_RATE, START_STATURE,
+                                                    START_HEADING, START_X,    START_Y};
+    float const widened[DYNAMICS_CORRELATED] = {h->sd.phase,   h->sd.stride_hz, h->sd.stature,
+                                                h->sd.heading, h->sd.pelvis[0], h->sd.pelvis[1]};
+    float sd[DYNAMICS_CORRELATED];
+    memset(h->correlation, 0, sizeof h->correlation);
+    for (int32_t i = 0; i < DYNAMICS_CORRELATED; i++) {
+        sd[i] = f_max(widened[i], sd_of(row[of[i]]));
+        h->correlation[i][i] = 1.0f;
+        for (int32_t k = 0; k < i; k++) {
+            double const more = of[i] == START_Y && of[k] == START_X ? added : 0.0;
+            float const r = (float)(product(row[of[i]], row[of[k]]) + more) / (sd[i] * sd[k]);
+            if (fabsf(r) <= 1.0f) /* not if the equations have no solution */
+                h->correlation[i][k] = h->correlation[k][i] = r;
+        }
+    }
 }
 
 double start_describe(const gait_start *s, const start_candidate *c, double at, gait_hypothesis *h)
 {
     start_scratch *const w = s->scratch;
-    double covariance[N][LD], theta[1][N], step[LD];
+    double row[N][LD], theta[1][N], step[LD];
     linearise(s, c);
     if (!solve_step(s, 0.0, step))
         memset(w->U, 0, sizeof w->U);
-    for (int32_t i = 0; i < N; i++) {
-        memset(covariance[i], 0, sizeof covariance[i]);
-        covariance[i][i] = 1.0;
-        cholesky_forward_vector(w->U, N, LD, covariance[i]);
-        cholesky_backward(w->U, N, LD, covariance[i]);
-    }
+    describe_errors(w, c, at, row);
     memcpy(theta[0], c->theta, sizeof theta[0]);
     place_states(s, (const double (*)[N])theta, 1, at, &w->states);
     particle_state now = {{0}};
@@ -392,24 +442,23 @@ double start_describe(const gait_start *s, const start_candidate *c, double at, 
         now.f[f] = w->states.f[f][0];
     h->mean = particle_to_state(&s->layout, &now);
     h->sd = s->prior_sd;
-    double const ahead = at * at;
-    h->sd.phase = root(covariance[START_PHASE][START_PHASE] + 2.0 * at * covariance[START_PHASE][START_RATE] +
-                       ahead * covariance[START_RATE][START_RATE]);
-    h->sd.stride_hz = root(covariance[START_RATE][START_RATE]);
-    h->sd.stature = root(covariance[START_STATURE][START_STATURE]);
-    h->sd.heading = root(covariance[START_HEADING][START_HEADING]);
-    double const moved = ahead * covariance[START_SPEED][START_SPEED];
-    h->sd.pelvis[0] = root(covariance[START_X][START_X] + moved);
-    h->sd.pelvis[1] = root(covariance[START_Y][START_Y] + moved);
-    h->sd.pelvis[2] = root(covariance[START_FLOOR][START_FLOOR]);
+    h->sd.phase = sd_of(row[START_PHASE]);
+    h->sd.stride_hz = sd_of(row[START_RATE]);
+    h->sd.stature = sd_of(row[START_STATURE]);
+    h->sd.heading = sd_of(row[START_HEADING]);
+    h->sd.pelvis[0] = sd_of(row[START_X]);
+    h->sd.pelvis[1] = sd_of(row[START_Y]);
+    h->sd.pelvis[2] = sd_of(row[START_FLOOR]);
     for (int32_t k = 0; k < s->layout.components; k++)
-        h->sd.coef[k] = root(covariance[START_SCORE + k][START_SCORE + k]);
+        h->sd.coef[k] = sd_of(row[START_SCORE + k]);
+    double added = 0.0;
     if (w->problem.person)
-        leave_open(s, c, h);
+        added = leave_open(s, c, h);
     else
         widen(s, h);
+    correlate((const double (*)[LD])row, added, h);
     h->speed = (float)c->theta[START_SPEED];
-    h->speed_sd = root(covariance[START_SPEED][START_SPEED]);
+    h->speed_sd = sd_of(row[START_SPEED]);
     h->in_place = c->in_place;
     h->observations = w->problem.observations;
     h->chi2_per_observation = (float)(c->chi2 / (double)w->problem.observations);

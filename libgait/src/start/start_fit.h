@@ -7,7 +7,7 @@
 #ifndef GAIT_START_START_FIT_H
 #define GAIT_START_START_FIT_H
 #include "base/arena.h"
-#include "filter/particles.h"
+#include "filter/dynamics.h"
 #include "gait_start.h"
 #include "start/blobs.h"
 #include "start/people.h"

@@ -67,7 +67,7 @@ void track_loss_redraw(gait_tracker *t, uint32_t counter)
         t->filter.weight[i] = share * (redrawn ? elsewhere : follow);
         t->filter.log_weight[i] = t->filter.weight[i] > 0.0 ? m_log64(t->filter.weight[i]) : -1e300;
         if (redrawn) {
-            particle_state const p = dynamics_draw(&d, &mean, &sd, i);
+            particle_state const p = dynamics_draw(&d, &mean, &sd, NULL, i);
             particle_put(&t->particles, i, &p);
         }
     }

@@ -62,11 +62,16 @@ static void draw_range(gait_tracker *t, const gait_hypothesis *const *from, int3
 {
     dynamics const d = tracker_dynamics(t, motion_class);
     float drawn = 0.0f; /* probability */
+    float root[DYNAMICS_CORRELATED][DYNAMICS_CORRELATED];
     for (int32_t i = first, k = -1; i < end; i++) {
-        while (k + 1 < n && (k < 0 || ((float)(i - first) + 0.5f) * total > drawn * (float)(end - first)))
+        while (k + 1 < n && (k < 0 || ((float)(i - first) + 0.5f) * total > drawn * (float)(end - first))) {
             drawn += from[++k]->probability;
+            dynamics_root(from[k]->correlation, root);
+        }
+        bool const same = from[k]->mean.motion_class == motion_class;
         gait_state const mean = as_class(t, &from[k]->mean, motion_class);
-        particle_state const p = dynamics_draw(&d, &mean, &from[k]->sd, i);
+        particle_state const p = dynamics_draw(&d, &mean, &from[k]->sd,
+                                               same ? (const float (*)[DYNAMICS_CORRELATED])root : NULL, i);
         particle_put(&t->particles, i, &p);
     }
 }

@@ -24,7 +24,7 @@ from ctypes import (
 from enum import IntEnum, IntFlag
 from typing import Any, NamedTuple
 
-ABI = 9
+ABI = 10
 ALIGN = 64
 MAX_JOINTS, MAX_ANGLES, MAX_COMPONENTS, MAX_PROPORTIONS, MAX_CAMERAS = 32, 32, 16, 8, 4
 MAX_CLASSES, MAX_PIXELS = 8, 16000

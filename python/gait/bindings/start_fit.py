@@ -48,7 +48,7 @@ class Hypothesis:
     Attributes
     ----------
     mean, sd : State
-        Independent normals at the time asked for.
+        Normals at the time asked for.
     speed, speed_sd : float
         Along the heading, metres per second.
     probability : float
@@ -59,6 +59,8 @@ class Hypothesis:
         The person stays in place, as on a treadmill.
     walks : bool
         A walk that fits the observations, good enough to start with.
+    correlation : ndarray of shape (6, 6)
+        Of phase, stride rate, stature, heading, and the pelvis' x and y; other fields are independent.
     """
 
     mean: State
@@ -69,10 +71,11 @@ class Hypothesis:
     chi2_per_observation: float
     in_place: bool
     walks: bool
+    correlation: NDArray[np.float64]
 
     def to_c(self) -> abi.HypothesisC:
         """Struct of the C library."""
-        return abi.HypothesisC(
+        c = abi.HypothesisC(
             mean=self.mean.to_c(),
             sd=self.sd.to_c(),
             speed=self.speed,
@@ -81,6 +84,9 @@ class Hypothesis:
             chi2_per_observation=self.chi2_per_observation,
             in_place=self.in_place,
         )
+        for row, values in zip(c.correlation, self.correlation.tolist(), strict=True):
+            row[:] = values
+        return c
 
 
 class StartFit:
@@ -182,6 +188,7 @@ class StartFit:
             c.chi2_per_observation,
             bool(c.in_place),
             bool(library().gait_hypothesis_walks(c)),
+            np.array(c.correlation, float),
         )
 
 
