@@ -47,7 +47,8 @@ STRIDE = 0.03  # error of the stride rate, as a share, at most
 _READING = """\
 Films of real people against joints of BlazePose (full) that a person checked; most cameras are guessed.
 They come from the network that libgait's detector uses itself: errors that both share do not show, and scores
-with the detector are flattered; those without it (eval_real_none) are not.  good: knees and ankles within 9 % of the person's height on average, hips in place; swap: left and
+with the detector are flattered; those without it (eval_real_none) are not.
+good: knees and ankles within 9 % of the person's height on average, hips in place; swap: left and
 right swapped; legs: hips in place, legs not; off: hips or legs elsewhere; none: not in the track.  wrong:
 frames under `tracking` that are not good.  Heel strikes: median distance of those by the phase from those
 counted in the pictures (tests/bench/real_strikes.json).  Stride rate: over the frames that

@@ -14,8 +14,8 @@ from circles import circles
 
 PUBLIC = {"gait.h", "gait_lift.h", "gait_pool.h", "gait_start.h"}
 SYSTEM = {
-    "arm_neon.h", "assert.h", "cpuid.h", "float.h", "immintrin.h", "limits.h", "math.h", "stdarg.h", "stdbool.h",
-    "stddef.h", "stdint.h", "stdio.h", "string.h", "sanitizer/asan_interface.h",
+    "arm_neon.h", "assert.h", "cpuid.h", "float.h", "immintrin.h", "limits.h", "math.h", "stdarg.h",
+    "stdbool.h", "stddef.h", "stdint.h", "stdio.h", "string.h", "sanitizer/asan_interface.h",
 }  # fmt: skip
 THREADS = {"pool.c": {"pthread.h", "signal.h", "stdatomic.h"}, "task.c": {"stdatomic.h"}}
 

@@ -229,7 +229,8 @@ COLD uint32_t likelihood_sample(gait_tracker *t, const particle_state *p, like_p
     return cameras;
 }
 
-COLD float likelihood_since(gait_tracker *t, const particle_state *p, uint32_t cameras, const like_patch *then)
+COLD float likelihood_since(gait_tracker *t, const particle_state *p, uint32_t cameras,
+                            const like_patch *then)
 {
     likelihood_scratch *const w = &t->work[0];
     like_patch samples[MODEL_MAX_LIMBS];
