@@ -4,6 +4,7 @@ import errno
 import os
 import subprocess
 import sys
+from pathlib import Path
 
 import pytest
 
@@ -188,10 +189,10 @@ def test_what_a_killed_command_left_is_named_and_kept(tmp_path, capsys):
         "with replacing(sys.argv[1]) as path: path.write_text(sys.argv[2]); os.kill(os.getpid(), 9)"
     )
     path = tmp_path / "a.csv"
-    for text in ("an hour of work", ""):
+    for text in ("an hour of work", "", "another"):
         subprocess.run([sys.executable, "-c", program, str(path), text], check=False)
     left = [p for p in tmp_path.iterdir() if p.name.startswith(".a.")]
-    assert len(left) == 2
+    assert len(left) == 3
     with replacing(path) as temporary:  # they may still be young, of a command that has just begun
         temporary.write_text("new")
     assert {p.name for p in tmp_path.iterdir()} == {"a.csv", *(p.name for p in left)}
@@ -202,6 +203,16 @@ def test_what_a_killed_command_left_is_named_and_kept(tmp_path, capsys):
         open_now.write_text("first")
         temporary.write_text("second")
     assert path.read_text() == "first"
-    assert (tmp_path / "a.unfinished.csv").read_text() == "an hour of work"
-    assert {p.name for p in tmp_path.iterdir()} == {"a.csv", "a.unfinished.csv"}
+    kept = [tmp_path / "a.unfinished.csv", tmp_path / "a.unfinished-2.csv"]  # neither replaces the other
+    assert {p.read_text() for p in kept} == {"an hour of work", "another"}
+    assert set(tmp_path.iterdir()) == {path, *kept}
     assert "was killed; what it wrote is in a.unfinished.csv" in capsys.readouterr().err
+
+
+def test_what_was_reported_as_written_outlives_a_kill():
+    """A few of the kills of tests/bench/kills.py."""
+    bench = Path(__file__).resolve().parents[1] / "bench" / "kills.py"
+    ended = subprocess.run(
+        [sys.executable, bench, "--kills", "3"], capture_output=True, text=True, check=False
+    )
+    assert ended.returncode == 0, ended.stderr

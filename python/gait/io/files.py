@@ -89,8 +89,9 @@ def _recover(target: Path) -> None:
 
 
 def _keep(left: Path, target: Path, what: str) -> None:
-    """Rename what was written of `target` to NAME.unfinished.SUFFIX, and report it."""
-    kept = target.with_name(f"{target.stem}.unfinished{target.suffix}")
+    """Rename what was written of `target` to NAME.unfinished.SUFFIX, or -2, -3 ... of it, and report it."""
+    names = (f"{target.stem}.unfinished{number}{target.suffix}" for number in ("", *range(-2, -1000, -1)))
+    kept = next(path for path in map(target.with_name, names) if not path.exists())
     os.replace(left, kept)
     note(f"{target}: {what} is in {kept.name}")
 
