@@ -3,6 +3,7 @@
 import json
 import math
 import os
+import struct
 from collections import Counter
 from pathlib import Path
 from types import SimpleNamespace
@@ -299,6 +300,29 @@ def test_mcap_of_a_log_keeps_every_message_and_its_time(tmp_path):
     os.truncate(log, log.stat().st_size - 3)
     assert gait.cli.main(["export", str(log), "-o", str(tmp_path / "b.mcap")]) == 1
     assert not (tmp_path / "b.mcap").exists()
+
+
+def test_strange_messages_of_a_log_are_kept_and_a_strange_log_is_one_line(tmp_path, capsys):
+    pytest.importorskip("lcm", reason="lcm is not installed: extra lcm")
+    from gait.camera.camera import Camera
+    from gait.lcm.link import LogWriter
+    from gait.lcm.messages import camera_message
+
+    strange = camera_message(Camera.looking((0, -4, 1.5), (0, 0, 1), (32, 24), 30.0), -5)
+    good, strange.fx = strange.encode(), float("nan")
+    log, out = tmp_path / "a.lcm", tmp_path / "a.mcap"
+    writer = LogWriter(log)
+    writer.write(1, "GAIT_CAMERA_0", good)
+    writer.write(2, "GAIT_CAMERA_0", strange.encode())
+    writer.close()
+    assert gait.cli.main(["export", str(log), "-o", str(out)]) == 0
+    assert [c.message_encoding for _, c, _ in messages(out)] == ["json", "lcm"]
+    whole = log.read_bytes()
+    for right, wrong in ((b"CAMERA", b"\xffAMERA"), (struct.pack(">q", 2), struct.pack(">q", -2))):
+        log.write_bytes(whole.replace(right, wrong, 1))
+        assert gait.cli.main(["export", str(log), "-o", str(tmp_path / "b.mcap")]) == 1
+        assert "record it again" in capsys.readouterr().err
+        assert not (tmp_path / "b.mcap").exists()
 
 
 def test_rerun(walk, tmp_path):

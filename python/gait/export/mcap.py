@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 
 from gait._version import __version__
 from gait.body.skeleton import BONES
-from gait.errors import UserError, unreadable
+from gait.errors import unreadable
 from gait.export.motion import Motion
 
 Array = NDArray[np.float64]
@@ -108,19 +108,20 @@ class _Writer:
         self, topic: str, schema: str, message: Mapping[str, Any], nanoseconds: int, number: int | None = None
     ) -> None:
         """Add a message in JSON; `number`: within its channel, counted from 0 if left out."""
+        data = json.dumps(message, allow_nan=False).encode()
         if topic not in self._channels:
             if schema not in self._schemas:
                 content = json.dumps(SCHEMAS.get(schema, _ANY)).encode()
                 self._schemas[schema] = self._writer.register_schema(schema, "jsonschema", content)
             self._channels[topic] = self._writer.register_channel(topic, "json", self._schemas[schema])
-        data = json.dumps(message, allow_nan=False).encode()
         self._write(topic, data, nanoseconds, number)
 
     def add_bytes(self, topic: str, data: bytes, nanoseconds: int, number: int) -> None:
-        """Add a message as it is, of a type that is not known."""
-        if topic not in self._channels:
-            self._channels[topic] = self._writer.register_channel(topic, "lcm", 0)
-        self._write(topic, data, nanoseconds, number)
+        """Add a message as it is, of a type that is not known or damaged."""
+        channel = f"{topic} as bytes"
+        if channel not in self._channels:
+            self._channels[channel] = self._writer.register_channel(topic, "lcm", 0)
+        self._write(channel, data, nanoseconds, number)
 
     def _write(self, topic: str, data: bytes, nanoseconds: int, number: int | None) -> None:
         count = self._count.get(topic, 0)
@@ -221,30 +222,25 @@ def write_log(path: Path, log: str | os.PathLike[str]) -> dict[str, int]:
     they are.  Estimates are on CHANNEL/scene as well, as a foxglove.SceneUpdate.  UserError if the log is
     damaged.
     """
-    import lcm
+    from gait.lcm.link import events_of, generated
 
-    from gait.lcm.link import break_of, generated
-
-    if broken := break_of(log):
-        raise UserError(f"{log}: {broken}; record it again")
     kinds = {
         kind._get_packed_fingerprint(): kind for kind in vars(generated()).values() if hasattr(kind, "decode")
     }
     counts: dict[str, int] = {}
     with _writing(path) as writer:
-        for event in lcm.EventLog(os.fspath(log), "r"):
+        for event in events_of(log):
             at, kind = event.timestamp * 1000, kinds.get(event.data[:8])
             counts[event.channel] = counts.get(event.channel, 0) + 1
             try:
                 message = None if kind is None else kind.decode(event.data)
-            except Exception:  # struct.error has no public base of its own; the bytes are kept
+                if message is not None:
+                    writer.add(event.channel, *_foxglove(message, at), at, event.eventnum)
+            except Exception:  # damaged, or of numbers that JSON lacks
                 message = None
             if message is None:
                 writer.add_bytes(event.channel, event.data, at, event.eventnum)
-                continue
-            schema, content = _foxglove(message, at)
-            writer.add(event.channel, schema, content, at, event.eventnum)
-            if type(message).__name__ == "estimate_t" and message.joints:
+            elif type(message).__name__ == "estimate_t" and message.joints:
                 places = np.array([joint.position for joint in message.joints])
                 topic = f"{event.channel}/scene"
                 counts[topic] = counts.get(topic, 0) + 1

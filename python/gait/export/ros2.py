@@ -244,16 +244,12 @@ def write_log(path: Path, log: str | os.PathLike[str]) -> dict[str, int]:
 
     UserError if the log is damaged or has no estimates.
     """
-    import lcm
-
-    from gait.lcm.link import break_of, gaitmsg
+    from gait.lcm.link import events_of, gaitmsg
     from gait.lcm.messages import camera_of, decode, estimate_of
 
-    if broken := break_of(log):
-        raise UserError(f"{log}: {broken}; record it again")
     bodies = Bodies()
     with _writing(path) as writer:
-        for event in lcm.EventLog(os.fspath(log), "r"):
+        for event in events_of(log):
             if named := _CAMERA.fullmatch(event.channel):
                 message = decode(gaitmsg.camera_t, event.data, event.channel)
                 at = 1000 * message.utime

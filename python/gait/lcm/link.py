@@ -62,6 +62,7 @@ MULTICAST = "udpm://"
 _FORM = "udpm://239.255.76.67:7667?ttl=0"
 _SYNC = 0xEDA1DA01
 _HEAD = struct.Struct(">Iqqii")  # sync, number, time, lengths of channel and data
+_LATEST = 2**63 // 1000  # microseconds, so that nanoseconds fit 64 bits
 _LONGEST = 1000  # bytes of a channel's name at which LCM stops
 
 
@@ -76,6 +77,26 @@ def log_of(url: str) -> tuple[str, str]:
 def break_of(path: str | os.PathLike[str]) -> str | None:
     """Describe where an incomplete log breaks off; None if the log is complete."""
     return _scan(path)[0]
+
+
+def events_of(path: str | os.PathLike[str], whole: bool = True) -> Iterator[Any]:
+    """Yield the events of a log; of one that breaks off, unless it has to be `whole`, those before.
+
+    UserError if it has to be, or where a channel's name or a time is none.
+    """
+    import lcm
+
+    if whole and (broken := break_of(path)):
+        raise UserError(f"{path}: {broken}; record it again")
+    try:
+        for event in lcm.EventLog(os.fspath(path), "r"):
+            if not 0 <= event.timestamp < _LATEST:
+                raise UserError(
+                    f"{path}: event {event.eventnum} has the time {event.timestamp}; record it again"
+                )
+            yield event
+    except UnicodeDecodeError:
+        raise UserError(f"{path}: the name of a channel is not UTF-8; record it again") from None
 
 
 def _scan(path: str | os.PathLike[str]) -> tuple[str | None, bool]:

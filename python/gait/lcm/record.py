@@ -7,7 +7,6 @@ from contextlib import ExitStack, closing
 from dataclasses import dataclass, field
 from typing import Any
 
-import lcm
 import numpy as np
 from numpy.typing import NDArray
 
@@ -16,7 +15,7 @@ from gait.errors import UserError
 from gait.io.files import replacing
 from gait.io.track_file import TrackWriter
 from gait.io.video import Frame
-from gait.lcm.link import LogWriter, break_of, handle, is_log, listener, log_of, now, require_log
+from gait.lcm.link import LogWriter, break_of, events_of, handle, is_log, listener, log_of, now, require_log
 from gait.lcm.messages import estimate_after, estimate_of
 from gait.progress import durations
 
@@ -274,7 +273,7 @@ def read_run(path: str) -> Run:
     messages: list[Any] = []
     remark, damage = None, None
     arrived: list[int] = []
-    for event in lcm.EventLog(path, "r"):
+    for event in events_of(path, whole=False):
         if event.channel != "GAIT_ESTIMATE":
             continue
         try:
