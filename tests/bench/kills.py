@@ -22,7 +22,6 @@ from contextlib import closing
 from pathlib import Path
 from types import SimpleNamespace
 
-import lcm
 import numpy as np
 import table
 from facts import facts
@@ -33,7 +32,7 @@ from gait.camera.camera import Camera
 from gait.io.files import replacing
 from gait.io.track_file import TrackWriter, read_track
 from gait.io.video import Frame
-from gait.lcm.link import LogWriter
+from gait.lcm.link import LogWriter, events_of
 from gait.lift.keypoints.corrections import Correction, Edits
 from gait.studio.session import Session
 from gait.track.tracker import Tracker
@@ -74,17 +73,9 @@ def write_corrections(path: Path, count: int) -> None:
     Session._save(session, edits)  # type: ignore[arg-type]
 
 
-def logged(path: Path) -> int:
-    """Events of a log; -1 where it breaks off."""
-    whole = path.stat().st_size
-    with closing(lcm.EventLog(str(path))) as log:
-        count = sum(1 for _ in log)
-        return count if log.tell() == whole else -1
-
-
 KINDS: dict[str, tuple[Callable[[], Callable[[Path, int], None]], Callable[[Path], int]]] = {
     "track file": (track_writer, lambda path: len(read_track(path).frame)),
-    "log of messages": (lambda: write_log, logged),
+    "log of messages": (lambda: write_log, lambda path: len(list(events_of(path)))),
     "corrections": (lambda: write_corrections, lambda path: path.read_text().count('"frame"')),
 }
 
@@ -108,8 +99,8 @@ def write_until_killed(write: Callable[[Path, int], None], path: Path, chance: r
         _, status = os.waitpid(child, 0)
         if os.WTERMSIG(status) != signal.SIGKILL:
             raise RuntimeError(f"the writer of {path.name} ended by itself")
-        told = first + reports.read()
-    return int.from_bytes(told[-4:], "little")
+        sent = first + reports.read()
+    return int.from_bytes(sent[-4:], "little")
 
 
 def attack(kind: str, kills: int) -> list[float]:
@@ -120,9 +111,9 @@ def attack(kind: str, kills: int) -> list[float]:
     for _ in range(kills):
         with tempfile.TemporaryDirectory() as folder:
             path = Path(folder) / "written.csv"
-            told = write_until_killed(write, path, chance)
-            reported += told
-            lost += not read(path) >= told
+            written = write_until_killed(write, path, chance)
+            reported += written
+            lost += not read(path) >= written
             amid += len(list(Path(folder).iterdir())) > 1
     return [kills, reported, lost, amid]
 
