@@ -55,7 +55,9 @@ OPT_release  := $(RELEASE_FLAGS)
 OPT_debug    := -O0
 OPT_sanitize := -O1 -fsanitize=address,undefined,float-cast-overflow -fno-sanitize-recover=all -fno-omit-frame-pointer
 OPT_thread   := -O1 -fsanitize=thread -fno-omit-frame-pointer
-OPT_fuzz     := $(OPT_sanitize) -fsanitize=fuzzer-no-link
+OPT_fuzz     := $(OPT_sanitize:-O1=-O2) -fsanitize=fuzzer-no-link
+# The library compares in its loops; libFuzzer's record of these takes two thirds of the time.
+CODE_FLAGS   += $(if $(filter fuzz,$(config)),-fno-sanitize-coverage=trace-cmp)
 CXX_FLAGS    += $(if $(filter fuzz,$(config)),-fno-sanitize=function) # needs the C++ runtime
 OPT_coverage := -O0 --coverage -fprofile-abs-path
 OPT ?= $(OPT_$(config))
@@ -93,7 +95,7 @@ UNIT := $(patsubst tests/unit/%.c,$(B)/unit/%,$(sort $(wildcard tests/unit/test_
 TOOLS := $(BIN)/gait-trackd
 LIBS := $(B)/libgait.so $(B)/libgait.a
 
-.PHONY: help setup lock lib tools test built check unit python-test demo model paper bench size bench-lift detector-profile eval eval-body eval-camera eval-cameras eval-gait eval-moving eval-real eval-learn eval-lift eval-paper eval-people eval-studio mutants asan tsan coverage unit-threads fuzz fuzz-run fuzz-long fuzz-targets golden-check \
+.PHONY: help setup lock lib tools test built check unit python-test demo model paper bench size bench-lift detector-profile eval eval-body eval-camera eval-cameras eval-gait eval-moving eval-real eval-learn eval-lift eval-paper eval-people eval-studio soak kills mutants asan sanitizers tsan coverage unit-threads fuzz fuzz-run fuzz-long fuzz-targets golden-check \
         docs screenshots sbom lint format wheel sdist wheel-check install install-daemon uninstall clean
 
 help: ## list the targets
@@ -266,7 +268,7 @@ check: lib ## symbols, heap, threads, globals, size, layers, stack, recursion, h
 	@B=$(B) CC='$(CC)' CXX='$(CXX)' tests/check/run.sh
 
 unit: $(UNIT) fuzz-targets ## C tests, and the stored inputs of the fuzz targets
-	@tests/unit/run.sh $(UNIT) $(FUZZ)
+	@tests/unit/run.sh $(UNIT) $(if $(FUZZ_ENGINE),$(FUZZ))
 
 # Linked with the objects, so that tests can call internal functions.  Their own code is compiled in a third of the time.
 $(B)/unit/test_trackd_%: tests/unit/test_trackd_%.c $(OBJ) $(B)/libtrackd.a $(B)/libgaitmsg.a Makefile $(MADE) | $(B)/unit/
@@ -301,7 +303,14 @@ coverage: setup ## branches that the tests of library and daemon take (ARGS='--a
 	    --rootdir . $(PYTEST_AT_ONCE) $(COVERED)
 	@$(PY) tests/check/coverage.py build/coverage $(ARGS)
 
+# One build for the sanitizers and for fuzzing, where there is clang.
 SANITIZED := $(if $(call has,clang),config=fuzz CC=clang,config=sanitize)
+SANITIZED_DAEMON := $(addprefix tests/python/test_lcm_,log.py lift.py moving.py cameras.py)
+sanitizers: setup ## C tests, the daemon and fuzzing under asan and ubsan, C tests of threads under tsan (RUNS= SEED=)
+	@LIMIT=1200 $(MAKE) --no-print-directory $(JOBS) $(SANITIZED) tools unit fuzz-run
+	@$(COMPILED_ONCE) GAIT_TRACKD='$(abspath build/$(if $(call has,clang),fuzz,sanitize)/bin/gait-trackd)' $(PY) -m pytest -q \
+	    -c python/pyproject.toml --rootdir . $(PYTEST_AT_ONCE) $(SANITIZED_DAEMON)
+	@$(MAKE) --no-print-directory $(JOBS) tsan
 
 tsan: ## C tests of threads under the thread sanitizer
 	@LIMIT=1200 $(MAKE) --no-print-directory config=thread unit-threads
@@ -457,6 +466,13 @@ eval-lift: setup lib ## lifting of held-out motion, clips and a real motion: tes
 
 eval-studio: setup lib ## corrections by hand, suggested and random, and the time each takes: tests/bench/results/studio.md *
 	@$(PY) tests/bench/studio_corrections.py
+
+soak: setup tools ## the daemon for 10^6 frames: memory, files, CPU time per frame (ARGS='--frames 108000 --rate 30': an hour)
+	@$(PY) tests/bench/soak.py $(ARGS)
+
+kills: setup lib tools ## writers and the daemon killed at random moments: kills.md, daemon_kills.md (ARGS=--record)
+	@$(PY) tests/bench/kills.py $(ARGS)
+	@$(PY) tests/bench/daemon_kills.py $(ARGS)
 
 # ---- packages ------------------------------------------------------------------------------------------------
 # The wheel runs on systems with glibc 2.28: thread functions are those of the oldest glibc for the CPU.

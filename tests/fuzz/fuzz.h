@@ -95,11 +95,16 @@ static inline size_t fuzz_damage(uint8_t *data, size_t size, fuzz_bytes *b)
 /* Change at most three fields of a struct, which are found by gait_field_at(). */
 static inline void fuzz_settings(const char *of, void *at, fuzz_bytes *b)
 {
+    enum { MOST = 512 };
+    static gait_field fields[MOST]; /* the library walks through its tables each time it is asked for one */
+    static uint32_t count;
+    while (count < MOST && gait_field_at(count, &fields[count]) == GAIT_OK)
+        count++;
     for (uint8_t left = fuzz_take(b) % 4; left > 0; left--) {
-        gait_field f;
         uint8_t chosen = fuzz_take(b);
         float const value = fuzz_number(b);
-        for (uint32_t i = 0; gait_field_at(i, &f) == GAIT_OK; i++) {
+        for (uint32_t i = 0; i < count; i++) {
+            gait_field const f = fields[i];
             if (strcmp(f.of, of) != 0 || !f.name[0] || strstr(f.name, "struct_size") || chosen-- > 0)
                 continue;
             int32_t const whole = value > -2e9f && value < 2e9f ? (int32_t)value : INT32_MIN;

@@ -1,4 +1,5 @@
-/* fuzz_messages.c - any messages, in any order: gait-trackd answers or complains, with lift, keypoints and a moving camera. */
+/* fuzz_messages.c - any messages, in any order: gait-trackd answers or complains, with lift, keypoints, a moving camera
+ * and a further one. */
 #include "../../tools/trackd/receiver.c"
 
 #include "daemon.h"
@@ -10,7 +11,7 @@
 #include "gaitmsg_tracks_t.h"
 
 static void start(service *s, lift_service *lift, keypoint_cue *cue, pose_path *path, sink *out,
-                  uint8_t choice)
+                  further *more, uint8_t choice)
 {
     static memory_file model, segments;
     static uint8_t blob[TOY_BYTES];
@@ -38,6 +39,8 @@ static void start(service *s, lift_service *lift, keypoint_cue *cue, pose_path *
         s->lift = lift;
     } else if (choice & 4)
         s->path = path;
+    if (choice & 16 && !s->path && further_open(more, "1", 0, &why))
+        s->further = more;
     s->max_gap = 2;
     s->max_pixels = FUZZ_WIDTH * FUZZ_HEIGHT;
     if (!ok || !service_open(s, out, 0, 1, NULL, choice & 8, &why))
@@ -50,7 +53,8 @@ int LLVMFuzzerTestOneInput(const uint8_t *data, size_t size)
     static lift_service lift;
     static keypoint_cue cue;
     static pose_path path;
-    static const struct {
+    static further more;
+    static const struct handler {
         lcm_msg_handler_t call;
         int64_t (*type)(void);
     } handlers[] = {
@@ -59,7 +63,14 @@ int LLVMFuzzerTestOneInput(const uint8_t *data, size_t size)
         {on_command, __gaitmsg_command_t_get_hash},   {on_status, __gaitmsg_status_t_get_hash},
         {on_keypoints, __gaitmsg_tracks2_t_get_hash},
     };
-    enum { HANDLERS = sizeof handlers / sizeof *handlers, TYPE = 8 };
+    static const struct handler of_further[] = {{on_further_frame, __gaitmsg_image_t_get_hash},
+                                                {on_further_camera, __gaitmsg_camera_t_get_hash},
+                                                {on_further_background, __gaitmsg_image_t_get_hash}};
+    enum {
+        HANDLERS = sizeof handlers / sizeof *handlers,
+        FURTHER = sizeof of_further / sizeof *of_further,
+        TYPE = 8
+    };
     fuzz_bytes b = {data, size};
     sink out = {0};
     snapshot_file snapshot = {0};
@@ -67,13 +78,16 @@ int LLVMFuzzerTestOneInput(const uint8_t *data, size_t size)
     lift = (lift_service){0};
     cue = (keypoint_cue){0};
     path = (pose_path){.turn_sd = 0.01f, .place_sd = 0.01f};
-    start(&s, &lift, &cue, &path, &out, fuzz_take(&b));
+    more = (further){0};
+    start(&s, &lift, &cue, &path, &out, &more, fuzz_take(&b));
     receiver r = {.service = &s, .log = true, .snapshot = &snapshot};
     while (b.left > 0) { /* kind, length, and the message, without its type unless that is to be wrong */
         uint8_t const kind = fuzz_take(&b);
         size_t const stated = (size_t)(fuzz_take(&b) << 8 | fuzz_take(&b)),
                      n = stated < b.left ? stated : b.left;
-        int64_t const type = handlers[kind % 8 % HANDLERS].type();
+        struct handler const h =
+            s.further && kind & 64 ? of_further[kind % FURTHER] : handlers[kind % 8 % HANDLERS];
+        int64_t const type = h.type();
         uint8_t *const message_bytes =
             malloc(TYPE + n); /* ends with the message, so that an overrun is noticed */
         if (!message_bytes)
@@ -84,7 +98,7 @@ int LLVMFuzzerTestOneInput(const uint8_t *data, size_t size)
         lcm_recv_buf_t const buffer = {.data = message_bytes + (kind & 128 ? TYPE : 0),
                                        .data_size = (uint32_t)(n + (kind & 128 ? 0 : TYPE)),
                                        .recv_utime = 1};
-        handlers[kind % 8 % HANDLERS].call(&buffer, "FUZZ", &r);
+        h.call(&buffer, "FUZZ_1", &r);
         b.at += n;
         b.left -= n;
         free(message_bytes);
@@ -94,5 +108,6 @@ int LLVMFuzzerTestOneInput(const uint8_t *data, size_t size)
     if (s.lift)
         lift_service_close(s.lift);
     service_close(&s);
+    further_close(&more);
     return 0;
 }

@@ -32,6 +32,8 @@ CAMERA = gait.Camera(
     np.array([0.0, 1, 5]),
 )
 IMAGE, CAMERA_KIND, BACKGROUND, TRACKS, COMMAND, STATUS = range(6)
+FURTHER_CAMERA, FURTHER_BACKGROUND, FURTHER_IMAGE = 64, 65, 66
+WITH_FURTHER = 16  # bit of the choice
 START = {"phase": 0.2, "stride_hz": 0.9, "stature": 1.7, "heading": 0.0, "pelvis": [0.0, 0.0, 0.9]}
 
 
@@ -60,8 +62,13 @@ def messages(choice: int, jpeg: int | None) -> bytes:
             COMMAND, command_message(kinds.START, 0, START, dict.fromkeys(START, 0.1) | {"pelvis": [0.1] * 3})
         ),
     ]
+    if choice & WITH_FURTHER:
+        plate = image_message(np.full((HEIGHT, WIDTH), 180, np.uint8), 1, -1, jpeg)
+        parts += [part(FURTHER_CAMERA, camera_message(CAMERA, 1)), part(FURTHER_BACKGROUND, plate)]
     for frame in range(2):
         utime = 1000 + 40000 * frame
+        if choice & WITH_FURTHER:
+            parts.append(part(FURTHER_IMAGE, image_message(picture(frame), utime, frame, jpeg)))
         parts.append(part(IMAGE, image_message(picture(frame), utime, frame, jpeg)))
         parts.append(part(TRACKS, tracks_message(names, uv, utime, frame)))
     parts.append(part(COMMAND, command_message(kinds.STOP)))
@@ -101,7 +108,8 @@ def main() -> int:
         "lift": [random.integers(9, 200, 300, np.uint8).tobytes() for _ in range(4)],
         "start": [bytes(range(9, 200)) * 20],
         "messages": [
-            messages(choice, quality) for choice, quality in ((0, None), (1, 80), (10, None), (13, 60))
+            messages(choice, quality)
+            for choice, quality in ((0, None), (1, 80), (10, None), (13, 60), (17, 60))
         ],
         "files": [
             files(0, json.dumps(CAMERA.to_dict())),

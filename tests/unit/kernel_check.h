@@ -51,7 +51,7 @@ static inline int guard_whole(const guarded *g)
 {
     int damaged = 0;
     for (size_t i = 0; i < GUARD; i++)
-        damaged += g->begin[g->bytes + i] != 0xa5 || g->begin[i - GUARD] != 0xa5;
+        damaged += g->begin[g->bytes + i] != 0xa5 || (g->begin - GUARD)[i] != 0xa5;
     return damaged == 0;
 }
 #endif
