@@ -246,6 +246,27 @@ def test_strides_beyond_the_search_are_named():
         sequence.prepare(Path("a.csv"), AngleTable("a", 50.0, angles))
 
 
+def test_markers_of_legs_in_another_unit_are_named_by_their_size(tmp_path):
+    labels = ["RHip", "RKnee", "RAnkle", "LHip", "LKnee", "LAnkle"]
+    legs = [[0.0, side, height] for side in (0.1, -0.1) for height in (0.9, 0.5, 0.1)]
+    path = write_trc(tmp_path / "a.trc", labels, 1e-3 * np.array([legs] * 60))
+    with pytest.raises(UserError, match="the known markers lie within 0.0008 m: correct the unit"):
+        readers.read(path)
+
+
+def test_too_few_markers_do_not_lack_names(tmp_path):
+    path = write_trc(tmp_path / "a.trc", ["RHip", "RKnee", "RAnkle", "RHeel"], np.ones((60, 4, 3)))
+    with pytest.raises(UserError, match=r"4 markers \(RHip, RKnee, RAnkle, RHeel\) do not show a body: 6"):
+        readers.read(path)
+
+
+@pytest.mark.parametrize("fps", [200.0, 100.0 / 0.33])
+def test_strides_shorter_than_the_search_are_not_taken_for_two(fps):
+    angles = mw.walk_angles(600, 60.0)
+    with pytest.raises(UserError, match=f"strides of {60 / fps:.2f} s are shorter than 0.4 s.*see --fps"):
+        sequence.prepare(Path("a.csv"), AngleTable("a", fps, angles))
+
+
 def test_noise_is_not_blamed_on_the_search():
     angles = np.cumsum(np.random.default_rng(0).normal(size=(600, 24)), axis=0) / 50
     with pytest.raises(UserError, match="a.csv: not learnt as 'walk'") as caught:

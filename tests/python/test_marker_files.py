@@ -89,7 +89,7 @@ def test_of_two_subjects_the_one_with_more_markers_is_taken(marked, tmp_path):
 
 def test_wrong_units_are_reported(marked, tmp_path):
     path = write_c3d(tmp_path / "a.c3d", mw.LOWER, marked[0][:20], "m", 100.0)
-    with pytest.raises(UserError, match=r"a.c3d: the markers do not fit a body .*check labels and units"):
+    with pytest.raises(UserError, match=r"a.c3d: the known markers lie within .*correct the unit"):
         readers.read(path)
 
 

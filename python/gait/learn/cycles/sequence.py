@@ -110,6 +110,8 @@ def _long(path: Path, read: Body | AngleTable, options: LearnOptions) -> Sequenc
     if found is None or kept.stop - kept.start < read.frames:
         motion = _motion(read.part(kept.start, kept.stop))
         found = stride.find(motion.angles, read.fps, mode)
+    if too_short := _too_short(motion.angles, read.fps, found.frames, options):
+        raise _refused(path, activity, too_short)
     judged, channels, heading = _judge(motion, found, activity)
     if not judged.accepted:
         other = judged.activity if {judged.activity, activity} == {"walk", "run"} else ""
@@ -152,14 +154,31 @@ def _too_long(angles: Floats, fps: float, options: LearnOptions) -> str:
         period.find_longer(angles, fps, options.period_mode),
         period.seconds(options.period_mode)[1],
     )
-    if not (np.isfinite(frames) and verdict.repeats(angles, frames) >= verdict.REPEATS):
-        return ""
-    if not verdict.legs(angles, frames) >= verdict.LEGS:
+    if not _is_stride(angles, frames):
         return ""
     return (
         f"strides of {frames / fps:.2f} s are longer than {longest:.3g} s, which is the longest allowed (see "
         f"--fps unless it is {fps:g} frames per second)"
     )
+
+
+def _too_short(angles: Floats, fps: float, found: float, options: LearnOptions) -> str:
+    """Return why the cycle found, of `found` frames, is several strides, each shorter than allowed, or ''."""
+    shortest = period.seconds(options.period_mode)[0]
+    for frames in (found / 2, found / 3):
+        if frames / fps < shortest and _is_stride(angles, frames):
+            return (
+                f"strides of {frames / fps:.2f} s are shorter than {shortest:.3g} s, which is the shortest "
+                f"allowed (see --fps unless it is {fps:g} frames per second)"
+            )
+    return ""
+
+
+def _is_stride(angles: Floats, frames: float) -> bool:
+    """Whether angles (T, 24) repeat after `frames` frames and the legs take turns; NaN: no."""
+    if not (np.isfinite(frames) and verdict.repeats(angles, frames) >= verdict.REPEATS):
+        return False
+    return bool(verdict.legs(angles, frames) >= verdict.LEGS)
 
 
 def _refused(path: Path, wanted: str, reason: str, other: str = "") -> UserError:

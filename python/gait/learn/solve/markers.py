@@ -22,6 +22,7 @@ from gait.learn.solve.kinematics import HINGES, SEGMENTS, pose_skeleton, segment
 from gait.learn.solve.skeleton_fit import LengthInformation
 
 FEWEST_LABELS = 6
+EXTENT = 0.2, 4.0  # metres that a person's markers take up
 JOINT_SD = 0.03  # metres beyond which a joint is not known
 AXIS_SD = np.radians(15)  # beyond which a direction is not known
 WORST_RMS = 0.05  # metres: with a larger one, markers are not where their labels place them
@@ -111,6 +112,7 @@ def _placed(
     columns, at = as_points(places)
     if not skeleton_fit.has_enough(points[:, columns]):
         raise UserError(f"{path}: fewer than three known markers in every frame; see --markers")
+    _require_size(path, points[:, columns])
     for side, word in zip(SIDES, ("left", "right"), strict=True):
         if not {f"{side}_thigh", f"{side}_shank"} & {mark.segment for mark in places.values()}:
             raise UserError(
@@ -118,6 +120,14 @@ def _placed(
                 f"--markers file{STATIC}"
             )
     return columns, at
+
+
+def _require_size(path: Path, observed: Floats) -> None:
+    """Refuse markers (T, K, 3) whose extent is no person's, whatever their proportions."""
+    shown = observed[np.isfinite(observed).all(axis=2).sum(axis=1) >= 2]
+    extent = float(np.median(np.nanmax(np.nanmax(shown, axis=1) - np.nanmin(shown, axis=1), axis=1)))
+    if not EXTENT[0] < extent < EXTENT[1]:
+        raise UserError(f"{path}: the known markers lie within {extent:.3g} m: correct the unit of the file")
 
 
 def as_points(places: Mapping[int, Landmark]) -> tuple[list[int], skeleton_fit.Points]:
@@ -149,6 +159,11 @@ def assign(
         best = max(best, places, key=len)
     if len(best) < FEWEST_LABELS:
         examples = ", ".join(labels[k] for k in visible[:5])
+        if len(best) == len(visible):
+            raise UserError(
+                f"{path}: {len(best)} markers ({examples}) do not show a body: {FEWEST_LABELS} are needed, "
+                "and on each leg some on thigh or shank; record more"
+            )
         remedy = 'name more in it, or its "set"' if marker_map else f"name them in a --markers file{STATIC}"
         where = f" with {marker_map.path}" if marker_map else ""
         raise UserError(
