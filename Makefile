@@ -69,7 +69,7 @@ TIGHT := $(if $(GCC),$(GCC_TIGHT))
 SMALL := $(if $(filter -O3,$(OPT)),-O2 $(TIGHT))
 LEAST := $(if $(filter -O3,$(OPT)),-Os $(TIGHT))
 SMALL_VECTOR := $(if $(SMALL),$(SMALL) $(if $(GCC),$(GCC_VECTOR),$(CLANG_VECTOR)))
-LESS := $(if $(SMALL),$(if $(GCC),$(GCC_LESS)))
+LESS := $(if $(SMALL),$(if $(GCC),$(GCC_LESS) $(if $(findstring aarch64,$(MACHINE)),$(GCC_AARCH64))))
 # Flags of a source by its file name; kernels and other sources differ where no list names them.
 listed = $(if $(filter $(1),$(VECTOR_SOURCES)),$(SMALL_VECTOR),$(if $(filter $(1),$(O2_SOURCES)),$(SMALL),$(2)))
 C_FLAGS = $(if $(filter $(1),$(O3_SOURCES)),,$(call listed,$(1),$(LEAST)))

@@ -19,6 +19,8 @@ CLANG_VECTOR   := -ftree-vectorize
 # Kernels that no list names go without vector code for the last few elements of a row, without a search for
 # redundancies across branches, and without a copy of each small function in all of its callers: 7 kB less, no slower.
 GCC_LESS       := -fno-tree-pre -fno-inline-small-functions --param=vect-epilogues-nomask=0
+# Loops over sixteen elements are unrolled where 400 KiB do not matter: a sixth fewer instructions of a particle.
+GCC_AARCH64    := -fpeel-loops
 # At -O3 gcc would unroll every loop over 16 lanes besides vectorising it: half as large again, no faster.
 GCC_KERNEL     := --param=max-completely-peel-times=8
 

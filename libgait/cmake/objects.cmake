@@ -14,6 +14,8 @@ if(NOT CMAKE_C_COMPILER_ID STREQUAL GNU)
   unset(GCC_TIGHT)
   unset(GCC_KERNEL)
   unset(GCC_LESS)
+elseif(CMAKE_SYSTEM_PROCESSOR MATCHES "aarch64|arm64")
+  list(APPEND GCC_LESS ${GCC_AARCH64})
 endif()
 set(CMAKE_REQUIRED_FLAGS -Werror) # clang only warns of a flag that this CPU does not have
 check_c_compiler_flag(-mno-outline-atomics GAIT_HAS_INLINE_ATOMICS)
