@@ -95,7 +95,7 @@ UNIT := $(patsubst tests/unit/%.c,$(B)/unit/%,$(sort $(wildcard tests/unit/test_
 TOOLS := $(BIN)/gait-trackd
 LIBS := $(B)/libgait.so $(B)/libgait.a
 
-.PHONY: help setup lock lib tools test built check unit python-test demo model paper bench size bench-lift detector-profile eval eval-body eval-camera eval-cameras eval-gait eval-moving eval-real eval-learn eval-lift eval-paper eval-people eval-studio soak kills mutants asan sanitizers tsan coverage unit-threads fuzz fuzz-run fuzz-long fuzz-targets golden-check \
+.PHONY: help setup lock lib tools test built check unit python-test demo model paper bench bench-board bench-instructions size bench-lift detector-profile eval eval-body eval-camera eval-cameras eval-gait eval-moving eval-real eval-learn eval-lift eval-paper eval-people eval-studio soak kills mutants asan sanitizers tsan coverage unit-threads fuzz fuzz-run fuzz-long fuzz-targets golden-check \
         docs screenshots sbom lint format wheel sdist wheel-check install install-daemon uninstall clean
 
 help: ## list the targets
@@ -405,6 +405,26 @@ BENCH_RUN = $(PY) tests/bench/bench.py --cc '$(CC)'
 bench: $(B)/bench/step | $(READY) ## speed by particles, threads, instruction set and stage; detector (ARGS='-s 40 --runs 7'; --record)
 	@$(BENCH_RUN) $(call BENCH_PAGE,bench) --csv $(BENCH_CSV) $< $(filter-out --record,$(ARGS))
 	@$(PY) tests/bench/detector_speed.py $(filter --record,$(ARGS))
+
+# For a computer without Python: one program, which is copied there with a model.
+bench-board: $(B)/bench/step-static ## the bench as one static program, for a board (CC=aarch64-linux-gnu-gcc)
+	@echo 'copy $< and a model to the board, and run there: ./step-static -m walk.gait -n 2000,10000 -t 1 -s 20'
+
+$(B)/bench/step-static: $(BENCH_OBJ) $(BENCH_PARTS) $(OBJ)
+	$(call log,LD   $@)$(CC) $(OPT) $(BENCH_WRAP) $(LDFLAGS) -static -o $@ $^ -lm -pthread
+
+# Of a particle: what 1,000 more take in three steps.
+QEMU ?= qemu-$(CPU)
+bench-instructions: $(B)/bench/instructions build/bench/instructions_plugin.so ## instructions of a particle under QEMU (CC=aarch64-linux-gnu-gcc)
+	@command -v $(QEMU) >/dev/null || { echo 'bench-instructions: no $(QEMU): install qemu-user' >&2; exit 1; }
+	@count() { $(QEMU) -plugin build/bench/instructions_plugin.so $< python/gait/data/walk.gait $$1; }; \
+	    few=$$(count 200) && many=$$(count 1200) && echo "$(MACHINE): $$(( (many - few) / 3000 )) instructions of a particle"
+
+$(B)/bench/instructions: $(B)/bench/instructions.o $(B)/bench/bench_scene.o $(B)/tools/trackd/common.c.o $(OBJ)
+	$(call log,LD   $@)$(CC) $(OPT) $(LDFLAGS) -static -o $@ $^ -lm -pthread
+
+build/bench/instructions_plugin.so: tests/bench/instructions_plugin.c | build/bench/
+	$(call log,CC   $<)cc -std=c11 -O2 -shared -fPIC -o $@ $<
 
 $(B)/bench/size: $(B)/bench/size.o $(OBJ)
 	$(call log,LD   $@)$(CC) $(OPT) $(LDFLAGS) -o $@ $^ -lm -pthread
