@@ -78,8 +78,7 @@ def _unknown() -> None:
         "The balancing man by the shipped prior of walks, frame by frame, "
         f"{lift_tracks.BALANCING_NOISE:g} px of noise, as usual and with config fit_threshold {STRICT:g}: "
         "median mm in the world, coverage of the 90 % intervals, share of the frames that are TRACKING. "
-        "Nothing is "
-        "wanted of it but that it is known."
+        "There is no target."
     )
     head = [f"{which}: {what}" for which in ("usual", "strict") for what in ("abs mm", "coverage", "tracked")]
     table.publish("lift_unknown", "A motion that no prior knows, live", ["camera", *head], rows, note)

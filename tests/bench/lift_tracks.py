@@ -270,7 +270,7 @@ def _balancing() -> None:
         "of smooth. resized: factor by which the fit's size was changed to that of a person's bones. In "
         "a motion so "
         "unlike and a camera so near (3 m) a small body close to the lens would fit better. "
-        "Wanted is honesty alone: intervals that hold the truth."
+        "The target is honest intervals: they must cover the truth."
     )
     head = ["prior of", "camera", "smooth", "blend", "mean pose", "abs mm", "median sd mm", "coverage"]
     head += ["about hips", "resized"]

@@ -1,5 +1,5 @@
 #!/usr/bin/env python3
-"""The paper's tracker at its best, and what each later addition buys: frames 0 to 50 from a true start.
+"""The paper's tracker at its best, and what each later addition gains: frames 0 to 50 from a true start.
 
     paper_ladder.py [--seeds 10] [--rung-seeds 3] [--record]
 
@@ -87,7 +87,7 @@ def main() -> int:
 
 @dataclass(frozen=True)
 class Climbed:
-    """Runs on the rungs on a clip, and errors of what needs no image, mm, both by name."""
+    """Runs of all rungs on a clip, and errors of the baselines without images, mm, by name."""
 
     footage: Footage
     without: dict[str, float]
@@ -95,7 +95,7 @@ class Climbed:
     filmed: dict[str, list[float]]  #: errors of gait track, mm
 
     def names(self) -> list[str]:
-        """Return all names, of what needs no image first."""
+        """Return all names, baselines first."""
         return [*self.without, *self.runs, *self.filmed]
 
     def roots(self, name: str) -> list[float]:
@@ -110,7 +110,7 @@ class Climbed:
 
 
 def climbed(f: Footage, paths: dict[str, dict[str, Path]], seeds: int, rung_seeds: int) -> Climbed:
-    """Track a clip on each rung, with models without its subject; without a truth, in paper mode alone."""
+    """Track a clip on each rung, by models without its subject; only in paper mode if there is no truth."""
     files = {prior: paths[prior].get(f.clip.subject or "", shipped) for prior, shipped in SHIPPED.items()}
     blobs = ladder.blobs(*(files[prior].read_bytes() for prior in SHIPPED))
     models = {name: Model(each) for name, each in blobs.items()}
@@ -131,7 +131,7 @@ def climbed(f: Footage, paths: dict[str, dict[str, Path]], seeds: int, rung_seed
 
 
 def tracked(f: Footage, model: Path, name: str, seed: int) -> float:
-    """Error of gait track over the same frames, mm, median over those that it has."""
+    """Median error of gait track over those of the same frames that its track has, mm."""
     assert f.scene is not None
     with tempfile.TemporaryDirectory(prefix="gait-") as folder:
         init, output = Path(folder) / "init.json", Path(folder) / "track.csv"
@@ -191,19 +191,21 @@ def about(seeds: int, found: list[Climbed]) -> str:
     return f"""{facts(f"paper_ladder.py --record --seeds {seeds}")}
 
 Frames 0 to 50 (outdoor: from the first frame in full view), 10,000 particles, models of 19 angles and 5
-components without the clip's subject; the start is the truth with noise (pelvis 3 cm, phase 0.03, rate 0.03
-per second, heading 0.05 rad), outdoor the clip's own. Settings are those of
-[search_paper](search_paper.md); chosen without development clips. Held: {CRITERION}. Wanted: held in 9 of
-10, at less than the error of the free-running cycle, on every clip; reached on {reached(found)}; outdoors
-only holding counts.
-Lost: runs that are reported as lost in some frame, of those that leave the person (right) and of
-those that hold it (wrong); in all {reported(runs, held=False)} and {reported(runs, held=True)}. root mm:
-root-aligned, median over the frames and then over the seeds. free: the mean cycle of the same model running
-on from the exact truth, which needs no image."""
+components learnt without the clip's subject. The start is the truth with noise (pelvis 3 cm, phase 0.03, rate
+0.03 per second, heading 0.05 rad); outdoors it is the clip's own. The settings are those of
+[search_paper](search_paper.md), which used no development clips.
+
+A run is held if {CRITERION}.
+Target for every clip: 9 of 10 runs are held, and the error is below that of the free-running cycle; outdoors
+only the first applies. Met on {reached(found)}. Lost: number of runs reported as lost in some frame, among
+those that leave the person (correct) and among those that are held (wrong); in total
+{reported(runs, held=False)} and {reported(runs, held=True)}. root mm: root-aligned error, median over the
+frames, then over the seeds. free: the mean cycle of the same model running free from the exact truth, without
+images."""
 
 
 def reached(found: list[Climbed]) -> str:
-    """State on how many clips the wanted is reached."""
+    """State on how many clips the target is met."""
     paper = ladder.PAPER.name
     free = ladder.FREE["paper"]
     both = [
@@ -219,20 +221,22 @@ def about_ladder(seeds: int, rung_seeds: int) -> str:
     """State how the ladder was made."""
     return f"""{facts(f"paper_ladder.py --record --seeds {seeds} --rung-seeds {rung_seeds}")}
 
-Root-aligned error, mm, of frames 0 to 50 from a true start with noise, median over the frames and then over
-the seeds (least to most): {seeds} seeds of the paper and of the default, {rung_seeds} of each other rung;
-models without the clip's subject. Each rung adds to the one above it and nothing else, but the robust texture
-comes with systematic resampling and with checks that a true start does not need; there are 5 components
-throughout, and 10,000 particles until a rung has fewer. The last three rows are gait track on these
-frames alone: with the keypoints of its detector as a cue, from the same starts; from its own start by them;
-and from its own start by the images, without any keypoints. Its own starts are given the stature alone; two
-hypotheses of left and right, and more particles at first, act in the last row only. Their error is the median
-over the frames that the track has.
-Static pose (of the model of people) and free-running cycles need no image.
-Gain: how far a rung is below the free-running cycle of its own model, which is all that the images give it;
-median of the clips' differences. The cycles start from the exact truth, the rungs from the truth with noise
-(pelvis 3 cm, phase 0.03, rate 0.03 per second, heading 0.05 rad), so the comparison favours no image.
-Outdoors there is no truth in space; [paper_mode](paper_mode.md) has that clip.
+Root-aligned error in mm of frames 0 to 50: median over the frames, then over the seeds (in brackets the range
+over the seeds). The paper's filter and the default have {seeds} seeds, every other rung {rung_seeds}; models
+are learnt without the clip's subject. Each rung adds one thing to the rung above, except that robust texture
+also brings systematic resampling and checks that a true start does not need. All rungs have 5 components, and
+10,000 particles until a rung has fewer.
+
+The last three rows are gait track on these frames: with keypoints of its detector, from the same starts; with
+keypoints, from its automatic start; and without keypoints, from its automatic start by images. Automatic
+starts are given only the stature. Two left/right hypotheses and more particles at first occur only in the
+last row. Errors are medians over the frames that the track has.
+
+Static pose (of the model of people) and free-running cycles need no image. Gain: how much smaller a rung's
+error is than that of its own model running free, which is what the images contribute; median of the clips'
+differences. The cycles start from the exact truth and the rungs from the truth with noise (pelvis 3 cm, phase
+0.03, rate 0.03 per second, heading 0.05 rad), so the comparison favours the cycles. The outdoor clip, which
+has no 3-D truth, is in [paper_mode](paper_mode.md).
 
 ![the ladder](paper_ladder.svg)"""
 

@@ -36,14 +36,14 @@ ALONG, LATE = np.linspace(-1, 1, 21), np.linspace(-0.5, 0.5, 17)
 
 
 def probe_of(f: Footage, model: Model) -> preference.Probe:
-    """The likelihood of one body in a clip, by the settings before the search."""
+    """The likelihood of one body in a clip, with the settings before the search."""
     assert f.scene is not None
     config = preference.config(Mode.PAPER, stayed_nats=0.0, **SETTINGS)
     return preference.Probe(f.scene, model, config, float(meta_of(f.clip.folder)["stature_m"]))
 
 
 def frozen(f: Footage, model: Model) -> freeze.Freeze:
-    """The true body and the best still one in a clip by term, by the settings that were frozen."""
+    """Terms of the true body and of the best motionless one in a clip, with the settings of paper mode."""
     assert f.scene is not None
     size = float(meta_of(f.clip.folder)["stature_m"])
     rows = preference.Probe(f.scene, model, preference.config(Mode.PAPER), size).table()
@@ -107,10 +107,10 @@ def about() -> str:
     """State what the table shows."""
     return f"""{facts("paper_maps.py --record")}
 
-Mean log-likelihood (eqs. 10-13) of a frame given the one before, over 11 frames, for the mean
-cycle at the true state or displaced from it, which walks on with the person or rests between the two
-frames.  The settings are those before the search.  A limb that lies on a static background and rests is
-predicted as well as can be."""
+Mean log-likelihood (eqs. 10-13) of a frame given the one before, over 11 frames. The body has the mean cycle,
+at the true state or displaced from it; between the two frames it walks on with the person or stands still.
+The settings are those before the search. A motionless limb on a static background is predicted perfectly,
+except for noise."""
 
 
 def about_terms(found: list[freeze.Freeze]) -> str:
@@ -119,11 +119,11 @@ def about_terms(found: list[freeze.Freeze]) -> str:
     gains = ", ".join(f"{f.scene.name} {e:+.1f} and {rest:+.1f}" for f in found for e, rest in (f.causes(),))
     return f"""{facts("paper_maps.py --record")}
 
-Log-likelihood of a frame given the one before, nats, less that of limbs that face the camera, are seen
-whole and do not change, by the settings of paper mode: of the true body, which walks, and of the best
-body at rest on the background ({places}). Terms are added in the order of the rows (q, p_occluded,
-sigma(alpha), then E limb by limb), and their sum is the last row. Preference for rest, of all E together
-and of all other terms: {gains}."""
+Log-likelihood in nats of a frame given the one before, in paper mode, relative to limbs that face the camera,
+are fully visible and do not change: for the true, walking body and for the best body at rest on the
+background ({places}). Terms are added in the order of the rows (q, p_occluded, sigma(alpha), then E limb by
+limb); the last row is their sum. By how much all E together, and all other terms, prefer the body at rest:
+{gains}."""
 
 
 if __name__ == "__main__":

@@ -20,22 +20,23 @@ from gait.paper.verdicts import KINDS, MOSTLY, kind
 HEAD = "| --- | --: | --: | --: | --- |"
 NOTE = """{facts}
 
-The page itself, build/paper/paper.html, has the pictures and every choice that the papers leave open. It was
+The page itself, build/paper/paper.html, has the pictures and all choices that the papers leave open. It was
 made from CMU's walks and motions and the outdoor clip with joints marked by hand. Theirs: what the paper
-states. Literal: its algorithm as printed, with errors of print resolved. Ours: the package's default, on the
-same data. {verdicts}.
+reports. Literal: the paper's algorithm as printed, with misprints corrected. Ours: the package's default
+method on the same data. {verdicts}.
 
-Wanted of the paper's filter, on seven clips of real motion: {most} of 10 runs on the person, and an error
-below that of its own mean cycle, which runs on without any image. Both are reached on {reached} of {clips}
-clips ([paper_mode](paper_mode.md), recorded apart; outdoors there is no truth in space):
+The target for the paper's filter on seven clips of real motion: {most} of 10 runs stay on the person, and the
+error is below that of the filter's own mean cycle running free, without images. It is met on {reached} of
+{clips} clips ([paper_mode](paper_mode.md), recorded separately; outdoors there is no 3-D truth):
 
 {table}
 
-On the person, there and on the page:
-{criterion}.
-Outdoors the page learns its model from the recordings and has about one mark a frame; paper_mode has the
-shipped model and all clear marks. Which term of the likelihood prefers rest on the background:
-[paper_terms](paper_terms.md). Which readings of equations were tried: [paper_readings](paper_readings.md)."""
+A run stays on the person, there and on the page, if {criterion}.
+
+For the outdoor clip, the page learns its model from the recordings and uses about one mark per frame;
+paper_mode uses the shipped model and all clear marks. [paper_terms](paper_terms.md) shows which term of the
+likelihood prefers a motionless body on the background, and [paper_readings](paper_readings.md) which readings
+of the equations were tried."""
 
 
 def counted(verdicts: list[str]) -> str:
@@ -45,10 +46,10 @@ def counted(verdicts: list[str]) -> str:
 
 
 def seven() -> dict[str, Any]:
-    """Return what the recorded runs on the target's clips came to, beside what is wanted."""
+    """Return the recorded results on the seven clips with the targets."""
     with open(table.RESULTS / "paper_mode.csv", newline="", encoding="utf-8") as file:
         rows = list(csv.DictReader(file))
-    lines, reached = ["| clip | on the person | error, mm | wanted below, mm | reached |", HEAD], 0
+    lines, reached = ["| clip | on the person | error, mm | target, below mm | met |", HEAD], 0
     for row in rows:
         held, count = map(int, row["held"].split(" of "))
         near = not row["root mm"] or float(row["root mm"]) < float(row["free mm"])

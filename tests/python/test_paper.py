@@ -176,6 +176,9 @@ def test_the_page_holds_every_figure_and_needs_no_other_file(walks, learning, tm
     monkeypatch.setattr(tracking, "PARTICLES", 200)
     monkeypatch.setattr(tracking, "SEEDS", 2)
     monkeypatch.setattr(ladder, "SEEDS", 1)
+    few = {"particles": 200}
+    monkeypatch.setattr(ladder, "RUNGS", [replace(rung, changes=rung.changes | few) for rung in ladder.RUNGS])
+    monkeypatch.setattr(ladder, "PAPER", ladder.RUNGS[1])
     monkeypatch.setattr(scene, "VIEWS", {"side": "demo"})
     monkeypatch.setattr(scene, "SIZE", (320, 240))
     monkeypatch.setattr(lifting, "FRAMES", 14)

@@ -27,15 +27,15 @@ class Entry:
     """One figure, table or experiment of a paper."""
 
     heading: str  #: such as "Fig. 2: length of a cycle"
-    theirs: str  #: what the paper states
-    literal: str  #: what its algorithm gives on these recordings
-    ours: str  #: what the package gives
+    theirs: str  #: what the paper reports
+    literal: str  #: result of its algorithm as printed on these recordings
+    ours: str  #: result of the package
     verdict: str
-    left_open: tuple[str, ...]  #: what the paper does not state, and what is done here
+    left_open: tuple[str, ...]  #: choices that the paper leaves open, as made here
     pictures: tuple[Picture, ...]
 
     def statements(self) -> dict[str, str]:
-        """Return what each side states and the verdict, by the columns of the page."""
+        """Return the results of each side and the verdict, by column of the page."""
         return dict(zip(HEAD[1:], (self.theirs, self.literal, self.ours, self.verdict), strict=True))
 
 
@@ -106,6 +106,6 @@ def _body(entry: Entry) -> str:
     cells = entry.statements().items()
     rows = "".join(f"<tr><td><b>{k}</b></td><td>{escape(v)}</td></tr>" for k, v in cells)
     items = "".join(f"<li>{escape(choice)}</li>" for choice in entry.left_open)
-    choices = f"<p>Left open by the paper, and chosen here:</p><ul>{items}</ul>" if items else ""
+    choices = f"<p>Choices made here that the paper leaves open:</p><ul>{items}</ul>" if items else ""
     pictures = "".join(f"<p>{escape(p.caption)}</p>{p.html}" for p in entry.pictures)
     return f"{movable(f'<table>{rows}</table>')}{choices}{pictures}"

@@ -1,8 +1,8 @@
-"""The freeze on a static background: which term of eqs. 10 to 13 prefers it, with pictures.
+"""Why the paper's likelihood prefers a motionless body on the background: eqs. 10 to 13 term by term.
 
-The terms are taken from the tracker's own log-likelihood.  On an even grey picture no limb differs from what
-it was (E = 0), so that q, p_occluded and sigma(alpha) are left; with tilt 0 all limbs have one sigma.  E of a
-limb is what comes back where the pictures are shown within that limb alone.
+The terms are isolated with the tracker's own log-likelihood.  In uniformly grey images no limb changes
+(E = 0), so that q, p_occluded and sigma(alpha) remain; with tilt 0 all limbs have the same sigma.  E of a
+limb is what is added when the pixels of that limb are revealed.
 """
 
 from __future__ import annotations
@@ -28,51 +28,54 @@ from gait.report.drawing import Overlay, draw_bones
 
 GREY = 128
 PIXEL_VARIANCE = 9.0  # grey levels squared, of either frame
-FEW = 2.0**-20, 2.0**-19  # densities of an occluded limb that count for hidden limbs alone
+FEW = 2.0**-20, 2.0**-19  # densities of an occluded limb, so small that only hidden limbs use them
 Q = "q: turned from the image, or seen in part"
 OCCLUDED = "p_occluded: limbs that are hidden"
 WIDTHS = "sigma(alpha): widths"
 TRUTH = (60, 230, 250)  # BGR
-RIM = 3  # pixels about a limb that are shown with it: points at its edge are compared between pixels
+RIM = 3  # pixels around a limb that are shown with it, since points at its edge are interpolated
 LAST = "E, beyond the edges of limbs"
 FULL = 0.6  # nats that a limb drawn in full red costs
 
 
 @dataclass(frozen=True)
 class Body:
-    """A body of which the log-likelihood is split: nats, means over the frames."""
+    """Log-likelihood of a body by term: nats, means over the frames.
 
-    terms: dict[str, float]  #: what q, p_occluded, the widths and E of each limb add to an ideal limb's
-    total: float  #: of a frame given the one before, less that of limbs that all are ideal
+    Everything is relative to ideal limbs, which face the camera, are fully visible and do not change.
+    """
+
+    terms: dict[str, float]  #: what q, p_occluded, the widths and E of each limb add
+    total: float  #: log-likelihood of a frame given the one before
 
     @property
     def differences(self) -> float:
-        """What the differences of grey levels cost, all limbs together."""
+        """Sum of the terms E of all limbs, from differences of grey levels."""
         return sum(value for name, value in self.terms.items() if name.startswith("E"))
 
 
 @dataclass(frozen=True)
 class Freeze:
-    """The true body, which walks, and the best one at rest on the background, in one scene."""
+    """The true, walking body and the best motionless one on the background, in one scene."""
 
     scene: Scene
     model: Model
-    place: str  #: where the still body is, a name of `preference.PLACES`
+    place: str  #: place of the motionless body, a name of `preference.PLACES`
     walks: Body
     rests: Body
 
     def gains(self) -> dict[str, float]:
-        """By how many nats each term prefers the still body."""
+        """By how many nats each term prefers the motionless body."""
         return {name: value - self.walks.terms[name] for name, value in self.rests.terms.items()}
 
     def causes(self) -> tuple[float, float]:
-        """By how many nats the differences of grey levels prefer the still body, and all other terms."""
+        """By how many nats E of all limbs prefers the motionless body, and all other terms do."""
         of_e = self.rests.differences - self.walks.differences
         return of_e, sum(self.gains().values()) - of_e
 
 
 def examine(scene: Scene, model: Model, stature: float, rows: Sequence[preference.Row]) -> Freeze:
-    """Split the log-likelihoods of the true body and of the best still one of `preference.Probe.table`."""
+    """Split the log-likelihoods of the true body and of the best motionless one of `Probe.table`."""
     place = preference.best_at_rest(rows)
     probes = _Probes(scene, model, stature)
     walks = probes.split(PLACES["on the person"], 1.0)
@@ -80,7 +83,7 @@ def examine(scene: Scene, model: Model, stature: float, rows: Sequence[preferenc
 
 
 class _Probes:
-    """The same body under settings of which each leaves terms out."""
+    """Probes of the same body whose settings leave out different terms."""
 
     def __init__(self, scene: Scene, model: Model, stature: float) -> None:
         def probe(**changes: float) -> Probe:
@@ -126,13 +129,13 @@ class _Probes:
 
 
 def _widened(where: np.ndarray) -> np.ndarray:
-    """Return a mask and `RIM` pixels about it."""
+    """Return a mask widened by `RIM` pixels."""
     size = 2 * RIM + 1
     return np.asarray(cv2.dilate(where.astype(np.uint8), np.ones((size, size), np.uint8)), bool)
 
 
 def split_table(found: Sequence[Freeze]) -> Picture:
-    """Return the terms by view: the true body, the still one, and by how much the still one is preferred."""
+    """Return the terms by view: of the true body, of the motionless one, and their difference."""
     head = ["nats a frame"]
     for each in found:
         head += [f"{each.scene.name}: walks", f"rests {each.place}", "prefers rest by"]
@@ -143,16 +146,17 @@ def split_table(found: Sequence[Freeze]) -> Picture:
         for name, each in shown.items()
     ]
     return table(
-        "Which term prefers rest: what each takes from the log-likelihood of limbs that face the camera, are "
-        "seen whole and do not change, for the true body, which walks, and the best body at rest on the "
-        "background. Terms are added in the order of the rows, E limb by limb; p_occluded bounds each.",
+        "Which term prefers rest: what each term costs, relative to limbs that face the camera, are fully "
+        "visible and do not change, for the true, walking body and for the best body at rest on the "
+        "background. Terms are added in the order of the rows, E limb by limb; p_occluded limits the cost of "
+        "each limb.",
         head,
         rows,
     )
 
 
 def pictures(found: Freeze, estimates: Sequence[Estimate], seed: int) -> list[Picture]:
-    """Return the estimates of a run that leaves the person over the frames, and the bodies of the table."""
+    """Draw the estimates of a run that leaves the person over the frames, and the bodies of the table."""
     overlay = Overlay(found.model, found.scene.camera)
     cells = []
     for k in (k for k in SHOWN if k < len(estimates)):
@@ -161,21 +165,21 @@ def pictures(found: Freeze, estimates: Sequence[Estimate], seed: int) -> list[Pi
         cells.append(_about(found.scene, drawn, k, f"frame {k}"))
     return [
         Picture(
-            f"Literal, {found.scene.name}, seed {seed}, the run that ends farthest off: the expected body "
-            "over the frames (tinted) beside the truth (yellow).",
-            image(np.asarray(np.hstack(cells)), "the filter's body beside the true one"),
+            f"Literal, {found.scene.name}, seed {seed}, the run with the largest error at the end: the "
+            "expected body (tinted) and the truth (yellow) drawn over the frames.",
+            image(np.asarray(np.hstack(cells)), "the filter's body and the true one"),
         ),
         Picture(
-            f"What eq. 11 compares, {found.scene.name}, in one step: the true body, which walks, and the "
-            f"still one {found.place}. Each limb is as red as what it covers has changed since the frame "
-            f"before (E; full at {FULL:g} nats): on the background hardly anything changes.",
-            image(_costs(found), "limbs of the walking and of the still body by their cost"),
+            f"What eq. 11 compares in one step, {found.scene.name}: the true, walking body and the "
+            f"motionless one {found.place}. The redder a limb, the more the image under it has changed since "
+            f"the frame before (E; saturated at {FULL:g} nats). On the background hardly anything changes.",
+            image(_costs(found), "limbs of the walking and of the motionless body by their cost"),
         ),
     ]
 
 
 def _costs(found: Freeze) -> Image:
-    """Draw the walking and the still body, each limb by its mean cost."""
+    """Draw the walking and the motionless body, each limb coloured by its mean cost."""
     cells = []
     k = preference.EVERY * (len(found.scene.frames) // (2 * preference.EVERY))
     probe = Probe(found.scene, found.model, preference.config(Mode.PAPER), stature=_stature(found))
@@ -213,7 +217,7 @@ def _colour(frame: Image) -> Image:
 
 
 def _about(scene: Scene, drawn: Image, k: int, words: str) -> Image:
-    """Cut out about the true person, with a body beside."""
+    """Cut out the true person with some space for a body beside."""
     pelvis: Floats = scene.truth.places["pelvis"][scene.rows[k]]
     side = 1.3 * CUT_OUT * scene.height
     return labelled(cut(drawn, scene.camera.project(pelvis), side), words)

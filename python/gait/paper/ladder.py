@@ -29,9 +29,9 @@ from gait.report.figures import Drawing
 
 SEED, SEEDS = 1, 10  # of the rungs; runs of the paper's filter in each view
 CAPTION = (
-    "Root-aligned error of the joints, mm, median over the frames and the views, with the range over the "
-    "views: each rung adds to the one above it. Grey: without any image; dashed: the free-running cycle of "
-    "the rung's own model, from the exact truth, where the rungs start with the error of a start."
+    "Root-aligned joint error in mm: the median over frames and views, with the range over the views. Each "
+    "rung adds one thing to the rung above. Grey bars use no image. Dashed lines show the rung's own model "
+    "running free, without images, from the exact true state; the rungs themselves start with some error."
 )
 STATIC = "static pose"
 _FREE = tuple(
@@ -40,7 +40,7 @@ _FREE = tuple(
 #: The free-running cycle that a rung is compared with, by `Rung.model`.
 FREE = {"paper": _FREE[0], "rigid": _FREE[1], "plain": _FREE[2], "root": _FREE[2], "people": _FREE[2]}
 COMPARED = "paper", "rigid", "people"  # models of these cycles
-#: What is added in later steps, off: settings of the default mode.
+#: Settings of the default mode that later rungs add, switched off.
 _WITHOUT: dict[str, Any] = {
     "evidence_time": 0.0,
     "rejuvenation_time": 0.0,
@@ -48,7 +48,7 @@ _WITHOUT: dict[str, Any] = {
     "stature_noise": 0.0,
     "stature_noise_start": 0.0,
 }
-#: The paper's sigmas, p_occluded and sigma(alpha) before they were searched.
+#: The paper's sigmas, p_occluded and sigma(alpha) as set by hand, before the search.
 UNSEARCHED: dict[str, Any] = {
     "phase_noise": 0.022,
     "rate_noise": 0.055,
@@ -65,7 +65,7 @@ UNSEARCHED: dict[str, Any] = {
     "limb_points": 16,
 }
 
-#: Settings of the dynamics, and of the spread of a start, which differ between the modes.
+#: Settings of the dynamics and of the initial spread that differ between the modes.
 _RELAXING = (
     "phase_noise",
     "rate_noise",
@@ -85,24 +85,24 @@ _TURNING = "turn_sd", "turn_time"
 
 @dataclass(frozen=True)
 class Rung:
-    """A way of tracking: one addition to the one before."""
+    """A way of tracking that adds one thing to the rung before."""
 
     name: str
     mode: Mode
-    #: "paper"; "rigid": of people, with the paper's 19 angles and a pelvis that goes evenly ahead, as the
-    #: paper's does; "plain": with all angles; "root": the pelvis moves within a stride, too; "people": angles
-    #: and pelvis follow the stride rate, too.
+    #: "paper"; "rigid": the package's prior, but with the paper's 19 angles and a pelvis that moves ahead at
+    #: constant speed, as in the paper; "plain": all angles; "root": the pelvis also moves within a stride;
+    #: "people": angles and pelvis also depend on the stride rate.
     model: str
     changes: dict[str, Any] = field(default_factory=dict)
 
 
 def _default(terms: Term, *added: str) -> dict[str, Any]:
-    """Return settings of the default mode with these terms and without what is not in `added`."""
+    """Return settings of the default mode with these terms; of the later additions only those in `added`."""
     return {"terms": terms} | {k: v for k, v in _WITHOUT.items() if k not in added}
 
 
 def _usual(*names: str) -> dict[str, Any]:
-    """Return settings of the default mode, and as many components as it has."""
+    """Return the named settings as the default mode has them, and its number of components."""
     usual = TrackerConfig.default()
     return {"components": COMPONENTS} | {name: getattr(usual, name) for name in names}
 
@@ -141,7 +141,7 @@ def config_of(rung: Rung, seed: int) -> TrackerConfig:
 
 
 def blobs(paper: bytes, people: bytes) -> dict[str, bytes]:
-    """Return the models of the rungs, of those of the paper and of people."""
+    """Return the models of the rungs, made from the paper's and from the package's."""
     root = dict(decode(people))
     root.pop("PACE", None)
     names, curves = unpack_names(root["CHNM"]), np.array(root["CURV"])
@@ -160,20 +160,22 @@ def blobs(paper: bytes, people: bytes) -> dict[str, bytes]:
 
 @dataclass(frozen=True)
 class Climbed:
-    """What was found on the views: root-aligned errors, mm, and runs of the paper's filter that hold."""
+    """What was found in the views: root-aligned errors, mm, and which runs of the paper's filter succeed."""
 
     scenes: list[Scene]
-    rungs: dict[str, list[float]]  #: error in each view, by rung and for what needs no image
-    held: list[int]  #: of SEEDS runs in paper mode, in each view
+    rungs: dict[str, list[float]]  #: error in each view, by rung or by baseline without images
+    held: list[int]  #: by view: how many of SEEDS runs in paper mode follow the person to the end
     paper: list[float]  #: their median error in each view
-    lost: tuple[str, str]  #: of those that leave the person, and that hold it: how many are reported as lost
-    preferred: list[tuple[list[Row], list[Row]]]  #: log-likelihoods by theirs and by ours in each view
-    frozen: list[Freeze]  #: which term prefers rest, in each view
-    farthest: tuple[int, int, list[Estimate]]  #: view and seed of the run that ends farthest off, and the run
+    lost: tuple[str, str]  #: how many runs are reported as lost: of those that leave the person, and the rest
+    preferred: list[tuple[list[Row], list[Row]]]  #: by view: log-likelihoods of the paper and of the default
+    frozen: list[Freeze]  #: by view: which term prefers a body at rest
+    farthest: tuple[
+        int, int, list[Estimate]
+    ]  #: view, seed and estimates of the run with the largest last error
 
     @property
     def free(self) -> list[float]:
-        """Error of the paper's mean cycle running free in each view."""
+        """Error, by view, of the paper's mean cycle running free."""
         return self.rungs[FREE["paper"]]
 
 
@@ -230,7 +232,7 @@ def steps(views: int) -> int:
 
 
 def entries(found: Climbed) -> Iterator[Entry]:
-    """Yield what the paper's likelihood reaches, and the ladder."""
+    """Yield the entry on the paper's likelihood, and the ladder."""
     yield _reach(found)
     yield _ladder(found)
 
@@ -240,8 +242,8 @@ def _reach(found: Climbed) -> Entry:
     wanted = round(verdicts.MOSTLY * SEEDS)
     runs = zip(names, found.held, found.paper, found.free, strict=True)
     each = "; ".join(
-        f"{name}: on the person in {held} of {SEEDS} runs (wanted {wanted}), {root:.0f} mm off (wanted less "
-        f"than {free:.0f}, without any image)"
+        f"{name}: on the person in {held} of {SEEDS} runs (target: {wanted}), error {root:.0f} mm (target: "
+        f"below {free:.0f}, the error without any image)"
         for name, held, root, free in runs
     )
     rows = [
@@ -258,32 +260,33 @@ def _reach(found: Climbed) -> Entry:
     view, seed, run = found.farthest
     head = "view", "the body is", "literal: walks", "rests", "ours: walks", "rests"
     caption = (
-        "By so many nats a frame the best still body on the background beats the true one: "
-        f"{'; '.join(terms)}. Below: mean log-likelihood, nats, of a frame given the one before, of the mean "
-        "cycle at the true state or displaced from it, which walks on with the person or rests between the "
-        "two frames. The two likelihoods have different units."
+        "How much better the best motionless body on the background scores than the true one, in nats per "
+        f"frame: {'; '.join(terms)}. Below: mean log-likelihood, in nats, of a frame given the one before. "
+        "The body has the mean cycle, at the true state or displaced from it, and between the two frames it "
+        "either walks on with the person or stands still. The two likelihoods have different units."
     )
     return Entry(
-        "Eqs. 10 to 13: what the likelihood reaches",
-        "A walking person is held for 50 frames, with drift where limbs hide each other, and recovery.",
-        "The paper's likelihood does not hold a person in every view: it compares a limb only with what it "
-        "covered in the frame before, and a static background looks like itself, so a body at rest on the "
-        f"background fits best. Rendered walks by view, frames 0 to {tracking.FRAMES}, root-aligned, "
-        f"medians. {each}. Reported as lost: {found.lost[0]} runs that leave the person, {found.lost[1]} "
-        "that hold it.",
-        "Silhouette, edges and a template compare with the background, too; the ladder has the errors.",
+        "Eqs. 10 to 13: what the likelihood achieves",
+        "A walking person is tracked for 50 frames; the model drifts where limbs hide each other, and "
+        "recovers.",
+        "The paper's likelihood does not keep track of a person in every view. It compares a limb only with "
+        "what it covered in the frame before. A static background always looks like itself, so a motionless "
+        f"body on the background fits best. Median root-aligned errors of rendered walks, by view, frames 0 "
+        f"to {tracking.FRAMES}. {each}. Reported as lost: {found.lost[0]} runs that leave the person, and "
+        f"{found.lost[1]} that stay on the person.",
+        "Silhouette, edges and template also compare with the background. The ladder shows the errors.",
         f"{verdicts.held(found.held, SEEDS, found.paper, found.free)}; {verdicts.at_rest(gains)}",
         (
-            "The clips: walks of a normative gait, which no person in the recordings has, rendered from "
-            f"several sides and started near the truth. Wanted in every view: {wanted} of {SEEDS} runs on "
-            "the person, and an error below that of the mean cycle that runs on from the exact truth. What "
-            "is wanted and reached on seven clips of real motion, one of them filmed outdoors: "
+            "The clips: walks with a normative gait, which differs from that of every person recorded, "
+            f"rendered from several sides and started near the truth. The target in every view: {wanted} of "
+            f"{SEEDS} runs on the person, and an error below that of the mean cycle running free from the "
+            "exact truth. Results on seven clips of real motion, one of them filmed outdoors, are in "
             "tests/bench/results/paper_mode.md of the sources.",
-            "Lost: for a third of a second the picture under the body stayed behind when the body walked. "
+            "Lost means that for a third of a second the image under the body did not move along with it. "
             "The threshold was chosen on simulated clips: tests/bench/results/search_paper_lost.md.",
             f"On the person: {tracking.CRITERION}.",
-            "Terms: q, p_occluded and sigma(alpha) are what is left where nothing in the picture differs; E "
-            "of a limb is what its pixels add when the picture is shown limb by limb.",
+            "Terms: q, p_occluded and sigma(alpha) are what remains when the two images are equal. E of a "
+            "limb is what its pixels add when the images are revealed limb by limb.",
         ),
         (
             *freeze.pictures(found.frozen[view], run, seed),
@@ -294,12 +297,12 @@ def _reach(found: Climbed) -> Entry:
 
 
 def own_cycle(name: str) -> str:
-    """Name the free-running cycle of a rung's own model, of people beyond the ladder."""
+    """Name the free-running cycle that a rung is compared with; names beyond the ladder have "people"."""
     return FREE[next((rung.model for rung in RUNGS if rung.name == name), "people")]
 
 
 def gain(errors: Mapping[str, Sequence[float]], name: str) -> float:
-    """Median over the views of how far a rung is below its own cycle: all that the images give it."""
+    """Return the error of a rung's own cycle less that of the rung, mm, median over the views."""
     return float(np.median(np.subtract(errors[own_cycle(name)], errors[name])))
 
 
@@ -314,28 +317,27 @@ def _ladder(found: Climbed) -> Entry:
         for name, errors in found.rungs.items()
     ]
     return Entry(
-        "Ladder: what each later addition buys",
-        "Nothing of the kind; tracking is shown on one clip.",
+        "Ladder: what each later addition gains",
+        "Not in the paper, which shows tracking on one clip.",
         f"{median[PAPER.name]:.0f} mm root-aligned over frames 0 to {tracking.FRAMES}, the median of "
         f"{len(names)} views; {median[RUNGS[0].name]:.0f} mm with sigmas set by hand.",
         f"{median[RUNGS[-1].name]:.0f} mm.",
         verdicts.without_image(*(gain(found.rungs, rung.name) for rung in (PAPER, RUNGS[-1]))),
         (
-            "Sigmas, epsilon, p_occluded, sigma(alpha) and n_s: searched on simulated clips. Here each rung "
-            f"has one seed ({SEED}), the paper's filter {SEEDS}; differences of some millimetres may be "
-            "chance. The table and plot of "
-            "clips of real motion, which go on to keypoints of a detector and automatic starts: "
-            "tests/bench/results/paper_ladder.md of the sources.",
+            "Sigmas, epsilon, p_occluded, sigma(alpha) and n_s were searched on simulated clips. Here each "
+            f"rung has one seed ({SEED}) and the paper's filter {SEEDS}, so differences of a few millimetres "
+            "may be chance. tests/bench/results/paper_ladder.md of the sources has the same table for clips "
+            "of real motion, with further rungs for a detector's keypoints and automatic starts.",
             "Each rung adds one thing and keeps the rest. Robust texture is that of the default mode, which "
-            "resamples systematically; 5 components throughout.",
-            "What needs no image starts from the exact truth, the rungs from the clip's init file with its "
-            "standard deviations: the comparison favours no image.",
+            "resamples systematically. All rungs have 5 components.",
+            "The baselines without images start from the exact truth, but the rungs from the clip's init "
+            "file and its standard deviations, so the comparison favours the baselines.",
         ),
         (
             picture(drawing),
             table(
-                "Millimetres, root-aligned, by view. Gain: of a rung over the free-running cycle of its own "
-                "model, median of the views.",
+                "Root-aligned error in mm, by view. Gain: how much smaller the error is than that of the "
+                "rung's own model running free, median of the views.",
                 ("", "median", "gain", *names),
                 rows,
             ),

@@ -1,4 +1,4 @@
-"""Figures 1 to 6 of Leventon and Freeman (1998), with what each side finds."""
+"""Figures 1 to 6 of Leventon and Freeman (1998), and the volume of the posterior."""
 
 from __future__ import annotations
 
@@ -25,12 +25,12 @@ MANY = 200  # draws whose limbs are measured
 SWING = 2.0  # standard deviations
 TALL = 1.75  # metres, of the figures' rows
 ACROSS = np.array([0.0, 1.0, 0.0])  # the depth, drawn to the right
-SHARE = 14  # magnitude of the paper's shrinking volume
+SHARE = 14  # orders of magnitude by which the paper's volume shrinks
 
 
 @dataclass(frozen=True)
 class Segments:
-    """What was found about segments."""
+    """What the figures show."""
 
     motions: list[Recorded]
     everything: Gaussian  #: of all motions
@@ -40,7 +40,7 @@ class Segments:
 
 
 def study(motions: list[Recorded], held: list[HeldOut]) -> Segments:
-    """Choose what is shown: the sequence whose error by Bayes is the median."""
+    """Choose the sequence to show: the one whose Bayes error is the median."""
     order = sorted(held, key=lambda h: h.scores[1].bayes)
     shown = order[len(order) // 2]
     return Segments(motions, leventon.learn_all(motions), held, shown, leventon.example(shown))
@@ -77,7 +77,7 @@ def _training(found: Segments) -> Entry:
         strips.add(row, x, _across(x), DARK)
     frames = [len(m.table) for m in found.motions]
     caption = (
-        "Some of the training motions, each over its whole length, seen from its side. Bold: right limbs."
+        "Some of the training motions, each over its whole length, seen from the side. Right limbs are bold."
     )
     return Entry(
         "Fig. 1: training motions",
@@ -85,16 +85,15 @@ def _training(found: Segments) -> Entry:
         "every 5 frames.",
         f"{len(found.motions)} sequences, {min(frames)} to {max(frames)} frames at 20 per second; "
         f"{found.everything.segments} segments.",
-        "The same segments, and those of people made up from them: other postures and lengths of limbs.",
+        "The same segments, and segments of artificial people with other postures and limb lengths.",
         verdicts.training(len(found.motions), min(frames), max(frames)),
         (
-            "Which motions: up to ten of 120 to 240 frames, longer recordings in equal parts, of all kinds "
-            "before walks; where these are too few, shorter ones, of walks one a person. A sequence is left "
-            "out with all of its recording.",
-            "The markers: 37 virtual ones on the body that was fitted to each recording.",
-            "The frame rate, about 20 per second: exactly 20, resampled after a low-pass filter. A sequence "
-            "of F frames gives the whole part of "
-            "(F - 10) / 5 and one more segments.",
+            "Which motions: up to ten of 120 to 240 frames, other motions before walks; longer recordings "
+            "are cut into equal parts. If there are too few, shorter ones, with one walk per person. A "
+            "sequence is left out together with the rest of its recording.",
+            "The markers: 37 virtual markers on the body fitted to each recording.",
+            "The frame rate: exactly 20 per second, resampled after a low-pass filter. A sequence of F "
+            "frames has floor((F - 10) / 5) + 1 segments.",
         ),
         (picture(Drawing("", "training", caption, strips.figure())),),
     )
@@ -118,28 +117,27 @@ def _synthesis(found: Segments) -> Entry:
     return Entry(
         "Fig. 2: synthesis, and the variance explained",
         "A segment from 40 modes is close to the original; 50 modes explain 91 % of the variance.",
-        f"40 modes leave {leventon.apart(own, truth):.0f} mm per marker of a segment that was learnt from "
-        f"({far:.0f} mm from the mean), "
-        f"{leventon.apart(left_out, truth):.0f} mm where its sequence was left out. They explain "
-        f"{share[SYNTHESIS - 1]:.2f} %, 50 modes {share[leventon.MODES - 1]:.2f} %; {need} are enough for "
-        "91 %.",
+        f"Error with 40 modes: {leventon.apart(own, truth):.0f} mm per marker for a segment of the training "
+        f"data (which is {far:.0f} mm from the mean), {leventon.apart(left_out, truth):.0f} mm if its "
+        f"sequence was left out. 40 modes explain {share[SYNTHESIS - 1]:.2f} % of the variance, 50 modes "
+        f"{share[leventon.MODES - 1]:.2f} %; {need} modes explain 91 %.",
         f"{found.shown.prior.size} modes of segments that all face one way explain "
         f"{100 * explained[-1]:.1f} %.",
         verdicts.synthesis(leventon.apart(own, truth) / far, need),
         (
-            "Coordinates: here the pelvis of the first frame is over the origin and the heading as "
-            f"recorded. 91 % take {need} modes; with places as recorded {placed}, without turned copies "
-            f"{rooted}. Which the paper had is open; its motions differ more.",
-            "Printed Lambda = U S cannot be a covariance of the scores; it is diagonal here, squared "
-            "singular values over N - 1. Eq. 1 is read with the mean, which it leaves out.",
-            "The copies turned by 90 degrees: about the vertical through the origin, of every segment.",
+            "Coordinates: in the first frame the pelvis is over the origin; the heading is as recorded. 91 % "
+            f"take {need} modes; with positions as recorded {placed}, without turned copies {rooted}. The "
+            "paper does not state its choice; its motions differ more.",
+            "Lambda = U S, as printed, cannot be the covariance of the scores. Here it is diagonal, with the "
+            "squared singular values over N - 1. The mean, missing in eq. 1, is added.",
+            "Every segment is also used turned by 90 degrees about the vertical through the origin.",
         ),
         (picture(Drawing("", "synthesis", f"A segment of {found.shown.name} and its 40 modes.", figure)),),
     )
 
 
 def _needed(motions: Sequence[Recorded], absolute: bool) -> int:
-    """Return how many modes explain 91 %, of segments at their places or rooted, without turned copies."""
+    """Return how many modes explain 91 % without turned copies, with positions as recorded or relative."""
     if not absolute:
         gaussian = leventon.learn_all(motions, turned=False)
     else:
@@ -166,16 +164,16 @@ def _spectrum(found: Segments) -> Entry:
     axes.legend(fontsize=8, frameon=False)
     return Entry(
         "Fig. 3: variances before and after",
-        "The diagonals of the prior's and the posterior's covariance: most variances shrink far.",
-        f"With {1000 * leventon.NOISE:.0f} mm of noise the variances shrink to {ratio.min():.1g} to "
+        "The diagonals of the prior's and the posterior's covariance: most variances shrink strongly.",
+        f"With {1000 * leventon.NOISE:.0f} mm of noise, the variances shrink to {ratio.min():.1g} to "
         f"{ratio.max():.2g} of the prior's, least in modes {', '.join(map(str, open_modes))}.",
-        "The same equations in the library; beside the modes, place, heading and stature are unknowns.",
+        "The library uses the same equations, with position, heading and stature as further unknowns.",
         verdicts.spectrum(ratio.tolist()),
         (
-            f"The noise: {1000 * leventon.NOISE:.0f} mm, standard deviation of each coordinate seen. The "
-            "text has a variance sigma, eq. 4 sigma squared and eq. 5 sigma times the identity.",
-            "Eqs. 5 and 6 have S where the covariance of the scores stands here. Eq. 6 is computed as the "
-            "inverse of the sum of both precisions, which is the same.",
+            f"The noise: a standard deviation of {1000 * leventon.NOISE:.0f} mm of each observed coordinate. "
+            "Sigma is a variance in the text, squared in eq. 4, and multiplies the identity in eq. 5.",
+            "Where eqs. 5 and 6 have S, the covariance of the scores is used. Eq. 6 is computed as the "
+            "inverse of the sum of both precisions, which is equal.",
         ),
         (
             picture(
@@ -201,16 +199,15 @@ def _draws(found: Segments) -> Entry:
     return Entry(
         "Fig. 4: draws from the prior",
         "Segments drawn at random from the prior.",
-        f"{DRAWS} draws of the Gaussian; of {MANY} the limbs differ from the mean length by "
-        f"{100 * differ[0]:.0f} % (rms).",
-        "The same kind of prior; segments all face one way, so that a draw is no mean of two headings.",
+        f"{DRAWS} draws from the Gaussian. In {MANY} draws, limb lengths vary by {100 * differ[0]:.0f} % "
+        "(rms).",
+        "The same kind of prior, but all segments face the same way, so that no draw mixes two headings.",
         verdicts.draws(*differ),
         (
-            "Which covariance is drawn from: that of the scores in all modes kept, without what they leave "
-            "out.",
-            "From which side a draw is seen: from that of its own hips in the first frame.",
+            "Scores of all modes that are kept are drawn; the variation outside the modes is left out.",
+            "A draw is seen from the side, as its hips are in the first frame.",
         ),
-        (picture(Drawing("", "draws", "Segments drawn from the prior, from their sides.", strips.figure())),),
+        (picture(Drawing("", "draws", "Segments drawn from the prior, from the side.", strips.figure())),),
     )
 
 
@@ -228,33 +225,34 @@ def _estimates(found: Segments) -> Entry:
     means = [_mean(held, k) for k in range(len(leventon.TRIED))]
     shown = means[leventon.TRIED.index(leventon.NOISE)]
     caption = (
-        f"20 frames of {found.shown.name}, left out: three overlapping segments, joined by linear weights. "
-        "The camera looks along the depth; below, the depth is drawn to the right. Grey: original. Mean "
-        "distance of all markers, but for the common depth, which no such view shows."
+        f"20 frames of {found.shown.name}, which was left out: three overlapping segments, blended linearly. "
+        "The camera looks along the depth; in the rows below the first, depth is drawn to the right. Grey: "
+        "original. The errors are mean distances of all markers, without the common depth, which such a view "
+        "cannot show."
     )
     if leventon.apart(e.bayes, e.truth) > leventon.apart(e.likelihood, e.truth):
         caption += (
-            " Here, where this sequence moves most, Bayes is farther off than the likelihood alone; the "
-            "table has the mean of all segments."
+            " In this part of the sequence, where it moves most, Bayes has a larger error than the "
+            "likelihood alone; the table has the means of all segments."
         )
     return Entry(
         "Fig. 5: estimates from one view",
         "20 frames of a sequence left out: original, orthographic view, likelihood alone, and Bayes, "
         "which is far better.",
-        f"Noise of {1000 * shown.noise:.0f} mm, mean of {len(held)} sequences: likelihood "
-        f"{shown.likelihood:.0f} mm, Bayes {shown.bayes:.0f} mm; 90 % intervals of the depth cover "
+        f"Mean errors of {len(held)} sequences with {1000 * shown.noise:.0f} mm of noise: likelihood "
+        f"{shown.likelihood:.0f} mm, Bayes {shown.bayes:.0f} mm. 90 % intervals of the depth cover "
         f"{100 * shown.covered:.0f} %.",
-        f"{shown.ours:.0f} mm, and the intervals cover {100 * shown.ours_covered:.0f} %, though the "
-        "heading is unknown.",
+        f"{shown.ours:.0f} mm, although the heading is unknown; the intervals cover "
+        f"{100 * shown.ours_covered:.0f} %.",
         verdicts.estimates([(m.likelihood, m.bayes) for m in means], shown.covered),
         (
-            f"Every one of {len(held)} sequences is left out in turn; shown is the one whose error is the "
-            "median, where it moves most. Other sequences of the same person are learnt from.",
-            "Likelihood alone: least squares of minimum norm in the modes.",
-            "Eq. 1 is printed without the mean and eq. 3 without the 1/2; sigma, a variance in the text and "
-            "squared in eq. 4, is a standard deviation.",
-            "A segment stands where its pelvis shows; in depth it continues the one before. Where two "
-            "overlap, linear weights join them.",
+            f"Each of {len(held)} sequences is left out in turn. The one with the median error is shown, "
+            "where it moves most. The training data include other sequences of the same person.",
+            "Likelihood alone: the least-squares solution of minimum norm in the modes.",
+            "Eq. 1 is printed without the mean and eq. 3 without the 1/2. Sigma, a variance in the text and "
+            "squared in eq. 4, is a standard deviation here.",
+            "A segment is placed where its pelvis is observed; in depth it continues the segment before. "
+            "Overlapping segments are blended linearly.",
             f"The noise: {', '.join(f'{1000 * n:.0f}' for n in leventon.TRIED)} mm; shown with "
             f"{1000 * leventon.NOISE:.0f}. The camera looks along y, level and orthographic.",
         ),
@@ -273,7 +271,7 @@ def _table(scores: Sequence[leventon.Score]) -> Picture:
         )
         for s in scores
     ]
-    caption = "Errors of single segments, millimetres per marker, mean over all sequences left out in turn."
+    caption = "Errors of single segments in mm per marker, mean over all sequences, each left out in turn."
     return table(caption, head, rows)
 
 
@@ -301,15 +299,15 @@ def _uncertain(found: Segments) -> Entry:
     shares = ", ".join(f"{100 * s:.0f} %" for s in along)
     return Entry(
         "Fig. 6: modes of greatest posterior variance",
-        "Modes that the view hardly restricts; the second is a translation in depth.",
+        "Modes that the view hardly constrains; the second is a translation in depth.",
         f"Shares of their energy along the depth: {shares}; as translation of the whole body: "
         + ", ".join(f"{100 * s:.0f} %" for s in rigid) + ".",
-        "gait lift reports and gait report lift draws the same of any clip.",
+        "gait lift reports them and gait report lift draws them, for any clip.",
         verdicts.uncertain(along, rigid),
         (
-            "They are eigenvectors of the posterior covariance. The paper compares diagonal terms, which "
-            "depend on the choice of modes.",
-            "Here the pelvis of the first frame is over the origin, which leaves little translation.",
+            "Here they are eigenvectors of the posterior covariance. The paper compares diagonal elements, "
+            "which depend on the choice of modes.",
+            "In the first frame the pelvis is over the origin, which leaves little translation.",
         ),
         (
             picture(Drawing("", "modes", "The depth is drawn to the right; sd per marker (rms).", figure)),
@@ -330,14 +328,14 @@ def _volume(found: Segments) -> Entry:
     words = ", ".join(f"{1000 * n:.0f} mm: 10^{r:.0f}" for n, r in zip(leventon.NOISES, ratios, strict=True))
     return Entry(
         "Volume of the posterior",
-        "The volume shrinks by 10^14 in 50 dimensions (printed the other way round).",
-        f"{words}. 10^-14 needs {1000 * same:.0f} mm of noise.",
-        "gait report lift prints it for any segment.",
+        "The volume shrinks by a factor of 10^14 in 50 dimensions (printed the other way round).",
+        f"{words}. It is 10^-14 with {1000 * same:.0f} mm of noise.",
+        "gait report lift prints the volume for any segment.",
         verdicts.volume(ratios, same, leventon.NOISES),
         (
-            "The noise sigma is not stated; it is read as a standard deviation.",
-            "The ratio is printed as prior over posterior, which could not be small; it is the square root "
-            "of det Q over det Lambda here.",
+            "The paper does not state the noise sigma, which is a standard deviation here.",
+            "The ratio is printed as prior over posterior, which could not be small. Here it is the square "
+            "root of det Q over det Lambda.",
         ),
         (picture(Drawing("", "volume", "Volume against noise.", figure)),),
     )

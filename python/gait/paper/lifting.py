@@ -99,8 +99,8 @@ def entry(both: Both) -> Entry:
     for title, lifted in (("Literal", both.literal), ("Ours", both.ours)):
         rows.append(
             Picture(
-                f"{title}: the stick figure over the frames; the 37 markers from 30 degrees off; the "
-                "cylinder figure from 30 degrees off.",
+                f"{title}: the stick figure over the frames; below, the 37 markers and the cylinder figure, "
+                "seen from 30 degrees to the side.",
                 image(_film(both, lifted), "frames"),
             )
         )
@@ -110,31 +110,31 @@ def entry(both: Both) -> Entry:
     what = "a real clip" if both.clip.real else "a rendered clip, as none was given"
     return Entry(
         "Fig. 7: a sequence of 100 frames",
-        "A dancer, 100 frames, about one click in a frame: overlays, markers and a cylinder figure from "
-        "30 degrees off. Sensors of 10 by 8.",
-        f"{frames} frames of {what}, {each:.1f} clicks a frame, {len(both.literal.clip.starts)} segments "
-        f"one after the other: {errors[0]}; correlation of sensors and figure "
+        "A dancer in 100 frames with about one click per frame: overlays, markers, and a cylinder figure "
+        "seen from 30 degrees to the side. 10 by 8 sensors.",
+        f"{frames} frames of {what}, {each:.1f} clicks per frame, {len(both.literal.clip.starts)} segments "
+        f"one after the other: {errors[0]}; correlation between sensors and figure "
         f"{both.literal.fit.fit_correlation:.2f}.",
         f"The same clicks, segments solved together: {errors[1]}; correlation "
         f"{both.ours.fit.fit_correlation:.2f}.",
         _verdict(both),
         (
-            "The filter of the sensors (gradients over local contrast, blurred) and the weights lambda: "
-            "found from the clip as in gait lift.",
-            "Eq. 7's minimiser: Levenberg-Marquardt with exact slopes. Its start: at the placement the mean "
-            "of the prior, and 1.5 sd to both sides along its first 3 modes; after that what the segment "
-            "before predicts, and where there are clicks also these alone. The lowest minimum is taken.",
-            "The frames: those of the clip, at which the prior's 20 per second are interpolated. The motion: "
-            "what the clip has, here mostly a walk; the paper has a dance.",
-            "10 by 8 sensors are 10 rows of 8, as a standing person is tall; they follow the person.",
-            "The headings of the training motions: turned to that of the placement, and by 90 degrees "
-            "from it.",
-            "The camera is calibrated and the floor known, where the paper has an orthographic view.",
-            "The start: place, heading and stature at the placement's frame are given by hand.",
-            f"Judged by every {LEFT_OUT}th click, which is not used. Followed: it is within a tenth of the "
-            "stature in the picture.",
-            "The clicks: marked joints of the clip, most where they were marked by hand." if both.clip.real
-            else "The clicks: one joint a frame, off by 3 pixels.",
+            "The sensors' filter (gradients over local contrast, blurred) and the weights lambda are found "
+            "from the clip, as in gait lift.",
+            "Eq. 7 is minimised by Levenberg-Marquardt with exact derivatives. The first segment starts from "
+            "the mean of the prior and from 1.5 sd to either side of it along its first 3 modes; later ones "
+            "start from the prediction of the segment before and, with clicks, also from the clicks alone. "
+            "The lowest minimum is used.",
+            "The prior has 20 frames per second, which are interpolated at the frames of the clip. The "
+            "motion is that of the clip, mostly walking; the paper's is a dance.",
+            "10 by 8 sensors are 10 rows of 8, as a standing person is tall. They follow the person.",
+            "The training motions are turned to the heading of the placement, and by 90 degrees from it.",
+            "The camera is calibrated and the floor is known; the paper has an orthographic view.",
+            "At the start, position, heading and stature are given by hand.",
+            f"Every {LEFT_OUT}th click is left out, to judge the result. The person counts as followed if "
+            "the error there is below a tenth of the stature in the picture.",
+            "The clicks are the joints marked in the clip's corrections." if both.clip.real
+            else "The clicks: one joint per frame, with an error of 3 pixels.",
         ),
         tuple(rows),
     )  # fmt: skip
@@ -155,21 +155,21 @@ def _pixels(lifted: LiftedVideo) -> float:
 
 
 def _error(both: Both, lifted: LiftedVideo) -> str:
-    """Return how far an estimate is off, in words."""
+    """Return the errors of an estimate in words."""
     words = ""
     if len(off := both.missed(lifted)):
-        words = f"{np.median(off):.0f} px from {len(off)} clicks that were left out (median)"
+        words = f"median error {np.median(off):.0f} px at {len(off)} clicks that were left out"
     if both.clip.truth is not None:
         at, places = both.clip.joints()
         rows = [at.index(k) for k in lifted.fit.frame.tolist()]
         true = np.stack([places[name] for name in EVAL15], axis=1)[rows]
         off = root_errors(lifted.fit.places[:, lifted.clip.prior.index(EVAL15)], true)
-        words += f"{', ' if words else ''}{np.median(off):.0f} mm from the truth (root-aligned, median)"
+        words += f"{', ' if words else ''}median root-aligned error {np.median(off):.0f} mm"
     return words or "no clicks"
 
 
 def energy_by_part(lifted: LiftedVideo) -> Floats:
-    """Return the energy (B, 3) of each segment: sensors (squared), prior and clicks (in squared sd)."""
+    """Return the energy (B, 3) of each segment: squared residuals of sensors, prior (sd) and clicks (sd)."""
     clip, found = lifted.clip, lifted.fit.sequence
     rows = []
     for b, (component, state) in enumerate(zip(found.components.tolist(), found.states, strict=True)):

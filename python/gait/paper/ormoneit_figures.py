@@ -1,4 +1,4 @@
-"""Figures 1 to 5 of Ormoneit and others (2000) and the components, with what each side finds."""
+"""Figures 1 to 5 of Ormoneit and others (2000), and the components."""
 
 from __future__ import annotations
 
@@ -40,7 +40,7 @@ NOTED = (
 SHOWN = ("l_hip_flexion", "l_knee_flexion")  # of figures 3 and 4
 COURSES = "Error after each pass, relative to the last."
 REPEATED = (
-    "The walks before and after, each repeated for two cycles, one colour a walk; black: the fitted "
+    "The walks before and after, each repeated over two cycles, with one colour per walk. Black: the fitted "
     "periodic spline."
 )
 SWING = 2.0  # standard deviations
@@ -49,8 +49,8 @@ AXIS = 0.10  # metres
 AXES = {0: (60, 60, 220), 1: (70, 160, 60), 2: (220, 120, 40)}  # BGR of x, y, z
 JOINTED = {"head": 3, "upper_arm": 3, "forearm": 1, "thigh": 3, "shank": 1}  # angles of a joint by its frame
 PHASES = 24  # of moving figures
-STIFF = 1e-6  # radians over a cycle, of an angle that does not move
-NOISE_FLAT = 0.25  # rise of the ratio of white noise that counts as none
+STIFF = 1e-6  # radians over a cycle, below which an angle does not move
+NOISE_FLAT = 0.25  # change of the ratio of white noise below which it is flat
 
 
 def entries(learning: Learning) -> Iterator[Entry]:
@@ -75,8 +75,8 @@ def _body(literal: Learned) -> Entry:
     turning = np.ptp(literal.curves[:, :, : len(ANGLES)], axis=1).max(axis=0) > STIFF
     moving = [name for name, moves in zip(ANGLES, turning, strict=True) if moves]
     picture = Picture(
-        "The limbs are tapered cylinders. At each joint its axes: x red, y green, z blue along the limb, "
-        "and the number of its relative angles.",
+        "The limbs are tapered cylinders. Each joint is shown with its axes (x red, y green, z blue along "
+        "the limb) and the number of its relative angles.",
         f'<img style="max-width: 60%" alt="body" src="{address(data.tobytes())}">',
     )
     return Entry(
@@ -91,8 +91,8 @@ def _body(literal: Learned) -> Entry:
             "Which 19 angles: neck 3, shoulders 3 each, elbows 1 each, hips 3 each, knees 1 each.",
             "Order and signs of the three angles of a joint: flexion, abduction, rotation about the limb, in "
             "the frame of the limb above; mirrored on the left.",
-            "Sizes and shapes of the limbs: those of the package, tapered and elliptic; trunk and ankles "
-            "at their mean angles.",
+            "Limb sizes and shapes are the package's, tapered and elliptic. Trunk and ankles have their mean "
+            "angles.",
         ),
         (picture,),
     )
@@ -135,23 +135,24 @@ def _periods(learning: Learning) -> Entry:
     )
     return Entry(
         "Fig. 2: length of the cycle",
-        "Ratio of each angle against periods of 50 to 250 frames, white noise flat, the sum with its peak "
-        "at 126 frames (898.65).",
+        "The ratio of each angle for periods of 50 to 250 frames. That of white noise is flat; the sum has "
+        "its peak at 126 frames (898.65).",
         f"{shown.name}: {shown.period.frames:.0f} frames, sum {shown.period.peak:.0f}; white noise "
-        f"{mean:.2f} on average, changing by {rise:+.2f} over the range. {same} of {total} walks get their "
-        f"cycle. A walk of {ormoneit.LONG_FRAMES} frames with a cycle of {ormoneit.LONG_PERIOD} frames: "
-        f"{long_literal:.0f}.",
+        f"{mean:.2f} on average, changing by {rise:+.2f} over the range. The cycle is found in {same} of "
+        f"{total} walks. In a walk of {ormoneit.LONG_FRAMES} frames with a cycle of {ormoneit.LONG_PERIOD} "
+        f"frames it finds {long_literal:.0f}.",
         f"{shown.name}: {refined.frames:.2f} frames; the median difference from whole frames is "
-        f"{np.median(off):.2f}. All {total} walks. The long walk: {long_refined:.2f}.",
+        f"{np.median(off):.2f}. Found in all {total} walks; in the long walk {long_refined:.2f}.",
         verdicts.periods(flat, same / total, total - same, abs(long_literal - ormoneit.LONG_PERIOD) > 1),
         (
-            "Eq. 1 is read as folding modulo p, as its text has it, not as the number of the cycle, which "
-            "it prints.",
-            "The frame rate: 120 frames per second, at which 126 frames are a usual stride.",
-            "Its ratio is the F of an analysis of variance; with missing data groups count by their size.",
-            "The peak's height grows with the length of a recording, so 898.65 is no target.",
-            "The paper has eight sequences of four people, and n = 20: here every walk given.",
-            "Zero marks a missing angle there; here gaps are marked, since zero is an angle too.",
+            "Eq. 1 as printed gives the number of the cycle; here it folds modulo p, as in the text.",
+            "The frame rate is 120 frames per second, at which 126 frames are a usual stride.",
+            "The ratio is the F statistic of an analysis of variance. With missing data, groups are weighted "
+            "by their size.",
+            "The peak grows with the length of the recording, so 898.65 is not a target.",
+            "The paper has eight sequences of four people, and n = 20; here all walks given are used.",
+            "The paper marks a missing angle by zero. Zero is also an angle, so gaps are marked separately "
+            "here.",
         ),
         (
             picture(Drawing("", "ratio", learn_figures.SNR, learn_figures.ratios(shown, len(PAPER_ANGLES)))),
@@ -166,22 +167,22 @@ def _offsets(learning: Learning) -> Entry:
     falling = bool(np.all(np.diff(errors) <= 1e-9 * errors[0]))
     return Entry(
         "Figs. 3 and 4: offsets of the sequences",
-        "Eight walking sequences; from offsets 0, a periodic spline and the offsets in turns, five passes "
-        "until the error (6.2536e+04) changes by less than 1e-6.",
+        "Eight walking sequences. Starting from zero offsets, a periodic spline and the offsets are fitted "
+        "in turn; after five passes the error (6.2536e+04) changes by less than 1e-6.",
         f"{len(literal.walks)} walks of {len({w.subject for w in literal.walks})} people; {passes} passes, "
         f"error {errors[0]:.3g} to {errors[-1]:.3g} square degrees, "
         f"{'falling throughout' if falling else 'not falling'}.",
-        f"{len(ours.found.objective)} passes from circular correlation, angles weighted by their noise; "
-        f"offsets differ by {100 * np.median(np.abs(apart)):.1f} % of a cycle (median), at most "
+        f"{len(ours.found.objective)} passes, starting from circular correlation and weighting angles by "
+        f"their noise. Offsets differ by {100 * np.median(np.abs(apart)):.1f} % of a cycle (median), at most "
         f"{100 * np.abs(apart).max():.1f} %.",
         verdicts.offsets(falling, float(np.abs(apart).max())),
         (
             "The spline: periodic, cubic, 20 uniform knots.",
             "The change of 1e-6 is taken relative to the error; at most 100 passes.",
-            "All angles count alike in square degrees, so that the knees decide most. Offsets are found "
-            "to 0.01 frame; the paper tries whole frames.",
-            "A common shift of all offsets changes nothing. It is fixed by the hips, so that both can be "
-            "compared.",
+            "All angles are weighted equally in square degrees, so the knees dominate. Offsets are found to "
+            "0.01 frame; the paper tries whole frames.",
+            "A common shift of all offsets has no effect on the error. The hips determine it, so that both "
+            "results can be compared.",
         ),
         (
             picture(Drawing("", "passes", COURSES, _courses(learning))),
@@ -244,28 +245,27 @@ def _passes(learning: Learning) -> Entry:
         axes.set_title(title, fontsize=10)
     return Entry(
         "Fig. 5: missing data by the iterated SVD",
-        "Cycles cut and resampled; mean and SVD of their first 20 Fourier coefficients replace missing "
-        "entries until the error falls by less than 1e-6.",
+        "Cycles are cut and resampled. Missing entries are replaced from the mean and SVD of the first 20 "
+        "Fourier coefficients until the error falls by less than 1e-6.",
         f"{len(literal.cycles.values)} cycles, {missing:.0f} % of the entries missing: {len(errors)} "
         f"passes, {errors[0]:.3f} to {errors[-1]:.3f} degrees. With {100 * removal.share:.0f} % removed in "
-        f"blocks: these are filled to {removal.literal:.1f} degrees ({removal.mean:.1f} by the mean of the "
+        f"blocks, the error there is {removal.literal:.1f} degrees ({removal.mean:.1f} with the mean of the "
         "column).",
-        f"Variational Bayes fills the same blocks to {removal.ours:.1f} degrees, with as many components.",
+        f"Variational Bayes with as many components: error {removal.ours:.1f} degrees in the same blocks.",
         verdicts.passes(falling, removal.literal, removal.mean),
         (
-            "20 coefficients: complex ones, 0 to 19, in a real orthonormal basis of 39 functions, so that "
-            "distances are those of the curves.",
-            "The mean is in this basis too (as printed it is not); otherwise it jumps where cycles join.",
-            "Cycles are resampled at 120 phases by penalised cubic splines, since unconstrained ones "
-            "explode in gaps; what lies more than 0.75 knots from a sample is missing.",
-            "The parts of a cycle before the first whole one and after the last count as cycles, with what "
-            "they lack missing.",
-            "Samples at j = 0 ... T - 1: j = T, which is printed too, is the next cycle's 0. The row-mean of "
-            "step 3 is one value for each column, and 1' mu is 1 mu'.",
-            "Missing entries start from the mean of their column; cycles with less than 40 % observed are "
-            "left out.",
-            "The change of 1e-6 is taken relative to the error on observed entries; at most 500 passes.",
-            "The number of components used to fill: the 5 that are kept.",
+            "The 20 coefficients are complex, 0 to 19. They are computed in a real orthonormal basis of 39 "
+            "functions, so that distances are those of the curves.",
+            "The mean is also in this basis (as printed it is not); otherwise it jumps where cycles join.",
+            "Cycles are resampled at 120 phases by penalised cubic splines, since unconstrained splines "
+            "diverge in gaps. Phases more than 0.75 knots from a sample are missing.",
+            "Incomplete cycles before the first whole one and after the last are used, with missing entries.",
+            "Samples are at j = 0 ... T - 1; the printed j = T is the next cycle's 0. The row mean of step 3 "
+            "is one value per column, and 1' mu is 1 mu'.",
+            "Missing entries start at the mean of their column. Cycles with less than 40 % observed are left "
+            "out.",
+            "The change of 1e-6 is relative to the error on observed entries, with at most 500 passes.",
+            "Entries are filled in with the 5 components that are kept.",
         ),
         (picture(Drawing("", "passes", "Error of each pass.", figure)),),
     )
@@ -282,23 +282,25 @@ def _components(learning: Learning) -> Entry:
     return Entry(
         "Components",
         "Five components (eigen-cycles) of the 19 angles.",
-        f"{len(literal.components.sd)} components with {shares[0]:.0f} % of the variance{out[0]}. Where "
-        f"cycles join, the mean steps by {printed:.1f} times its largest step elsewhere as printed, by "
-        f"{closed:.1f} times in the Fourier basis; the components by {max(steps):.1f} times at most.",
-        f"{len(ours.components.sd)} components of 24 angles and the root's 6 channels, mirrored cycles, "
-        f"every person alike, distances of joints; {shares[1]:.0f} % of that variance{out[1]}.",
+        f"{len(literal.components.sd)} components with {shares[0]:.0f} % of the variance{out[0]}. The step "
+        "where cycles join, over the largest step elsewhere: of the mean "
+        f"{printed:.1f} as printed and {closed:.1f} in the Fourier basis, of the components at most "
+        f"{max(steps):.1f}.",
+        f"{len(ours.components.sd)} components of 24 angles and the root's 6 channels, with mirrored cycles, "
+        f"equal weight for each person and distances of joints; {shares[1]:.0f} % of that variance{out[1]}.",
         verdicts.components(max(steps), _served(learning)),
         (
-            "Signs of components: the entry of largest magnitude is positive.",
-            "Cycles keep their open ends; the package closes them by a line.",
-            "v(psi) of eq. 3 is a row of a table of T by 19, not its column; between two rows it is linear.",
-            "The spread lambda of a score: its singular value over the square root of the number of cycles "
-            "less one, not the singular value, which grows with their number.",
+            "The sign of a component makes its entry of largest magnitude positive.",
+            "Cycles are not closed; the package closes them with a linear correction.",
+            "v(psi) of eq. 3 is a row of a table of T by 19, not a column, interpolated linearly between "
+            "rows.",
+            "The standard deviation lambda of a score is the singular value over the square root of the "
+            "number of cycles less one. The singular value itself grows with the number of cycles.",
         ),
         (
             Picture(
-                f"The paper's components as moving figures: mean (grey) and {SWING:g} sd to either side "
-                "(orange +, blue -), from the right and from ahead. Right limbs are bold.",
+                f"The paper's components as moving figures: the mean (grey) and {SWING:g} sd to either side "
+                "of it (orange +, blue -), seen from the right and from the front. Right limbs are bold.",
                 _moving(literal),
             ),
             picture(Drawing("", "curves", CURVES, figures_model.curves(literal, NOTED))),
@@ -308,7 +310,7 @@ def _components(learning: Learning) -> Entry:
 
 
 def _left_out(learned: Learned) -> str:
-    """Return the errors of people left out in words; empty if they are too few or too many."""
+    """Return the error of people left out in words; empty if there are too few people or too many."""
     found = learned.by_subject
     if found is None:
         return ""
@@ -319,7 +321,7 @@ def _left_out(learned: Learned) -> str:
 
 
 def _served(learning: Learning) -> tuple[float, float] | None:
-    """Return what the components and the mean alone leave of people left out, degrees, median."""
+    """Return the median errors of people left out, degrees, with the components and with the mean alone."""
     found = learning.literal.by_subject
     if found is None:
         return None

@@ -1,4 +1,4 @@
-"""What eqs. 10 to 13 of Ormoneit and others (2000) prefer: bodies on the person, displaced, and at rest."""
+"""Which bodies eqs. 10 to 13 of Ormoneit and others (2000) prefer: true, displaced, or at rest."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ EVERY = 4  # frames
 STEP = 33_333  # microseconds from frame to frame
 NOISES = ("phase", "rate", "forward", "lateral", "vertical", "heading", "tilt", "coef")
 STILL = {f"{name}_noise": 0.0 for name in NOISES}
-#: Displacement along the way (m), across it (m), of the phase (strides).
+#: Displacements along the direction of walking (m), across it (m), and in phase (strides).
 PLACES = {
     "on the person": (0.0, 0.0, 0.0),
     "a quarter stride late": (0.0, 0.0, -0.25),
@@ -37,18 +37,18 @@ _WHOLE = {"evidence_time": 0.0, "rejuvenation_time": 0.0}  # every frame counts 
 
 
 def config(mode: Mode, **changes: float) -> TrackerConfig:
-    """Return settings of few particles that all stay one body."""
+    """Return settings with a few particles and no noise, so that all remain the same body."""
     whole = {} if mode == Mode.PAPER else _WHOLE
     return TrackerConfig.default(mode, particles=16, **STILL, **whole, **changes)
 
 
 class Probe:
-    """The likelihood of one body in a scene: the mean cycle at the true place and phase, or displaced.
+    """The likelihood of one body in a scene: the mean cycle at the true position and phase, or displaced.
 
     Parameters
     ----------
     config : TrackerConfig
-        Without noise (`config`), so that all particles are one body.
+        Settings without noise, from `config`.
     """
 
     def __init__(self, scene: Scene, model: Model, config: TrackerConfig, stature: float) -> None:
@@ -64,7 +64,7 @@ class Probe:
         self.cycles: Floats = cycles
 
     def state(self, k: int, along: float, across: float, late: float) -> State:
-        """Mean cycle at the true place of frame k, displaced."""
+        """Mean cycle at the true position in frame k, displaced."""
         turn = float(self.heading[k])
         way = np.array([np.cos(turn), np.sin(turn), 0.0])
         left = np.array([-way[1], way[0], 0.0])
@@ -78,9 +78,10 @@ class Probe:
         )
 
     def step(self, k: int, place: Place, speed: float, seen: Seen | None = None) -> tuple[float, State]:
-        """Log-likelihood of frame k + 1, having gone on at so many times the person's speed; the body there.
+        """Log-likelihood of frame k + 1 and the body there, which moves on from frame k.
 
-        seen : two images that are shown in place of frames k and k + 1.
+        speed : as a multiple of the person's.
+        seen : two images that replace frames k and k + 1.
         """
         now, then = seen or (self.scene.frames[k].image, self.scene.frames[k + 1].image)
         self.tracker.start(self.state(k, *place), self.exactly, STEP)
@@ -91,23 +92,23 @@ class Probe:
 
     @property
     def picked(self) -> range:
-        """Frames from which a step is looked at."""
+        """Frames at which steps start."""
         return range(EVERY, len(self.scene.frames) - 3, EVERY)
 
     def nats(self, place: Place, speed: float) -> float:
-        """Mean log-likelihood of the next frame, having gone on at so many times the person's speed."""
+        """Mean log-likelihood of the next frame; parameters as for `step`."""
         return float(np.mean([self.step(k, place, speed)[0] for k in self.picked]))
 
     def table(self) -> list[Row]:
-        """Return the log-likelihoods of each body, walking on with the person and at rest."""
+        """Return the log-likelihoods of the body at each place, walking on with the person and at rest."""
         return [(name, self.nats(place, 1.0), self.nats(place, 0.0)) for name, place in PLACES.items()]
 
 
 def gain_at_rest(rows: Sequence[Row]) -> float:
-    """Return by how many nats the best body at rest off the person beats the true one that walks."""
+    """Return by how many nats the best body at rest on the background scores better than the true one."""
     return max(rest for name, _, rest in rows if name in BACKGROUND) - rows[0][1]
 
 
 def best_at_rest(rows: Sequence[Row]) -> str:
-    """Return which place on the background the likelihood likes best for a body at rest."""
+    """Return the place on the background where a body at rest has the highest likelihood."""
     return max((row for row in rows if row[0] in BACKGROUND), key=lambda row: row[2])[0]

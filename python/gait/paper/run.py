@@ -113,7 +113,7 @@ def _about(found: recordings.Recordings, used: Clip) -> list[str]:
         f"Made by gait paper from {len(found.walks)} walks of {people} people (first paper), "
         f"{len(found.motions)} motions (second paper: {', '.join(m.name for m in found.motions)}) and "
         f"{used.name}.",
-        "theirs: what the paper states. literal: its algorithm as printed, errors of print resolved. "
-        "ours: what the package does by default, on the same data.",
+        "theirs: what the paper reports. literal: the paper's algorithm as printed, with misprints "
+        "corrected, on these recordings. ours: the package's default method on the same data.",
     ]
     return lines + ([model.CMU] if model.from_cmu([Path(w.source) for w in found.walks]) else [])

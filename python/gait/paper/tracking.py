@@ -33,30 +33,30 @@ from gait.track.tracker import Tracker
 FRAMES = 50  # of the paper's figure
 SHOWN = tuple(range(0, FRAMES + 1, 10))
 PARTICLES = 10_000
-HELD = 0.1  # statures in the picture, mean of the true joints, within which a person counts as followed
-MARKED = 0.15  # of joints marked by hand, which are not where the model has them
-TAIL = 10  # last frames, by which it is judged whether a person is followed to the end
+HELD = 0.1  # mean joint error in the picture, in statures, below which a person counts as followed
+MARKED = 0.15  # the same if joints are marked by hand, which places them differently from the model
+TAIL = 10  # last frames, which decide whether a person is followed to the end
 CRITERION = (
-    f"in the last {TAIL} frames (median of those that can be judged) the joints are, on average, within "
-    f"{HELD:g} of the person's height in the picture from head to ankle; within {MARKED:g} where they are "
-    "marked by hand, and the height is then that at the start"
+    f"over the last {TAIL} frames, the median of the mean joint error in the picture is below {HELD:g} of "
+    f"the person's height from head to ankle; where joints are marked by hand, below {MARKED:g} of the "
+    "height at the start, over the frames with marks"
 )
-CUT_OUT = 1.35  # statures, side of a picture cut out about the person
+CUT_OUT = 1.35  # statures, side of a picture cut out around the person
 SIZE = 250  # pixels of a picture
 SEEDS = 10  # runs each way
 
 
 @dataclass(frozen=True)
 class Tracked:
-    """Estimates of the frames from the start, and how far they are off."""
+    """Estimates of the frames from the start, and their errors."""
 
     model: Model
     estimates: list[Estimate]
     frames: list[int]  #: of the errors
-    errors: Floats  #: (n,) pixels from marked or true joints, mean
-    rooted: Floats  #: (n,) millimetres from the true joints, root-aligned; empty without the truth
-    held: int  #: of SEEDS runs, of which this is the first, in which the person is followed to the end
-    unnoticed: int  #: of the others, those of status tracking in the last fifth of the frames
+    errors: Floats  #: (n,) mean distance from marked or true joints, pixels
+    rooted: Floats  #: (n,) root-aligned distance from the true joints, mm; empty without the truth
+    held: int  #: number of SEEDS runs, of which this is the first, that follow the person to the end
+    unnoticed: int  #: number of the other runs with status tracking in all of the last TAIL frames
 
 
 @dataclass(frozen=True)
@@ -105,7 +105,7 @@ def track(clip: Clip, learning: Learning, tasks: int, update: Callable[[int], No
 
 
 def checks(clip: Clip) -> list[Callable[[], object]]:
-    """Return what raises UserError if a file of a clip cannot be read or does not fit, or it is too short."""
+    """Return checks that raise UserError if a clip is too short, or a file of it is unreadable or unfit."""
 
     def long_enough() -> None:
         count, first = Video(clip.video).count, Start.read(clip.init, Model()).frame
@@ -136,7 +136,7 @@ def checks(clip: Clip) -> list[Callable[[], object]]:
 def _errors(
     clip: Clip, video: Video, camera: Camera, first: int, estimates: list[Estimate]
 ) -> tuple[list[int], Floats, Floats]:
-    """Return frames from the start, errors there in the picture, and root-aligned ones by the truth."""
+    """Return frames counted from the start, errors there in the picture, and root-aligned errors."""
     nothing = np.zeros(0)
     if clip.truth is not None:
         true, found = _true(clip, first, len(estimates)), joints_of(estimates)
@@ -154,14 +154,14 @@ def _errors(
 
 
 def _true(clip: Clip, first: int, count: int) -> Floats:
-    """Return the true joints EVAL15 (count, 15, 3) from a frame on."""
+    """Return the true joints EVAL15 (count, 15, 3), starting at a frame."""
     at, places = clip.joints()
     rows = [at.index(first + k) for k in range(count)]
     return np.asarray(np.stack([places[name] for name in EVAL15], axis=1)[rows])
 
 
 def entry(both: Both) -> Entry:
-    """Return figure 6 with both rows of both ways."""
+    """Return figure 6: two rows of pictures for each filter."""
     literal, ours = (_words(t) for t in (both.literal, both.ours))
     verdict = f"no counterpart: no marks or truth in the last {TAIL} frames to judge by; see the pictures"
     if len(_tail(both.literal.frames, both.literal.errors)):
@@ -173,50 +173,51 @@ def entry(both: Both) -> Entry:
     what = "a real clip" if both.clip.real else "rendered, as no clip was given"
     rows = []
     for title, tracked in (("Literal", both.literal), ("Ours", both.ours)):
-        caption = f"{title}: the expected body over frames 0, 10 ... 50 ({both.clip.name}, {what})."
+        caption = f"{title}: the expected body drawn over frames 0, 10 ... 50 ({both.clip.name}, {what})."
         rows.append(Picture(caption, image(_overlays(both, tracked), "overlays")))
         rows.append(
             Picture(f"{title}: the same from another viewpoint.", image(_standing(tracked), "bodies"))
         )
     return Entry(
         "Fig. 6: tracking with 10,000 particles",
-        "A person walking, frames 0 to 50: overlays and the expected configuration in 3-D. The model "
-        "drifts off at frame 30, where limbs hide each other, and recovers by frame 40. Started by hand.",
+        "A walking person in frames 0 to 50: overlays and the expected configuration in 3-D, started by "
+        "hand. The model drifts off at frame 30, where limbs hide each other, and recovers by frame 40.",
         literal,
         ours,
         verdict,
         (
-            "Sigma of psi, rho, tau and theta, epsilon, p_occluded, sigma(alpha), the points on a limb n_s: "
-            "paper mode's, searched on simulated clips; tests/bench/results/search_paper.md has them. The "
-            "search lets n_s be 4 to 16.",
-            "Sigmas: per square root of a second, so that they mean the same at any frame rate; the paper's "
-            "may be per frame. The rate: strides per second, its sigma in those; in the paper a speed of "
-            "the phase in no stated unit.",
-            "Eq. 5: lambda is the standard deviation of a score over people; at the start the scores spread "
-            "by a share of it. Eq. 6: the phase advances by the rate, as the text has it; in print the rate "
-            "is missing. Eq. 7: the rate is reflected into 0.4 to 2.1 seconds a stride.",
-            "Eq. 8: the body goes ahead along its own heading by the rate times the mean length of a "
-            "stride, which is missing in print, times the stature. Eq. 9: heading, pitch and roll each walk "
-            "at random.",
-            "Eq. 10: the sum's n is n_s. The pixels are points fixed on the limb that face the camera in "
-            "both frames, all counting alike; the frame before is seen with the particle's own ancestor. "
-            "Points that a nearer limb hides or that lie outside the image, in either frame, do not count.",
-            "Grey levels: 0 to 255 of the luma of the frame, as it is, without a correction of brightness, "
-            "in a picture scaled so that the person is about 192 pixels tall.",
-            "Eq. 11: the mean over the points, as printed, so that a limb counts as one observation. "
-            "sigma squared is 2 * 3 squared (both frames' noise, grey levels) + s squared (1 + k tan squared "
-            "alpha), the tangent 3 at most.",
-            "Eq. 12: alpha is the angle to the plane across the line of sight; q is its cosine times the "
-            "share of the points that are seen, full at 0.8 of them; a limb of which less than half of n_s "
-            "are seen in both frames counts as occluded. "
-            "p_occluded is a constant.",
-            "Eq. 13: logarithms, normalised over the particles. The first frame has none before it and "
-            "changes no weights. Resampling: multinomial, in every frame.",
-            "Expected configuration: weights that sum to 1, so without 1/N_s; the phase's and the "
-            "directions' means are circular.",
-            "Limb sizes and camera: the package's, and the clip's.",
-            "The start: the init file of the clip, by hand as in the paper, with its standard deviations.",
-            f"Both filters have a model learnt from the same walks. Shown is the first of {SEEDS} seeds.",
+            "The sigmas of psi, rho, tau and theta, epsilon, p_occluded, sigma(alpha) and n_s, the number of "
+            "points on a limb, are those of paper mode. They were searched on simulated clips, n_s from 4 to "
+            "16: tests/bench/results/search_paper.md.",
+            "Sigmas are per square root of a second, so that they do not depend on the frame rate; the "
+            "paper's may be per frame. The rate is in strides per second; in the paper it is a speed of the "
+            "phase, without a unit.",
+            "Eq. 5: lambda is the standard deviation of a score over people; the initial standard deviation "
+            "is a fraction of it. Eq. 6: the phase advances by the rate, as in the text; it is missing in "
+            "print. Eq. 7: the rate is reflected so that a stride takes 0.4 to 2.1 seconds.",
+            "Eq. 8: the body moves along its own heading by the rate times the mean stride length (missing "
+            "in print) times the stature. Eq. 9: heading, pitch and roll are independent random walks.",
+            "Eq. 10: the n of the sum is n_s. The pixels are fixed points on the limb that face the camera "
+            "in both frames, with equal weight; their place in the frame before is that of the particle's "
+            "own ancestor. Points that are outside the image or hidden by a nearer limb in either frame are "
+            "not used.",
+            "Grey levels: the luma of the frame, 0 to 255, without brightness correction, in an image scaled "
+            "so that the person is about 192 pixels tall.",
+            "Eq. 11: the mean over the points, as printed, so that a limb counts as one observation. sigma "
+            "squared is 2 * 3 squared (noise of both frames, grey levels) + s squared (1 + k tan squared "
+            "alpha), where the tangent is limited to 3.",
+            "Eq. 12: alpha is the angle between the limb and the plane across the line of sight; q is its "
+            "cosine times the share of points that are visible, divided by 0.8 and at most 1. A limb with "
+            "less than half of its n_s points visible in both frames counts as occluded. p_occluded is a "
+            "constant.",
+            "Eq. 13 is computed with logarithms, normalised over the particles. The first frame has no frame "
+            "before it and does not change the weights. Resampling is multinomial, in every frame.",
+            "Expected configuration: the weights sum to 1, so there is no 1/N_s; the means of phase and "
+            "angles are circular.",
+            "Limb sizes are the package's; the camera is the clip's.",
+            "The start is the init file of the clip with its standard deviations, set by hand as in the "
+            "paper.",
+            f"Both filters use models learnt from the same walks. The first of {SEEDS} seeds is shown.",
             f"On the person: {CRITERION}.",
         ),
         tuple(rows),
@@ -229,9 +230,9 @@ def _words(tracked: Tracked) -> str:
     words = f"status tracking in {count} of {len(tracked.estimates)} frames"
     if len(tracked.errors):
         each = ", ".join(f"{tracked.errors[i]:.0f} at {k}" for i, k in _near(tracked))
-        words += f"; joints {np.median(tracked.errors):.0f} px off in the picture (median), {each}"
+        words += f"; joint error in the picture {np.median(tracked.errors):.0f} px (median), {each}"
     if len(tracked.rooted):
-        words += f"; root-aligned {np.median(tracked.rooted):.0f} mm in space (median)"
+        words += f"; root-aligned error in space {np.median(tracked.rooted):.0f} mm (median)"
     return f"{words}."
 
 
@@ -259,17 +260,16 @@ def _tail(frames: list[int], errors: Floats) -> Floats:
 
 
 def followed(tail: Floats, height: float, marked: bool) -> bool:
-    """Whether a person is followed to the end: the one criterion of the page and of the benches.
+    """Whether a person is followed to the end: the criterion of the page and of the benches.
 
-    tail : (n,) mean distance of the joints in the picture, in each of the last TAIL frames for which it is
-        known, pixels; its median decides.
+    tail : (n,) mean joint error in the picture, pixels, in those of the last TAIL frames where it is known.
     marked : whether the joints are marked by hand.
     """
     return len(tail) > 0 and bool(np.median(tail) < (MARKED if marked else HELD) * height)
 
 
 def _overlays(both: Both, tracked: Tracked) -> Image:
-    """Draw the expected bodies over the frames, cut out about where ours has the person."""
+    """Draw the expected bodies over the frames, cut out around our estimate of the person."""
     overlay = Overlay(tracked.model, both.camera)
     cells = []
     for picture, k in zip(both.images, SHOWN, strict=True):
@@ -282,14 +282,14 @@ def _overlays(both: Both, tracked: Tracked) -> Image:
 
 
 def cut(picture: Image, middle: Floats, side: float) -> Image:
-    """Cut a square of SIZE pixels out of a picture, `side` of its own."""
+    """Cut a square of `side` pixels out of a picture and scale it to SIZE pixels."""
     scale = SIZE / side
     matrix = np.array([[scale, 0, SIZE / 2 - scale * middle[0]], [0, scale, SIZE / 2 - scale * middle[1]]])
     return np.asarray(cv2.warpAffine(picture, matrix, (SIZE, SIZE), flags=cv2.INTER_AREA), np.uint8)
 
 
 def _standing(tracked: Tracked) -> Image:
-    """Draw the expected bodies from in front and the left."""
+    """Draw the expected bodies, seen from the front left."""
     cells = []
     for k in SHOWN:
         mean = tracked.estimates[k].mean

@@ -1,4 +1,4 @@
-"""Verdicts of the page: each follows from numbers and begins with its kind."""
+"""Verdicts of the page, each derived from numbers; the first words are its kind."""
 
 from __future__ import annotations
 
@@ -7,23 +7,25 @@ from collections.abc import Sequence
 ANGLES = 19  # of the first paper
 THEIR_MOTIONS, THEIR_LENGTHS, THEIR_MODES = 10, (120, 240), 50  # of the second
 ALIKE = 0.1  # share of a cycle within which offsets agree
-NEAR = (1 - 0.91) ** 0.5  # share of the distance to the mean that the paper's own modes leave (rms)
-FAR_BETTER = 0.6  # of the error that is left
-SHRUNK = 10 ** (-2 * 14 / 50)  # of a variance, what the paper's volume leaves on average
-HUMAN = 0.2  # share by which the limbs of a body may differ from those learnt from
-NARROW = 0.8  # of the depths: less is too few in intervals of 90 %
+NEAR = (
+    1 - 0.91
+) ** 0.5  # distance from the original over distance from the mean, with the paper's own modes (rms)
+FAR_BETTER = 0.6  # remaining error over that of the view alone, below which Bayes is far better
+SHRUNK = 10 ** (-2 * 14 / 50)  # posterior over prior variance: the mean that the paper's volume implies
+HUMAN = 0.2  # relative difference in length, from the training data, of the limbs of a plausible body
+NARROW = 0.8  # coverage of 90 % intervals below which they are too narrow
 MOSTLY = 0.9  # of the runs
 CLEARLY = 0.8  # of the energy of a displacement
-SERVES = 0.75  # of what the mean alone leaves
-JUMP = 2.0  # times the largest step within a cycle, from its end to its start
+SERVES = 0.75  # error over that of the mean alone, below which components are useful
+JUMP = 2.0  # step from the end of a cycle to its start, over the largest step within it
 
 
 KINDS = "reproduced", "reproduced in part", "not reproduced", "no counterpart"
-"""How a verdict begins; the last: the paper states nothing to compare with."""
+"""First words of a verdict; the last kind is for what the paper does not report."""
 
 
 def kind(verdict: str) -> str:
-    """Return which of KINDS a verdict is."""
+    """Return the one of KINDS with which a verdict begins."""
     return max((each for each in KINDS if verdict.startswith(each)), key=len)
 
 
@@ -33,9 +35,15 @@ def body(angles: int) -> str:
 
 
 def periods(flat: bool, agreeing: float, failed: int, long_failed: bool) -> str:
-    """Fig. 2: whether white noise is flat, share of walks whose cycle is found, where whole periods fail."""
+    """Fig. 2.
+
+    flat : whether the ratio of white noise does not depend on the period.
+    agreeing : share of walks whose cycle is found with whole frames.
+    failed : number of the other walks.
+    long_failed : whether whole frames fail on a long walk.
+    """
     fails = [f"on {failed} walks"] if failed else []
-    fails += ["where the cycle of a long walk is no whole number of frames"] if long_failed else []
+    fails += ["on a long walk whose cycle is not a whole number of frames"] if long_failed else []
     if agreeing < MOSTLY:
         words = f"not reproduced: the cycle of {100 * agreeing:.0f} % of the walks is found"
     else:
@@ -44,15 +52,15 @@ def periods(flat: bool, agreeing: float, failed: int, long_failed: bool) -> str:
 
 
 def offsets(falling: bool, apart: float) -> str:
-    """Figs. 3 and 4: whether the error falls, and how far the offsets are from ours at most, in cycles."""
+    """Figs. 3 and 4: whether the error falls, and the largest difference from our offsets, in cycles."""
     if not falling:
         return "not reproduced: the error rises in some pass"
-    return "reproduced" if apart < ALIKE else "reproduced in part: it converges, but elsewhere than ours"
+    return "reproduced" if apart < ALIKE else "reproduced in part: it converges, but not to our offsets"
 
 
 def passes(falling: bool, filled: float, mean: float) -> str:
-    """Fig. 5: whether the error falls, and how far removed blocks are off, filled and by the mean."""
-    better = f"it fills {'better' if filled < mean else 'no better'} than the mean"
+    """Fig. 5: whether the error falls, and errors of removed blocks, filled in and replaced by the mean."""
+    better = f"it fills gaps {'better' if filled < mean else 'no better'} than the mean"
     if falling and filled < mean:
         return f"reproduced: the error falls pass by pass, and {better}"
     part = falling or filled < mean
@@ -61,26 +69,31 @@ def passes(falling: bool, filled: float, mean: float) -> str:
 
 
 def components(step: float, others: tuple[float, float] | None) -> str:
-    """Components: the step from the end of a cycle to its start, over the largest within it.
+    """Components.
 
-    others : what five components and the mean alone leave of people left out, degrees; None: too few people.
+    step : step from the end of a cycle to its start, over the largest step within it.
+    others : errors for people left out, degrees, with five components and with the mean alone; None if there
+        are too few people.
     """
     if step >= JUMP:
         return "not reproduced: curves that do not close"
     if others is None:
-        return "reproduced in part: smooth periodic curves, of too few people to leave one out"
+        return "reproduced in part: smooth periodic curves, but too few people to leave one out"
     five, mean = others
-    serves = "serve" if five < SERVES * mean else "do not serve"
+    fit = "fit" if five < SERVES * mean else "do not fit"
     words = (
-        f"smooth periodic curves, which {serves} people left out: {five:.1f} degrees, {mean:.1f} by the mean"
+        f"smooth periodic curves, which {fit} people left out: error {five:.1f} degrees, {mean:.1f} with the "
+        "mean alone"
     )
-    return f"{'reproduced' if five < SERVES * mean else 'not reproduced'}: {words} alone"
+    return f"{'reproduced' if five < SERVES * mean else 'not reproduced'}: {words}"
 
 
 def tracking(held: Sequence[int], seeds: int, ratio: float, unnoticed: Sequence[int]) -> str:
-    """Fig. 6: runs in which the person is followed to the end, literal and ours, and ratio of the errors.
+    """Fig. 6.
 
-    unnoticed : of the runs that left, those of status tracking at the end.
+    held : number of runs that follow the person to the end, literal and ours.
+    ratio : error of the paper's filter over ours.
+    unnoticed : number of the other runs whose status is tracking at the end.
     """
     literal, ours = held
     part = "reproduced in part" if literal > 0.5 * seeds else "not reproduced"
@@ -92,16 +105,15 @@ def tracking(held: Sequence[int], seeds: int, ratio: float, unnoticed: Sequence[
     ]
     return (
         f"{words}: the paper's filter stays on the person in {literal} of {seeds} runs, ours in {ours}; its "
-        f"error is {ratio:.1f} times ours"
-        + (f"; under status tracking to the end: {', '.join(left)}" if left else "")
+        f"error is {ratio:.1f} times ours" + (f"; not reported as lost: {', '.join(left)}" if left else "")
     )
 
 
 def without_image(paper: float, ours: float) -> str:
-    """Ladder: gain of the paper's filter and of ours over what needs no image, mm, medians of the views."""
+    """Ladder: by how much the images reduce the error of the paper's filter and of ours, mm."""
     return (
-        "no counterpart: against its own mean cycle, running on from the exact truth without any image, "
-        f"the paper's likelihood {_gains(paper)}, the default {_gains(ours)}, on the median of the views"
+        "no counterpart: compared with its own mean cycle running free from the exact truth, without any "
+        f"image, the paper's likelihood {_gains(paper)} and the default {_gains(ours)} (median of the views)"
     )
 
 
@@ -110,21 +122,25 @@ def _gains(gain: float) -> str:
 
 
 def held(runs: Sequence[int], seeds: int, errors: Sequence[float], none: Sequence[float]) -> str:
-    """Eqs. 10 to 13, by view: runs in which the person is followed to the end, and errors, mm.
+    """Eqs. 10 to 13, by view.
 
-    none : of the mean cycle running on without any image.
+    runs : number of runs, of `seeds`, that follow the person to the end.
+    errors, none : errors of the runs, and of the mean cycle running free without any image, mm.
     """
     stays = [count >= MOSTLY * seeds for count in runs]
     nearer = [error < free for error, free in zip(errors, none, strict=True)]
     both = sum(a and b for a, b in zip(stays, nearer, strict=True))
     if both == len(runs):
-        return "reproduced: the person is held in every view, nearer than without any image"
-    words = f"held in {sum(stays)} of {len(runs)} views, nearer than without any image in {sum(nearer)}"
-    return f"{'reproduced in part' if both else 'not reproduced'}: {words}, both in {both}"
+        return "reproduced: in every view the person is followed, more accurately than without any image"
+    words = (
+        f"the person is followed in {sum(stays)} of {len(runs)} views, and the error is smaller than without "
+        f"any image in {sum(nearer)}; both in {both}"
+    )
+    return f"{'reproduced in part' if both else 'not reproduced'}: {words}"
 
 
 def at_rest(gains: Sequence[Sequence[float]]) -> str:
-    """Eqs. 10 to 13: nats by which a body at rest beats the true one in each view, by theirs and by ours."""
+    """Eqs. 10 to 13: nats by which a body at rest scores better than the true one, by likelihood and view."""
     names = "the paper's likelihood", "the default's"
     wins = [f"{sum(gain > 0 for gain in each)} of {len(each)} views" for each in gains]
     each = zip(names, wins, strict=True)
@@ -142,7 +158,11 @@ def training(count: int, shortest: int, longest: int) -> str:
 
 
 def synthesis(left: float, needed: int) -> str:
-    """Fig. 2: share of the distance to the mean that is left, and modes needed for the paper's share."""
+    """Fig. 2.
+
+    left : distance from the original over distance from the mean.
+    needed : number of modes that explain as much variance as the paper's.
+    """
     words = "reproduced" if left < NEAR else "not reproduced: the synthesis is far from the original"
     if needed == THEIR_MODES:
         return f"{words}; as many modes are needed as in the paper"
@@ -157,13 +177,13 @@ def spectrum(ratios: Sequence[float]) -> str:
 
 
 def draws(limbs: float, learnt: float) -> str:
-    """Fig. 4: shares by which limbs differ in length from the mean, in draws and in what was learnt from."""
-    how = f"their limbs differ by {100 * limbs:.0f} % in length, those learnt from by {100 * learnt:.0f} %"
+    """Fig. 4: relative differences of limb lengths from their mean, in draws and in the training data."""
+    how = f"limb lengths vary by {100 * limbs:.0f} %, in the training data by {100 * learnt:.0f} %"
     return f"reproduced{': draws are bodies' if limbs < HUMAN else ' in part: draws are no bodies'}: {how}"
 
 
 def estimates(pairs: Sequence[tuple[float, float]], covered: float) -> str:
-    """Fig. 5: errors by likelihood alone and by Bayes at each noise, and depths within 90 % intervals."""
+    """Fig. 5: errors of the likelihood alone and of Bayes, by noise; coverage of 90 % intervals of depth."""
     left = [bayes / alone for alone, bayes in pairs]
     shares = ", ".join(f"{100 * share:.0f} %" for share in left)
     words = f"Bayes leaves {shares} of the error of the view alone"
@@ -175,7 +195,7 @@ def estimates(pairs: Sequence[tuple[float, float]], covered: float) -> str:
 
 
 def uncertain(along: Sequence[float], rigid: Sequence[float]) -> str:
-    """Fig. 6: shares of the energy along the depth, and of one displacement of the whole body."""
+    """Fig. 6: by mode, the shares of its energy along the depth and in a translation of the whole body."""
     if min(along) <= CLEARLY:
         return "not reproduced: not only motions in depth"
     moved = [k for k, share in enumerate(rigid, 1) if share > CLEARLY]
@@ -185,7 +205,7 @@ def uncertain(along: Sequence[float], rigid: Sequence[float]) -> str:
 
 
 def volume(ratios: Sequence[float], same: float, tried: Sequence[float]) -> str:
-    """Volume: its logarithm at each of the noises tried, and the noise of the paper's, metres."""
+    """Volume: its logarithm for each of the `tried` noises, and the noise that gives the paper's, metres."""
     if any(later <= earlier for earlier, later in zip(ratios, ratios[1:], strict=False)):
         return "not reproduced: the volume does not grow with the noise"
     if not tried[0] <= same <= tried[-1]:
@@ -194,7 +214,7 @@ def volume(ratios: Sequence[float], same: float, tried: Sequence[float]) -> str:
 
 
 def sequence(off: Sequence[float], height: float, share: float) -> str:
-    """Fig. 7: distances from marks that were left out, literal and ours, and the person's height, pixels."""
+    """Fig. 7: distances from clicks that were left out, literal and ours, and the person's height, pixels."""
     literal, ours = (each / height for each in off)
     words = (
         "reproduced: the person is followed"
@@ -202,6 +222,6 @@ def sequence(off: Sequence[float], height: float, share: float) -> str:
         else "not reproduced: the figure leaves the person"
     )
     return (
-        f"{words}; joints that were not clicked are {100 * literal:.0f} % of the height off, "
-        f"{100 * ours:.0f} % by ours"
+        f"{words}; the error at clicks that were left out is {100 * literal:.0f} % of the person's height, "
+        f"ours {100 * ours:.0f} %"
     )
