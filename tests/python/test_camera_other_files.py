@@ -146,6 +146,12 @@ REFUSED = {
     "text": (lambda p: written(p / "a.txt", "hello world\n"), "holds no camera; give a JSON camera file"),
     "yaml": (lambda p: written(p / "a.yaml", "a: [1, 2\n"), "not a YAML file"),
     "list": (lambda p: written(p / "a.yaml", "- 1\n- 2\n"), "contains no camera"),
+    "metashape": (
+        lambda p: written(
+            p / "a.xml", "<document><chunk><calibration><f>9</f></calibration></chunk></document>"
+        ),
+        "a.xml: XML of <document>, not a calibration of Qualisys; export the camera for OpenCV or COLMAP",
+    ),
     "xml": (lambda p: written(p / "a.qca.txt", "<calibration>\n<cameras>\n"), "not an XML file"),
 }
 

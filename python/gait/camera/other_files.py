@@ -214,6 +214,11 @@ def read_qualisys(path: str, name: str | None) -> Entries:
         for camera in root.iter("camera")
         if camera.find("intrinsic") is not None
     }
+    if not found:
+        raise UserError(
+            f"{path}: XML of <{root.tag}>, not a calibration of Qualisys; export the camera for OpenCV or "
+            "COLMAP"
+        )
     camera = _choose(path, found, name)
     if camera.get("viewrotation", "0") not in ("0", ""):
         turned = camera.get("viewrotation")
