@@ -36,7 +36,7 @@ from gait.io.video import Video
 from gait.lift.smooth.options import Options
 from gait.progress import progress
 
-KEPT = Path("build/detector-joints")
+KEPT = Path(__file__).resolve().parents[2] / "build" / "detector-joints"
 # pip compiles packages; where the environment forbids to keep that, every run would compile them again.
 INSTALLED = os.environ | {
     "PYTHONDONTWRITEBYTECODE": "",
