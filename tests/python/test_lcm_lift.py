@@ -214,9 +214,8 @@ def test_who_is_suddenly_elsewhere_is_ambiguous(tmp_path: Path) -> None:
 
 
 def test_what_is_published_of_an_absurd_camera_is_finite(tmp_path: Path) -> None:
-    far = camera_message(CAMERA, rig.utime(0))
-    far.t, far.fx, far.fy = [0, 0, 9e3], 1e30, 1e30
-    outcome, lifted = lift(tmp_path, [("GAIT_CAMERA_0", far), *events()[1:]])
+    far = Camera.looking([0.0, -9e3, 2.0], [0.0, 0.0, 0.9], (640, 480), 1e6)
+    outcome, lifted = lift(tmp_path, [("GAIT_CAMERA_0", camera_message(far, rig.utime(0))), *events()[1:]])
     assert all(np.isfinite([[*j.position, *j.sd] for j in m.joints]).all() for m in lifted)
     assert f"lift_frames {FRAMES} lifted {len(lifted)} " in outcome.printed
 
