@@ -88,7 +88,7 @@ def test_keypoints_with_y_down_are_refused(tmp_path, capsys):
     path = keypoints(tmp_path / "k.csv", np.column_stack([np.linspace(300, 900, 30), np.full(30, 400.0)]))
     assert main(["lift", path, "--camera", str(tmp_path / "y_down.json"), "-o", str(tmp_path / "o.csv")]) == 1
     err = capsys.readouterr().err
-    assert "y_down.json: " in err and "instead of z is up" in err and err.count("\n") == 1
+    assert "y_down.json: " in err and "-y up; give R and t" in err and err.count("\n") == 1
     assert not (tmp_path / "o.csv").exists()
 
 
