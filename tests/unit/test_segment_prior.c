@@ -99,7 +99,7 @@ static void test_no_cyclic_model(void)
     CHECK(!gait_model_joint_name(m, 0) && !gait_model_angle_name(m, 0));
     gait_tracker_default(&cfg, GAIT_MODE_DEFAULT);
     CHECK(gait_tracker_bytes(m, &cfg, &need, &err) == GAIT_ERR_ARG);
-    CHECK(strstr(err.text, "without --segments only") != NULL);
+    CHECK(strstr(err.text, "without `--segments only`") != NULL);
     CHECK(gait_model_pose(m, &state, &pose, &err) == GAIT_ERR_ARG && strstr(err.text, "no cyclic part"));
     CHECK(gait_tracker_prior(m, &state, &sd, NULL) == GAIT_ERR_ARG);
     toy_file f = toy_begin(buf, 0);
