@@ -96,7 +96,7 @@ TOOLS := $(BIN)/gait-trackd
 LIBS := $(B)/libgait.so $(B)/libgait.a
 
 .PHONY: help setup lock lib tools test built check unit python-test demo model paper bench bench-board bench-instructions size bench-lift detector-profile eval eval-body eval-camera eval-cameras eval-gait eval-moving eval-real eval-learn eval-lift eval-paper eval-people eval-studio soak kills mutants asan sanitizers tsan coverage unit-threads fuzz fuzz-run fuzz-long fuzz-targets golden-check \
-        docs screenshots sbom lint format wheel sdist wheel-check install install-daemon uninstall clean
+        docs screenshots sbom lint format wheel sdist wheel-check reproducible install install-daemon uninstall clean
 
 help: ## list the targets
 	@echo 'make demo     track a walking clip end to end, results in build/demo (VIDEO= CAMERA= for your own)'
@@ -509,6 +509,9 @@ wheel: build/lcm/.stamp ## Python package with the library inside, in build/whee
 	@$(VENV)/bin/auditwheel show build/wheel/$(WHEEL) | grep -E '"manylinux_2_(5|12|17|2[4678])_$(CPU)"' >/dev/null || \
 	    { echo 'wheel: needs a newer glibc than 2.28: see auditwheel show build/wheel/$(WHEEL)' >&2; exit 1; }
 	@echo build/wheel/$(WHEEL)
+
+reproducible: sdist lib ## two builds of the wheel, and two models learnt from MOCAP=, have the same bytes *
+	@tests/check/reproducible.sh build/wheel/libgait-$(VERSION).tar.gz $(PY) $(wildcard $(MOCAP))
 
 sdist: build/lcm/.stamp ## source package that builds without a network, in build/wheel
 	@rm -rf build/eigen3 && mkdir -p build/eigen3 && cp -r $(EIGEN)/Eigen build/eigen3
