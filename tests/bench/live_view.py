@@ -77,7 +77,10 @@ def main() -> int:
     note = f"{facts('tests/bench/live_view.py --record')}\n\n{args.seconds:.0f} s at {RATE} frames a second, "
     note += "640 x 480; a frame is dropped where the tracker answered none. Chromium is headless and has no "
     note += "graphics card: it draws each page's figure on the cores that track and send. It has an ordinary "
-    note += "user's priority; as root it would raise itself above the tracker."
+    note += (
+        "user's priority; as root it would raise itself above the tracker. Where the tracker alone leaves no "
+    )
+    note += "core idle, other programs ran, and browsers get pictures at the lowest rate."
     if args.record:
         table.publish("live_view", "The live page beside a tracker", head, rows, note)
     else:

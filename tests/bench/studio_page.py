@@ -43,7 +43,7 @@ def seconds(folder: Path, points: Keypoints, drags: Sequence[Drag]) -> list[floa
         film.symlink_to((folder / "video.mp4").resolve())
         keypoints_file.write(given, points)
         words = ["studio", film, "--keypoints", given, "--camera", folder / "camera.json", "--port", "0"]
-        command = [sys.executable, "-m", "gait", *map(str, words), "--no-browser", "--json", "--quiet"]
+        command = [sys.executable, "-m", "gait", *map(str, words), "--json", "--quiet"]
         with subprocess.Popen(command, stdout=subprocess.PIPE, text=True) as server:
             assert server.stdout is not None
             try:

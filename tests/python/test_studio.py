@@ -63,7 +63,7 @@ class Server:
     def __init__(self, folder, *source):
         given = source or ("--keypoints", "keypoints.csv")
         self.folder, self.command = folder, [sys.executable, "-m", "gait", "studio", "clip/video.mp4", *given]
-        self.command += ["--camera", "clip/camera.json", "--port", "0", "--no-browser", "--json", "--quiet"]
+        self.command += ["--camera", "clip/camera.json", "--port", "0", "--json", "--quiet"]
         self.start()
 
     def start(self):
@@ -376,7 +376,7 @@ def test_a_refused_start_leaves_nothing(clip, capsys, tmp_path, monkeypatch):
         "--corrections",
         str(tmp_path / "c.json"),
     ]
-    assert main(["studio", film, *words, "--port", "0", "--no-browser", "--quiet"]) == 1
+    assert main(["studio", film, *words, "--port", "0", "--quiet"]) == 1
     assert "hidden entry 1: first is not a number" in capsys.readouterr().err
     assert main(["studio", film, *camera, "--start", str(FRAMES - 1), "--port", "0", "--quiet"]) == 1
     assert f"only 1 frame of {FRAMES} left, from {FRAMES - 1} on" in capsys.readouterr().err

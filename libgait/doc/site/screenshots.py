@@ -130,6 +130,7 @@ def tracking(clip: Path, folder: Path) -> None:
             camera,
             "--height",
             "1.75",
+            "--smooth",
             "-o",
             str(clip / "track.csv"),
         ),
@@ -140,23 +141,31 @@ def tracking(clip: Path, folder: Path) -> None:
     with browser(1280, 1000) as page:
         page.goto(report.as_uri())
         page.get_by_label("Frame of the film").fill("60")
-        page.locator("video").evaluate("film => new Promise((done) => film.requestVideoFrameCallback(done))")
+        page.wait_for_function("!document.querySelector('video').seeking")
         page.wait_for_timeout(500)  # what is drawn over it
         keep(shot(page), folder / "run.jpg")
 
 
 def correcting(clip: Path, folder: Path) -> None:
-    """Show a proposed correction on the studio's page."""
-    words = [clip / "video.mp4", "--camera", clip / "camera.json", "--port", "0"]
-    command = [sys.executable, "-m", "gait", "studio", *map(str, words), "--no-browser", "--json", "--quiet"]
+    """Show a joint to correct on the studio's page."""
+    words = [
+        clip / "video.mp4",
+        "--camera",
+        clip / "camera.json",
+        "--track",
+        clip / "track.csv",
+        "--port",
+        "0",
+    ]
+    command = [sys.executable, "-m", "gait", "studio", *map(str, words), "--json", "--quiet"]
     with subprocess.Popen(command, stdout=subprocess.PIPE, text=True) as server, browser(1280, 720) as page:
         assert server.stdout is not None
         try:
             page.goto(json.loads(server.stdout.readline())["url"])
-            page.locator("#proposals li").first.wait_for()
             page.get_by_role("button", name="Begin").click()
             page.get_by_role("button", name="Follow").click()
-            page.keyboard.press("n")
+            page.get_by_label("Joint").select_option("r_ankle")
+            page.get_by_label("Frame of the film").fill("60")
             page.wait_for_timeout(1500)  # the film goes there
             keep(shot(page), folder / "studio.jpg")
         finally:

@@ -11,8 +11,8 @@ world and feet can be put on its floor; with --height alone the camera is estima
 either it is assumed to be level and far away.  The camera must be static: a film whose camera turns by more
 than a tenth of the picture is refused; gait lift --stabilize auto lifts it.
 
-The folder VIDEO.studio beside the video stores intermediate results.  Only this machine can open the page.
-Ctrl-C ends the command; nothing is lost.
+The command prints the address of the page; only this machine can open it.  The folder VIDEO.studio beside the
+video stores intermediate results.  Ctrl-C ends the command; nothing is lost.
 """
 
 from __future__ import annotations
@@ -23,16 +23,16 @@ from dataclasses import fields
 from functools import partial
 
 from gait.cli import values
-from gait.errors import UsageError, UserError
+from gait.errors import UsageError
 from gait.progress import note
 from gait.web import parts
 
 EXAMPLES = """\
 examples:
   gait studio --fetch
+  gait studio walk.mp4 --camera camera.json --track track.csv
   gait studio walk.mp4 --height 1.75
   gait studio walk.mp4 --camera camera.json --corrections corrections.json
-  gait studio walk.mp4 --camera camera.json --track track.csv
   gait studio walk.mp4 --camera camera.json --placement init.json
 """
 _PORT = 8730
@@ -77,7 +77,6 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "--port", type=values.whole(0, 65535), default=_PORT, help=f"port (default: {_PORT}; 0: any free one)"
     )
-    parser.add_argument("--no-browser", action="store_true", help="do not open the page, print its address")
     parser.add_argument(
         "--fetch", action="store_true", help="download components of web pages (3 MB) and check them"
     )
@@ -113,10 +112,8 @@ def run(args: argparse.Namespace) -> int:
             session = Session(source)
         url = serve.address(own)
         figures = {"url": url, "corrections": str(source.corrections)}
-        words = f"{url}  (corrections in {source.corrections})"
+        words = f"gait studio: open {url} (corrections in {source.corrections})"
         print(json.dumps(figures) if args.json else words, flush=True)
-        if not args.no_browser:
-            _open(url)
         server.run(session, own)
     return 0
 
@@ -146,13 +143,3 @@ def _check(args: argparse.Namespace) -> None:
         values.require_order(args.start or 0, args.stop)
     if args.scale_camera and not args.camera:
         raise UsageError("--scale-camera: needs --camera")
-
-
-def _open(url: str) -> None:
-    """Open the page, if there is a browser."""
-    import webbrowser
-
-    try:
-        webbrowser.open(url)
-    except webbrowser.Error as error:
-        raise UserError(f"{url}: no browser ({error}); give --no-browser and open it yourself") from error

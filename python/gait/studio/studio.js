@@ -255,6 +255,7 @@ function lists(saved = 'saved') {
   at('redo').disabled = !data.redo;
   at('proposals').replaceChildren(...data.proposals.map((p, k) => row(
     button(`${words(p.joint)}, frame ${p.frame} · ${p.px.toFixed(0)} px`, 'Go there and select the joint', () => propose(k)))));
+  at('sufficient').hidden = data.proposals.length > 0;
   const entries = [];
   const add = (list, index, text, frame, joint) => entries.push({ frame, item: row(
     button(text, 'Go there', () => go(frame, joint)),
