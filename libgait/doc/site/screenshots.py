@@ -164,7 +164,7 @@ def correcting(clip: Path, folder: Path) -> None:
             page.goto(json.loads(server.stdout.readline())["url"])
             page.get_by_role("button", name="Begin").click()
             page.get_by_role("button", name="Follow").click()
-            page.get_by_label("Joint").select_option("r_ankle")
+            page.locator("#joint").select_option(label="right ankle")
             page.get_by_label("Frame of the film").fill("60")
             page.wait_for_timeout(1500)  # the film goes there
             keep(shot(page), folder / "studio.jpg")
