@@ -140,7 +140,9 @@ def tracking(clip: Path, folder: Path) -> None:
     keep(next(iter(film.frames(60, 61))).image, folder / "overlay.jpg")
     with browser(1280, 1000) as page:
         page.goto(report.as_uri())
+        page.wait_for_function("document.querySelector('video').readyState >= 2")
         page.get_by_label("Frame of the film").fill("60")
+        page.get_by_text("frame 60").wait_for()
         page.wait_for_function("!document.querySelector('video').seeking")
         page.wait_for_timeout(500)  # what is drawn over it
         keep(shot(page), folder / "run.jpg")
@@ -148,17 +150,10 @@ def tracking(clip: Path, folder: Path) -> None:
 
 def correcting(clip: Path, folder: Path) -> None:
     """Show a joint to correct on the studio's page."""
-    words = [
-        clip / "video.mp4",
-        "--camera",
-        clip / "camera.json",
-        "--track",
-        clip / "track.csv",
-        "--port",
-        "0",
-    ]
-    command = [sys.executable, "-m", "gait", "studio", *map(str, words), "--json", "--quiet"]
-    with subprocess.Popen(command, stdout=subprocess.PIPE, text=True) as server, browser(1280, 720) as page:
+    words = ["video.mp4", "--camera", "camera.json", "--track", "track.csv", "--port", "0"]
+    command = [sys.executable, "-m", "gait", "studio", *words, "--json", "--quiet"]
+    starting = subprocess.Popen(command, stdout=subprocess.PIPE, text=True, cwd=clip)
+    with starting as server, browser(1280, 720) as page:
         assert server.stdout is not None
         try:
             page.goto(json.loads(server.stdout.readline())["url"])
