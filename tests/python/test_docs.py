@@ -257,6 +257,8 @@ def test_options_named_in_the_text_exist():
         "--version",
         "--record",
         "--runs",
+        "--seeds",
+        "--only",
         "--preload-nanny",
         "--static",
         "--strict",
