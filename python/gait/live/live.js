@@ -8,7 +8,7 @@ const QUIET_MS = 3000; // without an estimate the page reports that there is non
 const TEXT = { tracking: 'tracking', ambiguous: 'ambiguous', lost: 'lost', init: 'settling' };
 
 const start = await (await fetch('/state')).json();
-let scene, curves, software = false, shown = 0, paused = false, recording = Boolean(start.recording.path);
+let scene, curves, software = false, shown = 0, showing = 0, paused = false, recording = Boolean(start.recording.path);
 let chosen = 0; // person whose numbers and plots are shown
 const PHASE = start.curves.findIndex((curve) => curve.name === 'phase');
 const people = start.people.map((one) => ({ ...one, last: 0, heard: -Infinity, health: null, body: null }));
@@ -46,10 +46,15 @@ function draw() {
     curves: start.curves.map((curve, k) => ({ id: curve.id, values: found.map((one) => one.values[k]) })),
   }, Math.round(start.seconds * Math.max(5, found.at(-1).rate ?? 30)));
   scene.append({});
-  const data = scene.data, extra = data.times.length - KEPT;
-  if (extra > 0) for (const key of ['times', 'points', 'sd']) data[key].splice(0, extra);
 }
 setInterval(draw, DRAW_MS);
+
+/** Draw the figure of the newest sample. */
+function showFigure() {
+  showing = 0;
+  shown = performance.now();
+  scene.show(scene.data.times.length - 1);
+}
 
 // ---- people: each has a tracker of its own ----
 function choose(who) {
@@ -124,9 +129,8 @@ function onSample(one) {
   data.times.push(one.time);
   data.points.push(one.points);
   data.sd.push(one.sd);
-  if (software && person.last - shown < FIGURE_MS) return;
-  shown = person.last;
-  scene.show(data.times.length - 1);
+  if (data.times.length > KEPT) for (const key of ['times', 'points', 'sd']) data[key].shift();
+  showing ||= setTimeout(showFigure, software ? Math.max(shown + FIGURE_MS - person.last, 0) : 0);
 }
 
 function onHealth(one) {
@@ -180,13 +184,17 @@ for (const stream of start.streams) {
 
 function onPicture(stream) {
   const image = images.get(stream);
-  if (!image || paused || document.hidden) return;
-  image.newer = image.busy;
-  if (image.busy) return;
+  if (!image || paused) return;
+  image.newer = image.busy || document.hidden;
+  if (image.newer) return;
   image.busy = true;
   image.hidden = false;
   image.src = `/frame/${stream}.jpg?${Date.now()}`;
 }
+
+document.addEventListener('visibilitychange', () => {
+  for (const [stream, image] of images) if (image.newer && !image.busy) onPicture(stream);
+});
 
 // ---- buttons ----
 function message(text) {

@@ -28,9 +28,10 @@ _FILES = ("live.js", "live.css")
 _MOST = 16  # browsers at a time
 _ALIVE = 0.5  # seconds after which a quiet stream shows that it is there, or ends with the server
 _QUALITY = 80  # of JPEG pictures
-_KEPT = 64  # samples that a slow browser gets late, at most
+_KEPT = 256  # samples that a slow browser gets late, at most
 _FASTEST = 1 / 60  # seconds between messages to a browser
-_SLOWEST = 0.2  # the same at first and on a busy machine, times the number of browsers
+_SLOWEST = 0.2  # the same at first and on a busy machine, times the number of browsers,
+_RAREST = 2.0  # but no more
 _MEASURED = 0.5  # seconds over which idle time is measured
 _BUSY, _IDLE = 0.15, 0.3  # share of idle time below which messages become rarer, above which more frequent
 
@@ -76,7 +77,7 @@ class Pace:
 
     def begin(self, browsers: int) -> None:
         """Begin slowly, now that there are so many browsers."""
-        self.current = self._slowest = _SLOWEST * max(browsers, 1)
+        self.current = self._slowest = min(_SLOWEST * max(browsers, 1), _RAREST)
 
 
 def _idle_time() -> tuple[int, int]:

@@ -13,7 +13,11 @@ const UP = new THREE.Vector3(0, 1, 0); // axis of CYLINDER
 export const colour = (name) => getComputedStyle(document.documentElement).getPropertyValue(`--${name}`).trim();
 
 /** Whether there is no graphics card: the processor draws, and each picture costs it tens of milliseconds. */
-export const SOFTWARE = !document.createElement('canvas').getContext('webgl2', { failIfMajorPerformanceCaveat: true });
+export const SOFTWARE = (() => {
+  const gl = document.createElement('canvas').getContext('webgl2', { failIfMajorPerformanceCaveat: true });
+  const named = gl?.getExtension('WEBGL_debug_renderer_info');
+  return !gl || /SwiftShader|llvmpipe|Basic Render/i.test(named ? gl.getParameter(named.UNMASKED_RENDERER_WEBGL) : '');
+})();
 
 export class Scene {
   /**
@@ -148,7 +152,7 @@ export class Scene {
     if (!this.renderer) return;
     const middle = this.#middle(), camera = this.data.camera;
     const seen = camera ? Math.atan2(camera[1] - middle.y, camera[0] - middle.x) : -Math.PI / 2;
-    const about = seen + azimuth * DEGREE, up = Math.min(elevation, 89) * DEGREE, far = 3.7;
+    const about = seen + azimuth * DEGREE, up = Math.min(elevation, 89) * DEGREE, far = 4.3;
     this.controls.target.copy(middle);
     this.camera.position.set(
       middle.x + far * Math.cos(about) * Math.cos(up), middle.y + far * Math.sin(about) * Math.cos(up),
