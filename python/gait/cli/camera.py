@@ -55,7 +55,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         "-o", "--output", required=True, type=values.named(".json"), metavar="CAMERA.json", help="the camera"
     )
     add = parser.add_argument_group("by clicking on the floor").add_argument
-    add("--page", metavar="VIDEO|PICTURE", help="open a page to click marks on the floor")
+    add("--page", metavar="VIDEO|PICTURE", help="serve a page on which to click marks on the floor")
     add("--scale-camera", action="store_true", help="the film is resized: scale a lens of another resolution")
     add("--frame", type=values.whole(0), metavar="F", help="frame to show first (default: 0)")
     add("--port", type=values.whole(0, 65535), default=8040, metavar="P",
@@ -104,7 +104,7 @@ def _on_page(args: argparse.Namespace) -> int:
         lens, words = None, "The focal length is estimated from at least five marks; --lens makes it exact."
     scene = Scene(Path(args.page).name, size, frames, picture, lens, words, args.output, first)
     own = serve.listen(args.port)
-    note(f"gait camera: open {serve.address(own)} (Ctrl-C ends it)", args.quiet)
+    note(f"gait camera: open {serve.address(own)} (Ctrl-C ends it)")
 
     def report(line: str) -> None:
         print(json.dumps({"written": args.output}) if args.json else line, flush=True)
