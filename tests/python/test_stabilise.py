@@ -15,8 +15,8 @@ from gait.cli import main
 from gait.errors import UserError
 from gait.io.keypoints_file import Keypoints
 from gait.io.video import VideoWriter, sample_frames
+from gait.lift import detected
 from gait.studio.source import require_still
-from gait.track import walk_camera
 from gait.track.camera_motion import View
 from gait.track.moving_video import MovingVideo, map_pixels, panorama_of
 from gait.track.options import ClipOptions
@@ -169,7 +169,7 @@ def test_gait_lift_undoes_the_turns_too(tmp_path, monkeypatch, capsys):
     rng, frame = np.random.default_rng(5), np.arange(count)
     uv += 0.5 * rng.standard_normal(uv.shape)
     known = Keypoints(frame, video.times[frame], MODEL.joint_names, uv, np.ones(uv.shape[:2]))
-    monkeypatch.setattr(walk_camera, "find_people", lambda *_: {1: known})
+    monkeypatch.setattr(detected, "find_people", lambda *_: {1: known})
     write_camera(tmp_path / "c.json", turned[0].camera(CAMERA))  # of the first frame
     errors = []
     for choice in ("auto", "off"):
