@@ -62,6 +62,11 @@ def coordinates(count: int, distances: Mapping[tuple[int, int], float]) -> tuple
     return xy @ turn, off
 
 
+def _letter(mark: int) -> str:
+    """Name of a mark on the page: A to Z, then AA, AB ..."""
+    return ("" if mark < 26 else chr(64 + mark // 26)) + chr(65 + mark % 26)
+
+
 def _require_enough(count: int, pairs: NDArray[np.int64]) -> None:
     """Refuse distances of too few pairs of marks."""
     lacking = 2 * count - 3 - len(pairs)
@@ -70,14 +75,14 @@ def _require_enough(count: int, pairs: NDArray[np.int64]) -> None:
         raise UserError(f"marks: give {more} between {count} marks")
     few = [k for k in range(count) if (pairs == k).sum() < 2]
     if few:
-        raise UserError(f"marks: give at least two distances to mark {few[0] + 1}")
+        raise UserError(f"marks: give at least two distances to mark {_letter(few[0])}")
 
 
 def _require_agreement(pairs: NDArray[np.int64], lengths: Array, off: Array) -> None:
     """Refuse distances that contradict each other."""
     worst = int(np.abs(off).argmax())
     if abs(off[worst]) > 0.05 * lengths[worst] + 0.02:
-        i, j = pairs[worst] + 1
+        i, j = map(_letter, pairs[worst])
         raise UserError(
             f"marks: the distances contradict each other by {abs(off[worst]):.2f} m, most that of marks {i} "
             f"and {j}; measure again"

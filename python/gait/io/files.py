@@ -88,6 +88,11 @@ def _recover(target: Path) -> None:
         _keep(left, target, "the command that wrote it was killed; what it wrote")
 
 
+def is_unfinished(path: str | os.PathLike[str]) -> bool:
+    """Whether a file has, by its name, only a part of what it was to have."""
+    return re.search(r"\.unfinished(-\d+)?$", Path(path).stem) is not None
+
+
 def _keep(left: Path, target: Path, what: str) -> None:
     """Rename what was written of `target` to NAME.unfinished.SUFFIX, or -2, -3 ... of it, and report it."""
     names = (f"{target.stem}.unfinished{number}{target.suffix}" for number in ("", *range(-2, -1000, -1)))

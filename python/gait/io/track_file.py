@@ -20,7 +20,7 @@ from gait.bindings.estimate import Estimate
 from gait.body.skeleton import EVAL15, JOINTS
 from gait.errors import UserError
 from gait.io.fields import frame_numbers
-from gait.io.files import replacing, require_file
+from gait.io.files import is_unfinished, replacing, require_file
 from gait.io.video import Frame, Video
 
 Array = NDArray[np.float64]
@@ -276,9 +276,9 @@ def _track(table: _Table, status: list[str], phase: Array) -> Track:
 
 
 def _frames(table: _Table) -> range:
-    """Frames that were to be tracked, which all rows state alike."""
+    """Frames to be tracked, which all rows state alike; if the command was interrupted, those it reached."""
     first, last = (table.numbers(name) for name in CLIP_COLUMNS[1:])
-    return range(int(first[0]), int(last[0]) + 1)
+    return range(int(first[0]), int(table.frames()[-1] if is_unfinished(table.path) else last[0]) + 1)
 
 
 def _camera_change(table: _Table) -> Array:

@@ -16,7 +16,7 @@ from gait.body.model_curves import ModelCurves
 from gait.body.skeleton import JOINTS
 from gait.camera.camera import Camera
 from gait.errors import UserError
-from gait.io.files import replacing
+from gait.io.files import is_unfinished, replacing
 from gait.io.track_file import Track, read_track
 from gait.io.video import Video
 from gait.motion.evaluate import Measures
@@ -99,6 +99,8 @@ def write_report(
         )
     other = track.compare_film(files.track, video)
     note(other, files.quiet or not other)
+    last = f"the command that tracked was interrupted after frame {track.frame[-1]}"
+    cut = last if is_unfinished(files.track) else ""
     path, remark = _camera(files, track)
     camera = None if path is None else Camera.read(path, video.size, files.scale_camera)
     draws = Draws.read(files.draws, track) if files.draws else None
@@ -121,7 +123,7 @@ def write_report(
         times=video.times[film.frames.start : film.frames.stop],
         camera=camera,
         errors=errors,
-        notes=[words for words in (video.broken, other) if words],
+        notes=[words for words in (cut, video.broken, other) if words],
         facts={**(facts or {}), "Camera and files": _facts(files, video, path, camera)},
         drawings=dict(drawings or {}),
     )

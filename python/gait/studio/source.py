@@ -278,7 +278,13 @@ def _keypoints(
                 "an estimated one"
             )
         path = str(folder / "track.csv")
-        if other := read_track(wanted.track).compare_film(wanted.track, video):
+        track = read_track(wanted.track)
+        if track.frame[-1] >= video.count:
+            raise UserError(
+                f"{wanted.track}: has frame {track.frame[-1]}, {video.path} ends at {video.count - 1}; "
+                "give the track of this film"
+            )
+        if other := track.compare_film(wanted.track, video):
             warn(other)
         found, span = keypoints_of_track(wanted.track, camera), video.span(wanted.start or 0, wanted.stop)
         rows = slice(*np.searchsorted(found.frame, [span.start, span.stop]))

@@ -31,7 +31,8 @@ const indexOf = (frame) => frame - data.first;
 const words = (joint) => joint.replace(/^l_/, 'left ').replace(/^r_/, 'right ').replace('_', ' ');
 
 async function ask(path, body) {
-  const answer = await fetch(path, body === undefined ? {} : { method: 'POST', body: JSON.stringify(body) });
+  const answer = await fetch(path, body === undefined ? {} : { method: 'POST', body: JSON.stringify(body) })
+    .catch(() => { throw new Error('gait studio has ended; start it again: all corrections are saved'); });
   const found = await answer.json();
   if (!answer.ok) throw Object.assign(new Error(found.error ?? answer.statusText), { refused: answer.status === REFUSED });
   return found;

@@ -245,8 +245,6 @@ def _smooth(
     """Pass every frame with its smoothed estimate to the sinks, and write the draws."""
     with progress("smoothing", len(smoother), options.quiet) as update:
         rows, draws = smoother.finish(update=update)
-    if options.draws:
-        draws.write(options.draws)
     frames: Iterable[Frame] = (frame for frame, _ in rows)
     if options.overlay or options.report:  # decode the pictures once more
         frames = video.frames(rows[0][0].number, rows[-1][0].number + 1)
@@ -255,3 +253,5 @@ def _smooth(
         judged = plausibility.judged(frame, estimate)
         for sink in sinks:
             sink(frame, judged)
+    if options.draws:  # last, so that they are not left beside a part of the track
+        draws.write(options.draws)

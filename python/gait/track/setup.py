@@ -66,8 +66,12 @@ def beside(options: ClipOptions) -> list[str]:
     return [
         f"not used: {path} beside the film; to use it: --{option} {path}"
         for option, path in found.items()
-        if not given[option] and path.is_file()
+        if not given[option] and path.is_file() and not _same(path, options.camera_out)
     ]
+
+
+def _same(path: Path, other: str | None) -> bool:
+    return other is not None and path.resolve() == Path(other).resolve()
 
 
 def _start(options: ClipOptions, start: Start) -> str:

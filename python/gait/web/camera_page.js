@@ -225,7 +225,8 @@ function asked() {
 }
 async function send(path) {
   const body = JSON.stringify(asked());
-  const answer = await fetch(path, { method: 'POST', headers: { 'Content-Type': 'application/json' }, body });
+  const answer = await fetch(path, { method: 'POST', headers: { 'Content-Type': 'application/json' }, body })
+    .catch(() => { throw new Error('the command has ended; start gait camera --page again'); });
   if (!answer.ok) throw new Error(`the command answered ${answer.status}`);
   return answer.json();
 }
@@ -238,8 +239,8 @@ async function solve() {
   let found;
   try {
     found = await send('/place');
-  } catch {
-    found = { fault: 'the command has ended; start gait camera --page again' };
+  } catch (error) {
+    found = { fault: error.message };
   }
   clearTimeout(slow);
   if (mine !== turn) return;
