@@ -82,13 +82,7 @@ static bool step(runner *r, message *why)
 /* ---- a turn ---- */
 static bool start(const runner *r, message *why)
 {
-    gait_state const sd = {.phase = r->result->plan.search ? 0.5f : 0.05f,
-                           .stride_hz = 0.05f,
-                           .stature = 0.03f,
-                           .heading = 0.1f,
-                           .pelvis = {0.05f, 0.05f, 0.02f},
-                           .pitch = 0.02f,
-                           .roll = 0.02f};
+    gait_state const sd = bench_scene_start_sd(r->result->plan.search ? 0.5f : 0.05f);
     gait_error err = {.text = ""};
     for (int k = 0; k < trackers(r); k++)
         if (gait_tracker_start(r->tracker[k], &r->result->plan.scene->start, &sd, 0, &err) != GAIT_OK)

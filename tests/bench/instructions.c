@@ -20,13 +20,7 @@ static gait_result steps(const gait_model *model, int32_t particles, gait_error 
     gait_tracker_config cfg;
     gait_tracker *t = NULL;
     gait_estimate estimate;
-    gait_state const sd = {.phase = 0.05f,
-                           .stride_hz = 0.05f,
-                           .stature = 0.03f,
-                           .heading = 0.1f,
-                           .pelvis = {0.05f, 0.05f, 0.02f},
-                           .pitch = 0.02f,
-                           .roll = 0.02f};
+    gait_state const sd = bench_scene_start_sd(0.05f);
     size_t bytes = 0;
     if (!bench_scene_make(&scene, model, 640, 480, FRAMES, &why))
         return GAIT_ERR_ARG;
