@@ -80,12 +80,17 @@ def find_keypoints(request: Request, prior: SegmentPrior, quiet: bool) -> Detect
         One line that names the file at fault.
     """
     video = Video(request.video)
+    given = None
     if request.camera:
-        Camera.read(request.camera, video.size, request.scale_camera).check_place(request.camera)
+        given = Camera.read(request.camera, video.size, request.scale_camera)
+        given.check_place(request.camera)
     if request.corrections:
         read_edits(request.corrections, prior, video.span(request.start or 0, request.stop), video.size)
     people = find_people(video, quiet, request.start or 0, request.stop)
-    turns = _turns(request, video, people, quiet) if request.stabilize else None
+    turns = None
+    if request.stabilize:
+        camera = given or expected_camera(video, request.fov)
+        turns = find_turns(video, camera, sample_frames(video), people, None, quiet, first=given is not None)
     if turns is not None:
         people = {id: turns.in_reference(keypoints) for id, keypoints in people.items()}
     if request.camera or request.parallel:
@@ -100,13 +105,6 @@ def find_camera(request: Request, prior: SegmentPrior, quiet: bool) -> Calibrati
     if request.corrections:
         read_corrections(request.corrections, prior, video.count, size=video.size)
     return _calibrate(request, video, find_people(video, quiet), quiet)[1]
-
-
-def _turns(request: Request, video: Video, people: dict[int, Keypoints], quiet: bool) -> CameraTurns | None:
-    """Estimate how the camera turns; None if it is static."""
-    given = Camera.read(request.camera, video.size, request.scale_camera) if request.camera else None
-    camera = given or expected_camera(video, request.fov)
-    return find_turns(video, camera, sample_frames(video), people, None, quiet, first=given is not None)
 
 
 def _calibrate(

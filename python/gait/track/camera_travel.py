@@ -140,9 +140,8 @@ class CameraTravel:
             return None
         ideal = self._ideal(visible.pixels)
         floor, about, sd = visible.variance == 0, self._camera, np.inf
-        if (
-            floor.sum() >= FEWEST
-        ):  # the sky, in which nothing shows that the camera travels, may be most of it
+        # By the floor first: the sky, in which nothing shows that the camera travels, may be most of it.
+        if floor.sum() >= FEWEST:
             about, sd, _ = _fit(about, visible.where(floor), ideal[floor])
         self._camera, sd, fits = _fit(about, visible, ideal, sd)
         visible.improve(self._camera, ideal, sd, fits)
