@@ -7,24 +7,22 @@
 
 enum { N = START_UNKNOWNS, LD = START_LD };
 
-static const double RATE_SD = 0.15;  /* strides per second: people in films walk as slowly as they like */
-static const double SPEED_SD = 0.4;  /* metres per second, about the speed of the steps */
-static const double STILL_SD = 0.1;  /* metres per second, in place */
-static const double FLOOR_SD = 0.03; /* metres: a camera's height is not exact */
-static const double PLACE_SD = 3.0;  /* metres, about where the length of the legs puts the person */
-static const double IN_PLACE = 8.0;  /* twice the log odds of walking along a path over walking in place */
-static const double DEGREES = 4.0;   /* of freedom of the keypoints' errors */
-static const double BEHIND = 1e3;    /* standard deviations for joints behind the camera */
-static const double LEAD =
-    0.1; /* statures by which the foot that is lower in the image is nearer than the body */
-static const double FOOT_SD = 0.06;  /* metres by which all foot points of a person may be off */
-static const double BOX_PLACE = 0.1; /* metres by which shadows and clothes move all boxes of a person */
-static const double COURSE = 0.15;   /* radians: people do not walk exactly where their box moves */
-static const double OPEN = 0.3; /* information that boxes get on heading and phase, which they leave open */
-static const float OPEN_SD = 0.9f; /* standard deviation from which a heading counts as unknown, radians */
-static const float BUILD_SHARE =
-    0.25f;                           /* factor of the sd of scores and posture while the phase is unknown */
-static const float SPEEDS_UP = 0.4f; /* sd of a rate below the usual one, as a share of the difference */
+static const double RATE_SD = 0.15;     /* strides per second: people in films walk as slowly as they like */
+static const double SPEED_SD = 0.4;     /* metres per second, about the speed of the steps */
+static const double STILL_SD = 0.1;     /* metres per second, in place */
+static const double FLOOR_SD = 0.03;    /* metres: a camera's height is not exact */
+static const double PLACE_SD = 3.0;     /* metres, about where the length of the legs puts the person */
+static const double IN_PLACE = 8.0;     /* twice the log odds of walking along a path over walking in place */
+static const double DEGREES = 4.0;      /* of freedom of the keypoints' errors */
+static const double BEHIND = 1e3;       /* standard deviations for joints behind the camera */
+static const double LEAD = 0.1;         /* statures: the foot lower in the image is nearer than the body */
+static const double FOOT_SD = 0.06;     /* metres by which all foot points of a person may be off */
+static const double BOX_PLACE = 0.1;    /* metres by which shadows and clothes move all boxes of a person */
+static const double COURSE = 0.15;      /* radians: people do not walk exactly where their box moves */
+static const double OPEN = 0.3;         /* information that boxes get on heading and phase */
+static const float OPEN_SD = 0.9f;      /* radians of standard deviation from which a heading is unknown */
+static const float BUILD_SHARE = 0.25f; /* of the sd of scores and posture while the phase is unknown */
+static const float SPEEDS_UP = 0.4f;    /* sd of a rate below the usual one, as a share of the difference */
 static const float LEAST_PLACE_SD = 0.05f; /* metres */
 
 /* Steps of the finite differences that replace derivatives. */
