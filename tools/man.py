@@ -1,7 +1,7 @@
 """Write the manual pages of programs from their ``--help``: ``man.py FOLDER VERSION PROGRAM...``.
 
-A program whose help lists commands gets a page for each of them too, PROGRAM-COMMAND.1.  The text begins with
-the usage and paragraphs.  Entries of a list begin with two to four spaces; their meaning stands further in.
+A program whose help lists commands also gets a page for each command, PROGRAM-COMMAND.1.  The help must begin
+with the usage and paragraphs.  Entries of a list are indented by two to four spaces, their meaning by more.
 """
 
 from __future__ import annotations
@@ -35,7 +35,7 @@ def _entries(text: str) -> list[str]:
 
 
 def manual(name: str, version: str, text: str) -> str:
-    """Page in the language of man(7), of the text of ``--help``."""
+    """Convert the text of ``--help`` to a page in the language of man(7)."""
     usage, *paragraphs = re.split(r"\n\s*\n", text.rstrip())
     first = re.split(r"[.:](?:\s|$)", " ".join(paragraphs[0].split()))[0]
     usage = " ".join(usage.removeprefix("usage: ").split())

@@ -1,5 +1,5 @@
 #!/usr/bin/env python3
-"""Complete a bill of materials of Python packages (CycloneDX, JSON) by what no package states.
+"""Add to a bill of materials of Python packages (CycloneDX, JSON) what no package declares.
 
     sbom.py PACKAGES.json -o SBOM.json
 
@@ -22,7 +22,7 @@ from gait.io.files import replacing
 from gait.io.published import Published
 from gait.web import parts
 
-LICENCES = {  # SPDX, of files that are fetched
+LICENCES = {  # SPDX identifiers of downloaded files
     **dict.fromkeys(weights.STORE.files, "Apache-2.0"),
     parts.THREE: "MIT",
     parts.ORBIT: "MIT",
@@ -31,7 +31,7 @@ LICENCES = {  # SPDX, of files that are fetched
 
 
 def main() -> int:
-    """Read, add, write."""
+    """Read the bill, complete it and write it."""
     options = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawTextHelpFormatter)
     options.add_argument("packages", type=Path)
     options.add_argument("-o", "--output", type=Path, required=True)
@@ -44,7 +44,7 @@ def main() -> int:
 
 
 def complete(document: dict[str, Any]) -> dict[str, Any]:
-    """Return the bill with what is inside packages, compiled in, and fetched."""
+    """Add to the bill what packages contain, what is compiled into libgait, and what is downloaded."""
     packages = [one | within(one["name"]) for one in document["components"]]
     eigen = {
         "type": "library",
@@ -68,7 +68,7 @@ def fetched(file: Published) -> dict[str, Any]:
 
 
 def within(package: str) -> dict[str, Any]:
-    """Shared libraries of others that an installed package holds."""
+    """List the shared libraries of other projects that an installed package contains."""
     try:
         held = [file for file in files(package) or () if any(".libs" in part for part in file.parts[:-1])]
     except PackageNotFoundError:
@@ -85,7 +85,7 @@ def within(package: str) -> dict[str, Any]:
 
 
 def sha256(path: Path) -> str:
-    """Digest of a file, hexadecimal."""
+    """SHA-256 of a file, hexadecimal."""
     return hashlib.sha256(path.read_bytes()).hexdigest()
 
 

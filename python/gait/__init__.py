@@ -1,7 +1,7 @@
 """Learn how people walk from motion capture, and track them in video.
 
-The names below load what they need when first used, so ``import gait`` is quick and learning works without
-the C library.
+Each name below is imported when it is first used, so ``import gait`` is quick and learning works without the
+C library.
 """
 
 from __future__ import annotations

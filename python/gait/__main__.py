@@ -1,4 +1,4 @@
-"""``python -m gait`` is the ``gait`` command."""
+"""Run the ``gait`` command as ``python -m gait``."""
 
 import sys
 

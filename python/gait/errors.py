@@ -8,23 +8,23 @@ class UserError(Exception):
 
 
 class UsageError(UserError):
-    """Options out of their range, or that do not go together.  Commands print it and exit 2."""
+    """Options that are out of range or do not go together.  Commands print it and exit 2."""
 
 
 class LibraryError(UserError):
-    """libgait could not be loaded, or the file found is of another version or layout than this package."""
+    """libgait could not be loaded, or the file found has another version or layout than this package."""
 
 
 LONGEST_QUOTE = 40  # characters of a file that a message quotes
 
 
 def quoted(text: str) -> str:
-    """Quote text of a file in a message: short and printable, whatever the file holds."""
+    """Quote text from a file in a message: shortened and printable, whatever the file contains."""
     return repr(text if len(text) <= LONGEST_QUOTE else text[:LONGEST_QUOTE] + "...")
 
 
 def unreadable(path: object, error: OSError) -> UserError:
-    """Error about a file that the system does not let us read."""
+    """Make the error for a file that the system cannot open or read."""
     what = "its permissions" if isinstance(error, PermissionError) else "the name"
     return UserError(f"{path}: {error.strerror}; check {what}")
 
@@ -50,8 +50,8 @@ class GaitError(Exception):
 
 
 class GaitArgumentError(GaitError, ValueError):
-    """``GAIT_ERR_ARG``: not finite or outside the documented range."""
+    """``GAIT_ERR_ARG``: an argument is not finite or outside its documented range."""
 
 
 class GaitLimitError(GaitError, ValueError):
-    """``GAIT_ERR_LIMIT``: a count or size out of its range, as of particles, tasks or cameras."""
+    """``GAIT_ERR_LIMIT``: a count or size is out of range, such as that of particles, tasks or cameras."""

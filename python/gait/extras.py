@@ -1,4 +1,4 @@
-"""Optional packages: the extra of libgait that installs each, and the message when one is missing."""
+"""Optional packages: which extra of libgait installs each, and the message when one is missing."""
 
 from __future__ import annotations
 
@@ -29,7 +29,7 @@ EXTRAS = {
 
 
 def remedy(user: str, extras: Sequence[str], module: str | None = None) -> str:
-    """Return one line: what `user` needs of these extras and how to install it; empty if nothing is missing.
+    """Return one line: which packages `user` lacks and how to install them; empty if nothing is missing.
 
     Parameters
     ----------
@@ -37,7 +37,7 @@ def remedy(user: str, extras: Sequence[str], module: str | None = None) -> str:
         Command or function that needs the extras.
     extras : sequence of str
     module : str, optional
-        A module that could not be imported; if none of `extras` brings it, an extra that does is added.
+        A module that could not be imported; if none of `extras` installs it, an extra that does is added.
     """
     if module and not any(module in EXTRAS[extra] for extra in extras):
         extras = [*extras, *[extra for extra in EXTRAS if module in EXTRAS[extra]][:1]]

@@ -1,4 +1,4 @@
-"""Notes and progress on stderr, and how long things took."""
+"""Notes and progress bars on stderr, and statistics of durations."""
 
 from __future__ import annotations
 
@@ -24,7 +24,7 @@ def note(text: str, quiet: bool = False) -> None:
 
 @contextmanager
 def progress(what: str, total: int | None, quiet: bool = False) -> Iterator[Callable[[int], None]]:
-    """Yield a function to call with the count done so far; it draws a bar on a terminal.
+    """Yield a function that takes the count done so far and, on a terminal, draws a bar.
 
     Parameters
     ----------

@@ -1,11 +1,11 @@
 """The same arithmetic on every x86-64 CPU, so that the same recordings give the same model to the last bit.
 
-OpenBLAS, numpy and libm choose their kernels by the CPU when they are loaded, and their last bits differ.
-The filling of gaps takes up to hundreds of steps, each by those before, and may carry that to the sixth
-decimal.  All three can be made to use what every CPU has that numpy runs on (SSE4.2); learning takes a
-little longer.
+When they are loaded, OpenBLAS, numpy and libm choose kernels for the CPU, whose results differ in the last
+bits.  Filling gaps iterates up to hundreds of times, which can amplify this to the sixth decimal.  All three
+can be restricted to the instructions of every CPU on which numpy runs (SSE4.2); learning then takes a little
+longer.
 
-`dask worker --preload-nanny gait.reproducible tcp://HOST:PORT` does so in a worker.
+`dask worker --preload-nanny gait.reproducible tcp://HOST:PORT` does this in a worker.
 """
 
 from __future__ import annotations
@@ -27,12 +27,12 @@ COMMON = {
 }
 """Environment of a process that uses the common kernels."""
 
-_NO_WARNING = "ignore:During parsing environment variable:ImportWarning"  # numpy names features it lacks
-_RESTARTED = "GAIT_RESTARTED"  # process that was restarted: never twice, even if COMMON is reset at its start
+_NO_WARNING = "ignore:During parsing environment variable:ImportWarning"  # it names what the CPU lacks
+_RESTARTED = "GAIT_RESTARTED"  # set in a restarted process, so that it never restarts again
 
 
 def chosen() -> dict[str, str]:
-    """Return those of COMMON's names that this process was given, with their values."""
+    """Return the variables of COMMON that are set in this process, with their values."""
     return {name: os.environ[name] for name in COMMON if name in os.environ}
 
 
@@ -50,31 +50,34 @@ def settle() -> None:
 
 
 def dask_setup(_: object) -> None:
-    """Let the workers that a nanny starts use the common kernels."""
+    """Make the workers that a nanny starts use the common kernels."""
     if _to_choose():
         os.environ.update(COMMON)
 
 
 @contextlib.contextmanager
 def one_thread() -> Iterator[None]:
-    """Let the linear algebra of numpy use one thread within the block.
+    """Restrict numpy's linear algebra to one thread within the block.
 
-    Its bits then do not depend on the number of cores, and its small matrices are faster.
+    Its results then do not depend on the number of cores, and small matrices are faster.
     """
     with _algebra().limit(limits=1, user_api="blas"):
         yield
 
 
 def one_thread_for_good() -> None:
-    """Do so until the process ends: where tasks run in threads, one would end the other's limit."""
+    """Restrict numpy's linear algebra to one thread until the process ends.
+
+    For tasks in threads, where the end of one block would lift the limit for the others.
+    """
     _algebra().limit(limits=1, user_api="blas")
 
 
 @contextlib.contextmanager
 def one_opencv_thread() -> Iterator[None]:
-    """Let OpenCV use one thread within the block.
+    """Restrict OpenCV to one thread within the block.
 
-    Its HOG detector races with more: one search in hundreds gives some windows other votes.
+    With more threads its HOG detector has a race: in one search of hundreds, some windows get other votes.
     """
     import cv2
 
@@ -94,5 +97,5 @@ def _algebra() -> ThreadpoolController:
 
 
 def _to_choose() -> bool:
-    """Whether COMMON applies to this machine."""
+    """Whether COMMON applies to this machine: a POSIX system on x86-64."""
     return os.name == "posix" and os.uname().machine == "x86_64"

@@ -1,4 +1,4 @@
-"""Signals that end a command: all of them leave files complete and nothing half-written behind."""
+"""Signals that end a command without leaving half-written files behind."""
 
 from __future__ import annotations
 
@@ -10,11 +10,11 @@ from contextlib import contextmanager
 from types import FrameType, TracebackType
 
 _PR_SET_PDEATHSIG = 1
-_LIBC = ctypes.CDLL(None)  # loaded before a process splits
+_LIBC = ctypes.CDLL(None)  # loaded before any child process starts
 
 
 def ending_signals() -> tuple[signal.Signals, ...]:
-    """SIGINT, SIGTERM and SIGHUP, which a closed terminal sends, unless it is ignored, as by nohup."""
+    """SIGINT, SIGTERM and, unless it is ignored as under nohup, SIGHUP, which a closed terminal sends."""
     ignored = signal.getsignal(signal.SIGHUP) == signal.SIG_IGN
     return (signal.SIGINT, signal.SIGTERM) if ignored else (signal.SIGINT, signal.SIGTERM, signal.SIGHUP)
 
@@ -25,9 +25,10 @@ def die_with_parent() -> None:
 
 
 class Interruptible:
-    """In this block the signals that end a command raise KeyboardInterrupt.
+    """Within this block the signals that end a command raise KeyboardInterrupt.
 
-    SIGINT does so anyway, unless the shell lets background jobs ignore it; `ignored` leaves it at that.
+    With `ignored`, SIGINT is left alone: Python raises KeyboardInterrupt unless SIGINT was ignored when the
+    program started, as in background jobs of some shells.
     """
 
     def __init__(self, *, ignored: bool = False) -> None:
@@ -36,7 +37,7 @@ class Interruptible:
 
     def __enter__(self) -> Interruptible:
         self._before = []
-        if threading.current_thread() is threading.main_thread():  # only there handlers can be set
+        if threading.current_thread() is threading.main_thread():  # only the main thread can set handlers
             self._before = [(number, signal.signal(number, self._on_signal)) for number in self._numbers]
         return self
 
@@ -48,7 +49,7 @@ class Interruptible:
 
     @contextmanager
     def uninterrupted(self) -> Iterator[None]:
-        """Finish this block before the interrupt is raised."""
+        """Delay an interrupt until this block is finished."""
         self._held = True
         try:
             yield

@@ -1,1 +1,1 @@
-"""Many clips by one project file."""
+"""Process the clips of a project file."""

@@ -1,4 +1,4 @@
-"""Clips of a project on a Dask cluster whose workers have the same files under the same paths."""
+"""Run the clips of a project on a Dask cluster whose workers see the same files under the same paths."""
 
 from __future__ import annotations
 
@@ -19,12 +19,12 @@ def run(
 ) -> list[Row]:
     """Run clips as `Runner.run` does, on the workers of the scheduler at `address`.
 
-    What runs on a worker when this is interrupted goes on to its end there.
+    A clip that a worker has begun when this is interrupted still runs to its end there.
 
     Raises
     ------
     UserError
-        If dask is not installed, nothing answers, or workers have other versions.
+        If dask is not installed, the scheduler does not answer, or workers have other versions.
     """
     rows: dict[str, list[Row]] = {}
     with connected(address) as client:

@@ -28,44 +28,44 @@ _KEYS = ("subject", "height", "person", "people", "start", "stop", "make", "opti
 
 @dataclass(frozen=True)
 class Clip:
-    """One clip of a project; files are absolute."""
+    """One clip of a project; paths of files are absolute."""
 
     name: str
     video: str | None = None
     keypoints: str | None = None
     camera: str | None = None
-    subject: str = ""  #: who walks, for the summary
+    subject: str = ""  #: the person's name, for the summary
     height: float | None = None  #: metres
-    person: str | None = None  #: of several in `keypoints`
-    people: str | None = None  #: track so many people, or all
+    person: str | None = None  #: which of several people in `keypoints`
+    people: str | None = None  #: number of people to track, or "all"
     start: int | None = None
     stop: int | None = None
     make: tuple[str, ...] = ("track", "report")
-    options: tuple[str, ...] = ()  #: further words of gait track or gait lift
+    options: tuple[str, ...] = ()  #: further arguments of gait track or gait lift
 
     @property
     def lifted(self) -> bool:
-        """Whether it is lifted, not tracked."""
+        """Whether the clip is lifted rather than tracked."""
         return "lift" in self.make
 
     @property
     def result(self) -> str:
-        """Name of the file that all others are made of."""
+        """Name of the file from which all others are made."""
         return "motion.csv" if self.lifted else "track.csv"
 
     def key(self) -> str:
-        """Hash of everything that the outputs depend on: settings, files by size and time, version."""
+        """Hash of all that the outputs depend on: settings, version, size and time of the input files."""
         files = [os.stat(path) for path in (getattr(self, name) for name in _FILES) if path]
         state = [asdict(self), [(file.st_size, file.st_mtime_ns) for file in files], __version__]
         return hashlib.sha256(json.dumps(state).encode()).hexdigest()
 
     def command(self, folder: Path) -> list[str]:
-        """Words of the gait command that makes the file in a folder that all others are made of."""
+        """Arguments of the gait command that writes `result` to a folder."""
         result = str(folder / self.result)
         return self._lift(result) if self.lifted else self._track(result, folder)
 
     def further(self, folder: Path, person: str | None) -> list[list[str]]:
-        """Words of the gait commands that make the others, of one person if the clip is of several."""
+        """Arguments of the gait commands that make the other files, of one person if there are several."""
         ending = "" if person is None else f"-{person}"
         stem = self.result.partition(".")[0] + ending
         result = str(folder / f"{stem}.csv")
@@ -110,8 +110,8 @@ class Clip:
 def read(path: str | os.PathLike[str]) -> list[Clip]:
     """Read the clips of a project.
 
-    UserError if the file, or what is written of a clip, cannot be right; a file of a clip that is missing or
-    damaged is a failure of that clip alone.
+    UserError if the file or an entry in it is invalid.  If a clip's own files are missing or damaged, only
+    that clip fails, when it is run.
     """
     try:
         text = Path(path).read_bytes()
@@ -142,7 +142,7 @@ def read(path: str | os.PathLike[str]) -> list[Clip]:
 
 
 def _clip(fields: Fields, common: Clip, folder: Path, named: bool = False) -> Clip:
-    """Clip of a table, with what is common to all where it has nothing."""
+    """Make a clip from its table; entries that it lacks come from the common ones."""
     fields.only((*_KEYS, "name") if named else _KEYS)
     given: dict[str, Any] = {}
     for name in (*_FILES, "subject", "person"):
@@ -170,7 +170,7 @@ def _clip(fields: Fields, common: Clip, folder: Path, named: bool = False) -> Cl
 
 
 def _require(fields: Fields, clip: Clip) -> None:
-    """Refuse a clip that no command can take."""
+    """Raise UserError for a clip whose entries do not go together."""
     if not re.fullmatch(r"[\w][\w .+-]*", clip.name):
         raise fields.fail("name", f"is {clip.name!r}", "give letters, digits, spaces and . _ + -")
     if not clip.lifted and not clip.video:

@@ -1,4 +1,4 @@
-"""Run the clips of a project, several at a time: each in its own processes, and none of them twice."""
+"""Run the clips of a project, several at a time, each in its own processes; skip those already done."""
 
 from __future__ import annotations
 
@@ -22,10 +22,10 @@ from gait.report.page import Page, movable
 from gait.signals import die_with_parent
 
 DONE, FAILED = "done", "failed"
-RECORD = "done.json"  #: in the folder of a clip that is done
+RECORD = "done.json"  #: written to the folder of a clip when it is done
 GAIT = (sys.executable, "-m", "gait")
 _COUNTS = ("frames", "init", "tracking", "ambiguous", "lost")
-_GRACE = 5.0  # seconds that commands may take to end after an interrupt
+_GRACE = 5.0  # seconds that commands have to end after an interrupt
 
 Row = dict[str, Any]
 
@@ -37,7 +37,7 @@ class Runner:
     ----------
     output : Path
     gait : sequence of str
-        Start of the command lines.
+        First words of each command line: the program.
     """
 
     def __init__(self, output: Path, gait: Sequence[str] = GAIT) -> None:
@@ -48,8 +48,8 @@ class Runner:
     def run(self, clips: Sequence[Clip], jobs: int, report: Callable[[Row], None]) -> list[Row]:
         """Run clips, at most `jobs` at a time; return their rows in the order of the project.
 
-        A clip of several people has a row for each.  `report` gets each row when its clip has ended.  An
-        interrupt ends the commands that run; what is done stays done.
+        A clip of several people has one row per person.  `report` is called with each row when its clip ends.
+        An interrupt ends the running commands; finished clips are kept.
         """
         rows: dict[str, list[Row]] = {}
         with ThreadPoolExecutor(jobs) as pool:
@@ -87,7 +87,7 @@ class Runner:
         return rows
 
     def _row(self, clip: Clip, folder: Path, person: str | None, found: Any) -> Row:
-        """Make what follows from a track or a motion; return its row."""
+        """Make the files that follow from a track or a motion; return its row."""
         row = _begun(clip) | ({} if person is None else {"person": int(person)})
         row |= _figures("lift" if clip.lifted else "track", found)
         for command in clip.further(folder, person):
@@ -95,7 +95,7 @@ class Runner:
         return row | {"state": DONE, "error": ""}
 
     def _recorded(self, folder: Path, key: str) -> list[Row] | None:
-        """Return the rows of a clip that was done with the same settings, files and version."""
+        """Return the rows of a clip if it was done with the same settings, files and version."""
         try:
             record = json.loads((folder / RECORD).read_text(encoding="utf-8"))
         except (OSError, ValueError):
@@ -103,7 +103,7 @@ class Runner:
         return record["rows"] if isinstance(record, dict) and record.get("key") == key else None
 
     def _command(self, words: Sequence[str]) -> Any:
-        """Run a command to its end; return the JSON that it prints.  _Failed with its last line."""
+        """Run a command and return the JSON that it prints; _Failed, with its last line, if it fails."""
         with self._lock:
             if self._ended:
                 raise _Failed("interrupted")
@@ -129,7 +129,7 @@ class Runner:
             raise _Failed(f"gait {words[0]} printed no figures") from None
 
     def _end(self) -> None:
-        """End the commands that run, and start no more."""
+        """End the running commands, and start no more."""
         with self._lock:
             self._ended = True
             running = list(self._running)
@@ -147,16 +147,16 @@ def _begun(clip: Clip) -> Row:
 
 
 def failed(clip: Clip, error: str) -> Row:
-    """Row of a clip that failed, for a reason in one line."""
+    """Row of a clip that failed; `error` is the reason, in one line."""
     return _begun(clip) | {"state": FAILED, "error": error}
 
 
 class _Failed(Exception):
-    """A command of a clip failed; one line."""
+    """A command of a clip failed; its text is one line."""
 
 
 def _figures(command: str, found: Any) -> Row:
-    """Figures of a command for the summary."""
+    """Choose the figures for the summary from a command's JSON."""
     if command == "track":
         return {name: found[name] for name in _COUNTS if name in found}
     if command == "lift":

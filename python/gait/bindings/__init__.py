@@ -1,1 +1,1 @@
-"""Objects of the C library in Python: model, state, start, observations, estimate, lifter."""
+"""The C library's objects in Python: model, state, start, observations, estimate, lifter."""

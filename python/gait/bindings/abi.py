@@ -1,7 +1,7 @@
 """The C interface in ctypes: enumerations, structures and one table of functions.
 
-The fields of the structures are those that the loaded library describes (``gait_field_at``); `define` sets
-them on the classes below, so nothing here repeats the headers of libgait/include.
+The loaded library describes the fields of its structures (``gait_field_at``); `define` sets them on the
+classes below, so nothing here repeats the headers in libgait/include.
 """
 
 from __future__ import annotations
@@ -60,7 +60,7 @@ class PixelFormat(IntEnum):
 
 
 class Mode(IntEnum):
-    """Set of defaults: the product's, or the paper's own likelihood and dynamics."""
+    """Set of defaults: the product's, or the likelihood and dynamics of the paper."""
 
     DEFAULT = 0
     PAPER = 1
@@ -77,7 +77,7 @@ class Term(IntFlag):
 
 
 class TrackStatus(IntEnum):
-    """What an estimate is worth."""
+    """State of a track: how far its estimate can be trusted."""
 
     INIT = 0
     TRACKING = 1
@@ -95,14 +95,14 @@ class Flag(IntFlag):
 
 
 class Projection(IntEnum):
-    """View of 2-D tracks, ``GAIT_LIFT_PERSPECTIVE`` and so on."""
+    """Projection of 2-D keypoints, ``GAIT_LIFT_PERSPECTIVE`` and so on."""
 
     PERSPECTIVE = 0
     ORTHOGRAPHIC = 1
 
 
 class LiftFlag(IntFlag):
-    """What an estimate of a stream is worth, ``GAIT_LIFT_UNOBSERVED`` and so on."""
+    """Reasons to distrust an estimate of a stream, ``GAIT_LIFT_UNOBSERVED`` and so on."""
 
     UNOBSERVED = 1
     POOR_FIT = 2
@@ -258,11 +258,11 @@ _TYPES: dict[str, Any] = {
 
 
 class _ARRAY:
-    """Pointer to the numbers of a contiguous array; None: a null pointer."""
+    """Argument type: a contiguous array is passed as a pointer to its numbers, None as a null pointer."""
 
     @staticmethod
     def from_param(array: Any) -> c_void_p:
-        """Convert an argument."""
+        """Convert an argument; ctypes calls this."""
         return c_void_p(None if array is None else array.ctypes.data)
 
 
@@ -271,7 +271,7 @@ _SIZE, _STATE = POINTER(c_size_t), POINTER(StateC)
 
 
 def _made(kind: str, *arguments: Any) -> Iterator[tuple[str, list[Any], Any]]:
-    """Yield the two functions that make an object of these arguments."""
+    """Yield the signatures of the two functions that make an object: its size in bytes, and its init."""
     yield f"gait_{kind}_bytes", [*arguments, _SIZE, _ERR], _RESULT
     yield f"gait_{kind}_init", [_ARRAY, c_size_t, *arguments, POINTER(_HANDLE), _ERR], _RESULT
 
@@ -366,7 +366,7 @@ def fields(library: ctypes.CDLL) -> list[Field]:
 
 
 def define(rows: list[Field]) -> None:
-    """Give every structure its fields, once.
+    """Give every structure its fields, if that has not been done.
 
     Raises
     ------
@@ -387,12 +387,12 @@ def _ctype(row: Field) -> Any:
 
 
 def declare(library: ctypes.CDLL) -> None:
-    """Give every function its types.
+    """Declare argument and result types of every function.
 
     Raises
     ------
     AttributeError
-        If the library lacks one.
+        If the library lacks a function.
     """
     for name, arguments, result in FUNCTIONS:
         function = getattr(library, name)

@@ -13,7 +13,7 @@ from gait.bindings import abi
 from gait.bindings.library import library, struct_fields
 
 if TYPE_CHECKING:
-    import numpy as np  # at run time where it is used: --help shows defaults
+    import numpy as np  # otherwise imported where it is used, since --help only needs the defaults
     from numpy.typing import ArrayLike, NDArray
 
     from gait.camera.camera import Camera
@@ -23,17 +23,17 @@ _C = TypeVar("_C", bound="Config")
 
 @dataclass(frozen=True)
 class Setting:
-    """One setting of a config, as its table in the C header has it.
+    """One setting of a config, as described by its table in the C header.
 
     Attributes
     ----------
     name : str
     text, unit : str
-        Meaning; unit, '' if it has none.
+        Meaning; unit, or '' if it has none.
     low, high : float
-        Range; NaN where none is checked.
+        Range; NaN where a limit is not checked.
     default, paper : object
-        Default; that of ``Mode.PAPER``.
+        Default; default in ``Mode.PAPER``.
     """
 
     name: str
@@ -46,10 +46,10 @@ class Setting:
 
 
 class Config:
-    """Settings of an object of the library, read as attributes; immutable, see `replace`."""
+    """Settings of an object of the library, as attributes; immutable, see `replace`."""
 
     _of: ClassVar[str]  # struct
-    _apart: ClassVar[frozenset[str]]  # fields that other arguments fill
+    _apart: ClassVar[frozenset[str]]  # fields that are no settings: other arguments fill them
     _values: dict[str, Any]
 
     def __init__(self, values: dict[str, Any]) -> None:
@@ -57,9 +57,9 @@ class Config:
 
     @classmethod
     def _filled(cls, mode: int) -> Any:
-        """Struct with the library's defaults."""
+        """Make the struct with the library's defaults."""
         fill, c = getattr(library(), cls._of.replace("_config", "_fill")), abi.STRUCTS[cls._of]()
-        modes = [mode] if len(fill.argtypes) > 2 else []  # a tracker alone has modes
+        modes = [mode] if len(fill.argtypes) > 2 else []  # only a tracker has modes
         fill(c, ctypes.sizeof(c), *modes)
         return c
 
@@ -70,12 +70,12 @@ class Config:
         return {name: tuple(v) if isinstance(v, ctypes.Array) else v for name, v in values.items()}
 
     def replace(self: _C, **changes: Any) -> _C:
-        """Copy with other values.
+        """Return a copy with `changes`.
 
         Raises
         ------
         TypeError
-            If a change names no setting.
+            If a change has a name that is no setting.
         """
         for name in changes:
             if name not in self._values:
@@ -85,7 +85,7 @@ class Config:
 
     @classmethod
     def settings(cls) -> tuple[Setting, ...]:
-        """Every setting with its meaning, unit, range and defaults."""
+        """List every setting with its meaning, unit, range and defaults."""
         usual, paper = cls._defaults(0), cls._defaults(1)
         return tuple(
             Setting(row.name, row.text, row.unit, row.low, row.high, usual[row.name], paper[row.name])
@@ -94,7 +94,7 @@ class Config:
         )
 
     def _fill(self, c: Any) -> None:
-        """Write the values to a struct; ValueError for what does not fit it."""
+        """Write the values to a struct; ValueError for a value that does not fit its field."""
         for name, value in self._values.items():
             _put(c, name, value)
 
@@ -127,7 +127,7 @@ class Config:
 
 
 def _put(c: Any, name: str, value: Any) -> None:
-    """Set a field; ctypes would cut a number that does not fit it."""
+    """Set a field; ValueError for a number that does not fit it, which ctypes would truncate."""
     old = getattr(c, name)
     if isinstance(old, ctypes.Array):
         if not isinstance(value, Sized) or len(value) != len(old):
@@ -144,7 +144,7 @@ def _put(c: Any, name: str, value: Any) -> None:
 
 
 class TrackerConfig(Config):
-    """Settings of a tracker (``gait_tracker_config``); `default` gives those of the library.
+    """Settings of a tracker (``gait_tracker_config``); `default` returns the library's defaults.
 
     Every setting is an attribute; `settings` lists them with meaning, unit, range and default, as does the
     reference page.
@@ -155,26 +155,29 @@ class TrackerConfig(Config):
 
     @classmethod
     def default(cls, mode: abi.Mode | int = abi.Mode.DEFAULT, **changes: Any) -> TrackerConfig:
-        """Defaults of the library for `mode`, with `changes`.
+        """Return the library's defaults for `mode`, with `changes`.
 
         Raises
         ------
         TypeError
-            If a change names no setting.
+            If a change has a name that is no setting.
         """
         values = cls._defaults(int(mode))
         values |= {"mode": abi.Mode(values["mode"]), "terms": abi.Term(values["terms"])}
         return cls(values).replace(**changes)
 
     def to_c(self) -> Any:
-        """Make a ``gait_tracker_config`` without cameras and tasks; ValueError for what does not fit it."""
+        """Make a ``gait_tracker_config`` without cameras and tasks.
+
+        ValueError for a value that does not fit its field.
+        """
         c = self._filled(int(self.mode))
         self._fill(c)
         return c
 
 
 class LiftConfig(Config):
-    """Settings of a lifter (``gait_lift_config``) but for the view; `default` gives those of the library.
+    """Settings of a lifter (``gait_lift_config``) without the view; `default` returns the library's defaults.
 
     Every setting is an attribute; `settings` lists them with meaning, unit, range and default, as does the
     reference page.
@@ -185,17 +188,17 @@ class LiftConfig(Config):
 
     @classmethod
     def default(cls, **changes: Any) -> LiftConfig:
-        """Defaults of the library, with `changes`.
+        """Return the library's defaults, with `changes`.
 
         Raises
         ------
         TypeError
-            If a change names no setting.
+            If a change has a name that is no setting.
         """
         return cls(cls._defaults()).replace(**changes)
 
     def to_c(self, view: Camera | ArrayLike) -> Any:
-        """Make a ``gait_lift_config`` for a camera, or for the directions (2, 3) of u and v in the world."""
+        """Make a ``gait_lift_config`` for a camera, or for directions (2, 3) of u and v in the world."""
         from gait.camera.camera import Camera
 
         c = self._filled(0)
@@ -210,7 +213,7 @@ class LiftConfig(Config):
 
 
 def _axes(view: ArrayLike) -> NDArray[np.float64]:
-    """Directions (2, 3) of u and v."""
+    """Check and convert the directions (2, 3) of u and v."""
     import numpy as np
 
     try:
@@ -223,7 +226,7 @@ def _axes(view: ArrayLike) -> NDArray[np.float64]:
 
 
 def reference(config: type[Config]) -> str:
-    """Table of the settings in Markdown: name, meaning, unit, range, default."""
+    """Write a table of the settings in Markdown: name, meaning, unit, range, default."""
     lines = [
         "| setting | meaning | unit | range | default | paper mode |",
         "| --- | --- | --- | --- | --- | --- |",

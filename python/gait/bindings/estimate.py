@@ -29,13 +29,13 @@ class Estimate:
     ess : float
         Effective number of particles.
     phase_r : float
-        Certainty of the phase, [0, 1].
+        Certainty of the phase: length of the mean of unit vectors at the particles' phases, [0, 1].
     hypothesis_weight : float
         Weight of the dominant left/right hypothesis, [0, 1].
     speed : float
         Metres per second along the ground.
     mean, sd, best : State
-        Mean of the dominant hypothesis; standard deviation over all particles; heaviest particle.
+        Mean of the dominant hypothesis; standard deviations over all particles; the heaviest particle.
     joints : ndarray of shape (P, 3)
         Posterior mean of the joints in the world, metres.
     joint_sd : ndarray of shape (P, 3)
@@ -45,9 +45,9 @@ class Estimate:
     joint_names : tuple of str
         Names of the P joints.
     reason : str
-        Why a clip's rules made this estimate ambiguous, in words; empty where the tracker itself decided.
+        Why whole-clip checks made this estimate ambiguous, in words; empty if the tracker itself decided.
     motion_class : str
-        Name of the most probable class of motion, that of `mean`.
+        Name of the most probable class of motion, to which `mean` belongs.
     class_probability : ndarray of shape (C,)
         Probability of each of `Model.classes`.
     """
@@ -73,7 +73,7 @@ class Estimate:
     class_probability: Array = field(default_factory=lambda: np.ones(1))
 
     def joint(self, name: str) -> Array:
-        """Place of one joint in the world, shape (3,), metres."""
+        """Position of one joint in the world, shape (3,), metres."""
         return np.asarray(self.joints[self.joint_names.index(name)])
 
     @staticmethod

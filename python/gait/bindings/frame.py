@@ -1,4 +1,4 @@
-"""Input of the tracker at one time, for the C library: images, and joints detected in them."""
+"""Input of the tracker at one time, converted for the C library: images, and joints detected in them."""
 
 from __future__ import annotations
 
@@ -18,16 +18,16 @@ from gait.io.video import Image
 
 @dataclass(frozen=True)
 class FrameKeypoints:
-    """Joints that a detector has located in one picture: one frame of `gait.io.keypoints_file.Keypoints`.
+    """Joints that a detector has located in one image: one frame of `gait.io.keypoints_file.Keypoints`.
 
     Attributes
     ----------
     names : sequence of str
-        Which, as the model names them; others are left out.
+        The joints' names in the model; joints with other names are ignored.
     uv : array_like of shape (J, 2)
         Pixels as captured; NaN where a joint was not seen.
     sd : array_like that broadcasts to (J,)
-        Standard deviations, pixels, what the model's joints miss the detector's by included.
+        Standard deviations, pixels, including the differences between the detector's and the model's joints.
     """
 
     names: Sequence[str]
@@ -36,7 +36,7 @@ class FrameKeypoints:
 
 
 def per_camera(items: Any) -> list[Any]:
-    """One item for each camera: a list, or the only camera's own."""
+    """Return a list with one item for each camera; a single item belongs to the only camera."""
     if items is None or isinstance(items, np.ndarray | FrameKeypoints | CameraPose):
         return [items]
     return list(items)
@@ -54,7 +54,7 @@ def capture_time(utime: Any) -> int:
 
 
 def image_view(image: Image, camera: Camera, what: str) -> abi.ImageView:
-    """View of a contiguous picture that must fit the camera."""
+    """Make a ``gait_image`` of a contiguous image; ValueError if its size is not the camera's."""
     if image.dtype != np.uint8 or image.ndim not in (2, 3) or (image.ndim == 3 and image.shape[2] != 3):
         raise ValueError(f"{what}: {image.dtype} {image.shape}; give uint8 (h, w) grey or (h, w, 3) BGR")
     height, width = image.shape[:2]
@@ -65,7 +65,7 @@ def image_view(image: Image, camera: Camera, what: str) -> abi.ImageView:
 
 
 def keypoint_array(keypoints: FrameKeypoints, names: Sequence[str]) -> Any:
-    """Array of ``gait_keypoint`` in the order of the model's `names`."""
+    """Make an array of ``gait_keypoint`` in the order of the model's `names`."""
     uv, known = np.asarray(keypoints.uv, float), keypoints.names
     if uv.shape != (len(known), 2):
         raise ValueError(f"keypoints: uv has shape {uv.shape} instead of {(len(known), 2)}")

@@ -1,4 +1,4 @@
-"""Where a track starts: the first state of the person and its standard deviations."""
+"""The start of a track: the person's first state and its standard deviations."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ from gait.bindings.state import State, state_range
 from gait.errors import UserError
 from gait.io.fields import Fields, read_json
 
-# Standard deviations of values that an init file gives without any.
+# Standard deviations of values for which an init file gives none.
 DEFAULT_SD = {"pelvis": 0.05, "heading_rad": 0.1, "phase": 0.05, "stride_hz": 0.05, "stature_m": 0.03}
 KEYS = ("frame", *DEFAULT_SD, "sd")
 OUTSIDE = "the start is outside the picture; check pelvis and camera"
@@ -36,15 +36,15 @@ class Start:
     frame : int
         Frame of the video that it describes.
     mean, sd : State
-        Independent normals; a phase or heading whose sd is a half turn or more is uniform.
+        Independent normal distributions; a phase or heading whose sd is half a turn or more is uniform.
     apparent_stature : float, optional
-        Stature that the pictures give, metres, if it contradicts the one in `mean`.
+        Stature estimated from the images, metres, if it contradicts the one in `mean`.
     in_place : bool
         The person walks in place, as on a treadmill.
     hypotheses : tuple of Hypothesis
-        Between which the images are to choose, the most probable first; empty for a start that a user gives.
+        Alternatives that the images decide between, most probable first; empty if the user gave the start.
     source : str
-        What it was found from, in words; empty for a start that a user gives.
+        What the start was found from, in words; empty if the user gave it.
     """
 
     frame: int
@@ -59,15 +59,15 @@ class Start:
     def read(
         path: str | os.PathLike[str], model: Model, *, frame: int | None = None, height: float | None = None
     ) -> Start:
-        """Read an init file; what it leaves out comes from the model's broad prior.
+        """Read an init file; missing values come from the model's broad prior.
 
         Parameters
         ----------
         path : path
-            JSON with `KEYS`, each optional.  A pelvis of two numbers gets the model's height over ground.
+            JSON with `KEYS`, each optional.  A pelvis of two numbers gets the model's height above ground.
         model : Model
         frame : int, optional
-            First frame, if the file does not give it.
+            First frame; if the file gives one too, it must be the same.
         height : float, optional
             Stature in metres, which takes precedence over the file's.
 
@@ -97,7 +97,7 @@ class Start:
 
 
 def read_start(path: str | os.PathLike[str], what: str, keys: Sequence[str]) -> tuple[Fields, Fields]:
-    """Fields of a file with a person's place, which may have `keys`, and fields of its standard deviations.
+    """Read a file about a person's position: its fields, of which `keys` are allowed, and those of its "sd".
 
     Raises
     ------
@@ -117,7 +117,7 @@ def frame_number(fields: Fields) -> int:
 
 
 def set_height(mean: State, sd: State, height: float) -> None:
-    """Put a known stature in metres into a first state; its sd is at most the usual one."""
+    """Set a known stature in metres in a first state; its sd becomes at most that of a measured height."""
     low, high = state_range("stature")
     if not low <= height <= high:
         raise UserError(f"--height: {height:g} m is not a stature; give metres from {low} to {high}")
@@ -126,7 +126,7 @@ def set_height(mean: State, sd: State, height: float) -> None:
 
 
 def _place(fields: Fields, sds: Fields, model: Model, mean: State, sd: State) -> None:
-    """Set the pelvis; its height is the model's unless the file gives it."""
+    """Set the position of the pelvis; its height is the model's unless the file gives it."""
     remedy = "give x and y (and z if known) of the pelvis in metres"
     known = 2
     if "pelvis" in fields:

@@ -1,4 +1,4 @@
-"""Find and load libgait, check that it belongs to this package, and turn its error codes into exceptions."""
+"""Find and load libgait, check that it matches this package, and turn its error codes into exceptions."""
 
 from __future__ import annotations
 
@@ -15,16 +15,16 @@ from gait.bindings import abi
 from gait.errors import GaitArgumentError, GaitError, GaitLimitError, LibraryError
 
 if TYPE_CHECKING:
-    import numpy as np  # at run time where it is used, so that --help answers at once
+    import numpy as np  # otherwise imported where it is used, so that --help answers at once
     from numpy.typing import NDArray
 
 _HERE = Path(__file__).resolve().parents[1]
-_WHOLE = tuple("bBhHiIlLqQ")  # codes of ctypes' whole numbers
+_WHOLE = tuple("bBhHiIlLqQ")  # type codes of ctypes' integers
 _RAISES = {abi.Status.ARG: GaitArgumentError, abi.Status.LIMIT: GaitLimitError}
 
 
 def candidates() -> Iterator[str]:
-    """Yield the files to try, in order; ``$GAIT_LIBRARY`` alone if it is set."""
+    """Yield the files to try, in order; only ``$GAIT_LIBRARY`` if it is set."""
     chosen = os.environ.get("GAIT_LIBRARY")
     if chosen:
         yield chosen
@@ -38,12 +38,12 @@ def candidates() -> Iterator[str]:
 
 @functools.cache
 def library() -> ctypes.CDLL:
-    """Load libgait once.
+    """Load libgait, once.
 
     Raises
     ------
     LibraryError
-        Listing every file tried and why it would not do.
+        Lists every file tried and why it was rejected.
     """
     failures = []
     for path in candidates():
@@ -57,7 +57,7 @@ def library() -> ctypes.CDLL:
 
 
 def open_library(path: str) -> ctypes.CDLL:
-    """Load one file and check version, functions and layout against this package."""
+    """Load one file and check that version, functions and layout match this package."""
     if os.sep in path and not Path(path).is_file():
         raise LibraryError(f"{path}: no such file")
     try:
@@ -85,7 +85,7 @@ def open_library(path: str) -> ctypes.CDLL:
 
 
 def struct_fields(struct: str) -> list[abi.Field]:
-    """Fields of a struct of the library, in order, as its header describes them."""
+    """List the fields of a struct of the library, in order, as its header describes them."""
     return [row for row in abi.fields(library()) if row.of == struct and row.name]
 
 
@@ -95,7 +95,7 @@ def version_text(number: int) -> str:
 
 
 def check(status: int, error: abi.Error | None = None) -> int:
-    """Raise what a negative status means, in the library's words; return any other."""
+    """Raise a negative status as an exception with the library's text; return any other status."""
     if status >= 0:
         return status
     name = library().gait_result_name(status).decode()
@@ -105,12 +105,12 @@ def check(status: int, error: abi.Error | None = None) -> int:
 
 
 def call(name: str, *arguments: Any) -> int:
-    """Call a function whose last argument is a ``gait_error *``; return what `check` does.
+    """Call a function whose last argument is a ``gait_error *``; raise or return as `check` does.
 
-    Structures are given as they are; ctypes passes pointers to them.  ValueError for a whole number that does
-    not fit its type, which ctypes would cut.
+    Pass structures as they are; ctypes makes the pointers.  ValueError for an integer that does not fit its
+    type, which ctypes would truncate.
     """
-    function = getattr(library(), name)  # first: it describes the structures
+    function = getattr(library(), name)  # first, since loading defines the structures
     for kind, value in zip(function.argtypes, arguments, strict=False):
         if isinstance(value, int) and getattr(kind, "_type_", "") in _WHOLE and kind(value).value != value:
             raise ValueError(f"{name}: {value} does not fit in {8 * ctypes.sizeof(kind)} bits; give less")
@@ -119,7 +119,7 @@ def call(name: str, *arguments: Any) -> int:
 
 
 def make(kind: str, *arguments: Any) -> tuple[ctypes.c_void_p, NDArray[np.uint8]]:
-    """Make an object by ``gait_KIND_bytes`` and ``gait_KIND_init``; return it and its memory."""
+    """Make an object with ``gait_KIND_bytes`` and ``gait_KIND_init``; return it and its memory."""
     size, handle = ctypes.c_size_t(), ctypes.c_void_p()
     call(f"gait_{kind}_bytes", *arguments, size)
     memory = aligned(size.value)
@@ -128,7 +128,7 @@ def make(kind: str, *arguments: Any) -> tuple[ctypes.c_void_p, NDArray[np.uint8]
 
 
 def aligned(size: int) -> NDArray[np.uint8]:
-    """Memory of `size` bytes at an address that is a multiple of GAIT_ALIGN."""
+    """Allocate `size` bytes at an address that is a multiple of GAIT_ALIGN."""
     import numpy as np
 
     space = np.zeros(size + abi.ALIGN, np.uint8)

@@ -1,7 +1,7 @@
-"""3-D motion from 2-D keypoints by the C library: one segment, many at once, or a stream.
+"""3-D motion from 2-D keypoints with the C library: one segment, many at once, or a stream.
 
-After Leventon and Freeman (1998).  The prior is that of `gait.bindings.segment_prior.SegmentPrior`;
-tests/reference has the same inference in numpy and proves it.
+After Leventon and Freeman (1998).  The prior is a `gait.bindings.segment_prior.SegmentPrior`; tests/reference
+contains the same inference in numpy, against which the library is tested.
 """
 
 from __future__ import annotations
@@ -26,7 +26,7 @@ Array = NDArray[np.float64]
 
 @dataclass(frozen=True)
 class LiftInfo:
-    """What the segment prior of a blob holds; see ``gait_lift_info``."""
+    """Contents of a blob's segment prior; see ``gait_lift_info``."""
 
     markers: int
     frames: int
@@ -50,16 +50,17 @@ class Fit:
     log10_volume : float
         log10 of posterior over prior volume of all unknowns.
     chi2 : float
-        Sum of squared residuals in standard deviations.
+        Sum of squared residuals, each divided by its standard deviation.
     heading, heading_sd : float
         Radians about z; 0 = along +x.
     place : ndarray of shape (3,)
-        Of the pelvis in the first frame, z: of the floor, metres.
+        Position of the pelvis in the first frame, with the height of the floor as z, metres.
     share : float
         Posterior probability of the component.
     component, observed, iterations : int
-        Gaussian of the mixture; numbers observed; passes taken.
+        Index of the Gaussian in the mixture; number of observed coordinates; iterations of the fit.
     converged : bool
+        Whether the fit converged within the iterations allowed.
     """
 
     log_evidence: float
@@ -82,16 +83,16 @@ class LiftedFrame:
     Attributes
     ----------
     utime : int
-        Its capture time, microseconds.
+        Capture time, microseconds.
     frame : int
-        Frames pushed before it since the start.
+        Number of frames pushed before it since the start.
     status : TrackStatus
         TRACKING; AMBIGUOUS if the observations do not fit; INIT before the first whole segment.
     flags : LiftFlag
     heading : float
         Radians.
     chi2_per_observation : float
-        Squared standard deviations per number observed.
+        Squared residual, in standard deviations, per observed coordinate.
     markers, sd : ndarray of shape (J, 3)
         Posterior mean and standard deviation, metres, world; 0 for those not in the config's `report`.
     """
@@ -114,12 +115,12 @@ class Lifter:
     source : Model, path or bytes, optional
         Blob with a segment prior; the shipped model by default.
     view : Camera, or array_like of shape (2, 3)
-        Calibrated camera, with keypoints in pixels; or the directions of u and v in the world for an
-        orthographic view, with keypoints in metres.  Required: ``Lifter(view=camera)``.
+        Calibrated camera, for keypoints in pixels; or the directions of u and v in the world, for an
+        orthographic view with keypoints in metres.  Required: ``Lifter(view=camera)``.
     config : LiftConfig, optional
         Settings such as stature and lag; the library's defaults if left out.
     **settings
-        Not accepted: settings belong in `config`.
+        Not accepted, only named in the error: settings belong in `config`.
 
     Attributes
     ----------
@@ -127,7 +128,7 @@ class Lifter:
     names : tuple of str
         The J markers.
     memory_bytes : int
-        All the memory that lifting uses.
+        Size of the only memory that lifting uses.
 
     Raises
     ------
@@ -137,7 +138,7 @@ class Lifter:
         If the file cannot be read.
     GaitError
         If the blob has no valid segment prior, or a setting is out of range; later, if a method is called
-        before the one that it needs.
+        before another whose result it needs.
 
     Notes
     -----
@@ -176,7 +177,7 @@ class Lifter:
         call(f"gait_lift_{name}", self._handle, *arguments)
 
     def _observations(self, uv: ArrayLike, sd: ArrayLike | None, *shape: int) -> tuple[Array, Array | None]:
-        """Check shapes (..., J, 2) and (..., J)."""
+        """Convert observations to arrays of the right shapes (..., J, 2) and (..., J), or ValueError."""
         points = np.ascontiguousarray(uv, np.float64)
         if points.shape != (*shape, 2):
             raise ValueError(f"uv has shape {points.shape} instead of {(*shape, 2)}")
@@ -194,9 +195,9 @@ class Lifter:
         Parameters
         ----------
         uv : array_like of shape (F, J, 2)
-            Pixels, or metres of an orthographic view.
+            Pixels, or metres in an orthographic view.
         sd : array_like that broadcasts to (F, J), optional
-            Standard deviations in the same unit; the config's if left out.
+            Standard deviations in the same unit; by default the config's.
         """
         points, sds = self._observations(uv, sd, *self._shape)
         c = abi.LiftFitC()
@@ -204,7 +205,7 @@ class Lifter:
         return _fit(c)
 
     def segment_robust(self, uv: ArrayLike, sd: ArrayLike | None = None) -> tuple[Fit, Array]:
-        """Fit one segment as `segment` does, with outliers of the fit down-weighted.
+        """Fit one segment as `segment` does, down-weighting outliers.
 
         Returns
         -------
@@ -218,27 +219,27 @@ class Lifter:
         return _fit(c), weighted
 
     def expect(self, place: ArrayLike, heading: float = 0.0, heading_sd: float = -1.0) -> None:
-        """Expect the person of the following segments at this position (3,) and heading, not the config's.
+        """Set the expected position (3,) and heading of the person in later segments, replacing the config's.
 
-        A `heading_sd` of -1 leaves the heading unknown.  The lifter must have been made so.
+        A `heading_sd` of -1 means that the heading is unknown; the config's must then be -1 too.
         """
         self._call("expect", np.ascontiguousarray(place, np.float64).reshape(3), heading, heading_sd)
 
     def positions(self) -> tuple[Array, Array]:
-        """Give posterior mean and standard deviation (F, J, 3) of the last segment or of `fix`; metres."""
+        """Return posterior mean and standard deviation (F, J, 3) of the last segment or of `fix`; metres."""
         mean, sd = np.empty((*self._shape, 3)), np.empty((*self._shape, 3))
         self._call("positions", mean, sd)
         return mean, sd
 
     def posterior(self) -> tuple[Array, Array]:
-        """Mean (n,) and covariance (n, n) of modes, place, stature and heading; each N(0, 1) a priori."""
+        """Return mean (n,), covariance (n, n) of modes, position, stature, heading; each N(0, 1) a priori."""
         count = library().gait_lift_unknowns(self._handle)
         mean, covariance = np.empty(count), np.empty((count, count))
         self._call("posterior", mean, covariance)
         return mean, covariance
 
     def scale(self) -> float:
-        """Factor for the standard deviations of the last segment.
+        """Return a factor for the standard deviations of the last segment.
 
         Above 1 if its modes are larger than the prior expects, below 1 if they are smaller (the most probable
         scale of the modes' variances, with an inverse gamma prior).  In an orthographic view with known
@@ -252,7 +253,7 @@ class Lifter:
         return scale.value
 
     def least_squares(self) -> Array:
-        """Fit the last segment's observations alone (F, J, 3): least squares of minimum norm."""
+        """Fit the last segment without the prior: least squares of minimum norm (F, J, 3)."""
         mean = np.empty((*self._shape, 3))
         self._call("least_squares", mean)
         return mean
@@ -275,11 +276,14 @@ class Lifter:
         return sd, modes
 
     def fix(self, sd: ArrayLike) -> None:
-        """Compute the gain for standard deviations `sd` (F, J): orthographic view, config `heading_sd` 0."""
+        """Compute the gain for standard deviations `sd` (F, J).
+
+        The view must be orthographic and the config's `heading_sd` 0.
+        """
         self._call("fix", np.ascontiguousarray(np.broadcast_to(sd, self._shape), np.float64))
 
     def batch(self, uv: ArrayLike) -> Array:
-        """Lift segments (n, F, J, 2) by the gain of `fix`; posterior means (n, F, J, 3)."""
+        """Lift segments (n, F, J, 2) with the gain of `fix`; return posterior means (n, F, J, 3)."""
         count = len(np.asarray(uv))
         points, _ = self._observations(uv, None, count, *self._shape)
         mean = np.empty((*points.shape[:-1], 3))
@@ -287,12 +291,12 @@ class Lifter:
         return mean
 
     def push(self, utime: int, uv: ArrayLike, sd: ArrayLike | None = None) -> None:
-        """Add one frame to the stream: uv (J, 2), sd (J,); microseconds, increasing."""
+        """Add one frame to the stream: uv (J, 2), sd (J,); `utime`, microseconds, must increase."""
         points, sds = self._observations(uv, sd, self.info.markers)
         self._call("push", utime, points, sds)
 
     def estimate(self) -> LiftedFrame | None:
-        """Estimate the frame `lag` frames before the last one pushed; None: not so many yet."""
+        """Estimate the frame `lag` frames before the last one pushed; None while there are too few."""
         c = abi.LiftFrameC()
         try:
             self._call("estimate", c)
@@ -313,7 +317,7 @@ class Lifter:
         )
 
     def reset(self) -> None:
-        """Forget the stream."""
+        """Forget all frames of the stream."""
         library().gait_lift_reset(self._handle)
 
 
@@ -323,7 +327,7 @@ def _fit(c: abi.LiftFitC) -> Fit:
 
 
 def remove_spikes(time: ArrayLike, uv: ArrayLike, sd: ArrayLike) -> Array:
-    """Find points that are far off the line through the same point's neighbours in time.
+    """Mark points that are far from the line through the same point in neighbouring frames.
 
     Parameters
     ----------
@@ -344,12 +348,12 @@ def remove_spikes(time: ArrayLike, uv: ArrayLike, sd: ArrayLike) -> Array:
 
 
 def weight_outliers(square: ArrayLike, sd: ArrayLike) -> Array:
-    """Enlarge the standard deviations (P,) of points far from their prediction, so that they hardly count.
+    """Enlarge the standard deviations (P,) of points far from their prediction, so that they count little.
 
     Parameters
     ----------
     square : (P,)
-        Squared distances of the points of one frame from their prediction, in standard deviations.
+        Squared distances of one frame's points from their prediction, in standard deviations.
     """
     distances, weighted = np.ascontiguousarray(square, np.float64), np.array(sd, np.float64)
     library().gait_lift_weight_outliers(len(distances), distances, weighted, np.empty(len(distances)))

@@ -24,15 +24,15 @@ from gait.io.files import require_file
 
 Array = NDArray[np.float64]
 
-#: Models of the package by name: of people, the default; of Ormoneit and others (2000), for paper mode; of
-#: people of several laboratories who walk, stand, walk backwards and run.
+#: Models in the package by name: the default; that of Ormoneit and others (2000), for paper mode; one with
+#: the motion classes walking, standing, walking backwards and running, from several laboratories.
 SHIPPED = ("walk", "paper", "classes")
 NOT_CYCLIC = "contains no cyclic model; learn it without --segments only"
 
 
 @dataclass(frozen=True)
 class LoadedModel:
-    """A ``gait_model`` and the memory that it lies in."""
+    """A ``gait_model`` and the memory that contains it."""
 
     handle: ctypes.c_void_p
     blob: NDArray[np.uint8]
@@ -40,7 +40,7 @@ class LoadedModel:
 
 
 def load(source: str | os.PathLike[str] | bytes | None) -> LoadedModel:
-    """Check and take in a blob: a file, its contents, or one of the package (`SHIPPED`; None: ``walk``).
+    """Check and load a blob: a file, its contents, or one of the package (`SHIPPED`; None: ``walk``).
 
     Raises
     ------
@@ -72,17 +72,17 @@ class ModelInfo:
     components : int
         Principal components of the cyclic motion.
     proportions : int
-        Components of the variation of limb lengths at the same stature.
+        Components of the variation of limb lengths between people of the same stature.
     phases : int
-        Samples per stride of its curves.
+        Samples per stride of the curves.
     limbs : int
         Drawn body parts.
     stride_hz, stride_hz_sd : float
         Strides per second: mean of the training set, and standard deviation between subjects.
     stride_length, stride_length_sd : float
-        Fractions of stature, likewise.
+        The same of the stride length, fractions of stature.
     cyclic : int
-        1; 0 for a blob with only a segment prior.
+        1 if the blob has a cyclic model, 0 if only a segment prior.
     posture_angles : int
         Bit i: angle i belongs to the trunk or an arm, where posture varies most.
     classes : int
@@ -116,8 +116,8 @@ class Model:
     Parameters
     ----------
     source : path or bytes, optional
-        File or contents of a blob, or the name of a model of the package where there is no such file:
-        ``walk`` (the default), or ``paper``, of 19 angles and 5 components, which `gait track` takes in
+        File or contents of a blob, or, if there is no such file, the name of a model in the package:
+        ``walk`` (the default), or ``paper``, with 19 angles and 5 components, which `gait track` uses in
         paper mode.
 
     Attributes
@@ -130,7 +130,8 @@ class Model:
     Raises
     ------
     UserError
-        If the file cannot be read, or is no sound model: not one, damaged, of another version.
+        If the file cannot be read, or is not a valid model: another kind of file, damaged, or of another
+        version.
     GaitError
         If the library refuses a blob given as bytes.
     """
@@ -149,12 +150,12 @@ class Model:
         self.classes = self._names("class", info.classes)
 
     def _names(self, kind: str, count: int) -> tuple[str, ...]:
-        """Names of joints, angles or limbs; bytes that are no UTF-8 are escaped."""
+        """List names of joints, angles or limbs; bytes that are not UTF-8 are escaped."""
         name = getattr(self._lib, f"gait_model_{kind}_name")
         return tuple(name(self.handle, i).decode(errors="backslashreplace") for i in range(count))
 
     def class_info(self, motion_class: int) -> ModelInfo:
-        """Return what the model holds of one of its classes of motion; IndexError if it has fewer."""
+        """Return the contents of the model for one class of motion; IndexError if it has no such class."""
         handle = self._lib.gait_model_of_class(self.handle, motion_class)
         if not handle:
             raise IndexError(f"class {motion_class}: the model has {self.info.classes}")
@@ -164,13 +165,13 @@ class Model:
         return f"<gait.Model of {self.info.components} components, digest {self.info.digest:016x}>"
 
     def pose(self, state: State) -> tuple[Array, Array]:
-        """Joint positions (P, 3) in the world, metres, and joint angles (A,), radians, of one hypothesis."""
+        """Compute joints (P, 3) in the world, metres, and joint angles (A,), radians, of one state."""
         c = abi.PoseC()
         call("gait_model_pose", self.handle, state.to_c(), c)
         return pose_arrays(c, self.info.joints, self.info.angles)
 
     def poses(self, states: NDArray[np.void]) -> tuple[NDArray[np.float32], NDArray[np.float32]]:
-        """Joints (..., P, 3), metres, and angles (..., A), radians, of an array (...) of ``gait_state``."""
+        """Compute joints (..., P, 3), metres, and angles (..., A), radians, of an array of ``gait_state``."""
         flat = np.ascontiguousarray(states).reshape(-1)
         pose, error, pointer = abi.PoseC(), abi.Error(), ctypes.POINTER(abi.StateC)
         joint, angle = np.ctypeslib.as_array(pose.joint), np.ctypeslib.as_array(pose.angle)
@@ -185,26 +186,26 @@ class Model:
         return joints.reshape(*shape, *joints.shape[1:]), angles.reshape(*shape, *angles.shape[1:])
 
     def pelvis_height(self, state: State) -> float:
-        """Height of the pelvis over the ground that the model predicts, metres (for any ``state.pelvis``)."""
+        """Predict the height of the pelvis above the ground, metres; ``state.pelvis`` does not matter."""
         height = ctypes.c_float()
         call("gait_model_pelvis_height", self.handle, state.to_c(), height)
         return height.value
 
     def angle_mask(self, names: str) -> int:
-        """Bit i for each angle i named in `names`, separated by spaces; see config `offset_angles`."""
+        """Set bit i for each angle i in `names`, separated by spaces; see config `offset_angles`."""
         mask = ctypes.c_uint32()
         call("gait_model_angle_mask", self.handle, names.encode(), mask)
         return mask.value
 
     def prior(self) -> tuple[State, State]:
-        """Mean and standard deviation of an unknown person, with the pelvis at the origin."""
+        """Return mean and standard deviation of an unknown person's state, with the pelvis at the origin."""
         mean, sd = abi.StateC(), abi.StateC()
         call("gait_tracker_prior", self.handle, mean, sd)
         sizes = (self.info.components, self.info.angles)
         return State.from_c(mean, *sizes), State.from_c(sd, *sizes)
 
     def render(self, camera: Camera, state: State) -> NDArray[np.uint8]:
-        """Draw a hypothesis through an ideal lens: (height, width) of limb index + 1, or 0 for none."""
+        """Draw a state through an ideal lens: (height, width) of limb index + 1, or 0 for none."""
         ids = np.zeros((camera.height, camera.width), np.uint8)
         call("gait_render", self.handle, camera.to_c(), state.to_c(), ids, camera.width)
         return ids
@@ -222,14 +223,14 @@ def pose_arrays(c: abi.PoseC, joints: int, angles: int) -> tuple[Array, Array]:
 
 def pose_c(pose: CameraPose) -> abi.CameraPoseC:
     """Make a ``gait_camera_pose``."""
-    library()  # describes the structures
+    library()  # loading it defines the structures
     c = abi.CameraPoseC(turn_sd=pose.turn_sd, place_sd=pose.place_sd)
     c.R[:], c.t[:] = pose.R.ravel().tolist(), pose.t.tolist()
     return c
 
 
 def read_blob(path: str | os.PathLike[str] | None) -> bytes:
-    """Bytes of a blob file, or of one of the package's own by its name, whose container is sound."""
+    """Read a blob file, or a blob of the package by its name, and check its container."""
     name = SHIPPED[0] if path is None else str(path)
     if path is None or (name in SHIPPED and not Path(path).is_file()):
         shipped = resources.files("gait") / "data" / f"{name}.gait"
@@ -243,7 +244,7 @@ def read_blob(path: str | os.PathLike[str] | None) -> bytes:
 
 
 def read_cyclic(path: str | os.PathLike[str] | None) -> dict[str, Any]:
-    """Sections of a blob file, or of the package's own, that has a cyclic model."""
+    """Read the sections of a blob, of a file or of the package; UserError if it has no cyclic model."""
     sections = decode(read_blob(path), str(path))
     if "CURV" not in sections:
         raise UserError(f"{path}: {NOT_CYCLIC}")
@@ -252,6 +253,6 @@ def read_cyclic(path: str | os.PathLike[str] | None) -> dict[str, Any]:
 
 
 def walking_model(path: str | os.PathLike[str] | None) -> Model:
-    """Model with curves of walking: the given one or, if it has only a segment prior, the shipped one."""
+    """Load a model with walking curves: the given one, or the shipped one if it has only a segment prior."""
     own = path is not None and "CURV" in decode(read_blob(path))
     return Model(path if own else None)

@@ -1,9 +1,8 @@
 """The prior over segments of motion: x = mean + sum_i alpha_i mode_i + residual, alpha ~ N(0, I).
 
-A segment is F frames of J markers, in statures; the pelvis of its first frame is over the origin and the
-floor is z = 0.  With `headings` 0 its body looks along +x in the first frame.
-`gait.learn.segments.fit` writes what is read here; the sections are in
-libgait/doc/model-format.md.
+A segment is F frames of J markers, in statures; in its first frame the pelvis is above the origin; the floor
+is z = 0.  With `headings` 0 the body faces +x in the first frame.  `gait.learn.segments.fit` learns priors;
+libgait/doc/model-format.md describes the sections.
 """
 
 from __future__ import annotations
@@ -21,7 +20,7 @@ from gait.io import blob
 
 Floats = npt.NDArray[np.float64]
 
-#: Sections of a blob that hold the prior: all of them, or none.
+#: Sections of a blob that contain the prior; a blob has all of them or none.
 TAGS = ("SGNM", "SGIN", "SGRT", "SGWT", "SGMN", "SGMD", "SGSD", "SGPS")
 
 
@@ -38,22 +37,22 @@ class SegmentPrior:
     fps : float
         Frames per second of the segments.
     headings : int
-        0: the heading is latent; 2 or 8: so many turned copies were learnt, in the axes of the world.
+        0: the heading is latent; 2 or 8: that many rotated copies of each segment were learnt, in world axes.
     weights : (K,)
-        Shares of the mixture's components, sum 1.
+        Weights of the mixture's components; their sum is 1.
     mean : (K, F, J, 3)
     modes : (K, k, F, J, 3)
-        Principal directions times their standard deviations, most variance first.
+        Principal directions times their standard deviations, largest variance first.
     sd : (K, k)
         These standard deviations; 0 where a component has fewer modes.
     residual : (K, J)
-        Variance of each coordinate of a marker outside the modes, squared statures.
+        Variance of each coordinate of a marker that the modes do not explain, squared statures.
     gamma : float
-        Factor of that variance which held-out recordings ask for.
+        Factor of that variance, estimated on held-out recordings.
     stature : float
-        Mean of the people learnt from, metres.
+        Mean stature of the training subjects, metres.
     segments, recordings : int
-        How many were learnt from.
+        Size of the training set.
     """
 
     names: tuple[str, ...]
@@ -72,32 +71,32 @@ class SegmentPrior:
 
     @property
     def frames(self) -> int:
-        """Frames F of a segment."""
+        """Number F of frames of a segment."""
         return int(self.mean.shape[1])
 
     @property
     def components(self) -> int:
-        """Gaussians K of the mixture."""
+        """Number K of Gaussians in the mixture."""
         return len(self.weights)
 
     @property
     def size(self) -> int:
-        """Modes k of a component."""
+        """Number k of modes of a component."""
         return int(self.sd.shape[1])
 
     def explained(self) -> Floats:
-        """Share of the variance in the components that the first modes explain of what was learnt, (k,)."""
+        """Share (k,) of the variance within components, in training, that the first 1 ... k modes explain."""
         inside = np.cumsum(self.weights @ self.sd**2)
         outside = 3 * self.frames * float(self.weights @ self.residual.sum(axis=1))
         return np.asarray(inside / (inside[-1] + outside))
 
     def index(self, names: Sequence[str]) -> npt.NDArray[np.intp]:
-        """Places of markers among `names`.
+        """Find the indices of markers in the prior.
 
         Raises
         ------
         UserError
-            If the prior does not know one.
+            If the prior lacks one.
         """
         for name in names:
             if name not in self.names:
@@ -111,7 +110,7 @@ class SegmentPrior:
         Raises
         ------
         UserError
-            If the file is no sound blob, or holds no such prior.
+            If the file is not a valid blob, or contains no segment prior.
         """
         from gait.bindings.model import read_blob  # as in from_sections()
 
@@ -120,7 +119,7 @@ class SegmentPrior:
 
     @classmethod
     def from_sections(cls, sections: Mapping[str, Any], name: str = "blob") -> SegmentPrior:
-        """Take the prior out of the sections of a blob, called `name` in errors.
+        """Read the prior from the sections of a blob, which errors call `name`.
 
         Raises
         ------
@@ -157,7 +156,7 @@ class SegmentPrior:
         )
 
     def sections(self) -> dict[str, blob.Array]:
-        """Sections SGNM ... SGPS of a blob that holds this prior, in the order of the file."""
+        """Make the sections SGNM ... SGPS of a blob from this prior, in the order of the file."""
         counts = [self.frames, self.hop, self.headings, self.components, self.size, self.segments]
         return {
             "SGNM": blob.pack_names(list(self.names)),
@@ -171,7 +170,7 @@ class SegmentPrior:
         }
 
     def restricted(self, names: tuple[str, ...]) -> SegmentPrior:
-        """Prior of some of the markers over an even number of frames."""
+        """Restrict the prior to some of the markers and an even number of frames."""
         at, frames = self.index(names), self.frames // 2 * 2
         return replace(
             self,
@@ -183,7 +182,7 @@ class SegmentPrior:
         )
 
     def widened(self, factor: float) -> SegmentPrior:
-        """Prior with `factor` times the standard deviations about its mean, for unlike motions."""
+        """Multiply standard deviations about the mean by `factor`, for motions unlike the training set."""
         return replace(
             self, modes=factor * self.modes, sd=factor * self.sd, residual=factor**2 * self.residual
         )

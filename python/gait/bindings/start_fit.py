@@ -1,4 +1,4 @@
-"""The automatic start: hypotheses of where a person is and how they walk, from a second of observations."""
+"""The automatic start: hypotheses of where a person is and how they walk, from one second of observations."""
 
 from __future__ import annotations
 
@@ -21,14 +21,14 @@ from gait.io.video import Image
 
 @dataclass(frozen=True)
 class Box:
-    """A person who stands on the floor in full view, pixels as captured.
+    """A person who stands on the floor in full view, in pixels as captured.
 
     Attributes
     ----------
     foot, head : ndarray of shape (2,)
-        Lowest point of the feet and crown, at the middle of the body.
+        Lowest point of the feet, and crown, both at the middle of the body.
     sd : float
-        Standard deviation of these coordinates.
+        Standard deviation of each of these coordinates.
     """
 
     foot: NDArray[np.float64]
@@ -37,30 +37,30 @@ class Box:
 
     @property
     def tall(self) -> float:
-        """Height in the picture."""
+        """Height in the image, pixels."""
         return float(np.hypot(*(self.foot - self.head)))
 
 
 @dataclass(frozen=True)
 class Hypothesis:
-    """One answer of the automatic start.
+    """One result of the automatic start.
 
     Attributes
     ----------
     mean, sd : State
-        Normals at the time asked for.
+        Normal distributions at the time asked for.
     speed, speed_sd : float
         Along the heading, metres per second.
     probability : float
-        Among the hypotheses found.
+        Relative to all hypotheses found.
     chi2_per_observation : float
         Robust squared error per coordinate, in standard deviations; about 1 if the model fits.
     in_place : bool
         The person stays in place, as on a treadmill.
     walks : bool
-        A walk that fits the observations, good enough to start with.
+        The hypothesis is a walk and fits the observations well enough to start a track.
     correlation : ndarray of shape (6, 6)
-        Of phase, stride rate, stature, heading, and the pelvis' x and y; other fields are independent.
+        Of phase, stride rate, stature, heading, and the pelvis's x and y; other fields are independent.
     """
 
     mean: State
@@ -74,7 +74,7 @@ class Hypothesis:
     correlation: NDArray[np.float64]
 
     def to_c(self) -> abi.HypothesisC:
-        """Struct of the C library."""
+        """Make a ``gait_hypothesis``."""
         c = abi.HypothesisC(
             mean=self.mean.to_c(),
             sd=self.sd.to_c(),
@@ -98,14 +98,14 @@ class StartFit:
     camera : Camera
         Calibrated; if it moves, see `set_pose`.
     stature, stature_sd : float, optional
-        Of the person, metres; the model's adults if left out.
+        Of the person, metres; by default those of the model's adults.
     box_time : float, optional
         Seconds that the boxes of a person must cover.
 
     Raises
     ------
     GaitError
-        If the model has no cyclic part, or a number is out of its range.
+        If the model has no cyclic part, or a number is out of range.
     """
 
     def __init__(
@@ -126,7 +126,7 @@ class StartFit:
         self._handle, self._memory = make("start", model.handle, config)
 
     def set_pose(self, pose: CameraPose) -> None:
-        """Put the camera where it is in the frames and boxes given from now on."""
+        """Set the camera's pose in the frames and boxes added from now on."""
         call("gait_start_set_pose", self._handle, pose_c(pose))
 
     def add(self, utime: int, keypoints: FrameKeypoints) -> None:
@@ -148,30 +148,30 @@ class StartFit:
         return [Box(np.array(c.foot), np.array(c.head), c.sd) for c in found[: count.value]]
 
     def other_scene(self, image: Image, background: Image) -> bool:
-        """Whether half of a picture differs from the background: another scene, or the camera has moved."""
+        """Whether half of an image differs from the background: another scene, or the camera has moved."""
         other = ctypes.c_int32()
         views = [image_view(picture, self._camera, "frame") for picture in (image, background)]
         call("gait_start_other_scene", self._handle, *views, other)
         return bool(other.value)
 
     def stature(self, box: Box) -> float:
-        """Stature of the person in a box by the camera, metres; NaN if there is no floor under the feet."""
+        """Compute the stature of the person in a box, metres; NaN if the camera sees no floor at the feet."""
         found = ctypes.c_float()
         call("gait_start_box_stature", self._handle, _boxes_c([box]), found)
         return found.value
 
     def reset(self) -> None:
-        """Forget the frames."""
+        """Forget all frames added."""
         library().gait_start_reset(self._handle)
 
     def solve(self, utime: int) -> list[Hypothesis]:
-        """Fit the frames added and give hypotheses for a time, microseconds, the most probable first.
+        """Fit the frames added; return hypotheses for a time, microseconds, the most probable first.
 
         Raises
         ------
         GaitError
-            If too few frames show hips and ankles (four or more over 0.3 s are needed) or a box of one
-            person (eight or more over `box_time`), or nothing fits.
+            If too few frames show hips and ankles (at least four over 0.3 s are needed) or a box of one
+            person (at least eight over `box_time`), or nothing fits.
         """
         found, count = (abi.HypothesisC * abi.MAX_HYPOTHESES)(), ctypes.c_int32()
         call("gait_start_solve", self._handle, utime, found, abi.MAX_HYPOTHESES, count)

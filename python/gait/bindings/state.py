@@ -1,4 +1,4 @@
-"""One state of the person, with NumPy arrays."""
+"""One state of the person, as Python numbers and NumPy arrays."""
 
 from __future__ import annotations
 
@@ -15,14 +15,14 @@ from gait.bindings.library import library, struct_fields
 
 Array = NDArray[np.float64]
 LIMITS = {"coef": abi.MAX_COMPONENTS, "offset": abi.MAX_ANGLES, "proportion": abi.MAX_PROPORTIONS}
-LEAST_STATURE = 0.3  # metres, of a particle (particles.h)
-POSE_SCALARS = ("phase", "stride_hz", "stature", "heading", "pitch", "roll")  # poses need no more
+LEAST_STATURE = 0.3  # metres; the smallest that particles may have (particles.h)
+POSE_SCALARS = ("phase", "stride_hz", "stature", "heading", "pitch", "roll")  # scalars that a pose depends on
 SCALARS = (*POSE_SCALARS, "turn_rate")
 
 
 @cache
 def state_range(name: str) -> tuple[float, float]:
-    """Lowest and highest value of a field of a `State` to start from, by the library's table."""
+    """Lowest and highest value of a field of a first `State`, from the library's table."""
     return next((row.low, row.high) for row in struct_fields("gait_state") if row.name == name)
 
 
@@ -47,11 +47,11 @@ class State:
     coef : ndarray of shape (q,)
         Principal-component scores in standard deviations; missing ones are 0.
     offset : ndarray of shape (A,)
-        Posture: added to the model's joint angles, radians; missing ones are 0.
+        Posture offsets: added to the model's joint angles, radians; missing ones are 0.
     proportion : ndarray of shape (p,)
         Scores of the limbs' proportions in standard deviations; missing ones are 0.
     turn_rate : float
-        Of the heading, radians per second, positive to the left.
+        Change of the heading, radians per second, positive to the left.
     motion_class : int
         Index of the class of motion in `Model.classes`.
     """
@@ -71,7 +71,7 @@ class State:
 
     @staticmethod
     def from_c(c: abi.StateC, components: int, angles: int) -> State:
-        """Copy a ``gait_state``, keeping `components` scores and `angles` offsets."""
+        """Copy a ``gait_state``, with `components` scores and `angles` offsets."""
         arrays = {"pelvis": c.pelvis, "coef": c.coef[:components], "offset": c.offset[:angles]}
         arrays["proportion"] = c.proportion[:]
         values: dict[str, Any] = {name: float(getattr(c, name)) for name in SCALARS}
@@ -84,13 +84,13 @@ class State:
         Raises
         ------
         ValueError
-            If `pelvis` is not of 3 numbers, or another array has more than the library can hold.
+            If `pelvis` does not have 3 numbers, or another array has more than the library allows.
         """
         pelvis: Sequence[float] = np.asarray(self.pelvis, float).tolist()
         if len(pelvis) != 3 or any(np.size(getattr(self, name)) > most for name, most in LIMITS.items()):
             limits = ", ".join(f"{name} at most {most}" for name, most in LIMITS.items())
             raise ValueError(f"state: pelvis has 3 numbers, {limits}")
-        library()  # describes the structures
+        library()  # loading it defines the structures
         c = abi.StateC(**{name: float(getattr(self, name)) for name in SCALARS})
         c.motion_class = self.motion_class
         c.pelvis[:] = pelvis

@@ -1,4 +1,4 @@
-"""A person's measured body: a file of lengths, and a model whose skeleton has these lengths."""
+"""A person's measured body: a file of lengths, and a model whose skeleton has those lengths."""
 
 from __future__ import annotations
 
@@ -19,28 +19,29 @@ from gait.io.fields import read_json
 
 Floats = npt.NDArray[np.float64]
 
-#: A length, and the frame or point whose place in a limb's frame ends it; widths are between both sides.
+#: Each length to the frame or point at its end, whose position in its parent frame gives the length, or half
+#: of a width.  `_SUMS` are lengths with two parts.
 _LIMBS = {"thigh": "shank", "shank": "foot", "upper_arm": "forearm", "forearm": "wrist"}
 _WIDTHS = {"hip_width": "thigh", "shoulder_width": "upper_arm"}
 _SUMS = {"leg": ("thigh", "shank"), "arm": ("upper_arm", "forearm")}
 LENGTHS = (*_SUMS, *_LIMBS, *_WIDTHS)
-_USUAL = 0.7, 1.4  # a length as a multiple of that of people of the same stature
+_USUAL = 0.7, 1.4  # accepted lengths, as multiples of the model's at the same stature
 _REMEDY = "give metres between centres of joints"
 
 
 @dataclass(frozen=True)
 class MeasuredBody:
-    """What was measured of a person.
+    """Measurements of a person's body.
 
     Attributes
     ----------
     stature : float
         Metres.
     lengths : dict of str to float
-        Metres between centres of joints, some of `LENGTHS`: ``leg`` from hip to ankle, ``arm`` from shoulder
-        to wrist, or their parts, which both sides share; ``hip_width`` and ``shoulder_width`` across.
+        Metres between centres of joints, for some of `LENGTHS`: ``leg`` from hip to ankle and ``arm`` from
+        shoulder to wrist, or their parts, equal on both sides; ``hip_width``, ``shoulder_width``.
     source : str
-        File that they are from, for messages.
+        File with the measurements, for messages.
     """
 
     stature: float
@@ -69,20 +70,20 @@ class MeasuredBody:
 
 
 def model_of(body: MeasuredBody, source: str | os.PathLike[str] | None = None) -> bytes:
-    """Blob of a model, by default the package's, whose skeleton has the lengths of a body.
+    """Give the skeleton of a model, by default the package's, the lengths of a body; return the blob.
 
-    What was not measured stays in proportion to the stature.
+    Lengths that were not measured stay in proportion to the stature.
 
     Raises
     ------
     UserError
-        If the model cannot be read or lacks a limb, or if a length is no person's.
+        If the model cannot be read or lacks a limb, or if a length is implausible.
     """
     return blob.encode(_with_lengths(read_cyclic(source), body))
 
 
 def _with_lengths(sections: Mapping[str, Any], body: MeasuredBody) -> dict[str, Any]:
-    """Return the sections of a blob with the lengths of a body."""
+    """Return the sections of a blob, changed to the lengths of a body."""
     origins, places = np.array(sections["FRMF"], float), np.array(sections["PTNF"], float)
     limbs = np.array(sections["LIMF"], float)
     frames, points = blob.unpack_names(sections["FRNM"]), blob.unpack_names(sections["PTNM"])
@@ -106,7 +107,7 @@ def _with_lengths(sections: Mapping[str, Any], body: MeasuredBody) -> dict[str, 
 
 
 def _lengths(frames: list[str], origins: Floats, points: list[str], places: Floats) -> dict[str, float]:
-    """Lengths of the limbs and widths, statures; ValueError if the skeleton has no such part."""
+    """Lengths of limbs, and widths, in statures; ValueError if the skeleton lacks a part."""
     out = {}
     for name, end in _LIMBS.items():
         at = places[points.index(f"l_{end}")] if end == "wrist" else origins[frames.index(f"l_{end}")]
@@ -117,7 +118,7 @@ def _lengths(frames: list[str], origins: Floats, points: list[str], places: Floa
 
 
 def _factors(body: MeasuredBody, usual: Mapping[str, float]) -> dict[str, float]:
-    """Lengths as multiples of the usual ones."""
+    """Measured lengths as multiples of the `usual` ones; UserError for an implausible one."""
     measured = {name: length / body.stature for name, length in body.lengths.items()}
     for whole, parts in _SUMS.items():
         if whole not in measured:
@@ -136,7 +137,7 @@ def _factors(body: MeasuredBody, usual: Mapping[str, float]) -> dict[str, float]
 
 
 def _raised(sections: Mapping[str, Any], longer: float) -> dict[str, Floats]:
-    """Curves of all classes of motion with the pelvis higher as legs are `longer`, statures."""
+    """Curves of all classes of motion, with the pelvis raised by `longer`, statures, as the legs are."""
     height = blob.unpack_names(sections["CHNM"]).index("root_height")
     factor = 1.0 + longer / float(np.mean(sections["CURV"][0, :, height]))
     curves = {tag: np.array(values, float) for tag, values in sections.items() if tag[:3] in ("CUR", "PAC")}

@@ -1,7 +1,7 @@
 """Curves of a cyclic model in numpy, for many states at once, and their dependence on the stride rate.
 
-A model's angles and root motion are a mean and principal components over the stride (Ormoneit 2000, eq. 3).
-In models with section PACE the mean depends on the pace: how much faster than the mean a person walks.
+A model's angles and root motion are a mean plus principal components over the stride (Ormoneit 2000, eq. 3).
+In models with section PACE the mean depends on the pace: how far a person's stride rate is above the average.
 """
 
 from __future__ import annotations
@@ -23,10 +23,10 @@ MOST = 2.0
 
 
 def pace(statistics: npt.ArrayLike, stride_hz: npt.ArrayLike) -> Floats:
-    """Stride rates (...) as standard deviations between people from the mean, at most `MOST`.
+    """Pace (...): stride rates minus the mean, in standard deviations between people, limited to `MOST`.
 
-    `statistics` (2, ...): mean and standard deviation of the stride rate, as section GAIT begins; `stride_hz`
-    (...) is 0 where it is not known, as if it were the mean.
+    `statistics` (2, ...): mean and standard deviation of the stride rate, the first values of section GAIT;
+    `stride_hz` (...): 0 where unknown, for which the pace is 0.
     """
     mean, sd = np.asarray(statistics, float)[:2]
     rate = np.asarray(stride_hz, float)
@@ -37,14 +37,14 @@ def pace(statistics: npt.ArrayLike, stride_hz: npt.ArrayLike) -> Floats:
 
 @cache
 def waves(terms: int, phases: int) -> Floats:
-    """Constant, then cosine and sine of each harmonic (terms, phases); `terms` is an odd number."""
+    """Fourier basis (terms, phases), `terms` = 1 + 2 n: a constant, then cosine and sine of n harmonics."""
     turn = 2 * np.pi * np.outer(np.arange(1, (terms + 1) // 2), np.arange(phases) / phases)
     pairs = np.stack([np.cos(turn), np.sin(turn)], axis=1)
     return np.concatenate([np.ones((1, phases)), pairs.reshape(terms - 1, phases)])
 
 
 def series(curve: Floats, terms: int) -> Floats:
-    """PACE (terms, M) of a curve (T, M): its Fourier series, cut off."""
+    """Fourier coefficients (terms, M) of curves (T, M), truncated, as section PACE stores them."""
     rows = waves(terms, len(curve))
     return np.asarray(rows @ curve / np.sum(rows**2, axis=1)[:, None])
 
@@ -67,7 +67,7 @@ def slope_of(sections: Mapping[str, Any], name: str = "model") -> Floats | None:
 
 
 def at_phase(samples: Floats, phase: npt.ArrayLike) -> Floats:
-    """Return curves (K, T, ...) over the stride at phases (n...), linear between samples: (K, n..., ...)."""
+    """Interpolate curves (K, T, ...) over the stride linearly at phases (n...): (K, n..., ...)."""
     size = samples.shape[1]
     place = (np.asarray(phase, float) % 1.0) * size
     left = np.floor(place).astype(int) % size
@@ -78,9 +78,9 @@ def at_phase(samples: Floats, phase: npt.ArrayLike) -> Floats:
 def curves(
     sections: Mapping[str, Any], phase: npt.ArrayLike, coef: npt.ArrayLike, stride_hz: npt.ArrayLike = 0.0
 ) -> Floats:
-    """All channels (N, M) at phases (N,) for scores (N, k): the mean plus the sum of c_k comp_k.
+    """Evaluate all channels (N, M) at phases (N,) for scores (N, k): mean plus sum of score times component.
 
-    stride_hz : stride rates (N,) or scalar, which the mean follows; 0: the mean rate.
+    stride_hz : stride rates (N,) or scalar, on which the mean depends; 0: the average rate.
     """
     phase, coef = np.asarray(phase, float), np.asarray(coef, float)
     weights = np.concatenate([np.ones((len(phase), 1)), coef], axis=1)
@@ -95,12 +95,13 @@ def curves(
 class ModelCurves:
     """Angles and root motion of a model over the stride.
 
-    `sections`: of the blob, from `gait.io.blob.decode`. `names`: M channels: the angles, then the root's.
+    `sections`: those of the blob, from `gait.io.blob.decode`. `names`: the M channels: angles, then root.
     `samples` (1 + q, T, M): mean, then components times their standard deviations; radians or statures.
-    `residual`, `static` (M,): standard deviations of what the components leave, and of a person's constant
-    offset. `height_change` (p,): of the pelvis, relatively, by one standard deviation of each of the limbs'
-    proportions. `faster` (T, M): change of the mean per unit of `pace`; 0 in models whose mean does not
-    follow the rate. `stride_hz`, `stride_length`: means of the training set; per second, statures.
+    `residual`, `static` (M,): standard deviations of what the components do not explain, and of a person's
+    constant offset. `height_change` (p,): relative change of the pelvis's height per standard deviation of
+    each component of the limbs' proportions. `faster` (T, M): change of the mean per unit of `pace`; 0 in
+    models whose mean does not depend on the rate. `stride_hz`, `stride_length`: means of the training set, in
+    strides per second and statures.
     """
 
     def __init__(self, sections: Mapping[str, npt.NDArray[Any]]) -> None:
@@ -119,10 +120,10 @@ class ModelCurves:
         self.stride_hz, self.stride_length = float(self._gait[0]), float(self._gait[3])
 
     def channel(self, name: str, phase: Floats, coef: Floats, stride_hz: npt.ArrayLike = 0.0) -> Floats:
-        """Values of one channel.
+        """Evaluate one channel.
 
-        `phase` (...): strides, of any cycle. `coef` (..., k): scores of the first k components; broadcast
-        against `phase`. `stride_hz`: stride rates, broadcast against `phase`; 0: the mean rate.
+        `phase` (...): strides, of any cycle. `coef` (..., k): scores of the first k components, broadcast
+        against `phase`. `stride_hz`: stride rates, broadcast against `phase`; 0: the average rate.
         """
         at = self.names.index(name)
         curve = np.vstack([self.samples[: 1 + coef.shape[-1], :, at], self.faster[:, at]])
@@ -133,7 +134,7 @@ class ModelCurves:
     def norm(self, name: str, phase: Floats, stride_hz: float = 0.0) -> tuple[Floats, Floats]:
         """Mean and standard deviation of one channel among people, each of the shape of `phase`.
 
-        stride_hz : the rate at which they walk; 0: the mean rate.
+        stride_hz : the people's stride rate; 0: the average rate.
         """
         at = self.names.index(name)
         q = len(self.samples) - 1

@@ -1,9 +1,9 @@
-"""The default skeleton as data, and forward kinematics in numpy for learning, before there is a model.
+"""The default skeleton as data, and its forward kinematics in numpy, for learning, before a model exists.
 
-The C library poses learnt models; tests compare both.
+The C library poses learnt models; tests compare the two.
 
-Frames, rotations and signs are those of libgait/doc/model-format.md.  Lengths are fractions of stature,
-angles radians; body axes x forward, y left, z up.
+libgait/doc/model-format.md defines frames, rotations and signs.  Lengths are fractions of stature, angles
+radians; body axes are x forward, y left, z up.
 """
 
 from __future__ import annotations
@@ -37,7 +37,7 @@ EVAL15 = ["pelvis", "neck", "head_top"] + [
     f"{s}_{j}" for j in ("shoulder", "elbow", "wrist", "hip", "knee", "ankle") for s in SIDES
 ]
 JOINTS = EVAL15 + [f"{s}_{j}" for j in ("toe", "heel") for s in SIDES]
-#: As they are drawn.
+#: In the order of drawing.
 BONES = (
     *(("pelvis", "neck"), ("neck", "head_top")),
     *(("neck", f"{s}_shoulder") for s in "lr"),
@@ -52,13 +52,13 @@ BONES = (
 
 
 def side_of(name: str) -> str:
-    """Side of the body that a joint, limb or angle is on, by its name: ``left``, ``right`` or ``middle``."""
+    """Side of the body, from the name of a joint, limb or angle: ``left``, ``right`` or ``middle``."""
     return {"l_": "left", "r_": "right"}.get(name[:2], "middle")
 
 
 @dataclass(frozen=True)
 class Proportions:
-    """Generic body, fractions of stature; the right side mirrors the left.
+    """Body proportions, in fractions of stature; the right side mirrors the left.
 
     Vectors are in body axes with all angles 0.  The defaults are the means of eight walking subjects (CMU).
     """
@@ -68,10 +68,10 @@ class Proportions:
         0.0,
         0.0,
         0.0,
-    )  #: foot of the spine from the pelvis joint, in the pelvis
+    )  #: lower end of the spine from the pelvis joint, in the pelvis
     shoulder: tuple[float, float, float] = (0.0, 0.107, 0.283)  #: left shoulder, in the torso
-    neck: float = 0.320  #: neck joint over the foot of the spine
-    neck_ahead: float = 0.0  #: and before it
+    neck: float = 0.320  #: height of the neck joint above the lower end of the spine
+    neck_ahead: float = 0.0  #: its distance in front of it
     head: tuple[float, float, float] = (0.0, 0.0, 0.143)  #: top of the head from the neck joint, in the head
     upper_arm: float = 0.168
     forearm: float = 0.155  #: elbow to wrist
@@ -79,12 +79,12 @@ class Proportions:
     shank: float = 0.250
     toe: tuple[float, float, float] = (0.069, 0.0, -0.0235)  #: ball of the foot from the ankle
     heel: tuple[float, float, float] = (-0.035, 0.0, -0.034)  #: heel from the ankle
-    sole: float = 0.047  #: ankle over the sole
+    sole: float = 0.047  #: height of the ankle above the sole
 
 
 @dataclass(frozen=True)
 class Skeleton:
-    """Frames, points and limbs in the form the blob stores."""
+    """Frames, points and limbs in the form in which the blob stores them."""
 
     frames: list[str] = field(default_factory=list)  #: F names, parents first
     #: (F, 8) rows of FRMI: parent, number of rotations, then (signed axis, channel) pairs.
@@ -165,7 +165,7 @@ def _frames(p: Proportions) -> tuple[list[str], npt.NDArray[np.int32], Floats]:
 
 
 def _points(p: Proportions) -> dict[str, tuple[str, tuple[float, float, float]]]:
-    """Joint name to its frame and position there."""
+    """Name of each joint, to its frame and position in that frame."""
     zero = (0.0, 0.0, 0.0)
     points: dict[str, tuple[str, tuple[float, float, float]]] = {
         "pelvis": ("pelvis", zero),
@@ -187,9 +187,9 @@ def _points(p: Proportions) -> dict[str, tuple[str, tuple[float, float, float]]]
 
 
 CONE, ELLIPSOID = 0, 1
-#: Solids of a dressed body of 1.75 m, millimetres: shape, how far axes start and end from joints (left side),
-#: half axes at both ends.  Fitted to silhouettes of people whose pose is known (decisions.md, "What the
-#: defaults were chosen on"): flesh lies ahead of hips and spine; the trunk reaches into the neck.
+#: Solids of a dressed body of 1.75 m, millimetres: shape, offsets of the axis's start and end from the joints
+#: (left side), half axes at both ends.  Fitted to silhouettes of people in known poses (decisions.md, "What
+#: the defaults were chosen on"): flesh lies in front of hips and spine; the trunk reaches into the neck.
 _SOLIDS = {
     "torso": (CONE, (52, 0, 108), (61, 0, 86), (172, 133, 184, 72)),
     "pelvis": (CONE, (13, 0, -67), (40, 0, 128), (174, 117, 176, 120)),
@@ -203,9 +203,9 @@ _SOLIDS = {
 
 
 def _limbs(p: Proportions) -> dict[str, tuple[str, int, list[float]]]:
-    """Limb name to frame, shape and LIMF row."""
+    """Name of each limb, to its frame, shape and LIMF row."""
     joint = (0.0, 0.0, 0.0)
-    spans: dict[str, tuple[tuple[float, ...], tuple[float, ...]]] = {  # where solids start and end
+    spans: dict[str, tuple[tuple[float, ...], tuple[float, ...]]] = {  # joints between which solids lie
         "torso": (joint, (0, 0, p.shoulder[2])),
         "pelvis": (joint, joint),
         "head": (joint, (0, 0, p.head[2])),
@@ -225,7 +225,7 @@ def _limbs(p: Proportions) -> dict[str, tuple[str, int, list[float]]]:
 
 
 def _solid(name: str, span: tuple[tuple[float, ...], tuple[float, ...]], side: str) -> list[float]:
-    """LIMF row, statures: start, end, half axes."""
+    """Make a LIMF row, in statures: start, end, half axes."""
     _, start, end, radii = _SOLIDS[name]
     ends = [
         np.array(at) + np.array(_mirror(by, side)) / 1750 for at, by in zip(span, (start, end), strict=True)
@@ -245,13 +245,13 @@ def pose(
     proportion: npt.ArrayLike = (),
     stride_hz: npt.ArrayLike = 0.0,
 ) -> tuple[Floats, Floats]:
-    """Joints of N hypotheses: curves (Ormoneit 2000, eq. 3), then forward kinematics.
+    """Pose N states: evaluate the curves (Ormoneit 2000, eq. 3), then forward kinematics.
 
-    `model`: sections of a blob as `gait.io.blob.read` returns them, or its file. `phase`, `stature`,
+    `model`: sections of a blob, from `gait.io.blob.read`, or its file. `phase`, `stature`,
     `heading`, `pitch`, `roll` (N,): strides, metres, radians. `coef` (N, k) or (k,): scores in standard
     deviations, k <= q; the rest are 0. `pelvis` (N, 3) or (3,): pelvis joint in the world, metres.
     `proportion` (N, l) or (l,): scores of the limbs' proportions, l <= p; the rest are 0. `stride_hz` (N,):
-    stride rate, which the mean cycle follows; 0: the mean rate. Returns `joints` (N, P, 3): metres, world;
+    stride rate, on which the mean cycle depends; 0: the average. Returns `joints` (N, P, 3): metres, world;
     `angles` (N, A): radians.
     """
     sections = model if isinstance(model, Mapping) else blobs.read(model)
@@ -269,7 +269,7 @@ def pose(
 
 
 def points(sections: Mapping[str, Any], channels: Floats, proportion: npt.ArrayLike = ()) -> Floats:
-    """Points (N, P, 3) relative to frame 0's origin in statures, for channel values (N, M).
+    """Compute points (N, P, 3), in statures relative to frame 0's origin, from channel values (N, M).
 
     proportion : scores (N, l) or (l,) of the limbs' proportions.
     """
@@ -282,9 +282,9 @@ def points(sections: Mapping[str, Any], channels: Floats, proportion: npt.ArrayL
 def frames(
     sections: Mapping[str, Any], channels: Floats, proportion: npt.ArrayLike = ()
 ) -> tuple[Floats, Floats, Floats]:
-    """Rotations (N, F, 3, 3), origins (N, F, 3) in statures, and scales (N, F) of all frames.
+    """Compute rotations (N, F, 3, 3), origins (N, F, 3) in statures, and scales (N, F) of all frames.
 
-    Frame 0 lies at the origin; a scale is what the lengths given in a frame count for.
+    Frame 0 is at the origin; a scale is the factor of the lengths given in a frame.
     """
     links, offsets = np.asarray(sections["FRMI"]), np.asarray(sections["FRMF"], float)
     n = len(channels)
@@ -306,14 +306,14 @@ def frames(
 
 
 def length_change(sections: Mapping[str, Any], proportion: npt.ArrayLike) -> Floats:
-    """Factors (N, F + 1) of the lengths in the frames and of the pelvis's height, for scores (N, l), (l,)."""
+    """Factors (N, F + 1) of lengths in each frame and of the pelvis's height, for scores (N, l) or (l,)."""
     score = np.atleast_2d(np.asarray(proportion, float))
     table = np.asarray(sections.get("PROP", np.zeros((0, len(sections["FRMI"]) + 1))), float)
     return np.asarray(1 + score @ table[: score.shape[1]])
 
 
 def origin_shift(sections: Mapping[str, Any], proportion: npt.ArrayLike) -> Floats:
-    """How far (N, F, 3) the frames' origins move in their parents, statures, for scores (N, l), (l,)."""
+    """Shifts (N, F, 3) of the frames' origins in their parents, statures, for scores (N, l) or (l,)."""
     score = np.atleast_2d(np.asarray(proportion, float))
     table = np.asarray(sections.get("SHFT", np.zeros((0, len(sections["FRMI"]), 3))), float)
     used = table[: score.shape[1]]
@@ -321,7 +321,7 @@ def origin_shift(sections: Mapping[str, Any], proportion: npt.ArrayLike) -> Floa
 
 
 def axis_rotation(axis: int, angle: npt.ArrayLike) -> Floats:
-    """Rotations (..., 3, 3) by angles (...) about axis 0 = x, 1 = y, 2 = z."""
+    """Make rotations (..., 3, 3) by angles (...) about an axis: 0 = x, 1 = y, 2 = z."""
     angle = np.asarray(angle, float)
     c, s = np.cos(angle), np.sin(angle)
     matrix = np.zeros((*angle.shape, 3, 3))
