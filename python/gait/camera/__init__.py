@@ -1,1 +1,1 @@
-"""Cameras, video, and people seen in pictures without a model of walking."""
+"""Cameras: files, calibration, placement and paths."""

@@ -1,4 +1,4 @@
-"""Boards for calibrating a lens: printing them true to size, and finding their corners in a picture."""
+"""Boards for calibrating a lens: print them true to size, and find their corners in a picture."""
 
 from __future__ import annotations
 
@@ -15,21 +15,21 @@ Array = NDArray[np.float64]
 Grey = NDArray[np.uint8]
 
 PAPERS = {"a4": (297.0, 210.0), "letter": (279.4, 215.9), "a3": (420.0, 297.0)}  #: millimetres, landscape
-_MARGIN, _FOOT = 8.0, 18.0  # millimetres: what printers leave blank; the line below the board
+_MARGIN, _FOOT = 8.0, 18.0  # millimetres: margin that printers leave blank; space below the board for a line
 _BAR = 100.0  # millimetres of the bar that shows whether the scale is right
 _DPI = 300
 _MARKERS = cv2.aruco.DICT_5X5_100
-_CELLS = 7  # of a marker's side, border included
-_MARKER = 0.75  # of a square
-_COARSE = 1600  # pixels along the longer side of the picture in which a board is searched for
+_CELLS = 7  # along a marker's side, including its border
+_MARKER = 0.75  # side of a marker, in squares
+_COARSE = 1600  # pixels along the longer side of the reduced picture in which a board is searched for
 _USUAL = ((11, 8), (10, 7), (9, 7), (9, 6), (8, 6), (8, 5), (7, 6), (7, 5), (6, 5), (5, 4))
 """Chessboards in use, the larger first, as they hold smaller ones."""
-_LEAST_CORNERS = 8  # of a board with markers that is seen in part
+_LEAST_CORNERS = 8  # visible corners needed of a board with markers
 
 
 @dataclass(frozen=True)
 class Board:
-    """Chessboard of `columns` x `rows` inner corners, with markers in its white squares or without."""
+    """Chessboard of `columns` x `rows` inner corners, with or without markers in its white squares."""
 
     columns: int
     rows: int
@@ -44,12 +44,12 @@ class Board:
 
     @property
     def squares(self) -> tuple[int, int]:
-        """Squares along and down."""
+        """Number of squares across and down."""
         return self.columns + 1, self.rows + 1
 
     @property
     def corners(self) -> Array:
-        """Inner corners, shape (n, 3), in squares, by rows."""
+        """Positions of the inner corners, shape (n, 3), in squares, row by row."""
         row, column = np.divmod(np.arange(self.columns * self.rows), self.columns)
         return np.column_stack([column, row, np.zeros(len(row))]).astype(np.float64)
 
@@ -69,7 +69,7 @@ class Board:
         return np.array(found)
 
     def find(self, grey: Grey) -> tuple[NDArray[np.int64], Array] | None:
-        """Inner corners in a picture: their numbers (n,) and pixels (n, 2); None if it is not there."""
+        """Find the inner corners in a picture: numbers (n,), pixels (n, 2); None if there is no board."""
         small, scale = _coarse(grey)
         found = self._find_marked(small) if self.markers else self._find_plain(small)
         if found is None or scale == 1:
@@ -89,7 +89,7 @@ class Board:
         found = np.asarray(numbers, np.int64).ravel()
         column, row = found % self.columns, found // self.columns
         if min(len(set(column)), len(set(row))) < 2:
-            return None  # one line of corners has no plane
+            return None  # corners on one line determine no plane
         return found, np.asarray(uv[:, 0], np.float64)
 
     def _find_plain(self, grey: Grey) -> tuple[NDArray[np.int64], Array] | None:
@@ -106,7 +106,7 @@ OURS = Board(6, 4, True)
 
 
 def _coarse(grey: Grey) -> tuple[Grey, float]:
-    """Picture in which a board is searched for, and its scale."""
+    """Reduce a picture for the search for a board; return it and its scale."""
     scale = min(1.0, _COARSE / max(grey.shape))
     if scale == 1:
         return grey, scale
@@ -115,7 +115,7 @@ def _coarse(grey: Grey) -> tuple[Grey, float]:
 
 
 def read_board(text: str) -> Board:
-    """Board of ``charuco``, or of a chessboard's inner corners as ``9x6``; ValueError otherwise."""
+    """Parse ``charuco``, or a chessboard's inner corners such as ``9x6``; ValueError otherwise."""
     if text == "charuco":
         return OURS
     columns, cross, rows = text.lower().partition("x")
@@ -139,7 +139,7 @@ def other_board(grey: Grey, wanted: Board) -> str:
 def blur(grey: Grey, board: Board, number: NDArray[np.int64], uv: Array) -> float:
     """Width of the edges at a board's corners, pixels: about 2 in a sharp picture.
 
-    The wider of the two directions of edges counts, as motion blurs one of them alone.
+    It is the larger width of the edges along rows and along columns, since motion may blur only one of them.
     """
     half = int(np.clip(0.3 * _spacing(uv), 3, 25))
     normals = _edge_normals(board, number, uv)
@@ -208,7 +208,7 @@ def print_board(path: Path, kind: str, board: Board, paper: str) -> float:
 
 
 def _pdf(black: Array, size: tuple[float, float], at: tuple[float, float], text: str) -> bytes:
-    """One page with rectangles and a line of text; millimetres from the upper left."""
+    """Make a page with rectangles and a line of text; millimetres from the upper left."""
     point = 72 / 25.4
     lines = [f"{point:.9f} 0 0 {-point:.9f} 0 {size[1] * point:.4f} cm"]
     lines += ["{:.4f} {:.4f} {:.4f} {:.4f} re".format(*row) for row in black]
@@ -239,7 +239,7 @@ def _pdf(black: Array, size: tuple[float, float], at: tuple[float, float], text:
 
 
 def _png(black: Array, size: tuple[float, float], at: tuple[float, float], text: str) -> bytes:
-    """Draw the same as a picture that knows its resolution."""
+    """Draw the same as a PNG file that states its resolution."""
     dot = _DPI / 25.4
     page = np.full((round(size[1] * dot), round(size[0] * dot)), 255, np.uint8)
     for x, y, width, height in np.asarray(black) * dot:

@@ -1,4 +1,4 @@
-"""Calibrate a lens from a board in many poses (Zhang 2000, by OpenCV), and check the result."""
+"""Calibrate a lens from pictures of a board in many poses (Zhang 2000, with OpenCV), and check the result."""
 
 from __future__ import annotations
 
@@ -17,32 +17,32 @@ from gait.io.video import Video
 
 Array = NDArray[np.float64]
 
-LEAST, MOST = 6, 40  # pictures of different poses that a calibration needs, and uses
-_RATE = 8.0  # frames of a film looked at, per second
-_BLURRED = 6.0  # pixels of an edge's width
-_APART = 0.12  # of poses that differ: shares of the picture, and sines of tilts
-_WIDTH = 1280.0  # pixels along the longer side up to which limits in pixels hold; above they grow with it
-_RMS = 1.0  # pixels
-_FOCAL_SD = 0.02  # of the focal length
-_CHANGED = 0.02  # of the focal length, beside three standard deviations
-_OFF_MIDDLE = 0.15  # of the picture, of the principal point
-_WRONG = 3.0, 0.5  # times the median error of pictures, and pixels, from which a picture is left out
-_CORNER = 0.3  # of the picture's sides
-_TILT, _LEAST_TILT = 15.0, 20.0  # degrees to each side; from the least to the most, of what is refused
-_NEAR, _NEARER = 0.4, 1.3  # the board's length over the picture's; nearest over farthest
-_TRIED = 5  # pictures looked at for another board
+LEAST, MOST = 6, 40  # fewest and most pictures, of different poses, of a calibration
+_RATE = 8.0  # frames per second of a film that are searched
+_BLURRED = 6.0  # pixels; width of edges from which a picture counts as blurred
+_APART = 0.12  # least difference between poses: fractions of the picture, and sines of tilts
+_WIDTH = 1280.0  # pixels along the longer side; in larger pictures the limits in pixels grow in proportion
+_RMS = 1.0  # pixels; largest reprojection error
+_FOCAL_SD = 0.02  # largest standard deviation, as a fraction of the focal length
+_CHANGED = 0.02  # change of the focal length that is refused, in addition to three standard deviations
+_OFF_MIDDLE = 0.15  # largest offset of the principal point, as a fraction of the picture
+_WRONG = 3.0, 0.5  # a picture is left out if its error exceeds this many times the median, and these pixels
+_CORNER = 0.3  # size of a corner of the picture, as a fraction of its sides
+_TILT, _LEAST_TILT = 15.0, 20.0  # degrees: tilt to each side asked for; range of tilts below which we refuse
+_NEAR, _NEARER = 0.4, 1.3  # length of the board over that of the picture; nearest over farthest
+_TRIED = 5  # pictures searched for another kind of board
 
 
 @dataclass(frozen=True)
 class View:
-    """A board found in one picture, in their `order`: its corners' numbers (n,) and pixels (n, 2)."""
+    """A board found in picture number `order`: its corners' numbers (n,) and pixels (n, 2)."""
 
     order: int
     name: str
     number: NDArray[np.int64]
     uv: Array
     blur: float
-    pose: Array  #: middle (2) and size as shares of the picture, sines of its two tilts, about
+    pose: Array  #: approximate: middle (2) and size as fractions of the picture, sines of two tilts
 
 
 @dataclass(frozen=True)
@@ -56,15 +56,15 @@ class Lens:
     focal_sd : float
         Standard deviation of the focal length, pixels.
     views : tuple of View
-        Those used, in the order of the pictures.
+        The views used, in the order of the pictures.
     error : ndarray of shape (V,)
-        Distance of corners from where the calibration puts them, pixels rms, of each view.
+        Reprojection error of each view, pixels rms.
     left_out : tuple of str
         Views that did not fit the others.
     tried, blurred : int
-        Pictures searched for the board; of those, the ones in which it was blurred.
+        Number of pictures searched for the board; number of these in which it was blurred.
     missing : tuple of str
-        Poses that would make the calibration more certain, in words.
+        Poses that would make the calibration more precise, in words.
     """
 
     camera: Camera
@@ -78,13 +78,13 @@ class Lens:
 
     @property
     def rms(self) -> float:
-        """Of all corners, pixels."""
+        """Reprojection error over all corners, pixels rms."""
         weights = [len(view.uv) for view in self.views]
         return float(np.sqrt(np.average(self.error**2, weights=weights)))
 
     @property
     def fov(self) -> tuple[float, float]:
-        """Horizontal and vertical view, degrees, without distortion."""
+        """Horizontal and vertical field of view, degrees, without distortion."""
         c = self.camera
         across, down = (
             2 * np.degrees(np.arctan(0.5 * n / f)) for n, f in ((c.width, c.fx), (c.height, c.fy))
@@ -93,7 +93,7 @@ class Lens:
 
 
 def calibrate_film(video: Video, board: Board, progress: Callable[[int], None]) -> Lens:
-    """Calibrate from a film in which the board, or the camera, moves; errors as of `calibrate_pictures`."""
+    """Calibrate from a film in which the board or the camera moves; errors as in `calibrate_pictures`."""
     step = max(1, round(video.fps / _RATE))
     wanted = range(0, video.count, step)
 
@@ -107,12 +107,12 @@ def calibrate_film(video: Video, board: Board, progress: Callable[[int], None]) 
 
 
 def calibrate_pictures(paths: Sequence[str], board: Board, progress: Callable[[int], None]) -> Lens:
-    """Calibrate from pictures, all of one size.
+    """Calibrate from pictures of the same size.
 
     Raises
     ------
     UserError
-        If one cannot be read or is of another size, or the calibration would be bad; with the remedy.
+        If a picture cannot be read or has another size, or the calibration would be bad; with the remedy.
     """
     size = read_picture(paths[0]).shape[::-1]
 
@@ -133,7 +133,7 @@ def calibrate_pictures(paths: Sequence[str], board: Board, progress: Callable[[i
 
 
 def read_picture(path: str) -> Grey:
-    """Grey picture of a file, turned as it asks."""
+    """Read a picture from a file as grey, rotated as its EXIF data state."""
     require_file(path, "picture")
     grey = cv2.imread(path, cv2.IMREAD_GRAYSCALE)
     if grey is None:
@@ -168,7 +168,7 @@ def _calibrate(where: str, pictures: Iterator[tuple[str, Grey]], board: Board, s
 def _too_few(
     board: Board, sharp: int, different: int, blurred: int, tried: int, others: Sequence[str]
 ) -> str:
-    """Describe what is wrong with too few pictures, and the remedy."""
+    """Describe why there are too few usable pictures, and the remedy."""
     if sharp + blurred == 0:
         return (
             others[0]
@@ -188,7 +188,7 @@ def _too_few(
 
 
 def different(views: Sequence[View]) -> list[View]:
-    """Choose views of poses that differ, sharp ones first; at most `MOST`."""
+    """Choose at most `MOST` views whose poses differ, sharp ones first."""
     left = sorted(views, key=lambda view: view.blur)
     if not left:
         return []
@@ -206,7 +206,7 @@ def different(views: Sequence[View]) -> list[View]:
 
 
 def _pose(board: Board, number: NDArray[np.int64], uv: Array, size: tuple[int, int]) -> Array:
-    """Where a board is, about, with a lens as wide as the picture is long."""
+    """Estimate a board's pose roughly, assuming a focal length equal to the longer side of the picture."""
     focal = float(max(size))
     matrix = np.array([[focal, 0, size[0] / 2], [0, focal, size[1] / 2], [0, 0, 1]])
     _, turn, _ = cv2.solvePnP(board.corners[number], uv, matrix, np.zeros(5), flags=cv2.SOLVEPNP_IPPE)
@@ -217,7 +217,7 @@ def _pose(board: Board, number: NDArray[np.int64], uv: Array, size: tuple[int, i
 
 
 def _without_wrong(board: Board, views: Sequence[View], size: tuple[int, int]) -> Lens:
-    """Calibrate, once more without the views that do not fit the others."""
+    """Calibrate, then again without the views that do not fit the others."""
     first = fit(board, views, size)
     times, pixels = _WRONG
     limit = max(times * float(np.median(first.error)), pixels * max(1.0, max(size) / _WIDTH))
@@ -229,7 +229,7 @@ def _without_wrong(board: Board, views: Sequence[View], size: tuple[int, int]) -
 
 
 def fit(board: Board, views: Sequence[View], size: tuple[int, int]) -> Lens:
-    """Calibrate; of models with k1 k2, with p1 p2 and with k3 too, that with the best Bayesian criterion."""
+    """Calibrate with k1 k2, adding p1 p2, then k3; return the model with the best Bayesian criterion."""
     corners = board.corners.astype(np.float32)
     world = [np.ascontiguousarray(corners[view.number]) for view in views]
     seen = [np.ascontiguousarray(view.uv[:, None], np.float32) for view in views]
@@ -256,19 +256,19 @@ def fit(board: Board, views: Sequence[View], size: tuple[int, int]) -> Lens:
 
 
 def _folds(camera: Camera) -> bool:
-    """Whether the lens turns back on itself within the picture."""
+    """Whether the distortion folds back on itself within the picture."""
     k1, k2, _, _, k3 = camera.distortion
     far = max(
         np.hypot((u - camera.cx) / camera.fx, (v - camera.cy) / camera.fy)
         for u in (0, camera.width)
         for v in (0, camera.height)
     )
-    r = np.linspace(0, far, 200)  # undistorted; what is shown at the corners is at most a little nearer
+    r = np.linspace(0, far, 200)  # undistorted; the corners show points at most a little nearer
     return bool((1 + 3 * k1 * r**2 + 5 * k2 * r**4 + 7 * k3 * r**6 <= 0).any())
 
 
 def _require_good(where: str, board: Board, lens: Lens) -> None:
-    """Raise UserError for a calibration that would mislead, with the remedy."""
+    """Raise UserError for a bad calibration, with the remedy."""
     camera, fault, tilts = lens.camera, "", _tilts(board, lens)
     limit = _RMS * max(1.0, max(camera.size) / _WIDTH)
     off = max(abs(camera.cx / camera.width - 0.5), abs(camera.cy / camera.height - 0.5))
@@ -315,7 +315,7 @@ def _require_one_focal(where: str, board: Board, lens: Lens) -> None:
 
 
 def missing(board: Board, lens: Lens) -> Iterator[str]:
-    """Poses that would make the calibration more certain, in words."""
+    """Describe poses that would make the calibration more precise."""
     camera = lens.camera
     uv = np.concatenate([view.uv for view in lens.views]) / camera.size
     for down, row in (("upper", uv[:, 1] < _CORNER), ("lower", uv[:, 1] > 1 - _CORNER)):
@@ -340,7 +340,7 @@ def missing(board: Board, lens: Lens) -> Iterator[str]:
 
 
 def _tilts(board: Board, lens: Lens) -> Array:
-    """Return how far the boards are tilted, shape (V, 2), degrees: right edge nearer, lower edge nearer."""
+    """Return the tilts of the boards, shape (V, 2), degrees: right edge nearer, lower edge nearer."""
     found = []
     for view in lens.views:
         world = board.corners[view.number]

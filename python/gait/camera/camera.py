@@ -1,7 +1,7 @@
-"""Calibrated camera: projection of world points to pixels, and rays of pixels.
+"""Calibrated camera: projection of world points to pixels, and rays through pixels.
 
-Files: the project's JSON, OpenCV FileStorage YAML/XML, the TOML of Pose2Sim, anipose and FreeMoCap, and those
-of `gait.camera.other_files`.
+Reads the project's JSON, OpenCV FileStorage YAML/XML, the TOML of Pose2Sim, anipose and FreeMoCap, and the
+files of `gait.camera.other_files`.
 """
 
 from __future__ import annotations
@@ -39,8 +39,8 @@ Intrinsics = tuple[float, float, float, float]  # fx fy cx cy
 class Camera:
     """Pinhole camera with OpenCV's five-parameter lens.
 
-    ``x_cam = R x_world + t``, ``u = fx X/Z + cx``, ``v = fy Y/Z + cy``; pixel centres at integers; the
-    world has z up and the ground at z = 0.
+    ``x_cam = R x_world + t``, ``u = fx X/Z + cx``, ``v = fy Y/Z + cy``; pixel centres are at integers; in the
+    world z is up and the ground is z = 0.
 
     Attributes
     ----------
@@ -73,12 +73,12 @@ class Camera:
 
     @staticmethod
     def looking(place: ArrayLike, target: ArrayLike, size: tuple[int, int], focal: float) -> Camera:
-        """Make a camera at `place` with `target` in the middle and a level horizon.
+        """Make a camera at `place` with `target` in the middle of the picture and a level horizon.
 
         Parameters
         ----------
         place, target : array_like of shape (3,)
-            World, metres; not one above the other.
+            World, metres; neither vertically above the other.
         size : (int, int)
             Width and height, pixels.
         focal : float
@@ -109,12 +109,12 @@ class Camera:
         return np.asarray(-self.R.T @ self.t)
 
     def depth(self, points: ArrayLike) -> Array:
-        """Distance in front of the lens along its axis, shape (...), metres; negative behind."""
+        """Distance of world points (..., 3) along the lens's axis, shape (...), metres; negative behind."""
         return np.asarray(np.asarray(points, np.float64) @ self.R[2] + self.t[2])
 
     def project(self, points: ArrayLike) -> Array:
-        """Pixels (..., 2) of world points (..., 3), lens distortion included; NaN behind the camera."""
-        import cv2  # here, so that a model is used without OpenCV
+        """Project world points (..., 3) to pixels (..., 2), with lens distortion; NaN behind the camera."""
+        import cv2  # here, so that models can be used without OpenCV
 
         world = np.asarray(points, np.float64)
         flat = np.ascontiguousarray(world.reshape(-1, 3))
@@ -126,17 +126,17 @@ class Camera:
         return uv.reshape(*world.shape[:-1], 2)
 
     def shows(self, points: ArrayLike) -> bool:
-        """Whether any of world points (..., 3) is in the picture."""
+        """Whether any of the world points (..., 3) is in the picture."""
         uv = self.project(points)
         return bool(((uv >= 0) & (uv < self.size)).all(axis=-1).any())
 
     def rays(self, pixels: ArrayLike) -> Array:
-        """Rays through pixels (..., 2): unit directions (..., 3) in the world from `centre`."""
+        """Find the rays through pixels (..., 2): unit directions (..., 3) in the world, from `centre`."""
         import cv2  # as in project()
 
         uv = np.asarray(pixels, np.float64)
         flat = np.ascontiguousarray(uv.reshape(-1, 1, 2))
-        if not flat.size:  # OpenCV answers None
+        if not flat.size:  # for which OpenCV returns None
             return np.empty((*uv.shape[:-1], 3))
         stop = (cv2.TERM_CRITERIA_COUNT | cv2.TERM_CRITERIA_EPS, 100, 1e-9)
         same = np.eye(3)
@@ -146,7 +146,7 @@ class Camera:
         return direction.reshape(*uv.shape[:-1], 3)
 
     def on_plane(self, pixels: ArrayLike, height: float = 0.0) -> Array:
-        """World points (..., 3) where pixels (..., 2) meet the plane z = `height`; NaN if they never do."""
+        """Intersect rays of pixels (..., 2) with the plane z = `height`: (..., 3), NaN if they miss it."""
         direction = self.rays(pixels)
         with np.errstate(divide="ignore", invalid="ignore"):
             along = (height - self.centre[2]) / direction[..., 2]
@@ -154,7 +154,7 @@ class Camera:
         return self.centre + along[..., None] * direction
 
     def scaled(self, factor: float) -> Camera:
-        """Camera of the same picture resized by `factor` (pixel centres at integers)."""
+        """Return the camera of the same picture resized by `factor` (pixel centres at integers)."""
         shift = 0.5 * (factor - 1)
         return replace(
             self,
@@ -189,15 +189,15 @@ class Camera:
         raise UserError(f"{made}, another aspect{cut}; calibrate for this video or undo its crop")
 
     def same_aspect(self, size: tuple[int, int]) -> bool:
-        """Whether pictures of `size` may be this camera's, resized, to within a pixel."""
+        """Whether pictures of `size` may be resized pictures of this camera, to within a pixel."""
         return abs(self.height * size[0] / self.width - size[1]) < 1
 
     def for_size(self, size: tuple[int, int]) -> Camera:
-        """Camera of the same picture resized to `size`, whose aspect is the same (`same_aspect`)."""
+        """Return the camera of the same picture resized to `size`, of the same aspect (`same_aspect`)."""
         return replace(self.scaled(size[0] / self.width), width=size[0], height=size[1])
 
     def check_place(self, where: str) -> None:
-        """Raise UserError unless people who stand on the floor, z = 0, would be upright in the picture."""
+        """Raise UserError unless people standing on the floor, z = 0, would appear upright in the picture."""
         from gait.bindings.library import call
 
         try:
@@ -209,7 +209,7 @@ class Camera:
         """Make a ``gait_camera``."""
         from gait.bindings.library import library
 
-        library()  # describes the structures
+        library()  # loading it defines the structures
         c = CameraC(self.width, self.height, self.fx, self.fy, self.cx, self.cy)
         c.R[:], c.t[:] = self.R.ravel().tolist(), self.t.tolist()
         c.distortion[:] = self.distortion.tolist()
@@ -221,12 +221,12 @@ class Camera:
         return plain | {"R": self.R.tolist(), "t": self.t.tolist(), "distortion": self.distortion.tolist()}
 
 
-LONGEST_LENS = 1000  #: focal length over the width of the picture; the longest made have a few hundred
+LONGEST_LENS = 1000  #: largest ratio of focal length to picture width; real lenses reach a few hundred
 
 _JSON_KEYS = ("width", "height", "fx", "fy", "cx", "cy", "R", "t", "distortion", "note")
 
-#: Documented names of OpenCV files, and the others in use for the same: in OpenCV's samples of several
-#: versions, in ROS and in tutorials.  Compared in lower case without punctuation, as `_plain` gives them.
+#: Documented names in OpenCV files, and others in use for the same entries: in OpenCV's samples of several
+#: versions, in ROS and in tutorials.  Compared in lower case without punctuation, as `_plain` returns them.
 _OPENCV_NAMES = {
     "camera_matrix": ("cameramatrix", "k", "mtx", "intrinsicmatrix"),
     "distortion_coefficients": (
@@ -242,12 +242,13 @@ _OPENCV_NAMES = {
 }
 _TOML_KEYS = ("name", "size", "matrix", "distortions", "rotation", "translation", "fisheye")
 
-#: Keys that describe a lens, as `_plain` gives them: words in them, and whole keys.
+#: Keys that describe a lens, as `_plain` returns them: words in keys, and whole keys.
 _LENS_WORD = re.compile(
     r"dist(?!ance)|fisheye|omni|radial|tangential|prism|equidistant|kannala|(lens|camera|projection)(model|type)"
 )
 _LENS_KEYS = re.compile(r"model|d\d+|k[1-9]|p[12]|s[1-4]|xi|tau[xy]|skew")
-#: Models of a lens that has k1 k2 p1 p2 k3 alone; a rational one with more terms has too many numbers.
+#: Names of lens models with at most k1 k2 p1 p2 k3; the number of coefficients reveals rational ones with
+#: more.
 _LENSES = {
     *(
         "",
@@ -262,16 +263,18 @@ _LENSES = {
     ),
     *("opencv", "standard", "rationalpolynomial"),
 }
-#: Words in other models' names; a camera's model or type may also be that of its maker.
+#: Words in the names of other lens models; keys "model" and "type" may also name the manufacturer's product.
 _FOREIGN = re.compile(
     r"fisheye|equidist|equisolid|stereographic|kannala|^kb\d|omni|^mei$|e?ucm|unified|doublesphere|^ds$|^fov$"
     r"|division|ocam|scaramuzza|prism|spline|spheric|panoram"
 )
 _MODEL_KEYS = ("distortionmodel", "cameramodel", "lensmodel", "projectionmodel", "model", "cameratype")
-#: Names of OpenCV's fisheye lens, of four coefficients.
+#: Names of OpenCV's fisheye lens, with four coefficients.
 _FISHEYES = ("fisheye", "opencvfisheye", "equidistant", "equi", "kannalabrandt", "kannalabrandt4", "kb4")
-_MORE_TERMS = (8, 12, 14)  # numbers of OpenCV's lenses with rational terms, thin prisms, and tilt
-#: How much larger or smaller than the picture the one may be of which a principal point is the middle.
+_MORE_TERMS = (8, 12, 14)  # coefficients of OpenCV's lenses with rational terms, thin prisms, and tilt
+#: Largest relative difference in size between the picture and one with the principal point in its middle: if
+#: the file states the size, so that the picture may be cropped; otherwise; and, for a picture that was
+#: resized, between the factors of width and height.
 _CROPPED, _RESIZED, _ALIKE = 0.7, 0.2, 0.05
 
 
@@ -284,13 +287,13 @@ def read_camera(
     ----------
     path : str
         ``.json``, ``.yaml``, ``.yml``, ``.xml``, ``.toml``, ``.txt`` (COLMAP, Qualisys) or ``.pickle``
-        (OpenCap), where there are several cameras with ``:name`` after it.
+        (OpenCap); followed by ``:name`` if the file has several cameras.
     size : (int, int), optional
-        Width and height of the video, pixels: checked, and used by OpenCV files, which may lack it.
+        Width and height of the video, pixels: checked, and used for OpenCV files, which may lack the size.
     placed : bool
-        Whether rotation and translation must be there; without them the camera is at the origin.
+        Whether rotation and translation are required; without them the camera is at the origin.
     scale : bool
-        Whether a camera of pictures of the same aspect and another size is resized to `size`.
+        Whether to resize a camera to `size` if its pictures have the same aspect but another size.
 
     Raises
     ------
@@ -325,7 +328,7 @@ def read_camera(
 
 
 def camera_names(path: str) -> list[str]:
-    """Name each camera of a TOML file as `read_camera` takes it; a file of another kind is one camera.
+    """List the cameras of a TOML file as paths for `read_camera`; a file of another kind is one camera.
 
     Raises
     ------
@@ -344,13 +347,13 @@ def write_camera(path: Path, camera: Camera) -> None:
 
 
 def write_lens(path: Path, camera: Camera, note: str) -> None:
-    """Write a JSON camera file of the lens alone, without its place, and a note."""
+    """Write a JSON camera file with the lens but no pose, and a note."""
     lens = {key: value for key, value in camera.to_dict().items() if key not in ("R", "t")}
     path.write_text(json.dumps(lens | {"note": note}, indent=1) + "\n")
 
 
 def _split(path: str) -> tuple[str, str | None]:
-    """Separate FILE.toml:name."""
+    """Split FILE.toml:name into file and name."""
     file, colon, name = path.rpartition(":")
     several = file.lower().endswith((".toml", ".txt", ".yaml", ".yml", ".xml"))
     return (file, name) if colon and several else (path, None)
@@ -368,10 +371,10 @@ def _from_json(path: str, placed: bool) -> Camera:
 
 
 def _check_middle(path: str, camera: Camera, stated: bool) -> None:
-    """Refuse a principal point that is the middle of a picture of another size, or of none.
+    """Raise UserError if the principal point is the middle of a picture of another, or an impossible, size.
 
-    Cameras have it near the middle of the sensor; only where the file has `stated` the size may a picture be
-    cropped.
+    It is normally near the middle of the sensor.  Pictures may be cropped only if the file has `stated` their
+    size.
     """
     x, y = (2 * camera.cx + 1) / camera.width, (2 * camera.cy + 1) / camera.height
     off = max(abs(x - 1), abs(y - 1))
@@ -388,7 +391,7 @@ def _check_middle(path: str, camera: Camera, stated: bool) -> None:
 
 
 def _entries(path: str, suffix: str, name: str | None) -> dict[str, Any]:
-    """Entries of a file, as OpenCV names them."""
+    """Read the entries of a file, under OpenCV's names."""
     start = Path(path).read_bytes()[:4096]
     if suffix == ".txt" or b"<calibration" in start:
         return other_files.read_text(path, name)
@@ -402,7 +405,7 @@ def _entries(path: str, suffix: str, name: str | None) -> dict[str, Any]:
 def _from_entries(
     path: str, content: dict[str, Any], size: tuple[int, int] | None, placed: bool
 ) -> tuple[Camera, bool]:
-    """Return the camera, and whether the file has its size."""
+    """Return the camera, and whether the file states its size."""
     fields, fisheye = _opencv_fields(path, content)
     stated = any(key in fields for key in ("image_width", "image_height", "image_size"))
     if stated or size is None:
@@ -413,7 +416,7 @@ def _from_entries(
 
 
 def _image_size(fields: Fields) -> tuple[int, int]:
-    """Width and height that an OpenCV file has."""
+    """Read width and height from an OpenCV file."""
     remedy = "add image_width and image_height in pixels"
     if "image_size" in fields and "image_width" not in fields:
         return _size(fields, "image_size", remedy)
@@ -431,7 +434,7 @@ def _size(fields: Fields, key: str, remedy: str) -> tuple[int, int]:
 
 
 def _pose(fields: Fields, placed: bool) -> tuple[Array, Array]:
-    """Return rotation and translation; none, where they need not be there and are not."""
+    """Return rotation and translation; the identity and zero if both are missing and `placed` is false."""
     if not any(key in fields for key in ("R", "rvec", "t")):
         if not placed:
             return np.eye(3), np.zeros(3)
@@ -445,7 +448,7 @@ def _plain(name: str) -> str:
 
 
 def _opencv_fields(path: str, content: dict[str, Any]) -> tuple[Fields, bool]:
-    """Return the entries of a camera under their documented names, and whether it is a fisheye."""
+    """Return the entries of a camera under their documented names, and whether it is a fisheye lens."""
     data, others = dict[str, Any](), dict[str, Any]()
     documented = {other: name for name, others in _OPENCV_NAMES.items() for other in others}
     source: dict[str, str] = {}
@@ -478,7 +481,7 @@ def _is_fisheye(key: str, value: Any) -> bool:
 
 
 def _refuse_other_lenses(fields: Fields, others: Mapping[str, Any]) -> None:
-    """Refuse keys, none of them known, that describe a lens in another way; 0, false and '' describe none."""
+    """Raise UserError for unknown keys that describe another kind of lens, unless they are 0, false or ''."""
     for key, value in others.items():
         if not _LENS_KEYS.fullmatch(_plain(key)) and not _LENS_WORD.search(_plain(key)):
             continue
@@ -497,7 +500,7 @@ def _refuse_other_lenses(fields: Fields, others: Mapping[str, Any]) -> None:
 
 
 def _toml_cameras(path: str) -> tuple[dict[str, Any], dict[str, Mapping[str, Any]]]:
-    """Read the content of a TOML file, and the tables in it that are cameras."""
+    """Read a TOML file; return its content and those of its tables that are cameras."""
     with parsing(path, "TOML", "export the calibration anew"):
         data = tomllib.loads(Path(path).read_text(encoding="utf-8-sig"))
     return data, {
@@ -525,13 +528,13 @@ def _from_toml(path: str, name: str | None) -> Camera:
 
 
 def _in_millimetres(metadata: Any) -> bool:
-    """Whether a calibration is one of FreeMoCap, whose unit is that of its board."""
+    """Whether a calibration is FreeMoCap's, whose unit is that of its board, and that is the millimetre."""
     side = metadata.get("charuco_square_size") if isinstance(metadata, Mapping) else None
     return isinstance(side, int | float) and side > 1  # no square is a metre wide
 
 
 def _intrinsics(fields: Fields, key: str) -> Intrinsics:
-    """Return fx fy cx cy of a 3x3 matrix without skew."""
+    """Read fx fy cx cy from a 3x3 matrix without skew."""
     m = fields.array(key, (3, 3), "give [[fx, 0, cx], [0, fy, cy], [0, 0, 1]] in pixels")
     if m[0, 0] <= 0 or m[1, 1] <= 0:
         raise fields.fail(key, "has a focal length that is not positive", "give fx and fy in pixels")
@@ -543,7 +546,7 @@ def _intrinsics(fields: Fields, key: str) -> Intrinsics:
 
 
 def _rotation(fields: Fields, key: str) -> Array:
-    """Return a proper rotation; digits lost in a text file are restored."""
+    """Read a rotation and make it exactly orthonormal, since text files round it."""
     m = fields.array(key, (3, 3), "give the rotation from world to camera, 3 rows of 3 (or rvec in YAML)")
     u, _, vt = np.linalg.svd(m)
     nearest = u @ vt
@@ -570,7 +573,7 @@ def _lens(
     size: tuple[int, int],
     fisheye: bool,
 ) -> tuple[Intrinsics, Array]:
-    """Return fx fy cx cy and k1 k2 p1 p2 k3; of a fisheye, or a lens of more terms, those that agree."""
+    """Return fx fy cx cy and k1 k2 p1 p2 k3; a fisheye lens, or one with more terms, is approximated."""
     remedy = "give k1 k2 p1 p2 [k3]"
     count = fields.count(key, remedy) if key in fields else 0
     if not (fisheye or count in _MORE_TERMS):
@@ -590,7 +593,7 @@ def _lens(
 
 
 def _distortion(fields: Fields, key: str) -> Array:
-    """Return k1 k2 p1 p2 k3 from 0, 4 or 5 numbers; an absent key is an ideal lens."""
+    """Read k1 k2 p1 p2 k3 from 0, 4 or 5 numbers; without the key the lens is ideal."""
     if key not in fields:
         return np.zeros(5)
     remedy = "give k1 k2 p1 p2 [k3] (0, 4 or 5 numbers)"

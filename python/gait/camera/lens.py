@@ -1,4 +1,4 @@
-"""Lenses with terms other than k1 k2 p1 p2 k3, approximated by a lens with these where one agrees."""
+"""Approximate lenses with other terms than k1 k2 p1 p2 k3 by a lens with these, if one agrees."""
 
 from __future__ import annotations
 
@@ -7,18 +7,18 @@ from numpy.typing import NDArray
 
 Array = NDArray[np.float64]
 
-AGREE = 0.5  #: pixels anywhere in the picture by which such a lens may differ
+AGREE = 0.5  #: pixels by which the approximation may differ anywhere in the picture
 _CELLS = 40  # points along the longer side of the picture at which lenses are compared
-_RETURNS = 1e-3  # pixels by which a pixel may miss itself after there and back
+_RETURNS = 1e-3  # pixels by which a pixel may move when converted to a ray and back
 
 
 def agreeing(
     model: str, coefficients: Array, matrix: Array, size: tuple[int, int]
 ) -> tuple[Array, float, float] | None:
-    """Find k1 k2 p1 p2 k3 of the lens that agrees best with another in a picture.
+    """Find the k1 k2 p1 p2 k3 that agree best with another lens over a picture.
 
-    `model`: ``fisheye`` of OpenCV, four coefficients, or ``opencv``, 8, 12 or 14 of them; `matrix` (3, 3);
-    `size`: width and height in pixels.  Returns the coefficients (5,), the factor of its focal lengths, and
+    `model`: OpenCV's ``fisheye`` with four coefficients, or ``opencv`` with 8, 12 or 14; `matrix` (3, 3);
+    `size`: width and height in pixels.  Returns the coefficients (5,), the factor for the focal lengths, and
     the largest difference in pixels; None if some pixel has no ray in front of the camera, or more than one.
     """
     import cv2
@@ -30,7 +30,7 @@ def agreeing(
     stop = (cv2.TERM_CRITERIA_COUNT | cv2.TERM_CRITERIA_EPS, 200, 1e-12)
     if model == "fisheye":
         rays = cv2.fisheye.undistortPoints(pixels, matrix, coefficients, R=same, P=same, criteria=stop)
-        if np.abs(rays).max() > 1e3:  # OpenCV's mark for what it does not find
+        if np.abs(rays).max() > 1e3:  # what OpenCV returns if it finds no ray
             return None
         back = cv2.fisheye.distortPoints(rays, matrix, coefficients)
     else:
@@ -51,5 +51,5 @@ def agreeing(
     new = np.diag([larger, larger, 1.0]) @ matrix
     new[:2, 2] = matrix[:2, 2]
     again = cv2.undistortPointsIter(pixels, new, lens, same, same, stop)[:, 0]
-    inverse = np.abs((again - rays[:, 0]) * np.diag(new)[:2]).max()  # rays are found from pixels, too
+    inverse = np.abs((again - rays[:, 0]) * np.diag(new)[:2]).max()  # rays must also be found from pixels
     return lens, larger, float(max(np.abs(terms @ found - wanted).max(), inverse))

@@ -1,4 +1,4 @@
-"""Marks on the floor whose distances were measured: their coordinates, and a camera that sees them."""
+"""Marks on the floor with measured distances: their coordinates, and the camera that sees them."""
 
 from __future__ import annotations
 
@@ -13,11 +13,11 @@ from gait.errors import UserError
 
 Array = NDArray[np.float64]
 
-_STARTS = 40  # of the search for coordinates
-_VIEWS = (20.0, 120.0)  # degrees along the longer side, of a lens that is not known
-_CLICK = 1.0  # pixels by which a click is off, at least
-_UNSURE = 0.1  # of the focal length
-_FEWEST = 5  # points that determine a focal length too
+_STARTS = 40  # starting points of the search for coordinates
+_VIEWS = (20.0, 120.0)  # degrees along the longer side: field of view of an unknown lens
+_CLICK = 1.0  # pixels; smallest standard deviation of a click
+_UNSURE = 0.1  # largest standard deviation, as a fraction of the focal length
+_FEWEST = 5  # points needed to determine the focal length too
 
 
 def coordinates(count: int, distances: Mapping[tuple[int, int], float]) -> tuple[Array, Array]:
@@ -26,16 +26,16 @@ def coordinates(count: int, distances: Mapping[tuple[int, int], float]) -> tuple
     Parameters
     ----------
     count : int
-        Of marks.
+        Number of marks.
     distances : mapping
         Metres between the marks of a pair (i, j).
 
     Returns
     -------
     xy : ndarray of shape (count, 2)
-        Metres; turned so or mirrored, which distances do not determine.
+        Metres; possibly mirrored, since distances do not determine that.
     off : ndarray of shape (len(distances),)
-        Metres by which each distance is missed.
+        Residual of each distance, metres.
 
     Raises
     ------
@@ -68,7 +68,7 @@ def _letter(mark: int) -> str:
 
 
 def _require_enough(count: int, pairs: NDArray[np.int64]) -> None:
-    """Refuse distances of too few pairs of marks."""
+    """Raise UserError if too few distances are given."""
     lacking = 2 * count - 3 - len(pairs)
     if lacking > 0:
         more = f"{lacking} more distance{'s' if lacking > 1 else ''}"
@@ -79,7 +79,7 @@ def _require_enough(count: int, pairs: NDArray[np.int64]) -> None:
 
 
 def _require_agreement(pairs: NDArray[np.int64], lengths: Array, off: Array) -> None:
-    """Refuse distances that contradict each other."""
+    """Raise UserError if the distances contradict each other."""
     worst = int(np.abs(off).argmax())
     if abs(off[worst]) > 0.05 * lengths[worst] + 0.02:
         i, j = map(_letter, pairs[worst])
@@ -100,20 +100,20 @@ def place_marks(lens: Camera, uv: Array, xy: Array, mirrored: bool = False) -> t
     xy : ndarray of shape (n, 2) or (n, 3)
         Metres.
     mirrored : bool
-        Whether `xy` may be mirrored: then the side that the picture shows is taken.
+        Whether `xy` may be mirrored; the picture then decides.
 
     Returns
     -------
     camera : Camera
     off : ndarray of shape (n,)
-        Pixels by which each mark is missed.
+        Reprojection error of each mark, pixels.
     xy : ndarray of shape (n, 2) or (n, 3)
-        As used.
+        Coordinates used: as given, or mirrored.
 
     Raises
     ------
     UserError
-        If no place above the floor fits.
+        If no camera pose above the floor fits.
     """
     found, fault = list[tuple[Camera, Array, Array]](), None
     for sign in (1.0, -1.0) if mirrored else (1.0,):
@@ -134,14 +134,14 @@ def place_marks(lens: Camera, uv: Array, xy: Array, mirrored: bool = False) -> t
 def place_unknown(
     size: tuple[int, int], uv: Array, xy: Array, mirrored: bool = False
 ) -> tuple[Camera, Array, Array, float]:
-    """Find the focal length too, of a lens without distortion whose axis is in the middle of the picture.
+    """Place a camera and find its focal length, for a lens without distortion and a centred principal point.
 
     Returns
     -------
     camera, off, xy
-        As of `place_marks`.
+        As in `place_marks`.
     sd : float
-        Standard deviation of the focal length as a share of it.
+        Standard deviation of the focal length, as a fraction of it.
 
     Raises
     ------
@@ -177,7 +177,7 @@ def place_unknown(
 
 
 def _least(cost: Callable[[float], float], size: tuple[int, int]) -> tuple[float, bool]:
-    """Logarithm of the focal length of least cost, and whether it is at an end of those tried."""
+    """Find the log focal length with the least cost, and whether it is at an end of the range searched."""
     from scipy.optimize import minimize_scalar
 
     longest, shortest = (float(np.log(0.5 * max(size) / np.tan(np.radians(0.5 * view)))) for view in _VIEWS)
@@ -189,13 +189,13 @@ def _least(cost: Callable[[float], float], size: tuple[int, int]) -> tuple[float
 
 
 def lens_of(size: tuple[int, int], focal: float) -> Camera:
-    """Lens without distortion whose axis is in the middle of the picture; at the origin."""
+    """Make a camera at the origin, without distortion and with the principal point in the middle."""
     width, height = size
     return Camera(width, height, focal, focal, (width - 1) / 2, (height - 1) / 2, np.eye(3), np.zeros(3))
 
 
 def floor_lines(camera: Camera, xy: Array) -> list[list[list[float]]]:
-    """Lines of a grid on the floor round the marks, up to 3 m from them, as they appear in the picture.
+    """Project a grid on the floor around the marks, up to 3 m from them, into the picture.
 
     Parameters
     ----------

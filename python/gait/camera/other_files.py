@@ -1,8 +1,9 @@
 """Camera files of other tools: Kalibr, ROS camera_info, COLMAP, Qualisys, OpenCap.
 
-Each reader returns the entries of an OpenCV file by their documented names (``camera_matrix``,
-``distortion_coefficients``, ``image_width``, ``image_height``, ``R``, ``t``), and of a lens that is none of
-OpenCV's usual ones ``distortion_model``.  A camera whose file does not place it in the world has no R and t.
+Each reader returns the entries that an OpenCV file would have, under their documented names
+(``camera_matrix``, ``distortion_coefficients``, ``image_width``, ``image_height``, ``R``, ``t``), and
+``distortion_model`` if the lens is not OpenCV's usual one.  Cameras of files without extrinsics have no R and
+t.
 """
 
 from __future__ import annotations
@@ -24,7 +25,7 @@ Array = NDArray[np.float64]
 Entries = dict[str, Any]
 
 _UNDISTORT = "undistort the video, or calibrate with k1 k2 p1 p2 k3"
-#: COLMAP's models: their parameters; f stands for both focal lengths.
+#: Parameters of COLMAP's models; f stands for both focal lengths.
 _COLMAP = {
     "SIMPLE_PINHOLE": "f cx cy",
     "PINHOLE": "fx fy cx cy",
@@ -79,7 +80,7 @@ def _choose(path: str, found: Mapping[str, Any], name: str | None) -> Any:
 
 
 def _matrix(value: Any) -> Any:
-    """Rows of a matrix that is written as rows, cols and data."""
+    """Convert a matrix written as rows, cols and data to a list of rows."""
     if not isinstance(value, Mapping) or not {"rows", "cols", "data"} <= set(value):
         return value
     try:
@@ -111,7 +112,7 @@ def _pinhole(fx: float, fy: float, cx: float, cy: float, width: Any, height: Any
 
 
 def _ros(path: str, data: Mapping[str, Any]) -> Entries:
-    """Read a message sensor_msgs/CameraInfo: its R rectifies stereo pictures and is no place in the world."""
+    """Read a sensor_msgs/CameraInfo message; its R is ignored, as it only rectifies stereo pictures."""
     plain = {str(key).lower(): value for key, value in data.items()}
     cut = plain.get("roi") or {}
     if any(plain.get(f"binning_{axis}", 0) not in (0, 1) for axis in "xy") or any(
@@ -148,7 +149,7 @@ _COLMAP_OTHERS = ("FOV", "THIN_PRISM_FISHEYE", "RAD_TAN_THIN_PRISM_FISHEYE", "SI
 
 
 def _colmap(path: str, rows: list[list[str]], name: str | None) -> Entries:
-    """Camera of COLMAP by its id, or by the name of a picture, which then places it."""
+    """Read a camera of COLMAP by its id, or, with extrinsics, by the name of a picture."""
     cameras = {row[0]: row for row in rows}
     pictures = _colmap_pictures(Path(path).with_name("images.txt"))
     picture = pictures.get(name or "")
@@ -166,7 +167,7 @@ def _colmap(path: str, rows: list[list[str]], name: str | None) -> Entries:
     fx, fy = values.get("fx", values.get("f", 0.0)), values.get("fy", values.get("f", 0.0))
     entries = _pinhole(
         fx, fy, values["cx"] - 0.5, values["cy"] - 0.5, int(row[2]), int(row[3])
-    )  # from corners
+    )  # COLMAP measures from the corner of the first pixel
     if row[1].endswith("FISHEYE"):
         lens = [values.get(f"k{i}", 0.0) for i in range(1, 5)]
         entries |= {"distortion_model": "fisheye", "distortion_coefficients": lens}
@@ -179,7 +180,7 @@ def _colmap(path: str, rows: list[list[str]], name: str | None) -> Entries:
 
 
 def _colmap_pictures(path: Path) -> dict[str, list[str]]:
-    """Rows of images.txt by the picture's name; every second line has points."""
+    """Read the rows of images.txt by the picture's name; every second line lists points and is skipped."""
     if not path.is_file():
         return {}
     lines = [line for line in text_lines(path) if not line.startswith("#")]
@@ -188,7 +189,7 @@ def _colmap_pictures(path: Path) -> dict[str, list[str]]:
 
 
 def _quaternion(q: list[float]) -> Array:
-    """Rotation of a quaternion w x y z."""
+    """Convert a quaternion w x y z to a rotation."""
     w, x, y, z = np.asarray(q) / np.linalg.norm(q)
     return np.array(
         [
@@ -202,8 +203,8 @@ def _quaternion(q: list[float]) -> Array:
 def read_qualisys(path: str, name: str | None) -> Entries:
     """Read a camera of Qualisys's calibration by its serial number.
 
-    Lengths are millimetres, z up; the rows of its rotation are right, up and backwards; intrinsics are
-    counted in parts of a pixel.
+    In these files lengths are in millimetres, z is up, the rows of the rotation point right, up and
+    backwards, and intrinsics are in fractions of a pixel.
     """
     try:
         root = ElementTree.fromstring(Path(path).read_bytes())
@@ -255,7 +256,7 @@ def read_qualisys(path: str, name: str | None) -> Entries:
 
 
 def _attributes(path: str, camera: ElementTree.Element, name: str) -> dict[str, float]:
-    """Numbers of an element of a camera."""
+    """Read the numbers in the attributes of a camera's element."""
     element = camera.find(name)
     if element is None:
         raise UserError(f"{path}: camera {camera.get('serial')} lacks {name}; export the calibration anew")
@@ -263,7 +264,7 @@ def _attributes(path: str, camera: ElementTree.Element, name: str) -> dict[str, 
 
 
 def read_opencap(path: str) -> Entries:
-    """Read OpenCap's cameraIntrinsicsExtrinsics.pickle without R and t, which are in the board's world."""
+    """Read OpenCap's cameraIntrinsicsExtrinsics.pickle without R and t, which are relative to the board."""
     try:
         data = plain_pickle.load(Path(path).read_bytes())
         matrix, lens = np.asarray(data["intrinsicMat"], float), np.ravel(data["distortion"]).astype(float)

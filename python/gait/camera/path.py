@@ -22,16 +22,16 @@ _MATRIX = (*_ROTATION, "tx", "ty", "tz")
 _QUATERNION = ("x", "y", "z", "qx", "qy", "qz", "qw")
 _SD_COLUMNS = ("turn_sd_deg", "place_sd_m")
 _LENS = ("fx", "fy", "cx", "cy")
-LONGEST_GAP = 0.5  #: seconds between two poses between which others are interpolated
-_SLACK = 0.02  # seconds before the first and after the last pose in which these count
-_FASTEST = 20.0  # metres, and radians, per second: what is faster is a jump, not a motion
-_ROTATED = 1e-3  # by which rows of a rotation may miss being orthonormal
-_ONE_PLACE = 0.01  # metres within which a camera only turns
+LONGEST_GAP = 0.5  #: seconds; poses are not interpolated across longer gaps
+_SLACK = 0.02  # seconds before the first and after the last pose in which these are used
+_FASTEST = 20.0  # metres, and radians, per second: anything faster is a jump, not a motion
+_ROTATED = 1e-3  # by which rows of a rotation may differ from orthonormal
+_ONE_PLACE = 0.01  # metres; a camera that moves less only turns
 
 
 @dataclass(frozen=True)
 class CameraPose:
-    """Where a camera is in one frame, ``gait_camera_pose``.
+    """Pose of a camera in one frame, ``gait_camera_pose``.
 
     Attributes
     ----------
@@ -40,7 +40,7 @@ class CameraPose:
     t : ndarray of shape (3,)
         World origin in camera coordinates, metres.
     turn_sd, place_sd : float
-        Standard deviations of the direction about each axis, radians, and of each coordinate of the place,
+        Standard deviations of the rotation about each axis, radians, and of each coordinate of the position,
         metres; 0: exact.
     """
 
@@ -51,21 +51,21 @@ class CameraPose:
 
     @staticmethod
     def of(camera: Camera) -> CameraPose:
-        """Pose of a camera that stands still."""
+        """Return the pose of a camera that stands still."""
         return CameraPose(camera.R, camera.t)
 
     @property
     def centre(self) -> Array:
-        """Place of the lens in the world, shape (3,), metres."""
+        """Position of the lens in the world, shape (3,), metres."""
         return np.asarray(-self.R.T @ self.t)
 
     def camera(self, lens: Camera) -> Camera:
-        """Camera with a lens at this place."""
+        """Return the camera with this pose and the intrinsics of `lens`."""
         return replace(lens, R=self.R, t=self.t)
 
 
 def one_place(poses: Sequence[CameraPose]) -> bool:
-    """Whether a camera turns and does not travel."""
+    """Whether a camera only turns, without moving its lens."""
     centres = np.array([pose.centre for pose in poses])
     return bool(np.hypot.reduce(centres - np.median(centres, axis=0), axis=1).max() < _ONE_PLACE)
 
@@ -81,16 +81,16 @@ def stand_still(poses: Sequence[CameraPose]) -> bool:
 
 @dataclass(frozen=True)
 class CameraPath:
-    """Poses of one camera over time, as from a robot.
+    """Poses of one camera over time, for example from a robot.
 
     Attributes
     ----------
     path : str
         The file, for messages.
     at : ndarray of shape (N,)
-        Seconds, or numbers of frames.
+        Times in seconds, or numbers of frames.
     by_frame : bool
-        Which of these.
+        Whether `at` contains numbers of frames.
     poses : tuple of CameraPose
     """
 
@@ -128,7 +128,7 @@ class CameraPath:
         return CameraPath(path, at, by_frame, _poses(path, names, table, lines))
 
     def at_times(self, times: Sequence[float] | Array, first: int = 0) -> list[CameraPose]:
-        """Poses at the times of frames, seconds; `first` is the number of the first one.
+        """Interpolate poses at the times of frames, seconds; `first` is the number of the first frame.
 
         Rotations are interpolated along the shortest path, positions of the lens linearly.
 
@@ -162,7 +162,7 @@ class CameraPath:
         return out
 
     def _require_motion(self, number: int, right: int, seconds: float) -> None:
-        """Refuse to interpolate across a gap or a jump."""
+        """Raise UserError instead of interpolating across a gap or a jump."""
         left, then = self.poses[right - 1], self.poses[right]
         where = f"{self.path}: between {self.at[right - 1]:g} and {self.at[right]:g}"
         if seconds > LONGEST_GAP:
@@ -186,18 +186,18 @@ def _turn(before: Array, after: Array) -> Array:
 
 
 def between(left: CameraPose, right: CameraPose, share: float) -> CameraPose:
-    """Pose at a share of the way from one to another; its standard deviations are the larger ones."""
+    """Interpolate between two poses, `share` from 0 to 1; standard deviations are the larger ones."""
     from scipy.spatial.transform import Rotation
 
     sd = max(left.turn_sd, right.turn_sd), max(left.place_sd, right.place_sd)
     if np.array_equal(left.R, right.R) and np.array_equal(left.t, right.t):
-        return CameraPose(left.R, left.t, *sd)  # with the same digits
+        return CameraPose(left.R, left.t, *sd)  # without rounding
     R = Rotation.from_rotvec(share * _turn(left.R, right.R)).as_matrix() @ left.R
     return CameraPose(R, -R @ (left.centre + share * (right.centre - left.centre)), *sd)
 
 
 def write_path(path: Path, at: Sequence[float], poses: Sequence[CameraPose], *, by_frame: bool) -> None:
-    """Write poses as `CameraPath.read` reads them, with all their digits."""
+    """Write poses for `CameraPath.read`, with full precision."""
     uncertain = any(pose.turn_sd + pose.place_sd > 0 for pose in poses)
     with path.open("w", newline="", encoding="ascii") as file:
         rows = csv.writer(file)
@@ -209,7 +209,7 @@ def write_path(path: Path, at: Sequence[float], poses: Sequence[CameraPose], *, 
 
 
 def _read_table(path: str) -> tuple[list[str], Array, list[int]]:
-    """Names of the columns in use, their numbers (N, columns), and the line of each row."""
+    """Read a file: names of the columns in use, their numbers (N, columns), and the line of each row."""
     require_file(path, "file of camera poses")
     try:
         rows = table_rows(Path(path).read_text(encoding="utf-8-sig"))
@@ -269,7 +269,7 @@ def _poses(path: str, names: list[str], table: Array, lines: list[int]) -> tuple
 
 
 def _matrices(quaternions: Array) -> Array:
-    """Rotations (N, 3, 3) from world to camera of turns (N, 4) from camera to world."""
+    """Convert quaternions (N, 4) from camera to world to rotations (N, 3, 3) from world to camera."""
     from scipy.spatial.transform import Rotation
 
     return np.asarray(Rotation.from_quat(quaternions).inv().as_matrix())

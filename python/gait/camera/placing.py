@@ -1,4 +1,4 @@
-"""Extrinsics of a camera from points with known positions in the world and in the picture."""
+"""Extrinsics of a camera, from points with known positions in the world and in the picture."""
 
 from __future__ import annotations
 
@@ -18,10 +18,10 @@ from gait.io.files import require_file
 
 Array = NDArray[np.float64]
 
-LEAST = 4  # points on the ground that determine a place
+LEAST = 4  # points on the ground needed to place a camera
 _COLUMNS = ("u", "v", "x", "y")
-_STRAIGHT = 0.02  # of their length: points narrower than this lie on a line
-_FURTHEST = 1e6  # pixels or metres
+_STRAIGHT = 0.02  # ratio of width to length below which points count as being on a line
+_FURTHEST = 1e6  # pixels or metres; largest coordinate accepted
 
 
 @dataclass(frozen=True)
@@ -32,9 +32,9 @@ class Points:
     ----------
     path : str
     line : ndarray of int, shape (n,)
-        Of the file, from 1.
+        Line of the file, from 1.
     uv : ndarray of shape (n, 2)
-        Pixels, their centres at integers.
+        Pixels, with centres at integers.
     world : ndarray of shape (n, 3)
         Metres, z up, ground at z = 0.
     """
@@ -92,18 +92,18 @@ def _cell(path: str | os.PathLike[str], line: int, cells: list[str], at: int, na
 
 
 def place(lens: Camera, points: Points) -> tuple[Camera, Array]:
-    """Place a camera whose lens is known, by least squares in the picture (SQPnP, then Levenberg-Marquardt).
+    """Place a camera whose lens is known, by least squares of pixels (SQPnP, then Levenberg-Marquardt).
 
     Returns
     -------
     camera : Camera
     off : ndarray of shape (n,)
-        Pixels by which each point is missed.
+        Reprojection error of each point, pixels.
 
     Raises
     ------
     UserError
-        If no place above the ground fits the points.
+        If no camera pose above the ground fits the points.
     """
     _require_extent(points)
     K, dist = lens.matrix, lens.distortion

@@ -1,1 +1,1 @@
-"""Files: common parts of readers and writers, and formats that are independent of walking."""
+"""Files: common parts of readers and writers, and formats that do not depend on walking."""

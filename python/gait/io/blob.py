@@ -1,6 +1,6 @@
 """Read and write model blobs (`.gait`, format 1.0): a container of named arrays (model-format.md).
 
-The container is independent of walking; `gait.body.skeleton` and `gait.learn` define the sections.
+The container knows nothing about walking; `gait.body.skeleton` and `gait.learn` define the sections.
 """
 
 from __future__ import annotations
@@ -81,18 +81,18 @@ def decode(blob: bytes, name: str = "blob") -> dict[str, Array]:
 
 
 def checksum(blob: bytes) -> int:
-    """CRC-32 of a blob with its own checksum field taken as 0."""
+    """Compute the CRC-32 of a blob, with its checksum field taken as 0."""
     return zlib.crc32(blob[CRC_OFFSET + 4 :], zlib.crc32(bytes(4), zlib.crc32(blob[:CRC_OFFSET])))
 
 
 def stored_checksum(path: str | os.PathLike[str]) -> int:
-    """CRC-32 that a blob's header states."""
+    """Read the CRC-32 stated in a blob's header."""
     with open(path, "rb") as file:
         return int(HEADER.unpack(file.read(HEADER.size))[5])
 
 
 def write(path: str | os.PathLike[str], sections: Mapping[str, Array]) -> bytes:
-    """Write a blob whole or not at all; return its bytes."""
+    """Write a blob, completely or not at all; return its bytes."""
     blob = encode(sections)
     with replacing(path) as temporary:
         temporary.write_bytes(blob)
@@ -100,7 +100,7 @@ def write(path: str | os.PathLike[str], sections: Mapping[str, Array]) -> bytes:
 
 
 def read(path: str | os.PathLike[str]) -> dict[str, Array]:
-    """Read a blob from a file. UserError if the file cannot be read or is not a sound blob."""
+    """Read a blob from a file. UserError if the file cannot be read or is not a valid blob."""
     try:
         with open(path, "rb") as file:
             blob = file.read()
@@ -110,7 +110,7 @@ def read(path: str | os.PathLike[str]) -> dict[str, Array]:
 
 
 def pack_names(names: list[str]) -> npt.NDArray[np.uint8]:
-    """Names as NUL-padded UTF-8, uint8 (len(names), 32)."""
+    """Encode names as NUL-padded UTF-8, uint8 (len(names), 32)."""
     rows = np.zeros((len(names), NAME_BYTES), np.uint8)
     for row, name in zip(rows, names, strict=True):
         text = name.encode()
@@ -121,7 +121,7 @@ def pack_names(names: list[str]) -> npt.NDArray[np.uint8]:
 
 
 def unpack_names(rows: Array) -> list[str]:
-    """Names of a section as written by `pack_names`."""
+    """Decode the names of a section, the inverse of `pack_names`."""
     return [row.tobytes().split(b"\0")[0].decode(errors="backslashreplace") for row in rows]
 
 
@@ -130,7 +130,7 @@ def _aligned(n: int) -> int:
 
 
 def _storable(tag: str, array: Array) -> Array:
-    """Check an array and bring it into file order and byte order."""
+    """Check an array and convert it to the memory layout and byte order of the file."""
     stored = np.ascontiguousarray(array, np.asarray(array).dtype.newbyteorder("<"))
     if len(tag.encode("ascii")) != 4 or stored.dtype not in CODES or not 1 <= stored.ndim <= 4:
         raise ValueError(f"section {tag!r}: {stored.dtype} with {stored.ndim} axes cannot be stored")

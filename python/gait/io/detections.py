@@ -1,4 +1,4 @@
-"""Detections of other tools: people in frames, linked over time, and one of them chosen as keypoints."""
+"""Detections of other tools: link the people of all frames over time, and choose one of them."""
 
 from __future__ import annotations
 
@@ -17,24 +17,24 @@ from gait.progress import note
 
 Array = NDArray[np.float64]
 
-_LONGEST_BREAK = 30  # frames without a person who is then still the same
-_MOVED = 0.6  # of a person's extent: as far as their points may move from one detection to the next
-_NAMED = 6  # people that a note lists
+_LONGEST_BREAK = 30  # frames; a person who is missing for longer counts as another one
+_MOVED = 0.6  # largest movement of points between detections, as a fraction of the person's extent
+_NAMED = 6  # most people that a note lists
 
 
 @dataclass(frozen=True)
 class Clip:
-    """What files of other tools may lack: who of several people, and the frames that they were found in."""
+    """What a user can add to files of other tools: which person to use, and facts about the video."""
 
-    person: str | None = None  #: id of a person; None: the one who is seen most
+    person: str | None = None  #: id of the person to use; None: the one who is seen most
     fps: float | None = None  #: frames per second
     times: Array | None = None  #: (n,) seconds of the video's frames
     size: tuple[int, int] | None = None  #: width and height of the picture, pixels
-    quiet: bool = False  #: make no notes
+    quiet: bool = False  #: print no notes
 
     @property
     def given(self) -> bool:
-        """Whether the user stated any of it by options."""
+        """Whether the user gave any of it as options."""
         return self.person is not None or self.fps is not None
 
 
@@ -43,27 +43,27 @@ class Detection(NamedTuple):
 
     frame: int
     person: str | None
-    """Id of the person; None where the tool does not follow people."""
+    """Id of the person; None if the tool does not follow people."""
     points: Array
     """(P, 3): u, v in pixels and a confidence, about 0 to 1; NaN where not seen."""
 
 
 @dataclass(frozen=True)
 class Detections:
-    """Content of a file: P points of people in frames."""
+    """Content of a file: people in frames, with P points each."""
 
     names: tuple[str, ...]  #: P names
     found: Sequence[Detection]
     own: bool = False  #: whether the user chose the names
-    shares: bool = False  #: whether u and v are shares of the picture's width and height
+    shares: bool = False  #: whether u and v are fractions of the picture's width and height
     fps: float | None = None  #: frames per second, if the file has them
     times: Mapping[int, float] = field(default_factory=dict)  #: seconds of frames, if the file has them
 
 
 def names_of(where: str, count: int, given: Sequence[str] = ()) -> tuple[str, ...]:
-    """Names of `count` points: those that the file has, or the layout's of so many points.
+    """Return the names of `count` points: those in the file, or those of the layout with that many points.
 
-    UserError if the file has none and the layout is unknown.
+    UserError if the file has none and no layout has that many points.
     """
     names = tuple(given) if len(given) == count else points_of(count)
     if not names:
@@ -75,11 +75,11 @@ def names_of(where: str, count: int, given: Sequence[str] = ()) -> tuple[str, ..
 def one_person(
     path: str | os.PathLike[str], detected: Detections, clip: Clip
 ) -> tuple[NDArray[np.int64], Array, tuple[str, ...], Array, Array, list[str]]:
-    """Choose a person's joints.
+    """Choose one person and the points that are joints of the model.
 
-    Returns frames (T,), their times (T,) in seconds, J joints of the model, u and v (T, J, 2) in pixels, NaN
-    where not seen, confidences (T, J) from 0 to 1, and the names of points that are no joints.  UserError in
-    one line names the file.
+    Returns frames (T,), their times (T,) in seconds, the names of J joints, u and v (T, J, 2) in pixels, NaN
+    where not seen, confidences (T, J) from 0 to 1, and the names of points that are not joints of the model.
+    UserError in one line that names the file.
     """
     joints = [joint_named(name, detected.own) for name in detected.names]
     used = [i for i, joint in enumerate(joints) if joint and joints.index(joint) == i]
@@ -109,7 +109,7 @@ def one_person(
 
 
 def _people(found: Sequence[Detection]) -> dict[str, list[Detection]]:
-    """Return the detections of each person by id, in the order of frames."""
+    """Group the detections by person; keys are ids, values in the order of frames."""
     ordered = sorted(found, key=lambda detection: detection.frame)
     ids = Counter((detection.frame, detection.person) for detection in ordered)
     people: dict[str, list[Detection]] = {}
@@ -134,7 +134,7 @@ def _people(found: Sequence[Detection]) -> dict[str, list[Detection]]:
 def _linked(
     present: list[Detection], chains: list[list[Detection]]
 ) -> list[tuple[Detection, list[Detection] | None]]:
-    """Each detection of a frame with the chain that it continues, nearest first; None for a new person."""
+    """Pair each detection of a frame with the chain that it continues, nearest first; None: a new person."""
     pairs = [
         (moved, i, k)
         for i, detection in enumerate(present)
@@ -151,7 +151,7 @@ def _linked(
 
 
 def _moved(before: Array, after: Array) -> float:
-    """Median distance of the points that both have, over the person's extent; inf if they share none."""
+    """Median movement of the points visible in both, over the person's extent; inf if there are none."""
     both = _visible(before) & _visible(after)
     if not both.any():
         return np.inf
@@ -164,7 +164,7 @@ def _visible(points: Array) -> NDArray[np.bool_]:
 
 
 def _choose(path: str | os.PathLike[str], people: dict[str, list[Detection]], clip: Clip) -> list[Detection]:
-    """Return the detections of the person asked for, or of the one who is seen most: frames times extent."""
+    """Return the detections of the person asked for, or of the one with the largest frames times extent."""
     visible = {name: [d for d in chain if _visible(d.points).any()] for name, chain in people.items()}
     weight = {name: sum(_extent(d.points) for d in chain) for name, chain in visible.items() if chain}
     if not weight:
@@ -182,12 +182,12 @@ def _choose(path: str | os.PathLike[str], people: dict[str, list[Detection]], cl
 
 
 def _extent(points: Array) -> float:
-    """How tall or wide a person is, in the unit of the points; 1e-9 at least."""
+    """Height or width of a person, whichever is larger, in the unit of the points; at least 1e-9."""
     return max(float(np.ptp(points[_visible(points), :2], axis=0).max()), 1e-9)
 
 
 def _times(path: str | os.PathLike[str], frame: NDArray[np.int64], detected: Detections, clip: Clip) -> Array:
-    """Seconds of frames: of the video, or by --fps, or as the file has them."""
+    """Take the times of frames, seconds, from the video, from --fps, or from the file."""
     if clip.times is not None:
         if frame[0] < 0 or frame[-1] >= len(clip.times):
             raise UserError(

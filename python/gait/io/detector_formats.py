@@ -1,4 +1,4 @@
-"""Keypoint files of other tools, recognised by content: read, or rejected by name."""
+"""Recognise keypoint files of other tools by their content, and choose the reader or reject the format."""
 
 from __future__ import annotations
 
@@ -11,11 +11,11 @@ from gait.errors import UserError, unreadable
 from gait.io import detector_json, detector_tables
 from gait.io.detections import Detections
 
-_HEAD = 1 << 16  # bytes that show what a file is
+_HEAD = 1 << 16  # bytes at the beginning from which the format is recognised
 _CSV = "keypoints are CSV with one row per frame of one person: frame,time,<joint>_u,<joint>_v[,<joint>_c]"
 Reader = Callable[[str | os.PathLike[str]], Detections]
 
-#: First bytes of files that are no text.
+#: First bytes of binary files.
 _BINARY = {
     b"\x80": "a Python pickle",
     b"PK\x03\x04": "an archive, such as .npz",
@@ -23,14 +23,14 @@ _BINARY = {
     b"MATLAB": "a MATLAB file",
     b"PAR1": "Parquet",
 }
-#: What text of JSON holds that no reader knows.
+#: Text in JSON files that no reader supports.
 _YOLO = re.compile(r'"class"[^\0]*"keypoints"|"keypoints"[^\0]*"class"')
-#: First lines of tables that are read, and by what.
+#: First lines of supported tables, and their readers.
 _TABLES: tuple[tuple[str, Reader], ...] = (
     (r"^(scorer|individuals|bodyparts)\b.*\n(.*\n){0,2}coords\b", detector_tables.read_dlc_csv),
     (r"^[^\n]*\bframe_idx\b[^\n]*\.x\b", detector_tables.read_sleap_csv),
 )
-#: The same of tables that are none of keypoints, or cannot be identified.
+#: First lines of tables that are not supported, and what they are.
 _REFUSED = (
     (r"^scorer\b|^(individuals|bodyparts)\b", "DeepLabCut without its line coords"),
     (r"^[^\n]*\binstance\.score\b|^[^\n]*\bframe_idx\b", "SLEAP without columns frame_idx and NODE.x"),
@@ -48,9 +48,9 @@ _OWN = re.compile(r"^(?=[^\n]*\bframe\b)(?=[^\n]*\btime\b)[^\n]*\w_u\b")
 
 
 def reader_of(path: str | os.PathLike[str]) -> Reader | None:
-    """Reader of a file or folder of another tool; None for the package's CSV, and for what is not recognised.
+    """Find the reader for a file or folder of another tool; None for the package's CSV or an unknown file.
 
-    UserError if it cannot be read, or is recognised as a format that is not supported, with the remedy.
+    UserError, with the remedy, if it cannot be read or has a format that is recognised but not supported.
     """
     if Path(path).is_dir():
         return detector_json.read_folder

@@ -1,4 +1,4 @@
-"""Keypoints in JSON: OpenPose, COCO, AlphaPose, MMPose, MediaPipe."""
+"""Read keypoints in JSON: OpenPose, COCO, AlphaPose, MMPose, MediaPipe."""
 
 from __future__ import annotations
 
@@ -22,13 +22,13 @@ _OPENPOSE = "pose_keypoints_2d"
 _LISTS = ("frames", "instance_info", "predictions", "results", "data")
 _LANDMARKS = re.compile(r"pose_?landmarks?|landmarks?|keypoints", re.IGNORECASE)
 _TIMES = {"timestamp_ms": 0.001, "timestamp_s": 1.0, "time": 1.0, "timestamp": 1.0, "t": 1.0}
-_HIDDEN = 0.5  # confidence of a point that COCO's annotators placed though it is hidden
+_HIDDEN = 0.5  # confidence of a point that COCO's annotators marked as hidden
 
 
 def read_folder(folder: str | os.PathLike[str]) -> Detections:
-    """Read a folder of OpenPose: one JSON file per frame, whose number ends the name.
+    """Read a folder of OpenPose: one JSON file per frame, whose name ends with the frame's number.
 
-    UserError if a file is none of OpenPose's, or two have the same number.
+    UserError if a file is not OpenPose's, or two have the same number.
     """
     files = sorted(Path(folder).glob("*.json"))
     if not files:
@@ -55,7 +55,7 @@ def read_folder(folder: str | os.PathLike[str]) -> Detections:
 def read_json_file(path: str | os.PathLike[str]) -> Detections:
     """Read a JSON file of any tool, recognised by its content.
 
-    UserError in one line if it holds no people, or keypoints of an unknown layout.
+    UserError in one line if it contains no people, or keypoints in an unknown layout.
     """
     data, where = _load(path), str(path)
     try:
@@ -96,7 +96,7 @@ def _load(path: str | os.PathLike[str]) -> Any:
 
 
 def _frame_of(name: str, where: str) -> int:
-    """Frame number in a file's name: its last number."""
+    """Return the frame number in a file's name, which is the last number in it."""
     numbers = re.findall(r"\d+", re.sub(r"_keypoints|\.[a-zA-Z]\w*$", "", name))
     if not numbers:
         raise UserError(f"{where}: {name} has no frame number in its name; name it like NAME_000012")
@@ -104,7 +104,7 @@ def _frame_of(name: str, where: str) -> int:
 
 
 def _triples(where: str, values: Any) -> Array:
-    """Points (P, 3) of a flat list u v c u v c, or of a list of triples."""
+    """Convert a flat list u v c u v c, or a list of triples, to points (P, 3)."""
     try:
         points = np.asarray(values, np.float64)
         return points.reshape(-1, 3)
@@ -115,14 +115,14 @@ def _triples(where: str, values: Any) -> Array:
 
 
 def _one_width(where: str, width: int, person: Detection) -> int:
-    """Return the number of points of every person, who must all have as many."""
+    """Return the number of points of a person; UserError if it differs from `width`, that of the others."""
     if width and len(person.points) != width:
         raise UserError(f"{where}: people have {width} points and {len(person.points)}; use one layout")
     return len(person.points)
 
 
 def _layout(where: str, found: list[Detection], names: Sequence[str] = (), **more: Any) -> Detections:
-    """Return detections of people who all have as many points."""
+    """Make `Detections`; UserError if people have different numbers of points."""
     if not found:
         raise UserError(f"{where}: contains no person")
     width = 0
@@ -145,7 +145,7 @@ def _openpose(where: str, people: Any, frame: int) -> Iterator[Detection]:
 
 
 def _by_picture(where: str, name: str, content: Mapping[str, Any]) -> Iterator[Detection]:
-    """People of a picture in AlphaPose's formats open and cmu."""
+    """Read the people of a picture in AlphaPose's formats open and cmu."""
     frame = _frame_of(name, where)
     if "people" in content:
         yield from _openpose(where, content["people"], frame)
@@ -155,7 +155,7 @@ def _by_picture(where: str, name: str, content: Mapping[str, Any]) -> Iterator[D
 
 
 def _result(where: str, index: int, entry: Mapping[str, Any]) -> Detection:
-    """One entry of COCO's results, as AlphaPose writes them, too."""
+    """Read one entry of COCO's results, which AlphaPose also writes."""
     image = entry["image_id"]
     frame = int(image) if isinstance(image, int | float) else _frame_of(str(image), f"{where}: entry {index}")
     ids = np.ravel(entry.get("track_id", entry.get("idx", np.nan)))
@@ -165,7 +165,7 @@ def _result(where: str, index: int, entry: Mapping[str, Any]) -> Detection:
 
 
 def _coco(where: str, data: Mapping[str, Any]) -> Detections:
-    """Annotations of COCO: pictures by file name, visibility 0 (not there), 1 (hidden) or 2 as confidence."""
+    """Read COCO's annotations: frames from file names, confidence from visibility 0 (none), 1 (hidden), 2."""
     pictures = {entry["id"]: entry for entry in data.get("images", []) if "id" in entry}
     numbers = {}
     for rank, (key, entry) in enumerate(sorted(pictures.items(), key=lambda item: str(item[0]).zfill(20))):
@@ -193,9 +193,9 @@ def _mmpose_names(meta: Any) -> tuple[str, ...]:
 
 
 def _frames(where: str, frames: list[Any], names: Sequence[str], first: bool = False) -> Detections:
-    """Frames in a list, each with people or landmarks: MMPose and MediaPipe.
+    """Read a list of frames, each with people or landmarks, of MMPose or MediaPipe.
 
-    `first`: frames are numbered from 1, as MMPose's demos do, unless one is 0.
+    `first`: number of the first frame: 1 in files of MMPose's demos, unless a frame is numbered 0.
     """
     found: list[Detection] = []
     times: dict[int, float] = {}
@@ -218,7 +218,7 @@ def _frames(where: str, frames: list[Any], names: Sequence[str], first: bool = F
 
 
 def _number(entry: Any, default: int) -> Any:
-    """Return the frame number that an entry of a list has."""
+    """Return the frame number in an entry of a list, or the default."""
     if not isinstance(entry, Mapping):
         return default
     return entry.get("frame_id", entry.get("frame", default))
@@ -229,7 +229,7 @@ def _is_number(value: Any) -> bool:
 
 
 def _people(where: str, entry: Any) -> Iterator[tuple[str | None, Array, bool]]:
-    """Each person of a frame: id, points (P, 3), whether in shares of the picture."""
+    """Yield each person of a frame: id, points (P, 3), and whether these are fractions of the picture."""
     if entry is None:
         return
     if isinstance(entry, Mapping) and isinstance(entry.get("instances"), list):
@@ -250,7 +250,7 @@ def _people(where: str, entry: Any) -> Iterator[tuple[str | None, Array, bool]]:
 
 
 def _holds_landmarks(value: Any) -> bool:
-    """Whether a value holds landmarks, one person's or several people's; null and empty are no person."""
+    """Whether a value is landmarks of one or several people; null and empty lists mean no person."""
     return isinstance(value, list) and bool(value) and isinstance(value[0], list | Mapping)
 
 
@@ -265,7 +265,7 @@ def _mmpose(where: str, person: Mapping[str, Any]) -> tuple[str | None, Array, b
 
 
 def _landmarks(where: str, landmarks: list[Any]) -> Array:
-    """Points (33, 3) of MediaPipe's normalised landmarks with their visibility."""
+    """Convert MediaPipe's normalised landmarks to points (33, 3), with visibility as confidence."""
     try:
         points = np.array([[p["x"], p["y"], p.get("visibility", 1.0)] for p in landmarks], np.float64)
     except (KeyError, TypeError, ValueError, AttributeError):

@@ -1,4 +1,4 @@
-"""Keypoints in tables: CSV and HDF5 of DeepLabCut and SLEAP, TRC of Sports2D and Pose2Sim in pixels."""
+"""Read keypoints in tables: CSV and HDF5 of DeepLabCut and SLEAP, TRC in pixels of Sports2D and Pose2Sim."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ from gait.io.trc import METRES, NAMED, read_trc_table
 
 Array = NDArray[np.float64]
 
-_PIXELS = 20.0  # a .trc without depth whose points span more is in pixels, not metres
+_PIXELS = 20.0  # if the points of a .trc without depth span more than this, they are in pixels, not metres
 _DLC_LEVELS = ("scorer", "individuals", "bodyparts", "coords")
 
 
@@ -35,7 +35,7 @@ def read_dlc_csv(path: str | os.PathLike[str]) -> Detections:
     if not {"bodyparts", "coords"} <= set(levels) or not rows:
         raise UserError(f"{path}: DeepLabCut's header has lines scorer, bodyparts and coords, then frames")
     width = len(levels["coords"])
-    skipped = sum(not name for name in levels["coords"])  # labels have columns of the picture's path
+    skipped = sum(not name for name in levels["coords"])  # files of labels have them for the path
     individuals = levels.get("individuals", ["0"] * width)[skipped:]
     values = [_numbers(f"{path}: line {i}", row[1 + skipped :], width - skipped)
               for i, row in enumerate(rows, len(levels) + 1)]  # fmt: skip
@@ -67,9 +67,9 @@ def read_sleap_csv(path: str | os.PathLike[str]) -> Detections:
 
 
 def read_h5(path: str | os.PathLike[str]) -> Detections:
-    """Read HDF5 of DeepLabCut (a table of pandas) or SLEAP (analysis).
+    """Read HDF5 of DeepLabCut (a pandas table) or SLEAP (analysis).
 
-    UserError if it is another one; ModuleNotFoundError if h5py, extra ``h5``, is missing.
+    UserError if it is another file; ModuleNotFoundError if h5py, extra ``h5``, is missing.
     """
     import h5py
 
@@ -92,7 +92,7 @@ def read_h5(path: str | os.PathLike[str]) -> Detections:
 def read_pixel_trc(path: str | os.PathLike[str]) -> Detections:
     """Read a .trc of Sports2D or Pose2Sim in pixels: u to the right, v down, no depth.
 
-    The frame is the one at column Time.
+    Column Time gives the frame.
     """
     labels, points, rate, numbered = read_trc_table(Path(path), dict.fromkeys([*METRES, "px"], 1.0))
     times = np.array([time for _, time in numbered])
@@ -114,7 +114,7 @@ def read_pixel_trc(path: str | os.PathLike[str]) -> Detections:
 
 
 def is_trc(text: str) -> bool:
-    """Whether text begins as a .trc does."""
+    """Whether text begins like a .trc file."""
     lines = text.split("\n", 3)
     return len(lines) > 2 and set(lines[1].split()) >= NAMED
 
@@ -130,7 +130,7 @@ def _rows(path: str | os.PathLike[str]) -> list[list[str]]:
 
 
 def _numbers(where: str, cells: Sequence[str], width: int) -> list[float]:
-    """Cells as numbers, empty ones NaN."""
+    """Convert cells to numbers, empty ones to NaN."""
     if len(cells) != width:
         raise UserError(f"{where} has {len(cells)} values where {width} belong; export the file again")
     try:
@@ -141,7 +141,7 @@ def _numbers(where: str, cells: Sequence[str], width: int) -> list[float]:
 
 
 def _row_frame(path: str | os.PathLike[str], index: Sequence[str]) -> int:
-    """Frame of a row: its number, or the last number in the name of its picture."""
+    """Return the frame of a row: its number, or the last number in its picture's name."""
     numbers = re.findall(r"\d+", re.sub(r"\.[a-zA-Z]\w*$", "", index[-1] or index[0]))
     if not numbers:
         raise UserError(f"{path}: a row is named {index[0][:40]!r}, which has no frame number")
@@ -151,7 +151,7 @@ def _row_frame(path: str | os.PathLike[str], index: Sequence[str]) -> int:
 def _from_columns(
     path: str | os.PathLike[str], columns: list[tuple[str, str, str]], frames: Array, values: Array
 ) -> Detections:
-    """Return the detections of a table (T, C) whose columns are (individual, body part, coordinate)."""
+    """Make detections from a table (T, C) whose columns are (individual, body part, coordinate)."""
     people = list(dict.fromkeys(individual for individual, _, _ in columns))
     parts = list(dict.fromkeys(part for _, part, _ in columns))
     where = {column: i for i, column in enumerate(columns)}
@@ -171,7 +171,7 @@ def _from_columns(
 
 
 def _sleap(path: str | os.PathLike[str], file: Any) -> Detections:
-    """Analysis of SLEAP; axes as attribute dims names them, or (track, xy, node, frame)."""
+    """Read SLEAP's analysis; attribute dims names the axes, which are (track, xy, node, frame) by default."""
     tracks = file["tracks"]
     dims = json.loads(tracks.attrs["dims"]) if "dims" in tracks.attrs else ["track", "xy", "node", "frame"]
     uv = np.transpose(tracks[:], [dims.index(name) for name in ("frame", "track", "node", "xy")])
@@ -194,7 +194,7 @@ def _text(value: Any) -> str:
 
 
 def _pandas(path: str | os.PathLike[str], group: Any) -> Detections:
-    """Table of DeepLabCut, as pandas writes it in either of its two formats."""
+    """Read DeepLabCut's table, in either of the two formats of pandas."""
     kind = _text(group.attrs["pandas_type"])
     if kind == "frame_table":
         table = group["table"][:]

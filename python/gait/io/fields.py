@@ -1,4 +1,4 @@
-"""Checked reading of JSON objects and delimited tables: a fault is one line naming file, key and remedy."""
+"""Checked reading of JSON objects and tables of text; errors are one line naming file, key and remedy."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 from gait.errors import UserError, unreadable
 from gait.io.files import require_file
 
-_LAST_FRAME = 2**53  # larger whole numbers are not exact as floating point
+_LAST_FRAME = 2**53  # floating-point numbers cannot represent all larger integers
 
 
 class Fields:
@@ -33,17 +33,17 @@ class Fields:
         return key in self._data
 
     def fail(self, key: str, what: str, remedy: str) -> UserError:
-        """Make (not raise) the error of `key`."""
+        """Return (do not raise) an error about `key`."""
         return UserError(f"{self.where}: {key} {what}; {remedy}")
 
     def get(self, key: str, remedy: str) -> Any:
-        """Raw value of a key that must be there."""
+        """Return the raw value of a required key."""
         if key not in self._data:
             raise self.fail(key, "is missing", remedy)
         return self._data[key]
 
     def number(self, key: str, low: float, high: float, remedy: str) -> float:
-        """Finite number in [low, high]."""
+        """Return a finite number in [low, high]."""
         value = self.get(key, remedy)
         if isinstance(value, bool) or not isinstance(value, int | float):
             raise self.fail(key, "is not a number", remedy)
@@ -55,14 +55,14 @@ class Fields:
         return number
 
     def integer(self, key: str, low: int, high: int, remedy: str) -> int:
-        """Whole number in [low, high]; 640.0 counts as whole."""
+        """Return a whole number in [low, high]; 640.0 counts as whole."""
         value = self.number(key, low, high, remedy)
         if value != int(value):
             raise self.fail(key, f"is {value:g}, not a whole number", remedy)
         return int(value)
 
     def array(self, key: str, shape: Sequence[int], remedy: str) -> NDArray[np.float64]:
-        """Finite numbers of exactly this shape; a column or row matrix counts as a vector."""
+        """Return finite numbers of exactly this shape; a column or row matrix counts as a vector."""
         array = self._numbers(key, remedy)
         if len(shape) == 1 and array.ndim == 2 and 1 in array.shape:
             array = array.ravel()
@@ -74,11 +74,11 @@ class Fields:
         return array
 
     def count(self, key: str, remedy: str) -> int:
-        """How many numbers a key has, 1 for one that is no list."""
+        """Return how many numbers a key has; 1 if it is not a list."""
         return self._numbers(key, remedy).size
 
     def one_or_three(self, key: str, remedy: str) -> NDArray[np.float64]:
-        """Finite number () or three (3,)."""
+        """Return one finite number () or three (3,)."""
         return self.array(key, (3,) if self.count(key, remedy) == 3 else (), remedy)
 
     def _numbers(self, key: str, remedy: str) -> NDArray[np.float64]:
@@ -86,14 +86,14 @@ class Fields:
         if value is None:
             raise self.fail(key, "is null", remedy)
         try:
-            if any(isinstance(each, bool | str) for each in _leaves(value)):  # which NumPy takes for numbers
+            if any(isinstance(each, bool | str) for each in _leaves(value)):  # NumPy converts them
                 raise TypeError
             return np.asarray(value, dtype=np.float64)
         except (TypeError, ValueError, OverflowError):
             raise self.fail(key, "is not an array of numbers", remedy) from None
 
     def only(self, known: Sequence[str]) -> None:
-        """Refuse unknown keys: most are misspelt."""
+        """Raise UserError for unknown keys, most of which are misspelt."""
         for key in self._data:
             if key not in known:
                 raise self.fail(key, "is not a known key", f"use {' '.join(known)}")
@@ -107,7 +107,7 @@ class Fields:
 
 
 def _leaves(value: Any) -> Iterator[Any]:
-    """Yield what lists within lists hold."""
+    """Yield the values in nested lists."""
     if isinstance(value, list | tuple):
         for each in value:
             yield from _leaves(each)
@@ -116,7 +116,7 @@ def _leaves(value: Any) -> Iterator[Any]:
 
 
 def _double(number: float) -> float:
-    """Nearest floating-point number; whole ones too large for any are infinite."""
+    """Convert to a floating-point number; integers too large for one become infinite."""
     try:
         return float(number)
     except OverflowError:
@@ -138,7 +138,7 @@ def json_object(
     form: str,
     pairs: Callable[[list[tuple[str, Any]]], dict[str, Any]] = dict,
 ) -> dict[str, Any]:
-    """Content of a JSON file that holds one object; see `json_of`."""
+    """Read a JSON file that contains one object; see `json_of`."""
     try:
         text = Path(path).read_bytes()
     except OSError as error:
@@ -153,11 +153,11 @@ def json_of(
     form: str,
     pairs: Callable[[list[tuple[str, Any]]], dict[str, Any]] = dict,
 ) -> dict[str, Any]:
-    """Content of UTF-8 text, with or without a byte order mark, that holds one JSON object.
+    """Parse UTF-8 text, with or without a byte order mark, that contains one JSON object.
 
-    `name`: for messages: where the text is from; `remedy`, `form`: for messages: what to do about a text that
-    is no JSON, and about one that holds something else; `pairs`: makes a mapping of keys and values, which
-    may be there twice. UserError with the name and the remedy.
+    For messages: `name`: where the text is from; `remedy`: what to do if it is not JSON; `form`: what to do
+    if it is not an object. `pairs`: makes the mapping from pairs of keys and values, in which a key may occur
+    twice. UserError with the name and the remedy.
     """
     with parsing(name, "JSON", remedy):
         data = json.loads(text.decode("utf-8-sig"), object_pairs_hook=pairs)
@@ -168,23 +168,23 @@ def json_of(
 
 @contextmanager
 def parsing(name: str, kind: str, remedy: str) -> Iterator[None]:
-    """Turn what makes a text no valid JSON or TOML into one line.
+    """Turn errors of parsing JSON or TOML within the block into a UserError of one line.
 
-    UserError with the name of the file, the `kind` that it is not and the remedy.
+    It names the file, the expected `kind` and the remedy.
     """
     try:
         yield
     except RecursionError:
         why = "brackets nested too deeply"
         raise UserError(f"{name}: not valid {kind} ({why}); {remedy}") from None
-    except ValueError as error:  # syntax, encoding, or a number of thousands of digits
+    except ValueError as error:  # syntax, encoding, or a number with thousands of digits
         raise UserError(f"{name}: not valid {kind} ({error}); {remedy}") from None
 
 
 def frame_numbers(path: str | os.PathLike[str], column: NDArray[np.float64]) -> NDArray[np.int64]:
-    """Column `frame` of a table, whose rows start in line 2, as numbers of frames.
+    """Convert column `frame` of a table, whose rows start in line 2, to numbers of frames.
 
-    UserError if they are not whole numbers that increase, with the first such line.
+    UserError, with the first bad line, unless they are whole numbers that increase.
     """
     wrong = (column != column.round()) | (np.abs(column) > _LAST_FRAME)
     wrong[1:] |= np.diff(column) <= 0
@@ -201,11 +201,11 @@ DELIMITERS = ",;\t"
 
 
 def table_rows(text: str) -> list[tuple[int, list[str]]]:
-    """Cells of each row, with its line number; what occurs most in the first line separates them.
+    """Yield the cells of each row and its line number; the separator most frequent in the first line is used.
 
-    Where that is a semicolon, commas below the header are decimal points.
+    If that is a semicolon, commas below the header are decimal commas.
 
-    csv.Error if it is no such text.
+    csv.Error if the text is not a table.
     """
     first = text.split("\n", 1)[0]
     delimiter = max(DELIMITERS, key=first.count)

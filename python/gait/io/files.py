@@ -1,4 +1,4 @@
-"""Files: text read as lines; outputs complete or absent, written to a temporary file and then renamed."""
+"""Read text files, and write outputs completely or not at all, by renaming a temporary file."""
 
 from __future__ import annotations
 
@@ -17,23 +17,23 @@ from pathlib import Path
 from gait.errors import UserError, unreadable
 from gait.progress import note
 
-#: Disk full, or quota of the user, or limit of one file, or a disk that fails.
+#: Disk full, user's quota exceeded, file too large, or a disk error.
 FULL = (errno.ENOSPC, errno.EDQUOT, errno.EFBIG, errno.EIO)
-_SETTLED = 60.0  # seconds after which an unlocked temporary file is what a killed command left
+_SETTLED = 60.0  # seconds after which an unlocked temporary file must be left over from a killed command
 
 
 @contextmanager
 def replacing(path: str | os.PathLike[str], partial: Callable[[Path], bool] | None = None) -> Iterator[Path]:
-    """Yield a temporary file of the same folder, suffix and mode; rename it to `path` if the block succeeds.
+    """Yield a temporary file with the folder, suffix and mode of `path`; after success rename it to `path`.
 
-    Through a symbolic link the file is written that it points to.  Two writers of one path do not disturb
-    each other; the last one to end wins.  What a killed command left is renamed to NAME.unfinished.SUFFIX.
-    When the block has succeeded, the file is on the disk under its name even if the power fails.
+    If `path` is a symbolic link, its target is written.  Two writers of one path do not disturb each other;
+    the last one to finish wins.  A temporary file left by a killed command is renamed to
+    NAME.unfinished.SUFFIX.  Once the block has succeeded, the file is on the disk even if the power fails.
 
     `partial` is called with the temporary file if the block is interrupted or a disk is full.  If it returns
-    True, the file is worth keeping as it then is, and gets that name too.
+    True, the file is worth keeping in that state, and is also renamed to NAME.unfinished.SUFFIX.
 
-    UserError if a file cannot be put there, as by `require_writable`, or the disk is full.
+    UserError if no file can be written there, as in `require_writable`, or the disk is full.
     """
     require_writable(path)
     target = Path(os.path.realpath(path))
@@ -43,7 +43,7 @@ def replacing(path: str | os.PathLike[str], partial: Callable[[Path], bool] | No
     try:
         flags = os.O_RDWR | os.O_CREAT | os.O_EXCL | os.O_NOFOLLOW | os.O_CLOEXEC
         descriptor = os.open(temporary, flags, 0o666)
-        fcntl.flock(descriptor, fcntl.LOCK_EX)  # until it is closed: a killed command holds no lock
+        fcntl.flock(descriptor, fcntl.LOCK_EX)  # held until it is closed, so a killed command holds no lock
         if target.exists():
             os.fchmod(descriptor, stat.S_IMODE(target.stat().st_mode))
         yield temporary
@@ -65,7 +65,7 @@ def replacing(path: str | os.PathLike[str], partial: Callable[[Path], bool] | No
 
 
 def _flush(path: Path) -> None:
-    """Write a file or the names in a folder to the disk; some file systems cannot do the latter."""
+    """Flush a file, or the entries of a folder, to the disk; not all file systems can do the latter."""
     descriptor = os.open(path, os.O_RDONLY)
     try:
         os.fsync(descriptor)
@@ -77,7 +77,7 @@ def _flush(path: Path) -> None:
 
 
 def _recover(target: Path) -> None:
-    """Rename what killed writers of `target` left, and report it; remove it if it is empty."""
+    """Rename files left by killed writers of `target`, and report them; remove empty ones."""
     pattern = re.compile(rf"\.{re.escape(target.stem)}\.[0-9a-f]{{16}}{re.escape(target.suffix)}")
     for left in [entry for entry in target.parent.iterdir() if pattern.fullmatch(entry.name)]:
         if not _is_left(left):
@@ -89,12 +89,12 @@ def _recover(target: Path) -> None:
 
 
 def is_unfinished(path: str | os.PathLike[str]) -> bool:
-    """Whether a file has, by its name, only a part of what it was to have."""
+    """Whether a file's name marks it as unfinished."""
     return re.search(r"\.unfinished(-\d+)?$", Path(path).stem) is not None
 
 
 def _keep(left: Path, target: Path, what: str) -> None:
-    """Rename what was written of `target` to NAME.unfinished.SUFFIX, or -2, -3 ... of it, and report it."""
+    """Rename an unfinished `target` to NAME.unfinished.SUFFIX, or -2, -3 ... if that exists; report it."""
     names = (f"{target.stem}.unfinished{number}{target.suffix}" for number in ("", *range(-2, -1000, -1)))
     kept = next(path for path in map(target.with_name, names) if not path.exists())
     os.replace(left, kept)
@@ -102,13 +102,13 @@ def _keep(left: Path, target: Path, what: str) -> None:
 
 
 def _ends_early(error: BaseException) -> bool:
-    """Whether a command is interrupted or a disk is full, so that what is done is worth keeping."""
+    """Whether the error is an interrupt or a full disk, after which finished work is worth keeping."""
     cause = error.__cause__ if isinstance(error, UserError) else error
     return isinstance(cause, KeyboardInterrupt) or (isinstance(cause, OSError) and cause.errno in FULL)
 
 
 def _is_left(temporary: Path) -> bool:
-    """Whether no process writes a temporary file any more."""
+    """Whether no process is writing a temporary file any more."""
     try:
         descriptor = os.open(temporary, os.O_RDONLY | os.O_NOFOLLOW | os.O_CLOEXEC | os.O_NONBLOCK)
     except OSError:
@@ -126,7 +126,7 @@ def _is_left(temporary: Path) -> bool:
 def require_file(path: str | os.PathLike[str], what: str, remedy: str = "check the name") -> None:
     """Raise UserError unless `path` is a file that is not empty.
 
-    `what`: what it should be, for messages; `remedy`: where there is no such file.
+    For messages: `what`: what the file should be; `remedy`: what to do if it does not exist.
     """
     file = Path(path)
     if file.is_dir():
@@ -138,9 +138,9 @@ def require_file(path: str | os.PathLike[str], what: str, remedy: str = "check t
 
 
 def require_writable(path: str | os.PathLike[str]) -> None:
-    """Raise UserError if a file cannot be put at `path`; for long work, call it before the work.
+    """Raise UserError if no file can be written at `path`; call it before long work.
 
-    The folder must exist and be writable, and `path` be new or a regular file that may be written.
+    The folder must exist and be writable, and `path` must be new or a writable regular file.
     """
     _require_name(path)
     target = Path(os.path.realpath(path))
@@ -159,9 +159,9 @@ def require_writable(path: str | os.PathLike[str]) -> None:
 
 
 def require_outputs(outputs: Sequence[str | None], inputs: Sequence[str | None]) -> None:
-    """Raise UserError unless each output can be written, is named once, and is none of the inputs.
+    """Raise UserError unless each output can be written, is named once, and is not an input.
 
-    `outputs`, `inputs`: files, None where the user names none.
+    `outputs`, `inputs`: files, or None where the user gave none.
     """
     written: set[str] = set()
     for path in outputs:
@@ -176,16 +176,16 @@ def require_outputs(outputs: Sequence[str | None], inputs: Sequence[str | None])
 
 
 def require_unread(path: str, inputs: Sequence[str | None]) -> None:
-    """Raise UserError if the output `path` is one of the inputs, None where the user names none."""
+    """Raise UserError if the output `path` is one of the inputs, which may be None."""
     if os.path.realpath(path) in {os.path.realpath(name) for name in inputs if name}:
         raise UserError(f"{path}: is read by this command; give the output another name")
 
 
 @contextmanager
 def filling(path: str | os.PathLike[str]) -> Iterator[Path]:
-    """Yield an empty folder; if the block succeeds its files go to the folder `path`, pages (.html) last.
+    """Yield an empty folder; if the block succeeds, move its files to the folder `path`, pages (.html) last.
 
-    UserError if there can be no such folder, as by `require_folder`.
+    UserError if there can be no such folder, as in `require_folder`.
     """
     require_folder(path)
     folder = Path(path)
@@ -202,7 +202,7 @@ def filling(path: str | os.PathLike[str]) -> Iterator[Path]:
 
 
 def require_folder(path: str | os.PathLike[str]) -> None:
-    """Raise UserError if `path` cannot be a folder of files; for long work, call it before the work."""
+    """Raise UserError if `path` cannot be a folder with new files; call it before long work."""
     _require_name(path)
     folder = Path(path).absolute()
     there = next(p for p in (folder, *folder.parents) if p.exists())
@@ -214,7 +214,7 @@ def require_folder(path: str | os.PathLike[str]) -> None:
 
 
 def _takes_files(folder: Path) -> bool:
-    """Whether a file can be made in a folder; in /proc not even root can, whatever the permissions."""
+    """Whether a file can be created in a folder; permissions do not show it: in /proc not even root can."""
     try:
         with tempfile.TemporaryFile(dir=folder):
             return os.access(folder, os.W_OK)
@@ -228,7 +228,7 @@ def _require_name(path: str | os.PathLike[str]) -> None:
 
 
 def text_lines(path: Path) -> list[str]:
-    """Lines of a text file in any encoding that keeps ASCII. UserError if it cannot be read."""
+    """Read the lines of a text file in any encoding that extends ASCII. UserError if it cannot be read."""
     try:
         return path.read_text(encoding="latin-1").splitlines()
     except OSError as error:

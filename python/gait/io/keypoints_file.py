@@ -1,10 +1,10 @@
 """Files of 2-D joint keypoints: CSV ``frame,time,<joint>_u,<joint>_v[,<joint>_c]``.
 
-With a detector's errors ``<joint>_sd``, ``<joint>_lasting_sd`` and ``<joint>_frame_sd``, and in the first row
-``lasting_s`` and ``repeated``.
+A detector's errors may be given as ``<joint>_sd``, ``<joint>_lasting_sd`` and ``<joint>_frame_sd``, and, in
+the first row, ``lasting_s`` and ``repeated``.
 
-Empty cells are not seen.
-Columns may also be separated by tabs, or by semicolons with decimal commas.
+An empty cell means that a joint was not seen.  Columns may also be separated by tabs, or by semicolons with
+decimal commas.
 """
 
 from __future__ import annotations
@@ -29,43 +29,44 @@ from gait.io.files import replacing
 
 Array = NDArray[np.float64]
 
-LEAST_CONFIDENCE = 0.1  # points below it count as not seen
+LEAST_CONFIDENCE = 0.1  # points with less count as not seen
 
-LASTS = 1.0  # seconds in which a lasting error counts as one observation where it is no number of its own
-STRIDE = 1.1  # seconds, of most people
-LONGEST_STEP = 1.0  # seconds between frames; so long a step is a cycle of walking
-SHORTEST_STEP = 1e-5  # no camera is as fast
+LASTS = 1.0  # seconds for which a lasting error counts as one observation, unless modelled separately
+STRIDE = 1.1  # seconds; typical stride time
+LONGEST_STEP = 1.0  # seconds between frames; about one stride
+SHORTEST_STEP = 1e-5  # seconds between frames; no camera is this fast
 LONGEST_GAP = 10.0  # seconds without a row that lifting bridges; nothing is known in the middle of it
-RATE_OFF = 0.05  # by which the rates of keypoints and their video differ; phones vary by less
+RATE_OFF = 0.05  # relative difference between the rates of keypoints and video; phones vary less
 TIME_OFF = 0.6  # frames; times are often rounded to half a frame
-FURTHEST = 1e6  # pixels, or units of an orthographic view
+FURTHEST = 1e6  # largest coordinate, in pixels or units of an orthographic view
 
 
 @dataclass(frozen=True)
 class Keypoints:
-    """Points followed in one view over T frames."""
+    """Keypoints of a person over T frames of one view."""
 
     frame: NDArray[np.int64]  #: (T,) increasing
     time: Array  #: (T,) seconds, increasing
-    names: tuple[str, ...]  #: the J points
-    #: (T, J, 2) pixels (or metres of an orthographic view), u to the right, v down; NaN where not seen.
+    names: tuple[str, ...]  #: names of the J points
+    #: (T, J, 2) pixels (or metres in an orthographic view), u to the right, v down; NaN where not seen.
     uv: Array
-    confidence: Array  #: (T, J) from 0 to 1; 1 where the file has none
-    #: (T, J) standard deviation along an axis of errors that last over some frames, so large that frames may
-    #: count as independent: pixels, NaN where unknown.  None: keypoints are as good as they are steady.
+    confidence: Array  #: (T, J) from 0 to 1; 1 if the file has none
+    #: (T, J) standard deviation, along an axis, of errors that last some frames, enlarged so that frames may
+    #: count as independent: pixels, NaN where unknown.  None: the scatter between frames shows all errors.
     sd: Array | None = None
-    #: (T, J) standard deviation along an axis of errors that last for many seconds.  None: there are none.
+    #: (T, J) standard deviation, along an axis, of errors that last for many seconds.  None: there are none.
     lasting_sd: Array | None = None
-    lasting_s: float = np.inf  #: seconds in which the correlation of a lasting error with itself falls to 1/e
-    repeated: float = 0.0  #: share of the variance of other errors that comes again in every stride
-    #: (T, J) standard deviation along an axis of the errors in one frame, pixels.  None: unknown.
+    lasting_s: float = np.inf  #: seconds in which the autocorrelation of a lasting error falls to 1/e
+    repeated: float = 0.0  #: share of the variance of other errors that repeats in every stride
+    #: (T, J) standard deviation, along an axis, of the errors in one frame, pixels.  None: unknown.
     frame_sd: Array | None = None
-    #: (T, J) standard deviation along an axis of points given by hand, pixels; NaN elsewhere.  None: no such.
+    #: (T, J) standard deviation, along an axis, of points marked by hand, pixels; NaN elsewhere.  None: no
+    #: such points.
     by_hand: Array | None = None
 
     @property
     def visible(self) -> NDArray[np.bool_]:
-        """Which points are seen, shape (T, J)."""
+        """Whether each point is seen, shape (T, J)."""
         return np.asarray(np.isfinite(self.uv).all(axis=2))
 
     @property
@@ -74,7 +75,7 @@ class Keypoints:
         return float((len(self.time) - 1) / (self.time[-1] - self.time[0])) if len(self.time) > 1 else 1.0
 
     def part(self, rows: slice) -> Keypoints:
-        """Keypoints of some frames."""
+        """Return the keypoints of some frames."""
         names = ("frame", "time", "uv", "confidence", "sd", "lasting_sd", "frame_sd", "by_hand")
         columns: dict[str, Any] = {}
         for name in names:
@@ -83,7 +84,7 @@ class Keypoints:
         return replace(self, **columns)
 
     def among(self, points: NDArray[np.bool_]) -> Keypoints:
-        """Keypoints of some points (J,)."""
+        """Return the keypoints of some points (J,)."""
         named = zip(self.names, points, strict=True)
         columns: dict[str, Any] = {"names": tuple(name for name, own in named if own)}
         for name in ("uv", "confidence", "sd", "lasting_sd", "frame_sd", "by_hand"):
@@ -92,16 +93,16 @@ class Keypoints:
         return replace(self, **columns)
 
     def visible_frames(self) -> set[int]:
-        """Return the numbers of the frames in which any point is seen."""
+        """Return the numbers of the frames in which at least one point is seen."""
         return set(self.frame[self.visible.any(axis=1)].tolist())
 
     def outside(self, size: tuple[int, int]) -> float:
-        """Share of the points seen that lie outside of a picture of `size` (width, height)."""
+        """Share of the visible points that lie outside a picture of `size` (width, height)."""
         observed = self.uv[self.visible]
         return float(((observed < -0.5) | (observed > np.array(size) - 0.5)).any(axis=1).mean())
 
     def require_extent(self, path: str | os.PathLike[str], sd: float) -> None:
-        """Raise UserError if several points all lie within `sd`: they are not in its unit."""
+        """Raise UserError if several points all lie within `sd`, and so cannot be in the same unit."""
         observed = self.uv[self.visible]
         extent = float(np.ptp(observed, axis=0).max())
         if self.visible.any(axis=0).sum() > 1 and extent <= sd:
@@ -111,9 +112,9 @@ class Keypoints:
             )
 
     def compare_times(self, path: str | os.PathLike[str], times: Array) -> str:
-        """Compare `time` with those of a video's frames, `times` (n,) seconds; describe what differs, or ''.
+        """Compare `time` with the times (n,) of a video's frames, seconds; describe the difference, or ''.
 
-        UserError if the rates differ: then `frame` does not number the video's frames.
+        UserError if the rates differ, since `frame` then does not number the video's frames.
         """
         shared = (self.frame >= 0) & (self.frame < len(times))
         if len(times) < 2 or shared.sum() < 2:
@@ -135,7 +136,7 @@ class Keypoints:
         return f"time is up to {np.abs(late).max():.3g} s off the video's ({frames:+.1f} frames); {remedy}"
 
     def require_motion(self, path: str | os.PathLike[str]) -> None:
-        """Raise UserError unless this is one interval of two frames or more."""
+        """Raise UserError unless these are at least two frames without a long gap."""
         if len(self.time) < 2:
             raise UserError(f"{path}: has one frame; lifting needs motion, so give at least two")
         gap = np.diff(self.time)
@@ -147,18 +148,19 @@ class Keypoints:
             )
 
     def standard_deviations(self, sd: float) -> Array:
-        """Give standard deviations (T, J), `sd` at full confidence; inf where not seen."""
+        """Return standard deviations (T, J): `sd` at full confidence, inf where not seen."""
         found = np.where(self.visible, sd / np.maximum(self.confidence, LEAST_CONFIDENCE), np.inf)
         return self._with_hand(found)
 
     def _with_hand(self, sd: Array) -> Array:
-        """Give standard deviations with those of points given by hand."""
+        """Replace standard deviations by those of points marked by hand."""
         return sd if self.by_hand is None else np.where(np.isfinite(self.by_hand), self.by_hand, sd)
 
     def changing(self, sd: float, whole: bool = False) -> Array:
-        """Give standard deviations (T, J) without `lasting_sd`; `sd` as in `standard_deviations`.
+        """Return standard deviations (T, J) without `lasting_sd`; `sd` as in `standard_deviations`.
 
-        Of a `whole` sequence those errors that come again in every stride, as the pose does, count once.
+        If this is the `whole` sequence, errors that repeat in every stride, because the pose does, count
+        once.
         """
         jitter = self.standard_deviations(sd)
         if self.sd is None:
@@ -168,9 +170,9 @@ class Keypoints:
         return self._with_hand(np.hypot(jitter, lasting))
 
     def errors(self, sd: float) -> Array:
-        """Give standard deviations (T, J) with all errors; `sd` as in `standard_deviations`.
+        """Return standard deviations (T, J) of all errors; `sd` as in `standard_deviations`.
 
-        Errors that last count as one observation in `LASTS`, so that frames may count as independent.
+        Lasting errors count as one observation per `LASTS` seconds, so that frames may count as independent.
         """
         if self.lasting_sd is None:
             return self.changing(sd)
@@ -178,7 +180,7 @@ class Keypoints:
         return np.hypot(self.changing(sd), np.nan_to_num(self.lasting_sd) * np.sqrt(max(LASTS / step, 1.0)))
 
     def in_frame(self, sd: float) -> Array:
-        """Give `frame_sd` or, where it is unknown, `standard_deviations`."""
+        """Return `frame_sd` or, where it is unknown, `standard_deviations`."""
         found = self.standard_deviations(sd)
         return found if self.frame_sd is None else np.where(np.isfinite(self.frame_sd), self.frame_sd, found)
 
@@ -191,9 +193,9 @@ def read(
 ) -> tuple[Keypoints, list[str]]:
     """Read keypoints of points named in `known`, from the package's CSV or a file or folder of another tool.
 
-    `clip`: what other tools' files may lack.  Returns `ignored`: points that are not in `known`.  UserError
-    if the file is malformed, holds no point, or one that is not known unless `ignore_unknown`; files of other
-    tools may always have such points.
+    `clip`: what other tools' files may lack.  Also returns the ignored points, which are not in `known`.
+    UserError if the file is malformed, contains no point, or, unless `ignore_unknown`, contains one that is
+    not known; files of other tools may always have such points.
     """
     clip = clip or Clip()
     if not Path(path).exists():
@@ -256,7 +258,7 @@ def read(
 
 
 def _require_seconds(path: str | os.PathLike[str], time: Array) -> None:
-    """Raise UserError unless times increase as those of a camera in seconds do."""
+    """Raise UserError unless times increase in steps that a camera's times in seconds can have."""
     if (np.diff(time) <= 0).any():
         line = int(np.argmax(np.diff(time) <= 0)) + 3
         raise UserError(f"{path}: line {line}: time does not increase; give seconds")
@@ -286,7 +288,7 @@ def _read_foreign(
 
 
 def write(path: str | os.PathLike[str], keypoints: Keypoints) -> None:
-    """Write keypoints so that `read` gets them back (hundredths of a pixel)."""
+    """Write keypoints for `read`, rounded to hundredths of a pixel."""
     errors = {"sd": keypoints.sd, "lasting_sd": keypoints.lasting_sd, "frame_sd": keypoints.frame_sd}
     given = {name: values for name, values in errors.items() if values is not None}
     columns = ("u", "v", "c", *given)
@@ -310,7 +312,7 @@ def write(path: str | os.PathLike[str], keypoints: Keypoints) -> None:
 
 
 def as_filed(keypoints: Keypoints) -> Keypoints:
-    """Keypoints as `read` gets them from what `write` writes: what is made from either is the same."""
+    """Write keypoints and read them back, so that results do not depend on whether a file was in between."""
     with TemporaryDirectory() as folder:
         path = Path(folder) / "keypoints.csv"
         write(path, keypoints)
@@ -318,13 +320,13 @@ def as_filed(keypoints: Keypoints) -> Keypoints:
 
 
 class _Numbers:
-    """Columns of numbers with errors that name file, line and column."""
+    """Columns of numbers, with errors that name file, line and column."""
 
     def __init__(self, path: str | os.PathLike[str], columns: dict[str, int], rows: list[list[str]]) -> None:
         self._path, self._columns, self._rows = path, columns, rows
 
     def column(self, name: str, most: float = sys.float_info.max) -> Array:
-        """Values of a column between -most and most, NaN where it is empty."""
+        """Return a column's values, between -most and most, NaN where it is empty."""
         values = np.full(len(self._rows), np.nan)
         limit = f" of at most {most:g}" if most < sys.float_info.max else ""
         for i, row in enumerate(self._rows):
@@ -342,7 +344,7 @@ class _Numbers:
         return values
 
     def required(self, name: str) -> Array:
-        """Values of a column without gaps."""
+        """Return the values of a column that may have no empty cells."""
         values = self.column(name)
         if np.isnan(values).any():
             raise UserError(
@@ -351,7 +353,7 @@ class _Numbers:
         return values
 
     def confidence(self, name: str) -> Array:
-        """Confidences; 1 if there is no such column, 0 where it is empty."""
+        """Return confidences; 1 if there is no such column, 0 where it is empty."""
         if name not in self._columns:
             return np.ones(len(self._rows))
         values = self.column(name)
@@ -362,12 +364,12 @@ class _Numbers:
         return np.nan_to_num(values)
 
     def first(self, name: str, default: float) -> float:
-        """Give the first value of a column."""
+        """Return the first value of a column, or the default."""
         value = self.column(name)[0] if name in self._columns else np.nan
         return default if np.isnan(value) else float(value)
 
     def standard_deviation(self, name: str) -> Array:
-        """Give standard deviations; NaN if there is no such column or the cell is empty."""
+        """Return standard deviations; NaN if there is no such column or the cell is empty."""
         if name not in self._columns:
             return np.full(len(self._rows), np.nan)
         values = self.column(name, FURTHEST)
@@ -378,7 +380,7 @@ class _Numbers:
 
 
 def _table(path: str | os.PathLike[str]) -> tuple[list[str], list[list[str]]]:
-    """Header and rows of a CSV, all of one width."""
+    """Read header and rows of a CSV file; UserError unless all have the same number of cells."""
     try:
         text = Path(path).read_text(encoding="utf-8-sig")
         lines = [row for _, row in table_rows(text) if row]
@@ -396,13 +398,13 @@ def _table(path: str | os.PathLike[str]) -> tuple[list[str], list[list[str]]]:
     return head, lines[1:]
 
 
-MANY = 10  # points at exactly one place that no noise puts there
-COINCIDE = 4  # names at one place: from the side hips and pelvis meet, or shoulders and neck, but not more
-APART = 0.5  # of what the other points span: so far beside them feet do not meet
+MANY = 10  # points at exactly the same position, which noise would not produce
+COINCIDE = 4  # joints at one position: from the side, hips and pelvis or shoulders and neck meet, not more
+APART = 0.5  # distance from the other points, as a fraction of their extent, at which feet do not meet
 
 
 def refuse_sentinels(path: str | os.PathLike[str], names: Sequence[str], uv: Array) -> None:
-    """Raise UserError at points (T, J, 2) at 0, 0 or -1, -1; one name at 0 may be the origin of all."""
+    """Raise UserError for points (T, J, 2) at 0, 0 or -1, -1; a single point at 0, 0 may be the origin."""
     zero, minus = (uv == 0).all(axis=2), (uv == -1).all(axis=2)
     origin = zero.all(axis=0) & (zero.sum(axis=1) == 1)[:, None]
     wrong = (zero & ~origin) | minus
@@ -415,9 +417,10 @@ def refuse_sentinels(path: str | os.PathLike[str], names: Sequence[str], uv: Arr
 
 
 def shared_place(uv: Array) -> tuple[Array, int] | None:
-    """Find the place (2,) that several names of (T, J, 2) share exactly, and how often; None if none do.
+    """Find the position (2,) that several points of (T, J, 2) share exactly, and how often; None if none do.
 
-    Joints meet in the picture now and then: it is one beside all other points, or of more than can meet.
+    Joints can meet in the picture, so the position must be apart from all other points, or shared by more
+    joints than can meet.
     """
     observed = np.isfinite(uv).all(axis=2)
     pairs, which, counts = np.unique(uv[observed], axis=0, return_inverse=True, return_counts=True)
@@ -431,7 +434,7 @@ def shared_place(uv: Array) -> tuple[Array, int] | None:
 
 
 def _beside(place: Array, others: Array) -> bool:
-    """Whether a place (2,) is clearly outside of what the others (n, 2) span."""
+    """Whether a position (2,) is clearly outside the extent of the others (n, 2)."""
     if not len(others):
         return False
     low, high = others.min(axis=0), others.max(axis=0)

@@ -1,4 +1,4 @@
-"""Mapping of other tools' keypoints to joints of the model, by number of points or by name."""
+"""Map other tools' keypoints to joints of the model, by number of points or by name."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ _ARMS = "r_shoulder r_elbow r_wrist l_shoulder l_elbow l_wrist"
 _LEGS = "r_hip r_knee r_ankle l_hip l_knee l_ankle"
 _FEET = "l_big_toe - l_heel r_big_toe - r_heel"
 
-#: Layouts by their number of points: name and points; - and those after the last one are no joints.
+#: Layouts by their number of points: name and points; "-" and any after the last one are not joints.
 LAYOUTS = {
     15: ("MPI of OpenPose", f"head - {_ARMS} {_LEGS} -"),
     16: ("MPII", "r_ankle r_knee r_hip l_hip l_knee l_ankle pelvis - - head_top "
@@ -37,17 +37,17 @@ _SIDES = {"l": "l", "left": "l", "r": "r", "right": "r"}
 
 
 def points_of(count: int) -> tuple[str, ...]:
-    """Names of a layout's points, '' for those that are no joints; empty if no layout has so many points."""
+    """List names in the layout with `count` points, '' for those that are not joints; empty if unknown."""
     names = LAYOUTS.get(count, ("", ""))[1].split()
     return tuple([name.strip("-") for name in names] + [""] * (count - len(names))) if names else ()
 
 
 def joint_named(name: str, own: bool = False) -> str:
-    """Joint of the model that a point with this name is; '' if it is none.
+    """Return the model's joint for a point with this name; '' if there is none.
 
-    Sides are understood as l, r, left or right, before or after the part.  `own`: the name was chosen by the
-    user, so that head and neck may be anything; else head is the top of the head, as in HALPE and OpenPose.
-    The neck of other tools lies between the shoulders, which is not the neck of the model.
+    Sides may be l, r, left or right, before or after the part.  `own`: the user chose the name, so that head
+    and neck may be anything; otherwise head is the top of the head, as in HALPE and OpenPose.  The neck of
+    other tools is between the shoulders and not the neck of the model.
     """
     if own and name in ("neck", "head_top"):
         return name

@@ -1,9 +1,9 @@
-"""Focal length that a telephone or camera wrote into a film, as the equivalent of a 35 mm film camera.
+"""Read the 35 mm equivalent focal length that a phone or camera wrote into a film.
 
 Sources, in this order: the key ``com.apple.quicktime.camera.focal_length.35mm_equivalent`` in the metadata of
-the film or of a track (QuickTime File Format, "Metadata"; FFmpeg reads the film's alone), a tag of another
-container of that name or of the EXIF name, and the EXIF of the first picture of a film of JPEGs (CIPA DC-008,
-tag 0xA405).
+the film or of a track (QuickTime File Format, "Metadata"; FFmpeg reads only the film's), a tag of another
+container with that name or the EXIF name, and the EXIF data of the first picture of a film of JPEGs (CIPA
+DC-008, tag 0xA405).
 """
 
 from __future__ import annotations
@@ -19,30 +19,30 @@ from typing import BinaryIO
 _KEY = "com.apple.quicktime.camera.focal_length.35mm_equivalent"
 _NAMES = (_KEY, "focallengthin35mmfilm", "focallengthin35mmformat")
 _DIAGONAL = math.hypot(36.0, 24.0)  # millimetres, of a picture on 35 mm film
-_SHORTEST, _LONGEST = 5.0, 1000.0  # millimetres; a wider or narrower view is a mistake
-_FOLDERS = (b"moov", b"trak", b"udta")  # boxes that metadata may be in
-_LARGEST = 1 << 20  # bytes of metadata
+_SHORTEST, _LONGEST = 5.0, 1000.0  # millimetres; other values are mistakes
+_FOLDERS = (b"moov", b"trak", b"udta")  # boxes that may contain metadata
+_LARGEST = 1 << 20  # most bytes of metadata
 _NUMBERS = {21: ">i", 22: ">I", 23: ">f", 24: ">d"}  # well-known types of QuickTime: signed, unsigned, floats
 _EXIF_IFD, _EXIF_35MM = 0x8769, 0xA405
 
 
 def lens_tag(path: str | os.PathLike[str]) -> str | None:
-    """Read the text that a film has for its focal length; None if it has none.
+    """Read the text that states a film's focal length; None if there is none.
 
-    Damaged metadata counts as none: the film may be read all the same.
+    Damaged metadata count as none, since the film may still be readable.
     """
     return _quicktime(Path(path)) or _container(Path(path))
 
 
 def equivalent_mm(tag: str) -> float | None:
-    """Millimetres that a tag states, such as ``26.00mm``; None if it is no focal length of a camera."""
+    """Parse a tag such as ``26.00mm`` to millimetres; None if it is not a plausible focal length."""
     number = re.fullmatch(r"\s*(\d+(?:\.\d+)?)\s*(?:mm)?\s*", tag)
     mm = float(number[1]) if number else 0.0
     return mm if _SHORTEST <= mm <= _LONGEST else None
 
 
 def view_across(mm: float, size: tuple[int, int]) -> float:
-    """Horizontal view, degrees, of a picture of `size` pixels; equivalent lengths share the diagonal."""
+    """Horizontal field of view, degrees, of a picture of `size` pixels; `mm` applies to its diagonal."""
     focal = mm * math.hypot(*size) / _DIAGONAL
     return math.degrees(2 * math.atan(0.5 * size[0] / focal))
 
@@ -60,7 +60,7 @@ def _quicktime(path: Path) -> str | None:
 
 
 def _metadata(file: BinaryIO, begin: int, end: int, depth: int) -> Iterator[bytes]:
-    """Give the contents of the ``meta`` boxes between two places of a file."""
+    """Yield the contents of the ``meta`` boxes between two positions of a file."""
     while begin + 8 <= end:
         file.seek(begin)
         size, kind = struct.unpack(">I4s", file.read(8))
@@ -78,7 +78,7 @@ def _metadata(file: BinaryIO, begin: int, end: int, depth: int) -> Iterator[byte
 
 
 def _boxes(data: bytes, begin: int = 0) -> Iterator[tuple[bytes, bytes]]:
-    """Give kind and contents of the boxes in `data`."""
+    """Yield kind and contents of the boxes in `data`."""
     while begin + 8 <= len(data):
         size, kind = struct.unpack_from(">I4s", data, begin)
         if size < 8:
@@ -88,7 +88,7 @@ def _boxes(data: bytes, begin: int = 0) -> Iterator[tuple[bytes, bytes]]:
 
 
 def _item(meta: bytes) -> str | None:
-    """Value of the key in a ``meta`` box: a table of names, and a list of values by their numbers."""
+    """Read the key's value in a ``meta`` box, which has a table of names and a list of numbered values."""
     boxes = dict(_boxes(meta, 0 if meta[4:8] == b"hdlr" else 4))  # MP4 has a version before the boxes
     keys, values = boxes.get(b"keys", b""), boxes.get(b"ilst", b"")
     names = [name for _, name in _boxes(keys, 8)]
@@ -124,7 +124,7 @@ def _exif(jpeg: bytes) -> str | None:
     """Read the 35 mm equivalent from the EXIF segment of a JPEG."""
     at = 2
     try:
-        while jpeg[at] == 0xFF and jpeg[at + 1] != 0xDA:  # up to the picture's data
+        while jpeg[at] == 0xFF and jpeg[at + 1] != 0xDA:  # until the picture's data begin
             (size,) = struct.unpack_from(">H", jpeg, at + 2)
             if jpeg[at + 1] == 0xE1 and jpeg[at + 4 : at + 10] == b"Exif\0\0":
                 tiff = jpeg[at + 10 : at + 2 + size]
@@ -139,7 +139,7 @@ def _exif(jpeg: bytes) -> str | None:
 
 
 def _entry(tiff: bytes, order: str, folder: int, tag: int) -> int | None:
-    """Value of a tag of type SHORT or LONG in a folder of TIFF."""
+    """Read a tag of type SHORT or LONG in a TIFF directory."""
     (count,) = struct.unpack_from(order + "H", tiff, folder)
     for k in range(count):
         at = folder + 2 + 12 * k

@@ -1,4 +1,4 @@
-"""Files of OpenCV's FileStorage (.yaml, .yml, .xml), read into a mapping."""
+"""Read files of OpenCV's FileStorage (.yaml, .yml, .xml) into a mapping."""
 
 from __future__ import annotations
 
@@ -11,24 +11,24 @@ import numpy as np
 from gait.errors import UserError
 
 if TYPE_CHECKING:
-    import cv2  # at run time where it is used: other files are read without OpenCV
+    import cv2  # otherwise imported where it is used, so that other files can be read without OpenCV
 
 
 def read_storage(path: str) -> dict[str, Any]:
-    """Top-level nodes by name: numbers, strings, lists, matrices as nested lists, other maps as dicts.
+    """Read the top-level nodes by name: numbers, strings, lists, matrices as nested lists, maps as dicts.
 
-    UserError if the file is none, is damaged, or holds a name twice or a matrix that lacks numbers.
+    UserError if the file is not a FileStorage file, is damaged, or has a name twice or an incomplete matrix.
     """
     import cv2
 
     broken = UserError(f"{path}: not an OpenCV FileStorage file; write it with cv2.FileStorage")
-    text = Path(path).read_bytes().removeprefix(BOM_UTF8).decode("latin-1")  # only ASCII is looked at
+    text = Path(path).read_bytes().removeprefix(BOM_UTF8).decode("latin-1")  # only ASCII matters
     try:
         storage = cv2.FileStorage(text, cv2.FILE_STORAGE_READ | cv2.FILE_STORAGE_MEMORY)
         if not storage.isOpened():
             raise broken
         names = storage.root().keys()
-    except (cv2.error, SystemError):  # the constructor's binding wraps the one in the other
+    except (cv2.error, SystemError):  # the constructor's binding turns the former into the latter
         raise broken from None
     twice = next((name for name in names if names.count(name) > 1), None)
     if twice is not None:
@@ -48,7 +48,7 @@ def _value(path: str, name: str, node: cv2.FileNode) -> Any:
 
 
 def _matrix(path: str, name: str, content: dict[str, Any]) -> Any:
-    """Rows of a matrix."""
+    """Convert a matrix to a list of rows."""
     values = content.get("data", [])
     try:
         rows, columns = int(content["rows"]), int(content["cols"])

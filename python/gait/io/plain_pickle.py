@@ -1,4 +1,4 @@
-"""Pickles of lists, tuples, mappings, text, numbers and numpy arrays; nothing of a file is run."""
+"""Read pickles of lists, tuples, mappings, text, numbers and numpy arrays; no code in them is run."""
 
 from __future__ import annotations
 
@@ -25,7 +25,7 @@ class _Plain(pickle.Unpickler):
 
 
 def load(data: bytes) -> Any:
-    """Read a pickle. ValueError if it is damaged or holds anything but plain data."""
+    """Read a pickle. ValueError if it is damaged or contains anything but plain data."""
     try:
         return _Plain(io.BytesIO(bytes(data))).load()
     except (

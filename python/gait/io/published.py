@@ -1,6 +1,6 @@
-"""Files out of published packages, which are downloaded but not installed: checked by their SHA-256.
+"""Files from published packages, which are downloaded but not installed, and checked by SHA-256.
 
-The detector's weights and the components of web pages come from these; the repository contains none.
+The detector's weights and components of web pages are such files; the repository contains none of them.
 """
 
 from __future__ import annotations
@@ -23,9 +23,9 @@ from gait.io.files import replacing
 
 
 class Published(NamedTuple):
-    """A file: where it lies in its package, and what it must contain.
+    """A file: its path in its package, and its checksum.
 
-    `package` is ``name==version`` for a Python package, ``name@version`` for one of npm.
+    `package` is ``name==version`` for a Python package, ``name@version`` for an npm package.
     """
 
     file: str
@@ -45,13 +45,13 @@ class Store:
     variable : str
         Environment variable that names another folder.
     what : str
-        What the files are, in messages.
+        What the files are, for messages.
     remedy : str
-        What a user does to get them.
+        How a user gets them, for messages.
     files : tuple of Published
-        All that belongs there.
+        All files of the folder.
     source : str
-        Content of SOURCE.txt: where they come from, and their licences.
+        Content of SOURCE.txt: where the files come from, and their licences.
     """
 
     folder: str
@@ -62,14 +62,14 @@ class Store:
     source: str
 
     def folders(self) -> list[Path]:
-        """Folders that may hold the files, in search order: the variable's alone if it is set."""
+        """List folders that may contain the files, in search order; only the variable's if it is set."""
         if named := os.environ.get(self.variable):
             return [Path(named)]
         cache = Path(os.environ.get("XDG_CACHE_HOME") or Path.home() / ".cache")
         return [Path(sys.prefix) / "share/gait" / self.folder, cache / "gait" / self.folder]
 
     def find(self, wanted: Published) -> Path | None:
-        """Path of a file on this machine, None if it was not fetched.
+        """Find a file on this machine; None if it was not downloaded.
 
         Raises
         ------
@@ -87,7 +87,7 @@ class Store:
         Raises
         ------
         UserError
-            If it is absent, or not the file that was published.
+            If it is missing, or is not the file that was published.
         """
         path = self.find(wanted)
         if path is None:
@@ -102,14 +102,14 @@ class Store:
         return data
 
     def fetch(self, report: Callable[[str], None]) -> Path:
-        """Download the packages, check their files and keep them with the licence of their package.
+        """Download the packages, check their files, and store them with the licence of their package.
 
-        A package of npm is left out where there is no ``npm``.
+        npm packages are skipped if ``npm`` is not installed.
 
         Parameters
         ----------
         report : callable
-            Called with one line for each step.
+            Called with a line for each step.
 
         Returns
         -------
@@ -119,7 +119,7 @@ class Store:
         Raises
         ------
         UserError
-            If a package cannot be downloaded or does not hold what was published.
+            If a package cannot be downloaded or its files are not those that were published.
         """
         folder = self._writable_folder()
         if all(_is_whole(folder / each.file, each) for each in self.files):
@@ -155,7 +155,7 @@ def _is_whole(path: Path, wanted: Published) -> bool:
 
 
 def _download_wheel(package: str, folder: Path) -> Path:
-    # The wheel of one platform serves all: only its data files are taken.
+    # The wheel of any platform will do, since only its data files are used.
     platform = "--python-version 3.11 --implementation cp --abi cp311 --platform manylinux_2_28_x86_64"
     pip = [sys.executable, "-m", "pip", "download", "--quiet", "--disable-pip-version-check"]
     _run([*pip, "--no-deps", "--only-binary=:all:", *platform.split(), package], folder, package)

@@ -1,4 +1,4 @@
-"""Track and truth files: CSV with one row per frame and metric joint positions in the world."""
+"""Track and truth files: CSV with one row per frame and joint positions in the world, in metres."""
 
 from __future__ import annotations
 
@@ -42,7 +42,7 @@ CAMERA_COLUMNS = tuple(f"camera_{k}_{what}" for k in range(1, 5) for what in ("x
 
 
 def header(components: int, angle_names: tuple[str, ...], classes: tuple[str, ...] = ()) -> list[str]:
-    """Column names of a track file; those of classes of motion only where a model has several."""
+    """List the columns of a track file; columns for classes of motion only if the model has several."""
     scores = [f"c_{k + 1}" for k in range(components)]
     joints = [f"{joint}_{axis}" for joint in JOINTS for axis in ("x", "y", "z", "sx", "sy", "sz")]
     sds = [*SD_COLUMNS, *(f"{score}_sd" for score in scores)]
@@ -59,15 +59,15 @@ class TrackWriter:
     ----------
     path
     components : int
-        Scores per row.
+        Number of scores per row.
     joint_names, angle_names, classes : tuple of str
         Joints, angles and classes of motion of the model.
     frames : range, optional
-        That were to be tracked, if that is known; reasons of `Estimate` are then written too.
+        Frames to be tracked, if known; the reasons of estimates are then written too.
     camera_change : callable, optional
-        Gives `Track.camera_change` at a time in seconds, of a camera that was estimated from the walk.
+        Returns `Track.camera_change` at a time in seconds, for a camera that was estimated from the walk.
     person : int, optional
-        Number of the person, of several in a clip.
+        Number of the person, if a clip has several.
     film : str, optional
         `Video.digest` of the film that is tracked.
     """
@@ -144,7 +144,7 @@ class TrackWriter:
         return [] if change is None else [f"{value:.6f}" for value in change.T.ravel()]
 
     def _scores(self, coef: Array) -> Array:
-        """One value for each score column; a state may hold fewer, which are 0."""
+        """Return a value for each score column; scores that a state lacks are 0."""
         return np.pad(np.asarray(coef, float)[: self._components], (0, max(0, self._components - len(coef))))
 
 
@@ -153,7 +153,7 @@ def _or_empty(value: float) -> str:
 
 
 def _end_at_a_row(path: Path) -> bool:
-    """Cut off a row that was not written to its end; return whether there are rows under the header."""
+    """Cut off an incomplete last row; return whether any rows remain below the header."""
     with path.open("r+b") as file:
         whole = file.read()
         whole = whole[: whole.rfind(b"\n") + 1]
@@ -163,7 +163,7 @@ def _end_at_a_row(path: Path) -> bool:
 
 @dataclass(frozen=True)
 class Joints:
-    """Joint positions over frames, the truth of a clip."""
+    """Joint positions over frames: the truth of a clip."""
 
     frame: NDArray[np.int64]  #: (n,) increasing
     time: Array  #: (n,) seconds
@@ -178,23 +178,24 @@ class Joints:
 class Track(Joints):
     """A track file."""
 
-    status: list[str]  #: of each frame: init, tracking, ambiguous or lost
+    status: list[str]  #: for each frame: init, tracking, ambiguous or lost
     phase: Array  #: (n,) NaN where the person takes no strides
     sd: dict[str, Array]  #: (n, 3) posterior standard deviations, metres
-    #: (n,) every other column of numbers by its name: state, scores, angles and their standard deviations;
+    #: (n,) for each other column of numbers, by name: state, scores, angles and their standard deviations;
     #: NaN in `STRIDE_COLUMNS` where the person takes no strides.
     numbers: dict[str, Array] = field(default_factory=dict)
-    #: Class of motion of each frame; empty where the model has one.
+    #: Class of motion of each frame; empty if the model has only one.
     motion_class: list[str] = field(default_factory=list)
-    #: Frames that were to be tracked; None where the file does not state them.
+    #: Frames that were to be tracked; None if the file does not state them.
     frames: range | None = None
-    #: Why a clip's rules made each frame ambiguous, empty where the tracker itself decided; none: not stated.
+    #: Why whole-clip checks made each frame ambiguous, '' where the tracker itself decided; none if not
+    #: stated.
     reason: list[str] = field(default_factory=list)
-    #: (n, 3, 4) change of the pelvis' x and y, metres, and of the heading, radians, with each of four
-    #: independent parts of the uncertainty of a camera that was estimated from the walk, each of one sd and
-    #: common to all frames; None where the camera was given.
+    #: (n, 3, 4) changes of the pelvis's x and y, metres, and of the heading, radians, per sd of each of four
+    #: independent errors of a camera that was estimated from the walk, which are common to all frames; None
+    #: if the camera was given.
     camera_change: Array | None = None
-    #: `Video.digest` of the film that was tracked; empty: not stated.
+    #: `Video.digest` of the film that was tracked; empty if not stated.
     film: str = ""
 
     def eval15_sd(self) -> Array:
@@ -202,9 +203,9 @@ class Track(Joints):
         return np.stack([self.sd[name] for name in EVAL15], axis=1)
 
     def compare_film(self, path: str | os.PathLike[str], video: Video) -> str:
-        """Describe a film that need not be the one tracked, or ''; `path` is that of the track, for messages.
+        """Compare a film with the one tracked; return a warning, or ''; `path`: of the track, for messages.
 
-        UserError if its frames are shown at other times, so that it cannot be.
+        UserError if its frames have other times, so that it cannot be the film that was tracked.
         """
         if self.film in ("", video.digest):
             return ""
@@ -230,9 +231,9 @@ def read_truth(path: str | os.PathLike[str]) -> Joints:
 
 
 def read_estimates(path: str | os.PathLike[str]) -> Track:
-    """Read what ``gait track`` or ``gait lift`` wrote.
+    """Read a file from ``gait track`` or ``gait lift``.
 
-    Lifted motion has joints alone: every status is then ``tracking`` and the phase NaN.
+    Lifted motion has only joints: every status is then ``tracking`` and the phase NaN.
     """
     table = _Table(path, "track")
     if _has_no_state(table):
@@ -242,7 +243,7 @@ def read_estimates(path: str | os.PathLike[str]) -> Track:
 
 
 def read_track(path: str | os.PathLike[str]) -> Track:
-    """Read what ``gait track`` wrote."""
+    """Read a file from ``gait track``."""
     table = _Table(path, "track")
     if _has_no_state(table):
         raise UserError(f"{path}: has only joints, as from gait lift; give a track from gait track")
@@ -254,7 +255,7 @@ def read_track(path: str | os.PathLike[str]) -> Track:
 
 
 def _has_no_state(table: _Table) -> bool:
-    """Whether a file has joints alone: lifted motion, or a truth."""
+    """Whether a file has only joints, as lifted motion and truth have."""
     return not {"status", "phase"} & table.rows.keys()
 
 
@@ -276,7 +277,7 @@ def _track(table: _Table, status: list[str], phase: Array) -> Track:
 
 
 def _frames(table: _Table) -> range:
-    """Frames to be tracked, which all rows state alike; if the command was interrupted, those it reached."""
+    """Read the frames to be tracked, the same in all rows; if interrupted, those that were reached."""
     first, last = (table.numbers(name) for name in CLIP_COLUMNS[1:])
     return range(int(first[0]), int(table.frames()[-1] if is_unfinished(table.path) else last[0]) + 1)
 
@@ -287,13 +288,13 @@ def _camera_change(table: _Table) -> Array:
 
 
 def _is_number(column: str) -> bool:
-    """Whether `read_track` takes a column into `Track.numbers`."""
+    """Whether a column belongs in `Track.numbers`."""
     known = column in STATE_COLUMNS[3:] or column in SD_COLUMNS or column.endswith("_deg")
     return known or column.startswith("p_") or re.fullmatch(r"c_\d+(_sd)?", column) is not None
 
 
 class _Table:
-    """CSV columns by name, with errors that name file, line and column."""
+    """Columns of a CSV file by name, with errors that name file, line and column."""
 
     def __init__(self, path: str | os.PathLike[str], what: str) -> None:
         self.path, self.what = path, what
@@ -365,7 +366,7 @@ def write_lifted(
     places: Floats,
     sd: Floats,
 ) -> None:
-    """Write places and standard deviations (T, J, 3) of markers; the file appears whole or not at all."""
+    """Write positions and standard deviations (T, J, 3) of markers, completely or not at all."""
     head = [f"{name}_{axis}" for name in names for axis in ("x", "y", "z", "sx", "sy", "sz")]
     values = np.concatenate([places, sd], axis=2).reshape(len(frame), -1)
     with replacing(path) as temporary, open(temporary, "w", newline="", encoding="utf-8") as file:

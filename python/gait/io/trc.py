@@ -1,4 +1,4 @@
-"""TRC, the marker format of OpenSim: joints written, points read."""
+"""Read and write TRC, the marker format of OpenSim."""
 
 from __future__ import annotations
 
@@ -15,17 +15,17 @@ from gait.io.files import replacing, text_lines
 
 Array = NDArray[np.float64]
 
-METRES = {"m": 1.0, "mm": 0.001, "cm": 0.01}  #: one unit of a file
-NAMED = {"DataRate", "NumMarkers", "Units"}  #: fields that a header must name
-_RATE_OFF, _GAP = 0.02, 1.7  # relative difference of rates; steps of a frame that are a gap
-HEAD = 5  # lines of the header; an empty one may follow
+METRES = {"m": 1.0, "mm": 0.001, "cm": 0.01}  #: units of a file, in metres
+NAMED = {"DataRate", "NumMarkers", "Units"}  #: fields that a header must have
+_RATE_OFF, _GAP = 0.02, 1.7  # largest relative difference of rates; frame times from which a step is a gap
+HEAD = 5  # lines of the header; an empty line may follow
 
 
 def read_trc(path: Path, fps: float | None = None) -> tuple[list[str], Array, float]:
     """Read the points of a .trc.
 
-    Returns M labels, points (T, M, 3) in metres and the axes of the file, NaN where cells are empty, and
-    frames per second: `fps`, or DataRate, which the times must then confirm.  UserError names file, line and
+    Returns M labels, points (T, M, 3) in metres and in the file's axes, NaN where cells are empty, and frames
+    per second: `fps`, or DataRate, which must then agree with the times.  UserError names file, line and
     remedy.
     """
     labels, points, rate, times = read_trc_table(path, METRES)
@@ -37,7 +37,7 @@ def read_trc(path: Path, fps: float | None = None) -> tuple[list[str], Array, fl
 def read_trc_table(
     path: Path, scales: Mapping[str, float]
 ) -> tuple[list[str], Array, float, list[tuple[int, float]]]:
-    """Read labels, points (T, M, 3) times the factor of their unit in `scales`, DataRate, lines and times."""
+    """Read labels, points (T, M, 3) times their unit's factor in `scales`, DataRate, and lines with times."""
     lines = text_lines(path)
     if len(lines) < HEAD or not set(lines[1].split()) >= NAMED:
         raise UserError(f"{path}: not a .trc header of five lines; export the file again")
@@ -57,7 +57,7 @@ def read_trc_table(
 
 
 def _rate_and_scale(path: Path, head: dict[str, str], scales: Mapping[str, float]) -> tuple[float, float]:
-    """Frames per second and the unit's factor as the header has them."""
+    """Read frames per second and the unit's factor from the header."""
     rate, units = head.get("DataRate", ""), head.get("Units", "")
     if not _NUMBER.fullmatch(rate) or not 0 < float(rate) < np.inf:
         raise UserError(f"{path}:3: DataRate is {quoted(rate)}; write the frames per second")
@@ -69,7 +69,7 @@ def _rate_and_scale(path: Path, head: dict[str, str], scales: Mapping[str, float
 def _require_consistent(
     path: Path, head: dict[str, str], labels: list[str], times: list[tuple[int, float]]
 ) -> None:
-    """Refuse labels that are not unique, frames that are not all there, and times that fall."""
+    """Raise UserError if labels are not unique, frames are missing, or times do not increase."""
     twice = next((label for label in labels if labels.count(label) > 1), None)
     if twice is not None:
         raise UserError(f"{path}:4: label {quoted(twice)} appears twice; rename or remove one")
@@ -85,12 +85,12 @@ def _require_consistent(
 
 
 def _require_rate(path: Path, rate: float, times: list[tuple[int, float]]) -> None:
-    """Refuse times that contradict the rate, or that have gaps because rows are missing."""
+    """Raise UserError if times contradict the rate, or have gaps because rows are missing."""
     seconds = np.array([time for _, time in times])
     if np.isnan(seconds).any():  # the column may be empty
         return
     steps = np.diff(seconds)
-    measured = len(steps) / float(seconds[-1] - seconds[0])  # the mean, as times are rounded
+    measured = len(steps) / float(seconds[-1] - seconds[0])  # mean rate, as times are rounded
     gap = int(np.argmax(steps))
     if steps[gap] > _GAP / rate and steps[gap] > _GAP * np.median(steps):
         raise UserError(
@@ -105,7 +105,7 @@ def _require_rate(path: Path, rate: float, times: list[tuple[int, float]]) -> No
 
 
 def _row(line: str, width: int, where: str) -> list[float]:
-    """Cells as numbers, empty ones NaN; exporters leave out empty cells at the end of a line."""
+    """Convert cells to numbers, empty ones to NaN; exporters omit empty cells at the end of a line."""
     cells = line.rstrip("\r\n").split("\t")
     if len(cells) < 2 or any(cell.strip() for cell in cells[width:]):
         raise UserError(f"{where}: {len(cells)} cells where {width} belong; restore the file")

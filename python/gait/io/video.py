@@ -1,4 +1,4 @@
-"""Video files in and out (PyAV, so no system FFmpeg), and the plate of the empty scene.
+"""Read and write video files (with PyAV, which includes FFmpeg), and make a plate of the empty scene.
 
 PyAV and OpenCV are imported where they are used, so that pictures can be tracked without them.
 """
@@ -32,14 +32,14 @@ if TYPE_CHECKING:
 Image = NDArray[np.uint8]
 """A picture: (height, width) grey or (height, width, 3) BGR, uint8."""
 
-_ONE = 1 << 16  # of a display matrix, in fixed point
-_CHUNK_BYTES = 100_000_000  # of pictures kept at a time when they are read backwards
+_ONE = 1 << 16  # the number 1 in a display matrix, which is in fixed point
+_CHUNK_BYTES = 100_000_000  # most bytes of pictures in memory when they are read backwards
 SAMPLES = 40  # frames of a clip whose median is the empty scene
 _WAITING = 4  # pictures that may wait for the encoder
-_END = 3  # frames by which a duration may be longer than the pictures
+_END = 3  # frames by which the stated duration may exceed that of the pictures
 FAST = "veryfast"
 """Preset of x264 that takes 0.4 of the time of ``medium``; files are about as large."""
-#: With AVX-512 x264 gave other files from the same pictures now and then, on a busy machine.
+#: With AVX-512, on a busy machine, x264 sometimes wrote different files for the same pictures.
 _SAME_BITS = {"x264-params": "asm=sse4.2"} if platform.machine() in ("x86_64", "AMD64") else {}
 _CONTAINERS = (".mp4", ".mkv", ".mov")
 
@@ -53,19 +53,19 @@ class Frame(NamedTuple):
     """Presentation time since the first frame of the file, seconds."""
     image: Image
     pose: CameraPose | None = None
-    """Where the camera is, if it moves."""
+    """Pose of the camera, if it moves."""
     plate: Image | None = None
-    """The empty scene as the camera sees it from there, if that is known."""
+    """The empty scene as seen with that pose, if known."""
     others: tuple[Frame | None, ...] = ()
-    """What further cameras saw at the same time, by the times and numbers of their own films."""
+    """Frames of further cameras at the same time, with the times and numbers in their own films."""
 
     def camera(self, lens: Camera) -> Camera:
-        """Camera of this frame: the one given, where it is now."""
+        """Return the camera of this frame: `lens` with the pose of this frame, if it has one."""
         return lens if self.pose is None else self.pose.camera(lens)
 
     @property
     def utime(self) -> int:
-        """The time in integer microseconds, as the tracker wants it."""
+        """Time in whole microseconds, as the tracker needs it."""
         return round(self.time * 1e6)
 
 
@@ -76,22 +76,24 @@ class Video:
     ----------
     path : pathlib.Path
     width, height : int
-        Pixels, after the rotation or mirroring that a telephone stores beside the picture.
+        Pixels, after the rotation or mirroring that a phone stores beside the picture.
     fps : float
         Mean frames per second.
     count : int
-        Frames to show: those of the file without those that an edit list cuts off.  Damage may hide some.
+        Number of frames to show: those of the file, without those that an edit list cuts off.  Some may be
+        unreadable because of damage.
     times : ndarray of shape (count,)
-        When they are shown, seconds since the first, by the file's index.
+        Presentation times, seconds since the first frame, from the file's index.
     broken : str or None
-        In words, if the file ends before all the frames that it states.
+        A description, if the file ends before the last of the frames that it states.
     digest : str
-        Of the sizes of its coded pictures: copies in other containers have the same, other films do not.
+        Hash of the sizes of the coded pictures: the same for copies in other containers, but not for other
+        films.
 
     Raises
     ------
     UserError
-        If the file is missing or holds no video that can be decoded.
+        If the file is missing or contains no video that can be decoded.
     """
 
     def __init__(self, path: str | os.PathLike[str]) -> None:
@@ -110,7 +112,7 @@ class Video:
         return self.width, self.height
 
     def span(self, start: int, stop: int | None) -> range:
-        """Numbers of the frames start <= number < stop; UserError if there are none."""
+        """Return the numbers of the frames start <= number < stop; UserError if there are none."""
         stop = self.count if stop is None else min(stop, self.count)
         if start >= stop:
             raise UserError(f"{self.path}: no frame from {start} up to {stop}; it has {self.count}")
@@ -134,14 +136,14 @@ class Video:
     def backwards(self, stop: int, start: int = 0) -> Iterator[Frame]:
         """Yield the frames `start` <= index < `stop` from the last to the first, as BGR.
 
-        Decodes the file once for every chunk of frames, so that memory does not grow with their number.
+        Decodes the file once per chunk of frames, so that memory does not grow with their number.
         """
         chunk = max(8, _CHUNK_BYTES // (3 * self.width * self.height))
         for end in range(stop, start, -chunk):
             yield from reversed(list(self.frames(max(start, end - chunk), end)))
 
     def _probe(self) -> None:
-        """Read the first frame for the size, the packets for the count: headers count what is not shown."""
+        """Get the size from the first frame, the count from the packets; headers also count hidden frames."""
         import av
 
         with av.open(str(self.path)) as container:
@@ -156,7 +158,7 @@ class Video:
             self.times = _times(stamps, unit, self.fps)
             self.digest = hashlib.sha256(",".join(str(p.size) for p in packets).encode()).hexdigest()[:16]
             stated, more = stream.frames, 0
-            if not stated and container.duration and len(container.streams) == 1:  # sound may last longer
+            if not stated and container.duration and len(container.streams) == 1:  # sound may be longer
                 stated, more = round(container.duration * 1e-6 * self.fps), _END
             self.broken = None
             if len(packets) + more < stated:
@@ -168,7 +170,7 @@ class Video:
         raise UserError(f"{self.path}: has no frame that can be decoded; convert it with ffmpeg first")
 
     def _decode(self, stop: int | None) -> Iterator[tuple[int, float, av.VideoFrame]]:
-        """Yield index, time and raw frame; times missing or not increasing are set by the frame rate."""
+        """Yield index, time and raw frame; the frame rate replaces missing or non-increasing times."""
         import av
 
         last: float | None = None
@@ -190,12 +192,12 @@ class Video:
             raise self._unreadable(exc) from exc
 
     def _upright(self, frame: av.VideoFrame, pixels: str) -> Image:
-        """Picture in the pixel format asked for, turned and mirrored as the container asks."""
+        """Convert a frame to a pixel format, rotated and mirrored as the container states."""
         image = np.asarray(frame.to_ndarray(format=pixels), np.uint8)
         side_data: Any = frame.side_data.get("DISPLAYMATRIX")
         if side_data is None:
             return image
-        matrix = np.frombuffer(side_data, np.int32, 9) / _ONE  # of row vectors (x, y, 1)
+        matrix = np.frombuffer(side_data, np.int32, 9) / _ONE  # transforms row vectors (x, y, 1)
         x, y = ([round(float(value), 2) for value in matrix[row : row + 2]] for row in (0, 3))
         across = x[0] == 0  # whether the picture's columns become rows
         if sorted(map(abs, (*x, *y))) != [0, 0, 1, 1] or across != (y[1] == 0):
@@ -209,7 +211,7 @@ class Video:
         return np.ascontiguousarray(image[:: int(down), :: int(right)])
 
     def no_frame(self, first: int) -> UserError:
-        """Make (not raise) the error of a file whose frames from `first` on are damaged or not there."""
+        """Return (do not raise) the error for a file whose frames from `first` on are damaged or missing."""
         return UserError(f"{self.path}: no frame from {first} on can be decoded; convert it again")
 
     def _unreadable(self, exc: av.error.FFmpegError) -> UserError:
@@ -218,7 +220,7 @@ class Video:
 
 
 def _times(stamps: list[int | None], unit: float, fps: float) -> NDArray[np.float64]:
-    """Seconds since the first of time stamps in decoding order; by the rate if any lacks."""
+    """Convert time stamps in decoding order to seconds since the first; use the rate if one is missing."""
     known = np.array(sorted(stamp for stamp in stamps if stamp is not None), float)
     if len(known) < len(stamps) or (np.diff(known) <= 0).any() or not unit > 0:
         return np.arange(len(stamps)) / fps
@@ -226,27 +228,27 @@ def _times(stamps: list[int | None], unit: float, fps: float) -> NDArray[np.floa
 
 
 class VideoWriter:
-    """H.264 file that every player and browser shows; appears under its name when closed without error.
+    """H.264 file that every player and browser can show; it gets its name when closed without error.
 
-    Use as a context manager and call `write` with equal-sized images.  An odd width or height is extended by
-    one repeated pixel, because 4:2:0 video has even sizes.  If the block is interrupted or a disk is full,
-    the pictures encoded so far are kept as NAME.unfinished.SUFFIX.
+    Use it as a context manager and call `write` with pictures of the same size.  A width or height that is
+    not even is extended by repeating the last pixel, as 4:2:0 video needs.  If the block is interrupted or a
+    disk is full, the pictures encoded so far are kept as NAME.unfinished.SUFFIX.
 
     Parameters
     ----------
     path : path
-        Ends in .mp4, .mkv or .mov.
+        Name ending in .mp4, .mkv or .mov.
     fps : float
     crf : int
         Quality of x264, 0 (lossless) to 51; 18 is visually clean.
     preset : str
         Speed of x264: ``medium``, or `FAST` for pictures that are drawn while something else runs.
     bits_per_second : int, optional
-        Most of it over two seconds, whatever the quality.
+        Highest bit rate over two seconds, whatever the quality.
     keep : bool
-        Keep what was written before an interrupt.
+        Whether to keep the pictures written before an interrupt.
     keyframes : int, optional
-        Most frames from one that can be shown alone to the next; few make seeking quick and the file large.
+        Most frames from one I-frame to the next; with few, seeking is fast and the file large.
     """
 
     def __init__(
@@ -301,7 +303,7 @@ class VideoWriter:
     def write(self, image: Image) -> None:
         """Append one picture, (h, w) grey or (h, w, 3) BGR, which must not be changed afterwards.
 
-        A thread encodes it: what fails there is raised by a later call or at the end.
+        A thread encodes it; its errors are raised by a later call or at the end.
         """
         if self._fault is not None:
             raise self._fault
@@ -312,7 +314,7 @@ class VideoWriter:
         self._waiting.put(image)
 
     def _encode_all(self) -> None:
-        """Encode what comes until None, then end the file; after a fault take everything and do nothing."""
+        """Encode queued pictures until None, then finish the file; after an error, only empty the queue."""
         while (image := self._waiting.get()) is not None:
             self._try(self._encode, image)
         if self._stream is not None:
@@ -327,7 +329,7 @@ class VideoWriter:
                 self._fault = exc
 
     def _encode(self, image: Image | None) -> None:
-        """Encode one picture, or with None those that the encoder still holds."""
+        """Encode one picture; with None, flush the encoder."""
         import av
 
         frame = None
@@ -361,7 +363,7 @@ def sample_frames(
 
 
 def median(images: Sequence[Image]) -> Image:
-    """Median of pictures of one size, pixel by pixel."""
+    """Median of pictures of the same size, pixel by pixel."""
     plate = np.empty_like(images[0])
     for row in range(plate.shape[0]):  # row by row: a median of the whole stack would need it twice in memory
         plate[row] = np.median([image[row] for image in images], axis=0)
@@ -371,10 +373,10 @@ def median(images: Sequence[Image]) -> Image:
 def median_plate(
     video: Video, samples: int = SAMPLES, progress: Callable[[int], None] | None = None
 ) -> Image:
-    """Empty scene as the temporal median of `samples` frames spread evenly over the clip, BGR.
+    """Estimate the empty scene as the median over time of `samples` frames spread over the clip, BGR.
 
-    Right where every pixel shows the background in more than half of the samples: a static camera and a
-    person who walks through.  `progress` is called with the index of each frame decoded.
+    This works where each pixel shows the background in more than half of the samples: with a static camera
+    and a person who walks through the picture.  `progress` is called with the index of each frame decoded.
     """
     return median([frame.image for frame in sample_frames(video, samples, progress)])
 
@@ -396,7 +398,7 @@ def read_plate(path: str | os.PathLike[str], size: tuple[int, int]) -> Image:
 
 
 def background(choice: str, video: Video, progress: Callable[[int], None] | None = None) -> Image | None:
-    """Plate by the word of the ``--background`` option: ``auto`` (median), ``none`` or an image file."""
+    """Make the plate for the ``--background`` option: ``auto`` (median), ``none`` or an image file."""
     if choice == "none":
         return None
     if choice == "auto":
