@@ -1,7 +1,7 @@
-"""The two networks of BlazePose: boxes of people in a picture, and the landmarks of one person in a crop.
+"""The two networks of BlazePose: one finds people in a picture, one the landmarks of a person in a crop.
 
 Both run in LiteRT (package ``ai-edge-litert``).  Without it the landmark network runs in OpenCV, about half
-as fast with the same numbers, and OpenCV's detector of upright people replaces the person network, which
+as fast but with the same results, and OpenCV's detector of upright people replaces the person network, which
 OpenCV cannot read.
 """
 
@@ -23,25 +23,25 @@ from gait.reproducible import one_opencv_thread
 Array = NDArray[np.float64]
 Network = Callable[[NDArray[np.float32]], dict[str, NDArray[np.float32]]]
 
-_PERSON_SIDE, _CROP_SIDE, _HEAT_SIDE = 224, 256, 64  # pixels of the networks' inputs, cells of the heat maps
-_LANDMARKS = 39  # 33 of the body, then the centre and the top of the person's circle, then four unused
+_PERSON_SIDE, _CROP_SIDE, _HEAT_SIDE = 224, 256, 64  # inputs, pixels; heat maps, cells
+_LANDMARKS = 39  # 33 of the body, then centre and top of the person's circle, then four that are not used
 _CENTRE, _TOP = 33, 34
 _LEAST_PERSON = 0.5  # score of a box
-_SAME_BOX = 0.3  # intersection over union of boxes about one person
+_SAME_BOX = 0.3  # intersection over union from which boxes are around the same person
 _HEAT_RADIUS, _LEAST_HEAT = 3, 0.5
-_CROP_MARGIN = 1.25  # of the side of a crop over the diameter of the person's circle
-_THREADS = 2  # of LiteRT: faster than one, with the same bits
+_CROP_MARGIN = 1.25  # side of a crop over the diameter of the person's circle
+_THREADS = 2  # threads of LiteRT: faster than one, with the same bits
 
 JOINTS = {
     "l_shoulder": 11, "r_shoulder": 12, "l_elbow": 13, "r_elbow": 14, "l_wrist": 15, "r_wrist": 16,
     "l_hip": 23, "r_hip": 24, "l_knee": 25, "r_knee": 26, "l_ankle": 27, "r_ankle": 28,
     "l_heel": 29, "r_heel": 30, "l_toe": 31, "r_toe": 32,
 }  # fmt: skip
-"""Landmarks that are joints of the walking model, by its names."""
+"""Landmarks that are joints of the walking model, by their names there."""
 
 
 class Crop(NamedTuple):
-    """A square of the picture, turned so that the person in it is upright."""
+    """A square of the picture, rotated so that the person in it is upright."""
 
     centre: Array
     """(u, v), pixels."""
@@ -52,26 +52,26 @@ class Crop(NamedTuple):
 
 
 class Person(NamedTuple):
-    """One person as the landmark network finds it."""
+    """One person, as found by the landmark network."""
 
     score: float
     """Probability that there is a person in the crop."""
     uv: Array
     """Joints in the order of `JOINTS`, pixels, shape (16, 2)."""
     confidence: Array
-    """Probability that the joint is in the picture and not hidden, shape (16,)."""
+    """Probability that each joint is in the picture and not hidden, shape (16,)."""
     crop: Crop
     """Where to search for this person in the next frame."""
 
 
 def crop_about(centre: Array, top: Array) -> Crop:
-    """Crop of the person whose circle has this centre and passes through this point above it."""
+    """Make the crop for a person whose circle has this centre and, above it, passes through this point."""
     up = top - centre
     return Crop(centre, float(2.0 * _CROP_MARGIN * np.hypot(*up)), float(np.arctan2(up[0], -up[1])))
 
 
 def whole_picture(image: Image) -> Crop:
-    """Crop of the whole picture, for a person who fills it."""
+    """Make a crop of the whole picture, for a person who fills it."""
     height, width = image.shape[:2]
     return Crop(np.array([width - 1, height - 1]) / 2, float(max(width, height)), 0.0)
 
@@ -86,9 +86,9 @@ class PersonNetwork:
         self._anchors = _anchors()
 
     def __call__(self, image: Image, small: bool = True) -> Iterator[list[Crop]]:
-        """Search the whole picture, then smaller parts: yield the people of each size, the surest first.
+        """Search the whole picture, then smaller parts; for each size yield the people, most certain first.
 
-        `small`: search parts of half its shorter side, too.
+        `small`: also search parts of half its shorter side.
         """
         height, width = image.shape[:2]
         side = min(height, width)
@@ -102,7 +102,7 @@ class PersonNetwork:
         return [(score, crop._replace(centre=crop.centre + (x, y))) for score, crop in found]
 
     def _boxes(self, image: Image) -> list[tuple[float, Crop]]:
-        """Score and crop of every person that the network finds in a picture."""
+        """Return score and crop of every person that the network finds in a picture."""
         assert self._network is not None
         scale = _PERSON_SIDE / max(image.shape[:2])
         small = cv2.resize(image, None, fx=scale, fy=scale, interpolation=cv2.INTER_AREA)
@@ -112,7 +112,7 @@ class PersonNetwork:
         out = self._network(square[None])
         score = _sigmoid(out["Identity_1"][0, :, 0])
         sure = np.flatnonzero(score > _LEAST_PERSON)
-        # Centre, size and four points of each box, in the picture; the size is no point.
+        # Centre, size and four points of each box, in the picture; the size is a difference, not a point.
         points = out["Identity"][0][sure].reshape(-1, 6, 2).astype(np.float64)
         points[:, (0, 2, 3, 4, 5)] += self._anchors[sure, None] * _PERSON_SIDE - offset
         return _merged(score[sure], points / scale)
@@ -129,7 +129,7 @@ class LandmarkNetwork:
     Raises
     ------
     UserError
-        If its weights are absent or damaged.
+        If its weights are missing or damaged.
     """
 
     def __init__(self, name: str = "full") -> None:
@@ -163,7 +163,7 @@ def _sigmoid(x: NDArray[np.float32]) -> Array:
 
 
 def _refined(place: Array, heat: NDArray[np.float32]) -> Array:
-    """Centre of the heat map about each landmark, where it is warm, instead of the regressed place."""
+    """Replace regressed positions by the centres of the heat maps around them, where these have a peak."""
     cell = _CROP_SIDE / _HEAT_SIDE
     for j, (x, y) in enumerate((place / cell).astype(int)):
         rows = slice(max(y - _HEAT_RADIUS, 0), max(y + _HEAT_RADIUS + 1, 0))
@@ -176,7 +176,7 @@ def _refined(place: Array, heat: NDArray[np.float32]) -> Array:
 
 
 def _anchors() -> Array:
-    """Centres of the person network's boxes, shares of its input: 2, 2, 6 a cell at strides 8, 16, 32."""
+    """Centres of the person network's anchors, fractions of its input: 2, 2, 6 per 8, 16, 32 pixels."""
     grids = []
     for stride, count in ((8, 2), (16, 2), (32, 6)):
         cells = _PERSON_SIDE // stride
@@ -186,7 +186,7 @@ def _anchors() -> Array:
 
 
 def _merged(score: Array, points: Array) -> list[tuple[float, Crop]]:
-    """Means of overlapping boxes by their scores (n and n x 6 x 2: centre, size, four points)."""
+    """Average overlapping boxes, weighted by score (n; n x 6 x 2: centre, size, four points)."""
     found = []
     left = np.argsort(-score, kind="stable")
     while len(left):
@@ -203,12 +203,12 @@ def _merged(score: Array, points: Array) -> list[tuple[float, Crop]]:
 
 
 def _near(crop: Crop, others: Sequence[Crop]) -> bool:
-    """Whether a crop lies about the same person as one of the others."""
+    """Whether a crop is around the same person as one of the others."""
     return any(np.hypot(*(crop.centre - other.centre)) < other.side / 6 for other in others)
 
 
 def _apart(found: list[tuple[float, Crop]]) -> list[tuple[float, Crop]]:
-    """Leave out a crop that lies about the same person as one before it: parts of the picture overlap."""
+    """Leave out crops around the same person as an earlier one, since parts of the picture overlap."""
     kept: list[tuple[float, Crop]] = []
     for score, crop in found:
         if not _near(crop, [other for _, other in kept]):
@@ -217,7 +217,7 @@ def _apart(found: list[tuple[float, Crop]]) -> list[tuple[float, Crop]]:
 
 
 def _tiles(width: int, height: int, side: int) -> list[tuple[int, int, int, int]]:
-    """Squares (left, top, right, bottom) that cover a picture and overlap by half."""
+    """Cover a picture with squares (left, top, right, bottom) that overlap by half."""
 
     def starts(length: int) -> list[int]:
         count = max(1, int(np.ceil(2 * length / side)) - 1)
@@ -227,7 +227,7 @@ def _tiles(width: int, height: int, side: int) -> list[tuple[int, int, int, int]
 
 
 def _windows(image: Image) -> list[tuple[float, Crop]]:
-    """Upright people by OpenCV's detector (Dalal and Triggs 2005), where the person network cannot run."""
+    """Find upright people with OpenCV's detector (Dalal and Triggs 2005) if the person network cannot run."""
     scale = min(1.0, 640 / max(image.shape[:2]))
     small = cv2.resize(image, None, fx=scale, fy=scale, interpolation=cv2.INTER_AREA)
     with one_opencv_thread():
@@ -240,7 +240,7 @@ def _windows(image: Image) -> list[tuple[float, Crop]]:
 
 
 def _litert(data: bytes) -> Network | None:
-    """Network in LiteRT, None where the package is absent."""
+    """Load a network in LiteRT; None if the package is not installed."""
     try:
         from ai_edge_litert.interpreter import Interpreter
     except ImportError:
@@ -273,7 +273,7 @@ class _silenced:
 
 
 def _opencv(data: bytes) -> Network:
-    """Network in OpenCV, whose tensors have the channels first."""
+    """Load a network in OpenCV, whose tensors have the channels first."""
     network = cv2.dnn.readNetFromTFLite(np.frombuffer(data, np.uint8))
     names = [
         n for n in network.getUnconnectedOutLayersNames() if n in ("Identity", "Identity_1", "Identity_3")

@@ -1,11 +1,11 @@
-"""Find people and follow them from frame to frame by the detector, each with an id.
+"""Find people with the detector and follow them from frame to frame, each with an id.
 
-A person's crop comes from the landmarks of the frame before, extrapolated at their speed.  The person network
+A person's crop is predicted from the landmarks of earlier frames, at constant speed.  The person network
 scans the whole picture at the start, when a person is lost, and every second to find new people.
 
-People who meet in the picture are kept apart by their courses and the colours of their clothes: while two are
-near each other, landmarks off a person's course are those of another person, and the person counts as hidden.
-A person who comes back gets the old id if place and colours agree.
+People who meet in the picture are distinguished by their courses and the colours of their clothes: while two
+are near each other, landmarks off a person's course belong to another person, and the person counts as
+hidden. A person who comes back gets the old id if position and colours agree.
 """
 
 from __future__ import annotations
@@ -28,33 +28,33 @@ Colours = NDArray[np.float32]
 """Histogram of lightness and hue of the clothes on the trunk, shape `_BINS`, sum 1."""
 
 _LEAST_SCORE = 0.5  # of a person in a crop
-_SCAN_PERIOD = 1.0  # seconds between two scans of the whole picture
-_RETRY = 0.2  # the same while a person is lost or none was found
+_SCAN_PERIOD = 1.0  # seconds between scans of the whole picture
+_RETRY = 0.2  # the same while a person is lost or none has been found
 _FORGET = 60.0  # seconds after which a person who comes back gets a new id
-_SAME = 0.25  # of a crop's side between the centres of crops about one person
-_REACH = 0.8  # crop sides per second that a lost person may have left their course by, in addition to `_SAME`
-_COURSE = 0.3  # seconds over which the speed on a course is taken
-_CONTACT = 0.35  # crop sides between people who may be taken for each other
-_LONG_CONTACT = 1.0  # seconds, after which people go together and their courses are taken anew
+_SAME = 0.25  # crop sides between the centres of crops around the same person
+_REACH = 0.8  # crop sides per second by which a lost person may leave their course, in addition to `_SAME`
+_COURSE = 0.3  # seconds from which the speed on a course is computed
+_CONTACT = 0.35  # crop sides; people closer than this may be mistaken for each other
+_LONG_CONTACT = 1.0  # seconds, after which people walk together and their courses are computed afresh
 _OFF_COURSE = (
     0.12,
     0.15,
-)  # crop sides, and more per second in contact, that a person may be off their course
+)  # crop sides, and crop sides per second in contact, that a person may be off their course
 _ALIKE = 0.6  # overlap of the colours of one person; 5 % of the frames of a film in sun and shade have less
-_CLEARLY = 0.1  # by which the overlap with another's colours must be larger
+_CLEARLY = 0.1  # by which the overlap with another person's colours must be larger
 _MOST = 8  # people
-_LEAST_FRAMES = 3  # in which a person must be found
+_LEAST_FRAMES = 3  # frames in which a person must be found
 _LEAST_FEET = 0.3  # seconds for which both ankles must be in view where feet are needed
 _BINS = (6, 12, 12)  # of L, a and b
 _RANGES = (0, 256, 80, 176, 80, 176)
 _BLUR = [0.5 * np.eye(n) + 0.25 * (np.eye(n, k=1) + np.eye(n, k=-1)) for n in _BINS]
-_SAMPLE = 5  # frames between two samples of colours
+_SAMPLE = 5  # frames between samples of colours
 _TORSO = [list(JOINTS).index(name) for name in ("l_shoulder", "r_shoulder", "r_hip", "l_hip")]
 
 
 @dataclass
 class Followed:
-    """A person over the frames so far."""
+    """A person in the frames so far."""
 
     id: int
     frames: list[int] = field(default_factory=list)
@@ -66,13 +66,13 @@ class Followed:
     colours: Colours | None = None
     """Mean over samples."""
     samples: int = 0
-    """Of the colours."""
+    """Number of samples of the colours."""
     free: int = 0
     """Index of the last frame in which no other person was near."""
     lost: bool = False
 
     def expected(self, time: float) -> Crop:
-        """Crop at a time, moved on at the speed of the last two frames, or of the course after a loss."""
+        """Predict the crop at a time from the speed of the last two frames, or, if lost, of the course."""
         last = self.keypoints[-1].crop
         if self.lost:
             return last._replace(centre=self.on_course(time))
@@ -82,7 +82,7 @@ class Followed:
         return last._replace(centre=last.centre + (time - self.times[-1]) * step)
 
     def on_course(self, time: float) -> Array:
-        """Centre of the crop at a time, if the person goes on as before others were near."""
+        """Predict the crop's centre at a time from the person's course before others were near."""
         free, begin = self.free, self.free
         while begin > 0 and self.times[free] - self.times[begin - 1] <= _COURSE:
             begin -= 1
@@ -93,33 +93,33 @@ class Followed:
         return np.asarray(centre + (time - self.times[free]) * speed)
 
     def off_course(self, time: float, person: Person) -> float:
-        """Distance of a person found from the course, crop sides."""
+        """Distance of a detected person from the course, crop sides."""
         return float(np.hypot(*(person.crop.centre - self.on_course(time))) / person.crop.side)
 
 
 class PeopleDetector:
     """Finds people and their 2-D joints in the frames of one camera, and follows them.
 
-    The networks are fetched by ``gait detect --fetch``.
+    ``gait detect --fetch`` downloads the networks.
 
     Parameters
     ----------
     network : str
         Landmark network: ``full``, ``lite`` or ``heavy``.
     most : int
-        People followed at a time.
+        Most people followed at a time.
     everyone : bool
-        Search all of the picture for small people although some were found.
+        Search the whole picture for small people even if larger ones were found.
 
     Attributes
     ----------
     people : list of Followed
-        Everyone found so far, in the order of their ids, which begin at 1.
+        Everyone found so far, in order of their ids, which begin at 1.
 
     Raises
     ------
     UserError
-        If the weights are absent or damaged.
+        If the weights are missing or damaged.
     """
 
     def __init__(self, network: str = "full", most: int = _MOST, everyone: bool = False) -> None:
@@ -136,12 +136,12 @@ class PeopleDetector:
         Parameters
         ----------
         frame : Frame
-            As of `gait.Video`; number and time must increase.
+            A frame as from `gait.Video`; number and time must increase.
 
         Returns
         -------
         list of (Followed, Person)
-            Who it is, with an `id`, and the detector's joints in this frame: `uv` (16, 2), pixels, and
+            The person, with an `id`, and the detector's joints in this frame: `uv` (16, 2), pixels, and
             `confidence` (16,), in the order of the names of `keypoints`.
         """
         found: list[tuple[Followed, Person]] = []
@@ -152,7 +152,7 @@ class PeopleDetector:
             if not one.lost
         ]
         for one, person in sorted(located, key=lambda pair: pair[0].off_course(frame.time, pair[1])):
-            same = any(_same(person, p) for _, p in found)  # two people at one place are one
+            same = any(_same(person, p) for _, p in found)  # two people at the same position are one
             one.lost = person.score < _LEAST_SCORE or same or self._strange(one, frame, person, near[one.id])
             if not one.lost:
                 self._add(one, frame, person, near[one.id])
@@ -165,20 +165,20 @@ class PeopleDetector:
         return found
 
     def keypoints(self, times: Mapping[int, float] | Array, correct: bool = True) -> dict[int, Keypoints]:
-        """Give the keypoints of everyone found so far.
+        """Return the keypoints of everyone found so far.
 
         Parameters
         ----------
         times : mapping of int to float, or ndarray
             Seconds of each frame by its number, such as ``Video.times``.
         correct : bool
-            Move the joints to where the model has them, and give their errors (`gait.detect.profile`).
+            Convert the detector's joints to the model's, and add their errors (`gait.detect.profile`).
 
         Returns
         -------
         people : dict of int to Keypoints
-            By id, from the first to the last frame of each person, NaN where not found; people found in fewer
-            than three frames are left out.
+            Keypoints by id, from each person's first to last frame, NaN where not found; without people found
+            in fewer than three frames.
         """
         people = {one.id: _keypoints(one, times) for one in self.people if len(one.frames) >= _LEAST_FRAMES}
         if not correct:
@@ -186,7 +186,7 @@ class PeopleDetector:
         return {id: profile.corrected(found, self._network) for id, found in people.items()}
 
     def _others_near(self, one: Followed, time: float) -> list[Followed]:
-        """Others, in view or hidden for a moment, who may be taken for a person."""
+        """List other people, in view or briefly hidden, who may be mistaken for a person."""
         place = one.expected(time)
         return [
             other
@@ -197,7 +197,7 @@ class PeopleDetector:
         ]
 
     def _strange(self, one: Followed, frame: Frame, person: Person, near: list[Followed]) -> bool:
-        """Whether the person found in a crop is another person than the one it is about."""
+        """Whether the person found in a crop is not the one that the crop was made for."""
         contact = frame.time - one.times[one.free]
         off = one.off_course(frame.time, person) > _OFF_COURSE[0] + _OFF_COURSE[1] * contact
         if not (off or near):
@@ -209,9 +209,9 @@ class PeopleDetector:
         return own < _ALIKE
 
     def _scan(self, frame: Frame, found: list[tuple[Followed, Person]]) -> None:
-        """Search where people were hidden, and the picture, for people who are not followed.
+        """Search for people who are not followed, where people were hidden and in the picture.
 
-        Parts of the picture are searched, and all of it as one crop, until landmarks confirm a person.
+        Parts of the picture are searched, then all of it as one crop, until landmarks confirm a person.
         """
         time = frame.time
         self._add_new(frame, found, [p.expected(time) for p in self.people if self._just_lost(p, time)])
@@ -222,7 +222,7 @@ class PeopleDetector:
             self._add_new(frame, found, [whole_picture(frame.image)])
 
     def _add_new(self, frame: Frame, found: list[tuple[Followed, Person]], crops: list[Crop]) -> bool:
-        """Add the people in crops who are not found yet; return whether there is one."""
+        """Add people in crops who have not been found yet; return whether there is one."""
         count = len(found)
         for crop in crops:
             if len(found) >= self._most or any(_apart(crop, p.crop) < _SAME / 2 for _, p in found):
@@ -230,7 +230,7 @@ class PeopleDetector:
             person = self._landmarks(frame.image, crop)
             if person.score < _LEAST_SCORE or any(_same(person, p) for _, p in found):
                 continue
-            person = self._landmarks(frame.image, person.crop)  # once more, from a better crop
+            person = self._landmarks(frame.image, person.crop)  # again, with a better crop
             if person.score >= _LEAST_SCORE and not any(_same(person, p) for _, p in found):
                 one = self._who(frame, person)
                 self._add(one, frame, person, [])
@@ -242,7 +242,7 @@ class PeopleDetector:
         return one.lost and time - one.times[-1] < _SCAN_PERIOD
 
     def _who(self, frame: Frame, person: Person) -> Followed:
-        """Match a lost person by place and colours, or start a new one."""
+        """Find the lost person whose position and colours match, or create a new one."""
         colours = _colours(frame.image, person)
         best, least = None, np.inf
         for one in self.people:
@@ -261,7 +261,7 @@ class PeopleDetector:
         return best
 
     def _add(self, one: Followed, frame: Frame, person: Person, near: list[Followed]) -> None:
-        """Add a person found in a frame to their track."""
+        """Append a person's observation in a frame."""
         one.frames.append(frame.number)
         one.times.append(frame.time)
         one.keypoints.append(person)
@@ -294,24 +294,25 @@ def detect(
     network : str
         ``full``, ``lite`` or ``heavy``.
     most : int
-        People followed at a time.
+        Most people followed at a time.
     first, stop : int
         Frames to use.
     update : callable, optional
         Called with the number of frames done.
     correct : bool
-        As in `PeopleDetector.keypoints`, which gives what is returned.
+        As in `PeopleDetector.keypoints`.
     everyone : bool
-        Search all of the picture for small people although some were found.
+        Search the whole picture for small people even if larger ones were found.
 
     Returns
     -------
     people : dict of int to Keypoints
+        As from `PeopleDetector.keypoints`.
 
     Raises
     ------
     UserError
-        If the weights are absent or damaged, or the video cannot be read.
+        If the weights are missing or damaged, or the video cannot be read.
     """
     detector = PeopleDetector(network, most, everyone)
     times = {}
@@ -324,7 +325,7 @@ def detect(
 
 
 def _keypoints(one: Followed, times: Mapping[int, float] | Array) -> Keypoints:
-    """Keypoints of a person, NaN in frames where the person was not found."""
+    """Make the keypoints of a person, NaN in frames where the person was not found."""
     frames = np.arange(one.frames[0], one.frames[-1] + 1)
     uv = np.full((len(frames), len(JOINTS), 2), np.nan)
     confidence = np.zeros(uv.shape[:2])
@@ -342,7 +343,7 @@ def height(keypoints: Keypoints) -> float:
 
 
 def require_length(video: Video, frames: range) -> None:
-    """Refuse a picture, or a video of whose frames too few are used to find people in."""
+    """Raise UserError for a picture, or if too few frames of a video are used to find people."""
     if len(frames) >= _LEAST_FRAMES:
         return
     few = "1 frame" if len(frames) == 1 else f"{len(frames)} frames"
@@ -353,7 +354,7 @@ def require_length(video: Video, frames: range) -> None:
 
 
 def require_person(people: dict[int, Keypoints], video: Video) -> None:
-    """Refuse a video in which no person was found."""
+    """Raise UserError if no person was found in a video."""
     if not people:
         raise UserError(
             f"{video.path}: no person found; the whole body should be in view, 80 pixels or taller"
@@ -361,7 +362,7 @@ def require_person(people: dict[int, Keypoints], video: Video) -> None:
 
 
 def require_feet(keypoints: Keypoints, video: Video) -> None:
-    """Refuse a person whose feet are not in the picture long enough for a start or a camera."""
+    """Raise UserError if a person's feet are not visible long enough for a start or a camera."""
     ankles = keypoints.uv[:, [j for j, name in enumerate(keypoints.names) if name.endswith("_ankle")]]
     inside = ((ankles >= 0) & (ankles <= np.array(video.size) - 1)).all(axis=(1, 2))
     if inside.sum() < _LEAST_FEET * video.fps:
@@ -371,22 +372,22 @@ def require_feet(keypoints: Keypoints, video: Video) -> None:
 
 
 def by_size(people: dict[int, Keypoints]) -> list[int]:
-    """Sort the people of a clip, the one in view longest and tallest first."""
+    """Sort the people of a clip by frames in view times height in the picture, the largest first."""
     return sorted(people, key=lambda n: -np.isfinite(people[n].uv[:, 0, 0]).sum() * height(people[n]))
 
 
 def main_person(people: dict[int, Keypoints]) -> int:
-    """Choose the main person of a clip: the one in view longest and tallest."""
+    """Choose the main person of a clip: the first in `by_size`."""
     return by_size(people)[0]
 
 
 def _apart(a: Crop, b: Crop) -> float:
-    """Distance between the centres of two crops, sides of the smaller one."""
+    """Distance between the centres of two crops, in sides of the smaller one."""
     return float(np.hypot(*(a.centre - b.centre)) / min(a.side, b.side))
 
 
 def _same(a: Person, b: Person) -> bool:
-    """Whether two sets of landmarks are of one person."""
+    """Whether two sets of landmarks are of the same person."""
     if _apart(a.crop, b.crop) < _SAME / 2:
         return True
     off = np.median(np.hypot(*(a.uv - b.uv).T))
@@ -394,7 +395,7 @@ def _same(a: Person, b: Person) -> bool:
 
 
 def _colours(image: Image, person: Person) -> Colours:
-    """Colours of the clothes on the trunk, blurred by a bin."""
+    """Histogram of the colours of the clothes on the trunk, blurred by one bin."""
     hull = cv2.convexHull(person.uv[_TORSO].astype(np.int32))
     x, y, width, height = cv2.boundingRect(hull)
     top, left = max(y, 0), max(x, 0)

@@ -1,15 +1,15 @@
 """How a detector's joints differ from the model's: offsets, and size and duration of errors.
 
-A detector has learnt hips, ankles and toes from pictures; those of the model are centres of joints.  A
-profile gives the difference of each joint as a sum of vectors between keypoints of the person:
+A detector has learnt hips, ankles and toes from pictures; the model's are centres of joints.  A profile
+describes the difference of each joint as a weighted sum of vectors between keypoints of the person:
 
     trunk      middle of the shoulders to middle of the hips
     outwards   middle of the hips to the hip of the joint's side
     limb       from the hip to the knee of the joint's side, or from the knee to the ankle
-    forwards   heel to toe; of hips and arms the mean of both feet
+    forwards   heel to toe; for hips and arms the mean of both feet
 
-Differences in space that are fixed to the body project to the same sums from every view, so that a profile
-holds for any camera.  What remains is split into an error that lasts for many seconds and one that changes.
+Differences that are fixed to the body in space project to the same sums in every view, so that a profile is
+valid for any camera.  The remaining error is split into one that lasts for many seconds and one that changes.
 Profiles are learnt on clips with known joints (`make detector-profile`) and stored in `profile.json`.
 """
 
@@ -28,24 +28,25 @@ from gait.io.keypoints_file import LEAST_CONFIDENCE, Keypoints
 Array = NDArray[np.float64]
 
 FILE = Path(__file__).with_name("profile.json")
-LEG, TRUNK = 0.49, 0.28  # of a person's height: hip to ankle, shoulder to hip
+LEG, TRUNK = 0.49, 0.28  # fractions of a person's height: hip to ankle, shoulder to hip
 _ARMS = ("shoulder", "elbow", "wrist", "hip")
 
 
 @dataclass(frozen=True)
 class JointProfile:
-    """One joint of either side.
+    """Errors of one joint, the same on both sides.
 
     Attributes
     ----------
     offset : tuple of float
-        Shares of the three `vectors` that lead from the detector's joint to the model's.
+        Weights of the three `vectors` whose sum leads from the detector's joint to the model's.
     lasting_sd : float
-        Standard deviation of an error that lasts, along an axis, person's heights.
+        Standard deviation, along an axis, of the lasting error, as a fraction of the person's height.
     sd : float
-        The same of an error that changes from frame to frame.
+        The same of the error that changes from frame to frame.
     correlation_s : float
-        Seconds in which such errors count as one observation: twice the integral of their autocorrelation.
+        Seconds over which changing errors count as one observation: twice the integral of their
+        autocorrelation.
     """
 
     offset: tuple[float, ...]
@@ -54,22 +55,22 @@ class JointProfile:
     correlation_s: float
 
     def effective_sd(self, step: float) -> float:
-        """Give `sd` for frames `step` seconds apart so large that they count as independent."""
+        """Enlarge `sd` so that frames `step` seconds apart may count as independent."""
         return float(self.sd * np.sqrt(max(self.correlation_s / step, 1.0)))
 
 
 @dataclass(frozen=True)
 class Profile:
-    """A landmark network.
+    """Errors of a landmark network.
 
     Attributes
     ----------
     joints : dict of JointProfile
-        By joint without its side.
+        Keys are joints without their side.
     lasting_s : float
-        Seconds in which the correlation of a lasting error with itself falls to 1/e.
+        Seconds in which the autocorrelation of a lasting error falls to 1/e.
     repeated : float
-        Share of the variance of changing errors that comes again in every stride.
+        Share of the variance of changing errors that repeats in every stride.
     """
 
     joints: dict[str, JointProfile]
@@ -77,13 +78,13 @@ class Profile:
     repeated: float
 
     def joint(self, name: str) -> JointProfile:
-        """Profile of a joint with its side; of an elbow where the joint is unknown."""
+        """Return the profile of a joint with its side; that of an elbow if the joint is unknown."""
         return self.joints.get(name.partition("_")[2], self.joints["elbow"])
 
 
 @cache
 def load(network: str) -> Profile:
-    """Profile of a landmark network."""
+    """Load the profile of a landmark network."""
     found = json.loads(FILE.read_text(encoding="utf-8"))["networks"][network]
     joints = {name: JointProfile(**joint) for name, joint in found["joints"].items()}
     return Profile(joints, found["lasting_s"], found["repeated"])
@@ -108,7 +109,7 @@ def vectors(keypoints: Keypoints, name: str) -> Array:
 
 
 def picture_height(keypoints: Keypoints) -> Array:
-    """Height of the person in each frame (T,) from legs and trunk, pixels; the median where unknown."""
+    """Estimate the person's height in each frame (T,) from legs and trunk, pixels; the median if unknown."""
     joints = ("shoulder", "hip", "ankle") if "l_shoulder" in keypoints.names else ("hip", "ankle")
     places = [keypoints.names.index(f"{side}_{joint}") for joint in joints for side in "lr"]
     middles = keypoints.uv[:, places].reshape(-1, len(joints), 2, 2).mean(axis=2)
@@ -118,36 +119,36 @@ def picture_height(keypoints: Keypoints) -> Array:
 
 
 def frame_sd(keypoints: Keypoints, network: str = "full") -> Array:
-    """Give the standard deviations (T, J) of the errors in one frame, what lasts and what changes, pixels.
+    """Return the standard deviations (T, J) of all errors in one frame, lasting and changing, pixels.
 
-    A detector whose profile is unknown is taken to err as `full` does.
+    A detector without a profile is assumed to have the errors of `full`.
     """
     joints = _joints(keypoints, network)
     return _pixels(keypoints, [float(np.hypot(joint.lasting_sd, joint.sd)) for joint in joints])
 
 
 def changing_sd(keypoints: Keypoints, network: str = "full") -> tuple[Array, Array]:
-    """Give the errors that change within a walk: their sd (T, J), pixels, and correlation (J,), seconds.
+    """Return the changing errors: their sd (T, J), pixels, and correlation time (J,), seconds.
 
-    Unknown detectors and joints are as in `frame_sd`.
+    Unknown detectors and joints are treated as in `frame_sd`.
     """
     joints = _joints(keypoints, network)
     return _pixels(keypoints, [joint.sd for joint in joints]), np.array([j.correlation_s for j in joints])
 
 
 def _joints(keypoints: Keypoints, network: str) -> list[JointProfile]:
-    """Profile of each joint (J,)."""
+    """Return the profile of each joint (J,)."""
     return [load(network).joint(name) for name in keypoints.names]
 
 
 def _pixels(keypoints: Keypoints, share: list[float]) -> Array:
-    """Give the standard deviations (T, J) in pixels of shares of the person's height, by confidence."""
+    """Convert fractions of the person's height to standard deviations (T, J) in pixels, by confidence."""
     sd = picture_height(keypoints)[:, None] * share
     return np.asarray(sd / np.maximum(keypoints.confidence, LEAST_CONFIDENCE))
 
 
 def corrected(keypoints: Keypoints, network: str) -> Keypoints:
-    """Move a detector's joints to where the model has them, and give their standard deviations.
+    """Convert a detector's joints to the model's, and add their standard deviations.
 
     Parameters
     ----------
@@ -159,7 +160,7 @@ def corrected(keypoints: Keypoints, network: str) -> Keypoints:
     Returns
     -------
     Keypoints
-        With `sd` (such that frames count as independent), `lasting_sd` and `frame_sd`, pixels.
+        With `sd` (enlarged so that frames may count as independent), `lasting_sd` and `frame_sd`, pixels.
     """
     profile = load(network)
     step = float(np.median(np.diff(keypoints.time))) if len(keypoints.time) > 1 else np.inf

@@ -1,10 +1,10 @@
 """Find people in a picture by their shape, without a network and without the empty scene.
 
-The HOG detector of OpenCV (Dalal and Triggs, CVPR 2005) lets gradients of a window vote for a person.
-Windows count if a person on the ground between their ends would have a plausible stature.  A coarse search
-of the whole picture proposes people; about each of them the picture is searched once more at a size at which
-the person is larger than the smallest window, because windows about a smaller one show feet and head too far
-apart.
+OpenCV's HOG detector (Dalal and Triggs, CVPR 2005) computes from the gradients in a window a score for a
+person. A window counts if a person who stands on the ground and fills it would have a plausible stature.  A
+coarse search of the whole picture proposes people.  Around each of them the picture is searched again,
+enlarged so that the person is larger than the smallest window, because windows around smaller people extend
+too far beyond head and feet.
 """
 
 from __future__ import annotations
@@ -22,30 +22,30 @@ from gait.reproducible import one_opencv_thread
 
 Array = NDArray[np.float64]
 Stature = Callable[[Box], float]
-"""Stature of the person in a box, metres; NaN where there is no floor."""
+"""Computes the stature of the person in a box, metres; NaN if the feet are not on the floor."""
 
-SIDES = (420, 760)  # pixels, the larger side of the pictures searched, in this order
-LEAST = 96  # pixels that a person must be tall in the largest
-_BORDER = 0.2  # of the picture's height added above and below: a window is larger than the person
+SIDES = (420, 760)  # pixels; longer sides of the pictures searched, in this order
+LEAST = 96  # pixels; smallest height of a person in the largest of them
+_BORDER = 0.2  # of the picture's height, added above and below, as a window is larger than the person
 _SIDES = 16  # pixels added at the sides
-_MOST = 4  # people proposed
-_TALL = 120  # pixels of a person in the second search
-_REACH = (0.75, 0.95)  # heights searched about a person's middle: to each side, up and down
-_THRESHOLD = -0.5  # of a window's vote: weak ones count in numbers
-_SHARP = 3.0  # nats per unit of a vote
-_HEAD, _FOOT = 0.125, 0.86  # of the window: crown of the head, soles of the feet
+_MOST = 4  # most people proposed
+_TALL = 120  # pixels; height of a person in the second search
+_REACH = (0.75, 0.95)  # area searched around a person's middle, in heights: to each side, up and down
+_THRESHOLD = -0.5  # least score of a window; many weak ones count too
+_SHARP = 3.0  # nats per unit of the score
+_HEAD, _FOOT = 0.125, 0.86  # position of crown and soles in a window, as fractions of its height
 _STATURE, _STATURE_SD = 1.68, 0.12  # metres
-_ENOUGH = 0.5  # least vote of the best window about a person
-_ENOUGH_NEAR = 0.0  # the same of a person who is expected there
-_SAME = 0.3  # heights between the feet of windows about one person
-_WINDOW_SD = 0.015  # of a mean of windows, heights, from frame to frame
-PLAUSIBLE = (1.2, 2.4)  #: metres: apparent statures of people, which shadows lengthen
-_FLAT = 2.0  # grey levels: standard deviation of a picture that shows nothing
+_ENOUGH = 0.5  # least score of the best window around a person
+_ENOUGH_NEAR = 0.0  # the same for a person who is expected there
+_SAME = 0.3  # heights between the feet in windows around the same person
+_WINDOW_SD = 0.015  # heights; sd of a mean of windows from frame to frame
+PLAUSIBLE = (1.2, 2.4)  #: metres; apparent statures of people, which shadows lengthen
+_FLAT = 2.0  # grey levels; standard deviation below which a picture shows nothing
 
 
 @functools.cache
 def hog_detector() -> cv2.HOGDescriptor:
-    """Detector of upright people, made once."""
+    """Return the detector of upright people, which is created once."""
     hog = cv2.HOGDescriptor()
     hog.setSVMDetector(np.array(cv2.HOGDescriptor.getDefaultPeopleDetector()))
     return hog
@@ -62,7 +62,7 @@ def find_people(image: Image, stature: Stature) -> list[Box]:
     Returns
     -------
     people : list of Box
-        The most certain first; people under `LEAST` pixels are missed.
+        The most certain first; people smaller than `LEAST` pixels are missed.
     """
     if image[::8, ::8].std() < _FLAT:
         return []
@@ -77,18 +77,18 @@ def find_people(image: Image, stature: Stature) -> list[Box]:
 
 
 def _known(box: Box, found: list[tuple[float, Box]]) -> bool:
-    """Whether a person is among those found."""
+    """Whether a person is among those found already."""
     return any(np.hypot(*(box.foot - other.foot)) < _SAME * box.tall for _, other in found)
 
 
 def find_near(image: Image, box: Box, stature: Stature) -> Box | None:
-    """Find the person whose box in a picture is about this one; None if no person stands there."""
+    """Find the person whose box is near this one; None if no person stands there."""
     found = _nearby(image, box, stature, _ENOUGH_NEAR)
     return None if found is None else found[1]
 
 
 def _nearby(image: Image, box: Box, stature: Stature, least: float) -> tuple[float, Box] | None:
-    """Search the picture about a box once more: the vote for the person there and their box, or None."""
+    """Search the picture around a box again; return score and box of the person there, or None."""
     middle, reach = (box.foot + box.head) / 2, np.array(_REACH) * box.tall
     corner = middle - reach
     groups = _groups(_search(image, corner, tuple(2 * reach), _TALL / box.tall, stature))
@@ -98,9 +98,9 @@ def _nearby(image: Image, box: Box, stature: Stature, least: float) -> tuple[flo
 def _search(
     image: Image, corner: Array, size: tuple[float, ...], scale: float, stature: Stature
 ) -> list[tuple[float, float, Box]]:
-    """Windows about people in a part of the picture at a scale: vote, weight, person."""
+    """Find windows around people in a part of the picture at a scale: score, weight, person."""
     part, offset = _part(image, corner, size, scale)
-    if np.any(np.array(part.shape[1::-1]) < hog_detector().winSize):  # OpenCV would read beyond it
+    if np.any(np.array(part.shape[1::-1]) < hog_detector().winSize):  # OpenCV would read out of bounds
         return []
     with one_opencv_thread():
         windows, votes = hog_detector().detectMultiScale(
@@ -118,7 +118,7 @@ def _search(
 
 
 def _part(image: Image, corner: Array, size: tuple[float, ...], scale: float) -> tuple[Image, Array]:
-    """Part of a picture at a scale, with a border of repeated pixels above and below; and its corner."""
+    """Cut out and scale a part of a picture, with repeated pixels above and below; also return its corner."""
     height, width = image.shape[:2]
     x0, y0 = (max(0, int(c)) for c in corner)
     x1, y1 = min(width, int(corner[0] + size[0]) + 1), min(height, int(corner[1] + size[1]) + 1)
@@ -133,14 +133,14 @@ def _part(image: Image, corner: Array, size: tuple[float, ...], scale: float) ->
 
 
 def _box(x: float, y: float, width: float, height: float) -> Box:
-    """Person in a window."""
+    """Return the box of the person in a window."""
     middle = x + width / 2
     foot, head = np.array([middle, y + _FOOT * height]), np.array([middle, y + _HEAD * height])
     return Box(foot, head, _WINDOW_SD * height)
 
 
 def _groups(windows: list[tuple[float, float, Box]]) -> list[tuple[float, Box]]:
-    """One box for the windows about one place, and the largest vote; the greatest weights first."""
+    """Merge windows at the same position into one box with the largest score, greatest weight first."""
     left = sorted(windows, key=lambda window: -window[1])
     found = []
     while left:

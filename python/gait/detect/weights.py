@@ -1,8 +1,7 @@
 """Weights of the detector: files of two published packages.
 
-The networks are those of BlazePose (Bazarevsky and others 2020), by Google, licence Apache-2.0.  They come
-from the Python package ``mediapipe`` and the npm package ``@mediapipe/pose``, which are downloaded but not
-installed.
+The networks are BlazePose's (Bazarevsky and others 2020; Google, Apache-2.0).  They are contained in the
+Python package ``mediapipe`` and the npm package ``@mediapipe/pose``, which are downloaded but not installed.
 """
 
 from __future__ import annotations
@@ -10,7 +9,7 @@ from __future__ import annotations
 from gait.io.published import Published, Store
 
 FETCH = "run gait detect --fetch once, with a network connection"
-"""What a user does to get the weights."""
+"""How a user gets the weights."""
 
 _WHEEL, _NPM = "mediapipe==0.10.21", "@mediapipe/pose@0.5.1675469404"
 PERSON = Published(

@@ -1,1 +1,1 @@
-"""True and tracked motion: footfalls and parameters, and errors against the truth."""
+"""Motion, true or tracked: footfalls, gait parameters, and errors against the truth."""

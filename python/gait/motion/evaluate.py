@@ -1,6 +1,6 @@
 """Errors of a track against the truth: joints, phase, picture, intervals, and two baselines without images.
 
-The baselines are a standing mean pose and a mean cycle that runs on from the true start.
+The baselines are a standing mean pose, and a mean cycle that continues from the true start.
 """
 
 from __future__ import annotations
@@ -32,8 +32,8 @@ _BONES += [(f"{s}_{a}", f"{s}_{b}") for s in "lr" for a, b in (("shoulder", "elb
 def static_pose(model: dict[str, Any], truth: Joints, names: Sequence[str] = EVAL15) -> Array:
     """Mean pose of the model at the true hip midpoint and walking direction, joints `names` (n, P, 3).
 
-    `model`: sections of the blob; `truth`: gives place, direction and the stature that fits its limbs;
-    `names`: P joints that begin with those of EVAL15.
+    `model`: sections of the blob; `truth`: provides position, direction and a stature that fits its limbs;
+    `names`: P joints, beginning with those of EVAL15.
     """
     joints = _poses(model, _PHASES, stature(model, truth), names=names).mean(axis=0)
     joints -= joints[HIPS].mean(axis=0)
@@ -44,9 +44,9 @@ def static_pose(model: dict[str, Any], truth: Joints, names: Sequence[str] = EVA
 def free_run(
     model: dict[str, Any], truth: Joints, strikes: Strikes, first: int, names: Sequence[str] = EVAL15
 ) -> Array | None:
-    """Mean cycle running on from the true state at row `first` of the truth, joints `names` (n, P, 3).
+    """Mean cycle that continues from the true state at row `first` of the truth, joints `names` (n, P, 3).
 
-    Place, direction, phase and stride rate are the truth's at that row, then nothing is looked at.
+    Position, direction, phase and stride rate are the truth's at that row; later rows are not used.
     None if the phase is unknown.
     """
     cycles = strikes.cycles(np.append(truth.frame[first], truth.frame[first] + 1))
@@ -62,7 +62,7 @@ def free_run(
 
 
 def stature(model: dict[str, Any], truth: Joints) -> float:
-    """Stature in metres at which the model's limbs are as long together as the truth's."""
+    """Stature in metres at which the model's limbs have the same total length as the truth's."""
     joints = dict(zip(EVAL15, np.moveaxis(_poses(model, _PHASES[:1], 1.0), 1, 0), strict=True))
     lengths = [
         sum(float(np.median(np.linalg.norm(at[a] - at[b], axis=1))) for a, b in _BONES)
@@ -74,16 +74,16 @@ def stature(model: dict[str, Any], truth: Joints) -> float:
 def _poses(
     model: dict[str, Any], phase: Array, size: float, rate: float = 0.0, names: Sequence[str] = EVAL15
 ) -> Array:
-    """Joints `names` (n, P, 3) of the mean cycle heading along x with the pelvis at the origin."""
+    """Joints `names` (n, P, 3) of the mean cycle, heading along x, with the pelvis at the origin."""
     joints, _ = skeleton.pose(model, phase, np.zeros(0), size, 0.0, 0.0, 0.0, np.zeros(3), stride_hz=rate)
     known = unpack_names(model["PTNM"])
     return joints[:, [known.index(name) for name in names]]
 
 
 def root_path(model: dict[str, Any], cycles: Array, rate: float = 0.0) -> Array:
-    """Pelvis (n, 3) of the mean cycle in statures against phase in strides, wherever it began.
+    """Pelvis (n, 3) of the mean cycle, in statures, at phases in strides; the origin is arbitrary.
 
-    rate : strides per second, which the mean cycle follows; 0: the mean rate.
+    rate : strides per second, on which the mean cycle depends; 0: the average rate.
     """
     names = unpack_names(model["CHNM"])
     columns = [names.index(f"root_{name}") for name in ("forward", "sway", "height")]
@@ -95,7 +95,7 @@ def root_path(model: dict[str, Any], cycles: Array, rate: float = 0.0) -> Array:
 
 
 def body_axes(truth: Joints, stride: float = STRIDE) -> Array:
-    """Give rotations (n, 3, 3) from x forward, y left, z up to the world."""
+    """Return rotations (n, 3, 3) from body axes (x forward, y left, z up) to the world."""
     forward = walking_direction(truth, stride)
     up = np.broadcast_to([0.0, 0.0, 1.0], forward.shape)
     return np.stack([forward, np.cross(up, forward), up], axis=2)
@@ -105,14 +105,14 @@ def _hip_midpoint(truth: Joints) -> Array:
     return 0.5 * (truth.places["l_hip"] + truth.places["r_hip"])
 
 
-APART = 15  # frames between two that count as independent
+APART = 15  # frames after which errors count as independent
 _BINS = 10
 _HALF = {"50": 0.6744898, "90": 1.6448536}  # half-widths of normal intervals, standard deviations
-_TINY = 1e-9  # metres; an sd of 0 would claim to be exact
+_TINY = 1e-9  # metres; smallest standard deviation
 
 
 def coverage(found: Array, sd: Array, true: Array) -> dict[str, float]:
-    """Share of the coordinates inside the normal 50 % and 90 % intervals.
+    """Share of the coordinates within the normal 50 % and 90 % intervals.
 
     `found`, `sd`, `true`: estimate, its standard deviation, truth.
     """
@@ -121,14 +121,14 @@ def coverage(found: Array, sd: Array, true: Array) -> dict[str, float]:
 
 
 def calibration(found: Array, sd: Array, true: Array) -> dict[str, Any]:
-    """Measures of the intervals beyond their coverage.
+    """Measure how well standard deviations describe the errors, beyond the coverage of intervals.
 
-    `found`, `sd`, `true` (n, 15, 3): EVAL15 in metres, frame by frame. Returns ``pit``: shares of 10 equal
-    bins of the probability integral transform over frames `APART` apart, ``pit_chi2`` their chi-square
-    statistic against flat and ``pit_p`` its p-value as if coordinates were independent (they are not: read it
-    as a ranking); ``z2``: mean squared error in variances, 1 where the standard deviations are right;
-    ``crps_mm``: continuous ranked probability score of a normal (Gneiting and Raftery 2007), lower is better;
-    ``width_mm``: mean width of the 90 % intervals.
+    `found`, `sd`, `true` (n, 15, 3): EVAL15 in metres, for consecutive frames. Returns ``pit``: shares of 10
+    equal bins of the probability integral transform over frames `APART` apart, ``pit_chi2`` their chi-square
+    statistic against a flat distribution and ``pit_p`` its p-value as if coordinates were independent (they
+    are not, so use it only for ranking); ``z2``: mean squared error in variances, 1 if the standard
+    deviations are right; ``crps_mm``: continuous ranked probability score of a normal distribution (Gneiting
+    and Raftery 2007), lower is better; ``width_mm``: mean width of the 90 % intervals.
     """
     z = (true - found) / np.maximum(sd, _TINY)
     counts, _ = np.histogram(ndtr(z[::APART]), _BINS, (0.0, 1.0))
@@ -159,16 +159,16 @@ LIMBS = [i for i, name in enumerate(EVAL15) if name not in ("pelvis", "neck", "h
 def evaluate(
     track: Track, truth: Joints, *, strikes: Strikes, model: dict[str, Any], camera: Camera | None = None
 ) -> Measures:
-    """Compare the frames that both have.
+    """Compare the frames that a track and the truth have in common.
 
     `strikes`: heel strikes of the truth; `model`: sections of the model blob, for the baselines; `camera`:
-    for the distance in the picture. Returns ``frames``; ``abs``, ``root`` (mm) and ``px`` each as ``median``,
-    ``mean``, ``p90``; ``lost`` (share); ``phase`` (cycles; see `phase_errors`) and ``px`` are None where
-    they, strikes or camera are unknown; ``coverage`` (share) of the ``50`` and ``90`` % intervals; ``static``
-    and ``free``: the baselines; ``root12``: as ``root`` over shoulders, elbows, wrists, hips, knees and
-    ankles, the joints that 2-D pose networks have; ``proc``: after the best rotation, scale and shift of
-    every frame, to compare with literature only; ``status``, ``trust`` (see `trust`); ``calibration`` (see
-    `gait.motion.evaluate`). UserError if they have no frame in common.
+    for distances in the picture. Returns ``frames``; ``abs``, ``root`` (mm) and ``px``, each as ``median``,
+    ``mean``, ``p90``; ``lost`` (share); ``phase`` (cycles; see `phase_errors`); ``coverage`` (share) of the
+    ``50`` and ``90`` % intervals; ``static`` and ``free``: the baselines; ``root12``: like ``root``, over
+    shoulders, elbows, wrists, hips, knees and ankles, the joints that 2-D pose networks have; ``proc``: after
+    the best rotation, scale and shift of each frame, only for comparison with the literature; ``status``,
+    ``trust`` (see `trust`); ``calibration`` (see `calibration`). ``phase`` is None if strikes or phases are
+    unknown, ``px`` if the camera is. UserError if they have no frame in common.
     """
     common, ours, theirs = np.intersect1d(track.frame, truth.frame, return_indices=True)
     if len(common) == 0:
@@ -205,7 +205,7 @@ def summary(values: Array) -> dict[str, float]:
 
 
 def pose_errors(found: Array, true: Array, given_up: NDArray[np.bool_] | None = None) -> Measures:
-    """``abs``, ``root`` in mm and the share ``lost`` of EVAL15 positions (n, 15, 3) in metres."""
+    """Compute ``abs`` and ``root`` in mm and the share ``lost``, for EVAL15 (n, 15, 3) in metres."""
     absolute = 1000 * np.linalg.norm(found - true, axis=2).mean(axis=1)
     root = root_errors(found, true)
     lost = root > LOST_MM if given_up is None else (root > LOST_MM) | given_up
@@ -213,14 +213,14 @@ def pose_errors(found: Array, true: Array, given_up: NDArray[np.bool_] | None = 
 
 
 def root_errors(found: Array, true: Array, joints: list[int] = BODY) -> Array:
-    """Mean distance (n,) in mm of `joints` (the 14 other than the pelvis), hip midpoints laid together."""
+    """Mean distance (n,) in mm of `joints` (by default all but the pelvis), after aligning hip midpoints."""
     found = found - found[:, HIPS].mean(axis=1, keepdims=True)
     true = true - true[:, HIPS].mean(axis=1, keepdims=True)
     return np.asarray(1000 * np.linalg.norm(found - true, axis=2)[:, joints].mean(axis=1))
 
 
 def procrustes_errors(found: Array, true: Array) -> Array:
-    """Mean distance (n,) in mm of EVAL15 after the least-squares similarity of every frame (Umeyama 1991)."""
+    """Mean distance (n,) in mm of EVAL15, after a least-squares similarity in each frame (Umeyama 1991)."""
     found = found - found.mean(axis=1, keepdims=True)
     true = true - true.mean(axis=1, keepdims=True)
     u, s, vt = np.linalg.svd(np.einsum("nji,njk->nik", true, found))
@@ -233,10 +233,10 @@ def procrustes_errors(found: Array, true: Array) -> Array:
 
 
 def trust(root: Array, status: NDArray[np.str_]) -> dict[str, float]:
-    """How far the status can be believed, shares of all frames.
+    """Measure how far the status can be trusted, as shares of all frames.
 
-    ``wrong_tracking``: off by more than `LOST_MM` with status ``tracking``; ``weighted_lost``: frames lost,
-    those counted twice.
+    ``wrong_tracking``: frames more than `LOST_MM` off with status ``tracking``; ``weighted_lost``: frames
+    that far off or with status ``lost``, counting those wrongly ``tracking`` twice.
     """
     off = root > LOST_MM
     silent = off & (status == "tracking")
@@ -247,9 +247,9 @@ def trust(root: Array, status: NDArray[np.str_]) -> dict[str, float]:
 def phase_errors(found: Array, true: Array) -> dict[str, float]:
     """Errors of the phase in cycles.
 
-    A frame is flipped when it is nearer to half a cycle away than to the truth: ``flips`` is their share.
-    The rest measures what is left after taking the half cycle off: ``median``, ``mean``, ``p90`` of its
-    absolute value, ``bias`` its signed mean.  Frames without a phase do not count.
+    A frame is flipped if its phase is nearer to half a cycle from the truth than to the truth: ``flips`` is
+    the share of such frames.  The other figures are without that half cycle: ``median``, ``mean`` and ``p90``
+    of the absolute error, and ``bias``, the mean error.  Frames without a phase do not count.
     """
     known = np.isfinite(found)
     error = (found[known] - true[known] + 0.5) % 1.0 - 0.5
@@ -259,7 +259,7 @@ def phase_errors(found: Array, true: Array) -> dict[str, float]:
 
 
 def picture_errors(found: Array, true: Array, camera: Camera) -> dict[str, float] | None:
-    """Distance in pixels between the projections of EVAL15; None if nothing is before the camera."""
+    """Distance in pixels between the projections of EVAL15; None if nothing is in front of the camera."""
     distance = np.linalg.norm(camera.project(found) - camera.project(true), axis=2)
     visible = np.isfinite(distance)
     frames = visible.any(axis=1)

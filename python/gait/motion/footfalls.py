@@ -1,11 +1,11 @@
 """When and where the feet of a walking person touch and leave the ground, with uncertainties.
 
-Heel strikes are where the heel is furthest ahead of the pelvis along the walking direction, toe-offs where
-the toe is furthest behind it (Zeni et al. 2008, Gait & Posture 27:710).
+A heel strike is when the heel is furthest ahead of the pelvis along the walking direction, a toe-off when the
+toe is furthest behind it (Zeni et al. 2008, Gait & Posture 27:710).
 
-Uncertainty is carried by draws.  With the motions of ``gait track --draws`` each draw is a whole motion, so
-errors that last are the same at both ends of a stride, as they should be.  A track alone has only the
-standard deviations of each frame: `gait.motion.uncertainty` states how long their errors last.
+Uncertainty is represented by draws.  With the motions of ``gait track --draws`` each draw is a whole motion,
+so lasting errors are the same at both ends of a stride, as they should be.  A track without draws has only
+the standard deviations of each frame; `gait.motion.uncertainty` describes how long their errors last.
 """
 
 from __future__ import annotations
@@ -25,9 +25,9 @@ from gait.io.track_file import Joints, Track
 
 Array = NDArray[np.float64]
 
-STRIDE = 1.1  # seconds, where the true one is not known
-_APART = 0.5  # seconds between strikes of one foot, at least
-_REACH = 0.1  # metres that a foot swings past the pelvis, at least
+STRIDE = 1.1  # seconds; stride time assumed where the true one is unknown
+_APART = 0.5  # least seconds between strikes of one foot
+_REACH = 0.1  # least metres that a foot swings past the pelvis
 
 
 @dataclass(frozen=True)
@@ -38,15 +38,16 @@ class Strikes:
     left: Array
 
     def phase(self, frames: ArrayLike) -> Array | None:
-        """Phase [0, 1) at frame numbers (n,): linear between strikes; None if fewer than two are known.
+        """Phase [0, 1) at frame numbers (n,), linear between strikes; None if fewer than two are known.
 
-        Right strikes are phase 0.  Left strikes, near but not at 0.5, serve only if right ones are too few.
+        Right strikes are phase 0.  Left strikes, which are only near 0.5, are used if there are too few right
+        ones.
         """
         cycles = self.cycles(frames)
         return None if cycles is None else cycles % 1.0
 
     def cycles(self, frames: ArrayLike) -> Array | None:
-        """Return phase without wrapping, in strides; beyond the first and last strike the rate goes on."""
+        """Return the phase without wrapping, in strides, extrapolated before the first and after the last."""
         at: Array = self.right
         count: Array = np.arange(len(self.right), dtype=float)
         if len(at) < 2:
@@ -59,7 +60,7 @@ class Strikes:
         return np.asarray(count[piece] + share * (count[piece + 1] - count[piece]))
 
     def _both(self) -> tuple[Array, Array]:
-        """Strikes of both feet, half a stride from one to the next."""
+        """Merge the strikes of both feet, which are half a stride apart."""
         at = np.concatenate([self.right, self.left])
         order = np.argsort(at)
         is_left = np.concatenate([np.zeros(len(self.right), bool), np.ones(len(self.left), bool)])[order]
@@ -68,13 +69,13 @@ class Strikes:
 
 
 def strikes_of(truth: Joints, meta: Path) -> Strikes:
-    """Strikes that the file `meta` lists, if it is there and lists any, else those found in the truth."""
+    """Return the strikes listed in the file `meta`, or, if it is missing or has none, those in the truth."""
     known = strikes_from_meta(meta) if meta.is_file() else None
     return known or strikes_by_zeni(truth)
 
 
 def strikes_from_meta(path: str | os.PathLike[str]) -> Strikes | None:
-    """Strikes from the ``events_video_frames`` of a clip's meta.json; None if it has none."""
+    """Read strikes from ``events_video_frames`` in a clip's meta.json; None if it has none."""
     events = read_json(path, "meta").table("events_video_frames", "give lists of heel strikes")
     if "r_heel_strike" not in events or "l_heel_strike" not in events:
         return None
@@ -82,9 +83,9 @@ def strikes_from_meta(path: str | os.PathLike[str]) -> Strikes | None:
 
 
 def strikes_by_zeni(truth: Joints) -> Strikes:
-    """Strikes where a heel is furthest ahead of the pelvis along the walking direction (Zeni et al. 2008).
+    """Find strikes, when a heel is furthest ahead of the pelvis in walking direction (Zeni et al. 2008).
 
-    Where the truth has no heels the ankles serve.
+    If the truth has no heels, the ankles are used.
     """
     ahead = walking_direction(truth)
     pelvis = truth.places["pelvis"]
@@ -97,8 +98,8 @@ def strikes_by_zeni(truth: Joints) -> Strikes:
 def walking_direction(truth: Joints, stride: float = STRIDE) -> Array:
     """Return the unit direction of travel along the ground at each frame, shape (n, 3).
 
-    It is the way of the pelvis over one stride of `stride` seconds around the frame, over which the sway of
-    the pelvis cancels; near the ends, over the first and last stride.
+    It is the direction in which the pelvis moves during one stride of `stride` seconds around the frame, so
+    that its sway cancels; near the ends, during the first or last stride.
     """
     time, pelvis = truth.time, truth.places["pelvis"][:, :2]
     early = np.clip(time - stride / 2, time[0], max(time[0], time[-1] - stride))
@@ -114,9 +115,9 @@ def _foot(truth: Joints, side: str) -> Array:
 
 
 def furthest(time: Array, reach: Array) -> Array:
-    """Return the times of the maxima of `reach`, refined by the parabola through three frames.
+    """Return the times of the maxima of `reach`, refined by a parabola through three frames.
 
-    `time` (n,); `reach` (n,): metres that a foot is ahead of the pelvis (or behind it, to find toe-offs).
+    `time` (n,); `reach` (n,): how far a foot is ahead of the pelvis (or behind it, to find toe-offs), metres.
     """
     step = float(np.median(np.diff(time)))
     peaks = maxima(reach, _REACH, max(1, round(_APART / step)))
@@ -129,8 +130,9 @@ def furthest(time: Array, reach: Array) -> Array:
 def maxima(values: Array, least: float, apart: int) -> NDArray[np.int64]:
     """Return the indices of the local maxima of `values` (n,) that are at least `least`.
 
-    Of maxima nearer than `apart` the highest stays, of equal ones the last; of equal neighbours the middle is
-    the maximum.  The same as ``scipy.signal.find_peaks``, which takes over a second to load.
+    Of maxima less than `apart` from each other only the highest is kept, of equal ones the last; of equal
+    neighbouring values the middle is the maximum.  This does what ``scipy.signal.find_peaks`` does, which
+    takes over a second to import.
     """
     change = np.flatnonzero(np.diff(values))
     up = np.diff(values)[change] > 0
@@ -144,12 +146,12 @@ def maxima(values: Array, least: float, apart: int) -> NDArray[np.int64]:
 
 
 def _strikes(truth: Joints, reach: Array) -> Array:
-    """Fractional frame numbers of the strikes of a foot that is `reach` (n,) metres ahead."""
+    """Fractional frame numbers of the strikes of a foot that is `reach` (n,) metres ahead of the pelvis."""
     return np.interp(furthest(truth.time, reach), truth.time, truth.frame.astype(float))
 
 
 def _times(events: Fields, key: str) -> Array:
-    """Increasing strike times of one foot."""
+    """Read the strike times of one foot, which must increase."""
     remedy = "give a list of increasing frame numbers"
     times = events.array(key, (events.count(key, remedy),), remedy)
     if (np.diff(times) <= 0).any():
@@ -159,9 +161,9 @@ def _times(events: Fields, key: str) -> Array:
 
 SIDES = ("right", "left")
 
-_STANCE = np.linspace(0.10, 0.30, 5)  # of a stride after the strike: the foot is flat
-_SWING = np.linspace(0.12, 0.26, 8)  # of a stride before the strike: the toe passes the other foot
-NEAR = 0.25  # seconds: further apart two events are not the same
+_STANCE = np.linspace(0.10, 0.30, 5)  # strides after the strike, when the foot is flat
+_SWING = np.linspace(0.12, 0.26, 8)  # strides before the strike, when the toe passes the other foot
+NEAR = 0.25  # seconds; events further apart are not the same
 
 
 @dataclass(frozen=True)
@@ -174,7 +176,7 @@ class Events:
 
     @property
     def count(self) -> int:
-        """How many there are."""
+        """Number of events."""
         return sum(len(times) for kind in (self.strike, self.off) for times in kind.values())
 
 
@@ -182,13 +184,13 @@ class Events:
 class Contacts:
     """Contacts of one foot with the ground; leading axes (...) may run over draws."""
 
-    #: (..., k) seconds; `off` ends the contact that `strike` begins, NaN where it was not seen.
+    #: (..., k) seconds; `off` ends the contact that `strike` begins; NaN if it was not seen.
     strike: Array
     off: Array
-    place: Array  #: (..., k, 3) ankle while the foot is flat, metres, world; NaN where the track ends before
+    place: Array  #: (..., k, 3) ankle while the foot is flat, metres, world; NaN if the track ends before
     pelvis: Array  #: (..., k, 3) at the strike
-    #: (..., k) metres that the toe clears the floor by in the middle of the swing before the strike, at
-    #: least; NaN where the track begins later
+    #: (..., k) least height of the toe above the floor in the middle of the swing before the strike, metres;
+    #: NaN if the track begins later
     clearance: Array
 
 
@@ -204,7 +206,7 @@ def find_events(joints: Joints) -> Events:
 
 
 def same_events(found: Events, wanted: Events) -> Events:
-    """Return those of `found` that `wanted` has, in its order; NaN where there is none."""
+    """Match events: for each of `wanted`, return the event of `found` near it, or NaN if there is none."""
 
     def pick(have: Array, want: Array) -> Array:
         if not len(have):
@@ -219,7 +221,7 @@ def same_events(found: Events, wanted: Events) -> Events:
 
 
 def contacts(joints: Joints, events: Events, side: str, stride: float) -> Contacts:
-    """Contacts of one foot. `side`: "right" or "left"; `stride`: seconds of a stride, about."""
+    """Describe the contacts of one foot. `side`: "right" or "left"; `stride`: rough stride time, seconds."""
     strike = events.strike[side]
     return Contacts(
         strike=strike,
@@ -231,7 +233,7 @@ def contacts(joints: Joints, events: Events, side: str, stride: float) -> Contac
 
 
 def at(time: Array, values: Array, when: Array) -> Array:
-    """Values (n, d) linear in time at `when` (k,): shape (k, d)."""
+    """Interpolate values (n, d) linearly at times `when` (k,): shape (k, d)."""
     return np.stack([np.interp(when, time, column) for column in values.T], axis=-1)
 
 
@@ -242,13 +244,13 @@ def stride_time(events: Events) -> float:
 
 
 def stack(draws: list[Contacts]) -> Contacts:
-    """Contacts of many draws as one, shape (draws, ...)."""
+    """Stack the contacts of many draws along a new first axis, shape (draws, ...)."""
     names = [item.name for item in fields(Contacts)]
     return Contacts(**{name: np.stack([getattr(draw, name) for draw in draws]) for name in names})
 
 
 def _offs(strike: Array, off: Array, stride: float) -> Array:
-    """First toe-off within a stride after each strike."""
+    """Find the first toe-off within a stride after each strike; NaN if there is none."""
     out = np.full(len(strike), np.nan)
     for k, begun in enumerate(strike):
         after = off[(off > begun) & (off < begun + 0.9 * stride)]
@@ -258,7 +260,7 @@ def _offs(strike: Array, off: Array, stride: float) -> Array:
 
 
 def _flat(time: Array, ankle: Array, strike: Array, stride: float) -> Array:
-    """Mean of the ankle while the foot is flat, as far as the track goes."""
+    """Mean position of the ankle while the foot is flat; NaN if the track ends before."""
     out = np.full((len(strike), 3), np.nan)
     for k, begun in enumerate(strike):
         when = begun + stride * _STANCE
@@ -269,7 +271,7 @@ def _flat(time: Array, ankle: Array, strike: Array, stride: float) -> Array:
 
 
 def _clearance(time: Array, toe: Array, strike: Array, stride: float) -> Array:
-    """Least height of the toe in the middle of the swing, over that while the foot was flat before."""
+    """Least height of the toe in the middle of the swing, above its height while the foot was flat before."""
     swing = np.interp(strike[:, None] - stride * _SWING, time, toe)
     flat = np.interp(strike[:, None] - stride * (1 - _STANCE), time, toe)
     begun = strike - stride * (1 - _STANCE[0]) >= time[0]
@@ -282,7 +284,7 @@ class Draws:
 
     frame: NDArray[np.int64]  #: (n,)
     time: Array  #: (n,) seconds
-    #: The D draws are of P joints and A angles.
+    #: Names of the P joints and A angles of the D draws.
     joint_names: tuple[str, ...]
     angle_names: tuple[str, ...]
     joints: NDArray[np.float32]  #: (D, n, P, 3) metres, world
@@ -290,7 +292,7 @@ class Draws:
     phase: NDArray[np.float32]  #: (D, n) [0, 1) of the stride
 
     def motion(self, draw: int) -> Joints:
-        """One of the motions."""
+        """Return one of the motions."""
         places = {name: self.joints[draw, :, i].astype(float) for i, name in enumerate(self.joint_names)}
         return Joints(self.frame, self.time, places)
 
@@ -302,7 +304,7 @@ class Draws:
 
     @staticmethod
     def read(path: str | os.PathLike[str], track: Track) -> Draws:
-        """Read a file of `write` that must be of the same frames as `track`."""
+        """Read a file from `write`; UserError unless its frames are those of `track`."""
         require_file(path, "file of draws", "gait track --smooth --draws writes it")
         try:
             with np.load(path, allow_pickle=False) as stored:
@@ -321,19 +323,19 @@ _ARRAYS = ("frame", "time", "joint_names", "angle_names", "joints", "angles", "p
 
 
 def moved_by_camera(change: Array, off: Array) -> Array:
-    """How places move over the floor with each part of the camera's uncertainty.
+    """Compute how positions move over the floor with each independent error of the camera.
 
     Parameters
     ----------
     change : ndarray of shape (..., 3, 4)
-        Of the person's place and heading, as `Track.camera_change`.
+        Changes of the person's position and heading, as in `Track.camera_change`.
     off : ndarray of shape (..., 2)
-        Of the places from the person's, metres.
+        Offsets of the positions from the person's, metres.
 
     Returns
     -------
     ndarray of shape (..., 2, 4)
-        Metres.
+        Metres per sd of each error.
     """
     turned = np.stack([-off[..., 1], off[..., 0]], axis=-1)[..., None] * change[..., 2:, :]
     return np.asarray(change[..., :2, :] + turned)

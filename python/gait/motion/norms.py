@@ -1,8 +1,8 @@
-"""Gait parameters compared with norms: people of the model at this pace, and normal speeds by age and sex.
+"""Compare gait parameters with norms: people of the model at the same pace, and normal speeds by age and sex.
 
-The norm by pace is drawn from the model: people as those that it was learnt from, with components, lasting
-offsets and proportions by their standard deviations, who walk at the stride rate and stature of the track.
-Their parameters come from their motion by the same code as those of a track.
+The norm by pace is computed from people drawn from the model: their components, lasting offsets and
+proportions vary as among the people from which it was learnt, and they walk with the track's stride rate and
+stature.  Their parameters are computed from their motion by the same code as those of a track.
 """
 
 from __future__ import annotations
@@ -27,46 +27,46 @@ Array = NDArray[np.float64]
 
 SEXES = ("f", "m")
 #: Comfortable speed of healthy adults, mean and standard deviation, m/s, by sex and decade of age from the
-#: twenties to the seventies: Bohannon 1997, Age and Ageing 26:15-19 (230 people, 7.6 m of floor).
+#: twenties to the seventies: Bohannon 1997, Age and Ageing 26:15-19 (230 people who walked 7.6 m).
 SPEED = {
     "f": ((1.407, 0.175), (1.415, 0.127), (1.391, 0.158), (1.395, 0.151), (1.296, 0.213), (1.272, 0.211)),
     "m": ((1.393, 0.153), (1.458, 0.094), (1.462, 0.164), (1.393, 0.229), (1.359, 0.205), (1.330, 0.196)),
 }
-AGES = (20, 79)  # years that `SPEED` has
+AGES = (20, 79)  # years that `SPEED` covers
 BY_PACE = (
     *("step_width_m", "foot_clearance_m", "stance_percent", "double_support_percent"),
     *(f"asymmetry:{name}" for name in MIRRORED),
 )
-"""Parameters whose norm is drawn from people at the same stride rate."""
+"""Parameters whose norm comes from people with the same stride rate."""
 
 _PEOPLE = 40
-_STRIDES, _SAMPLES = 3.4, 48  # strides that each walks, and frames of a stride
-_RANGE = 2.0  # standard deviations of the norm within which a value is inside
+_STRIDES, _SAMPLES = 3.4, 48  # strides that each person walks, and frames per stride
+_RANGE = 2.0  # standard deviations; the norm's range is its mean plus or minus this
 _SURE, _LIKELY, _POSSIBLE = 0.95, 0.5, 0.05  # probabilities
-_cdf = NormalDist().cdf  # SciPy takes longer to load than all else here
+_cdf = NormalDist().cdf  # importing SciPy would take longer than everything else here
 
 
 @dataclass(frozen=True)
 class Compared:
-    """A parameter beside its norm."""
+    """A parameter and its norm."""
 
-    name: str  #: of `QUANTITIES`, or ``asymmetry:NAME``
-    #: Value and standard deviation (NaN: unknown) of the track, and mean and standard deviation among people.
+    name: str  #: one of `QUANTITIES`, or ``asymmetry:NAME``
+    #: Value and standard deviation (NaN: unknown) of the track; mean and standard deviation among people.
     value: float
     sd: float
     norm: float
     norm_sd: float
-    source: str  #: ``pace``: people of the model at this stride rate; ``speed``: at this speed; ``age``
+    source: str  #: norm: ``pace``: people of the model at this stride rate; ``speed``: at this speed; ``age``
 
     @property
     def outside(self) -> float:
-        """Probability that the true value is outside two standard deviations of the norm, either way."""
+        """Probability that the true value is more than two standard deviations below or above the norm."""
         low, high = self._ends
         return _cdf(low) + 1 - _cdf(high)
 
     @property
     def words(self) -> str:
-        """State whether it is inside, and how sure that is."""
+        """Describe whether the value is in the norm's range, and how certain that is."""
         low, high = self._ends
         below, above = _cdf(low), 1 - _cdf(high)
         share, way = max((below, "below"), (above, "above"))
@@ -80,7 +80,7 @@ class Compared:
         return f"{sure}{way} ({100 * share:.0f} %)"
 
     def as_json(self) -> dict[str, Any]:
-        """Return all of it for JSON; an unknown standard deviation is null."""
+        """Return the comparison for JSON; an unknown standard deviation is null."""
         return {
             "name": self.name,
             "value": self.value,
@@ -93,7 +93,7 @@ class Compared:
 
     @property
     def _ends(self) -> tuple[float, float]:
-        """Ends of the norm's range in standard deviations of the value."""
+        """Distances from the value to the ends of the norm's range, in standard deviations of the value."""
         sd = self.sd if self.sd > 0 else 1e-9
         width = _RANGE * self.norm_sd
         return (self.norm - width - self.value) / sd, (self.norm + width - self.value) / sd
@@ -106,7 +106,7 @@ def beside_norms(
     age: float | None = None,
     sex: str | None = None,
 ) -> list[Compared]:
-    """Compare means over the sure strides with norms; empty where no stride is sure or no stature is known.
+    """Compare means over the sure strides with norms; empty if no stride is sure or the stature is unknown.
 
     `model`: sections of the blob; `age`: years, within `AGES`; `sex`: one of `SEXES`; both for the
     comfortable speed only. UserError if there is no norm for the age.
@@ -139,7 +139,7 @@ def beside_norms(
 
 
 def comfortable(age: float, sex: str | None = None) -> tuple[float, float]:
-    """Mean and standard deviation of the comfortable speed, m/s; of both sexes together without `sex`.
+    """Mean and standard deviation of the comfortable speed, m/s; without `sex`, of women and men together.
 
     UserError if no norm is known for the age.
     """
@@ -154,7 +154,7 @@ def comfortable(age: float, sex: str | None = None) -> tuple[float, float]:
 def rate_at(model: Mapping[str, Any], speed: float, stature: float) -> tuple[float, float]:
     """Mean and standard deviation of the stride rate, 1/s, of people who walk at `speed` m/s.
 
-    Logarithms of rate and length of the stride are taken as independent normals among people.
+    This assumes that the logarithms of stride rate and stride length are independent and normal among people.
     """
     rate, rate_sd, _, length, length_sd, *_ = (float(value) for value in model["GAIT"])
     rate_share, other = rate_sd / rate, length_sd / length
@@ -167,7 +167,7 @@ def rate_at(model: Mapping[str, Any], speed: float, stature: float) -> tuple[flo
 def people(model: Mapping[str, Any], rate: float, stature: float) -> dict[str, tuple[float, float]]:
     """Mean and standard deviation of gait parameters among people of the model at a stride rate.
 
-    `rate`: strides per second; `stature`: metres. By name of `BY_PACE`.
+    `rate`: strides per second; `stature`: metres. The keys of the result are those of `BY_PACE`.
     """
     random = np.random.default_rng(0)
     cycles = np.arange(round(_STRIDES * _SAMPLES)) / _SAMPLES
@@ -183,11 +183,11 @@ def people(model: Mapping[str, Any], rate: float, stature: float) -> dict[str, t
 def _walk(
     model: Mapping[str, Any], cycles: Array, rate: float, stature: float, random: np.random.Generator
 ) -> dict[str, float]:
-    """Parameters of one person drawn; empty if they make no whole stride."""
+    """Draw one person and compute their parameters; empty if they make no whole stride."""
     scores = random.standard_normal(len(model["CURV"]) - 1)
     channels = curves(model, cycles, np.tile(scores, (len(cycles), 1)), rate)
     names = unpack_names(model["CHNM"])
-    kinds = [name[2:] if name[:2] in ("l_", "r_") else name for name in names]  # offsets are of both sides
+    kinds = [name[2:] if name[:2] in ("l_", "r_") else name for name in names]  # the same on both sides
     lasting = dict(zip(kinds, random.standard_normal(len(kinds)), strict=True))
     channels += np.asarray(model["CHST"], float)[:, 3] * [lasting[kind] for kind in kinds]
     forward, sway, height = (channels[:, names.index(f"root_{way}")] for way in ("forward", "sway", "height"))

@@ -1,7 +1,7 @@
 """Gait parameters and joint-angle cycles of a track, with uncertainties, and their files.
 
-Contacts of the feet are drawn from the posterior (`gait.motion.uncertainty`) and every parameter is computed
-again from each draw; its standard deviation is that over the draws.
+Contacts of the feet are drawn from the posterior (`gait.motion.uncertainty`), every parameter is computed
+from each draw, and its standard deviation is that over the draws.
 """
 
 from __future__ import annotations
@@ -45,12 +45,12 @@ QUANTITIES = {
     "stance_percent": "stance, % of the stride",
     "double_support_percent": "double support, % of the stride",
 }
-"""Names in files, with the words for people."""
+"""Names in files, with names and units for people."""
 
 _UNSURE = {"lost", "ambiguous"}
-_STEADY = 0.8  # of the median speed: slower strides at an end of the walk are of starting or stopping
+_STEADY = 0.8  # of the median speed; at the ends of the walk, slower strides are starting or stopping
 MIRRORED = ("step_time_s", "step_length_m", "stance_percent")
-"""Quantities whose left and right are compared."""
+"""Quantities for which left and right are compared."""
 
 
 @dataclass(frozen=True)
@@ -61,18 +61,18 @@ class Strides:
     #: (k,) seconds.
     start: Array
     end: Array
-    #: (k,) `QUANTITIES` and their standard deviations; NaN where the track does not show one.
+    #: (k,) `QUANTITIES` and their standard deviations; NaN where the track does not show them.
     values: dict[str, Array]
     sd: dict[str, Array]
-    draws: dict[str, Array]  #: (D, k) the same of every draw
-    #: (k,) no frame of the stride was lost or ambiguous; if no stride is so, none was lost; and the person
-    #: neither starts nor stops in it
+    draws: dict[str, Array]  #: (D, k) `QUANTITIES` in each draw
+    #: (k,) whether the stride counts: none of its frames is lost or ambiguous (if all strides have ambiguous
+    #: frames, none is lost), and the person neither starts nor stops in it
     sure: NDArray[np.bool_]
 
 
 @dataclass(frozen=True)
 class Parameters:
-    """What `measure` finds."""
+    """Result of `measure`."""
 
     #: Strikes and toe-offs, seconds.
     events: Events
@@ -80,7 +80,7 @@ class Parameters:
     strides: dict[str, Strides]  #: by side
     source: str  #: where the uncertainty comes from, in words
     all_unsure: bool = False  #: every stride has ambiguous frames; those that were not lost count as sure
-    slowing: int = 0  #: strides that do not count because the person starts or stops in them
+    slowing: int = 0  #: number of strides that do not count because the person starts or stops in them
 
     @property
     def speed(self) -> float | None:
@@ -89,7 +89,7 @@ class Parameters:
         return None if found is None else found["mean"]
 
     def counted(self) -> str:
-        """State which strides the means are over."""
+        """Describe the strides over which the means are taken."""
         right, left = (int(self.strides[side].sure.sum()) for side in SIDES)
         text = f"{right} right and {left} left strides"
         left_out = sum(len(s.sure) for s in self.strides.values()) - right - left
@@ -101,7 +101,7 @@ class Parameters:
         return f"{text} (not counted: {', '.join(why)})"
 
     def summary(self) -> dict[str, dict[str, Any]]:
-        """Means over the sure strides: by quantity, for right, left and both feet.
+        """Compute means over the sure strides: by quantity, for right, left and both feet.
 
         Each is ``{"mean", "sd", "between"}``: the mean, its standard deviation, and the standard deviation
         between strides; ``"asymmetry_percent"`` is 200 (right - left) / (right + left) (Robinson 1987).
@@ -116,7 +116,7 @@ class Parameters:
         return out
 
     def _sure(self, name: str, sides: tuple[str, ...]) -> tuple[Array, Array]:
-        """Values (k,) and draws (D, k) of the sure strides of the feet."""
+        """Return values (k,) and draws (D, k) of a quantity in the sure strides of some feet."""
         chosen = [self.strides[side] for side in sides]
         values = np.concatenate([s.values[name][s.sure] for s in chosen])
         draws = np.concatenate([s.draws[name][:, s.sure] for s in chosen], axis=1)
@@ -148,9 +148,9 @@ def asymmetry(right: Array, left: Array) -> Array:
 
 
 def measure(track: Track, draws: Draws | None = None) -> Parameters:
-    """Gait parameters of a track.
+    """Measure the gait parameters of a track.
 
-    `track`: of at least three frames. `draws`: motions drawn from the posterior; without them the standard
+    `track`: at least three frames. `draws`: motions drawn from the posterior; without them the standard
     deviations of the track are used. UserError if no foot strikes twice in the track.
     """
     if len(track.frame) < 3:
@@ -179,14 +179,14 @@ def measure(track: Track, draws: Draws | None = None) -> Parameters:
             np.array([_is_free(track, _UNSURE, *ends) for ends in zip(start, end, strict=True)], bool)[whole],
         )
     some = any(s.sure.any() for s in strides.values())
-    if not some:  # better than nothing: left and right seldom swap for some frames only
+    if not some:  # better than nothing, since left and right seldom swap in only some frames
         for s in strides.values():
             s.sure[:] = [_is_free(track, {"lost"}, *ends) for ends in zip(s.start, s.end, strict=True)]
     return Parameters(events, event_sd, strides, source, all_unsure=not some, slowing=_leave_out(strides))
 
 
 def _leave_out(strides: Mapping[str, Strides]) -> int:
-    """Let strides at the ends of the walk that are much slower than the others not count; how many."""
+    """Mark much slower strides at the ends of the walk as not sure; return how many there are."""
     speed = np.concatenate([s.values["speed_m_s"] for s in strides.values()])
     start = np.concatenate([s.start for s in strides.values()])
     sure = np.concatenate([s.sure for s in strides.values()])
@@ -202,7 +202,7 @@ def _leave_out(strides: Mapping[str, Strides]) -> int:
 
 
 def strides_of(motion: Joints, events: Events) -> dict[str, Strides]:
-    """Strides of a motion whose events are known, by side; all are sure, and there are no draws.
+    """Make the strides of a motion with known events, by side; all are sure, and there are no draws.
 
     UserError if no foot strikes twice.
     """
@@ -223,12 +223,12 @@ def strides_of(motion: Joints, events: Events) -> dict[str, Strides]:
 
 
 def _whole(start: Array, end: Array, stride: float) -> NDArray[np.bool_]:
-    """Which strides missed no strike."""
+    """Which intervals between strikes are one stride, without a missed strike in between."""
     return (end - start > 0.6 * stride) & (end - start < 1.6 * stride)
 
 
 def measured(track: Track, draws: Draws | None = None) -> Parameters | None:
-    """Gait parameters of a track, as by `measure`; None if it has no whole stride."""
+    """Measure the gait parameters of a track as `measure` does; None if it has no whole stride."""
     try:
         return measure(track, draws)
     except UserError:
@@ -236,12 +236,12 @@ def measured(track: Track, draws: Draws | None = None) -> Parameters | None:
 
 
 def stride_quantities(foot: Contacts, other: Contacts, between: NDArray[np.int64]) -> dict[str, Array]:
-    """`QUANTITIES` of the strides of a foot, shape (..., k - 1) for k strikes.
+    """Compute `QUANTITIES` of the strides of a foot, shape (..., k - 1) for k strikes.
 
-    The step is the one that ends the stride: from the other foot's strike within it.
+    A stride's step is its second one, from the other foot's strike to the end of the stride.
 
-    `foot`, `other`: of the foot and of the other one, with the same leading axes. `between` (k - 1,): which
-    strike of the other foot lies within each stride; -1: none.
+    `foot`, `other`: contacts of this foot and of the other, with the same leading axes. `between` (k - 1,):
+    index of the other foot's strike within each stride; -1: none.
     """
     start, end = foot.strike[..., :-1], foot.strike[..., 1:]
     middle, last_off = _pick(other.strike, between), _pick(other.off, np.where(between > 0, between - 1, -1))
@@ -267,7 +267,7 @@ def stride_quantities(foot: Contacts, other: Contacts, between: NDArray[np.int64
 
 
 def _pick(values: Array, index: NDArray[np.int64], axis: int = -1) -> Array:
-    """`values` at `index` along an axis; NaN where the index is -1."""
+    """Pick `values` at `index` along an axis; NaN where the index is -1."""
     shape = list(values.shape)
     shape[axis] = 1
     padded = np.concatenate([values, np.full(shape, np.nan)], axis=axis)
@@ -282,21 +282,21 @@ def _between(strike: Array, other: Array) -> NDArray[np.int64]:
 
 
 def _is_free(track: Track, statuses: set[str], start: float, end: float) -> bool:
-    """Whether no frame of a stride has one of these statuses, or is one in which no strides are taken."""
+    """Whether no frame of a stride has one of these statuses, and the person takes strides in all of them."""
     inside = (track.time >= start) & (track.time <= end)
-    walks = np.isfinite(track.phase[inside]).all() or np.isnan(track.phase).all()  # motion that was lifted
+    walks = np.isfinite(track.phase[inside]).all() or np.isnan(track.phase).all()  # as in lifted motion
     return bool(walks) and not statuses & {track.status[i] for i in np.flatnonzero(inside)}
 
 
 def mean_of(values: Array, axis: int) -> Array:
-    """Mean of what is there."""
+    """Mean of the values that are not NaN; NaN if there are none."""
     with warnings.catch_warnings():
-        warnings.simplefilter("ignore", RuntimeWarning)  # of nothing: NaN
+        warnings.simplefilter("ignore", RuntimeWarning)  # about means of nothing
         return np.asarray(np.nanmean(values, axis=axis))
 
 
 def sd_of(draws: Array) -> Array:
-    """Return the standard deviation over the first axis; NaN where fewer than half of the draws have one."""
+    """Return the sd over the first axis; NaN where fewer than half of the draws have a value."""
     with warnings.catch_warnings():
         warnings.simplefilter("ignore", RuntimeWarning)
         sd = np.nanstd(draws, axis=0)
@@ -304,29 +304,29 @@ def sd_of(draws: Array) -> Array:
 
 
 PERCENT = np.linspace(0, 100, 101)
-"""Of the stride: right strike to right strike, and left to left for the angles of the left side."""
-_SMALL = 0.005  # strides, for slopes
+"""Percent of the stride, from right strike to right strike; for angles of the left side, left to left."""
+_SMALL = 0.005  # strides; step of the phase for numerical derivatives
 
 
 @dataclass(frozen=True)
 class AngleCycle:
-    """One angle over the cycle, degrees, each array of shape (101,) unless stated otherwise."""
+    """One angle over the cycle, degrees; arrays have shape (101,) unless stated otherwise."""
 
-    strides: Array  #: (k, 101) of the sure strides
+    strides: Array  #: (k, 101) the sure strides
     #: Mean of the strides, and its posterior standard deviation (NaN if the track has none).
     mean: Array
     sd: Array
-    #: Of the people the model was learned from, at the stride rate of these strides.
+    #: Mean and standard deviation among the people from which the model was learnt, at the same stride rate.
     norm_mean: Array
     norm_sd: Array
 
     @property
     def z(self) -> Array:
-        """Departure from the norm, in its standard deviations."""
+        """Difference from the norm, in its standard deviations."""
         return np.asarray((self.mean - self.norm_mean) / np.maximum(self.norm_sd, 1e-6))
 
     def summary(self) -> dict[str, Any]:
-        """Range of the mean, root mean square of z, and where z is largest."""
+        """Return the range of the mean, the root mean square of z, and where z is largest."""
         worst = int(np.argmax(np.abs(self.z)))
         return {
             "least_deg": float(self.mean.min()),
@@ -341,10 +341,10 @@ class AngleCycle:
 def angle_cycles(
     track: Track, parameters: Parameters, curves: ModelCurves, draws: Draws | None = None
 ) -> dict[str, AngleCycle]:
-    """Cycles of every angle that both track and model have.
+    """Compute the cycles of every angle that both track and model have.
 
-    `parameters`: of the track. `curves`: the norm; without draws also how scores and phase move the angles.
-    `draws`: motions drawn from the posterior.
+    `parameters`: those of the track. `curves`: the norm; without draws, they also show how angles depend on
+    scores and phase. `draws`: motions drawn from the posterior.
     """
     angles = {name[: -len("_deg")]: v for name, v in track.numbers.items() if name.endswith("_deg")}
     angles |= _pelvis_angles(track, curves)
@@ -364,13 +364,13 @@ def angle_cycles(
 
 
 def _interpolated(when: Array, time: Array, values: Array) -> Array:
-    """Values (n,) linear in time at `when` (...), over frames without a value."""
+    """Interpolate values (n,) linearly at times `when` (...), across frames without a value."""
     known = np.isfinite(values)
     return np.interp(when, time[known], values[known]) if known.any() else np.full(when.shape, np.nan)
 
 
 def _pelvis_angles(track: Track, curves: ModelCurves) -> dict[str, Array]:
-    """Angles of the pelvis, degrees: of the line through both hips, and the model's tilt at this phase."""
+    """Angles of the pelvis, degrees: from the line through both hips, and, for the tilt, from the model."""
     if "heading_rad" not in track.numbers:
         return {}
     x, y, up = (track.places["l_hip"] - track.places["r_hip"]).T
@@ -381,7 +381,7 @@ def _pelvis_angles(track: Track, curves: ModelCurves) -> dict[str, Array]:
         "root_yaw": (turn + np.pi) % (2 * np.pi) - np.pi,
         "root_pitch": curves.channel(
             "root_pitch",
-            np.nan_to_num(track.phase),  # the rate is NaN in the same frames
+            np.nan_to_num(track.phase),  # where it is NaN, the rate is too
             np.stack([track.numbers[name] for name in scores], axis=1),
             track.numbers["stride_hz"],
         ),
@@ -390,7 +390,7 @@ def _pelvis_angles(track: Track, curves: ModelCurves) -> dict[str, Array]:
 
 
 def _scores(track: Track, curves: ModelCurves) -> list[str]:
-    """Columns of a track with the scores that the model has."""
+    """Scores of a track that the model has, one column each."""
     scores = sorted((n for n in track.numbers if n.startswith("c_") and not n.endswith("_sd")), key=_number)
     return scores[: len(curves.samples) - 1]
 
@@ -403,14 +403,14 @@ def _times(parameters: Parameters, side: str) -> Array:
 
 
 def _drawn_sd(draws: Draws, name: str, when: Array) -> Array:
-    """Return the sd of the mean curve over the draws, differences in timing included."""
+    """Return the sd of the mean curve over the draws, including differences in timing."""
     values = np.degrees(draws.angles[:, :, draws.angle_names.index(name)].astype(float))
     means = [np.interp(when, draws.time, motion).mean(axis=0) for motion in values]
     return np.asarray(np.std(means, axis=0))
 
 
 def _linear_sd(track: Track, name: str, curves: ModelCurves, when: Array) -> Array:
-    """Return the sd by linear propagation from phase and scores, with equal errors in every stride."""
+    """Return the sd by linear propagation from phase and scores, assuming the same errors in every stride."""
     numbers = track.numbers
     if "phase_sd" not in numbers:
         return np.full(len(PERCENT), np.nan)
@@ -432,7 +432,7 @@ def _number(score: str) -> int:
 
 
 def as_json(track: Track, parameters: Parameters, cycles: Mapping[str, AngleCycle]) -> dict[str, Any]:
-    """Everything but the curves, for JSON: unknown values are null."""
+    """Return everything but the curves, for JSON; unknown values are null."""
     found = {
         "frames": [int(track.frame[0]), int(track.frame[-1])],
         "uncertainty": parameters.source,
@@ -446,7 +446,7 @@ def as_json(track: Track, parameters: Parameters, cycles: Mapping[str, AngleCycl
 
 
 def event_rows(track: Track, parameters: Parameters) -> Iterator[dict[str, Any]]:
-    """Strikes and toe-offs in the order of time."""
+    """List strikes and toe-offs in order of time."""
     rows: list[dict[str, Any]] = []
     for side in SIDES:
         for kind in ("strike", "off"):
@@ -462,7 +462,7 @@ _EVENT = {"strike": "heel_strike", "off": "toe_off"}
 
 
 def stride_rows(parameters: Parameters) -> Iterator[dict[str, Any]]:
-    """Strides in the order of their start, each quantity with its standard deviation."""
+    """List strides in order of their start, each quantity with its standard deviation."""
     rows = []
     for side in SIDES:
         s = parameters.strides[side]
@@ -476,7 +476,7 @@ def stride_rows(parameters: Parameters) -> Iterator[dict[str, Any]]:
 
 
 def curve_rows(cycles: Mapping[str, AngleCycle]) -> Iterator[dict[str, Any]]:
-    """Mean and norm of every angle, each with its sd, at each percent of the stride, degrees."""
+    """List mean and norm of every angle, with their sd, at each percent of the stride, degrees."""
     for i, percent in enumerate(PERCENT):
         row: dict[str, Any] = {"percent": int(percent)}
         for name, c in cycles.items():
@@ -488,7 +488,7 @@ def curve_rows(cycles: Mapping[str, AngleCycle]) -> Iterator[dict[str, Any]]:
 def write_tables(
     folder: Path, found: Mapping[str, Any], parameters: Parameters, cycles: Mapping[str, AngleCycle]
 ) -> None:
-    """Write parameters.json (`found`, of `as_json`), events.csv, strides.csv and curves.csv into `folder`."""
+    """Write parameters.json (`found`, from `as_json`), events.csv, strides.csv and curves.csv to `folder`."""
     text = json.dumps(found, indent=1, allow_nan=False) + "\n"
     (folder / "parameters.json").write_text(text, encoding="utf-8")
     _write_csv(folder / "events.csv", found["events"])
@@ -497,7 +497,7 @@ def write_tables(
 
 
 def _write_csv(path: Path, rows: Sequence[Mapping[str, Any]]) -> None:
-    """Write rows of the same keys; unknown values are left empty."""
+    """Write rows with the same keys; unknown values are left empty."""
     with open(path, "w", newline="", encoding="utf-8") as file:
         table = csv.writer(file, lineterminator="\n")
         table.writerow(rows[0] if rows else ())

@@ -1,18 +1,19 @@
 """Uncertain footfalls: motions that agree with a track's standard deviations, and the contacts of each.
 
-Errors of a track last, and how long they last decides what they do to a gait parameter.  Errors that are
-independent in every frame would claim too much for means over strides and too little for single ones.  Parts:
+Errors of a track last for some time, which decides how they affect a gait parameter.  If they were taken as
+independent in every frame, means over strides would seem too precise and single strides too imprecise.
+Parts:
 
-- place of the whole person: the same for all joints, cancels in every length;
-- size: the same share of every length, as the distance from the camera follows from the size in the picture;
-- the person: joints are elsewhere than in the model, by a constant and by what repeats with every stride, on
-  each side for itself.  Cancels in strides, but not in steps, width, clearance or symmetry, and a mean over
-  strides does not reduce it;
-- what wanders within a stride;
-- the camera, where it was estimated from the walk: common to all frames.
+- position of the whole person: the same for all joints, cancels in every length;
+- size: scales every length alike, as the distance from the camera follows from the size in the picture;
+- person: joints differ from the model's by a constant and by a part that repeats with every stride,
+  independently on each side.  This cancels in strides, but not in steps, width, clearance or symmetry, and a
+  mean over strides does not reduce it;
+- errors that change within a stride;
+- camera, if it was estimated from the walk: common to all frames.
 
-Motions drawn from the posterior (`Draws`) have all of that but what the model cannot express; that is the
-difference to the standard deviations of the track, and counts as the person's.
+Motions drawn from the posterior (`Draws`) contain all of this except for what the model cannot express.  That
+is the difference from the track's standard deviations, and is treated as the person's part.
 """
 
 from __future__ import annotations
@@ -39,23 +40,23 @@ from gait.motion.footfalls import (
 Array = NDArray[np.float64]
 
 JOINTS = ("pelvis", *(f"{s}_{part}" for s in "rl" for part in ("ankle", "heel", "toe")))
-"""Joints that contacts need."""
+"""Joints from which contacts are found."""
 
-_COUNT = 100  # motions where the track has none; a standard deviation is then known to 7 %
-# Shares of the variance of a joint and of the phase, where only the standard deviations of frames are known;
-# chosen on people of `gait simulate` that no result is reported for.
+_COUNT = 100  # motions drawn if the track has none; a standard deviation is then known to 7 %
+# Shares of the variance of a joint and of the phase, if only the standard deviations of frames are known;
+# chosen on people of `gait simulate` who are in no reported result.
 _PERSON, _WANDER = 0.5, 0.15
 _LATE = 0.6  # share of the variance of the phase that lasts
 _CONSTANT = 0.5  # share of the person's variance that is constant; the rest are `_WAVES` waves of the stride
 _WAVES = 2
-_SECONDS = 0.12  # over which what wanders is smooth
-_SIZE = 0.7  # of the person's part of a joint: many joints together determine the size in the picture
+_SECONDS = 0.12  # duration over which errors within a stride are smooth
+_SIZE = 0.7  # error of the size over the person's part of a joint: many joints determine the size
 
 
 def draw_contacts(
     track: Track, events: Events, stride: float, draws: Draws | None
 ) -> tuple[dict[str, Contacts], Events, str]:
-    """Draws of the contacts by side, shape (D, ...), standard deviations of the events, and their source."""
+    """Draw contacts by side, shape (D, ...); also return the events' standard deviations and their source."""
     if draws is None and "phase_sd" not in track.numbers:
         nothing = {side: _unknown(contacts(track, events, side, stride)) for side in SIDES}
         return nothing, _event_sd([events], unknown=True), "unknown: the track has no column phase_sd"
@@ -75,7 +76,7 @@ def draw_contacts(
 
 
 def _motions(track: Track, draws: Draws | None) -> Iterator[Joints]:
-    """Motions of `JOINTS` that agree with the track's standard deviations."""
+    """Yield motions of `JOINTS` that agree with the track's standard deviations."""
     random = np.random.default_rng(0)
     count = _COUNT if draws is None else len(draws.phase)
     moved = {name: _moved(track, name) for name in JOINTS}
@@ -99,20 +100,20 @@ def _motions(track: Track, draws: Draws | None) -> Iterator[Joints]:
 
 
 def _moved(track: Track, name: str) -> Array:
-    """How a joint moves with the parts of the camera's uncertainty (n, 2, 4); 0 where it was given."""
+    """Movement (n, 2, 4) of a joint with each independent error of the camera; 0 if the camera was given."""
     if track.camera_change is None:
         return np.zeros((len(track.time), 2, 4))
     return moved_by_camera(track.camera_change, (track.places[name] - track.places["pelvis"])[:, :2])
 
 
 def _without_camera(sd: Array, moved: Array) -> Array:
-    """Return the standard deviations (n, 3) of a joint where the camera is right, metres."""
+    """Return the standard deviations (n, 3) of a joint without the camera's part, metres."""
     common = np.pad((moved**2).sum(axis=2), ((0, 0), (0, 1)))
     return np.asarray(np.sqrt(np.maximum(sd**2 - common, 0.0)))
 
 
 def _person_sd(sd: dict[str, Array], draws: Draws | None) -> dict[str, Array]:
-    """Return the standard deviations (3,) of the person's part by joint, metres."""
+    """Return the standard deviations (3,) of the person's part, by joint, metres."""
     if draws is None:
         return {name: np.sqrt(_PERSON) * np.median(sd[name], axis=0) for name in JOINTS}
     out = {}
@@ -123,7 +124,7 @@ def _person_sd(sd: dict[str, Array], draws: Draws | None) -> dict[str, Array]:
 
 
 def _size_sd(track: Track, own: dict[str, Array], draws: Draws | None) -> float:
-    """Return the standard deviation of the size, as a share."""
+    """Return the relative standard deviation of the size."""
     stature = float(np.median(track.numbers.get("stature_m", 0.0)))
     if not stature > 0:
         return 0.0
@@ -139,9 +140,9 @@ def _size_sd(track: Track, own: dict[str, Array], draws: Draws | None) -> float:
 
 
 def _waves(phase: Array) -> Array:
-    """Constant and waves of the stride (n, 1 + 2 `_WAVES`) whose squares sum to 1 in every frame.
+    """Constant and harmonics of the stride (n, 1 + 2 `_WAVES`), whose squares sum to 1 in every frame.
 
-    Where there is no phase the constant is all.
+    Without a phase there is only the constant.
     """
     known = np.isfinite(phase)[:, None]
     turn = 2 * np.pi * np.where(known, phase[:, None], 0.0) * np.arange(1, _WAVES + 1)
@@ -150,9 +151,9 @@ def _waves(phase: Array) -> Array:
 
 
 def _warped(track: Track, random: np.random.Generator) -> dict[str, Array]:
-    """Places of the track, late by an error of the phase where there is one."""
+    """Positions of the track, shifted in time by a random error of the phase."""
     rate = np.maximum(track.numbers["stride_hz"], 0.1)
-    sd = np.minimum(track.numbers["phase_sd"], 0.29) / rate  # no less sure than knowing nothing
+    sd = np.minimum(track.numbers["phase_sd"], 0.29) / rate  # 0.29: sd of a uniform phase
     wander = _wander(track.time, 1, random)[:, 0]
     late = np.nan_to_num(sd) * (np.sqrt(_LATE) * random.standard_normal() + np.sqrt(1 - _LATE) * wander)
     return {
@@ -173,7 +174,7 @@ def _wander(time: Array, count: int, random: np.random.Generator) -> Array:
 
 
 def _event_sd(found: list[Events], unknown: bool = False) -> Events:
-    """Return the sd of each event over the draws that have it; NaN if fewer than half have it."""
+    """Return the sd of each event over the draws that have it; NaN if fewer than half of them do."""
 
     def sd(times: list[Array]) -> Array:
         stacked = np.stack(times)
@@ -187,5 +188,5 @@ def _event_sd(found: list[Events], unknown: bool = False) -> Events:
 
 
 def _unknown(c: Contacts) -> Contacts:
-    """Return one draw of contacts of which nothing is known."""
+    """Return a draw in which everything about the contacts is NaN."""
     return Contacts(**{item.name: np.full_like(getattr(c, item.name), np.nan)[None] for item in fields(c)})

@@ -1,4 +1,4 @@
-"""The verdict on a track in plain words, the same on the terminal and on the page of a run."""
+"""The verdict on a track in plain words, the same in the terminal and on the page of a run."""
 
 from __future__ import annotations
 
@@ -11,14 +11,14 @@ from gait.io.track_file import STATUSES, Track
 from gait.motion.parameters import Parameters, measured
 
 LEGS = "the images do not show which leg is the right one"
-"""Why the tracker itself leaves left and right open."""
-_MOVES = 0.25  # share of the strides' speed that the pelvis moves at least, unless the person walks in place
-_SECONDS = 0.5  # of a track from which places give a speed
+"""Why the tracker itself leaves left and right undecided."""
+_MOVES = 0.25  # a person whose pelvis moves slower than this share of the strides' speed walks in place
+_SECONDS = 0.5  # shortest track, and interval, whose positions give a speed
 
 
 @dataclass(frozen=True)
 class Verdict:
-    """What a track is worth.
+    """How far a track can be trusted.
 
     Attributes
     ----------
@@ -27,17 +27,17 @@ class Verdict:
     counts : dict of str to int
         Frames by status.
     strides : int
-        Strides that count for the gait parameters, of the foot that has more of them; whole strides if none
-        counts.
+        Strides that count for the gait parameters, of the foot that has more of them; if none counts, whole
+        strides.
     speed : float or None
-        Metres per second along the ground: the mean of `Parameters`, or of the way if no stride counts; of a
-        person who walks in place, of the strides.
+        Metres per second along the ground: the mean of `Parameters`, or from the path if no stride counts; of
+        a person who walks in place, from the strides.
     in_place : bool
         The person walks in place, as on a treadmill.
     no_strides : int
         Frames with an estimate in which the person takes no strides.
     why : dict of str to int
-        Why frames are ambiguous: frames by reason, most first; empty if that is not known.
+        Number of ambiguous frames for each reason, most frequent first; empty if reasons are unknown.
     """
 
     total: int
@@ -50,16 +50,16 @@ class Verdict:
 
     @property
     def tracked(self) -> int:
-        """Frames with an estimate of the person, sure or not."""
+        """Number of frames with an estimate of the person, sure or not."""
         return self.counts["tracking"] + self.counts["ambiguous"]
 
     @property
     def absent(self) -> int:
-        """Frames without a row in the track."""
+        """Number of frames without a row in the track."""
         return self.total - sum(self.counts.values())
 
     def sentence(self) -> str:
-        """State in one sentence what was tracked, how the person walked, and what is uncertain."""
+        """One sentence: what was tracked, how the person walked, and what is uncertain."""
         parts = [f"Tracked {self.tracked} of {count_of(self.total, 'frame')}"]
         parts.append(count_of(self.strides, "whole stride") if self.strides else "no whole stride")
         if self.speed is not None:
@@ -75,13 +75,13 @@ class Verdict:
         return "; ".join([text, *(f"{what} in {count_of(n, 'frame')}" for what, n in rest.items() if n)])
 
     def statuses(self) -> str:
-        """Count the frames by status, all of them."""
+        """Numbers of frames by status, in words."""
         text = f"{sum(self.counts.values())} frames: "
         text += ", ".join(f"{self.counts[status]} {status}" for status in STATUSES)
         return text + (f"; {self.absent} more without an estimate" if self.absent else "")
 
     def warning(self) -> str | None:
-        """Return what to do if no frame can be relied on; None if some can."""
+        """Return advice if no frame can be relied on, otherwise None."""
         if self.counts["tracking"]:
             return None
         return (
@@ -101,9 +101,9 @@ def verdict_of(
     ----------
     track : Track
     total : int, optional
-        Frames that were to be tracked, where the track does not state them.
+        Number of frames that were to be tracked, if the track does not state them.
     parameters : Parameters, optional
-        Of the track, if they are known already.
+        Parameters of the track, if they have been computed.
     """
     counts = {status: track.status.count(status) for status in STATUSES}
     if parameters is None:
@@ -141,7 +141,7 @@ def _speed(track: Track) -> tuple[float | None, bool]:
     time, place = track.time[followed], track.places["pelvis"][followed, :2]
     if time[-1] - time[0] < _SECONDS:
         return of_strides, False
-    # Sway to the sides is no way: the path is measured between places half a second apart or more.
+    # To exclude sideways sway, the path is measured between positions at least half a second apart.
     steps = int((time[-1] - time[0]) / _SECONDS)
     knots = np.searchsorted(time, np.linspace(time[0], time[-1], steps + 1))
     way = float(np.linalg.norm(np.diff(place[knots], axis=0), axis=1).sum())
@@ -151,5 +151,5 @@ def _speed(track: Track) -> tuple[float | None, bool]:
 
 
 def count_of(count: int, what: str) -> str:
-    """Return a count with its noun, plural where it has to be."""
+    """Return a count with its noun, in the plural if needed."""
     return f"{count} {what}{'' if count == 1 else 's'}"
