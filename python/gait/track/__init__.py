@@ -1,1 +1,1 @@
-"""Tracking a person through frames: automatic start, particle filter, smoothing."""
+"""Track people through frames: automatic start, particle filter, smoothing."""

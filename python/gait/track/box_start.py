@@ -1,7 +1,7 @@
 """Automatic start from pictures: find boxes around people in a clip until a person walks.
 
-People are found where frames differ from the empty scene or, without one, by their shape; the library fits a
-walk to a second of their boxes (`gait.bindings.start_fit`).
+People are found where frames differ from the empty scene or, if that is unknown, by their shape; the library
+fits a walk to one second of their boxes (`gait.bindings.start_fit`).
 """
 
 from __future__ import annotations
@@ -20,19 +20,19 @@ from gait.detect.shapes import PLAUSIBLE, find_people
 from gait.errors import GaitError, UserError
 from gait.io.video import Frame, Image, Video
 
-_ENOUGH = 8  # frames with a person, at least
-_SELDOM = 0.09  # seconds, at least, between frames searched without a background: that is slow
+_ENOUGH = 8  # fewest frames with a person
+_SELDOM = 0.09  # least seconds between frames searched without a background, which is slow
 _WINDOW = 1.0  # seconds of boxes that are fitted
-_LEAST_WINDOW = 0.3  # the same in a short clip, at least
-_PROBES = 6  # frames of a clip, of which one must show a person
+_LEAST_WINDOW = 0.3  # least seconds in a short clip
+_PROBES = 6  # frames of a clip, at least one of which must show a person
 _STEP = 0.1  # seconds from one fit to the next
-_GOES_ON = 1.5  # seconds after a first window in which a person walks, who may only have begun to
+_GOES_ON = 1.5  # seconds searched after the first window with a walk, which may show only its beginning
 _ONLY_STANDING = (
     "--init auto found a person who stays in place but none who walks along the floor; give --init FILE.json "
     f"or use the detector ({weights.FETCH})"
 )
-_STATURE_SD = 0.03  # metres, of one that the user gives
-_BEYOND = 4.0  # standard deviations by which an apparent stature contradicts the one expected
+_STATURE_SD = 0.03  # metres, of a stature given by the user
+_BEYOND = 4.0  # standard deviations from which an apparent stature contradicts the expected one
 
 
 class BoxStart:
@@ -41,8 +41,8 @@ class BoxStart:
     Parameters
     ----------
     camera, plate, model
-        `plate` is the empty scene, BGR; without one people are found by their shape, every 0.09 s at most.
-        Frames of a camera that moves have their own.
+        `plate` is the empty scene, BGR; without it people are found by their shape, at most every 0.09 s.
+        Frames of a moving camera have their own.
     height : float, optional
         Known stature, metres.
     window : float
@@ -51,7 +51,7 @@ class BoxStart:
     Attributes
     ----------
     misplaced : list of float
-        Apparent stature of the largest person, metres, in each frame in which the camera makes everyone's
+        Apparent stature of the largest person, metres, in each frame in which all statures would be
         implausible; NaN above the horizon.
     """
 
@@ -68,18 +68,18 @@ class BoxStart:
         self._expected = model.prior()[0].stature if height is None else height
         self._plate, self._window = plate, window
         self.misplaced: list[float] = []
-        self._times: list[tuple[int, float]] = []  # frames observed
+        self._times: list[tuple[int, float]] = []  # number and time of the frames observed
         self._statures: list[float] = []
         self._last_fit = -np.inf
 
     def forget(self) -> None:
-        """Forget the frames observed."""
+        """Forget all frames observed."""
         self._fit.reset()
         self._times.clear()
         self._statures.clear()
 
     def observe(self, frame: Frame) -> None:
-        """Find people in a frame and give their boxes to the fit."""
+        """Find people in a frame and add their boxes to the fit."""
         if self._plate is None and self._times and 0 <= frame.time - self._times[-1][1] < _SELDOM:
             return
         boxes = self._boxes(frame)
@@ -88,7 +88,7 @@ class BoxStart:
         self._statures += [self._fit.stature(box) for box in boxes[:1]]
 
     def worth(self, video: Video, first: int, stop: int) -> bool:
-        """Whether to search a clip: without the empty scene (slow), only if a probe shows a person."""
+        """Whether to search a clip: without the empty scene, which is slow, a probe must show a person."""
         if self._plate is not None:
             return True
         probes = np.unique(np.linspace(first, stop - 1, _PROBES).astype(int)).tolist()
@@ -96,7 +96,7 @@ class BoxStart:
         return any(self._boxes(frame) for frame in shown)
 
     def best(self, frame: Frame, *, latest: bool = False) -> tuple[Start, Hypothesis] | None:
-        """Most probable start, at a frame (`latest`) or half a window earlier; None: there is none."""
+        """Find the most probable start, at a frame (`latest`) or half a window earlier; None if none fits."""
         back = 0.0 if latest else self._window / 2
         at = next((item for item in self._times if item[1] >= frame.time - back - 1e-6), None)
         if at is None:
@@ -112,7 +112,7 @@ class BoxStart:
         return Start(at[0], one.mean, one.sd, stature, hypotheses=tuple(found)), one
 
     def walks_in(self, frame: Frame) -> Start | None:
-        """Start at a frame just observed, if a person walks in it."""
+        """Return a start at the frame just observed if a person walks there, otherwise None."""
         if not self._times or self._times[-1][0] != frame.number:
             return None
         if 0 <= frame.time - self._last_fit < _STEP:
@@ -122,7 +122,7 @@ class BoxStart:
         return found[0] if found is not None and found[1].walks else None
 
     def find_lost(self, frame: Frame, status: TrackStatus) -> Start | None:
-        """Start at a frame in which a person who was lost walks; while followed, frames are forgotten."""
+        """Return a start at a frame in which a lost person walks; while they are tracked, forget frames."""
         if status in (TrackStatus.TRACKING, TrackStatus.AMBIGUOUS):
             self.forget()
         if status != TrackStatus.LOST:
@@ -161,7 +161,7 @@ def find_start(
 ) -> Start:
     """Find the first state of the first person who walks in a clip.
 
-    If no person walks, a person who stands out against the empty scene is taken, with an unknown heading,
+    If no person walks, a person who stands out against the empty scene is used, with an unknown heading,
     unless the scene may not be empty (`shapes_first`).
 
     Parameters
@@ -173,9 +173,9 @@ def find_start(
     height : float, optional
         Known stature, metres.
     shapes : bool
-        Also find people by their shape, which is slow, where none stands out against the empty scene.
+        Also find people by their shape, which is slow, if none stands out against the empty scene.
     shapes_first : bool
-        Find them by their shape before the scene is looked at, which may not be empty.
+        Find people by their shape before using the scene, since it may not be empty.
 
     Raises
     ------
@@ -201,10 +201,10 @@ def find_start(
 
 
 def _search(finder: BoxStart, frames: Iterable[Frame]) -> tuple[Start | None, Start | None]:
-    """Search frames for a person who walks: the start; and the first of a person who fits, walking or not.
+    """Search frames; return the start of a person who walks, and the first start of one who may not walk.
 
-    Of the windows after the first in which a person walks the one with the surest speed is taken: people who
-    have only begun to walk are not yet as fast, and their direction is not sure.
+    After the first window with a walk the search continues, and the window with the most certain speed is
+    used: people who are just starting to walk are slower, and their direction is uncertain.
     """
     first: Start | None = None
     best: tuple[float, Start] | None = None
@@ -237,7 +237,7 @@ def _finders(
     shapes: bool,
     shapes_first: bool,
 ) -> Iterator[BoxStart]:
-    """Yield the ways to find a person: by an empty scene first, as it gives the place better."""
+    """Yield the ways to find a person, with the empty scene first, as it gives a better position."""
     by_plate = None if plate is None else BoxStart(camera, plate, model, height, window)
     by_shape = BoxStart(camera, None, model, height, window) if shapes else None
     order = (by_shape, by_plate) if shapes_first else (by_plate, by_shape)

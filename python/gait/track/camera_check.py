@@ -17,13 +17,13 @@ from gait.track.walk_start import CameraPrior, choose_frames
 
 Array = NDArray[np.float64]
 
-_TALLER = 0.12  # of the stature, by which a person who appears taller or shorter contradicts a camera
-_PEOPLE = (1.4, 2.1)  # metres, of a person of unknown stature
+_TALLER = 0.12  # relative error of the apparent stature that contradicts a camera
+_PEOPLE = (1.4, 2.1)  # metres; apparent statures accepted if the person's is unknown
 _PARTS = ("focal length", "tilt", "roll")
-_GIVEN_SD = np.array([0.1, np.radians(2.0), np.radians(1.5), 0.1])  # expected of a camera, as in CameraPrior
+_GIVEN_SD = np.array([0.1, np.radians(2.0), np.radians(1.5), 0.1])  # of the given camera, as in CameraPrior
 _WRONG = np.array([0.25, np.radians(6.0), np.radians(5.0)])  # differences of `_PARTS` that are reported
 _CERTAIN = 2.0  # standard deviations of the estimate that a difference must exceed as well
-_FITS = 1.4  # squared robust error per coordinate; fits above it, as of moving cameras, contradict nothing
+_FITS = 1.4  # squared robust error per coordinate; worse fits, as with moving cameras, prove nothing
 _UPRIGHT = 35.0  # degrees by which a walking body may lean in the picture
 
 
@@ -31,18 +31,18 @@ def contradiction(given: Camera, keypoints: Keypoints, model: Model, height: flo
     """Report how a given camera contradicts a walk, and what would fit; None if it does not.
 
     A camera contradicts a walk if no walk on its floor fits, if the person appears too tall or too short, or
-    if an estimate of the camera that expects it to be right differs clearly from it.  A path straight across
-    the view leaves the focal length open, so that a wrong one is not noticed.
+    if an estimate of the camera, with the given one as prior, differs clearly from it.  A path straight
+    across the view does not determine the focal length, so that a wrong one is not noticed.
 
     Parameters
     ----------
     given : Camera
     keypoints : Keypoints
-        Of one person, pixels.
+        Keypoints of one person, pixels.
     model : Model
-        Its cyclic part.
+        Its cyclic part is used.
     height : float or None
-        The person's stature, metres, if it is known.
+        The person's stature, metres, if known.
     """
     walk = _walk(keypoints, model)
     if walk is None:
@@ -89,7 +89,7 @@ def _wrong_size(appears: float, height: float | None) -> str | None:
 
 
 def _wrong_part(given: Camera, walk: Keypoints, model: Model, stature: float) -> str | None:
-    """Report focal length, tilt or roll that an estimate which expects the given ones moves away from."""
+    """Report the focal length, tilt or roll if an estimate with the given ones as prior differs from it."""
     expected = _parameters(given)
     try:
         found = calibrate(walk, given.size, model, stature, near=CameraPrior(expected, _GIVEN_SD))
@@ -103,7 +103,7 @@ def _wrong_part(given: Camera, walk: Keypoints, model: Model, stature: float) ->
 
 
 def _parameters(camera: Camera) -> Array:
-    """Log focal length [px], tilt, roll [rad], log height [m] of a camera, in the middle of its picture."""
+    """Compute log focal length [px], tilt, roll [rad], log height [m] of a camera, at mid-picture."""
     middle = (np.array(camera.size) - 1) / 2
     ahead, right, left, down, up = camera.rays(middle + [[0, 0], [1, 0], [-1, 0], [0, 1], [0, -1]])
     across, upwards = (right - left) / 2, (up - down) / 2
@@ -113,7 +113,7 @@ def _parameters(camera: Camera) -> Array:
 
 
 def _turned_frames(given: Camera, walk: Keypoints, model: Model) -> str | None:
-    """Report frames that are turned against the camera, if the walk fits so."""
+    """Report frames that are rotated relative to the camera, if the walk fits when they are turned back."""
     quarters = round(_lean(given, walk) / 90) % 4
     if quarters and _fits(given, _turned(walk, given.size, -quarters), model):
         turn = {1: "90 degrees clockwise", 2: "180 degrees", 3: "90 degrees counter-clockwise"}[quarters]
@@ -122,7 +122,7 @@ def _turned_frames(given: Camera, walk: Keypoints, model: Model) -> str | None:
 
 
 def _fits(camera: Camera, walk: Keypoints, model: Model) -> bool:
-    """Whether bodies are upright and the walk of a person fits."""
+    """Whether bodies are upright and a walk fits."""
     if camera.centre[2] <= 0 or abs(_lean(camera, walk)) > _UPRIGHT:
         return False
     start = find_keypoint_start(walk, camera, model)
@@ -130,12 +130,12 @@ def _fits(camera: Camera, walk: Keypoints, model: Model) -> bool:
 
 
 def _lean(camera: Camera, walk: Keypoints) -> float:
-    """Angle between bodies and the vertical in the picture, degrees, clockwise."""
+    """Angle of bodies from the vertical in the picture, degrees, clockwise."""
     top, foot = (
         np.mean([walk.uv[:, walk.names.index(f"{side}_{joint}")] for side in "lr"], axis=0)
         for joint in ("shoulder", "ankle")
     )
-    place = camera.centre + 5.0 * camera.rays(foot)  # any distance shows the same vertical
+    place = camera.centre + 5.0 * camera.rays(foot)  # the vertical is the same at any distance
     observed, vertical = foot - top, camera.project(place) - camera.project(place + [0.0, 0.0, 0.3])
     ratio = (observed @ [1, 1j]) * np.conj(vertical @ [1, 1j])
     ratio = ratio[np.isfinite(ratio) & (ratio != 0)]
@@ -143,7 +143,7 @@ def _lean(camera: Camera, walk: Keypoints) -> float:
 
 
 def _turned(walk: Keypoints, size: tuple[int, int], quarters: int) -> Keypoints:
-    """Keypoints turned clockwise about the middle of the picture."""
+    """Rotate keypoints clockwise about the middle of the picture by quarters of a turn."""
     middle = (np.array(size) - 1) / 2
     turn = np.linalg.matrix_power(np.array([[0, 1], [-1, 0]]), quarters % 4)
     return replace(walk, uv=(walk.uv - middle) @ turn + middle)

@@ -1,7 +1,7 @@
 """How a camera turns and zooms during a clip, measured on the static scene.
 
-Corners of a key frame are tracked into later frames (pyramidal Lucas-Kanade).  A camera that turns about its
-lens moves them as the homography K' Q K^-1, whatever their distance.  Three angles and a zoom are fitted with
+Corners of a key frame are tracked into later frames (pyramidal Lucas-Kanade).  If the camera turns about its
+lens, they move by the homography K' Q K^-1, whatever their distance.  Three angles and a zoom are fitted with
 Tukey's weights, so that moving people and objects do not count.
 """
 
@@ -22,33 +22,33 @@ Array = NDArray[np.float64]
 Box = tuple[float, float, float, float]
 """Left, top, right, bottom, pixels."""
 
-_SIDE = 640  # pixels of the longer side of the pictures in which corners are tracked, at most
-CELLS = 18  # cells along it; one corner from each, so that a thing with much texture has no larger share
-_EDGE = 8  # pixels from the picture's edge without corners
-_CORNER = 3e-4  # least smaller eigenvalue of a corner's gradients, as cornerMinEigenVal gives it
+_SIDE = 640  # pixels; largest longer side of the pictures in which corners are tracked
+CELLS = 18  # cells along it; with one corner each, so that objects with much texture do not dominate
+_EDGE = 8  # pixels; margin of the picture without corners
+_CORNER = 3e-4  # least value of cornerMinEigenVal at a corner
 _WINDOW, _LEVELS = (21, 21), 3  # of Lucas-Kanade
-FEWEST = 20  # corners that agree, at least
-_STILL = 0.75  # pixels by which a corner of a still camera moves at most, from noise and compression
-_SHARE = 0.3  # of the corners that must agree, at least
-_AREA = 0.2  # over which they lie, against corners all over the picture, at least
+FEWEST = 20  # fewest corners that agree
+_STILL = 0.75  # pixels; corners of a still camera move less, by noise and compression
+_SHARE = 0.3  # least share of the corners that agree
+_AREA = 0.2  # least area that these cover, relative to corners all over the picture
 _FEW_LEFT = 0.5  # share of a key frame's corners below which a new key frame is taken
 TUKEY, SHARPEST, BLUNTEST = 4.685, 0.15, 2.0  # standard deviations to weight 0; least and most sd, pixels
 _ZOOM = 1e-4  # variance of the logarithm of the zoom
-ITERATIONS, COARSE = 20, 4  # of the fit; the first ones with the sd of all corners
+ITERATIONS, COARSE = 20, 4  # iterations of the fit; the first ones use the sd of all corners
 
 
 @dataclass(frozen=True)
 class View:
-    """Where a camera looks in a frame, against the reference.
+    """View of a camera in a frame, relative to the reference.
 
     Attributes
     ----------
     turn : ndarray of shape (3, 3)
-        From the axes of the camera in the reference to those in the frame.
+        Rotation from the camera's axes in the reference to those in the frame.
     zoom : float
         Focal length over that in the reference.
     residual : float
-        Robust standard deviation of the corners about it, pixels; NaN if no view was found in the frame.
+        Robust standard deviation of the corners' residuals, pixels; NaN if no view was found in the frame.
     """
 
     turn: Array
@@ -56,15 +56,15 @@ class View:
     residual: float = 0.0
 
     def after(self, other: View) -> View:
-        """View of the same frame against the reference of `other`, a view of this one's reference."""
+        """View of the same frame relative to the reference of `other`, which is a view of this reference."""
         return View(self.turn @ other.turn, self.zoom * other.zoom, self.residual)
 
     def inverse(self) -> View:
-        """View of the reference against the frame."""
+        """View of the reference relative to the frame."""
         return replace(self, turn=self.turn.T, zoom=1 / self.zoom)
 
     def camera(self, reference: Camera) -> Camera:
-        """Camera of the frame in the same world as that of the reference."""
+        """Return the camera of the frame, in the same world as that of the reference."""
         R, t = self.turn @ reference.R, self.turn @ reference.t
         return replace(reference, R=R, t=t, fx=self.zoom * reference.fx, fy=self.zoom * reference.fy)
 
@@ -78,12 +78,12 @@ class CameraMotion:
     Parameters
     ----------
     camera : Camera
-        Of the reference, which is the first frame.
+        Camera of the reference, which is the first frame.
 
     Attributes
     ----------
     scale : float
-        Size of the pictures used over that of the frames.
+        Size of the reduced pictures over that of the frames.
     """
 
     def __init__(self, camera: Camera) -> None:
@@ -95,11 +95,11 @@ class CameraMotion:
         self._corners = np.zeros((0, 2), np.float32)
 
     def start(self, image: Image, people: Iterable[Box] = ()) -> None:
-        """Take the reference, (h, w) grey or (h, w, 3) BGR, with boxes of people in it."""
+        """Set the reference, (h, w) grey or (h, w, 3) BGR, with boxes of the people in it."""
         self._set_key(small_picture(image, self._camera), people, UNMOVED)
 
     def still(self, image: Image) -> bool:
-        """Whether the camera looks as in the key frame."""
+        """Whether the camera has the same view as in the key frame."""
         after = self._track(small_picture(image, self._camera), UNMOVED)
         if after is None:
             return False
@@ -107,7 +107,7 @@ class CameraMotion:
         return bool((off < _STILL).mean() > _SHARE)
 
     def step(self, image: Image, people: Iterable[Box] = ()) -> View:
-        """Find the view of the next frame; where that fails it is the last one, with residual NaN."""
+        """Find the view of the next frame; if that fails, return the last one, with residual NaN."""
         small = small_picture(image, self._camera)
         found, visible = self._match(small)
         if visible < _FEW_LEFT:
@@ -124,7 +124,7 @@ class CameraMotion:
         self._corners = find_corners(small, self.scale * np.array(list(people)).reshape(-1, 4))
 
     def _match(self, small: Image) -> tuple[View | None, float]:
-        """View of a picture, if enough corners agree, and the share of them that are still visible."""
+        """Find the view of a picture, if enough corners agree, and the share of corners still visible."""
         guess = self._last.after(self._key_view.inverse())
         after = self._track(small, guess)
         if after is None:
@@ -137,12 +137,12 @@ class CameraMotion:
         return view.after(self._key_view) if found else None, agree.sum() / len(after)
 
     def _everywhere(self, places: Array) -> bool:
-        """Whether pixels (N, 2) lie all over the picture, not on one thing in it."""
+        """Whether pixels (N, 2) are spread over the picture rather than on one object."""
         width, height = self._camera.size
         return bool(np.linalg.det(np.cov(places.T)) > (_AREA * width * height / 12) ** 2)
 
     def _track(self, small: Image, guess: View) -> NDArray[np.float32] | None:
-        """Places (N, 2) of the key frame's corners, NaN where they are not visible; None if too few are."""
+        """Find the key frame's corners (N, 2), NaN where not visible; None if too few are."""
         if len(self._corners) < FEWEST:
             return None
         expected = map_pixels(self._corners.astype(float), self._camera, guess.camera(self._camera))
@@ -162,12 +162,12 @@ class CameraMotion:
 
 
 def working_scale(camera: Camera) -> float:
-    """Size of the pictures in which corners are tracked over that of a camera's."""
+    """Size of the pictures in which corners are tracked over that of the camera's pictures."""
     return min(1.0, _SIDE / max(camera.size))
 
 
 def small_picture(image: Image, camera: Camera) -> Image:
-    """Grey picture (h, w) of the size of `camera` from one (h, w) or (h, w, 3) BGR."""
+    """Convert a picture (h, w) or (h, w, 3) BGR to grey (h, w) of the size of `camera`."""
     grey = image if image.ndim == 2 else cv2.cvtColor(image, cv2.COLOR_BGR2GRAY)
     if grey.shape[::-1] != camera.size:
         grey = cv2.resize(grey, camera.size, interpolation=cv2.INTER_AREA)
@@ -175,7 +175,7 @@ def small_picture(image: Image, camera: Camera) -> Image:
 
 
 def find_corners(grey: Image, people: Array) -> NDArray[np.float32]:
-    """Best corner (N, 2) of each cell of a grid, not in boxes (K, 4) of people."""
+    """Find the best corner (N, 2) in each cell of a grid, outside the boxes (K, 4) of people."""
     strength = cv2.cornerMinEigenVal(grey, 7)
     for left, top, right, bottom in np.maximum(people, 0).astype(int):
         strength[top:bottom, left:right] = 0
@@ -197,7 +197,7 @@ def fit_view(
 ) -> tuple[View, NDArray[np.bool_]]:
     """Fit a view to points that moved from `before` to `after`, pixels (N, 2), N > 1.
 
-    Gauss-Newton with Tukey's weights from `start` on.  Also returns which points (N,) agree.
+    Gauss-Newton with Tukey's weights, from `start`.  Also returns which points (N,) agree.
     """
     rays, view, sd = replace(camera, R=np.eye(3), t=np.zeros(3)).rays(before), start, np.inf
     off = np.zeros(len(before))
@@ -206,7 +206,7 @@ def fit_view(
         miss = after - expected
         off = np.hypot(*miss.T)
         near = off if iteration < COARSE else off[off < TUKEY * sd]
-        near_sd = float(np.median(near)) / 1.177 if len(near) else np.inf  # of two normal coordinates
+        near_sd = float(np.median(near)) / 1.177 if len(near) else np.inf  # median of a Rayleigh distribution
         sd = max(SHARPEST, near_sd if iteration < COARSE else min(sd, near_sd))
         weight = np.square(np.clip(1 - np.square(off / (TUKEY * sd)), 0, None))
         normal = np.einsum("nki,n,nkj->ij", slope, weight, slope)
@@ -221,9 +221,9 @@ def fit_view(
 
 
 def _motion(rays: Array, view: View, camera: Camera) -> tuple[Array, Array]:
-    """Pixels (N, 2) of rays (N, 3) in a view, and their derivatives (N, 2, 4) by three angles and log zoom.
+    """Project rays (N, 3) to pixels (N, 2), with derivatives (N, 2, 4) by three angles and log zoom.
 
-    The derivatives leave out the lens distortion.
+    The derivatives ignore lens distortion.
     """
     turned = rays @ view.turn.T
     one = replace(view.camera(camera), R=np.eye(3), t=np.zeros(3))

@@ -1,10 +1,10 @@
 """How a camera travels over the floor, measured on the static scene.
 
 Corners are tracked from frame to frame (pyramidal Lucas-Kanade).  Each is a landmark on its ray in the frame
-where it was found: below the horizon it lies on the floor, which gives the scale; elsewhere, and where that
-does not fit, its inverse distance is estimated (Civera, Davison, Montiel: Inverse Depth Parametrization for
-Monocular SLAM, 2008).  The pose of each frame is fitted to all landmarks with Tukey's weights, so that moving
-people, objects and shadows do not count.  Errors accumulate along the way.
+where it was found.  Below the horizon it is assumed to be on the floor, which gives the scale; elsewhere, and
+if that does not fit, its inverse distance is estimated (Civera, Davison, Montiel: Inverse Depth
+Parametrization for Monocular SLAM, 2008).  The pose of each frame is fitted to all landmarks with Tukey's
+weights, so that moving people, objects and shadows do not count.  Errors accumulate along the path.
 """
 
 from __future__ import annotations
@@ -36,30 +36,30 @@ from gait.track.camera_motion import (
 Array = NDArray[np.float64]
 
 _WINDOW, _LEVELS = (9, 9), 3  # of Lucas-Kanade
-_RETURNS = 0.5  # pixels within which a corner tracked back must be where it was
+_RETURNS = 0.5  # pixels; largest distance of a corner tracked forwards and back from its origin
 _EDGE = 4  # pixels from the picture's edge at which a landmark is dropped
 _FURTHEST = 40.0  # metres to the furthest landmark on the floor
-_INVERSE, _INVERSE_SD = 0.1, 0.3  # 1/m: inverse distance of other landmarks before they are seen again
-_NEAREST = 5.0  # 1/m: largest inverse distance
-_DRIFT = 3.0  # pixels: sd of a tracked corner over the time for which it is seen
+_INVERSE, _INVERSE_SD = 0.1, 0.3  # 1/m; prior of the inverse distance of other landmarks
+_NEAREST = 5.0  # 1/m; largest inverse distance
+_DRIFT = 3.0  # pixels; sd of a tracked corner over the time for which it is seen
 _MISSES = 2  # frames in which a landmark may not fit
-_TURN_SD, _PLACE_SD = np.radians(0.25), 0.01  # of a pose: about as far off as those of simulated robots
+_TURN_SD, _PLACE_SD = np.radians(0.25), 0.01  # of a pose; about the errors with simulated robots
 
 
 @dataclass
 class _Landmarks:
-    """Landmarks, each on the ray of the frame where it was found.
+    """Landmarks, each on its ray in the frame where it was found.
 
     Attributes
     ----------
     pixels : ndarray of shape (N, 2)
-        Where each is in the last picture.
+        Position in the last picture.
     origin, ray : ndarray of shape (N, 3)
-        Place of the camera when it was found, metres, and unit vector from there, world.
+        Position of the camera when the landmark was found, metres, and unit vector from there, world.
     inverse, variance : ndarray of shape (N,)
-        Inverse distance along the ray, 1/m, and its variance; 0 on the floor.
+        Inverse distance along the ray, 1/m, and its variance, which is 0 on the floor.
     misses : ndarray of shape (N,)
-        Frames in which it did not fit, less those in which it did.
+        Number of frames in which it did not fit, minus those in which it did.
     """
 
     pixels: NDArray[np.float32]
@@ -71,7 +71,7 @@ class _Landmarks:
 
     @staticmethod
     def at(camera: Camera, pixels: NDArray[np.float32], *, floor: bool = True) -> _Landmarks:
-        """Landmarks at pixels (N, 2) of a picture; `floor`: those below the horizon lie on it."""
+        """Make landmarks at pixels (N, 2) of a picture; `floor`: those below the horizon are on the floor."""
         ray = camera.rays(pixels.astype(float))
         ray /= np.linalg.norm(ray, axis=1, keepdims=True)
         inverse = -ray[:, 2] / camera.centre[2]
@@ -86,16 +86,16 @@ class _Landmarks:
         )
 
     def where(self, chosen: NDArray[np.bool_]) -> _Landmarks:
-        """Select those chosen (N,)."""
+        """Select landmarks by a mask (N,)."""
         return _Landmarks(*(values[chosen] for values in vars(self).values()))
 
     def and_(self, other: _Landmarks) -> _Landmarks:
-        """Join these and others."""
+        """Concatenate these landmarks and others."""
         pairs = zip(vars(self).values(), vars(other).values(), strict=True)
         return _Landmarks(*(np.concatenate(pair) for pair in pairs))
 
     def improve(self, camera: Camera, pixels: Array, sd: float, fits: NDArray[np.bool_]) -> None:
-        """Measure the inverse distance of those that fit and are not on the floor, in place."""
+        """Update the inverse distance of landmarks that fit and are not on the floor, in place."""
         expected, _, slope = _project(camera, self)
         chosen = fits & (self.variance > 0)
         miss, slope, variance = (pixels - expected)[chosen], slope[chosen], max(_DRIFT, sd) ** 2
@@ -111,16 +111,16 @@ class CameraTravel:
     Parameters
     ----------
     camera : Camera
-        Of the first frame, over the floor z = 0.
+        Camera of the first frame, above the floor z = 0.
     image : image
         First frame, (h, w) grey or (h, w, 3) BGR.
     people : iterable of Box
-        Who is in it: they are not taken for the scene.
+        People in it, who are not part of the scene.
 
     Attributes
     ----------
     floor : int
-        Landmarks on the floor that fitted in the last frame.
+        Number of landmarks on the floor that fitted in the last frame.
     """
 
     def __init__(self, camera: Camera, image: Image, people: Iterable[Box] = ()) -> None:
@@ -140,7 +140,7 @@ class CameraTravel:
             return None
         ideal = self._ideal(visible.pixels)
         floor, about, sd = visible.variance == 0, self._camera, np.inf
-        # By the floor first: the sky, in which nothing shows that the camera travels, may be most of it.
+        # Use the floor first: most of the picture may be sky, which does not show that the camera travels.
         if floor.sum() >= FEWEST:
             about, sd, _ = _fit(about, visible.where(floor), ideal[floor])
         self._camera, sd, fits = _fit(about, visible, ideal, sd)
@@ -159,12 +159,12 @@ class CameraTravel:
         return self._scale * np.array(list(people), float).reshape(-1, 4)
 
     def _ideal(self, pixels: NDArray[np.float32]) -> Array:
-        """Pixels (N, 2) as a lens without distortion would show them."""
+        """Convert pixels (N, 2) to those of a lens without distortion."""
         lens = replace(self._camera, R=np.eye(3), t=np.zeros(3))
         return replace(lens, distortion=np.zeros(5)).project(lens.rays(pixels.astype(float)))
 
     def _add(self, boxes: Array) -> None:
-        """Add the corners of cells without a landmark."""
+        """Add corners in cells without a landmark."""
         found = find_corners(self._picture, boxes)
         side, across = max(self._picture.shape) / CELLS, np.array([1, 2 * CELLS])
         taken = (self._landmarks.pixels // side) @ across
@@ -172,7 +172,7 @@ class CameraTravel:
         self._landmarks = self._landmarks.and_(_Landmarks.at(self._camera, found))
 
     def _track(self, picture: Image, boxes: Array) -> None:
-        """Move the landmarks to where the next picture shows them, and drop those not seen there."""
+        """Track the landmarks into the next picture, and drop those not found there."""
         before, self._picture, old = self._picture, picture, self._landmarks
         if not len(old.pixels):
             return
@@ -190,7 +190,7 @@ class CameraTravel:
 def _moved(
     before: Image, after: Image, pixels: NDArray[np.float32]
 ) -> tuple[NDArray[np.float32], NDArray[np.bool_]]:
-    """Where the corners (N, 2) of a picture are in another one, and whether (N,) each is found."""
+    """Track corners (N, 2) of a picture into another one; also return whether (N,) each was found."""
     places, found, _ = cv2.calcOpticalFlowPyrLK(  # type: ignore[call-overload]
         before,
         after,
@@ -205,16 +205,16 @@ def _moved(
 def _project(camera: Camera, visible: _Landmarks) -> tuple[Array, Array, Array]:
     """Project landmarks without lens distortion.
 
-    A landmark is at origin + ray / inverse; multiplied by its inverse distance it may be at infinity.
+    A landmark is at origin + ray / inverse; computing with this times `inverse` allows points at infinity.
 
     Returns
     -------
     pixels : ndarray of shape (N, 2)
         NaN behind the camera.
     by_pose : ndarray of shape (N, 2, 6)
-        Derivatives by a turn of the camera, radians, and by its place, metres.
+        Derivatives by a rotation of the camera, radians, and by its position, metres.
     by_inverse : ndarray of shape (N, 2)
-        By the inverse distance.
+        Derivatives by the inverse distance.
     """
     away = visible.origin - camera.centre
     q = (visible.ray + visible.inverse[:, None] * away) @ camera.R.T
@@ -234,9 +234,9 @@ def _project(camera: Camera, visible: _Landmarks) -> tuple[Array, Array, Array]:
 def _fit(
     camera: Camera, visible: _Landmarks, pixels: Array, sd: float = np.inf
 ) -> tuple[Camera, float, NDArray[np.bool_]]:
-    """Fit the pose to pixels (N, 2) of landmarks: camera, sd of a pixel, and which landmarks (N,) fit.
+    """Fit the pose to pixels (N, 2) of landmarks; return camera, sd of a pixel, and which landmarks (N,) fit.
 
-    `sd`: of a pixel, if `camera` is about right already.
+    `sd`: sd of a pixel, if `camera` is already about right.
     """
     off = np.zeros(len(pixels))
     for iteration in range(0 if np.isinf(sd) else COARSE, ITERATIONS):
@@ -249,7 +249,7 @@ def _fit(
         precision = np.linalg.inv(unit**2 * np.eye(2) + covariance)
         off = unit * np.sqrt(np.einsum("nk,nkl,nl->n", miss, precision, miss))
         near = off if iteration < COARSE else off[off < TUKEY * sd]
-        near_sd = float(np.median(near)) / 1.177 if len(near) else np.inf  # of two normal coordinates
+        near_sd = float(np.median(near)) / 1.177 if len(near) else np.inf  # median of a Rayleigh distribution
         sd = max(SHARPEST, near_sd if iteration < COARSE else min(sd, near_sd))
         weight = np.square(np.clip(1 - np.square(off / (TUKEY * sd)), 0, None))
         normal = np.einsum("nki,n,nkl,nlj->ij", slope, weight, precision, slope, optimize=True)

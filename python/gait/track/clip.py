@@ -1,4 +1,4 @@
-"""Track the person in a video file, from the files read to the files written."""
+"""Track the person in a video file, from reading the inputs to writing the outputs."""
 
 from __future__ import annotations
 
@@ -38,14 +38,14 @@ def track_clip(options: ClipOptions) -> dict[str, Any]:
     Raises
     ------
     UserError
-        If a file cannot be read, if no person can be found to start with, or no frame can be tracked.
+        If a file cannot be read, no person can be found to start with, or no frame can be tracked.
     """
     scene = with_further_cameras(options, Scene.read(options))
     return track_scene(options, scene, first_state(options, scene))
 
 
 def track_scene(options: ClipOptions, scene: Scene, start: Start, also: Sink | None = None) -> dict[str, Any]:
-    """Track the person of a scene from a start on; `also` gets each estimate that is written."""
+    """Track the person of a scene from a start; `also` receives each estimate that is written."""
     if options.background == "auto" and scene.empty is not None and (start.in_place or stays(scene)):
         scene = scene.without_plate()  # the median shows the person
     used = setup(options, scene, start, scene.empty is not None)
@@ -92,7 +92,7 @@ def track_scene(options: ClipOptions, scene: Scene, start: Start, also: Sink | N
 
 
 def _stature(options: ClipOptions, scene: Scene, start: Start) -> tuple[float, float]:
-    """Give the expected stature and its sd, metres: the start's, unless pictures alone guessed them."""
+    """Return the expected stature and its sd, metres: the start's, unless these were found in the images."""
     mean, sd = start.mean, start.sd
     if options.init == "auto" and not scene.people:
         mean, sd = scene.model.prior()
@@ -108,7 +108,7 @@ def _follower(
     keypoints: PersonKeypoints | PersonShapes,
     plausibility: Plausibility,
 ) -> Follower:
-    """Make a follower that finds a lost person by keypoints or, without any, in the pictures."""
+    """Make a follower that finds a lost person by keypoints or, if there are none, in the pictures."""
 
     def find_again(first: int, stop: int, stature: float) -> Start | None:
         if not scene.people or not isinstance(keypoints, PersonKeypoints):
@@ -134,7 +134,7 @@ def _follower(
 def _find_again(
     scene: Scene, keypoints: PersonKeypoints, first: int, stop: int, stature: float
 ) -> Start | None:
-    """Find the person by their keypoints or, if these show no walk, of a person who may be the same."""
+    """Find the person by their keypoints or, if these show no walk, by those of an id that may be theirs."""
     for ids in keypoints.ids, scene.others():
         found = {
             id: find_keypoint_start(

@@ -1,4 +1,4 @@
-"""Write the results of a tracked clip: files, and figures of the report."""
+"""Write the results of a tracked clip: files, and figures for the report."""
 
 from __future__ import annotations
 
@@ -32,22 +32,22 @@ from gait.track.smooth import Smoother
 from gait.track.standing import Sink, Standing
 from gait.track.tracker import Tracker
 
-_HARDLY = 0.1  # of the frames: a person followed in fewer was hardly followed
+_HARDLY = 0.1  # share of the frames; a person followed in fewer was hardly followed
 
 
 class Results:
-    """What the report at the end needs from each step.
+    """Collects from each step what the final report needs.
 
     Attributes
     ----------
     times : list of float
-        Seconds, of the estimates written.
+        Times of the estimates written, seconds.
     joints : list of ndarray of shape (J, 3)
         Their joints, metres.
     starts : list of (int, float, float)
-        Frame of each start of the tracker, and the place there, metres.
+        Frame of each start of the tracker, and the person's position there, metres.
     film : PageFilm or None
-        For the report.
+        Film on the report's page.
     """
 
     def __init__(self, tracker: Tracker) -> None:
@@ -57,7 +57,7 @@ class Results:
         self._begun = time.perf_counter()
         self.times: list[float] = []
         self.joints: list[np.ndarray[Any, Any]] = []
-        self._frames: list[tuple[int, bool, bool]] = []  # number, lost, in the picture
+        self._frames: list[tuple[int, bool, bool]] = []  # number, whether lost, whether in the picture
         self.starts: list[tuple[int, float, float]] = []
         self.film: PageFilm | None = None
 
@@ -77,7 +77,7 @@ class Results:
         self._frames.append((frame.number, estimate.status == TrackStatus.LOST, shown))
 
     def coverage(self) -> list[str]:
-        """Report where the person was followed, where they left the picture, and where they were lost."""
+        """Describe in which frames the person was followed, left the picture, or was lost."""
         spans = [list(span) for _, span in groupby(self._frames, key=lambda frame: frame[1])]
         out = []
         for span, after in zip(spans, [*spans[1:], None], strict=True):
@@ -96,7 +96,7 @@ class Results:
         return self._statuses.count(TrackStatus.LOST) > count / 2 and followed < _HARDLY * count
 
     def summary(self, threads: int, step_seconds: Sequence[float]) -> dict[str, Any]:
-        """Return the figures of ``--json``; step_ms is the time inside gait_tracker_step alone."""
+        """Return the figures of ``--json``; step_ms is only the time in gait_tracker_step."""
         tracker = self._tracker
         return {
             "frames": self._count,
@@ -120,9 +120,9 @@ def write(
     keypoints: PersonKeypoints | None,
     also: Sink | None = None,
 ) -> Results:
-    """Write the estimates into all outputs, which appear together at the end, and into `also`.
+    """Write the estimates to all outputs, which appear together at the end, and to `also`.
 
-    Keypoints, where there are any, show in which frames the person takes no strides.
+    Keypoints, if there are any, show in which frames the person takes no strides.
     """
     model, video, span, results = tracker.model, scene.video, scene.frames, Results(tracker)
     with ExitStack() as stack:
@@ -164,7 +164,7 @@ def write(
 
 
 def _write_cameras(path: Path, scene: Scene) -> None:
-    """Write the camera of each frame: frame, fx fy cx cy, R by rows, t; `CameraPath` reads it."""
+    """Write the camera of each frame, for `CameraPath.read`: frame, fx fy cx cy, R by rows, t."""
     with path.open("w", newline="") as file:
         rows = csv.writer(file)
         names = [f"r{row}{column}" for row in (1, 2, 3) for column in (1, 2, 3)]
@@ -176,7 +176,7 @@ def _write_cameras(path: Path, scene: Scene) -> None:
 
 
 class Drawing:
-    """Draws every frame as captured, those before the first estimate too; of several cameras side by side.
+    """Draws every frame as captured, also those before the first estimate; several cameras side by side.
 
     Parameters
     ----------
@@ -193,12 +193,12 @@ class Drawing:
 
     @staticmethod
     def size(scene: Scene) -> tuple[int, int]:
-        """Width and height of the frames in pixels, all cameras' as tall as the first one's."""
+        """Width and height of the drawn frames in pixels; all cameras' are as tall as the first one's."""
         width, height = scene.camera.size
         return width + sum(_scaled_width(one.camera, height) for one in scene.further), height
 
     def add(self, frame: Frame, estimate: Estimate) -> None:
-        """Draw a frame; frames increase."""
+        """Draw a frame; frame numbers must increase."""
         scene = self._scene
         if not self._begun and frame.number > scene.frames.start:
             for before in scene.video.frames(scene.frames.start, frame.number):
@@ -216,7 +216,7 @@ class Drawing:
         else:
             picture = overlay.draw(frame.image, estimate, frame.number, legend=legend)
         for k, (other, view) in enumerate(zip(others, frame.others, strict=True)):
-            if view is not None:  # else what the camera saw last
+            if view is not None:  # otherwise keep the camera's last picture
                 drawn = view.image if estimate is None else other.draw_people(view.image, {"": estimate})
                 self._beside[k] = drawn
         size = camera.height
@@ -228,12 +228,12 @@ class Drawing:
 
 
 def _scaled_width(camera: Camera, height: int) -> int:
-    """Width of a camera's picture of another height, pixels."""
+    """Width of a camera's picture when scaled to another height, pixels."""
     return 2 * round(camera.width * height / camera.height / 2)
 
 
 def _widened(sink: Sink, calibration: Calibration | None) -> Sink:
-    """Return a sink that adds the uncertainty of a camera that was found to each estimate."""
+    """Return a sink that adds the uncertainty of an estimated camera to each estimate."""
     if calibration is None:
         return sink
     return lambda frame, estimate: sink(frame, calibration.widened(frame.time, estimate))
@@ -246,12 +246,12 @@ def _smooth(
     with progress("smoothing", len(smoother), options.quiet) as update:
         rows, draws = smoother.finish(update=update)
     frames: Iterable[Frame] = (frame for frame, _ in rows)
-    if options.overlay or options.report:  # decode the pictures once more
+    if options.overlay or options.report:  # decode the pictures again
         frames = video.frames(rows[0][0].number, rows[-1][0].number + 1)
     plausibility.restart()
     for frame, (_, estimate) in zip(frames, rows, strict=True):
         judged = plausibility.judged(frame, estimate)
         for sink in sinks:
             sink(frame, judged)
-    if options.draws:  # last, so that they are not left beside a part of the track
+    if options.draws:  # last, so that they are never left beside an unfinished track
         draws.write(options.draws)

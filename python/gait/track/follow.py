@@ -17,32 +17,32 @@ from gait.track.person_shapes import PersonShapes
 from gait.track.plausible import Plausibility
 from gait.track.tracker import Tracker
 
-_LONGEST_GAP = 1.0  # seconds for which a lost person is tracked on backwards
-_LEAST_BEFORE = 0.5  # seconds before a track in which an earlier start is worth a search
+_LONGEST_GAP = 1.0  # seconds for which a lost person is still tracked backwards
+_LEAST_BEFORE = 0.5  # seconds before a track that are worth searching for an earlier start
 _CONTRADICTED = 0.5  # seconds of keypoints elsewhere after which the person is lost
-_OPEN_PHASE = 0.2  # strides: sd of the phase from which a start leaves left and right open
-_SETTLED = 0.2  # seconds of `tracking` after which they are known
-_SETTLES = 4.0  # seconds from a start in which that is waited for
-_DRAWS = 3  # of particles that must agree
+_OPEN_PHASE = 0.2  # strides; sd of the phase from which a start does not determine left and right
+_SETTLED = 0.2  # seconds of status `tracking` after which they are known
+_SETTLES = 4.0  # seconds after a start within which that must happen
+_DRAWS = 3  # draws of particles that must agree
 _SAME_SIDE = 0.2  # strides between the phases of draws that agree
 _DISAGREE = "repeated starts disagree about left and right"
 
 FindAgain = Callable[[int, int, float], Start | None]
-"""First start in the frames first <= number < stop, of a person of a stature [m]; None: there is none."""
+"""Finds the first start in frames first <= number < stop, of a person with a stature [m]; None if none."""
 
 
 class _Support:
-    """The last frame in which keypoints did not contradict a track, from its start on.
+    """The last frame, since a track's start, that supports it.
 
-    Frames without keypoints support a track that is not contradicted, as the images decide there.  After a
-    contradiction that lasted, only keypoints near the estimate do.
+    Frames without keypoints support a track that is not contradicted, since the images decide there.  After a
+    lasting contradiction only keypoints near the estimate do.
     """
 
     def __init__(self, frame: Frame) -> None:
         self.frame, self._time = frame.number, frame.time
 
     def contradicted(self, frame: Frame, near: bool | None) -> bool:
-        """Take in whether there are keypoints near the estimate; return whether there were none for long."""
+        """Add whether there are keypoints near the estimate; return whether there have long been none."""
         if near or (near is None and abs(frame.time - self._time) <= _CONTRADICTED):
             self.frame, self._time = frame.number, frame.time
         return abs(frame.time - self._time) > _CONTRADICTED
@@ -55,24 +55,24 @@ class Follower:
     ----------
     tracker : Tracker
     video : Video
-        Of the tracker's first camera; its frames have those of the others.
+        Video of the tracker's first camera; its frames contain those of the others.
     keypoints : PersonKeypoints or PersonShapes
     plausibility : Plausibility
-        Of its estimates.
+        Judges the estimates.
     find_again : FindAgain
-        Finds the person anew after a loss, and where they were in view before.
+        Finds the person again after a loss, and in earlier frames.
     auto_start : BoxStart, optional
         Finds a lost person in the pictures.
     one_pass : bool
-        All estimates come from one forward pass, which the smoother needs; tracking backwards only finds an
-        earlier start.
+        Whether all estimates come from one forward pass, as the smoother needs; tracking backwards then only
+        finds an earlier start.
     plate_of : callable
-        Empty scene of a frame, if that is not the tracker's.
+        Returns the empty scene of a frame, if it is not the tracker's.
 
     Attributes
     ----------
     step_seconds : list of float
-        Time that each step spent in the C library, those of searches and backwards included.
+        Time that each step spent in the C library, including steps of searches and backwards.
     """
 
     def __init__(
@@ -91,13 +91,13 @@ class Follower:
         self._plausibility = plausibility
         self._find_again, self._auto_start, self._one_pass = find_again, auto_start, one_pass
         self._plate_of = plate_of
-        self._uncertain = False  # which leg is which
+        self._uncertain = False  # about left and right
         self.step_seconds: list[float] = []
 
     def follow(self, start: Start, frames: range) -> Iterator[tuple[Frame, Estimate]]:
-        """Yield the frames in order from the first in which the person is visible, each with its estimate.
+        """Yield the frames in order, from the first in which the person is visible, each with its estimate.
 
-        Frames before a start have the estimates of the tracker that ran backwards from it.
+        Estimates of frames before a start come from the tracker running backwards from it.
         """
         start = self._settled(start, frames)
         given, before = self._earlier(start, frames.start)
@@ -131,7 +131,7 @@ class Follower:
                 now, lost, support = None, False, _Support(frame)
 
     def _settled(self, start: Start, frames: range) -> Start:
-        """Move a start that leaves left and right open to where the images decide, later or else earlier.
+        """If a start does not determine left and right, move it to a later or earlier frame where images do.
 
         Several draws of particles decide; unless they agree, left and right stay uncertain throughout.
         """
@@ -144,7 +144,7 @@ class Follower:
         return found[int(np.argmax(agreeing))] if found else start
 
     def _draw(self, start: Start, frames: range, draw: int) -> Start | None:
-        """Start where one draw of particles has decided; None if it does not soon."""
+        """Return a start where one draw of particles has decided; None if it does not soon."""
         config = self._tracker.config.replace(seed=self._tracker.config.seed ^ draw)
         later = ((frame, frame.utime) for frame in self._video.frames(start.frame, frames.stop))
         found = self._decided(self._tracker.like(config), start, later)
@@ -155,9 +155,9 @@ class Follower:
         return found
 
     def _decided(self, tracker: Tracker, start: Start, frames: Iterator[tuple[Frame, int]]) -> Start | None:
-        """Start where a tracker has been `tracking` for a while; None if it is not soon.
+        """Return a start where a tracker has been `tracking` for a while; None if it is not soon.
 
-        `frames` are given with the tracker's time of each, microseconds.
+        `frames`: with the tracker's time of each, microseconds.
         """
         now: Estimate | None = None
         since = begun = 0.0
@@ -177,9 +177,9 @@ class Follower:
     def _first(
         self, start: Start, before: dict[int, Estimate], first: int
     ) -> tuple[Start, dict[int, Estimate]]:
-        """Find an earlier start, from when the person was in view with a gap after it, or keep this one.
+        """Find an earlier start, if the person was in view earlier and then absent, or keep this one.
 
-        `before` has the estimates up to the start, `first` is the first frame to track.
+        `before`: estimates up to the start; `first`: first frame to track.
         """
         stop = min(before, default=start.frame)
         if stop - first < _LEAST_BEFORE * self._video.fps:
@@ -191,7 +191,7 @@ class Follower:
         return found, before | more
 
     def _step(self, tracker: Tracker, frame: Frame, utime: int, last: Estimate | None) -> Estimate:
-        """Step with the person's keypoints; judge the estimate."""
+        """Step with the person's keypoints, and judge the estimate."""
         joints = self._keypoints.of_cameras(frame, last)
         images = [frame.image, *(None if view is None else view.image for view in frame.others)]
         found = tracker.step(images, utime, joints, poses=frame.pose, backgrounds=self._plate_of(frame))
@@ -208,7 +208,7 @@ class Follower:
         self._plausibility.restart()
 
     def _earlier(self, start: Start, first: int) -> tuple[Start, dict[int, Estimate]]:
-        """Where to start, and the estimates of the frames from `first` up to it."""
+        """Return where to start, and the estimates of the frames from `first` to there."""
         before = self._backwards(start, first) if first < start.frame else {}
         if not self._one_pass:
             return start, before
@@ -216,7 +216,7 @@ class Follower:
         return (_start_from(before[min(sure)], min(sure), start) if sure else start), {}
 
     def _backwards(self, start: Start, first: int) -> dict[int, Estimate]:
-        """Track backwards from a start to `first`: estimates by frame, as far as the person is visible."""
+        """Track backwards from a start to `first`; return estimates by frame, while the person is visible."""
         config = self._tracker.config.replace(reverse=1.0)
         tracker = self._tracker.like(config)
         found: dict[int, Estimate] = {}
@@ -229,7 +229,7 @@ class Follower:
             last = self._step(tracker, frame, -frame.utime, last)
             found[frame.number] = replace(last, utime=frame.utime, frame=frame.number - start.frame)
             if keypoints is not None and support.contradicted(frame, keypoints.near(frame, last)):
-                earliest = max(earliest, support.frame)  # the person is elsewhere from here on
+                earliest = max(earliest, support.frame)  # before it the person is elsewhere
                 break
             if last.status != TrackStatus.LOST and not last.flags & Flag.UNSUPPORTED:
                 visible, earliest = frame.time, frame.number
@@ -239,7 +239,7 @@ class Follower:
 
 
 def _same_side(one: Start, other: Start, fps: float) -> bool:
-    """Whether two starts of one walk agree in phase."""
+    """Whether two starts of the same walk agree in phase."""
     seconds = (other.frame - one.frame) / fps
     rate = (one.mean.stride_hz + other.mean.stride_hz) / 2
     off = other.mean.phase - one.mean.phase - rate * seconds
@@ -247,7 +247,7 @@ def _same_side(one: Start, other: Start, fps: float) -> bool:
 
 
 def _start_from(now: Estimate, frame: int, start: Start) -> Start:
-    """Start at an estimate, with standard deviations of at least those of a start that a user gives."""
+    """Make a start from an estimate, with standard deviations at least those of a start given by a user."""
     sd = replace(
         now.sd,
         phase=max(now.sd.phase, DEFAULT_SD["phase"]),

@@ -1,10 +1,10 @@
 """Calibrate a camera from 2-D keypoints of a person of known stature who walks on a level floor.
 
-One Bayesian estimate of camera and walk (after Lv, Zhao and Nevatia 2006, who use heads and feet alone):
-focal length, tilt, roll and height of the camera, and the person's path, heading and phase at knots, with
-the cyclic model's bone lengths and curves.  Feet that do not slide tie the speed to the length of the steps,
-which relates depth to width and so determines the focal length.  The maximum of the posterior is found by
-Gauss-Newton steps from several focal lengths; its curvature gives the standard deviations.
+Camera and walk are estimated together (after Lv, Zhao and Nevatia 2006, who use only heads and feet): focal
+length, tilt, roll and height of the camera, and the person's path, heading and phase at knots, with the
+cyclic model's bone lengths and curves.  Since feet do not slide, the speed follows from the length of the
+steps, which relates depth to width and so determines the focal length.  The maximum of the posterior is found
+by Gauss-Newton steps from several focal lengths; its curvature gives the standard deviations.
 """
 
 from __future__ import annotations
@@ -36,33 +36,32 @@ from gait.track.walk_start import (
 
 Array = NDArray[np.float64]
 
-_WORST = 6.0  # squared robust error per coordinate up to which the result is accepted
+_WORST = 6.0  # squared robust error per coordinate up to which a result is accepted
 _POOR = 1.2  # the same, above which left and right may be swapped
-_LEAST_RATE = 0.4  # strides per second of a person who walks
-_UNKNOWN = 0.2  # relative standard deviation from which the focal length counts as poorly determined
-_OPEN = 1.0  # and from which the camera is refused
+_LEAST_RATE = 0.4  # strides per second; a slower person stands
+_UNKNOWN = 0.2  # relative sd from which the focal length counts as poorly determined
+_OPEN = 1.0  # relative sd of the focal length from which the camera is rejected
 
 
 @dataclass(frozen=True)
 class Calibration:
-    """A camera found from a walk.
+    """A camera estimated from a walk.
 
     Attributes
     ----------
     camera : Camera
-        Its world has z up and the floor at z = 0; the origin is on the floor below the camera, which looks
+        In its world z is up and the floor is z = 0; the origin is on the floor below the camera, which looks
         along y.
     sd : ndarray of shape (4,)
         Standard deviations of the focal length (relative), tilt, roll (radians) and height (relative).
     tilt, roll : float
         Radians, positive downwards and clockwise.
     time : ndarray of shape (K,)
-        Seconds, of the knots of the path.
+        Times of the path's knots, seconds.
     path : ndarray of shape (K, 3)
-        Place of the pelvis on the floor, metres, and heading, radians.
+        Position of the pelvis on the floor, metres, and heading, radians.
     path_change : ndarray of shape (K, 3, 4)
-        Change of `path` with each of the four, if each is in its standard deviations and they are
-        independent.
+        Change of `path` per sd of each of four independent errors of the camera.
     in_place : bool
         The person walks in place, as on a treadmill.
     chi2_per_observation : float
@@ -80,7 +79,7 @@ class Calibration:
     chi2_per_observation: float
 
     def describe(self) -> list[str]:
-        """Describe the camera, and what the walk does not determine, one sentence a line."""
+        """Describe the camera, and what the walk does not determine; one sentence per line."""
         camera, sd = self.camera, self.sd
         f, height = camera.fx, camera.centre[2]
         fov = 2 * np.degrees(np.arctan(0.5 * camera.width / f))
@@ -99,7 +98,7 @@ class Calibration:
         return lines
 
     def figures(self) -> dict[str, Any]:
-        """Give the figures of ``--json``."""
+        """Return the figures of ``--json``."""
         height = float(self.camera.centre[2])
         scale = np.array([self.camera.fx, np.degrees(1.0), np.degrees(1.0), height])
         values = (self.camera.fx, np.degrees(self.tilt), np.degrees(self.roll), height)
@@ -109,7 +108,7 @@ class Calibration:
         return means | sds | {"in_place": self.in_place, "chi2_per_observation": self.chi2_per_observation}
 
     def widened(self, time: float, estimate: Estimate) -> Estimate:
-        """Add the uncertainty of the camera to the sd of an estimate, `time` seconds into the clip."""
+        """Add the uncertainty of the camera to the sd of the estimate `time` seconds into the clip."""
         joint_sd = self.joint_sd(np.array([time]), estimate.joints[None], estimate.joint_sd[None])[0]
         x, y, turn = np.linalg.norm(self.change_at(time), axis=1)
         pelvis = np.hypot(estimate.sd.pelvis, [x, y, 0.0])
@@ -129,6 +128,7 @@ class Calibration:
         Returns
         -------
         ndarray of shape (T, J, 3)
+            Larger standard deviations, metres.
         """
         here = np.stack([np.interp(time, self.time, column) for column in self.path[:, :2].T], axis=1)
         moved = moved_by_camera(self._path_change(time)[:, None], joints[..., :2] - here[:, None])
@@ -136,11 +136,11 @@ class Calibration:
         return np.asarray(np.hypot(sd, np.pad(wider, ((0, 0), (0, 0), (0, 1)))))
 
     def change_at(self, time: float) -> Array:
-        """Give `path_change` `time` seconds into the clip: shape (3, 4)."""
+        """Return `path_change` at `time` seconds into the clip: shape (3, 4)."""
         return self._path_change(np.array([time]))[0]
 
     def _path_change(self, time: Array) -> Array:
-        """Give `path_change` at times (T,): shape (T, 3, 4)."""
+        """Interpolate `path_change` at times (T,): shape (T, 3, 4)."""
         columns = self.path_change.reshape(len(self.time), -1).T
         at = np.stack([np.interp(time, self.time, column) for column in columns], axis=1)
         return at.reshape(len(time), 3, 4)
@@ -157,24 +157,24 @@ def calibrate(
     near: CameraPrior | None = None,
     where: str = "keypoints",
 ) -> Calibration:
-    """Find the camera from the keypoints of a walking person.
+    """Estimate the camera from the keypoints of a walking person.
 
     Parameters
     ----------
     keypoints : Keypoints
-        Of one person, pixels; the camera does not move.
+        Keypoints of one person, pixels, from a camera that does not move.
     size : (int, int)
         Width and height of the picture.
     model : Model
-        Its cyclic part.
+        Its cyclic part is used.
     height : float
         The person's stature, metres.
     fov : float, optional
-        Horizontal field of view, degrees, as the camera's maker gives it.
+        Horizontal field of view, degrees, as stated by the camera's maker.
     fov_sd : float
-        Standard deviation of the logarithm of the focal length that follows from `fov`.
+        Standard deviation of the logarithm of the focal length computed from `fov`.
     near : CameraPrior, optional
-        What is expected of the camera, instead of `fov`.
+        Prior of the camera, instead of `fov`.
     where : str
         Name of the input in errors.
 
@@ -186,7 +186,7 @@ def calibrate(
     ------
     UserError
         If a joint is missing, the whole person is visible for less than a second, no second of the keypoints
-        fits a walk, the person stands, or the walk leaves the focal length open.
+        fits a walk, the person stands, or the walk does not determine the focal length.
     """
     needed = {"l_hip", "r_hip", "l_ankle", "r_ankle", "l_shoulder", "r_shoulder"}
     if missing := needed - set(keypoints.names):
@@ -210,7 +210,7 @@ def _calibrate(
     body = WalkingBody(model, chosen.names)
     best = _first_fit(chosen, size, model, body, height, prior)
     if best is None or best.chi2_per_observation > _POOR:
-        # A detector may take a back for a front.
+        # A detector may mistake a person's back for the front.
         other = _first_fit(swap_sides(chosen), size, model, body, height, prior)
         if best is None or (other is not None and other.cost_per_frame < best.cost_per_frame):
             best = other
@@ -238,7 +238,7 @@ def _first_fit(
     height: float,
     prior: CameraPrior,
 ) -> WalkFit | None:
-    """Best fit of a part of the clip; None if none begins."""
+    """Return the best fit of a part of the clip; None if no start was found."""
     best: WalkFit | None = None
     for start in find_starts(chosen, size, model, height, prior):
         near = start.time - WINDOW / 2, start.time + WINDOW / 2
@@ -251,11 +251,11 @@ def _first_fit(
 
 
 def _result(fit: WalkFit, size: tuple[int, int]) -> Calibration:
-    """Camera and path of a fit, and how the path changes with the camera."""
+    """Convert a fit to camera, path, and changes of the path with the camera."""
     covariance, first = fit.covariance(), fit.model.fixed
     camera = covariance[:4, :4]
     root = np.linalg.cholesky(camera)
-    # Part of the path's covariance that comes from the camera: S_pc S_cc^-1 S_cp = D D'.
+    # Part of the path's covariance that is due to the camera: S_pc S_cc^-1 S_cp = D D'.
     path_change = np.linalg.solve(root, covariance[:4, first:]).T.reshape(-1, 4, 4)[:, :3]
     return Calibration(
         make_camera(fit.q[:4], size),

@@ -19,14 +19,14 @@ Array = NDArray[np.float64]
 
 
 class SeveralVideos(Video):
-    """The film of the first camera; each frame has the nearest ones of the others.
+    """The film of the first camera, in which each frame contains the other cameras' nearest frames.
 
     Parameters
     ----------
     video : Video
     others : sequence of Video
     offsets : sequence of float
-        When each of these began, seconds after `video`.
+        Start of each of these, seconds after that of `video`.
     """
 
     def __init__(self, video: Video, others: Sequence[Video], offsets: Sequence[float]) -> None:
@@ -60,13 +60,13 @@ class SeveralVideos(Video):
         for number in partners.tolist():
             while number >= 0 and (found is None or found.number < number):
                 found = next(frames, None)
-                if found is None:  # the film ends before its frames do
+                if found is None:  # the film ends before the frames that it states
                     return
             yield found if number >= 0 and found is not None and found.number == number else None
 
 
 def _nearest(times: Array, others: Array) -> NDArray[np.int64]:
-    """Index (T,) of the frame of another film nearest to each time; -1 if that is nearer to another time."""
+    """Find the other film's nearest frame (T,) to each time; -1 if that frame is nearer to another time."""
 
     def nearest(to: Array, of: Array) -> NDArray[np.int64]:
         after = np.searchsorted(of, to).clip(1, len(of) - 1)
@@ -80,12 +80,12 @@ def _nearest(times: Array, others: Array) -> NDArray[np.int64]:
 
 
 def with_further_cameras(options: ClipOptions, scene: Scene) -> Scene:
-    """Read the other films of `options`, find when they began, and add them to the scene.
+    """Read the other films of `options`, find their time offsets, and add them to the scene.
 
     Raises
     ------
     UserError
-        If a film cannot be read, or when it began cannot be found.
+        If a film cannot be read, or its time offset cannot be found.
     """
     if not options.further:
         return scene
@@ -110,7 +110,7 @@ def with_further_cameras(options: ClipOptions, scene: Scene) -> Scene:
 
 
 def _offset(scene: Scene, other: Scene, given: float | None) -> tuple[int, Offset]:
-    """Find who is the same person in another film, and when that began."""
+    """Find the same person in another film, and the film's time offset."""
     first = scene.people.get(scene.person)
     found: dict[int, Offset] = {}
     for id, keypoints in other.people.items():

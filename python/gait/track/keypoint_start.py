@@ -1,7 +1,7 @@
 """The start of a track from the keypoints of a clip: the first second in which a person walks.
 
-Windows of a second are fitted one after the other (`gait.bindings.start_fit`), so a person who first stands,
-or who comes into view late, is found as soon as they walk.
+Windows of one second are fitted in turn (`gait.bindings.start_fit`), so a person who stands at first, or
+comes into view late, is found as soon as they walk.
 """
 
 from __future__ import annotations
@@ -22,22 +22,22 @@ from gait.io.keypoints_file import Keypoints
 
 _WINDOW = 1.0  # seconds of keypoints that are fitted
 _STEP = 0.2  # seconds from one window to the next
-_FITS_BEST = 4.0  # chi-square per coordinate up to which the best window is taken if no person walks in any
-_STATURE_SD = 0.05  # metres, of one that the user gives; a detector's skeleton may have another size
+_FITS_BEST = 4.0  # chi-square per coordinate up to which the best window is used if no window shows a walk
+_STATURE_SD = 0.05  # metres, of a stature given by the user; a detector's skeleton may have another size
 
 
 def keypoint_noise(keypoints: Keypoints) -> dict[int, FrameKeypoints]:
-    """Keypoints by frame, each with the standard deviation that its joint has.
+    """Split keypoints by frame, and add the standard deviation of each joint.
 
     Parameters
     ----------
     keypoints : Keypoints
-        Of one person.
+        Keypoints of one person.
 
     Returns
     -------
     keypoints : dict of int to FrameKeypoints
-        By number of the frame; pixels.  Joints that were not found have a negative standard deviation.
+        Keypoints by frame number, pixels.  Joints that were not found have a negative standard deviation.
     """
     sd = frame_sd(keypoints) if keypoints.frame_sd is None else keypoints.frame_sd
     sd = np.where(keypoints.visible, sd, -1.0)
@@ -55,12 +55,12 @@ def find_keypoint_start(
     height: float | None = None,
     poses: Mapping[int, CameraPose] | None = None,
 ) -> Start | None:
-    """Find the first state of the person whose keypoints these are.
+    """Find the first state of a person from their keypoints.
 
     Parameters
     ----------
     keypoints : Keypoints
-        Of one person, pixels of the camera.
+        Keypoints of one person, in pixels of the camera.
     camera : Camera
     model : Model
     first, stop : int
@@ -68,12 +68,12 @@ def find_keypoint_start(
     height : float, optional
         Known stature, metres.
     poses : mapping of int to CameraPose, optional
-        Of the camera in each frame, if it moves.
+        Pose of the camera in each frame, if it moves.
 
     Returns
     -------
     start : Start or None
-        None if no second of them fits a walk.
+        None if no second of the keypoints fits a walk.
     """
     if not {"l_hip", "r_hip", "l_ankle", "r_ankle"} <= set(keypoints.names):
         return None
@@ -108,9 +108,9 @@ def _fit_window(
     at: int,
     poses: Mapping[int, CameraPose],
 ) -> tuple[Start, Hypothesis] | None:
-    """Fit the second from ``frames[at]`` on; None if no walk fits or hips and ankles are not in view.
+    """Fit the second from ``frames[at]``; None if no walk fits or hips and ankles are not in view.
 
-    `frames` (T,) are numbers, `times` (T,) their seconds.
+    `frames` (T,): frame numbers; `times` (T,): their times, seconds.
     """
     fit.reset()
     for frame, time in zip(frames[at:], times[at:], strict=True):

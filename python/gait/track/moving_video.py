@@ -1,7 +1,7 @@
 """A clip from a moving camera: each frame with the camera's pose and, if it only turns, the empty scene.
 
-Where the camera stays in one place, a picture of the whole scene is made of the clip's frames, their median
-in each direction that they show, and each frame is given what its camera would see of it.
+If the camera stays in one place, the median of the clip's frames in each direction that they show gives a
+picture of the whole scene, and from this each frame gets the empty scene as its camera would see it.
 """
 
 from __future__ import annotations
@@ -20,10 +20,10 @@ from gait.io.video import Frame, Image, Video
 
 Array = NDArray[np.float64]
 
-_WIDEST = 1.0  # picture sizes added at each side
-_STEP = 16  # pixels between points of which the place in another picture is computed; others are interpolated
-_COVERED = 0.98  # of a frame's directions that the picture of the scene must show
-_FEWEST = 5  # samples whose median is the scene
+_WIDEST = 1.0  # most picture sizes added on each side
+_STEP = 16  # pixels; grid of points that are mapped exactly; pixels in between are interpolated
+_COVERED = 0.98  # least share of a frame that the picture of the scene covers
+_FEWEST = 5  # fewest samples from which the median is computed
 
 
 @dataclass(frozen=True)
@@ -33,7 +33,7 @@ class Panorama:
     Attributes
     ----------
     camera : Camera
-        Without lens distortion; it sees all frames.
+        Camera without lens distortion whose picture covers all frames.
     image : image
     """
 
@@ -44,7 +44,7 @@ class Panorama:
     def of(
         samples: Sequence[Frame], lens: Camera, poses: Mapping[int, CameraPose], given: Image | None = None
     ) -> Panorama:
-        """Median of the samples where they show the scene; `given` is the empty scene as `lens` sees it."""
+        """Compute the median of the samples; where `given` (the empty scene, by `lens`) is known, use it."""
         whole = _extended(lens, list(poses.values()))
         image = _median([(frame.image, poses[frame.number].camera(lens)) for frame in samples], whole)
         if given is not None:
@@ -52,7 +52,7 @@ class Panorama:
         return Panorama(whole, image)
 
     def plate_for(self, camera: Camera) -> Image | None:
-        """Empty scene as a camera in the same place sees it; None if part of that is not known."""
+        """Return the empty scene as seen by a camera in the same place; None if a part is unknown."""
         u, v = (np.arange(0, size, _STEP, dtype=float) for size in camera.size)
         places = map_pixels(np.stack(np.meshgrid(u, v), axis=-1), camera, self.camera)
         with np.errstate(invalid="ignore"):
@@ -61,16 +61,16 @@ class Panorama:
 
 
 def map_pixels(pixels: Array, source: Camera, target: Camera) -> Array:
-    """Pixels (..., 2) of `source` as `target` sees the same directions from the same place."""
+    """Convert pixels (..., 2) of `source` to the pixels of `target`, in the same place, in that direction."""
     return target.project(target.centre + source.rays(pixels))
 
 
 def warped(image: Image, source: Camera, target: Camera, out: Image | None = None) -> Image:
-    """Show a picture of `source` as `target` sees it from the same place; where it shows nothing, `out`."""
+    """Warp a picture of `source` to the view of `target` in the same place; `out` where it shows nothing."""
     u, v = (np.arange(0, size + _STEP, _STEP, dtype=float) for size in target.size)
     places = map_pixels(np.stack(np.meshgrid(u, v), axis=-1), target, source)
     places = np.nan_to_num(places, nan=-1e4).astype(np.float32)
-    # Pixel (i, j) of the grid lies at _STEP (i, j); resize() would place it half a step further.
+    # Grid point (i, j) is at pixel _STEP (i, j); resize() would place it half a step further.
     fine = np.array([[1 / _STEP, 0, 0], [0, 1 / _STEP, 0]])
     flags = cv2.INTER_LINEAR | cv2.WARP_INVERSE_MAP
     maps = cv2.warpAffine(places, fine, target.size, flags=flags, borderMode=cv2.BORDER_REPLICATE)
@@ -81,14 +81,14 @@ def warped(image: Image, source: Camera, target: Camera, out: Image | None = Non
 
 
 class MovingVideo(Video):
-    """A clip whose frames have the pose of the camera, and the empty scene where that is known.
+    """A clip whose frames have the pose of the camera and, where known, the empty scene.
 
     Parameters
     ----------
     video : Video
     lens : Camera
     poses : mapping of int to CameraPose
-        By number of the frame, of all that are read.
+        Poses by frame number, for all frames that are read.
     panorama : Panorama, optional
     """
 
@@ -110,7 +110,7 @@ class MovingVideo(Video):
             yield self._placed(frame)
 
     def pick(self, wanted: Collection[int], progress: Callable[[int], None] | None = None) -> Iterator[Frame]:
-        """Yield those of the frames `wanted` whose pose is known, as BGR."""
+        """Yield those of the frames `wanted` whose poses are known, as BGR."""
         yield from map(self._placed, self._video.pick(self.poses.keys() & set(wanted), progress))
 
     def _placed(self, frame: Frame) -> Frame:
@@ -123,7 +123,7 @@ class MovingVideo(Video):
 def panorama_of(
     samples: Sequence[Frame], lens: Camera, poses: Mapping[int, CameraPose], given: Image | None = None
 ) -> Panorama | None:
-    """Picture of the empty scene; None if the camera travels, or too few samples have a pose."""
+    """Make a panorama of the empty scene; None if the camera travels or too few samples have a pose."""
     known = [frame for frame in samples if frame.number in poses]
     if len(known) < _FEWEST or not one_place(list(poses.values())):
         return None
@@ -131,7 +131,7 @@ def panorama_of(
 
 
 def _extended(lens: Camera, poses: Sequence[CameraPose]) -> Camera:
-    """Camera without distortion that sees all that the frames show, as far as one picture can."""
+    """Make a camera without distortion whose picture covers all frames, as far as one picture can."""
     flat = replace(_middle(poses).camera(lens), distortion=np.zeros(5))
     size = np.array(lens.size)
     u, v = (np.linspace(0, length - 1, 9) for length in lens.size)
@@ -144,13 +144,13 @@ def _extended(lens: Camera, poses: Sequence[CameraPose]) -> Camera:
 
 
 def _middle(poses: Sequence[CameraPose]) -> CameraPose:
-    """Find the pose that looks nearest to the median direction of all."""
+    """Find the pose whose direction is nearest to the median of all."""
     ways = np.array([pose.R[2] for pose in poses])
     return poses[int(np.linalg.norm(ways - np.median(ways, axis=0), axis=1).argmin())]
 
 
 def _median(known: Sequence[tuple[Image, Camera]], whole: Camera) -> Image:
-    """Median of pictures at each pixel that any of them shows; elsewhere the nearest pixel of the first."""
+    """Median of pictures at each pixel shown by any of them; elsewhere the nearest pixel of the first."""
     width, height = whole.size
     blank = np.zeros((height, width, 3), np.uint8)
     pictures, shown = [], []
@@ -162,7 +162,7 @@ def _median(known: Sequence[tuple[Image, Camera]], whole: Camera) -> Image:
     for row in range(height):
         values = np.array([picture[row] for picture in pictures], np.int16)
         visible = np.array([mask[row] for mask in shown])
-        values[~visible] = 256  # last
+        values[~visible] = 256  # unknown pixels are sorted last
         values.sort(axis=0)
         count = visible.sum(axis=0)
         low, high = (np.maximum(count + more, 0) // 2 for more in (-1, 0))

@@ -20,26 +20,26 @@ class ClipOptions:
     Attributes
     ----------
     video, output : str
-        The clip and the track to write.
+        The clip, and the track to write.
     camera : str, optional
-        Its camera file; the camera is estimated from the walk if left out, which needs `height` and
+        Its camera file; without one the camera is estimated from the walk, which needs `height` and
         keypoints.
     further : tuple of (str, str)
         Film and camera file of each further camera, in the world of the first.
     offsets : tuple of float, optional
-        When each further film began, seconds after `video`; found from the motion if left out.
+        Start of each further film, seconds after that of `video`; by default estimated from the motion.
     scale_camera : bool
-        Whether a camera of pictures of another size and the same aspect is resized to the clip's.
+        Whether to resize a camera to the clip's size if its pictures have the same aspect but another size.
     camera_path : str, optional
-        File of the poses of a camera that moves; `camera` is then its lens.
+        File with the poses of a moving camera; `camera` is then its lens.
     camera_out : str, optional
         File to write the camera to.
     cameras_out : str, optional
         File to write the camera of each frame to; they differ if the camera turns.
     fov : float, optional
-        Horizontal field of view, degrees, for a camera that is found.
+        Horizontal field of view, degrees, if the camera is estimated.
     model : str, optional
-        The model of the package if left out: that of people, in paper mode the paper's.
+        By default the package's: ``walk``, or in paper mode ``paper``.
     init, background : str
         A file, ``auto``, or for the background ``none``.
     height : float, optional
@@ -52,18 +52,18 @@ class ClipOptions:
     start, stop : int, optional
         Frames to track: start <= frame < stop.
     detector : str
-        Network that finds keypoints for the start and as a cue: ``full``, ``lite``, ``heavy``, ``none``, or
-        ``auto``: ``full`` if its weights are on this machine.  It is not used in paper mode.
+        Network that finds keypoints, for the start and for the likelihood: ``full``, ``lite``, ``heavy``,
+        ``none``, or ``auto``: ``full`` if its weights are on this machine.  It is not used in paper mode.
     keypoints : str, optional
-        File of 2-D keypoints found in the frames, instead of a detector.
+        File of 2-D keypoints in the frames, instead of a detector.
     person : str, optional
-        Who of several people in a keypoint file of another tool; the one who is seen most if left out.
+        Which of several people in a keypoint file of another tool; by default the one who is seen most.
     people : int, optional
-        Track everyone who walks, at most so many, with `track_people`; None for one person.
+        Track everyone who walks, at most this many, with `track_people`; None for one person.
     keypoints_sd : float
-        Their standard deviation at full confidence, pixels.
+        Standard deviation of keypoints at full confidence, pixels.
     stabilize : str
-        ``auto``: find how the camera moves; ``off``: it stands still, or its poses are given.
+        ``auto``: estimate how the camera moves; ``off``: it stands still, or its poses are given.
     overlay, draws, trc, report : str, optional
         Further files to write.
     smooth : bool
@@ -108,5 +108,5 @@ class ClipOptions:
 
     @property
     def network(self) -> str:
-        """Landmark network that `detector` names; ``none`` for no detector."""
+        """Name of the landmark network to use; ``none`` for no detector."""
         return "full" if self.detector == "auto" else self.detector

@@ -1,8 +1,8 @@
-"""Effects of other people in a clip on the images of one: they hide the person, and are foreground.
+"""Account for other people in a clip, who hide the tracked person and are foreground.
 
 Where another person covers the picture, the empty scene given to the tracker is changed so that a body there
-costs as much as none: foreground that is another person's is not missed, and a person behind them is hidden
-rather than absent.  Who is nearer is decided by the feet: on level ground the nearer ones are lower.
+costs as much as none.  Then another person's foreground need not be explained, and a person behind them is
+hidden rather than absent.  The feet show who is nearer: on level ground nearer feet are lower in the picture.
 """
 
 from __future__ import annotations
@@ -18,29 +18,29 @@ from gait.io.video import Frame, Image
 
 Array = NDArray[np.float64]
 
-_CHANGE = 11  # grey levels from the empty scene at which body and no body cost the same, with missed_weight
-_HEIGHTS = 1.28  # heights of a person from shoulder to ankle
-_HEAD = (0.115, 0.085)  # of the head over the shoulders, and its radius, heights
+_CHANGE = 11  # grey levels from the empty scene at which, with missed_weight, body and no body cost the same
+_HEIGHTS = 1.28  # height of a person over the distance from shoulder to ankle
+_HEAD = (0.115, 0.085)  # heights: centre of the head above the shoulders, and its radius
 _TRUNK = ("l_shoulder", "r_shoulder", "r_hip", "l_hip")
 _TRUNK_EDGE = 0.06  # heights by which clothes reach beyond shoulders and hips
 _LIMBS = {
     ("shoulder", "elbow"): 0.075, ("elbow", "wrist"): 0.065, ("hip", "knee"): 0.115, ("knee", "ankle"): 0.09,
     ("ankle", "toe"): 0.07, ("ankle", "heel"): 0.07,
 }  # fmt: skip
-"""Width of a limb with its clothes, heights."""
-_STANCE = 0.25  # seconds either way in which a foot stands: the lowest ankle is on the ground
+"""Width of a limb with clothes, heights."""
+_STANCE = 0.25  # seconds before and after, within which the lowest ankle is on the ground
 _FEET = ("l_ankle", "r_ankle")
-_REACH = 0.3  # heights from shoulder to foot by which head and clothes reach beyond the joints
-_REGION = 0.8  # heights from the middle of a person up to which the tracker compares the picture
+_REACH = 0.3  # by which head and clothes extend beyond the joints, in distances from shoulder to foot
+_REGION = 0.8  # heights; radius around a person's middle in which the tracker uses the picture
 
 
 class Outline:
-    """Where one person covers the picture, by the keypoints in each frame.
+    """Area of the picture that one person covers, from the keypoints of each frame.
 
     Parameters
     ----------
     keypoints : Keypoints
-        Those of frames in which the person was not found lie between those before and after.
+        Interpolated in frames in which the person was not found.
     fps : float
         Frames per second.
     """
@@ -54,12 +54,12 @@ class Outline:
         self._foot = np.lib.stride_tricks.sliding_window_view(padded, 2 * reach + 1).max(axis=1)
 
     def foot(self, number: int) -> float | None:
-        """Row of the foot on the ground in a frame, pixels; None before and after the person's frames."""
+        """Row of the foot on the ground in a frame, pixels; None outside the person's frames."""
         row = number - self._first
         return float(self._foot[row]) if 0 <= row < len(self._foot) else None
 
     def box(self, number: int) -> Array | None:
-        """Smallest and largest (u, v) that the person reaches in a frame, (2, 2); None if not there."""
+        """Bounding box of the person in a frame: smallest and largest (u, v), (2, 2); None if absent."""
         row = number - self._first
         if not 0 <= row < len(self._uv) or not np.isfinite(self._uv[row]).all():
             return None
@@ -67,7 +67,7 @@ class Outline:
         return np.array([low, high]) + _REACH * (high[1] - low[1]) * np.array([[-1.0], [1.0]])
 
     def draw(self, number: int, canvas: Image, corner: Array, value: int) -> None:
-        """Set the pixels that the person covers in a frame, of a window (h, w) of the picture, in place.
+        """Set the pixels covered by the person, in a window (h, w) of the picture, in place.
 
         `corner`: (u, v) of the window's first pixel.
         """
@@ -91,12 +91,12 @@ class Outline:
 
 
 class OtherPeople:
-    """Gives each frame an empty scene in which the other people count for nothing.
+    """Makes for each frame an empty scene that neutralises other people.
 
     Parameters
     ----------
     plate : image or None
-        Empty scene; of a camera that moves each frame has its own.
+        Empty scene; with a moving camera each frame has its own.
     own : Outline
         The person who is tracked.
     others : sequence of Outline
@@ -106,7 +106,7 @@ class OtherPeople:
         self._plate, self._own, self._others = plate, own, others
 
     def plate(self, frame: Frame) -> Image | None:
-        """Empty scene for a frame; None if the tracker's own needs no change."""
+        """Make the empty scene for a frame; None if the tracker's own needs no change."""
         empty = self._plate if frame.plate is None else frame.plate
         if empty is None or empty.shape != frame.image.shape:
             return frame.plate
@@ -128,7 +128,7 @@ class OtherPeople:
         return out
 
     def _near(self, other: Outline, number: int) -> bool:
-        """Whether another person may be in the part of the picture that the tracker compares."""
+        """Whether another person may be in the part of the picture that the tracker uses."""
         mine, theirs = self._own.box(number), other.box(number)
         if theirs is None or mine is None:
             return theirs is not None
@@ -137,7 +137,7 @@ class OtherPeople:
         return bool((theirs[0] < middle + reach).all() and (theirs[1] > middle - reach).all())
 
     def _covered(self, near: Sequence[Outline], number: int, corner: Array, size: Array) -> Image:
-        """Pixels (h, w) of a window that others cover, without those where the person is in front of them."""
+        """Mask (h, w) of a window: pixels covered by others who are not behind the person."""
         foot = self._own.foot(number)
         feet = [other.foot(number) for other in near]
         canvas = np.zeros(size[::-1], np.uint8)
@@ -154,15 +154,15 @@ class OtherPeople:
 
 
 def with_track(keypoints: Keypoints, joints: Mapping[int, Mapping[str, Array]], times: Array) -> Keypoints:
-    """Keypoints with the joints of a track in the frames in which the detector did not find the person.
+    """Fill keypoints with the joints of a track in frames in which the detector did not find the person.
 
     Parameters
     ----------
     keypoints : Keypoints
     joints : mapping of int to mapping of str to ndarray of shape (2,)
-        By frame and name, pixels.
+        Pixels, by frame and name.
     times : ndarray
-        Seconds of all frames of the clip.
+        Times of all frames of the clip, seconds.
     """
     frames = np.arange(min([int(keypoints.frame[0]), *joints]), max([int(keypoints.frame[-1]), *joints]) + 1)
     uv = np.full((len(frames), len(keypoints.names), 2), np.nan)
@@ -177,7 +177,7 @@ def with_track(keypoints: Keypoints, joints: Mapping[int, Mapping[str, Array]], 
 
 
 def _filled(uv: Array) -> Array:
-    """Coordinates (T, J, 2) with those between two frames interpolated; NaN where never found."""
+    """Interpolate missing coordinates (T, J, 2) between frames; NaN for joints that were never found."""
     out = uv.copy()
     rows = np.arange(len(uv))
     for column in out.reshape(len(uv), -1).T:

@@ -1,8 +1,8 @@
 """Track several people in a clip, each with a separate tracker.
 
-The detector identifies people, even when they cross.  Each person is tracked as if alone, with two
-differences: keypoints of the others are left out, and where the others are in the picture it counts neither
-as the person nor as the empty scene (`gait.track.other_people`).
+The detector identifies people, even when they cross.  Each person is tracked as if alone, except that the
+others' keypoints are left out, and that the areas they cover are neutral, counting neither as the person nor
+as the empty scene (`gait.track.other_people`).
 """
 
 from __future__ import annotations
@@ -37,7 +37,7 @@ from gait.track.scene import Scene, require_scene
 Array = NDArray[np.float64]
 
 MOST = 8
-"""People tracked in one clip."""
+"""Most people tracked in one clip."""
 
 Estimates = dict[int, Estimate]
 
@@ -50,7 +50,7 @@ def track_people(options: ClipOptions) -> dict[str, Any]:
     Raises
     ------
     UserError
-        If a file cannot be read, or no one is found who walks.
+        If a file cannot be read, or no one walks.
     """
     assert options.people is not None
     scene = Scene.read(options)
@@ -89,13 +89,13 @@ def track_people(options: ClipOptions) -> dict[str, Any]:
 
 
 def numbered(path: str, id: int) -> str:
-    """Name of a person's file: track.csv becomes track-2.csv."""
+    """Add a person's number to a file name: track.csv becomes track-2.csv."""
     named = Path(path)
     return str(named.with_name(f"{named.stem}-{id}{named.suffix}"))
 
 
 def _starts(options: ClipOptions, scene: Scene) -> dict[int, Start]:
-    """First state of everyone who walks, the one in view longest and tallest first."""
+    """Find the first state of everyone who walks, in the order of `by_size`."""
     starts: dict[int, Start] = {}
     for id in by_size(scene.people):
         if len(starts) == options.people:
@@ -119,7 +119,7 @@ def _starts(options: ClipOptions, scene: Scene) -> dict[int, Start]:
 
 
 def _options_of(options: ClipOptions, scene: Scene, id: int, first: bool) -> ClipOptions:
-    """Give the options of one person's track; that of the `first` writes the camera, which is everyone's."""
+    """Return the options of one person's track; only that of the `first` writes the camera."""
     return replace(
         options,
         output=numbered(options.output, id),
@@ -134,7 +134,7 @@ def _options_of(options: ClipOptions, scene: Scene, id: int, first: bool) -> Cli
 
 
 def _scene_of(scene: Scene, id: int, tracked: list[int], outlines: dict[int, Keypoints]) -> Scene:
-    """Give the scene of one person: others who are tracked are set apart."""
+    """Return the scene of one person, in which the other tracked people are kept apart."""
     apart = {other for other in tracked if other != id}
     return replace(
         scene,
@@ -154,7 +154,7 @@ def _kept(into: Estimates) -> Callable[[Frame, Estimate], None]:
 
 
 def _joints(scene: Scene, found: Estimates) -> dict[int, dict[str, Array]]:
-    """Pixels of the estimated joints in the frames in which the person was followed."""
+    """Project the estimated joints to pixels in the frames in which the person was followed."""
     out = {}
     for number, estimate in found.items():
         uv = scene.camera_at(number).project(estimate.joints)
@@ -164,14 +164,14 @@ def _joints(scene: Scene, found: Estimates) -> dict[int, dict[str, Array]]:
 
 
 def _colours(found: dict[int, Estimates]) -> dict[int, tuple[int, int, int]]:
-    """Colour of each person, BGR."""
+    """Choose a colour for each person, BGR."""
     return {id: PEOPLE[k % len(PEOPLE)] for k, id in enumerate(sorted(found))}
 
 
 def _draw(options: ClipOptions, scene: Scene, found: dict[int, Estimates]) -> PageFilm | None:
-    """Write the film of everyone, each in a colour of their own with the number over the head.
+    """Write the film with everyone, each in their own colour and with their number above the head.
 
-    Return the page's film if there is to be a page.
+    Returns the film for the page, if one is to be written.
     """
     colours = {str(id): colour for id, colour in _colours(found).items()}
     still = Overlay(scene.model, scene.camera)

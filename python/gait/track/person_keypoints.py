@@ -1,7 +1,7 @@
 """Keypoints of everyone in a clip, and which of them belong to the tracked person.
 
-In each frame the keypoints nearest to the estimated joints are used, if they are near enough.  Keypoints of
-someone else, or of a detector that jumped, are left out.
+In each frame the keypoints nearest to the estimated joints are used, if they are near enough.  This excludes
+other people's keypoints, and the detector's jumps.
 """
 
 from __future__ import annotations
@@ -17,9 +17,9 @@ from gait.bindings.frame import FrameKeypoints
 from gait.camera.camera import Camera
 from gait.io.video import Frame
 
-_GATE = 0.25  # person's heights: keypoints whose median distance from the estimate is larger are not theirs
-_NEAR = 0.15  # person's heights up to which this distance supports the estimate
-_AGREE = 0.08  # person's heights up to which knees and ankles agree with the estimate, on average
+_GATE = 0.25  # person's heights; keypoints with a larger median distance are not the person's
+_NEAR = 0.15  # person's heights; up to this distance they support the estimate
+_AGREE = 0.08  # person's heights; mean distance up to which knees and ankles agree with the estimate
 _LEGS = ("l_knee", "r_knee", "l_ankle", "r_ankle")
 
 
@@ -30,18 +30,18 @@ class PersonKeypoints:
     ----------
     camera : Camera
     keypoints : mapping of int to mapping of int to FrameKeypoints
-        By id of the person and number of the frame.
+        Keypoints by person's id and frame number.
     person : int
         Id of the person to track.
     apart : mapping, optional
-        The same as `keypoints` of people with tracks of their own.
+        Like `keypoints`, of people who have their own tracks.
     further : sequence of PersonKeypoints
-        Of the same person in the films of further cameras.
+        The same person in the films of further cameras.
 
     Attributes
     ----------
     ids : list of int
-        Of this person: the one given, and those under which the person came back.
+        Ids of the person: the one given, and those with which they came back.
     """
 
     def __init__(
@@ -56,15 +56,15 @@ class PersonKeypoints:
         self._further = further
 
     def add(self, id: int) -> None:
-        """Take an id for another one of this person."""
+        """Add an id of this person."""
         if id not in self.ids:
             self.ids.append(id)
 
     def restart(self) -> None:
-        """Nothing is remembered from frame to frame."""
+        """Do nothing: nothing is remembered from frame to frame."""
 
     def of_cameras(self, frame: Frame, last: Estimate | None) -> list[FrameKeypoints | None]:
-        """Keypoints of the person in the picture of each camera, as `choose` finds them."""
+        """Choose the person's keypoints in the picture of each camera, as `choose` does."""
         views = zip(self._further, frame.others, strict=False)
         return [
             self.choose(frame, last),
@@ -72,9 +72,9 @@ class PersonKeypoints:
         ]
 
     def choose(self, frame: Frame, last: Estimate | None) -> FrameKeypoints | None:
-        """Keypoints of the person in a frame after the last estimate; None if there are none.
+        """Choose the person's keypoints in a frame, given the last estimate; None if there are none.
 
-        Without an estimate, or with one of a lost person, they are those of the person to track.
+        Without an estimate, or if the person is lost, these are the keypoints with the person's ids.
         """
         if last is None or last.status == TrackStatus.LOST:
             return self._own(frame.number)
@@ -87,7 +87,7 @@ class PersonKeypoints:
     def near(self, frame: Frame, estimate: Estimate) -> bool | None:
         """Whether a person was found near the estimate; None if the person to track was not found at all.
 
-        False also if only a person with a track of their own was found there.  Most cameras decide.
+        Also False if the only one found there has their own track.  The majority of cameras decides.
         """
         views = [one.near(view, estimate) for one, view in self._views(frame)]
         return _most([self._near(frame, estimate), *views])
@@ -99,7 +99,7 @@ class PersonKeypoints:
         return None if self._own(frame.number) is None and not self._taken(frame, estimate) else False
 
     def agree(self, frame: Frame, estimate: Estimate) -> bool | None:
-        """Whether the keypoints in a frame agree with the estimate, legs included; None if there are none."""
+        """Whether the keypoints in a frame, including the legs, agree with the estimate; None if none."""
         return _most(
             [self._agree(frame, estimate), *(one.agree(view, estimate) for one, view in self._views(frame))]
         )
@@ -115,18 +115,18 @@ class PersonKeypoints:
         return not len(legs) or bool(legs.mean() < _AGREE)
 
     def _views(self, frame: Frame) -> Iterator[tuple[PersonKeypoints, Frame]]:
-        """Yield what further cameras saw at the time of a frame."""
+        """Yield the views of further cameras at the time of a frame."""
         for one, view in zip(self._further, frame.others, strict=False):
             if view is not None:
                 yield one, view
 
     def _taken(self, frame: Frame, estimate: Estimate) -> bool:
-        """Whether a person with a track of their own was found near the estimate."""
+        """Whether a person who has their own track was found near the estimate."""
         there = (one[frame.number] for one in self._apart.values() if frame.number in one)
         return any(self._distance(frame, estimate, keypoints) < _NEAR for keypoints in there)
 
     def _own(self, frame: int) -> FrameKeypoints | None:
-        """Keypoints of the person to track in a frame."""
+        """List the keypoints with the person's ids in a frame."""
         for id in self.ids:
             keypoints = self._keypoints.get(id, {}).get(frame)
             if keypoints is not None and np.isfinite(keypoints.uv).any():
@@ -134,19 +134,19 @@ class PersonKeypoints:
         return None
 
     def _found(self, frame: int) -> list[FrameKeypoints]:
-        """Keypoints of everyone in a frame."""
+        """List the keypoints of everyone in a frame."""
         people = (keypoints[frame] for keypoints in self._keypoints.values() if frame in keypoints)
         return [keypoints for keypoints in people if np.isfinite(keypoints.uv).any()]
 
     def _distance(self, frame: Frame, estimate: Estimate, keypoints: FrameKeypoints) -> float:
-        """Median distance from the estimated joints, person's heights; infinite without common joints."""
+        """Median distance from the estimated joints, person's heights; infinite if no joint was found."""
         apart = self._distances(frame, estimate, keypoints, tuple(keypoints.names))
         return float(np.median(apart)) if len(apart) else np.inf
 
     def _distances(
         self, frame: Frame, estimate: Estimate, keypoints: FrameKeypoints, names: tuple[str, ...]
     ) -> NDArray[np.float64]:
-        """Distances (K,) of the named keypoints found from the estimated joints, person's heights."""
+        """Distances (K,) of the named keypoints, where found, from the estimated joints, person's heights."""
         expected = frame.camera(self._camera).project(estimate.joints)
         if np.isnan(expected).any():  # behind the camera
             return np.full(len(names), np.inf)
@@ -158,12 +158,12 @@ class PersonKeypoints:
             return np.empty(0)
         ours, theirs = ours[found], theirs[found]
         extent = [np.hypot(*np.ptp(joints, axis=0)) for joints in (ours, theirs)]
-        # A figure that is too large is as far off as one of the right size.
+        # scaled, so that an estimate that is too large is not nearer than one of the right size
         height = np.ptp(expected[:, 1]) * min(extent[1] / max(extent[0], 1e-9), 1.0)
         return np.asarray(np.hypot(*(ours - theirs).T) / max(height, 1.0))
 
 
 def _most(answers: Sequence[bool | None]) -> bool | None:
-    """Answer as at least half of those do who know; None if none does."""
+    """Answer of at least half of the cameras that have one; None if none has."""
     known = [answer for answer in answers if answer is not None]
     return 2 * sum(known) >= len(known) if known else None

@@ -1,7 +1,7 @@
 """Check whether a person's shape is found at the estimate, for clips without keypoints.
 
-A figure in about the right place may still be a wrong one, when edges of the scene or a median background
-with people in it support it; the shape then shows its feet or head elsewhere.
+An estimate in about the right place may still be wrong if it is supported by edges of the scene, or by a
+median background with people in it; the shape then shows feet or head elsewhere.
 """
 
 from __future__ import annotations
@@ -23,26 +23,26 @@ from gait.io.video import Frame
 
 Array = NDArray[np.float64]
 
-_SELDOM = 0.09  # seconds, at least, from one search to the next
-_PATIENCE = 0.5  # seconds without the person's shape after which they are not seen
-_PELVIS = 0.48  # height of the pelvis in a box, of the box's
-_SD = (0.03, 0.04, 0.04)  # person's heights, of crown, pelvis and lowest point: build, clothes, shadows
+_SELDOM = 0.09  # least seconds between searches
+_PATIENCE = 0.5  # seconds without the person's shape after which the person is not visible
+_PELVIS = 0.48  # height of the pelvis over that of the box
+_SD = (0.03, 0.04, 0.04)  # person's heights: crown, pelvis, lowest point (build, clothes, shadows)
 _LOW = 0.01  # heights by which the soles of a shape are too low
 _MEDIAN_OF = 5  # searches whose median is judged
-_HEAD = 0.07  # heights by which the crown may be off
-_SOLES = (-0.085, 0.035)  # the same of the soles, downwards
+_HEAD = 0.07  # heights; largest difference of the crown
+_SOLES = (-0.085, 0.035)  # heights; range of the difference of the soles, positive downwards
 
 
 class PersonShapes:
-    """Searches frames for a person about the last estimate; what it finds becomes three keypoints.
+    """Searches frames for a person near the last estimate, and turns the shape found into three keypoints.
 
     Parameters
     ----------
     camera : Camera
     stature : callable
-        Of the person in a box, metres.
+        Computes the stature of the person in a box, metres.
     place : callable, optional
-        Gives `stature` the pose of a camera that moves.
+        Sets the pose of a moving camera for `stature`.
     """
 
     def __init__(
@@ -55,18 +55,18 @@ class PersonShapes:
         self.restart()
 
     def restart(self) -> None:
-        """Forget what was seen: the track starts anew."""
+        """Forget all shapes, since the track starts again."""
         self._searched: Frame | None = None
         self._found: Box | None = None
-        self._last: float | None = None  # seconds, when a shape was found
+        self._last: float | None = None  # time at which a shape was last found, seconds
         self._off: deque[Array] = deque(maxlen=_MEDIAN_OF)
 
     def of_cameras(self, frame: Frame, last: Estimate | None) -> list[FrameKeypoints | None]:
-        """Give what `choose` finds in the picture of the first camera."""
+        """Return what `choose` finds in the picture of the first camera."""
         return [self.choose(frame, last)]
 
     def choose(self, frame: Frame, last: Estimate | None) -> FrameKeypoints | None:
-        """Crown, pelvis and lowest point of the shape near the last estimate; None if unseen, or too soon.
+        """Find crown, pelvis and lowest point of the shape near the last estimate; None if none or too soon.
 
         The frames' times may increase or decrease.
         """
@@ -85,24 +85,24 @@ class PersonShapes:
         self._last = frame.time
         head, foot, tall = self._found.head, self._found.foot, self._found.tall
         expected = camera.project(last.joints)
-        lowest = int(np.argmax(expected[:, 1]))  # it hardly moves, as the person stands on it
+        lowest = int(np.argmax(expected[:, 1]))  # of the standing foot, which hardly moves
         sole = np.array([expected[lowest, 0], foot[1] - _LOW * tall])
         uv = np.array([head, _PELVIS * head + (1 - _PELVIS) * foot, sole])
         return FrameKeypoints(("head_top", "pelvis", last.joint_names[lowest]), uv, np.array(_SD) * tall)
 
     def agree(self, frame: Frame, estimate: Estimate) -> bool | None:
-        """Whether shapes object to an estimate (False); a shape does not show the legs, so never True."""
+        """Return False if shapes contradict an estimate, else None: they do not show whether legs agree."""
         if self._searched is frame and self._found is not None:
             self._off.append(_difference(self._box(frame, estimate), self._found))
         missing = self._last is not None and abs(frame.time - self._last) > _PATIENCE
         return False if not self._fits() or missing else None
 
     def near(self, frame: Frame, estimate: Estimate) -> bool:
-        """Whether the person is not seen elsewhere than in the estimate just judged."""
+        """Whether shapes do not contradict the estimate just judged."""
         return self.agree(frame, estimate) is not False
 
     def _box(self, frame: Frame, estimate: Estimate) -> Box | None:
-        """Box of the estimated body; None if part of it is behind the camera."""
+        """Return the box of the estimated body; None if part of it is behind the camera."""
         expected = frame.camera(self._camera).project(estimate.joints)
         if np.isnan(expected).any():
             return None
@@ -112,7 +112,7 @@ class PersonShapes:
         return Box(foot, crown, 1.0) if foot[1] > crown[1] else None
 
     def _fits(self) -> bool:
-        """Whether estimates have lately been where the shape is."""
+        """Whether recent estimates were where the shapes were."""
         if not self._off:
             return True
         x, crown, soles = np.median(self._off, axis=0)
@@ -120,7 +120,7 @@ class PersonShapes:
 
 
 def _difference(box: Box | None, shape: Box) -> Array:
-    """Crown (x, y) and soles (y) of an estimate less those of the shape, the shape's heights."""
+    """Crown (x, y) and soles (y) of an estimate minus those of the shape, in heights of the shape."""
     if box is None:
         return np.full(3, np.inf)
     return np.array([*(box.head - shape.head), box.foot[1] - shape.foot[1]]) / shape.tall

@@ -1,4 +1,4 @@
-"""Decide which estimates are `tracking`: those that keypoints confirm or, without any, a plausible walk."""
+"""Decide which estimates are `tracking`: those with matching keypoints or, without any, a plausible walk."""
 
 from __future__ import annotations
 
@@ -14,9 +14,9 @@ from gait.io.video import Frame
 from gait.track.person_keypoints import PersonKeypoints
 from gait.track.person_shapes import PersonShapes
 
-_DEPARTURE = 0.6  # metres in a second by which the pelvis may leave the path of strides and heading
+_DEPARTURE = 0.6  # metres in one second by which the pelvis may depart from the path of strides and heading
 _BEYOND = 4.0  # standard deviations from which a stature is implausible
-_LEAST_SD = 0.05  # metres, of a stature
+_LEAST_SD = 0.05  # metres; least standard deviation of a stature
 _ELSEWHERE = "the person detected in the image does not match"
 _NO_WALK = "the path does not match the strides, or the stature is unusual"
 _UNSEEN = "the images hardly show the person"
@@ -29,9 +29,9 @@ class Plausibility:
     ----------
     keypoints : PersonKeypoints or PersonShapes
     stature, stature_sd : float
-        Expected of the person, metres.
+        Expected stature of the person, and its standard deviation, metres.
     belt : float
-        Share of each stride that a belt takes back.
+        Share of each stride that a treadmill's belt moves the person back.
     """
 
     def __init__(
@@ -43,12 +43,12 @@ class Plausibility:
         self._path: deque[tuple[float, NDArray[np.float64], NDArray[np.float64]]] = deque()
 
     def restart(self) -> None:
-        """Forget the path: the track starts anew elsewhere."""
+        """Forget the path, since the track starts again elsewhere."""
         self._path.clear()
         self._keypoints.restart()
 
     def judged(self, frame: Frame, estimate: Estimate) -> Estimate:
-        """Change `tracking` to `ambiguous` unless keypoints or, without any, image and walk support it."""
+        """Change `tracking` to `ambiguous` unless keypoints or, without any, images and walk support it."""
         walks = self._walks(frame.time, estimate)
         agree = self._keypoints.agree(frame, estimate)
         supported = not estimate.flags & Flag.UNSUPPORTED
@@ -58,9 +58,9 @@ class Plausibility:
         return replace(estimate, status=TrackStatus.AMBIGUOUS, reason=reason)
 
     def _walks(self, time: float, estimate: Estimate) -> bool:
-        """Whether the stature is plausible and the last second's path follows from strides and heading.
+        """Whether the stature is plausible and the path of the last second agrees with strides and heading.
 
-        `time` in seconds; it may run backwards.
+        `time`: seconds; it may decrease.
         """
         heading, speed = estimate.mean.heading, estimate.speed * self._travel
         velocity = speed * np.array([np.cos(heading), np.sin(heading)])

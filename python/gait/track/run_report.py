@@ -27,7 +27,7 @@ class RunReport:
     ----------
     options, scene
     used : mapping of str to str
-        Start, background, camera and joints that were used, in words.
+        Which start, background, camera and joints were used, in words.
     particles : int
     """
 
@@ -39,7 +39,7 @@ class RunReport:
         self._verdict = verdict_of(self._track, parameters=self._parameters)
 
     def figures(self) -> dict[str, Any]:
-        """Return the verdict in words, a warning or null, what was used, where files went, and remarks."""
+        """Return the verdict in words, a warning or None, the inputs used, the files written, and remarks."""
         return {
             "verdict": self._verdict.sentence(),
             "statuses": self._verdict.statuses(),

@@ -37,50 +37,50 @@ from gait.track.walk_camera import calibrate_film, expected_camera, note_camera
 
 Array = NDArray[np.float64]
 
-_COLOUR = 4.0  # grey levels between the channels of half of a picture in colour, at least
+_COLOUR = 4.0  # grey levels; least difference between channels, in half of a colour picture
 _TRUNK = ("l_shoulder", "r_shoulder", "l_hip", "r_hip")
-_TRUNKS = 200  # compared, evenly spread over the clip
+_TRUNKS = 200  # frames whose trunks are compared, evenly spread over the clip
 _SHAPES = 16  # frames searched for people's shapes, which is slow
-_TRUNK_HEIGHTS = (0.52, 0.81)  # of hips and shoulders, shares of a person's height
-_HALF_WIDTH = 0.2  # of a trunk seen from the side, shares of its height
-_STAYS = 0.45  # share of a clip's frames from which the median may show who is in them
+_TRUNK_HEIGHTS = (0.52, 0.81)  # of hips and shoulders, fractions of a person's height
+_HALF_WIDTH = 0.2  # of a trunk seen from the side, as a fraction of its height
+_STAYS = 0.45  # share of a clip's frames from which the median may show a person
 
 
 @dataclass(frozen=True)
 class Scene:
-    """A clip, its camera and what was found in it before tracking.
+    """A clip, its camera, and what was found in it before tracking.
 
     Attributes
     ----------
     video : Video
         A `MovingVideo` if the camera moves.
     camera : Camera
-        If it moves, that of the reference frame of `motion`, or of the first frame.
+        If the camera moves, that of the reference frame of `motion`, or of the first frame.
     model : Model
     plate : image or None
-        The empty scene; of a camera that moves in `video`.
+        The empty scene; with a moving camera, the frames of `video` have it.
     motion : CameraTurns or None
-        How the camera turns, if that was found in the clip.
+        How the camera turns, if that was estimated from the clip.
     frames : range
         Frames to track.
     people : dict of int to Keypoints
         Keypoints of everyone found, by id.
     person : int
-        The person to track, an id of `people`; -1 without keypoints.
+        Id in `people` of the person to track; -1 without keypoints.
     keypoints : dict of int to dict of int to FrameKeypoints
-        The keypoints with their noise, by id and frame.
+        The keypoints with their standard deviations, by id and frame.
     calibration : Calibration or None
-        How the camera was found, if it was not given.
+        The estimate of the camera, if none was given.
     apart : dict of int to dict of int to FrameKeypoints
-        The same as `keypoints` of people who have tracks of their own.
+        Like `keypoints`, of people who have their own tracks.
     outlines : dict of int to Outline
-        Where people are in the picture, by id, if several are tracked.
+        Areas of the picture that people cover, by id, if several people are tracked.
     further : tuple of Scene
-        The same walk as further cameras filmed it; `video` has their frames, too.
+        The same walk filmed by further cameras; `video` contains their frames.
     began : tuple of str
-        When each of these films began, in words.
+        Time offset of each of these films, in words.
     moved : bool
-        Whether the camera moves although it counts as static.
+        Whether the camera moves although it is treated as static.
     """
 
     video: Video
@@ -101,38 +101,38 @@ class Scene:
 
     @property
     def moving(self) -> MovingVideo | None:
-        """`video`, if the camera moves."""
+        """Return `video` if the camera moves, otherwise None."""
         return self.video if isinstance(self.video, MovingVideo) else None
 
     @property
     def poses(self) -> Mapping[int, CameraPose]:
-        """Pose of the camera in each frame, if it moves."""
+        """Return the camera's pose in each frame if it moves, otherwise nothing."""
         return self.moving.poses if self.moving else {}
 
     @property
     def empty(self) -> Image | None:
-        """The empty scene, of a camera that turns in a wider picture; None if it is not known."""
+        """The empty scene, as a panorama if the camera turns; None if it is unknown."""
         if self.moving is None or self.moving.panorama is None:
             return self.plate
         return self.moving.panorama.image
 
     def camera_at(self, number: int) -> Camera:
-        """Camera of a frame."""
+        """Return the camera of a frame."""
         return self.poses[number].camera(self.camera) if self.poses else self.camera
 
     def without_plate(self) -> Scene:
-        """Return the same without the empty scene."""
+        """Return the same scene without its plate."""
         return replace(self, plate=None, video=self.moving.without_panorama() if self.moving else self.video)
 
     def plate_of(self) -> Callable[[Frame], Image | None]:
-        """Return what gives a frame's empty scene, if not `plate`: others count for nothing in it."""
+        """Return the function that makes a frame's empty scene, which neutralises other tracked people."""
         if not self.outlines:
             return lambda frame: frame.plate
         others = [outline for id, outline in self.outlines.items() if id != self.person]
         return OtherPeople(self.plate, self.outlines[self.person], others).plate
 
     def others(self) -> list[int]:
-        """Ids of those who are never in view together with the person: they may be the same one."""
+        """Return the ids that are never in view together with the person, and so may be the same person."""
         if not self.people:
             return []
         frames = {id: one.visible_frames() for id, one in self.people.items()}
@@ -140,9 +140,9 @@ class Scene:
 
     @staticmethod
     def read(options: ClipOptions, *, starts: bool = True) -> Scene:
-        """Read the files, run the detector if there is one, and find the camera if none is given.
+        """Read the files, run the detector if there is one, and estimate the camera if none is given.
 
-        `starts`: whether the track starts in this film, so that the person has to be in it, feet included.
+        `starts`: whether the track starts in this film, which must then show the person including the feet.
 
         Raises
         ------
@@ -155,11 +155,11 @@ class Scene:
         name = options.model or ("paper" if options.mode == Mode.PAPER else "walk")
         model = Model(name if options.body is None else model_of(options.body, name))
         if starts and camera is not None and options.init != "auto":
-            _read_start(options, video, camera, poses, model)  # refused before the work on the whole clip
+            _read_start(options, video, camera, poses, model)  # to fail early if it is invalid
         _require_detector(options)
         given = None if options.background in ("auto", "none") else background(options.background, video)
         with ThreadPoolExecutor(1) as pool:
-            # The median of the clip is computed on another core while the detector runs.
+            # Another core computes the median of the clip while the detector runs.
             beside = pool.submit(_sample, options, video, poses) if _detects(options) else None
             if beside is None:
                 with progress("background", video.count, options.quiet) as update:
@@ -202,7 +202,7 @@ class Scene:
 def _cameras(
     options: ClipOptions, video: Video, frames: range
 ) -> tuple[Camera | None, dict[int, CameraPose]]:
-    """Read the camera given, and its pose in each frame if it moves."""
+    """Read the given camera, and its pose in each frame if it moves."""
     if options.camera_path:
         assert options.camera is not None
         lens = read_camera(options.camera, video.size, placed=False, scale=options.scale_camera)
@@ -225,7 +225,7 @@ def _sample(
     poses: Mapping[int, CameraPose],
     update: Callable[[int], None] | None = None,
 ) -> tuple[list[Frame], Image | None]:
-    """Frames over the clip, as far as they are needed, and their median if that is the background."""
+    """Sample frames over the clip if they are needed, and compute their median if it is the background."""
     if options.background != "auto" and options.stabilize == "off":
         return [], None
     samples = sample_frames(video, progress=update)
@@ -240,7 +240,7 @@ def _moves(
     samples: list[Frame],
     people: dict[int, Keypoints],
 ) -> bool:
-    """Whether a camera that counts as static moves in the samples of the background, with a note."""
+    """Whether a camera treated as static moves in the samples of the background; if so, print a note."""
     if not samples or options.camera_path:
         return False
     if not moves(camera or expected_camera(video, options.fov), samples, people):
@@ -256,7 +256,7 @@ def _moves(
 def _calibrate(
     options: ClipOptions, video: Video, model: Model, people: dict[int, Keypoints], motion: CameraTurns | None
 ) -> tuple[int, Calibration]:
-    """Find the camera from a walk, and the id of the person who walks."""
+    """Estimate the camera from a walk; also return the id of the person who walks."""
     if not people:
         remedy = (
             "leave out --detector none, or give --camera" if options.detector == "none" else weights.FETCH
@@ -272,7 +272,7 @@ def _calibrate(
 
 
 def first_state(options: ClipOptions, scene: Scene) -> Start:
-    """First state, from the init file or found in the clip."""
+    """Return the first state, from the init file or found in the clip."""
     if options.init != "auto":
         start = _read_start(options, scene.video, scene.camera, scene.poses, scene.model)
         require_scene(options, scene, start.frame)
@@ -288,7 +288,7 @@ def first_state(options: ClipOptions, scene: Scene) -> Start:
 def _read_start(
     options: ClipOptions, video: Video, camera: Camera, poses: Mapping[int, CameraPose], model: Model
 ) -> Start:
-    """Read a start from the init file; it must be in the picture, in a frame to track."""
+    """Read a start from the init file; UserError unless it is in the picture, in a frame to track."""
     start = Start.read(options.init, model, frame=options.start, height=options.height)
     stop = video.count if options.stop is None else min(options.stop, video.count)
     if start.frame >= stop:
@@ -302,7 +302,7 @@ def _read_start(
 
 
 def _in_place(scene: Scene, frame: int) -> bool:
-    """Whether the keypoints of the second from a frame on show a person who walks in place."""
+    """Whether the keypoints of one second, from a frame, show a person who walks in place."""
     if not scene.people:
         return False
     stop = frame + round(1.2 * scene.video.fps)
@@ -314,22 +314,22 @@ def _in_place(scene: Scene, frame: int) -> bool:
 
 
 def stays(scene: Scene) -> bool:
-    """Whether the trunk of the person covers one place of the picture in about half of the clip's frames.
+    """Whether the person's trunk covers the same part of the picture in about half of the clip's frames.
 
-    So does the trunk of a person who walks in place, or towards the camera or away from it.  Without
-    keypoints the trunk is that of people's shapes.
+    This is so if the person walks in place, towards the camera or away from it.  Without keypoints, trunks
+    are those of people's shapes.
     """
     low, high, shown = _trunks(scene) if scene.people else _shape_trunks(scene)
     if not len(low):
         return False
-    reach = _HALF_WIDTH * (high - low)[:, 1:] * (1, 0)  # of a trunk seen from the side
+    reach = _HALF_WIDTH * (high - low)[:, 1:] * (1, 0)  # half of a trunk seen from the side
     middle = (low + high)[:, None] / 2
-    covered = ((middle > low - reach) & (middle < high + reach)).all(axis=2)  # middle of a frame by frame
+    covered = ((middle > low - reach) & (middle < high + reach)).all(axis=2)  # (middles, frames)
     return bool(covered.mean(axis=1).max() * shown > _STAYS)
 
 
 def _trunks(scene: Scene) -> tuple[Array, Array, float]:
-    """Corners (n, 2) of the person's trunk in frames with its keypoints, and the share of such frames."""
+    """Corners (n, 2) of the person's trunk in frames that have keypoints of it, and the share of these."""
     keypoints = _in_reference(scene)
     assert keypoints is not None
     trunk = keypoints.uv[:, [keypoints.names.index(name) for name in _TRUNK]]
@@ -339,7 +339,7 @@ def _trunks(scene: Scene) -> tuple[Array, Array, float]:
 
 
 def _shape_trunks(scene: Scene) -> tuple[Array, Array, float]:
-    """Give the same of frames in which a person's shape is found."""
+    """Return the same for frames in which a person's shape is found."""
     fit, found = StartFit(scene.model, scene.camera), []
     samples = sample_frames(scene.video, _SHAPES)
     for frame in samples:
@@ -355,7 +355,7 @@ def _shape_trunks(scene: Scene) -> tuple[Array, Array, float]:
 
 
 def _note_start(options: ClipOptions, scene: Scene, start: Start) -> None:
-    """Report where the start is, and what makes it uncertain."""
+    """Print where the start is, and what makes it uncertain."""
     at, turn, turn_sd = start.mean, np.degrees(start.mean.heading), np.degrees(start.sd.heading)
     note(
         f"start found at frame {start.frame}: x {at.pelvis[0]:.2f} y {at.pelvis[1]:.2f} m, "
@@ -374,7 +374,7 @@ def _note_start(options: ClipOptions, scene: Scene, start: Start) -> None:
 
 
 def _find_first_state(options: ClipOptions, scene: Scene) -> Start:
-    """First state from the keypoints or, if none of them fit a walk, from the pictures."""
+    """Find the first state from the keypoints or, if these do not fit a walk, from the pictures."""
     camera, model, frames, height = scene.camera, scene.model, scene.frames, options.height
     if scene.people:
         keypoints = scene.people[scene.person]
@@ -398,14 +398,14 @@ def _find_first_state(options: ClipOptions, scene: Scene) -> Start:
         first=frames.start,
         stop=options.stop,
         height=height,
-        shapes=not _detects(options),  # slow, and needless where the detector found no person
+        shapes=not _detects(options),  # slow, and useless if the detector found no person
         shapes_first=finds_shapes(options),  # a median may show people
     )
     return replace(found, source="the shape of a person in the images")
 
 
 def _in_reference(scene: Scene) -> Keypoints | None:
-    """Keypoints of the person as one camera that stands still would see them; None if none can."""
+    """Convert the person's keypoints to those of a camera that stands still; None if that is impossible."""
     keypoints = scene.people.get(scene.person)
     if keypoints is None or not scene.poses:
         return keypoints
@@ -413,7 +413,7 @@ def _in_reference(scene: Scene) -> Keypoints | None:
 
 
 def _check_camera(options: ClipOptions, scene: Scene) -> None:
-    """Report a camera file that contradicts the walk."""
+    """Print a warning if the camera file contradicts the walk."""
     keypoints = _in_reference(scene)
     if options.camera is None or keypoints is None:
         return
@@ -422,7 +422,7 @@ def _check_camera(options: ClipOptions, scene: Scene) -> None:
 
 
 def require_scene(options: ClipOptions, scene: Scene, first: int) -> None:
-    """Refuse a background image of another scene than frame `first`, or of which only one has colours."""
+    """Raise UserError if the background shows another scene than frame `first`, or only one has colours."""
     frame = next(iter(scene.video.frames(first, first + 1)), None)
     plate = frame.plate if frame is not None and scene.moving else scene.plate
     if plate is None or frame is None:
@@ -447,13 +447,13 @@ def require_scene(options: ClipOptions, scene: Scene, first: int) -> None:
 
 
 def one_is_grey(image: Image, plate: Image) -> bool:
-    """Whether one of two BGR pictures is grey throughout and the other in colour."""
+    """Whether one of two BGR pictures is entirely grey and the other in colour."""
     colour = [float(np.median(np.ptp(one[::4, ::4], axis=2))) for one in (image, plate)]
     return min(colour) == 0 and max(colour) > _COLOUR
 
 
 def _detect(options: ClipOptions, video: Video, frames: range) -> tuple[dict[int, Keypoints], int]:
-    """Keypoints of everyone that the detector finds, and the main person; none without a detector."""
+    """Find everyone's keypoints with the detector, and the main person; empty without a detector."""
     if not _detects(options):
         return {}, -1
     from gait.detect import people as detector  # here, as it loads the networks' runtime
@@ -473,7 +473,7 @@ def _detect(options: ClipOptions, video: Video, frames: range) -> tuple[dict[int
 
 
 def _require_feet(keypoints: Keypoints, video: Video) -> None:
-    """Refuse a person whose feet are not in view for a start."""
+    """Raise UserError if the person's feet are not in view for a start."""
     from gait.detect.people import require_feet  # here, as it loads the networks' runtime
 
     require_feet(keypoints, video)
@@ -488,10 +488,7 @@ def _who_starts(
     frames: range,
     poses: Mapping[int, CameraPose],
 ) -> int:
-    """Choose, of several people, one who walks, the one in view longest and tallest if there are more.
-
-    `person`: who it is if no one walks.
-    """
+    """Choose the person to track: the first in `by_size` who walks, or `person` if no one does."""
     from gait.detect.people import by_size  # here, as it loads the networks' runtime
 
     for id in by_size(people) if len(people) > 1 else []:
@@ -510,21 +507,21 @@ def _who_starts(
 
 
 def _require_detector(options: ClipOptions) -> None:
-    """Refuse weights that are damaged, or absent although asked for, before long work."""
+    """Raise UserError, before long work, if weights are damaged, or missing although asked for."""
     if _detects(options):
         weights.load(weights.PERSON)
         weights.load(weights.LANDMARKS[options.network])
 
 
 def _detects(options: ClipOptions) -> bool:
-    """Whether the detector is to run: not with keypoints of a file, and as ``auto`` only with its weights."""
+    """Whether to run the detector: not with a file of keypoints, and with ``auto`` only if it has weights."""
     if options.keypoints or options.detector == "none" or options.mode == Mode.PAPER:
         return False
     return options.detector != "auto" or _has_detector(options)
 
 
 def finds_shapes(options: ClipOptions) -> bool:
-    """Whether people's shapes are searched: for want of keypoints, and of an empty scene that was given."""
+    """Whether to search people's shapes: if there are no keypoints, and no empty scene was given."""
     given = options.keypoints or options.background not in ("auto", "none")
     return not (given or options.mode == Mode.PAPER or _detects(options))
 
@@ -536,7 +533,7 @@ def _has_detector(options: ClipOptions) -> bool:
 
 
 def _read_keypoints(options: ClipOptions, video: Video, model: Model, frames: range) -> Keypoints:
-    """Keypoints of the model's joints from a file; they must be of frames to track."""
+    """Read keypoints of the model's joints from a file; UserError unless some are in frames to track."""
     assert options.keypoints is not None
     clip = Clip(options.person, times=video.times, size=video.size, quiet=options.quiet)
     read, ignored = keypoints_file.read(options.keypoints, model.joint_names, ignore_unknown=True, clip=clip)

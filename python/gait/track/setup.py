@@ -18,7 +18,7 @@ _BESIDE = {"init": "init.json", "camera": "camera.json"}
 
 
 def setup(options: ClipOptions, scene: Scene, start: Start, used: bool) -> dict[str, str]:
-    """Describe what was used, by name, each in words; `used`: whether the background was."""
+    """Describe in words the inputs used, by name; `used`: whether the background was."""
     words = {
         "start": _start(options, start),
         "background": _background(options, scene, used),
@@ -31,7 +31,7 @@ def setup(options: ClipOptions, scene: Scene, start: Start, used: bool) -> dict[
 
 
 def settings(options: ClipOptions, scene: Scene, particles: int) -> dict[str, str]:
-    """Further settings in words, by name."""
+    """Describe further settings in words, by name."""
     return camera_facts(scene.camera) | {
         "picture": f"{scene.video.width} × {scene.video.height} px, {scene.video.fps:.4g} frames per second",
         "stature given": "not given" if options.height is None else f"{options.height:.2f} m",
@@ -46,7 +46,7 @@ def settings(options: ClipOptions, scene: Scene, particles: int) -> dict[str, st
 
 
 def files(options: ClipOptions) -> dict[str, str]:
-    """Name the outputs by what they hold."""
+    """List the outputs by their contents."""
     named = {
         "track": options.output,
         "camera": options.camera_out,
@@ -60,7 +60,7 @@ def files(options: ClipOptions) -> dict[str, str]:
 
 
 def beside(options: ClipOptions) -> list[str]:
-    """Report files beside the film that might have been meant to be used."""
+    """List files beside the film that the user may have meant to use."""
     given = {"init": options.init != "auto", "camera": options.camera is not None}
     found = {option: Path(options.video).with_name(name) for option, name in _BESIDE.items()}
     return [

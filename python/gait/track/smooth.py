@@ -1,13 +1,13 @@
 """Smoothing: sample motions from the posterior of a whole clip, from its last frame back to the first.
 
 Plain backward simulation (Godsill, Doucet and West 2004, JASA 99:156) picks for each frame one of the
-filter's particles, by its weight and by how well the state already drawn for the next frame follows from it.
-A state has 16 numbers that change little between frames, so hardly any particle but the true parent fits: of
-100 motions only 8 differed.  Therefore particles are picked by a wide kernel, and the remaining difference
-is corrected by linear regression (as in Beaumont, Zhang and Balding 2002, Genetics 162:2025): with pairs (x,
-x') of a particle and its drawn successor and J = cov(x, x') cov(x')^-1, the state before s is x + J (s -
-x').  For linear dynamics with normal noise this is exact for any kernel: it samples from the smoother of
-Rauch, Tung and Striebel (1965).
+filter's particles, by its weight and by the probability that it moves to the state already drawn for the next
+frame. A state has 16 numbers that change little between frames, so hardly any particle but the true parent
+fits: of 100 motions only 8 differed.  Therefore particles are picked with a wide kernel, and the remaining
+difference is corrected by linear regression (as in Beaumont, Zhang and Balding 2002, Genetics 162:2025): with
+pairs (x, x') of a particle and its drawn successor, and J = cov(x, x') cov(x')^-1, the state before s is x +
+J (s - x').  For linear dynamics with normal noise this is exact for any kernel: it samples from the smoother
+of Rauch, Tung and Striebel (1965).
 """
 
 from __future__ import annotations
@@ -33,34 +33,34 @@ from gait.track.tracker import Tracker
 Array = NDArray[np.float64]
 Table = NDArray[np.floating[Any]]
 
-PHASE, HEADING = 0, 3  # columns of a table: the numbers of a ``gait_state``
+PHASE, HEADING = 0, 3  # columns of a table, which are the numbers of a ``gait_state``
 
 _PAIRS = 1000  # particles with successors, per frame
-_WIDTH = 1.5  # of the kernel, in standard deviations of the successors
+_WIDTH = 1.5  # of the kernel, standard deviations of the successors
 _GROUP = (0.25, 0.8)  # strides and radians within which motions and particles belong together
 _NEAR = (0.15, 0.5)  # strides and radians around a hypothesis, as in estimate.c
-_SIZE_SD = 0.01  # share to which pictures determine the size, as in estimate.c
+_SIZE_SD = 0.01  # relative sd of the size that pictures determine at best, as in estimate.c
 _SURE = 0.7  # least weight of the dominant hypothesis under `tracking`, DOMINANT_WEIGHT of estimate.h
 
 
 class Spool:
     """Pairs of every frame in a temporary file, so that memory does not grow with the clip.
 
-    A pair is a particle, chosen by its weight, and where the dynamics move it until the next frame.
-    Use it in a ``with`` block; the file goes with it.
+    A pair is a particle, chosen by weight, and its state after the dynamics have moved it to the next frame.
+    Use it in a ``with`` block, at the end of which the file is deleted.
 
     Parameters
     ----------
     seed : int
-        Of the choice.
+        Seed of the choice.
     """
 
     def __init__(self, seed: int) -> None:
         self._random = np.random.default_rng(seed)
         self._size = 0
-        self._last: tuple[NDArray[np.void], Estimate] | None = None  # chosen states and estimate of a frame
-        self._chosen: list[_Record] = []  # of each frame
-        self._moved: list[_Record | None] = []  # what those of the frame before became; None at a start
+        self._last: tuple[NDArray[np.void], Estimate] | None = None  # states and estimate of the last frame
+        self._chosen: list[_Record] = []  # for each frame
+        self._moved: list[_Record | None] = []  # successors of the previous frame's; None at a start
 
     def __enter__(self) -> Spool:
         self._file = tempfile.TemporaryFile(prefix="gait-")
@@ -72,7 +72,7 @@ class Spool:
         self._file.close()
 
     def add(self, tracker: Tracker, estimate: Estimate) -> None:
-        """Keep pairs after a step."""
+        """Store pairs after a step."""
         moved = None
         if self._last is not None:
             before, then = self._last
@@ -88,7 +88,7 @@ class Spool:
         return len(self._chosen)
 
     def read(self, index: int) -> tuple[Table, Table | None]:
-        """Chosen states (N, columns) of a frame, and their successors; None if the next frame is a start."""
+        """Read a frame's states (N, columns) and their successors, which are None if the next is a start."""
         moved = self._moved[index + 1] if index + 1 < len(self) else None
         return self._get(self._chosen[index]), None if moved is None else self._get(moved)
 
@@ -109,7 +109,7 @@ class Spool:
 
 
 class _Record(NamedTuple):
-    """A table in the file of a spool: its offset, its first row, and which columns are stored."""
+    """A table in the file of a spool: its offset, its first row, and the columns stored."""
 
     offset: int
     first: NDArray[np.float32]
@@ -117,7 +117,7 @@ class _Record(NamedTuple):
 
 
 def _table(states: NDArray[np.void]) -> Table:
-    """All numbers of an array (N,) of ``gait_state``, (N, columns)."""
+    """View an array (N,) of ``gait_state`` as a table of its numbers (N, columns)."""
     return states.view(np.float32).reshape(len(states), -1)
 
 
@@ -130,16 +130,16 @@ def draw_motions(
     ----------
     spool : Spool
     count : int
-        How many motions, M.
+        Number of motions, M.
     seed : int
-        Of the random numbers.
+        Seed of the random numbers.
     update : callable, optional
         Called with the number of frames done.
 
     Returns
     -------
     ndarray of shape (M, n, columns)
-        The numbers of the states.
+        Numbers of the states.
     """
     random = np.random.default_rng(seed)
     frames: list[Table] = []
@@ -159,13 +159,13 @@ def draw_motions(
 
 
 def _before(before: Table, after: Table, s: Table, random: np.random.Generator) -> Array:
-    """Draw a predecessor of each state of `s` (M, columns) from pairs of states and successors."""
+    """Draw a predecessor for each state of `s` (M, columns) from pairs of states and successors."""
     varying = (after != after[0]).any(axis=0)
     columns = int(varying.sum())
     close = _near(after, s[0])
     if close.sum() > 4 * columns:
         before, after = before[close], after[close]
-    # all relative to one of the states: phase and heading are angles
+    # relative to one of the states, since phase and heading are angles
     gain, scatter = _regression(_difference(before, s[0])[:, varying], _difference(after, s[0])[:, varying])
     root = np.linalg.cholesky(scatter)
     gap = _difference(s[:, None], after)[..., varying]  # (M, N, columns)
@@ -182,7 +182,7 @@ def _before(before: Table, after: Table, s: Table, random: np.random.Generator) 
 
 
 def _difference(a: Table, b: Table) -> Array:
-    """Return a - b with phase and heading the short way round."""
+    """Return a - b, with phase and heading wrapped to the shorter way."""
     out = np.subtract(a, b, dtype=float)
     out[..., PHASE] = wrap(out[..., PHASE], 1.0)
     out[..., HEADING] = wrap(out[..., HEADING], 2 * np.pi)
@@ -190,12 +190,12 @@ def _difference(a: Table, b: Table) -> Array:
 
 
 def wrap(x: Array, turn: float) -> Array:
-    """Fold into half a turn either way."""
+    """Wrap to [-turn / 2, turn / 2)."""
     return np.asarray((x + turn / 2) % turn - turn / 2)
 
 
 def _regression(b: Array, a: Array) -> tuple[Array, Array]:
-    """Gain J (columns, columns) of b on a, and the covariance of a, made regular."""
+    """Regress b on a: gain J (columns, columns), and the regularised covariance of a."""
     b, a = b - b.mean(axis=0), a - a.mean(axis=0)
     scatter = a.T @ a / len(a)
     scatter[np.diag_indices_from(scatter)] += 1e-6 * np.diag(scatter) + 1e-14
@@ -209,7 +209,7 @@ def _near(states: Table, one: Table) -> NDArray[np.bool_]:
 
 
 def _groups(states: Table) -> list[NDArray[np.int64]]:
-    """Group the indices of similar states, each group around its first."""
+    """Group the indices of similar states, each group around its first member."""
     left = np.arange(len(states))
     groups = []
     while len(left):
@@ -220,7 +220,7 @@ def _groups(states: Table) -> list[NDArray[np.int64]]:
 
 
 def _pick(weights: Table, count: int, random: np.random.Generator) -> NDArray[np.int64]:
-    """Choose `count` particles by weight (systematic), in their order."""
+    """Choose `count` particles by weight (systematic sampling), in order."""
     at = (random.random() + np.arange(count)) / count * weights.sum()
     return np.minimum(np.searchsorted(np.cumsum(weights), at, side="right"), len(weights) - 1)
 
@@ -230,9 +230,9 @@ _NOTHING = np.empty((0, 0, 3), np.uint8)
 
 
 class Smoother:
-    """Keeps the particles of a tracker after each frame; at the end estimates each frame from all of them.
+    """Stores a tracker's particles after each frame, and at the end estimates each frame from all of them.
 
-    Use it in a ``with`` block; it keeps a temporary file.
+    Use it in a ``with`` block; it has a temporary file.
 
     Parameters
     ----------
@@ -243,7 +243,7 @@ class Smoother:
         self._tracker = tracker
         self._spool = Spool(tracker.config.seed)
         self._filtered: list[tuple[Frame, Estimate]] = []
-        self._stature_sd: list[float] = []  # at the start that each frame follows, as a fraction
+        self._stature_sd: list[float] = []  # for each frame, at the start before it, as a fraction
 
     def __enter__(self) -> Smoother:
         self._spool.__enter__()
@@ -253,7 +253,7 @@ class Smoother:
         self._spool.__exit__(None, None, None)
 
     def add(self, frame: Frame, estimate: Estimate) -> None:
-        """Take in a frame, whose picture is not kept, after the tracker's step."""
+        """Add a frame after the tracker's step; its picture is not kept."""
         self._filtered.append((frame._replace(image=_NOTHING, plate=None), estimate))
         self._stature_sd.append(self._tracker.start_stature_sd)
         self._spool.add(self._tracker, estimate)
@@ -285,9 +285,9 @@ class Smoother:
         )
 
     def _widened(self, index: int, now: Estimate) -> Estimate:
-        """Add to a frame's standard deviations what no number of frames reduces, as estimate.c does.
+        """Add to a frame's standard deviations the errors that more frames do not reduce, as estimate.c does.
 
-        That is what the model cannot express and, with one camera, the uncertain size of the person.
+        These are what the model cannot express and, with one camera, the uncertain size of the person.
         """
         tracker, start_sd = self._tracker, self._stature_sd[index]
         share, one_view = tracker.config.joint_sd_model, len(tracker.cameras) == 1
@@ -313,12 +313,12 @@ def smoothed(
     joints: NDArray[np.float32],
     angles: NDArray[np.float32],
 ) -> Estimate:
-    """Estimate a frame from the motions, as the filter does from its particles.
+    """Estimate a frame from the motions as the filter does from its particles.
 
     Parameters
     ----------
     then : Estimate
-        Of the filter; its evidence and, where it was lost, its status stay.
+        The filter's estimate; its evidence and, if it is `lost`, its status are kept.
     model : Model
     states : ndarray of ``gait_state``, shape (M,)
     joints : ndarray of shape (M, P, 3)
@@ -359,7 +359,7 @@ def smoothed(
 
 
 def _pace(then: State, now: State) -> float:
-    """How the speed changes with stature and stride rate."""
+    """Factor of the speed due to changes of stature and stride rate."""
     return now.stature * now.stride_hz / (then.stature * then.stride_hz)
 
 
@@ -373,7 +373,7 @@ def _dominant(states: NDArray[np.void]) -> tuple[NDArray[np.bool_], float]:
 
 
 def _circular(values: Array, use: NDArray[np.bool_], turn: float) -> tuple[float, float]:
-    """Mean over the hypothesis, and standard deviation over all, of values that repeat after `turn`."""
+    """Mean over the hypothesis, and standard deviation over all, of values with period `turn`."""
     unit = np.exp(2j * np.pi * values.astype(float) / turn)
     mean = (np.angle(unit[use].mean()) / (2 * np.pi)) % 1.0
     sd = np.sqrt(max(0.0, -2 * np.log(max(abs(unit.mean()), 1e-6)))) / (2 * np.pi)
@@ -381,7 +381,7 @@ def _circular(values: Array, use: NDArray[np.bool_], turn: float) -> tuple[float
 
 
 def _status(then: TrackStatus, weight: float) -> TrackStatus:
-    """Status of a smoothed frame: lost frames stay lost, ambiguity is judged anew from the motions."""
+    """Decide the status of a smoothed frame: lost frames stay lost; the motions decide about ambiguity."""
     if then == TrackStatus.LOST or (weight < _SURE and then == TrackStatus.INIT):
         return then
     return TrackStatus.TRACKING if weight >= _SURE else TrackStatus.AMBIGUOUS

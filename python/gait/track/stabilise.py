@@ -1,6 +1,6 @@
-"""Estimate how the camera of a clip without poses turns, or how it travels.
+"""Estimate how the camera of a clip without poses turns or travels.
 
-The track is in the scene's frame: the world of the reference frame, for which the camera given holds.
+The track is in the scene's frame: the world of the reference frame, for which the given camera is valid.
 """
 
 from __future__ import annotations
@@ -23,22 +23,23 @@ from gait.track.moving_video import map_pixels
 
 Array = NDArray[np.float64]
 
-_MARGIN = 0.15  # of a person's height, about the keypoints
-_MOSTLY = 0.8  # of the frames in which the camera must be found, or be still
-_TRAVELS = 1.0  # pixels of a picture 640 wide: median residual from which the camera does not only turn
-_AWAY = 0.15  # metres in a second from which it does not, if the floor is seen: more than a hand or an error
+_MARGIN = 0.15  # of a person's height, around the keypoints
+_MOSTLY = 0.8  # share of the frames in which the camera must be found, or be still
+_TRAVELS = 1.0  # pixels in a picture 640 wide; median residual from which the camera does not only turn
+_AWAY = 0.15  # metres in a second from which it travels, if the floor is seen; more than a hand moves
 
 
 @dataclass(frozen=True)
 class CameraTurns:
-    """What is known of the camera's motion in a clip.
+    """How a camera turns during a clip.
 
     Attributes
     ----------
     camera : Camera
-        Of the reference; without a calibration its place is meaningless and its focal length a guess.
+        Camera of the reference; without calibration, its position is meaningless and its focal length a
+        guess.
     views : list of View
-        Of each frame against the reference.
+        View of each frame relative to the reference.
     reference : int
         Number of the reference frame; -1 for the background image.
     """
@@ -48,13 +49,13 @@ class CameraTurns:
     reference: int
 
     def furthest(self) -> float:
-        """Largest distance that a frame is moved, pixels in the middle of the picture."""
+        """Return the largest shift of a frame, pixels in the middle of the picture."""
         middle = np.array([[self.camera.cx, self.camera.cy]])
         places = [map_pixels(middle, self.camera, view.camera(self.camera)) - middle for view in self.views]
         return float(np.nanmax(np.hypot(*np.concatenate(places).T)))
 
     def in_reference(self, captured: Keypoints) -> Keypoints:
-        """Keypoints of the captured frames as the camera of the reference would see them."""
+        """Convert keypoints of the captured frames to the pixels of the reference's camera."""
         uv = captured.uv.copy()
         for row, number in enumerate(captured.frame.tolist()):
             if number < len(self.views):
@@ -62,12 +63,12 @@ class CameraTurns:
         return replace(captured, uv=uv)
 
     def cameras(self, camera: Camera) -> dict[int, Camera]:
-        """Camera of each frame; `camera`, of the reference, may be better known by now."""
+        """Return the camera of each frame; `camera`: a possibly better estimate of the reference's camera."""
         poses = self.poses(camera)
         return {number: replace(camera, R=pose.R, t=pose.t) for number, pose in poses.items()}
 
     def poses(self, camera: Camera) -> dict[int, CameraPose]:
-        """Pose of each frame; `camera`, of the reference, may be better known by now."""
+        """Return the pose of each frame; `camera`: a possibly better estimate of the reference's camera."""
         u, v = (np.linspace(0, size - 1, 7) for size in camera.size)
         before = np.stack(np.meshgrid(u, v), axis=-1).reshape(-1, 2)
         out = {}
@@ -94,22 +95,22 @@ def find_motion(
     ----------
     video : Video
     camera : Camera
-        Of the reference.
+        Camera of the reference.
     samples : sequence of Frame
         Frames spread over the clip, which show whether the camera moves at all.
     people : mapping of int to Keypoints
-        Who is in the clip: they are not taken for the scene.
+        People in the clip, who are not part of the scene.
     plate : image, optional
         The empty scene, which is then the reference.
     first : bool
-        Otherwise the reference is the first frame, or else the one in the middle of the motion.
+        Without `plate`, whether the reference is the first frame or the one in the middle of the motion.
 
     Returns
     -------
     motion : CameraTurns or None
         None if the camera stands still or does not only turn.
     why : str
-        In words, why its motion is not known; empty otherwise.
+        Why its motion could not be estimated, in words, or empty.
     """
     boxes = _boxes(people)
     motion = _begin(camera, samples, boxes, plate)
@@ -140,7 +141,7 @@ def find_turns(
     *,
     first: bool,
 ) -> CameraTurns | None:
-    """Find the turns of a clip's camera, and report them; None if it stands still or does not only turn.
+    """Measure and report how a clip's camera turns; None if it stands still or does not only turn.
 
     Parameters are as for `find_motion`.
     """
@@ -164,13 +165,13 @@ def find_travel(
 ) -> dict[int, CameraPose]:
     """Measure how the camera travels over the floor, and report it.
 
-    Parameters are as for `find_motion`; `camera` is that of the first frame, over the floor z = 0.
+    Parameters are as for `find_motion`; `camera` is that of the first frame, above the floor z = 0.
 
     Returns
     -------
     poses : dict of int to CameraPose
-        By number of the frame; empty if it stands still or only turns, or where too little of the floor is
-        seen, in which case it is not known.
+        Poses by frame number; empty if the camera stands still or only turns, or if too little of the floor
+        is visible to know.
     """
     if not moves(camera, samples, people):
         return {}
@@ -206,14 +207,14 @@ def find_travel(
 def moves(
     camera: Camera, samples: Sequence[Frame], people: Mapping[int, Keypoints], plate: Image | None = None
 ) -> bool:
-    """Whether the camera does not stand still; parameters as for `find_motion`."""
+    """Whether the camera moves at all; parameters are as for `find_motion`."""
     return not _still(_begin(camera, samples, _boxes(people), plate), samples)
 
 
 def _begin(
     camera: Camera, samples: Sequence[Frame], boxes: Mapping[int, list[Box]], plate: Image | None
 ) -> CameraMotion:
-    """Take the empty scene, or the first sample, as the reference."""
+    """Set the empty scene, or the first sample, as the reference."""
     motion = CameraMotion(camera)
     if plate is None:
         motion.start(samples[0].image, boxes.get(samples[0].number, []))
@@ -223,12 +224,12 @@ def _begin(
 
 
 def _still(motion: CameraMotion, samples: Sequence[Frame]) -> bool:
-    """Whether most samples look at the reference."""
+    """Whether most samples have the view of the reference."""
     return bool(np.mean([motion.still(frame.image) for frame in samples]) > _MOSTLY)
 
 
 def _boxes(people: Mapping[int, Keypoints]) -> dict[int, list[Box]]:
-    """Boxes about everyone, by number of the frame."""
+    """Make boxes around everyone, by frame number."""
     boxes: dict[int, list[Box]] = {}
     for keypoints in people.values():
         for frame, uv in zip(keypoints.frame.tolist(), keypoints.uv, strict=True):

@@ -1,9 +1,9 @@
 """Standing people take no strides: phase, stride rate and speed stay undefined until strides begin.
 
-A model of walking alone follows a person who stands, or takes a half step from there, with a phase that moves
-on slowly.  A person stands where for `_STILL` seconds neither ankle moves in the picture against the hips and
-the pelvis goes a small part of the way of the strides.  A stride leads from strike to strike of one foot, so
-from there on there is none before both feet have struck.
+A model with only walking follows a person who stands, or takes half a step, with a phase that advances
+slowly. A person stands if for `_STILL` seconds neither ankle moves relative to the hips in the picture, and
+the pelvis covers only a small part of the strides' path.  As a stride is from strike to strike of one foot,
+there is none after that until both feet have struck.
 """
 
 from __future__ import annotations
@@ -22,24 +22,24 @@ from gait.track.person_keypoints import PersonKeypoints
 
 Sink = Callable[[Frame, Estimate], None]
 
-_STILL = 0.3  # seconds: longer than both feet are on the floor in a step
-_MOVES = 0.01  # person's heights: standard deviation of the place of an ankle that moves
-_WAY = 0.5  # of the way of the strides: who stands goes less
+_STILL = 0.3  # seconds; longer than both feet are on the floor in a step
+_MOVES = 0.01  # person's heights; least standard deviation of the position of a moving ankle
+_WAY = 0.5  # share of the strides' path; a person who stands moves less
 _HIPS, _ANKLES = ("l_hip", "r_hip"), ("l_ankle", "r_ankle")
 
 
 @dataclass
 class _Held:
-    """A frame whose neighbours are still to come."""
+    """A frame that waits for the following ones."""
 
     frame: Frame
     estimate: Estimate
-    ankles: NDArray[np.float64]  #: (2, 2) against the hips, person's heights; NaN where they were not found
+    ankles: NDArray[np.float64]  #: (2, 2) relative to the hips, person's heights; NaN where not found
     stands: bool = False
 
 
 class Standing:
-    """Passes estimates on to sinks in their order, without phase, rate and speed where there are no strides.
+    """Passes estimates on to sinks in order, without phase, rate and speed where there are no strides.
 
     Parameters
     ----------
@@ -55,7 +55,7 @@ class Standing:
         self._half = 0  # half strides of the last phase
 
     def add(self, frame: Frame, estimate: Estimate) -> None:
-        """Take in the next frame, and pass on those that are decided."""
+        """Add the next frame, and pass on those that are decided."""
         self._held.append(_Held(frame, estimate, self._ankles(frame, estimate)))
         while len(self._held) > 1 and frame.time - self._held[1].frame.time >= _STILL:
             self._pass_on(self._held.popleft())
@@ -64,7 +64,7 @@ class Standing:
                 held.stands = True
 
     def finish(self) -> None:
-        """Pass on what is held."""
+        """Pass on the frames that are still waiting."""
         while self._held:
             self._pass_on(self._held.popleft())
 
@@ -78,9 +78,9 @@ class Standing:
         return np.asarray((ankles - hips.mean(axis=0)) / height)
 
     def _still(self) -> bool:
-        """Whether the person stands in all frames that are held."""
+        """Whether the person stands in all waiting frames."""
         sd = np.std([held.ankles for held in self._held], axis=0)
-        if not np.hypot(*sd.T).max() < _MOVES:  # not if any is NaN
+        if not np.hypot(*sd.T).max() < _MOVES:  # also false if any is NaN
             return False
         heading = [held.estimate.mean.heading for held in self._held]
         speed = [held.estimate.speed for held in self._held]

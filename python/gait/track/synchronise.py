@@ -1,9 +1,9 @@
 """Time offset between two films of a walk, from the joints detected in both.
 
-The two directions in which two cameras see one joint at one time meet: the second lies in the plane through
-both cameras and the first (the epipolar constraint).  With the films shifted against each other, joints that
-move across these planes miss them.  What a detector and the camera files miss lasts, so the mismatch counts
-how far directions are from the planes, and once more how far they are from that joint's usual distance.
+The rays along which two cameras see a joint at the same time intersect: the second lies in the plane through
+both cameras and the first ray (the epipolar constraint).  If the films are shifted in time, joints that move
+across these planes are off them.  Errors of the detector and the camera files last, so the mismatch contains
+both the distances of rays from the planes and the changes of these distances from each joint's average.
 """
 
 from __future__ import annotations
@@ -18,29 +18,29 @@ from gait.io.keypoints_file import Keypoints
 
 Array = NDArray[np.float64]
 
-_OVERLAP = 1.0  # seconds that both must show, at least
-_SHARE = 0.3  # of the shorter film that both must show, at least
-_MOST = 300  # frames compared
-_GAP = 0.15  # seconds between frames from which joints between them are not known
-_LEAST_SINE = 0.05  # of the angle between a direction and that to the other camera
-_ELSEWHERE = 0.2  # seconds from the best offset to another one
-_CLEARLY = 1.25  # times the mismatch of the best offset that any other must have
-_FINE = 10  # parts of a frame in which an offset is found
-_TOGETHER = 1.1  # times the best mismatch up to which films begin together if that is a frame away
+_OVERLAP = 1.0  # least seconds that both films must show
+_SHARE = 0.3  # least share of the shorter film that both must show
+_MOST = 300  # most frames compared
+_GAP = 0.15  # seconds; joints are not interpolated across longer gaps
+_LEAST_SINE = 0.05  # of the angle between a ray and the direction to the other camera
+_ELSEWHERE = 0.2  # seconds; offsets further from the best count as others
+_CLEARLY = 1.25  # least ratio of any other offset's mismatch to the best one's
+_FINE = 10  # steps per frame of the final search
+_TOGETHER = 1.1  # films began together if that has up to this times the best mismatch, a frame away
 
 
 @dataclass(frozen=True)
 class Offset:
-    """When a film began.
+    """Time offset of a film.
 
     Attributes
     ----------
     seconds : float
-        Of its first frame, after that of the other film.
+        Time of its first frame after that of the other film.
     mismatch : float
-        Of directions to each other's planes, degrees.
+        Angle between rays and epipolar planes, degrees.
     certain : bool
-        Whether any other offset fits clearly worse.
+        Whether all other offsets fit clearly worse.
     """
 
     seconds: float
@@ -56,16 +56,16 @@ def find_offset(
     Parameters
     ----------
     first, other : Keypoints
-        Of the same person in two films, pixels.
+        Keypoints of the same person in two films, pixels.
     first_camera, camera : Camera
-        In one world.
+        Their cameras, in the same world.
     given : float, optional
         The offset, seconds, if only its mismatch is wanted.
 
     Returns
     -------
     offset : Offset or None
-        None if no offset lets both films show the person for long.
+        None if with no offset both films show the person for long enough.
     """
     names = [name for name in first.names if name in other.names]
     planes, times = _planes(first, names, first_camera, camera.centre - first_camera.centre)
@@ -96,7 +96,7 @@ def find_offset(
 
 
 def _planes(keypoints: Keypoints, names: list[str], camera: Camera, baseline: Array) -> tuple[Array, Array]:
-    """Give unit normals (T, J, 3) of the planes through both cameras and each joint, and their times (T,)."""
+    """Return unit normals (T, J, 3) of the planes through both cameras and each joint, and times (T,)."""
     every = slice(None, None, len(keypoints.time) // _MOST + 1)
     rays = _rays(keypoints, names, camera)[every]
     normals = np.cross(baseline / np.linalg.norm(baseline), rays)
@@ -107,7 +107,7 @@ def _planes(keypoints: Keypoints, names: list[str], camera: Camera, baseline: Ar
 
 
 def _rays(keypoints: Keypoints, names: list[str], camera: Camera) -> Array:
-    """Give unit directions (T, J, 3) of joints, world; NaN where they were not found."""
+    """Return unit directions (T, J, 3) of joints in the world; NaN where they were not found."""
     columns = [keypoints.names.index(name) for name in names]
     visible = keypoints.visible[:, columns]
     rays = camera.rays(np.where(visible[..., None], keypoints.uv[:, columns], 0.0))
@@ -116,7 +116,7 @@ def _rays(keypoints: Keypoints, names: list[str], camera: Camera) -> Array:
 
 
 def _mismatch(planes: Array, times: Array, rays: Array, ray_times: Array, offset: float) -> float:
-    """Mismatch of an offset, degrees; NaN if too few directions can be compared."""
+    """Compute the mismatch of an offset, degrees; NaN if too few rays can be compared."""
     wanted = times - offset
     after = np.searchsorted(ray_times, wanted).clip(1, len(ray_times) - 1)
     begin, end = ray_times[after - 1], ray_times[after]

@@ -21,29 +21,29 @@ class TaskSource(Protocol):
 
     @property
     def struct(self) -> abi.Tasks:
-        """The structure given to the library; whatever it points to lives as long as this object."""
+        """The structure for the library; whatever it points to lives as long as this object."""
 
     def reraise(self) -> None:
-        """Raise what went wrong in a callback since the last call."""
+        """Raise the exception of a callback since the last call, if any."""
 
 
 class PythonTasks:
     """Run the library's tasks through a Python callable.
 
-    An exception in the callable is kept, the tasks it left undone are done in the calling thread (so the
-    tracker stays sound), and `reraise` raises it after the C call.  Tasks that still run in other threads
+    If the callable raises an exception, the calling thread does the remaining tasks, so that the tracker
+    stays valid, and `reraise` raises the exception after the C call.  Tasks that still run in other threads
     when the callable returns are waited for; a task that is called later raises RuntimeError in its thread.
     """
 
     def __init__(self, runner: Runner) -> None:
         self._runner = runner
         self._failure: BaseException | None = None
-        library()  # describes the structures
+        library()  # loading it defines the structures
         self._callback = abi.RunFn(self._run)
         self.struct = abi.Tasks(self._callback, None)
 
     def reraise(self) -> None:
-        """Raise what the callable raised, once."""
+        """Raise the callable's exception, once."""
         failure, self._failure = self._failure, None
         if failure is not None:
             raise failure
@@ -55,9 +55,9 @@ class PythonTasks:
         def task(i: int) -> None:
             nonlocal running
             with changed:
-                if ended:  # the frame that the task belongs to is gone
+                if ended:  # the frame of this task no longer exists
                     raise RuntimeError("a task was called after its runner returned")
-                left.remove(i)  # a second call for the same i is an error of the runner, and raises here
+                left.remove(i)  # raises if the runner calls the same i twice
                 running += 1
             try:
                 function(context, i)
@@ -69,7 +69,7 @@ class PythonTasks:
         failure: BaseException | None = None
         try:
             self._runner(task, count)
-        except BaseException as exc:  # nothing may pass through the C frames
+        except BaseException as exc:  # exceptions must not pass through C frames
             failure = exc
         with changed:
             ended = True
@@ -83,27 +83,27 @@ class PythonTasks:
 
 
 class PoolTasks:
-    """Threads of the library (``gait_pool``); they end with this object or with the program."""
+    """Threads of the library (``gait_pool``), which end with this object or with the program."""
 
     def __init__(self, count: int) -> None:
         lib = library()
         handle, self._memory = make("pool", count)
         self.struct: abi.Tasks = lib.gait_pool_tasks(handle)
-        # The memory must outlive the threads: the finaliser holds it as well.
+        # The memory must outlive the threads, so the finaliser refers to it too.
         weakref.finalize(self, _stop, lib, handle, self._memory, os.getpid())
 
     def reraise(self) -> None:
-        """Nothing of Python runs in these threads."""
+        """Do nothing: no Python code runs in these threads."""
 
 
 def _stop(lib: ctypes.CDLL, handle: ctypes.c_void_p, memory: object, owner: int) -> None:
-    if os.getpid() == owner:  # a child process has no threads to wait for
+    if os.getpid() == owner:  # a child process does not have the threads
         lib.gait_pool_stop(handle)
-    del memory  # held until here
+    del memory  # not freed before this
 
 
 def threads(count: int) -> PoolTasks | None:
-    """Tasks on `count` threads; None for 1, where the calling thread does the work."""
+    """Make tasks for `count` threads; None for 1, where the calling thread does the work."""
     if count < 1:
         raise ValueError("threads: at least 1")
     return PoolTasks(count) if count > 1 else None

@@ -32,7 +32,7 @@ class Tracker:
     model : Model
     cameras : Camera or sequence of Camera
     config : TrackerConfig, optional
-        The library's defaults if left out.
+        By default the library's defaults.
     background : image, or sequence of image or None, optional
         Empty scene seen by each camera; copied.
     tasks : int, callable or TaskSource
@@ -41,7 +41,7 @@ class Tracker:
     Attributes
     ----------
     memory_bytes, isa : int, str
-        All the memory the filter uses; the instruction set in use: scalar, base, avx2 or avx512.
+        Size of the memory that the filter uses; the instruction set in use: scalar, base, avx2 or avx512.
     step_seconds : float
         Time that the last `step` spent in the C library.
     start_stature_sd : float
@@ -80,12 +80,12 @@ class Tracker:
             self.set_background(plate, i)
 
     def like(self, config: TrackerConfig) -> Tracker:
-        """Tracker of the same model, cameras, background and threads with another configuration."""
+        """Make a tracker with the same model, cameras, background and threads but another configuration."""
         plates = [self._plates.get(i) for i in range(len(self.cameras))]
         return Tracker(self.model, self.cameras, config, background=plates, tasks=self._tasks or 1)
 
     def set_background(self, plate: Image | None, camera: int = 0) -> None:
-        """Copy the empty scene of one camera as captured, (h, w) or (h, w, 3) BGR; None removes it."""
+        """Set the empty scene of one camera as captured, (h, w) or (h, w, 3) BGR; copied; None removes it."""
         view = None
         if plate is not None:
             plate = np.array(plate, order="C")
@@ -97,12 +97,12 @@ class Tracker:
             self._plates[camera] = plate  # the library borrows the pixels
 
     def start(self, mean: State, sd: State, utime: int = 0) -> None:
-        """Draw the particles from independent normals.
+        """Draw the particles from independent normal distributions.
 
         Parameters
         ----------
         mean, sd : State
-            A phase or heading whose sd is a half turn or more is uniform.
+            A phase or heading whose sd is half a turn or more is uniform.
         utime : int
             Time of the first frame, microseconds.
         """
@@ -117,8 +117,8 @@ class Tracker:
         Parameters
         ----------
         hypotheses : sequence of Hypothesis
-            The most probable first; ignored are those elsewhere in the image, or that differ from the first
-            in walking in place.
+            The most probable first.  Those elsewhere in the image, or that differ from the first in whether
+            the person walks in place, are ignored.
         utime : int
             Time of the first frame, microseconds.
         """
@@ -136,7 +136,7 @@ class Tracker:
         poses: CameraPose | Sequence[CameraPose | None] | None = None,
         backgrounds: Image | Sequence[Image | None] | None = None,
     ) -> Estimate:
-        """Process one frame and estimate.
+        """Process one frame and return the estimate.
 
         Parameters
         ----------
@@ -145,12 +145,12 @@ class Tracker:
         utime : int
             Capture time, microseconds; must increase.
         keypoints : FrameKeypoints, or sequence of FrameKeypoints or None, optional
-            Found in each camera's image; used if ``config.terms`` has ``Term.KEYPOINTS``.
+            Keypoints found in each camera's image; used if ``config.terms`` has ``Term.KEYPOINTS``.
         poses : CameraPose, or sequence of CameraPose or None, optional
             Pose of each camera in this frame, if it moves; otherwise the pose of its `Camera`.
         backgrounds : image, or sequence of image or None, optional
-            The empty scene seen by each camera in this frame.  That of `set_background` is only used at
-            the original pose.
+            The empty scene seen by each camera in this frame.  The one from `set_background` is only used
+            with the camera's original pose.
         """
         images, plates = (
             [None if image is None else np.ascontiguousarray(image) for image in per_camera(pictures)]
@@ -178,7 +178,7 @@ class Tracker:
         return Estimate.from_c(out, self.model)
 
     def lagged(self, back: int | None = None) -> Estimate | None:
-        """Estimate of the frame `back` steps ago given every frame since, by tracing ancestors.
+        """Estimate the frame `back` steps ago from all frames up to now, by tracing ancestors.
 
         Parameters
         ----------
@@ -188,7 +188,7 @@ class Tracker:
         Returns
         -------
         Estimate or None
-            None if there were not so many steps since the start.
+            None if there have been fewer steps since the start.
         """
         out = abi.EstimateC()
         try:
@@ -200,14 +200,14 @@ class Tracker:
         return Estimate.from_c(out, self.model)
 
     def particles(self) -> tuple[NDArray[np.void], NDArray[np.float32]]:
-        """All particles, a structured array (N,) with the fields of ``gait_state``, and weights (N,)."""
+        """Return all particles, an array (N,) with the fields of ``gait_state``, and their weights (N,)."""
         count = self._call("particles", None, None, 0)
         states, weights = (abi.StateC * count)(), np.zeros(count, np.float32)
         self._call("particles", states, weights, count)
         return np.ctypeslib.as_array(states), weights
 
     def predict(self, states: NDArray[np.void], seconds: float) -> NDArray[np.void]:
-        """Predict states over an interval without an image: one draw of the dynamics for each.
+        """Predict states over an interval without images: one draw of the dynamics for each.
 
         Parameters
         ----------
@@ -218,8 +218,8 @@ class Tracker:
 
         Notes
         -----
-        The dynamics are those at present: the stature varies more soon after a start.  The same call between
-        the same steps gives the same.
+        The dynamics are the present ones: soon after a start the stature varies more.  The same call between
+        the same steps gives the same result.
         """
         out = states.copy()
         self._call("predict", out, len(out), seconds)
@@ -230,9 +230,9 @@ class Tracker:
         return int(library().gait_tracker_digest(self._handle))
 
     def save(self) -> bytes:
-        """Copy of the whole state, for `restore` into a tracker of the same model and configuration.
+        """Copy the whole state, for `restore` in a tracker with the same model and configuration.
 
-        It does not contain empty scenes: give the other tracker its own (`set_background`).
+        Empty scenes are not included; set those of the other tracker with `set_background`.
         """
         size = ctypes.c_size_t()
         self._call("save", None, 0, size)
@@ -247,7 +247,7 @@ class Tracker:
         self._call("restore", memory, len(snapshot))
 
     def _call(self, name: str, *arguments: object) -> int:
-        """Call a function of the tracker; raise what happened in a callback, else what it refuses."""
+        """Call a function of the tracker; raise the exception of a callback, or else the function's error."""
         try:
             return call(f"gait_tracker_{name}", self._handle, *arguments)
         finally:

@@ -1,4 +1,4 @@
-"""The camera of a film, estimated from the walk in it, for `gait camera`, `gait track` and `gait lift`."""
+"""Estimate the camera of a film from the walk in it, for `gait camera`, `gait track` and `gait lift`."""
 
 from __future__ import annotations
 
@@ -15,18 +15,18 @@ from gait.progress import note, progress
 from gait.track.from_walk import Calibration, calibrate
 from gait.track.walk_start import GIVEN_FOV_SD, usual_camera
 
-_TAG_SD = 0.1  # of the focal length's logarithm; stabilised films are cropped by about as much
+_TAG_SD = 0.1  # sd of the log focal length; stabilised films are cropped by about as much
 
 
 def find_people(video: Video, quiet: bool, first: int = 0, stop: int | None = None) -> dict[int, Keypoints]:
-    """Find the keypoints of people in a film by the detector, as a file of them has them.
+    """Find the keypoints of people in a film with the detector, rounded as in a file of keypoints.
 
-    The person in view longest and tallest is the first.
+    The order is that of `by_size`.
 
     Raises
     ------
     UserError
-        If the detector's weights are absent, or it finds no person.
+        If the detector's weights are missing, or it finds no person.
     """
     from gait.detect.people import by_size, detect, require_length, require_person  # loads the runtime
 
@@ -40,23 +40,23 @@ def find_people(video: Video, quiet: bool, first: int = 0, stop: int | None = No
 
 
 def expected_fov(video: Video, fov: float | None, quiet: bool) -> tuple[float | None, float]:
-    """Field of view that is known before the walk is looked at.
+    """Return the field of view known from the user or the file.
 
     Parameters
     ----------
     video : Video
         Its file may state a focal length.
     fov : float or None
-        The user's, degrees, which wins.
+        The user's value, degrees, which takes precedence.
     quiet : bool
-        Do not report what the file states.
+        Do not print what the file states.
 
     Returns
     -------
     fov : float or None
         Horizontal field of view, degrees.
     sd : float
-        Of the logarithm of the focal length.
+        Standard deviation of the log focal length.
     """
     tag = None if fov is not None else lens_tag(video.path)
     if tag is None:
@@ -75,7 +75,7 @@ def expected_fov(video: Video, fov: float | None, quiet: bool) -> tuple[float | 
 
 
 def expected_camera(video: Video, fov: float | None) -> Camera:
-    """Camera that is expected before the walk is looked at; parameters as for `expected_fov`."""
+    """Return the camera expected without using the walk; parameters are as for `expected_fov`."""
     return usual_camera(video.size, expected_fov(video, fov, quiet=True)[0])
 
 
@@ -87,28 +87,28 @@ def calibrate_film(
     fov: float | None,
     quiet: bool,
 ) -> tuple[int, Calibration]:
-    """Find the camera of a film from the first of the people whose walk gives it.
+    """Estimate the camera of a film from the first person whose walk determines it.
 
     Parameters
     ----------
     video : Video
     people : mapping of int to Keypoints
-        By id, in the order in which they are tried.
+        Keypoints by id, in the order in which people are tried.
     model, height
-        As for `calibrate`; `height` is of the person who walks.
+        As for `calibrate`; `height` is that of the person who walks.
     fov, quiet
         As for `expected_fov`.
 
     Returns
     -------
     id : int
-        Who walks.
+        The person who walks.
     found : Calibration
 
     Raises
     ------
     UserError
-        As `calibrate`, or if the feet are not in view, of the first person; it names the file.
+        As in `calibrate`, or if the feet are not in view, for the first person; it names the file.
     """
     from gait.detect.people import require_feet  # as above
 
@@ -126,6 +126,6 @@ def calibrate_film(
 
 
 def note_camera(found: Calibration, quiet: bool) -> None:
-    """Report the camera that was found."""
+    """Print the camera that was estimated."""
     for line in found.describe():
         note(line, quiet)

@@ -1,4 +1,4 @@
-"""The most probable camera and walk: Gauss-Newton steps, and the part of the clip that fits the walk."""
+"""Find the most probable camera and walk by Gauss-Newton steps, and the part of the clip that is a walk."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from gait.track.walk_start import WalkStart
 Array = NDArray[np.float64]
 
 _GROWTH = 1.0  # seconds by which the fitted part grows at either end
-_FITS = 9.0  # squared robust error per coordinate up to which more of the clip fits the walk
+_FITS = 9.0  # squared robust error per coordinate up to which further frames fit the walk
 
 
 class WalkFit:
@@ -20,7 +20,7 @@ class WalkFit:
     Attributes
     ----------
     model : WalkModel
-        Keypoints of that part.
+        Its keypoints are those of that part.
     q : ndarray of shape (P,)
         The most probable parameters so far.
     """
@@ -41,7 +41,7 @@ class WalkFit:
 
     @property
     def rate(self) -> float:
-        """Strides per second, on average."""
+        """Average strides per second."""
         return float(self.model.rates(self.q).mean())
 
     @property
@@ -51,11 +51,11 @@ class WalkFit:
 
     @property
     def cost_per_frame(self) -> float:
-        """Cost by which fits of different windows of the clip are compared."""
+        """Cost for comparing fits of different windows of the clip."""
         return self.model.cost(self.q) / len(self.model.time)
 
     def refine(self, most: int) -> None:
-        """Take steps of Levenberg and Marquardt."""
+        """Take at most `most` Levenberg-Marquardt steps."""
         cost, damping = self.model.cost(self.q), 1e-3
         for _ in range(most):
             matrix, gradient = self.model.normal(self.q)
@@ -72,7 +72,7 @@ class WalkFit:
                 break
 
     def grow(self) -> WalkFit:
-        """Extend the fit by a second at a time at either end, as long as the new frames fit the walk."""
+        """Extend the fit at either end, by one second at a time, as long as the new frames fit the walk."""
         low, high = self.model.time[0], self.model.time[-1]
         first, last = self.model.clip
         open_ = {-1, 1}
@@ -103,13 +103,13 @@ class WalkFit:
         return self
 
     def _swap_sides(self) -> None:
-        """Swap left and right in frames that the detector took for the other way round."""
+        """Swap left and right in frames in which the detector confused them."""
         if (model := self.model.swapped(self.q)) is not None:
             self.model = model
             self.refine(4)
 
     def _extend(self, low: float, high: float, q: Array, time: Array) -> None:
-        """Use another interval; beyond the old knots the walk goes straight on."""
+        """Use another interval; beyond the old knots the walk continues straight."""
         self.model = self.model.over(low, high)
         knots = self.model.knots(q)
         slopes = (knots[-1] - knots[0]) / (time[-1] - time[0])
@@ -118,6 +118,6 @@ class WalkFit:
         self.q = np.concatenate([q[: self.model.fixed], (inside + beyond[:, None] * slopes).ravel()])
 
     def covariance(self) -> Array:
-        """Covariance of the parameters, as the curvature and the fit have it."""
+        """Covariance of the parameters, from the curvature, scaled by the error of the fit."""
         matrix, _ = self.model.normal(self.q)
         return np.asarray(np.linalg.inv(matrix) * max(self.chi2_per_observation, 1.0))

@@ -1,9 +1,9 @@
 """Measurement model of a walk: expected joints in the image, and the probability of camera and walk.
 
-`WalkingBody` has the joints of the cyclic model, linear in its scores and proportions; `WalkModel` places it
-on a path, projects it and compares it with keypoints.  The parameters are one vector: camera (log focal
-length, tilt, roll, log height), stature, scores, proportions and leans, offsets of the detector's joints, and
-place, heading and phase at knots.
+`WalkingBody` computes the joints of the cyclic model, linearised in scores and proportions; `WalkModel`
+places it on a path, projects it and compares it with keypoints.  The parameters are one vector: camera (log
+focal length, tilt, roll, log height), stature, scores, proportions and leans, offsets of the detector's
+joints, and position, heading and phase at knots.
 """
 
 from __future__ import annotations
@@ -23,35 +23,35 @@ from gait.track.walk_start import STATURE_SD, CameraPrior, make_camera, swap_sid
 Array = NDArray[np.float64]
 
 _KNOTS = 0.5  # seconds between knots
-_PIXEL = 0.5  # pixels, noise of any keypoint
-#: Errors that repeat with every stride, of the model's curves and of the detector at a phase: shares of the
-#: person's height, measured on rendered walks, and seconds in which they count as one observation.
+_PIXEL = 0.5  # pixels; noise of any keypoint
+#: Errors that repeat with every stride, of the model's curves and of the detector at each phase: fractions of
+#: the person's height, measured on rendered walks, and seconds for which they count as one observation.
 _REPEATING = {
     "shoulder": 0.006, "elbow": 0.008, "wrist": 0.015, "hip": 0.008, "knee": 0.010, "ankle": 0.007,
     "heel": 0.010,
 }  # fmt: skip
 _REPEATING_ELSEWHERE = 0.007
 _REPEATING_TIME = 0.25
-_LEAST_OFFSET_SD = 0.003  # of the stature, constant difference between any detector's joint and the model's
-_LEAN_SD, _SIDE_LEAN_SD, _TRUNK_SD = 0.021, 0.013, 0.040  # radians, as recorded people and walks differ
-_SLIDE_SD = 0.05  # metres per second, of feet on the floor, along the heading
-_SIDEWAYS_SD = 0.05  # metres per second, of the walk across the heading
-_STILL_SD = 0.03  # metres per second on a treadmill
+_LEAST_OFFSET_SD = 0.003  # of the stature; least constant offset of a detector's joint from the model's
+_LEAN_SD, _SIDE_LEAN_SD, _TRUNK_SD = 0.021, 0.013, 0.040  # radians, between recorded people and walks
+_SLIDE_SD = 0.05  # metres per second; sliding of feet on the floor, along the heading
+_SIDEWAYS_SD = 0.05  # metres per second; speed across the heading
+_STILL_SD = 0.03  # metres per second; speed on a treadmill
 _BEND_SD, _TURN_SD, _HURRY_SD = 0.05, 0.12, 0.02  # changes of slope at a knot: metres, radians, strides
-_CURVE_SD = 0.3  # radians per second, of the turn on average
+_CURVE_SD = 0.3  # radians per second; average turn rate
 _SCORES = 5  # components of the model that are fitted
-_SWAPPED = 16.0  # twice the logarithm of the odds from which the sides of a frame are swapped
-_DEGREES = 4.0  # of freedom of Student's t
+_SWAPPED = 16.0  # twice the log odds from which left and right of a frame are swapped
+_DEGREES = 4.0  # degrees of freedom of Student's t
 
 
 def _heavy_tailed(residual: Array) -> Array:
-    """Residuals whose squares are Student-t costs: unusual cameras are not pulled to the usual one."""
+    """Convert residuals so that their squares are Student-t costs, which pull unusual cameras less."""
     root = np.sqrt(_DEGREES * np.log1p(residual**2 / _DEGREES))
     return np.asarray(np.sign(residual) * root)
 
 
 class WalkingBody:
-    """Joints over the stride, statures; linear in scores, proportions and leans; pelvis at (0, 0)."""
+    """Joints over the stride, statures, with the pelvis at (0, 0); linear in scores, proportions, leans."""
 
     PHASES = 60
 
@@ -71,19 +71,19 @@ class WalkingBody:
         states.append(replace(base, stride_hz=base.stride_hz + model.info.stride_hz_sd))
         table = np.array([self._cycle(model, state) for state in states])
         table[1:] -= table[0]
-        # The pelvis sways: it moves from side to side and unevenly forwards over the foot on the floor.
+        # The pelvis sways from side to side, and moves forwards unevenly over the foot on the floor.
         velocity = self._over_foot(table, model.joint_names)
         backwards = velocity[..., 0].mean(axis=1)
         way = np.cumsum(velocity - velocity.mean(axis=1, keepdims=True), axis=1) / self.PHASES
         table[..., :2] += (way - way.mean(axis=1, keepdims=True))[:, :, None]
-        # The ankle rolls forward over the foot, so it goes back more slowly than the floor.
+        # The ankle rolls forward over the foot, so it moves back more slowly than the floor does.
         stride = backwards * model.info.stride_length / backwards[0]
         leans = self._leans(table[0], model.joint_names)
         self.table = np.concatenate([table[:-1], leans, table[-1:]])[:, :, rows]
         self.stride = np.concatenate([stride[:-1], np.zeros(len(leans)), stride[-1:]])
         self.parts = len(self.table) - 2  # scores, proportions, leans
         self.rate, self.rate_sd = model.info.stride_hz, model.info.stride_hz_sd
-        self.offsets = 3 * len(self.names)  # of the detector's joints: forward, left, up
+        self.offsets = 3 * len(self.names)  # offsets of the detector's joints: forward, left, up
         lasting = [load("full").joint(name).lasting_sd for name in self.names]
         self.offset_sd = np.repeat(np.maximum(lasting, _LEAST_OFFSET_SD), 3)  # statures
 
@@ -97,7 +97,7 @@ class WalkingBody:
         return out
 
     def _over_foot(self, table: Array, names: tuple[str, ...]) -> Array:
-        """Velocity (rows, PHASES, 2) of the pelvis over the foot on the floor, statures per stride.
+        """Velocity (rows, PHASES, 2) of the pelvis relative to the foot on the floor, statures per stride.
 
         Each foot is flat for a third of the stride; in between the velocity is interpolated.
         """
@@ -116,9 +116,9 @@ class WalkingBody:
 
     @staticmethod
     def _leans(cycle: Array, names: tuple[str, ...]) -> Array:
-        """Give changes (3, PHASES, joints, 3) of a `cycle` by leans of one standard deviation.
+        """Return changes (3, PHASES, joints, 3) of a `cycle` by leans of one standard deviation.
 
-        The body leans forward and to the side about the feet, the trunk forward about the hips.
+        The body leans forward and sideways about the feet, the trunk forward about the hips.
         """
         up = cycle[..., 2]
         hips = [names.index("l_hip"), names.index("r_hip")]
@@ -140,7 +140,7 @@ class WalkingBody:
         )
 
     def joints(self, phase: Array, rate: Array, parts: Array, offsets: Array) -> Array:
-        """Joints (T, J, 3), statures."""
+        """Compute joints (T, J, 3), statures."""
         place = (phase % 1.0) * self.PHASES
         left = np.floor(place).astype(int) % self.PHASES
         share = (place - np.floor(place))[:, None, None]
@@ -151,12 +151,12 @@ class WalkingBody:
         return np.asarray(out + offsets.reshape(-1, 3))
 
     def strides(self, rate: Array, parts: Array) -> Array:
-        """Stride lengths (..., T), statures."""
+        """Compute stride lengths (..., T), statures."""
         return np.asarray(self.weights(parts, rate) @ self.stride)
 
 
 class WalkModel:
-    """Keypoints of an interval, and what is expected of camera and walk.
+    """Keypoints of an interval, and the prior of camera and walk.
 
     Attributes
     ----------
@@ -164,13 +164,13 @@ class WalkModel:
     in_place : bool
         The person walks in place, as on a treadmill.
     time : ndarray of shape (T,)
-        Seconds, of the keypoints.
+        Times of the keypoints, seconds.
     knot_time : ndarray of shape (K,)
-        Seconds, of the knots.
+        Times of the knots, seconds.
     clip : tuple of float
-        Seconds, of the first and the last keypoint outside of the interval also.
+        Times of the first and last keypoint, also outside the interval, seconds.
     fixed : int
-        Parameters before those of the knots.
+        Number of parameters before those of the knots.
     """
 
     def __init__(
@@ -203,21 +203,21 @@ class WalkModel:
         jitter = np.hypot(jitter[rows][:, self.body.columns], _PIXEL)
         self._inverse = np.where(np.isfinite(uv).all(axis=2), 1.0 / np.hypot(jitter, repeats), 0.0)
         self._uv = np.nan_to_num(uv)
-        # Further strides show the repeating errors again, so frames count less the more strides there are.
+        # More strides contain the same repeating errors, so frames count less the more strides there are.
         strides = max(1.0, body.rate * (t[-1] - t[0]))
         lasting = jitter**2 * lasts[self.body.columns] + repeats**2 * _REPEATING_TIME * strides
-        single = lasting * self._inverse**2  # seconds that count as one observation
+        single = lasting * self._inverse**2  # seconds for which they count as one observation
         self._thin = np.minimum(1.0, float(np.median(np.diff(t))) / np.maximum(single, 1e-9))
 
     def over(self, low: float, high: float, keypoints: Keypoints | None = None) -> WalkModel:
-        """Make the same model of another interval, seconds, or also of other `keypoints`."""
+        """Make the same model for another interval, seconds, and optionally for other `keypoints`."""
         return WalkModel(
             self._all if keypoints is None else keypoints, self._size, self.body, self._height, self._prior,
             in_place=self.in_place, interval=(low, high),
         )  # fmt: skip
 
     def swapped(self, q: Array) -> WalkModel | None:
-        """Make the model with sides swapped in frames that fit much better so; None: there are none."""
+        """Make the model with sides swapped in frames that then fit much better; None if there are none."""
         swapped = self.over(self.time[0], self.time[-1], swap_sides(self._all))
         better = self.robust(q).sum(axis=1) > swapped.robust(q).sum(axis=1) + _SWAPPED
         if not better.any():
@@ -226,11 +226,11 @@ class WalkModel:
         return self.over(self.time[0], self.time[-1], swap_sides(self._all, rows))
 
     def knots(self, q: Array) -> Array:
-        """Knots (..., K, 4): x, y, metres; heading, radians; phase."""
+        """Return the knots (..., K, 4): x, y, metres; heading, radians; phase."""
         return q[..., self.fixed :].reshape(*q.shape[:-1], -1, 4)
 
     def errors(self, q: Array) -> Array:
-        """Errors of the keypoints (T, J, 2), in standard deviations."""
+        """Compute the errors of the keypoints (T, J, 2), in standard deviations."""
         now = np.stack([np.interp(self.time, self.knot_time, column) for column in self.knots(q).T], axis=1)
         rates = np.interp(self.time, self._middles(), self.rates(q))
         joints = self._joints(q, now, rates)
@@ -241,7 +241,7 @@ class WalkModel:
         return np.asarray((uv - self._uv) * self._inverse[..., None])
 
     def _joints(self, q: Array, now: Array, rates: Array) -> Array:
-        """Joints (T, J, 3) in the world, metres, with the path `now` (T, 4) and the stride rates (T,)."""
+        """Compute joints (T, J, 3) in the world, metres, for the path `now` (T, 4) and stride rates (T,)."""
         body, stature = self.body, self._height * np.exp(q[4])
         parts, offsets = q[5 : 5 + body.parts], q[5 + body.parts : self.fixed]
         local = stature * body.joints(now[:, 3], rates, parts, offsets)
@@ -257,11 +257,11 @@ class WalkModel:
         return np.asarray((self.knot_time[1:] + self.knot_time[:-1]) / 2)
 
     def rates(self, q: Array) -> Array:
-        """Stride rates between knots (..., K - 1), hertz."""
+        """Return the stride rates between knots (..., K - 1), hertz."""
         return np.asarray(np.diff(self.knots(q)[..., 3]) / np.diff(self.knot_time))
 
     def expected(self, q: Array) -> Array:
-        """Residuals (..., R) of what is expected of camera and walk; `q` (..., P)."""
+        """Compute the residuals (..., R) of the prior of camera and walk; `q` (..., P)."""
         body, knots, flat = self.body, self.knots(q), (*q.shape[:-1], -1)
         step, heading = np.diff(self.knot_time), knots[..., 2]
         velocity = np.diff(knots[..., :2], axis=-2) / step[:, None]
@@ -273,7 +273,7 @@ class WalkModel:
             speed = [ahead / _STILL_SD, aside / _STILL_SD]
         else:
             usual = body.strides(rates, parts) * self._height * np.exp(q[..., 4:5]) * rates
-            many = np.sqrt(len(step))  # one uncertainty of the whole walk
+            many = np.sqrt(len(step))  # as one uncertainty of the whole walk
             speed = [(ahead - usual) / _SLIDE_SD / many, aside / _SIDEWAYS_SD / many]
         faster = np.diff(np.stack([ahead, aside], axis=-1), axis=-2) * np.diff(self._middles())[:, None]
         bends = np.diff(knots[..., 2:], 2, axis=-2) / np.array([_TURN_SD, _HURRY_SD])
@@ -295,21 +295,21 @@ class WalkModel:
         return float((self._thin * self.robust(q)).sum() + (self.expected(q) ** 2).sum())
 
     def robust(self, q: Array) -> Array:
-        """Student-t costs of the keypoints (T, J)."""
+        """Compute the Student-t costs of the keypoints (T, J)."""
         square = (self.errors(q) ** 2).sum(axis=2)
         return np.asarray(_DEGREES * np.log1p(square / _DEGREES))
 
     def groups(self) -> Iterator[tuple[NDArray[np.int64], Array]]:
-        """Give parameters whose effects do not overlap, and which errors (T, J, 2, columns) each changes."""
+        """Group parameters with separate effects, with the errors (T, J, 2, columns) that each changes."""
         plain = self.fixed - self.body.offsets
         for k in range(plain):
             yield np.array([k]), np.ones(1)
-        joints = np.eye(len(self.body.names))[:, None]  # each offset moves a joint of its own
+        joints = np.eye(len(self.body.names))[:, None]  # each offset moves its own joint
         for axis in range(3):
             yield np.arange(plain + axis, self.fixed, 3), joints
         knots = np.arange(len(self.knot_time))
         at = np.interp(self.time, self.knot_time, knots)
-        for first in range(min(4, len(knots))):  # a knot changes what is less than two knots away
+        for first in range(min(4, len(knots))):  # a knot affects times less than two knots away
             chosen = knots[first::4]
             near = (np.abs(at[:, None] - chosen) < 2.0)[:, None, None].astype(float)
             for kind in range(4):
@@ -321,7 +321,7 @@ class WalkModel:
         return np.asarray(robust.sum(axis=1) / np.maximum(2 * (self._inverse > 0).sum(axis=1), 1))
 
     def normal(self, q: Array) -> tuple[Array, Array]:
-        """Form the normal equations: matrix and gradient."""
+        """Form the normal equations; return matrix and gradient."""
         errors, expected = self.errors(q), self.expected(q)
         weight = np.sqrt(self._thin[..., None] / (1.0 + (errors**2).sum(axis=2, keepdims=True) / _DEGREES))
         data = np.zeros((*errors.shape, len(q)))
@@ -332,7 +332,7 @@ class WalkModel:
             moved[columns] += h
             change = (self.errors(moved) - errors) * (weight / h)
             data[..., columns] = change[..., None] * share
-        own = np.arange(self.fixed - self.body.offsets, self.fixed)  # each offset is expected by itself
+        own = np.arange(self.fixed - self.body.offsets, self.fixed)  # each offset has its own prior
         prior[:, own] = 0.0
         prior[own, own] = 1.0 / self.body.offset_sd
         others = np.delete(np.arange(len(q)), own)

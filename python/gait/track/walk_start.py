@@ -1,7 +1,7 @@
 """Start of the fit of camera and walk: the prior of a camera, and initial cameras and walks.
 
-For each of several focal lengths tilt and height follow from hips and ankles as upright sticks; the automatic
-start is fitted with that camera to a second of the walk.
+For each of several focal lengths, tilt and height are estimated from hips and ankles as ends of upright
+sticks; with that camera the automatic start is fitted to a second of the walk.
 """
 
 from __future__ import annotations
@@ -23,17 +23,17 @@ from gait.track.keypoint_start import keypoint_noise
 Array = NDArray[np.float64]
 
 WINDOW = 1.2  # seconds of walking to start with
-STATURE_SD = 0.015  # of the stature, with shoes
-_USUAL_FOV = 65.0  # degrees along the longer side of the picture, of a usual phone
-_FOV_SD = 0.45  # of the focal length's logarithm; of --fov:
+STATURE_SD = 0.015  # of the stature, including shoes
+_USUAL_FOV = 65.0  # degrees along the longer side of the picture, of a typical phone
+_FOV_SD = 0.45  # of the log focal length; with --fov:
 GIVEN_FOV_SD = 0.05
-_KNOWN_SD = 0.15  # of the focal length's logarithm, below which a fit starts from the expected one alone
-_HEIGHT, _HEIGHT_SD = 1.3, 0.5  # metres; of the logarithm
+_KNOWN_SD = 0.15  # sd of the log focal length below which a fit starts only from the expected one
+_HEIGHT, _HEIGHT_SD = 1.3, 0.5  # metres; sd of the logarithm
 _TILT, _TILT_SD, _ROLL_SD = 0.05, 0.2, 0.02  # radians
-_STICK_SD = 0.025  # of the height, of hips over ankles as an upright stick
-_STARTS = (0.6, 0.85, 1.2, 2.2, 4.0)  # focal lengths to start from, longer sides of the picture
-_LONGEST = 12.0  # seconds of a walk that are used
-_LEVEL_STEPS, _SETTLED = 30, 1e-9  # of the fit of sticks, and relative change of its cost that ends it
+_STICK_SD = 0.025  # relative sd of the height of hips above ankles
+_STARTS = (0.6, 0.85, 1.2, 2.2, 4.0)  # focal lengths to start from, in longer sides of the picture
+_LONGEST = 12.0  # most seconds of a walk that are used
+_LEVEL_STEPS, _SETTLED = 30, 1e-9  # most steps of the fit of sticks; relative change of cost that ends it
 _RATE = 10.0  # frames per second that are used
 
 
@@ -46,7 +46,7 @@ class CameraPrior:
 
     @staticmethod
     def of(size: tuple[int, int], fov: float | None, fov_sd: float = GIVEN_FOV_SD) -> CameraPrior:
-        """Give the usual camera's, or that of a horizontal field of view `fov`, as for `calibrate`."""
+        """Make the prior of a typical camera, or of one with field of view `fov`, as for `calibrate`."""
         side, angle, sd = (max(size), _USUAL_FOV, _FOV_SD) if fov is None else (size[0], fov, fov_sd)
         focal = 0.5 * side / np.tan(np.radians(angle) / 2)
         return CameraPrior(
@@ -73,7 +73,7 @@ def usual_camera(size: tuple[int, int], fov: float | None = None) -> Camera:
 
 
 def choose_frames(keypoints: Keypoints) -> Keypoints:
-    """Choose frames with hips and ankles, thinned, of the `_LONGEST` seconds whose size changes most."""
+    """Choose some frames with hips and ankles, from the `_LONGEST` seconds in which size varies most."""
     legs = [keypoints.names.index(name) for name in ("l_hip", "r_hip", "l_ankle", "r_ankle")]
     whole = np.isfinite(keypoints.uv[:, legs]).all(axis=(1, 2))
     time = keypoints.time[whole]
@@ -110,7 +110,7 @@ def swap_sides(keypoints: Keypoints, rows: NDArray[np.bool_] | None = None) -> K
 
 @dataclass
 class WalkStart:
-    """Where a fit begins: camera, and the walk about a time."""
+    """Start of a fit: camera, and the walk around a time."""
 
     camera: Array
     walk: Hypothesis
@@ -120,7 +120,7 @@ class WalkStart:
 def find_starts(
     keypoints: Keypoints, size: tuple[int, int], model: Model, height: float, prior: CameraPrior
 ) -> list[WalkStart]:
-    """Fit windows of the clip with the camera at several focal lengths, or at the expected one if known."""
+    """Fit windows of the clip with cameras of several focal lengths, or of the expected one if known."""
     noise = keypoint_noise(keypoints)
     found = []
     span = keypoints.time[-1] - keypoints.time[0]
@@ -150,7 +150,7 @@ def find_starts(
 
 
 def _level(q: Array, keypoints: Keypoints, size: tuple[int, int], height: float, prior: CameraPrior) -> Array:
-    """Tilt and height of the camera, at a given focal length, from hips and ankles as upright sticks."""
+    """Estimate tilt and height of a camera of given focal length, from hips and ankles as upright sticks."""
     names = keypoints.names
     hip, ankle = (
         np.mean([keypoints.uv[:, names.index(f"{side}_{joint}")] for side in "lr"], axis=0)
@@ -174,7 +174,7 @@ def _level(q: Array, keypoints: Keypoints, size: tuple[int, int], height: float,
 
 
 def _descent(residuals: Callable[[Array], Array], p: Array) -> Array:
-    """Least squares from `p` by Levenberg and Marquardt; SciPy's takes longer to load than this to run."""
+    """Solve least squares from `p` by Levenberg-Marquardt; importing SciPy would take longer than this."""
     cost, damping, h = float(np.sum(residuals(p) ** 2)), 1e-3, 1e-6
     for _ in range(_LEVEL_STEPS):
         here = residuals(p)
