@@ -1,4 +1,4 @@
-"""What a bench states was wanted, over several runs: a busy host spoils some of them, seldom most."""
+"""What benchmarks measured against their targets, over several runs: a busy host spoils some, seldom most."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ ROW = re.compile(r"(\s*\S.*?)\s+(>=|<=|<)\s+([\d.]+)\s+([\d.]+)\s+.*(?:reached|M
 
 
 class Wanted(NamedTuple):
-    """A line of the bench: what is measured, `relation` to the figure wanted, and the figure of that run."""
+    """A line of the benchmark: what was measured, `relation` to the target, the target, and the figure."""
 
     what: str
     relation: str
@@ -19,20 +19,20 @@ class Wanted(NamedTuple):
     figure: float
 
     def met(self, figure: float) -> bool:
-        """Whether another figure would do."""
+        """Whether another figure would meet the target."""
         if self.relation == ">=":
             return figure >= self.wanted
         return figure < self.wanted or (self.relation == "<=" and figure == self.wanted)
 
 
 def wanted(printed: str) -> list[Wanted]:
-    """Lines that end with a verdict, in their order."""
+    """Lines that end with a verdict, in order."""
     found = (ROW.match(line) for line in printed.splitlines())
     return [Wanted(m[1], m[2], float(m[3]), float(m[4])) for m in found if m]
 
 
 def summary(runs: Sequence[str]) -> str:
-    """Median, least and most of each figure; how many runs reach what is wanted, and whether the median does.
+    """Median, minimum and maximum of each figure, how many runs meet the target, and whether the median does.
 
     Parameters
     ----------

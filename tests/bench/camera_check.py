@@ -1,11 +1,11 @@
 #!/usr/bin/env python3
-"""Wrong cameras: which of them `gait track` and `gait lift` report, on rendered clips and on films.
+"""Which wrong cameras `gait track` and `gait lift` report, on rendered clips and on films.
 
     camera_check.py [CLIP...]
 
-Each clip's camera file is changed in several ways.  A change is found before the video is read further
-("refused"), or from the keypoints of the person who walks: the focal length, the person's stature, turned
-frames, or the axes of the world.  Turned frames are simulated by keypoints that are turned.
+Each clip's camera file is changed in several ways.  A fault is found either before the video is read
+("refused") or from the keypoints of the walking person: in the focal length, in the person's stature, in
+frames that are turned, or in the axes of the world.  Turned frames are simulated by turning the keypoints.
 """
 
 from __future__ import annotations
@@ -43,7 +43,7 @@ WORDS = {
 
 
 def main() -> int:
-    """Check every clip with every camera and publish; 0 also without the data."""
+    """Check every clip with every camera and publish; exit code 0 also if the data are absent."""
     if eval_clips.absent():
         return 0
     folders = [eval_clips.DATA / "eval" / "dev", eval_clips.DATA / "real"]
@@ -54,17 +54,19 @@ def main() -> int:
     rows.append(["reported", *(f"{count} of {len(chosen)}" for count in counts)])
     head = ["clip", "right", *(name for name, _ in _changes()), "frames turned by 180", "size halved"]
     note = (
-        f"{facts('tests/bench/camera_check.py')}\n\nWhat is reported of a camera file that is right (the six "
-        "rendered clips) or guessed (the films), and of one that is changed; the stature is given. refused: "
-        "an error before the clip is read; stature: the person appears more than 12 % taller or shorter; "
-        "focal: the walk contradicts the focal length; frames: turned frames. Empty: nothing."
+        f"{facts('tests/bench/camera_check.py')}\n\n"
+        "The table shows what is reported about each camera file: unchanged (correct for the six "
+        "rendered clips, guessed for the films), and with one fault. The stature is given. refused: an "
+        "error before the clip is read; stature: the person appears more than 12 % taller or shorter; "
+        "focal: the walk contradicts the focal length; frames: turned frames. An empty cell means that "
+        "nothing is reported."
     )
     table.publish("camera_check", "Wrong cameras", head, rows, note)
     return 0
 
 
 def _changes() -> Iterator[tuple[str, Change]]:
-    """Give names of faults, and functions that put them into a camera."""
+    """Names of faults, and functions that put them into a camera."""
     for name, share in (("focal x 1.5", 1.5), ("focal / 1.5", 1 / 1.5)):
         yield name, lambda camera, share=share: replace(camera, fx=share * camera.fx, fy=share * camera.fy)
     for name, share in (("height x 4/3", THIRD), ("height / (4/3)", 1 / THIRD)):
@@ -75,12 +77,12 @@ def _changes() -> Iterator[tuple[str, Change]]:
 
 
 def _raised(camera: Camera, share: float) -> Camera:
-    """Camera at another height, by a share."""
+    """Change the camera's height by a factor."""
     return replace(camera, t=-camera.R @ (camera.centre * [1.0, 1.0, share]))
 
 
 def _clip(folder: Path) -> list[Any]:
-    """Row of a clip: what is reported of its camera, and of each changed one."""
+    """Row of a clip: what is reported about its own camera and about each changed one."""
     video = Video(next(folder.glob("video.*")))
     meta = json.loads((folder / "meta.json").read_text())
     stature = meta.get("stature_m") or meta["limb_lengths_m"]["stature"]
@@ -96,7 +98,7 @@ def _clip(folder: Path) -> list[Any]:
 
 
 def _reported(camera: Camera, video: Video, keypoints: Keypoints, model: Model, stature: float) -> str:
-    """Name what is reported, in a word."""
+    """Name what is reported, in one word."""
     try:
         camera.check_size("camera.json", video.size)
         camera.check_place("camera.json")

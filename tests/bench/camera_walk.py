@@ -3,9 +3,9 @@
 
     camera_walk.py [CLIP...]
 
-Each clip is tracked with its true camera and without any, given the stature.  The truth is transformed into
-the world of a camera that is found: the origin is on the floor below it, and it looks along y.  Exit code
-1 if a bound is missed.
+Each clip is tracked with its true camera, and without a camera but with the stature.  The truth is
+transformed into the world of the camera that is found: the origin is on the floor below it, and it looks
+along y.  Exit code 1 if a bound is missed.
 """
 
 from __future__ import annotations
@@ -39,7 +39,7 @@ HIPS = [EVAL15.index("l_hip"), EVAL15.index("r_hip")]
 
 
 def main() -> int:
-    """Track every clip twice and publish; 1 if a bound is missed, 0 also without the data."""
+    """Track every clip twice and publish; exit code 1 if a bound is missed, 0 also if the data are absent."""
     if eval_clips.absent():
         return 0
     folder = eval_clips.DATA / "eval" / "dev"
@@ -54,14 +54,15 @@ def main() -> int:
     head = ["clip", "focal %", "focal sd %", "tilt deg", "tilt sd", "roll deg", "height %", "height sd %"]
     head += ["joints mm", "with camera", "speed %", "with camera %", "pelvis in 90 %", "missed"]
     note = (
-        f"{facts('tests/bench/camera_walk.py')}\n\nErrors of focal length, tilt, roll and height of the "
-        "camera, with their reported standard deviations; root-aligned error of the 15 joints and error of "
-        "the speed, without a camera and with the true one; share of frames whose pelvis is in the 90 % "
-        f"interval (x and y). {sum(held)} of {len(held)} camera parameters are in theirs. "
-        f"Wanted: focal length within {FOCAL:g} %, tilt {TILT:g} degrees, height {HEIGHT:g} %, speed "
-        f"{SPEED:g} %, joints within {100 * (WORSE - 1):.0f} % of those with the camera, "
-        f"{COVERAGE[0]:.0%} to {COVERAGE[1]:.0%} of the pelvis and of the parameters "
-        f"({'' if honest else 'not '}met) in their intervals."
+        f"{facts('tests/bench/camera_walk.py')}\n\n"
+        "Errors of focal length, tilt, roll and height of the camera that is found, with their reported "
+        "standard deviations; root-aligned error of the 15 joints and error of the speed, without a "
+        "camera and with the true one; share of frames in which the pelvis is inside its 90 % interval "
+        f"(x and y). Of the camera parameters, {sum(held)} of {len(held)} are inside their intervals. "
+        f"Targets: focal length within {FOCAL:g} %, tilt {TILT:g} degrees, height {HEIGHT:g} %, speed "
+        f"{SPEED:g} %; joints at most {100 * (WORSE - 1):.0f} % worse than with the camera; "
+        f"{COVERAGE[0]:.0%} to {COVERAGE[1]:.0%} of the pelvis positions and of the parameters "
+        f"({'' if honest else 'not '}met) inside their intervals."
     )
     table.publish("camera_walk", "A camera found from the walk", head, rows, note)
     return int(not honest or any(row[-1] != "-" for row in rows))
@@ -135,7 +136,7 @@ def _parts(camera: Camera) -> Floats:
 
 
 def _shown(off: Floats, sd: Floats) -> list[float]:
-    """Errors and standard deviations of a camera's parameters as the table has them: per cent and degrees."""
+    """Errors and standard deviations of a camera's parameters in the table's units: per cent and degrees."""
     percent, degrees, tilt_sd = 100 * np.expm1(off), np.degrees(off), np.degrees(sd[1])
     values = (percent[0], 100 * sd[0], degrees[1], tilt_sd, degrees[2], percent[3], 100 * sd[3])
     return [float(v) for v in values]

@@ -1,11 +1,12 @@
 #!/usr/bin/env python3
-"""gait-trackd killed at random moments: what it loses, and how long the next one takes.
+"""gait-trackd killed at random moments: what is lost, and how long the next daemon needs to continue.
 
     daemon_kills.py [--kills 200] [--record]
 
-A stream of 30 frames a second of a drawn person, at any time a SIGKILL, at once another daemon on the same
-snapshot.  A daemon has gone on when it reports to follow the person of a frame and estimates follow without a
-START; a frame is lost if it was sent and no daemon estimated it.  No other program may publish on the URL.
+A stream of 30 frames a second of a drawn person; at random times a SIGKILL, after which another daemon is
+started at once on the same snapshot.  A daemon has continued if it reports that it follows the person from a
+frame and estimates follow without a START.  A frame is lost if it was sent and no daemon estimated it.  No
+other program may publish on the URL.
 """
 
 from __future__ import annotations
@@ -38,7 +39,7 @@ WANTED_MS = 200.0
 
 
 class Stream:
-    """Frames at their times, and what came back."""
+    """Frames with their times, and the answers received."""
 
     def __init__(self, url: str) -> None:
         self.listener = rig.Listener(url)
@@ -47,7 +48,7 @@ class Stream:
         self.answered: dict[int, float] = {}
 
     def run(self, until: float) -> None:
-        """Send what is due and take in answers, until a time of the monotonic clock."""
+        """Send the frames that are due and receive answers, until a time of the monotonic clock."""
         while (now := time.monotonic()) < until:
             due = self.began + self.sent / RATE
             if now >= due:
@@ -66,7 +67,7 @@ class Stream:
 
 
 def main() -> int:
-    """Kill, measure, print; 1 if a daemon did not go on."""
+    """Kill, measure, print; exit code 1 if a daemon did not continue."""
     options = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawTextHelpFormatter)
     options.add_argument("--kills", type=int, default=200)
     options.add_argument("--record", action="store_true")
@@ -94,7 +95,10 @@ def main() -> int:
             first = min((f for f in stream.answered if f > known), default=None)
             resumed = RESUMED.search(log.read_text())
             if first is None or resumed is None:
-                print(f"daemon_kills: it did not go on:\n{before}--\n{log.read_text()}", file=sys.stderr)
+                print(
+                    (f"daemon_kills: the daemon did not continue:\n{before}--\n{log.read_text()}"),
+                    file=sys.stderr,
+                )
                 old += 1
                 begin(stream)
                 continue
@@ -112,10 +116,10 @@ def main() -> int:
     head = ["kills", "went on", "ms median", "ms 90 %", "ms most", "frames lost, median", "most"]
     title = "A daemon that is killed"
     note = (
-        f"{facts('tests/bench/daemon_kills.py --record')}\n\nSIGKILL at random moments of a stream of "
-        f"{RATE:.0f} frames a second, snapshots every {PERIOD_S:.0f} s, {rig.PARTICLES} particles, "
-        "160 x 120.  Milliseconds from the start of the next daemon to its first estimate, wanted below "
-        f"{WANTED_MS:.0f}; frames sent in between are lost."
+        f"{facts('tests/bench/daemon_kills.py --record')}\n\n"
+        f"SIGKILL at random moments of a stream of {RATE:.0f} frames a second; snapshots every "
+        f"{PERIOD_S:.0f} s, {rig.PARTICLES} particles, 160 x 120. Milliseconds from the start of the next "
+        f"daemon to its first estimate, target: below {WANTED_MS:.0f}; frames sent in between are lost."
     )
     if args.record:
         table.publish("daemon_kills", title, head, [row], note)
@@ -131,7 +135,7 @@ def start(words: list[str], log: Path) -> subprocess.Popen[bytes]:
 
 
 def begin(stream: Stream) -> None:
-    """Camera, background, a start; then frames until the first estimate."""
+    """Send camera, background and a start; then frames until the first estimate."""
     listener = stream.listener
     listener.until(lambda: bool(listener.statuses), "a first status")
     listener.ask(rig.opening()[:2], lambda s: s.background_mask, "camera and background")

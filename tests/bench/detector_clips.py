@@ -1,7 +1,7 @@
 """Walks with known joints for the detector's profile: the gait of each recorded person on a rendered body.
 
-None of the people of the development clips is among them.  Bodies, clothes, scenes and light are drawn by the
-number of the clip; views, sizes and distances take turns.  What a folder has is kept.
+None of the people is in a development clip.  The number of the clip determines body, clothes, scene and
+light; views, sizes and distances alternate.  Clips that already exist in the folder are kept.
 """
 
 from __future__ import annotations
@@ -51,7 +51,7 @@ def scenario(number: int, gait: Path) -> Scenario:
 
 
 def make(folder: Path, update: Callable[[int], None]) -> list[Path]:
-    """Make the clips that a folder lacks; give all."""
+    """Make the clips that the folder lacks; return all."""
     folder.mkdir(parents=True, exist_ok=True)
     clips = []
     for number, (name, source) in enumerate(recordings().items()):

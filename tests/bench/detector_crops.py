@@ -3,9 +3,9 @@
 
     detector_crops.py [CLIP...]
 
-Each development clip is searched as it is, and with a box painted over the person for a second.  The tracker
-has seen the whole clip with the detector's keypoints, and predicts each frame from its estimates of the two
-before.  True joints in place of predicted ones show what a perfect tracker would gain.
+The detector runs on each development clip as it is, and with a box painted over the person for a second.  The
+tracker has seen the whole clip with the detector's keypoints, and predicts each frame from its estimates of
+the two frames before.  True joints in place of predicted ones show what a perfect tracker would gain.
 """
 
 from __future__ import annotations
@@ -34,14 +34,16 @@ from gait.io.track_file import Joints, read_track, read_truth
 
 Floats = npt.NDArray[np.float64]
 NETWORK = "lite"
-RADIUS = 0.56  # of the circle about a crop's person, lengths of head, trunk and legs: as the network's own
+RADIUS = (
+    0.56  # of the circle around the person in a crop, in lengths of head, trunk and legs: as the network's
+)
 LEAST_SCORE = 0.5  # of a person in a crop, as in gait.detect.people
-RIGHT = 0.05  # person's heights up to which the median joint is right
+RIGHT = 0.05  # error of the median joint that counts as right, in person's heights
 HIDDEN_S = 1.0
 
 
 def main() -> int:
-    """Search every clip and publish; 0 also without the data."""
+    """Run the detector on every clip and publish; exit code 0 also if the data are absent."""
     if eval_clips.absent():
         return 0
     folder = eval_clips.DATA / "eval" / "dev"
@@ -49,11 +51,11 @@ def main() -> int:
     rows = [row for clip in clips for row in _rows(clip)]
     head = ["clip", "crops", "found %", "median %", "95th percentile %", "found, hidden %", "back after s"]
     note = (
-        f"{facts('tests/bench/detector_crops.py')}\n\nNetwork {NETWORK}. Share of the frames in which the "
-        "person is found; distance of the joints found from the true ones, per cent of the person's height. "
-        f"With a box painted over the person for {HIDDEN_S:g} s: share of these frames in which a person is "
-        "found, and seconds from their end to the first frame whose median joint is right within "
-        f"{100 * RIGHT:g} %."
+        f"{facts('tests/bench/detector_crops.py')}\n\n"
+        f"Network {NETWORK}. Share of the frames in which the person is found, and distance of the joints "
+        "found from the true ones in per cent of the person's height. For a box painted over the person "
+        f"for {HIDDEN_S:g} s: share of these frames in which a person is found, and seconds from their "
+        f"end to the first frame whose median joint is within {100 * RIGHT:g} % of the height."
     )
     table.publish("detector_crops", "Crops of the detector", head, rows, note)
     return 0
@@ -105,7 +107,7 @@ def _distance(uv: Floats, true: Floats) -> Floats:
 
 
 def _searched(clip: Path, video: Video, true: Keypoints, folder: Path) -> dict[str, Floats]:
-    """Joints (T, J, 2) by each source of crops, pixels, moved to the model's; NaN where none are found."""
+    """Joints (T, J, 2) with each source of crops, pixels, moved to the model's; NaN where none are found."""
     landmarks = np.full((video.count, len(JOINTS), 2), np.nan)
     for person in detect_people(video, NETWORK).values():  # the one nearest to the truth in each frame
         nearer = _distance(person.uv, true.uv[person.frame]) < _distance(
@@ -122,7 +124,7 @@ def _searched(clip: Path, video: Video, true: Keypoints, folder: Path) -> dict[s
 
 
 def _crops(camera: Camera, joints: Joints) -> dict[int, Crop]:
-    """Crop about the joints of each frame."""
+    """Crop around the joints of each frame."""
     hips = (joints.places["l_hip"] + joints.places["r_hip"]) / 2
     ankles = (joints.places["l_ankle"] + joints.places["r_ankle"]) / 2
     size = sum(
@@ -141,7 +143,7 @@ def _crops(camera: Camera, joints: Joints) -> dict[int, Crop]:
 
 
 def _predicted(camera: Camera, track: Joints) -> dict[int, Crop]:
-    """Crop of each frame as the two estimates before it predict it."""
+    """Crop of each frame as predicted by the two estimates before it."""
     known = _crops(camera, track)
     predicted = {}
     for frame in known:

@@ -1,9 +1,9 @@
-"""Learn the profile of each landmark network: where its joints lie beside the model's, and how they err.
+"""Learn the profile of each landmark network: the offsets of its joints from the model's, and their errors.
 
 Runs the networks on clips with known joints and writes python/gait/detect/profile.json.  Offsets are fitted
-on all clips; errors are those of each clip by offsets fitted on the others, who are other people.  Without
-CLIPS, walks of `detector_clips` are made in build/detector-profile first: each the gait of another recorded
-person, none of those of the development clips.
+to all clips.  Errors are cross-validated: each clip is judged with offsets fitted to the others, which show
+other people.  Without CLIPS, walks of `detector_clips` are made in build/detector-profile first, each with
+the gait of another recorded person, none of them from the development clips.
 
     python tests/bench/detector_profile.py [CLIPS]
 """
@@ -25,24 +25,26 @@ from gait.io.video import Video
 from gait.progress import progress
 
 CLIPS = Path("build/detector-profile")
-MOST = 0.08  # person's heights; larger errors are outliers: swapped sides, another thing
-RIDGE = 2e-3  # pulls offsets to zero that the clips do not show
+MOST = 0.08  # person's heights; larger errors are outliers: swapped sides, another object
+RIDGE = 2e-3  # pulls offsets that the clips do not show to zero
 LAGS = 15  # frames over which errors may be correlated
-QUIET = 0.05  # correlation that is none
+QUIET = 0.05  # a smaller correlation counts as none
 SPREAD = 1.4826  # median absolute deviation to standard deviation
 HELD, NORMAL = (
     0.9,
     1.645,
-)  # share of lasting errors in so many standard deviations; a few are far larger
-WINDOW = 0.8  # seconds whose mean error hardly holds what changes, which is measured in two of them
-DURATIONS = np.geomspace(0.5, 10.0, 60)  # seconds that an error may last; clips do not show more
+)  # share of lasting errors within so many standard deviations; a few are far larger
+WINDOW = 0.8  # seconds over which changing errors nearly average out; these are measured in two windows
+DURATIONS = np.geomspace(
+    0.5, 10.0, 60
+)  # longest duration of an error in seconds; clips do not show longer ones
 
 
 @dataclass
 class Joint:
-    """A joint in one clip, in person's heights: known less found (T, 2), and vectors (T, 2, 3).
+    """A joint in one clip, in person's heights: known minus found (T, 2), and vectors (T, 2, 3).
 
-    `step` and `stride` are seconds.
+    `step` and `stride` are in seconds.
     """
 
     off: np.ndarray
@@ -52,29 +54,29 @@ class Joint:
 
     @property
     def good(self) -> np.ndarray:
-        """Frames (T,) that are no outliers; none if most are."""
+        """Frames (T,) without outliers; none if most are outliers."""
         good = (np.abs(self.off) < MOST).all(axis=1) & np.isfinite(self.along).all(axis=(1, 2))
         return good & (good.mean() > 0.5)
 
 
 @dataclass
 class Errors:
-    """What offsets leave of a joint in one clip, person's heights.
+    """What remains of a joint's error in one clip after the offsets, in person's heights.
 
     Attributes
     ----------
     mean : (2,)
         Error in the whole clip.
     sd, correlation_s : float
-        Of its change, and seconds in which that counts as one observation.
+        Standard deviation of the changing error, and the seconds that count as one observation of it.
     seconds : float
-        Of the clip.
+        Length of the clip.
     windows : (W, 2)
         Mean errors in intervals of `WINDOW`; NaN where the joint is not known.
     variance : float
-        Of its change, outliers cut off.
+        Of the changing error, without outliers.
     repeated : (N, 2)
-        Products of its change with that one stride later.
+        Products of the changing error with that one stride later.
     """
 
     mean: np.ndarray
@@ -86,7 +88,7 @@ class Errors:
     repeated: np.ndarray
 
     def noise(self, seconds: float) -> float:
-        """Variance that the change of the error gives its mean over an interval."""
+        """Variance that the changing error adds to the mean over an interval."""
         return self.sd**2 * min(self.correlation_s / seconds, 1.0)
 
 
@@ -107,7 +109,7 @@ def clip_joints(folder: Path, network: str) -> dict[str, Joint]:
 
 
 def fitted(joints: list[Joint]) -> np.ndarray:
-    """Fit offsets by least squares, every walk of the same weight."""
+    """Fit offsets by least squares, with equal weight for every walk."""
     normal, right = RIDGE * np.eye(3), np.zeros(3)
     for joint in joints:
         along, off = (
@@ -120,7 +122,7 @@ def fitted(joints: list[Joint]) -> np.ndarray:
 
 
 def errors(joint: Joint, offset: np.ndarray) -> Errors | None:
-    """Measure what offsets leave; None where most frames are outliers."""
+    """Measure what remains after the offsets; None if most frames are outliers."""
     good = joint.good
     if not good.any():
         return None
@@ -157,7 +159,7 @@ def errors(joint: Joint, offset: np.ndarray) -> Errors | None:
 
 
 def duration(measured: list[Errors]) -> float:
-    """Seconds in which the correlation of lasting errors with themselves falls to 1/e, by mean windows."""
+    """Seconds in which the autocorrelation of lasting errors falls to 1/e, from the means of windows."""
     square = np.concatenate([(e.windows**2 - e.noise(WINDOW)).ravel() for e in measured])
     longest = max(len(e.windows) for e in measured)
     lags, shares, counts = [], [], []
@@ -172,14 +174,14 @@ def duration(measured: list[Errors]) -> float:
 
 
 def again(measured: list[Errors]) -> float:
-    """Share of the variance of changing errors that comes again in every stride."""
+    """Share of the variance of changing errors that recurs in every stride."""
     products = np.concatenate([e.repeated for e in measured])
     squares = np.concatenate([np.full(e.repeated.shape, e.variance) for e in measured])
     return float(np.clip(products.mean() / squares.mean(), 0.0, 1.0)) if products.size else 0.0
 
 
 def learn(clips: list[dict[str, Joint]]) -> dict[str, object]:
-    """Profile of a network by the joints of its clips."""
+    """Profile of a network from the joints of its clips."""
     found: dict[str, dict[str, object]] = {}
     every = []
     for name in sorted({name[2:] for name in clips[0]}):

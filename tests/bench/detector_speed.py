@@ -1,10 +1,11 @@
 #!/usr/bin/env python3
-"""Speed of the detector: milliseconds a person by network and runtime, and of `gait track` with it.
+"""Speed of the detector: milliseconds per person by network and runtime, and of `gait track` with it.
 
     detector_speed.py [--record]
 
-The last part of make bench.  A person is one run of the landmark network on a crop; frames a second are those
-of the whole command on a film of 1280 x 720, start-up included.  --record keeps the page on a quiet host.
+The last part of make bench.  "Per person" is one run of the landmark network on a crop; frames per second are
+those of the whole command on a film of 1280 x 720, including start-up.  --record keeps the page if the host
+is quiet.
 """
 
 from __future__ import annotations
@@ -28,14 +29,14 @@ from gait.detect.networks import LandmarkNetwork, whole_picture
 
 FILM = eval_clips.DATA / "real" / "lab_side"
 RUNS = 40
-WANTED = 25.0  # frames a second of gait track with lite, on two cores
+WANTED = 25.0  # frames per second of gait track with lite, on two cores
 BUSY = 0.5  # load average from which figures are not recorded
 
 Row = list[object]
 
 
 def main() -> int:
-    """Measure, print and, if asked to, record; 0 also without weights or film."""
+    """Measure, print and, if asked to, record; exit code 0 also if weights or film are absent."""
     load = os.getloadavg()[0]
     absent = [w.file for w in (weights.PERSON, *weights.LANDMARKS.values()) if weights.find(w) is None]
     if absent or not FILM.is_dir():
@@ -45,9 +46,10 @@ def main() -> int:
     rows += [_track("lite"), _track("full")]
     head = ["what", "runtime", "ms wall", "ms CPU", "frames/s", "wanted", "reached"]
     note = (
-        f"{facts('make bench ARGS=--record')} Load average before: {load:.1f}.\n\nMedian time of a "
-        f"person by the landmark network, {RUNS} runs; LiteRT has two threads, OpenCV one for each core. "
-        "gait track: time of a frame of the whole command, start-up included, on a film of 1280 x 720."
+        f"{facts('make bench ARGS=--record')} Load average before: {load:.1f}.\n\n"
+        f"Median time per person of the landmark network, {RUNS} runs; LiteRT has two threads, OpenCV one "
+        "for each core. gait track: time per frame of the whole command, including start-up, on a film "
+        "of 1280 x 720."
     )
     title = "Speed of the detector"
     if "--record" in sys.argv and load < BUSY:

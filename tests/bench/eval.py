@@ -9,8 +9,8 @@
     make eval ARGS='--folder DIR'              any folder of clips (video.mp4 camera.json truth.csv ...)
     make eval ARGS='--simulated DIR'           hard cases: made in DIR if absent, then evaluated
 
-A development clip's subject is left out of learning.  A start from the truth has noise drawn by the seed;
-auto is `gait track` as it is, images the same without the detector.
+A development clip's subject is left out of learning.  A start from the truth has noise drawn with the seed;
+auto is `gait track` with its own start, images is the same without the detector.
 Writes results.json, results.csv and index.html (overlays, plots; failures first) into build/eval.
 """
 
@@ -58,14 +58,25 @@ def arguments() -> argparse.Namespace:
     add("--clips", nargs="+", metavar="NAME", help="names of clips (all, and outdoor)")
     add("--folder", type=Path, metavar="DIR", help="evaluate the clips in DIR instead")
     add("--simulated", type=Path, metavar="DIR", help="make the hard cases in DIR if need be, evaluate them")
-    add("--stature-error", type=float, metavar="SHARE", help="also with the start's stature wrong by +-SHARE")
-    add("--background", nargs="+", choices=("plate", "auto", "none"), default=[], help="also with these")
-    add("--every", type=int, nargs="+", default=[], metavar="K", help="also with each K-th frame")
+    add(
+        "--stature-error",
+        type=float,
+        metavar="SHARE",
+        help="also with a stature in the start that is wrong by +-SHARE",
+    )
+    add(
+        "--background",
+        nargs="+",
+        choices=("plate", "auto", "none"),
+        default=[],
+        help="also with these backgrounds",
+    )
+    add("--every", type=int, nargs="+", default=[], metavar="K", help="also with every K-th frame only")
     add("--particles", type=int, nargs="+", default=[], metavar="N", help="also with N particles")
-    add("--ablate", action="store_true", help="also with each term and feature switched off")
+    add("--ablate", action="store_true", help="also with each term and feature switched off in turn")
     add("--all", action="store_true", help="--stature-error 0.05 --background none --every 2 3")
     add("--against", type=Path, metavar="JSON", help="results.json of an earlier run: print what changed")
-    add("--jobs", type=int, default=2, metavar="J", help="runs side by side, same results (2)")
+    add("--jobs", type=int, default=2, metavar="J", help="runs side by side; results do not depend on it (2)")
     add("--json", action="store_true", help="print the figures of every run as JSON instead of tables")
     add("--html", type=Path, default=OUT, metavar="DIR", help="folder of the results (build/eval)")
     add("--no-pictures", action="store_true", help="neither overlays nor a page")
@@ -80,7 +91,7 @@ def arguments() -> argparse.Namespace:
 
 
 def arms_of(args: argparse.Namespace) -> list[Arm]:
-    """The main arms, then one for each thing that the command line varies."""
+    """The main arms, then one arm for each thing that the command line varies."""
     switches = eval_ablate.switches(TrackerConfig.default()) if args.ablate else None
     return main_arms(args.modes, args.init, args.seeds) + varied_arms(
         seeds=args.seeds or 3,
@@ -154,7 +165,7 @@ def tables(
     before: list[dict[str, Any]],
     wanted: bool = True,
 ) -> list[tuple[str, str]]:
-    """Headings and tables in the shape of `shape`; `before` is an earlier run's rows or empty."""
+    """Headings and tables as made by `shape`; `before` has the rows of an earlier run or is empty."""
     summaries = eval_table.summaries(rows)
     parts = [("Clips", shape(eval_table.grid(summaries), 2))]
     parts.append(("Intervals and status", shape(eval_table.honesty(summaries), 2)))
@@ -224,7 +235,7 @@ def earlier(path: Path) -> list[dict[str, Any]]:
 
 
 def main() -> int:
-    """Evaluate and report; 1 if something wanted is not reached."""
+    """Evaluate and report; exit code 1 if a target is not reached."""
     args = arguments()
     signal.signal(signal.SIGTERM, signal.default_int_handler)  # ends the workers as well
     if not eval_clips.DATA.is_dir() and not (args.folder or args.simulated):

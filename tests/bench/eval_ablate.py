@@ -1,4 +1,4 @@
-"""Ablation: what each adopted term and feature is worth, by switching it off through the public settings."""
+"""Ablation: what each likelihood term and feature is worth, by switching it off with the public settings."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from gait import Term, TrackerConfig
 Rows = list[dict[str, Any]]
 Runs = dict[tuple[str, int], dict[str, Any]]
 
-# feature: settings that switch it off; those that this version lacks, or has off already, are passed over
+# feature: settings that switch it off; skipped if this version lacks them or has the feature off already
 _FEATURES: dict[str, dict[str, Any]] = {
     "components": {"components": 0},
     "score noise": {"coef_noise": 0.0},
@@ -58,7 +58,7 @@ def costs(rows: Rows) -> list[dict[str, Any]]:
 
 
 def changes(before: Rows, after: Rows) -> list[dict[str, Any]]:
-    """For each arm in both: what changed from one evaluation to another, clip by clip and seed by seed."""
+    """For each arm in both evaluations: what changed from one to the other, paired by clip and seed."""
     arms = [a for a in dict.fromkeys(r["arm"] for r in after) if any(r["arm"] == a for r in before)]
     return [_line(arm, _by_run(before, arm), _by_run(after, arm)) for arm in arms]
 
@@ -77,7 +77,7 @@ def _line(name: str, base: Runs, runs: Runs) -> dict[str, Any]:
 
 
 def _differences(base: Runs, runs: Runs, name: str) -> np.ndarray | None:
-    """Run minus base, (clips, seeds), where both are known for every seed of a clip."""
+    """Run minus base (clips, seeds), for clips where both are known with every seed."""
     clips: dict[str, list[float]] = {}
     for (clip, seed), row in runs.items():
         before = base.get((clip, seed))

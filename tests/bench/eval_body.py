@@ -1,12 +1,12 @@
 #!/usr/bin/env python3
-"""Tracks of people whose limbs were measured, beside tracks that know their stature alone.
+"""Tracks of people whose limbs were measured, compared with tracks for which only the stature is known.
 
     eval_body.py [--record] [--seeds 2] [--simulated 401,402] [--frames 100]
 
-The development clips, each with a model learnt without its subject, and simulated walks of people whose
-bodies are drawn from what was learnt (gait simulate --body drawn), with camera, background and detector.
-Lengths are those of the truth, each with an error of a centimetre as of a tape.  Clips and tracks are kept
-in build/eval-body.
+The clips are the development clips, each with a model learnt without its subject, and simulated walks of
+people whose bodies are drawn from the learnt distribution (gait simulate --body drawn), with camera,
+background and detector.  Lengths are the true ones, each with an error of a centimetre, as measured with a
+tape.  Clips and tracks are kept in build/eval-body.
 """
 
 from __future__ import annotations
@@ -59,7 +59,7 @@ class Case:
 
 
 def main() -> int:
-    """Make, track, compare, print; 1 if the clips are further off than is wanted."""
+    """Make, track, compare, print; exit code 1 if the errors exceed the targets."""
     options = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawTextHelpFormatter)
     options.add_argument("--seeds", type=int, default=2, help="runs of a clip")
     options.add_argument("--simulated", default="401,402", help="seeds of simulated clips, or none")
@@ -148,7 +148,7 @@ def measured(case: Case, seeds: int) -> Iterator[list[object]]:
 
 
 def without_constant(track: Track, truth: Joints, camera: Camera) -> tuple[float, float]:
-    """Root error (mm) without what is constant in the body's frame, and without its part across the view."""
+    """Root error (mm) without its constant part in the body's frame, and without that across the view."""
     _, ours, theirs = np.intersect1d(track.frame, truth.frame, return_indices=True)
     found, true = track.eval15()[ours], truth.eval15()[theirs]
     middle = true[:, HIPS].mean(axis=1, keepdims=True)
@@ -166,7 +166,7 @@ def without_constant(track: Track, truth: Joints, camera: Camera) -> tuple[float
 
 
 def words(rows: list[list[object]], developed: list[str]) -> tuple[str, bool]:
-    """Sum the table up in words, and state whether something wanted was missed."""
+    """Summarise the table in words, and state whether a target was missed."""
     parts, missed = [], False
     names = list(dict.fromkeys(str(row[0]) for row in rows))
     groups = {"development clips": developed, "simulated": [name for name in names if name not in developed]}
@@ -184,12 +184,13 @@ def words(rows: list[list[object]], developed: list[str]) -> tuple[str, bool]:
             )
             missed |= title != "simulated" and (middle[0] > WANTED[0] or worst[0] > WANTED[1])
     text = (
-        "Root errors with the stature known, and with the lengths of limbs and the widths of hips and "
-        f"shoulders known to {1000 * TAPE_SD:.0f} mm as well (`gait track --body`); detector, camera and "
-        "background; means over the seeds. *without constant*: less what is constant for each joint in the "
-        "body's frame, as no estimate of the person could do better; *without its part in the picture*: less "
-        "the share of it that this one view shows. Medians of the clips, mm "
-        f"(wanted on the development clips: root {WANTED[0]:.0f}, none above {WANTED[1]:.0f}):\n\n"
+        "Root errors with the stature known, and with lengths of limbs and widths of hips and shoulders "
+        f"known to {1000 * TAPE_SD:.0f} mm as well (`gait track --body`); with detector, camera and "
+        "background; means over the seeds. *without constant*: less the error that is constant for each "
+        "joint in the body's frame, a lower bound that no better knowledge of the person would improve; "
+        "*without its part in the picture*: less only the part of it that this one view shows. Medians "
+        f"of the clips, mm (targets on the development clips: root {WANTED[0]:.0f}, none above "
+        f"{WANTED[1]:.0f}):\n\n"
     )
     return text + "\n".join(parts), missed
 

@@ -1,11 +1,11 @@
 #!/usr/bin/env python3
-"""Tracks with one and with two cameras, and the offset between films that is found beside the true one.
+"""Tracks with one and with two cameras, and the time offset found between films compared with the true one.
 
     eval_cameras.py [--record] [--seeds 501,502,503] [--frames 110] [--late 0.5]
 
-Simulated walks (gait simulate --cameras 2), from the side, at 45 degrees and towards the first camera,
-tracked with the detector and all defaults; the second film once as it is, and once cut so that it begins
---late seconds later, which has to be found.
+Simulated walks (gait simulate --cameras 2), from the side, at 45 degrees and towards the first camera, are
+tracked with the detector and all defaults.  The second film is used once as it is and once cut to begin
+--late seconds later; this offset must be found.
 Clips and tracks are kept in build/eval-cameras.
 """
 
@@ -35,7 +35,7 @@ WANTED = 40.0  # mm, median over frames of the distance of joints from where the
 
 
 def main() -> int:
-    """Make, track, compare, print; 1 if walks towards the camera are beyond what is wanted."""
+    """Make, track, compare, print; exit code 1 if walks towards the camera miss the target."""
     options = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawTextHelpFormatter)
     options.add_argument("--seeds", default="501,502,503")
     options.add_argument("--frames", type=int, default=110)
@@ -63,13 +63,13 @@ def main() -> int:
     middle = float(np.median(toward))
     missed = middle > WANTED
     note = (
-        f"{facts('make eval-cameras ARGS=--record')}\n\nSimulated walks of {args.frames} frames, seeds "
-        f"{args.seeds}, with the detector and all defaults, by one camera and by two; the second one stands "
-        f"60 degrees round the path, and its film begins with the first (two) or {args.late:g} s later "
-        "(cut), which is found from the motion. "
-        "Medians over the frames: joints in space; pose, the midpoints of the hips laid on each other. "
-        "inside: coordinates within their 90 % intervals. Towards the camera, two cameras: median of clips "
-        f"{middle:.0f} mm, wanted at most {WANTED:.0f}{', missed' if missed else ''}."
+        f"{facts('make eval-cameras ARGS=--record')}\n\n"
+        f"Simulated walks of {args.frames} frames, seeds {args.seeds}, with the detector and all "
+        "defaults, with one camera and with two. The second camera stands 60 degrees around the path. "
+        f"Its film begins with the first one (two) or {args.late:g} s later (cut); this offset is found "
+        "from the motion. Medians over the frames: joints in space; pose, with the midpoints of the hips "
+        "aligned. inside: coordinates within their 90 % intervals. Towards the camera, two cameras: "
+        f"median of clips {middle:.0f} mm, target at most {WANTED:.0f}{', missed' if missed else ''}."
     )
     (table.publish if args.record else _show)("cameras", "One camera and two", head, rows, note)
     return int(missed)
@@ -81,7 +81,7 @@ def _show(name: str, title: str, head: list[str], rows: list[list[object]], note
 
 
 def made(view: str, seed: int, frames: int, late: float) -> tuple[Path, float]:
-    """Make a clip unless it is there; return its folder, and when the second film begins, seconds."""
+    """Make a clip unless it exists; return its folder, and when the second film begins, seconds."""
     scenario = Scenario(view=view, seed=seed, frames=frames, cameras=2)
     folder, cut = FOLDER / f"{view}_{seed}", round(late * scenario.fps)
     if not (folder / "late.mp4").is_file():
