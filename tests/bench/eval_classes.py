@@ -1,14 +1,14 @@
-"""Classes of motion: people who stop, stand, turn, walk backwards or run, with and without classes.
+"""Classes of motion: people who stop, stand, turn, walk backwards or run, tracked with and without classes.
 
     make built && .venv/bin/python tests/bench/eval_classes.py [--seeds 3] [--record]
     .venv/bin/python tests/bench/eval_classes.py --only stopping backwards
 
-The clips are presets of `gait simulate`, with further seeds of the person, those of `eval_simulated` for slow
-walks and runs, and the development clips.  Models are the package's: walk; classes, which walks, stands,
-walks backwards and runs; and, where people only walk, the walk of classes alone, which is learnt from people
-of seven sources instead of CMU's.  A start is the truth with the noise of `eval_clips`, without the class.
-The time of a step is compared between the package's walk and the same walk with standing and walking
-backwards.
+The clips are presets of `gait simulate`, with further seeds of the person; the slow walks and runs of
+`eval_simulated`; and the development clips.  The models are those of the package: walk; classes, which walks,
+stands, walks backwards and runs; and, where people only walk, the walk of classes alone, which is learnt from
+people of seven sources instead of CMU's.  A start is the truth with the noise of `eval_clips`; it does not
+state the class.  The time of a step is compared between the package's walk and the same walk with standing
+and walking backwards added.
 """
 
 from __future__ import annotations
@@ -83,15 +83,15 @@ COLUMNS = (
 )
 _READING = f"""\
 Clips of `gait simulate`, and the development clips (names with a number), whose people are among those that
-all models were learnt from; the start is the truth with noise and does not state the class, so people who
-stand or walk backwards are tracked as walking for the first frames.  {ALONE}: without its other
-classes.
+all models were learnt from.  The start is the truth with noise and does not state the class, so people who
+stand or walk backwards are tracked as walking for the first frames.  {ALONE}: the same model without its
+other classes.
 
-- root: error with the hips laid together, median over frames, then over seeds; abs: as it stands
-- in 90 %: share of the joints' coordinates in their 90 % intervals, wanted {COVERED[0]} to {COVERED[1]}
-- far: of the frames under `tracking` those more than {1000 * FAR:.0f} mm off (root)
-- wrong class: of the same frames those of another class, later than {DELAY} s after a change, wanted below
-  {100 * WRONG:.0f} %; - : the model has one"""
+- root: error with the hips aligned, median over frames, then over seeds; abs: error without alignment
+- in 90 %: share of the joints' coordinates in their 90 % intervals, target {COVERED[0]} to {COVERED[1]}
+- far: share of the frames under `tracking` that are more than {1000 * FAR:.0f} mm off (root)
+- wrong class: share of the same frames with another class, later than {DELAY} s after a change, target below
+  {100 * WRONG:.0f} %; - : the model has one class"""
 
 CLIPS: dict[str, Scenario] = {
     **{name: PRESETS[name] for name in ("stopping", "standing", "backwards", "turning")},
@@ -116,7 +116,7 @@ class Run:
     clip: str
     model: str
     seed: int
-    root: float  #: mm, median over frames, hips laid together
+    root: float  #: mm, median over frames, hips aligned
     absolute: float  #: mm
     covered: float  #: share of the coordinates in their 90 % intervals
     tracking: float  #: share of the frames
@@ -125,12 +125,14 @@ class Run:
 
 
 def main() -> None:
-    """Make what is missing, track and print."""
+    """Make the clips that are missing, track and print."""
     parser = argparse.ArgumentParser(
         description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
     )
     parser.add_argument("--seeds", type=int, default=3, help="runs of a clip (3)")
-    parser.add_argument("--jobs", type=int, default=2, help="runs side by side, same results (2)")
+    parser.add_argument(
+        "--jobs", type=int, default=2, help="runs side by side; results do not depend on it (2)"
+    )
     parser.add_argument("--only", nargs="+", metavar="NAME", help="names of clips")
     parser.add_argument("--record", action="store_true", help="write results/eval_classes.md and .csv")
     args = parser.parse_args()
@@ -151,7 +153,7 @@ def main() -> None:
 
 
 def _clips(only: list[str] | None) -> list[Clip]:
-    """Clips of the scenarios, made where they are missing, and the runner."""
+    """Clips of the scenarios, made if they are missing, and the runner."""
     wanted = {name: case for name, case in CLIPS.items() if not only or name in only}
     if not only or RUNNING in only:
         OUT.mkdir(parents=True, exist_ok=True)
@@ -169,7 +171,7 @@ def _clips(only: list[str] | None) -> list[Clip]:
 
 
 def _runs(clips: list[Clip], seeds: int, jobs: int) -> Iterator[Run]:
-    """Every clip with every model, side by side."""
+    """Track every clip with every model, side by side."""
     alone = OUT / f"{ALONE}.gait"
     blob.write(alone, {tag: of for tag, of in read_cyclic("classes").items() if not of_class(tag)})
     each = [
@@ -242,7 +244,7 @@ def _classes(path: Path | None, count: int) -> list[str]:
 
 
 def _time_of_three(clips: list[Clip]) -> str:
-    """Time steps of both models in turns over the first clip; a line with their ratio."""
+    """Time steps of both models alternately on the first clip; return a line with their ratio."""
     shipped, three = resources.files("gait") / "data" / "walk.gait", OUT / "three.gait"
     words = ["learn", shipped, "-o", three, "--class", "stand", "--class", "backwards"]
     subprocess.run([sys.executable, "-m", "gait", *map(str, words)], check=True, capture_output=True)
@@ -265,13 +267,14 @@ def _time_of_three(clips: list[Clip]) -> str:
     verdict = "reached" if ratio <= DEARER else "missed"
     names = ", ".join(Model(three).classes)
     return (
-        f"A step with three classes ({names}) takes {ratio:.2f} times as long as one with the walk alone: "
-        f"processor\ntime, median over the frames of a clip; wanted at most {DEARER}: {verdict}."
+        f"A step with three classes ({names}) takes {ratio:.2f} times as long as a step with the walk "
+        "alone: processor\n"
+        f"time, median over the frames of a clip; target at most {DEARER}: {verdict}."
     )
 
 
 def _rows(runs: list[Run]) -> Iterator[tuple[object, ...]]:
-    """Medians over the seeds, both models side by side."""
+    """Medians over the seeds, with both models side by side."""
     for clip in dict.fromkeys(run.clip for run in runs):
         for model in dict.fromkeys(run.model for run in runs):
             these = [run for run in runs if run.clip == clip and run.model == model]

@@ -25,7 +25,7 @@ ROOT = Path(__file__).resolve().parents[2]
 DATA = ROOT.parent / "shared" / "data"
 MOCAP = DATA / "mocap" / "cmu_walk"
 OUTDOOR = "outdoor"
-OUTDOOR_FRAMES = (64, 187)  # she is in full view
+OUTDOOR_FRAMES = (64, 187)  # the first frame in which she is in full view
 OUTDOOR_HEIGHT = 1.65  # metres
 _PRIORS = {"people": "", "paper": "paper."}  # in the names of models
 SD = {"pelvis": 0.03, "heading_rad": 0.05, "phase": 0.03, "stride_hz": 0.03, "stature_m": 0.003}
@@ -33,7 +33,7 @@ SD = {"pelvis": 0.03, "heading_rad": 0.05, "phase": 0.03, "stride_hz": 0.03, "st
 
 
 def shared_clips(names: list[str] | None) -> list[Clip]:
-    """The development clips and the outdoor clip, or those of `names`."""
+    """The development clips and the outdoor clip, or those called `names`."""
     known = {clip.name: clip for clip in folder_clips(DATA / "eval" / "dev")} | {OUTDOOR: outdoor_clip()}
     unknown = [name for name in names or () if name not in known]
     if unknown:
@@ -44,7 +44,7 @@ def shared_clips(names: list[str] | None) -> list[Clip]:
 def folder_clips(folder: Path) -> list[Clip]:
     """Every sub-folder with video.mp4 and camera.json (or the folder itself).
 
-    background.png, truth.csv, meta.json and init.json are used where they are.
+    background.png, truth.csv, meta.json and init.json are used if they exist.
     """
     places = [p for p in [folder, *sorted(folder.iterdir())] if (p / "video.mp4").is_file()]
     if not places:
@@ -96,14 +96,14 @@ def meta_of(folder: Path) -> dict[str, Any]:
 
 
 def absent() -> bool:
-    """Whether the shared data are not there, which is stated."""
+    """Print a message and return True if the shared data are absent."""
     if not DATA.is_dir():
         print(f"{Path(sys.argv[0]).stem}: {DATA} is not there, left out", file=sys.stderr)
     return not DATA.is_dir()
 
 
 def people(names: list[str] | None = None) -> tuple[list[Clip], dict[str, Path]]:
-    """Clips with true joints (of these names, or all), and models learnt without each one's subject."""
+    """Clips with true joints (of these names, or all), and models learnt without each clip's subject."""
     clips = [clip for clip in shared_clips(names) if clip.truth]
     with progress("learning", None) as update:
         return clips, models(clips, ROOT / "build" / "eval" / "models", 1, update)
@@ -112,7 +112,7 @@ def people(names: list[str] | None = None) -> tuple[list[Clip], dict[str, Path]]
 def models(
     clips: list[Clip], folder: Path, jobs: int, update: Callable[[int], None], prior: str = "people"
 ) -> dict[str, Path]:
-    """Models without each clip's subject, learned once for a state of the learning code and the data."""
+    """Models without each clip's subject, learnt once for each state of the learning code and the data."""
     folder.mkdir(parents=True, exist_ok=True)
     key = _learning_key()
     subjects = sorted({clip.subject for clip in clips if clip.subject})
@@ -147,9 +147,9 @@ def _learn(subject: str, path: Path, prior: str) -> None:
 
 
 def noisy_start(clip: Clip, seed: int, stature_error: float) -> dict[str, Any]:
-    """First state in the form of an ``--init`` file: the clip's own, or the truth plus noise by the seed.
+    """First state in the form of an ``--init`` file: the clip's own, or the truth plus noise from the seed.
 
-    A wrong stature comes with the sd of a start that gives none: the user believes the number.
+    A wrong stature gets the sd that a start without a stature has: the user believes the number.
     """
     start = json.loads(clip.init.read_text()) if clip.init else _noisy_truth(clip, seed)
     if stature_error:
@@ -174,7 +174,7 @@ def _noisy_truth(clip: Clip, seed: int) -> dict[str, Any]:
 
 
 def _cadence(clip: Clip, truth: Joints) -> dict[str, float]:
-    """Phase and stride rate at the first frame; nothing where no person walks or steps are too few."""
+    """Phase and stride rate at the first frame; empty if no person walks or there are too few steps."""
     cycles = strikes_of(truth, clip.folder / "meta.json").cycles(truth.frame[:2])
     if cycles is None or not clip.steady:
         return {}

@@ -1,7 +1,8 @@
-"""New clips out of simulated ones: frames held, reversed, covered, cut out or joined, the truth with them.
+"""New clips made from simulated ones: frames held, reversed, covered, cut out or joined, with their truth.
 
 Each edit reads the folders of its sources, writes a clip into a new folder, and returns what its meta.json
-states beyond the first source: ``steady`` False where the phase means nothing, ``person`` False without one.
+states in addition to the first source: ``steady`` False if the phase means nothing, ``person`` False if there
+is none.
 """
 
 from __future__ import annotations
@@ -22,10 +23,10 @@ from gait.io.video import Image
 
 Edit = Callable[[Sequence[Path], Path], dict[str, Any]]
 
-_NOISE = 2.0  # of the sensor on frames that are held, grey levels
+_NOISE = 2.0  # noise of the sensor on frames that are held, grey levels
 _STOP = 50  # frame at which the person of `stopping` freezes
 _HIDDEN = (40, 70)  # frames without a view of the person: a second
-_DIFFERENT = 24  # grey levels from the plate that make a pixel part of a person
+_DIFFERENT = 24  # grey levels by which a pixel of a person differs from the plate
 
 
 def standing(sources: Sequence[Path], target: Path) -> dict[str, Any]:
@@ -47,7 +48,7 @@ def _held(source: Path, target: Path, picked: list[int]) -> dict[str, Any]:
 
 
 def backwards(sources: Sequence[Path], target: Path) -> dict[str, Any]:
-    """A walk played in reverse: motion backwards, the body looking forwards."""
+    """A walk played in reverse: the person moves backwards while the body looks forwards."""
     frames = _frames(sources[0])
     order = list(range(len(frames)))[::-1]
     _write(sources[0], target, (frames[n] for n in order), order)
@@ -55,7 +56,7 @@ def backwards(sources: Sequence[Path], target: Path) -> dict[str, Any]:
 
 
 def hidden(sources: Sequence[Path], target: Path) -> dict[str, Any]:
-    """A textured screen before the person's whole way for a second."""
+    """A textured screen in front of the person's whole path for a second."""
     source = sources[0]
     screen = cv2.GaussianBlur(np.random.default_rng(2).uniform(40, 215, _plate(source).shape), (0, 0), 4)
     frames = _frames(source)
@@ -67,7 +68,7 @@ def hidden(sources: Sequence[Path], target: Path) -> dict[str, Any]:
 
 
 def leaves(sources: Sequence[Path], target: Path) -> dict[str, Any]:
-    """The middle of the picture only: the person enters and leaves."""
+    """Only the middle of the picture: the person enters and leaves."""
     source = sources[0]
     camera = Camera.read(str(source / "camera.json"))
     left = camera.width // 4 // 2 * 2
@@ -82,7 +83,7 @@ def leaves(sources: Sequence[Path], target: Path) -> dict[str, Any]:
 
 
 def second_person(sources: Sequence[Path], target: Path) -> dict[str, Any]:
-    """Another person crosses in front, cut out of a clip of their own (so without a shadow)."""
+    """Another person crosses in front, cut out of another clip (and therefore without a shadow)."""
     frames, others, plate = _frames(sources[0]), _frames(sources[1]), _plate(sources[1])
     made = []
     for mine, other in zip(frames, others, strict=True):
@@ -135,7 +136,7 @@ def _noisy(image: Image, rng: np.random.Generator) -> Image:
 
 
 def _box(folder: Path, frame: int, margin: float) -> tuple[np.ndarray, np.ndarray]:
-    """Corners in pixels of the person's joints at `frame`, wider by `margin` of their height."""
+    """Corners, pixels, of a box around the person's joints at `frame`, wider by `margin` of their height."""
     camera, truth = Camera.read(str(folder / "camera.json")), read_truth(folder / "truth.csv")
     uv = camera.project(truth.eval15()[frame])
     space = margin * np.ptp(uv[:, 1])

@@ -5,9 +5,10 @@
     make eval-gait ARGS='--simulated DIR'    slow, fast, asymmetric and aided walks by gait simulate instead
 
 Each clip is tracked by `gait track --smooth --draws` with a model learnt without its subject, from the truth
-with the noise of `eval_clips`; the same without --smooth is the arm `track`.  Beside them stand a pose that
-does not move and the mean cycle that runs on from the true start.  Angles of both motions come from the same
-fit of a skeleton to joints (`gait.export.angles`), so that a constant is a difference of joint centres.
+with the noise of `eval_clips`; the arm `track` is the same without --smooth.  For comparison there are two
+baselines: a pose that does not move, and the mean cycle that continues from the true start.  Angles of all
+motions come from the same fit of a skeleton to joints (`gait.export.angles`), so a constant error of an angle
+is a difference of joint centres.
 """
 
 from __future__ import annotations
@@ -45,7 +46,7 @@ from gait.progress import progress
 OUT = eval_clips.ROOT / "build" / "eval-gait"
 ARMS = ("track", "smooth", "free cycle", "static pose")
 
-#: Columns of errors: heading, name in `gait_errors`, factor to the unit of the heading; 0: relative.
+#: Columns of errors: heading, name in `gait_errors`, factor to the heading's unit; 0: relative.
 ERRORS = (
     ("heel strike ms", "heel_strike_s", 1000.0),
     ("toe-off ms", "toe_off_s", 1000.0),
@@ -62,7 +63,7 @@ ERRORS = (
     ("step time asym. pp", "asymmetry:step_time_s", 1.0),
     ("step length asym. pp", "asymmetry:step_length_m", 1.0),
 )
-#: Angles by the names of OpenSim, as in libgait/doc/reference/angles.md: channels of both sides or one.
+#: Angles with OpenSim's names, as in libgait/doc/reference/angles.md: channels of both sides, or one.
 ANGLES = {
     "hip_flexion": ("r_hip_flexion", "l_hip_flexion"),
     "hip_adduction": ("r_hip_abduction", "l_hip_abduction"),
@@ -74,9 +75,9 @@ ANGLES = {
     "lumbar_bending": ("torso_x",),
     "lumbar_rotation": ("torso_z",),
 }
-#: What is aimed at: heading, pooled value at most.
+#: Targets: heading, greatest pooled value.
 WANTED = {"heel strike ms": 15.0, "the person's mm": 20.0, "speed m/s": 0.03, "cadence %": 1.0}
-WANTED_ANGLES = {"hip_flexion": 3.5, "knee_angle": 3.5}  # degrees, after a constant
+WANTED_ANGLES = {"hip_flexion": 3.5, "knee_angle": 3.5}  # degrees, after subtracting a constant
 WANTED_COVERAGE = (85.0, 95.0)  # per cent
 
 _LEG = ("hip_flexion", "knee_angle", "ankle_angle")
@@ -116,10 +117,10 @@ PUBLISHED: tuple[tuple[Any, ...], ...] = (
 PUBLISHED_NOTE = """\
 Stenum and others 2021, PLoS Computational Biology 17:e1008935 (32 people); Gilon and others 2026,
 arXiv:2603.24733; Peiffer and others 2025, arXiv:2507.08268; Keating and others 2026, Sensors (39 people,
-beside a walkway with light barriers).  These are of other people, on other clips, with other references, and
-mostly of films of real people; ours are of drawn or simulated films whose truth is exact.  They show the
-order of size that a laboratory meets, and rank nothing.  Ours are pooled, angles as they are; `make eval` has
-the pelvis among its joints."""
+beside a walkway with light barriers).  The published figures come from other people, other clips and other
+references, and mostly from films of real people; ours come from drawn or simulated films whose truth is
+exact.  They show the order of magnitude that a laboratory sees, and do not rank anything.  Ours are pooled,
+with angles as they are; `make eval` counts the pelvis among its joints."""
 
 
 @dataclass(frozen=True)
@@ -130,21 +131,26 @@ class Run:
     arm: str
     seed: int
     compared: dict[str, Compared]  #: of `gait_errors`; empty if no whole stride was found
-    asked: int  #: strides of the truth
+    asked: int  #: strides in the truth
     #: degrees by name of `ANGLES`: mean absolute error, then without the mean difference of each side
     raw: dict[str, float]
     shifted: dict[str, float]
 
 
 def main() -> int:
-    """Track what is missing, compare, print or record; 1 if something wanted is not reached."""
+    """Track what is missing, compare, print or record; exit code 1 if a target is not reached."""
     parser = argparse.ArgumentParser(
         description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
     )
     add = parser.add_argument
-    add("--seeds", type=int, default=3, help="runs of a clip, each from a start of its own (3)")
+    add("--seeds", type=int, default=3, help="runs of a clip, each from its own start (3)")
     add("--clips", nargs="+", metavar="NAME", help="names of clips (all with true joints)")
-    add("--simulated", type=Path, metavar="DIR", help="make walks in DIR if need be, and evaluate those")
+    add(
+        "--simulated",
+        type=Path,
+        metavar="DIR",
+        help="make walks in DIR unless they exist, and evaluate those",
+    )
     add(
         "--first-seed",
         type=int,
@@ -168,7 +174,7 @@ def main() -> int:
 
 
 def _clips(args: argparse.Namespace) -> list[Clip]:
-    """Clips that were asked for, of those with true joints."""
+    """The clips with true joints that were asked for."""
     if args.simulated:
         with progress("making clips", len(gait_cases.CASES)) as update:
             gait_cases.make(args.simulated, args.first_seed, args.jobs, update)
@@ -198,12 +204,12 @@ def _runs(clips: list[Clip], args: argparse.Namespace) -> list[Run]:
 
 
 def _folder(clip: Clip, model: Path | None, seed: int) -> Path:
-    """Of a run's files; one for every state of what was learnt."""
+    """Start of the names of a run's files; another one for every state of what was learnt."""
     return OUT / clip.folder.parent.name / f"{clip.name}.{model.stem if model else 'walk'}.{seed}"
 
 
 def _track(clip: Clip, model: Path | None, seed: int) -> None:
-    """Track with and without --smooth, unless that is done."""
+    """Track with and without --smooth, unless that has been done."""
     folder = _folder(clip, model, seed)
     folder.mkdir(parents=True, exist_ok=True)
     init = folder / "init.json"
@@ -268,7 +274,7 @@ def _run(
 
 
 def _angle_errors(track: Joints, truth: Joints) -> tuple[dict[str, float], dict[str, float]]:
-    """Mean absolute errors by name of `ANGLES`, degrees: raw, and after the mean of each side is removed."""
+    """Mean absolute errors by name of `ANGLES`, degrees: raw, and after subtracting the mean of each side."""
     _, ours, theirs = np.intersect1d(track.frame, truth.frame, return_indices=True)
     found, true = (_fitted(motion, rows) for motion, rows in ((track, ours), (truth, theirs)))
     raw, shifted = {}, {}
@@ -287,7 +293,7 @@ def _fitted(motion: Joints, rows: np.ndarray) -> np.ndarray:
 
 
 def report(runs: list[Run], record: str | None) -> list[str]:
-    """Print the tables, keep them if asked for, and return what is not reached."""
+    """Print the tables, keep them if asked for, and return the targets that are missed."""
     names = list(dict.fromkeys(run.clip for run in runs))
     errors = [row for clip in (*names, None) for arm in ARMS if (row := _error_row(runs, clip, arm))]
     angle = [row for clip in (*names, None) for arm in ARMS if (row := _angle_row(runs, clip, arm))]
@@ -323,18 +329,19 @@ def _command() -> str:
 
 
 _READING = """\
-Of strides without unsure frames that the truth has as well: strides found / of the truth.  Heel strike and
-toe-off: against the events of meta.json.  A row `all` pools the values of all clips and seeds.  The person's
-stride length, cadence (relative) and speed are means over a clip; asymmetry is 200 (right - left) / (right +
-left), in percentage points.  Foot clearance: least height of the toe joint in the middle of the swing."""
+Errors are over strides without unsure frames that the truth also has (column strides: found / in the truth).
+Heel strike and toe-off are compared with the events of meta.json.  A row `all` pools the values of all clips
+and seeds.  The person's stride length, cadence (relative) and speed are means over a clip; asymmetry is
+200 (right - left) / (right + left), in percentage points.  Foot clearance is the least height of the toe
+joint in the middle of the swing."""
 _ANGLE_READING = """\
-Names and signs as in libgait/doc/reference/angles.md.  raw: as it is; shifted: after the mean difference of
-each side over the clip is removed.  Joints do not show pelvic tilt: hip_flexion is against a pelvis that does
-not tilt, in both motions alike."""
+Names and signs are those of libgait/doc/reference/angles.md.  raw: the angles as they are; shifted: after
+subtracting the mean difference of each side over the clip.  Joints do not show pelvic tilt, so in both
+motions hip_flexion is relative to a pelvis that does not tilt."""
 _INTERVAL_READING = """\
-Share of the true values inside the 90 % intervals (mean +- 1.645 standard deviations), over clips and seeds;
-z rms: root mean square error in standard deviations, 1 where they are right.  track: standard deviations of
-each frame; smooth: draws from the posterior of the whole clip."""
+Share of the true values inside the 90 % intervals (mean +- 1.645 standard deviations), over clips and
+seeds. z rms: root mean square error in standard deviations, which is 1 if they are right.  track: standard
+deviations of each frame; smooth: draws from the posterior of the whole clip."""
 
 
 def _chosen(runs: list[Run], clip: str | None, arm: str) -> list[Run]:
@@ -415,7 +422,7 @@ def _coverage_rows(runs: list[Run]) -> Iterator[list[Any]]:
 def _verdicts(
     errors: list[list[Any]], angle: list[list[Any]], intervals: list[list[Any]]
 ) -> tuple[list[list[Any]], list[str]]:
-    """Rows of what is wanted and reached, judged by the arm smooth, and what is missed."""
+    """Rows of targets and results, judged with the arm smooth, and the targets missed."""
     head = [name for name, _, _ in ERRORS]
     rows: list[list[Any]] = []
     for name, most in WANTED.items():

@@ -18,7 +18,7 @@ PARTS = (
     "learn_size.py",
     "learn_speed.py",
 )
-WITH_MOCAP = PARTS[1:]  # parts that want the folder of walks as argument
+WITH_MOCAP = PARTS[1:]  # parts that take the folder of walks as argument
 
 
 def main() -> int:

@@ -3,7 +3,7 @@
 
     make eval-lift
 
-The exact identities (F1-F3, F5-F7) are tests (decisions.md states which), speeds are make bench-lift.
+The exact identities (F1-F3, F5-F7) are tests, which decisions.md lists; `make bench-lift` measures speeds.
 """
 
 from __future__ import annotations

@@ -1,4 +1,4 @@
-"""The real clip: joints marked by hand in the picture (reference2d.json)."""
+"""The real clip, judged with joints marked by hand in the picture (reference2d.json)."""
 
 from __future__ import annotations
 
@@ -16,7 +16,9 @@ from gait.motion.evaluate import phase_errors
 from gait.motion.footfalls import Strikes
 
 LEG = ("hip", "knee", "ankle")
-LOST_SHARE = 0.15  # of the person's height in the picture: marks further off, on average, are of a lost frame
+LOST_SHARE = (
+    0.15  # of the person's height in the picture: a frame whose marks are further off on average is lost
+)
 _GUESSED, _CLEAR = 1, 2  # values of vis
 
 
@@ -74,7 +76,7 @@ class Marks:
 
     @property
     def height(self) -> float:
-        """Person's height in the picture, pixels: head's centre to toes, and half a head more."""
+        """Person's height in the picture, pixels: from the head's centre to the toes, plus half a head."""
         head, toe = self.joints.index("head_centre"), self.joints.index(f"{self.near}_toe")
         neck = self.joints.index("neck")
         up = np.abs(self.uv[:, neck, 1] - self.uv[:, head, 1])

@@ -15,22 +15,24 @@ from gait.io.track_file import STATUSES, Joints, Track, read_truth
 from gait.motion.evaluate import APART, LOST_MM, root_errors
 from gait.motion.footfalls import Strikes, strikes_by_zeni
 
-LOCK_AFTER = (1.0, 1.5)  # seconds from the start: the phase must be right in this window
-LOCK = 0.05  # cycles, error that still counts as locked
-WRONG = 0.05  # share of the frames after the first second: more, flipped under `tracking`, is a wrong run
-WITHIN = 2.0  # frames that a heel strike may be off
-_DRAWS = 256  # particles whose poses make the covariance
-_SHRINK = 0.1  # of the covariance towards its diagonal: limbs are rigid, so it is nearly singular
+LOCK_AFTER = (1.0, 1.5)  # seconds after the start in which the phase must be right
+LOCK = 0.05  # cycles; largest error that still counts as locked
+WRONG = (
+    0.05  # a run is wrong if a larger share of the frames after the first second is flipped under `tracking`
+)
+WITHIN = 2.0  # frames by which a heel strike may be off
+_DRAWS = 256  # particles whose poses give the covariance
+_SHRINK = 0.1  # shrinks the covariance towards its diagonal: limbs are rigid, so it is nearly singular
 
 
 def shares(track: Track) -> dict[str, float]:
-    """Share of the frames in each status."""
+    """Share of the frames with each status."""
     status = np.array(track.status)
     return {word: float((status == word).mean()) for word in STATUSES}
 
 
 def against_truth(track: Track, truth: Joints, camera: Camera) -> dict[str, np.ndarray]:
-    """Errors frame by frame; frames that the truth lacks are NaN."""
+    """Errors frame by frame; NaN in frames that the truth lacks."""
     _, ours, theirs = np.intersect1d(track.frame, truth.frame, return_indices=True)
     found, true = track.eval15()[ours], truth.eval15()[theirs]
     pixels = np.linalg.norm(camera.project(found) - camera.project(true), axis=2)
@@ -59,7 +61,7 @@ def phase_difference(found: np.ndarray, true: np.ndarray) -> np.ndarray:
 
 
 def phase_interval(series: dict[str, np.ndarray], sd: np.ndarray) -> dict[str, float]:
-    """Share of the frames whose 90 % interval of the phase holds the truth."""
+    """Share of the frames whose 90 % interval of the phase contains the truth."""
     if "true_phase" not in series:
         return {}
     off = np.abs(phase_difference(series["phase"], series["true_phase"]))
@@ -100,10 +102,11 @@ def _side(status: np.ndarray, silent: float) -> str:
 
 
 def strike_errors(track: Track, strikes: Strikes) -> dict[str, Any]:
-    """Heel strikes of the track's joints against known ones inside the frames tracked.
+    """Heel strikes of the track's joints compared with the known ones inside the frames tracked.
 
-    ``within``: share of the known strikes met within `WITHIN` frames; ``worst`` (frames); ``stride`` relative
-    error of the mean stride time.  Strikes in the first and last 3 frames are not asked for.
+    ``within``: share of the known strikes that are matched within `WITHIN` frames; ``worst`` (frames);
+    ``stride`` relative error of the mean stride time.  Strikes in the first and last 3 frames are not
+    required.
     """
     found = strikes_by_zeni(track)
     low, high = track.frame[0] + 3, track.frame[-1] - 3
@@ -141,7 +144,7 @@ def lost_at_end(series: dict[str, np.ndarray]) -> bool:
 
 
 class Uncertainty:
-    """NEES (Bar-Shalom et al. 2001) of all joints together, by the particles' own covariance."""
+    """NEES (Bar-Shalom et al. 2001) of all joints together, with the particles' own covariance."""
 
     def __init__(self, truth: Path | None, model: Model) -> None:
         self._truth = read_truth(truth) if truth else None
@@ -149,7 +152,7 @@ class Uncertainty:
         self._true = None if self._truth is None else self._truth.eval15()
         self._model = model
         self._joints = [model.joint_names.index(name) for name in EVAL15]
-        self._next = APART  # the first frames are the start's doing
+        self._next = APART  # the start determines the first frames
 
     def wants(self, frame: int) -> bool:
         """Is this one of the frames, far enough apart, that are measured?"""
@@ -159,13 +162,13 @@ class Uncertainty:
         return True
 
     def nees(self, frame: int, estimate: Estimate, states: np.ndarray, weights: np.ndarray) -> float:
-        """Squared error per dimension in units of the covariance: 1 where it is right."""
+        """Squared error per dimension in units of the covariance; 1 if the covariance is right."""
         picked = np.searchsorted(np.cumsum(weights), (np.arange(_DRAWS) + 0.5) / _DRAWS * weights.sum())
         picked = np.minimum(picked, len(weights) - 1)
         poses = np.array([self._model.pose(_state(states[i]))[0][self._joints].ravel() for i in picked])
         covariance = np.cov(poses.T)
         diagonal = np.diag(covariance)
-        shrunk = (1 - _SHRINK) * covariance + np.diag(_SHRINK * diagonal + 1e-6)  # 1 mm at least
+        shrunk = (1 - _SHRINK) * covariance + np.diag(_SHRINK * diagonal + 1e-6)  # at least 1 mm
         error = estimate.joints[self._joints].ravel() - self._true[self._rows[frame]].ravel()
         return float(error @ np.linalg.solve(shrunk, error) / len(error))
 

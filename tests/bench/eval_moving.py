@@ -1,11 +1,11 @@
 #!/usr/bin/env python3
-"""Tracks from cameras that move, beside the same walks before a camera that stands still.
+"""Tracks from moving cameras, compared with the same walks in front of a camera that stands still.
 
     eval_moving.py [--record] [--seeds 24,41] [--frames 60]
 
-Simulated walks (gait simulate --moving), each started from its init file, without a detector: poses as they
-are, poses with errors that are drawn anew for each frame, with and without their standard deviations in the
-file, and what --stabilize finds.  Clips are kept in build/eval-moving.
+Simulated walks (gait simulate --moving), each started from its init file, without a detector.  The arms use
+exact poses; poses with errors that are drawn anew for each frame, with and without their standard deviations
+in the file; and the poses that --stabilize finds.  Clips are kept in build/eval-moving.
 """
 
 from __future__ import annotations
@@ -38,7 +38,7 @@ ARMS = ("exact", "noisy", "noisy, sd not given", "estimated")
 
 
 def main() -> int:
-    """Make, track, compare, print; 1 if a median is beyond what is wanted."""
+    """Make, track, compare, print; exit code 1 if a median misses its target."""
     options = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawTextHelpFormatter)
     options.add_argument("--seeds", default="24,41")
     options.add_argument("--frames", type=int, default=60)
@@ -83,11 +83,12 @@ def main() -> int:
     head = ["camera", "poses", "root mm", "from-to", "to still", "wanted", "abs mm", "lost"]
     title = "Cameras that move"
     note = (
-        f"{facts('make eval-moving ARGS=--record')}\n\nSimulated walks of {args.frames} frames, seeds "
-        f"{args.seeds}, {SIZE[0]} x {SIZE[1]}, from an init file, no detector. root, abs: medians over "
-        "clips of the median over frames, and the extremes. to still: against a still camera of that "
-        f"view. noisy: errors of {np.degrees(TURN_SD):.1f} degrees and {100 * PLACE_SD:.0f} cm, drawn anew "
-        "for each frame; sd not given: without standard deviations in the file. follow: a robot 1 m "
+        f"{facts('make eval-moving ARGS=--record')}\n\n"
+        f"Simulated walks of {args.frames} frames, seeds {args.seeds}, {SIZE[0]} x {SIZE[1]}, from an "
+        "init file, without a detector. root, abs: medians over clips of the median over frames, with "
+        "the range in brackets. to still: relative to a still camera with that view. noisy: errors of "
+        f"{np.degrees(TURN_SD):.1f} degrees and {100 * PLACE_SD:.0f} cm, drawn anew for each frame; sd "
+        "not given: without standard deviations in the file. follow: the camera is on a robot 1 m "
         "behind. lost: frames with the status lost."
     )
     (table.publish if args.record else _show)("moving", title, head, rows, note)
@@ -99,7 +100,7 @@ def _show(name: str, title: str, head: list[str], rows: list[list[object]], note
 
 
 def made(scenario: Scenario, name: str) -> Path:
-    """Folder of a clip, which is made unless it is there."""
+    """Folder of a clip, which is made unless it exists."""
     folder = FOLDER / f"{name}-{scenario.seed}-{scenario.frames}"
     if not (folder / "meta.json").is_file():
         simulate(scenario, folder)

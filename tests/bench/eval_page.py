@@ -1,4 +1,4 @@
-"""The page of an evaluation: tables on top, failures first with pictures, then every clip; one HTML file."""
+"""The page of an evaluation: tables first, then failures with pictures, then every clip; one HTML file."""
 
 from __future__ import annotations
 
@@ -27,7 +27,7 @@ td:nth-child(-n+2),th:nth-child(-n+2){text-align:left}.words td{text-align:left}
 .film img{width:100%}figcaption,.dim{color:#666;font-size:12px}svg{max-width:100%;height:auto}
 summary{cursor:pointer;font-weight:600;margin:.6em 0}
 """
-FAR = 65.0  # mm root: a clip above it is listed with the failures
+FAR = 65.0  # mm root: a clip with a larger error is listed among the failures
 
 
 def write(
@@ -62,7 +62,7 @@ def write(
 
 
 def faults(row: dict[str, Any]) -> list[str]:
-    """What is wrong with a run, worst first; paper mode is a baseline and only its losses count."""
+    """What is wrong with a run, worst first; paper mode is a baseline, of which only losses count."""
     found = [row["failure"]] if row["failure"] and not row["empty"] else []
     if row["lost_run"]:
         found.append("lost")

@@ -1,12 +1,12 @@
 #!/usr/bin/env python3
-"""Several people in one clip beside each of them alone: numbers kept, errors, false tracks, time.
+"""Several people in one clip, compared with each of them alone: numbers kept, errors, false tracks, time.
 
     eval_people.py [--record] [--seeds 301-310] [--frames 54] [--jobs 1]
 
-Simulated people (gait simulate --people) who cross, from the side and at 45 degrees, with each seed; and with
-the first seed three abreast and one who overtakes.  Each clip is tracked by gait track --people all with its
-camera, its background and the detector; then each person in a clip of the same scene without the others.
-Clips and tracks are kept in build/eval-people.
+Simulated people (gait simulate --people) who cross, from the side and at 45 degrees, with each seed; and,
+with the first seed, three people abreast and one who overtakes.  Each clip is tracked by gait track --people
+all with its camera, its background and the detector; then each person in a clip of the same scene without the
+others.  Clips and tracks are kept in build/eval-people.
 """
 
 from __future__ import annotations
@@ -41,13 +41,16 @@ FOLDER = Path(__file__).resolve().parents[2] / "build" / "eval-people"
 SIZE = 320, 240
 FPS = 24.0
 NEAR = 0.5  # metres from a pelvis within which a track is of that person
-SWITCHED = 0.25  # seconds for which a track is nearer to another person than to its own
-WANTED = 1.15, 0.9  # median error to that of a person alone, share of crossings without a switch
-COST = 1.1  # CPU time together, of the sum of each alone, at most
+SWITCHED = 0.25  # seconds for which a switched track is nearer to another person than to its own
+WANTED = (
+    1.15,
+    0.9,
+)  # largest median error relative to a person alone; least share of crossings without a switch
+COST = 1.1  # CPU time of all people together, as a multiple of the sum of each alone, at most
 
 
 def main() -> int:
-    """Make, track, compare, print; 1 if something is beyond what is wanted."""
+    """Make, track, compare, print; exit code 1 if a target is missed."""
     options = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawTextHelpFormatter)
     options.add_argument("--seeds", default="301-310", help="first and last")
     options.add_argument("--frames", type=int, default=54)
@@ -73,17 +76,19 @@ def main() -> int:
     within = sum(ratio <= WANTED[0] for ratio in ratios)
     command = f"make eval-people ARGS='--record --seeds {args.seeds}'"
     note = (
-        f"{facts(command)}\n\nSimulated clips of {args.frames} frames, {FPS:.0f} per second, seeds "
-        f"{args.seeds}, {SIZE[0]} x {SIZE[1]}; camera and background given, detector `full`. Errors: "
-        "medians over frames of the root error of a person's track, mm, together with all, and alone in the "
-        "same scene. switched: a track was for 0.25 s nearer to another person than to its "
-        "own, and within 0.5 m of them, or two tracks are of one person. false: frames with the status "
-        "`tracking` more than 0.5 m from everyone.\n\n"
-        f"Crossings in which both were tracked and no number was switched: {kept} of {crossings} (wanted: "
-        f"{WANTED[1]:.0%}). Median of together to alone over the people in crossings: {median:.2f} (wanted: "
-        f"at most {WANTED[0]}); {within} of {len(ratios)} people are within that. Frames of `tracking` "
-        f"without a person: {strays} (wanted: 0). CPU time of the whole command together, of the sum of each "
-        f"alone: median over clips {cost:.2f}, at most {max(costs):.2f} (wanted: at most {COST})."
+        f"{facts(command)}\n\n"
+        f"Simulated clips of {args.frames} frames, {FPS:.0f} per second, seeds {args.seeds}, {SIZE[0]} x "
+        f"{SIZE[1]}; camera and background given, detector `full`. Errors are medians over frames of the "
+        "root error of a person's track, mm: with all people together, and alone in the same scene. "
+        "switched: for 0.25 s a track was nearer to another person than to its own, and within 0.5 m of "
+        "them, or two tracks followed one person. false: frames with the status `tracking` that are more "
+        "than 0.5 m from every person.\n\n"
+        f"Crossings in which both people were tracked and no number was switched: {kept} of {crossings} "
+        f"(target: {WANTED[1]:.0%}). Ratio of together to alone, median over the people in crossings: "
+        f"{median:.2f} (target: at most {WANTED[0]}); {within} of {len(ratios)} people are within that. "
+        f"Frames of `tracking` without a person: {strays} (target: 0). CPU time of the whole command for "
+        f"all together, relative to the sum of each alone: median over clips {cost:.2f}, at most "
+        f"{max(costs):.2f} (target: at most {COST})."
     )
     head = ["clip", "seed", "person", "together", "alone", "ratio", "lost", "switched", "false"]
     if args.record:
@@ -95,12 +100,12 @@ def main() -> int:
 
 
 def scenario_of(kind: str, view: str, seed: int, frames: int) -> Scenario:
-    """Give what to simulate."""
+    """Return what to simulate."""
     return Scenario(people=kind, view=view, seed=seed, frames=frames, size=SIZE, fps=FPS)
 
 
 def measured(scenario: Scenario) -> tuple[list[list[object]], bool, float]:
-    """Make and track a clip: rows of people, whether it is a crossing in which all went right, cost."""
+    """Make and track a clip: rows of people, whether it is a crossing in which all went right, the cost."""
     folder, count = made(scenario), 1 + COMPANY[scenario.people]
     began = time.process_time()
     tracks = tracked(folder)
@@ -122,7 +127,7 @@ def measured(scenario: Scenario) -> tuple[list[list[object]], bool, float]:
 
 
 def made(scenario: Scenario) -> Path:
-    """Folder of a clip and of the clips of each person alone, which are made unless they are there."""
+    """Folder of a clip and of the clips of each person alone, which are made unless they exist."""
     folder = FOLDER / f"{scenario.people}-{scenario.view}-{scenario.seed}-{scenario.frames}"
     if (folder / "alone.txt").is_file():
         return folder
@@ -141,7 +146,7 @@ def made(scenario: Scenario) -> Path:
 
 
 def options_of(folder: Path, video: str, output: str, people: int | None = None) -> ClipOptions:
-    """Give the options of a track: all that is known of a clip but who is in it."""
+    """Options of a track: all that is known of a clip except who is in it."""
     camera, background = str(folder / "camera.json"), str(folder / "background.png")
     return ClipOptions(
         str(folder / video), camera, str(folder / output), background=background, people=people, quiet=True
@@ -170,7 +175,7 @@ def truth_of(folder: Path, k: int) -> Joints:
 
 
 def compared(folder: Path, tracks: dict[int, Track], count: int) -> tuple[dict[int, Track], bool, int]:
-    """Whose each track is, whether a number was switched, and frames of `tracking` without a person."""
+    """Person each track follows, whether a number was switched, frames of `tracking` without a person."""
     truths = {k: truth_of(folder, k).places["pelvis"] for k in range(1, count + 1)}
     own: dict[int, Track] = {}
     switched, stray = False, 0

@@ -28,14 +28,14 @@ _SPACE = 1.35  # height of the picture in heights of the person
 def pictures(
     result: Result, video: Video, camera: Camera, model: Model, estimates: dict[int, Estimate]
 ) -> list[tuple[str, bytes]]:
-    """Caption and JPEG of the worst, median and best frame; first, middle, last without a truth."""
+    """Caption and JPEG of the worst, median and best frame; of the first, middle and last without a truth."""
     chosen = _choose(result)
     overlay, out = Overlay(model, camera), {}
     numbers = {number for number, _ in chosen}
     for frame in video.frames(min(numbers), max(numbers) + 1):
         if frame.number in numbers:
             estimate, known = estimates[frame.number], _known(result, model, camera, frame.number)
-            posed = np.isfinite(estimate.mean.phase)  # a person who stands has joints alone
+            posed = np.isfinite(estimate.mean.phase)  # a person who stands has joints but no phase
             canvas = overlay.body(frame.image, estimate.mean) if posed else frame.image.copy()
             overlay.skeleton(canvas, estimate.joints)
             shown = np.vstack([camera.project(estimate.joints), known])
@@ -80,7 +80,7 @@ def _known(result: Result, model: Model, camera: Camera, number: int) -> Array:
 
 
 def _crop(canvas: Image, shown: Array) -> tuple[Image, Callable[[Array], Array]]:
-    """Picture of the surroundings of the points `shown`, and what takes pixels there."""
+    """Picture of the surroundings of the points `shown`, and the function that takes pixels there."""
     height, width = canvas.shape[:2]
     low, high = np.clip([shown.min(axis=0), shown.max(axis=0)], 0, [width - 1, height - 1])
     tall = max(_SPACE * float((high - low)[1]), _SPACE * float((high - low)[0]) * HEIGHT / WIDTH, 60.0)
@@ -93,7 +93,7 @@ def _crop(canvas: Image, shown: Array) -> tuple[Image, Callable[[Array], Array]]
 
 
 def _draw_known(picture: Image, uv: Array, names: Sequence[str] | None) -> None:
-    """Truth as a thin skeleton of the joints `names`, or marks as rings, in place."""
+    """Draw the truth as a thin skeleton of the joints `names`, or marks as rings, in place."""
     if names is None or len(uv) == 0:
         for at in uv[np.isfinite(uv).all(axis=1)]:
             cv2.circle(picture, tuple(np.rint(at).astype(int).tolist()), 5, KNOWN, 1, cv2.LINE_AA)

@@ -115,7 +115,7 @@ INITS = ("truth", "auto", "images")
 
 
 def main_arms(modes: Sequence[str], inits: Sequence[str], seeds: int | None) -> list[Arm]:
-    """Each mode from each kind of start: 3 seeds, 4 for the default mode without a start given.
+    """Each mode from each kind of start: 3 seeds, 4 for the default mode without a given start.
 
     Paper mode uses no detector, so its ``images`` would repeat its ``auto``.
     """
@@ -137,7 +137,7 @@ def varied_arms(
     particles: Iterable[int] = (),
     switches: dict[str, dict[str, Any]] | None = None,
 ) -> list[Arm]:
-    """Default mode from the truth with one thing different in each arm.
+    """Default mode from the truth, with one difference in each arm.
 
     Parameters
     ----------

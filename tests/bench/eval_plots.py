@@ -1,4 +1,4 @@
-"""Plots of a clip in one arm: error over time, phase, joints, the way from above; a line for each seed."""
+"""Plots of a clip in one arm: error over time, phase, joints, path seen from above; a line for each seed."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ _GREY = "#888888"
 
 
 def draw(results: list[Result]) -> str:
-    """Draw four plots as SVG; what the clip has no truth for stays out."""
+    """Draw four plots as SVG; plots that need a truth which the clip lacks are left out."""
     runs = [r for r in results if not r.failure]
     with matplotlib.rc_context({"svg.fonttype": "none", "svg.hashsalt": "gait", "font.size": 8.5}):
         figure = Figure(figsize=(10.5, 5.2), layout="constrained")
@@ -67,7 +67,7 @@ def _error(axes: Axes, runs: list[Result]) -> None:
         axes.set(ylabel="error, mm (dotted: abs)", ylim=(0, max(1.08 * highest, LOST_MM * 1.05)))
     else:
         axes.set(ylabel="mean distance of the marks, px", ylim=(0, None))
-    axes.set(title="Error; ground: grey init, yellow ambiguous, red lost", xlabel="frame")
+    axes.set(title="Error; background: grey init, yellow ambiguous, red lost", xlabel="frame")
     if axes.get_legend_handles_labels()[0]:
         axes.legend(loc="upper right", ncols=2, framealpha=0.7, fontsize=7)
 
@@ -85,7 +85,7 @@ def _phase(axes: Axes, runs: list[Result]) -> None:
 
 
 def _joints(axes: Axes, runs: list[Result]) -> None:
-    """Bars of the median error of each joint: mm with the hips laid together, or pixels at the marks."""
+    """Bars of the median error of each joint: mm with the hips aligned, or pixels at the marks."""
     table: dict[str, list[float]] = {}
     for run in runs:
         if "joints" in run.series:
@@ -100,9 +100,7 @@ def _joints(axes: Axes, runs: list[Result]) -> None:
         axes.plot(table[name], [row] * len(table[name]), "k.", ms=2)
     axes.set_yticks(range(len(names)), names, fontsize=7)
     axes.invert_yaxis()
-    unit = (
-        "px at clear marks" if any("joint_px" in run.measures for run in runs) else "mm, hips laid together"
-    )
+    unit = "px at clear marks" if any("joint_px" in run.measures for run in runs) else "mm, hips aligned"
     axes.set(title="Median error of each joint (dots: seeds)", xlabel=unit)
 
 

@@ -10,7 +10,7 @@ stride_hz), reference2d.csv (frame, <joint>_u, <joint>_v, pixels) and, for the a
 Arms: auto: film and camera alone; nobg: without a background; known: from init.json; nocam: the stature
 instead of a camera.  auto-none, nobg-none and known-none: the same with --detector none, in a table of
 their own.
-Contact sheets go into build/eval-real; no picture of these people goes into the repository.
+Contact sheets are written into build/eval-real; no picture of these people may enter the repository.
 """
 
 from __future__ import annotations
@@ -37,22 +37,22 @@ ROOT = Path(__file__).resolve().parents[2]
 OUT = ROOT / "build" / "eval-real"
 WITHOUT = "-none"  # end of the names of arms without the detector
 ARMS = ("auto", "nobg", "known", "nocam", *(f"{arm}{WITHOUT}" for arm in ("auto", "nobg", "known")))
-MEAN = {"auto": 0.85, "nocam": 0.75, "known": 0.90}  # of the good frames, at least
-LEAST = {"auto": 0.65}  # and of each clip
-NEAR = {"nobg": ("auto", 0.05)}  # mean at most so far below that of another arm
+MEAN = {"auto": 0.85, "nocam": 0.75, "known": 0.90}  # least mean share of good frames
+LEAST = {"auto": 0.65}  # and the least of each clip
+NEAR = {"nobg": ("auto", 0.05)}  # the mean may be this much lower than that of another arm
 WRONG = 0.02  # of the frames under `tracking`, at most
 STRIDE = 0.03  # error of the stride rate, as a share, at most
 
 
 _READING = """\
-Films of real people against joints of BlazePose (full) that a person checked; most cameras are guessed.
-They come from the network that libgait's detector uses itself: errors that both share do not show, and scores
-with the detector are flattered; those without it (eval_real_none) are not.
-good: knees and ankles within 9 % of the person's height on average, hips in place; swap: left and
-right swapped; legs: hips in place, legs not; off: hips or legs elsewhere; none: not in the track.  wrong:
-frames under `tracking` that are not good.  Heel strikes: median distance of those by the phase from those
-counted in the pictures (tests/bench/real_strikes.json).  Stride rate: over the frames that
-have a phase.  CPU s and frames/s: of the whole command, detector and all, also where other programs ran."""
+Films of real people, compared with joints of BlazePose (full) that a person checked; most cameras are
+guessed. libgait's detector uses the same network: errors that both share do not show, so scores with the
+detector are too good; those without it (eval_real_none) are not affected. good: knees and ankles within 9
+% of the person's height on average, hips in place; swap: left and right swapped; legs: hips in place, legs
+not; off: hips or legs elsewhere; none: frames not in the track.  wrong: frames under `tracking` that are
+not good.  Heel strikes: median distance of the track's heel strikes, from its phase, from those counted in
+the pictures (tests/bench/real_strikes.json).  Stride rate: over the frames that have a phase.  CPU s and
+frames/s are those of the whole command including the detector, in some rows with other programs running."""
 
 
 @dataclass(frozen=True)
@@ -147,7 +147,9 @@ def _missed(results: list[Result], everything: list[Result]) -> list[str]:
     if not results:
         return []
     arm = results[0].arm
-    without = arm.endswith(WITHOUT)  # a refusal is right where the images do not suffice, a wrong track never
+    without = arm.endswith(
+        WITHOUT
+    )  # an error message is acceptable if the images do not suffice, a wrong track never is
     missed = [f"{r.clip} {r.arm}: {r.failed}" for r in results if r.failed and not without]
     mean = _mean(results)
     if mean < MEAN.get(arm, 0):

@@ -34,18 +34,18 @@ from gait.track.scene import Scene, first_state
 
 @dataclass
 class Result:
-    """What came out of a job.
+    """What a job produced.
 
     Attributes
     ----------
     measures : dict
-        Of `gait eval`, and those of `eval_measures` and `eval_marks`; empty after a failure.
+        Those of `gait eval`, `eval_measures` and `eval_marks`; empty after a failure.
     series : dict of str to ndarray
         Frame by frame, for the plots.
     pictures : list of (str, bytes)
         Caption and JPEG.
     failure : str
-        The tracker's or the start's one line, if it failed.
+        The one line with which the tracker or the start failed, if it did.
     """
 
     job: Job
@@ -71,7 +71,7 @@ class Thinned(Video):
 
 @dataclass
 class _Kept:
-    """What the run keeps of each frame beside the track file."""
+    """What the run keeps of each frame in addition to the track file."""
 
     estimates: dict[int, Estimate] = field(default_factory=dict)
     nees: list[float] = field(default_factory=list)
@@ -79,7 +79,7 @@ class _Kept:
 
 
 def run(job: Job) -> Result:
-    """Track and judge; an error of the user's kind is a result, not the end of the evaluation."""
+    """Track and judge; an error caused by input is a result and does not end the evaluation."""
     cv2.setNumThreads(1)  # jobs run side by side
     library()  # a library that does not load is no result
     try:
@@ -116,7 +116,7 @@ def _plate(job: Job, video: Video) -> Image | None:
 
 
 def _as_gait_track(job: Job) -> _Kept:
-    """Track as ``gait track --init auto`` does: with the detector, backwards from the start as well."""
+    """Track as ``gait track --init auto`` does: with the detector, and also backwards from the start."""
     clip, arm, kept = job.clip, job.arm, _Kept()
     plate = str(clip.plate) if arm.background == "plate" and clip.plate else "none"
     options = ClipOptions(
@@ -145,7 +145,7 @@ def _as_gait_track(job: Job) -> _Kept:
 
 
 def _from_truth(job: Job, video: Video, camera: Camera, model: Model) -> _Kept:
-    """Track into the run's CSV file from the true state with noise; a lost person is looked for."""
+    """Track into the run's CSV file from the true state with noise; search again for a lost person."""
     clip, arm, kept = job.clip, job.arm, _Kept()
     plate = _plate(job, video)
     config = TrackerConfig.default(Mode[arm.mode.upper()], seed=job.seed, **dict(arm.changes))
@@ -176,7 +176,7 @@ def _from_truth(job: Job, video: Video, camera: Camera, model: Model) -> _Kept:
 
 
 def _judge(job: Job, track: Track, camera: Camera) -> Result:
-    """Measures and series of a track against whatever truth the clip has."""
+    """Measures and series of a track, compared with whatever truth the clip has."""
     clip = job.clip
     result = Result(job)
     result.series = {

@@ -1,7 +1,8 @@
 """Hard cases by `gait simulate`: paces, statures, views and light that the development clips lack.
 
-What simulate cannot walk is made from its clips (see `eval_edits`): standing still, walking backwards, a
-second person, an occlusion, leaving the picture, no person.  Running is an OpenSim recording, learned.
+Motions that simulate does not have are made from its clips (see `eval_edits`): standing still, walking
+backwards, a second person, an occlusion, leaving the picture, no person.  Running is learnt from an OpenSim
+recording.
 Not made: sitting, stairs, carried things, a moving camera, sharp turns on the spot.
 """
 
@@ -51,7 +52,7 @@ EDITS: dict[str, tuple[eval_edits.Edit, tuple[str, ...]]] = {
 
 
 def make(folder: Path, jobs: int, update: Callable[[int], None]) -> None:
-    """Make the cases that `folder` lacks; a case is there when its meta.json is."""
+    """Make the cases that `folder` lacks; a case exists if its meta.json does."""
     folder.mkdir(parents=True, exist_ok=True)
     missing = {name: case for name, case in (CASES | _running(folder)).items() if not _made(folder / name)}
     done = 0
@@ -73,7 +74,7 @@ def _made(folder: Path) -> bool:
 
 
 def _running(folder: Path) -> dict[str, Scenario]:
-    """The runner's scenario, its model learned first; nothing where the recording is absent."""
+    """The runner's scenario, whose model is learnt first; nothing if the recording is absent."""
     if not RUNNER.is_file():
         return {}
     model = folder / "run.gait"
@@ -88,7 +89,7 @@ def _running(folder: Path) -> dict[str, Scenario]:
 
 
 def _simulate(scenario: Scenario, target: Path) -> None:
-    """Make a clip beside its place, then move it there whole."""
+    """Make a clip beside its final place, then move it there as a whole."""
     making = target.with_name(f".{target.name}")
     simulate(scenario, making)
     shutil.rmtree(target, ignore_errors=True)

@@ -1,12 +1,12 @@
 #!/usr/bin/env python3
-"""Tracks of real films, and of simulated cameras that move, with and without `--stabilize auto`.
+"""Tracks of real films, and of simulated moving cameras, with and without `--stabilize auto`.
 
     eval_stabilize.py [--only NAME...] [--turns] [--record]
 
---turns: no tracks; how far the cameras of the real films turn, and what that is at the person.
-never: --stabilize off, with a background and without; moving: --stabilize auto, which leaves alone what
-stands still; always: the same, with every camera taken to move.  Where auto finds that the camera stands
-still it is the same as never, and never is not run; where it finds that it moves, always is the same as
+--turns: no tracks, only how far the cameras of the real films turn, and how large that is at the person.
+never: --stabilize off, with a background and without; moving: --stabilize auto, which leaves cameras alone
+that stand still; always: the same, with every camera assumed to move.  If auto finds that the camera stands
+still, the result is that of never, which is not run; if it finds that the camera moves, always is the same as
 moving.  Clips of `gait simulate` are kept in build/eval-stabilize.
 """
 
@@ -42,18 +42,19 @@ ALWAYS = (
     "import sys; from gait.cli import main; from gait.track import stabilise; "
     "stabilise._still = lambda *_: False; sys.exit(main(sys.argv[1:]))",
 )
-GOOD = 0.09  # person's heights up to which legs are in place in `make eval-real`
+GOOD = 0.09  # person's heights; largest error of legs that are in place in `make eval-real`
 TALL = 0.9  # of a person's height, from ears to toes
 _TURNS = """\
 How far the camera of each film of `make eval-real` turns from its first frame, as `--stabilize auto` finds it
-with the camera given, and how far a person in the scene's frame is then drawn beside the one in the picture
-by a program that knows that camera alone: shares of the person's height, in the frames that are judged."""
+with the camera given.  A program that knows only that first camera draws the person at another place than in
+the picture: the columns in % have that distance as a share of the person's height, in the frames judged."""
 _READING = """\
-The arm `auto` of `make eval-real` (camera given, detector on). never, moving, always: --stabilize off; auto;
-auto, with every camera taken to move. good, wrong under `tracking`: as there, joints in the picture by the
-camera of each frame. one camera: good frames if the joints are drawn by the one camera that was given, as a
-program does that knows no other. Clips of which auto finds that the camera stands still have the same track
-by it as by off. Simulated: `gait simulate --preset P --moving KIND`, with errors of 15 joints in space."""
+The arm `auto` of `make eval-real` (camera given, detector on). never: --stabilize off; moving: --stabilize
+auto; always: auto with every camera assumed to move. good, wrong under `tracking`: as there, with joints
+projected by the camera of each frame. one camera: good frames if the joints are projected by the one
+camera that was given, as in a program that knows no other. If auto finds that the camera of a clip stands
+still, its track is the same as with off. Simulated: `gait simulate --preset P --moving KIND`, with errors
+of 15 joints in space."""
 
 
 def main() -> int:
@@ -62,7 +63,7 @@ def main() -> int:
         description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
     )
     parser.add_argument("--only", nargs="+", metavar="NAME", help="names of clips (all)")
-    parser.add_argument("--turns", action="store_true", help="measure turns alone")
+    parser.add_argument("--turns", action="store_true", help="only measure how far the cameras turn")
     parser.add_argument("--record", action="store_true")
     args = parser.parse_args()
     clips = read_clips(ROOT.parent / "shared/data/real", args.only)
@@ -102,7 +103,7 @@ def _show(name: str, title: str, head: list[str], rows: Iterable[list[object]], 
 
 
 def _turns(clip: Clip) -> list[object]:
-    """Row of a film: how its camera turns, and how far that moves the person, by the checked joints."""
+    """Row of a film: how its camera turns, and how far that moves the person, from the checked joints."""
     video, given = Video(clip.video), _given(clip)
     names = tuple(sorted(set.intersection(*map(set, clip.reference.values()))))
     frames = np.array(sorted(clip.reference))
@@ -120,7 +121,7 @@ def _turns(clip: Clip) -> list[object]:
 
 
 def _made(preset: str, moving: str) -> Path:
-    """Folder of a simulated clip, which is made unless it is there."""
+    """Folder of a simulated clip, which is made unless it exists."""
     folder = FOLDER / f"{preset}_{moving}"
     if not (folder / "meta.json").is_file():
         simulate(replace(PRESETS[preset], moving=moving), folder)
@@ -141,7 +142,7 @@ def _rows(clip: Clip) -> list[list[object]]:
 
 
 def _row(clip: Clip, arm: str, found: Result, start: str = "auto") -> list[object]:
-    """Cells of a run, by the arm `start` of eval-real, on a clip whose camera moves."""
+    """Cells of a run, with the arm `start` of eval-real, on a clip whose camera moves."""
     own, one, errors = found.score, 0.0, [np.nan, np.nan]
     if not found.failed:
         track, given = read_estimates(OUT / f"{clip.folder.name}_{start}.csv"), _given(clip)

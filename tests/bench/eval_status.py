@@ -1,11 +1,11 @@
 #!/usr/bin/env python3
-"""Status of the track of people who walk in unusual ways, with all defaults: what a newcomer types.
+"""Status of the track of people who walk in unusual ways, with all defaults, as a newcomer runs it.
 
     eval_status.py [--seeds 0,100] [--only NAME...] [--record]
 
-`gait track VIDEO --camera CAMERA -o OUT`, the detector on, of clips that `gait simulate` makes and of the
-development clip of a person who comes towards a long lens.  Each preset is made with its own seed plus each
-of --seeds.  Clips are kept in build/eval-status.
+`gait track VIDEO --camera CAMERA -o OUT`, with the detector on, of clips that `gait simulate` makes and of
+the development clip of a person who comes towards a long lens.  Each preset is made with its own seed plus
+each of --seeds.  Clips are kept in build/eval-status.
 """
 
 from __future__ import annotations
@@ -33,19 +33,22 @@ NAMES = ("toward", "backwards", "limping", "stick", "crutches", "stopping", "sta
 FAR = "toward300_08"
 STATUSES = ("tracking", "ambiguous", "init", "lost")
 _READING = """\
-`gait track` with the camera alone, detector on, all else default, of clips of `gait simulate --preset` and of
-a development clip. Shares of the frames in which all joints are in the picture. good: knees and ankles within
-9 % of the person's height on average in the picture, hips in place; swap, off: left and right swapped; hips
-or legs elsewhere. wrong: of the frames under `tracking`, those that are not good. Root-aligned and absolute
-error of 15 joints in space, and of the heading: medians over the frames under `tracking`."""
+`gait track` with the camera, the detector on and all other options at their defaults, on clips of `gait
+simulate --preset` and on a development clip. Shares are of the frames in which all joints are in the
+picture. good: knees and ankles within 9 % of the person's height on average in the picture, hips in place;
+swap: left and right swapped; off: hips or legs elsewhere. wrong: share of the frames under `tracking` that
+are not good. Root-aligned and absolute error of 15 joints in space, and error of the heading: medians over
+the frames under `tracking`."""
 
 
 def main() -> int:
-    """Make, track, print; always 0: the page reports."""
+    """Make, track, print; exit code always 0: the page reports."""
     parser = argparse.ArgumentParser(
         description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
     )
-    parser.add_argument("--seeds", default="0,100", help="added to that of each preset (default: 0,100)")
+    parser.add_argument(
+        "--seeds", default="0,100", help="numbers added to the seed of each preset (default: 0,100)"
+    )
     parser.add_argument("--only", nargs="+", metavar="NAME", help="presets, or the development clip (all)")
     parser.add_argument("--record", action="store_true")
     args = parser.parse_args()
@@ -70,7 +73,7 @@ def main() -> int:
 
 
 def made(name: str, more: int) -> Path:
-    """Folder of a preset's clip by another seed, which is made unless it is there."""
+    """Folder of a preset's clip with another seed, which is made unless it exists."""
     scenario = replace(PRESETS[name], seed=PRESETS[name].seed + more)
     folder = FOLDER / f"{name}_{scenario.seed}"
     if not (folder / "meta.json").is_file():
@@ -79,7 +82,7 @@ def made(name: str, more: int) -> Path:
 
 
 def _row(clip: Clip) -> list[object]:
-    """Track a clip and give its row."""
+    """Track a clip and return its row."""
     name, found = clip.folder.name, run(clip, "auto", [])
     if found.failed:
         return [name, *[None] * (len(STATUSES) + 8), found.failed]

@@ -1,4 +1,4 @@
-"""Rows of figures: one of each run (CSV), and one of each clip and arm with medians over the seeds."""
+"""Rows of figures: one for each run (CSV), and one for each clip and arm with medians over the seeds."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ MEDIAPIPE = {  # MediaPipe Pose 0.10.21, 12 joints root-aligned, mm: ../shared/d
     "side_lr_35": 127, "side_rl_16": 89, "oblique45_07": 84, "oblique45_pole_05": 93, "toward300_08": 113,
 }  # fmt: skip
 
-_FROM = {  # column: path into the measures, factor
+_FROM = {  # column: path in the measures, factor
     "root_mm": ("root.median", 1),
     "root_p90": ("root.p90", 1),
     "abs_mm": ("abs.median", 1),
@@ -89,27 +89,30 @@ HONESTY = {  # of the second table
     "silent %": ("silent_pct", 1),
     "swapped %": ("swapped_pct", 1),
 }
-_SD = ("root", "abs", "px")  # columns that also show least and most over the seeds
+_SD = ("root", "abs", "px")  # columns that also show the range over the seeds
 
 LEGEND = (
-    "Medians over the seeds of a clip's median over frames (least-most). root abs proc 12j: mm, hips laid "
-    "together, as it stands, after the best similarity of each frame (to compare with literature only), "
-    "root over 12 limb joints; MPipe: MediaPipe Pose in the measure of 12j; static: mean pose at the true "
-    "place (root); free: mean cycle running free from the true start (root); px: distance in the image, "
-    "outdoor: near leg; clear: all clear marks; far: root > 150 mm or reported as lost; twice: "
-    "the same, frames under tracking counted twice; c90: share of joint coordinates inside the 90 % "
-    "intervals; HS: heel strikes within 2 frames; from: first frame tracked; ms: a step. Intervals and "
-    "status: lost: reported as lost; PIT chi2: probability integral transform against flat, 10 bins; z2: "
-    "squared error in variances, 1 is right; "
-    "NEES: error of all joints in the particles' covariance per dimension, 1 is right; CRPS: score of the "
-    "intervals, lower is better; width: of the 90 % intervals; silent: frames more than 150 mm off under "
-    "tracking; swapped: frames half a cycle off under tracking, of those after the first second. Starts "
-    "from the truth know the stature to 3 mm; those whose stature is wrong believe it to 30 mm."
+    "Each figure is the median over the seeds of a clip's median over frames, with the range over the "
+    "seeds in brackets. root, abs, proc: errors in mm, with the hips aligned, without alignment, and "
+    "after the best similarity transform of each frame (only for comparison with the literature); 12j: "
+    "root error of 12 limb joints; MPipe: MediaPipe Pose, measured as 12j; static: root error of the "
+    "mean pose at the true place; free: root error of the mean cycle that runs freely from the true "
+    "start; px: distance in the image, outdoors of the near leg; clear: distance of all clear marks; "
+    "phase%: error of the phase; flip%: frames half a cycle off; far%: frames with a root error above "
+    "150 mm or reported as lost; twice%: the same, with frames under tracking counted twice; c90: share "
+    "of joint coordinates inside the 90 % intervals; HS%: heel strikes within 2 frames; from: first "
+    "frame tracked; ms: time of a step. Table of intervals and status: lost: frames reported as lost; "
+    "PIT chi2: distance of the probability integral transform from a flat histogram of 10 bins; z2: "
+    "squared error divided by the variance, 1 is right; NEES: error of all joints in units of the "
+    "particles' covariance, per dimension, 1 is right; CRPS: score of the intervals, lower is better; "
+    "width: of the 90 % intervals; silent: frames more than 150 mm off under tracking; swapped: frames "
+    "half a cycle off under tracking, of those after the first second. Starts from the truth have the "
+    "right stature with a standard deviation of 3 mm; starts with a wrong stature have one of 30 mm."
 )
 
 
 def figures(result: Result) -> dict[str, Any]:
-    """All figures of one run; None where the clip has no such truth."""
+    """All figures of one run; None if the clip has no such truth."""
     job = result.job
     row: dict[str, Any] = {"clip": job.clip.name, "arm": job.arm.name, "seed": job.seed}
     for name, (path, factor) in _FROM.items():
@@ -122,9 +125,9 @@ def figures(result: Result) -> dict[str, Any]:
     row["mediapipe_mm"] = MEDIAPIPE.get(job.clip.name)
     row["failure"] = result.failure.replace(f"{job.clip.folder}/", "")
     row["empty"] = job.clip.empty
-    if job.clip.empty:  # no person is there: to find no person is right
+    if job.clip.empty:  # if no person is there, a track that finds none is right
         row["lost_run"] = False
-    elif result.failure:  # a run that failed has lost every frame
+    elif result.failure:  # a run that failed counts as lost in every frame
         row["lost_pct"] = row["lost2_pct"] = 100.0
     return row
 
@@ -138,7 +141,7 @@ def _dig(tree: Any, path: Iterable[str]) -> Any:
 
 
 def summaries(rows: list[dict[str, Any]]) -> list[dict[str, Any]]:
-    """One row of each clip and arm: medians of numbers, with ``<name>_range`` over the seeds."""
+    """One row for each clip and arm: medians of numbers, with ``<name>_range`` over the seeds."""
     out = []
     for key in dict.fromkeys((row["arm"], row["clip"]) for row in rows):
         group = [row for row in rows if (row["arm"], row["clip"]) == key]
@@ -154,7 +157,7 @@ def summaries(rows: list[dict[str, Any]]) -> list[dict[str, Any]]:
 
 
 def failures(rows: list[dict[str, Any]]) -> list[str]:
-    """Runs that failed, with their one line; equal lines together."""
+    """Runs that failed with their error messages; runs with the same message share a line."""
     lines: dict[str, list[str]] = {}
     for row in rows:
         if row["failure"]:
@@ -163,7 +166,7 @@ def failures(rows: list[dict[str, Any]]) -> list[str]:
 
 
 def cells(summary: dict[str, Any], shown: dict[str, tuple[str, int]]) -> list[str]:
-    """Texts of one line of the table, without clip and arm."""
+    """Cells of one line of the table, without clip and arm."""
     out = []
     for column, (name, decimals) in shown.items():
         value = summary[name]
@@ -179,7 +182,7 @@ def cells(summary: dict[str, Any], shown: dict[str, tuple[str, int]]) -> list[st
 
 
 def grid(rows: list[dict[str, Any]]) -> list[list[str]]:
-    """Head and lines of the table of `summaries`."""
+    """Head and lines of the table for rows of `summaries`."""
     head = ["clip", "arm", "runs", *SHOWN, "lost runs"]
     lines = [
         [s["clip"], s["arm"], str(s["runs"]), *cells(s, SHOWN), str(s["lost_runs"]) if s["lost_runs"] else ""]
@@ -194,7 +197,7 @@ def honesty(rows: list[dict[str, Any]]) -> list[list[str]]:
 
 
 def plain(lines: list[list[str]], words: int = 2) -> str:
-    """Lay the table out for a terminal; the first `words` columns are text, empty ones are left out."""
+    """Lay the table out for a terminal; the first `words` columns are text, empty columns are left out."""
     return table.aligned(*_filled(lines, words))
 
 
@@ -204,7 +207,7 @@ def markdown(lines: list[list[str]], words: int = 2) -> str:
 
 
 def filled(lines: list[list[str]]) -> list[int]:
-    """Columns that are not empty throughout."""
+    """Columns that are not entirely empty."""
     return [k for k in range(len(lines[0])) if any(line[k] for line in lines[1:])]
 
 

@@ -1,4 +1,4 @@
-"""What the tracker must show: each measure, what is wanted, what was reached."""
+"""What the tracker must show: each measure with its target and the result."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ STARTS = {AUTO: "auto", "default/images": "without the detector"}
 
 @dataclass(frozen=True)
 class Verdict:
-    """One line: `passed` is None where no run shows it."""
+    """One line; `passed` is None if no run shows it."""
 
     measure: str
     wanted: str
@@ -29,12 +29,12 @@ class Verdict:
 
     @property
     def word(self) -> str:
-        """How it is printed."""
+        """Word that is printed."""
         return {True: "pass", False: "FAIL", None: "-"}[self.passed]
 
 
 def verdicts(rows: Rows) -> list[Verdict]:
-    """All lines that the runs show; the others state so."""
+    """All lines; those that no run shows state so."""
     return [check(rows) for check in _CHECKS]
 
 
@@ -55,7 +55,7 @@ def _of(rows: Rows, arm: str, outdoor: bool | None = False) -> Rows:
 
 
 def per_clip(rows: Rows, name: str) -> dict[str, float]:
-    """Median over the seeds of each clip; a run that failed counts as without bound."""
+    """Median over the seeds of each clip; infinite if a run failed."""
     out = {}
     for clip in dict.fromkeys(row["clip"] for row in rows):
         runs = [row for row in rows if row["clip"] == clip]
@@ -92,7 +92,7 @@ def _abs(rows: Rows) -> Verdict:
 
 
 def _stature(rows: Rows) -> Verdict:
-    measure = "the same with a wrong stature in the start, believed to 30 mm instead of 3"
+    measure = "the same with a wrong stature in the start (standard deviation 30 mm instead of 3)"
     wanted = "<= 110 mm; px unchanged (within 10 %)"
     wrong = [row for row in rows if row["arm"].startswith("stature ")]
     if not wrong:
@@ -137,8 +137,8 @@ def _locked(rows: Rows, arm: str) -> Verdict:
 
 def _side(rows: Rows, arm: str) -> Verdict:
     measure = (
-        f"{STARTS[arm]}: right leg right under tracking in most frames after a second, or ambiguous; wrong: "
-        "over 5 % of them under tracking"
+        f"{STARTS[arm]}: left and right correct under tracking, or ambiguous, in most frames after the first "
+        "second; wrong: over 5 % of them swapped under tracking"
     )
     wanted = ">= 95 %; wrong in <= 1 run of 28"
     runs = _of(rows, arm, None)
@@ -171,7 +171,7 @@ def _no_plate(rows: Rows) -> Verdict:
 
 
 def _beside(rows: Rows, arm: str) -> list[str]:
-    """What an arm does to errors not judged: absolute in the worst clip, pixels in the real one."""
+    """Effect of an arm on errors that are not judged: absolute in the worst clip, pixels in the real one."""
     base, other = (per_clip(_of(rows, name), "abs_mm") for name in (BASE, arm))
     pairs = {clip: (base[clip], other[clip]) for clip in other if clip in base}
     reported = []

@@ -1,4 +1,4 @@
-"""On what the numbers of an evaluation were made."""
+"""How the numbers of an evaluation were made."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ PACKAGES = ("libgait", "numpy", "scipy")
 
 
 def facts(command: str) -> str:
-    """What made the numbers: command, commit, machine and versions."""
+    """Command, commit, machine and versions that made the numbers."""
     versions = ", ".join(f"{name} {version(name)}" for name in PACKAGES)
     return (
         f"`{command}` at commit {_commit()}; {_processor()}, {os.cpu_count()} cores, "

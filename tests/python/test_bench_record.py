@@ -58,7 +58,7 @@ def test_a_number_of_runs_that_is_none(runs, monkeypatch, capsys):
     monkeypatch.setattr("sys.argv", ["bench.py", f"--runs={runs}", "true"])
     with pytest.raises(SystemExit) as stop:
         bench.main()
-    assert stop.value.code == 2 and f"{runs} is not a number from 1 on" in capsys.readouterr().err
+    assert stop.value.code == 2 and f"{runs} is not a number of at least 1" in capsys.readouterr().err
 
 
 def test_a_bench_that_fails_leaves_no_record(tmp_path, monkeypatch, capsys):
