@@ -23,11 +23,11 @@ Sections = Mapping[str, Any]
 COMPARED = [name for name in EVAL15 if name != "pelvis"]
 COLUMNS = [JOINTS.index(name) for name in COMPARED]
 TURNS = [CHANNELS.index(f"root_{axis}") for axis in ("roll", "pitch", "yaw")]
-STARTS = 16  # phase offsets tried first, over a stride
+STARTS = 16  # phase offsets tried first, over one stride
 EVERY = 12  # frames; a tenth of a second in CMU's recordings
-STEP = 1e-4  # of the numerical derivatives: standard deviations and strides
-PASSES = 12  # of the nonlinear least squares
-OFFSETS = "offsets"  # beside the sections of a model: channels (m, 30) moved by one sd of each offset
+STEP = 1e-4  # steps of the numerical derivatives: standard deviations and strides
+PASSES = 12  # iterations of the nonlinear least squares
+OFFSETS = "offsets"  # added to the sections of a model: channels (m, 30) moved by one sd of each offset
 
 
 @dataclass
@@ -57,7 +57,7 @@ class Walk:
 
 @dataclass
 class Found:
-    """What is left of a walk.
+    """Residuals of a walk.
 
     Attributes
     ----------
@@ -115,8 +115,9 @@ def model_joints(w: Walk, sections: Sections, x: Floats, channels: Floats) -> Fl
 def in_joints(w: Walk, sections: Sections, frames_alike: bool = False) -> Found:
     """Scores, proportions and phase by nonlinear least squares of the joints: no others do better.
 
-    Then static offsets besides, the most probable ones: each has its standard deviation, and a coordinate of
-    a joint that of what the model leaves of this walk without offsets; anew in every frame, or once for all.
+    Then the most probable static offsets in addition.  Each offset has its standard deviation, and a
+    coordinate of a joint has the standard deviation of this walk's residuals without offsets: one per frame,
+    or one for the whole walk.
     """
     *others, m = sizes(sections)
     start = np.zeros((STARTS, sum(others) + m + 1))
@@ -131,9 +132,9 @@ def in_joints(w: Walk, sections: Sections, frames_alike: bool = False) -> Found:
 
 
 def in_angles(w: Walk, sections: Sections) -> Found:
-    """Scores and offset by least squares of the channels, as the paper projects; then lengths to the joints.
+    """Scores and offset by least squares of the channels, as in the paper; then lengths from the joints.
 
-    The sway does not count, and the other channels by `channel_scale`.
+    The sway does not count, and the other channels are divided by `channel_scale`.
     """
     q, p, _ = sizes(sections)
     tries = [_linear(w, sections, k / STARTS) for k in range(STARTS)]
@@ -147,7 +148,7 @@ def in_angles(w: Walk, sections: Sections) -> Found:
 
 
 def exact_angles(w: Walk, sections: Sections) -> Found:
-    """What the reduced skeleton leaves with the recording's own angles."""
+    """Errors of the reduced skeleton with the recording's own angles."""
     x = np.zeros((1, sum(sizes(sections)) + 1))
     return Found(_distance(w, model_joints(w, sections, x, w.channels[None])), 0.0)
 

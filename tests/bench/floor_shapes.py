@@ -1,4 +1,4 @@
-"""Shapes of particles that learn_floor.py compares: how many components, proportions and static offsets."""
+"""Shapes of particles that learn_floor.py compares: numbers of components, proportions and static offsets."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ from gait.body.skeleton import ANGLES
 from gait.learn.options import DEFAULT_COMPONENTS
 from gait.learn.prior.fit import Learned
 
-MOST = 12  # dimensions of a particle for its shape
+MOST = 12  # dimensions of a particle that its shape may use
 LENGTHS = MOST - DEFAULT_COMPONENTS
 USED = 5  # components that the tracker uses by default
 OURS, PLAIN_BODY = "libgait", "libgait, no proportions"
@@ -46,13 +46,13 @@ class Shape:
 
 
 def _tracked(names: Iterable[str] = ANGLES) -> tuple[str, ...]:
-    """Those of the angles that have an offset in the tracker by default."""
+    """Names of the angles that have an offset in the tracker by default."""
     wanted = Model().info.posture_angles
     return tuple(name for name in names if wanted >> ANGLES.index(name) & 1)
 
 
 SIX, TRUNK = _tracked(), _tracked(("torso_x", "torso_y", "torso_z"))
-#: MOST dimensions divided otherwise: some ways, of which none was chosen by its outcome.
+#: MOST dimensions divided in other ways, none of which was chosen by its result.
 DIVIDED = {
     "offsets for 2 components": Shape(6, 4, TRUNK),
     "offsets for 2 components, 4 proportions": Shape(6, 0, SIX),

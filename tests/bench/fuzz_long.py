@@ -3,8 +3,8 @@
 
     fuzz_long.py [--runs N] [--only NAME] [--keep] [--record]
 
-``make fuzz-long`` builds them.  With --keep, inputs that reach branches no kept input reaches are added to
-tests/fuzz/corpus; they run with every ``make test``.
+``make fuzz-long`` builds them.  With --keep, inputs that reach branches which no kept input reaches are added
+to tests/fuzz/corpus; they run with every ``make test``.
 """
 
 from __future__ import annotations
@@ -24,11 +24,11 @@ from facts import facts
 ROOT = Path(__file__).resolve().parents[2]
 BUILT, FOUND, CORPUS = ROOT / "build/fuzz/fuzz", ROOT / "build/fuzz/found", ROOT / "tests/fuzz/corpus"
 LONGEST = 4096  # bytes of an input
-KEPT_BYTES, KEPT_FILES = 2048, 40  # most of a kept input, and of one target
+KEPT_BYTES, KEPT_FILES = 2048, 40  # largest size of a kept input, and of the kept inputs of one target
 
 
 def fuzz(name: str, runs: int, seed: int, seconds: int) -> list[int]:
-    """Run one target; executions, branches reached, executions a second, most memory in MB, faults."""
+    """Run one target; executions, branches reached, executions per second, peak memory in MB, faults."""
     found = FOUND / name
     found.mkdir(parents=True, exist_ok=True)
     options = {"runs": runs, "seed": seed, "max_total_time": seconds, "max_len": LONGEST, "timeout": 60}
@@ -58,7 +58,7 @@ def fuzz(name: str, runs: int, seed: int, seconds: int) -> list[int]:
 
 
 def keep(name: str) -> None:
-    """Add what the kept inputs do not reach, the smallest input for each."""
+    """Add inputs for branches that the kept inputs do not reach, the smallest input for each."""
     merged = ROOT / "build/fuzz/merged" / name
     shutil.rmtree(merged, ignore_errors=True)
     merged.mkdir(parents=True)
@@ -72,10 +72,10 @@ def keep(name: str) -> None:
 
 
 def main() -> int:
-    """Fuzz, print; 1 if anything was found."""
+    """Fuzz, print; exit code 1 if anything was found."""
     options = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawTextHelpFormatter)
     options.add_argument("--runs", type=int, default=1_000_000)
-    options.add_argument("--seconds", type=int, default=0, help="most time for each; 0: without a bound")
+    options.add_argument("--seconds", type=int, default=0, help="longest time for each target; 0: no limit")
     options.add_argument("--seed", type=int, default=1)
     options.add_argument("--only", action="append", metavar="NAME")
     options.add_argument("--keep", action="store_true")

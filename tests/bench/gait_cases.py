@@ -1,7 +1,7 @@
 """Walks of `gait simulate` for eval_gait.py: slow, fast, asymmetric, with a stick, with crutches, usual.
 
-Bodies are drawn from the proportions of the people that the package's model was learnt from.  Choices are
-made on people of other seeds (`--first-seed`) than those that are reported.
+Bodies are drawn from the proportions of the people that the package's model was learnt from.  Design choices
+are made on people with other seeds (`--first-seed`) than those that are reported.
 """
 
 from __future__ import annotations
@@ -25,7 +25,7 @@ CASES: dict[str, Scenario] = {
 
 
 def make(folder: Path, first_seed: int, jobs: int, update: Callable[[int], None]) -> None:
-    """Make the walks that `folder` lacks; one is there when its meta.json is.
+    """Make the walks that `folder` lacks; a walk exists if its meta.json does.
 
     `first_seed`: added to the seed of every person.
     """
@@ -42,7 +42,7 @@ def make(folder: Path, first_seed: int, jobs: int, update: Callable[[int], None]
 
 
 def _simulate(scenario: Scenario, target: Path) -> None:
-    """Make a clip beside its place, then move it there whole."""
+    """Make a clip beside its final place, then move it there as a whole."""
     making = target.with_name(f".{target.name}")
     simulate(scenario, making)
     shutil.rmtree(target, ignore_errors=True)

@@ -1,6 +1,7 @@
 """Errors of footfalls and gait parameters against the truth, with their intervals, as gait labs report them.
 
-Strides and events are matched by time; what the truth lacks is not judged, and what a track lacks is missed.
+Strides and events are matched by time.  Those that the truth lacks are not judged; those that a track lacks
+count as missed.
 """
 
 from __future__ import annotations
@@ -29,14 +30,14 @@ from gait.motion.parameters import (
 Array = NDArray[np.float64]
 
 EVENTS = {"heel_strike_s": "heel strike, s", "toe_off_s": "toe-off, s"}
-HALF = 1.6448536  # half-width of a 90 % interval of a normal, standard deviations
+HALF = 1.6448536  # half-width of the 90 % interval of a normal distribution, standard deviations
 
 
 @dataclass(frozen=True)
 class Compared:
-    """Values of one quantity beside the true ones."""
+    """Values of one quantity with the true ones."""
 
-    #: (k,) in the quantity's unit; `sd` is NaN where the track states none.
+    #: (k,) in the quantity's unit; `sd` is NaN if the track states none.
     found: Array
     true: Array
     sd: Array
@@ -48,13 +49,13 @@ class Compared:
 
     @property
     def covered(self) -> NDArray[np.bool_]:
-        """Whether the 90 % interval holds the true value, of those that have one."""
+        """Whether the 90 % interval contains the true value, for those that have an interval."""
         known = np.isfinite(self.sd)
         return np.abs(self.error[known]) <= HALF * self.sd[known]
 
 
 def true_events(truth: Joints, meta: Path) -> Events:
-    """Events in seconds: those that the file `meta` lists, if it is there and lists all, else the truth's."""
+    """Events in seconds: those that the file `meta` lists if it exists and is complete, else the truth's."""
     stated = json.loads(meta.read_text(encoding="utf-8")) if meta.is_file() else {}
     listed = stated.get("events_video_frames", {})
     names = {kind: {side: f"{side[0]}_{kind}" for side in SIDES} for kind in ("heel_strike", "toe_off")}
@@ -100,7 +101,7 @@ def gait_errors(parameters: Parameters, truth: Joints, events: Events) -> dict[s
 
 
 def _of_events(parameters: Parameters, events: Events) -> dict[str, Compared]:
-    """Events beside the true ones that were found."""
+    """Events that were found, with the true ones."""
     matched = same_events(parameters.events, events)
     out = {}
     for name, kind in zip(EVENTS, ("strike", "off"), strict=True):
@@ -118,7 +119,7 @@ def _of_events(parameters: Parameters, events: Events) -> dict[str, Compared]:
 
 
 def _matched(found: Strides, true: Strides) -> tuple[list[int], list[int]]:
-    """Rows of the sure strides that the truth has as well, and theirs in the truth."""
+    """Rows of the strides that are sure and that the truth also has, and their rows in the truth."""
     rows, theirs = [], []
     for i in np.flatnonzero(found.sure):
         off = np.maximum(np.abs(true.start - found.start[i]), np.abs(true.end - found.end[i]))

@@ -1,4 +1,4 @@
-"""Ways to fill missing entries of cycles (R, T, M), functions of values, mask and number of components."""
+"""Ways to fill missing entries of cycles (R, T, M), as functions of values, mask and number of components."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ Mask = npt.NDArray[np.bool_]
 Imputer = Callable[[Floats, Mask, int], Floats]
 
 PPCA_PASSES, PPCA_TOLERANCE = 200, 1e-5
-SVD_PASSES, SVD_TOLERANCE = 500, 1e-6  # of the paper: relative decrease of the error
+SVD_PASSES, SVD_TOLERANCE = 500, 1e-6  # the paper's: relative decrease of the error
 
 
 def mean(values: Floats, mask: Mask, components: int) -> Floats:
@@ -27,7 +27,7 @@ def mean(values: Floats, mask: Mask, components: int) -> Floats:
 
 
 def line(values: Floats, mask: Mask, components: int) -> Floats:
-    """Straight lines across the gaps of each curve, round the cycle."""
+    """Straight lines across the gaps of each curve, around the cycle."""
     del components
     return _interpolated(values, mask, lambda at, known, y, n: np.interp(at, known, y, period=n))
 
@@ -55,7 +55,7 @@ def _interpolated(values: Floats, mask: Mask, between: Callable[..., Floats]) ->
 
 
 def svd(values: Floats, mask: Mask, components: int) -> Floats:
-    """Singular value decomposition and filling by turns, without Fourier basis (SVDimpute)."""
+    """Singular value decomposition and filling in turn, without Fourier basis (SVDimpute)."""
     return _by_svd(values, mask, components, np.eye(values.shape[1]))
 
 

@@ -1,11 +1,12 @@
 #!/usr/bin/env python3
-"""Tracks by the weight of the keypoint term, on rendered and on real films, with the detector's own joints.
+"""Tracks with several weights of the keypoint term, on rendered and on real films, with detected joints.
 
     keypoints_weight.py [--only NAME...] [--record]
 
-Each film is searched by the detector once, as `gait track` does it, and tracked from the automatic start with
-each weight.  The development clips are judged by the true joints, with models that leave out the person's
-subject; films of real people by heel strikes counted in the pictures, and by joints that a person checked.
+The detector runs on each film once, as in `gait track`; the film is then tracked from the automatic start
+with each weight.  The development clips are judged by the true joints, with models that leave out the
+person's subject; films of real people by heel strikes counted in the pictures, and by joints that a person
+checked.
 """
 
 from __future__ import annotations
@@ -31,11 +32,12 @@ from gait.track.scene import Scene, first_state
 ROOT = Path(__file__).resolve().parents[2]
 WEIGHTS = (0.0, 2.0, 8.0, 32.0)
 _READING = """\
-`gait track`, all defaults but the weight; 0: pictures alone, but for the start. Keypoints are those of the
-detector (full), with the errors of its profile. Rendered clips: root-aligned and absolute error of 15 joints,
-median over the frames, mm. All: good frames and wrong ones under `tracking` as in `make eval-real`, against
-true joints or, of real films, joints that a person checked, which come from such a detector as well; heel
-strikes: median distance from the true ones or from those counted in the pictures. Default: {default:g}."""
+`gait track` with all defaults except the weight; 0: images only, except for the start. Keypoints are those of
+the detector (full), with the errors of its profile. Rendered clips: root-aligned and absolute error of 15
+joints, median over the frames, mm. All films: good frames, and wrong ones under `tracking`, as in
+`make eval-real`, compared with true joints or, for real films, with joints that a person checked, which come
+from such a detector as well; heel strikes: median distance from the true ones or from those counted in the
+pictures. Default: {default:g}."""
 
 
 def main() -> int:

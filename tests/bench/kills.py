@@ -1,11 +1,12 @@
 #!/usr/bin/env python3
-"""Writers killed at random moments: what they reported as written is there and whole.
+"""Writers killed at random moments: what they reported as written must exist and be complete.
 
     kills.py [--kills 200] [--record]
 
-A process writes one file again and again, each time with one entry more, and reports each that is written;
-at a random moment it gets a SIGKILL.  Then the file must be readable and hold at least the entries that were
-reported.  What it was writing is beside it, for the next command to find.  Snapshots are in daemon_kills.py.
+A process writes one file again and again, each time with one entry more, and reports each version that is
+written; at a random moment it gets a SIGKILL.  The file must then be readable and contain at least the
+entries that were reported.  The unfinished version remains beside it, where the next command finds it.
+Snapshots are tested in daemon_kills.py.
 """
 
 from __future__ import annotations
@@ -38,11 +39,11 @@ from gait.studio.session import Session
 from gait.track.tracker import Tracker
 
 PICTURE = np.zeros((48, 64), np.uint8)
-LONGEST = 0.05  # seconds until a kill
+LONGEST = 0.05  # longest time in seconds until a kill
 
 
 def track_writer() -> Callable[[Path, int], None]:
-    """Writes a track file of so many frames, as gait track does."""
+    """Write a track file with so many frames, as gait track does."""
     model = Model()
     camera = Camera(
         64, 48, 50.0, 50.0, 31.5, 23.5, np.array([[1.0, 0, 0], [0, 0, -1], [0, 1, 0]]), np.array([0, 1.0, 5])
@@ -60,14 +61,14 @@ def track_writer() -> Callable[[Path, int], None]:
 
 
 def write_log(path: Path, count: int) -> None:
-    """A log of so many events, as gait record does."""
+    """Write a log with so many events, as gait record does."""
     with replacing(path) as temporary, closing(LogWriter(temporary, name=str(path))) as log:
         for number in range(count):
             log.write(number, "GAIT_ESTIMATE", bytes(500))
 
 
 def write_corrections(path: Path, count: int) -> None:
-    """So many corrections, as gait studio saves them."""
+    """Write so many corrections, as gait studio saves them."""
     edits = Edits(tuple(Correction(number, "r_ankle", (1.0, 2.0), 2.0) for number in range(count)))
     session = SimpleNamespace(source=SimpleNamespace(corrections=path))
     Session._save(session, edits)  # type: ignore[arg-type]
@@ -104,7 +105,7 @@ def write_until_killed(write: Callable[[Path, int], None], path: Path, chance: r
 
 
 def attack(kind: str, kills: int) -> list[float]:
-    """Kills, entries reported, kills after which some were missing, and those amid a write."""
+    """Kills, entries reported, kills after which some were missing, and kills in the middle of a write."""
     make, read = KINDS[kind]
     write, chance = make(), random.Random(1)
     reported, lost, amid = 0, 0, 0
@@ -119,7 +120,7 @@ def attack(kind: str, kills: int) -> list[float]:
 
 
 def main() -> int:
-    """Kill, read, print; 1 if anything was lost."""
+    """Kill, read, print; exit code 1 if anything was lost."""
     options = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawTextHelpFormatter)
     options.add_argument("--kills", type=int, default=200)
     options.add_argument("--record", action="store_true")

@@ -1,4 +1,4 @@
-"""Components of generated and recorded cycles against their wanted bounds (L8-L13), for learn_impute.py."""
+"""Components of generated and recorded cycles compared with their bounds (L8-L13), for learn_impute.py."""
 
 from __future__ import annotations
 
@@ -29,30 +29,36 @@ from gait.reproducible import one_thread_for_good
 
 COLUMNS = ("measure", "case", "figure", "value", "wanted", "met")
 SEEDS = 5
-STATURE = 1.7  # metres, of the generator's people where millimetres are asked for
-#: Our channels of the generator's angles, in its order.
+STATURE = 1.7  # metres, of the generator's people for errors in millimetres
+#: The model's channels of the generator's angles, in the generator's order.
 CHANNEL = [CHANNELS.index(f"neck_{axis}") for axis in "xyz"] + [
     CHANNELS.index(f"{side}_{name}{'_flexion' if name in ('elbow', 'knee') else ''}")
     for side in "rl"
     for name in g.SIDE
 ]
 NOTE = (
-    f"Generator G1, 80 cycles, 1 degree of noise; the worst of {SEEDS} sets. L8: half of the cycles lack "
-    "a whole limb for half the cycle, or one of eight people lacks an angle or both arms in all cycles. "
-    "L9: step across the seam over the usual step, for the curves and their first two differences. The usual "
-    "step is the median step, or the larger of the two steps beside the seam where that is more. This is not "
-    "the measure as it was specified, which is the median step alone: the generator's exact mean, which has "
-    "no seam, misses that bound, for it is steep at phase 0; its rows and those of the mean found are given. "
-    "L11: eight people. L12: each pass as it came out; a rise of 1e-9 is rounding. L13: eight people, 5 "
-    "components of the other seven, scores by least squares of the 80 % that are observed, noise included in "
-    f"what is left; millimetres: mean distance of 14 joints with the pelvis aligned, {STATURE:g} m tall. "
-    "auto: chosen is the smallest number within one standard error of the least error."
+    "The cycles come from generator G1: 80 cycles, 1 degree of noise. Each figure is the worst of "
+    f"{SEEDS} sets.\n\n"
+    "- L8: half of the cycles lack a whole limb for half the cycle, or one of eight people lacks an "
+    "angle or both arms in all cycles.\n"
+    "- L9: the step across the seam of the cycle, relative to the usual step, for the curves and their "
+    "first two differences. The usual step is the median step, or the larger of the two steps next to "
+    "the seam if that is greater. The measure as specified used only the median step, but even the "
+    "generator's exact mean, which has no seam, misses that bound, because it is steep at phase 0. The "
+    'rows "over the median step" show this for the exact mean and for the mean found.\n'
+    "- L11: eight people.\n"
+    "- L12: the objective of each pass is checked as it came out; a rise below 1e-9 is rounding.\n"
+    "- L13: eight people; each is described by 5 components learnt from the other seven. The scores come "
+    "from least squares of the 80 % of the values that are observed, and the residual includes the "
+    "noise. Millimetres: mean distance of 14 joints with the pelvis aligned, for a stature of "
+    f"{STATURE:g} m.\n"
+    "- auto: the number chosen is the smallest within one standard error of the least error."
 )
 Row = tuple[str, str, str, float | int, str, str]
 
 
 def components(mocap: Path) -> bool:
-    """Publish the table; False if a bound is missed."""
+    """Publish the table; return False if a bound is missed."""
     parts = (_limbs, _seams, _angles, _scores, _passes, _unseen, _numbers)
     rows: list[Row] = []
     with (
@@ -84,7 +90,7 @@ def _rng(code: int, seed: int) -> np.random.Generator:
 
 
 def _limbs() -> Iterator[Row]:
-    """L8: error where whole limbs or channels are missing, over the oracle's."""
+    """L8: error where whole limbs or channels are missing, relative to the oracle's."""
     ratios: dict[str, list[float]] = {"limbs for half a cycle": [], "one person without an angle": []}
     ratios["one person without arms"] = []
     for seed in range(SEEDS):
@@ -103,7 +109,7 @@ def _limbs() -> Iterator[Row]:
 
 
 def _seams() -> Iterator[Row]:
-    """L9: curves of closing cycles and of some that creep by 6 degrees close."""
+    """L9: the mean and components close, for cycles that close and for cycles that drift by 6 degrees."""
     for rise in (0.0, 6.0):
         mean, curves = [], []
         for seed in range(SEEDS):
@@ -120,7 +126,7 @@ def _seams() -> Iterator[Row]:
 
 
 def _by_median(case: str, curves: npt.NDArray[np.float64]) -> Iterator[Row]:
-    """Seams by the measure as specified, which the generator itself does not keep."""
+    """Seams by the measure as specified, whose bound the generator itself misses."""
     for name, value in zip(
         ("", " of first differences", " of second"), cases.seams(curves, False), strict=True
     ):
@@ -159,7 +165,7 @@ def _scores() -> Iterator[Row]:
 
 
 def _passes() -> Iterator[Row]:
-    """L12: passes descend, stop and do not depend on where they began."""
+    """L12: passes decrease the objective, stop, and do not depend on where they start."""
     for share in (0.05, 0.2, 0.4):
         passes, rise, difference = [], [], []
         for seed in range(SEEDS):
@@ -182,7 +188,7 @@ def _rise(objective: list[float]) -> float:
 
 
 def _unseen() -> Iterator[Row]:
-    """L13: what five components of other people leave of a person's cycles."""
+    """L13: what five components of other people do not explain of a person's cycles."""
     angles, distances = [], []
     for seed in range(SEEDS):
         case = cases.people(_rng(13, seed))
@@ -203,7 +209,7 @@ def _unseen() -> Iterator[Row]:
 
 
 def _described(found: pca.Components, case: cases.Case, rows: npt.NDArray[np.bool_]) -> Any:
-    """Rows (n, T, M) by the components, with scores by least squares of what is observed of each."""
+    """Rows (n, T, M) described by the components, with scores by least squares of what each observes."""
     result = []
     for values, visible in zip(case.values[rows], case.mask[rows], strict=True):
         scores = np.linalg.lstsq(found.curves[:, visible].T, (values - found.mean)[visible], rcond=None)[0]
@@ -219,7 +225,7 @@ def _joints(cycles: npt.NDArray[np.float64]) -> npt.NDArray[np.float64]:
 
 
 def _numbers() -> Iterator[Row]:
-    """The number of components found on generated walks."""
+    """Number of components chosen on generated walks."""
     by_blocks, by_people = [], []
     for seed in range(SEEDS):
         case = cases.people(_rng(13, seed))
@@ -231,7 +237,7 @@ def _numbers() -> Iterator[Row]:
 
 
 def _recorded(mocap: Path) -> list[Row]:
-    """The number of components found on recorded walks."""
+    """Number of components chosen on recorded walks."""
     files = sorted(mocap.rglob("*.amc"))
     if not files:
         print(f"{mocap}: no .amc files; recorded walks are left out", file=sys.stderr)

@@ -3,11 +3,11 @@
 
     .venv/bin/python tests/bench/learn_floor.py ../shared/data/mocap/cmu_walk
 
-The distance of 14 joints from the recording's after alignment of the pelvis (place and orientation), mm,
-for the paper's model (5 components, one body), for the one shipped (8 components, 4 proportions), for the
-steps between them, and for other shapes (floor_shapes.py) with static offsets of angles.  It is the floor
-under a tracker's error: no likelihood and no filter can go below it without scores that change during the
-walk.
+The distance of 14 joints from the recorded ones after alignment of the pelvis (place and orientation), mm,
+for the paper's model (5 components, one body), for the shipped one (8 components, 4 proportions), for the
+steps between them, and for other shapes (floor_shapes.py) with static offsets of angles.  It is the lower
+bound of a tracker's error: no likelihood and no filter can have a smaller one without scores that change
+during the walk.
 """
 
 from __future__ import annotations
@@ -47,7 +47,7 @@ Project = Callable[[floor_fit.Walk, Sections], floor_fit.Found]
 
 PAPER = 5  # components
 MEAN, SHIPPED, OWN = "mean of the learners", "as shipped", "own"  # bodies
-JOINTS, ANGLES, ALIKE = "joints", "angles", "joints, frames alike"  # what the projection makes small
+JOINTS, ANGLES, ALIKE = "joints", "angles", "joints, frames alike"  # error that the projection minimises
 PROJECT: dict[str, Project] = {
     JOINTS: floor_fit.in_joints,
     ANGLES: floor_fit.in_angles,
@@ -55,14 +55,14 @@ PROJECT: dict[str, Project] = {
 }
 BASELINE = "paper"
 OTHERS = "cmu_misc"  # folder beside the walks: other people and motions
-WALKS_TOO = ("md",)  # a dancer there with the bones of a person, 05
+WALKS_TOO = ("md",)  # a dancer in that folder with the bones of person 05
 GOAL = 25.0  # per cent below the paper's model
-LIKE = 0.1  # mm that are no difference
+LIKE = 0.1  # a smaller difference in mm counts as none
 
 
 @dataclass(frozen=True)
 class Case:
-    """A row of the table: model, whose body it has, and how a walk is projected on it."""
+    """A row of the table: model, body, and how a walk is projected on it."""
 
     model: str
     body: str
@@ -77,37 +77,42 @@ CASES = [
     Case(TRACKED, SHIPPED, ALIKE),
     *(Case(name, body, ANGLES) for body in (MEAN, SHIPPED) for name in (BASELINE, OURS)),
 ]
-#: The comparison that the goal is judged by: like for like, and nothing but the models differs.
+#: The comparison by which the goal is judged: the models differ in nothing else.
 FAIR = Case(OURS, MEAN, JOINTS)
 PAPERS_WAY = Case(BASELINE, MEAN, ANGLES)
 MEAN_CYCLE, EXACT = Case("own mean cycle", OWN, JOINTS), Case("own angles, every frame", OWN, "none")
 
 NOTE = """\
-Leave one subject out, {walks} walks of {subjects} people: the model learns from the others and describes the
-walk with one constant vector of scores (and proportions) and one phase offset, at its own period and stature.
-Mean distance of 14 joints after alignment of the pelvis, mm, averaged over a subject's walks.
+Leave one subject out, {walks} walks of {subjects} people: the model is learnt from the others and describes
+the walk with one constant vector of scores (and proportions) and one phase offset, at the walk's own period
+and stature.  The figures are mean distances of 14 joints after alignment of the pelvis, mm, averaged over a
+subject's walks.
 
-- model: *paper* is `gait learn --prior paper --components 5`, *libgait* the default; the rows between are the
-  paper's analysis with 12 components and what is added to it one after the other.  libgait spends 4 of its 12
-  dimensions on the lengths of limbs and places of shoulders, learnt besides from {others} people whose motion
-  is no walk (`cmu_misc`).  With *+ stride rate* and in *libgait* the mean cycle follows the stride rate, the
-  walk's own here: the rate is a state of the paper's tracker (eq. 7) too, so it is none of the dimensions.
-  *libgait, as tracked* is what the tracker has by default: {used} components, no proportions, and offsets of
+- model: *paper* is `gait learn --prior paper --components 5`, *libgait* is the default.  The rows between
+them
+  are the paper's analysis with 12 components, and what is added to it step by step.  libgait uses 4 of its 12
+  dimensions for the lengths of limbs and places of shoulders, which are also learnt from {others} people who
+  do not walk (`cmu_misc`).  With *+ stride rate* and in *libgait* the mean cycle follows the stride rate,
+  here the walk's own.  The rate is also a state of the paper's tracker (eq. 7), so it does not count as a
+  dimension. *libgait, as tracked* is the tracker's default: {used} components, no proportions, and offsets of
   trunk, shoulders and elbows.
-- offsets: constants added to single angles, the last of the dimensions, the most probable ones given their
-  sd among the learners (section `CHST`, learnt anew without the subject) and that of a joint's
-  coordinate, which is what the model leaves of the walk without offsets.  Where every frame counts, these
-  outweigh what was learnt, and the offsets are nearly free; with *frames alike* a walk counts as one frame,
-  since a model errs alike in all strides.  Scores and proportions are free in all rows.  The sd
-  of those tracked, degrees, with all people among the learners: {offsets_sd}.
-- body: *mean of the learners*, or *as shipped*: joints moved by hand to where anatomical bodies have them
-  (`generic_proportions`), which these recordings do not know, so that both models are far off.
-- projection: *joints*, nonlinear least squares of the joints, the best the model can do; *angles*, least
-  squares of the angles as in the paper, then of the joints for the lengths.
-- less: median below that of the paper's model with the same body and projection; wanted: {goal:g} %.
+- offsets: constants added to single angles; they are the last of the dimensions.  The most probable offsets
+are
+  taken, given their standard deviations among the learners (section `CHST`, learnt anew without the subject)
+  and that of a joint's coordinate, which is the residual of the walk without offsets.  If every frame counts,
+  the frames outweigh what was learnt and the offsets are nearly free; with *frames alike* a walk counts as
+  one frame, because a model has the same errors in all strides.  Scores and proportions are free in all rows.
+  Standard deviations of the offsets tracked, degrees, with all people among the learners: {offsets_sd}.
+- body: *mean of the learners*, or *as shipped*: joints moved by hand to anatomical places
+  (`generic_proportions`).  The joints of these recordings lie elsewhere, so both models then have large
+  errors.
+- projection: *joints*, nonlinear least squares of the joints, which is the best that the model can do;
+  *angles*, least squares of the angles as in the paper, then of the joints for the lengths.
+- less: how much lower the median is than that of the paper's model with the same body and projection; target:
+  {goal:g} %.
 
-**The goal of {goal:g} % is {verdict}** where it is judged, with the mean body of the learners and joints
-projected for both models: {fair:.1f} % less.  No other row decides:
+**The goal of {goal:g} % is {verdict}** in the comparison that decides, with the mean body of the learners and
+joints projected for both models: {fair:.1f} % less.  The other comparisons do not decide:
 
 - with the body as shipped it is {shipped:.1f} %;
 - with angles projected for both models it is {angles:.1f} %, and with the body as shipped too {both:.1f} %;
@@ -115,17 +120,17 @@ projected for both models: {fair:.1f} % less.  No other row decides:
 - as tracked it is {tracked:.1f} %, and with the body as shipped {tracked_shipped:.1f} %; without offsets
   {unmoved:.1f} % and {unmoved_shipped:.1f} %;
 - offsets of all angles ({all_shape}) lower the floor to {all_offsets:.1f} mm, with frames alike to
-  {alike:.1f} mm, but these are more than {most} numbers.  Within {most}, in place of components or
-  proportions, those tried leave {divided} mm, {lower} than {shape} by more than {like:g} mm;
-- the best description by libgait (joints) against the paper's model projected the paper's way (angles), same
-  body: {ours:.1f} against {papers:.1f} mm, {way:.1f} %.
+  {alike:.1f} mm, but these are more than {most} numbers.  With {most} numbers, offsets in place of components
+  or proportions leave {divided} mm, {lower} than {shape} by more than {like:g} mm;
+- the best description by libgait (joints), compared with the paper's model projected in the paper's way
+  (angles), same body: {ours:.1f} against {papers:.1f} mm, {way:.1f} %.
 """
 
 Result = dict[Case, list[floor_fit.Found]]
 
 
 def hold_out(sequences: list[Sequence], others: Bodies, subject: str) -> tuple[str, Result]:
-    """Floors of the walks of one subject by the models of all others."""
+    """Floors of the walks of one subject with the models of all others."""
     one_thread_for_good()
     walks = [(s, floor_fit.walk(s)) for s in sequences if s.subject == subject]
     made, bodies = models([s for s in sequences if s.subject != subject], others)
@@ -173,7 +178,7 @@ def _alike(filled: Floats, subject: Indices, metric: Floats) -> Floats:
 
 
 def own_cycle(s: Sequence) -> Sections:
-    """A model of one walk: its mean cycle, no components, the person's own lengths."""
+    """Model of one walk: its mean cycle, no components, the person's own lengths."""
     rows = cutting.cut_cycles([s.channels], np.array([s.period.frames]), np.zeros(1), fit.SAMPLES)
     mean = components.fit(rows.values, rows.mask, 0).mean
     return {"CURV": mean[None], **default_skeleton(retarget.own_proportions(s.measures)).sections()}
@@ -216,14 +221,14 @@ def rows_of(found: dict[str, Result], medians: dict[Case, float]) -> Iterable[li
 
 
 def offsets_sd(sequences: list[Sequence], others: Bodies) -> str:
-    """Learnt standard deviations of the offsets that the tracker has, in words."""
+    """Learnt standard deviations of the tracker's offsets, in words."""
     with one_thread():
         static = np.degrees(fit.fit(sequences, others=others).static)
     return ", ".join(f"{name} {static[CHANNELS.index(name)]:.1f}" for name in SHAPES[TRACKED].angles)
 
 
 def publish(found: dict[str, Result], walks: int, others: int, offsets_sd: str) -> bool:
-    """Publish the table; False if the goal is missed where it is judged."""
+    """Publish the table; return False if the goal is missed in the comparison that decides."""
     medians = {case: float(np.median(per_subject(found, case))) for case in [*CASES, MEAN_CYCLE, EXACT]}
     fair = less(medians, FAIR)
     divided = [medians[Case(name, MEAN, JOINTS)] for name in DIVIDED]
@@ -290,7 +295,7 @@ def main() -> int:
 
 
 def strangers(paths: list[Path], persons: list[str]) -> Bodies:
-    """Bodies of people in other files who are none of the people, one each."""
+    """Bodies of the people in other files who are not among the subjects, one each."""
     files = dict(zip(sources.subjects(paths), paths, strict=True))
     read = [readers.read(path) for who, path in files.items() if who not in persons]
     return [retarget.measure(retarget.levelled(body)) for body in read if not isinstance(body, AngleTable)]

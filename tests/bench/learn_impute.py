@@ -1,10 +1,10 @@
 #!/usr/bin/env python3
-"""Filling of missing entries and components: gait beside other ways and packages (L7-L12).
+"""Filling of missing entries and components: gait compared with other methods and packages (L7-L12).
 
     .venv/bin/python tests/bench/learn_impute.py [MOCAP] [--peers build/peers/bin/python]
 
-MOCAP is the folder of .amc walks on which the number of components is chosen.  Without the other packages
-(`make eval-learn` installs them) their rows are left out.
+MOCAP is the folder of .amc walks on which the number of components is chosen.  If the other packages are not
+installed (`make eval-learn` installs them), their rows are left out.
 """
 
 from __future__ import annotations
@@ -36,23 +36,24 @@ ROOT = Path(__file__).resolve().parents[2]
 MOCAP = ROOT / "../shared/data/mocap/cmu_walk"
 PEERS = ROOT / "build/peers/bin/python"
 SEEDS = 10  # of the reference problem
-SLOW = {"scikit-fda": 2, "scikit-learn": 5}  # seeds of packages that take long
-TRUE, TOO_MANY = 3, 5  # components of the reference problem; guessed too high
+SLOW = {"scikit-fda": 2, "scikit-learn": 5}  # seeds for slow packages
+TRUE, TOO_MANY = 3, 5  # components of the reference problem; a guess that is too high
 WITHOUT_RANK = ("column mean", "linear", "cubic spline", "sklearn", "scikit-fda")
 SHARES, SHARE_SEEDS = (0.05, 0.1, 0.2, 0.4), 3
-OF_ORACLE = {0.2: 1.05, 0.4: 1.10}  # most of the oracle's error at these shares
+OF_ORACLE = {0.2: 1.05, 0.4: 1.10}  # largest multiple of the oracle's error at these shares
 TIMES_BETTER = ("column mean", "linear"), 5  # than these, at every share
 ORACLE = "oracle (the generator is known)"
 OURS = "gait (functional PCA, Bayesian)"
 Run = tuple[Floats, Floats, str]  # errors and seconds by problem, version
 REFERENCE_NOTE = (
-    "RMSE on the missing entries against the noisy truth, median over problems; ratios to the oracle are "
-    "of the same problems, `worst` is the largest. Generator: `reference` in tests/python/learn_cases.py "
-    "(three random modes of four harmonics, scores of sd 2, 1.2 and 0.7, noise 0.45, blocks of 6-20 "
-    "phases). Wanted of gait: no worse than any other, at most 1.05 of the oracle, and with 5 components "
-    "at most 1.1 of its RMSE with 3. Slow packages get fewer problems, the first ones. scikit-fda is "
-    "given the true four harmonics as basis (gait uses 19); IterativeImputer uses all phases, 25 rounds. "
-    "One thread each, seconds of the wall clock."
+    "RMSE of the missing entries compared with the noisy truth, median over problems. Ratios to the "
+    "oracle are over the same problems; `worst` is the largest. The generator is `reference` in "
+    "tests/python/learn_cases.py (three random modes of four harmonics, scores of sd 2, 1.2 and 0.7, "
+    "noise 0.45, blocks of 6-20 phases). Targets for gait: no worse than any other method, at most 1.05 "
+    "of the oracle, and with 5 components at most 1.1 of its RMSE with 3. Slow packages get fewer "
+    "problems, the first ones. scikit-fda is given the true four harmonics as basis (gait uses 19); "
+    "IterativeImputer uses all phases and 25 rounds. Each method has one thread; seconds are wall clock "
+    "time."
 )
 
 
@@ -90,7 +91,7 @@ def reference(peers: Path) -> bool:
 
 
 def _holds(errors: dict[tuple[str, int], Floats], best: Floats) -> bool:
-    """Whether gait is no worse than any other on the problems both have, and near the oracle."""
+    """Whether gait is no worse than any other method on the problems that both have, and near the oracle."""
     ours = errors[OURS, TRUE]
     near = np.median(ours / best) <= 1.05 and np.median(errors[OURS, TOO_MANY] / ours) <= 1.1
     return bool(near) and all(
@@ -126,7 +127,7 @@ def _row(
 
 
 def _peer_runs(peers: Path, problems: list[Any]) -> Iterator[tuple[tuple[str, int], Run]]:
-    """Errors, seconds and versions of the other packages, each problem in a process of its own."""
+    """Errors, seconds and versions of the other packages, each problem in its own process."""
     jobs = [(name, count) for name in METHODS for count in _counts(name)]
     with progress("other packages", len(jobs), False) as update, tempfile.TemporaryDirectory() as folder:
         for done, (name, count) in enumerate(jobs):
@@ -156,7 +157,7 @@ def _peer(peers: Path, folder: Path, problem: Any, name: str, count: int) -> tup
 
 
 def _by_share(job: tuple[str, int]) -> list[Any]:
-    """Row of one method and number of components; without a name that of the oracle."""
+    """Row of one method and number of components; without a name, of the oracle."""
     name, count = job
     medians = []
     for share in SHARES:
@@ -169,7 +170,7 @@ def _by_share(job: tuple[str, int]) -> list[Any]:
 
 
 def shares() -> bool:
-    """Publish errors on 19 angles by the share missing (L7); False if a bound is missed."""
+    """Publish errors on 19 angles by the share missing (L7); return False if a bound is missed."""
     jobs = [(name, count) for name in IMPUTERS for count in (5, 8) if count == 5 or len(_counts(name)) > 1]
     rows: list[list[Any]] = []
     with (
@@ -188,9 +189,10 @@ def shares() -> bool:
         "RMSE on missing blocks, degrees (L7)",
         ("measure", "method", "components", *(f"{share:.0%} missing" for share in SHARES), "met"),
         [["L7", *row, verdict] for row, verdict in zip(rows, verdicts, strict=True)],
-        f"80 cycles x 128 phases x 19 angles of generator G1, 5 modes, 1 degree of noise (which is part of "
-        f"the RMSE), median over {SHARE_SEEDS} sets. Wanted of gait, with 5 components and with 8, which are "
-        f"too many: at most {bounds}, and at every share {times} times better than {' and '.join(others)}.",
+        "80 cycles x 128 phases x 19 angles of generator G1, 5 modes, 1 degree of noise (which is part "
+        f"of the RMSE), median over {SHARE_SEEDS} sets. Targets for gait, with 5 components and with 8, "
+        f"which are too many: at most {bounds}, and at every share {times} times better than "
+        f"{' and '.join(others)}.",
     )
     return "NO" not in verdicts
 

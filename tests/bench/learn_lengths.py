@@ -1,5 +1,5 @@
 #!/usr/bin/env python3
-"""Lengths of limbs from markers: each recording of a person by itself, and all of them together.
+"""Lengths of limbs from markers: each recording of a person separately, and all of them together.
 
 .venv/bin/python tests/bench/learn_lengths.py ../shared/data/mocap/cmu_walk
 """
@@ -29,11 +29,11 @@ LIMBS = ("upper_arm", "forearm", "thigh", "shank", "foot")
 NAMES = ("run", "walk")
 COLUMNS = ("figure", "fitted", *NAMES, "apart")
 NOTE = """\
-A person's walk and run, {files}: each recording fitted by itself,
-and both with the lengths that they share (places of markers stay each recording's own).  Left and
-right averaged; apart: between the two recordings.  Residual: root mean square distance of the markers from
-their places on the fitted body.  Seconds: to read and fit both files one after the other, the measuring
-before it included.
+A person's walk and run, {files}: each recording fitted separately,
+and both with shared lengths (each recording keeps its own places of markers).  Left and right are averaged;
+apart: difference between the two recordings.  Residual: root mean square distance of the markers from their
+places on the fitted body.  Seconds: to read and fit both files one after the other, including the measuring
+beforehand.
 """
 
 

@@ -1,8 +1,8 @@
-"""Other packages on one imputation problem, run by the python of build/peers (no part of gait here).
+"""Other packages on one imputation problem, run by the Python of build/peers (nothing of gait is used).
 
     build/peers/bin/python tests/bench/learn_peers.py PROBLEM.npz RESULT.npz METHOD COMPONENTS
 
-PROBLEM holds `values` and `mask` (rows, phases); RESULT gets `filled`, `seconds` and `version`.
+PROBLEM contains `values` and `mask` (rows, phases); RESULT gets `filled`, `seconds` and `version`.
 """
 
 import importlib
@@ -13,11 +13,13 @@ from importlib.metadata import version
 
 import numpy as np
 
-BASIS = 9  # functions of scikit-fda's Fourier basis: the four harmonics of the reference problem, as a favour
+BASIS = (
+    9  # functions of scikit-fda's Fourier basis: the four harmonics of the reference problem, in its favour
+)
 
 
 def iterative_imputer(values, mask, components):
-    """Scikit-learn: each column by Bayesian ridge regression on the others, in turns."""
+    """Scikit-learn: each column by Bayesian ridge regression on the others, in turn."""
     from sklearn.experimental import enable_iterative_imputer  # noqa: F401
     from sklearn.impute import IterativeImputer
 
@@ -27,7 +29,7 @@ def iterative_imputer(values, mask, components):
 
 
 def fill_em(values, mask, components):
-    """Statsmodels: principal components fitted to the filled data by turns."""
+    """Statsmodels: principal components fitted to the filled data, in turn."""
     from statsmodels.multivariate.pca import PCA
 
     data = np.where(mask, values, np.nan)

@@ -3,9 +3,9 @@
 
     .venv/bin/python tests/bench/learn_people.py ../shared/data/mocap
 
-Mean angles and proportions by source show where joint centres differ, before and after those of CMU's
-skeletons are moved to the anatomical ones.  Floors are those of
-learn_floor.py, as tracked, of the model of CMU's people alone and of all whose licence permits shipping.
+Mean angles and proportions by source show where joint centres differ, before and after the joints of CMU's
+skeletons are moved to the anatomical ones.  Floors are those of learn_floor.py, as tracked: of the model of
+CMU's people alone, and of the model of all people whose licence permits shipping.
 """
 
 from __future__ import annotations
@@ -40,7 +40,7 @@ from gait.reproducible import one_thread_for_good
 Floats = npt.NDArray[np.float64]
 
 CMU = "cmu_walk"
-#: Sources whose licences permit a shipped model, and those that serve as people left out alone.
+#: Sources whose licences permit a shipped model, and sources that serve only as people left out.
 FREE = ("btk", "gaitalytics", "bvhtoolbox", "opensim", "mcgill", "cmu_more")
 OTHERS = ("ammr", "nimble", "ezc3d", "gaittoolbox", "c3dorg")
 SCALED = ("cmu_more",)  # lengths of limbs are generic there
@@ -50,15 +50,16 @@ HEAD = 0.2  # metres above the neck, for recordings without a head
 RECORDED, ANATOMICAL = JOINT_CENTRES
 SHOWN = ("hip_flexion", "knee_flexion", "ankle_flexion", "shoulder_flexion", "shoulder_rotation")
 NOTE = """\
-{walks} walks of {count} people; a source's people count alike.  Angles are means over whole cycles and both
-sides, degrees; lengths are shares of the stature, per cent.  *anatomical*: `gait learn --joints anatomical`,
-which moves knees, ankles, shoulders and wrists of CMU's skeletons to where the markers of other laboratories
-put them.  In published walks (Plug-in-Gait) a knee is flexed by 22 to 25 degrees on average.
+{walks} walks of {count} people; the people of a source have equal weights.  Angles are means over whole
+cycles and both sides, degrees; lengths are shares of the stature, per cent.  *anatomical*: `gait learn
+--joints anatomical`, which moves knees, ankles, shoulders and wrists of CMU's skeletons to where the markers
+of other laboratories put them.  In published walks (Plug-in-Gait) the knee is flexed by 22 to 25 degrees on
+average.
 
-Floors, mm, median and mean over people: 14 joints after alignment of the pelvis, 5 components and offsets of
-trunk, shoulders and elbows, as the tracker has them, on the mean body of the learners ({folds} groups left
-out of every source at once; people with recordings of the legs alone are not among the learners).  People
-from elsewhere are the {new} whose whole body was recorded.
+Floors, mm, median and mean over people: 14 joints after alignment of the pelvis, with 5 components and
+offsets of trunk, shoulders and elbows as in the tracker, on the mean body of the learners.  {folds} groups
+are left out of every source at once; people with recordings of the legs alone are not among the learners.
+People from elsewhere are the {new} whose whole body was recorded.
 
 {floors}
 """
@@ -117,7 +118,7 @@ def row(name: str, some: list[Person]) -> list[Any]:
 
 
 def walk_of(one: Person) -> floor_fit.Walk | None:
-    """Take frames in which all joints are known; None if hardly any are."""
+    """Select frames in which all joints are known; None if there are hardly any."""
     s, body = one.walk, one.body.part(*one.walk.kept)
     joints = dict(body.joints)
     if not np.isfinite(joints["head"]).any():
@@ -174,7 +175,7 @@ def floors(all_people: list[Person], sources: tuple[str, ...]) -> tuple[dict[str
 
 
 def floor_table(kinds: dict[str, list[Person]]) -> tuple[str, int]:
-    """Compare the models; Markdown and the number of people from elsewhere."""
+    """Compare the models; return Markdown and the number of people from elsewhere."""
     rows: list[list[Any]] = []
     new: dict[str, float] = {}
     for kind, all_people in kinds.items():

@@ -1,5 +1,5 @@
 #!/usr/bin/env python3
-"""Periods and alignment against their theory (L1-L6) and against the walks of CMU.
+"""Periods and alignment compared with their theory (L1-L6) and with the walks of CMU.
 
     .venv/bin/python tests/bench/learn_period.py [MOCAP]
 
@@ -36,14 +36,14 @@ Row = tuple[str, str, str, float, str, str]
 FPS = 120.0
 MOCAP = Path(__file__).resolve().parents[2] / "../shared/data/mocap"
 TRUE = (61.7, 80.3, 126.4, 240.2)
-LENGTHS = {600: 20, 1500: 16, 5000: 8}  # frames to runs for each period
-JITTER, JITTERED = 0.02, (126.4, 1500, 100)  # share of the stride's time; period, frames, runs
+LENGTHS = {600: 20, 1500: 16, 5000: 8}  # number of frames: runs for each period
+JITTER, JITTERED = 0.02, (126.4, 1500, 100)  # sd of the stride time as a share of it; period, frames, runs
 MULTIPLES = 1000
 SERIES, SERIES_FRAMES = 1000, 1500
 STYLES = (0.0, 2.0, 4.0)  # degrees
-ALIGNMENTS = 334  # for each of the styles
+ALIGNMENTS = 334  # runs for each of the styles
 GAUGES = 10
-ADDED = (0.123456, 0.25, 0.5)  # cycles, to all phases
+ADDED = (0.123456, 0.25, 0.5)  # cycles, added to all phases
 HIPS = (7, 15)  # right and left hip flexion of the generator
 BY_STYLE = "L5 by style"  # reported, not judged
 COLUMNS = ("measure", "case", "figure", "value", "wanted", "met")
@@ -58,7 +58,7 @@ def _period(job: tuple[float, int, int, str]) -> float:
 
 
 def _jittered(seed: int) -> float:
-    """Error of the period, frames, where each stride has a time of its own."""
+    """Error of the period, frames, if the stride times vary."""
     true, frames, _ = JITTERED
     rng = np.random.default_rng([7, seed])
     offset = rng.uniform(0, true)
@@ -67,7 +67,7 @@ def _jittered(seed: int) -> float:
 
 
 def _styled(seed: int) -> float:
-    """Period found over the true one, for a person of random period, length and style."""
+    """Period found divided by the true one, for a person of random period, length and style."""
     rng = np.random.default_rng([2, seed])
     true = rng.uniform(52, 240)
     frames = int(rng.integers(max(500, int(3 * true)), 1000))
@@ -77,7 +77,7 @@ def _styled(seed: int) -> float:
 
 
 def _aligned(job: tuple[int, float, str]) -> tuple[Floats, float, int, bool]:
-    """Errors of offsets in frames, the largest in cycles, the passes, whether the objective always fell."""
+    """Errors of offsets in frames, the largest in cycles, the passes, whether the objective never rose."""
     seed, style, start = job
     signals, periods, true = persons(np.random.default_rng([5, seed, int(style)]), style)
     found = align.align(signals, periods, np.zeros(len(signals)) if start == "zeros" else None)
@@ -131,7 +131,7 @@ def _row(code: str, case: str, measure: str, value: float, wanted: str, met: boo
 
 
 def _periods(run: Callable[..., Iterable[Any]]) -> list[Row]:
-    """L1 of both modes, and where the paper's fails."""
+    """L1 in both modes, and where the paper's fails."""
     cases = [(true, frames, runs) for frames, runs in LENGTHS.items() for true in TRUE]
     jobs = [(true, frames, seed, "refined") for true, frames, runs in cases for seed in range(runs)]
     errors = np.array(list(run(_period, jobs))) - [job[0] for job in jobs]
@@ -160,7 +160,7 @@ def _periods(run: Callable[..., Iterable[Any]]) -> list[Row]:
 
 
 def _jitter(run: Callable[..., Iterable[Any]]) -> Row:
-    """L1 with strides of unlike times: reported beside the floor, no bound."""
+    """L1 with varying stride times: reported with the floor, without a bound."""
     true, frames, runs = JITTERED
     rms = float(np.sqrt(np.mean(np.square(list(run(_jittered, range(runs)))))))
     floor = JITTER * true / np.sqrt(frames / true)
@@ -169,7 +169,7 @@ def _jitter(run: Callable[..., Iterable[Any]]) -> Row:
 
 
 def _multiples(run: Callable[..., Iterable[Any]]) -> Row:
-    """L2: how many periods are a multiple or a part."""
+    """L2: how many periods are a multiple or a fraction of the true one."""
     ratio = np.array(list(run(_styled, range(MULTIPLES))))
     wrong = sum(np.abs(ratio / k - 1) < 0.02 for k in (2, 3, 4, 5, 1 / 2, 1 / 3, 1 / 4, 1 / 5))
     count = int(np.sum((wrong > 0) | (np.abs(ratio - 1) > 0.02)))
@@ -177,7 +177,7 @@ def _multiples(run: Callable[..., Iterable[Any]]) -> Row:
 
 
 def _alignment(run: Callable[..., Iterable[Any]]) -> list[Row]:
-    """L5: errors of offsets, all styles together and each."""
+    """L5: errors of offsets, of all styles together and of each style."""
     rows = []
     for start, runs in (("xcorr", ALIGNMENTS), ("zeros", ALIGNMENTS // 10)):
         found = {
@@ -206,7 +206,7 @@ def _alignment(run: Callable[..., Iterable[Any]]) -> list[Row]:
 
 
 def _walks(run: Callable[..., Iterable[Any]], folder: Path) -> bool:
-    """Publish the periods of the walks of CMU; whether all are within 2 %."""
+    """Publish the periods of the walks of CMU; return whether all are within 2 %."""
     lines = [line.split() for line in (folder / "walk_periods.txt").read_text().splitlines()]
     known = {w[0][:5]: float(w[w.index("period") + 1].rstrip("s")) for w in lines if w[0][:2].isdigit()}
     rows = []
@@ -235,10 +235,10 @@ def _walks(run: Callable[..., Iterable[Any]], folder: Path) -> bool:
             "legs",
         ),
         rows,
-        f"Wanted: every error below 2 %, none a multiple. Largest {errors.max():.2f} %, median "
-        f"{np.median(errors):.2f} %; the reference has steps of 0.01 s and takes the whole file of the knee. "
-        "Repeats: correlation with the next cycle; legs: cosine of the lag beyond half a cycle between "
-        "left and right leg, whatever their swing.",
+        f"Target: every error below 2 %, no multiples. Largest {errors.max():.2f} %, median "
+        f"{np.median(errors):.2f} %. The reference has steps of 0.01 s and uses the knee over the whole "
+        "file. Repeats: correlation with the next cycle; legs: cosine of the lag beyond half a cycle "
+        "between left and right leg, whatever the range of their motion.",
     )
     return good
 
@@ -278,16 +278,19 @@ def main() -> int:
         "Period and alignment (L1-L6)",
         COLUMNS,
         rows,
-        "Generator G1 (tests/python/gait_generator.py). L1: 5 degrees of noise, 10 % missing in blocks; the "
-        "bound is Cramer and Rao's. The largest error wanted is below 0.5 frames; but where the bound is "
-        "above 0.125 frames (p = 240.2, T = 600: 2.5 cycles) no method can keep that, so four times it. "
-        "The floor where stride times vary is jitter x p / sqrt(T / p), the spread of the mean of so many "
-        "strides; nothing is wanted there. The literal mode is judged where its fold drifts less than two "
-        "frames; all else that it finds is reported. L2: random style, 3 degrees, 10 % missing. L5: eight "
-        "people each, 3 degrees of noise. Judged are the errors of styles of 0, 2 and 4 degrees together, a "
-        "third of the runs each; the rows by style hold each style alone to the same bounds, and what they "
-        "miss does not fail this command. An objective rises if any pass ends above the one before by more "
-        "than rounding (1e-9). L6: the constant is added to the phases at which the alignment begins.",
+        "The data come from generator G1 (tests/python/gait_generator.py).\n\n"
+        "- L1: 5 degrees of noise, 10 % missing in blocks; the bound is that of Cramer and Rao. The "
+        "target for the largest error is 0.5 frames. If the bound is above 0.125 frames (p = 240.2, T = "
+        "600: 2.5 cycles), no method can reach that, and the target is four times the bound. If stride "
+        "times vary, the floor is jitter x p / sqrt(T / p), the standard deviation of the mean of so "
+        "many strides; these rows have no target. The literal mode is judged if its fold drifts by less "
+        "than two frames; its other results are only reported.\n"
+        "- L2: random style, 3 degrees of noise, 10 % missing.\n"
+        "- L5: eight people each, 3 degrees of noise. The errors of styles of 0, 2 and 4 degrees are "
+        "judged together, each a third of the runs. The rows by style compare each style with the same "
+        "bounds, but missing them does not fail this command. An objective rises if any pass ends above "
+        "the one before by more than rounding (1e-9).\n"
+        "- L6: the constant is added to the phases at which the alignment begins.",
     )
     return 0 if good and all(row[5] != "NO" for row in rows if row[0] != BY_STYLE) else 1
 

@@ -1,5 +1,5 @@
 #!/usr/bin/env python3
-"""How large a model of five components is, and what its phases and the series of section PACE leave out.
+"""How large a model of five components is, and the error due to its phases and its series in section PACE.
 
 .venv/bin/python tests/bench/learn_size.py ../shared/data/mocap/cmu_walk
 """
@@ -26,15 +26,15 @@ from gait.reproducible import one_thread
 
 Floats = npt.NDArray[np.float64]
 
-COMPONENTS, LIMIT = 5, 100_000  # bytes wanted
-TERMS = 2 * HARMONICS + 1  # of the curves as they are learnt: none is cut off
+COMPONENTS, LIMIT = 5, 100_000  # target, bytes
+TERMS = 2 * HARMONICS + 1  # harmonics of the curves as they are learnt; none is cut off
 PHASES = (fit.SAMPLES, 128)  # the second is the reference's
 FINE = 32  # points between two phases
 COLUMNS = ("measure", "case", "figure", "value", "wanted", "met")
 
 
 def interpolated(curve: Floats, phases: int) -> tuple[Floats, Floats]:
-    """Give a band-limited curve between so many phases, linear and true, (FINE phases, M) each."""
+    """Evaluate a band-limited curve between so many phases, linearly and exactly, (FINE phases, M) each."""
     rows = series(curve, TERMS)
     known, true = (waves(TERMS, n).T @ rows for n in (phases, FINE * phases))
     share = (np.arange(FINE) / FINE)[:, None]
@@ -76,8 +76,8 @@ def main() -> int:
         "Size of a model",
         COLUMNS,
         rows,
-        f"The cyclic model of {len(paths)} walks, without the prior over segments, and what it loses by "
-        "being no larger: root mean square over joints and phases, about the pelvis.",
+        f"The cyclic model of {len(paths)} walks, without the prior over segments, and the error due to "
+        "its limited size: root mean square over joints and phases, relative to the pelvis.",
     )
     return 0 if size < LIMIT else 1
 

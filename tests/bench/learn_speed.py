@@ -29,14 +29,14 @@ from gait.io import blob
 from gait.progress import progress
 
 RUNS, JOBS = 3, (1, 2)
-SECONDS = 20  # wanted on two cores
+SECONDS = 20  # target on two cores
 POSES = 1000  # on which C and Python are compared
 COLUMNS = ("measure", "case", "figure", "value", "wanted", "met")
 Row = tuple[str, str, str, float | int, str, str]
 
 
 def learn(mocap: Path, jobs: int, model: Path) -> tuple[float, float, float]:
-    """Seconds of a run, processor time and memory, MB, of its process without its workers'."""
+    """Wall clock and processor time of a run, seconds, and memory of its process without the workers, MB."""
     command = ["-m", "gait", "learn", str(mocap), "-o", str(model), "--jobs", str(jobs), "--quiet"]
     begun = time.perf_counter()
     run = subprocess.Popen([sys.executable, *command], stdout=subprocess.DEVNULL)
@@ -102,10 +102,10 @@ def main() -> int:
         "Speed and sameness of gait learn (L14)",
         COLUMNS,
         rows,
-        f"`gait learn` from start to end of the process, median of {RUNS} runs, nothing set aside for it on "
-        "the machine; wanted on two cores. Other CPUs are played by the kernels of OpenBLAS, numpy and libm "
-        "that they choose; the command makes all x86-64 take the same. Others, and other versions of these "
-        "libraries, may differ in the sixth decimal.",
+        f"`gait learn` from start to end of the process, median of {RUNS} runs on a machine that may run "
+        "other programs; the target is for two cores. Other CPUs are simulated by the kernels that "
+        "OpenBLAS, numpy and libm would choose on them; the command uses the same kernels on all x86-64. "
+        "Other processors, and other versions of these libraries, may differ in the sixth decimal.",
     )
     return 0 if all(row[5] != "NO" for row in rows) else 1
 

@@ -57,7 +57,9 @@ def test_track_keeps_the_rows_that_are_finished(tmp_path):
         assert f"; what was written is in {name}\n" in printed
     track = read_track(output / "t.unfinished.csv")
     rows = len(track.frame)
-    assert track.frames == range(track.frame[-1] + 1)  # the others were not reached, which is not the same as not found
+    assert track.frames == range(
+        track.frame[-1] + 1
+    )  # the others were not reached, which is not the same as not found
     assert 1 <= rows < 900 and abs(Video(output / "o.unfinished.mp4").count - rows) <= 1
 
 
