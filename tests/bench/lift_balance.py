@@ -3,9 +3,10 @@
 
     make eval-lift, or lift_balance.py
 
-Each motion is lifted without constraints on feet, with feet that do not slide (the default), and with the
-force of the ground inside the polygon of the standing feet as well.  Walks are those of lift_people; other
-motions are seen by a camera 6 m away, by a prior of all such motions without what their subject did.
+Each motion is lifted without constraints on the feet, with feet that do not slide (the default), and
+additionally with the force of the ground inside the polygon of the standing feet.  Walks are those of
+lift_people.  Other motions are seen by a camera 6 m away, and lifted with a prior of all such motions except
+those of the same subject.
 """
 
 from __future__ import annotations
@@ -51,14 +52,14 @@ OTHERS = {
     "punch": "cmu_misc/02/02_05.amc",
     "dance": "cmu_misc/mjackson/131_03.amc",
 }
-FRAMES = 90  # of another motion, from its middle
-STANDS = 0.15  # m/s, of an ankle that stands
+FRAMES = 90  # frames of another motion, from its middle
+STANDS = 0.15  # m/s; an ankle slower than this stands
 ANKLES = [EVAL15.index("l_ankle"), EVAL15.index("r_ankle")]
 
 
 @dataclass(frozen=True)
 class Case:
-    """Joints EVAL15 (T, 15, 3) in the world, who sees them, and a prior without the subject."""
+    """Joints EVAL15 (T, 15, 3) in the world, the camera, and a prior without the subject."""
 
     name: str
     places: Floats
@@ -67,7 +68,7 @@ class Case:
 
 
 def main() -> int:
-    """Lift and publish; 1 if feet slide more, or poses are worse, with feet that should not slide."""
+    """Lift and publish; exit code 1 if the constraint makes feet slide more or poses worse."""
     if eval_clips.absent():
         return 0
     found: dict[str, list[list[list[float]]]] = {}
@@ -85,15 +86,16 @@ def main() -> int:
         for arm, mean in zip(ARMS, np.nanmean(each, axis=0), strict=True):
             rows.append([name, len(each), arm, *mean.tolist()])
     note = (
-        f"Perspective view, {lift_tracks.NOISE:g} px of noise, {lift_tracks.GAPS:.0%} of the points missing, "
-        "stature unknown. Means over motions: root-aligned and absolute error of 15 joints, mm; speed of "
-        f"ankles that truly stand (below {STANDS:g} m/s), mm/s; coverage of 90 % intervals about the hips; "
-        "share estimated by segments alone, where the motion is too unlike those learnt and constraints have "
-        "no effect. neither: --no-contact; no slip: the default; balance: --balance. Wanted: on all walks no "
-        f"slip has less of the first three than neither. Reached: {_reached(rows[-3], rows[-2])}. Of all "
-        f"motions: {_reached(rows[-6], rows[-5])}. Balance on walks, against no slip: "
-        f"{_reached(rows[-2], rows[-1])}; it stays as an option because some want the body balanced "
-        "whatever it costs, and is off because on walks it gains nothing."
+        f"Perspective view, {lift_tracks.NOISE:g} px of noise, {lift_tracks.GAPS:.0%} of the points "
+        "missing, stature unknown. The columns are means over motions: root-aligned and absolute error "
+        f"of 15 joints, mm; speed of ankles that truly stand (below {STANDS:g} m/s), mm/s; coverage of 90 "
+        "% intervals about the hips; alone: share of frames estimated by segments alone, where the "
+        "motion is too unlike those learnt and constraints have no effect. Constraints: neither: "
+        "--no-contact; no slip: the default; balance: --balance. Target: on all walks, no slip is below "
+        f"neither in the first three columns. Result: {_reached(rows[-3], rows[-2])}. On all motions: "
+        f"{_reached(rows[-6], rows[-5])}. Balance on walks, compared with no slip: "
+        f"{_reached(rows[-2], rows[-1])}. Balance is off by default because it improves nothing on walks; "
+        "the option remains for users who need a balanced body whatever it costs."
     )
     head = ["motion", "motions", "constraints", "root mm", "abs mm", "slide mm/s", "about hips", "alone"]
     table.publish("lift_balance", "Feet that do not slide, and balance", head, rows, note)
@@ -102,7 +104,7 @@ def main() -> int:
 
 
 def _reached(before: list[Any], after: list[Any]) -> str:
-    """State the first three figures of two rows, and which of them fall."""
+    """State the first three figures of two rows, and which of them are lower."""
     pairs = zip(("root", "abs", "slide"), before[3:6], after[3:6], strict=True)
     return "; ".join(f"{name} {a:.1f} to {b:.1f}, {'less' if b < a else 'not less'}" for name, a, b in pairs)
 

@@ -1,4 +1,4 @@
-"""A user who corrects the estimate of a clip: the worst joints first, pointed at with some noise."""
+"""A simulated user who corrects the estimate of a clip, the worst joints first, with some noise."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ from gait.motion.evaluate import root_errors
 
 Array = NDArray[np.float64]
 
-WIDTH90 = 1.645  # standard deviations of half a 90 % interval
+WIDTH90 = 1.645  # standard deviations in half a 90 % interval
 POINTING = 3.0  # pixels, standard deviation of a click
 
 
@@ -59,7 +59,7 @@ def corrected(
     most : int
         Corrections altogether.
     share : float
-        Of the frames that get a correction before the user looks again.
+        Share of the frames that are corrected before the user sees a new estimate.
     """
     rng = np.random.default_rng(seed)
     uv = clip.view.project(truth)[0]

@@ -1,11 +1,11 @@
 #!/usr/bin/env python3
-"""The share of coordinates that intervals would cover if they were exactly right, clip by clip.
+"""Share of coordinates that intervals would cover if they were exactly right, clip by clip.
 
 lift_coverage.py
 
-A lift's errors last: much of them is one error of distance and stature, which all coordinates of a clip
-share.  So even if the intervals are right, a clip's coverage is rarely near 90 %.  Truths drawn from the
-lift's own covariance show how it would vary.
+The errors of a lift last: much of them is one error of distance and stature, which all coordinates of a clip
+share.  Even if the intervals are right, the coverage of a single clip is therefore rarely near 90 %.  Truths
+drawn from the lift's own covariance show how it would vary.
 """
 
 from __future__ import annotations
@@ -29,8 +29,8 @@ from gait.lift.keypoints.corrections import Edits
 from gait.lift.smooth.options import Options
 from gait.progress import progress
 
-FRAMES, DRAWS = 6, 4000  # of a clip, evenly spread; truths drawn for each
-LOW, HIGH = 0.8, 0.95  # the coverage wanted of a clip
+FRAMES, DRAWS = 6, 4000  # frames of a clip, evenly spaced; truths drawn for each
+LOW, HIGH = 0.8, 0.95  # target for the coverage of a clip
 HEAD = [
     "clip",
     "coverage",
@@ -44,7 +44,7 @@ HEAD = [
 
 
 def main() -> int:
-    """Publish the table; 0 also without the data."""
+    """Publish the table; exit code 0 also if the data are absent."""
     clips = sorted(path.parent for path in (eval_clips.DATA / "eval" / "dev").glob("*/truth.csv"))
     if not clips:
         print(f"lift_coverage: {eval_clips.DATA} is not there, left out", file=sys.stderr)
@@ -56,14 +56,15 @@ def main() -> int:
             update(done)
     right, above = (float(np.mean([row[k] for row in rows])) for k in (5, 6))
     note = (
-        "Joints of the detector (full), lifted as by `gait lift` with all defaults. coverage: of the clip's "
-        "true coordinates in their 90 % intervals. drawn: truths drawn from the covariance of a frame, "
-        f"{DRAWS} in each of {FRAMES} frames, so that the intervals are right: mean, median and quantiles of "
-        "the share of a frame's coordinates that they cover, how often it is from "
-        f"{LOW:g} to {HIGH:g}, and how often above. 3 directions: share of the variance in the three "
-        f"principal directions of the joints together.\n\nIf the intervals are right, {right:.0f} % of the "
-        f"frames are covered to {LOW:g} to {HIGH:g}, and {above:.0f} % to more; a clip is about as one "
-        "frame, as far as its errors last."
+        "Joints of the detector (full), lifted as by `gait lift` with all defaults. coverage: share of "
+        "the clip's true coordinates in their 90 % intervals. drawn: the same if the intervals are "
+        f"right, for truths drawn from the covariance of a frame, {DRAWS} in each of {FRAMES} frames: "
+        "mean, median and quantiles of the share of a frame's coordinates that is covered, how often it "
+        f"is from {LOW:g} to {HIGH:g}, and how often above. 3 directions: share of the variance in the "
+        "three principal directions of the joints together.\n\n"
+        f"If the intervals are right, {right:.0f} % of the frames have a coverage from {LOW:g} to "
+        f"{HIGH:g}, and {above:.0f} % a higher one; as far as errors last, a whole clip behaves like one "
+        "frame."
     )
     table.publish(
         "lift_coverage",

@@ -1,10 +1,10 @@
 #!/usr/bin/env python3
-"""gait lift of the detector's joints: errors, how honest the intervals are, stature and cost.
+"""gait lift of the detector's joints: errors, coverage of the intervals, stature and cost.
 
 make eval-lift, or lift_detector.py
 
-Development clips by all networks, films of real people by `full`.  Joints are kept in build/detector-joints,
-as the networks give them; each run moves them by the profile, as gait detect does.
+Development clips with all networks, films of real people with `full`.  Joints are kept in
+build/detector-joints as the networks give them; each run moves them by the profile, as gait detect does.
 """
 
 from __future__ import annotations
@@ -37,7 +37,7 @@ from gait.lift.smooth.options import Options
 from gait.progress import progress
 
 KEPT = Path(__file__).resolve().parents[2] / "build" / "detector-joints"
-# pip compiles packages; where the environment forbids to keep that, every run would compile them again.
+# pip compiles packages; an environment that forbids keeping the result would compile them in every run.
 INSTALLED = os.environ | {
     "PYTHONDONTWRITEBYTECODE": "",
     "PYTHONPYCACHEPREFIX": str(Path("build/pycache").resolve()),
@@ -60,7 +60,7 @@ def joints(clip: Path, network: str) -> Keypoints:
 def lifted(
     found: Keypoints, camera: Path, output: Path, *options: object
 ) -> tuple[dict[str, object], float, int]:
-    """Lift by the command: its summary, seconds of CPU and number of warnings."""
+    """Lift with the command: its summary, seconds of CPU and number of warnings."""
     points = output.with_suffix(".points.csv")
     keypoints_file.write(points, found)
     before = resource.getrusage(resource.RUSAGE_CHILDREN)
@@ -102,19 +102,20 @@ def judge(output: Path, truth: Path) -> list[float]:
 
 
 def note(rows: list[list[Any]]) -> str:
-    """Explain the table, with the coverages of the rendered clips on average."""
+    """Explain the table, with the mean coverage of the rendered clips."""
     columns = [[row[HEAD.index(name)] for row in rows] for name in ("coverage", "floor known")]
     usual, known = (np.mean([share for share in column if share is not None]) for column in columns)
     return (
-        "`gait lift` with the joints of `gait detect`, all defaults, stature unknown. Development "
-        "clips by all networks (none of their people is in the detector's profile), then films of real "
-        "people: their cameras are guessed from an assumed stature, so the stature shows how well the "
-        "lift agrees with the camera. Coverage: of coordinates in their 90 % intervals; wanted from "
-        f"0.8 to 0.95. Floor known: the same with `--floor-sd {lift_tracks.FLOOR_KNOWN:g}`: in rendered "
-        f"clips the floor is exact, which the usual {Options.floor_sd:g} m do not count on. On average they "
-        f"are {usual:.3f} and {known:.3f}. CPU: of the whole command, start-up included, packages compiled "
-        "as by pip, also where other programs ran; wanted below 4 s for 150 frames. Stature: wanted within "
-        "6 % where the camera is right."
+        "`gait lift` with the joints of `gait detect`, all defaults, stature unknown. The rows are the "
+        "development clips with all networks (none of their people is in the detector's profile), then "
+        "films of real people, whose cameras are guessed from an assumed stature: there the stature only "
+        "shows how well the lift agrees with the camera. Coverage: share of coordinates in their 90 % "
+        "intervals; target from 0.8 to 0.95. Floor known: the same with `--floor-sd "
+        f"{lift_tracks.FLOOR_KNOWN:g}`; the floor of rendered clips is exact, while the default assumes a "
+        f"standard deviation of {Options.floor_sd:g} m. The mean coverages are {usual:.3f} and "
+        f"{known:.3f}. CPU: seconds of the whole command including start-up, with packages compiled as by "
+        "pip, in some rows with other programs running; target below 4 s for 150 frames. Stature: target "
+        "within 6 % if the camera is right."
     )
 
 
@@ -129,7 +130,7 @@ def main() -> int:
     jobs += [("full", film) for film in films]
     rows = []
     with tempfile.TemporaryDirectory() as folder, progress("clips", len(jobs)) as update:
-        row(clips[0], "full", Path(folder))  # compiles what is not yet
+        row(clips[0], "full", Path(folder))  # compiles what is not compiled yet
         for done, (network, clip) in enumerate(jobs, 1):
             rows.append(["detector", clip.name, network, *row(clip, network, Path(folder))])
             update(done)

@@ -1,5 +1,5 @@
 #!/usr/bin/env python3
-"""What one parallel view leaves open: displacements along the line of sight (F6, F7).
+"""What one parallel view leaves undetermined: displacements along the line of sight (F6, F7).
 
 make eval-lift, or lift_directions.py
 """
@@ -22,14 +22,14 @@ Floats = npt.NDArray[np.float64]
 
 VIEWS = {"side": (0, 1), "front": (1, 0)}  # across the picture, along the line of sight
 NOISE = 0.020  # metres
-FEW = 6  # modes that are reduced least
+FEW = 6  # modes whose variance is reduced least
 COUNT = 5  # displacements
-DEPTH, RIGID = 0.99, 0.98  # of the first displacement: shares wanted
-OTHERS = 0.95  # of all of them
+DEPTH, RIGID = 0.99, 0.98  # least shares wanted of the first displacement
+OTHERS = 0.95  # least share wanted of all of them
 
 
 def main() -> int:
-    """Publish the table; 1 if displacements are not as wanted where the place is open."""
+    """Publish the table; exit code 1 if displacements miss the targets when the place is unknown."""
     if eval_clips.absent():
         return 0
     rows = []
@@ -40,7 +40,7 @@ def main() -> int:
 
 
 def _row(source: str, known: HeldOut, view: str, free: bool) -> list[object]:
-    """One prior from one side, its place open or known."""
+    """One prior from one side, with its place unknown or known."""
     across, along = VIEWS[view]
     axes, depth = np.eye(3)[[across, 2]], np.eye(3)[along]
     known_place = placed_as_learnt(known.stature)
@@ -70,13 +70,14 @@ def _along(mode: Floats, axis: int) -> float:
 
 def _publish(rows: list[list[object]]) -> None:
     note = (
-        f"The mean segment seen with {1000 * NOISE:g} mm of noise; stature and heading known, the place open "
-        "or known, as it is in the paper. First: share along the line of sight and share of a rigid "
-        "translation of the most uncertain displacement; least depth: the smallest share along it of "
-        f"{COUNT}. Wanted where the place is open: {DEPTH:g}, {RIGID:g} and {OTHERS:g}; where it is known no "
-        "translation is left. Of the modes themselves, which are not made of it (F7): share along it of the "
-        f"{FEW} that are reduced least, of all, and the correlation of that share with what is left of their "
-        "variance."
+        f"The mean segment seen with {1000 * NOISE:g} mm of noise. Stature and heading are known; the "
+        "place is unknown (open) or known, as in the paper. First: for the most uncertain displacement, "
+        "its share along the line of sight and the share of a rigid translation in it. Least depth: the "
+        f"smallest share along the line of sight among the {COUNT} most uncertain displacements. Targets "
+        f"if the place is unknown: {DEPTH:g}, {RIGID:g} and {OTHERS:g}; if it is known, there is no "
+        "translation. The last columns describe the modes themselves (F7): mean share along the line of "
+        f"sight of the {FEW} modes whose variance is reduced least, and of all modes, and the correlation of "
+        "this share with the remaining share of the variance."
     )
     head = ["prior", "view", "place", "first: depth", "first: rigid", "least depth"]
     head += [f"of {FEW} modes", "of all", "correlation", "met"]

@@ -46,16 +46,16 @@ WALKS = {"35": "35_08", "07": "07_02", "16": "16_31"}
 ANGLES = (90, 45)  # degrees
 SEEDS = (1, 2, 3)
 FRAMES = slice(10, 50)
-WITHIN = 1.3  # of the error with known markers
+WITHIN = 1.3  # largest multiple of the error with known markers
 ENOUGH = 60.0  # mm
 MOST = 0.5  # corrections per frame
 SPIKE = 0.01  # statures
 HELD = (0.80, 0.95)  # coverage of 90 % intervals, mean of the rows
-MARKS = {"head_centre"}  # marked joints that the prior has not
+MARKS = {"head_centre"}  # marked joints that the prior lacks
 
 
 def main(argv: Sequence[str] | None = None) -> int:
-    """Run all parts; 1 if a bound is missed."""
+    """Run all parts; exit code 1 if a bound is missed."""
     parser = argparse.ArgumentParser(description=__doc__.split("\n")[0])
     parser.add_argument("mocap", type=Path, nargs="?", default=eval_clips.MOCAP, help="folder of .amc walks")
     parser.add_argument("--only", choices=PARTS, action="append", help="run this part only (may be repeated)")
@@ -75,7 +75,7 @@ def main(argv: Sequence[str] | None = None) -> int:
 
 
 def _models(subjects: Sequence[str], clips: Sequence[Clip]) -> dict[str, Path]:
-    """Models learnt from everyone but one of the subjects, who walk in the clips."""
+    """Models learnt from all people but one of the subjects, who walk in the clips."""
     wanted = [clip for clip in clips if clip.subject in subjects]
     folder = eval_clips.ROOT / "build" / "eval" / "models"
     with progress("learning", None) as update:
@@ -108,16 +108,17 @@ def _sticks(mocap: Path, models: dict[str, Path]) -> bool:
             *("gap %", "jump %", "bend %", "inside %", "coverage", "met"),
         ],
         rows,
-        "Root-aligned error of EVAL15 (median over frames, mm) of held-out people drawn as sticks, 20"
-        f" frames/s, camera 6.5 m away, no background plate, {len(SEEDS)} seeds of noise and placement."
-        " known: all 15 joints in every frame; 0, 0.5, 1: corrections per frame by a simulated user (worst"
-        f" joints first, {POINTING:g} px); +-: half the 95 % interval of the mean ratio, by the rows."
-        " coverage: of the 90 % intervals of places, without corrections.\n\n"
-        "The paper's way (`--alone`), percent of the stature, without corrections: gap, of the mean depth of"
-        " what neighbours share; jump, the largest by which a joint's step from one frame to the next differs"
-        " from the mean of the steps beside it, where segments begin or end; bend, rms second difference of"
-        " joints there; inside, at the other frames. Placed in each of the first frames in turn, so that"
-        " every frame is a join and inside equally often.",
+        "The figures are root-aligned errors of EVAL15 (median over frames, mm) of held-out people drawn "
+        f"as sticks, 20 frames/s, camera 6.5 m away, no background plate, {len(SEEDS)} seeds of noise and "
+        "placement. known: all 15 joints in every frame; 0, 0.5, 1: corrections per frame by a simulated "
+        f"user (worst joints first, {POINTING:g} px); +-: half the 95 % interval of the mean ratio, from "
+        "the rows. coverage: of the 90 % intervals of places, without corrections.\n\n"
+        "The remaining columns show the paper's way (`--alone`) without corrections, in percent of the "
+        "stature. gap: largest difference between the mean depths that neighbouring segments give their "
+        "shared frames; jump: largest difference between a joint's step from one frame to the next and "
+        "the mean of the steps before and after it, where segments begin or end; bend: rms second "
+        "difference of joints there; inside: the same at the other frames. The clip is placed in each of "
+        "the first frames in turn, so that every frame is equally often at a join and inside.",
     )
     return all(met)
 
@@ -147,7 +148,7 @@ def _walk(path: Path) -> Walk:
 
 
 def _all_known(clip: ClipSegments, truth: np.ndarray[Any, Any]) -> ClipSegments:
-    """Clip with every joint of every frame pointed at."""
+    """Clip with a correction for every joint of every frame."""
     rng = np.random.default_rng(0)
     uv = clip.view.project(truth)[0] + POINTING * rng.standard_normal((*truth.shape[:2], 2))
     return replace(
@@ -185,7 +186,7 @@ def _joins(prior: SegmentPrior, walk: Walk, angle: float) -> list[float]:
 
 
 def _clips(clips: Sequence[Clip], models: dict[str, Path]) -> bool:
-    """Corrections that the development clips need."""
+    """Number of corrections that the development clips need."""
     rows: list[list[Any]] = []
     for clip in clips:
         for plated in (True, False):
@@ -225,12 +226,13 @@ def _publish_clips(rows: list[list[Any]]) -> None:
             *("root then mm", "coverage then", "met"),
         ],
         rows,
-        "root, abs, px: without corrections, medians over frames. coverage: of the 90 % intervals of "
-        "places, without corrections and with. corrections: by a simulated user (worst "
-        f"joints first, {POINTING:g} px, a tenth of the frames at a time) until the root error is below "
-        f"{ENOUGH:g} mm, at most {MOST:g} per frame. Placed from the truth with "
-        "noise (3 cm, 0.05 rad, 1 % of stature, phase 0.03). none: sensors see the scene, as in the paper. "
-        f"met: the error is reached, or mean coverages from {HELD[0]:g} to {HELD[1]:g}.",
+        "root, abs, px: errors without corrections, medians over frames. coverage: of the 90 % intervals "
+        "of places, without and with corrections. corrections: by a simulated user (worst joints first, "
+        f"{POINTING:g} px, a tenth of the frames at a time) until the root error is below {ENOUGH:g} mm, "
+        f"at most {MOST:g} per frame. The clip is placed from the truth with noise (3 cm, 0.05 rad, 1 % "
+        "of stature, phase 0.03). none: without a background, so that the sensors see the scene, as in "
+        f"the paper. met: whether the error is reached, or the mean coverage is from {HELD[0]:g} to "
+        f"{HELD[1]:g}.",
     )
 
 
@@ -260,7 +262,7 @@ def _segments(clip: Clip, model: Path, plated: bool) -> tuple[ClipSegments, np.n
 
 
 def _outdoor(prior: SegmentPrior) -> None:
-    """Report distances from hand-marked joints of the real clip."""
+    """Publish distances from hand-marked joints of the real clip."""
     clip = eval_clips.outdoor_clip()
     video, view = Video(clip.video), CameraView(Camera.read(f"{clip.camera}"))
     placed = read_placement(str(clip.init), prior, True)
@@ -296,8 +298,9 @@ def _outdoor(prior: SegmentPrior) -> None:
         "From images: the real clip",
         ["corrections", "median px", "mean px", "largest px"],
         rows,
-        f"Distance of {len(names)} joints marked by hand in {len(frames)} of {len(film.times)} frames; she is"
-        " about 415 px tall. Each round corrects the worst joint of every marked frame by its mark.",
+        f"Distance from the {len(names)} joints that were marked by hand in {len(frames)} of "
+        f"{len(film.times)} frames; the person is about 415 px tall. In each round the worst joint of "
+        "every marked frame is corrected to its mark.",
     )
 
 

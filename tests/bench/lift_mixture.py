@@ -18,11 +18,11 @@ from lift_mocap import MODES, NOISE, SEQUENCES, errors_of, held_out
 
 from gait.progress import progress
 
-COUNTS = ("1", "2", "auto")  # of --segment-mixture
+COUNTS = ("1", "2", "auto")  # values of --segment-mixture
 
 
 def main() -> int:
-    """Lift all sequences with priors of one Gaussian, of two, and of as many as predict people best."""
+    """Lift all sequences with priors of one Gaussian, of two, and of the number that predicts people best."""
     if eval_clips.absent():
         return 0
     rows = []
@@ -35,10 +35,10 @@ def main() -> int:
         same = np.array([row[3:] for row in rows if row[1] == count], float)
         rows.append(["mean of all", count, np.nan, *same.mean(axis=0).tolist()])
     note = (
-        "Sequences left out as in lift_mocap, by priors of one Gaussian (the default), of two, and of as "
-        "many as predict people left out best (auto); of a mixture the lifter takes the component with the "
-        "most evidence. Bayes: error in mm per marker at 5, 20 and 50 mm of noise; coverage: of the 90 % "
-        "intervals of the depth at 50 mm, as they are and scaled."
+        "Sequences are left out as in lift_mocap. The priors have one Gaussian (the default), two, or "
+        "the number that predicts people left out best (auto); of a mixture the lifter uses the "
+        "component with the most evidence. Bayes: error in mm per marker at 5, 20 and 50 mm of noise; "
+        "coverage: of the 90 % intervals of the depth at 50 mm, unscaled and scaled."
     )
     head = ["left out", "asked for", "Gaussians", *(f"Bayes {1000 * sd:.0f}" for sd in NOISE)]
     table.publish("lift_mixture", "How many Gaussians", [*head, "coverage", "scaled"], rows, note)

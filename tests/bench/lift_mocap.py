@@ -1,11 +1,11 @@
 #!/usr/bin/env python3
-"""Segments of held-out motion capture from one parallel view: Bayes beside likelihood alone (F4, F8, F11).
+"""Segments of held-out motion capture in one parallel view: Bayes against likelihood alone (F4, F8, F11).
 
     make eval-lift, or lift_mocap.py
 
-The whole subject of a sequence is left out of what its prior is learnt from.  Segments are placed as in the
-prior (pelvis over the origin in the first frame, heading known, as in the paper's axes) and seen from eight
-sides; the C core lifts them.
+The prior is learnt without any recording of a sequence's subject.  Segments are placed as in the prior
+(pelvis over the origin in the first frame, heading known, in the paper's axes) and seen from eight sides; the
+C core lifts them.
 """
 
 from __future__ import annotations
@@ -45,25 +45,31 @@ SEQUENCES = {
     "walk": "cmu_walk/35/35_08.amc",
 }
 MODES = {"cmu_walk": 50, "cmu_misc": 80}
-ONE_OF_EACH = ("walk", "punch")  # a prior of walks and one of other motions without them
+ONE_OF_EACH = ("walk", "punch")  # a prior of walks and a prior of other motions, each without one of these
 NOISE = (0.005, 0.020, 0.050)  # metres
 MISSING = (0.0, 0.1, 0.3, 0.5)
 SIDES = 8
 MOST = 24  # segments of a sequence
-RATIO = 1.6  # of likelihood-only over Bayes at 50 mm
-WEIGHTS = (0.12, 0.25, 0.5, 1.0, 2.0)  # of the prior against what is seen, of which the best is looked for
-NEAR_BEST = 1.1  # of Bayes over the best of them
+RATIO = 1.6  # least ratio of likelihood-only to Bayes at 50 mm
+WEIGHTS = (
+    0.12,
+    0.25,
+    0.5,
+    1.0,
+    2.0,
+)  # of the prior relative to the observations, among which the best is searched
+NEAR_BEST = 1.1  # largest ratio of Bayes to the best of them
 COVERAGE = (0.80, 0.95)
-GROWTH = 1.15  # of the error at 30 % missing
+GROWTH = 1.15  # largest growth of the error at 30 % missing
 AXES = np.array([[1.0, 0, 0], [0, 0, 1]])  # of the picture: depth is along y
 DEPTH = 1
-WITHIN = 1.645  # standard deviations that hold 90 %
-WITHIN_SCALED = 1.81  # scaled ones: Student's t of ten degrees, chosen by lift_modes
+WITHIN = 1.645  # standard deviations that contain 90 %
+WITHIN_SCALED = 1.81  # the same for scaled ones: Student's t of ten degrees, chosen with lift_modes
 
 
 @dataclass(frozen=True)
 class HeldOut:
-    """A model, its prior, and segments (n, F, J, 3) in statures of a sequence that it does not know."""
+    """A model, its prior, and segments (n, F, J, 3), in statures, of a sequence that is not in it."""
 
     model: Path
     prior: SegmentPrior
@@ -73,7 +79,7 @@ class HeldOut:
 
 @dataclass(frozen=True)
 class Errors:
-    """Of one noise, over segments: mean errors in mm, and what the posterior states of itself."""
+    """Means over segments at one noise level: errors in mm, and the posterior's coverage and volume."""
 
     segments: int
     mean: float
@@ -86,7 +92,7 @@ class Errors:
 
 
 def main() -> int:
-    """Run all sequences; 1 if a bound is missed."""
+    """Run all sequences; exit code 1 if a bound is missed."""
     if eval_clips.absent():
         return 0
     with progress("held-out sequences", len(SEQUENCES)) as update, tempfile.TemporaryDirectory() as folder:
@@ -104,7 +110,7 @@ def main() -> int:
 def learnt_without(
     file: Path, model: Path, sources: tuple[str, ...], modes: int = 50, mixture: str = "1"
 ) -> SegmentPrior:
-    """Prior of all recordings of folders but those of a file's subject, whose folder it is in."""
+    """Prior of all recordings in the folders, except those of the file's subject."""
     out = f"{file.parent.name}/*"
     command = ["learn", *(str(MOCAP / source) for source in sources), "--segments", "only"]
     command += ["--exclude", out, "--segment-modes", str(modes), "--segment-mixture", mixture]
@@ -114,7 +120,7 @@ def learnt_without(
 
 
 def held_out(file: str, folder: Path, modes: int, mixture: str = "1") -> HeldOut:
-    """Learn what is beside a sequence, and cut the sequence into segments placed as in the prior."""
+    """Learn from all other subjects, and cut the sequence into segments placed as in the prior."""
     path, wanted, model = MOCAP / file, SegmentOptions(source="only", people=False), folder / "m.gait"
     prior = learnt_without(path, model, (file.split("/")[0],), modes, mixture)
     motion = segment_motion.of(path, readers.read(path), wanted)
@@ -126,7 +132,7 @@ def held_out(file: str, folder: Path, modes: int, mixture: str = "1") -> HeldOut
 
 
 def one_of_each() -> Iterator[tuple[str, HeldOut]]:
-    """Name and held-out sequence of one prior of walks and one of other motions, with a bar of progress."""
+    """Yield name and held-out sequence of a prior of walks and of one of other motions; show progress."""
     with progress("priors", len(ONE_OF_EACH)) as update, tempfile.TemporaryDirectory() as folder:
         for done, title in enumerate(ONE_OF_EACH, 1):
             source = SEQUENCES[title].split("/")[0]
@@ -135,7 +141,7 @@ def one_of_each() -> Iterator[tuple[str, HeldOut]]:
 
 
 def _observed(known: HeldOut, sd: float, missing: float) -> Iterator[tuple[int, Floats, Floats, Floats]]:
-    """Side, truth (F, J, 3) turned to it, picture and sd of every segment, from sides in turn."""
+    """Side, truth (F, J, 3) turned to it, picture and sd of every segment; the sides take turns."""
     rng = np.random.default_rng(1)
     for k, segment in enumerate(known.segments * known.stature):
         truth = segment @ axis_rotation(2, -_turn(k % SIDES)).T
@@ -148,7 +154,7 @@ def _turn(side: int) -> float:
 
 
 def _lifters(known: HeldOut, **changes: float) -> list[Lifter]:
-    """One for each side."""
+    """One lifter for each side."""
     turns = [_turn(side) for side in range(SIDES)]
     return [Lifter(known.model, AXES, placed_as_learnt(known.stature, -turn, **changes)) for turn in turns]
 
@@ -158,7 +164,7 @@ def _error(found: Floats, truth: Floats) -> float:
 
 
 def errors_of(known: HeldOut, sd: float) -> Errors:
-    """Lift all segments seen with a noise."""
+    """Lift all segments, observed with this noise."""
     lifters = _lifters(known)
     learnt = Gaussian.of(known.prior, known.stature)
     errors, inside, scaled, volumes = [], [], [], []
@@ -178,9 +184,9 @@ def errors_of(known: HeldOut, sd: float) -> Errors:
 
 
 def _best(known: HeldOut, sd: float) -> float:
-    """Error of the posterior mean by the best weight of the prior.
+    """Error of the posterior mean with the best weight of the prior.
 
-    A prior of w times the precision is as one of its own against w times the variance of all noise.
+    Multiplying the precision of the prior by w is equivalent to multiplying the variance of all noise by w.
     """
     found = []
     for weight in WEIGHTS:
@@ -194,7 +200,7 @@ def _best(known: HeldOut, sd: float) -> float:
 
 
 def _row(title: str, known: HeldOut, sd: float) -> list[object]:
-    """One line of the table of F4 and F8."""
+    """One row of the table of F4 and F8."""
     e, best = errors_of(known, sd), _best(known, sd)
     ratio = e.likelihood / e.bayes
     met = ratio >= RATIO if sd == NOISE[-1] else ratio > 1
@@ -212,12 +218,12 @@ def _row(title: str, known: HeldOut, sd: float) -> list[object]:
 
 
 def _held(share: float, missed: str = "NO") -> tuple[float, str]:
-    """Coverage, and whether it is as wanted."""
+    """Coverage, and whether it meets its target."""
     return share, "yes" if COVERAGE[0] <= share <= COVERAGE[1] else missed
 
 
 def _together(rows: list[list[object]], sd: float) -> list[object]:
-    """Mean over the sequences of one noise; coverage and nearness to the best are wanted of all together."""
+    """Mean over the sequences at one noise level, which must meet coverage and be near the best weight."""
     numbers = ([x for x in row[3:] if not isinstance(x, str)] for row in rows if row[2] == round(1000 * sd))
     same = np.array(list(numbers), float)
     _, mean, likelihood, bayes, floor, _, best, _, share, scaled, volume = same.mean(axis=0).tolist()
@@ -232,7 +238,7 @@ def _together(rows: list[list[object]], sd: float) -> list[object]:
 
 
 def _gaps(title: str, known: HeldOut) -> list[object]:
-    """Errors with points missing, 20 mm of noise; whether they grow little (F11)."""
+    """Errors with points missing, at 20 mm of noise, and whether they grow little (F11)."""
     lifters, errors, promised = _lifters(known), [], []
     for share in MISSING:
         found = []
@@ -250,27 +256,32 @@ def _gaps(title: str, known: HeldOut) -> list[object]:
 
 def _publish(rows: list[list[object]], missing: list[list[object]]) -> None:
     note = (
-        "One parallel view of 37 markers per segment of half a second. mm per marker: of the prior's mean, "
-        "of least squares in the modes (likelihood only), of the posterior mean (Bayes), of "
-        "the segment's own projection on the modes (floor; Bayes has what lies outside them too), and of "
-        "Bayes with the best of five weights of the prior (best; over: Bayes by that). Coverage: of the 90 % "
-        f"intervals of the depth, +- {WITHIN} sd; scaled: of +- {WITHIN_SCALED} sd times "
-        "Lifter.scale, which are wider where the segment's own modes are larger than the prior expects; "
-        f"held: whether from {COVERAGE[0]} to {COVERAGE[1]}. "
-        "Volume: log10 of the posterior's over the prior's. The walk's prior is learnt from cmu_walk, "
-        f"{MODES['cmu_walk']} modes; the others' from cmu_misc, {MODES['cmu_misc']} modes (lift_modes states "
-        "why) or a quarter of the segments; all but what the sequence's subject did (--segments only). "
-        "Wanted: Bayes "
-        f"better at every noise, by {RATIO} at 50 mm (met); both coverages held by all together at every "
-        "noise, as the reference counts (which motions alone hold them is reported); of all together Bayes "
-        f"at most {NEAR_BEST} of the best weight's."
+        "Each segment lasts half a second; its 37 markers are seen in one parallel view. All sequences "
+        "are left out of the priors with everything else that their subject did. The walk's prior is "
+        f"learnt from cmu_walk with {MODES['cmu_walk']} modes; the priors of the others are learnt from "
+        f"cmu_misc with {MODES['cmu_misc']} modes (lift_modes states why), or a quarter of the number of "
+        "segments if that is less (--segments only).\n\n"
+        "- mean, likelihood, Bayes: error in mm per marker of the prior's mean, of least squares in the "
+        "modes (likelihood only), and of the posterior mean\n"
+        "- floor: error of the segment's own projection on the modes; Bayes also includes what lies "
+        "outside the modes\n"
+        "- ratio: likelihood divided by Bayes; best: Bayes with the best of five weights of the prior; "
+        "over: Bayes divided by best\n"
+        f"- coverage: of the 90 % intervals of the depth, +- {WITHIN} sd; scaled: of intervals of +- "
+        f"{WITHIN_SCALED} sd times Lifter.scale, which are wider if the segment's modes are larger than "
+        f"the prior expects; held: whether the coverage is from {COVERAGE[0]} to {COVERAGE[1]}\n"
+        "- volume: log10 of the posterior's volume divided by the prior's\n\n"
+        f"Targets: Bayes is better at every noise, and at 50 mm the ratio is at least {RATIO} (met). For "
+        "all sequences together, both coverages are held at every noise (for single motions they are "
+        f"only reported), and the error of Bayes is at most {NEAR_BEST} times that with the best weight."
     )
     head = ["measure", "left out", "noise mm", "segments", "mean", "likelihood", "Bayes", "floor", "ratio"]
     head += ["best", "over", "coverage", "held", "scaled", "scaled held", "volume", "met"]
     table.publish("lift_mocap", "Held-out motion capture", head, rows, note)
     note = (
-        "The same with points missing at random, noise 20 mm: mm per marker. Growth: at 30 % over none, as "
-        f"it is and as the posterior standard deviations state. Wanted: at most {GROWTH}."
+        "The same with points missing at random, at 20 mm of noise: error in mm per marker. Growth: "
+        "error at 30 % missing divided by the error with none; stated growth: the same for the posterior "
+        f"standard deviations. Target: at most {GROWTH}."
     )
     shares = [f"{share:.0%} missing" for share in MISSING]
     head = ["measure", "left out", *shares, "growth", "stated growth", "met"]

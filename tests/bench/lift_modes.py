@@ -1,5 +1,5 @@
 #!/usr/bin/env python3
-"""How many modes a prior of eclectic motions is lifted with: chosen on sequences that are not reported.
+"""How many modes a prior of mixed motions should have, chosen on sequences that are not reported.
 
 make eval-lift, or lift_modes.py
 """
@@ -43,7 +43,7 @@ def main() -> int:
 
 
 def tried(folder: Path) -> Iterator[list[object]]:
-    """Numbers of modes: on the sequences they are chosen on, then on those that are reported."""
+    """Rows by number of modes: for the sequences that they are chosen on, then for the reported ones."""
     eclectic = {title: file for title, file in SEQUENCES.items() if file.startswith("cmu_misc")}
     for use, sequences in (("chosen on", OTHERS), ("reported", eclectic)):
         for title, file in sequences.items():
@@ -58,11 +58,12 @@ def tried(folder: Path) -> Iterator[list[object]]:
 
 def _publish(modes: list[list[object]]) -> None:
     note = (
-        "Least squares are tamed by few modes as Bayes is by the prior, so that with few the ratio is small "
-        "though nothing is gained: Bayes alone is better with more. Chosen on the first sequences, whose "
-        "Bayes errors count: mm at 5 and at 50 mm of noise; ratio and coverages at 50 mm. "
-        "The freedom of the scale (LIFT_FREEDOM) and its +- "
-        f"{WITHIN_SCALED} for 90 % were chosen by the same sequences."
+        "The number of modes was chosen on the first sequences (use: chosen on), by the errors of Bayes. "
+        "The ratio of likelihood to Bayes is no criterion: with few modes it is small, because few modes "
+        "regularise least squares much as the prior regularises Bayes, but the errors of Bayes are lower "
+        "with more modes. Errors are in mm per marker at 5 and at 50 mm of noise; ratio and coverages "
+        f"are at 50 mm. The degrees of freedom of the scale (LIFT_FREEDOM) and its +- {WITHIN_SCALED} for "
+        "90 % were chosen on the same sequences."
     )
     head = ["use", "left out", "modes", "likelihood 5", "Bayes 5", "likelihood 50", "Bayes 50", "ratio"]
     table.publish("lift_modes", "How many modes", [*head, "coverage", "scaled"], modes, note)

@@ -1,5 +1,5 @@
 #!/usr/bin/env python3
-"""gait lift where the tracks hold a part of the body only: errors and how honest the intervals are.
+"""gait lift if the tracks contain only a part of the body: errors and coverage of the intervals.
 
 make eval-lift, or lift_parts.py
 """
@@ -35,7 +35,7 @@ PARTS = {
 
 
 def main() -> int:
-    """Publish the table; nothing is wanted of it."""
+    """Publish the table; it has no targets."""
     if eval_clips.absent():
         return 0
     clips, models = eval_clips.people()
@@ -76,9 +76,10 @@ def _publish(measured: dict[str, list[list[float]]], reported: dict[str, bool]) 
         rows.append(["parts", part, *np.ravel([middle, worst], order="F"), "" if reported[part] else "yes"])
     head = ["root mm", "worst root", "abs mm", "worst abs", "coverage", "least coverage"]
     note = (
-        "The development clips as above, but only these joints are in the tracks; all 15 are judged. Medians "
-        "and the worst over the clips: root-aligned and absolute error, share of coordinates in their 90 % "
-        "intervals. warns: gait lift states that the tracks hardly show how far away the person is."
+        "The development clips with only these joints in the tracks; all 15 joints are judged. Medians "
+        "and the worst over the clips: root-aligned and absolute error, share of coordinates in their 90 "
+        "% intervals. warns: whether gait lift warns that the tracks hardly show how far away the person "
+        "is."
     )
     table.publish("lift_parts", "Parts of the body", ["measure", "seen", *head, "warns"], rows, note)
 

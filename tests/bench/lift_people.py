@@ -1,12 +1,12 @@
 #!/usr/bin/env python3
-"""Lifting people of any stature on floors that are not quite where the camera has them.
+"""Lifting people of any stature on floors that are not exactly where the camera file has them.
 
     make eval-lift, or lift_people.py
 
-The development clips show six people near the mean stature on exact floors: too few to show whether
-intervals of places are honest, because a stature or a floor that is off moves a whole clip.  Here other walks
-of the same people, unknown to their priors, are made taller or shorter and put higher or lower, and
-seen by the cameras of the clips.
+The development clips show six people near the mean stature on exact floors.  That is too few to judge
+intervals of places, because an error of the stature or of the floor moves a whole clip.  Here other walks of
+the same people, who are not in their priors, are made taller or shorter and placed higher or lower, and seen
+by the cameras of the clips.
 """
 
 from __future__ import annotations
@@ -40,15 +40,15 @@ Floats = npt.NDArray[np.float64]
 
 RATE = 30.0  # frames per second
 SHORTEST, LONGEST = 45, 150  # frames of a walk
-WALKS, TIMES = 3, 2  # of a person at most, and how often each is used
-STATURE_SD, FLOOR_SD = motion.PEOPLE_SD, 0.03  # metres; as lifting takes them to be
+WALKS, TIMES = 3, 2  # greatest number per person, and how often each is used
+STATURE_SD, FLOOR_SD = motion.PEOPLE_SD, 0.03  # metres; what lifting assumes
 COVERAGE = (0.80, 0.95)
 SEED = 1
 
 
 @dataclass(frozen=True)
 class Walk:
-    """A person's joints EVAL15 (T, 15, 3) in the world, and who sees them."""
+    """A person's joints EVAL15 (T, 15, 3) in the world, and the camera."""
 
     clip: str
     places: Floats
@@ -68,7 +68,7 @@ class Outcome:
 
 
 def main() -> int:
-    """Publish the table; 1 if the intervals of all together hold too few or too many."""
+    """Publish the table; exit code 1 if the intervals of all together cover too little or too much."""
     if eval_clips.absent():
         return 0
     everyone, found = walks(np.random.default_rng(SEED)), []
@@ -85,13 +85,13 @@ def main() -> int:
 
 
 def walks(rng: np.random.Generator) -> list[Walk]:
-    """Walks of all clips' people, each of them `TIMES` in a row."""
+    """Walks of all clips' people, each of them `TIMES` in succession."""
     clips, paths = eval_clips.people()
     return [walk for clip in clips for walk in _walks(clip, paths[str(clip.subject)], rng)]
 
 
 def _walks(clip: Clip, model: Path, rng: np.random.Generator) -> Iterator[Walk]:
-    """Walks of the clip's person along the clip's way, not the clip's own."""
+    """Walks of the clip's person along the clip's path, other than the clip's own."""
     camera, prior = Camera.read(str(clip.camera)), SegmentPrior.load(model)
     own = str(eval_clips.meta_of(clip.folder)["mocap_trial"])
     middle, ahead = _way(read_truth(str(clip.truth)).eval15())
@@ -106,14 +106,14 @@ def _walks(clip: Clip, model: Path, rng: np.random.Generator) -> Iterator[Walk]:
 
 
 def _way(places: Floats) -> tuple[Floats, float]:
-    """Where the hips are on the ground half way, (x, y, 0), and the direction walked, radians."""
+    """Position of the hips on the ground half way, (x, y, 0), and the walking direction, radians."""
     hips = places[:, lift_tracks.HIPS].mean(axis=1)
     step = hips[-1] - hips[0]
     return hips[len(hips) // 2] * (1.0, 1.0, 0.0), float(np.arctan2(step[1], step[0]))
 
 
 def _recorded(subject: str, own: str) -> list[Floats]:
-    """Joints (T, 15, 3) in statures of some of a person's walks, but for one."""
+    """Joints (T, 15, 3), in statures, of some of a person's walks, except for one."""
     wanted, found = SegmentOptions(source="only", people=False, fps=RATE), []
     for path in sorted((eval_clips.MOCAP / subject).glob("*.amc")):
         read = segment_motion.of(path, readers.read(path), wanted)
@@ -153,7 +153,7 @@ def _judged(walk: Walk, places: Floats, sd: Floats, rooted_sd: Floats | None, tr
 
 
 def _row(title: str, found: list[tuple[str, Outcome, Outcome]]) -> list[object]:
-    """One line: mean and rms error of the distance and its standard deviation, percent, and coverage."""
+    """One row: mean and rms error of the distance and its standard deviation, percent, and coverage."""
     cells: list[object] = []
     for outcomes in ([live for _, live, _ in found], [whole for _, _, whole in found]):
         off = 100 * np.array([o.off for o in outcomes])
@@ -167,13 +167,13 @@ def _row(title: str, found: list[tuple[str, Outcome, Outcome]]) -> list[object]:
 
 def _publish(rows: list[list[object]]) -> None:
     note = (
-        f"Other walks of the clips' people, made {100 * STATURE_SD:g} cm taller or shorter and put "
-        f"{100 * FLOOR_SD:g} cm higher or lower (standard deviations), seen by the clips' cameras with "
+        f"Other walks of the clips' people, made taller or shorter by {100 * STATURE_SD:g} cm and placed "
+        f"higher or lower by {100 * FLOOR_SD:g} cm (standard deviations), seen by the clips' cameras with "
         f"{lift_tracks.NOISE:g} px of noise, {lift_tracks.GAPS:.0%} missing. mean, rms: error of the "
-        "distance from the camera, percent (negative: too near), beside the standard deviation that the "
-        "estimate states; coverage of the 90 % intervals of places in the world, and about the hips; "
-        "live and as a "
-        f"whole. Wanted of all together: coverage from {COVERAGE[0]:g} to {COVERAGE[1]:g}."
+        "distance from the camera, percent (negative: too near); stated: the standard deviation of this "
+        "error that the estimate reports. Coverage of the 90 % intervals of places, in the world and "
+        f"about the hips; live and as a whole. Target for all together: coverage from {COVERAGE[0]:g} to "
+        f"{COVERAGE[1]:g}."
     )
     head = ["clip", "walks", "live: mean %", "live: rms %", "live: stated %", "live: coverage"]
     head += ["whole: mean %", "whole: rms %", "whole: stated %", "whole: coverage", "about hips", "met"]

@@ -1,5 +1,5 @@
 #!/usr/bin/env python3
-"""gait lift where a detector swaps left and right for some frames.
+"""gait lift with a detector that swaps left and right for some frames.
 
 make eval-lift, or lift_sides.py
 """
@@ -33,12 +33,12 @@ Floats = npt.NDArray[np.float64]
 LEGS = ("hip", "knee", "ankle")
 PARTS = {"legs": LEGS, "legs and arms": (*LEGS, "shoulder", "elbow", "wrist"), "nothing": ()}
 SEED = 11
-EACH, APART = 3, 4  # cases of a walk, and how far apart they are in the list
+EACH, APART = 3, 4  # cases of a walk, and their distance in the list
 
 
 @dataclass(frozen=True)
 class Case:
-    """What is swapped for how many frames, at frames a second, among what share of outliers."""
+    """What is swapped, for how many frames, at how many frames per second, with what share of outliers."""
 
     part: str
     length: int
@@ -62,7 +62,7 @@ CASES = (
 
 
 def main() -> int:
-    """Publish the table; nothing is wanted of it."""
+    """Publish the table; it has no targets."""
     if eval_clips.absent():
         return 0
     rng = np.random.default_rng(SEED)
@@ -79,9 +79,9 @@ def main() -> int:
 
 
 def _case(walk: lift_people.Walk, case: Case, rng: np.random.Generator) -> list[float]:
-    """Root errors of a walk as seen, swapped and put back, and how many lifts the putting back lasts.
+    """Root errors of a walk as seen, swapped and put back, and the time of putting back in lifts.
 
-    Then points swapped, left so and moved in vain.
+    Then the numbers of points swapped, left wrong and moved although they were right.
     """
     places = walk.places[:: round(lift_people.RATE / case.rate)]
     frames = np.arange(len(places))
@@ -104,7 +104,7 @@ def _case(walk: lift_people.Walk, case: Case, rng: np.random.Generator) -> list[
 
 
 def _error(walk: lift_people.Walk, observed: Keypoints, places: Floats, rows: slice) -> float:
-    """Root error of a walk in some rows, mm; infinite if its lift is refused."""
+    """Root error of a walk in some rows, mm; infinite if its lift fails."""
     steady, _ = noise.without_spikes(observed, lift_tracks.NOISE)
     try:
         lifted = lift_tracks.lifted(walk.prior, steady, walk.camera, lift_tracks.NOISE)
@@ -130,7 +130,7 @@ def swapped(tracks: Keypoints, joints: tuple[str, ...], begin: int, end: int) ->
 
 
 def _differ(one: Keypoints, other: Keypoints, among: npt.NDArray[np.bool_]) -> int:
-    """Points among some that are not where the other tracks have them."""
+    """Number of the chosen points that differ from those of the other tracks."""
     return int((among & one.visible & (one.uv != other.uv).any(axis=2)).sum())
 
 
@@ -146,13 +146,13 @@ def _publish(found: dict[Case, list[list[float]]]) -> None:
             ]
         )
     note = (
-        "Other walks of the clips' people as in lift_people, 3 px of noise, 10 % missing, some of the rest "
-        f"outliers ({lift_tracks.OFF:g} px); in one interval of frames left and right are swapped. "
-        "Root-aligned error in that interval, median mm: as seen, swapped (--keep-sides), put back "
-        "(gait lift alone). "
-        "Lifts: how long the putting back takes, over a lift of the tracks as seen, median. Points "
-        "swapped; of these those still wrong after putting back; those moved that were right. Refused: "
-        "walks that come out of no size of a person, swapped and put back; such an error is infinite."
+        "Other walks of the clips' people as in lift_people, 3 px of noise, 10 % missing, some of the "
+        f"rest outliers ({lift_tracks.OFF:g} px); left and right are swapped in one interval of frames. "
+        "Root-aligned error in that interval, median mm: as observed; swapped (--keep-sides); put back (the "
+        "default of gait lift). Lifts: time of putting back, as a multiple of the time of a lift of the "
+        "tracks as seen, median. Then the number of points swapped, of these the number still wrong "
+        "after putting back, and the number of right points that were moved. Refused: walks for which no "
+        "size of a person fits, swapped and put back; their error counts as infinite."
     )
     head = [
         "swapped",

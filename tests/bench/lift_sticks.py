@@ -73,7 +73,7 @@ def stick_clip(prior: SegmentPrior, walk: Walk, angle: float, seed: int = 0, fra
 
 
 def depth_gaps(clip: ClipSegments, sequence: Sequence) -> Array:
-    """How much nearer (B - 1,) each segment has what it shares with the one before, on average, metres."""
+    """How much nearer (B - 1,) each segment puts the frames it shares with the last one, mean in metres."""
     frames, hop = clip.prior.frames, clip.prior.hop
     places = [
         clip.shapes[int(c)].positions(state, np.eye(frames), slice(None))[0]
@@ -93,7 +93,8 @@ def at_joins(clip: ClipSegments) -> NDArray[np.bool_]:
 def spike(clip: ClipSegments, fit: ClipFit) -> float:
     """Largest jump of a marker where segments begin or end, metres.
 
-    A jump is what a step from one frame to the next differs from the mean of the steps before and after it.
+    A jump is the difference between a step from one frame to the next and the mean of the steps before and
+    after.
     """
     step, near = np.diff(fit.places, axis=0), at_joins(clip)
     size = np.linalg.norm(step[1:-1] - (step[:-2] + step[2:]) / 2, axis=2)

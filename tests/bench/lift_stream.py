@@ -28,14 +28,14 @@ Ints = npt.NDArray[np.int64]
 Flags = npt.NDArray[np.bool_]
 
 LEAST = 0.80  # coverage
-WRONG = 0.05  # share of the points
-MANY = 0.15  # of the points, where the status shows what to rely on
+WRONG = 0.05  # share of wrong points
+MANY = 0.15  # share of wrong points with which the status shows what to rely on
 SWAPPED = 10  # frames
-STRICT = 4.0  # fit_threshold, below the usual one
+STRICT = 4.0  # fit_threshold below the default
 
 
 def main() -> int:
-    """Publish the table; 1 if the intervals of a clip hold too little."""
+    """Publish the table; exit code 1 if the intervals of a clip cover too little."""
     if eval_clips.absent():
         return 0
     clips, paths = eval_clips.people()
@@ -45,14 +45,14 @@ def main() -> int:
     head += [f"{name}: {what}" for name in SPOILT for what in ("abs mm", "worst", "coverage")]
     head += [f"many: {what}" for what in ("tracked", "abs mm", "worst", "coverage")] + ["met"]
     note = (
-        f"As for lift_dev, frame by frame with a lag of {LiftConfig.default().lag}: stature unknown; given "
-        "(the true one); exact: coverage if the mean stature is taken for the person's (stature_sd 0). "
-        f"wrong: {WRONG:.0%} of the points, off by {lift_tracks.OFF:g} px (a standard deviation); legs: left "
-        f"and right swapped for {SWAPPED} frames; worst: of any frame, mm. many: {MANY:.0%} of them; "
-        "tracked: share of the frames that come out as TRACKING, the only ones that count there. "
-        f"Coverage of the 90 % intervals of places in the world. Wanted: at least {LEAST:g}, of unknown "
-        "stature; "
-        "whether they are too wide takes more people than six (lift_people)."
+        f"As for lift_dev, frame by frame with a lag of {LiftConfig.default().lag}. The stature is "
+        "unknown, or given (the true one); exact: coverage if the mean stature is assumed to be the "
+        f"person's (stature_sd 0). wrong: {WRONG:.0%} of the points are off by {lift_tracks.OFF:g} px "
+        f"(standard deviation); legs: left and right swapped for {SWAPPED} frames; worst: largest error "
+        f"of a frame, mm. many: {MANY:.0%} of the points are wrong; tracked: share of the frames reported "
+        "as TRACKING, the only ones that count in these columns. Coverage of the 90 % intervals of "
+        f"places in the world. Target: at least {LEAST:g} with unknown stature. Six people are too few to "
+        "show whether the intervals are too large; see lift_people."
     )
     table.publish("lift_stream", "Live tracks of the development clips", head, rows, note)
     _unknown()
@@ -60,7 +60,7 @@ def main() -> int:
 
 
 def _unknown() -> None:
-    """Publish what comes out live of a motion that the prior does not know."""
+    """Publish live results for a motion that the prior does not contain."""
     joints, cameras = lift_tracks.balancing()
     rows = []
     for name, camera in cameras.items():
@@ -75,10 +75,10 @@ def _unknown() -> None:
             row += [1000 * float(np.median(apart)), float(inside), float(tracked.mean())]
         rows.append(row)
     note = (
-        "The balancing man by the shipped prior of walks, frame by frame, "
-        f"{lift_tracks.BALANCING_NOISE:g} px of noise, as usual and with config fit_threshold {STRICT:g}: "
-        "median mm in the world, coverage of the 90 % intervals, share of the frames that are TRACKING. "
-        "There is no target."
+        "The balancing man with the shipped prior of walks, frame by frame, "
+        f"{lift_tracks.BALANCING_NOISE:g} px of noise, with the default config and with fit_threshold "
+        f"{STRICT:g}: median mm in the world, coverage of the 90 % intervals, share of the frames that "
+        "are TRACKING. There is no target."
     )
     head = [f"{which}: {what}" for which in ("usual", "strict") for what in ("abs mm", "coverage", "tracked")]
     table.publish("lift_unknown", "A motion that no prior knows, live", ["camera", *head], rows, note)
@@ -90,7 +90,7 @@ def _wrong(tracks: Keypoints, share: float = WRONG) -> Keypoints:
 
 
 def _legs(tracks: Keypoints) -> Keypoints:
-    """Keypoints of a detector that takes one leg for the other in the middle of the clip."""
+    """Keypoints of a detector that confuses the legs in the middle of the clip."""
     left, right = (
         [tracks.names.index(f"{side}_{joint}") for joint in ("hip", "knee", "ankle")] for side in "lr"
     )
@@ -121,7 +121,7 @@ def _row(clip: Clip, model: Path) -> list[object]:
 
 
 def _many(tracks: Keypoints, camera: Camera, model: Path, true: Floats) -> list[float]:
-    """Share of frames tracked among many wrong points; median and worst mm of those, and coverage."""
+    """Share of frames tracked with many wrong points; their median and worst error in mm, and coverage."""
     at, found, sd, tracked = streamed(_wrong(tracks, MANY), camera, model, LiftConfig.default())
     relied = at[tracked], found[tracked], sd[tracked]
     return [float(tracked.mean()), *_judged(*relied, true)[1:]]
@@ -138,7 +138,7 @@ def _judged(at: Ints, found: Floats, sd: Floats, true: Floats) -> list[float]:
 def streamed(
     tracks: Keypoints, camera: Camera, model: Path | None, config: LiftConfig
 ) -> tuple[Ints, Floats, Floats, Flags]:
-    """Frames (n) that come out of the live lifter, joints and sd (n, P, 3), whether TRACKING (n)."""
+    """Frames (n) that the live lifter returns, joints and sd (n, P, 3), whether TRACKING (n)."""
     lifter = Lifter(model, camera, config)
     index = [lifter.names.index(name) for name in tracks.names]
     utimes = np.round(1e6 * tracks.time).astype(int)

@@ -1,5 +1,5 @@
 #!/usr/bin/env python3
-"""gait lift of 2-D tracks: the development clips, and a real motion that no prior knows (balancing).
+"""gait lift of 2-D tracks: the development clips, and a real motion that no prior contains (balancing).
 
     make eval-lift, or lift_tracks.py
 
@@ -37,20 +37,20 @@ Floats = npt.NDArray[np.float64]
 NOISE, GAPS = 3.0, 0.1  # pixels, share of the points
 OUTLIERS, OFF = 0.15, 150.0  # share of the points, pixels
 TARGET = 35.0  # mm, root-aligned
-FLOOR_KNOWN = 0.01  # metres: a floor as exact as the clips' own
+FLOOR_KNOWN = 0.01  # metres: a floor as exact as that of the clips
 COVERAGE = (0.80, 0.95)
 BALANCING = eval_clips.DATA / "video" / "balancing"
 TRC = "groundtruth_trc/S00_P00_T01_BalancingTrial_0-100.trc"
 CAMERAS = ("cam_01", "cam_02", "cam_03", "cam_04")
 BALANCING_NOISE = 5.0
-BEAM = 0.3  # metres, of the height at which he stands
+BEAM = 0.3  # metres; sd of the height at which he stands
 Y_UP = [2, 0, 1]  # axes of the .trc to x, y, z of the calibration
-WITHIN = 1.645  # standard deviations that hold 90 %
+WITHIN = 1.645  # standard deviations that contain 90 %
 HIPS = [EVAL15.index("l_hip"), EVAL15.index("r_hip")]
 
 
 def main() -> int:
-    """Run both parts; 1 if a bound is missed."""
+    """Run both parts; exit code 1 if a bound is missed."""
     if eval_clips.absent():
         return 0
     with one_thread():
@@ -87,7 +87,7 @@ def root_error(found: Floats, truth: Floats, hips: list[int]) -> float:
 
 
 def _heading(truth: Floats, hips: list[int]) -> Floats:
-    """Heading (T,) by the hips."""
+    """Heading (T,) from the hips."""
     across = truth[:, hips[0]] - truth[:, hips[1]]
     return np.arctan2(-across[:, 0], across[:, 1])
 
@@ -114,13 +114,13 @@ def lifted(
     floor_sd: float = motion.Options.floor_sd,
     stature: float | None = None,
 ) -> motion.Motion:
-    """Lift tracks by a camera, or without one."""
+    """Lift tracks with a camera, or without one."""
     options = motion.Options(method=method, pixel_sd=noise, floor_sd=floor_sd, stature=stature)
     return motion.lift(prior, tracks, _view(camera, tracks), options, motion.output_names(prior, tracks))
 
 
 def _upright(places: Floats, camera: Camera) -> Floats:
-    """Turn places of a level view along y about z so that y is the camera's line of sight."""
+    """Turn places of a level view along y about z so that y becomes the camera's line of sight."""
     ahead = camera.R[2]
     return places @ axis_rotation(2, float(np.arctan2(-ahead[0], ahead[1]))).T
 
@@ -156,15 +156,13 @@ def _clips() -> list[list[object]]:
             update(done)
     note = (
         f"True joints in the picture, {NOISE:g} px of noise, {GAPS:.0%} missing, stature unknown; "
-        "root-aligned median mm over 15 joints. blend: overlapping segments mixed as in the paper. "
-        "no camera: only the tracks; the view is taken to be level and far away (above is not). "
-        "mean pose: at the true heading. "
-        "Coverage of the 90 % intervals: of places in the world (lift_people judges it), and about the hips. "
-        f"known: the stature is given and the floor is known to {100 * FLOOR_KNOWN:g} cm, as it is in the "
-        "clips (gait lift --height --floor-sd). "
-        f"outliers: {OUTLIERS:.0%} of the points off by {OFF:g} px (a standard deviation); those that jump "
-        "are left out first, as gait lift does. "
-        f"Wanted: below {TARGET:g} mm with the camera."
+        "root-aligned median mm over 15 joints. blend: overlapping segments are mixed as in the paper. "
+        "no camera: only the tracks; the view is assumed to be level and far away (which above is not). "
+        "mean pose: at the true heading. Coverage of the 90 % intervals: of places in the world "
+        "(lift_people judges it), and about the hips. known: the stature is given and the floor is known "
+        f"to {100 * FLOOR_KNOWN:g} cm, as it is in the clips (gait lift --height --floor-sd). outliers: "
+        f"{OUTLIERS:.0%} of the points are off by {OFF:g} px (standard deviation); spikes are left out "
+        f"first, as in gait lift. Target: below {TARGET:g} mm with the camera."
     )
     head = [
         "measure",
@@ -187,7 +185,7 @@ def _clips() -> list[list[object]]:
 
 
 def _blind(prior: SegmentPrior, tracks: Keypoints, camera: Camera, truth: Floats) -> float:
-    """Error of the tracks alone; NaN if there is no estimate."""
+    """Error with the tracks alone; NaN if there is no estimate."""
     try:
         found = lifted(prior, tracks, None, NOISE)
     except UserError:
@@ -237,7 +235,7 @@ def balancing() -> tuple[Joints, dict[str, Camera]]:
 
 
 def _balancing() -> None:
-    """Table of the real motion; nothing is wanted of it but honesty."""
+    """Table of the real motion; the only target is honest intervals."""
     joints, cameras = balancing()
     rows: list[list[object]] = []
     with tempfile.TemporaryDirectory() as name, progress("balancing", 2 * len(cameras)) as update:
@@ -264,13 +262,12 @@ def _balancing() -> None:
                 )
                 update(len(rows))
     note = (
-        "A man nearly falls from a beam: the reference of four views in one of them, "
-        f"{BALANCING_NOISE:g} px of noise, stature unknown; root-aligned median mm over 14 joints. "
-        "No prior has seen such a motion; standard deviations and coverage of the 90 % intervals are those "
-        "of smooth. resized: factor by which the fit's size was changed to that of a person's bones. In "
-        "a motion so "
-        "unlike and a camera so near (3 m) a small body close to the lens would fit better. "
-        "The target is honest intervals: they must cover the truth."
+        "A man nearly falls from a beam. The keypoints are the reference of four views projected into "
+        f"one of them, with {BALANCING_NOISE:g} px of noise; the stature is unknown. Root-aligned median "
+        "mm over 14 joints. No prior contains such a motion; standard deviations and coverage of the 90 "
+        "% intervals are those of smooth. resized: factor by which the size of the fit was corrected to "
+        "that of a person's bones. For such an unusual motion and such a near camera (3 m), a small body "
+        "close to the lens would fit better. The target is honest intervals: they must cover the truth."
     )
     head = ["prior of", "camera", "smooth", "blend", "mean pose", "abs mm", "median sd mm", "coverage"]
     head += ["about hips", "resized"]

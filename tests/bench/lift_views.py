@@ -1,9 +1,9 @@
 #!/usr/bin/env python3
-"""gait lift of one camera's keypoints and of several cameras' at once, on a real motion that no prior knows.
+"""gait lift of one camera's and of several cameras' keypoints, on a real motion that no prior contains.
 
     lift_views.py [--record]
 
-The reference joints of the balancing man in the picture of each camera, with noise.
+The keypoints are the reference joints of the balancing man in the picture of each camera, with noise.
 """
 
 from __future__ import annotations
@@ -93,13 +93,15 @@ def main() -> int:
     ]
     head += ["prior widened"]
     note = (
-        f"{facts('lift_views.py --record')}\n\nThe balancing man ([one camera](lift_balancing.md)): "
-        "reference joints, which were triangulated from four views, in the picture of each camera with "
-        f"{noise:g} px of noise; prior of walks, stature unknown. Medians over frames of the mean over 14 "
-        "joints, root-aligned and in the world; angles at elbows, hips and knees, degrees, over frames and "
-        "joints. Coverage of 90 % intervals. Pose2Sim's published errors of joint angles are 2 to 6 degrees: "
-        "of other motions and against markers, so only the order of magnitude compares. The films themselves "
-        "are not lifted: they are cut to 1080 columns, and the calibration is of 1088."
+        f"{facts('lift_views.py --record')}\n\n"
+        "The balancing man ([one camera](lift_balancing.md)): reference joints, which were triangulated "
+        f"from four views, in the picture of each camera with {noise:g} px of noise; prior of walks, "
+        "stature unknown. The errors are medians over frames of the mean over 14 joints, root-aligned "
+        "and in the world; errors of the angles at elbows, hips and knees are in degrees, over frames "
+        "and joints. Coverage is that of 90 % intervals. Pose2Sim's published errors of joint angles are "
+        "2 to 6 degrees; they are for other motions and relative to markers, so only the order of "
+        "magnitude can be compared. The films themselves are not lifted, because they are cut to 1080 "
+        "columns and the calibration is for 1088."
     )
     title = "A real motion by one camera and by several"
     table.publish("lift_views", title, head, rows, note) if record else table.show(title, head, rows)

@@ -3,11 +3,11 @@
 
     live_view.py [--seconds 20] [--clients 10] [--pages 1,3,10] [--record]
 
-gait-trackd follows a simulated walk that `gait capture` sends at its 30 frames a second: by itself, with
-`gait view`, with clients that take every event and picture as browsers do, with two cameras of which the page
-shows both, and with pages open in a headless Chromium, which draw on the same cores; in the last case
-gait-trackd and `gait capture` have real-time priority, if the user may set it.  The clips are made once in
-build/bench.
+gait-trackd follows a simulated walk that `gait capture` sends at 30 frames a second.  The cases are: the
+tracker by itself; with `gait view`; with clients that receive every event and picture as browsers do; with
+two cameras, of which the page shows both; and with pages open in a headless Chromium, which draws on the same
+cores.  In the last case gait-trackd and `gait capture` have real-time priority, if the user may set it.  The
+clips are made once in build/bench.
 """
 
 from __future__ import annotations
@@ -49,7 +49,7 @@ HEAD = ("case", "frames", "dropped", "step ms", "tracker's CPU ms a frame", "lat
 
 
 def main() -> int:
-    """Measure all cases, print, and record if asked to; 1 if browsers cost frames."""
+    """Measure all cases, print, and record if asked to; exit code 1 if browsers cost frames."""
     options = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawTextHelpFormatter)
     options.add_argument("--seconds", type=float, default=20.0)
     options.add_argument("--clients", type=int, default=10)
@@ -89,7 +89,7 @@ def main() -> int:
 
 
 class Case:
-    """Runs of some seconds."""
+    """Runs of a given number of seconds."""
 
     def __init__(self, seconds: float) -> None:
         self._seconds = seconds
@@ -103,7 +103,7 @@ class Case:
         pages: int = 0,
         first: Sequence[str] = (),
     ) -> list[Any]:
-        """Track camera 0 while cameras are `sent` and `streams` are on the live page; a row of the table.
+        """Track camera 0 while the cameras `sent` send and the live page shows `streams`; return a table row.
 
         `first` are the words before the commands that track and send.
         """
@@ -159,7 +159,7 @@ def running(words: list[Any]) -> Iterator[subprocess.Popen[str]]:
 
 
 def sender(stream: int, url: str) -> list[str]:
-    """Words of `gait capture` that send the film of a camera; the first has the start, too."""
+    """Words of `gait capture` that send the film of a camera; those of the first camera include the start."""
     ending = f"_{stream + 1}" if stream else ""
     files = {"camera": f"camera{ending}.json", "background": f"background{ending}.png"}
     words = [str(CLIP / f"video{ending}.mp4"), f"--stream={stream}", f"--url={url}", "--loop", "--quiet"]
@@ -207,7 +207,7 @@ def processor_seconds(pid: int) -> float:
 
 
 def browse(address: str, counts: list[int], mine: int, stop: threading.Event) -> None:
-    """Take in events as a page does, and each picture that they announce."""
+    """Receive events as a page does, and each picture that they announce."""
     with urllib.request.urlopen(f"{address}events", timeout=60) as events:
         while not stop.is_set() and (line := events.readline()):
             if line == b"event: picture\n":

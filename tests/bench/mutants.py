@@ -1,11 +1,11 @@
 #!/usr/bin/env python3
-"""Change each equation of both papers once: some test that is about its meaning has to notice.
+"""Change each equation of both papers once; a test that is about its meaning must fail.
 
     make mutants
 
-A mutant is one changed line in a copy of the sources.  The tests named beside it are built and run there;
-they state what the equation means (golden digests are not among them, they notice every change).  The list
-is in mutant_list.py, the table goes to tests/bench/results/mutants.md; exit code 1 if one is not caught.
+A mutant is one changed line in a copy of the sources.  The tests named with it are built and run there; they
+state what the equation means (golden digests are not among them, because they notice every change).  The list
+is in mutant_list.py, the table goes to tests/bench/results/mutants.md; exit code 1 if a mutant survives.
 """
 
 from __future__ import annotations
@@ -26,11 +26,11 @@ from mutant_list import MUTANTS, Mutant
 from gait.progress import progress
 
 ROOT = Path(__file__).resolve().parents[2]
-LIMIT = 1800  # seconds of a test; a busy machine takes ten times as long as an idle one
+LIMIT = 1800  # seconds for a test; a busy machine takes ten times as long as an idle one
 
 
 class Copy:
-    """A copy of the sources in a folder of its own, in which mutants are tried."""
+    """A copy of the sources in its own folder, in which mutants are tried."""
 
     def __init__(self, folder: Path) -> None:
         self.folder = folder
@@ -74,7 +74,7 @@ class Copy:
 
 
 def stale(mutants: tuple[Mutant, ...] = MUTANTS) -> Iterator[Mutant]:
-    """Mutants whose line is not in the sources exactly once, or whose tests are not there."""
+    """Mutants whose line is not in the sources exactly once, or whose tests are missing."""
     for mutant in mutants:
         once = (ROOT / mutant.file).read_text().count(mutant.before) == 1
         if not once or not all(map(_is_there, mutant.tests.split())):
@@ -82,16 +82,18 @@ def stale(mutants: tuple[Mutant, ...] = MUTANTS) -> Iterator[Mutant]:
 
 
 def _is_there(test: str) -> bool:
-    """Whether the file of a test is there, and a function that is named in it."""
+    """Whether the file of a test exists, and the function named in it."""
     name, _, function = test.partition("::")
     path = ROOT / "tests" / (f"python/{name}" if name.endswith(".py") else f"unit/{name}.c")
     return path.is_file() and f"def {function}(" * bool(function) in path.read_text()
 
 
 def main() -> int:
-    """Try all mutants, or some; 1 if one survives, 2 if the list does not fit the sources."""
+    """Try all mutants, or some; exit code 1 if one survives, 2 if the list does not match the sources."""
     parser = argparse.ArgumentParser(description=__doc__.split("\n")[0])
-    parser.add_argument("--only", default="", help="mutants whose equation begins with this; records nothing")
+    parser.add_argument(
+        "--only", default="", help="only mutants whose equation begins with this; records nothing"
+    )
     args = parser.parse_args()
     for mutant in stale():
         print(f"mutants: {mutant.file}: no single line {mutant.before!r}, or a test is gone", file=sys.stderr)

@@ -3,9 +3,9 @@
 
     overlay.py [--record] [CLIP...]
 
-Both runs are given camera, background and keypoints, so that tracking is all the rest.  Processor time
-counts, which other programs hardly change; drawing and encoding run beside each other.  Exit code 1 if they
-take more of it than tracking.
+Both runs are given camera, background and keypoints, so that only tracking remains.  Processor time is
+compared, because other programs hardly change it and drawing and encoding run in parallel.  Exit code 1 if
+they take more processor time than tracking.
 """
 
 from __future__ import annotations
@@ -40,9 +40,10 @@ def main() -> int:
     rows = [_row(clip) for clip in clips]
     head = ["clip", "frames", "tracking ms", "drawing ms", "share"]
     note = (
-        f"{facts('tests/bench/overlay.py --record')}\n\nMilliseconds of processor time a frame: of the "
-        "command without an overlay (decoding, tracking, its start), and what `--overlay` adds (drawing and "
-        "encoding). Share: of the former. Wanted: drawing takes no more than tracking."
+        f"{facts('tests/bench/overlay.py --record')}\n\n"
+        "Milliseconds of processor time per frame: of the command without an overlay (decoding, "
+        "tracking, its start), and what `--overlay` adds (drawing and encoding). Share: the addition "
+        "relative to the former. Target: drawing takes no more than tracking."
     )
     if args.record:
         table.publish("overlay", "Drawing beside tracking", head, rows, note)

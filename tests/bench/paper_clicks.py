@@ -1,8 +1,8 @@
-"""Write the joints marked by hand in the outdoor clip as corrections for `gait paper`, about one a frame.
+"""Write the joints marked by hand in the outdoor clip as corrections for `gait paper`, about one per frame.
 
     paper_clicks.py reference2d.json corrections.json
 
-Of each marked frame the joints that are clear in the picture are taken in turn.
+The joints that are clear in the picture take turns from one marked frame to the next.
 """
 
 from __future__ import annotations
@@ -15,11 +15,11 @@ from typing import Any
 from gait.body.skeleton import JOINTS
 
 CLEAR = 2
-SD = 3.0  # pixels, of marking by hand
+SD = 3.0  # pixels; sd of marking by hand
 
 
 def clicks(marked: dict[str, Any]) -> list[dict[str, Any]]:
-    """Return corrections: as many in a marked frame as there are frames to the next."""
+    """Return corrections: as many in a marked frame as there are frames until the next one."""
     numbers, names = list(marked["frame_numbers"]), list(marked["joints"])
     found, turn = list[dict[str, Any]](), 0
     for k, frame in enumerate(numbers):

@@ -3,10 +3,10 @@
 
     paper_maps.py [--folder build/search_paper] [--record]
 
-On the clips of search_paper.py the mean cycle is put at the true place and phase, or displaced, in one frame,
-and either walks on as the person does to the next frame or stays.  The tables give the log-likelihood of that
-next frame, whole by the settings before the search, and by term for those that it froze; maps over
-displacement and speed are drawn beside the clips.
+On the clips of search_paper.py, the mean cycle is put at the true place and phase in one frame, or displaced
+from it, and then either walks to the next frame as the person does or stays.  The tables give the
+log-likelihood of that next frame: in total with the settings before the search, and by term with the settings
+that the search chose.  Maps over displacement and speed are drawn beside the clips.
 """
 
 from __future__ import annotations

@@ -40,7 +40,7 @@ of the equations were tried."""
 
 
 def counted(verdicts: list[str]) -> str:
-    """Return how many verdicts there are of each kind."""
+    """Return the number of verdicts of each kind."""
     kinds = [kind(each) for each in verdicts]
     return ", ".join(f"{kinds.count(each)} {each}" for each in KINDS)
 

@@ -1,11 +1,12 @@
 #!/usr/bin/env python3
-"""Of two readings of an equation of Ormoneit and others (2000), which one tracks: paper mode under both.
+"""Which of two readings of an equation of Ormoneit and others (2000) tracks: paper mode with both.
 
     paper_readings.py [--folder build/search_paper] [--seeds 6] [--record]
 
-On the clips of search_paper.py, with the settings that it froze; no development clip is looked at.  A
-reading that changes how much a grey level counts has a sigma of its own, the best of some by one seed;
-all are judged by others, which the search did not use.  Each is compared with what was taken run by run.
+The clips are those of search_paper.py, with the settings that it chose; no development clip is used.  If a
+reading changes how much a grey level counts, it has its own sigma, the best of some with one seed; all
+readings are judged with other seeds, which the search did not use.  Each is compared run by run with the
+reading that was chosen.
 """
 
 from __future__ import annotations
@@ -35,10 +36,10 @@ Settings = dict[str, float]
 
 
 def summed(sd: float) -> Settings:
-    """Settings under which eq. 11 has the sum over n_s points, with this sigma, in place of their mean.
+    """Settings with which eq. 11 has the sum over n_s points, with this sigma, in place of their mean.
 
-    The exponent's variance is divided by n_s, and p_occluded multiplied by the root of it, so that the factor
-    before the exponential, which the sum leaves as it is, keeps its ratio to p_occluded.
+    The exponent's variance is divided by n_s, and p_occluded is multiplied by the root of n_s, so that the
+    factor before the exponential, which the sum does not change, keeps its ratio to p_occluded.
     """
     points, square = TAKEN.limb_points, sd**2
     left = (PIXELS + square) / points - PIXELS
@@ -54,11 +55,11 @@ def tuned(changes: Settings) -> dict[str, Settings]:
     return {f"{k * TAKEN.surface_sd:.3g}": changes | {"surface_sd": k * TAKEN.surface_sd} for k in FACTORS}
 
 
-MORE = "than taken", "95 %"  # columns of what the score differs by
+MORE = "than taken", "95 %"  # columns of the difference between scores
 FACTORS = (0.7, 1.0, 1.4)
 SUMS = (20.0, 28.0, 56.0)  # sigmas of a sum over the points
 FEWER = 8  # points
-#: Equation, reading, what differs from the settings that were taken, by sigma of eq. 11.
+#: Equation, reading, settings that differ from those chosen, by sigma of eq. 11.
 READINGS: tuple[tuple[str, str, dict[str, Settings]], ...] = (
     ("all", "as taken", {f"{TAKEN.surface_sd:.3g}": {}}),
     (
@@ -91,7 +92,7 @@ READINGS: tuple[tuple[str, str, dict[str, Settings]], ...] = (
 
 
 def main() -> int:
-    """Track under each reading, and publish."""
+    """Track with each reading, and publish."""
     parser = argparse.ArgumentParser(
         description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
     )
@@ -120,7 +121,7 @@ def main() -> int:
 
 @dataclass(frozen=True)
 class Judged:
-    """Runs under a reading, by clip and seed."""
+    """Runs with a reading, by clip and seed."""
 
     free: list[float]  #: error of the free-running cycle of each clip, mm
     runs: list[list[Run]]
@@ -141,12 +142,12 @@ class Judged:
 
     @property
     def ratio(self) -> float:
-        """Error over that of the free-running cycle, the mean of the clips."""
+        """Error divided by that of the free-running cycle, mean of the clips."""
         return float(np.mean([root / free for root, free in zip(self.roots, self.free, strict=True)]))
 
     @property
     def scores(self) -> np.ndarray:
-        """As in the search, by clip and seed: the ratio, and 1 more for a run that leaves the person."""
+        """As in the search, by clip and seed: the ratio, plus 1 for a run that leaves the person."""
         pairs = zip(self.runs, self.free, strict=True)
         return np.array([[r.root / free + (not r.held) for r in each] for each, free in pairs])
 
@@ -156,7 +157,7 @@ class Judged:
         return float(np.mean(self.scores))
 
     def row(self, taken: Judged) -> list[Any]:
-        """Return cells of the table; `taken`: runs of the same seeds under the readings that were taken."""
+        """Return cells of the table; `taken`: runs with the same seeds and the readings that were chosen."""
         every = [r for each in self.runs for r in each]
         left = f"{sum(not r.held for r in every)} of {len(every)}"
         numbers = (round(self.score, 2), *self._apart(taken), round(self.ratio, 2))
@@ -174,29 +175,29 @@ class Judged:
 
 
 def about(seeds: int) -> str:
-    """State how the readings were compared, and which could not be."""
+    """State how the readings were compared, and which could not be compared."""
     same = summed(SUMS[-1])["surface_sd"]
     return f"""{facts(f"paper_readings.py --record --seeds {seeds}")}
 
-Where an equation of the filter can be read in two ways, paper mode under both, on the clips of
-[search_paper](search_paper.md): root-aligned error, mm, frames 0 to 50, the mean of {seeds} seeds; over
-that of the free-running cycle, the mean of the clips; runs that leave the person, and how many of these are
-reported as lost; score: that ratio and the share of the runs that leave, as in the search. Than taken: by
-how much the score differs from the first row's, run by run from the same starts and random numbers, and the
-95 % interval of that for other seeds on these clips, one row at a time. sigma: that
-of eq. 11, in grey levels, where a reading changes how much it counts the best of three, chosen with a
-separate seed.
-A constant sigma is no reading: the paper has it increase with narrow angles, in a form that it leaves open.
+Some equations of the filter can be read in two ways.  The table compares paper mode with both readings on the
+clips of [search_paper](search_paper.md), frames 0 to 50: root-aligned error, mm, mean of {seeds} seeds; root
+/ free: the error divided by that of the free-running cycle, mean of the clips; runs that leave the person,
+and how many of these are reported as lost; score: that ratio plus the share of the runs that leave, as in the
+search. Than taken: difference of the score from the first row's, paired by run with the same starts and
+random numbers, and its 95 % interval over seeds on these clips, for each row separately.  sigma: that of eq.
+11, in grey levels; if a reading changes how much it counts, the best of three, chosen with a separate seed. A
+constant sigma is not a reading: the paper lets it increase with narrow angles, in a form that it does not
+give.
 
-The two readings of the sum in eq. 11 are one likelihood with two sigmas, but for the noise of a pixel: the
-sum over {TAKEN.limb_points} points with a sigma of {SUMS[-1]:g} is their mean with {same:.1f}. What the
-search takes for sigma holds for both.
+The two readings of the sum in eq. 11 are one likelihood with two sigmas, except for the noise of a pixel: the
+sum over {TAKEN.limb_points} points with a sigma of {SUMS[-1]:g} equals their mean with {same:.1f}.  The sigma
+that the search chooses therefore serves both.
 
 Not run, because one reading cannot work: eq. 1 with the number of the cycle as the group, as printed
 (each group is then a whole cycle); eq. 6 without the rate, as printed (the phase stands still); eq. 8
-without the length of a stride (its units do not fit); eq. 13 as a product of densities (it underflows;
-logarithms are the same). The texture of the frame before is each particle's own, as eq. 10 has it; one
-of the mean would be no likelihood of a particle."""
+without the length of a stride (its units do not match); eq. 13 as a product of densities (it underflows;
+logarithms are equivalent).  Each particle keeps its own texture of the previous frame, as in eq. 10; with a
+mean texture the likelihood would not be that of a particle."""
 
 
 if __name__ == "__main__":

@@ -22,7 +22,7 @@ from gait.paper.tracking import FRAMES, TAIL, followed, joints_of, picture_heigh
 
 
 class Footage:
-    """The first frames of a clip in memory, with what is known of them."""
+    """The first frames of a clip in memory, and what is known about them."""
 
     def __init__(self, clip: Clip) -> None:
         video = Video(clip.video)
@@ -34,13 +34,13 @@ class Footage:
             self.scene = Scene.of(clip.name, self.camera, self.plate, self.frames, str(clip.truth))
 
     def baselines(self, model: Path) -> dict[str, float]:
-        """Errors without any image, mm: the mean pose at the true place, the mean cycle running free."""
+        """Errors without any image, mm: the mean pose at the true place, the mean cycle running freely."""
         if self.scene is None:
             return {"static": np.nan, "free": np.nan}
         return self.scene.baselines(blob.decode(model.read_bytes(), str(model)))
 
     def start(self, seed: int, model: Model) -> Start:
-        """True state of the first frame with noise drawn by the seed, or the clip's own."""
+        """True state of the first frame with noise drawn with the seed, or the clip's own."""
         with tempfile.TemporaryDirectory(prefix="gait-") as folder:
             path = Path(folder) / "init.json"
             path.write_text(json.dumps(noisy_start(self.clip, seed, 0.0)))

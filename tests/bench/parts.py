@@ -1,8 +1,8 @@
-"""An evaluation in parts: scripts that publish tables, joined in one page that names what made each.
+"""An evaluation in parts: scripts that publish tables, joined on one page that names what made each table.
 
-Each part is a script of its own that publishes tables (table.py) and fails if a bound is missed.  All parts
-are run; those that fail are named on the page and at the end.  `--only PART` runs one and joins its tables
-with the last ones of the others; the page names which commit made which.
+Each part is a separate script that publishes tables (table.py) and fails if a bound is missed.  All parts are
+run; those that fail are named on the page and at the end.  `--only PART` runs one part and joins its tables
+with the latest ones of the others; the page names the commit that made each.
 """
 
 from __future__ import annotations
@@ -26,7 +26,7 @@ HERE = Path(__file__).resolve().parent
 
 
 class Run(NamedTuple):
-    """What a part published (names of tables), made with what, in how many seconds, and what failed."""
+    """What a part published (names of tables), how it was made, in how many seconds, and what failed."""
 
     tables: str
     made: str
@@ -52,7 +52,7 @@ class Evaluation(NamedTuple):
     parts: Mapping[str, Sequence[str]]
 
     def main(self, only: Sequence[str] | None) -> int:
-        """Run all parts, or some of them; 1 if one fails."""
+        """Run all parts, or some of them; exit code 1 if one fails."""
         runs, chosen = self.known(), only or list(self.parts)
         for part in chosen:
             print(f"== {part}", flush=True)
@@ -68,7 +68,7 @@ class Evaluation(NamedTuple):
         code = subprocess.run([sys.executable, str(HERE / part), *self.parts[part]], check=False).returncode
         fresh = [path.stem for path, stamp in self._stamps().items() if stamps.get(path) != stamp]
         failed = ("a bound is missed" if fresh else "no table: run it by itself") if code else ""
-        if failed and not fresh and before:  # what it published stays on the page
+        if failed and not fresh and before:  # the tables that it published stay on the page
             return before._replace(failed=f"{failed}; its tables are older")
         return Run(" ".join(fresh), facts(f"make {self.name}"), round(time.perf_counter() - begun), failed)
 
@@ -87,7 +87,7 @@ class Evaluation(NamedTuple):
         return {r["part"]: Run(r["tables"], r["made"], int(r["seconds"]), r["failed"]) for r in rows}
 
     def write(self, runs: Mapping[str, Run]) -> None:
-        """Record the runs and join their tables, whatever part was run last."""
+        """Record the runs and join the tables, whatever part was run last."""
         rows = [(part, runs[part]) for part in self.parts if part in runs]
         with replacing(table.RESULTS / f"{self.page}_runs.csv") as path, path.open("w", newline="") as file:
             writer = csv.writer(file, lineterminator="\n")
@@ -128,7 +128,7 @@ def summary(tables: Sequence[Path]) -> str:
 
 
 def _place(measure: str) -> tuple[bool, str, int, str]:
-    """Numbered measures (F4, L2) by their number first, those by style after their own, then all others."""
+    """Sort key: numbered measures (F4, L2) by number, those by style after their own, then all others."""
     code = measure.split()[0]
     numbered = code[:1].isalpha() and code[1:].isdigit()
     return (False, code[0], int(code[1:]), measure) if numbered else (True, "", 0, "")

@@ -26,8 +26,12 @@ LEGS = ("l_knee", "r_knee", "l_ankle", "r_ankle")
 HIPS = ("l_hip", "r_hip")
 JOINTS = tuple(f"{side}_{joint}" for joint in ("shoulder", "elbow", "wrist") for side in "lr") + HIPS + LEGS
 KINDS = ("good", "swap", "legs", "off", "none")
-"""Of a frame: all in place; left and right swapped; legs elsewhere; hips or legs far off; no row."""
-_GOOD, _HIPS, _LEGS = 0.09, 0.15, 0.20  # limits of good legs, of hips and legs far off, person's heights
+"""# kinds of frames: all in place; left and right swapped; legs elsewhere; hips or legs far off; no row"""
+_GOOD, _HIPS, _LEGS = (
+    0.09,
+    0.15,
+    0.20,
+)  # largest errors of good legs, and of hips and legs that are not far off, person's heights
 _EARS = 0.925  # height of the ears, person's heights
 _STRIKES = Path(__file__).parent / "real_strikes.json"
 _TILES, _TILE = 8, 300  # of a contact sheet; pixels
@@ -112,15 +116,15 @@ def _read(path: Path) -> Clip:
 
 
 def rate_of(strikes: list[tuple[float, float]], fps: float) -> float | None:
-    """Strides per second of heel strikes that follow each other, right and left in turn; None of too few."""
+    """Strides per second from successive heel strikes, right and left in turn; None if there are too few."""
     frames = sorted(frame for frame, _ in strikes)
     return 0.5 * fps / float(np.polyfit(range(len(frames)), frames, 1)[0]) if len(frames) > 2 else None
 
 
 def from_truth(folder: Path) -> Clip:
-    """Give a clip of `gait simulate`, or one like it, with the true joints as the reference.
+    """Describe a clip of `gait simulate`, or one like it, with the true joints as the reference.
 
-    Frames with a joint outside of the picture do not count.
+    Frames with a joint outside the picture do not count.
     """
     meta, truth = json.loads((folder / "meta.json").read_text()), read_truth(folder / "truth.csv")
     names = (*JOINTS, "l_heel", "r_heel", "head_top")
@@ -251,7 +255,7 @@ def errors_in_space(clip: Clip, track: Track, rows: np.ndarray) -> list[float]:
 
 
 def project(track: Track, row: int, camera: Camera) -> Points:
-    """Joints in the picture by name; what is behind the camera is left out."""
+    """Joints in the picture by name; joints behind the camera are left out."""
     names = [name for name in track.places if np.isfinite(track.places[name][row]).all()]
     uv = camera.project(np.array([track.places[name][row] for name in names]))
     return {name: at for name, at in zip(names, uv, strict=True) if np.isfinite(at).all()}
@@ -282,7 +286,7 @@ def contact_sheet(clip: Clip, track: Track, cameras: Mapping[int, Camera], out: 
 
 
 def _crop(image: np.ndarray, points: Points) -> np.ndarray:
-    """Square about the reference joints, 1.5 times their extent."""
+    """Square around the reference joints, 1.5 times their extent."""
     if not points:
         return image
     places = np.array(list(points.values()))

@@ -1,17 +1,18 @@
 #!/usr/bin/env python3
-"""Find what Ormoneit and others (2000) call empirically determined, on simulated clips.
+"""Find the values that Ormoneit and others (2000) call empirically determined, on simulated clips.
 
     search_paper.py [--folder build/search_paper] [--count 7] [--changes 20] [--record]
     search_paper.py --lost [--record]
 
-The clips are made by `gait simulate` (no development clip is looked at).  The first settings are those
-before the search, the second a guess from pictures of the likelihood; more are drawn at random, evenly in
-their logarithms. Then the best ones are changed at random in half of their settings.  A setting's score is
-the mean over clips of its root-aligned error over that of the mean cycle running free from the true start
-(at most 3), plus the share of runs that leave the person.  One seed each; the best ones are judged again by
-others.  Results are kept in the folder; a run goes on where the last one ended.
+The clips are made by `gait simulate`; no development clip is used.  The first settings are those before the
+search, the second are a guess from pictures of the likelihood, and more are drawn at random, evenly in their
+logarithms.  Then the best ones are changed at random in half of their settings.  The score of some settings
+is the mean over clips of the root-aligned error divided by that of the mean cycle running freely from the
+true start (at most 3), plus the share of runs that leave the person.  All settings are tried with one seed;
+the best ones are judged again with others.  Results are kept in the folder, and a run continues where the
+last one ended.
 
---lost chooses, with the settings of paper mode as they are, from when on a person counts as lost.
+--lost chooses the threshold from which a person counts as lost, with the settings of paper mode as they are.
 """
 
 from __future__ import annotations
@@ -42,7 +43,7 @@ ROOT = Path(__file__).resolve().parents[2]
 FOLDER = ROOT / "build" / "search_paper"
 MODEL = ROOT / "python" / "gait" / "data" / "paper.gait"
 SMALL = {"size": (480, 360), "frames": 70}
-#: Clips by the person whose gait is walked: none of them is in a development clip or in the model.
+#: Clips by the person whose gait is used; no person is in a development clip or in the model.
 CLIPS: dict[str, Scenario] = {
     "c12": Scenario(direction="rl", seed=111, clutter=True, **SMALL),
     "c47": Scenario(view="oblique", seed=112, **SMALL),
@@ -67,20 +68,20 @@ SPACE: dict[str, tuple[str, float, float]] = {
     "surface_tilt": ("sigma(alpha), eq. 11", 0.1, 10.0),
     "limb_points": ("n_s, eq. 10", 4, 16),
 }
-#: From the pictures of the likelihood: little noise, but for the way ahead, and a flat likelihood.
+#: From pictures of the likelihood: little noise, except along the path, and a flat likelihood.
 GUESS = {
     "phase_noise": 0.008, "rate_noise": 0.03, "forward_noise": 0.06, "lateral_noise": 0.01,
     "vertical_noise": 0.01, "heading_noise": 0.02, "tilt_noise": 0.01, "coef_noise": 0.05, "coef_start": 0.3,
     "occluded_density": 0.015, "surface_sd": 14.0, "surface_tilt": 1.0, "limb_points": 16,
 }  # fmt: skip
 BEFORE = ladder.UNSEARCHED
-WORST = 3.0  # of a run's error over the free cycle's
-AGAIN = 5  # of the best ones are judged by more seeds
+WORST = 3.0  # largest ratio of a run's error to that of the free cycle
+AGAIN = 5  # number of the best ones, which are judged with more seeds
 KEPT = 3  # settings that are changed in turn
 SPREAD = 0.6  # sd of the logarithm of a factor
 FIRST, MORE = range(1), range(1, 4)  # seeds of all settings, and of the best
 NEVER_LOST = {"stayed_nats": 0.0}
-THRESHOLDS = (1.0, 1.5, 2.5, 5.0)  # of stayed_nats; 5 is that before the search
+THRESHOLDS = (1.0, 1.5, 2.5, 5.0)  # values of stayed_nats; 5 is that before the search
 
 Settings = dict[str, float]
 
@@ -93,7 +94,9 @@ def main() -> int:
     parser.add_argument("--folder", type=Path, default=FOLDER)
     parser.add_argument("--count", type=int, default=7, help="settings drawn at random")
     parser.add_argument("--changes", type=int, default=20, help="changes of the best")
-    parser.add_argument("--lost", action="store_true", help="choose from when on a person counts as lost")
+    parser.add_argument(
+        "--lost", action="store_true", help="choose the threshold from which a person counts as lost"
+    )
     parser.add_argument("--record", action="store_true", help="publish the table")
     args = parser.parse_args()
     search = Search(args.folder)
@@ -161,7 +164,7 @@ class Search:
         self.rows: list[dict[str, Any]] = [json.loads(line) for line in lines]
 
     def score(self, what: str, settings: Settings, seeds: range) -> None:
-        """Score settings, if that has not been done."""
+        """Score settings, unless that has been done."""
         if any(row["settings"] == settings and row["seeds"] == list(seeds) for row in self.rows):
             return
         runs = [
@@ -187,14 +190,14 @@ class Search:
             file.write(json.dumps(row) + "\n")
 
     def top(self, seeds: range, count: int) -> list[tuple[str, Settings]]:
-        """Return what was tried and its settings, of the lowest scores."""
+        """Return the lowest scores and the settings that were tried."""
         rows = [row for row in self.rows if row["seeds"] == list(seeds)]
         rows.sort(key=lambda row: row["score"])
         return [(row["what"], row["settings"]) for row in rows[:count]]
 
 
 def publish(search: Search, best: Settings, counts: str) -> None:
-    """Write the frozen settings, and every score on which they rest."""
+    """Write the chosen settings, and every score on which the choice is based."""
     frozen = {name: frozen_value(name, value) for name, value in best.items()}
     rows = [
         [name, symbol, BEFORE[name], frozen[name], low, high] for name, (symbol, low, high) in SPACE.items()
@@ -214,13 +217,15 @@ def publish(search: Search, best: Settings, counts: str) -> None:
 
 
 def lost(search: Search, record: bool) -> None:
-    """Show, by threshold, how often a run is reported as lost that leaves the person, and that does not."""
+    """Show how often runs that leave the person, and runs that do not, are reported as lost, by threshold."""
     runs: dict[float, list[Run]] = {nats: [] for nats in THRESHOLDS}
     with progress("lost", len(search.footage)) as update:
         for k, f in enumerate(search.footage, 1):
             for seed in MORE:
                 run: Run | None = None
-                for nats in THRESHOLDS:  # who is not lost by one is lost by no larger one
+                for nats in (
+                    THRESHOLDS
+                ):  # a run that one threshold does not report as lost is not reported by a larger one
                     if run is None or run.lost:
                         run = f.run(search.model, Mode.PAPER, 100 * k + seed, {"stayed_nats": nats})
                     runs[nats].append(run)
@@ -232,16 +237,16 @@ def lost(search: Search, record: bool) -> None:
     best = max(rows, key=lambda row: (row[-1], row[0]))[0]
     note = f"""{facts("search_paper.py --lost --record")}
 
-Of the runs that leave the person, and of those that hold it, how many are reported as lost in some frame, by
-stayed_nats; on the clips of [search_paper](search_paper.md), {len(MORE)} seeds each. Chosen: the largest
-difference of the two shares, {best:g}."""
+How many of the runs that leave the person, and of those that stay on it, are reported as lost in some
+frame, by stayed_nats; on the clips of [search_paper](search_paper.md), {len(MORE)} seeds each.  The value
+chosen has the largest difference of the two shares: {best:g}."""
     write = table.publish if record else lambda name, *rest, note="": table.show(*rest)
     columns = ("stayed_nats", "lost of those that leave", "lost of those that hold", "difference of shares")
     write("search_paper_lost", "From when on a person counts as lost", columns, rows, note=note)
 
 
 def frozen_value(name: str, value: float) -> float:
-    """Return a value with two significant digits: so few runs show no more."""
+    """Return a value with two significant digits: so few runs justify no more."""
     return _whole(name, float(f"{value:.2g}"))
 
 

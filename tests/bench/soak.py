@@ -1,11 +1,11 @@
 #!/usr/bin/env python3
-"""gait-trackd for a long time: memory, open files and time per frame stay what they were.
+"""gait-trackd for a long time: memory, open files and time per frame must not grow.
 
     soak.py [--frames 1000000] [--rate HZ] [--record]
 
-Frames of a drawn person over LCM, each sent when the one before has been estimated, or RATE a second; 108000
-at 30 are an hour.  Every two seconds of film the person begins again, with a START.  Time is CPU time of all
-of the daemon's threads, so that other programs hardly matter.
+Frames of a drawn person over LCM, each sent when the one before has been estimated, or HZ per second; 108000
+at 30 per second take an hour.  Every two seconds of film the person begins again, with a START.  Time is CPU
+time of all threads of the daemon, which other programs hardly affect.
 """
 
 from __future__ import annotations
@@ -27,12 +27,12 @@ from gait.lcm.link import private_url
 from gait.lcm.messages import image_message
 
 SHOWN = 60  # pictures, again and again
-SETTLED = 0.1  # share of the frames after which memory and files are those of the end
+SETTLED = 0.1  # share of the frames after which memory and files must not grow
 MOST_RATIO, MOST_KB = 3.0, 256
 
 
 class Process:
-    """What a running process uses."""
+    """Resources of a running process."""
 
     def __init__(self, pid: int) -> None:
         self._folder = Path(f"/proc/{pid}")
@@ -77,7 +77,7 @@ def soak(frames: int, rate: float) -> list[float]:
 
 
 def main() -> int:
-    """Run, print; 1 if anything grew."""
+    """Run, print; exit code 1 if anything grew."""
     options = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawTextHelpFormatter)
     options.add_argument("--frames", type=int, default=1_000_000)
     options.add_argument("--rate", type=float, default=0.0)
@@ -90,9 +90,10 @@ def main() -> int:
         f"{args.rate:g} frames a second" if args.rate else "each frame when the one before has been estimated"
     )
     note = (
-        f"{facts('tests/bench/soak.py --record')}\n\n{pace}; {rig.PARTICLES} particles, 160 x 120.  "
-        f"Memory and open files after {SETTLED:.0%} of the frames and at the end, wanted: no more than "
-        f"{MOST_KB} kB and no file more; 99.9 % of the frames within {MOST_RATIO:g} times the median."
+        f"{facts('tests/bench/soak.py --record')}\n\n"
+        f"{pace}; {rig.PARTICLES} particles, 160 x 120. Memory and open files after {SETTLED:.0%} of the "
+        f"frames and at the end. Targets: at most {MOST_KB} kB more and no additional open file; 99.9 % "
+        f"of the frames within {MOST_RATIO:g} times the median."
     )
     if args.record:
         table.publish("soak" if not args.rate else "soak_hour", title, head, [row], note)

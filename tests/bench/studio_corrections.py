@@ -1,10 +1,11 @@
 #!/usr/bin/env python3
-"""Corrections by hand: how many it takes, proposed ones against random ones, and how long one is solved.
+"""Corrections by hand: how many are needed, proposed against random ones, and how long solving one takes.
 
 make eval-studio, or studio_corrections.py
 
-The experiment of Leventon and Freeman (1998), section 4, who gave about one correction a frame in a sequence
-of 100 frames.  The user is simulated: asked for a joint in a frame, they point at where it truly is.
+The experiment of Leventon and Freeman (1998), section 4, who made about one correction per frame in a
+sequence of 100 frames.  The user is simulated: when asked for a joint in a frame, the user points at its true
+place.
 """
 
 from __future__ import annotations
@@ -38,9 +39,9 @@ from gait.reproducible import one_thread
 Array = NDArray[np.float64]
 
 CLIPS = ("side_rl_16", "above_38", "toward300_08")
-"""Not those on which the rule for proposals was chosen: oblique45_07, side_lr_35, oblique45_pole_05.
+"""Not the clips on which the rule for proposals was chosen: oblique45_07, side_lr_35, oblique45_pole_05.
 
-On these it was then compared with the rule before it."""
+On these clips the rule was compared with the one before it."""
 LONG = "toward300_08"
 FRAMES = 100
 COUNTS = (5, 10, 20, 40, 70, 100)
@@ -74,7 +75,7 @@ class Clip:
         return lift_run.lift_prepared("", self.prepared, edits, self.prior, self.request, True)
 
     def click(self, row: int, joint: str, rng: np.random.Generator) -> Correction:
-        """Point at where a joint truly is."""
+        """Point at the true place of a joint."""
         sd = POINTING * self.tall
         at = self.uv[row, EVAL15.index(joint)] + sd * rng.standard_normal(2)
         frame = int(self.prepared.keypoints.frame[row])
@@ -120,7 +121,7 @@ def course(clip: Clip, kind: str, seed: int, update: Callable[[], None]) -> list
 
 
 def solving(clip: Clip) -> tuple[Array, Array]:
-    """Processor time and time of the clock that corrections of a long clip take, seconds."""
+    """Processor time and wall clock time of corrections of a long clip, seconds."""
     rng = np.random.default_rng(0)
     lifted, edits = clip.lift(Edits()), Edits()
     live = Interactive(
@@ -170,15 +171,16 @@ def main() -> int:
     painted = studio_page.seconds(folder / LONG, long.points, drags)
     verdict = "met" if cpu.max() <= WANTED_S else "MISSED"
     note = (
-        f"{facts('make eval-studio')}\n\nThe first {FRAMES} frames of clips on which the rule for proposals "
-        "was compared with the one before it (it was chosen on others), the detector's joints (`full`), "
-        "corrections at the true joint "
-        f"with a noise of {100 * POINTING:g} % of the height. mm: median error about the hips; px: median "
-        "error in the picture. proposed: those that the studio lists, asked again after each column; random: "
-        f"any joint in any frame, mean of {SEEDS} runs. Leventon and Freeman gave about one a frame (last "
-        f"column). One correction of the {len(long.true)} frames of {LONG} takes {np.median(cpu):.2f} s "
-        f"of one processor (longest {cpu.max():.2f}; by the clock of this machine, "
-        f"{np.median(clock):.2f} and {clock.max():.2f}); wanted {WANTED_S:g} s ({verdict} in processor time)."
+        f"{facts('make eval-studio')}\n\n"
+        f"The first {FRAMES} frames of clips on which the rule for proposals was compared with the one "
+        "before it (it was chosen on other clips), with the detector's joints (`full`) and corrections "
+        f"at the true joint with a noise of {100 * POINTING:g} % of the height. mm: median error about "
+        "the hips; px: median error in the picture. proposed: joints that the studio lists, updated "
+        f"after each column; random: any joint in any frame, mean of {SEEDS} runs. Leventon and Freeman "
+        f"made about one correction per frame (last column). One correction of the {len(long.true)} "
+        f"frames of {LONG} takes {np.median(cpu):.2f} s of one processor (longest {cpu.max():.2f}; wall "
+        f"clock on this machine, {np.median(clock):.2f} and {clock.max():.2f}); target {WANTED_S:g} s "
+        f"({verdict} in processor time)."
     )
     note += studio_page.words(painted, WANTED_S)
     head = ["clip", "frames", "corrections", "error", "0", *map(str, COUNTS)]

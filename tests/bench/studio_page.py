@@ -25,7 +25,7 @@ Drag = tuple[int, str, tuple[float, float]]
 
 
 def seconds(folder: Path, points: Keypoints, drags: Sequence[Drag]) -> list[float]:
-    """Drag joints one after the other, while the whole is solved in the background; empty without Chromium.
+    """Drag joints one by one, while the whole clip is solved in the background; empty without Chromium.
 
     Parameters
     ----------

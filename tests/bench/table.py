@@ -12,13 +12,13 @@ from typing import Any
 from gait.io.files import replacing
 
 RESULTS = Path(__file__).resolve().parent / "results"
-DIGITS = 4  # significant ones of a number that is not whole
+DIGITS = 4  # significant digits of a number that is not whole
 
 
 def show(
     title: str, columns: Sequence[str], rows: Iterable[Sequence[Any]]
 ) -> tuple[list[str], list[list[str]], list[bool]]:
-    """Print a table; return its head, its cells as text, and which columns hold numbers.
+    """Print a table; return its head, its cells as text, and which columns contain numbers.
 
     Parameters
     ----------
@@ -70,7 +70,7 @@ def _is_number(text: str) -> bool:
 
 
 def aligned(head: list[str], cells: list[list[str]], numbers: list[bool]) -> str:
-    """Columns padded with blanks, those of `numbers` to the right."""
+    """Columns padded with blanks; those with `numbers` are aligned to the right."""
     width = [max(map(len, column)) for column in zip(head, *cells, strict=True)]
     rule = ["-" * w for w in width]
     return "\n".join(
@@ -84,7 +84,7 @@ def _padded(text: str, width: int, right: bool) -> str:
 
 
 def markdown(head: list[str], cells: list[list[str]], numbers: list[bool]) -> str:
-    """Return a table of Markdown, those of `numbers` to the right."""
+    """Return a table in Markdown; columns with `numbers` are aligned to the right."""
     lines = [head, ["--:" if right else "---" for right in numbers], *cells]
     return "\n".join("| " + " | ".join(c.replace("|", "\\|") for c in line) + " |" for line in lines)
 

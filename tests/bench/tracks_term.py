@@ -1,10 +1,10 @@
 #!/usr/bin/env python3
-"""What joints of a detector (gait track --tracks) add to the pictures: the development clips.
+"""What a detector's joints (gait track --tracks) add to the pictures, on the development clips.
 
     tracks_term.py [CLIP...]
 
-A detector is the truth in the picture with 3 px of noise and 10 % missing.  Models leave out the person's
-subject; every clip is tracked from three starts.  A part of make eval-lift.
+The detector is simulated: the truth in the picture with 3 px of noise and 10 % missing.  Models leave out the
+person's subject; every clip is tracked from three starts.  A part of make eval-lift.
 """
 
 from __future__ import annotations
@@ -52,9 +52,8 @@ def main() -> int:
             rows += _rows(clip, paths[str(clip.subject)], Path(folder))
             update(done)
     note = (
-        f"Joints of the truth in the picture, {lift_tracks.NOISE:g} px of noise, {lift_tracks.GAPS:.0%} "
-        f"missing, --tracks-sd {PIXEL_SD:g}. Median mm over frames, mean of {len(SEEDS)} starts. "
-        f"{_losses(rows)}"
+        f"True joints in the picture, {lift_tracks.NOISE:g} px of noise, {lift_tracks.GAPS:.0%} missing, "
+        f"--tracks-sd {PIXEL_SD:g}. Median mm over frames, mean of {len(SEEDS)} starts. {_losses(rows)}"
     )
     head = ["clip", "cues", "root mm", "abs mm", "px", "lost %"]
     table.publish("tracks_term", "Joints of a detector beside the pictures", head, rows, note)
@@ -62,7 +61,7 @@ def main() -> int:
 
 
 def _losses(rows: Sequence[Sequence[Any]]) -> str:
-    """Which errors are larger with the joints than with the pictures alone."""
+    """Name the errors that are larger with the joints than with the pictures alone."""
     arms = {(row[0], row[1]): row[2:5] for row in rows}
     worse = [
         f"{clip} {what} ({before:.3g} to {after:.3g})"
