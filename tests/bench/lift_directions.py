@@ -75,8 +75,8 @@ def _publish(rows: list[list[object]]) -> None:
         "its share along the line of sight and the share of a rigid translation in it. Least depth: the "
         f"smallest share along the line of sight among the {COUNT} most uncertain displacements. Targets "
         f"if the place is unknown: {DEPTH:g}, {RIGID:g} and {OTHERS:g}; if it is known, there is no "
-        "translation. The last columns describe the modes themselves (F7): mean share along the line of "
-        f"sight of the {FEW} modes whose variance is reduced least, and of all modes, and the correlation of "
+        "translation. The last columns describe the modes themselves (F7): mean share along the "
+        f"line of sight of the {FEW} modes whose variance is reduced least, and of all modes, and the correlation of "
         "this share with the remaining share of the variance."
     )
     head = ["prior", "view", "place", "first: depth", "first: rigid", "least depth"]

@@ -75,12 +75,12 @@ def main() -> int:
         rows.append(measure(name, streams=(0,), pages=opened[-1], first=REAL_TIME))
     head = [*HEAD, "pictures/s of a camera and browser", "cores busy"]
     note = f"{facts('tests/bench/live_view.py --record')}\n\n{args.seconds:.0f} s at {RATE} frames a second, "
-    note += "640 x 480; a frame is dropped where the tracker answered none. Chromium is headless and has no "
-    note += "graphics card: it draws each page's figure on the cores that track and send. It has an ordinary "
+    note += "640 x 480; a frame is dropped if the tracker answered none. Chromium is headless and has no "
+    note += "graphics card: it draws each page's figure on the cores that track and send. It has the "
     note += (
-        "user's priority; as root it would raise itself above the tracker. Where the tracker alone leaves no "
+        "priority of an ordinary user; as root it would raise itself above the tracker. If the tracker alone "
     )
-    note += "core idle, other programs ran, and browsers get pictures at the lowest rate."
+    note += "leaves no core idle, other programs were running; browsers then get pictures at the lowest rate."
     if args.record:
         table.publish("live_view", "The live page beside a tracker", head, rows, note)
     else:

@@ -256,14 +256,15 @@ def about(search: Search, counts: str) -> str:
     tried = sum(row["seeds"] == list(FIRST) for row in search.rows)
     return f"""{facts(f"search_paper.py {counts} --record")}
 
-Frozen as the defaults of paper mode: the best of {tried} settings in
-[search_paper_runs](search_paper_runs.md), by the mean over six clips of the root-aligned error over that of
-the free-running cycle plus the share of runs that leave the person. All are tried with one seed, the best
-{AGAIN} again with {len(MORE)} others, which alone decide between them.  phase_noise and n_s ended at a
-bound of the search.
-The clips (480 x 360, {FRAMES + 1} frames used) are made by `gait simulate` with the
-gaits of people {people}, who are neither in the model nor in a development clip.  The noise of a pixel (3
-grey levels) is not searched, since only its sum with sigma counts."""
+The defaults of paper mode are the best of {tried} settings in [search_paper_runs](search_paper_runs.md).  The
+score is the mean over six clips of the root-aligned error divided by that of the free-running cycle, plus the
+share of runs that leave the person.  All settings are tried with one seed; the best {AGAIN} are tried again
+with {len(MORE)} other seeds, which alone decide between them.  phase_noise and n_s ended at a bound of the
+search.
+
+The clips (480 x 360, {FRAMES + 1} frames used) are made by `gait simulate` with the gaits of people {people},
+who are neither in the model nor in a development clip.  The noise of a pixel (3 grey levels) is not searched,
+because only its sum with sigma matters."""
 
 
 if __name__ == "__main__":
