@@ -76,8 +76,8 @@ def _publish(rows: list[list[object]]) -> None:
         f"smallest share along the line of sight among the {COUNT} most uncertain displacements. Targets "
         f"if the place is unknown: {DEPTH:g}, {RIGID:g} and {OTHERS:g}; if it is known, there is no "
         "translation. The last columns describe the modes themselves (F7): mean share along the "
-        f"line of sight of the {FEW} modes whose variance is reduced least, and of all modes, and the correlation of "
-        "this share with the remaining share of the variance."
+        f"line of sight of the {FEW} modes whose variance is reduced least, and of all modes, and the "
+        "correlation of this share with the remaining share of the variance."
     )
     head = ["prior", "view", "place", "first: depth", "first: rigid", "least depth"]
     head += [f"of {FEW} modes", "of all", "correlation", "met"]
