@@ -1,12 +1,12 @@
 """The ``gait`` command.
 
-Each command is a row of ``COMMANDS`` and a module here with ``add_arguments(parser)`` and
-``run(args) -> int``.  The module's docstring is the text of ``--help``; its ``EXAMPLES`` come last.  It
-imports what its options need; everything heavier, NumPy included, is imported in the functions that use it,
-so that ``--help`` and wrong usage answer at once.
-Every command gets ``--quiet``, and ``--json`` unless the module has ``JSON = False``.  Figures go to stdout,
-notes and progress to stderr.
-Exit codes are 0 for success, 1 for a failure, 2 for wrong usage.
+Each command is a row of ``COMMANDS`` and a module here with ``add_arguments(parser)`` and ``run(args) ->
+int``. The module's docstring is the text of ``--help``, followed by its ``EXAMPLES``.  The module imports
+only what its options need; anything heavier, including NumPy, is imported in the functions that use it, so
+that ``--help`` and usage errors appear at once.
+
+Every command has ``--quiet``, and ``--json`` unless the module has ``JSON = False``.  Figures go to stdout,
+notes and progress to stderr.  Exit codes are 0 for success, 1 for a failure and 2 for wrong usage.
 """
 
 from __future__ import annotations
@@ -27,7 +27,7 @@ from gait.signals import Interruptible
 
 
 class Command(NamedTuple):
-    """A command: its module here, its line in ``gait --help``, the extras of libgait that it needs."""
+    """A command: its module here, its line in ``gait --help``, and the extras of libgait that it needs."""
 
     module: str
     help: str
@@ -80,16 +80,16 @@ _DIRECTION = re.compile(r"-[xyz]|-[\d.][^,]*,[^,]+,[^,]+")
 def main(argv: Sequence[str] | None = None) -> int:
     """Run one command and return its exit code."""
     words = list(sys.argv[1:] if argv is None else argv)
-    if argv is None and words[:1] in (["learn"], ["paper"]):  # the process is ours, numpy not yet loaded
+    if argv is None and words[:1] in (["learn"], ["paper"]):  # not from Python, so numpy is not loaded yet
         reproducible.settle()
-    if " ".join(words[:2]) in COMMANDS:  # a command of two words
+    if " ".join(words[:2]) in COMMANDS:  # a command with two words
         words[:2] = [" ".join(words[:2])]
     command = f" {words[0]}" if words and words[0] in COMMANDS else ""
     try:
         with Interruptible(ignored=True):
             args = _parser(words).parse_args(list(_joined(words)))
             code = int(args.run(args))
-            sys.stdout.flush()  # at exit Python would complain about a reader that has left
+            sys.stdout.flush()  # at exit, Python would report a closed pipe
             return code
     except UsageError as exc:
         _failed(command, str(exc))
@@ -103,7 +103,7 @@ def main(argv: Sequence[str] | None = None) -> int:
             raise
         print(text, file=sys.stderr)
         return 1
-    except BrokenPipeError:  # the reader of our output has left, which is no failure of ours
+    except BrokenPipeError:  # the reader of our output has closed it, which is not our failure
         with contextlib.suppress(OSError):
             os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
         return 1
@@ -121,7 +121,7 @@ def _failed(command: str, text: str) -> int:
 
 
 class _Parser(argparse.ArgumentParser):
-    """Parser that reports what is wrong in one line."""
+    """Parser that reports errors in one line."""
 
     def error(self, message: str) -> NoReturn:
         self.exit(2, f"{self.prog}: error: {message}\n")
@@ -139,7 +139,7 @@ class _Version(argparse.Action):
 
 
 def _parser(words: Sequence[str]) -> argparse.ArgumentParser:
-    """Parser of the command named first in `words`; without one it lists the commands and imports none."""
+    """Make the parser for `words`; it has only the command named first, or else lists all, importing none."""
     parser = _Parser(
         prog="gait",
         description="Learn how people walk from motion capture, and track them in video.",
@@ -176,7 +176,7 @@ def _fill(parser: argparse.ArgumentParser, command: Command) -> None:
 
 
 def _joined(words: Sequence[str]) -> Iterator[str]:
-    """Join ``--orthographic -x`` or ``-1,0,0`` into one word, as argparse takes ``-x`` for an option."""
+    """Join ``--orthographic -x``, or ``-1,0,0``, into one word: argparse would take ``-x`` as an option."""
     held = ""
     for word in words:
         if held and _DIRECTION.fullmatch(word):
@@ -191,6 +191,6 @@ def _joined(words: Sequence[str]) -> Iterator[str]:
 
 
 def _offer(parser: argparse.ArgumentParser, option: str, text: str) -> None:
-    """Add a switch that every command has, unless the command defines it itself."""
+    """Add a switch common to all commands, unless the command defines it itself."""
     with contextlib.suppress(argparse.ArgumentError):
         parser.add_argument(option, action="store_true", help=text)

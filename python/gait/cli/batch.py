@@ -62,7 +62,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 def run(args: argparse.Namespace) -> int:
     """Run all clips and summarise."""
     from gait.batch import project
-    from gait.batch.run import FAILED, Runner, write_summary  # needs its extras before any clip is run
+    from gait.batch.run import FAILED, Runner, write_summary  # reports missing extras before any clip is run
 
     if args.dask and args.jobs:
         raise UsageError("--jobs is for this machine and --dask for a cluster; give one of them")
@@ -76,7 +76,7 @@ def run(args: argparse.Namespace) -> int:
         note(f"{row['name']}: {row['state']}{error}", args.quiet)
 
     if args.dask:
-        from gait.batch import cluster  # what it needs is of the extra
+        from gait.batch import cluster  # needs extra dask
 
         rows = cluster.run(output, clips, args.dask, report)
     else:

@@ -116,7 +116,7 @@ def _write(path: str, lens: Lens) -> None:
 
 
 def _summary(lens: Lens) -> dict[str, Any]:
-    """Figures of ``--json``."""
+    """Return the figures of ``--json``."""
     camera = lens.camera
     return {
         "pictures": lens.tried,

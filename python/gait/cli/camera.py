@@ -35,8 +35,8 @@ if TYPE_CHECKING:
     from gait.io.keypoints_file import Keypoints
     from gait.track.from_walk import Calibration
 
-_OUTSIDE, _FILLED = 0.05, 0.72  # shares of points, and of the picture's sides
-_LARGE = 3.0  # pixels, rms, above which the points should be checked
+_OUTSIDE, _FILLED = 0.05, 0.72  # shares of the points, and of the picture's sides
+_LARGE = 3.0  # pixels rms; above it the points should be checked
 
 EXAMPLES = """\
 examples:
@@ -110,11 +110,11 @@ def _on_page(args: argparse.Namespace) -> int:
         print(json.dumps({"written": args.output}) if args.json else line, flush=True)
 
     serve.run(application(scene, own.getsockname()[1], report), own)
-    return 0  # also without a camera: the user ends the page
+    return 0  # also if no camera was written, since the user ended the page
 
 
 def _pictures(args: argparse.Namespace) -> tuple[Callable[[int], Any], tuple[int, int], int, float | None]:
-    """Give a frame by its number; size; number of frames; the horizontal view if it is known."""
+    """Return a function from frame number to picture; size; number of frames; horizontal view if known."""
     import cv2
 
     from gait.io.lens_tag import equivalent_mm, lens_tag, view_across
@@ -180,7 +180,7 @@ def _from_walk(args: argparse.Namespace) -> int:
 
 
 def _calibrate(args: argparse.Namespace, model: Model) -> Calibration:
-    """Find the camera of a film, or of a file of keypoints."""
+    """Estimate the camera of a film or a file of keypoints."""
     from gait.io import keypoints_file
     from gait.io.video import Video
     from gait.track.from_walk import calibrate
@@ -200,7 +200,7 @@ def _calibrate(args: argparse.Namespace, model: Model) -> Calibration:
 
 
 def _check_size(args: argparse.Namespace, keypoints: Keypoints) -> None:
-    """Refuse a size that points lie outside of; note one that they fill in part only."""
+    """Raise UserError if points are outside the picture; print a note if they fill only a part of it."""
     import numpy as np
 
     width, height = args.size
@@ -220,7 +220,7 @@ def _check_size(args: argparse.Namespace, keypoints: Keypoints) -> None:
 
 
 def _size(text: str) -> tuple[int, int]:
-    """Width and height as 1280x720."""
+    """Parse width and height, such as 1280x720."""
     from gait.bindings.abi import MAX_PIXELS
 
     width, cross, height = text.lower().partition("x")

@@ -84,7 +84,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 
 def run(args: argparse.Namespace) -> int:
-    """Send and report."""
+    """Send the frames and print a summary."""
     from gait.lcm.capture import Publisher, parse_rate
 
     url, rate = lcm_url(args.url), parse_rate(args.rate)
@@ -102,7 +102,7 @@ def run(args: argparse.Namespace) -> int:
 
 
 def _require_sense(args: argparse.Namespace, url: str) -> None:
-    """Raise unless the options fit together and the log to write is none of the files to read."""
+    """Raise unless the options go together and the log to write is not a file to read."""
     if args.stop is not None:
         values.require_order(args.start, args.stop)
     if args.height is not None and not args.init:
@@ -123,7 +123,7 @@ def _send(
     rate: float | None,
     signals: Interruptible,
 ) -> Pacer:
-    """Send all frames, or until an interrupt, which is the way to end a camera or a loop."""
+    """Send all frames, or until an interrupt, which is how to end a camera or a loop."""
     from gait.lcm.capture import DeviceSource
 
     if args.wait > 0:
@@ -137,7 +137,7 @@ def _send(
 
 
 def _primed(source: FileSource | DeviceSource) -> Iterator[Frame]:
-    """Frames of the source; the first of a file is already decoded, as it may take long to find."""
+    """Iterate over the source's frames, after decoding a file's first one, which may take long to find."""
     from gait.lcm.capture import DeviceSource
 
     frames = source.frames()
@@ -198,7 +198,7 @@ def _setup(args: argparse.Namespace, source: FileSource | DeviceSource) -> Setup
 
 
 def _moving(args: argparse.Namespace, source: FileSource | DeviceSource) -> tuple[Camera, dict[int, Camera]]:
-    """Camera of the first frame, and of each, of one that moves."""
+    """Return the camera of the first frame, and those of all frames, of a moving camera."""
     from gait.camera.camera import read_camera
     from gait.camera.path import CameraPath
     from gait.lcm.capture import FileSource
@@ -231,7 +231,7 @@ def _start(args: argparse.Namespace, source: FileSource | DeviceSource, setup: S
         return start
     if isinstance(source, DeviceSource) or setup.camera is None:
         raise UsageError("--init auto: needs a video file and --camera; give an init file")
-    from gait.track.box_start import find_start  # slow to load, and only needed here
+    from gait.track.box_start import find_start  # slow to import, and only needed here
 
     return find_start(
         source.video, setup.camera, setup.plate, model, first=args.start, stop=args.stop, height=args.height

@@ -72,7 +72,7 @@ def script() -> str:
     for name in COMMANDS:
         try:
             actions = list(_actions(parser_of(name)))
-        except (ModuleNotFoundError, UserError):  # its extra is missing, and with it the command's use
+        except (ModuleNotFoundError, UserError):  # its extra is missing, so the command cannot be used
             actions = []
         words[name] = [
             option for action in actions for option in action.option_strings if option.startswith("--")
@@ -89,7 +89,7 @@ def script() -> str:
 
 
 def _actions(parser: argparse.ArgumentParser) -> Iterator[argparse.Action]:
-    """Options and arguments of a command that its help shows."""
+    """List the options and arguments that a command's help shows."""
     yield from (action for action in parser._actions if action.help != argparse.SUPPRESS)
 
 

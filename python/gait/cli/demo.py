@@ -37,7 +37,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     values.add_camera(parser)
     parser.add_argument("--truth", metavar="TRUTH.csv", help="true motion, to report errors against")
     values.add_clip(parser, "send")
-    parser.set_defaults(init=None, background=None)  # those beside the video, else auto
+    parser.set_defaults(init=None, background=None)  # those beside the video, or else auto
     values.add_filter(parser, _threads())
     parser.add_argument(
         "-m",
@@ -62,7 +62,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 
 def _threads() -> int:
-    """All cores but the one that decodes the clip, up to four."""
+    """Return the default number of threads: all cores but one, which decodes the clip, up to four."""
     return max(1, min(4, (os.cpu_count() or 1) - 1))
 
 

@@ -23,7 +23,7 @@ from gait.io.files import require_outputs
 from gait.progress import note, progress
 from gait.signals import Interruptible
 
-_TURN = 0.1  # seconds that one call waits for a message
+_TURN = 0.1  # seconds that a call waits for a message
 
 EXAMPLES = """\
 examples:
@@ -65,8 +65,8 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 
 def _live(args: argparse.Namespace) -> int:
-    """Answer frames that arrive over LCM until the user ends it."""
-    from gait.lcm.detect import LiveDetector  # here, as it loads OpenCV and LCM
+    """Detect joints in frames that arrive over LCM until the user ends it."""
+    from gait.lcm.detect import LiveDetector  # here, as it imports OpenCV and LCM
     from gait.lcm.link import lcm_url
 
     if args.video or args.output or args.person is not None:
@@ -74,7 +74,7 @@ def _live(args: argparse.Namespace) -> int:
     url = lcm_url(args.url)
     detector = LiveDetector(url, args.stream or 0, args.network, args.people)
     note(f"listening on {url}", args.quiet)
-    with Interruptible(), contextlib.suppress(KeyboardInterrupt):  # the user ends it so
+    with Interruptible(), contextlib.suppress(KeyboardInterrupt):  # this is how the user ends it
         while True:
             detector.handle(_TURN)
     if detector.damage:
@@ -85,7 +85,7 @@ def _live(args: argparse.Namespace) -> int:
 
 
 def run(args: argparse.Namespace) -> int:
-    """Fetch, answer, or detect and write."""
+    """Download the weights, detect live, or detect in a video and write the keypoints."""
     from gait.io.keypoints_file import write
     from gait.io.video import Video
 
@@ -101,7 +101,7 @@ def run(args: argparse.Namespace) -> int:
     if not args.video or not args.output:
         raise UsageError("give VIDEO and -o KEYPOINTS.csv, or --fetch")
     require_outputs((args.output,), (args.video,))
-    # Imported here, as they load OpenCV.
+    # Imported here, as they import OpenCV.
     from gait.detect.people import detect, height, main_person, require_length, require_person
 
     video = Video(args.video)

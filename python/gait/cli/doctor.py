@@ -23,13 +23,13 @@ examples:
 
 _DEVICES = Path("/dev")
 _DAEMON = Path(__file__).resolve().parents[3] / "build" / "bin" / "gait-trackd"
-_LEAST_FREE = 1 << 30  # bytes: a track of an hour, or an overlay of some minutes
+_LEAST_FREE = 1 << 30  # bytes; enough for a track of an hour or an overlay of some minutes
 _MESSAGE = b"gait doctor"
-_SECONDS = 1.0  # for a message to come back
+_SECONDS = 1.0  # seconds that a message may take to come back
 
 
 class Finding(NamedTuple):
-    """What one check found."""
+    """Result of one check."""
 
     name: str
     state: str
@@ -39,11 +39,11 @@ class Finding(NamedTuple):
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
-    """Add nothing: the command has the common options alone."""
+    """Add nothing, as the command has only the common options."""
 
 
 def run(args: argparse.Namespace) -> int:
-    """Check and report."""
+    """Run all checks and print the results."""
     found = [finding for check in CHECKS for finding in check()]
     if args.json:
         print(json.dumps([finding._asdict() for finding in found]))
@@ -58,7 +58,7 @@ def _line(finding: Finding) -> str:
 
 
 def check_library() -> Iterator[Finding]:
-    """Check for a library of this version and layout, and the instruction set that it uses."""
+    """Check the library's version and layout, and report the instruction set that it uses."""
     from gait.bindings.library import library, version_text
     from gait.errors import LibraryError
 
@@ -79,7 +79,7 @@ def check_library() -> Iterator[Finding]:
 
 
 def check_model() -> Iterator[Finding]:
-    """Check the model of the package."""
+    """Check the package's model."""
     from gait.bindings.model import Model
     from gait.errors import GaitError, UserError
 
@@ -105,7 +105,7 @@ def check_extras() -> Iterator[Finding]:
 
 
 def check_weights() -> Iterator[Finding]:
-    """Check that the detector's weights are there and whole."""
+    """Check that the detector's weights are present and undamaged."""
     from gait.detect import weights
     from gait.errors import UserError
 
@@ -124,7 +124,7 @@ def check_weights() -> Iterator[Finding]:
 
 
 def check_network() -> Iterator[Finding]:
-    """Check LCM's multicast on this host, and the receive buffer."""
+    """Check LCM's multicast and receive buffer on this host."""
     from gait.errors import UserError
 
     try:
@@ -132,7 +132,7 @@ def check_network() -> Iterator[Finding]:
     except ModuleNotFoundError:
         yield Finding("lcm", "note", "is not installed", "pip install 'libgait[video,lcm]'")
         return
-    except UserError as error:  # liblcm lacks the system's GLib
+    except UserError as error:  # the system's GLib is missing
         text, _, remedy = str(error).partition("; ")
         yield Finding("lcm", "fault", text, remedy)
         return
@@ -149,7 +149,7 @@ def check_network() -> Iterator[Finding]:
 
 
 def _comes_back(link: object) -> bool:
-    """Whether a message sent over LCM on a port of its own is received."""
+    """Whether a message sent over LCM, on a private port, is received."""
     from gait.errors import UserError
 
     received: list[bytes] = []
@@ -164,7 +164,7 @@ def _comes_back(link: object) -> bool:
 
 
 def check_daemon() -> Iterator[Finding]:
-    """Check the daemon beside the sources or on the PATH, of this version."""
+    """Check that a daemon of this version is in the source tree or on the PATH."""
     import subprocess
 
     from gait._version import __version__
@@ -192,7 +192,7 @@ def check_daemon() -> Iterator[Finding]:
 
 
 def check_cameras() -> Iterator[Finding]:
-    """Check cameras of this machine and the right to read them."""
+    """Check for cameras on this machine, and permission to read them."""
     cameras = sorted(_DEVICES.glob("video*"))
     if not cameras:
         yield Finding(
@@ -207,7 +207,7 @@ def check_cameras() -> Iterator[Finding]:
 
 
 def check_disk() -> Iterator[Finding]:
-    """Check space and rights where outputs and temporary files go."""
+    """Check space and permissions where outputs and temporary files are written."""
     import tempfile
 
     for what, folder in (("folder", Path.cwd()), ("temporary folder", Path(tempfile.gettempdir()))):

@@ -28,7 +28,7 @@ from gait.progress import note
 if TYPE_CHECKING:
     from gait.io.track_file import Joints
 
-DRIFT = 0.1  # seconds by which times of paired frames may run apart
+DRIFT = 0.1  # seconds by which the times of paired frames may drift apart
 
 EXAMPLES = """\
 examples:
@@ -46,7 +46,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 
 def run(args: argparse.Namespace) -> int:
-    """Read, compare, print."""
+    """Read the files, compare them, and print the errors."""
     from gait.bindings.model import read_cyclic
     from gait.camera.camera import Camera
     from gait.io.track_file import read_estimates, read_truth
@@ -58,7 +58,7 @@ def run(args: argparse.Namespace) -> int:
         raise UserError(f"{args.track}: is given as the track and as its truth; give two files")
     truth = read_truth(args.truth)
     beside = Path(args.truth).parent
-    moves = (beside / "poses.csv").is_file()  # one camera does not see all frames
+    moves = (beside / "poses.csv").is_file()  # there is no single camera for all frames
     there = (beside / "camera.json").is_file() and not moves
     camera = args.camera or (beside / "camera.json" if there else None)
     track = read_estimates(args.track)
@@ -83,7 +83,7 @@ def run(args: argparse.Namespace) -> int:
 
 
 def _drift(track: Joints, truth: Joints) -> float:
-    """Seconds by which the times of frames of the same numbers run apart, wherever both count from."""
+    """Drift in seconds between the times of frames with the same numbers; a constant offset is ignored."""
     import numpy as np
 
     _, ours, theirs = np.intersect1d(track.frame, truth.frame, return_indices=True)

@@ -42,7 +42,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 
 def run(args: argparse.Namespace) -> int:
-    """Export and report."""
+    """Export the file and print a summary."""
     beside = files.BESIDE.get(Path(args.output).suffix.lower())
     outputs = (args.output, str(Path(args.output).with_suffix(beside)) if beside else None)
     require_outputs(outputs, (args.input,))

@@ -12,7 +12,7 @@ GAIT = (
     "stride_hz", "stride_hz_sd", "stride_time_cv", "stride_length", "stride_length_sd", "fps", "stature_m",
     "stature_sd_m",
 )  # fmt: skip
-"""Names of the numbers in section GAIT."""
+"""Names of the numbers of section GAIT."""
 
 EXAMPLES = """\
 examples:
@@ -27,7 +27,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 
 def run(args: argparse.Namespace) -> int:
-    """Read and print."""
+    """Read the model and print its description."""
     from gait.io import blob
 
     sections = blob.read(args.model)
@@ -37,7 +37,7 @@ def run(args: argparse.Namespace) -> int:
 
 
 def describe(sections: Mapping[str, Any], size: int, crc: int, name: str = "blob") -> dict[str, Any]:
-    """Figures of a model, called `name` in errors; a section that is absent gives no entry."""
+    """Return the figures of a model, which errors call `name`; missing sections give no entry."""
     import numpy as np
 
     from gait.bindings.segment_prior import TAGS, SegmentPrior
@@ -55,7 +55,7 @@ def describe(sections: Mapping[str, Any], size: int, crc: int, name: str = "blob
         if tag in sections:
             result[key] = blob.unpack_names(sections[tag])
     if "CURV" in sections:
-        slope_of(sections, name)  # refuses what no tracker can use
+        slope_of(sections, name)  # raises UserError if no tracker could use it
         result |= {"components": len(sections["CURV"]) - 1, "phases": sections["CURV"].shape[1]}
     if "GAIT" in sections:
         result["gait"] = dict(zip(GAIT, np.round(sections["GAIT"].astype(float), 4).tolist(), strict=False))
@@ -72,7 +72,7 @@ def describe(sections: Mapping[str, Any], size: int, crc: int, name: str = "blob
 
 
 def text(name: str, s: Mapping[str, Any]) -> str:
-    """Lay the figures out for people."""
+    """Format the figures for people."""
     from gait.learn.segments import summary as segment_summary
 
     meta, gait = s.get("meta", {}), s.get("gait", {})
@@ -109,7 +109,7 @@ def text(name: str, s: Mapping[str, Any]) -> str:
 
 
 def _classes(sections: Mapping[str, Any]) -> list[dict[str, Any]]:
-    """Figures of each class of motion: its rate, its speed and how often people change from it."""
+    """Return the figures of each class of motion: rate, speed, and how often people change from it."""
     from gait.io import blob
 
     names = blob.unpack_names(sections["CLNM"])
@@ -134,7 +134,7 @@ def _classes(sections: Mapping[str, Any]) -> list[dict[str, Any]]:
 
 
 def _class_line(one: Mapping[str, Any]) -> str:
-    """One class in words."""
+    """Describe one class."""
     what = f"of {one['cycles']} cycles" if one["cycles"] else "derived from the walk"
     if one["curves_of"] != one["name"]:
         what = f"the curves of {one['curves_of']} in reverse"
@@ -146,7 +146,7 @@ def _class_line(one: Mapping[str, Any]) -> str:
 
 
 def sequence_lines(rows: list[list[Any]]) -> list[str]:
-    """Table of sequences: rows of gait.learn.prior.model.SEQUENCE_COLUMNS."""
+    """Format a table of sequences, rows of gait.learn.prior.model.SEQUENCE_COLUMNS."""
     wide = max([11, *(len(row[0]) for row in rows)]) + 1
     lines = [f"{'sequence':{wide}}{'period':>9}{'cycles':>8}{'sharpness':>11}{'residual':>10}"]
     for name, period, cycles, sharpness, residual in rows:

@@ -49,7 +49,7 @@ examples:
 """
 
 AUTO = "auto"
-#: Ranges of the options of segments.
+#: Ranges of the options for segments.
 FRAMES, FPS, MODES, MIXTURE = (4, 60), (5, 240), (1, 120), (1, 16)
 SEGMENT = ("frames", "hop", "fps", "modes", "headings", "mixture", "markers")  # options --segment-...
 
@@ -66,7 +66,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 
 def _add_recordings(group: argparse._ArgumentGroup) -> None:
-    """Add which files to read, who is in them, and where their markers and joints are."""
+    """Add options: which files to read, which people are in them, and where markers and joints are."""
     _add_globs(
         group,
         "--exclude",
@@ -126,12 +126,12 @@ def _add_recordings(group: argparse._ArgumentGroup) -> None:
 
 
 def _add_globs(group: argparse._ArgumentGroup, option: str, help: str, metavar: str = "GLOB") -> None:
-    """Add an option of one or more files, which may be repeated."""
+    """Add an option with one or more files, which may be repeated."""
     group.add_argument(option, nargs="+", action="extend", default=[], metavar=metavar, help=help)
 
 
 def _add_model(group: argparse._ArgumentGroup) -> None:
-    """Add which motion to learn, and how."""
+    """Add options: which motion to learn, and how."""
     group.add_argument(
         "--activity",
         default="walk",
@@ -176,7 +176,7 @@ def _add_model(group: argparse._ArgumentGroup) -> None:
 
 
 def _add_segments(group: argparse._ArgumentGroup) -> None:
-    """Add the source of the segment prior, and its size."""
+    """Add options: source and size of the segment prior."""
     usual = SegmentOptions()
     group.add_argument(
         "--segments",
@@ -216,7 +216,7 @@ def _add_segments(group: argparse._ArgumentGroup) -> None:
 
 
 def _add_processes(group: argparse._ArgumentGroup) -> None:
-    """Add where recordings are read."""
+    """Add options: where recordings are read."""
     group.add_argument(
         "--jobs",
         type=values.whole(1),
@@ -235,11 +235,11 @@ def _auto_or(text: str, most: int) -> int | str:
 
 
 def run(args: argparse.Namespace) -> int:
-    """Start the processes of a large run, learn, and print the figures."""
+    """Start the processes of a large run, learn the model, and print the figures."""
     options = _options(args)
     if options.jobs > 1 and not options.dask and forkserver.worth(options.sources):
-        forkserver.start()  # its imports run beside ours
-    from gait.learn import run as learning  # SciPy takes most of a second
+        forkserver.start()  # its imports run in parallel with ours
+    from gait.learn import run as learning  # importing SciPy takes almost a second
     from gait.learn.classes import run as classes
     from gait.learn.report import summary
 

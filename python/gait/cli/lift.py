@@ -78,8 +78,8 @@ _ONLY_ONE_VIEW = (
     *("video", "fov", "scale_camera", "camera_out"),
 )
 PIXEL_SD, FLOOR_SD = Options.pixel_sd, Options.floor_sd  # pixels, metres
-WHOLE = 0.5  # share of a displacement's energy from which it moves the whole body
-UNKNOWN_MM = 1000.0  # a displacement less certain than that is the distance, in a view without perspective
+WHOLE = 0.5  # share of a displacement's energy from which it counts as moving the whole body
+UNKNOWN_MM = 1000.0  # a less certain displacement is the distance, in a view without perspective
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
@@ -91,7 +91,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 
 def _add_common(parser: argparse.ArgumentParser) -> None:
-    """Add the files, the camera, the person, and further outputs."""
+    """Add options: files, camera, person, and further outputs."""
     parser.add_argument(
         "input",
         nargs="+",
@@ -149,7 +149,7 @@ def _add_common(parser: argparse.ArgumentParser) -> None:
 
 
 def _add_keypoints(group: argparse._ArgumentGroup) -> None:
-    """Add the view, the estimator, the repairs of keypoints, and what another tool's file may lack."""
+    """Add options: view, estimator, repairs of keypoints, and what another tool's file may lack."""
     add = group.add_argument
     add(
         "--orthographic",
@@ -212,7 +212,7 @@ def _add_keypoints(group: argparse._ArgumentGroup) -> None:
 
 
 def _add_video(group: argparse._ArgumentGroup) -> None:
-    """Add the options that only a video has."""
+    """Add the options for videos only."""
     values.add_fov(group)
     group.add_argument(
         "--camera-out",
@@ -233,7 +233,7 @@ def _add_video(group: argparse._ArgumentGroup) -> None:
 
 
 def _add_pictures(group: argparse._ArgumentGroup) -> None:
-    """Add the options of a lift without a detector."""
+    """Add the options for lifting without a detector."""
     group.add_argument(
         "--placement", metavar="P.json", help="rough position of the person in one frame; lifts the images"
     )
@@ -288,7 +288,7 @@ def _take_views(args: argparse.Namespace) -> None:
 
 
 def _is_video(path: str, pictures: bool) -> bool:
-    """Whether a file is a video, not keypoints; without a suffix only if its `pictures` are to be lifted."""
+    """Whether a file is a video, not keypoints; without a suffix, only if its `pictures` are to be lifted."""
     from gait.io.detector_formats import reader_of
 
     suffix = Path(path).suffix.lower()
@@ -299,7 +299,7 @@ def _is_video(path: str, pictures: bool) -> bool:
 
 
 def _lift_keypoints(args: argparse.Namespace, video: bool) -> tuple[dict[str, Any], str]:
-    """Lift keypoints of a file, or found in a video; the summary, and in words."""
+    """Lift keypoints from a file or found in a video; return the summary, and the summary in words."""
     from gait.bindings.model import walking_model
     from gait.io.track_file import write_lifted
     from gait.io.trc import write_trc
@@ -360,7 +360,7 @@ def _lift_keypoints(args: argparse.Namespace, video: bool) -> tuple[dict[str, An
     _write_camera(args, calibration)
     figures = summary(lifted)
     if args.overlay or args.suggest:
-        from gait.io.video import Video  # OpenCV and PyAV, which keypoints alone do not need
+        from gait.io.video import Video  # imports PyAV, not needed for files of keypoints
         from gait.lift import picture
 
         if args.overlay:
@@ -374,8 +374,8 @@ def _lift_keypoints(args: argparse.Namespace, video: bool) -> tuple[dict[str, An
 
 
 def _detect(args: argparse.Namespace, prior: SegmentPrior, video: str, camera: str | None) -> Detected:
-    """Find the keypoints of the person in one of the videos, seen by one of the cameras."""
-    from gait.lift.detected import find_keypoints  # OpenCV and PyAV, which files of keypoints do not need
+    """Find the person's keypoints in one of the videos, from one of the cameras."""
+    from gait.lift.detected import find_keypoints  # imports OpenCV and PyAV, not needed for files
 
     return find_keypoints(_request(args, video, camera), prior, args.quiet)
 
@@ -399,13 +399,13 @@ def _request(args: argparse.Namespace, video: str, camera: str | None) -> Reques
 
 
 def _clip(args: argparse.Namespace) -> Clip:
-    """Collect what a file of another tool may lack: who, when, and the size of the picture."""
+    """Collect what a file of another tool may lack: person, times, and the size of the picture."""
     from gait.camera.camera import Camera
     from gait.io.detections import Clip
 
     size = times = None
     if args.video:
-        from gait.io.video import Video  # PyAV, which a file that has times does not need
+        from gait.io.video import Video  # imports PyAV, not needed for files with times
 
         film = Video(args.video)
         size, times = film.size, film.times
@@ -415,7 +415,7 @@ def _clip(args: argparse.Namespace) -> Clip:
 
 
 def _write_camera(args: argparse.Namespace, calibration: Calibration | None) -> None:
-    """Write the camera, estimated or given, if asked to."""
+    """Write the camera, estimated or given, if asked for."""
     from gait.camera.camera import read_camera, write_camera
 
     if args.camera_out:
@@ -427,14 +427,14 @@ def _write_camera(args: argparse.Namespace, calibration: Calibration | None) -> 
 
 
 def _scaled(args: argparse.Namespace) -> tuple[int, int] | None:
-    """Size to which --scale-camera resizes the camera: that of the video."""
+    """Return the size to which --scale-camera resizes the camera, that of the video."""
     from gait.io.video import Video
 
     return Video(args.video or args.input).size if args.scale_camera else None
 
 
 def _lift_pictures(args: argparse.Namespace) -> tuple[dict[str, Any], str]:
-    """Lift the images of a video; the summary, and in words."""
+    """Lift the images of a video; return the summary, and the summary in words."""
     from gait.body.skeleton import JOINTS
     from gait.io.track_file import write_lifted
     from gait.lift import run as lift_run
@@ -486,7 +486,7 @@ def _options(args: argparse.Namespace) -> Options:
 
 
 def _require_own(args: argparse.Namespace, video: bool) -> None:
-    """Reject options that would have no effect."""
+    """Raise UsageError for options that would have no effect."""
     useless: tuple[str, ...]
     if not video:
         useless, why = _ONLY_VIDEO, f"is for a video, and {args.input} contains keypoints"
@@ -513,7 +513,7 @@ def _require_own(args: argparse.Namespace, video: bool) -> None:
 
 
 def _check(args: argparse.Namespace, video: bool) -> None:
-    """Reject options that exclude each other, and a video without camera or stature."""
+    """Raise UsageError for options that exclude each other, and for a video without camera or stature."""
     if video and not (args.camera or args.orthographic or args.height):
         raise UsageError("give --camera CAM, or --height M to estimate the camera from the walk")
     smooth = args.method in (None, "smooth")
@@ -555,7 +555,7 @@ def _asked(suggested: list[dict[str, Any]]) -> list[str]:
 
 
 def _left(segments: dict[str, Any]) -> str:
-    """Describe what segments leave uncertain."""
+    """Describe the least certain displacements of segments."""
     modes = segments["least_certain"]
     each = []
     for mode in modes:

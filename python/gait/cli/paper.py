@@ -68,7 +68,7 @@ def run(args: argparse.Namespace) -> int:
     if wrong:
         raise UsageError("; ".join(wrong))
     require_outputs((args.output,), (args.video, *(path for path in given.values() if path != "auto")))
-    from gait.paper import run as paper  # Matplotlib and SciPy take a second
+    from gait.paper import run as paper  # importing Matplotlib and SciPy takes a second
     from gait.paper.clip import Clip
 
     clip = None

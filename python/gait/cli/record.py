@@ -50,7 +50,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 
 def run(args: argparse.Namespace) -> int:
-    """Record and report."""
+    """Record the estimates and print the figures."""
     from gait.lcm.record import ESTIMATE, LAGGED, LISTENING, Recorder
 
     url = lcm_url(args.url)
@@ -78,7 +78,7 @@ def run(args: argparse.Namespace) -> int:
 
 
 def text(figures: dict[str, Any]) -> str:
-    """Lay the figures out for people."""
+    """Format the figures for people."""
     lines = [
         f"{figures['frames']} frames, {figures['dropped']} dropped by the tracker, "
         f"{figures['lost']} estimates lost in transit",

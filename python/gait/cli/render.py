@@ -50,7 +50,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 
 def run(args: argparse.Namespace) -> int:
-    """Draw and write."""
+    """Draw the picture and write it."""
     import cv2
 
     from gait.bindings.model import Model
@@ -73,7 +73,7 @@ def run(args: argparse.Namespace) -> int:
 
 
 def _state(args: argparse.Namespace, model: Model) -> State:
-    """State of --phase or --state; on the ground at the origin unless placed."""
+    """Make the state from --phase or --state, on the ground at the origin unless it has a position."""
     from gait.bindings.state import POSE_SCALARS, State, state_range
     from gait.io.fields import Fields, read_json
 

@@ -56,7 +56,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 
 def run(args: argparse.Namespace) -> int:
-    """Draw, write, print."""
+    """Write the page and print the verdict and errors."""
     from gait.report.error_table import as_text
     from gait.report.run_files import RunFiles, write_report
 
@@ -95,7 +95,7 @@ def run(args: argparse.Namespace) -> int:
     if is_track:
         verdict, measures = write_report(files)
     else:
-        from gait.lcm import link, report  # here, as tracks need no LCM
+        from gait.lcm import link, report  # here, as reports of tracks do not need LCM
 
         verdict, measures = report.write_report(args.source, files, live=not args.replayed)
         damage = link.break_of(args.source)

@@ -44,7 +44,7 @@ examples:
   gait report lift --mocap walk_01.bvh --clip keypoints.csv --camera camera.json -o figures
 """
 
-FIGURES = 5  # besides that of a clip
+FIGURES = 5  # without that of a clip
 _FROM = "Mean distance of the markers from their true positions"
 _WORDS = {
     "mean_mm": ("error of the mean motion", " mm", f"{_FROM}, without using the view."),
@@ -84,7 +84,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 
 def run(args: argparse.Namespace) -> int:
-    """Draw, write, print."""
+    """Draw the figures, write the page, and print the numbers."""
     from gait.bindings.segment_prior import SegmentPrior
     from gait.lift.report.segment_figures import case
     from gait.report.page import Page
@@ -117,7 +117,7 @@ def run(args: argparse.Namespace) -> int:
 
 
 def _clip(args: argparse.Namespace, prior: SegmentPrior) -> tuple[Keypoints, Motion, View]:
-    """Lift the keypoints of the clip as `gait lift` does."""
+    """Lift the clip's keypoints as `gait lift` does."""
     from gait.lift import run as lift_run
 
     request = lift_run.Request(
@@ -139,7 +139,7 @@ def _drawings(
 
 
 def _segment(path: str, prior: SegmentPrior) -> tuple[Floats, float]:
-    """Segment (F, J, 3) of a recording with the most motion, and the stature; metres."""
+    """Return the segment (F, J, 3) of a recording with the most motion, and the stature; metres."""
     import numpy as np
 
     from gait.learn.segments import corpus as segment_corpus
@@ -179,7 +179,7 @@ def _why_no_segment(read: segment_motion.Motion, prior: SegmentPrior) -> str:
 
 
 def _written(folder: Path, drawing: Drawing) -> str:
-    """Write a figure's PNG; its part of the page."""
+    """Write a figure as PNG; return its part of the page."""
     caption, data = html.escape(drawing.caption), drawing.write(folder)
     return f'<p>{caption}</p><img style="max-width: 100%" alt="{caption}" src="{data}">'
 
@@ -196,7 +196,7 @@ def _facts(prior: SegmentPrior) -> dict[str, str]:
 
 
 def _figures(c: Case) -> dict[str, Any]:
-    """Figures of ``--json``: errors in mm per marker."""
+    """Return the figures of ``--json``: errors in mm per marker."""
     import numpy as np
 
     def apart(found: Floats) -> float:

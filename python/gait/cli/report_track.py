@@ -45,7 +45,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 
 def run(args: argparse.Namespace) -> int:
-    """Measure, write, print."""
+    """Measure the parameters, write page and tables, and print a summary."""
     from gait.bindings.model import read_cyclic
     from gait.body.model_curves import ModelCurves
     from gait.io.track_file import read_track
@@ -83,7 +83,7 @@ def run(args: argparse.Namespace) -> int:
 
 
 def _text(parameters: Parameters, norms: Sequence[Compared]) -> str:
-    """Tables for the terminal."""
+    """Format tables for the terminal."""
     from gait.report.gait_parts import HEAD, NORM_HEAD, norm_rows, parameter_rows
 
     notes = f"mean ± its standard deviation (between strides); uncertainty from {parameters.source}"

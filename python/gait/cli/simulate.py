@@ -126,7 +126,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 
 def run(args: argparse.Namespace) -> int:
-    """Make the clip and print what is in it."""
+    """Make the clip and print what it shows."""
     from gait.simulate.clip import files, simulate
 
     scenario = replace(PRESETS[args.preset], **_given(args))
@@ -150,7 +150,7 @@ def run(args: argparse.Namespace) -> int:
 
 
 def _given(args: argparse.Namespace) -> dict[str, Any]:
-    """Return the options of a scenario that the command line sets."""
+    """Return the options of a scenario that are on the command line."""
     values = {field.name: getattr(args, field.name) for field in fields(Scenario)}
     return {name: value for name, value in values.items() if value is not None}
 
@@ -165,7 +165,7 @@ def _text(summary: dict[str, Any], folder: str) -> str:
 
 
 def _size(text: str) -> tuple[int, int]:
-    """Read WxH."""
+    """Parse WIDTHxHEIGHT."""
     width, _, height = text.lower().partition("x")
     try:
         return int(width), int(height)

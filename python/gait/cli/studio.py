@@ -83,7 +83,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 
 def run(args: argparse.Namespace) -> int:
-    """Fetch, or serve until interrupted."""
+    """Download the components, or serve the page until interrupted."""
     if args.fetch:
         folder = parts.fetch(partial(note, quiet=args.quiet))
         print(json.dumps({"folder": str(folder)}) if args.json else f"parts of pages in {folder}")
@@ -92,9 +92,9 @@ def run(args: argparse.Namespace) -> int:
     if not args.video:
         raise UsageError("give VIDEO, or --fetch")
     _check(args)
-    for part in parts.STORE.files:  # before anything takes long
+    for part in parts.STORE.files:  # to fail early if one is missing
         parts.load(part)
-    # Imported here, as they load numpy, OpenCV and the server.
+    # Imported here, as they import numpy, OpenCV and the server.
     from gait.io.files import require_writable
     from gait.io.video import Video
     from gait.studio import server
@@ -119,7 +119,7 @@ def run(args: argparse.Namespace) -> int:
 
 
 def _check(args: argparse.Namespace) -> None:
-    """Refuse options that do not go together."""
+    """Raise UsageError for options that do not go together."""
     given = [name for name in ("keypoints", "track", "placement") if getattr(args, name)]
     if len(given) > 1:
         raise UsageError(f"--{given[0]} and --{given[1]} exclude each other; give one of them")

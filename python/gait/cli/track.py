@@ -165,7 +165,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 
 def run(args: argparse.Namespace) -> int:
-    """Track and report."""
+    """Track the clip and print a summary."""
     from gait.body.measured import MeasuredBody
     from gait.track.clip import ClipOptions, track_clip
     from gait.track.people import track_people
@@ -217,7 +217,7 @@ def run(args: argparse.Namespace) -> int:
     )
     body = MeasuredBody.read(args.body) if args.body else None
     if args.report:
-        import gait.report.run_page  # noqa: F401  so that a missing package is reported before the long work
+        import gait.report.run_page  # noqa: F401  so that a missing package is reported before long work
 
     given = {name: getattr(args, name) for name in ClipOptions.__dataclass_fields__ if name != "further"}
     given |= {"mode": Mode[args.mode.upper()], "keypoints_sd": args.keypoints_sd or KEYPOINTS_SD}
@@ -235,7 +235,7 @@ def run(args: argparse.Namespace) -> int:
 
 
 def _cameras(args: argparse.Namespace) -> list[str]:
-    """Camera file of each film; none if the camera is to be estimated."""
+    """Return the camera file of each film; empty if the camera is to be estimated."""
     films = len(args.video)
     if films > MAX_CAMERAS:
         raise UsageError(f"{films} films; give at most {MAX_CAMERAS}")
@@ -255,7 +255,7 @@ def _cameras(args: argparse.Namespace) -> list[str]:
 
 
 def _people(text: str) -> int:
-    """Read how many people to track at most."""
+    """Parse the largest number of people to track."""
     most = 8
     if text == "all":
         return most

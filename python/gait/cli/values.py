@@ -1,4 +1,4 @@
-"""Options that commands share: types of values with their ranges, and common arguments."""
+"""Options shared by commands: types of values with ranges, and common arguments."""
 
 from __future__ import annotations
 
@@ -10,18 +10,18 @@ from gait.bindings.abi import Mode
 from gait.bindings.config import TrackerConfig
 from gait.errors import LibraryError, UsageError
 
-PARTICLES = (16, 1 << 20)  # as in gait.h and gait-trackd, like those below
+PARTICLES = (16, 1 << 20)  # as in gait.h and gait-trackd, like the ranges below
 THREADS = (1, 256)  # GAIT_POOL_MAX
 SEED = (0, (1 << 64) - 1)
 STREAM = (0, 30)
 PICTURES = (".jpg", ".jpeg", ".png", ".bmp", ".tif", ".tiff", ".webp")
 PAGES = (".html", ".htm")
-FILMS = (".mp4", ".mkv", ".mov")  # that are written
+FILMS = (".mp4", ".mkv", ".mov")  # suffixes of films that can be written
 CAMERA = "camera file: JSON, OpenCV YAML or XML, FILE.toml:NAME, or of another tool"
 
 
 def whole(low: int, high: int | None = None) -> Callable[[str], int]:
-    """Whole numbers in [low, high]."""
+    """Make a type: whole numbers in [low, high]."""
 
     def value(text: str) -> int:
         try:
@@ -37,7 +37,7 @@ def whole(low: int, high: int | None = None) -> Callable[[str], int]:
 
 
 def between(low: float, high: float, unit: str) -> Callable[[str], float]:
-    """Numbers in [low, high], in `unit`."""
+    """Make a type: numbers in [low, high], in `unit`."""
 
     def value(text: str) -> float:
         number = _number(text)
@@ -49,8 +49,8 @@ def between(low: float, high: float, unit: str) -> Callable[[str], float]:
 
 
 def stature(text: str) -> float:
-    """Height of a person in metres."""
-    from gait.bindings.state import state_range  # here, as it loads NumPy
+    """Parse the height of a person in metres."""
+    from gait.bindings.state import state_range  # here, as it imports NumPy
 
     low, high = state_range("stature")
     metres = _number(text)
@@ -60,7 +60,7 @@ def stature(text: str) -> float:
 
 
 def positive(text: str) -> float:
-    """Finite numbers above 0."""
+    """Parse a finite number above 0."""
     value = _number(text)
     if not 0 < value < float("inf"):
         raise ArgumentTypeError(f"{text}: give a number above 0")
@@ -68,7 +68,7 @@ def positive(text: str) -> float:
 
 
 def seconds(text: str) -> float:
-    """Finite times from 0 up, in seconds."""
+    """Parse a finite time in seconds, at least 0."""
     value = _number(text)
     if not 0 <= value < float("inf"):
         raise ArgumentTypeError(f"{text}: give seconds from 0 up")
@@ -76,7 +76,7 @@ def seconds(text: str) -> float:
 
 
 def norm_age(text: str) -> float:
-    """Ages of which norms are known, years."""
+    """Parse an age in years for which norms are known."""
     value = _number(text)
     if not 20 <= value < 80:  # as gait.motion.norms.AGES
         raise ArgumentTypeError(f"{text}: norms are known from 20 to 79 years; leave it out")
@@ -84,7 +84,7 @@ def norm_age(text: str) -> float:
 
 
 def named(*endings: str) -> Callable[[str], str]:
-    """Names of outputs of one kind, by the ending; an empty one is refused with the other outputs."""
+    """Make a type: names of outputs with one of these endings; empty names are rejected later."""
 
     def value(text: str) -> str:
         if text and not text.lower().endswith(endings):
@@ -108,7 +108,7 @@ def add_camera(
     scale: bool = False,
     several: bool = False,
 ) -> None:
-    """Add ``--camera``, with `several` one for each film, and, with `scale`, ``--scale-camera``."""
+    """Add ``--camera``, with `several` one per film, and, with `scale`, ``--scale-camera``."""
     action = "append" if several else "store"
     parser.add_argument("--camera", action=action, metavar="CAM", help=CAMERA + note)
     if scale:
@@ -120,7 +120,7 @@ def add_camera(
 
 
 def offsets(text: str) -> tuple[float, ...]:
-    """Read seconds, separated by commas."""
+    """Parse seconds, separated by commas."""
     try:
         seconds = tuple(float(part) for part in text.split(","))
     except ValueError:
@@ -131,7 +131,7 @@ def offsets(text: str) -> tuple[float, ...]:
 
 
 def cameras_of(given: Sequence[str] | None, offsets: Sequence[float] | None, films: int) -> list[str]:
-    """Camera file of each of several films, of those `given`; refuse `offsets` that are not one for each."""
+    """Return the camera file of each film, from those `given`; UsageError if counts, or `offsets`, differ."""
     from gait.camera.camera import camera_names  # here, so that --help answers at once
 
     cameras = [name for file in given or () for name in camera_names(file)]
@@ -165,7 +165,7 @@ def add_stabilize(parser: _ActionsContainer, default: str | None) -> None:
 
 
 def add_norms(parser: ArgumentParser) -> None:
-    """Add what the norm of the comfortable speed depends on."""
+    """Add ``--age`` and ``--sex``, on which the norm of the comfortable speed depends."""
     parser.add_argument(
         "--age", type=norm_age, metavar="YEARS", help="age of the person, for the norm of speed (20 to 79)"
     )
@@ -173,13 +173,13 @@ def add_norms(parser: ArgumentParser) -> None:
 
 
 def require_age(age: float | None, sex: str | None) -> None:
-    """Raise UsageError if there is a sex without an age."""
+    """Raise UsageError for a sex without an age."""
     if sex and age is None:
         raise UsageError("--sex: needs --age")
 
 
 def add_model(parser: ArgumentParser, what: str = "walking model") -> None:
-    """Add ``--model``; None stands for the model of the package."""
+    """Add ``--model``; None means the package's model."""
     parser.add_argument(
         "-m",
         "--model",
@@ -190,7 +190,7 @@ def add_model(parser: ArgumentParser, what: str = "walking model") -> None:
 
 
 def add_seed(parser: _ActionsContainer, of: str) -> None:
-    """Add ``--seed``; `of` is what it is the seed of."""
+    """Add ``--seed``; `of`: what it is the seed of, for the help."""
     help = f"seed of {of} (default: 1)"
     parser.add_argument("--seed", type=whole(*SEED), default=1, metavar="S", help=help)
 
@@ -205,7 +205,7 @@ def add_url(parser: ArgumentParser) -> None:
 
 
 def add_clip(parser: ArgumentParser, use: str, init: str = "auto", background: str = "auto") -> None:
-    """Add ``--init --background --height --start --stop``; `use` is what happens to the frames."""
+    """Add ``--init --background --height --start --stop``; `use`: what is done with frames, for the help."""
     parser.add_argument(
         "--init", default=init, metavar="INIT.json|auto", help=f"first state (default: {init})"
     )
@@ -251,7 +251,7 @@ def add_filter(parser: ArgumentParser, threads: int) -> None:
 
 
 def _particles(mode: Mode) -> str:
-    """Write the default number of particles; without the library the help must still be readable."""
+    """Write the default number of particles, for help that must be readable even without the library."""
     try:
         return str(TrackerConfig.default(mode).particles)
     except LibraryError:
@@ -259,7 +259,7 @@ def _particles(mode: Mode) -> str:
 
 
 def _number(text: str) -> float:
-    """Read a number; NaN if the text is none."""
+    """Parse a number; NaN if the text is not one."""
     try:
         return float(text)
     except ValueError:

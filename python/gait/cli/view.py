@@ -26,7 +26,7 @@ if TYPE_CHECKING:
     from gait.io.video import Image
 
 JSON = False
-_TURN = 0.1  # seconds
+_TURN = 0.1  # seconds between polls
 
 EXAMPLES = """\
 examples:
@@ -74,7 +74,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 
 def run(args: argparse.Namespace) -> int:
-    """Show or save."""
+    """Serve the page, or save one picture."""
     from gait.bindings.model import Model
     from gait.camera.camera import Camera
 
@@ -108,7 +108,7 @@ def _serve(
         )
         page.begin(feed.page_data)
         print(page.address, flush=True)
-        with Interruptible(), contextlib.suppress(KeyboardInterrupt):  # the user ends it so
+        with Interruptible(), contextlib.suppress(KeyboardInterrupt):  # this is how the user ends it
             while feed.handle(_TURN):
                 pass
     finally:

@@ -1,4 +1,4 @@
-"""Streaming over LCM (package ``gaitmsg``): frames out, estimates in.  `gait-trackd` is in between."""
+"""Streaming over LCM (package ``gaitmsg``): send frames to `gait-trackd`, receive its estimates."""
 
 from gait.lcm.link import DEFAULT_URL, gaitmsg, lcm_url, open_lcm
 

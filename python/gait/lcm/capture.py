@@ -24,7 +24,7 @@ from gait.lcm.messages import camera_message, command_message, decode, image_mes
 
 
 class FileSource:
-    """Frames `start` <= index < `stop` of a video file, once or for ever.
+    """Frames `start` <= index < `stop` of a video file, once or in a loop.
 
     Attributes
     ----------
@@ -46,13 +46,13 @@ class FileSource:
         self.first = self.time_of(start)
 
     def time_of(self, index: int) -> float:
-        """Video time of one frame, seconds, exactly as `frames` gives it."""
+        """Video time of one frame, seconds, exactly as in `frames`."""
         for frame in self.video.frames(index, index + 1, grey=True):
             return frame.time
         raise UserError(f"{self.video.path}: has no frame {index}; it has {self.video.count}, counted from 0")
 
     def frames(self) -> Iterator[Frame]:
-        """Yield the frames; numbers and times go on through repetitions, one frame interval apart."""
+        """Yield the frames; in a loop, numbers and times continue, with one frame interval in between."""
         shift_number, shift_time = 0, 0.0
         while True:
             number = time_ = None
@@ -66,9 +66,9 @@ class FileSource:
 
 
 class DeviceSource:
-    """A camera of this machine by number or path (/dev/video0).
+    """A camera of this machine, by number or path (/dev/video0).
 
-    A frame is stamped when it is grabbed; video time counts from when the device was opened.
+    A frame's time stamp is when it is grabbed; video time 0 is when the device was opened.
     """
 
     live = True
@@ -112,14 +112,14 @@ _MAX_HZ = 1000.0
 
 
 class Pacer:
-    """When to send each frame, and which capture time to write on it.
+    """Decides when to send each frame, and its capture time.
 
-    Capture times always follow the video's own clock; only the sending is faster or slower.
+    Capture times always follow the video's own clock; only the sending may be faster or slower.
 
     Parameters
     ----------
     rate : float or None
-        Frames per second; None: as the video was taken; infinity: no waiting.
+        Frames per second; None: as recorded; infinity: without waiting.
     first : float
         Video time of the first frame, seconds.
     lead : float
@@ -130,7 +130,7 @@ class Pacer:
     origin : int
         Capture time of video time 0, microseconds since the Unix epoch.
     late : float
-        Largest delay of a frame behind its deadline, seconds.
+        Largest delay of a frame after it was due, seconds.
     """
 
     def __init__(
@@ -154,7 +154,7 @@ class Pacer:
         return self.origin + round(video_time * 1e6)
 
     def wait(self, video_time: float) -> None:
-        """Return when the frame at `video_time` seconds is due; at once if it is late."""
+        """Wait until the frame at `video_time` seconds is due; do not wait if it is late."""
         after = video_time - self._first if self._rate is None else self._sent / self._rate
         self._sent += 1
         delay = self._begin + after - self._clock()
@@ -180,21 +180,21 @@ def parse_rate(text: str) -> float | None:
 
 
 T = TypeVar("T")
-_TURN = 0.1  # seconds until a full queue is looked at again
+_TURN = 0.1  # seconds between attempts to append to a full queue
 
 
 class _End:
-    """Last entry of the queue: how the source ended."""
+    """Last entry of the queue, which states how the source ended."""
 
     def __init__(self, reason: BaseException | None) -> None:
         self.reason = reason
 
 
 def ahead(source: Iterable[T], limit: int) -> Iterator[T]:
-    """Yield the items of `source`, which another thread takes up to `limit` items early.
+    """Yield the items of `source`, which another thread reads up to `limit` items ahead.
 
-    So a frame that is slow to decode is not sent late.  An exception of the source is raised here, after the
-    items before it.
+    A frame that is slow to decode is then not sent late.  An exception of the source is raised here, after
+    the items before it.
     """
     waiting: queue.Queue[T | _End] = queue.Queue(limit)
     left = threading.Event()
@@ -214,7 +214,7 @@ def ahead(source: Iterable[T], limit: int) -> Iterator[T]:
             for item in source:
                 if not put(item):
                     return
-        except BaseException as exc:  # whatever it is belongs to the one who asked
+        except BaseException as exc:  # to be raised in the consumer's thread
             reason = exc
         put(_End(reason))
 
@@ -230,15 +230,15 @@ def ahead(source: Iterable[T], limit: int) -> Iterator[T]:
         thread.join()
 
 
-ANNOUNCE = 2.0  # seconds of video between two announcements of camera and empty scene
+ANNOUNCE = 2.0  # seconds of video between announcements of camera and empty scene
 _AHEAD = 8  # frames decoded before they are due
-_ASK = 0.5  # seconds until a question to the tracker is repeated
+_ASK = 0.5  # seconds after which a message is repeated if the tracker does not answer
 _LEAD = 0.5  # seconds from START to the first frame, in which the tracker can confirm
 
 
 @dataclass
 class Setup:
-    """What is sent beside the frames.
+    """What is sent in addition to the frames.
 
     Attributes
     ----------
@@ -246,7 +246,7 @@ class Setup:
         Number of the camera.
     camera : Camera or None
     cameras : mapping of int to Camera
-        Of each frame, by its number, if the camera moves.
+        Camera of each frame, by frame number, if the camera moves.
     plate : image or None
         Empty scene.
     start : Start or None
@@ -267,12 +267,12 @@ class Setup:
 
 
 class Publisher:
-    """One stream of frames on ``GAIT_IMAGE_<i>`` and what belongs to it.
+    """Sends one stream of frames on ``GAIT_IMAGE_<i>``, with calibration, empty scene and START.
 
     Attributes
     ----------
     sent : int
-        Frames sent.
+        Number of frames sent.
     """
 
     def __init__(self, url: str, setup: Setup) -> None:
@@ -284,20 +284,20 @@ class Publisher:
             self._out.subscribe("GAIT_STATUS", self._on_status).set_queue_capacity(8)
 
     def meet(self, patience: float) -> None:
-        """Announce until a tracker confirms camera and empty scene.
+        """Announce camera and empty scene until a tracker confirms them.
 
         Raises
         ------
         UserError
-            If none has after `patience` seconds.
+            If no tracker has after `patience` seconds.
         """
         self._ask(patience, lambda: self.announce(0), self._is_ready, "knows the camera")
 
     def begin(self, source: FileSource | DeviceSource, rate: float | None, patience: float) -> Pacer:
-        """Announce, send START and return the clock of the stream, whose first frame is due from then on.
+        """Announce, send START and return the stream's clock, by which the first frame is due from now on.
 
-        With `patience` > 0 START is repeated, each time for a later stream, until a tracker confirms it.  The
-        START of a file is for one capture time; that of a live camera is for the frame that comes next.
+        With `patience` > 0 START is repeated, each time for a later stream, until a tracker confirms it.  For
+        a file, START names a capture time; for a live camera, it refers to the next frame.
         """
         self._announced = source.first
         if self._setup.start is None or patience <= 0 or isinstance(self._out, LogWriter):
@@ -317,7 +317,7 @@ class Publisher:
         )
 
     def close(self) -> None:
-        """Write what waits, into a log."""
+        """Flush the log, if this writes one."""
         if isinstance(self._out, LogWriter):
             self._out.close()
 
@@ -328,9 +328,9 @@ class Publisher:
         done: Callable[[int], None],
         whole: Callable[[], AbstractContextManager[None]] = nullcontext,
     ) -> None:
-        """Send each frame when it is due; `done` is called with the number of each.
+        """Send each frame when it is due; call `done` with its number.
 
-        What goes out does so in a block of `whole`, where no interrupt may come.
+        Messages are sent in a block of `whole`, in which interrupts wait.
         """
         channel = f"GAIT_IMAGE_{self._setup.stream}"
         for number, seconds, data in ahead(self._encoded(frames, pacer), _AHEAD):
@@ -353,7 +353,7 @@ class Publisher:
             yield frame.number, frame.time, message.encode()
 
     def announce(self, utime: int) -> None:
-        """Send calibration and empty scene, as far as they are known."""
+        """Send calibration and empty scene, if known."""
         stream, setup = self._setup.stream, self._setup
         if setup.camera is not None:
             self._send_camera(setup.camera, utime)
@@ -389,7 +389,7 @@ class Publisher:
         )
 
     def _listen(self, seconds: float, wanted: Callable[[Any], bool]) -> bool:
-        """Wait for a status that is `wanted`."""
+        """Wait until a `wanted` status arrives; return whether one has."""
         assert not isinstance(self._out, LogWriter), "a log does not answer"
         deadline = time.monotonic() + seconds
         while (left := deadline - time.monotonic()) > 0:

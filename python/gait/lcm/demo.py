@@ -1,4 +1,4 @@
-"""Run capture, tracker and recorder together on a clip, as separate processes, and report."""
+"""Run capture, tracker and recorder on a clip, as separate processes, and write a report."""
 
 from __future__ import annotations
 
@@ -32,33 +32,33 @@ from gait.progress import note
 from gait.report.run_files import RunFiles
 from gait.signals import die_with_parent
 
-_GRACE = 5.0  # seconds that a process may take to end when asked
-_TURN = 0.05  # seconds between two looks
+_GRACE = 5.0  # seconds that a process has to end when asked
+_TURN = 0.05  # seconds between polls
 
 
 class Child:
-    """One process and its name for messages."""
+    """A process, and its name for messages."""
 
     def __init__(self, name: str, process: subprocess.Popen[str]) -> None:
         self.name, self.process = name, process
 
     @property
     def running(self) -> bool:
-        """Whether it has not ended."""
+        """Whether it is still running."""
         return self.process.poll() is None
 
     def interrupt(self) -> None:
-        """Ask it to end in good order."""
+        """Ask it to end (SIGINT), so that it completes its files."""
         if self.running:
             self.process.send_signal(signal.SIGINT)
 
     def wait_for_word(self, word: str) -> None:
-        """Return when a line on its piped stderr begins with `word`.
+        """Wait until a line on its piped stderr begins with `word`.
 
         Raises
         ------
         UserError
-            If it ends without.
+            If it ends before.
         """
         assert self.process.stderr is not None
         for line in self.process.stderr:
@@ -68,12 +68,12 @@ class Child:
         raise UserError(f"{self.name}: ended before it was ready; see its output above")
 
     def result(self, patience: float) -> str:
-        """Wait for its end and return what it printed.
+        """Wait for its end and return what it printed to stdout.
 
         Raises
         ------
         UserError
-            If it failed or did not end; its own words are on stderr already.
+            If it failed or did not end; its own messages are on stderr already.
         """
         try:
             printed, words = self.process.communicate(timeout=patience)
@@ -91,7 +91,7 @@ class Child:
 class Session:
     """Start processes that end with this one: at the end of the block, however it ends, even by SIGKILL.
 
-    Ends nothing that it did not start.
+    It ends only processes that it started.
     """
 
     def __init__(self) -> None:
@@ -110,9 +110,9 @@ class Session:
             _end(child.process, deadline)
 
     def start(self, name: str, command: Sequence[str], *, pipe_errors: bool = False) -> Child:
-        """Start a process whose stdout is kept, and whose stderr is kept too if `pipe_errors`.
+        """Start a process with piped stdout, and, if `pipe_errors`, piped stderr.
 
-        It gets a session of its own, so that Ctrl-C reaches this process alone, which then ends the others.
+        It gets its own session, so that Ctrl-C reaches only this process, which then ends the others.
         """
         try:
             process = subprocess.Popen(
@@ -130,7 +130,7 @@ class Session:
         return self._children[-1]
 
     def wait(self, awaited: Child, needed: Sequence[Child]) -> None:
-        """Return when `awaited` has ended; fail at once if one of the `needed` ends before it."""
+        """Wait until `awaited` has ended; raise UserError at once if one of the `needed` ends before it."""
         while awaited.running:
             for child in needed:
                 if not child.running:
@@ -139,7 +139,7 @@ class Session:
 
 
 def _end(process: subprocess.Popen[str], deadline: float) -> None:
-    """Wait until `deadline` (monotonic clock), then kill."""
+    """Wait for a process until `deadline` (monotonic clock), then kill it."""
     try:
         process.wait(max(0.0, deadline - time.monotonic()))
     except subprocess.TimeoutExpired:
@@ -151,10 +151,10 @@ def _end(process: subprocess.Popen[str], deadline: float) -> None:
 
 
 RESULTS = ("track.csv", "overlay.mp4", "report.html")
-_READY = 60.0  # seconds in which the tracker must have confirmed camera and start
-_LARGE = 1 << 21  # bytes of a colour frame that no receiver keeps up with
-_IDLE = 2.0  # seconds without an estimate that end the recording
-_END = 30.0  # seconds that a process may take to end once its work is done
+_READY = 60.0  # seconds that the tracker has to confirm camera and start
+_LARGE = 1 << 21  # bytes of a colour frame above which receivers cannot keep up
+_IDLE = 2.0  # seconds without an estimate after which the recording ends
+_END = 30.0  # seconds that a process has to end when its work is done
 _BESIDE = {"camera": "camera.json", "init": "init.json", "background": "background.png", "truth": "truth.csv"}
 
 
@@ -169,9 +169,9 @@ class Demo:
     trackd, model : str
         The tracker's program and its model.
     threads : int
-        Of the tracker.
+        Threads of the tracker.
     video, camera, init, background, truth : str, optional
-        The clip and its files; those left out are looked for beside the video.  Without a video a clip is
+        The clip and its files; files not given are searched for beside the video.  Without a video a clip is
         rendered.
     height : float, optional
         The person's stature, metres.
@@ -197,14 +197,14 @@ class Demo:
     quiet: bool = False
 
     def run(self) -> tuple[dict[str, Any], Measures | None]:
-        """Make the clip if need be, run the processes, and write the report.
+        """Make the clip if needed, run the processes, and write the report.
 
         Returns
         -------
         recording : dict
             The figures of ``gait record --json``.
         measures : dict or None
-            The errors, if there is a truth.
+            The errors, if the truth is known.
 
         Raises
         ------
@@ -219,7 +219,7 @@ class Demo:
         live = multicast_works()
         with _alone(self.output), Session() as session:
             for name in RESULTS:
-                (self.output / name).unlink(missing_ok=True)  # if this run fails they would look like its own
+                (self.output / name).unlink(missing_ok=True)  # not to be mistaken for this run
             clip = self._with_clip(session)
             if live:
                 recording = clip._run_live(session)
@@ -241,7 +241,7 @@ class Demo:
         return recording, measures
 
     def _check_inputs(self) -> None:
-        """Read what the user gave, so that a fault shows before anything is rendered or started."""
+        """Read the user's files, so that faults are reported before anything is rendered or started."""
         model = Model(self.model)
         if self.video is None:
             for name in _BESIDE:
@@ -260,7 +260,7 @@ class Demo:
             read_truth(clip.truth)
 
     def _with_clip(self, session: Session) -> Demo:
-        """Return this demo with all files of its clip, which is rendered unless it is the user's."""
+        """Return this demo with all files of its clip, which is rendered unless the user gave one."""
         if self.video is not None:
             return self._complete()
         folder = self.output / "clip"
@@ -269,7 +269,7 @@ class Demo:
         return replace(self, video=str(folder / "video.mp4"))._complete()
 
     def _complete(self) -> Demo:
-        """Fill in the files that lie beside the video."""
+        """Add files that are beside the video."""
         assert self.video is not None
         beside = {name: Path(self.video).parent / file for name, file in _BESIDE.items()}
         found: dict[str, Any] = {
@@ -298,7 +298,7 @@ class Demo:
         return figures
 
     def _compression(self, session: Session) -> list[str]:
-        """Options of gait capture that let a receiver's buffer take two frames, in colour if possible."""
+        """Choose options of gait capture so that two frames fit a receive buffer, in colour if possible."""
         assert self.video is not None
         width, height = Video(self.video).size
         if 2 * 3 * width * height <= receive_buffer():
@@ -315,7 +315,7 @@ class Demo:
         return ["--grey"]
 
     def _run_through_log(self, session: Session) -> dict[str, Any]:
-        """Run one after the other through files: nothing is lost, nothing is in real time."""
+        """Run the processes one after the other through log files, without loss but not in real time."""
         frames, estimates = ((self.output / name).resolve() for name in ("frames.log", "sent.log"))
         for file in (frames, estimates):
             file.unlink(missing_ok=True)
@@ -342,7 +342,7 @@ class Demo:
         return [*_gait("record"), "--url", url, *files, "--until-idle", str(_IDLE), "--json"]
 
     def _capture(self) -> list[str]:
-        """Command line of gait capture without the URL."""
+        """Make the command line of gait capture, without the URL."""
         init = self.init or "auto"
         start = self.start if self.start is not None else _frame_of(init)
         given = {
@@ -361,7 +361,7 @@ class Demo:
 
 @contextmanager
 def _alone(out: Path) -> Iterator[None]:
-    """Lock the folder for this demo; the lock goes with the process, however that ends."""
+    """Lock the folder for this demo; the lock ends with the process, however that ends."""
     folder = os.open(out, os.O_RDONLY | os.O_DIRECTORY)
     try:
         try:
@@ -374,12 +374,12 @@ def _alone(out: Path) -> Iterator[None]:
 
 
 def _gait(command: str) -> list[str]:
-    """Start of the command line of a command, run by this very Python."""
+    """Make the beginning of the command line of a gait command, run by this Python."""
     return [sys.executable, "-m", "gait", command]
 
 
 def _frame_of(init: str) -> int:
-    """Frame of an init file: frames before it need not be sent."""
+    """Read the frame of an init file, before which frames need not be sent."""
     if init == "auto":
         return 0
     fields = read_json(init, "init")

@@ -1,4 +1,4 @@
-"""Joints of people in frames that arrive over LCM: ``GAIT_IMAGE_<i>`` in, ``GAIT_TRACKS_<i>`` out."""
+"""Detect joints of people in frames that arrive over LCM (``GAIT_IMAGE_<i>``); send ``GAIT_TRACKS_<i>``."""
 
 from __future__ import annotations
 
@@ -15,16 +15,16 @@ from gait.io.video import Frame
 from gait.lcm.link import gaitmsg, handle, is_log, open_lcm
 from gait.lcm.messages import decode, frame_number, picture, tracks_message
 
-_KEPT = 1  # frames that wait: older ones are dropped while the detector is busy
+_KEPT = 1  # frames that wait while the detector is busy; older ones are dropped
 
 
-_KEEPS = 10.0  # seconds out of view after which a person's number may be given to another
+_KEEPS = 10.0  # seconds out of view after which a person's number may be reused
 
 
 class Numbers:
-    """Numbers of the people in view, from 1: the trackers are few, the people who pass are not.
+    """Numbers of the people in view, from 1; there are few trackers, but many people may pass.
 
-    A person who comes back has the old number, surely within `_KEEPS` seconds.
+    A person who comes back has the old number, at least within `_KEEPS` seconds.
 
     Parameters
     ----------
@@ -34,10 +34,10 @@ class Numbers:
 
     def __init__(self, most: int) -> None:
         self._most = most
-        self._owners: dict[int, tuple[int, float]] = {}  # number: id, and when that person was seen last
+        self._owners: dict[int, tuple[int, float]] = {}  # by number: id, and when that person was last seen
 
     def number(self, id: int, time: float) -> int | None:
-        """Give the number of the person with an id, in view at a time in seconds; None: all are taken."""
+        """Return the number of the person with an id, in view at a time [s]; None if all are taken."""
         found = next((number for number, (owner, _) in self._owners.items() if owner == id), None)
         if found is None and len(self._owners) < self._most:
             found = len(self._owners) + 1
@@ -50,33 +50,33 @@ class Numbers:
 
 
 class LiveDetector:
-    """Locates the joints of people in every frame that the machine has time for.
+    """Detects the joints of people in as many frames as the machine can process.
 
-    Those of person N go to ``GAIT_TRACKS_<i>_<N>``, and to ``GAIT_TRACKS_<i>`` those of the person found in
-    most frames so far, and of the next one when that person is gone.
+    The joints of person N are sent on ``GAIT_TRACKS_<i>_<N>``.  Those of the person found in most frames so
+    far are also sent on ``GAIT_TRACKS_<i>``, or, if that person has gone, those of the next one.
 
     Parameters
     ----------
     url : str
-        A network; a log cannot be answered.
+        A network, not a log.
     stream : int
         Number of the camera.
     network : str
         ``full``, ``lite`` or ``heavy``.
     people : int
-        People followed at a time.
+        Most people followed at a time.
 
     Attributes
     ----------
     frames, found : int
-        Frames examined, and those of them with a person.
+        Numbers of frames processed, and of those with a person.
     damage : str or None
-        Describes what is wrong with the first message that could not be used.
+        Describes the fault of the first message that could not be used.
 
     Raises
     ------
     UserError
-        If the weights are absent or damaged, or LCM cannot be opened.
+        If the weights are missing or damaged, or LCM cannot be opened.
     """
 
     def __init__(self, url: str, stream: int, network: str, people: int) -> None:
@@ -92,7 +92,7 @@ class LiveDetector:
         self.damage: str | None = None
 
     def handle(self, seconds: float) -> None:
-        """Take in a frame, waiting at most so long, but for damaged ones."""
+        """Process a frame, waiting for it at most this long; skip damaged ones."""
         try:
             handle(self._lcm, seconds, False)
         except UserError as fault:
@@ -118,7 +118,7 @@ class LiveDetector:
                     self._lcm.publish(f"{self._channel}_{number}", data)
 
     def _tracks(self, one: Followed, image: Any) -> Any:
-        """Joints of a person in the newest frame, where the model has them."""
+        """Make the message with a person's joints in the newest frame, converted to the model's."""
         last = one.keypoints[-1]
         frame, time = np.array(one.frames[-1:]), np.array(one.times[-1:])
         raw = Keypoints(frame, time, tuple(JOINTS), last.uv[None], last.confidence[None])

@@ -1,4 +1,4 @@
-"""Connections to LCM and its logs, and the message classes that are generated from lcm_types/."""
+"""Connections to LCM and its logs, and the message classes generated from lcm_types/."""
 
 from __future__ import annotations
 
@@ -24,12 +24,12 @@ from gait.io.files import require_file
 
 _HERE = Path(__file__).resolve().parent
 _PLACES = (_HERE.parent / "lib", _HERE.parents[2] / "build" / "lcm" / "python")
-"""Folders that may hold ``gaitmsg``: of an installed package, of the source tree."""
+"""Folders that may contain ``gaitmsg``: of an installed package, or of the source tree."""
 
 
 @functools.cache
 def generated() -> ModuleType:
-    """Import the package.
+    """Import the package of message classes.
 
     Raises
     ------
@@ -49,7 +49,7 @@ def generated() -> ModuleType:
 
 
 class _OnUse:
-    """The package, imported when a class is asked for: the words of ``--help`` need none."""
+    """The package of message classes, imported when a class is used, as ``--help`` does not need it."""
 
     def __getattr__(self, name: str) -> Any:
         return getattr(generated(), name)
@@ -62,12 +62,12 @@ MULTICAST = "udpm://"
 _FORM = "udpm://239.255.76.67:7667?ttl=0"
 _SYNC = 0xEDA1DA01
 _HEAD = struct.Struct(">Iqqii")  # sync, number, time, lengths of channel and data
-_LATEST = 2**63 // 1000  # microseconds, so that nanoseconds fit 64 bits
-_LONGEST = 1000  # bytes of a channel's name at which LCM stops
+_LATEST = 2**63 // 1000  # microseconds; nanoseconds must fit 64 bits
+_LONGEST = 1000  # bytes of a channel's name that LCM accepts
 
 
 def log_of(url: str) -> tuple[str, str]:
-    """Path and mode (``r``, ``w``, ``a``, or empty if it is none of them) of a log's URL, as LCM reads it."""
+    """Split a log's URL as LCM does into path and mode (``r``, ``w``, ``a``, or empty if it is another)."""
     path, _, options = url.removeprefix(PREFIX).partition("?")
     modes = [word.removeprefix("mode=") for word in options.split("&") if word.startswith("mode=")]
     mode = modes[-1] if modes else "r"
@@ -80,9 +80,9 @@ def break_of(path: str | os.PathLike[str]) -> str | None:
 
 
 def events_of(path: str | os.PathLike[str], whole: bool = True) -> Iterator[Any]:
-    """Yield the events of a log; of one that breaks off, unless it has to be `whole`, those before.
+    """Yield the events of a log; if it breaks off, those before, unless it has to be `whole`.
 
-    UserError if it has to be, or where a channel's name or a time is none.
+    UserError if it breaks off but has to be whole, or if a channel's name or a time is invalid.
     """
     import lcm
 
@@ -100,7 +100,7 @@ def events_of(path: str | os.PathLike[str], whole: bool = True) -> Iterator[Any]
 
 
 def _scan(path: str | os.PathLike[str]) -> tuple[str | None, bool]:
-    """Describe where an incomplete log breaks off, and whether by an event that states more than the file."""
+    """Describe where an incomplete log breaks off; return also whether an event claims more than the file."""
     size, at, events, beyond = Path(path).stat().st_size, 0, 0, False
     with open(path, "rb") as file:
         while at < size:
@@ -122,20 +122,20 @@ def _scan(path: str | os.PathLike[str]) -> tuple[str | None, bool]:
 
 
 class LogWriter:
-    """A log, event by event.
+    """Writes a log event by event.
 
     Parameters
     ----------
     path : path
     mode : str
-        ``w``: new, ``a``: at its end.
+        ``w``: new file; ``a``: append.
     name : str, optional
-        Of the file for messages, where it is written under another one.
+        Name of the file in messages, if it is written under another one.
 
     Raises
     ------
     UserError
-        As all methods do, if the log cannot be written.
+        If the log cannot be written; all methods raise it.
     """
 
     def __init__(self, path: str | os.PathLike[str], mode: str = "w", name: str | None = None) -> None:
@@ -146,7 +146,7 @@ class LogWriter:
             raise self._fault(error) from None
 
     def write(self, utime: int, channel: str, data: bytes) -> None:
-        """Append an event of time `utime`, microseconds since the Unix epoch."""
+        """Append an event with time `utime`, microseconds since the Unix epoch."""
         name = channel.encode("utf-8")
         try:
             self._file.write(_HEAD.pack(_SYNC, self._events, utime, len(name), len(data)) + name)
@@ -156,11 +156,11 @@ class LogWriter:
         self._events += 1
 
     def publish(self, channel: str, data: bytes) -> None:
-        """Append a message, dated now, as LCM publishes into a log."""
+        """Append a message with the present time, as LCM does when it publishes to a log."""
         self.write(now(), channel, data)
 
     def close(self) -> None:
-        """Write what waits, and close."""
+        """Flush and close the file."""
         try:
             self._file.close()
         except OSError as error:
@@ -172,13 +172,13 @@ class LogWriter:
 
 try:
     import lcm
-except ImportError as exc:  # its own fallbacks hide the reason: liblcm needs the system's GLib
+except ImportError as exc:  # lcm hides the reason: liblcm needs the system's GLib
     if exc.name == "lcm":
         raise
     raise UserError(f"lcm: cannot be loaded ({exc}); install libglib2.0-0 and the lcm wheel") from None
 
 DEFAULT_URL = "udpm://239.255.76.67:7667?ttl=0&recv_buf_size=4194304"
-"""The URL sets the receive buffer: with the system's default 9 of 10 colour frames are lost."""
+"""The URL sets the receive buffer, as with the system's default 9 of 10 colour frames are lost."""
 
 ROUTE_REMEDY = "if this machine has no multicast route: ip route add 224.0.0.0/4 dev lo (as root)"
 _RMEM_MAX = Path("/proc/sys/net/core/rmem_max")
@@ -186,23 +186,23 @@ _RMEM_ENOUGH = 1 << 20
 
 
 def now() -> int:
-    """Wall clock, microseconds since the Unix epoch."""
+    """Return the wall-clock time, microseconds since the Unix epoch."""
     return time.time_ns() // 1000
 
 
 def lcm_url(url: str | None = None) -> str:
-    """Return `url` if given, else ``LCM_DEFAULT_URL`` of the environment, else `DEFAULT_URL`."""
+    """Return `url` if given, else ``LCM_DEFAULT_URL`` from the environment, else `DEFAULT_URL`."""
     return url or os.environ.get("LCM_DEFAULT_URL") or DEFAULT_URL
 
 
 def open_lcm(url: str | None = None) -> lcm.LCM:
-    """Connect.
+    """Connect to LCM.
 
     Raises
     ------
     UserError
-        If LCM refuses, with the remedy: a missing multicast route, or a log that cannot be opened; if
-        there are no classes for its messages.
+        If LCM cannot connect, with the remedy: a multicast route is missing, or a log cannot be opened; or if
+        the message classes have not been generated.
     """
     generated()
     wanted = lcm_url(url)
@@ -210,7 +210,7 @@ def open_lcm(url: str | None = None) -> lcm.LCM:
     if is_log(wanted) and mode == "r":
         require_log(path)
         damage, beyond = _scan(path)
-        if beyond:  # liblcm would take memory for what the event states
+        if beyond:  # liblcm would allocate what the event claims
             raise UserError(f"{wanted}: {damage}")
     _require_group(wanted)
     try:
@@ -229,9 +229,9 @@ def open_lcm(url: str | None = None) -> lcm.LCM:
 
 
 def _require_group(url: str) -> None:
-    """Refuse a network that is none: an address without multicast, or no port."""
+    """Raise UserError for a network that LCM cannot use: without a multicast address, or without a port."""
     if not url.startswith(MULTICAST) or not url.removeprefix(MULTICAST).partition("?")[0]:
-        return  # liblcm has a network of its own where none is named
+        return  # liblcm uses its default network if none is named
     try:
         parts = urlsplit(url)
         sound = ip_address(parts.hostname or "").is_multicast and bool(parts.port)
@@ -243,7 +243,7 @@ def _require_group(url: str) -> None:
 
 
 def require_log(path: str | os.PathLike[str]) -> None:
-    """Raise UserError unless a file begins as LCM's logs do."""
+    """Raise UserError unless a file begins like LCM's logs."""
     remedy = "make one with gait record --log or lcm-logger"
     require_file(path, "LCM log", remedy)
     with open(path, "rb") as file:
@@ -252,14 +252,14 @@ def require_log(path: str | os.PathLike[str]) -> None:
 
 
 def listener(url: str) -> lcm.LCM:
-    """Connect to listen, which leaves a log as it is."""
+    """Connect to receive; a log is never changed."""
     if is_log(url) and log_of(url)[1] != "r":
         raise UsageError(f"--url {url}: a log is only read here; leave out ?mode=")
     return open_lcm(url)
 
 
 def publisher(url: str) -> lcm.LCM | LogWriter:
-    """Connect to send: to a network, or into a log."""
+    """Connect to send to a network or a log."""
     if not is_log(url):
         return open_lcm(url)
     generated()
@@ -270,15 +270,15 @@ def publisher(url: str) -> lcm.LCM | LogWriter:
 
 
 def waiting(links: Sequence[lcm.LCM], seconds: float = 0.0) -> list[lcm.LCM]:
-    """Those of live links that have a message, or get one within so long."""
+    """Return those of live links that have a message, waiting at most this long for one."""
     ready = select.select([link.fileno() for link in links], [], [], seconds)[0]
     return [link for link in links if link.fileno() in ready]
 
 
 def handle(link: lcm.LCM, seconds: float, log: bool) -> bool:
-    """Take in a message, waiting at most so long; False at the end of a `log`.
+    """Handle a message, waiting at most this long; False at the end of a `log`.
 
-    A live link waits in `select`, which a signal interrupts without harm; liblcm's own wait fails then.
+    A live link waits in `select`, which signals may interrupt; liblcm's own wait would then fail.
     """
     if not log:
         if waiting([link], seconds):
@@ -292,12 +292,12 @@ def handle(link: lcm.LCM, seconds: float, log: bool) -> bool:
 
 
 def is_log(url: str) -> bool:
-    """Whether a URL is a log file, which loses nothing, not a network."""
+    """Whether a URL is a log file, which loses no messages, rather than a network."""
     return url.startswith(PREFIX)
 
 
 def private_url() -> str:
-    """Make a multicast URL with a port that is free on this machine: a private network."""
+    """Make the URL of a private network: multicast with a port that is free on this machine."""
     with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as probe:
         probe.bind(("", 0))
         port = probe.getsockname()[1]
@@ -305,7 +305,7 @@ def private_url() -> str:
 
 
 def multicast_works() -> bool:
-    """Try whether LCM can open its default network here."""
+    """Whether LCM can open its default network on this machine."""
     try:
         open_lcm(DEFAULT_URL)
     except UserError:
@@ -314,13 +314,13 @@ def multicast_works() -> bool:
 
 
 def receive_buffer() -> int:
-    """Bytes that a receiver on this machine gets when it asks for those of `DEFAULT_URL`."""
+    """Size of the receive buffer, bytes, granted on this machine to a receiver with `DEFAULT_URL`."""
     asked = int(DEFAULT_URL.rpartition("=")[2])
     return min(asked, int(_RMEM_MAX.read_text(encoding="ascii"))) if _RMEM_MAX.is_file() else asked
 
 
 def buffer_warning(url: str) -> str | None:
-    """One line if the kernel will not grant the receive buffer that `url` asks for."""
+    """Return a warning if the kernel does not grant the receive buffer that `url` asks for."""
     granted = receive_buffer()
     if not url.startswith(MULTICAST) or granted >= _RMEM_ENOUGH:
         return None
@@ -332,7 +332,7 @@ def buffer_warning(url: str) -> str | None:
 
 @contextlib.contextmanager
 def muted_stderr() -> Iterator[None]:
-    """Silence file descriptor 2: liblcm writes pages there about a missing route."""
+    """Silence file descriptor 2, to which liblcm writes pages of text if a route is missing."""
     sys.stderr.flush()
     saved, null = os.dup(2), os.open(os.devnull, os.O_WRONLY)
     try:

@@ -1,4 +1,4 @@
-"""Conversion between objects of this package and messages of ``gaitmsg``."""
+"""Conversion between this package's objects and messages of ``gaitmsg``."""
 
 from __future__ import annotations
 
@@ -21,8 +21,8 @@ from gait.lcm.link import gaitmsg
 
 _FRAME_KEY = "frame"
 _UNKNOWN = math.nan
-_FURTHEST = 1e9  # of a camera's numbers
-_ROTATION = 1e-3  # by which the rows of a rotation may miss, as in the library
+_FURTHEST = 1e9  # largest magnitude of a camera's numbers
+_ROTATION = 1e-3  # by which rows of a rotation may differ from orthonormal, as in the library
 
 
 def decode(kind: Any, data: bytes, channel: str) -> Any:
@@ -31,23 +31,23 @@ def decode(kind: Any, data: bytes, channel: str) -> Any:
     Raises
     ------
     UserError
-        If the bytes are of another type, or of another version of it.
+        If the bytes are a message of another type or version.
     """
     try:
         return kind.decode(data)
     except (ValueError, IndexError, UnicodeDecodeError, MemoryError) as exc:
         raise UserError(f"{channel}: not a gaitmsg.{kind.__name__} of this version ({exc})") from None
-    except Exception as exc:  # struct.error has no public base of its own
+    except Exception as exc:  # struct.error is a subclass of Exception only
         raise UserError(f"{channel}: damaged gaitmsg.{kind.__name__} ({exc})") from None
 
 
 def estimate_after(data: bytes, channel: str, before: Any = None) -> Any:
-    """Decode an ``estimate_t`` of a stream, `before` its first.
+    """Decode an ``estimate_t`` of a stream; `before`: the stream's first estimate.
 
     Raises
     ------
     UserError
-        If it is damaged, or of other joints, angles or components.
+        If it is damaged, or has other joints, angles or components than `before`.
     """
     message = decode(gaitmsg.estimate_t, data, channel)
     if not message.joints:
@@ -58,7 +58,7 @@ def estimate_after(data: bytes, channel: str, before: Any = None) -> Any:
 
 
 def _holds(message: Any) -> tuple[list[str], list[str], int]:
-    """Joints, angles and number of components of an ``estimate_t``."""
+    """List joints and angles, and the number of components, of an ``estimate_t``."""
     return (
         [joint.name for joint in message.joints],
         [angle.name for angle in message.angles],
@@ -75,7 +75,7 @@ def image_message(image: Image, utime: int, frame: int, jpeg: int | None = None)
     utime : int
         Capture time, microseconds.
     frame : int
-        Running number at the source; negative: none.
+        Frame number at the source; negative: none.
     jpeg : int, optional
         Compress with this quality, 1 to 100.
     """
@@ -100,7 +100,7 @@ def image_message(image: Image, utime: int, frame: int, jpeg: int | None = None)
 
 
 def frame_number(image: Any) -> int:
-    """Return the running number of an ``image_t`` at its source; -1 if it has none."""
+    """Return the frame number of an ``image_t`` at its source; -1 if it has none."""
     for entry in image.metadata:
         if entry.key == _FRAME_KEY and entry.n == 8:
             return int.from_bytes(entry.value, "big")
@@ -116,25 +116,25 @@ def tracks_message(
     *,
     errors: ArrayLike | None = None,
 ) -> Any:
-    """Make a ``tracks_t``, joints located in one picture, from any detector's points.
+    """Make a ``tracks_t``, with joints located in one picture, from any detector's points.
 
-    With `errors` it is a ``tracks2_t``, which states them.
+    With `errors` it is a ``tracks2_t``, which contains them.
 
     Parameters
     ----------
     names : sequence of str
-        The J joints, as the model names them.
+        Names of the J joints, as in the model.
     uv : array_like of shape (J, 2)
         Pixels; NaN where a joint was not seen.
     utime : int
         Capture time of the picture, microseconds.
     frame : int
-        Its running number at the source; negative: none.
+        Its frame number at the source; negative: none.
     confidence : array_like that broadcasts to (J,)
-        From 0, not seen, to 1.
+        From 0, where a joint was not seen, to 1.
     errors : array_like of shape (J, 3), optional
-        Standard deviation of all errors of the picture and of the part of them that lasts, pixels; seconds
-        in which the rest counts as one observation.
+        Standard deviations of all errors in the picture, and of the lasting part, pixels; seconds for which
+        the other part counts as one observation.
     """
     points = np.asarray(uv, float)
     visible = np.isfinite(points).all(axis=1)
@@ -152,12 +152,12 @@ def tracks_message(
 
 
 def picture(message: Any) -> Image:
-    """Pixels of an ``image_t``: (h, w) grey or (h, w, 3) BGR.
+    """Read the pixels of an ``image_t``: (h, w) grey or (h, w, 3) BGR.
 
     Raises
     ------
     UserError
-        If the format is not one of package ``gaitmsg`` or the data are short.
+        If the format is not one of package ``gaitmsg``, or data are missing.
     """
     kind = type(message)
     if not all(1 <= side <= MAX_PIXELS for side in (message.width, message.height)):
@@ -165,7 +165,7 @@ def picture(message: Any) -> Image:
     if message.pixelformat == kind.PIXEL_FORMAT_MJPEG:
         try:
             image = cv2.imdecode(np.frombuffer(message.data, np.uint8), cv2.IMREAD_UNCHANGED)
-        except cv2.error:  # empty, or of more pixels than OpenCV takes
+        except cv2.error:  # empty, or more pixels than OpenCV allows
             image = None
         if image is None or image.dtype != np.uint8 or image.shape[2:] not in ((), (3,)):
             raise UserError("image: JPEG frame cannot be decoded")
@@ -205,8 +205,10 @@ def camera_of(message: Any) -> Camera:
     Raises
     ------
     UserError
-        If it is no camera: its size, focal lengths or rotation cannot be, or numbers are not finite.
+        If size, focal lengths or rotation are impossible, or numbers are not finite.
     """
+    # Not gait_camera_check(), which also judges the pose: any pose is shown and exported, as of a moving
+    # camera.
     plain = {name: getattr(message, name) for name in ("width", "height", "fx", "fy", "cx", "cy")}
     turn = np.reshape(message.R, (3, 3)).astype(float)
     numbers = np.array([*plain.values(), *message.R, *message.t, *message.distortion], float)
@@ -221,9 +223,9 @@ def camera_of(message: Any) -> Camera:
 
 
 def state_message(values: State | Mapping[str, Any]) -> Any:
-    """Make a ``state_t`` from a `State`, or from some of its fields: the others are NaN, unknown.
+    """Make a ``state_t`` from a `State`, or from some of its fields; the others are NaN, which means unknown.
 
-    The message has no turn rate.
+    The message does not contain the turn rate.
     """
     known = vars(values) if isinstance(values, State) else values
     message = gaitmsg.state_t()
@@ -236,13 +238,13 @@ def state_message(values: State | Mapping[str, Any]) -> Any:
 
 
 def _padded(values: Any, size: int) -> tuple[int, list[float]]:
-    """Count and values, with zeros up to `size`; all of them unknown if `values` is None."""
+    """Return count and values, padded with zeros to `size`; all unknown if `values` is None."""
     given = [_UNKNOWN] * size if values is None else [float(x) for x in values]
     return len(given), given + [0.0] * (size - len(given))
 
 
 def state_of(message: Any) -> State:
-    """Read a ``state_t``; it has no limbs' proportions, which are then those of the mean body."""
+    """Read a ``state_t``; as it has no proportions, these are those of the mean body."""
     state = State(pelvis=np.array(message.pelvis, float))
     for name in POSE_SCALARS:
         setattr(state, name, float(getattr(message, name)))
@@ -257,7 +259,7 @@ def command_message(
     mean: State | Mapping[str, Any] | None = None,
     sd: State | Mapping[str, Any] | None = None,
 ) -> Any:
-    """Make a ``command_t`` with an id of its own; `mean` and `sd` are those of START."""
+    """Make a ``command_t`` with a unique id; `mean` and `sd` are for START."""
     message = gaitmsg.command_t()
     message.utime, message.command, message.id = utime, command, time.monotonic_ns()
     message.mean, message.sd = state_message(mean or {}), state_message(sd or {})
@@ -270,7 +272,7 @@ def estimate_of(message: Any) -> Estimate:
     Raises
     ------
     UserError
-        If its status is none.
+        If its status is unknown.
     """
     if message.status not in list(TrackStatus):
         raise UserError(f"estimate: status {message.status} is unknown")

@@ -1,4 +1,4 @@
-"""Collect a tracker's estimates from LCM into a track file and a log, and read such a log."""
+"""Record a tracker's estimates from LCM in a track file and a log, and read such a log."""
 
 from __future__ import annotations
 
@@ -20,16 +20,16 @@ from gait.lcm.messages import estimate_after, estimate_of
 from gait.progress import durations
 
 LISTENING = "listening"
-"""First word of the note that every estimate from now on will be recorded."""
+"""First word of the note on stderr that all estimates from now on will be recorded."""
 
 _NO_IMAGE = np.empty((0, 0), np.uint8)
-_TURN = 0.1  # seconds, longest wait before looking whether to stop
+_TURN = 0.1  # seconds; longest wait before checking whether to stop
 _QUEUE = 1000  # estimates that may wait for the disk
 
 
 @dataclass
 class Figures:
-    """What was measured on the way: one entry per estimate, milliseconds."""
+    """Measurements during the recording: one entry per estimate; milliseconds."""
 
     step: list[float] = field(default_factory=list)
     latency: list[float] = field(default_factory=list)
@@ -39,7 +39,7 @@ class Figures:
     damaged: int = 0
 
     def add(self, message: Any, arrived: int) -> None:
-        """Take in one estimate."""
+        """Add one estimate."""
         if self.last is not None and message.step > self.last.step + 1:
             self.lost += message.step - self.last.step - 1
         self.last = message
@@ -48,7 +48,7 @@ class Figures:
         self.utime.append(message.utime)
 
     def summary(self, live: bool) -> dict[str, Any]:
-        """Figures as ``gait record --json`` prints them; latency means something only for a `live` stream."""
+        """Return the figures of ``gait record --json``; latency is meaningful only for a `live` stream."""
         span = (self.utime[-1] - self.utime[0]) / 1e6 if len(self.utime) > 1 else 0.0
         last = self.last
         return {
@@ -68,7 +68,7 @@ ESTIMATE, LAGGED = "GAIT_ESTIMATE", "GAIT_ESTIMATE_LAG"
 
 
 class Recorder:
-    """Write estimates as they come.
+    """Records estimates as they arrive.
 
     Parameters
     ----------
@@ -76,19 +76,19 @@ class Recorder:
     output : str
         Track file, as ``gait track`` writes it.
     channel : str
-        ``GAIT_ESTIMATE``, or ``GAIT_ESTIMATE_LAG``: each frame some frames later, by what was seen since.
+        ``GAIT_ESTIMATE``, or ``GAIT_ESTIMATE_LAG``: each frame estimated some frames later.
     log : str, optional
-        LCM log of the messages themselves, each with the time it arrived here; `gait.lcm.record` reads it.
+        LCM log to write the messages to, each with its time of arrival, for `read_run`.
 
     Attributes
     ----------
     figures : Figures
     stop : bool
-        Set it to end `run` in good order.
+        Set it to end `run`.
     other : str or None
-        Describes another stream, if its start has ended the recording.
+        Describes the other stream whose beginning ended the recording.
     damage : str or None
-        Describes what is wrong with the first message that was left out.
+        Describes the fault of the first message that was skipped.
     """
 
     def __init__(self, url: str, output: str, log: str | None = None, channel: str = ESTIMATE) -> None:
@@ -109,14 +109,14 @@ class Recorder:
     def run(
         self, frames: int | None = None, idle: float | None = None, patience: float | None = None
     ) -> None:
-        """Record until `frames` have come, none has for `idle` seconds, the log ends, or `stop` is set.
+        """Record until `frames` have arrived, none has for `idle` seconds, the log ends, or `stop` is set.
 
-        The beginning of another stream ends it too: one file holds one.
+        The beginning of another stream also ends it, as a file contains only one.
 
         Raises
         ------
         UserError
-            If nothing came at all, within `patience` seconds where that is given; no file is written then.
+            If no estimate arrived, or none within `patience` seconds if given; then no file is written.
             If two trackers publish at once, or a log breaks off; the file then contains the part before.
         """
         begun = time.monotonic()
@@ -146,14 +146,14 @@ class Recorder:
             self._require_whole()
 
     def summary(self) -> dict[str, Any]:
-        """Figures of the recording."""
+        """Return the figures of the recording."""
         return self.figures.summary(self._live)
 
     def _on_estimate(self, channel: str, data: bytes) -> None:
         arrived = now()
         try:
             message = estimate_after(data, channel, self.figures.last)
-        except UserError as fault:  # one message does not end a recording
+        except UserError as fault:  # a bad message does not end a recording
             self.figures.damaged += 1
             self.damage = self.damage or str(fault)
             return
@@ -171,15 +171,15 @@ class Recorder:
             self._flush()
 
     def _require_whole(self) -> None:
-        """Raise UserError if the log that has ended is not whole."""
+        """Raise UserError if the log that has ended is incomplete."""
         path = log_of(self._url)[0]
         fault = break_of(path)
         if fault:
             raise UserError(f"{path}: {fault}; {self._output} contains the part before")
 
     def _goes_on(self, previous: Any, message: Any) -> bool:
-        """Whether an estimate continues the stream of the one before; if not, note why."""
-        played_again = message.receive_utime == self._first  # as is the first of a log
+        """Whether an estimate continues the stream of the previous one; if not, store why in `other`."""
+        played_again = message.receive_utime == self._first  # as when a log repeats
         if not played_again and _of_two(previous, message):
             self._two = True
         elif _number(message) <= _number(previous):
@@ -189,7 +189,7 @@ class Recorder:
         return False
 
     def _flush(self) -> None:
-        """Write what waits; the first two rows wait for each other, because together they date frame 0."""
+        """Write waiting rows; the first waits for the second, as both are needed for the time of frame 0."""
         if self._waiting and self._writer is None:
             self._open()
         for message in self._waiting:
@@ -208,15 +208,15 @@ class Recorder:
 
 
 def _number(message: Any) -> int:
-    """Frame number of an estimate: the source's, else the count of steps."""
+    """Return the frame number of an estimate: the source's, or else the count of steps."""
     return int(message.frame if message.frame >= 0 else message.step)
 
 
 def _of_two(previous: Any, message: Any) -> bool:
-    """Whether two estimates, one received after the other, are of two trackers at work at the same time.
+    """Whether two successive estimates come from two trackers that run at the same time.
 
-    A tracker has one estimate of a frame, receives one frame after the other, and counts its steps up; only a
-    later START makes it count from 0 again.
+    One tracker makes one estimate per frame, receives frames in order, and counts its steps; only a later
+    START makes it count from 0 again.
     """
     if _number(message) <= _number(previous):
         return message.utime == previous.utime or message.receive_utime <= previous.receive_utime
@@ -238,20 +238,20 @@ class Run:
     Attributes
     ----------
     frame : ndarray of int, shape (n,)
-        Numbers at the source, increasing.
+        Frame numbers at the source, increasing.
     seconds : ndarray of shape (n,)
-        Capture time since the first estimate.
+        Capture times since the first estimate.
     estimates : list of Estimate
     step_ms : ndarray of shape (n,)
-        Time the tracker spent on the frame.
+        Time that the tracker spent on each frame.
     latency_ms : ndarray of shape (n,)
         From capture to the arrival of the estimate in the log.
     dropped : int
-        Frames captured and never tracked.
+        Number of frames captured but not tracked.
     tracker_digest : int
-        After the last frame, unsigned.
+        Digest after the last frame, unsigned.
     remark : str or None
-        What the log holds beyond that.
+        Describes what else the log contains.
     """
 
     frame: NDArray[np.int64]
@@ -265,9 +265,9 @@ class Run:
 
 
 def read_run(path: str) -> Run:
-    """Read the ``GAIT_ESTIMATE`` messages of a log of ``gait record --log`` or ``lcm-logger``.
+    """Read the ``GAIT_ESTIMATE`` messages of a log from ``gait record --log`` or ``lcm-logger``.
 
-    Only the first stream counts: a frame number that does not increase begins another.
+    Only the first stream is used; a frame number that does not increase begins another.
     """
     require_log(path)
     messages: list[Any] = []

@@ -20,16 +20,16 @@ from gait.report.run_files import RunFiles
 
 
 def write_report(log: str, files: RunFiles, *, live: bool = True) -> tuple[Verdict, Measures | None]:
-    """Write the page and, if named, the overlay video; return the verdict, and errors if there is a truth.
+    """Write the page and, if named, the overlay video; return the verdict, and errors if the truth is known.
 
     Parameters
     ----------
     log : str
-        Estimates, from gait record --log or lcm-logger.
+        Log with estimates, from gait record --log or lcm-logger.
     files : RunFiles
-        The track recorded with them and the clip to read, and what to write.
+        The track recorded with them, the clip, and the files to write.
     live : bool
-        Whether the stream was tracked as it was taken, so that its latency means something.
+        Whether the stream was tracked live, so that its latency is meaningful.
 
     Raises
     ------
@@ -40,7 +40,7 @@ def write_report(log: str, files: RunFiles, *, live: bool = True) -> tuple[Verdi
     if run.remark:
         note(f"{log}: {run.remark}", files.quiet)
     numbers = run.frame.tolist()
-    estimates = {  # the film shows the time of the video, not of the day
+    estimates = {  # the film shows the time in the video, not the time of day
         number: replace(estimate, utime=round(1e6 * float(times[number])))
         for number, estimate in zip(numbers, run.estimates, strict=True)
         if number < len(times)

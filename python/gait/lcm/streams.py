@@ -1,4 +1,4 @@
-"""Cameras that send a stream over the network: RTSP, HTTP and other URLs that FFmpeg opens."""
+"""Cameras that send a stream over the network: RTSP, HTTP and other URLs that FFmpeg can open."""
 
 from __future__ import annotations
 
@@ -19,12 +19,12 @@ from gait.progress import note
 _URL = re.compile(r"(rtsps?|rtmps?|https?|srt|tcp|udp)://", re.IGNORECASE)
 _LOGIN = re.compile(r"(?<=://)[^/@]*@")
 BROKEN: tuple[type[BaseException], ...] = (av.error.FFmpegError, OSError, ValueError)
-"""Errors of a stream that cannot be opened or breaks off."""
+"""Exceptions for a stream that cannot be opened or breaks off."""
 STOPPED: tuple[type[BaseException], ...] = (*BROKEN, StopIteration)
-"""The same and the end of its frames."""
+"""The same, and the end of its frames."""
 _OPEN, _READ = 4.0, 2.0  # seconds that opening, and one read, may take
-_WAITS = (0.0, 0.25, 0.5, 1.0)  # seconds before each attempt to connect again; the last one for all others
-#: A second, in microseconds, is enough to see what the stream is; RTSP over TCP loses nothing on the way.
+_WAITS = (0.0, 0.25, 0.5, 1.0)  # seconds before each attempt to reconnect; the last value is repeated
+#: One second, in microseconds, suffices to analyse a stream; RTSP over TCP loses no packets.
 _OPTIONS = {"analyzeduration": "1000000", "flags": "low_delay", "rtsp_transport": "tcp"}
 
 
@@ -34,9 +34,9 @@ def is_stream(name: str) -> bool:
 
 
 class StreamSource(DeviceSource):
-    """A camera's stream, connected again whenever it breaks off.
+    """A camera's stream, which is reconnected whenever it breaks off.
 
-    A frame is stamped when it is decoded; video time counts from when the stream was opened.  UserError if it
+    A frame's time stamp is when it is decoded; video time 0 is when the stream was opened.  UserError if it
     cannot be opened at first, or comes back with pictures of another size.
     """
 
@@ -54,7 +54,7 @@ class StreamSource(DeviceSource):
         self._frames = chain([first], self._frames)
 
     def frames(self) -> Iterator[Frame]:
-        """Yield frames for ever, as they arrive."""
+        """Yield frames without end, as they arrive."""
         number = 0
         while True:
             try:
@@ -79,7 +79,7 @@ class StreamSource(DeviceSource):
             yield from container.decode(video=0)
 
     def _again(self) -> Iterator[av.VideoFrame]:
-        """Connect until a frame arrives."""
+        """Reconnect until a frame arrives."""
         note(f"{self._name}: connection lost; reconnecting", self._quiet)
         lost, waits = time.monotonic(), chain(_WAITS, iter(lambda: _WAITS[-1], None))
         while True:
