@@ -95,12 +95,12 @@ UNIT := $(patsubst tests/unit/%.c,$(B)/unit/%,$(sort $(wildcard tests/unit/test_
 TOOLS := $(BIN)/gait-trackd
 LIBS := $(B)/libgait.so $(B)/libgait.a
 
-.PHONY: help setup lock lib tools test built check unit python-test demo model paper bench bench-board bench-instructions size bench-lift detector-profile eval eval-body eval-camera eval-cameras eval-gait eval-moving eval-real eval-learn eval-lift eval-paper eval-people eval-studio soak kills mutants asan sanitizers tsan coverage unit-threads fuzz fuzz-run fuzz-long fuzz-targets golden-check \
+.PHONY: help setup lock lib tools test test-all built check unit python-test demo model paper bench bench-board bench-instructions size bench-lift detector-profile eval eval-body eval-camera eval-cameras eval-gait eval-moving eval-real eval-learn eval-lift eval-paper eval-people eval-studio soak kills mutants asan sanitizers tsan coverage unit-threads fuzz fuzz-run fuzz-long fuzz-targets golden-check \
         docs screenshots sbom lint format wheel sdist wheel-check reproducible install install-daemon uninstall clean
 
 help: ## list the targets
 	@echo 'make demo     track a walking clip end to end, results in build/demo (VIDEO= CAMERA= for your own)'
-	@echo 'make test     build and test everything'
+	@echo 'make test     build and test'
 	@echo; awk -F ':.*## ' '/^[a-z-]+:.*## / { printf "  %-14s %s\n", $$1, $$2 }' $(firstword $(MAKEFILE_LIST))
 	@echo; echo '* needs the data beside the repository (../shared/data); without it, tests that need some are skipped'
 	@echo 'targets eval* fail if a bound is missed; bench, bench-lift print MISSED: rates depend on the host'
@@ -122,7 +122,7 @@ ifneq ($(COMPILED),)
 $(if $(call has,$(CC)),,$(error no C compiler '$(CC)': install it or set CC=))
 $(if $(call has,$(CXX)),,$(error no C++ compiler '$(CXX)': install it or set CXX=))
 endif
-ifneq ($(and $(FOREIGN),$(filter built test python-test demo,$(COMPILED))),)
+ifneq ($(and $(FOREIGN),$(filter built test test-all python-test demo,$(COMPILED))),)
 $(error what runs on $(MACHINE) is not tested here: `make lib tools CC=$(CC)` builds it)
 endif
 
@@ -257,7 +257,10 @@ WITH_TOOLS = $(CC) -std=c11 -D_POSIX_C_SOURCE=200809L $(COMMON:-O3=-O1) -MT $@ -
     -o $@ $< $(B)/libtrackd.a $(OBJ) $(B)/libgaitmsg.a $(call lcm_libs,$(@D)) $(JPEG_LIBS) -lm
 
 # ---- tests ---------------------------------------------------------------------------------------------------
-test: built check unit python-test ## all tests and checks below
+test test-all: built check unit python-test
+test: ## tests and checks below, without the Python tests marked long
+test: MARKED := -m 'not long'
+test-all: ## all tests and checks below
 
 # As many compilers at a time as there are processors, unless make has a -j option.
 JOBS = $(if $(filter -j% --jobserver%,$(MAKEFLAGS)),,-j$(shell getconf _NPROCESSORS_ONLN))
@@ -283,8 +286,8 @@ $(B)/unit/%: tests/unit/%.c $(OBJ) Makefile $(MADE) | $(B)/unit/
 # What their many processes import is compiled once, also where the caller's environment forbids it.
 COMPILED_ONCE := PYTHONDONTWRITEBYTECODE= PYTHONPYCACHEPREFIX='$(abspath build/pycache)'
 PYTEST_AT_ONCE = -n $(shell expr $$(getconf _NPROCESSORS_ONLN) + 1) --maxprocesses 8 --dist loadfile --no-loadscope-reorder
-python-test: setup lib tools ## Python tests (ARGS='-k blob' to select)
-	@$(COMPILED_ONCE) $(PY) -m pytest -q -c python/pyproject.toml --rootdir . $(PYTEST_AT_ONCE) tests/python $(ARGS)
+python-test: setup lib tools ## all Python tests (ARGS='-k blob' or '-m long' to select)
+	@$(COMPILED_ONCE) $(PY) -m pytest -q -c python/pyproject.toml --rootdir . $(PYTEST_AT_ONCE) $(MARKED) tests/python $(ARGS)
 
 asan: ## C tests under the address and undefined-behaviour sanitizers
 	@LIMIT=1200 $(MAKE) --no-print-directory config=sanitize unit

@@ -55,6 +55,7 @@ def test_a_known_lens_comes_back(shown, tmp_path, capsys):
     assert figures["used"] == 12 and figures["rms_px"] < 0.15 and max(figures["error_px"].values()) < 0.3
 
 
+@pytest.mark.long
 def test_a_chessboard_without_markers(tmp_path, capsys):
     board, lens = Board(9, 6, False), camera()
     names = pictures(tmp_path, 12, lens, board, far=(2.2, 3.0))
@@ -63,6 +64,7 @@ def test_a_chessboard_without_markers(tmp_path, capsys):
     assert read_camera(str(tmp_path / "lens.json"), placed=False).fx == pytest.approx(lens.fx, rel=0.01)
 
 
+@pytest.mark.long
 def test_sharp_frames_of_a_film_are_picked(tmp_path, capsys):
     """Every pose is held for a while; between poses the board is blurred by its motion."""
     lens, sheet = camera(), texture()
@@ -128,6 +130,7 @@ def test_blurred_pictures_are_refused(tmp_path, capsys):
     assert "blurred in" in (err := fault(names, capsys, tmp_path / "l.json")) and "move it slowly" in err
 
 
+@pytest.mark.long
 def test_another_board_is_named(shown, tmp_path, capsys):
     other = pictures(tmp_path, 2, board=Board(7, 5, False), far=(2.2, 2.4))
     for given, board, words in (

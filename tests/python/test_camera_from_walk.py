@@ -156,6 +156,7 @@ def test_what_is_no_walk_is_refused(change, words):
         calibrate(keypoints(view(), **change), SIZE, MODEL, 1.75)
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("share", [0.3, 1.0], ids=["some frames", "all frames"])
 def test_sides_that_a_detector_swaps_are_put_right(share):
     away = 1.8, (0.3, 3.6)

@@ -16,6 +16,8 @@ from gait.camera.marks import coordinates, floor_lines, lens_of, place_marks, pl
 from gait.cli import main
 from gait.web import camera_page
 
+pytestmark = pytest.mark.long
+
 SIZE = (1280, 720)
 TRUE = Camera.looking([0.6, -6.0, 1.5], [1.2, 1.0, 0.6], SIZE, 1000.0)
 MARKS = np.array([[0.0, 0.0], [2.4, 0.0], [2.9, 3.0], [-0.4, 2.5], [1.0, 1.2]])

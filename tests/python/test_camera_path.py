@@ -106,6 +106,7 @@ def track(folder, *words: str) -> int:
     return main(["track", str(folder / "video.mp4"), *files, *to, *words])
 
 
+@pytest.mark.long
 def test_a_person_before_a_robot_is_followed_in_the_world(clip):
     assert track(clip, "--camera-path", str(clip / "poses.csv"), "--cameras-out", str(clip / "c.csv")) == 0
     found, truth = (

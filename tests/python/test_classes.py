@@ -89,6 +89,7 @@ def test_classes_that_do_not_fit_are_refused() -> None:
     assert join(join(walk, three), three).keys() == join(walk, three).keys()
 
 
+@pytest.mark.long
 def test_learn_makes_classes_and_info_shows_them(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     walks, out = mocap_files.write_trials(tmp_path / "walks", 4), tmp_path / "m.gait"
     words = ["learn", str(walks), "-o", str(out), "--segments", "none", "--quiet", "--json", "--jobs", "1"]

@@ -25,6 +25,7 @@ def test_signals_that_end_a_command_interrupt_it(number):
         signal.raise_signal(number)
 
 
+@pytest.mark.long
 def test_track_keeps_the_rows_that_are_finished(tmp_path):
     """A clip of a wall, long enough that no run tracks it to its end."""
     clip = tmp_path / "clip"

@@ -206,6 +206,7 @@ def root_error(scene, capsys, *options):
     return np.mean(errors), digest
 
 
+@pytest.mark.long
 def test_tracks_of_a_detector_help(scene, tracks, capsys):
     without, plain = root_error(scene, capsys)
     helped, found = root_error(scene, capsys, "--keypoints", tracks)

@@ -56,6 +56,7 @@ def off(found, true):
     return float(distance / np.median(np.ptp(true[..., 1], axis=1)))
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("turned", TURNS)
 def test_the_matrix_of_a_film_is_honoured(turned, walk, tmp_path):
     picture = walk[1][0][:, 100:460]

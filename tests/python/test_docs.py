@@ -187,6 +187,7 @@ def stand_in(clip, folder):
     (folder / "points.csv").write_text("\n".join(["u,v,x,y", *rows, ""]))
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("page", [p for p in RUN if ALL[p]], ids=lambda p: p.relative_to(ROOT).as_posix())
 def test_the_blocks_of_a_page_work(page, folder, clip, installed, monkeypatch):
     monkeypatch.chdir(folder)

@@ -225,6 +225,7 @@ def test_an_empty_picture_is_reported(tmp_path):
 CLIPS = DATA / "eval" / "dev"
 
 
+@pytest.mark.long
 @pytest.mark.skipif(not CLIPS.is_dir(), reason="../shared/data is absent")
 @pytest.mark.parametrize("name", ["side_rl_16", "oblique45_pole_05", "toward300_08"])
 def test_a_person_is_found_without_a_background(name):

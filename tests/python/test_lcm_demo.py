@@ -40,6 +40,7 @@ def check_demo(done, out):
     return read_track(out / "track.csv")
 
 
+@pytest.mark.long
 def test_the_demo_over_multicast(folder, tmp_path):
     rig.need_multicast()
     out = tmp_path / "out"
@@ -48,6 +49,7 @@ def test_the_demo_over_multicast(folder, tmp_path):
     assert track.frame[-1] > COUNT / 2 and "latency ms: median" in done.stdout
 
 
+@pytest.mark.long
 def test_the_demo_without_multicast_goes_through_a_log(folder, tmp_path):
     out = tmp_path / "out"
     words = ["-m", "gait", "demo", "--video", folder / "video.mp4", "--particles", rig.PARTICLES, "-o", out]

@@ -47,6 +47,7 @@ def begin(listener, pacer):
     listener.ask([("GAIT_COMMAND", command)], lambda s: s.command_id == command.id, "the START")
 
 
+@pytest.mark.long
 def test_a_stream_at_thirty_hertz_arrives_and_is_tracked_in_time(url, tmp_path):
     """Capture here, tracker in another process, recorder in a thread: loss and latency of each leg."""
     count = 60
@@ -149,6 +150,7 @@ def test_start_stop_and_reset_are_confirmed(url):
     assert outcome.code == 0 and outcome.frames == 0
 
 
+@pytest.mark.long
 def test_status_comes_every_second(url):
     with rig.daemon(url) as (listener, _):
         listener.statuses.clear()

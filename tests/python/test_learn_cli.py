@@ -71,6 +71,7 @@ def test_a_bad_file_in_a_folder_is_named_and_the_rest_is_learnt(walks, tmp_path,
     assert np.all(np.diff(summary["imputation_objective"]) <= 0)
 
 
+@pytest.mark.long
 def test_the_same_input_gives_the_same_bytes(walks, learned, tmp_path):
     assert run("learn", walks, "-o", tmp_path / "again.gait", "--components", 3, "--quiet") == 0
     assert (tmp_path / "again.gait").read_bytes() == learned.read_bytes()
@@ -261,6 +262,7 @@ def test_the_curves_of_the_shipped_model_have_no_seam():
     assert cases.seam(curves[0] + ramp) > 2  # a jump of a hundredth of each channel's range shows
 
 
+@pytest.mark.long
 def test_the_shipped_model_comes_from_the_documented_command(tmp_path):
     if not WALKS.is_dir():
         pytest.skip(f"{WALKS} is absent: the learning data are not part of the repository")

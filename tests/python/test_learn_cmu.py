@@ -10,6 +10,8 @@ from gait.errors import UserError
 from gait.learn.cycles.sequence import load
 from gait.learn.options import LearnOptions
 
+pytestmark = pytest.mark.long
+
 FPS = 120.0
 MOCAP = Path(__file__).parents[2] / "../shared/data/mocap"
 

@@ -76,6 +76,7 @@ def scheduler(local):
     return local.scheduler_address
 
 
+@pytest.mark.long
 def test_a_cluster_gives_the_same_model(walks, alone, scheduler, tmp_path, monkeypatch, capsys):
     monkeypatch.chdir(walks.parent)  # the workers have another folder
     model = tmp_path / "dask.gait"

@@ -29,6 +29,8 @@ from gait.learn.options import LearnOptions
 from gait.learn.prior import rank
 from gait.signals import Interruptible
 
+pytestmark = pytest.mark.long
+
 
 @pytest.fixture(scope="module")
 def walks(tmp_path_factory):

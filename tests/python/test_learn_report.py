@@ -23,6 +23,8 @@ from gait.learn.report.figures_model import SHOWN
 from gait.report.figures import Drawing
 from gait.reproducible import one_thread
 
+pytestmark = pytest.mark.long
+
 
 @pytest.fixture(scope="module", autouse=True)
 def as_the_command_does():

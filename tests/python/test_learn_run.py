@@ -274,6 +274,7 @@ def test_zeros_are_hinted_at_once(amc, tmp_path, capsys):
     assert not printed(capsys, *words, "--quiet")
 
 
+@pytest.mark.long
 def test_labels_of_no_marker_and_a_mapping_without_markers_are_reported(amc, tmp_path, capsys):
     for k in (1, 2):
         points, _ = mw.person(mw.FULL, frames=400, seed=k)
@@ -391,6 +392,7 @@ def learned(tmp_path_factory):
     return folder / "m.gait"
 
 
+@pytest.mark.long
 def test_five_components_take_less_than_100_kB(learned):
     sections = blob.read(learned)
     assert sections["PACE"].shape == (people.TERMS, 30) and len(sections["PROP"]) == lengths.COUNT
@@ -415,6 +417,7 @@ def test_zeros_have_no_sign():
     assert stored.tobytes() == np.array([0, 0, 0, -0.25], np.float32).tobytes()
 
 
+@pytest.mark.long
 def test_machines_that_calculate_otherwise_write_the_same_bytes(tmp_path):
     played = machines.environments()
     if len(played) < 2:

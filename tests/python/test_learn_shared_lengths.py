@@ -18,6 +18,8 @@ from gait.learn.solve.kinematics import SCALES, SEGMENTS
 from gait.learn.solve.skeleton_fit import NO_INFORMATION, PEOPLE, LengthInformation, log_bayes_factor
 from gait.reproducible import one_thread
 
+pytestmark = pytest.mark.long
+
 FILE = Path("walk.c3d")
 LIMBS = [k for k, name in enumerate(SCALES) if name in ("upper_arm", "forearm", "thigh", "shank", "foot")]
 

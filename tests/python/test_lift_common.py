@@ -134,6 +134,7 @@ def stranger(seed):
     return lift_sticks.Walk(list(JOINTS), joints, 20.0, heading, stage.body.stature)
 
 
+@pytest.mark.long
 def test_intervals_cover_the_stated_share(monkeypatch):
     """Sticks of strangers from ahead to the side; sd are neither thrice too small nor too large."""
     prior, squares, held = SegmentPrior.load(), [], []

@@ -59,6 +59,7 @@ def joints(columns, letters):
     )
 
 
+@pytest.mark.long
 def test_the_camera_comes_from_the_walk(lift, files, tmp_path):
     found, figures, notes = lift("--height", STATURE, "--camera-out", tmp_path / "found.json")
     given, _, _ = lift("--camera", files / "camera.json", "--height", STATURE)

@@ -57,6 +57,7 @@ def drawn(prior, around, rng):
     return x.reshape(-1, len(prior.names), 3)
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("view", VIEWS)
 def test_exact_pixels_of_the_prior_are_lifted_to_their_depth(walk, monkeypatch, view):
     """Draws of the prior itself: linearised at what noise was fitted too, all came out 4 to 5 % nearer."""

@@ -194,6 +194,7 @@ def lift(*words):
     return main(["lift", *map(str, words)])
 
 
+@pytest.mark.long
 def test_the_command_lifts_a_video(files, tmp_path, corrected, prior, capsys):
     some, _ = corrected[-1]
     (tmp_path / "clicks.json").write_text(json.dumps(as_json(some.corrections)))

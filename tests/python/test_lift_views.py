@@ -51,6 +51,7 @@ def lift(place, *views, options=()):
     return *(1000 * np.median(np.linalg.norm(one, axis=2)) for one in off), inside
 
 
+@pytest.mark.long
 def test_two_views_are_nearer_than_one(place, capsys):
     alone, rooted, _ = lift(place, "a")
     both, both_rooted, inside = lift(place, "a", "b")

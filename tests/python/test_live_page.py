@@ -14,6 +14,8 @@ from gait.lcm.link import private_url
 from gait.live.feed import Feed
 from gait.live.server import Hub, Pace, Page
 
+pytestmark = pytest.mark.long
+
 
 @pytest.fixture(scope="module")
 def reports(tmp_path_factory):

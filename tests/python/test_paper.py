@@ -48,6 +48,7 @@ def learning(walks):
     return ormoneit.learn(load.load_all(sources.find([str(walks)])[0]).sequences)
 
 
+@pytest.mark.long
 def test_whole_periods_are_found_but_a_long_walk_of_a_broken_one_is_not(learning):
     assert learning.agreeing == len(learning.walks)
     for found, walk in zip(learning.literal_walks, learning.walks, strict=True):
@@ -167,6 +168,7 @@ def test_the_plot_of_the_ladder_has_each_rungs_own_cycle():
     assert free == [without[ladder.FREE[rung.model]] for rung in ladder.RUNGS]
 
 
+@pytest.mark.long
 def test_the_page_holds_every_figure_and_needs_no_other_file(walks, learning, tmp_path, monkeypatch, capsys):
     """A whole run on toy walks and a small rendered clip."""
     small = replace(PRESETS[clips.PRESET], size=(320, 240), frames=16)

@@ -50,6 +50,7 @@ def detected(joints, hidden=()):
     return Keypoints(frame, frame / 30, NAMES, uv, np.isfinite(uv[..., 0]).astype(float))
 
 
+@pytest.mark.long
 def test_people_who_cross_keep_their_numbers(crossing, tmp_path, monkeypatch, capsys):
     pictures, joints = crossing
     apart = np.abs(joints[0, :, 0, 0] - joints[1, :, 0, 0])

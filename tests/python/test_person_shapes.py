@@ -203,6 +203,7 @@ def test_left_and_right_are_known_only_if_all_draws_agree(monkeypatch, draws, fi
 FILM = DATA / "real" / "treadmill"
 
 
+@pytest.mark.long
 @pytest.mark.skipif(not FILM.is_dir(), reason="../shared/data is absent")
 def test_a_person_on_a_treadmill_is_refused_with_the_remedy():
     video = Video(next(FILM.glob("video.*")))

@@ -36,6 +36,7 @@ def folder(tmp_path, monkeypatch):
     return tmp_path
 
 
+@pytest.mark.long
 def test_figures_of_a_draw(folder, capsys):
     assert main(["report", "lift", "-m", "m.gait", "-o", "r", "--clip", "t.csv", "--json"]) == 0
     found = json.loads(capsys.readouterr().out)

@@ -56,6 +56,7 @@ def test_files_state_the_same_as_the_library(folder, capsys):
     assert set(printed["angles"]) == {"r_hip_flexion", "l_hip_flexion", "torso_x"} | pelvis
 
 
+@pytest.mark.long
 def test_the_page_needs_nothing_else_and_its_drawings_are_sound(folder, capsys):
     assert main(["report", "track", str(folder / "walk.csv"), "-o", str(folder / "page")]) == 0
     words = capsys.readouterr().out

@@ -25,6 +25,8 @@ from gait.io.video import VideoWriter
 from gait.motion.verdict import LEGS, verdict_of
 from gait.report.film import page_size
 
+pytestmark = pytest.mark.long
+
 MODEL = Model()
 CHANGE = np.arange(12.0).reshape(3, 4) / 1000
 FRAMES, FIRST = 90, 6  # of the film; the first with an estimate

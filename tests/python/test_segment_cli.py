@@ -52,6 +52,7 @@ def differences(path, other):
     return found | dict.fromkeys(one.keys() ^ two.keys(), np.nan)
 
 
+@pytest.mark.long
 def test_the_prior_is_learnt_beside_the_cyclic_model_which_stays_the_same(walks, tmp_path, capsys):
     both, without = tmp_path / "both.gait", tmp_path / "without.gait"
     assert learn(walks, both, "--json") == 0

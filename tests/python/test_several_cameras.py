@@ -139,6 +139,7 @@ def test_most_cameras_decide_whether_keypoints_are_near():
         assert one.near(frame, None) is one.agree(frame, None) is wanted
 
 
+@pytest.mark.long
 def test_a_second_camera_shows_how_far_the_person_is(tmp_path, monkeypatch, capsys):
     monkeypatch.chdir(tmp_path)
     simulate(SCENARIO, ".")

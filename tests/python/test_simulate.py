@@ -76,6 +76,7 @@ def test_a_frame_does_not_depend_on_the_frames_before_it() -> None:
     assert forward[2].tobytes() == again[2].tobytes()
 
 
+@pytest.mark.long
 def test_a_folder_holds_every_file(clip: Path) -> None:
     assert sorted(p.name for p in clip.iterdir()) == sorted(FILES)
     video = Video(clip / "video.mp4")
@@ -268,6 +269,7 @@ def test_the_directions_are_mirrored() -> None:
         assert sign * (u[-1] - u[0]) > 20
 
 
+@pytest.mark.long
 def test_pole_hides_joints_and_is_part_of_the_background() -> None:
     scenario = replace(TINY, view="oblique", frames=60)
     plain, pole = (set_stage(replace(scenario, pole=flag)) for flag in (False, True))

@@ -118,6 +118,7 @@ class Pairs:
         return before, None if index + 1 in self.starts else self.rule.move(before, self.random)
 
 
+@pytest.mark.long
 def test_linear_normal_dynamics_give_the_exact_smoother():
     """Against Rauch, Tung and Striebel's recursion, from samples of the Kalman filter's posteriors."""
     rule, random = Linear.rule, np.random.default_rng(1)
@@ -225,6 +226,7 @@ def track(folder, output, *more):
     return main([*command, "-o", str(folder / output), "--particles", "300", "--quiet", *more])
 
 
+@pytest.mark.long
 def test_the_command_smooths_and_repeats_itself(folder):
     for output, more in (("f.csv", ()), ("s.csv", ("--smooth", "--draws", str(folder / "d.npz")))):
         assert track(folder, output, *more) == 0

@@ -159,6 +159,7 @@ def test_a_scene_without_texture_is_reported(tmp_path):
     assert motion is None and "too little texture" in why
 
 
+@pytest.mark.long
 def test_gait_lift_undoes_the_turns_too(tmp_path, monkeypatch, capsys):
     """A person who walks 1.2 m/s before a camera that follows them, as a detector finds them."""
     count = 30

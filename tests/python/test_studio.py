@@ -28,6 +28,8 @@ from gait.io.video import Video
 from gait.lift.keypoints.corrections import Correction, Edits, read_edits
 from gait.lift.run import load_prior
 
+pytestmark = pytest.mark.long
+
 WRONG = range(18, 32)  # frames in which the detector has lost a foot
 FOOT = ("r_ankle", "r_toe", "r_heel")
 FRAMES, FPS = 54, 30.0

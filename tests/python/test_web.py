@@ -79,6 +79,7 @@ def test_damaged_parts_are_refused(tmp_path, monkeypatch):
         parts.load(parts.THREE)
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("dark", [False, True])
 def test_a_page_that_needs_no_other_file_draws(fetched, tmp_path, dark):
     page_file = tmp_path / "page.html"
