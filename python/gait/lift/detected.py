@@ -1,4 +1,4 @@
-"""The person in a video as `gait lift` finds them: keypoints by the detector, the camera from the walk."""
+"""Find the person in a video for `gait lift`: keypoints from the detector, the camera from the walk."""
 
 from __future__ import annotations
 
@@ -24,11 +24,11 @@ class Request:
     video : str
         File.
     camera, model, corrections : str, optional
-        Files. A camera is estimated if none is given, and corrections are only checked, before the work.
+        Files. Without a camera it is estimated; corrections are only checked, before long work.
     scale_camera : bool
-        Whether a camera of another resolution is resized to the video's.
+        Whether to resize a camera of another resolution to the video's.
     parallel : bool
-        Whether the view is from far away, so that there is no camera to estimate.
+        Whether the view is orthographic, so that there is no camera to estimate.
     height : float, optional
         The person's stature, metres; an estimate of the camera needs it.
     fov : float, optional
@@ -59,11 +59,11 @@ class Detected:
     Attributes
     ----------
     keypoints : Keypoints
-        With `turns`, where the camera of one frame would see them.
+        If there are `turns`, in pixels of the reference's camera.
     calibration : Calibration, optional
         The camera, if it was estimated.
     turns : CameraTurns, optional
-        How the camera turns; None if it is static or was not asked for.
+        How the camera turns; None if it is static or turns are not to be undone.
     """
 
     keypoints: Keypoints
@@ -100,7 +100,7 @@ def find_keypoints(request: Request, prior: SegmentPrior, quiet: bool) -> Detect
 
 
 def find_camera(request: Request, prior: SegmentPrior, quiet: bool) -> Calibration:
-    """Estimate the camera of a video whose images are lifted, from the walk in it; errors as above."""
+    """Estimate a video's camera from the walk, for lifting its images; errors as in `find_keypoints`."""
     video = Video(request.video)
     if request.corrections:
         read_corrections(request.corrections, prior, video.count, size=video.size)
@@ -110,7 +110,7 @@ def find_camera(request: Request, prior: SegmentPrior, quiet: bool) -> Calibrati
 def _calibrate(
     request: Request, video: Video, people: dict[int, Keypoints], quiet: bool
 ) -> tuple[int, Calibration]:
-    """Find who walks, estimate the camera from that walk, and report it."""
+    """Find a person who walks, estimate the camera from that walk, and print it."""
     assert request.height is not None
     model = walking_model(request.model)
     id, found = calibrate_film(video, people, model, request.height, request.fov, quiet)

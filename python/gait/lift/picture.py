@@ -1,4 +1,4 @@
-"""A lifted motion in the picture: uncertainty, which corrections would help, the overlay."""
+"""A lifted motion in the picture: uncertainty, useful corrections, the overlay."""
 
 from __future__ import annotations
 
@@ -21,11 +21,11 @@ from gait.track.stabilise import CameraTurns
 
 Floats = npt.NDArray[np.float64]
 
-NEAR_S = 0.35  # seconds from a correction of the same joint within which another would add little
+NEAR_S = 0.35  # seconds around a correction of a joint in which another one of it would add little
 
 
 def views(lifted: Lifted) -> list[View]:
-    """View of each frame: the camera, or one from far away whose scale may change."""
+    """Return the view of each frame: the camera, or an orthographic view whose scale may change."""
     motion, view = lifted.motion, lifted.view.alone()
     assert motion.uv is not None
     if isinstance(view, Perspective):
@@ -40,7 +40,7 @@ def views(lifted: Lifted) -> list[View]:
 
 
 def slopes(lifted: Lifted) -> Floats:
-    """Slopes (T, J, 2, 3) of the markers' pixels by their places."""
+    """Return derivatives (T, J, 2, 3) of the markers' pixels by their positions."""
     places = lifted.motion.places
     return np.stack([view.project(body)[1] for view, body in zip(views(lifted), places, strict=True)])
 
@@ -48,8 +48,8 @@ def slopes(lifted: Lifted) -> Floats:
 def covariances(lifted: Lifted) -> Floats:
     """Covariances (T, 3 J, 3 J) of the coordinates of a frame's markers, square metres.
 
-    Of segments estimated alone only the standard deviations about the hips are known: the errors of joints
-    are then taken for independent, which makes intervals of angles too wide.
+    For segments estimated alone, only standard deviations relative to the hips are known.  Errors of joints
+    are then assumed independent, which makes the intervals of angles too wide.
     """
     motion = lifted.motion
     if motion.covariance is not None:
@@ -59,9 +59,9 @@ def covariances(lifted: Lifted) -> Floats:
 
 
 def picture_sd(lifted: Lifted) -> Floats:
-    """Give standard deviations (T, J) of the markers along an axis of the picture, pixels.
+    """Return standard deviations (T, J) of the markers along an axis of the picture, pixels.
 
-    An uncertain camera moves the places in the world, and hardly where they are in its picture.
+    Errors of the camera move markers in the world, but hardly in its picture.
     """
     by_place, frames = slopes(lifted), len(lifted.motion.places)
     count = by_place.shape[1]
@@ -72,9 +72,9 @@ def picture_sd(lifted: Lifted) -> Floats:
 
 
 def missed(lifted: Lifted) -> Floats:
-    """How far (T, J) each marker is from where it was detected, pixels.
+    """Distance (T, J) of each marker from its detection, pixels.
 
-    0 where it was not detected, and near a correction of it, which has shown how wrong the detector was.
+    It is 0 if the marker was not detected, and near a correction of it, which shows the detector's error.
     """
     motion, points = lifted.motion, lifted.keypoints
     found = np.zeros(motion.places.shape[:2])
@@ -89,7 +89,7 @@ def missed(lifted: Lifted) -> Floats:
 
 
 def suggestions(lifted: Lifted, most: int) -> list[Suggestion]:
-    """Corrections of joints, most useful first, of a motion lifted from keypoints."""
+    """Suggest corrections of joints, most useful first, for a motion lifted from keypoints."""
     motion, points = lifted.motion, lifted.keypoints
     joints = [name for name in motion.names if name in JOINTS]
     columns = [motion.names.index(name) for name in joints]
@@ -98,7 +98,8 @@ def suggestions(lifted: Lifted, most: int) -> list[Suggestion]:
     slope = np.zeros((len(by_place), len(joints), 2, len(rows)))
     for j in range(len(joints)):
         slope[:, j, :, 3 * j : 3 * j + 3] = by_place[:, j]
-    # A detector errs for a while, and about a foot as a whole: a correction shows what it missed around it.
+    # Errors of a detector last a while, and concern a foot as a whole, so a correction also shows those
+    # around it.
     lasts = np.exp(-2 * np.abs(points.time[:, None] - points.time) / ERRS_FOR)
     alike = np.array(
         [[other in found_alike(joints, joint) for other in range(len(joints))] for joint in joints]
@@ -128,7 +129,7 @@ def draw_overlay(
     Parameters
     ----------
     turns : CameraTurns, optional
-        Of the calibrated camera, against which the keypoints were stabilised.
+        Turns of the calibrated camera, if the keypoints were stabilised.
     """
     motion, frame, by_frame = lifted.motion, lifted.keypoints.frame, views(lifted)
     figure = Figure.fit(motion.places, motion.names)

@@ -1,4 +1,4 @@
-"""Lift a file of 2-D keypoints as `gait lift` and `gait report lift` do: read, repair, lift, and warn."""
+"""Lift files of 2-D keypoints for `gait lift` and `gait report lift`: read, repair, lift, and warn."""
 
 from __future__ import annotations
 
@@ -28,13 +28,13 @@ from gait.reproducible import one_thread
 from gait.track.from_walk import Calibration
 from gait.track.synchronise import find_offset
 
-FEW = 4  # recordings; with two of one person, intervals of other people's walks covered as little as 70 %
-MOST_NAMED = 5  # spikes, changes of person
-MOST_SPANS = 4  # named
-OUTSIDE = 0.1  # of the points: with fewer, the picture cuts the person off
-SHAKY = 1.3  # times a standard deviation from which points jitter more than it
+FEW = 4  # recordings; with two of one person, 90 % intervals for other people contained as little as 70 %
+MOST_NAMED = 5  # most spikes and changes of person that a message lists
+MOST_SPANS = 4  # most intervals that a message lists
+OUTSIDE = 0.1  # share of points outside the picture; with fewer, the picture's edge cuts the person off
+SHAKY = 1.3  # ratio of jitter to standard deviation from which a warning is printed
 FAR = 4.0  # standard deviations of a median distance; noise alone gives 1.2
-OFTEN = 3  # frames in which a point is an outlier; correct ones are once in a few thousand
+OFTEN = 3  # frames in which a point is an outlier; correct points are in one of a few thousand
 TOO_MANY = 0.18  # share of wrong points; one in seven does little harm, one in five may
 UNUSUAL = 2.5  # standard deviations of a stature; one person in 80 is as unusual
 
@@ -48,29 +48,29 @@ class Request:
     Attributes
     ----------
     options : Options
-        Of the method; `pixel_sd` counts only if `pixel_sd_given`, else the points' jitter is measured.
+        Settings of the method; `pixel_sd` is used only if `pixel_sd_given`, otherwise jitter is measured.
     camera : str, optional
-        File of the calibration; without one the view is from far away.
+        Camera file; without one the view is orthographic.
     size : (int, int), optional
-        Of the video: a camera of another resolution is resized to it.
+        Size of the video, to which a camera of another resolution is resized.
     calibration : Calibration, optional
         Camera estimated from the walk instead; its uncertainty is added to the standard deviations.
     axis : str, optional
-        Direction of such a view; level and with a slowly changing scale if left out.
+        Direction of an orthographic view; by default level, with a slowly changing scale.
     metres : float, optional
-        Of a unit of u and v along `axis`; unknown if left out.
+        Length of a unit of u and v along `axis`; by default unknown.
     ignore_unknown : bool
-        Leave out points that the model does not know.
+        Ignore points that the model does not know.
     keep_sides, keep_spikes : bool
-        Leave swaps of left and right, and spikes, as they are.
+        Do not undo swaps of left and right; do not remove spikes.
     all_markers : bool
         Estimate all markers of the prior.
     stabilised : bool
-        The keypoints are those of a stabilised clip, which shows more than the camera's picture.
+        The keypoints are from a stabilised clip, which may extend beyond the camera's picture.
     hints : bool
-        Name the options of `gait lift` in warnings.
+        Mention options of `gait lift` in warnings.
     clip : Clip
-        What a keypoint file of another tool may lack: who of several people, times, the size of the picture.
+        What a keypoint file of another tool may lack: the person to use, times, the size of the picture.
     corrections : str, optional
         File of corrections by hand.
     """
@@ -94,7 +94,7 @@ class Request:
 
 @dataclass(frozen=True)
 class Prepared:
-    """Keypoints as they are lifted, before any correction by hand; see `Lifted`."""
+    """Keypoints ready for lifting, before any correction by hand; see `Lifted`."""
 
     keypoints: Keypoints
     view: AnyView
@@ -115,9 +115,9 @@ class Lifted:
         With the standard deviation that was used.
     motion : Motion
     repairs : dict
-        What was repaired, as in the ``--json`` summary.
+        Repairs of the keypoints, as in the ``--json`` summary.
     edits : Edits
-        What was corrected by hand.
+        Corrections by hand.
     """
 
     keypoints: Keypoints
@@ -141,7 +141,7 @@ def load_prior(model: str | None, warn: Warn) -> SegmentPrior:
 
 
 def lift_file(path: str, prior: SegmentPrior, request: Request, warn: Warn, quiet: bool) -> Lifted:
-    """Read keypoints, undo swaps of left and right, leave out spikes, and lift what remains.
+    """Read keypoints, undo swaps of left and right, remove spikes, and lift the rest.
 
     Raises
     ------
@@ -157,9 +157,9 @@ def lift_file(path: str, prior: SegmentPrior, request: Request, warn: Warn, quie
 def lift_keypoints(
     path: str, keypoints: Keypoints, prior: SegmentPrior, request: Request, warn: Warn, quiet: bool
 ) -> Lifted:
-    """Lift keypoints of the prior's markers as `lift_file` does; errors name `path`, where they are from."""
+    """Lift keypoints of the prior's markers as `lift_file` does; errors name `path` as their source."""
     edits = Edits()
-    if request.corrections:  # refused before the work
+    if request.corrections:  # to fail before long work
         frames = range(int(keypoints.frame[0]), int(keypoints.frame[-1]) + 1)
         view = _view(keypoints, request, lambda _: None)
         size = {"size": view.camera.size} if isinstance(view, Perspective) else {}
@@ -176,14 +176,14 @@ def lift_views(
     warn: Warn,
     quiet: bool,
 ) -> Lifted:
-    """Lift the keypoints of several cameras at once, in the frames of the first.
+    """Lift the keypoints of several cameras together, in the frames of the first.
 
     Parameters
     ----------
     views : sequence of (str, Keypoints or None, str)
-        File, its keypoints if they were not read from it, and the file of the camera.
+        File; its keypoints, or None to read them from it; camera file.
     offsets : sequence of float, optional
-        When each film but the first began, seconds after the first; found from the motion if left out.
+        Start of each film but the first, seconds after the first; by default estimated from the motion.
 
     Raises
     ------
@@ -229,7 +229,7 @@ def lift_views(
 def prepare(
     path: str, keypoints: Keypoints, prior: SegmentPrior, request: Request, warn: Warn, quiet: bool
 ) -> Prepared:
-    """Repair keypoints before they are lifted: swaps of left and right, spikes."""
+    """Repair keypoints before lifting: swaps of left and right, spikes."""
     options, hint = request.options, request.hints
     _check(path, keypoints, options.pixel_sd, warn)
     if not request.pixel_sd_given:
@@ -256,7 +256,7 @@ def lift_prepared(
         pinned = pins(keypoints, edits, camera, prior)
     names = motion.output_names(prior, keypoints, request.all_markers)
     segments = motion.segments_of(prior, keypoints)
-    # matrices are too small for several threads to gain
+    # matrices are too small to gain from several threads
     with one_thread(), progress("segments", segments, quiet) as update, _naming(path):
         lifted = motion.lift(prior, keypoints, view, options, names, update, pinned)
     if request.calibration is not None:
@@ -266,7 +266,7 @@ def lift_prepared(
 
 
 def _check(path: str, keypoints: Keypoints, sd: float, warn: Warn) -> None:
-    """Refuse keypoints, whose noise is `sd`, that are no motion; warn about what looks wrong."""
+    """Raise UserError unless keypoints, with noise `sd`, show a motion; warn about what looks wrong."""
     keypoints.require_motion(path)
     keypoints.require_extent(path, sd)
     if found := keypoints_file.shared_place(keypoints.uv):
@@ -287,7 +287,7 @@ def _check(path: str, keypoints: Keypoints, sd: float, warn: Warn) -> None:
 def measured_noise(keypoints: Keypoints, warn: Warn) -> float:
     """Measure the standard deviation at full confidence: the points' jitter, if it is more than usual.
 
-    Spikes are no jitter: among many, others would pass for correct points.
+    Spikes are excluded; with a larger noise, others among them would pass as correct points.
     """
     usual = Options.pixel_sd
     shake = noise.shake(noise.without_spikes(keypoints, usual)[0])
@@ -301,7 +301,7 @@ def measured_noise(keypoints: Keypoints, warn: Warn) -> float:
 
 
 def _view(keypoints: Keypoints, request: Request, warn: Warn) -> View:
-    """View of the keypoints; warn if they cannot be of the camera's picture."""
+    """Make the view of the keypoints; warn if they cannot be from the camera's picture."""
     if request.calibration is not None:
         return Perspective(request.calibration.camera)
     if request.camera:
@@ -315,7 +315,7 @@ def _view(keypoints: Keypoints, request: Request, warn: Warn) -> View:
                 f"{request.camera} the calibration for this video?"
             )
         return Perspective(camera)
-    middle = np.nanmedian(keypoints.uv, axis=(0, 1))  # outliers do not move it
+    middle = np.nanmedian(keypoints.uv, axis=(0, 1))  # robust to outliers
     return Parallel(looking_along(request.axis or "y"), request.metres, middle, steady=bool(request.axis))
 
 
@@ -329,7 +329,7 @@ def _without_swaps(
     quiet: bool,
     hint: bool,
 ) -> tuple[Keypoints, dict[str, Any]]:
-    """Undo swaps of left and right, name them, and give their figures for ``--json``."""
+    """Undo swaps of left and right, and report them; also return their figures for ``--json``."""
     with _naming(path):
         motion.require(prior, keypoints, view, options)
     with one_thread(), progress("sides", len(keypoints.time), quiet) as update:
@@ -350,7 +350,7 @@ def _without_swaps(
 
 
 def _named_swaps(swapped: list[swaps.Swapped]) -> str:
-    """Name intervals of frames, the longest first, and what was swapped in them."""
+    """List intervals of frames, longest first, and the joints that were swapped in them."""
     joints: dict[tuple[int, int], list[str]] = {}
     for each in swapped:
         for span in each.spans:
@@ -364,7 +364,7 @@ def _named_swaps(swapped: list[swaps.Swapped]) -> str:
 def _without_spikes(
     keypoints: Keypoints, sd: float, warn: Warn, hint: bool
 ) -> tuple[Keypoints, dict[str, Any]]:
-    """Leave out spikes, name them, and give their figures for ``--json``."""
+    """Remove spikes, and report them; also return their figures for ``--json``."""
     keypoints, spikes = noise.without_spikes(keypoints, sd)
     if spikes:
         named = ", ".join(f"{name} in frame {frame}" for frame, name in spikes[:MOST_NAMED])
@@ -379,7 +379,7 @@ def _without_spikes(
 
 @contextmanager
 def _naming(path: str) -> Iterator[None]:
-    """Name a file in errors."""
+    """Add the name of a file to errors within the block."""
     try:
         yield
     except UserError as error:
@@ -387,7 +387,7 @@ def _naming(path: str) -> Iterator[None]:
 
 
 def require_person(path: str, lifted: Lifted, request: Request) -> None:
-    """Refuse an estimate that cannot be a person; the error names `path`."""
+    """Raise UserError, naming `path`, for an estimate that cannot be a person."""
     found = lifted.motion
     if not np.isfinite(found.error).any():
         raise UserError(f"{path}: the estimate is behind the camera; check the camera and the names")
@@ -398,12 +398,12 @@ def require_person(path: str, lifted: Lifted, request: Request) -> None:
 
 
 def warnings_of(lifted: Lifted, prior_stature: float) -> list[str]:
-    """Reasons why a result may be wrong, a line each.
+    """List reasons why a result may be wrong, one line each.
 
     Parameters
     ----------
     prior_stature : float
-        Of the people learnt from, metres.
+        Mean stature of the training subjects, metres.
     """
     found, keypoints, options = lifted.motion, lifted.keypoints, lifted.options
     camera = not isinstance(lifted.view, Parallel)
@@ -411,7 +411,7 @@ def warnings_of(lifted: Lifted, prior_stature: float) -> list[str]:
     outliers, shake = _named_outliers(found, keypoints.names), noise.shake(keypoints)
     lost = _share_lost(found, keypoints, int(lifted.repairs["spikes"]))
     believed, sd = motion.believed_stature(options, prior_stature)
-    off = abs(found.stature - believed) / sd if found.steps else 0.0  # segments alone do not estimate it
+    off = abs(found.stature - believed) / sd if found.steps else 0.0  # single segments do not
     lens = "the camera's focal length" if camera else "--metres-per-unit"
     reasons = {
         "hips and ankles, which determine the distance, are hardly visible: the person may be metres "
@@ -436,13 +436,13 @@ def warnings_of(lifted: Lifted, prior_stature: float) -> list[str]:
 
 
 def _share_lost(found: Motion, keypoints: Keypoints, spikes: int) -> float:
-    """Share of the points that were left out or down-weighted."""
+    """Share of the points that were removed or down-weighted."""
     outliers = 0 if found.outliers is None else int(found.outliers.sum())
     return (spikes + outliers) / max(int(keypoints.visible.sum()) + spikes, 1)
 
 
 def _named_outliers(found: Motion, names: tuple[str, ...]) -> str:
-    """Points that were often outliers, and in how many frames."""
+    """List points that were often outliers, and in how many frames."""
     if found.outliers is None:
         return ""
     counts = zip(names, found.outliers.sum(axis=0).tolist(), strict=True)

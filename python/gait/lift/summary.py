@@ -9,7 +9,7 @@ import numpy as np
 from gait.lift.run import Lifted
 from gait.lift.segment.explain import Uncertain
 
-MOVED = 3  # joints that a displacement moves most
+MOVED = 3  # joints listed for a displacement, those that it moves most
 
 
 def summary(lifted: Lifted) -> dict[str, Any]:
@@ -22,7 +22,7 @@ def summary(lifted: Lifted) -> dict[str, Any]:
         "visible_share": float(keypoints.visible.mean()),
         "reprojection_px": float(np.nanmedian(found.error)),
         "sd_mm": 1000 * float(np.median(found.sd)),
-        "stature_m": found.stature if found.steps else None,  # not estimated by segments alone
+        "stature_m": found.stature if found.steps else None,  # methods of single segments do not estimate it
         "iterations": found.steps,
         "settled": found.settled,
         "log10_volume_ratio": found.log_volume_ratio,
@@ -38,7 +38,7 @@ def summary(lifted: Lifted) -> dict[str, Any]:
 
 
 def least_certain(left: Uncertain, names: tuple[str, ...]) -> dict[str, Any]:
-    """Medians over single segments: volume, the least certain displacements and what they move most."""
+    """Return medians over single segments: volume, least certain displacements, joints these move most."""
     most = np.argsort(-left.shares, axis=1, kind="stable")[:, :MOVED]
     figures = {
         "sd_mm": (1000 * left.sd).tolist(),

@@ -1,1 +1,1 @@
-"""2-D keypoints before lifting: noise, spikes, swaps of left and right, changes of person."""
+"""Prepare 2-D keypoints for lifting: noise, spikes, swaps of left and right, changes of person."""

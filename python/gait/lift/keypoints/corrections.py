@@ -1,16 +1,17 @@
 """Corrections by hand, and their effect on keypoints.
 
-The file (JSON), in which every list may be absent::
+The file (JSON), in which every list is optional::
 
     {"corrections": [{"frame": 70, "joint": "l_knee", "uv": [1285.5, 812.0], "sd_px": 5}],
      "hidden": [{"first": 80, "last": 95, "joint": "r_ankle"}],
      "swapped": [{"first": 40, "last": 52}],
      "floor": [{"frame": 60, "joint": "l_heel", "uv": [1190.0, 940.0]}]}
 
-``corrections`` pull a joint (or another marker of the prior) to a pixel; ``sd_px`` is how exactly it was
-pointed at.  ``hidden`` joints are not visible, whatever the detector found.  ``swapped`` swaps left and right
-of all joints.  ``floor`` puts a foot on the floor of a calibrated camera, where the pixel shows it.
-``corrections`` serve the pictures of a video as well (`gait.lift.video`), the others keypoints alone.
+``corrections`` pull a joint (or another marker of the prior) to a pixel; ``sd_px`` is the standard deviation
+of the click.  ``hidden`` joints are not visible, whatever the detector found.  ``swapped`` swaps left and
+right of all joints.  ``floor`` puts a foot on the floor of a calibrated camera, where the pixel shows it.
+``corrections`` also work when a video's images are lifted (`gait.lift.video`), the others only with
+keypoints.
 """
 
 from __future__ import annotations
@@ -33,9 +34,9 @@ from gait.io.keypoints_file import FURTHEST, Keypoints
 Floats = npt.NDArray[np.float64]
 Size = tuple[int, int]
 
-_LARGEST = MAX_PIXELS, MAX_PIXELS  # picture that a camera may have
-CLICK_SD = 4.0  # pixels, unless the correction gives it
-ERRS_FOR = 0.25  # seconds in which the correlation of a detector's error with itself falls to 1/e
+_LARGEST = MAX_PIXELS, MAX_PIXELS  # largest picture of a camera
+CLICK_SD = 4.0  # pixels, unless the correction states it
+ERRS_FOR = 0.25  # seconds in which the autocorrelation of a detector's error falls to 1/e
 FLOOR_SD = 0.02  # metres, of a foot that stands at a point of the floor
 FEET = ("toe", "heel", "ankle")
 
@@ -47,7 +48,7 @@ class Correction:
     Attributes
     ----------
     frame : int
-        Of the video, from 0.
+        Frame of the video, from 0.
     joint : str
     uv : (float, float)
         Pixels.
@@ -80,7 +81,7 @@ class Swap:
 
 @dataclass(frozen=True)
 class FloorPin:
-    """A foot that stands in a frame where pixel `uv` shows the floor."""
+    """A foot that, in one frame, stands on the floor at pixel `uv`."""
 
     frame: int
     joint: str
@@ -98,13 +99,13 @@ class Edits:
     floor: tuple[FloorPin, ...] = ()
 
     def as_json(self) -> dict[str, list[dict[str, Any]]]:
-        """Contents of the file, without empty lists but that of corrections."""
+        """Make the contents of the file; of empty lists, only that of corrections is kept."""
         lists = {key: [_plain(asdict(each)) for each in getattr(self, key)] for key in _LISTS}
         return {key: entries for key, entries in lists.items() if entries or key == "corrections"}
 
 
 def as_json(corrections: Sequence[Correction]) -> dict[str, list[dict[str, Any]]]:
-    """Contents of a file of corrections alone."""
+    """Make the contents of a file that has only corrections."""
     return Edits(tuple(corrections)).as_json()
 
 
@@ -113,9 +114,9 @@ def _plain(entry: dict[str, Any]) -> dict[str, Any]:
 
 
 class EntryReader:
-    """Entries of a file, and of the requests that become such: only what can be read is ever saved.
+    """Reads and checks entries of a file, and of requests, which are saved to one only if they are valid.
 
-    Frames are those that exist, joints those of the prior, pixels near the picture.
+    Frames must exist, joints must be in the prior, and pixels must be near the picture.
     """
 
     def __init__(self, prior: SegmentPrior, frames: range, size: Size) -> None:
@@ -153,7 +154,7 @@ class EntryReader:
         return first, last
 
     def frame(self, fields: Fields, key: str) -> int:
-        """Give the number of a frame under a key."""
+        """Read the number of a frame under a key."""
         frames = self._frames
         remedy = f"give a frame in the range used, {frames[0]} to {frames[-1]}, or other --start and --stop"
         return fields.integer(key, frames[0], frames[-1], remedy)
@@ -165,7 +166,7 @@ class EntryReader:
         return str(joint)
 
     def pixel(self, fields: Fields, key: str) -> tuple[float, float]:
-        """Column and row under a key."""
+        """Read column and row under a key."""
         size = self._size
         u, v = fields.array(key, (2,), "give column and row, pixels")
         if any(not -n <= x <= 2 * n for x, n in zip((u, v), size, strict=True)):
@@ -193,9 +194,9 @@ Entry = TypeVar("Entry", Correction, FloorPin)
 def read_edits(
     path: str | os.PathLike[str], prior: SegmentPrior, frames: range, size: Size = _LARGEST
 ) -> Edits:
-    """Read a corrections file: of some frames, each joint of one pulled or pinned at most once.
+    """Read a corrections file for some frames; in each, a joint may be pulled or pinned only once.
 
-    Joints may lie outside the picture of `size` (width, height), but not further than it is large.
+    Joints may be outside the picture of `size` (width, height), but at most by its size.
 
     Raises
     ------
@@ -230,7 +231,7 @@ def _called(key: str) -> str:
 
 
 def _require_single(path: str | os.PathLike[str], what: str, does: str, entries: Sequence[Entry]) -> None:
-    """Refuse a second entry of a joint and frame."""
+    """Raise UserError for a second entry for the same joint and frame."""
     first: dict[tuple[int, str], int] = {}
     for number, entry in enumerate(entries, 1):
         twin = first.setdefault((entry.frame, entry.joint), number)
@@ -242,9 +243,9 @@ def _require_single(path: str | os.PathLike[str], what: str, does: str, entries:
 def read_corrections(
     path: str | os.PathLike[str], prior: SegmentPrior, stop: int, first: int = 0, size: Size = _LARGEST
 ) -> list[Correction]:
-    """Read a file that has nothing but corrections, as the pictures of a video take them.
+    """Read a file that may contain only corrections, as for lifting a video's images.
 
-    Frames from `first` to before `stop`; errors are those of `read_edits`.
+    Frames must be in `first` <= frame < `stop`; errors are those of `read_edits`.
     """
     edits = read_edits(path, prior, range(first, stop), size)
     other = next((key for key in _LISTS if key != "corrections" and getattr(edits, key)), None)
@@ -254,10 +255,11 @@ def read_corrections(
 
 
 def corrected(keypoints: Keypoints, edits: Edits, sd: float) -> Keypoints:
-    """Keypoints with what was corrected by hand.
+    """Apply corrections by hand to keypoints.
 
-    A correction shows how wrong the detector was there.  Detectors err for a while, and about a foot as a
-    whole: points around it get the variance of that error, less as time goes by.
+    A correction shows the detector's error at that joint and time.  Such errors last for a while, and concern
+    a foot as a whole, so the variance of neighbouring points is increased by that of the error, less with
+    time.
 
     Parameters
     ----------
@@ -291,7 +293,7 @@ def corrected(keypoints: Keypoints, edits: Edits, sd: float) -> Keypoints:
             for other in found_alike(found.names, c.joint):
                 errs[:, other] = np.maximum(errs[:, other], wrong * np.exp(-2 * since / ERRS_FOR))
         by_hand[row, column] = c.sd_px
-    for c in edits.corrections:  # all errors are known before the points move
+    for c in edits.corrections:  # all errors, before any point is moved
         row, column = rows_of[c.frame], found.names.index(c.joint)
         uv[row, column], confidence[row, column] = c.uv, 1.0
     own = np.zeros(errs.shape) if found.sd is None else np.nan_to_num(found.sd)
@@ -307,7 +309,7 @@ def corrected(keypoints: Keypoints, edits: Edits, sd: float) -> Keypoints:
 
 
 def found_alike(names: Sequence[str], joint: str) -> list[int]:
-    """Columns of points that a detector finds together: a joint alone, or all of its foot."""
+    """List the columns of points with the same errors as a joint: itself, or all points of its foot."""
     if not joint.endswith(FEET):
         return [names.index(joint)]
     return [k for k, name in enumerate(names) if name[:2] == joint[:2] and name.endswith(FEET)]
@@ -318,13 +320,13 @@ def _rows(keypoints: Keypoints, first: int, last: int) -> npt.NDArray[np.intp]:
 
 
 def _pairs(names: Sequence[str]) -> list[tuple[int, int]]:
-    """Columns of left and right points."""
+    """List the columns of left and right points."""
     both = [n for n in names if n.startswith("l_") and f"r_{n[2:]}" in names]
     return [(names.index(n), names.index(f"r_{n[2:]}")) for n in both]
 
 
 def _with_points(keypoints: Keypoints, joints: Sequence[str]) -> Keypoints:
-    """Keypoints with empty columns of joints that they lack."""
+    """Add empty columns for joints that the keypoints lack."""
     new = [joint for joint in dict.fromkeys(joints) if joint not in keypoints.names]
     if not new:
         return keypoints
@@ -356,7 +358,7 @@ class Pins:
         Frames, as rows of the keypoints.
     joint : tuple of str
     place, sd : (n, 3)
-        Where the foot stands in the world and how well that is known, metres.
+        Position of the foot in the world, and its standard deviations, metres.
     """
 
     row: npt.NDArray[np.intp]
@@ -366,7 +368,7 @@ class Pins:
 
 
 def pins(keypoints: Keypoints, edits: Edits, camera: Camera | None, prior: SegmentPrior) -> Pins | None:
-    """Where pinned feet stand; None without any.
+    """Find the positions of pinned feet in the world; None if there are none.
 
     Raises
     ------

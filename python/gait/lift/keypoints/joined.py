@@ -1,4 +1,4 @@
-"""Keypoints of one person in the films of several cameras as points of one table."""
+"""Join the keypoints of one person in several cameras' films in one table."""
 
 from __future__ import annotations
 
@@ -13,24 +13,24 @@ from gait.io.keypoints_file import Keypoints
 
 Array = NDArray[np.float64]
 
-_GAP = 0.15  # seconds between frames from which points between them are not known
+_GAP = 0.15  # seconds; points are not interpolated across longer gaps
 
 
 def joined(views: Sequence[Keypoints], offsets: Sequence[float]) -> tuple[Keypoints, NDArray[np.intp]]:
-    """Bring the points of several films to the frames of the first.
+    """Interpolate the points of several films at the frames of the first.
 
     Parameters
     ----------
     views : sequence of Keypoints
-        Of each camera.
+        Keypoints of each camera.
     offsets : sequence of float
-        When each film but the first began, seconds after the first.
+        Start of each film but the first, seconds after the first.
 
     Returns
     -------
     keypoints : Keypoints
-        The points of the first camera, of the second and so on; names repeat.  Between two frames of their
-        own film points lie on the line.
+        The points of the first camera, then of the second and so on, so that names repeat.  Points are
+        interpolated linearly between frames of their own film.
     camera : (P,)
         Number of each point's camera.
     """
@@ -66,7 +66,7 @@ def _stacked(columns: Sequence[Array | None], views: Sequence[Keypoints]) -> Arr
 
 
 def _at(keypoints: Keypoints, times: Array) -> Keypoints:
-    """Keypoints at other times (T,), seconds of their film."""
+    """Interpolate keypoints at other times (T,), seconds of their film."""
     after = np.searchsorted(keypoints.time, times).clip(1, len(keypoints.time) - 1)
     begin, end = keypoints.time[after - 1], keypoints.time[after]
     share = (times - begin) / (end - begin)

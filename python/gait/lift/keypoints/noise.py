@@ -1,6 +1,6 @@
-"""Noise of 2-D keypoints: spikes that last a frame or two, and jitter.
+"""Noise of 2-D keypoints: spikes that last a frame or two, jitter, and switches to another person.
 
-Where 2-D keypoints change from one person to another: most points jump alike from one frame to the next.
+At a switch, most points jump in the same way from one frame to the next.
 """
 
 from __future__ import annotations
@@ -16,21 +16,22 @@ from gait.io.keypoints_file import Keypoints
 Array = NDArray[np.float64]
 
 SPREAD = 1.4826  # median absolute deviation to standard deviation, normal noise
-QUICK = 0.051  # seconds from frame to frame (20 a second): with longer steps motion looks like noise
+QUICK = 0.051  # seconds from frame to frame (20 per second); with longer steps motion looks like noise
 
 
 def without_spikes(keypoints: Keypoints, sd: float) -> tuple[Keypoints, list[tuple[int, str]]]:
-    """Take out points that lie far off the line between the same point's neighbours in time.
+    """Remove points that are far from the line through the same point in neighbouring frames.
 
-    The measure of a point is the larger of the noise `sd` (pixels) and the median of its own distances from
-    that line, which holds its acceleration.  The furthest goes first, because it bends its neighbours' lines.
+    Distances are relative to the larger of the noise `sd` (pixels) and the median of the point's own
+    distances, which contains its acceleration.  The furthest point is removed first, since it bends its
+    neighbours' lines.
 
     Returns
     -------
     keypoints : Keypoints
-        With these points not seen.
+        Without the removed points.
     jumps : list of (frame, name)
-        In the order of time.
+        The removed points, in order of time.
     """
     kept = remove_spikes(keypoints.time, keypoints.uv, np.full(keypoints.uv.shape[:2], sd))
     spikes = keypoints.visible & (kept < 0)
@@ -39,9 +40,10 @@ def without_spikes(keypoints: Keypoints, sd: float) -> tuple[Keypoints, list[tup
 
 
 def shake(keypoints: Keypoints) -> float:
-    """Noise at full confidence that no motion explains, pixels; NaN where too few frames follow soon.
+    """Measure the noise at full confidence that no motion explains, pixels; NaN if too few frames are close.
 
-    By third differences: white noise's are sqrt(20) times as large, and a walk's at `QUICK` a pixel.
+    Uses third differences: those of white noise are sqrt(20) times the noise, those of a walk, at `QUICK`, a
+    pixel.
     """
     third = np.abs(np.diff(keypoints.uv, 3, axis=0))
     observed = third[np.isfinite(third)]
@@ -52,14 +54,14 @@ def shake(keypoints: Keypoints) -> float:
     )
 
 
-FEWEST = 4  # points seen before and after
-FAR = 0.25  # of the person's extent in the picture: no person moves so much more than in the frames around
+FEWEST = 4  # fewest points seen in both frames
+FAR = 0.25  # of the person's extent in the picture; no person moves this much more than in the frames around
 AROUND = 5  # frames before and after that show how the points move
-SOON = 2.0  # times the usual step of time: later, a person may be anywhere
+SOON = 2.0  # times the usual frame time; after a longer step a person may be anywhere
 
 
 def person_changes(keypoints: Keypoints) -> list[tuple[int, int | None]]:
-    """Find intervals on another person: first and last frame; None where the track stays there."""
+    """Find intervals with another person: first and last frame, or None if the keypoints stay there."""
     if len(keypoints.time) < 2:
         return []
     changes = np.flatnonzero(_changes(keypoints)).tolist()
@@ -69,7 +71,7 @@ def person_changes(keypoints: Keypoints) -> list[tuple[int, int | None]]:
 
 
 def _changes(keypoints: Keypoints) -> NDArray[np.bool_]:
-    """Whether most points jump alike after each frame but the last, (T - 1,)."""
+    """Whether most points jump in the same way after each frame but the last, (T - 1,)."""
     moves, step = np.diff(keypoints.uv, axis=0), np.diff(keypoints.time)
     excess = moves - _around(moves)
     jumped = np.zeros(len(moves), bool)
@@ -86,7 +88,7 @@ def _changes(keypoints: Keypoints) -> NDArray[np.bool_]:
 
 
 def _around(moves: Array) -> Array:
-    """Median of each point's moves (T, J, 2) in the frames around; its own where there are no others."""
+    """Median of each point's moves (T, J, 2) in the frames around, or its own move if there are none."""
     padded = np.pad(moves, ((AROUND, AROUND), (0, 0), (0, 0)), constant_values=np.nan)
     windows = np.lib.stride_tricks.sliding_window_view(padded, 2 * AROUND + 1, axis=0)
     known = np.where(np.isfinite(windows), windows, np.inf)

@@ -1,7 +1,7 @@
-"""Suggested corrections: each is the one that makes all joints most certain in the picture.
+"""Suggest corrections that would reduce the uncertainty of all joints in the picture most.
 
-Greedy: the correction that is expected to take most from the total variance of all joints is taken, as if it
-were made, and so on.  What is close in time and of the same joint is not suggested again.
+Greedy search: choose the correction that is expected to reduce the total variance of all joints most, assume
+that it has been made, and repeat.  The same joint is not suggested again within a short time.
 """
 
 from __future__ import annotations
@@ -28,22 +28,22 @@ class Suggestion:
 
 @dataclass
 class FramePosterior:
-    """Frames that one Gaussian describes.
+    """Frames whose posterior is one Gaussian.
 
     Attributes
     ----------
     frame : (T,)
-        Numbers in the video.
+        Frame numbers in the video.
     slope : (T, J, 2, n)
-        Of the joints' pixels by the numbers that the Gaussian is over.
+        Derivatives of the joints' pixels by the Gaussian's n variables.
     covariance : (n, n)
-        Of those numbers.
+        Covariance of these variables.
     missed : (T, J) or None
-        How far each joint is from where it was detected, pixels: more that it may be off.
+        Distance of each joint from its detection, pixels, which adds to its uncertainty.
     missed_around : (T, J) or None
-        What a correction also takes from what was missed around it, square pixels, summed over frames.
+        By how much a correction also reduces such distances around it, square pixels, summed over frames.
     lasts : float
-        Frames for which a correction of one of these helps.
+        Number of frames in which a correction of one of them helps.
     """
 
     frame: npt.NDArray[np.intp]
@@ -64,14 +64,14 @@ class FramePosterior:
         square = np.maximum((half * self.slope).sum(axis=(2, 3)), 0)
         if self.missed is not None:
             square = square + self.missed**2
-        self.off = np.where(self._open, np.sqrt(square), 0.0)  #: (T, J) pixels, both axes together
+        self.off = np.where(self._open, np.sqrt(square), 0.0)  #: (T, J) pixels, over both axes
         inner = half @ self.slope.swapaxes(2, 3) + CLICK_SD**2 * np.eye(2)
         reach = half @ self._total @ half.swapaxes(2, 3)
         gain = self.lasts * np.trace(np.linalg.solve(inner, reach), axis1=2, axis2=3)
         self.gain = gain if self.missed_around is None else gain + self.missed_around  #: (T, J) square pixels
 
     def correct(self, row: int, joint: int, sd: float) -> None:
-        """Take a correction of a frame and joint into the covariance."""
+        """Update the covariance as if a joint had been corrected in a frame."""
         slope = self.slope[row, joint]
         across = self.covariance @ slope.T
         inner = slope @ across + sd**2 * np.eye(2)
@@ -79,7 +79,7 @@ class FramePosterior:
         self._measure()
 
     def close(self, frame: int, joint: int, alike: Sequence[int], near: float) -> None:
-        """Suggest a joint no more within `near` frames; what joints found `alike` missed there is known."""
+        """Suggest a joint no more within `near` frames; there, errors of joints `alike` are then known."""
         rows = np.abs(self.frame - frame) < near
         if rows.any():
             self._open[rows, joint] = False
@@ -90,7 +90,7 @@ class FramePosterior:
             self._measure()
 
     def best(self, enough: float) -> tuple[float, int, int]:
-        """Gain, row and joint of the best correction of a joint that is further off than `enough`."""
+        """Find gain, row and joint of the best correction, of a joint more uncertain than `enough`."""
         gain = np.where(self.off > enough, self.gain, 0.0)
         row, joint = (int(at) for at in np.unravel_index(int(gain.argmax()), gain.shape))
         return float(gain[row, joint]), row, joint
@@ -99,20 +99,20 @@ class FramePosterior:
 def suggest(
     posteriors: Sequence[FramePosterior], joints: Sequence[str], near: float, enough: float, most: int
 ) -> list[Suggestion]:
-    """Corrections, most useful first, until every joint is known in the picture.
+    """Suggest corrections, most useful first, until every joint is known in the picture.
 
     Parameters
     ----------
     posteriors : sequence of FramePosterior
         They are changed.
     joints : sequence of str
-        The J joints.
+        Names of the J joints.
     near : float
-        Frames from a correction of a joint within which another of it would add little.
+        Frames around a correction of a joint in which another one of it would add little.
     enough : float
-        Pixels within which a joint counts as known.
+        Standard deviation, pixels, below which a joint counts as known.
     most : int
-        Corrections to give at most.
+        Most corrections to suggest.
     """
     asked: list[Suggestion] = []
     while posteriors and len(asked) < most:

@@ -1,15 +1,14 @@
-"""Left and right points that may have been swapped, from their motion between frames.
+"""Find left and right points that a detector swapped for some frames, and put them back.
 
-A detector that takes one leg for the other swaps two points.  Their difference then changes its sign
-at once, where that of a body goes on as it did.  For every pair the signs are sought that let it go on best:
-the Viterbi algorithm over frames, with a Kalman filter of constant velocity along each of two survivors.
-Pairs are examined again with the results of the others, because detectors swap limbs rather than joints.
+A detector that mistakes one leg for the other swaps two points.  Their difference then suddenly changes its
+sign, while that of a body continues smoothly.  `suspected` finds for every pair the signs with the smoothest
+motion, by the Viterbi algorithm over frames, with a Kalman filter of constant velocity for each of the two
+survivors.  Pairs are examined again with the results of the others, since detectors swap limbs rather than
+joints.
 
-Left and right in 2-D keypoints: points that a detector swapped for some frames, put back.
-
-How points go on from frame to frame proposes where (`gait.lift.flips`); outliers and quick steps look
-like swaps too.  The motion decides: every interval is lifted with its surroundings, swapped and as it
-is, and limb by limb, and what fits clearly better is taken.
+Outliers and quick steps look like swaps too, so in `undo_swaps` the motion decides: every interval is lifted
+with its surroundings, as it is, swapped, and with single limbs swapped, and the best is kept if it is clearly
+better.
 """
 
 from __future__ import annotations
@@ -29,20 +28,20 @@ Ints = npt.NDArray[np.intp]
 Flags = npt.NDArray[np.bool_]
 
 LONGEST = 0.3  # seconds without a pair after which its continuation is unknown
-CAP = 20.0  # largest -log density of an observation under a sign: it may be an outlier
-RARE = 9.0  # -log probability that an swap begins or ends from one observation to the next,
-OFTEN = 1.0  # where another pair's does,
-STAY = 0.4  # and that a observation is not as the other pairs'
-ROUNDS = 3  # in which pairs hear of one another
-HALF = float(np.sqrt(2 * np.log(2)))  # half of normal noise in a plane is longer, standard deviations
-STEADY = 0.02  # variance of the acceleration's share in a second difference, of its noise, at the least
-UNKNOWN = 1e6  # variance over that of a observation where nothing is known
-SIGNS = np.array([1.0, -1.0])  # of a difference as it is seen: left and right as they are, swapped
+CAP = 20.0  # largest -log density of an observation, which may be an outlier
+RARE = 9.0  # -log probability that a swap begins or ends between two observations,
+OFTEN = 1.0  # the same where another pair's does,
+STAY = 0.4  # and -log probability that an observation differs from the other pairs'
+ROUNDS = 3  # passes, in each of which pairs use the others' results
+HALF = float(np.sqrt(2 * np.log(2)))  # median length of normal noise in a plane, standard deviations
+STEADY = 0.02  # least variance of the acceleration in second differences, relative to that of the noise
+UNKNOWN = 1e6  # variance, relative to an observation's, where nothing is known
+SIGNS = np.array([1.0, -1.0])  # of an observed difference: as it is, swapped
 OTHER = 1.0 - np.eye(2)
 
 
 def suspected(keypoints: Keypoints, pairs: Ints, sd: float) -> Flags:
-    """In which frames pairs seem swapped (T, P), against most; frames without a pair go with those before.
+    """Find frames (T, P) in which pairs seem swapped, unlike in most; frames without a pair follow the last.
 
     Parameters
     ----------
@@ -65,9 +64,9 @@ class _Pairs:
     time : (T,)
     visible : (T, P)
     apart : (T, P, 2)
-        Left less right, pixels; 0 where not seen.
+        Left minus right, pixels; 0 where not seen.
     variance : (T, P)
-        Of its noise along an axis.
+        Variance of its noise along an axis.
     acceleration : (P,)
         Variance of its acceleration along an axis, (pixels / s^2)^2.
     """
@@ -80,7 +79,7 @@ class _Pairs:
 
     @classmethod
     def of(cls, keypoints: Keypoints, pairs: Ints, observed: Flags, sd: float) -> _Pairs:
-        """Take pairs (P, 2) of columns out of keypoints."""
+        """Extract pairs (P, 2) of columns from keypoints."""
         apart = np.where(
             observed[..., None], keypoints.uv[:, pairs[:, 0]] - keypoints.uv[:, pairs[:, 1]], 0.0
         )
@@ -93,7 +92,7 @@ class _Pairs:
 
 
 def _acceleration(time: Floats, apart: Floats, variance: Floats) -> float:
-    """Variance of the acceleration, by how far n observations lie off the line between their neighbours."""
+    """Estimate the variance of the acceleration from distances of observations to their neighbours' line."""
     if len(time) < 3:
         return 0.0
     step = np.diff(time)
@@ -105,7 +104,7 @@ def _acceleration(time: Floats, apart: Floats, variance: Floats) -> float:
 
 
 def _most_probable(pairs: _Pairs) -> Flags:
-    """Which pairs are swapped in which frames (T, P)."""
+    """Find the most probable frames (T, P) in which pairs are swapped."""
     wrong = _course(pairs, np.zeros(pairs.visible.shape, bool), np.zeros(pairs.visible.shape))
     for _ in range(ROUNDS):
         flips = _flips(wrong, pairs.visible)
@@ -117,7 +116,7 @@ def _most_probable(pairs: _Pairs) -> Flags:
 
 
 def _flips(wrong: Flags, observed: Flags) -> Flags:
-    """From the observation before until which frames (T, P) an swap may have begun or ended."""
+    """Mark the frames (T, P) in which a swap may have begun or ended, since the observation before."""
     found = np.zeros(observed.shape, bool)
     for k, rows in enumerate(observed.T):
         at = np.flatnonzero(rows)
@@ -127,7 +126,7 @@ def _flips(wrong: Flags, observed: Flags) -> Flags:
 
 
 def _course(pairs: _Pairs, easy: Flags, others: Floats) -> Flags:
-    """Most probable states (T, P): as the share of `others`, and changing easily where `easy`."""
+    """Find the most probable states (T, P), preferring those of `others`, with cheap changes where `easy`."""
     count, size = pairs.visible.shape
     filters = _Filters(pairs)
     total = np.tile([0.0, STAY], (size, 1))
@@ -153,7 +152,7 @@ def _course(pairs: _Pairs, easy: Flags, others: Floats) -> Flags:
 
 
 class _Filters:
-    """Kalman filters of P pairs under two survivors, of the same covariance: not swapped now, swapped."""
+    """Kalman filters of P pairs for two survivors, not swapped now and swapped, with the same covariance."""
 
     def __init__(self, pairs: _Pairs) -> None:
         size = pairs.visible.shape[1]
@@ -163,7 +162,7 @@ class _Filters:
         self._p = self._c = self._v = np.zeros(size)
 
     def predict(self, t: int) -> tuple[Floats, Floats]:
-        """Predict a frame: errors of its observations (P, before, now, 2), and squared in variances."""
+        """Predict a frame; return errors of observations (P, before, now, 2), and squares in variances."""
         dt = self._pairs.time[t] - self._last
         known, noise = dt <= LONGEST, self._pairs.variance[t]
         dt = np.where(known, dt, 0.0)
@@ -178,11 +177,11 @@ class _Filters:
         return off, (off**2).sum(axis=3) / (self._moved[0] + noise)[:, None, None]
 
     def learn(self, t: int, before: npt.NDArray[np.intp], off: Floats, square: Floats) -> None:
-        """Go on with what was seen, from the survivor `before` each of the two (P, 2)."""
+        """Update the two survivors with the observation, each from its predecessor `before` (P, 2)."""
         observed, noise = self._pairs.visible[t], self._pairs.variance[t]
         p, c, v = self._moved
         pick = (self._every[:, None], before, np.arange(2))
-        trusted = (square[pick] < 2 * CAP)[..., None]  # others are outliers under this survivor
+        trusted = (square[pick] < 2 * CAP)[..., None]  # others are outliers for this survivor
         gain, quick = ((x / (p + noise))[:, None, None] * trusted for x in (p, c))
         place = self._predicted[pick[:2]] + gain * off[pick]
         velocity = self._velocity[pick[:2]] + quick * off[pick]
@@ -195,25 +194,25 @@ class _Filters:
         self._last = np.where(observed, self._pairs.time[t], self._last)
 
 
-SLOWEST = 0.11  # seconds from frame to frame: with longer steps strides are steps of the other leg
-MOST = 1 / 3  # of a pair's frames: of more it is open which are right
-AROUND = 1.0  # seconds before and after an interval in which its readings are compared
-NEAR = 0.5  # seconds between intervals that are judged as one
+SLOWEST = 0.11  # seconds from frame to frame; with longer steps a step looks like a swap
+MOST = 1 / 3  # of a pair's frames; if more are swapped, it is unknown which are right
+AROUND = 1.0  # seconds before and after an interval that are lifted with it
+NEAR = 0.5  # seconds between intervals that are judged together
 LIMBS = (("hip", "knee", "ankle", "heel", "toe"), ("shoulder", "elbow", "wrist", "hand"))
-CLEAR = 9.0  # log-evidence that an swap must gain, each pair
+CLEAR = 9.0  # log evidence that a swap must gain for each pair
 
 
 class Reading(NamedTuple):
-    """Keypoints as a model of motion reads them.
+    """Result of fitting a model of motion to keypoints.
 
     Attributes
     ----------
     density : float
-        Logarithm, but for a constant.
+        Log density of the keypoints, up to a constant.
     predicted : (T, P, 2)
-        Where the motion has the points, pixels.
+        Predicted points, pixels.
     motion : object
-        For the model to begin with from.
+        Motion from which the model can start for similar keypoints.
     """
 
     density: float
@@ -221,7 +220,7 @@ class Reading(NamedTuple):
     motion: Any = None
 
 
-#: Read keypoints, from scratch or beginning with the motion of a reading that is nearly the same.
+#: Fits a model of motion to keypoints, from scratch or from the motion of a reading of similar keypoints.
 Evidence = Callable[[Keypoints, Reading | None], Reading]
 
 
@@ -232,7 +231,7 @@ class Swapped:
     Attributes
     ----------
     joint : str
-        Without its side.
+        Name without its side.
     spans : list of (int, int)
         First and last frame of each interval.
     """
@@ -242,14 +241,14 @@ class Swapped:
 
 
 def undo_swaps(keypoints: Keypoints, sd: float, evidence: Evidence) -> tuple[Keypoints, list[Swapped]]:
-    """Put left and right points back where they were swapped in few frames; most are taken to be right.
+    """Undo swaps of left and right points in a few frames, assuming that most frames are right.
 
     Parameters
     ----------
     sd : float
         Noise of a point at full confidence, pixels.
     evidence : callable
-        Model of the motion, for some frames of keypoints.
+        Model of the motion, called with some frames of the keypoints.
     """
     joints = [
         name[2:] for name in keypoints.names if name.startswith("l_") and f"r_{name[2:]}" in keypoints.names
@@ -275,7 +274,7 @@ def undo_swaps(keypoints: Keypoints, sd: float, evidence: Evidence) -> tuple[Key
 
 
 def _without_spikes(keypoints: Keypoints, pairs: Ints, sd: float) -> Keypoints:
-    """Keypoints without the points that jump whichever side they are of: they would decide the rest's."""
+    """Remove points that are spikes on whichever side they are, as they would decide about the others."""
     kept, _ = noise.without_spikes(keypoints, sd)
     jumped = np.asarray((keypoints.visible & ~kept.visible)[:, pairs].any(axis=2))
     other, _ = noise.without_spikes(_swapped(keypoints, pairs, jumped), sd)
@@ -284,10 +283,10 @@ def _without_spikes(keypoints: Keypoints, pairs: Ints, sd: float) -> Keypoints:
 
 
 def _completed(keypoints: Keypoints, pairs: Ints, steady: Keypoints, wrong: Flags) -> Flags:
-    """Flag (T, P) also pairs that are not whole in steady keypoints, where one before or after is wrong.
+    """Also flag (T, P) pairs that are incomplete in the steady keypoints, next to a swapped pair.
 
-    They are as they lie nearer to the lines between those around; by distances, as one may be anywhere or
-    not be seen.
+    They count as swapped if their points are then nearer to the lines between those around.  Plain distances
+    are compared, as one point may be anywhere or missing.
     """
     found, put = wrong.copy(), _swapped(steady, pairs, wrong).uv
     for k, known in enumerate(steady.visible[:, pairs].all(axis=2).T):
@@ -306,25 +305,25 @@ def _completed(keypoints: Keypoints, pairs: Ints, steady: Keypoints, wrong: Flag
 
 
 def _along(time: Floats, rows: Ints, uv: Floats) -> Floats:
-    """Places (T, 2) of a point on the lines between those of some rows."""
+    """Interpolate the positions (T, 2) of a point between those of some rows."""
     return np.stack([np.interp(time, time[rows], axis[rows]) for axis in uv.T], axis=1)
 
 
 def _intervals(keypoints: Keypoints, wrong: Flags) -> Iterator[tuple[int, int]]:
-    """First row, and the one after the last, of intervals with `wrong` pairs further apart than `NEAR`."""
+    """Yield first row, and the row after the last, of intervals with `wrong` pairs more than `NEAR` apart."""
     rows = np.flatnonzero(wrong.any(axis=1))
     parts = np.split(rows, np.flatnonzero(np.diff(keypoints.time[rows]) > NEAR) + 1)
     return ((int(part[0]), int(part[-1]) + 1) for part in parts if part.size)
 
 
 def _around(keypoints: Keypoints, first: int, end: int) -> slice:
-    """Rows of an interval and its surroundings."""
+    """Return the rows of an interval and its surroundings."""
     begin = np.searchsorted(keypoints.time, keypoints.time[first] - AROUND)
     return slice(int(begin), int(np.searchsorted(keypoints.time, keypoints.time[end - 1] + AROUND, "right")))
 
 
 def _swapped(keypoints: Keypoints, pairs: Ints, wrong: Flags) -> Keypoints:
-    """Keypoints with the two points of pairs (P, 2) swapped where `wrong` (T, P)."""
+    """Swap the two points of pairs (P, 2) where `wrong` (T, P)."""
     uv, confidence = keypoints.uv.copy(), keypoints.confidence.copy()
     for pair, rows in zip(pairs, wrong.T, strict=True):
         for values in (uv, confidence):
@@ -341,10 +340,11 @@ def _judged(
     sd: float,
     evidence: Evidence,
 ) -> Flags:
-    """Take in `own` rows of a proposal (T, P) what the motion confirms: all or nothing, then each limb.
+    """Accept from `own` rows of a proposal (T, P) what the motion confirms: all or nothing, then each limb.
 
-    Where something was swapped, other pairs may have been along with it for as long.  What the best motion so
-    far explains no better than before is not tried; what it explains better is fitted beginning with it.
+    Where one pair was swapped, other pairs may have been swapped with it for as long.  Variations that the
+    best motion so far does not explain better are not tried; the others are fitted, starting from that
+    motion.
     """
     sds = keypoints.standard_deviations(sd)
 
@@ -377,14 +377,14 @@ def _judged(
 
 
 def _limbs(keypoints: Keypoints, pairs: Ints) -> list[Ints]:
-    """Pairs of legs, of arms and of the rest."""
+    """Group the pairs: legs, arms, and the others."""
     joints = [keypoints.names[left][2:] for left in pairs[:, 0]]
     limb = np.array([next((k for k, limb in enumerate(LIMBS) if joint in limb), -1) for joint in joints])
     return [np.flatnonzero(limb == k) for k in np.unique(limb)]
 
 
 def _others(best: Flags, wrong: Flags, observed: Flags, limb: Ints) -> Iterator[Flags]:
-    """Vary the best reading: with none of a limb, with it as proposed, and with all of it."""
+    """Yield variations of the best flags: none of a limb, the limb as proposed, and all of it."""
     proposed = np.asarray(wrong[:, limb].any(axis=1))
     whole = observed[:, limb] & np.asarray(proposed if proposed.any() else wrong.any(axis=1))[:, None]
     none = np.zeros_like(whole)
@@ -395,6 +395,6 @@ def _others(best: Flags, wrong: Flags, observed: Flags, limb: Ints) -> Iterator[
 
 
 def _spans(frames: npt.NDArray[np.int64], wrong: Flags) -> list[tuple[int, int]]:
-    """First and last of the frames (n,) in each interval of `wrong` ones."""
+    """List first and last frame of each interval of `wrong` frames among `frames` (n,)."""
     edges = np.flatnonzero(np.diff(np.pad(wrong.astype(int), 1))).reshape(-1, 2)
     return [(int(frames[first]), int(frames[end - 1])) for first, end in edges]

@@ -1,6 +1,6 @@
-"""Stick figures of motion for the report of lifting: rows of one scale, a column for each figure.
+"""Stick figures for the report of lifting: rows of motion, and a lifted clip from two sides.
 
-Figure of a lifted clip: what was seen, and the motion from another side (Leventon and Freeman, fig. 7).
+The latter shows the keypoints, and the motion from another direction (Leventon and Freeman, fig. 7).
 """
 
 from __future__ import annotations
@@ -22,22 +22,22 @@ from gait.report.figures import STICKS, Drawing, plain
 
 Floats = npt.NDArray[np.float64]
 
-SHOWN = 5  # frames of a segment
-STEP = 0.75  # statures, the least from one figure of a row to the next
-GAP = 0.1  # statures at least between figures
-WIDTH, LABEL = 8.5, 1.2  # inches, of the whole and of what stands left of the rows
-ABOVE = 0.5  # inches, of legend and times
+SHOWN = 5  # frames of a segment that are drawn
+STEP = 0.75  # statures; least distance between figures of a row
+GAP = 0.1  # statures; least gap between figures
+WIDTH, LABEL = 8.5, 1.2  # inches; width of the whole, and of the labels left of the rows
+ABOVE = 0.5  # inches; height of legend and times
 FAINT = "#c8c8c4"
-HALO = 2.5  # points by which what is drawn under something else is wider, so that it shows where both agree
-BAR = 0.5  # metres
-BELOW = 0.1  # statures under the last row, where the bar is
+HALO = 2.5  # points by which lines underneath are wider, so that they show where both agree
+BAR = 0.5  # metres; length of the scale bar
+BELOW = 0.1  # statures; distance of the bar below the last row
 SIDE = np.array([1.0, 0.0, 0.0])  # to the right on the paper: seen from the person's right
 AHEAD = np.array([0.0, 1.0, 0.0])  # seen from ahead
 
 
 @dataclass(frozen=True)
 class _Drawn:
-    """Figures of a row: flat (n, J, 2) about their columns, up is positive, metres."""
+    """Figures of a row: 2-D positions (n, J, 2) relative to their columns, up positive, metres."""
 
     row: int
     flat: Floats
@@ -51,13 +51,13 @@ class Strips:
     Parameters
     ----------
     titles : sequence of str
-        One a row.
+        One title per row.
     names : sequence of str
         The J markers of all motions.
     size : float
         Stature, metres.
     fps : float
-        Of all motions.
+        Frames per second of all motions.
     """
 
     def __init__(self, titles: Sequence[str], names: Sequence[str], size: float, fps: float) -> None:
@@ -75,16 +75,16 @@ class Strips:
         ghost: bool = False,
         path: Floats | None = None,
     ) -> None:
-        """Put a motion (F, J, 3) into a row.
+        """Add a motion (F, J, 3) to a row.
 
         Parameters
         ----------
         across : (3,)
-            What is to the right on the paper; up is z.
+            Direction that points right on the paper; z points up.
         ghost : bool
-            Faint and wide, under something else.
+            Draw it faint and wide, under other figures.
         path : (F, J, 3), optional
-            Motion whose middle every figure stands at; its own if left out.
+            Motion at whose middle each figure is placed; by default its own.
         """
         self._frames = np.linspace(0, len(places) - 1, min(SHOWN, len(places))).round().astype(int)
         middle = (places if path is None else path)[self._frames].mean(axis=1, keepdims=True)
@@ -93,7 +93,7 @@ class Strips:
         self._drawn.append(_Drawn(row, flat, colour, ghost))
 
     def figure(self) -> Figure:
-        """Draw all rows, as large as lets every figure have a column of its own."""
+        """Draw all rows, as large as possible while figures do not overlap."""
         pitch, (left, right), (low, high) = self._extents()
         gap = GAP * self._size
         heights = np.full(len(self._titles), high - low + gap)
@@ -116,7 +116,7 @@ class Strips:
         return figure
 
     def _extents(self) -> tuple[float, tuple[float, float], tuple[float, float]]:
-        """Width of a column, and what all rows reach across and up, metres."""
+        """Width of a column, and horizontal and vertical extent of all rows, metres."""
         lows = np.full((len(self._titles), len(self._frames), 2), np.inf)
         highs = -lows
         for each in self._drawn:
@@ -144,7 +144,7 @@ class Strips:
 
 
 def _row(figure: Figure, box: tuple[float, float, float, float], title: str) -> Axes:
-    """Axes of a row with its title on the left and a line for the floor."""
+    """Make the axes of a row, with its title on the left and a line for the floor."""
     axes = figure.add_axes(box)
     hide_axes(axes)
     axes.set_ylabel(title, rotation=0, ha="right", va="center", fontsize=9)
@@ -153,7 +153,7 @@ def _row(figure: Figure, box: tuple[float, float, float, float], title: str) -> 
 
 
 def hide_axes(axes: Axes) -> None:
-    """Style axes that show figures at a true aspect, without ticks."""
+    """Style axes for figures: equal scales, without ticks."""
     plain(axes)
     axes.grid(visible=False)
     axes.set_aspect("equal")
@@ -170,7 +170,7 @@ def scale_bar(axes: Axes, x: float, y: float, words: str = "") -> None:
 
 
 def clip(keypoints: Keypoints, motion: Motion, view: View, name: str) -> Drawing:
-    """Frames of a clip: its points with the estimate over them, and the estimate turned by 90 degrees."""
+    """Draw frames of a clip: its points with the estimate, and the estimate rotated by 90 degrees."""
     frames = np.linspace(0, len(keypoints.frame) - 1, min(SHOWN, len(keypoints.frame))).round().astype(int)
     figure = Figure(figsize=(9, 4.8), layout="constrained")
     panels = figure.subplots(2, len(frames), squeeze=False)
@@ -206,7 +206,7 @@ def clip(keypoints: Keypoints, motion: Motion, view: View, name: str) -> Drawing
 
 
 def _one_scale(panels: Sequence[Axes]) -> None:
-    """Give panels of one row the same height, and the first a bar under it."""
+    """Make the panels of a row equally high, and put a scale bar below the first."""
     lowest = min(axes.dataLim.y0 for axes in panels)
     highest = max(axes.dataLim.y1 for axes in panels)
     under = lowest - BELOW * (highest - lowest)
@@ -216,9 +216,9 @@ def _one_scale(panels: Sequence[Axes]) -> None:
 
 
 def _in_picture(view: View, motion: Motion, frame: int, keypoints: Keypoints) -> tuple[Floats, Floats]:
-    """Estimate (J, 2) and points seen (n, 2) of a frame of the keypoints, pixels, up is positive.
+    """Project the estimate (J, 2) of a frame, and return its visible points (n, 2), pixels, up positive.
 
-    Of a view from far away only the shape is known: it is shifted and scaled to the points.
+    In an orthographic view only the shape is known, so it is shifted and scaled to the points.
     """
     uv, observed = keypoints.uv[frame], keypoints.visible[frame]
     body = motion.places[frame]

@@ -17,22 +17,22 @@ from gait.report.figures import Drawing, grid, line_legend
 Floats = npt.NDArray[np.float64]
 
 SYNTHESIS = 40  # modes of the paper's fig. 2
-NOISE = 0.02  # metres, of the points seen in figs. 3, 5 and 6
+NOISE = 0.02  # metres, of the observed points in figs. 3, 5 and 6
 DRAWS = MODES = 3
 SWING = 2.0  # standard deviations by which uncertain modes are drawn
 
 
 @dataclass(frozen=True)
 class Gaussian:
-    """Segments of people of one stature: mean + sum_i alpha_i modes_i + residual, alpha ~ N(0, I); metres.
+    """Segments of people with one stature: mean + sum_i alpha_i modes_i + residual, alpha ~ N(0, I); metres.
 
     Attributes
     ----------
     mean : (F, J, 3)
     modes : (k, F, J, 3)
-        Times their standard deviations.
+        Modes times their standard deviations.
     residual : (J,)
-        Variance of each coordinate outside the modes.
+        Variance of each coordinate that the modes do not explain.
     """
 
     mean: Floats
@@ -41,34 +41,34 @@ class Gaussian:
 
     @staticmethod
     def of(prior: SegmentPrior, stature: float, component: int = 0) -> Gaussian:
-        """Component of a prior, placed as it was learnt."""
+        """Make the Gaussian of a component of a prior, in the position in which it was learnt."""
         used = prior.modes[component][prior.sd[component] > 0]
         residual = stature**2 * prior.gamma * prior.residual[component]
         return Gaussian(stature * prior.mean[component], stature * used, residual)
 
     def projected(self, x: Floats, count: int | None = None) -> Floats:
-        """Nearest segment to x (F, J, 3) in the span of the first modes about the mean."""
+        """Project x (F, J, 3) to the span of the first modes about the mean."""
         flat = self.modes[:count].reshape(len(self.modes[:count]), -1).T
         scores = np.linalg.lstsq(flat, (x - self.mean).ravel(), rcond=None)[0]
         return np.asarray(self.mean + (flat @ scores).reshape(x.shape))
 
     def draw(self, rng: np.random.Generator, residual: bool = True) -> Floats:
-        """Segment (F, J, 3) from the prior."""
+        """Draw a segment (F, J, 3) from the prior."""
         x = self.mean + np.tensordot(rng.normal(size=len(self.modes)), self.modes, 1)
         return x + rng.normal(size=x.shape) * np.sqrt(self.residual)[:, None] * residual
 
 
 @dataclass(frozen=True)
 class Case:
-    """A segment, seen along x (from behind) without its depth.
+    """A segment observed along x (from behind), without depth, and estimates of it.
 
     Attributes
     ----------
     prior : SegmentPrior
     truth : (F, J, 3)
-        Metres, placed as in the prior.
+        Metres, positioned as in the prior.
     what : str
-        Where it is from.
+        What the segment is, in words.
     gaussian : Gaussian
         The prior at its stature.
     bayes, likelihood : (F, J, 3)
@@ -76,9 +76,9 @@ class Case:
     variance : (k,)
         Posterior variances of the modes' scores.
     log10_volume : float
-        Of the posterior over the prior.
+        log10 of posterior over prior volume.
     uncertain : (MODES, F, J, 3)
-        Least certain displacements, one standard deviation long, the longest first.
+        Least certain displacements, one standard deviation long, longest first.
     """
 
     prior: SegmentPrior
@@ -93,7 +93,7 @@ class Case:
 
 
 def case(model: str | None, truth: Floats | None, stature: float, what: str, seed: int) -> Case:
-    """See a segment, or one drawn from a model's prior if `truth` is None, from behind with noise."""
+    """Observe a segment, or one drawn from a model's prior if `truth` is None, from behind with noise."""
     prior, rng = SegmentPrior.load(model), np.random.default_rng(seed)
     gaussian = Gaussian.of(prior, stature)
     x = gaussian.draw(rng) if truth is None else truth
@@ -117,13 +117,13 @@ def case(model: str | None, truth: Floats | None, stature: float, what: str, see
 
 
 def placed_as_learnt(stature: float, heading: float = 0.0, **changes: float) -> LiftConfig:
-    """Make the settings of a lifter for a person whose size, place and heading are known, as in the paper."""
+    """Make settings of a lifter for a person of known size, position and heading, as in the paper."""
     known = {"stature": stature, "stature_sd": 0.0, "heading": heading, "heading_sd": 0.0}
     return LiftConfig.default(**known, place_sd=(0.0, 0.0, 0.0), **changes)
 
 
 def drawings(c: Case, seed: int) -> Iterator[Drawing]:
-    """All figures of a case."""
+    """Draw all figures of a case."""
     yield spectrum(c)
     yield synthesis(c)
     yield draws(c, seed)
@@ -132,7 +132,7 @@ def drawings(c: Case, seed: int) -> Iterator[Drawing]:
 
 
 def spectrum(c: Case) -> Drawing:
-    """Variances of the modes before and after the segment was seen (fig. 3)."""
+    """Draw the variances of the modes before and after observing the segment (fig. 3)."""
     figure, panels = grid(1, 2, 9, 3.4)
     lengths = np.linalg.norm(c.gaussian.modes.reshape(len(c.gaussian.modes), -1), axis=1) ** 2
     after = lengths * c.variance
@@ -169,7 +169,7 @@ def synthesis(c: Case) -> Drawing:
 
 
 def _strips(c: Case, titles: Sequence[str]) -> Strips:
-    """Rows for motions of a case."""
+    """Make rows for motions of a case."""
     return Strips(titles, c.prior.names, c.prior.stature, c.prior.fps)
 
 
@@ -178,7 +178,7 @@ def _apart(found: Floats, truth: Floats) -> float:
 
 
 def draws(c: Case, seed: int) -> Drawing:
-    """Segments drawn from the prior (fig. 4)."""
+    """Draw random segments from the prior (fig. 4)."""
     rng = np.random.default_rng(seed)
     strips = _strips(c, [f"draw {k + 1}" for k in range(DRAWS)])
     for row in range(DRAWS):
@@ -188,7 +188,7 @@ def draws(c: Case, seed: int) -> Drawing:
 
 
 def estimates(c: Case) -> Drawing:
-    """Original, projection, likelihood alone and Bayes, from where the depth shows (fig. 5)."""
+    """Draw original, projection, likelihood alone and Bayes, from the side, which shows depth (fig. 5)."""
     projected = c.gaussian.projected(c.truth)
     found = {
         "original": (c.truth, DARK),
@@ -211,7 +211,7 @@ def estimates(c: Case) -> Drawing:
 
 
 def uncertain(c: Case) -> Drawing:
-    """Least certain displacements, from where they show most (fig. 6)."""
+    """Draw the least certain displacements, from where they are most visible (fig. 6)."""
     length = np.linalg.norm(c.uncertain.reshape(MODES, -1), axis=1) / np.sqrt(c.truth[..., 0].size)
     titles = [f"mode {k + 1}\n{1000 * each:.0f} mm" for k, each in enumerate(length)]
     strips = _strips(c, titles)

@@ -1,1 +1,1 @@
-"""Single segments by the C library, and the views they are seen in."""
+"""Single segments, estimated by the C library, and the views in which they are observed."""

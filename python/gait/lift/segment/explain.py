@@ -1,7 +1,8 @@
-"""Every segment of a sequence separately, by the C library's lifter, and the most probable path through them.
+"""Estimate every segment of a sequence separately with the C library, and choose the most probable sequence.
 
-A segment seen from far away fits nearly as well when it is mirrored in depth.  So all distinct headings that
-explain a segment are kept, and its neighbours decide which it is (Viterbi over the explanations).
+A segment seen from far away fits nearly as well when it is mirrored in depth.  Therefore all distinct
+headings that explain a segment are kept, and its neighbours decide among them (Viterbi over the
+explanations).
 """
 
 from __future__ import annotations
@@ -21,16 +22,16 @@ from gait.lift.segment.view import Perspective, View
 
 Floats = npt.NDArray[np.float64]
 
-FEWEST = 4  # points that must be seen of a segment for an estimate of its own
-STARTS = 8  # headings all round from which an unknown one is searched for
-START_SD = round(np.pi / STARTS, 1)  # radians from a start: half of the distance between two
-SAME = 0.2  # radians: explanations that are nearer are one
-TURN_SD = 0.7  # radians by which the heading changes in half a segment
-GROUND_SD = 10.0  # metres, of the place on the ground
-FLOOR_SD = 0.05  # metres, of the floor's height; a single segment depends on it less than a sequence
+FEWEST = 4  # fewest visible points of a segment that is estimated by itself
+STARTS = 8  # headings, all around, from which an unknown one is searched for
+START_SD = round(np.pi / STARTS, 1)  # radians from a start: half the distance between two
+SAME = 0.2  # radians; explanations with closer headings are the same
+TURN_SD = 0.7  # radians; sd of the change of heading in half a segment
+GROUND_SD = 10.0  # metres, of the position on the ground
+FLOOR_SD = 0.05  # metres, of the floor's height, on which a single segment depends less than a sequence
 ANY_HEIGHT = 10.0  # metres, of the floor's height without a camera
-MOST_SEARCHES = 5  # while the place found is far from the expected one
-FLAT = 100.0  # times the modes' standard deviations: next to no prior
+MOST_SEARCHES = 5  # most searches while the position found is far from the expected one
+FLAT = 100.0  # factor of the modes' standard deviations that leaves almost no prior
 
 
 @dataclass(frozen=True)
@@ -40,11 +41,11 @@ class Explanation:
     Attributes
     ----------
     heading : float
-        Of the prior's axes in the world, radians.
+        Heading of the prior's axes in the world, radians.
     component : int
-        Of the prior's mixture.
+        Index in the prior's mixture.
     place : (3,)
-        Where on the ground, metres.
+        Position on the ground, metres.
     share : float
         Probability among the explanations of the same segment.
     visible : Observations
@@ -69,10 +70,10 @@ class SegmentFit:
     places, sd : (F, J, 3)
         Mean and standard deviations, metres.
     log10_volume : float
-        log10 of the posterior's volume over the prior's.
+        log10 of posterior over prior volume.
     mode_sd : (n,)
-        Standard deviations of its displacements over all markers and frames, metres, the least certain first;
-        of as many of them as were asked for.
+        Standard deviations of the n least certain displacements over all markers and frames, metres, largest
+        first.
     modes : (n, F, J, 3)
         These displacements, one standard deviation long.
     """
@@ -86,22 +87,22 @@ class SegmentFit:
     modes: Floats
 
     def rooted_sd(self, ends: npt.NDArray[np.intp]) -> Floats:
-        """Give standard deviations (F, J, 3) about the middle of two markers."""
+        """Return standard deviations (F, J, 3) relative to the middle of two markers."""
         apart = self.modes - self.modes[:, :, ends].mean(axis=2, keepdims=True)
         outside = np.maximum(self.sd**2 - (self.modes**2).sum(axis=0), 0.0)
         middle = outside[:, ends].sum(axis=1, keepdims=True) / 4
         own = outside + middle
-        own[:, ends] -= outside[:, ends]  # half of an end is in the middle
+        own[:, ends] -= outside[:, ends]  # half of each of them is in the middle
         return np.asarray(np.sqrt((apart**2).sum(axis=0) + own))
 
 
 class SegmentLifter:
-    """Explains segments of a prior (`SegmentPrior.restricted`) in a view, by the C library.
+    """Explains segments of a prior (`SegmentPrior.restricted`) in a view, with the C library.
 
     Parameters
     ----------
     stature, stature_sd : float
-        Metres.
+        Stature and its standard deviation, metres.
     """
 
     def __init__(self, prior: SegmentPrior, view: View, stature: float, stature_sd: float) -> None:
@@ -115,9 +116,9 @@ class SegmentLifter:
         self._known: dict[bytes, tuple[list[Explanation], Floats]] = {}
 
     def explanations(self, observed: Observations) -> list[Explanation]:
-        """Find all explanations of a segment, the most probable first; none if too little is seen.
+        """Find all explanations of a segment, the most probable first; none if too little is visible.
 
-        A segment that was explained before is not explained again.
+        Results are cached, so that the same segment is not explained twice.
         """
         shown = observed.uv.tobytes() + observed.sd.tobytes()
         if shown not in self._known:
@@ -147,7 +148,7 @@ class SegmentLifter:
         return sorted(found, key=lambda e: -e.share)
 
     def solve(self, chosen: Explanation, displacements: int | None = None) -> SegmentFit:
-        """Posterior of an explanation with so many displacements, all if None: they take half of the time."""
+        """Compute the posterior of an explanation, with this many displacements (slow); None: with all."""
         fit = self._fit(chosen.visible, chosen.heading, chosen.place)
         places, sd = self._lifter.positions()
         mode_sd, modes = np.empty(0), np.empty((0, *places.shape))
@@ -156,19 +157,19 @@ class SegmentLifter:
         return SegmentFit(fit.heading, fit.component, places, sd, fit.log10_volume, mode_sd, modes)
 
     def open_modes(self, chosen: Explanation) -> float:
-        """How many of the modes the points of an explanation leave open: the sum of their variances."""
+        """Count the modes that an explanation's points do not determine: the sum of their variances."""
         fit = self._fit(chosen.visible, chosen.heading, chosen.place)
         used = self._prior.sd[fit.component] > 0
         return float(np.diag(self._lifter.posterior()[1])[: len(used)][used].sum())
 
     def _fit(self, observed: Observations, heading: float, place: Floats) -> Fit:
-        """Fit a segment near a heading and a place."""
+        """Fit a segment near a heading and a position."""
         if self._latent:
             self._lifter.expect((place[0], place[1], 0.0), heading, START_SD)
         return self._lifter.segment(observed.uv, observed.sd)
 
     def _robust(self, observed: Observations) -> tuple[Fit, Floats]:
-        """Search for any heading, with outliers down-weighted, near the place of the segment before."""
+        """Search all headings, down-weighting outliers, near the position of the segment before."""
         if not self._latent:
             return self._lifter.segment_robust(observed.uv, observed.sd)
         for _ in range(MOST_SEARCHES):
@@ -192,12 +193,12 @@ def explanations(
     observed: Observations,
     update: Callable[[int], None] = lambda done: None,
 ) -> list[list[Explanation]]:
-    """Explain every segment of a grid alone; none where next to nothing is seen.
+    """Explain every segment of a grid by itself; no explanations where almost nothing is visible.
 
     Parameters
     ----------
-    visible : Observations
-        Of the prior's markers on whole blocks of half a segment, in the lifter's units.
+    observed : Observations
+        Observations of the prior's markers in whole blocks of half a segment, in the lifter's units.
     """
     half = prior.frames // 2
     found = []
@@ -210,14 +211,14 @@ def explanations(
 def without_prior(
     prior: SegmentPrior, view: View, stature: float, stature_sd: float, chosen: Sequence[Explanation]
 ) -> list[SegmentFit]:
-    """Estimate segments by the measurements alone: the limit of ever larger standard deviations of the modes.
+    """Estimate segments from the observations alone: the limit of large standard deviations of the modes.
 
-    What moves the body as a whole keeps its prior: no view from far away shows a distance.
+    Motions of the whole body keep their prior, since an orthographic view does not show distance.
 
     Raises
     ------
     UserError
-        If the measurements of a segment leave a combination of modes open.
+        If the observations of a segment do not determine all modes.
     """
     flat = SegmentLifter(replace(prior, modes=FLAT * prior.modes), view, stature, stature_sd)
     for each in chosen:
@@ -231,9 +232,9 @@ def without_prior(
 
 
 def course(found: Sequence[Sequence[Explanation]]) -> list[Explanation]:
-    """Choose one explanation of every segment: probable, and with headings that change little.
+    """Choose one explanation of every segment, so that they are probable and headings change little.
 
-    Segments without any take that of the nearest one before or after.
+    Segments without explanations get that of the nearest segment before or after.
     """
     known = [s for s, choices in enumerate(found) if choices]
     chosen = dict(zip(known, _course([found[s] for s in known]), strict=True))
@@ -241,7 +242,7 @@ def course(found: Sequence[Sequence[Explanation]]) -> list[Explanation]:
 
 
 def _course(found: Sequence[Sequence[Explanation]]) -> list[Explanation]:
-    """Choose among explanations of segments that all have some."""
+    """Choose among the explanations of segments that all have some."""
     score = _log_shares(found[0])
     back = []
     for before, now in zip(found, found[1:], strict=False):
@@ -249,7 +250,7 @@ def _course(found: Sequence[Sequence[Explanation]]) -> list[Explanation]:
         turn = (turn + np.pi) % (2 * np.pi) - np.pi
         table = score - 0.5 * (turn / TURN_SD) ** 2
         back.append(table.argmax(axis=1))
-        # segments overlap by half: half of the evidence is their neighbour's
+        # segments overlap by half, so half of the evidence is their neighbour's
         score = table.max(axis=1) + 0.5 * _log_shares(now)
     chosen = [int(score.argmax())]
     for best in reversed(back):
@@ -263,16 +264,16 @@ def _log_shares(choices: Sequence[Explanation]) -> Floats:
 
 @dataclass(frozen=True)
 class Uncertain:
-    """What segments leave uncertain, medians over them (Leventon and Freeman 1998, fig. 6).
+    """Uncertainty of single segments, as medians over them (Leventon and Freeman 1998, fig. 6).
 
     Attributes
     ----------
     log10_volume : float
-        log10 of the posterior's volume over the prior's.
+        log10 of posterior over prior volume.
     sd : (COUNT,)
         Standard deviations of the least certain displacements, rms per marker, metres, largest first.
     along, rigid : (COUNT,)
-        Shares of their energy along the line of sight, and that move the whole body as one.
+        Shares of their energy that are along the line of sight, and that move the whole body rigidly.
     shares : (COUNT, J)
         Shares of their energy by marker.
     """
@@ -288,14 +289,14 @@ COUNT = 3  # displacements, as in the paper's fig. 6
 
 
 def summarise(segments: Sequence[SegmentFit], view: View) -> Uncertain:
-    """Sum up the segments of a sequence."""
+    """Summarise the uncertainty of the segments of a sequence."""
     each = np.median([_least_certain(found, view) for found in segments], axis=0)
     volume = float(np.median([found.log10_volume for found in segments]))
     return Uncertain(volume, each[:, 0], each[:, 1], each[:, 2], each[:, 3:])
 
 
 def _least_certain(found: SegmentFit, view: View) -> Floats:
-    """Give sd, share along the line of sight, rigid share and shares by marker, (COUNT, 3 + J)."""
+    """Return sd, share along the line of sight, rigid share, and shares by marker, (COUNT, 3 + J)."""
     ahead, size = view.direction(found.places), np.sqrt(found.places[..., 0].size)
     rows = zip(found.mode_sd[:COUNT].tolist(), found.modes[:COUNT], strict=True)
     return np.array(
@@ -307,11 +308,11 @@ def _least_certain(found: SegmentFit, view: View) -> Floats:
 
 
 def share_along(mode: Floats, axis: Floats) -> float:
-    """Share of a mode's energy (F, J, 3) that is along a unit vector (3,)."""
+    """Share of the energy of a mode (F, J, 3) that is along a unit vector (3,)."""
     return float(np.sum((mode @ axis) ** 2) / np.sum(mode**2))
 
 
 def share_rigid(mode: Floats) -> float:
-    """Share of a mode's energy (F, J, 3) that is one displacement of all markers in all frames."""
+    """Share of the energy of a mode (F, J, 3) that displaces all markers alike in all frames."""
     points = mode.reshape(-1, 3)
     return float(len(points) * np.sum(points.mean(axis=0) ** 2) / np.sum(points**2))

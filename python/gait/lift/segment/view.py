@@ -1,8 +1,6 @@
-"""Views whose scale may be unknown, as rows that are linear in the markers and in the scale.
+"""Views in which a motion is observed: one or several calibrated cameras, or orthographic ("parallel").
 
-A calibrated camera and a parallel view of known scale give the rows of `gait.lift.observe`.  Where the scale
-is unknown, the length l of one unit of the picture is one more number per frame: a point seen at (u, v) obeys
-right . X - u l = 0 and down . X - v l = 0, with the noise sd l.  Near a guess this is linearised there.
+The scale of a parallel view may be unknown; `gait.lift.smooth.rows` has the linear equations.
 """
 
 from __future__ import annotations
@@ -27,11 +25,11 @@ class Perspective:
 
     camera: Camera
     scaled = False  #: whether the scale is unknown
-    grounded = True  #: whether the height over the floor z = 0 is known
+    grounded = True  #: whether the height above the floor z = 0 is known
 
     @property
     def axes(self) -> Floats:
-        """Right, down and ahead in the world, rows of (3, 3)."""
+        """Right, down and forward in the world, as rows of (3, 3)."""
         return np.asarray(self.camera.R)
 
     def alone(self, camera: int = 0) -> Perspective:
@@ -39,29 +37,29 @@ class Perspective:
         return self
 
     def project(self, places: Floats, lengths: Floats) -> Floats:
-        """Pixels (T, J, 2) of places (T, J, 3)."""
+        """Project positions (T, J, 3) to pixels (T, J, 2)."""
         return self.camera.project(places)
 
     def direction(self, places: Floats) -> Floats:
-        """Direction (3,) from the lens to the middle of places (F, J, 3)."""
+        """Direction (3,) from the lens to the middle of positions (F, J, 3)."""
         ray = places.mean(axis=(0, 1)) - self.camera.centre
         return np.asarray(ray / np.linalg.norm(ray))
 
 
 @dataclass(frozen=True)
 class Parallel:
-    """View from far away.
+    """Orthographic view.
 
     Attributes
     ----------
     axes : (3, 3)
-        Right, down and ahead in the world as rows.
+        Right, down and forward in the world, as rows.
     metres : float or None
         Length of one unit of the picture; None: unknown.
     origin : (2,)
-        Point of the picture that stays where it is when the scale changes.
+        Point of the picture that does not move when the scale changes.
     steady : bool
-        An unknown scale does not change in time.
+        An unknown scale is constant over time.
     """
 
     axes: Floats
@@ -80,21 +78,21 @@ class Parallel:
         return self
 
     def metric(self, observed: Observations, lengths: Floats) -> Observations:
-        """Observations in metres from the origin if a unit of the picture has `lengths` (T,) metres."""
+        """Convert observations to metres from the origin, with `lengths` (T,) of a unit of the picture."""
         return Observations(
             (observed.uv - self.origin) * lengths[:, None, None], observed.sd * lengths[:, None]
         )
 
     def project(self, places: Floats, lengths: Floats) -> Floats:
-        """Picture coordinates (T, J, 2) of places (T, J, 3)."""
+        """Project positions (T, J, 3) to picture coordinates (T, J, 2)."""
         return np.asarray(places @ self.axes[:2].T / lengths[:, None, None] + self.origin)
 
     def direction(self, places: Floats) -> Floats:
-        """Direction (3,) of view, the same for all places."""
+        """Direction (3,) of view, the same for all positions."""
         return self.axes[2]
 
     def lengths(self, observed: Observations, mean: Floats, stature: float) -> Floats:
-        """Guess the lengths (T,) of a unit from the extents of what is seen and of a mean body (J, 3)."""
+        """Guess the lengths (T,) of a unit from the extents of the observations and of a mean body (J, 3)."""
         if self.metres is not None:
             return np.full(len(observed.uv), self.metres)
         flat = stature * mean @ self.axes[:2].T
@@ -112,12 +110,12 @@ class Parallel:
 
 @dataclass(frozen=True, eq=False)
 class Several:
-    """Views of several calibrated cameras at once: each point belongs to one of them.
+    """Views of several calibrated cameras together; each point belongs to one of them.
 
     Attributes
     ----------
     cameras : tuple of Camera
-        In one world.
+        Cameras in the same world.
     of_point : (P,)
         Number of each point's camera.
     """
@@ -132,7 +130,7 @@ class Several:
         return Perspective(self.cameras[camera])
 
     def project(self, places: Floats, lengths: Floats) -> Floats:
-        """Pixels (T, P, 2) of the points' places (T, P, 3), each in its own camera's picture."""
+        """Project points (T, P, 3) to pixels (T, P, 2), each in its own camera's picture."""
         uv = np.empty((*places.shape[:-1], 2))
         for number, camera in enumerate(self.cameras):
             own = self.of_point == number
@@ -146,24 +144,24 @@ AnyView = View | Several
 
 
 def _extent(points: Floats) -> float:
-    """Spread of points (n, 2) along their main direction."""
+    """Extent of points (n, 2) along their main direction."""
     return float(np.linalg.norm(points - points.mean(axis=0), ord=2))
 
 
 def _smoothed(values: Floats, reach: int = 15) -> Floats:
-    """Take the running median."""
+    """Compute a running median."""
     return np.array(
         [np.median(values[max(0, i - reach) : i + reach + 1]) for i in range(len(values))], np.float64
     )
 
 
 def looking_along(text: str) -> Floats:
-    """Axes (3, 3) of a view along `x`, `-y` or `1,2,0` of a world with z up: right, down, ahead.
+    """Parse a direction of view, such as `x`, `-y` or `1,2,0`, to axes (3, 3): right, down, forward; z is up.
 
     Raises
     ------
     UsageError
-        If it is no direction.
+        If the text is not a direction.
     """
     name = text.lstrip("+-")
     try:
