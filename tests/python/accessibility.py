@@ -36,7 +36,7 @@ _BEYOND = """[...document.querySelectorAll('body *')]
 
 
 def check(page):
-    """Assert that a page needs no scrolling sideways and has no serious finding, light and dark."""
+    """Assert that a page does not scroll sideways and has no serious finding, light and dark."""
     for width, height, scheme in SCREENS:
         page.set_viewport_size({"width": width, "height": height})
         page.emulate_media(color_scheme=scheme)
@@ -46,7 +46,7 @@ def check(page):
 
 
 def check_file(path):
-    """Check a page that is a file, where there is a Chromium."""
+    """Check a page in a file, if there is a Chromium."""
     if browser.FETCHED.is_dir() and (shutil.which("chromium") or shutil.which("chromium-browser")):
         with browser.opened() as page:
             page.goto(path.absolute().as_uri())

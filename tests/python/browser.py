@@ -1,4 +1,4 @@
-"""Pages in a real Chromium, driven by playwright; tests that use it are skipped where either is absent."""
+"""Pages in a real Chromium, driven by playwright; tests that use it are skipped if either is missing."""
 
 import contextlib
 import functools
@@ -13,7 +13,7 @@ FETCHED = Path(sys.prefix) / "share/gait/web"
 
 
 def chromium():
-    """Chromium and, if all is there, playwright's `sync_playwright`; else skip."""
+    """Chromium and, if both are installed, playwright's `sync_playwright`; skip otherwise."""
     path = shutil.which("chromium") or shutil.which("chromium-browser")
     if path is None:
         pytest.skip("no chromium (Debian: chromium)")
@@ -32,7 +32,7 @@ def _launched():
 
 
 def end():
-    """Close the Chromium, if there is one."""
+    """Close the Chromium, if one is open."""
     if _launched.cache_info().currsize:
         playwright, browser = _launched()
         browser.close()
@@ -42,7 +42,7 @@ def end():
 
 @contextlib.contextmanager
 def opened(width=1280, height=720, dark=False, strict=True):
-    """A page apart from others; errors of its scripts and, if `strict`, of its console fail the test."""
+    """A page of its own; errors of its scripts and, if `strict`, of its console fail the test."""
     _, browser = _launched()
     page = browser.new_page(
         viewport={"width": width, "height": height}, color_scheme="dark" if dark else "light"
@@ -68,7 +68,7 @@ def until(page, expression, seconds=60):
 
 @contextlib.contextmanager
 def serving(make_app):
-    """Serve `make_app(port)` in a thread; gives the URL."""
+    """Serve `make_app(port)` in a thread; returns the URL."""
     from gait.web import serve
 
     own = serve.listen(0)

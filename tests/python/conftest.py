@@ -10,10 +10,10 @@ from pathlib import Path
 import pytest
 
 if "PYTEST_XDIST_WORKER" in os.environ:
-    # Before numpy is loaded: threads of processes side by side would only wait for each other's processors.
+    # Before numpy is loaded: threads of parallel processes would only wait for each other's processors.
     os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
 if signal.getsignal(signal.SIGINT) == signal.SIG_IGN:
-    # A shell that starts something in the background lets it, and all that it starts, ignore interruptions.
+    # A shell that starts a command in the background makes it and its children ignore interruptions.
     signal.signal(signal.SIGINT, signal.default_int_handler)
 
 signal.signal(signal.SIGHUP, signal.SIG_DFL)  # the same of nohup and closed terminals
@@ -29,7 +29,7 @@ os.environ["GAIT_WEIGHTS"] = str(Path(__file__).parent)  # a folder without weig
 
 @pytest.fixture
 def fetched(monkeypatch):
-    """Let the detector find the weights that `make setup` fetched; their folder."""
+    """Let the detector find the weights that `make setup` downloaded; returns their folder."""
     from gait.detect import weights  # here, after the settings above
 
     folder = Path(sys.prefix) / "share/gait/weights"
@@ -39,7 +39,7 @@ def fetched(monkeypatch):
     return folder
 
 
-# Files whose few tests take long begin first, so that no processor waits at the end.
+# Files whose few tests take long start first, so that no processor is idle at the end.
 LONG = "docs initial learn_dask learn_jobs learn_report lift_robust paper studio"
 FIRST = [f"test_{name}.py" for name in LONG.split()]
 
@@ -57,7 +57,7 @@ def _chromium_ends():
 
 
 def _cpu():
-    """Processor time of this process and of its children that ended, seconds."""
+    """Processor time of this process and of its finished children, seconds."""
     used = [resource.getrusage(who) for who in (resource.RUSAGE_SELF, resource.RUSAGE_CHILDREN)]
     return sum(u.ru_utime + u.ru_stime for u in used)
 
@@ -67,7 +67,7 @@ _before = _cpu()
 
 @pytest.hookimpl(wrapper=True)
 def pytest_runtest_makereport():
-    """Keep with each part of a test the processor time since the one before: other programs do not count."""
+    """Record the processor time of each part of a test: other programs do not count."""
     global _before
     report = yield
     now = _cpu()
@@ -76,11 +76,11 @@ def pytest_runtest_makereport():
     return report
 
 
-SLOW = 60.0  # seconds of processor time from which it is shown what took it
+SLOW = 60.0  # seconds of processor time from which a test is listed
 
 
 def pytest_terminal_summary(terminalreporter):
-    """Print what took longest, and the counts in the form of the C tests: errors count as failed."""
+    """Print the slowest tests, and the counts in the form of the C tests: errors count as failures."""
     cpu = Counter()
     for report in (r for reports in terminalreporter.stats.values() for r in reports):
         if isinstance(report, pytest.TestReport):

@@ -1,4 +1,4 @@
-"""Pictures of a board as a known lens would show them: every pixel's ray meets the board."""
+"""Pictures of a board as a known lens would show them, from where each pixel's ray meets the board."""
 
 import cv2
 import numpy as np
@@ -6,7 +6,7 @@ import numpy as np
 from gait.camera.board import OURS
 
 SQUARE = 64  # pixels of the texture
-BORDER = 1.0  # squares of white paper round the board
+BORDER = 1.0  # squares of white paper around the board
 
 
 def texture(board=OURS):

@@ -1,4 +1,4 @@
-"""A person drawn by the library's own rasteriser on a noisy wall: a small clip of exactly known state."""
+"""A person drawn by the library's own rasteriser on a noisy wall: a small clip of exactly known states."""
 
 from pathlib import Path
 

@@ -85,7 +85,7 @@ def walk(rng, period, frames, *, offset=0.0, noise=5.0, scores=None, modes=None,
 
 
 def jittered(rng, phase, jitter):
-    """Phases (n,) of strides whose times vary: `phase` counts usual stride times, each stride is even."""
+    """Phases (n,) of strides whose times vary: `phase` counts usual stride times; each stride is uniform."""
     first = np.floor(phase[0])
     count = 2 * int(np.ceil(phase[-1] - first) + 1)  # twice as many as usual: enough if they are short
     times = 1 + jitter * rng.normal(size=count)

@@ -35,7 +35,7 @@ TRACKD = Path(os.environ.get("GAIT_TRACKD", ROOT / "build" / "bin" / "gait-track
 MODEL = ROOT / "python" / "gait" / "data" / "walk.gait"
 PYTHON = ROOT / ".venv" / "bin" / "python"
 FPS = 30
-PATIENCE = 120.0  # seconds for anything that should come at once, on a machine busy with other things
+PATIENCE = 120.0  # seconds for anything that should come at once, even on a busy machine
 PARTICLES = 64
 
 CAMERA = Camera(
@@ -101,7 +101,7 @@ Event = tuple[str, Any]
 
 
 def opening(first: int = 0) -> list[Event]:
-    """What comes before the frames: camera, empty scene, START."""
+    """What precedes the frames: camera, empty scene, START."""
     return [
         ("GAIT_CAMERA_0", camera_message(CAMERA, utime(first))),
         ("GAIT_BACKGROUND_0", image_message(plate(), utime(first), -1)),
@@ -193,7 +193,7 @@ def run(*words: object) -> Outcome:
 
 
 def play(log: Path, *options: object) -> Outcome:
-    """Track a log; the estimates come from what gait-trackd publishes.  Nothing is a failure."""
+    """Track a log; return the estimates that gait-trackd publishes.  Having no estimates is a failure."""
     out = log.with_suffix(".out")
     out.unlink(missing_ok=True)
     outcome = run(*command("--url", f"file://{log}?speed=0", "--out", f"file://{out}?mode=w", *options)[1:])
@@ -205,7 +205,7 @@ def play(log: Path, *options: object) -> Outcome:
 
 
 class Listener:
-    """Collects what a tracker publishes, and sends to it; `pid` is the tracker's."""
+    """Collects what a tracker publishes, and sends messages to it; `pid` is the tracker's."""
 
     pid = 0
 
@@ -227,11 +227,11 @@ class Listener:
             self._lcm.publish(channel, message.encode())
 
     def listen(self, ms: int) -> None:
-        """Take in a message, waiting at most so long."""
+        """Receive a message, waiting at most so long."""
         self._lcm.handle_timeout(ms)
 
     def until(self, condition: Callable[[], bool], what: str, seconds: float = PATIENCE) -> None:
-        """Take in messages until the condition holds; fail if it does not in time."""
+        """Receive messages until the condition holds; fail if it does not in time."""
         deadline = time.monotonic() + seconds
         while not condition():
             left = deadline - time.monotonic()
@@ -243,7 +243,7 @@ class Listener:
         return self.statuses[-1] if self.statuses else None
 
     def ask(self, events: Sequence[Event], condition: Callable[[Any], bool], what: str) -> None:
-        """Send again and again until a status, newer than the first sending, shows the effect."""
+        """Send repeatedly until a status that is newer than the first message shows the effect."""
         self.statuses.clear()
         deadline = time.monotonic() + PATIENCE
         while not any(condition(s) for s in self.statuses):
@@ -253,7 +253,7 @@ class Listener:
 
 
 def peak_kb(pid: int) -> int:
-    """Largest resident memory that a process has had; skips where the kernel does not state."""
+    """Largest resident memory that a process has had; skip if the kernel does not report it."""
     lines = Path(f"/proc/{pid}/status")
     printed = re.search(r"VmHWM:\s+(\d+) kB", lines.read_text() if lines.exists() else "")
     if not printed:
@@ -263,7 +263,7 @@ def peak_kb(pid: int) -> int:
 
 @contextmanager
 def daemon(url: str, *options: object) -> Iterator[tuple[Listener, Callable[[], Outcome]]]:
-    """gait-trackd on a network; yields a listener and a function that ends it in good order."""
+    """gait-trackd on a network; yields a listener and a function that ends the daemon cleanly."""
     listener = Listener(url)
     process = subprocess.Popen(
         command("--url", url, *options), stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True
@@ -284,7 +284,7 @@ def daemon(url: str, *options: object) -> Iterator[tuple[Listener, Callable[[], 
 
 
 def gait(*words: object) -> subprocess.CompletedProcess[str]:
-    """Run a command of gait in this process, which saves the start of another."""
+    """Run a command of gait in this process, which saves starting another one."""
     out, err = io.StringIO(), io.StringIO()
     with redirect_stdout(out), redirect_stderr(err):
         try:
@@ -296,7 +296,7 @@ def gait(*words: object) -> subprocess.CompletedProcess[str]:
 
 @cache
 def _multicast_fault() -> str | None:
-    """Why messages do not get through here, or None: sends one to itself."""
+    """Why messages do not get through here, or None; found by sending one to itself."""
     url = private_url()
     try:
         link = open_lcm(url)
@@ -309,14 +309,14 @@ def _multicast_fault() -> str | None:
 
 
 def need_multicast() -> None:
-    """Skip a test where this machine has no multicast."""
+    """Skip a test on a machine without multicast."""
     fault = _multicast_fault()
     if fault:
         pytest.skip(f"no multicast: {fault}")
 
 
 def without_network(*words: str) -> subprocess.CompletedProcess[str]:
-    """Run a command in an empty network namespace; skip where that is not allowed."""
+    """Run a command in an empty network namespace; skip if that is not allowed."""
     unshare = ["unshare", "--net"] if os.geteuid() == 0 else ["unshare", "--map-root-user", "--net"]
     try:
         tried = subprocess.run([*unshare, "true"], capture_output=True, timeout=PATIENCE, check=False)

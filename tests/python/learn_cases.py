@@ -1,7 +1,7 @@
 """Cycles with known truth for tests and evaluations of imputation and components (L7-L12).
 
 `walks` are those of generator G1 with people; `reference` is the small problem on which other packages are
-compared.  Both come with what one who knows the generator would fill in (best linear prediction).
+compared.  Both come with the best linear prediction from the known generator (the oracle).
 """
 
 from dataclasses import dataclass
@@ -19,7 +19,7 @@ LIMBS = {"right arm": (3, 7), "right leg": (7, 11), "left arm": (11, 15), "left 
 
 @dataclass
 class Case:
-    """Cycles (R, T, M), where they are observed, and the generator behind them."""
+    """Cycles (R, T, M), the mask of observed entries, and the generator behind them."""
 
     values: np.ndarray
     mask: np.ndarray
@@ -31,7 +31,7 @@ class Case:
     subject: np.ndarray  # (R,)
 
     def oracle(self):
-        """Data with missing entries as expected by one who knows mean, modes, their sd and the noise."""
+        """Data whose missing entries are predicted from the known mean, modes, their sd and the noise."""
         result = self.values.copy()
         for row, visible in zip(result, self.mask, strict=True):
             design = self.modes[:, visible].T
@@ -46,7 +46,7 @@ class Case:
 
 
 def rms(a, b, where):
-    """Root mean square of a - b where known."""
+    """Root mean square of a - b over the known entries."""
     return float(np.sqrt(np.mean((a - b)[where] ** 2)))
 
 
@@ -58,7 +58,7 @@ def walks(rng, rows=80, missing=0.2, noise=1.0):
 
 
 def people(rng, subjects=8, cycles_each=10, missing=0.2, noise=1.0):
-    """Cycles of people, each with a style of their own: score = subject's + 0.44 x cycle's."""
+    """Cycles of people, each with their own style: score = subject's + 0.44 x cycle's."""
     modes, rows = g.random_modes(rng), subjects * cycles_each
     style = SUBJECT_SD * rng.normal(size=(subjects, 5)).repeat(cycles_each, axis=0)
     scores = (style + CYCLE_SD * rng.normal(size=(rows, 5))) * g.SCORE_SD
@@ -97,7 +97,7 @@ def reference(rng):
 
 
 def without_limbs(case, rng):
-    """Take whole limbs over half a cycle from every other row; True where taken."""
+    """Remove whole limbs over half a cycle from every other row; True where removed."""
     taken = np.zeros_like(case.mask)
     for row in taken[::2]:
         first, last = list(LIMBS.values())[int(rng.integers(len(LIMBS)))]
@@ -107,7 +107,7 @@ def without_limbs(case, rng):
 
 
 def without_channel(case, channels, rows):
-    """Take channels from rows altogether; True where taken."""
+    """Remove channels from whole rows; True where removed."""
     taken = np.zeros_like(case.mask)
     taken[np.ix_(rows, np.arange(g.GRID), channels)] = True
     return _take(case, taken)
@@ -119,7 +119,7 @@ def _take(case, taken):
 
 
 def drifting(rng, sequences=12, rise=6.0):
-    """Cycles (`cycles.Cycles`) of people whose angles creep by `rise` degrees per cycle."""
+    """Cycles (`cycles.Cycles`) of people whose angles drift by `rise` degrees per cycle."""
     modes, signals, periods, offsets = g.random_modes(rng), [], [], []
     for _ in range(sequences):
         period, frames = rng.uniform(100, 140), 460
@@ -135,8 +135,9 @@ def drifting(rng, sequences=12, rise=6.0):
 def seams(curves, neighbours=True):
     """Worst step across the seam over the usual step, for curves (T, M) and their first two differences (3,).
 
-    The usual step is the median, as in the measure's definition; with `neighbours` no less than the steps
-    beside the seam, for where a smooth curve is steep at phase 0 the median alone shows no step.
+    The usual step is the median, as in the measure's definition; with `neighbours` it is at least as large as
+    the steps next to the seam.  With the median alone, a smooth curve that is steep at phase 0 seems to have
+    a seam.
     """
     worst = np.zeros(3)
     for order in range(3):

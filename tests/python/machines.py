@@ -1,6 +1,6 @@
-"""Other x86-64 machines played on this one: kernels of the algebra, of numpy and of libm.
+"""Other x86-64 machines simulated on this one: kernels of the linear algebra, of numpy and of libm.
 
-Each is an environment for a process of its own; kernels are chosen when libraries are loaded.
+Each is an environment for a separate process, because kernels are chosen when libraries are loaded.
 """
 
 import hashlib
@@ -29,7 +29,7 @@ print(*(hashlib.sha256(part.tobytes()).hexdigest() for part in parts))
 
 
 def environments():
-    """Environment of each kind of machine that this one can play and whose bits differ."""
+    """Environment of each kind of machine that this one can simulate and whose bits differ."""
     if platform.machine() not in ("x86_64", "AMD64") or not Path("/proc/cpuinfo").is_file():
         return {}
     has = Path("/proc/cpuinfo").read_text().split("flags", 1)[1].split("\n", 1)[0].split()

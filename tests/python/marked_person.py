@@ -23,7 +23,7 @@ def landmarks(labels):
 
 
 def walk_angles(frames, period, seed=0):
-    """Smooth cyclic angles (T, 24), radians, of the size of a walk."""
+    """Smooth cyclic angles (T, 24), radians, with the range of a walk."""
     rng, phase = np.random.default_rng(seed), 2 * np.pi * np.arange(frames) / period
     angles = np.radians(rng.uniform(3, 8, len(ANGLES))) * np.sin(
         phase[:, None] + rng.uniform(0, 6, len(ANGLES))
@@ -44,9 +44,9 @@ def own_lengths(rng, sd=0.08):
 
 
 def person(labels, frames=360, fps=120.0, period=120.0, sd=0.08, noise=0.003, seed=0, again=None):
-    """Points (T, M, 3), metres, z up, and the true pose, of a person of odd lengths and marker places.
+    """Points (T, M, 3), metres, z up, and the true pose, of a person with unusual lengths and marker places.
 
-    With `again` it is another recording of the person `seed`, with markers put on anew.
+    With `again` it is another recording of the person `seed`, with markers attached anew.
     """
     rng = np.random.default_rng(seed)
     angles = walk_angles(frames, period, seed)

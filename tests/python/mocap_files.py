@@ -139,7 +139,7 @@ def write_people(folder):
 
 
 def write_trials(folder, count):
-    """Toy walks of one subject and a broken file in their midst."""
+    """Toy walks of one subject with a broken file among them."""
     for i in range(count):
         write_toy(folder, f"01_{i:02}", period=110.0 + 5 * i, seed=i, frames=300 + 20 * i)
     (folder / "01_02x.amc").write_text(BROKEN)

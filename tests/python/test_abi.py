@@ -1,4 +1,4 @@
-"""The handshake between Python and the library: it passes, and every kind of slip is caught."""
+"""The handshake between Python and the library: it passes, and every kind of mismatch is detected."""
 
 import re
 import subprocess
@@ -38,7 +38,7 @@ def test_a_missing_or_additional_field_is_caught():
 
 
 def test_structures_are_those_of_the_headers():
-    """The description is what the compiler made of the same tables: every struct, field, type and bound."""
+    """The description equals what the compiler made of the same tables: structs, fields, types, bounds."""
     for row in abi.fields(REAL):
         if row.name:
             assert re.search(rf"^\s+{re.escape(row.type)}, {row.name}, ", HEADERS, re.M), row
@@ -121,7 +121,7 @@ def test_memory_is_aligned(size):
 
 
 def test_the_library_is_loaded_before_a_structure_is_made():
-    """A structure has no fields before; a fresh process makes a model or a pool first of all."""
+    """A structure has no fields until its first use, which may be a model or a pool in a fresh process."""
     for first in (
         "from gait.bindings.model import load; load(None)",
         "from gait.track.tasks import threads; threads(2)",

@@ -1,4 +1,4 @@
-"""gait batch: clips in processes of their own; resumed after a kill, damaged ones end nothing."""
+"""gait batch: clips in separate processes; runs resume after a kill, and damaged clips end nothing."""
 
 import csv
 import json
@@ -21,7 +21,7 @@ from gait.camera.camera import write_camera
 from gait.errors import UserError
 from gait.io.keypoints_file import write
 
-# A stand-in for gait: notes each call, crashes on "bad", waits on "slow" until the file GO is there.
+# A stand-in for gait: records each call, crashes on "bad", waits on "slow" until the file GO exists.
 FAKE = """\
 import json, os, sys, time
 from pathlib import Path
@@ -149,7 +149,7 @@ def test_a_cluster_runs_the_same_project(place, monkeypatch):
         warnings.catch_warnings(),
         distributed.LocalCluster(**one, dashboard_address=None, silence_logs=50) as local,
     ):
-        warnings.simplefilter("ignore")  # those of distributed are not ours to mend
+        warnings.simplefilter("ignore")  # warnings of distributed, which are not ours to fix
         rows = cluster.run(place / "out", clips, local.scheduler_address, reported.append, fake)
     states = [DONE, FAILED, FAILED, FAILED, DONE]
     assert [row["state"] for row in rows] == states and len(reported) == 5
@@ -188,7 +188,7 @@ def test_a_kill_ends_the_commands_and_the_rest_is_resumed(place):
     )
     command = [sys.executable, "-c", script, str(place)]
     process = subprocess.Popen(command, stdout=subprocess.PIPE, text=True)
-    assert process.stdout.readline() == "a\n"  # slow waits now, or will
+    assert process.stdout.readline() == "a\n"  # slow is waiting now, or will be
     while f"track {place}/slow.mp4" not in calls(place):
         assert process.poll() is None
     process.send_signal(signal.SIGKILL)

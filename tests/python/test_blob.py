@@ -1,4 +1,4 @@
-"""The container of models: round trip, layout, and refusal of anything damaged."""
+"""The container of models: round trip, layout, and rejection of anything damaged."""
 
 import struct
 import zlib

@@ -1,4 +1,4 @@
-"""What `make lib` needs elsewhere: no Python, Eigen from wherever it is, a cross compiler's own tools."""
+"""What `make lib` needs on other machines: no Python, Eigen from anywhere, a cross compiler's own tools."""
 
 import os
 import re
@@ -84,7 +84,7 @@ def test_a_cross_compiler_brings_its_tools_and_has_its_own_folder(checkout):
 
 
 def test_a_library_without_threads_needs_none(tmp_path):
-    """GAIT_NO_THREADS leaves the pool out: nothing of it, and no threads of the system, in the object."""
+    """GAIT_NO_THREADS leaves out the pool: the object contains nothing of it and no threads of the system."""
     source = ROOT / "libgait/src/base/pool.c"
     options = ["-std=c11", "-Wpedantic", "-Werror", "-DGAIT_NO_THREADS", f"-I{ROOT}/libgait/include"]
     options += ["-iquote", f"{ROOT}/libgait/src", "-c"]
@@ -106,7 +106,7 @@ def test_figures_of_a_machine_are_kept_only_if_asked(words, folder):
 
 
 def compile_one(checkout, *words: str) -> str:
-    """What make does, with this machine's compilers, for one object."""
+    """What make does for one object, with this machine's compilers."""
     env = {
         k: v for k, v in os.environ.items() if not k.startswith("MAKE") and k not in ("CC", "CFLAGS", "OPT")
     }

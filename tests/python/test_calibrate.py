@@ -1,4 +1,4 @@
-"""gait calibrate: known lenses come back, every fault is one line, boards are printed true to size."""
+"""gait calibrate: known lenses are recovered, every fault is one line, boards are printed true to size."""
 
 import json
 import re
@@ -83,7 +83,7 @@ def test_sharp_frames_of_a_film_are_picked(tmp_path, capsys):
 
 
 def test_the_text_names_what_is_missing_and_what_is_next(tmp_path, capsys):
-    """A board that is never in the corners, nor near."""
+    """A board that never comes near or into the corners."""
     sheet, lens, names = texture(), camera(), []
     for k, (turn, shift) in enumerate(poses(10, far=(3.2, 3.3))):
         middle = shift * [0.25, 0.25, 1]

@@ -173,7 +173,7 @@ def test_pose2sim_toml_by_name(tmp_path):
 
 @pytest.mark.parametrize("suffix", ["json", "toml", "yaml", "xml"])
 def test_a_byte_order_mark_is_passed_over(suffix, tmp_path):
-    """As Windows' editors write it."""
+    """As editors on Windows write it."""
     path = tmp_path / f"cam.{suffix}"
     if suffix == "json":
         write_json(path)

@@ -1,4 +1,4 @@
-"""Camera files that contradict the walk are reported with what would fit; right ones are not."""
+"""Camera files that contradict the walk are reported with values that would fit; correct ones are not."""
 
 import re
 from dataclasses import replace
@@ -67,7 +67,7 @@ def test_a_wrong_camera_is_reported_with_one_that_fits(change, words):
 
 @pytest.mark.parametrize("share", [1.5, 1 / 1.5])
 def test_a_wrong_focal_length_of_a_level_camera_is_reported(share):
-    """It leaves the stature as it is."""
+    """The stature stays as it is."""
     level = view(tilt=0.0)
     walk = keypoints(level)
     report = contradiction(replace(level, fx=share * level.fx, fy=share * level.fy), walk, MODEL, None)
@@ -152,7 +152,7 @@ def test_a_person_of_unknown_stature_is_of_any_usual_one():
     ],
 )
 def test_a_part_is_named_from_its_threshold_on(change, words):
-    """The person appears as tall as they are, so that only the parts of the camera can differ."""
+    """The person appears with their true height, so that only the parts of the camera can differ."""
     walk = keypoints(view())
     given = view(**change)
     appears = find_keypoint_start(walk, given, MODEL)
@@ -162,7 +162,7 @@ def test_a_part_is_named_from_its_threshold_on(change, words):
 
 
 def test_a_difference_within_the_uncertainty_of_the_estimate_is_not_reported(monkeypatch):
-    """A path across the view leaves the focal length open: only its standard deviation keeps it silent."""
+    """A path across the view leaves the focal length open: only its standard deviation prevents a report."""
     walk, given = keypoints(view(tilt=0.0), ACROSS), view(tilt=0.0, focal=1500.0)
     assert camera_check._wrong_part(given, walk, MODEL, STATURE) is None
     found = calibrate(walk, SIZE, MODEL, STATURE)

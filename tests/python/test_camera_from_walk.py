@@ -26,7 +26,7 @@ from gait.track.walk_start import swap_sides
 
 @cache
 def calibrated(walk=TOWARDS, **truth):
-    """Camera found from a walk before a camera; found once, though several tests look at it."""
+    """Camera found from a walk in front of a camera; found once for all tests."""
     return calibrate(keypoints(view(**truth), walk), SIZE, MODEL, 1.75)
 
 

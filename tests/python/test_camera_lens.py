@@ -1,4 +1,4 @@
-"""Camera files of other tools: every lens is used rightly or refused, and sizes that contradict are too."""
+"""Camera files of other tools: every lens is used correctly or rejected, and so are contradicting sizes."""
 
 from pathlib import Path
 

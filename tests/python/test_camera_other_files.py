@@ -1,4 +1,4 @@
-"""Cameras of other tools: the same pixels as by the tool's own equations, or one line that refuses them."""
+"""Cameras of other tools: the same pixels as from the tool's own equations, or a one-line error."""
 
 import json
 import pickle
@@ -51,7 +51,7 @@ def ros_file(path, model="plumb_bob", coefficients=(*LENS, 0.0)):
 
 
 def ros_message(path, model="plumb_bob", coefficients=(*LENS, 0.0), more=""):
-    """As `ros2 topic echo` prints it: r rectifies and is no place in the world."""
+    """As `ros2 topic echo` prints it: r rectifies the image and is not a pose in the world."""
     path.write_text(
         f"header:\n  frame_id: head\nheight: 720\nwidth: 1280\ndistortion_model: {model}\n"
         f"d: {list(coefficients)}\nk: {MATRIX.ravel().tolist()}\nr: [0, 1, 0, -1, 0, 0, 0, 0, 1]\n"

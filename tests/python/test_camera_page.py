@@ -1,4 +1,4 @@
-"""Marks on the floor: their distances, the page to click them on, and the camera that comes of them."""
+"""Marks on the floor: their distances, the page on which they are clicked, and the resulting camera."""
 
 import json
 import signal

@@ -22,7 +22,7 @@ def run(script: str, *args: object) -> subprocess.CompletedProcess[str]:
 
 
 def fails(done: subprocess.CompletedProcess[str], *words: str) -> bool:
-    """The check refused and its output holds the words."""
+    """The check failed and its output contains the words."""
     return done.returncode == 1 and all(w in done.stdout + done.stderr for w in words)
 
 

@@ -165,7 +165,7 @@ def test_bad_classes_are_one_line(
 
 
 def estimates(model: gait.Model) -> list[Estimate]:
-    """Of a small clip of a person who stands."""
+    """A small clip of a person who stands."""
     camera = gait.Camera(
         64,
         48,
@@ -222,7 +222,7 @@ def test_a_stop_brings_the_feet_together_without_a_slide(tmp_path: Path) -> None
     assert speed.max() < 0.05
     assert np.linalg.norm(points["l_ankle"][inner] - points["r_ankle"][inner], axis=1).max() < 0.35
     for side in "lr":
-        for part in ("heel", "toe"):  # who stands does not slide
+        for part in ("heel", "toe"):  # a person who stands does not slide
             assert np.ptp(points[f"{side}_{part}"][inner], axis=0).max() < 0.005
     assert stage.walk.speed[stage.frames][:10].mean() > 0.9
 

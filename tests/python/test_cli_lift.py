@@ -94,7 +94,7 @@ def test_the_joints_that_a_displacement_moves_most_are_named():
 
 @pytest.mark.parametrize("method", METHODS)
 def test_a_stature_is_reported_where_it_was_estimated(folder, capsys, method):
-    """Segments alone keep the stature that was believed: no estimate."""
+    """With segments alone the stature stays the assumed one: it is not estimated."""
     command = ["lift", "t.csv", "-m", "m.gait", "-o", "out.csv", "--camera", "cam.json", "--method", method]
     assert main([*command, "--json"]) == 0
     stature = json.loads(capsys.readouterr().out)["stature_m"]

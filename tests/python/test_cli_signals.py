@@ -1,4 +1,4 @@
-"""Commands that are ended from outside leave nothing half-written behind."""
+"""Commands that are interrupted leave nothing half-written behind."""
 
 import json
 import os
@@ -60,7 +60,7 @@ def test_track_keeps_the_rows_that_are_finished(tmp_path):
     rows = len(track.frame)
     assert track.frames == range(
         track.frame[-1] + 1
-    )  # the others were not reached, which is not the same as not found
+    )  # the others were not reached, which differs from not found
     assert 1 <= rows < 900 and abs(Video(output / "o.unfinished.mp4").count - rows) <= 1
 
 

@@ -1,4 +1,4 @@
-"""The commands that track, evaluate and draw, as a user calls them."""
+"""The commands that track, evaluate and draw, called as a user does."""
 
 import csv
 import json
@@ -195,7 +195,7 @@ def tracks(scene):
 
 
 def root_error(scene, capsys, *options):
-    """Median error of tracks of the clip, mm, the mean of four seeds as one alone is luck, and a digest."""
+    """Median error of tracks of the clip, mm, over four seeds because a single one is luck, and a digest."""
     errors = []
     for seed in range(1, 5):
         words = ["--json", "--mode", "paper", "--background", "none", "--seed", seed, *options]

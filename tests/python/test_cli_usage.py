@@ -36,7 +36,7 @@ OUTPUTS = {"output", "overlay", "camera_out", "cameras_out", "trc", "log", "prin
 
 
 def test_outputs_of_another_kind_are_refused_before_anything_is_read():
-    """A page in a .pdf, or a camera in a .txt, would be written and then read by nothing."""
+    """A page in a .pdf, or a camera in a .txt, would be written and could then not be read by anything."""
     elsewhere = ("learn", "export")  # with all that they are given, and by the kinds that are written
     outputs = [
         (command, action)
@@ -122,7 +122,7 @@ def test_the_module_runs_and_passes_the_exit_code(tmp_path):
 
 
 def test_too_little_memory_is_one_line(tmp_path):
-    """As much memory as loading takes, and a picture more than that allows."""
+    """Only as much memory as loading takes: a picture needs more than that."""
     limited = "import resource, gait.cli.simulate, gait.simulate.clip, numpy as np\n" + (
         "used = int(open('/proc/self/statm').read().split()[0]) * resource.getpagesize()\n"
         "resource.setrlimit(resource.RLIMIT_AS, (used + (1 << 28),) * 2)\n"
@@ -156,7 +156,7 @@ def test_help_loads_nothing_heavy():
 
 @pytest.mark.parametrize("command", ["", "track", "lift", "report lift"])
 def test_help_answers_in_three_tenths_of_a_second(command):
-    """CPU time, as other work may keep this machine busy; the best of three."""
+    """CPU time, because other programs may keep this machine busy; the best of three."""
 
     def spent():
         used = resource.getrusage(resource.RUSAGE_CHILDREN)

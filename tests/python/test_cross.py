@@ -38,5 +38,5 @@ def test_the_daemon_for_another_cpu_gives_the_same_bits(tmp_path, monkeypatch):
     there = rig.play(log)
     assert (here.frames, here.digest) == (4, there.digest)
     for estimate in here.estimates + there.estimates:
-        estimate.receive_utime = estimate.step_us = 0  # the only ones that depend on time
+        estimate.receive_utime = estimate.step_us = 0  # the only values that depend on time
     assert [e.encode() for e in here.estimates] == [e.encode() for e in there.estimates]

@@ -1,4 +1,4 @@
-"""People in made films: in portrait, filling the picture, small; films without a person to be found."""
+"""People in generated films: in portrait, filling the picture, small; and films without a person."""
 
 import json
 
@@ -35,7 +35,7 @@ def walk(tmp_path_factory):
 
 
 def film(path, pictures, turned=0):
-    """Write pictures as a camera does that was held turned clockwise: sideways, with a matrix."""
+    """Write pictures as a camera does that was held rotated clockwise: sideways, with a matrix."""
     with VideoWriter(path, 30, crf=10) as video:
         for picture in pictures:
             video.write(np.ascontiguousarray(np.rot90(picture, turned // 90)))
@@ -123,7 +123,7 @@ def test_a_person_of_80_pixels_is_found(walk, tmp_path):
 
 
 def refused(capsys, folder, *words):
-    """Run a command that must end with one line and write nothing; the line."""
+    """Run a command that must end with one line and write nothing; return the line."""
     before = sorted(folder.iterdir())
     assert cli.main([str(word) for word in (*words, "--quiet")]) == 1
     out, err = capsys.readouterr()

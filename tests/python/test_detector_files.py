@@ -1,4 +1,4 @@
-"""Keypoints of other tools are read: one walk written in every format comes back as the same keypoints."""
+"""Keypoints of other tools are read: a walk written in each format comes back as the same keypoints."""
 
 import json
 import pickle

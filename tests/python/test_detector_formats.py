@@ -1,4 +1,4 @@
-"""Keypoint files of other tools are recognised by their content, whatever their suffix: read, or refused."""
+"""Keypoint files of other tools are recognised by content, whatever their suffix, and read or rejected."""
 
 import json
 from pathlib import Path

@@ -1,4 +1,4 @@
-"""Profiles of the detector: its joints moved to the model's, and their lasting errors."""
+"""Profiles of the detector: its joints are moved to the model's, and their lasting errors."""
 
 import json
 import sys

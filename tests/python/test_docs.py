@@ -91,7 +91,7 @@ ALL = {page: blocks(page) for page in PAGES}
 
 
 def run(*command, **options):
-    """Run, and show the output if it fails."""
+    """Run a command; show its output if it fails."""
     options = {"env": ENV, "timeout": 300} | options
     done = subprocess.run([*map(str, command)], capture_output=True, text=True, **options)
     assert done.returncode == 0, f"{command}: {done.stdout}{done.stderr}"
@@ -133,7 +133,7 @@ def folder(tmp_path, clip, installed):
 
 
 def execute(block, folder, clip, env):
-    """Do what a reader does with a block."""
+    """Do with a block what a reader does."""
     if block.file:
         (folder / block.file).parent.mkdir(parents=True, exist_ok=True)
         (folder / block.file).write_text(block.text, encoding="utf-8")
@@ -168,7 +168,7 @@ def gait_here(*words, clip):
 
 
 def python_here(text):
-    """What a program prints that is run in this process, as importing takes longer than most of them."""
+    """What a program prints, run in this process because importing takes longer than most programs."""
     out = io.StringIO()
     with contextlib.redirect_stdout(out):
         exec(compile(text, "block", "exec"), {"__name__": "__main__"})
@@ -316,7 +316,7 @@ def test_every_public_name_has_a_place_in_the_reference():
 
 
 def output_of(page, start, folder):
-    """What the first Python block of a page that begins so prints, beside the clip in a folder."""
+    """Output of a page's first Python block that begins with these words, with the clip in the folder."""
     (block,) = (b for b in ALL[DOC / page] if b.language == "python" and start in b.text)
     with (folder / "walk/truth.csv").open(encoding="utf-8", newline="") as f:
         return python_here(block.text).splitlines(), list(csv.DictReader(f))

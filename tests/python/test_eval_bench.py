@@ -332,6 +332,6 @@ def test_a_camera_from_a_walk_that_misses_a_bound_fails(place, value, name, tmp_
 
 
 def test_every_bench_finds_what_it_imports():
-    """Most run by hand and seldom: a module of the package that moved would be noticed late."""
+    """Most of these run seldom and by hand: a module of the package that moved would be noticed late."""
     for path in Path(eval_clips.__file__).parent.glob("*.py"):
         importlib.import_module(path.stem)

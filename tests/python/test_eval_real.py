@@ -1,4 +1,4 @@
-"""What `make eval-real` counts as good, against tracks of which it is known."""
+"""What `make eval-real` counts as good, checked with tracks whose quality is known."""
 
 import sys
 from dataclasses import replace

@@ -1,4 +1,4 @@
-"""Error measures against numbers worked out by hand, and the baselines against what they should reach."""
+"""Error measures compared with numbers worked out by hand, and the baselines with what they should reach."""
 
 import json
 from dataclasses import replace
@@ -307,7 +307,7 @@ def test_a_model_of_segments_alone_is_refused_by_name(tmp_path):
 
 @pytest.mark.parametrize(("rate", "reported"), [(30, False), (10, True)])
 def test_frames_of_other_times_are_reported(tmp_path, capsys, rate, reported):
-    """Every third frame of a truth numbered by itself is paired with other moments."""
+    """Every third frame of a truth with its own numbering is paired with other moments."""
     places = np.stack([TRUTH.places[name] for name in JOINTS], axis=1)
     sd, frames = np.full_like(places, 0.1), np.arange(len(places))
     write_lifted(tmp_path / "truth.csv", frames, frames / 30, JOINTS, places, sd)

@@ -1,4 +1,4 @@
-"""gait export: what others read is the motion, to 0.1 mm and 0.1 degree."""
+"""gait export: other programs read the same motion, to 0.1 mm and 0.1 degree."""
 
 import json
 import math

@@ -1,4 +1,4 @@
-"""Outputs that appear whole or not at all, and places where none may be put."""
+"""Outputs are written completely or not at all, and places where none may be written are rejected."""
 
 import errno
 import os

@@ -1,4 +1,4 @@
-"""Errors of gait parameters against a truth: known errors are found, intervals that hold them counted."""
+"""Errors of gait parameters compared with a truth: known errors are found, and covering intervals counted."""
 
 import sys
 from dataclasses import replace
@@ -22,7 +22,7 @@ def truth_of(track):
 
 
 def test_a_known_error_of_each_kind_is_found():
-    """A track late by 20 ms whose lengths are 3 % too large: events are late, times right, lengths large."""
+    """A track 20 ms late with lengths 3 % too large: events are late, durations right, lengths too large."""
     truth = truth_of(walking_track(seconds=6))
     late, large = 0.02, 1.03
     places = {}

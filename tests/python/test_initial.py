@@ -1,4 +1,4 @@
-"""First states: from a file, with every fault reported, and found in the pictures."""
+"""First states: read from a file, with every fault reported, and found in the pictures."""
 
 import json
 from dataclasses import replace
@@ -266,7 +266,7 @@ def test_two_people_who_pass_are_kept_apart(tmp_path):
 
 
 def in_mirror(view, state, i):
-    """The wall with a mirror in it, 1.5 m behind the path, which shows the person from the knees up."""
+    """The wall with a mirror 1.5 m behind the path, which shows the person from the knees up."""
     corners = view.project([[x, 1.5, z] for x, z in ((-2.5, 0.5), (2.5, 0.5), (2.5, 2.2), (-2.5, 2.2))])
     glass = cv2.fillPoly(np.zeros(wall().shape[:2], np.uint8), [np.rint(corners).astype(np.int32)], 255)
     pelvis = state.pelvis * [1, -1, 1] + [0, 3.0, 0]
@@ -325,7 +325,7 @@ def test_the_automatic_start_leaves_a_standing_person(tmp_path):
 
 @pytest.mark.parametrize("rate", [6, 10, 15, 25, 30, 60])
 def test_detections_alone_suffice_at_any_frame_rate(monkeypatch, rate):
-    """Enough detections in time, and no more than a slow detector can give."""
+    """Enough detections in time, and no more than a slow detector can deliver."""
     view = camera(place=(0.0, -6.0, 2.2))
     boxes = []
 

@@ -1,4 +1,4 @@
-"""`make install` puts a library there that programs can be built against, and `make uninstall` removes it."""
+"""`make install` installs a library that programs can be built with, and `make uninstall` removes it."""
 
 import os
 import re
@@ -27,7 +27,7 @@ def make(target: str, *words: str) -> subprocess.CompletedProcess[str]:
 
 @pytest.fixture
 def installed(tmp_path):
-    """Folder that stands for / with the library installed in /opt/gait."""
+    """Folder used in place of /, with the library installed in /opt/gait."""
     done = make("install", f"DESTDIR={tmp_path}", "PREFIX=/opt/gait")
     assert done.returncode == 0, done.stderr
     return tmp_path

@@ -1,4 +1,4 @@
-"""Files of 2-D keypoints: what is read, and what every fault is called."""
+"""Files of 2-D keypoints: what is read, and the message for every fault."""
 
 from __future__ import annotations
 
@@ -141,7 +141,7 @@ def test_frames_that_are_numbered_from_elsewhere_are_reported(shift):
 
 
 def test_frames_left_out_but_numbered_on_are_reported():
-    """A detector that skips two frames and counts on is two frames off afterwards."""
+    """A detector that skips two frames but does not count them is two frames off afterwards."""
     time = np.delete(TIMES, [40, 41])
     assert "0.0667 s off" in counted(np.arange(58), time).compare_times("t.csv", TIMES)
 

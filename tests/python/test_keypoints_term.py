@@ -18,7 +18,7 @@ CONFIG = TrackerConfig.default(particles=300)
 
 
 def found(i: int, noise: float = 1.0) -> FrameKeypoints:
-    """What a detector states of a frame: most joints, in an order of its own, and one the model lacks."""
+    """What a detector reports for a frame: most joints, in its own order, and one that the model lacks."""
     rng = np.random.default_rng(i)
     uv = VIEW.project(MODEL.pose(TRUE[i])[0]) + noise * rng.normal(size=(len(MODEL.joint_names), 2))
     uv[rng.random(len(uv)) < 0.2] = np.nan

@@ -51,7 +51,7 @@ def test_frames_older_than_the_budget_are_dropped_and_counted(url):
 
 
 def test_frames_sent_twice_are_not_dropped(url):
-    """Whichever of the two is tracked."""
+    """Whichever of the two frames is tracked."""
     with rig.daemon(url, "--max-gap", 60) as (listener, finish):
         armed(listener)
         for number in range(8):

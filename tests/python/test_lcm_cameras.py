@@ -1,4 +1,4 @@
-"""gait-trackd --further-streams: frames of several cameras of one person, as far as they come."""
+"""gait-trackd --further-streams: frames of several cameras of one person, as far as they arrive."""
 
 import re
 from dataclasses import replace
@@ -60,7 +60,7 @@ def in_message(camera):
 
 
 def by_python(there):
-    """Digest of the library that is given the same; `there`: frames that the second camera has."""
+    """Digest of the library with the same input; `there`: frames that the second camera has."""
     tracker = Tracker(
         rig.model(),
         [in_message(rig.CAMERA), in_message(SIDE)],
@@ -75,7 +75,7 @@ def by_python(there):
 
 @pytest.mark.parametrize("missing", [(), range(8, 14)])
 def test_two_streams_are_one_tracker(missing, tmp_path):
-    """The digest is the library's with two cameras, whichever frame comes first, and if some do not come."""
+    """The digest is the library's with two cameras, whichever frame comes first, even if some are missing."""
     both = [
         event for i in range(FRAMES) for event in (*rig.frames(i, i + 1), *([second(i)] * (i not in missing)))
     ]

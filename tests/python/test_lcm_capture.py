@@ -1,4 +1,4 @@
-"""gait capture as a process: logs that it writes, and its end by a signal."""
+"""gait capture as a process: the logs that it writes, and its end by a signal."""
 
 import resource
 import signal
@@ -91,7 +91,7 @@ def test_a_folder_that_is_missing_is_reported(folder, tmp_path):
 
 @pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM])
 def test_a_signal_ends_it_after_a_whole_frame(folder, tmp_path, number):
-    """As a script starts it with &, where SIGINT is ignored."""
+    """As a script starts it with &: SIGINT is then ignored."""
     log = tmp_path / "x.log"
     words = [folder / "video.mp4", "--loop", "--rate", "200", "--url", f"file://{log}?mode=w"]
     process = subprocess.Popen(

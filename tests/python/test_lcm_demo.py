@@ -1,4 +1,4 @@
-"""gait demo: what it writes, what it leaves behind when it is ended or fails, and what it refuses."""
+"""gait demo: what it writes, what it leaves behind when it is stopped or fails, and what it rejects."""
 
 import fcntl
 import os
@@ -21,7 +21,7 @@ def folder(tmp_path_factory):
 
 @pytest.fixture(scope="module")
 def long_video(tmp_path_factory):
-    """Ten seconds: a demo that is ended early ends in its midst."""
+    """Ten seconds, so that a demo that is stopped early is still running."""
     return rig.write_clip(tmp_path_factory.mktemp("long"), 10 * rig.FPS) / "video.mp4"
 
 

@@ -1,4 +1,4 @@
-"""gait detect --lcm: frames come in over LCM, and the joints found in them go out."""
+"""gait detect --lcm: receives frames over LCM and publishes the joints found in them."""
 
 import re
 
@@ -24,7 +24,7 @@ CONFIDENCE = np.linspace(0.3, 1, len(JOINTS))
 
 
 class FakePeople:
-    """Finds in every frame brighter than 10 a passer-by and a person who was seen before."""
+    """In every frame brighter than 10 finds a passer-by and a person who was detected before."""
 
     def __init__(self, network, most):
         self.one, self.times = Followed(1), []
@@ -118,7 +118,7 @@ def test_the_tracker_uses_the_joints_of_every_second_frame(tmp_path, monkeypatch
     ]
 
     class Link:
-        """Passes on what is published into the log."""
+        """Copies what is published into the log."""
 
         def subscribe(self, channel, handler):
             self.handler = handler

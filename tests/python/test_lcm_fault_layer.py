@@ -1,4 +1,4 @@
-"""gait-trackd on a machine that fails it: memory, disk and clock, by a layer under its calls."""
+"""gait-trackd when memory, disk or clock fail, simulated by a layer under its calls."""
 
 import json
 import subprocess
@@ -21,7 +21,7 @@ def layer(tmp_path_factory):
 
 @pytest.fixture
 def words(tmp_path):
-    """All for which the daemon takes memory or writes: lift, keypoints, particles, a log of its own."""
+    """Everything for which the daemon takes memory or writes: lift, keypoints, particles, its own log."""
     log = rig.write_log(tmp_path / "in.log", [*rig.opening(), *rig.frames(0, 3)])
     camera = tmp_path / "camera.json"
     camera.write_text(json.dumps(rig.CAMERA.to_dict()))

@@ -1,4 +1,4 @@
-"""gait-trackd and bad input: one line that names file, field and remedy; exit 1, or 2 for usage."""
+"""gait-trackd with bad input: one line that names file, field and remedy; exit code 1, or 2 for usage."""
 
 import json
 import re
@@ -37,7 +37,7 @@ def options(tmp_path, *more):
 
 
 def accepted(tmp_path, *more):
-    """The files given are of use, only the log is not; what was reported."""
+    """The given files are usable, only the log is not; return what was reported."""
     outcome = rig.run(*options(tmp_path, *more))
     assert outcome.code == 1 and "no frames on GAIT_IMAGE_0" in outcome.words.splitlines()[-1], outcome.words
     assert all(" particles, " in line for line in outcome.words.splitlines()[:-1]), outcome.words
@@ -277,7 +277,7 @@ SETTINGS = [name for name, value in TrackerConfig.default() if isinstance(value,
 
 @pytest.mark.parametrize("name", SETTINGS)
 def test_the_ranges_are_those_of_the_library(name):
-    """A value the library would refuse is a usage error, and no other value is."""
+    """Every value that the library would reject is a usage error, and no other value is."""
     change, option = {name: 1e9}, name.replace("_", "-")
     with pytest.raises(GaitError, match="is outside") as refused:
         Tracker(Model(), rig.CAMERA, TrackerConfig.default(**change))

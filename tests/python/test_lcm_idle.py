@@ -1,4 +1,4 @@
-"""gait-trackd states once why frames arrive and no person is tracked, and where it listens."""
+"""gait-trackd reports once why frames arrive but no person is tracked, and where it listens."""
 
 import lcm_rig as rig
 import numpy as np

@@ -1,4 +1,4 @@
-"""gait-trackd --lift: 2-D tracks from a log come out as 3-D joints, the same that the library gives."""
+"""gait-trackd --lift: 2-D tracks from a log give 3-D joints, the same as from the library."""
 
 from __future__ import annotations
 
@@ -27,7 +27,7 @@ GROWTH_KB = 225  # of 900 frames: 256 bytes of each message kept would be seen
 
 @cache
 def model() -> tuple[bytes, tuple[str, ...]]:
-    """A prior under which a pose goes on along x for ever."""
+    """A prior in which a pose moves along x forever."""
     prior = toy_prior(10, 19, 8, seed=2)
     drift = 0.03 * np.arange(10)[None, :, None, None] * np.array([1.0, 0, 0])
     steady = np.repeat(prior.modes[:, :, :1], 10, axis=2)
@@ -119,7 +119,7 @@ def test_joints_are_those_of_the_library(tmp_path: Path, stated: bool) -> None:
 
 
 def test_the_lifter_alone_costs_the_tracker_nothing(tmp_path: Path) -> None:
-    """Frames and tracks in one log: the tracker's digest is what it is without them."""
+    """With frames and tracks in one log, the tracker's digest is the same as without the tracks."""
     film = [*rig.opening(), *rig.frames(0, 6)]
     plain = rig.play(rig.write_log(tmp_path / "b.log", film))
     names = model()[1][:NAMES_SHOWN]
@@ -130,7 +130,7 @@ def test_the_lifter_alone_costs_the_tracker_nothing(tmp_path: Path) -> None:
 
 
 def test_memory_does_not_grow_with_the_stream(tmp_path: Path) -> None:
-    """Resident memory: once every segment has been in use, 900 frames more add no more."""
+    """Resident memory: once every segment has been used, 900 further frames add nothing."""
     rig.need_multicast()
     blob = tmp_path / "lift.gait"
     blob.write_bytes(model()[0])
@@ -183,7 +183,7 @@ def test_tracks_out_of_order_or_of_strangers_are_named(tmp_path: Path) -> None:
 
 
 def test_one_stamp_far_ahead_does_not_end_the_lift(tmp_path: Path) -> None:
-    """It begins anew with the next tracks: all of them were rejected until a restart."""
+    """It starts again with the next tracks; before, all of them were rejected until a restart."""
     happenings, names = events(), model()[1][:NAMES_SHOWN]
     ahead = tracks_message(names, observations()[9][1], rig.utime(9) + 3_600_000_000, 7777)
     happenings[10:11] = [("GAIT_TRACKS_0", ahead)]
@@ -195,7 +195,7 @@ def test_one_stamp_far_ahead_does_not_end_the_lift(tmp_path: Path) -> None:
 
 
 def test_who_is_suddenly_elsewhere_is_ambiguous(tmp_path: Path) -> None:
-    """While the library states that what it saw did not fit and was searched for anew."""
+    """While the library reports that the observations did not fit and were searched anew."""
     blob, names = model()
     lifter = Lifter(blob, camera(), LiftConfig.default(lag=LAG, sd=SD))
     happenings, want = events()[:1], []
@@ -221,7 +221,7 @@ def test_what_is_published_of_an_absurd_camera_is_finite(tmp_path: Path) -> None
 
 
 def spoilt(message: Any) -> Any:
-    """Points that are of no use: a stranger, one twice, three confidences that are none."""
+    """Points that cannot be used: an unknown one, a duplicate, three invalid confidences."""
     names = model()[1]
     message.tracks += [point("nose", 0.9), point(message.tracks[0].name, 0.9)]
     message.tracks += [point(names[NAMES_SHOWN + k], c) for k, c in enumerate((1.5, -0.5, math.nan))]

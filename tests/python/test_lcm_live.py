@@ -49,7 +49,7 @@ def begin(listener, pacer):
 
 @pytest.mark.long
 def test_a_stream_at_thirty_hertz_arrives_and_is_tracked_in_time(url, tmp_path):
-    """Capture here, tracker in another process, recorder in a thread: loss and latency of each leg."""
+    """Capture here, tracker in another process, recorder in a thread: loss and latency of each step."""
     count = 60
     with rig.daemon(url) as (listener, finish):
         ready(listener)
@@ -80,7 +80,7 @@ def test_a_stream_at_thirty_hertz_arrives_and_is_tracked_in_time(url, tmp_path):
 
 
 def test_the_newest_frame_wins_and_the_others_are_counted(url):
-    """Five times faster than a slow tracker: it skips ahead instead of lagging behind."""
+    """Five times faster than a slow tracker, which must skip frames instead of lagging behind."""
     count = 80
     with rig.daemon(url, "-n", 60000, "--max-gap", 60) as (listener, finish):
         ready(listener)
@@ -188,7 +188,7 @@ def test_damaged_messages_do_not_stop_a_running_tracker(url):
 
 
 def test_junk_does_not_flood_the_log_and_the_status(url):
-    """Messages of two channels in turns, so that no line repeats the one before."""
+    """Messages of two channels in turn, so that no line repeats the one before."""
     with rig.daemon(url) as (listener, finish):
         ready(listener)
         listener.statuses.clear()

@@ -1,4 +1,4 @@
-"""gait-trackd on LCM logs: nothing is lost, everything is repeatable, no message can hurt it."""
+"""gait-trackd on LCM logs: nothing is lost, everything is repeatable, no message does harm."""
 
 import json
 import struct
@@ -180,7 +180,7 @@ def wrong_camera():
 
 
 def announced(tmp_path, seconds, *options):
-    """A wrong camera first, then the right one again and again for that long, then the stream."""
+    """A wrong camera first, then for that long the right one repeatedly, then the stream."""
     right = [
         ("GAIT_CAMERA_0", camera_message(rig.CAMERA, 1_000_000 + 2_000_000 * k))
         for k in range(seconds // 2 + 1)
@@ -302,7 +302,7 @@ def test_lost_frames_are_counted_by_their_numbers(tmp_path):
 
 
 def test_repeats_are_not_dropped_frames(tmp_path):
-    """`dropped` is of frames that were never tracked: by number and time, by time alone, by number alone."""
+    """`dropped` counts frames that were never tracked: by number and time, by time alone, by number alone."""
     twice = [event for event in rig.frames(0, 8) for _ in range(2)]
     plain = [("GAIT_IMAGE_0", rig.frame_message(i // 2, metadata=[], nmetadata=0)) for i in range(16)]
     late = [("GAIT_IMAGE_0", rig.frame_message(i // 2, utime=rig.utime(i))) for i in range(16)]
@@ -327,7 +327,7 @@ def test_a_frame_that_comes_after_a_later_one_is_dropped_once(tmp_path):
 
 
 def test_frames_of_a_source_that_does_not_count(tmp_path):
-    """A bot_core publisher sends no frame numbers: nothing is counted as lost, estimates state -1."""
+    """A bot_core publisher sends no frame numbers: nothing counts as lost, and estimates have number -1."""
     events = [("GAIT_IMAGE_0", rig.frame_message(i, metadata=[], nmetadata=0)) for i in range(4)]
     outcome = track(tmp_path, [*rig.opening(), *events])
     assert tracked(outcome) == [-1] * 4 and outcome.dropped == 0
@@ -348,7 +348,7 @@ def test_a_clock_set_back_a_little_is_waited_for_and_reported_once(tmp_path):
 
 
 def test_a_clock_set_back_far_stops_the_tracker_which_reports_it_once(tmp_path):
-    """As a long pause does: every later frame was rejected for ever, each with a line of its own."""
+    """As after a long pause, when every later frame was rejected forever, each with its own log line."""
     back = [("GAIT_IMAGE_0", rig.frame_message(i, utime=rig.utime(i) - 900_000)) for i in range(3, 9)]
     again = ("GAIT_COMMAND", rig.start(6, at=0))
     init = tmp_path / "i.json"

@@ -25,7 +25,7 @@ PRINTED = re.compile(r"poses_refused (\d+) frames_without_pose (\d+)")
 
 
 def camera_at(frame: float) -> rig.Camera:
-    """The camera drives along with the person at 1 m/s and turns away by 0.2 rad/s."""
+    """The camera moves along with the person at 1 m/s and turns away by 0.2 rad/s."""
     seconds = frame / rig.FPS
     R = rig.CAMERA.R @ Rotation.from_rotvec([0, 0, -0.2 * seconds]).as_matrix()
     return replace(rig.CAMERA, R=R, t=-R @ (rig.CAMERA.centre + [seconds - 0.3, 0, 0]))
@@ -47,7 +47,7 @@ def pose(frame: float, camera: rig.Camera | None = None) -> rig.Event:
 
 
 def play(tmp_path: Path, events: list[rig.Event], *options: object) -> tuple[rig.Outcome, tuple[int, int]]:
-    """Track a log; also how many poses were refused, and how many frames had none."""
+    """Track a log; also return how many poses were rejected, and how many frames had none."""
     log = rig.write_log(tmp_path / "a.log", [pose(0), ("GAIT_COMMAND", rig.start(0)), *events])
     outcome = rig.play(log, "--moving-camera", *options)
     printed = PRINTED.search(outcome.printed)
@@ -70,7 +70,7 @@ def test_poses_at_the_frames_times_give_the_bits_of_the_library(tmp_path):
 
 
 def test_a_frame_between_two_poses_waits_for_the_later_one(tmp_path):
-    """Poses at other times than the frames, the later one of each frame after it."""
+    """Poses at other times than the frames, the later one of each pair after its frame."""
     events = [pose(-0.4)]
     for i in range(FRAMES):
         events += [image(i), pose(i + 0.6)]

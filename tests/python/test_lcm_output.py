@@ -1,4 +1,4 @@
-"""Logs that gait-trackd reads and writes: none is destroyed, no loss goes unnoticed."""
+"""Logs that gait-trackd reads and writes: none is destroyed, and every loss is noticed."""
 
 import json
 import resource

@@ -51,7 +51,7 @@ def joints(person, frame):
 
 @pytest.fixture(scope="module")
 def streams(tmp_path_factory):
-    """Estimates of both people's trackers, and the log that they were played."""
+    """Estimates of both people's trackers, and the log from which they were made."""
     rng, names = np.random.default_rng(1), list(rig.model().joint_names)
     camera = camera_message(rig.CAMERA, 1)
     log = [("GAIT_CAMERA_0", camera), ("GAIT_BACKGROUND_0", image_message(rig.plate(), 1, -1))]
@@ -87,7 +87,7 @@ def test_people_who_cross_keep_their_trackers(streams):
 
 
 def test_a_person_who_comes_back_has_the_same_number(streams):
-    """Away for 8.5 s, in which no person is tracked."""
+    """Away for 8.5 s, during which no person is tracked."""
     for person in (1, 2):
         gone = range(WALK + FPS // 2 + 1, 1000 if person == 1 else BACK)
         away = [e for e in streams[0][person] if e.frame in gone]

@@ -1,4 +1,4 @@
-"""gait record as a process: whatever ends it, the track so far is whole and the reason is reported."""
+"""gait record as a process: whatever ends it, the track so far is complete and the reason is reported."""
 
 import json
 import resource
@@ -30,7 +30,7 @@ def estimates(tmp_path_factory):
 @pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM, signal.SIGHUP])
 @pytest.mark.parametrize("flowing", [False, True], ids=["quiet", "flowing"])
 def test_an_interrupted_recording_is_whole(estimates, tmp_path, number, flowing):
-    """Estimates flow on, or have ceased so that the signal comes while it waits."""
+    """Estimates continue, or have stopped so that the signal comes while the command waits."""
     rig.need_multicast()
     url, out = private_url(), tmp_path / "track.csv"
     process = subprocess.Popen(
@@ -84,7 +84,7 @@ def test_a_missing_folder_is_named_before_listening(tmp_path, option):
 
 
 def record(tmp_path, estimates, *options):
-    """Record estimates that came one after the other; the process, and the frames of the track."""
+    """Record estimates sent one after the other; return the process and the frames of the track."""
     log, out = tmp_path / "in.log", tmp_path / "t.csv"
     rig.write_log(log, [("GAIT_ESTIMATE", e) for e in estimates])
     done = rig.gait("record", "--url", f"file://{log}?speed=0", "-o", out, *options)
@@ -125,7 +125,7 @@ def test_another_stream_that_begins_is_reported(estimates, tmp_path):
 
 
 def test_damaged_messages_are_left_out_and_reported(estimates, tmp_path):
-    """Bytes of something else, an estimate cut short, and one without joints do not end a recording."""
+    """Foreign bytes, a truncated estimate and one without joints do not end a recording."""
     plain = later(estimates[3], njoints=0, joints=[], nangles=0, angles=[])
     log = tmp_path / "in.log"
     writer = LogWriter(log)
@@ -150,7 +150,7 @@ def test_a_log_played_again_is_another_stream(estimates, tmp_path):
 
 
 def test_a_start_in_the_middle_is_the_same_stream(estimates, tmp_path):
-    """A person is found anew: steps count from 0 again, frames go on; the very first of them may be lost."""
+    """A person is found anew: steps count from 0 again, frames continue; the very first ones may be lost."""
     anew = [later(e, step=e.frame - 8, dropped=0) for e in estimates[8:]]
     for rest in (anew, anew[1:]):
         done, frames = record(tmp_path, [*estimates[:8], *rest], "--quiet")
@@ -221,7 +221,7 @@ def test_ends_that_cannot_be_are_usage_errors(tmp_path, option):
 
 
 def test_a_log_for_which_there_is_no_space_is_reported(estimates, tmp_path):
-    """The last bytes wait in memory: only closing shows that they do not fit."""
+    """The last bytes are still in memory: only closing the file shows that they do not fit."""
     log = rig.write_log(tmp_path / "in.log", [("GAIT_ESTIMATE", e) for e in estimates])
     space = log.stat().st_size - 100
     words = [str(rig.PYTHON), "-m", "gait", "record", "--url", f"file://{log}?speed=0"]

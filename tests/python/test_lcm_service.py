@@ -1,4 +1,4 @@
-"""gait-trackd as a service that stays up: snapshots, a service manager, settings that are read again."""
+"""gait-trackd as a long-running service: snapshots, a service manager, settings that are read again."""
 
 import json
 import os
@@ -101,7 +101,7 @@ def test_a_folder_that_cannot_be_written_is_reported_once(tmp_path):
 
 @pytest.fixture
 def manager(tmp_path, monkeypatch):
-    """What is reported to a service manager, in order: call for the next line that is not WATCHDOG=1."""
+    """What a service manager receives, in order: each call returns the next line that is not WATCHDOG=1."""
     sock, lines = socket.socket(socket.AF_UNIX, socket.SOCK_DGRAM), SimpleQueue()
     sock.bind(str(tmp_path / "notify"))
     monkeypatch.setenv("NOTIFY_SOCKET", str(tmp_path / "notify"))

@@ -1,4 +1,4 @@
-"""Where a track begins: START and --init against the frames that come."""
+"""Where a track begins: START and --init combined with the frames that arrive."""
 
 import json
 
@@ -119,7 +119,7 @@ def bad_start(part, **change):
     ],
 )
 def test_a_senseless_start_is_refused_at_once(tmp_path, part, change, words):
-    """Before a frame or the camera comes, and while a person is tracked, who goes on being tracked."""
+    """Before a frame or the camera arrives, and while a person is tracked, who continues to be tracked."""
     camera, scene, good = rig.opening()
     bad = bad_start(part, **change)
     for events in ([camera, scene, bad], [bad, camera, scene]):

@@ -107,7 +107,7 @@ def paced(rate, times, work):
 
 
 def test_delays_do_not_add_up():
-    """Frames take a third of the interval to prepare, one takes two: the others stay on the grid."""
+    """Frames take a third of the interval to prepare, one takes two intervals: the others keep the grid."""
     times = np.arange(50) / 30 + 4.0
     work = np.full(50, 1 / 90)
     work[20] = 2 / 30

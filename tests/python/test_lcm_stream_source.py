@@ -1,4 +1,4 @@
-"""gait capture of a stream: a local server breaks off, refuses, and comes back; frames go on."""
+"""gait capture of a stream: a local server breaks off, refuses, and returns; frames continue."""
 
 import io
 import threading

@@ -1,4 +1,4 @@
-"""What gait-trackd states of frames past and of strides, on logs."""
+"""What gait-trackd reports about past frames and strides, on logs."""
 
 import lcm_rig as rig
 import numpy as np
@@ -35,7 +35,7 @@ def places(messages):
 
 
 def test_classes_of_motion_follow_each_estimate(walk, tmp_path):
-    """A model with one class publishes none."""
+    """With a model of one class it publishes no classes."""
     learnt = blob.read(rig.MODEL)
     classes = [
         MotionClass("walk", changes={"stand": Change(0.5, 6.0, 0.05)}),
@@ -94,7 +94,7 @@ def test_strides_of_the_drawn_walk_are_reported(walk, lag):
 
 
 def test_pauses_bridged_by_prediction_are_not_frames(tmp_path):
-    """A gap of a second and more makes steps without a frame; those are not sent again."""
+    """A gap of a second or more makes steps without a frame; those are not sent again."""
     events = [*rig.opening(), *rig.frames(0, 12), *rig.frames(50, 62)]
     now, past, _ = played(rig.write_log(tmp_path / "gap.log", events), "--lag", 3)
     assert [m.frame for m in now] == [*range(12), *range(50, 62)]

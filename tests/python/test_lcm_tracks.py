@@ -1,4 +1,4 @@
-"""gait-trackd --keypoints-term: joints of a detector go to the frames that they were found in."""
+"""gait-trackd --keypoints-term: joints of a detector are used with the frames that they were found in."""
 
 from __future__ import annotations
 
@@ -24,7 +24,7 @@ PRINTED = re.compile(r"keypoint_messages (\d+) keypoints_used (\d+) keypoints_la
 
 @cache
 def found(frame: int) -> tuple[np.ndarray, np.ndarray]:
-    """What a detector states of a frame: pixels (P, 2) with gaps, and confidences."""
+    """What a detector reports for a frame: pixels (P, 2) with gaps, and confidences."""
     rng = np.random.default_rng(frame)
     uv = rig.CAMERA.project(rig.model().pose(rig.person(frame))[0])
     uv = (uv + 0.3 * rng.normal(size=uv.shape)).astype(np.float32)
@@ -50,7 +50,7 @@ def errors(frame: int) -> np.ndarray:
 
 
 def play(tmp_path: Path, events: list[rig.Event], *options: object) -> tuple[rig.Outcome, tuple[int, ...]]:
-    """Track a log with the term; also how many tracks came, were used and were late."""
+    """Track a log with the term; also return how many tracks came, were used and were late."""
     log = rig.write_log(tmp_path / "a.log", [*rig.opening(), *events])
     outcome = rig.play(log, "--keypoints-term", "--keypoints-sd", SD, *options)
     printed = PRINTED.search(outcome.printed)
@@ -59,7 +59,7 @@ def play(tmp_path: Path, events: list[rig.Event], *options: object) -> tuple[rig
 
 
 def each(first: int = 0, stop: int = FRAMES) -> list[rig.Event]:
-    """Every frame, and then what is found in it."""
+    """Every frame, followed by what is found in it."""
     return [event for i in range(first, stop) for event in (image(i), tracks(i))]
 
 
@@ -70,7 +70,7 @@ def as_in_messages(camera: rig.Camera) -> rig.Camera:
 
 
 def by_python(stated: bool = False) -> str:
-    """Digest of the library that is given the same; `stated`: the errors of `errors`."""
+    """Digest of the library with the same input; `stated`: the errors of `errors`."""
     terms = TrackerConfig.default().terms | Term.KEYPOINTS
     tracker = Tracker(
         rig.model(),
@@ -151,7 +151,7 @@ def test_points_of_no_use_are_left_out_and_counted(tmp_path: Path) -> None:
 
 
 def test_frames_do_not_wait_longer_than_for_the_next_one(tmp_path: Path) -> None:
-    """Keypoints that come after that are counted and named, and change nothing."""
+    """Keypoints that arrive later are counted and named, and change nothing."""
     without, printed = play(tmp_path, frames())
     assert printed == (0, 0, 0) and without.frames == FRAMES  # also the last one, when the log ends
     late = [event for i in range(FRAMES) for event in ([image(i), tracks(i - 1)] if i else [image(0)])]
@@ -161,7 +161,7 @@ def test_frames_do_not_wait_longer_than_for_the_next_one(tmp_path: Path) -> None
 
 
 def test_a_clock_set_back_makes_no_later_tracks_late(tmp_path: Path) -> None:
-    """But those of the frame that shows it: all frames after the next START have their joints."""
+    """All frames after the next START have their joints, including the frame of the START."""
     back = each()
     for _, message in back:
         message.utime -= 900_000

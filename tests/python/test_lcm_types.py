@@ -52,7 +52,7 @@ def test_published_types_are_frozen(name):
 
 
 def test_help_needs_no_generated_types():
-    """In a fresh clone commands explain themselves, and name in one line what is missing when run."""
+    """In a fresh clone commands explain themselves, and name what is missing in one line when run."""
     code = """if True:
         import contextlib, io, pathlib, gait.lcm.link as types
         from gait.cli import main

@@ -1,4 +1,4 @@
-"""gait view: the right estimate in the right frame, in a file and in a browser."""
+"""gait view: each frame shows its own estimate, in a file and in a browser."""
 
 import json
 import signal
@@ -42,7 +42,7 @@ def log(tmp_path):
 
 
 def follow(path, camera=None, watched=lambda: True):
-    """The pictures that a log gives, what is reported with them, and the feed itself."""
+    """The pictures of a log, what is reported with them, and the feed itself."""
     shown, reports = [], []
     cameras = {} if camera is None else {0: camera}
     feed = Feed(
@@ -84,7 +84,7 @@ def test_nothing_is_drawn_until_a_browser_is_there_and_then_the_newest(log):
 
 
 def test_several_people_are_drawn_into_one_frame(log, monkeypatch):
-    """A frame is drawn when all trackers at work have answered it."""
+    """A frame is drawn when all running trackers have answered it."""
     rig.need_multicast()
     monkeypatch.setattr(feeds, "_LONGEST", 1e6)
     shown, heard, urls = [], [], [private_url(), private_url()]
@@ -109,7 +109,7 @@ def test_several_people_are_drawn_into_one_frame(log, monkeypatch):
 
 
 def test_cameras_that_run_by_themselves_are_drawn_with_the_frame_nearest_in_time(log, tmp_path):
-    """A second camera 9 ms late, of which one frame is missing, beside one of 33 ms a frame."""
+    """A second camera that is 9 ms late and misses a frame, with a first one of 33 ms per frame."""
     events = [*rig.opening(), ("GAIT_CAMERA_1", camera_message(rig.CAMERA, rig.utime(0)))]
     for i, (frame, estimate) in enumerate(zip(rig.frames(0, 6), log[1], strict=True)):
         late = deepcopy(frame[1])
@@ -303,7 +303,7 @@ def test_a_log_is_only_read(log):
 
 
 def test_a_job_of_a_script_ends_by_sigint():
-    """Behind & a shell has it ignored."""
+    """A shell ignores it for commands behind &."""
     rig.need_multicast()
     process = subprocess.Popen(
         [str(rig.PYTHON), "-m", "gait", "view", "--url", private_url()],

@@ -26,7 +26,7 @@ def test_offsets_are_found_below_a_frame(start):
 
 
 def spoil(monkeypatch, passes, wrong):
-    """After so many passes over 8 people put all offsets wrong by so many frames, in turn up and down."""
+    """After so many passes over 8 people, shift all offsets by so many frames, alternately up and down."""
     calls, best_offset = [], align._Sequence.best_offset
 
     def spoiled(sequence, table, weights, now):
@@ -77,7 +77,7 @@ HIPS = (7, 15)  # right and left hip flexion of the generator
 
 
 def test_a_constant_added_to_all_phases_gives_the_same_curves():
-    """L6: the gauge takes it out, so that model files of different runs agree."""
+    """L6: the gauge removes it, so that model files of different runs agree."""
     signals, periods, _ = persons(np.random.default_rng(3), 2.0)
     begin = align.align(signals, periods).offsets
     curves = []
@@ -118,7 +118,7 @@ def test_sequences_without_whole_angles_are_aligned_by_the_others():
 
 
 def test_a_first_sequence_of_trunk_alone_is_ambiguous_and_others_start_too():
-    """What repeats every step fits at two phases: the curve to start from comes from other sequences too."""
+    """A curve that repeats every step fits at two phases: the initial curve comes from several sequences."""
     lower = 0
     for seed in range(4):
         rng = np.random.default_rng(seed)

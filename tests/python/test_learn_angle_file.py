@@ -1,4 +1,4 @@
-"""Angles in .csv: units, gaps, what a track writes, and any text at all."""
+"""Angles in .csv: units, gaps, tracks as input, and arbitrary text."""
 
 from pathlib import Path
 

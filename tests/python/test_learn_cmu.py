@@ -1,4 +1,4 @@
-"""Real recordings: periods and steady parts of the walks of CMU, and what is refused."""
+"""Real recordings: periods and steady parts of the walks of CMU, and what is rejected."""
 
 from pathlib import Path
 

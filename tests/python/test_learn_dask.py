@@ -1,4 +1,4 @@
-"""Files read on a Dask cluster, here one of this machine: the same result, one line for what fails."""
+"""Files read on a Dask cluster, here a local one: the same result, and one line for each failure."""
 
 import contextlib
 import importlib.metadata
@@ -33,7 +33,7 @@ def walks(tmp_path_factory):
 
 @pytest.fixture(scope="module")
 def alone(walks, tmp_path_factory):
-    """Bytes of the model that this machine learns without a cluster, and what it notes."""
+    """Bytes of the model that this machine learns without a cluster, and its notes."""
     model, notes = tmp_path_factory.mktemp("alone") / "m.gait", io.StringIO()
     with contextlib.redirect_stderr(notes):
         assert gait.cli.main([*LEARN, str(walks), "-o", str(model), "--jobs", "1"]) == 0
@@ -42,13 +42,13 @@ def alone(walks, tmp_path_factory):
 
 @pytest.fixture(autouse=True)
 def patience(monkeypatch):
-    """Scheduler and workers are there, and on a busy machine slow to answer."""
+    """Scheduler and workers exist but may be slow to answer on a busy machine."""
     monkeypatch.setattr(cluster, "CONNECT", 120.0)
 
 
 @pytest.fixture(autouse=True)
 def as_the_command_line(monkeypatch):
-    """What `gait learn` sets for itself; the workers have it by the remedy that a refusal names."""
+    """What `gait learn` sets for itself; the workers get it from the remedy that an error names."""
     for name, value in reproducible.COMMON.items():
         monkeypatch.setenv(name, value)
 
@@ -146,7 +146,7 @@ def test_a_worker_with_other_kernels_is_refused_with_the_remedy(walks, scheduler
 
 
 def test_a_file_that_kills_its_workers_is_named(walks, local, tmp_path, monkeypatch):
-    """Workers that die on a task are KilledWorker to the client; here a task of the last test ends them."""
+    """To the client, workers that die on a task are KilledWorker; here a task of the last test ends them."""
     bad = Path(shutil.copy(walks / "01_00.amc", tmp_path / "05_01.amc"))
     true = cluster._run
     monkeypatch.setattr(

@@ -1,4 +1,4 @@
-"""Motion files that contradict themselves or gave a wrong model: refused in one line, or learnt."""
+"""Motion files that contradict themselves or gave a wrong model: rejected in one line, or learnt."""
 
 import struct
 from pathlib import Path

@@ -193,7 +193,7 @@ def person(tmp_path_factory):
 
 
 def write(path, person, share, seed=0, every=1, unseen=()):
-    """Joint positions with a share of the cells empty, of every `every`-th frame, without the unseen."""
+    """Joint positions of every `every`-th frame with a share of empty cells, without the joints `unseen`."""
     rng = np.random.default_rng(seed)
     rows = [",".join(["time", *(f"{name}_{axis}" for name in tables.JOINTS for axis in "xyz")])]
     for t in sorted(set(range(0, person.frames, every)) - set(unseen)):

@@ -1,4 +1,4 @@
-"""The floor under unseen people: static offsets are found, and held back by what was learnt of them."""
+"""The floor for unseen people: static offsets are found, and limited by the learnt distribution."""
 
 from __future__ import annotations
 
@@ -30,7 +30,7 @@ def sections():
 
 @pytest.fixture(scope="module")
 def walk(sections):
-    """A person of the mean body and scores of 0, one elbow always bent more."""
+    """A person with the mean body and scores of 0, whose one elbow is always bent more."""
     at = np.arange(30) / 10
     channels = curves(sections, at, np.zeros((30, 2)))
     channels[:, ELBOW] += BENT

@@ -51,7 +51,7 @@ def test_passes_descend_and_stop(imputed):
 
 
 def test_passes_stop_when_the_bound_hardly_gains():
-    """A channel that half of the people never show moves on when there is nothing left to gain."""
+    """A channel that half of the people never show still changes when the others have converged."""
     case = cases.people(np.random.default_rng(26), missing=0.1)
     cases.without_channel(case, [10], np.flatnonzero(case.subject % 2 == 0))
     problem = imputation.Problem(case.values, case.mask, fourier_basis(g.GRID, HARMONICS))
@@ -179,7 +179,7 @@ def test_automatic_number_of_components_is_the_generators():
 
 
 def test_people_held_out_need_no_more_components_than_they_share():
-    """What only one person does helps to fill that person's cycles, not to describe others."""
+    """What only one person does helps to fill that person's cycles, but not to describe other people."""
     rng = np.random.default_rng(21)
     case = cases.people(rng, subjects=6)
     own = g.random_modes(rng, 6).curves(np.arange(g.GRID) / g.GRID)

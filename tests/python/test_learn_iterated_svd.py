@@ -49,7 +49,7 @@ def test_what_was_observed_stays_as_it_was():
 
 
 def test_the_error_is_that_of_what_was_observed():
-    """Noise is left where it was observed, and nothing is where it was filled."""
+    """Noise remains where entries were observed, and there is none where they were filled."""
     values, mask = drawn(noise=0.5)
     found = complete(np.where(mask, values, 0.0), mask, KEPT, BASIS)
     coded = encode(np.array(found.filled), BASIS)

@@ -1,4 +1,4 @@
-"""Files read in several processes: equal results, errors of one line, bounded memory, nothing left behind."""
+"""Files read in several processes: equal results, one-line errors, bounded memory, nothing left behind."""
 
 import errno
 import gc
@@ -46,7 +46,7 @@ def at_once(monkeypatch):
 
 @pytest.fixture
 def stuck(walks):
-    """A file on which its reader waits for ever, between others."""
+    """A file, between others, for which its reader waits forever."""
     path = walks / "01_03x.amc"
     os.mkfifo(path)
     writer = os.open(path, os.O_RDWR)
@@ -82,7 +82,7 @@ def wait_for(condition, seconds=120):
 
 
 def contents(sequences):
-    """All that could differ."""
+    """Everything that could differ."""
     return [
         (s.name, s.subject, s.source, s.fps, s.channels.tobytes(), s.heading.tobytes(), s.strides.tobytes(),
          s.period.frames, s.period.scores.tobytes(), s.measures.stature)
@@ -132,7 +132,7 @@ def test_workers_are_expected_where_much_is_to_be_read_beside_the_first_file(tmp
 
 
 def test_the_forkserver_starts_for_a_large_run_before_what_is_slow_to_import(tmp_path):
-    """Runs that end at once: the skeleton beside a recording is none."""
+    """Runs that end at once: the skeleton beside a recording is invalid."""
     script = (
         "import sys, gait.cli; from gait.learn.corpus import forkserver\n"
         "forkserver.start = lambda: print('scipy' in sys.modules)\n"
@@ -146,7 +146,7 @@ def test_the_forkserver_starts_for_a_large_run_before_what_is_slow_to_import(tmp
 
 @pytest.mark.skipif(not Path("/proc/self/status").is_file(), reason="blocked signals are listed elsewhere")
 def test_the_server_that_imports_does_not_hear_an_interruption():
-    """From a terminal it reaches the whole group; the command ends its server itself."""
+    """From a terminal the signal reaches the whole group; the command itself ends its server."""
     status = "print(open(f'/proc/{forkserver._forkserver._forkserver_pid}/status').read())"
     program = (
         "from multiprocessing import forkserver; from gait.learn.corpus import forkserver as f; "
@@ -325,7 +325,7 @@ print(json.dumps({"cycles": len(learned.cycles.values), "peak": int(peak.split()
 
 
 def peak(folder, copies):
-    """Cycles learnt and the largest resident memory of the process that did, MB."""
+    """Cycles learnt, and the peak resident memory of the process that learnt them, MB."""
     words = [sys.executable, "-c", CHILD, str(folder), str(copies)]
     out = json.loads(subprocess.run(words, check=True, capture_output=True, text=True).stdout)
     return out["cycles"], out["peak"]

@@ -26,7 +26,7 @@ SHIPPED = blob.decode(read_blob(None))
 
 
 def body(stature=1.7, shoulder=(0, 0, 0), **factor):
-    """A person with lengths of groups multiplied and the left shoulder moved besides, statures."""
+    """A person with lengths of groups multiplied and, in addition, the left shoulder moved, statures."""
     f = {name: factor.get(name, 1.0) for name in lengths.GROUPS}
     both = np.ones(2)
     toe = np.array([MEAN.toe[0], MEAN.toe[2]])
@@ -65,7 +65,7 @@ def test_spans_are_the_lengths_of_the_groups():
 
 
 def test_planted_components_of_lengths_are_found():
-    """Legs long in thigh and short in shank, and long arms: two components span what was planted."""
+    """Legs with long thighs and short shanks, and long arms: two components span what was planted."""
     planted = np.zeros((2, len(lengths.GROUPS)))
     planted[0, [GROUP["thigh"], GROUP["shank"]]] = 0.05, -0.05
     planted[1, [GROUP["upper_arm"], GROUP["forearm"]]] = 0.06, 0.04
@@ -81,7 +81,7 @@ def test_planted_components_of_lengths_are_found():
 
 
 def test_shoulders_move_apart_from_the_neck():
-    """Shoulders forward and wide on a trunk of any length: SHFT has them, and PROP the trunk alone."""
+    """Shoulders forward and wide on a trunk of any length: SHFT contains them, and PROP the trunk alone."""
     planted = np.zeros((2, lengths.CHANGES))
     planted[0, 7:] = 0.02, 0.01, -0.015
     planted[1, GROUP["torso"]] = 0.02
@@ -145,7 +145,7 @@ def lowest(sections, coef, proportion):
 
 @pytest.mark.parametrize("score", [-2, 2])
 def test_feet_stay_on_the_ground_with_longer_and_shorter_legs(score):
-    """The shipped walk on legs a twentieth longer or shorter: within 3 mm of the mean body's ground."""
+    """The shipped walk on legs a twentieth longer or shorter stays within 3 mm of the mean body's ground."""
     legs = np.zeros((1, len(lengths.GROUPS)))
     legs[0, [GROUP["thigh"], GROUP["shank"]]] = 0.025
     table, _ = lengths.learn(people(6, np.random.default_rng(5), legs), MEAN, POSE, count=1)

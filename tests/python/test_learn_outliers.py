@@ -88,7 +88,7 @@ def test_one_subject_has_neither_proportions_nor_a_static_offset(sequences):
 
 
 def test_three_subjects_have_proportions(sequences):
-    """Toy people are of one skeleton: lengths change by what swing does to the stature, next to nothing."""
+    """Toy people share one skeleton: lengths hardly change, only by the effect of swing on the stature."""
     made = sections(fit.fit(sequences, LearnOptions(components=2)))
     assert made["PROP"].shape == (1, len(made["FRMI"]) + 1)
     assert made["SHFT"].shape == (1, len(made["FRMI"]), 3) and np.abs(made["SHFT"]).max() < 2e-3

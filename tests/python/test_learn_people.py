@@ -1,4 +1,4 @@
-"""The prior that reaches people who were not recorded: mirror images, metric, stride rate, gaps."""
+"""The prior for people who were not recorded: mirror images, metric, stride rate, gaps."""
 
 from types import SimpleNamespace
 
@@ -77,7 +77,7 @@ def test_metric_is_the_displacement_of_the_joints():
 
 
 def test_components_are_those_the_cycles_were_made_of():
-    """Two modes, each symmetric: a mode and its image are one."""
+    """Two modes, each symmetric: a mode equals its image."""
     rng = np.random.default_rng(6)
     mean, *modes = smooth(rng, 3)
     mean = (mean + people.mirrored(mean[None])[0]) / 2
@@ -114,7 +114,7 @@ def test_subjects_count_alike_however_many_cycles_they_have():
 
 
 def test_sd_is_of_subjects():
-    """One mode, two people one standard deviation apart: sd 1 although one has nine cycles."""
+    """One mode, two people one standard deviation apart: sd 1 although one of them has nine cycles."""
     mode = smooth(np.random.default_rng(9), 1)
     mode = mode + people.mirrored(mode)
     mode /= np.linalg.norm(mode)
@@ -187,7 +187,7 @@ def wave(rng):
 
 
 def persons(rng, slope, paces):
-    """Cycles, people and paces: every person has their own mean, and the same slope."""
+    """Cycles, people and paces: every person has their own mean, and all have the same slope."""
     rows = [own + p * slope for own, each in ((wave(rng), each) for each in paces) for p in each]
     subject = np.repeat(np.arange(len(paces)), [len(each) for each in paces])
     return np.array(rows), subject, np.concatenate(paces)
@@ -271,7 +271,7 @@ def test_paces_of_sequences_are_those_the_tracker_takes():
 
 
 def paced():
-    """The shipped model with a slope of its own in every channel."""
+    """The shipped model with a different slope in every channel."""
     slope = series(0.02 * wave(np.random.default_rng(6)), people.TERMS)
     return {**SHIPPED, "PACE": slope.astype(np.float32)}
 

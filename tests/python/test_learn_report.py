@@ -51,7 +51,7 @@ def learned(sequences):
 
 
 class Page(HTMLParser):
-    """Checks that elements nest; collects texts, links and pictures."""
+    """Check that elements nest; collect texts, links and pictures."""
 
     def __init__(self, text):
         super().__init__()
@@ -209,7 +209,7 @@ def one_file(sequences):
 
 
 def lower_body(sequences):
-    """Only the legs were seen."""
+    """Only the legs were recorded."""
     legs = np.array([any(part in name for part in ("hip", "knee", "ankle")) for name in ANGLES])
     cut = [replace(s, channels=s.channels.copy()) for s in sequences[::2]]
     for s in cut:
@@ -218,7 +218,7 @@ def lower_body(sequences):
 
 
 def many_subjects(sequences):
-    """More sequences than have names or are drawn, more subjects than have a legend or a fit of their own."""
+    """More sequences than have names or are drawn, more subjects than have a legend or a separate fit."""
     many = [
         replace(s, subject=f"{s.subject}{k}", name=f"{s.name}_{k}") for k in range(13) for s in sequences[:1]
     ]

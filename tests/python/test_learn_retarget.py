@@ -1,4 +1,4 @@
-"""Retargeting: known angles of the default skeleton are found again; root channels; real walks (8 mm)."""
+"""Retargeting: known angles of the default skeleton are recovered; root channels; real walks (8 mm)."""
 
 from dataclasses import replace
 from pathlib import Path
@@ -196,7 +196,7 @@ def test_real_walks_are_reproduced_to_8_mm():
 
 @pytest.mark.parametrize("turn", [0.0, 0.5, 0.97])
 def test_arms_that_stay_straight_do_not_show_their_rotation(turn):
-    """The hinge of a file is `turn` half turns off; knees bend, elbows by 5 degrees at most."""
+    """The hinge of a file is off by `turn` half turns; knees bend, elbows by 5 degrees at most."""
     channels = 0.3 * np.sin(np.arange(40)[:, None] / 6 + np.arange(len(CHANNELS)))
     channels[:, len(ANGLES) :] = 0
     for s in SIDES:

@@ -1,4 +1,4 @@
-"""gait learn: what it refuses, excludes and notes, whose the files are, size and bytes of the model."""
+"""gait learn: what it rejects, excludes and notes, who the files belong to, size and bytes of the model."""
 
 import json
 import os
@@ -433,7 +433,7 @@ def test_machines_that_calculate_otherwise_write_the_same_bytes(tmp_path):
 
 
 def test_gaps_that_are_still_changing_are_an_error_with_a_remedy(walks, tmp_path, capsys, monkeypatch):
-    """Nothing is written, and the people whose parts are missing are named; it ends when it converges."""
+    """Nothing is written, and the people whose parts are missing are named; the search converges."""
     monkeypatch.setattr(imputation.climb, "__defaults__", (imputation.TOLERANCE, 2))
     options = ("-o", tmp_path / "m.gait", "--segments", "none")
     legs = tmp_path / "03_01.csv"

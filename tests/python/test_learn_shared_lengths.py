@@ -1,4 +1,4 @@
-"""Lengths of limbs by all recordings of a person together: nearer to the truth, and of one person."""
+"""Lengths of limbs from all recordings of a person together: nearer to the truth, and those of one person."""
 
 import json
 from pathlib import Path
@@ -53,7 +53,7 @@ def pooled(*found):
 
 @pytest.fixture(scope="module")
 def twice():
-    """Two recordings of one person: the first shows no arms, the second hardly anything of the legs."""
+    """Two recordings of one person: the first shows no arms, the second hardly any of the legs."""
     arms = [side + name for side in "LR" for name in ("UPA", "ELB", "FRA", "WRA", "WRB")]
     legs = [side + name for side in "LR" for name in ("THI", "KNE", "ANK", "HEE", "TOE")]
     first, second = (mw.person(mw.FULL, seed=2, again=k)[0] for k in (1, 2))
@@ -106,7 +106,7 @@ def test_lengths_that_are_held_stay(twice):
 
 
 def test_bayes_factors_of_one_body_are_right():
-    """Draws of the model, half of them of two people: the factors give how often they are of one."""
+    """Draws of the model, half of them of two people: the factors state how often they are of one person."""
     rng, size = np.random.default_rng(0), len(SCALES)
     same, unusual = rng.random(3000) < 0.5, []
     for one in same:
@@ -127,7 +127,7 @@ def test_what_shows_nothing_separates_no_people():
 
 
 def body(stature, error=0.0, precision=1e4):
-    """Findings of a person's stature with an error of log stature."""
+    """Estimates of a person's stature with an error of the log stature."""
     matrix = np.zeros(PEOPLE.matrix.shape)
     matrix[0, 0] = precision
     return LengthInformation(matrix, matrix[0] * (np.log(stature) + error))

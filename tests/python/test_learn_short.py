@@ -1,4 +1,4 @@
-"""Trials of hardly more than a stride: their period by steps, and several of a person learnt together."""
+"""Trials of little more than a stride: their period from steps, and several of a person learnt together."""
 
 from pathlib import Path
 
@@ -28,7 +28,7 @@ def single():
 
 
 def walking(cycles, seed=0, unlike=0.0):
-    """Angles (T, 24), radians, of a walk whose left side is shifted by 3 degrees, and `unlike` besides."""
+    """Angles (T, 24), radians, of a walk whose left side is shifted by 3 degrees, plus `unlike`."""
     rng, frames = np.random.default_rng(seed), round(cycles * TRUE)
     angles = np.full((frames, len(ANGLES)), np.nan)
     start = rng.uniform(0, 1)

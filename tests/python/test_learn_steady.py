@@ -23,7 +23,7 @@ FPS = 120.0
 
 @pytest.fixture(autouse=True, scope="module")
 def small_matrices():
-    """One thread of linear algebra, as `gait learn` does it: several times as fast here."""
+    """One thread of linear algebra, as in `gait learn`: several times as fast here."""
     with one_thread():
         yield
 
@@ -90,7 +90,7 @@ def test_a_multiple_that_fits_a_short_recording_is_divided():
 @pytest.mark.parametrize("true", [61.7, 80.3])
 @pytest.mark.xfail(strict=True, reason="the whole-frame fold drifts by K |p - round p| frames")
 def test_literal_mode_finds_a_fractional_period_in_a_long_sequence(true):
-    """Known to be red: a multiple nearer to a whole number wins, 185 and 241 = three periods."""
+    """A known case: a multiple nearer to a whole number wins, 185 and 241 = three periods."""
     signals = g.walk(np.random.default_rng(3), true, 5000, noise=5.0)
     assert period.find(signals, FPS, "literal").frames == pytest.approx(true, abs=1)
 
@@ -164,7 +164,7 @@ def test_ratio_of_a_sinusoid_has_its_closed_form():
 @pytest.mark.parametrize("fps", [25.0, 30.0, 60.0])
 @pytest.mark.parametrize("seed", range(3))
 def test_low_frame_rates_do_not_halve_the_period(fps, seed):
-    """With more bins than frames in a cycle no bin repeats, and half a cycle once looked best."""
+    """With more bins than frames in a cycle no bin repeats, so half a cycle once seemed best."""
     true, frames = 1.05 * fps, int(3.1 * fps)
     signals = g.walk(np.random.default_rng(seed), true, frames, offset=3.0 * seed, noise=1.0)
     assert period.find(signals, fps).frames == pytest.approx(true, rel=0.01)
@@ -209,7 +209,7 @@ def test_reasons_are_in_words():
 
 @pytest.mark.parametrize(("place", "yaw"), [(False, False), (False, True), (True, False)])
 def test_what_is_unknown_is_not_needed(place, yaw):
-    """Angles alone show standing; the pace of the joints shows the rest roughly."""
+    """Angles alone show standing; the speed of the joints shows the rest roughly."""
     o = g.outing(np.random.default_rng(2), TRIM_FPS, PERIOD)
     kept, found = log_scales(o, place, yaw)
     assert abs(kept.start - o.begin) < PERIOD and abs(kept.stop - o.end) < PERIOD
@@ -470,7 +470,7 @@ def test_alternation_is_of_the_legs_and_of_one_period():
 
 
 def test_legs_that_move_together_keep_their_period():
-    """Jumps and squats: no multiple has legs that take turns."""
+    """Jumps and squats: no multiple has legs that alternate."""
     angles = gait(lag=0.0)
     assert stride.find(angles, VERDICT_FPS).frames == period.find(angles, VERDICT_FPS).frames
 

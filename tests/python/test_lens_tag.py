@@ -1,4 +1,4 @@
-"""The focal length that telephones and cameras write into films, read and used as a prior."""
+"""The focal length that phones and cameras write into films, read and used as a prior."""
 
 import struct
 
@@ -35,7 +35,7 @@ def box(kind, *parts):
 
 
 def track_meta(value, kind=1, version=b""):
-    """Metadata of a track as telephones write it: `version` is there in MP4, not in QuickTime."""
+    """Metadata of a track as phones write it: `version` exists in MP4, not in QuickTime."""
     names = b"".join(box(b"mdta", name.encode()) for name in ("com.apple.quicktime.camera.lens_model", KEY))
     items = [
         box(struct.pack(">I", number), box(b"data", struct.pack(">II", kind_, 0), data))

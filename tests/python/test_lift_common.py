@@ -1,4 +1,4 @@
-"""Errors of a clip from end to end: the estimate moves as predicted, intervals cover the stated share."""
+"""Errors that last a whole clip: the estimate moves as predicted, and intervals cover the stated share."""
 
 import sys
 from dataclasses import replace
@@ -35,7 +35,7 @@ def settled(energies, link, states):
 
 @pytest.fixture(scope="module")
 def chain():
-    """Two segments tied together, seen as the prior's mean, and their states of least energy."""
+    """Two segments tied together, observed as the prior's mean, and their states of least energy."""
     prior = SegmentPrior.load()
     clip = lift_sticks.stick_clip(prior, walk(), np.radians(60), seed=1)
     state = clip.mean_state()
@@ -53,7 +53,7 @@ def chain():
 
 
 def shown_elsewhere(energy, state, error):
-    """The same values read where the figure with an error (in sd) would give them."""
+    """The same values, read where the figure with an error (in sd) would appear."""
     reading = energy.reading
     places, _ = energy.shape.positions(state, energy.weights, energy.sticks.markers)
     uv, _ = energy.view.project(places)
@@ -126,7 +126,7 @@ def test_a_figure_that_explains_little_may_have_drifted():
 
 
 def stranger(seed):
-    """A person of a normative gait, unknown to the prior."""
+    """A person with a normative gait, which the prior does not contain."""
     stage = set_stage(Scenario(frames=24, fps=20.0, seed=seed))
     points = stage.walk.points(stage.frames)
     joints = np.stack([points[name] for name in JOINTS], axis=1)
@@ -136,7 +136,7 @@ def stranger(seed):
 
 @pytest.mark.long
 def test_intervals_cover_the_stated_share(monkeypatch):
-    """Sticks of strangers from ahead to the side; sd are neither thrice too small nor too large."""
+    """Stick figures of strangers from ahead to the side; sd are neither three times too small nor large."""
     prior, squares, held = SegmentPrior.load(), [], []
     for angle, seed in ((15, 201), (45, 202), (90, 203)):
         person = stranger(seed)

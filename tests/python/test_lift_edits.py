@@ -1,4 +1,4 @@
-"""Corrections by hand of keypoints: the file, what it does to keypoints, and parts solved again."""
+"""Corrections by hand of keypoints: the file, its effect on keypoints, and solving parts again."""
 
 import json
 from dataclasses import replace
@@ -155,7 +155,7 @@ def test_a_pin_stands_where_the_pixel_shows_the_floor():
 
 @pytest.fixture(scope="module")
 def walk():
-    """Keypoints of 3 s of a walk across the view, a foot wrong for a while; and where they truly are."""
+    """Keypoints of 3 s of a walk across the view, a foot wrong for a while; and the true positions."""
     points = walking_keypoints.keypoints(CAMERA, walking_keypoints.ACROSS, noise=0.5)
     truth = walking_keypoints.keypoints(CAMERA, walking_keypoints.ACROSS, noise=0.0).uv
     uv = points.uv.copy()

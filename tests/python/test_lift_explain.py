@@ -1,4 +1,4 @@
-"""Segments of a sequence alone, by the C library: as the numpy posterior has them."""
+"""Segments of a sequence alone, by the C library: equal to the numpy posterior."""
 
 from __future__ import annotations
 
@@ -21,12 +21,12 @@ SAME = {"rtol": 1e-6, "atol": 1e-6}
 
 
 def gaussian(prior, **changes):
-    """The prior where the lifter expects a person without a camera."""
+    """The prior placed where the lifter expects a person without a camera."""
     return reference.place(prior, height_sd=explain.ANY_HEIGHT, **changes)
 
 
 def drawn(prior, seed=1, sd=0.01, missing=0.2, heading=0.4):
-    """A segment of a heading and what a view along y sees of it."""
+    """A segment with a heading, and its picture in a view along y."""
     rng = np.random.default_rng(seed)
     x = reference.place(prior, heading=heading, ground_sd=0.5).draw(rng)
     uv = x @ FAR.axes[:2].T + sd * rng.normal(size=(*x.shape[:2], 2))
@@ -78,7 +78,7 @@ def test_a_person_far_away_is_not_drawn_to_the_origin():
 
 
 def test_similar_headings_share_the_probability_and_the_course_decides():
-    """From the side, without perspective, forth and back is one picture of a body that is flat."""
+    """From the side, without perspective, forwards and backwards look the same for a flat body."""
     prior = toy_prior(4, 12, 4, seed=6)
     flat = np.array([1.0, 0, 1])  # all in the plane of x and z: y and -y cannot be distinguished
     prior.mean[...] *= flat

@@ -34,7 +34,7 @@ def files(tmp_path_factory):
 
 @pytest.fixture
 def lift(files, tmp_path, monkeypatch, capsys):
-    """Lift the film, in which the detector finds the walk; give the result's columns and what is printed."""
+    """Lift the film, in which the detector finds the walk; return the result's columns and the output."""
     found = keypoints(view())
     found.confidence[:, NAMES.index("l_wrist")] = 0.05
     found.uv[:, NAMES.index("l_wrist")] = 700.0

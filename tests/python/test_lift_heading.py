@@ -1,4 +1,4 @@
-"""A segment whose heading, place and depth are unknown, through a camera: found, with honest uncertainty."""
+"""A segment whose heading, place and depth are unknown, seen by a camera: found, with honest uncertainty."""
 
 import numpy as np
 import pytest
@@ -48,7 +48,7 @@ def test_distortion_is_taken_out():
 
 
 def test_two_similar_headings_share_the_probability():
-    """From the side, without perspective, forth and back is one picture of a body that is flat."""
+    """From the side, without perspective, forwards and backwards look the same for a flat body."""
     prior, rng = toy_prior(4, 12, 4, seed=6), np.random.default_rng(2)
     flat = np.array([1.0, 0, 1])  # all in the plane of x and z: y and -y cannot be distinguished
     prior.mean[...] *= flat
@@ -83,7 +83,7 @@ def test_a_prior_in_the_axes_of_the_world_is_not_turned():
 
 
 def test_an_unknown_stature_is_found_where_the_floor_is_known():
-    """From above: the floor shows how far away the person is, and so how tall."""
+    """From above: the floor shows how far away the person is, and therefore how tall."""
     prior, rng = toy_prior(5, 15, 4, seed=3), np.random.default_rng(4)
     above = Camera.looking((0.0, -6.0, 6.0), (0.0, 0.0, 0.9), (640, 480), 700.0)
     truth = place(prior, stature=1.85, heading=0.3, ground_sd=0, height_sd=0).draw(rng, residual=False)
@@ -98,7 +98,7 @@ def test_an_unknown_stature_is_found_where_the_floor_is_known():
 
 
 def test_perspective_of_a_known_place_is_one_linear_problem():
-    """Rows at the truth: the posterior is that of any linear measurement, dual and information form alike."""
+    """Rows at the truth: the posterior is that of a linear measurement, in dual and information form."""
     prior, rng = toy_prior(4, 10, 5), np.random.default_rng(2)
     gaussian = place(prior)
     truth = gaussian.mean + 0.1

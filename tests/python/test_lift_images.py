@@ -1,4 +1,4 @@
-"""The estimate from images: exact slopes of sticks and energy, sensors, and what users write."""
+"""The estimate from images: exact derivatives of sticks and energy, sensors, and what users write."""
 
 import json
 from dataclasses import replace
@@ -46,7 +46,7 @@ def by_differences(function, at):
 
 
 def energy_of(view, headings=0, **parts):
-    """Energy of a random segment with everything in it, and a state near the middle of the view."""
+    """Energy of a random segment with all terms, and a state near the middle of the view."""
     prior = toy_prior(frames=6, markers=len(JOINTS), size=4, headings=headings)
     shape, sticks = Shape.of(prior, 0, 1.7), Sticks.of(prior.names)
     rng = np.random.default_rng(1)
@@ -108,7 +108,7 @@ def test_a_camera_projects_as_the_camera_does_and_moves_nothing_along_its_rays()
 @pytest.mark.parametrize("view", VIEWS)
 @pytest.mark.parametrize("headings", [0, 2])
 def test_the_energy_has_an_exact_jacobian(view, headings):
-    """To 1e-5 relative."""
+    """Equal to 1e-5 relative."""
     energy, state = energy_of(VIEWS[view], headings)
     _, slope = energy.rows(state)
     wanted = by_differences(lambda s: energy.rows(s)[0], state)
@@ -274,12 +274,12 @@ def test_place_is_a_slice_of_the_state():
 
 
 def test_a_phase_shows_which_leg_is_ahead(tmp_path):
-    """Half a stride later left and right are swapped; hardly known, it shows nothing."""
+    """Half a stride later left and right are swapped; a phase that is hardly known shows nothing."""
     prior, cycle = SegmentPrior.load(), read_cyclic(None)
     path = tmp_path / "p.json"
 
     def ahead(phase):
-        """How far the left ankle is before the right one in the first frame, metres."""
+        """How far the left ankle is in front of the right one in the first frame, metres."""
         path.write_text(json.dumps(ROUGH | {"phase": phase, "stride_hz": 0.9}))
         phase_prior = PhasePrior.of(prior, cycle, read_placement(path, prior, True))
         state = np.concatenate([phase_prior.mean[0], np.zeros(6)])

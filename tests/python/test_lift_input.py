@@ -1,4 +1,4 @@
-"""`gait lift` of what detectors and calibrations deliver: refused, or reported in a line."""
+"""`gait lift` with what detectors and calibrations deliver: rejected, or reported in one line."""
 
 from __future__ import annotations
 
@@ -46,7 +46,7 @@ def pixels():
 
 
 def lift(capsys, keypoints="t.csv", camera="cam.json", *options):
-    """The exit code and the notes; those about the input come before any method, of which one is fast."""
+    """Exit code and notes; notes about the input precede any method, so a fast one is used."""
     usual = ["-m", "m.gait", "-o", "out.csv", "--method", "blend"]
     code = main(["lift", keypoints, "--camera", camera, *usual, *options])
     return code, capsys.readouterr().err

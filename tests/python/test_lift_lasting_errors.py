@@ -1,4 +1,4 @@
-"""Errors of a detector that last, as numbers beside the motion."""
+"""Lasting errors of a detector, estimated as numbers beside the motion."""
 
 import numpy as np
 import pytest

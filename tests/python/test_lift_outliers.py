@@ -1,4 +1,4 @@
-"""Spikes are taken out of 2-D keypoints, quick motion is not; noise is distinguished from motion."""
+"""Spikes are removed from 2-D keypoints, fast motion is not; noise is distinguished from motion."""
 
 from dataclasses import replace
 
@@ -48,7 +48,7 @@ def test_many_spikes_beside_gaps():
 
 @pytest.mark.parametrize("seed", range(5))
 def test_spikes_are_those_of_the_numpy_version(seed):
-    """Measured anew after each removal, beside gaps and at the ends."""
+    """Spikes beside gaps and at the ends are found: the noise is measured again after each removal."""
     rng = np.random.default_rng(seed)
     keypoints = swinging(30, frames=120)
     keypoints.uv[rng.random((120, 2)) < 0.1] = np.nan
@@ -80,7 +80,7 @@ def test_few_points_are_left_alone():
 
 @pytest.mark.parametrize("noise", [0.0, 4.0, 12.0])
 def test_noise_is_distinguished_from_motion(noise):
-    """The keypoints have 3 px of their own."""
+    """The keypoints themselves have 3 px."""
     keypoints = swinging(30, frames=300)
     more = noise * np.random.default_rng(7).standard_normal(keypoints.uv.shape)
     assert shake(replace(keypoints, uv=keypoints.uv + more)) == pytest.approx(np.hypot(3, noise), rel=0.12)

@@ -16,7 +16,7 @@ DEPTH = np.array([0.0, 1, 0])
 
 
 def observed(x: np.ndarray, sd: float, rng=None, missing: float = 0.0) -> Observations:
-    """What a camera that looks along y sees of a segment (F, J, 3)."""
+    """Picture of a segment (F, J, 3) in a camera that looks along y."""
     rng = rng or np.random.default_rng(5)
     uv = x @ AXES.T
     unseen = rng.uniform(size=uv.shape[:2]) < missing
@@ -202,7 +202,7 @@ def test_nothing_observed_leaves_the_prior():
 
 
 def test_subspace_estimate_is_the_papers():
-    """x = m + U alpha with Var(x) = U Q U' + gamma psi; what is seen outside the modes makes it surer."""
+    """x = m + U alpha with Var(x) = U Q U' + gamma psi; observations outside the modes reduce it."""
     gaussian = place(toy_prior(4, 6, 6))
     _, rows = measured(gaussian)
     found = infer(gaussian, rows)

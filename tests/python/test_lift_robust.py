@@ -1,4 +1,4 @@
-"""Points that a detector put elsewhere for longer lose their weight; right ones and other motions keep it."""
+"""Points that a detector misplaces for longer lose their weight; correct ones and other motions keep it."""
 
 from __future__ import annotations
 
@@ -60,7 +60,7 @@ def test_missing_points_are_not_judged():
 
 @pytest.fixture(scope="module")
 def walk():
-    """Shipped prior, its mean motion going on along x for two seconds, and its keypoints with noise."""
+    """Shipped prior, its mean motion continued along x for two seconds, and its keypoints with noise."""
     prior = SegmentPrior.load()
     half = prior.frames // 2
     body = 1.7 * prior.mean[0][:, prior.index(EVAL15)]
@@ -91,7 +91,7 @@ def test_a_point_wrong_for_a_second_hardly_matters(walk):
 
 
 def spoilt(keypoints, share, seed):
-    """Keypoints of which a share of the points is anywhere."""
+    """Keypoints of which a share is at random places."""
     rng = np.random.default_rng(seed)
     outliers = rng.random(keypoints.visible.shape) < share
     return replace(keypoints, uv=keypoints.uv + outliers[..., None] * rng.normal(0, 150, keypoints.uv.shape))
@@ -108,7 +108,7 @@ def test_a_person_is_found_among_outliers(walk):
 
 
 def live(keypoints, share, seed):
-    """Frames of a live lift of spoilt keypoints."""
+    """Frames of a live lift of corrupted keypoints."""
     lifter = Lifter(view=CAMERA)
     uv = np.full((len(lifter.names), 2), np.nan)
     order = [lifter.names.index(name) for name in keypoints.names]
@@ -131,7 +131,7 @@ def test_a_live_start_finds_a_person_among_outliers(walk):
 
 
 def test_what_a_live_start_gets_wrong_is_not_relied_on(walk):
-    """Three points in ten are anywhere: what is called tracked lies near, or in its intervals."""
+    """Three points in ten are at random places: joints called tracked are near or within their intervals."""
     _, places, keypoints = walk
     wrong = 0
     for seed in range(12):

@@ -1,4 +1,4 @@
-"""The smoother over a sequence of 2-D keypoints against dense algebra, and what it promises."""
+"""The smoother over a sequence of 2-D keypoints compared with dense algebra, and what it promises."""
 
 from __future__ import annotations
 
@@ -43,7 +43,7 @@ def around(prior, blocks=BLOCKS):
 
 
 def dense(diagonal, below):
-    """Whole matrix of its blocks."""
+    """Whole matrix from its blocks."""
     count, size = diagonal.shape[:2]
     full = np.zeros((count, size, count, size))
     for s in range(count):
@@ -54,7 +54,7 @@ def dense(diagonal, below):
 
 
 def whole(information):
-    """Whole matrix and vector of blocks and of what lasts."""
+    """Whole matrix and vector from blocks and lasting unknowns."""
     inner = dense(information.diagonal, information.below)
     side = information.border.reshape(len(inner), -1)
     matrix = np.block([[inner, side], [side.T, information.corner]])
@@ -106,7 +106,7 @@ def test_border_is_dense_algebra(prior):
 
 
 def test_chain_holds_each_overlap_once(prior):
-    """Its first segment has the segment's own covariance, its determinant is that of the factors."""
+    """Its first segment has the segment's own covariance; its determinant is that of the factors."""
     straight, axes = around(prior), axis_rotation(2, 0.4)
     places = straight.places @ axes.T
     there = replace(straight, heading=straight.heading + 0.4, places=places, grown=places)
@@ -133,7 +133,7 @@ def test_chain_holds_each_overlap_once(prior):
 
 
 def test_what_lasts_is_no_surer_for_a_longer_sequence(prior):
-    """Before anything is seen the size of the body is as open in the long run as in one segment."""
+    """Without observations the size of the body is as uncertain in a long sequence as in one segment."""
     freedom, blocks = Freedom(stature=1.7, stature_sd=0.1, height_sd=0.05), 12
     found = chain.chain(chain.Prior(prior), around(prior, blocks), freedom)
     covariance = np.linalg.inv(whole(found.information)[0])
@@ -162,7 +162,7 @@ def drawn(prior, rng):
 
 
 def observed(prior, places, view, sd, rng, missing=0.1):
-    """Keypoints between the frames of the grid, and what was seen there."""
+    """Keypoints between the frames of the grid, and the places observed there."""
     grid = Grid(0.0, prior.fps, BLOCKS, FRAMES // 2)
     time = np.arange(0.0, grid.time[-1], 1 / 30)
     frames, weights = grid.between(time)
@@ -173,7 +173,7 @@ def observed(prior, places, view, sd, rng, missing=0.1):
 
 
 def test_smoother_covers_what_is_drawn_from_its_prior(prior):
-    """90 % intervals hold 90 % of the coordinates, depth included; the posterior is the smaller volume."""
+    """90 % intervals contain 90 % of the coordinates, also in depth; the posterior has the smaller volume."""
     rng = np.random.default_rng(3)
     view = Parallel(looking_along("y"), 1.0, np.zeros(2))
     inside, ratios = [], []
@@ -204,7 +204,7 @@ def test_places_between_frames_are_cubic():
 
 
 def test_scale_does_not_drift_with_noise():
-    """A body is not drawn towards the camera by noise: without it known, its size stays near the truth."""
+    """Noise does not pull a body towards the camera: its unknown size stays near the truth."""
     prior = toy_prior(FRAMES, 12, 4, seed=5)
     rng = np.random.default_rng(0)
     camera = Camera.looking((0, -6, 1.4), (0, 0, 0.9), (640, 480), 600)
@@ -288,7 +288,7 @@ def test_lifting_needs_four_frames():
 
 
 def lifted_by(monkeypatch, outcomes):
-    """Lift with a smoother whose attempts end as set, one by one: an error, or chi2 per observation."""
+    """Lift with a smoother whose attempts end as listed, one by one: an error, or chi2 per observation."""
     prior, pending = toy_prior(6, 4, 3), list(outcomes)
 
     def attempt(of):
@@ -326,7 +326,7 @@ def test_what_no_width_mends_is_refused_as_the_learnt_one_is(monkeypatch):
 
 
 def test_a_motion_estimated_by_its_segments_is_reported(monkeypatch):
-    """Iterations, rest and stature are then those of the segments, not of the smoother that went astray."""
+    """Iterations, rest and stature are then those of the segments, not of the smoother that failed."""
     found, _ = lifted_by(monkeypatch, [1.0])  # came to no rest
     assert found.alone and found.settled and found.steps == 0 and found.stature == 1.8
     assert (found.places == 0).all() and found.chi2_per_observation == 1.0
@@ -359,7 +359,7 @@ def test_without_a_camera_the_lowest_feet_are_on_the_floor(method):
 
 @pytest.mark.parametrize("method", METHODS)
 def test_sd_about_the_hips_are_those_of_differences(method):
-    """About the hips the common displacement, which a far view does not show, drops out."""
+    """About the hips the common displacement, which a distant view does not show, cancels."""
     prior = toy_prior(FRAMES, 12, 4, seed=5)
     time = np.arange(FRAMES * 2) / 20
     drift = np.arange(len(time))[:, None, None] * (prior.mean[0, 1] - prior.mean[0, 0])

@@ -1,4 +1,4 @@
-"""Left and right points that were swapped for some frames are put back; others stay."""
+"""Left and right points that were swapped for some frames are put back; other points stay."""
 
 from dataclasses import replace
 
@@ -15,7 +15,7 @@ FRAMES, NOISE = 90, 2.0
 
 
 def walking(rate=30.0, gaps=0.0, noise=NOISE):
-    """Legs that swing past each other once a second, as from the side, while the body moves on."""
+    """Legs that swing past each other once a second, seen from the side, while the body moves on."""
     rng = np.random.default_rng(6)
     time = np.arange(FRAMES) / rate
     uv = places(time) + noise * rng.normal(size=(FRAMES, 5, 2))
@@ -32,7 +32,7 @@ def places(time):
 
 
 def model(keypoints, near=None):
-    """Log density of keypoints by one who knows how these legs swing, and where they then are."""
+    """Log density of keypoints for a model that knows how these legs swing, and where they are next."""
     expected = places(keypoints.time)
     square = ((keypoints.uv - expected) ** 2).sum(axis=2) / NOISE**2
     return Reading(-0.5 * float(np.nansum(np.minimum(square, 50))), expected)
@@ -94,7 +94,7 @@ def test_outliers_do_not_hide_a_swap():
 
 
 def test_the_motion_decides():
-    """What goes on better swapped stays where the motion does not fit better for it."""
+    """Points that continue better when swapped stay if the motion does not then fit better."""
     spoilt = swapped(walking(), 30, 50)
     back, found = undo_swaps(spoilt, NOISE, lambda keypoints, near: Reading(0.0, keypoints.uv))
     assert found == []
@@ -131,7 +131,7 @@ def test_what_fits_hardly_better_stays():
 
 @pytest.mark.parametrize("first", [40, 50])
 def test_more_than_few_frames_are_left_alone(first):
-    """Which of the two is right is open then."""
+    """Which of the two is right is then undetermined."""
     spoilt = swapped(walking(), first, 89)
     back, found = undo_swaps(spoilt, NOISE, model)
     assert found == []

@@ -1,4 +1,4 @@
-"""Size and depth: not drawn to the lens by the fit, and by the bones where the fit has no influence."""
+"""Size and depth: the fit does not pull them to the lens, and bones set them where it has no influence."""
 
 from __future__ import annotations
 
@@ -37,7 +37,7 @@ def walk():
 
 
 def drawn(prior, around, rng):
-    """Motion drawn from the chain of a person of known stature on a known floor, (grid, J, 3)."""
+    """Motion drawn from the chain for a person of known stature on a known floor, (grid, J, 3)."""
     found = chain.chain(chain.Prior(prior), around, Freedom(STATURE, 1e-4, 1e-4))
     information = found.information
     count, size_ = information.vector.shape
@@ -60,7 +60,7 @@ def drawn(prior, around, rng):
 @pytest.mark.long
 @pytest.mark.parametrize("view", VIEWS)
 def test_exact_pixels_of_the_prior_are_lifted_to_their_depth(walk, monkeypatch, view):
-    """Draws of the prior itself: linearised at what noise was fitted too, all came out 4 to 5 % nearer."""
+    """Draws of the prior itself: linearised at places fitted to noise too, all came out 4 to 5 % nearer."""
     prior, mean = walk
     half = prior.frames // 2
     segments = len(mean) // half - 1
@@ -88,7 +88,7 @@ def test_exact_pixels_of_the_prior_are_lifted_to_their_depth(walk, monkeypatch, 
 
 
 def test_noise_of_any_size_leaves_the_distance(walk):
-    """Points that noise alone put half a metre off were taken by their rays, and all drew to the lens."""
+    """Points half a metre off by noise were projected along their rays, and pulled everything to the lens."""
     prior, places = walk
     camera = Camera.looking(VIEWS["from the side"], (0, 0, 0.9), (640, 480), 900)
     uv = camera.project(places[:, prior.index(EVAL15)])
@@ -104,7 +104,7 @@ BODY = Camera.looking((0, -4, 1.5), (0, 0, 0.9), (640, 480), 600)
 
 
 def person(prior, factor):
-    """Mean body in a row of frames, zoomed about the lens, and standard deviations."""
+    """Mean body in a row of frames, scaled about the lens, and standard deviations."""
     places = np.repeat(STATURE * prior.mean[0][:1], 4, axis=0)
     lens = -BODY.R.T @ BODY.t
     return places, lens + factor * (places - lens), np.full(places.shape, 0.01)
@@ -120,7 +120,7 @@ def test_bones_give_the_size():
 
 
 def test_a_short_person_who_walks_as_learnt_is_left_short(walk):
-    """A short person was made a sixth larger, and as much too far away, though floor and motion showed it."""
+    """A short person became a sixth larger and too far away, although floor and motion showed the size."""
     prior, mean = walk
     places = 1.45 / STATURE * mean
     camera = Camera.looking(VIEWS["from the side"], (0, 0, 0.9), (640, 480), 600)
@@ -136,7 +136,7 @@ def test_a_short_person_who_walks_as_learnt_is_left_short(walk):
 
 
 def test_people_of_the_prior_have_its_bones(walk):
-    """Whatever they do: as long on average over the prior as in motions drawn from it."""
+    """Bones of any motion have the same mean length over the prior as in motions drawn from it."""
     prior, _ = walk
     rng = np.random.default_rng(0)
     squares = 0.0
@@ -188,7 +188,7 @@ def test_parts_that_hardly_show_the_distance():
     ("observed", "sure"), [(EVAL15, True), ([n for n in EVAL15 if "ankle" not in n], False)]
 )
 def test_without_ankles_the_distance_is_as_open_as_the_size(walk, observed, sure):
-    """Legs that are never visible stand on the floor by the prior alone, which seemed to fix the distance."""
+    """Legs that are never visible stand on the floor only in the prior, which seemed to fix the distance."""
     prior, places = walk
     camera = Camera.looking(VIEWS["towards"], (0, 0, 0.9), (640, 480), 900)
     uv = camera.project(places[:, prior.index(observed)])
@@ -202,7 +202,7 @@ def test_without_ankles_the_distance_is_as_open_as_the_size(walk, observed, sure
 
 @pytest.mark.parametrize("floats", [True, False])
 def test_one_who_fits_but_floats_is_as_large_as_the_bones(walk, floats):
-    """A person in a circle came out small and near the lens, 0.3 m over the floor."""
+    """A person in a circle came out small and near the lens, 0.3 m above the floor."""
     prior, places = walk
     camera = Camera.looking(VIEWS["from the side"], (0, 0, 0.9), (640, 480), 600)
     lens = -camera.R.T @ camera.t

@@ -1,4 +1,4 @@
-"""What soft constraints of the smoother are for: feet slide less, bones change less, bodies are balanced."""
+"""The purpose of the smoother's soft constraints: feet slide less, bones change less, bodies are balanced."""
 
 import numpy as np
 import pytest
@@ -21,13 +21,13 @@ RATE = 20.0  # frames per second of the prior
 
 @pytest.fixture(scope="module")
 def stage():
-    """A person of a normative gait, unknown to the prior."""
+    """A person with a normative gait, which the prior does not contain."""
     return set_stage(Scenario(frames=FRAMES, fps=FPS, seed=301))
 
 
 @pytest.fixture(scope="module")
 def figures(stage):
-    """Sliding speed of standing feet (m/s), variation of bones (m), and the grid, by what is asked for."""
+    """Sliding speed of standing feet (m/s), variation of bones (m), and the grid, by the constraints used."""
     points = stage.walk.points(stage.frames)
     truth = np.stack([points[name] for name in EVAL15], axis=1)
     uv = stage.camera.project(truth) + NOISE * np.random.default_rng(5).standard_normal((FRAMES, 15, 2))
@@ -106,7 +106,7 @@ def test_the_nearest_place_of_a_polygon(point, place):
 
 
 def out_of_polygon(places, sure):
-    """Distance of the ground's force from the polygon in the middle frames, present lengths of the trunk."""
+    """Distance of the ground's force from the polygon in the middle frames, in lengths of the trunk."""
     share, feet = balance.masses(JOINTS), [JOINTS.index(name) for name in FEET]
     middle = places.swapaxes(1, 2) @ share
     off = []
@@ -124,7 +124,7 @@ def out_of_polygon(places, sure):
 
 
 def test_balance_has_the_slope_of_the_distance_from_the_polygon(stage):
-    """Of the squared distance in lengths of the trunk, so that a smaller body is not better balanced."""
+    """The squared distance is in lengths of the trunk, so that a smaller body is not better balanced."""
     points = stage.walk.points(stage.frames)
     places = np.stack([points[name] for name in JOINTS], axis=1)[:4] + 0.0
     places[:, : JOINTS.index("l_knee"), 0] += np.array([0.2, 0.25, 0.21, 0.3])[:, None]  # leaning

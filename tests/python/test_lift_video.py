@@ -46,7 +46,7 @@ def prior():
 
 
 def walk(frames=24, coef=(0.7, -0.5)):
-    """Walk of the shipped cyclic model with proportions and a way of its own."""
+    """Walk of the shipped cyclic model with its own proportions and path."""
     time = np.arange(frames) / FPS
     place = np.column_stack([SPEED * time, np.zeros(frames), np.full(frames, 0.9)])
     joints, _ = pose(
@@ -67,7 +67,7 @@ def root(fit, prior):
 
 @pytest.fixture(scope="module")
 def corrected(clip):
-    """The clip and its estimate: without corrections, then after each six."""
+    """The clip and its estimate: without corrections, then after every six."""
     return list(lift_clicks.corrected(clip, walk().joints[:, EVAL], EVAL15, 12, share=0.25))
 
 
@@ -111,7 +111,7 @@ def test_known_markers_without_sensors_give_the_motion(clip, prior):
 
 
 def test_corrections_of_a_marker_err_alike_within_a_segment(clip):
-    """Several show no more of what the prior leaves out than one does; other markers know nothing of it."""
+    """Several show no more of what the prior leaves out than one does; other markers are not affected."""
 
     def lasting(*spots):
         held = [Correction(frame, joint, (300.0, 200.0), 3.0) for frame, joint in spots]
@@ -123,7 +123,7 @@ def test_corrections_of_a_marker_err_alike_within_a_segment(clip):
 
 
 def test_the_papers_way_is_continuous_in_depth(clip, monkeypatch):
-    """F10: what neighbours share is as far away in both, on average; without the moves it is not."""
+    """F10: moved, neighbours put what they share equally far away on average; unmoved they do not."""
     alone = replace(clip, settings=Settings(joined=False))
     fit = fit_clip(alone)
     gaps = lift_sticks.depth_gaps(alone, fit.sequence)
@@ -135,7 +135,7 @@ def test_the_papers_way_is_continuous_in_depth(clip, monkeypatch):
 
 
 def test_segments_come_in_and_go_by_even_steps(clip):
-    """A triangle over frames: neighbours' shares have sum 1, and a step is as large at an end as within."""
+    """A triangle over frames: neighbours' weights sum to 1, and the step at an end is as large as within."""
     first, second = _share(clip, 0), _share(clip, 1)
     hop = clip.prior.hop
     assert first[hop:] + second[:-hop] == pytest.approx(np.ones(hop))
@@ -217,7 +217,7 @@ def test_the_command_lifts_a_video(files, tmp_path, corrected, prior, capsys):
 
 
 def test_without_a_camera_the_axes_are_the_pictures(files, tmp_path, clip, capsys, monkeypatch):
-    """Sensors that the figure does not explain are reported as well."""
+    """Sensor readings that the figure does not explain are reported as well."""
     monkeypatch.setattr(lift_video, "POOR_CORRELATION", 1.0)
     uv = clip.view.project(walk().joints)[0]
     pelvis = uv[0, JOINTS.index("pelvis")]

@@ -1,4 +1,4 @@
-"""gait lift with keypoints of several cameras: the distance comes from them, not from the person's size."""
+"""gait lift with keypoints of several cameras: they determine the distance, not the person's size."""
 
 import json
 
@@ -17,7 +17,7 @@ LATE = 0.4  # seconds by which the second film began later
 
 @pytest.fixture(scope="module")
 def place(tmp_path_factory):
-    """Keypoints of a walk towards a camera, as it and another from the side see them; a tall person."""
+    """Keypoints of a tall person who walks towards a camera, as seen by it and by another from the side."""
     folder = tmp_path_factory.mktemp("views")
     for name, camera, seed in (("a", walking.view(), 1), ("b", SIDE, 2)):
         write_camera(folder / f"{name}.json", camera)
@@ -33,7 +33,7 @@ def found_rest(keypoints):
 
 
 def lift(place, *views, options=()):
-    """Lift; errors of the joints, mm: in the world, and with the hips' midpoints laid on each other."""
+    """Lift; errors of the joints, mm: in the world, and with the midpoints of the hips aligned."""
     files = [str(place / f"{name}.csv") for name in views]
     cameras = [word for name in views for word in ("--camera", str(place / f"{name[0]}.json"))]
     out = place / "out.csv"

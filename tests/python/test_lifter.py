@@ -1,4 +1,4 @@
-"""The C lifter against the numpy one, term by term, and against the exact posterior of a perspective view."""
+"""The C lifter against the numpy one, term by term, and the exact posterior of a perspective view."""
 
 from __future__ import annotations
 
@@ -43,14 +43,14 @@ def known(**changes: object) -> LiftConfig:
 
 @cache
 def model(size: int = 50, headings: int = 0, components: int = 1) -> tuple[bytes, SegmentPrior]:
-    """A toy prior as a blob, and as the blob holds it."""
+    """A toy prior as a blob, and as read from the blob."""
     prior = toy_prior(FRAMES, MARKERS, size, seed=1, components=components, headings=headings)
     contents = toy_blob(prior)
     return contents, SegmentPrior.from_sections(blob.decode(contents, "toy"))
 
 
 def noise_sd(rng: np.random.Generator, low: float, high: float, missing: float = 0.2) -> np.ndarray:
-    """Standard deviations of all observations, infinite where nothing is seen."""
+    """Standard deviations of all observations, infinite if not observed."""
     sd = rng.uniform(low, high, (FRAMES, MARKERS))
     sd[rng.random(sd.shape) < missing] = np.inf
     return sd
@@ -88,7 +88,7 @@ def test_every_figure_equals_the_numpy_posterior(angle: float, stature_sd: float
 
 
 def _likeliest_scale(gaussian: reference.Gaussian, rows: observe.Rows) -> float:
-    """Factor of the modes by which the evidence is largest, its square inverse gamma of FREEDOM a priori."""
+    """Factor of the modes with the largest evidence; its square is inverse gamma of FREEDOM a priori."""
     own = np.arange(len(gaussian.modes)) < len(gaussian.modes) - gaussian.rigid
 
     def objective(x: float) -> float:
@@ -248,9 +248,9 @@ def test_a_prior_in_the_axes_of_the_world_has_no_heading_to_find() -> None:
 
 
 def test_intervals_hold_people_of_any_stature() -> None:
-    """Taking the mean stature for theirs puts people at a wrong distance, and is sure of it.
+    """Assuming the mean stature puts people at a wrong distance with too small an uncertainty.
 
-    If the stature moved the mean alone and not what the modes add, all would come out nearer.
+    If the stature moved the mean alone and not what the modes add, all people would come out nearer.
     """
     contents, prior = model(size=12)
     rng = np.random.default_rng(6)
@@ -339,7 +339,7 @@ def test_wrong_shapes_and_settings_are_refused() -> None:
 
 
 def _walk(prior: SegmentPrior, times: np.ndarray, speed: float) -> np.ndarray:
-    """The mean's first pose carried along x: under a prior made steady it goes on so for ever."""
+    """The mean's first pose moved along x: with a steady prior it continues forever."""
     start = prior.stature * prior.mean[0, 0]
     return start + np.outer(speed * times, [1.0, 0, 0])[:, None]
 
@@ -380,7 +380,7 @@ EXTREMES = [(3.0, 1.0), (1e-12, 1.0), (1e-150, 1.0), (1e300, 1.0), (3.0, 1e5), (
 
 @pytest.mark.parametrize("camera", [{}, {"cx": 3e38}, {"fx": 1e-30}, {"fx": 3e38}, {"fx": 1e15, "fy": 1e15}])
 def test_results_are_finite_or_refused(camera):
-    """Whatever an input out of any range gives, it is not called a result."""
+    """Whatever an input outside every range gives, it is not reported as a result."""
     contents, _ = model(12)
     lifter = Lifter(contents, replace(CAMERA, **camera), LiftConfig.default(lag=2))
     rng = np.random.default_rng(0)
@@ -397,7 +397,7 @@ def test_results_are_finite_or_refused(camera):
 
 
 def streamed(lifter: Lifter, uv: np.ndarray, sd: float) -> object:
-    """Estimate of a stream; None: nothing was seen."""
+    """Estimate of a stream; None: nothing was observed."""
     lifter.reset()
     for k in range(FRAMES + 4):
         lifter.push(33_333 * k, uv[k % FRAMES], np.full(MARKERS, sd))

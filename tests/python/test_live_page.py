@@ -19,7 +19,7 @@ pytestmark = pytest.mark.long
 
 @pytest.fixture(scope="module")
 def reports(tmp_path_factory):
-    """Samples and pictures of six frames, and what the page begins with."""
+    """Samples and pictures of six frames, and the initial state of the page."""
     folder = tmp_path_factory.mktemp("live")
     opening, frames = rig.opening(), rig.frames(0, 6)
     estimates = rig.play(rig.write_log(folder / "in.log", [*opening, *frames])).estimates

@@ -43,7 +43,7 @@ def write_c3d(path, labels, points, unit="mm", scale=1000.0, rate=120.0):
 
 
 def write_trc(path, labels, points):
-    """Millimetres, y up, with empty cells where missing and none of them at the end of a line."""
+    """Millimetres, y up, with empty cells for missing markers and none of them at the end of a line."""
     lines = [f"PathFileType  4\t(X/Y/Z) {path.name}", "DataRate\tCameraRate\tNumFrames\tNumMarkers\tUnits"]
     lines += [f" 120.0\t\t 120.0\t\t {len(points)}\t {len(labels)}\t mm"]
     lines += ["Frame#\tTime\t" + "\t\t\t".join(labels), "\t\tX1\tY1\tZ1", ""]
@@ -264,7 +264,7 @@ def test_real_markers_fit(name, rms, knee, stride):
 
 
 def test_a_person_entering_and_leaving_is_missing_outside():
-    """Against the knees that the laboratory's own software computed and stored in the file."""
+    """Compared with the knees that the laboratory's own software computed and stored in the file."""
     path = real("c3d/PlugInC3D.c3d")
     body = readers.read(path)
     angles = np.degrees(angles_of(body))

@@ -1,4 +1,4 @@
-"""Markers to bodies: derivatives, known people found again, gaps, agreement with the mocap path."""
+"""Markers to bodies: derivatives, known people recovered, gaps, agreement with joints from motion capture."""
 
 from pathlib import Path
 
@@ -70,7 +70,7 @@ def test_derivatives_are_exact():
 
 
 def test_unusual_lengths_are_found_again(full):
-    """Lengths 8 % off the generic ones, markers 6 mm off their places, 3 mm noise."""
+    """Lengths 8 % off the generic ones, markers 6 mm off their places, 3 mm of noise."""
     _, pose, body = full
     error = np.degrees(angles_of(body) - pose.angles)
     offset = error.mean(axis=0)[:-2]  # without the ankles: these feet never stand flat, which gives the zero
@@ -132,7 +132,7 @@ def test_outliers_do_not_pull(full):
 
 
 def test_a_few_frames_that_do_not_fit_do_not_count_against_the_others(full):
-    """In 15 % of the frames only six markers are visible, and these are of another person."""
+    """In 15 % of the frames only six markers are visible, and these belong to another person."""
     points, _, whole = full
     strange = points.copy()
     strange[40:94] = np.nan
@@ -213,7 +213,7 @@ def test_a_treadmill_becomes_ground():
 
 
 def on_belt(speed, slope, stance, frames=480, fps=120.0, period=100.0):
-    """Joints of a person in place: feet go back with a sloping belt, then forward through the air."""
+    """Joints of a person who stays in place: feet move back with a sloping belt, then forward in the air."""
     rng, joints = np.random.default_rng(3), {"pelvis": np.tile([0.0, 0.0, 1.0], (frames, 1))}
     for s, lag in (("l", 0.0), ("r", 0.5)):
         phase = np.mod(np.arange(frames) / period + lag, 1)
@@ -255,7 +255,7 @@ def test_belts_of_recorded_runs(name, speed):
 
 @pytest.mark.parametrize("name", ["02/02_01", "35/35_01"])
 def test_markers_and_skeleton_of_one_recording_agree(name):
-    """Markers put on a CMU person's bones give the angles that his skeleton gives."""
+    """Markers put on the bones of a CMU subject give the angles of that subject's skeleton."""
     if not WALKS.is_dir():
         pytest.skip(f"{WALKS} is absent: the learning data are not part of the repository")
     body = retarget.align_pelvis(retarget.level(readers.read(WALKS / f"{name}.amc"))[0])
@@ -307,7 +307,7 @@ def test_axes_of_segments_are_no_markers(ends):
 
 
 def test_a_marker_named_like_an_axis_is_a_marker():
-    """LCLA alone is a marker on the clavicle; so are four of such names that do not stand at right angles."""
+    """LCLA alone is a marker on the clavicle; so are four of such names that are not at right angles."""
     points = mw.person(mw.FULL, frames=60)[0]
     four = [mw.FULL.index(name) for name in ("LSHO", "CLAV", "STRN", "C7")]
     labels = [*mw.FULL, "LCLO", "LCLA", "LCLL", "LCLP"]

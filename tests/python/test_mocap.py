@@ -1,4 +1,4 @@
-"""Readers of ASF/AMC and BVH: geometry, equality of the two, and messages for malformed files."""
+"""Readers of ASF/AMC and BVH: geometry, agreement of the two, and messages for malformed files."""
 
 from pathlib import Path
 
@@ -82,7 +82,7 @@ TRUNK = {"root": "Hips", "lowerback": "Spine", "lowerneck": "Chest", "upperneck"
 
 
 def named(side, form="{}"):
-    """Names by a form, those of limbs by another with {side} and {part}, such as "{part}_{side}"."""
+    """Names by one pattern, those of limbs by another with {side} and {part}, such as "{part}_{side}"."""
     limbs = {
         f"{s}{old}": side.format(side=word, s=s.upper(), part=part)
         for s, word in (("l", "Left"), ("r", "Right"))

@@ -1,4 +1,4 @@
-"""Model: poses equal the numpy twin, pictures agree with them, bad blobs are refused with a reason."""
+"""Model: poses equal those of the numpy version, pictures agree with them, invalid blobs are rejected."""
 
 import re
 import struct
@@ -65,7 +65,7 @@ def test_the_paper_model_has_19_angles_and_5_components(tmp_path, monkeypatch):
     with pytest.raises(UserError, match="papers: no such model file"):
         Model("papers")
     monkeypatch.chdir(tmp_path)
-    (tmp_path / "paper").write_bytes(read_blob(None))  # a file of the user's goes before a name
+    (tmp_path / "paper").write_bytes(read_blob(None))  # a user's file takes precedence over a name
     assert Model("paper").info.digest == MODEL.info.digest
 
 

@@ -1,4 +1,4 @@
-"""Norms: people at this pace, comfortable speeds by age, and what is outside with how sure that is."""
+"""Norms: people at this pace, comfortable speeds by age, and values outside with their certainty."""
 
 from dataclasses import replace
 
@@ -26,7 +26,7 @@ def with_stature(track, stature=1.7):
 
 
 def test_words_follow_the_probability_of_being_outside():
-    """A norm of 1 +- 0.1: inside is 0.8 to 1.2."""
+    """A norm of 1 +- 0.1: values from 0.8 to 1.2 are inside."""
     for value, sd, words in (
         (1.0, 0.05, "inside"),
         (1.3, 0.03, "above (100 %)"),

@@ -1,4 +1,4 @@
-"""`gait paper`: the papers' own algorithms find what was planted, and the page holds all figures."""
+"""`gait paper`: the papers' own algorithms find what was planted, and the page contains all figures."""
 
 from __future__ import annotations
 
@@ -32,7 +32,7 @@ FROZEN = Path(__file__).resolve().parents[1] / "bench" / "results" / "search_pap
 
 @pytest.fixture(scope="module", autouse=True)
 def alone():
-    """BLAS in one thread, as the command has it."""
+    """BLAS in one thread, as in the command."""
     with one_thread():
         yield
 

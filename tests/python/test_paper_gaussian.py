@@ -1,4 +1,4 @@
-"""Segments by the letter of Leventon and Freeman (1998): one Gaussian, its posterior, joined segments."""
+"""Segments exactly as in Leventon and Freeman (1998): one Gaussian, its posterior, joined segments."""
 
 from __future__ import annotations
 
@@ -50,7 +50,7 @@ def test_the_view_collapses_y():
 
 
 def test_the_view_alone_is_explained_as_it_is():
-    """Least squares of minimum norm in the modes: exact in the picture, without a prior to hold it."""
+    """Least squares of minimum norm in the modes: exact in the picture, without a prior to restrict it."""
     rng = np.random.default_rng(6)
     gaussian = leventon.learn(planted(rng), turned=False)
     alpha = 3 * np.sqrt(gaussian.variance) * rng.normal(size=len(gaussian.variance))
@@ -74,7 +74,7 @@ def test_the_least_certain_displacements_are_the_posteriors_longest_axes():
 
 
 def test_the_posterior_holds_what_was_drawn_and_equals_the_papers_form():
-    """Equation 5 in its dual form; intervals hold 90 %; the volume is that of the singular values."""
+    """Equation 5 in its dual form; intervals contain 90 %; the volume is that of the singular values."""
     rng, noise = np.random.default_rng(2), 0.05
     gaussian = leventon.learn(planted(rng), turned=False)
     sd = np.sqrt(gaussian.variance)
@@ -99,7 +99,7 @@ def test_the_posterior_holds_what_was_drawn_and_equals_the_papers_form():
 
 
 def test_joined_segments_continue_in_depth():
-    """Segments of one motion that differ in depth alone are joined to that motion."""
+    """Segments of one motion that differ only in depth are joined to that motion."""
     rng = np.random.default_rng(3)
     x = rng.normal(size=(leventon.WINDOW, len(MARKERS), 3))
     depth = np.eye(3)[leventon.DEPTH]

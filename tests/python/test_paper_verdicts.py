@@ -1,4 +1,4 @@
-"""Verdicts of `gait paper` follow from what was found: a wrong prior, figure or filter changes them."""
+"""Verdicts of `gait paper` follow from the results: a wrong prior, figure or filter changes them."""
 
 from __future__ import annotations
 
@@ -34,7 +34,7 @@ def quick(monkeypatch):
 
 
 def motion(name, seed, frames=150):
-    """A stiff body that sways as a whole and turns about its middle, in its own way."""
+    """A stiff body that sways and turns as a whole about its middle, differently in each motion."""
     rng, t = np.random.default_rng(seed), np.arange(frames) / 20
     body = np.array([AT[marker] for marker in MARKERS])
     turn = rng.uniform(0.1, 0.4) * np.sin(t * rng.uniform(2, 5))
@@ -53,7 +53,7 @@ def recorded(name, places):
 
 @pytest.fixture(scope="module")
 def found():
-    """What is found of four motions: the Gaussian of all, and the last one by that of the others."""
+    """Results of four motions: the Gaussian of all, and the last one with that of the others."""
     motions = [motion(f"m{seed}", seed) for seed in range(4)]
     gaussian = leventon.learn_all(motions[:3])
     gaussian = replace(gaussian, modes=gaussian.modes[:, :MODES], variance=gaussian.variance[:MODES])
@@ -74,7 +74,7 @@ def verdict(found, figure):
 
 
 def shown(found, **changes):
-    """The same with another Gaussian in what is shown."""
+    """The same results with another Gaussian."""
     held = replace(found.shown, gaussian=replace(found.shown.gaussian, **changes))
     return replace(found, held=[held], shown=held)
 
@@ -99,7 +99,7 @@ def test_a_wrong_prior_changes_the_verdict(figure, right, wrong, change, found):
 
 
 def shuffled(gaussian):
-    """The Gaussian with the coordinates of its modes in another order: no motion of a body any more."""
+    """The Gaussian with the coordinates of its modes permuted, which is no longer a motion of a body."""
     return replace(gaussian, modes=np.random.default_rng(3).permutation(gaussian.modes))
 
 
@@ -116,7 +116,7 @@ def turned_inside_out(found):
 
 
 def test_every_verdict_of_numbers_can_come_out_otherwise():
-    """Sentences of the figures whose numbers are made by long runs."""
+    """Sentences of the figures whose numbers come from long runs."""
     for function, good, bad in (
         (verdicts.body, (19,), (24,)),
         (verdicts.periods, (True, 1.0, 0, False), (True, 0.5, 9, False)),

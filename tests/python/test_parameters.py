@@ -1,4 +1,4 @@
-"""Gait parameters: against a walk by rule, against true clips, with and without draws."""
+"""Gait parameters of a walk with known rules and of true clips, with and without draws."""
 
 from dataclasses import replace
 from itertools import pairwise
@@ -25,7 +25,7 @@ CLIPS = sorted((DATA / "eval/dev").glob("*/meta.json"))
 
 
 def drawn(track, count=60, late=0.02, seed=0):
-    """Motions that are the track's, each late by a normal number of seconds and scaled about the origin."""
+    """Copies of the track, each late by a normal number of seconds and scaled about the origin."""
     random = np.random.default_rng(seed)
     names = tuple(track.places)
     joints = np.empty((count, len(track.time), len(names), 3), np.float32)
@@ -76,7 +76,7 @@ def test_sd_follow_those_of_the_track_and_last():
     assert (right.sd["stride_time_s"][1:-1] < 0.85 * np.sqrt(2) * late).all()  # both ends are late together
     ratio = twice.strides["right"].sd["stride_time_s"] / right.sd["stride_time_s"]
     np.testing.assert_allclose(ratio, 2, rtol=0.35)
-    # A mean over seven strides is surer of what changes between them, not of what is the person's.
+    # A mean over seven strides is more certain about what varies between them, not about the person.
     summary = once.summary()
     assert summary["stride_time_s"]["both"]["sd"] < 0.6 * right.sd["stride_time_s"].mean()
     assert summary["step_width_m"]["both"]["sd"] > 0.7 * right.sd["step_width_m"].mean()
@@ -93,7 +93,7 @@ def test_without_sd_nothing_is_claimed():
 
 
 def test_errors_that_last_cancel_between_the_ends_of_a_stride():
-    """All events of a motion are late alike: its events are unsure by that much, its strides are not."""
+    """All events of a motion are equally late: its events are uncertain by that much, its strides are not."""
     track = walking_track()
     parameters = measure(track, drawn(track))
     late = 0.02 * 60**-0.5  # how well 60 draws know their standard deviation, roughly
@@ -104,7 +104,7 @@ def test_errors_that_last_cancel_between_the_ends_of_a_stride():
 
 
 def test_errors_of_a_camera_are_common_to_all_frames():
-    """A place that is a metre off in all frames alike changes no stride; a scale that is off changes all."""
+    """A place that is a metre off in all frames changes no stride; a scale that is off changes all."""
     track = walking_track(sd=0.01)
     change = np.zeros((len(track.time), 3, 4))
     change[:, :2, 0] = 1.0

@@ -1,4 +1,4 @@
-"""Several people in one clip: each has a track, though one hides the other."""
+"""Several people in one clip: each has a track, although one hides the other."""
 
 import json
 

@@ -1,4 +1,4 @@
-"""Without a detector a person's shape confirms the track, which starts where the person surely walks."""
+"""Without a detector a person's shape confirms the track, which starts where a person certainly walks."""
 
 from types import SimpleNamespace
 
@@ -31,7 +31,7 @@ ESTIMATE = SimpleNamespace(joints=JOINTS, joint_names=MODEL.joint_names, status=
 
 
 def box(head=0.0, foot=0.0, aside=0.0):
-    """Box of the person, with head and feet so many heights lower."""
+    """Box of the person, with head and feet lower by so many heights."""
     tall = FOOT[1] - CROWN[1]
     return Box(
         np.array([CROWN[0] + aside * tall, FOOT[1] + foot * tall]),

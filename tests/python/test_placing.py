@@ -1,4 +1,4 @@
-"""Placing a camera: the true place comes back, every fault of the points is one line."""
+"""Placing a camera: the true place is recovered, every fault of the points is one line."""
 
 import json
 

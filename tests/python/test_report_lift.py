@@ -108,7 +108,7 @@ def test_the_method_is_of_a_clip(folder, monkeypatch, capsys):
 
 
 def test_a_clip_is_lifted_in_one_thread_as_gait_lift_does_it(folder, monkeypatch, capsys):
-    """Threads of the linear algebra get in each other's way at matrices this small."""
+    """Threads of the linear algebra slow each other down with matrices this small."""
     lift, observed = motion.lift, []
 
     def watched(prior, keypoints, *args):
@@ -164,7 +164,7 @@ def test_a_recording(folder, capsys):
 
 @pytest.mark.parametrize("recording", ["walk", "run"])
 def test_markers_that_a_recording_lacks_are_named(folder, capsys, recording):
-    """They hold seconds of motion, but the head has no markers."""
+    """They cover seconds of motion, but the head has no markers."""
     path = MOCAP / "trc" / f"motion_capture_{recording}.trc"
     if not path.is_file():
         pytest.skip(f"{path} is not there")
@@ -187,7 +187,7 @@ def test_why_a_recording_has_no_segment(frames, words):
 
 
 def test_every_figure_has_a_column_of_its_own():
-    """One row wanders off as least squares do: no figure is cut off or runs into the next."""
+    """One row drifts away, as least squares may: no figure is cut off or runs into the next."""
     rng = np.random.default_rng(1)
     names = ("head_top", "neck", "pelvis", "l_hip", "l_knee", "l_ankle", "r_hip", "r_knee", "r_ankle")
     truth = rng.normal(size=(9, len(names), 3)) * (0.3, 0.3, 0.4) + (0, 0, 0.8)

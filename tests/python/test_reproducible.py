@@ -1,4 +1,4 @@
-"""`gait learn` starts itself anew with the kernels that every CPU has, once and where it can."""
+"""`gait learn` restarts itself with the kernels that every CPU has, once and if it can."""
 
 import os
 import platform
@@ -66,7 +66,7 @@ def test_an_environment_that_is_set_back_ends(tmp_path, monkeypatch):
 
 
 def test_workers_elsewhere_are_left_as_the_command_is(monkeypatch):
-    """Both or neither: a cluster of other machines was refused with the remedy that it had taken."""
+    """Both or neither: a cluster of other machines was rejected with the remedy that it had followed."""
     monkeypatch.setattr(os, "uname", lambda: SimpleNamespace(machine="aarch64"))
     for name in reproducible.COMMON:
         monkeypatch.delenv(name, raising=False)

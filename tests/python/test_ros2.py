@@ -1,4 +1,4 @@
-"""gait export --ros2: another library reads the bodies and the tree of frames that the estimates state."""
+"""gait export --ros2: another library reads the bodies and the tree of frames that the estimates contain."""
 
 from collections import Counter
 
@@ -15,7 +15,7 @@ FIRST = 1_700_000_000_000_000  # microseconds
 
 
 def read(path):
-    """Messages of a bag as (time, topic, message), by rosbags, which has nothing of our writer."""
+    """Messages of a bag as (time, topic, message), read by rosbags, which shares no code with our writer."""
     rosbag2 = pytest.importorskip("rosbags.rosbag2", reason="rosbags is not installed: extra dev")
     from rosbags.typesys import Stores, get_typestore
     from rosbags.typesys.msg import get_types_from_msg

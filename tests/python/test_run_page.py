@@ -72,7 +72,7 @@ def folder(tmp_path_factory):
 
 @pytest.fixture(scope="module")
 def whole(folder):
-    """A page with everything (the turning figure where its parts were fetched), and what was printed."""
+    """A page with everything (the turning figure if its parts were downloaded), and what was printed."""
     out = io.StringIO()
     words = [
         "report",
@@ -119,7 +119,7 @@ def test_a_page_of_a_part_of_the_film_states_the_same_as_the_tracker(folder, cap
 
 
 def test_another_film_is_recognised(folder, tmp_path, capsys):
-    """A copy in another container is the same film; one that was coded anew may be; other times are not."""
+    """A copy in another container is the same film, one encoded anew may be; other times are not."""
     film = Video(folder / "walk.mp4")
     pictures = [frame.image for frame in film.frames()]
     write(tmp_path / "anew.mp4", [np.roll(picture, 40, axis=1) for picture in pictures])

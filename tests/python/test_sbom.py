@@ -1,4 +1,4 @@
-"""The bill of materials holds what no Python package states."""
+"""The bill of materials lists what no Python package states."""
 
 import importlib.util
 from pathlib import Path

@@ -1,4 +1,4 @@
-"""Cameras of another resolution: resized by --scale-camera, else named; upright floors are refused."""
+"""Cameras of another resolution: resized by --scale-camera, else named; upright floors are rejected."""
 
 import json
 from dataclasses import replace
@@ -81,7 +81,7 @@ def keypoints(path, uv):
 
 
 def test_keypoints_with_y_down_are_refused(tmp_path, capsys):
-    """As films are: no estimate is made in a world whose floor stands upright."""
+    """As in films: no estimate is made in a world whose floor stands upright."""
     down = np.array([[1, 0, 0], [0, 0, 1], [0, -1, 0]])  # y down, as of OpenCV's own world
     turned = Camera(*TRUE.size, 1000, 1000, 639.5, 359.5, TRUE.R @ down, TRUE.t)
     (tmp_path / "y_down.json").write_text(json.dumps(turned.to_dict()))

@@ -23,7 +23,7 @@ from gait.lift.smooth.rows import orthographic
 
 @pytest.fixture(scope="module")
 def walks(tmp_path_factory):
-    """Toy walks of three people, and a person who stands still, which is no walk."""
+    """Toy walks of three people, and a person who stands still, which is not a walk."""
     folder = tmp_path_factory.mktemp("walks")
     for i, (subject, trial) in enumerate([(1, 1), (1, 2), (2, 1), (3, 1)]):
         motion = {"period": 110.0 + 6 * i, "swing": 0.85 + 0.05 * i, "seed": i, "frames": 420}
@@ -91,7 +91,7 @@ def test_eight_headings_are_of_the_world(walks, tmp_path):
 
 
 def test_the_number_of_components_is_found_and_reported(walks, tmp_path, capsys):
-    """`segment_mixture` is tested for which number it is."""
+    """Other tests of `segment_mixture` check which number it is."""
     path = tmp_path / "m.gait"
     assert learn(walks, path, "--segments", "only", "--segment-mixture", "auto", "--json") == 0
     reported = json.loads(capsys.readouterr().out)["segments"]
@@ -101,7 +101,7 @@ def test_the_number_of_components_is_found_and_reported(walks, tmp_path, capsys)
 
 
 def test_recorded_markers_are_those_of_the_files(tmp_path, capsys):
-    """One of three recordings lacks the head's: they are learnt, being in most of the files."""
+    """One of three recordings lacks the head's markers: they are learnt, because most files have them."""
     folder = tmp_path / "marked"
     folder.mkdir()
     for k in range(3):
@@ -144,7 +144,7 @@ def test_all_also_learns_from_what_is_no_walk(walks, tmp_path, capsys):
 
 
 def test_all_needs_a_cyclic_model_and_names_what_does_not(walks, tmp_path, capsys):
-    """Nothing is written then: no segment is used nevertheless."""
+    """Then nothing is written: no segment is used anyway."""
     path = tmp_path / "all.gait"
     words = ("learn", walks / "04", "-o", path, "--jobs", 1, "--segment-hop", 1, "--segments")
     assert run(*words, "all") == 1 and not path.exists()

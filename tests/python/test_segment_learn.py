@@ -93,7 +93,7 @@ def test_resampling_keeps_what_is_slow_and_filters_what_is_fast():
 
 
 def test_angles_alone_walk_over_the_floor_on_their_lower_foot():
-    """Legs that swing forward lifted carry the body on by two steps a cycle; absent arms stay unknown."""
+    """Legs that swing forward in the air carry the body on by two steps a cycle; absent arms stay unknown."""
     phase = np.arange(400) / 100
     angles = np.full((400, len(ANGLES)), np.nan)
     for side, shift in (("l", 0.5), ("r", 0.0)):
@@ -191,7 +191,7 @@ def test_gaps_are_filled_as_the_rest_of_the_segment_lets_expect():
 
 
 def test_gamma_is_what_people_left_out_ask_for():
-    """All others' rest is too small by the person's own share of it."""
+    """The residual of all other people is too small by the person's own share of it."""
     rng = np.random.default_rng(5)
     rows, *_ = toy_rows(rng, 600)
     subject = np.repeat(np.arange(6), 100)
@@ -251,7 +251,7 @@ def test_a_mixture_finds_its_components_and_how_many():
 
 
 def test_people_made_up_of_those_left_out_do_not_help_a_mixture():
-    """Every person moves in a way of their own: a component for each is no use to the next one."""
+    """Every person moves differently: a separate component for each does not help with the next person."""
     rng = np.random.default_rng(8)
     person, real = np.repeat(np.arange(6), 100), np.tile(np.arange(100) < 20, 6)
     scores = rng.normal(size=(6, 2))[person] + 0.02 * rng.normal(size=(600, 2))
@@ -302,7 +302,7 @@ MODES = 50
 
 
 def shares(files: Iterable[str]) -> tuple[np.ndarray, np.ndarray]:
-    """Cumulative shares of the variance (MODES,) that the prior's modes hold, and by singular values."""
+    """Cumulative shares of the variance (MODES,) in the prior's modes, and from singular values."""
     wanted = SegmentOptions(source="only", people=False, modes=MODES)
     with Corpus() as corpus:
         for file in files:
@@ -336,7 +336,7 @@ def test_modes_hold_as_much_variance_as_singular_values_do(
 
 @pytest.mark.parametrize("components", [1, 3])
 def test_prior_survives_the_file(tmp_path, components):
-    """What was written is read, to the rounding of the file."""
+    """What was written is read back, to the rounding of the file."""
     prior = toy_prior(5, 8, 6, seed=2, components=components)
     path = tmp_path / "toy.gait"
     path.write_bytes(toy_blob(prior))
@@ -349,7 +349,7 @@ def test_prior_survives_the_file(tmp_path, components):
 
 
 def test_markers_are_found_by_name():
-    """Places follow the order asked for; an unknown name is an error that lists the known ones."""
+    """Places are in the requested order; an unknown name is an error that lists the known ones."""
     prior = toy_prior(3, 4, 2)
     assert prior.index(["head_top", "pelvis"]).tolist() == [2, 0]
     with pytest.raises(UserError, match="'nose' is not in the prior; it knows pelvis neck"):
@@ -392,5 +392,5 @@ def test_contradictions_are_refused(tag, change):
 
 
 def test_the_group_is_complete_and_ordered():
-    """The sections are those of the format, none left out."""
+    """The sections are those of the format, and none is missing."""
     assert tuple(blob.decode(toy_blob(toy_prior()))) == TAGS

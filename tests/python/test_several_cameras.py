@@ -1,4 +1,4 @@
-"""Several cameras that film one walk: the films are brought together, and the place becomes sure."""
+"""Several cameras that film one walk: the films are synchronised, and the place becomes certain."""
 
 import json
 from dataclasses import replace

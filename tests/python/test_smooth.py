@@ -1,4 +1,4 @@
-"""Smoothing: the dynamics' twin, the exact linear case, two modes, new starts, the command."""
+"""Smoothing: the dynamics in numpy, the exact linear case, two modes, new starts, the command."""
 
 import json
 
@@ -32,9 +32,9 @@ NOISE = [row.name for row in struct_fields("gait_tracker_config") if "_noise" in
 
 
 def coasting(mode, count, **changes):
-    """A tracker of 8000 particles that has only predicted, for `count` steps, and its twin.
+    """A tracker of 8000 particles that has only predicted, for `count` steps, and its numpy version.
 
-    It settles soon, because without a picture it is lost after a third of a second and searches then.
+    It settles early, because without a picture it is lost after a third of a second and then searches.
     """
     changes = {"particles": 8000, "resample_ess": 0.0, "settle_time": 0.15} | changes
     config = TrackerConfig.default(mode, proportions=-1 if mode is Mode.DEFAULT else 0, **changes)
@@ -104,7 +104,7 @@ class Linear:
 
 
 class Pairs:
-    """In place of a spool: tables of equal weights, moved by a rule; a start at the frames in `starts`."""
+    """Replaces a spool: tables of equal weights, moved by a rule; a start at the frames in `starts`."""
 
     def __init__(self, frames, rule, starts=()):
         self.frames, self.rule, self.starts = frames, rule, {*starts, len(frames)}
@@ -120,7 +120,7 @@ class Pairs:
 
 @pytest.mark.long
 def test_linear_normal_dynamics_give_the_exact_smoother():
-    """Against Rauch, Tung and Striebel's recursion, from samples of the Kalman filter's posteriors."""
+    """Against the recursion of Rauch, Tung and Striebel, from samples of the Kalman filter's posteriors."""
     rule, random = Linear.rule, np.random.default_rng(1)
     q, h, r = Linear.noise @ Linear.noise, np.array([[1.0, 0, 0, 0], [0, 0, 1.0, 1.0]]), 0.02**2 * np.eye(2)
     x, mean, cov = np.zeros(4), np.zeros(4), 0.03**2 * np.eye(4)

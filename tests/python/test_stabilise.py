@@ -119,7 +119,7 @@ def travelling(path, away: float, angle: float, floor: bool = True) -> tuple[Vid
 
 
 def test_the_poses_of_a_camera_that_travels_over_a_floor_are_found(tmp_path, capsys):
-    """Although a box moves with the camera that is not known to be a person."""
+    """Although a box moves with the camera and is not known to be a person."""
     video, cameras = travelling(tmp_path / "v.mp4", 0.8, 0.2)
     poses = find_travel(video, cameras[0], sample_frames(video), {}, quiet=False)
     assert len(poses) == len(cameras) and "the camera travelled up to 0.8 m" in capsys.readouterr().err

@@ -1,4 +1,4 @@
-"""Who stands has no phase, rate and speed until both feet have struck."""
+"""A person who stands has no phase, rate and speed until both feet have struck."""
 
 from dataclasses import replace
 

@@ -50,7 +50,7 @@ def single():
 
 
 def marked(labels, angles, travel=1.3, seed=5):
-    """Points (T, M, 3) of a person of odd lengths in poses (T, 24), and the true body's angles."""
+    """Points (T, M, 3) of a person with unusual lengths in poses (T, 24), and the true body's angles."""
     rng = np.random.default_rng(seed)
     scales = mw.own_lengths(rng, 0.05)
     time = np.arange(len(angles)) / 120

@@ -1,4 +1,4 @@
-"""gait studio in a real Chromium: a clip whose truth is known, corrected by the mouse."""
+"""gait studio in a real Chromium: a clip with known truth, corrected with the mouse."""
 
 import contextlib
 import csv
@@ -43,7 +43,7 @@ def table(path):
 
 @pytest.fixture(scope="module")
 def clip(tmp_path_factory):
-    """A short clip, and keypoints that are right but for a foot in `WRONG`."""
+    """A short clip, and keypoints that are right except for a foot in `WRONG`."""
     browser.chromium()
     folder = tmp_path_factory.mktemp("studio")
     shown = ["--frames", str(FRAMES), "--fps", f"{FPS:g}", "--size", "480x270", "--view", "side", "--quiet"]
@@ -114,7 +114,7 @@ def show(page, url):
 
 
 def screen(page, frame, uv):
-    """Where a pixel of a frame is on the screen; shows the frame."""
+    """Position of a frame's pixel on the screen; shows the frame."""
     page.evaluate(f"studio.film.seek({frame})")
     box = page.locator("#film .stage canvas").bounding_box()
     x, y = page.evaluate(f"studio.film.picture.toScreen([{uv[0]}, {uv[1]}])")
@@ -304,7 +304,7 @@ def test_the_film_comes_in_ranges_and_bad_requests_are_refused(clip, server):
 
 
 def test_what_is_saved_can_be_read(clip, server):
-    """No request puts into the file what the next start would refuse."""
+    """No request writes something into the file that the next start would reject."""
     folder, saved = clip[0], clip[0] / "clip/video.mp4.studio/corrections.json"
     pull = {"do": "pull", "frame": 30, "joint": "r_toe", "uv": [200.123456, 150], "sd_px": 2}
     assert post(server.url, "edit", pull)[0] == 200
@@ -340,7 +340,7 @@ def get(url, path):
 
 
 def test_pictures_are_corrected_as_the_batch_command_does(clip, monkeypatch):
-    """Without a browser, as the page would ask."""
+    """Without a browser, as the page would request it."""
     folder, truth = clip
     here = folder / "pictures/clip"
     shutil.copytree(folder / "clip", here, ignore=shutil.ignore_patterns("*.studio"))

@@ -1,4 +1,4 @@
-"""Threads of the library from Python: they come, work and go."""
+"""Threads of the library in Python: they are started, work and end."""
 
 import gc
 import os
@@ -62,7 +62,7 @@ def test_a_child_process_works_and_ends():
 
 @pytest.mark.parametrize("early", ["running", "queued"])
 def test_a_runner_that_returns_early_leaves_no_late_calls(early):
-    """Its tasks belong to a C frame: those that run are waited for, later ones are refused."""
+    """Its tasks belong to a C frame: running ones are waited for, later ones are rejected."""
     called, late, refused = [], [], []
     begun, go_on, queue_on = threading.Event(), threading.Event(), threading.Event()
 

@@ -43,7 +43,7 @@ def init(folder, state, number):
 
 @pytest.fixture
 def folder(tmp_path):
-    """The drawn walk with its camera, its empty scene and a start in its middle."""
+    """The drawn walk with its camera, its empty scene and a start in the middle."""
     write(tmp_path / "walk.mp4", FRAMES)
     cv2.imwrite(str(tmp_path / "plate.png"), wall())
     (tmp_path / "camera.json").write_text(json.dumps(camera().to_dict()))
@@ -60,7 +60,7 @@ def track(folder, *options):
 
 
 def errors(folder):
-    """Frames of the track, and their errors as far as they show the walk, metres."""
+    """Frames of the track, and their errors where the walk is in view, metres."""
     rows = read_track(folder / "o.csv")
     mine = np.stack([rows.places[name] for name in ("l_knee", "r_knee", "l_ankle", "r_ankle")], axis=1)
     order = [MODEL.joint_names.index(name) for name in ("l_knee", "r_knee", "l_ankle", "r_ankle")]
@@ -139,7 +139,7 @@ def test_a_person_who_comes_back_is_found_by_keypoints(ids, at, folder, capsys, 
 def test_a_lost_person_is_found_again_within_a_second_in_full_view(known, folder):
     """Hidden for 1.5 s behind a wall, then walking on.
 
-    Pictures alone take longer to show left and right, and the distance from the camera.
+    Without keypoints, pictures take longer to show left and right, and the distance from the camera.
     """
     back, count = START + 45, START + 90
     pictures, states = clip(MODEL, SECTIONS, count, start=(-2.3, 0.0))
@@ -172,7 +172,7 @@ def test_a_film_of_noise_ends_with_a_warning(folder, capsys):
 
 @pytest.fixture(scope="module")
 def estimate():
-    """What a tracker has of the walk's last frame."""
+    """Estimates of a tracker for the last frame of the walk."""
     tracker = Tracker(MODEL, camera(), TrackerConfig.default(particles=200), background=wall())
     mean, sd = MODEL.prior()
     sd.pelvis[:] = sd.heading = sd.phase = 0.02
@@ -207,7 +207,7 @@ def test_a_figure_of_another_size_is_not_near(estimate):
 
 
 class Script:
-    """A tracker that stays on the person, or beside them from a frame on, until it is started anew."""
+    """A tracker that stays on the person, or leaves them at a frame, until it is started again."""
 
     step_seconds = 0.0
 
@@ -242,10 +242,11 @@ class Film:
 
 @pytest.fixture
 def astray(estimate):
-    """Follow a track, from a start on, that goes astray at frame 20 or, backwards, at 79.
+    """Follow a track that leaves the person at frame 20 or, backwards, at 79.
 
     The person is found in frames 0 to 19 and 80 to 99; between them are ghosts for a second, then nothing,
-    then the person.  Returns the times of the starts in frames, the spans searched for a start, and the rows.
+    then the person.  Returns the times of the starts in frames, the intervals searched for a start, and the
+    rows.
     """
 
     def run(start, ghosts, nothing, again):
@@ -270,7 +271,7 @@ def astray(estimate):
 
 
 def test_a_person_hidden_for_long_is_taken_up_again(astray):
-    """Frames without keypoints do not hide that the track went astray."""
+    """Frames without keypoints do not hide that the track left the person."""
     starts, asked, near, statuses = astray(0, range(20, 50), range(50, 65), 65)
     assert starts == [0, -65, 65]  # a negative one is backwards
     assert len(asked) == 1 and 35 <= asked[0][0] <= 37

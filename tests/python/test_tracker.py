@@ -1,4 +1,4 @@
-"""Tracker through Python: configuration, order of calls, callbacks, replay, and a drawn walk followed."""
+"""Tracker through Python: configuration, order of calls, callbacks, replay, and tracking of a drawn walk."""
 
 import ctypes
 import gc
@@ -168,7 +168,7 @@ def test_an_exception_in_a_task_runner_is_raised_after_the_call():
         tracker.step(FRAMES[0], 0)
     calm.step(FRAMES[0], 0)
     run(tracker, 1, 4), run(calm, 1, 4)
-    assert tracker.digest() == calm.digest()  # the tasks it left were done all the same
+    assert tracker.digest() == calm.digest()  # the tasks it left were completed anyway
 
 
 def test_a_runner_that_forgets_tasks_is_reported():

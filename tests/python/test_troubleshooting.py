@@ -29,7 +29,7 @@ QUOTES = re.findall(r"^\| `(.+?)` \|", PAGE.read_text(encoding="utf-8"), re.M)
 
 
 def quoted(quote, texts):
-    """Whether a text of the code may read as a quote, in which ... stands for anything."""
+    """Whether a text of the code may become a quote, in which ... stands for anything."""
     pieces = quote.split("...")
     pattern, longest = re.compile(".*?".join(map(re.escape, pieces)), re.S), max(pieces, key=len)
     if any(pattern.search(text) for text in texts if longest in text):

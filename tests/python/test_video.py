@@ -23,7 +23,7 @@ FAULTS = Path(__file__).resolve().parents[2] / "../shared/data/faults"
 
 
 def pattern(i, width=64, height=48):
-    """Smooth picture with a bright bar whose place shows the frame."""
+    """Smooth picture with a bright bar whose place shows the frame number."""
     image = np.full((height, width, 3), 60, np.uint8)
     image[:, 4 * i : 4 * i + 4] = (200, 180, 220)
     return image
@@ -202,7 +202,7 @@ def test_plates_that_do_not_fit(film, tmp_path):
 
 
 def patched(film, path, box, at, values):
-    """Copy an MP4 with 32-bit numbers of a box overwritten; `at` is counted from behind the box's name."""
+    """Copy an MP4 with 32-bit numbers of a box overwritten; `at` counts from the end of the box's name."""
     content = bytearray(film.read_bytes())
     struct.pack_into(f">{len(values)}i", content, content.index(box) + len(box) + at, *values)
     path.write_bytes(content)

@@ -61,7 +61,7 @@ LCM_MESSAGES = "from gait.lcm.link import generated; generated().estimate_t().en
 
 
 def run(command, folder, **environment):
-    """Run a program that sees nothing of this environment but what is given here."""
+    """Run a program that sees only the part of this environment that is given here."""
     return subprocess.run(
         [str(word) for word in command],
         cwd=folder,
@@ -137,7 +137,7 @@ def test_help_is_quick(numpy_alone, tmp_path):
 
 
 def test_the_wheel_makes_a_clip_and_tracks_it(tmp_path):
-    """The commands of the README on fewer and smaller frames, with only the environment on the PATH."""
+    """The commands of the README with fewer and smaller frames, with only the environment on the PATH."""
     venv = tmp_path / "venv"
     subprocess.run([sys.executable, "-m", "venv", "--without-pip", venv], check=True)
     pins = ["--no-compile", "--constraint", ROOT / "python/constraints.txt"]

@@ -1,4 +1,4 @@
-"""Small priors over segments with known parameters, for tests of what builds on them."""
+"""Small priors over segments with known parameters, for tests of code that uses priors."""
 
 from __future__ import annotations
 
@@ -48,5 +48,5 @@ def toy_prior(
 
 
 def toy_blob(prior: SegmentPrior) -> bytes:
-    """Blob that holds the prior alone."""
+    """Blob that contains only the prior."""
     return blob.encode(sections(prior))

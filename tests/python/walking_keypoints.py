@@ -1,4 +1,4 @@
-"""Keypoints of a person of the shipped model who walks straight on, as a camera sees them."""
+"""Keypoints of a person with the shipped model who walks straight on, as seen by a camera."""
 
 from dataclasses import replace
 
@@ -39,5 +39,5 @@ def keypoints(camera, walk=TOWARDS, *, seconds=3.0, noise=1.5, seed=0, **how):
 
 
 def view(focal=1000.0, tilt=0.08, roll=0.0, height=1.4):
-    """Camera of a telephone on a tripod."""
+    """Camera of a phone on a tripod."""
     return make_camera(np.array([np.log(focal), tilt, roll, np.log(height)]), SIZE)
