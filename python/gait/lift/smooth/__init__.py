@@ -1,1 +1,1 @@
-"""A whole sequence: one Gaussian over overlapping segments, or the segments blended."""
+"""Estimate a whole sequence: as one Gaussian over overlapping segments, or as blended segments."""

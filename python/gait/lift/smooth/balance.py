@@ -1,10 +1,10 @@
 """Balance as a soft constraint: the ground's force acts where feet stand.
 
-The force of the ground acts within the polygon of the standing feet.  For an inverted pendulum it acts at
-z = c - h / g c'', of the body's centre of mass c, which is h above the feet; while a person stands still it
-is below the centre of mass.  Where an estimate has z outside the polygon, a row draws it back.
+The ground's force acts within the polygon of the standing feet.  For an inverted pendulum it acts at
+z = c - h / g c'', where c is the body's centre of mass and h its height above the feet; for a person who
+stands still that is below the centre of mass.  If an estimate has z outside the polygon, a row pulls it back.
 
-Masses and centres of the body's segments: de Leva, "Adjustments to Zatsiorsky-Seluyanov's segment inertia
+Masses and centres of mass of body segments: de Leva, "Adjustments to Zatsiorsky-Seluyanov's segment inertia
 parameters", Journal of Biomechanics 29 (1996), table 4, mean of women and men.
 """
 
@@ -21,14 +21,14 @@ from gait.lift.smooth.soft_constraints import FEET, Rows, trunk
 Floats = npt.NDArray[np.float64]
 
 GRAVITY = 9.81  # m/s^2
-STANDS = 0.5  # from which a foot is sure enough to stand to bear weight
-BALANCE_SD = 0.05  # metres out of the polygon, as feet are lines here and bodies no pendulums
-EDGE = 0.03  # metres out of the polygon below which a row fades, so that rows do not come and go
-LEAST = 1e-3  # metres out of the polygon that count
-FLAT = 1e-6  # square metres of a triangle that has no inside
-_LIMBS = (  # from, to, share of the mass, place of its centre between them
+STANDS = 0.5  # probability of standing from which a foot may bear weight
+BALANCE_SD = 0.05  # metres outside the polygon, as feet are lines here and bodies are not pendulums
+EDGE = 0.03  # metres outside the polygon below which a row fades, so that rows do not switch on and off
+LEAST = 1e-3  # metres outside the polygon from which there is a row
+FLAT = 1e-6  # square metres; smaller triangles are degenerate
+_LIMBS = (  # from, to, share of the mass, relative position of its centre between them
     ("shoulder", "elbow", 0.0263, 0.576),
-    ("elbow", "wrist", 0.0208, 0.61),  # with the hand, 0.6 % of the mass, beyond the wrist
+    ("elbow", "wrist", 0.0208, 0.61),  # including the hand beyond the wrist, 0.6 % of the mass
     ("hip", "knee", 0.1447, 0.385),
     ("knee", "ankle", 0.0457, 0.444),
     ("heel", "toe", 0.0133, 0.421),
@@ -41,7 +41,7 @@ SEGMENTS = (
 
 
 def masses(names: Sequence[str]) -> Floats | None:
-    """Share of the body's mass (J,) that each marker stands for; None if an end of a segment is missing."""
+    """Share of the body's mass (J,) that each marker represents; None if an end of a segment is missing."""
     if not {name for *ends, _, _ in SEGMENTS for name in ends} <= set(names):
         return None
     share = np.zeros(len(names))
@@ -52,14 +52,16 @@ def masses(names: Sequence[str]) -> Floats | None:
 
 
 def balance(rows: Rows, names: Sequence[str], places: Floats, sure: Floats, rate: float) -> None:
-    """Draw the force into the polygon of the standing feet where places (grid, J, 3) have it outside.
+    """Add rows that pull the force into the polygon of the standing feet, where positions have it outside.
 
-    Distances count in lengths of the trunk, as in `contacts`.
+    Distances are in lengths of the trunk, as in `contacts`.
 
     Parameters
     ----------
+    places : (grid, J, 3)
+        Positions at which the rows are linearised, metres.
     sure : (grid - 1, feet)
-        How sure feet stand from each frame to the next, by `contacts`.
+        Probability that feet stand from each frame to the next, from `contacts`.
     """
     share, every = masses(names), np.arange(len(names))
     if share is None:
@@ -86,14 +88,14 @@ def balance(rows: Rows, names: Sequence[str], places: Floats, sure: Floats, rate
             columns.append(rows.layout.place(np.full_like(on, t), on) + axis)
             factors.append(-normal * corners)
         sd = BALANCE_SD * np.hypot(1.0, EDGE / away)
-        # linear part of away / trunk's length, in present lengths
+        # linear part of away / (length of the trunk), in present lengths
         rows.add(
             np.concatenate(columns)[None], np.concatenate(factors)[None], np.array([-away]), np.array([sd])
         )
 
 
 def nearest(corners: Floats, point: Floats) -> Floats:
-    """Weights (n,) of the corners (n, 2) of a convex polygon that give its place nearest to a point."""
+    """Weights (n,) of a convex polygon's corners (n, 2) that give its position nearest to a point."""
     count, every = len(corners), np.eye(len(corners))
     for triangle in map(list, combinations(range(count), 3)):
         system = np.vstack([corners[triangle].T, np.ones(3)])

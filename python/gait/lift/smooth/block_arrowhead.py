@@ -1,11 +1,8 @@
-"""Gaussians whose information matrix is block-tridiagonal: blocks of time, each tied to its neighbours.
+"""Gaussians with a block arrowhead information matrix: blocks of time, and lasting unknowns.
 
-Everything is exact; work and memory grow with the number of blocks.
-
-Gaussians over blocks of time and over numbers that last: block-tridiagonal information with a border.
-
-With x the blocks and g what lasts, the information matrix is [[A, C], [C', D]] with A block-block_arrowhead.
-Eliminating x leaves S = D - C' A^-1 C of g's own size; everything is exact.
+With x the blocks, each coupled with its neighbours, and g the lasting unknowns, the information matrix is
+[[A, C], [C', D]], where A is block-tridiagonal.  Eliminating x leaves S = D - C' A^-1 C of the size of g.
+Everything is exact; work and memory are proportional to the number of blocks.
 """
 
 from __future__ import annotations
@@ -21,14 +18,14 @@ Floats = npt.NDArray[np.float64]
 
 @dataclass(frozen=True)
 class Factor:
-    """Cholesky factor of an information matrix of B blocks of n rows.
+    """Cholesky factor of a block-tridiagonal information matrix with B blocks of n rows.
 
     Attributes
     ----------
     lower : (B, n, n)
-        Its blocks on the diagonal.
+        Blocks on the diagonal of the factor.
     below : (B - 1, n, n)
-        Its blocks below them.
+        Blocks below the diagonal.
     """
 
     lower: Floats
@@ -56,11 +53,11 @@ class Factor:
         return result
 
     def solve(self, vector: Floats) -> Floats:
-        """Mean (B, n, c) of Gaussians with information vectors (B, n, c)."""
+        """Compute the means (B, n, c) of Gaussians with information vectors (B, n, c)."""
         return self.backward(self.forward(vector))
 
     def covariance(self) -> tuple[Floats, Floats]:
-        """Blocks of the covariance: on the diagonal (B, n, n), of each with the one before (B - 1, n, n)."""
+        """Compute blocks of the covariance: diagonal (B, n, n), and with the one before (B - 1, n, n)."""
         diagonal, across = np.empty(self.lower.shape), np.empty(self.below.shape)
         for s in reversed(range(len(diagonal))):
             half = lapack.dtrtri(self.lower[s], lower=1)[0]
@@ -80,11 +77,11 @@ def factor(diagonal: Floats, below: Floats) -> Factor:
     LinAlgError
         If it is not positive definite.
     """
-    # columns lie together, as LAPACK has them, so that nothing is copied
+    # column-major, as in LAPACK, so that nothing is copied
     lower, left = np.empty(diagonal.shape).transpose(0, 2, 1), np.empty(below.shape)
     for s, block in enumerate(diagonal):
         rest = block.T
-        if s:  # of symmetric matrices only the lower triangle is computed and read
+        if s:  # only the lower triangle of symmetric matrices is computed and read
             rest = blas.dsyrk(-1.0, left[s - 1].T, beta=1.0, c=rest, trans=1, lower=1)
         lower[s], wrong = lapack.dpotrf(rest, lower=1, clean=1)
         if wrong:
@@ -96,19 +93,19 @@ def factor(diagonal: Floats, below: Floats) -> Factor:
 
 @dataclass(frozen=True)
 class Information:
-    """Information matrix and vector of B blocks of n numbers and of G that last.
+    """Information matrix and vector of B blocks of n unknowns, and of G lasting unknowns.
 
     Attributes
     ----------
     diagonal : (B, n, n)
     below : (B - 1, n, n)
     border : (B, n, G)
-        Of the blocks with what lasts.
+        Information between blocks and lasting unknowns.
     corner : (G, G)
     vector : (B, n)
         Information times mean, of the blocks.
     edge : (G,)
-        The same of what lasts.
+        The same of the lasting unknowns.
     """
 
     diagonal: Floats
@@ -121,14 +118,14 @@ class Information:
 
 @dataclass(frozen=True)
 class Solution:
-    """Mean of such a Gaussian and what its covariance needs.
+    """Mean of such a Gaussian, and the factors from which its covariance is computed.
 
     Attributes
     ----------
     blocks : (B, n)
     lasting : (G,)
     log_det : float
-        Of the information matrix.
+        Log determinant of the information matrix.
     """
 
     blocks: Floats
@@ -139,7 +136,7 @@ class Solution:
     _lower: Floats  #: factor of S
 
     def covariance(self) -> tuple[Floats, Floats]:
-        """Blocks of the covariance of x: on the diagonal, and of each with the one before."""
+        """Compute blocks of the covariance of x: on the diagonal, and of each with the one before."""
         diagonal, across = self._factor.covariance()
         reach = self._factor.backward(self._half) @ np.linalg.inv(self._lower).T
         diagonal += reach @ reach.transpose(0, 2, 1)
@@ -148,7 +145,7 @@ class Solution:
 
 
 def solve(info: Information) -> Solution:
-    """Mean and factors.
+    """Compute mean and factors.
 
     Raises
     ------

@@ -1,14 +1,15 @@
 """The segment prior over a whole sequence: a Markov chain of half segments, given the lasting unknowns.
 
-Frames of the prior's rate are cut into blocks of half a segment.  Two neighbouring blocks are a segment, so
-that the prior gives p(first, second) and, by division, p(second | first): the sequence has the density p(X_0,
-X_1) prod_s p(X_s+1 | X_s), in which every overlap counts once.  Its information matrix is block-
-block_arrowhead.  In the world a segment is X = stature Rz(heading) x + shift; shift and heading are unknown
-too and enter by their linear effects around the present estimate (`Around`).
+Frames at the prior's rate are divided into blocks of half a segment.  Two neighbouring blocks are a segment,
+so the prior gives p(first, second) and, by division, p(second | first).  The sequence has the density p(X_0,
+X_1) prod_s p(X_s+1 | X_s), in which every overlap counts once.  Its information matrix is a block arrowhead.
+In the world a segment is X = stature Rz(heading) x + shift, where shift and heading are also unknown and are
+included by their linear effects around the present estimate (`Around`).
 
-A chain forgets: left to it, every half segment would bring news of the person's size and of the floor, and
-the more frames, the surer it would be of the mean person.  So what stays the same throughout - stature, floor
-and where a person's joints are taken to be - are numbers g of their own, and the chain is that given g.
+A Markov chain forgets: by itself, every half segment would be new evidence about the person's size and the
+floor, and more frames would make it ever more certain of the mean person.  Therefore what is constant
+throughout (stature, floor, and offsets of the person's joints) are separate unknowns g, and the chain is
+conditional on g.
 """
 
 from __future__ import annotations
@@ -26,25 +27,25 @@ from gait.lift.smooth.block_arrowhead import Information
 
 Floats = npt.NDArray[np.float64]
 
-GROUND_SD = 10.0  # metres, where on the ground
-LASTING = 0.7  # share of the variance outside the modes that stays as it is within a segment
-THROUGHOUT = 0.5  # share of that which stays as it is in the whole sequence
-OFFSET_SD = 0.009  # statures, of where a person's joints are taken to be
-HEADING_SD = 2.0  # radians around the present estimate: as good as unknown
-WHOLE = 2  # numbers that last and move the whole body, stature and floor; each marker's offset follows
-LEADING = 3  # modes whose scores enter the shapes that views are linearised around
+GROUND_SD = 10.0  # metres, of the position on the ground
+LASTING = 0.7  # share of the variance outside the modes that is constant within a segment
+THROUGHOUT = 0.5  # share of the latter that is constant in the whole sequence
+OFFSET_SD = 0.009  # statures, of the offsets of a person's joints
+HEADING_SD = 2.0  # radians around the present estimate; practically unknown
+WHOLE = 2  # lasting unknowns that move the whole body: stature and floor; each marker's offset follows
+LEADING = 3  # modes in the shapes around which views are linearised
 
 
 @dataclass(frozen=True)
 class Freedom:
-    """What the sequence may do beyond the prior's modes.
+    """Freedom of a sequence in addition to the prior's modes.
 
     Attributes
     ----------
     stature, stature_sd : float
         Metres.
     height_sd : float
-        Of the floor under the person, metres.
+        Standard deviation of the height of the floor under the person, metres.
     """
 
     stature: float
@@ -54,21 +55,21 @@ class Freedom:
 
 @dataclass(frozen=True)
 class Around:
-    """Estimate that the chain is linearised around, S segments of 2 b frames.
+    """Estimate around which the chain is linearised, with S segments of 2 b frames.
 
     Attributes
     ----------
     heading : (S,)
         Radians.
     component : (S,)
-        Of the prior's mixture.
+        Index in the prior's mixture.
     stature : float
         Metres.
     places : (S, 2 b, J, 3)
-        Markers in the world, metres.
+        Markers in the world, metres, from the leading modes.
     grown : (S, 2 b, J, 3)
-        What grows with the stature: the same by all modes.  If some did not grow, a small body near the lens
-        would pay less for them, and everyone was drawn to it.
+        The same from all modes, for the derivatives by stature.  If some modes did not scale with the
+        stature, they would cost a small body near the lens less, and all estimates would be drawn towards it.
     """
 
     heading: Floats
@@ -80,17 +81,16 @@ class Around:
 
 @dataclass(frozen=True)
 class Chain:
-    """Information form of the chain, B blocks of n = 3 b J numbers, and of what lasts (`block_arrowhead`).
+    """Information form of the chain: B blocks of n = 3 b J unknowns, and lasting ones (`block_arrowhead`).
 
     Attributes
     ----------
     information : Information
     constant : float
-        Mean' information mean, summed over the factors.
+        Mean' information mean, summed over the factors of the density.
     log_det : float
-        Of the information matrix.
+        Log determinant of the information matrix.
     segments : list of Segment
-        Its segments.
     """
 
     information: Information
@@ -101,15 +101,15 @@ class Chain:
 
 @dataclass(frozen=True)
 class Common:
-    """What all segments of a component have in common, whatever their place, heading and stature.
+    """What all segments of a component have in common, whatever their position, heading and stature.
 
-    In standard deviations of what changes from frame to frame, and in the axes of the body, a segment's modes
-    and its markers' offsets are the same.  So is the factor of their part of I + loads loads'.
+    In the body's axes, and in units of the standard deviations of what changes from frame to frame, modes and
+    offsets of markers are the same in all segments, and so is the factor of their part of I + loads loads'.
 
     Attributes
     ----------
     sd : (n / 3,)
-        Of a number of each marker that changes from frame to frame, statures.
+        Standard deviation of what changes from frame to frame, for each marker and frame, statures.
     lower : (k, k)
         Cholesky factor of I + scaled scaled', of modes and offsets.
     thin : (k, n)
@@ -131,7 +131,7 @@ class Common:
 
     @classmethod
     def of(cls, prior: SegmentPrior, component: int, frames: int) -> Common:
-        """Prepare the first frames of a component."""
+        """Compute it for the first frames of a component."""
         modes, outside = prior.modes[component][:, :frames], prior.gamma * prior.residual[component]
         sd = np.sqrt((1 - LASTING) * outside)
         shares = _each_marker(np.full(len(sd), np.sqrt((1 - THROUGHOUT) * LASTING / (1 - LASTING))), frames)
@@ -143,25 +143,25 @@ class Common:
         return cls(np.tile(sd, frames), lower, thin, offsets, left, left @ offsets.T)
 
     def information(self) -> Floats:
-        """Information (n, n) of a body of stature 1 m without its rigid motions, in its axes."""
+        """Information (n, n) of a body with stature 1 m, without rigid motions, in its own axes."""
         sd = np.repeat(self.sd, 3)
         return np.asarray((np.eye(len(sd)) - self.thin.T @ self.thin) / (sd * sd[:, None]))
 
 
 class Prior:
-    """A segment prior with what its chains need over and over.
+    """A segment prior, with precomputed matrices that all its chains need.
 
     Attributes
     ----------
     segments : SegmentPrior
     common : tuple of (Common, Common)
-        Of each component's C, of whole segments and of their first halves.
+        For each of the C components: of whole segments, and of their first halves.
     alone : (C, n, n)
-        Information of the first half alone, of a body of stature 1 m, without its rigid motions, in its axes.
+        Marginal information of the first half, as in `Common.information`.
     diagonal : (10 C, n n)
-        `_harmonics` of that of the first half, less alone, and of that of the second half.
+        `_harmonics` of the information of a whole segment: its first block minus `alone`; its second block.
     below : (5 C, n n)
-        `_harmonics` of that of the second half with the first.
+        `_harmonics` of the information between the second half and the first.
     """
 
     def __init__(self, segments: SegmentPrior) -> None:
@@ -179,7 +179,7 @@ class Prior:
 
 
 def chain(prior: Prior, around: Around, freedom: Freedom) -> Chain:
-    """Make the chain of a prior (of `SegmentPrior.restricted`) with 2 b frames a segment."""
+    """Make the chain of a prior (from `SegmentPrior.restricted`) with 2 b frames per segment."""
     segments, frames, markers = around.places.shape[:3]
     size, lasting = 3 * markers * frames // 2, WHOLE + 3 * markers
     diagonal, below = _common_information(prior, around, size)
@@ -222,15 +222,15 @@ def _common_information(prior: Prior, around: Around, size: int) -> tuple[Floats
 
 
 def moved(before: Chain, around: Around, freedom: Freedom, places: Floats, lasting: Floats) -> Around:
-    """Linearise around new places (grid, J, 3): headings, stature and shapes that they imply under the prior.
+    """Linearise around new positions (grid, J, 3): headings, stature and shapes that they imply.
 
     `before`: the chain `around` the old ones.
 
-    The shapes hold the leading modes only.  What else an estimate fits goes with the noise that it is fitted
-    to: derivatives taken there are correlated with the residuals, and draw the body to the lens, where the
-    same residuals in the picture are fewer metres (errors in variables; by the share of fitted numbers).  All
-    segments and all views are linearised around the same shapes, so that a change of size about the lens
-    costs nothing by itself.  What grows with the stature holds all modes (`Around`).
+    The shapes contain only the leading modes.  The other modes of an estimate fit noise, so derivatives there
+    would be correlated with the residuals and draw the body to the lens, where the same residuals in the
+    picture are fewer metres (errors in variables, in proportion to the number of modes).  All segments and
+    views are linearised around the same shapes, so that scaling the body about the lens costs nothing by
+    itself. Derivatives by stature use all modes (`Around`).
     """
     headings, shapes, grown = [], [], []
     half = around.places.shape[1] // 2
@@ -247,12 +247,12 @@ def moved(before: Chain, around: Around, freedom: Freedom, places: Floats, lasti
 
 
 def overlapping(values: Floats, half: int) -> Floats:
-    """Segments (S, 2 half, ...) of a sequence (grid, ...), each `half` frames after the one before."""
+    """Cut a sequence (grid, ...) into segments (S, 2 half, ...), each `half` frames after the one before."""
     return np.stack([values[at : at + 2 * half] for at in range(0, len(values) - half, half)])
 
 
 def blended(segments: Floats, half: int) -> Floats:
-    """Overlapping segments (S, F, ...), each `half` frames after the one before, by triangular weights."""
+    """Blend overlapping segments (S, F, ...), `half` frames after each other, by triangular weights."""
     count, frames = segments.shape[:2]
     weight = 1 - np.abs((np.arange(frames) + 0.5) / frames * 2 - 1)
     weight = weight.reshape(-1, *[1] * (segments.ndim - 2))
@@ -265,7 +265,7 @@ def blended(segments: Floats, half: int) -> Floats:
 
 
 def in_turn(segments: Floats, half: int) -> Floats:
-    """Every second of overlapping segments (S, F, ...) after the other; the last block from the last one."""
+    """Concatenate every second of overlapping segments (S, F, ...), ending with the last one's last block."""
     last = len(segments) - 1
     owner = [min(block - block % 2, last) for block in range(last + 2)]
     return np.concatenate(
@@ -274,11 +274,11 @@ def in_turn(segments: Floats, half: int) -> Floats:
 
 
 class Segment:
-    """One segment in the axes of its body: N(mean + lasting' g, diag(sd^2) + loads' loads), g ~ N(0, I).
+    """One segment in its body's axes: N(mean + lasting' g, diag(sd^2) + loads' loads), g ~ N(0, I).
 
-    The loads are modes, offsets of the markers, and `rigid`: place on the ground and heading.  The inverse
-    of the covariance is (I - thin' thin) with rows and columns divided by sd, where thin are the rows of
-    `Common` and those of the rigid motions.
+    The loads are the modes, the markers' offsets, and `rigid`: position on the ground and heading.  The
+    inverse of the covariance is (I - thin' thin) with rows and columns divided by sd, where thin contains the
+    rows of `Common` and those of the rigid motions.
     """
 
     def __init__(self, prior: Prior, around: Around, freedom: Freedom, s: int) -> None:
@@ -308,7 +308,7 @@ class Segment:
         return (values.reshape(-1, 3) @ self._turn.T).reshape(values.shape)
 
     def _prepare(self, common: Common) -> None:
-        """Complete the factor of what segments have in common by the rigid motions."""
+        """Extend the factor common to all segments by the rigid motions."""
         self._common, self.sd = common, np.repeat(self._stature * common.sd, 3)
         rigid = self.rigid / self.sd
         self._across = rigid @ common.thin.T
@@ -316,7 +316,7 @@ class Segment:
         self._rigid_thin = _divided(self._lower, rigid - self._across @ common.thin)
 
     def first_half(self) -> Segment:
-        """Marginal of the first half."""
+        """Return the marginal of the first half."""
         half = copy(self)
         keep = len(self.sd) // 2
         half.own, half.rigid = self.own[:, :keep], self.rigid[:, :keep]
@@ -324,20 +324,20 @@ class Segment:
         return half
 
     def log_det(self) -> float:
-        """Logarithm of the determinant of the information, given what lasts."""
+        """Log determinant of the information, given the lasting unknowns."""
         roots = (
             np.abs(self.sd),
             np.diag(self._common.lower),
             np.diag(self._lower),
-        )  # sd has the sign of stature
+        )  # sd has the sign of the stature
         return -2 * sum(float(np.log(values).sum()) for values in roots)
 
     def rigid_thin(self) -> Floats:
-        """Rows (3, n) of the rigid motions in the world: less information by their product."""
+        """Compute rows (3, n) of the rigid motions in the world, whose product reduces the information."""
         return self._in_world(self._rigid_thin / self.sd)
 
     def products(self) -> tuple[Floats, Floats]:
-        """Give information times mean and lasting (1 + G, n), in the world, and that times these."""
+        """Return information times mean and lasting (1 + G, n), in the world, and this times the same."""
         common, own = self._common, self.own / self.sd
         left = np.concatenate([own - (own @ common.thin.T) @ common.thin, common.left])
         across = np.concatenate([own, common.offsets]) @ self._rigid_thin.T
@@ -348,7 +348,7 @@ class Segment:
         return self._in_world((left - across @ self._rigid_thin) / self.sd), squares - across @ across.T
 
     def explained(self, places: Floats, lasting: Floats) -> tuple[float, Floats, Floats]:
-        """Give the turn of places (F, J, 3), radians, and their shapes by the leading modes and by all."""
+        """Return the turn of positions (F, J, 3), radians, and their shapes by leading and by all modes."""
         middle = self.own[0] + lasting[:WHOLE] @ self.own[1:]
         offsets = lasting[WHOLE:].reshape(-1, 3) * self._offset_sd[:, None]
         off = ((places @ self._turn - offsets).ravel() - middle) / self.sd
@@ -362,41 +362,41 @@ class Segment:
 
 
 def _circle(heading: Floats) -> Floats:
-    """Give functions (S, 5) of headings whose sum a turned matrix is: 1, cos, sin, cos and sin of twice."""
+    """Return basis functions (S, 5) of headings for a rotated matrix: 1, cos, sin, cos and sin of twice."""
     turns = [f(k * heading) for k in (1, 2) for f in (np.cos, np.sin)]
     return np.stack([np.ones(len(heading)), *turns], axis=-1)
 
 
 def _harmonics(matrix: Floats) -> Floats:
-    """Factors (5, n n) of these functions in a matrix (n, n) of coordinates whose axes are turned."""
+    """Return the coefficients (5, n n) of these functions for a matrix (n, n) whose axes are rotated."""
     angles = 2 * np.pi / 5 * np.arange(5.0)
     turned = np.stack([_turned(matrix, angle).ravel() for angle in angles])
     return np.asarray(np.linalg.inv(_circle(angles)) @ turned)
 
 
 def _turned(matrix: Floats, heading: float) -> Floats:
-    """Matrix (n, n) of coordinates of markers in axes that are turned."""
+    """Rotate the axes of a matrix (n, n) of markers' coordinates."""
     turn = axis_rotation(2, heading).T
     rows = (matrix.reshape(-1, 3) @ turn).reshape(matrix.shape).T
     return np.asarray((rows.reshape(-1, 3) @ turn).reshape(rows.shape).T)
 
 
 def _offset_sd(outside: Floats) -> Floats:
-    """Give standard deviations (J,) of markers' offsets that last throughout, statures."""
+    """Return standard deviations (J,) of markers' offsets that last throughout, statures."""
     return np.asarray(np.sqrt(THROUGHOUT * LASTING * outside + OFFSET_SD**2))
 
 
 def _divided(lower: Floats, rows: Floats) -> Floats:
-    """Multiply rows (k, n) by the inverse of a lower triangle (k, k), without copies."""
+    """Multiply the inverse of a lower triangle (k, k) by rows (k, n), without copies."""
     return np.asarray(blas.dtrsm(1.0, lower.T, rows.T, side=1).T)
 
 
 def _each_marker(sd: Floats, frames: int) -> Floats:
-    """Move (3 J, F, J, 3) of each marker along each axis by its sd (J,), alike in all frames."""
+    """Return moves (3 J, F, J, 3) of each marker along each axis by its sd (J,), the same in all frames."""
     own = (np.eye(3 * len(sd)) * np.repeat(sd, 3)).reshape(3 * len(sd), 1, len(sd), 3)
     return np.broadcast_to(own, (3 * len(sd), frames, len(sd), 3))
 
 
 def _over_ground(places: Floats) -> Floats:
-    """Middle of the first frame over the ground: x, y, 0."""
+    """Return the middle of the first frame, projected on the ground: x, y, 0."""
     return np.array([*places[0, :, :2].mean(axis=0), 0.0])

@@ -1,8 +1,8 @@
-"""Solve a lifted motion again near a correction, in a fraction of the time of the whole.
+"""Solve a lifted motion again near a correction, in a fraction of the time for the whole.
 
-What changes is near: blocks around the corrected frames are solved given those further away and what lasts,
-from the estimate that there is.  It is the linear problem of the whole, so that solving that as well moves
-the figure little.
+A correction changes the motion nearby, so the blocks around it are solved given the blocks further away and
+the lasting unknowns, starting from the present estimate.  The linear problem is the same as that of the
+whole, so solving the whole later moves the figure little.
 """
 
 from __future__ import annotations
@@ -24,21 +24,21 @@ from gait.lift.smooth.smoother import Problem, Start, State
 
 Floats = npt.NDArray[np.float64]
 
-AROUND = 3  # blocks before and after the corrected ones that are solved again
+AROUND = 3  # blocks before and after the corrected ones that are also solved again
 
 
 @dataclass(frozen=True)
 class Nearby:
-    """What a correction moved.
+    """The motion near a correction.
 
     Attributes
     ----------
     rows : (n,)
         Frames, as rows of the keypoints.
     places : (n, J, 3)
-        Metres.
+        Positions of the markers, metres.
     uv : (n, J, 2)
-        Where the markers are in the picture.
+        The markers in the picture.
     """
 
     rows: npt.NDArray[np.intp]
@@ -52,13 +52,13 @@ class Interactive:
     Parameters
     ----------
     prior : SegmentPrior
-        The whole one.
-    view, options :
-        As the motion was lifted.
+        The whole prior.
+    view, options : AnyView, Options
+        Those with which the motion was lifted.
     points : tuple of str
-        Points of the keypoints that it was lifted from.
+        Points of the keypoints from which it was lifted.
     found : Motion
-        With the state of the smoother.
+        The motion, with the state of the smoother.
     """
 
     def __init__(
@@ -72,12 +72,12 @@ class Interactive:
         self._places, self._uv = found.places.copy(), found.uv.copy()
 
     def solve(self, keypoints: Keypoints, pins: Pins | None, frames: range) -> Nearby:
-        """Solve again around some frames, numbered as in the keypoints, and keep the result to go on from.
+        """Solve again around some frames, numbered as in the keypoints, and keep the result as the new state.
 
         Raises
         ------
         LinAlgError
-            The keypoints are no motion that the prior knows.
+            If the keypoints fit no motion that the prior knows.
         """
         problem = self._whole(keypoints, pins)
         state = replace(self._state, errors=self._errors(problem, keypoints.names))
@@ -88,7 +88,7 @@ class Interactive:
         part, own = problem.part(first, end), _part(state, first, end, problem.grid.frames)
         held = first > 0, end < problem.grid.blocks
         before = part.at_video(own.places)
-        # A joint that is pulled is there after one step.  What is no longer corrected is judged by the moved
+        # A pulled joint arrives in one step.  Points that are no longer corrected are judged by the moved
         # body at first, and only then by the one that moved back.
         by_hand = keypoints.by_hand is not None and np.isfinite(keypoints.by_hand[corrected]).any()
         for _ in range(1 if by_hand else 2):
@@ -97,7 +97,7 @@ class Interactive:
         rows = problem.rows_of(first, end)
         places, lengths = part.at_video(own.places), part.at_video(own.lengths)
         self._state, self._points = _joined(state, own, first, end, problem.grid.frames), keypoints.names
-        # What was done to the motion after it was smoothed, its size and its floor, stays.
+        # Changes of size and floor that were made to the motion after smoothing are kept.
         self._places[rows] += places - before
         self._uv[rows] = self._view.project(places, lengths)
         return Nearby(rows, self._places[rows], self._uv[rows])
@@ -111,7 +111,7 @@ class Interactive:
         return Problem(self._prior, observed, self._view, freedom, start, *constraints, chained=known)
 
     def _errors(self, problem: Problem, points: tuple[str, ...]) -> Floats:
-        """Numbers of the detector's lasting errors, of other points than before."""
+        """Rearrange the unknowns of the detector's lasting errors for other points than before."""
         if not problem.errors.count or not self._state.errors.size:
             return np.zeros(problem.errors.count)
         old = dict(
@@ -124,7 +124,7 @@ class Interactive:
 
 
 def _part(state: State, first: int, end: int, frames: int) -> State:
-    """Cut an estimate to the blocks `first` to before `end`."""
+    """Cut an estimate to the blocks `first` <= block < `end`."""
     segments, grid = slice(first, end - 1), slice(first * frames, end * frames)
     around = state.around
     return replace(
@@ -142,7 +142,7 @@ def _part(state: State, first: int, end: int, frames: int) -> State:
 
 
 def _joined(state: State, part: State, first: int, end: int, frames: int) -> State:
-    """Put a part of an estimate back."""
+    """Insert a part of an estimate into the whole."""
     segments, grid = slice(first, end - 1), slice(first * frames, end * frames)
 
     def put(whole: Floats, own: Floats, where: slice) -> Floats:

@@ -1,9 +1,9 @@
 """Lasting errors of a detector, estimated along with the motion.
 
-A detector that takes a point for the ankle does so in the next frame too.  Such an error is no new evidence
-in later frames; taken for noise of each frame it would have to be so large that the figure could hardly
-follow the points.  Each point has an error in the picture that runs straight between knots, which are as far
-apart as errors last; of a shorter sequence it is constant.
+A detector that mistakes a point for the ankle does so in the next frame too.  Such an error is no new
+evidence in later frames; as independent noise of each frame it would have to be so large that the figure
+would hardly follow the points.  Therefore each point has an error in the picture that is linear between
+knots, whose distance is the duration of errors; in a shorter sequence the error is constant.
 """
 
 from __future__ import annotations
@@ -18,16 +18,16 @@ Ints = npt.NDArray[np.intp]
 
 
 class LastingErrors:
-    """Errors of P points in T frames by C numbers that are N(0, 1).
+    """Errors of P points in T frames as functions of C unknowns, which are N(0, 1).
 
     Parameters
     ----------
     time : (T,)
         Seconds.
     sd : (T, P)
-        Standard deviation along an axis, pixels; 0 or NaN of a point without such errors.
+        Standard deviation along an axis, pixels; 0 or NaN for a point without such errors.
     lasts : float
-        Seconds in which the correlation of an error with itself falls to 1/e.
+        Seconds in which the autocorrelation of an error falls to 1/e.
     """
 
     def __init__(self, time: Floats, sd: Floats, lasts: float) -> None:
@@ -41,13 +41,13 @@ class LastingErrors:
         self.count = int(np.prod(self._shape)) if self.sd.any() else 0
 
     def part(self, rows: Ints) -> LastingErrors:
-        """Errors of some of the frames, by the same numbers."""
+        """Return the errors of some of the frames, with the same unknowns."""
         own = copy(self)
         own.sd, own._course = self.sd[rows], self._course[rows]
         return own
 
     def in_picture(self, numbers: Floats) -> Floats:
-        """Errors (T, P, 2) in pixels."""
+        """Compute errors (T, P, 2) in pixels from the unknowns."""
         if not self.count:
             return np.zeros((*self.sd.shape, 2))
         return np.asarray(
@@ -55,9 +55,9 @@ class LastingErrors:
         )
 
     def factors(self, frame: Ints, point: Ints) -> tuple[Ints, Floats]:
-        """Numbers (n, K) that make the error of points along the first axis, and their factors, pixels.
+        """Return indices (n, K) of the unknowns of points' errors along the first axis, and factors, pixels.
 
-        The numbers of the second axis follow.
+        The unknowns of the second axis follow.
         """
         knots, points, _ = self._shape
         if not self.count:

@@ -1,12 +1,13 @@
-"""The result of lifting keypoints.
+"""Lift keypoints to motion in space, by any of four methods.
 
-What lifting refuses: keypoints that show too little, and estimates that are no person.
+- smooth: one Gaussian over the whole sequence (`gait.lift.smooth.smoother`).
+- blend: overlapping segments, each estimated by itself, blended with triangular weights (Leventon and Freeman
+  1998).
+- segment: segments one after another.
+- likelihood: like blend, but by least squares in the modes instead of with the prior, for comparison (their
+  fig. 5).
 
-From keypoints of points in one view to motion in space, by any of four methods.
-
-smooth: one Gaussian over the whole sequence (`gait.lift.sequence`).  blend: overlapping segments estimated
-alone and mixed by triangular weights (Leventon and Freeman 1998).  segment: segments one after another.
-likelihood: as blend, by least squares in the modes instead of the prior, for comparison (their fig. 5).
+Raises UserError for keypoints that show too little, and for estimates that cannot be a person.
 """
 
 from __future__ import annotations
@@ -47,41 +48,41 @@ class Motion:
     names : tuple of str
         The J markers.
     places, sd : (T, J, 3)
-        Metres, and posterior standard deviations.
+        Positions and their posterior standard deviations, metres.
     rooted_sd : (T, J, 3)
-        Standard deviations of the places about the middle of the hips.
+        Standard deviations of positions relative to the middle of the hips.
     error : (T, P)
-        Distance in the picture from what was seen, pixels; NaN where nothing was.
+        Reprojection error of each point, pixels; NaN where it was not visible.
     stature : float
-        Metres; of segments alone what was believed.
+        Metres; not estimated, but expected, if segments were estimated alone.
     steps : int
         Iterations over the whole sequence; 0 for segments alone.
     settled : bool
+        Whether the iteration converged.
     log_volume_ratio : float
-        Logarithm to base 10 of the posterior's volume over the prior's; of segments alone, their mean.
+        log10 of posterior over prior volume; for segments alone, their mean.
     uncertain : Uncertain
-        What its segments, each alone, leave open.
+        Uncertainty of its segments, each estimated alone.
     evidence : float
-        Logarithm of the density of what is seen, but for a constant; NaN for segments alone.
+        Log density of the observations, up to a constant; NaN for segments alone.
     chi2_per_observation : float
-        Squared standard deviations per number seen, about 1; NaN for segments alone.
+        Squared residual, in standard deviations, per observation, about 1; NaN for segments alone.
     wider : float
-        Factor of the prior's standard deviations that the keypoints asked for; 1 for motions like those
-        learnt.
+        Factor of the prior's standard deviations that the keypoints needed; 1 for motions like those in
+        training.
     resized : float
-        Factor by which the fit's size was changed to that of a person; 1 for motions like those learnt.
+        Factor by which the fit's size was changed to that of a person; 1 for motions like those in training.
     alone : bool
-        Whether the motion was so unlike those learnt that its segments were estimated alone instead.
+        Whether the motion was so unlike those in training that its segments were estimated alone instead.
     outliers : (T, P)
-        Points that were down-weighted because they are far from their predictions; None for segments
-        alone.
+        Whether each point was down-weighted because it is far from its prediction; None for segments alone.
     uv : (T, J, 2)
-        Where the markers are in the picture.
+        The markers in the picture.
     state : State
-        Of the smoother, to go on from; None for segments alone.
+        State of the smoother, from which it can continue; None for segments alone.
     covariance : (T, 3 J, 3 J) or None
-        Of all coordinates of a frame's markers, square metres, if the options ask for it; None for segments
-        alone.
+        Covariance of all coordinates of a frame's markers, square metres, if the options ask for it; None for
+        segments alone.
     """
 
     names: tuple[str, ...]
@@ -106,24 +107,25 @@ class Motion:
 
 
 class Unlike(UserError):
-    """The keypoints show a motion unlike the prior's: a wider prior may do."""
+    """The keypoints show a motion unlike the prior's; a wider prior may help."""
 
 
-# Times the distance that follows from the person's size in the picture: no lens that sees feet is so high.
+# Largest height of a camera that sees feet, over the distance that follows from the person's size in the
+# picture.
 HIGH = 4.0
-SIZES = (0.6, 1.6)  # of the usual extent: no person is smaller or larger
+SIZES = (0.6, 1.6)  # range of the extent over that of the mean body; no person is smaller or larger
 
 
 def require_metres(
     camera: Camera, keypoints: Keypoints, prior: SegmentPrior, stature: float, options: Options
 ) -> None:
-    """Refuse a camera that stands far higher than the person is away: its t is no metres."""
+    """Raise UserError if a camera is much higher than the person is away, since its t is not in metres."""
     points = Observations(keypoints.uv, keypoints.standard_deviations(options.pixel_sd))
     observed = points.among(prior.index(keypoints.names), len(prior.names))
     flat = Parallel(camera.R, None, np.zeros(2))
     try:
         lengths = flat.lengths(observed, prior.mean[0].mean(axis=0), stature)
-    except UsageError:  # too few points at a time for a size
+    except UsageError:  # too few points at any time to show a size
         return
     away, height = float((camera.fx + camera.fy) / 2 * lengths[0]), float(camera.centre[2])
     if abs(height) > HIGH * away + stature + 3 * options.floor_sd:
@@ -134,7 +136,7 @@ def require_metres(
 
 
 def require_visible(found: list[list[Explanation]], grid: Grid, keypoints: Keypoints, alone: bool) -> None:
-    """Refuse keypoints that show next to nothing, or nothing in a segment if each is estimated `alone`."""
+    """Raise UserError if almost nothing is visible, or nothing in a segment if each is estimated `alone`."""
     if not any(found):
         step = float(np.median(np.diff(keypoints.time[keypoints.visible.any(axis=1)], append=np.inf)))
         if LONGEST_GAP <= step < np.inf:
@@ -152,7 +154,7 @@ def require_visible(found: list[list[Explanation]], grid: Grid, keypoints: Keypo
 
 
 def require_size(places: Floats, prior: SegmentPrior, stature: float) -> None:
-    """Refuse an estimate that shrank or grew to fit a motion unlike the prior's."""
+    """Raise Unlike for an estimate that shrank or grew to fit a motion unlike the prior's."""
     ratio = _extent(places) / (stature * _extent(prior.mean[0]))
     if not SIZES[0] < ratio < SIZES[1]:
         raise Unlike(
@@ -168,16 +170,16 @@ def _extent(places: Floats) -> float:
     return float(np.linalg.norm(apart, axis=2).mean())
 
 
-KNOWN_SD, PEOPLE_SD = 0.04, 0.09  # metres, of a stature that is given, and among people
-ANY_HEIGHT = 10.0  # metres, standard deviation of the floor's height without a camera
-# Factors of the prior's standard deviations, tried in turn while the keypoints ask for it.
+KNOWN_SD, PEOPLE_SD = 0.04, 0.09  # metres; sd of a given stature, and of people's statures
+ANY_HEIGHT = 10.0  # metres; standard deviation of the floor's height without a camera
+# Factors of the prior's standard deviations, tried in turn while the keypoints do not fit.
 WIDER = (1.0, 2.0, 4.0, 8.0)
 FLOATS = 4.0  # standard deviations of the floor's height from which a person does not stand on it
-POOR_FIT = 1.3  # squared standard deviations per number seen from which a wider prior is tried
+POOR_FIT = 1.3  # chi2 per observation from which a wider prior is tried
 
 
 def output_names(prior: SegmentPrior, keypoints: Keypoints, everything: bool = False) -> tuple[str, ...]:
-    """Markers to estimate, in the prior's order: joints, those in the keypoints, or all."""
+    """List the markers to estimate, in the prior's order: joints and those in the keypoints, or all."""
     return tuple(n for n in prior.names if everything or n in JOINTS or n in keypoints.names)
 
 
@@ -188,7 +190,7 @@ def segments_of(prior: SegmentPrior, keypoints: Keypoints) -> int:
 
 @dataclass(frozen=True)
 class _Sequence:
-    """Keypoints, what they are lifted with, and the grid of times."""
+    """Keypoints, with everything needed to lift them, and the grid of times."""
 
     prior: SegmentPrior
     keypoints: Keypoints
@@ -200,11 +202,11 @@ class _Sequence:
 
     @property
     def markers(self) -> npt.NDArray[np.intp]:
-        """Which marker of the prior each keypoint is."""
+        """Index of each keypoint's marker in the prior."""
         return self.prior.index(self.keypoints.names)
 
     def alone(self) -> tuple[_Sequence, View]:
-        """Give what one camera alone sees: of several the one that sees most points."""
+        """Return the observations of one camera; of several, the one that sees most points."""
         if not isinstance(self.view, Several):
             return self, self.view
         counts = np.bincount(self.view.of_point, self.keypoints.visible.sum(axis=0))
@@ -222,12 +224,12 @@ def lift(
     update: Callable[[int], None] = lambda done: None,
     pins: Pins | None = None,
 ) -> Motion:
-    """Estimate markers of a prior over all frames of keypoints; `pins` are feet at known places.
+    """Estimate markers of a prior over all frames of keypoints; `pins`: feet at known positions.
 
     Raises
     ------
     UserError
-        If segments are too short, or too little is seen.
+        If segments are too short, or too little is visible.
     """
     require(prior, keypoints, view, options)
     prior = prior.restricted(names)
@@ -235,20 +237,20 @@ def lift(
     if options.method != "smooth":
         return _lift(of)
     best = _widest_needed(of)
-    several = isinstance(view, Several)  # segments alone have one view
+    several = isinstance(view, Several)  # segments alone use one view
     return _unlike(of, best) if (best.wider > 1 or not best.settled) and not several else best
 
 
 def problem_of(
     prior: SegmentPrior, keypoints: Keypoints, view: AnyView, options: Options, pins: Pins | None
 ) -> tuple[Observed, Freedom]:
-    """Give what the smoother sees of keypoints, and what a sequence of a restricted prior may do."""
+    """Set up the smoother's problem for keypoints."""
     of = _Sequence(prior, keypoints, view, options, Grid.over(keypoints.time, prior), pins=pins)
     return _observed(of), _freedom(of)
 
 
 def require(prior: SegmentPrior, keypoints: Keypoints, view: AnyView, options: Options) -> None:
-    """Refuse a prior of too short segments, and a camera that is not in metres."""
+    """Raise UserError for a prior with too short segments, or a camera that is not in metres."""
     if prior.frames < 4:
         raise UserError(f"the model's segments have {prior.frames} frames; lifting needs 4 or more")
     if isinstance(view, Perspective):
@@ -256,7 +258,7 @@ def require(prior: SegmentPrior, keypoints: Keypoints, view: AnyView, options: O
 
 
 def _widest_needed(of: _Sequence) -> Motion:
-    """Estimate by the prior, or by a wider one if the keypoints ask for it."""
+    """Estimate with the prior, or with a wider one if the keypoints do not fit."""
     best: Motion | None = None
     refused: Unlike | None = None
     for wider in WIDER:
@@ -279,14 +281,14 @@ def _widest_needed(of: _Sequence) -> Motion:
 
 
 def _unlike(of: _Sequence, found: Motion) -> Motion:
-    """Estimate a motion that the prior does not know by its segments alone: a chain of them goes astray.
+    """Estimate a motion that the prior does not know from its segments alone, as their chain would fail.
 
-    Size and standard deviations are by the bones and by the chi2 of the whole, which the segments do not
-    know.
+    Size and standard deviations are then corrected by the bones and by the chi2 of the whole, which single
+    segments do not show.
     """
     try:
         alone = _lift(replace(of, options=replace(of.options, method="blend"), update=lambda done: None))
-    except UserError:  # segments in which next to nothing is seen
+    except UserError:  # segments in which almost nothing is visible
         return found
     chi2 = max(found.chi2_per_observation, 1.0) * found.wider**2
     sized = _sized(of, alone, chi2)
@@ -307,7 +309,7 @@ def _unlike(of: _Sequence, found: Motion) -> Motion:
 
 @contextmanager
 def _numbers_in_range() -> Iterator[None]:
-    """Unlike if numbers leave their range on the way."""
+    """Raise Unlike if numbers overflow within the block."""
     try:
         yield
     except (np.linalg.LinAlgError, GaitError):
@@ -319,7 +321,7 @@ def _numbers_in_range() -> Iterator[None]:
 
 @dataclass(frozen=True)
 class _Task:
-    """What a sequence gives the smoother, and the segments alone."""
+    """Estimates of single segments, from which the smoother starts."""
 
     observed: Observed
     freedom: Freedom
@@ -328,7 +330,7 @@ class _Task:
     fits: list[SegmentFit]
 
     def start(self, frames: int) -> Start:
-        """Blend the segments, of blocks of `frames`."""
+        """Blend the segments, with blocks of `frames`, to a start of the smoother."""
         return Start(
             heading=np.array([fit.heading for fit in self.fits]),
             component=np.array([fit.component for fit in self.fits]),
@@ -339,14 +341,14 @@ class _Task:
 
 
 def _lifter(prior: SegmentPrior, view: View, options: Options) -> SegmentLifter:
-    """Make what explains segments alone."""
+    """Make the lifter of single segments."""
     stature, stature_sd = believed_stature(options, prior.stature)
-    # a start must not shrink a motion that does not fit: its noise in the picture would grow
+    # a start must not shrink a motion that does not fit, as noise in the picture would then grow
     return SegmentLifter(prior, view, stature, 0.0 if options.method == "smooth" else stature_sd)
 
 
 def _task(of: _Sequence, displacements: int | None, lifter: SegmentLifter | None = None) -> _Task:
-    """Estimate each segment alone with so many displacements (`solve`), by `lifter` where it is at hand."""
+    """Estimate each segment alone, with this many displacements (see `solve`), with `lifter` if given."""
     one, view = of.alone()
     prior, keypoints, options, grid = one.prior, one.keypoints, one.options, one.grid
     points = Observations(keypoints.uv, keypoints.errors(options.pixel_sd))
@@ -370,13 +372,13 @@ def _task(of: _Sequence, displacements: int | None, lifter: SegmentLifter | None
 
 
 def _freedom(of: _Sequence) -> Freedom:
-    """Give what the whole sequence may do beyond the prior's modes."""
+    """Return the freedom of the whole sequence in addition to the prior's modes."""
     stature, stature_sd = believed_stature(of.options, of.prior.stature)
     return Freedom(stature, stature_sd, of.options.floor_sd if of.view.grounded else ANY_HEIGHT)
 
 
 def _observed(of: _Sequence) -> Observed:
-    """Give what the smoother sees."""
+    """Return the observations for the smoother."""
     keypoints, pinned = of.keypoints, of.pins
     return Observed(
         keypoints.time,
@@ -392,12 +394,12 @@ def _observed(of: _Sequence) -> Observed:
 
 
 class Evidence:
-    """Log density of keypoints by a prior and the smoother, for keypoints that differ in few frames.
+    """Log density of keypoints under a prior, by the smoother, for keypoints that differ in few frames.
 
     Parameters
     ----------
     names : tuple of str
-        The points.
+        Names of the points.
     """
 
     def __init__(self, prior: SegmentPrior, names: tuple[str, ...], view: AnyView, options: Options) -> None:
@@ -406,7 +408,7 @@ class Evidence:
 
     @cached_property
     def _lifter(self) -> SegmentLifter:
-        assert not isinstance(self._view, Several)  # sides are of one camera's keypoints
+        assert not isinstance(self._view, Several)  # swaps are searched for in one camera's keypoints
         return _lifter(self._prior, self._view, self._options)
 
     @cached_property
@@ -425,9 +427,9 @@ class Evidence:
         return Reading(*smoother.evidence(self._chained, _observed(of), self._view, _freedom(of), begun))
 
     def __call__(self, keypoints: Keypoints, near: Reading | None = None) -> Reading:
-        """Read keypoints; -inf and NaN if the smoother refuses them.
+        """Fit keypoints; -inf and NaN if the smoother fails.
 
-        `near`: reading of nearly the same keypoints, whose motion is gone on from.
+        `near`: reading of similar keypoints, from whose motion to start.
         """
         try:
             return self._read(keypoints, near)
@@ -476,15 +478,15 @@ def _lift(of: _Sequence) -> Motion:
 
 
 def believed_stature(options: Options, usual: float) -> tuple[float, float]:
-    """Give the stature before anything is seen and how well it is known, metres; `usual`: of people."""
+    """Return the expected stature and its standard deviation, metres; `usual`: mean stature of people."""
     return options.stature or usual, KNOWN_SD if options.stature else PEOPLE_SD
 
 
 def _sized(of: _Sequence, found: Lifted | Motion | size.Resized, chi2: float) -> size.Resized:
-    """Give the estimate a person's size if it has none; only a lens leaves it open.
+    """Change the estimate's size if it cannot be a person's, which can only happen with a perspective camera.
 
-    One that fits and stands on the floor is of its prior's kind, and prior and floor know more of its size
-    than the bones do, unless joints that no person sees were put there by the prior to suit them.
+    If a motion fits and stands on the floor, it is like the prior's, and prior and floor determine its size
+    better than the bones do, unless the prior has placed joints that were not visible to suit them.
     """
     prior, view, options = of.prior, of.view, of.options
     fitted = size.Resized(found.places, found.sd, found.rooted_sd, covariance=found.covariance)
@@ -502,7 +504,7 @@ def _sized(of: _Sequence, found: Lifted | Motion | size.Resized, chi2: float) ->
 
 
 def _alone(of: _Sequence, task: _Task) -> Motion:
-    """Segments estimated alone, mixed or one after another."""
+    """Estimate segments alone, and blend or concatenate them."""
     prior, grid, fits = of.prior, of.grid, task.fits
     places, sds = np.stack([fit.places for fit in fits]), np.stack([fit.sd for fit in fits])
     join = in_turn if of.options.method == "segment" else blended
@@ -533,16 +535,17 @@ def _alone(of: _Sequence, task: _Task) -> Motion:
 
 
 def _mixed(places: Floats, sd: Floats, join: Callable[[Floats, int], Floats], half: int) -> Floats:
-    """Give standard deviations of overlapping segments that are mixed.
+    """Return standard deviations of blended overlapping segments.
 
-    Neighbours see the same points: together they are no surer than alone, and where they differ less sure.
+    Neighbours use the same points, so together they are not more certain than alone, and less so if they
+    differ.
     """
     apart = join(places**2, half) - join(places, half) ** 2
     return np.asarray(np.sqrt(join(sd, half) ** 2 + np.maximum(apart, 0.0)))
 
 
 def _error(of: _Sequence, places: Floats, lengths: Floats) -> Floats:
-    """Distance (T, P) of markers in the picture from what was observed; without a camera but for a shift."""
+    """Distance (T, P) of markers from the observations in the picture; without a camera, up to a shift."""
     miss = of.view.project(places[:, of.markers], lengths) - of.keypoints.uv
     if not of.view.grounded:
         observed = np.isfinite(miss).all(axis=2, keepdims=True)
@@ -552,12 +555,12 @@ def _error(of: _Sequence, places: Floats, lengths: Floats) -> Floats:
 
 
 def _placed(of: _Sequence, places: Floats) -> Floats:
-    """Places; a motion of unknown height is shifted so that its lowest feet are on the floor."""
+    """Return positions; if the height is unknown, shifted so that the lowest feet are on the floor."""
     return places if of.view.grounded else places - np.array([0.0, 0.0, _height(places, of.prior)])
 
 
 def _height(places: Floats, prior: SegmentPrior) -> float:
-    """How high over the floor the lowest feet stand, metres; 0 without feet."""
+    """Height of the lowest feet above the floor, metres; 0 without feet."""
     feet = [i for i, name in enumerate(prior.names) if name.endswith(("_toe", "_heel", "_ankle"))]
     if not feet:
         return 0.0

@@ -18,15 +18,15 @@ class Options:
     stature : float or None
         Metres; None: unknown.
     pixel_sd : float
-        Noise of points seen with full confidence.
+        Noise of points at full confidence.
     floor_sd : float
-        How well the ground of the camera's world is where the person stands, metres.
+        Standard deviation of the floor's height about z = 0 in the camera's world, metres.
     contact, bones : bool
-        Feet stay put; bones keep their length.
+        Soft constraints: feet on the floor do not slide; bones keep their length.
     balance : bool
-        The ground pushes where feet stand; needs `contact`.
+        Soft constraint: the ground's force acts where feet stand; needs `contact`.
     covariance : bool
-        Give the covariances of each frame's joints too, which takes time.
+        Also compute the covariances of each frame's joints, which takes time.
     """
 
     method: str = "smooth"

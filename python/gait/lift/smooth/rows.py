@@ -1,19 +1,17 @@
-"""2-D observations of markers, and the rows of the linear model that they are: direction . X + noise = value.
+"""2-D observations as rows of a linear model of the markers' positions: direction . X + noise = value.
 
-Orthographic views are linear in the markers' places.  A perspective one is too when it is multiplied by the
-depth: with R, t of the camera and (a, b) the ideal image coordinates of a point X,
+Orthographic views are linear in the positions.  Perspective views are too, when multiplied by the depth: with
+R, t of the camera and (a, b) the ideal image coordinates of a point X,
 
     (R_x - a R_z) . X = a t_z - t_x,    (R_y - b R_z) . X = b t_z - t_y,
 
-and only the noise, sd Z / f, depends on where the point is: it is taken at a guess and iterated.  These rows
-hold the observation's own noise, which draws bodies towards the camera (by the square of noise over extent);
-so near a guess the derivatives of the projection there are taken instead, as the C core does.
+where only the noise, sd Z / f, depends on the position; it is evaluated at a guess and iterated.  As a and b
+also contain the observation's noise, these rows draw bodies towards the camera (by the square of noise over
+extent). Near a guess, the derivatives of the projection at the guess are used instead, as in the C core.
 
-Views whose scale may be unknown, as rows that are linear in the markers and in the scale.
-
-A calibrated camera and a parallel view of known scale give the rows of `gait.lift.observe`.  Where the scale
-is unknown, the length l of one unit of the picture is one more number per frame: a point seen at (u, v) obeys
-right . X - u l = 0 and down . X - v l = 0, with the noise sd l.  Near a guess this is linearised there.
+If the scale of a parallel view is unknown, the length l of one unit of the picture is another unknown of each
+frame: a point observed at (u, v) satisfies right . X - u l = 0 and down . X - v l = 0, with noise sd l.  This
+is linearised around a guess.
 """
 
 from __future__ import annotations
@@ -29,9 +27,9 @@ from gait.lift.segment.view import AnyView, Perspective, Several
 
 Floats = npt.NDArray[np.float64]
 
-NEAREST = 0.1  # metres before the lens: noise is not taken nearer
-NEAR = 0.5  # metres beside the ray: a guess is good enough to take the projection's derivatives there
-NOISE = 5.0  # standard deviations that noise alone puts a point off: no guess is bad for that
+NEAREST = 0.1  # metres in front of the lens; least depth for the noise
+NEAR = 0.5  # metres from the ray within which a guess is good enough for the projection's derivatives
+NOISE = 5.0  # standard deviations from the ray that noise alone may cause, so that the guess is also good
 
 
 @dataclass(frozen=True)
@@ -44,7 +42,7 @@ class Rows:
     direction : (n, 2, 3)
     value : (n, 2)
     variance : (n, 2)
-        Of the noise, which is independent; in units of `value` squared.
+        Variance of the noise, which is independent; in units of `value` squared.
     """
 
     frame: npt.NDArray[np.intp]
@@ -54,17 +52,17 @@ class Rows:
     variance: Floats
 
     def shifted(self, places: Floats) -> Rows:
-        """Rows that measure displacements from `places` (T, J, 3)."""
+        """Convert to rows that measure displacements from `places` (T, J, 3)."""
         at = places[self.frame, self.marker]
         return replace(self, value=self.value - np.einsum("nai,ni->na", self.direction, at))
 
 
 def orthographic(observed: Observations, axes: Floats) -> Rows:
-    """Rows of a view that leaves depth out.
+    """Make the rows of an orthographic view.
 
     Parameters
     ----------
-    visible : Observations
+    observed : Observations
         Metres along `axes`.
     axes : (2, 3)
         Unit vectors of the picture.
@@ -76,16 +74,16 @@ def orthographic(observed: Observations, axes: Floats) -> Rows:
 
 
 def perspective(observed: Observations, camera: Camera, about: Floats, guess: Floats | None = None) -> Rows:
-    """Rows of a calibrated view, the noise being that at the places `about`.
+    """Make the rows of a calibrated view, with the noise at the positions `about`.
 
     Parameters
     ----------
-    visible : Observations
-        Pixels; the lens distortion is taken out of them here.
+    observed : Observations
+        Pixels as captured; lens distortion is corrected here.
     about : (T, J, 3) or (3,)
-        Where derivatives are taken, metres, world.
+        Positions at which derivatives are taken, metres, world.
     guess : (T, J, 3), optional
-        Where the rows hold exactly; by default `about`.
+        Positions at which the rows are exact; by default `about`.
     """
     frame, marker = np.nonzero(observed.visible)
     rays = camera.rays(observed.uv[frame, marker]) @ camera.R.T
@@ -105,26 +103,26 @@ def perspective(observed: Observations, camera: Camera, about: Floats, guess: Fl
 
 
 def _ideal(camera: Camera, places: Floats) -> Floats:
-    """Ideal image coordinates (n, 2) of places (n, 3)."""
+    """Project positions (n, 3) to ideal image coordinates (n, 2)."""
     depth = np.maximum(camera.depth(places), NEAREST)[:, None]
     return np.asarray((places @ camera.R[:2].T + camera.t[:2]) / depth)
 
 
 def scale_free(rows: Rows, places: Floats, lengths: Floats) -> tuple[Rows, Floats]:
-    """Let the length of a unit of the picture be unknown.
+    """Make the length of a unit of the picture an unknown.
 
     Parameters
     ----------
     rows : Rows
-        From `Parallel.rows` with `lengths` (T,).
+        Rows of a parallel view with `lengths` (T,).
     places : (T, J, 3)
-        What the rows are linearised at: the picture of these, and not the noisy one, is scaled.
+        Positions around which to linearise; their projection is scaled, not the noisy observations.
 
     Returns
     -------
     rows : Rows
     factors : (n, 2)
-        Of the frame's length.
+        Factors of the frame's length.
     """
     rows = rows.shifted(places)
     at = np.einsum("nai,ni->na", rows.direction, places[rows.frame, rows.marker])
@@ -132,14 +130,14 @@ def scale_free(rows: Rows, places: Floats, lengths: Floats) -> tuple[Rows, Float
 
 
 def rows_of(view: AnyView, observed: Observations, places: Floats, lengths: Floats, guess: Floats) -> Rows:
-    """Rows of observations in a view.
+    """Make the rows of observations in a view.
 
     Parameters
     ----------
     places, guess : (T, J, 3)
-        Where derivatives are taken, and where the rows hold exactly; both only matter for a camera.
+        Positions at which derivatives are taken, and at which the rows are exact; only used for cameras.
     lengths : (T,)
-        Metres of a unit of the picture; only matter without a camera.
+        Metres of a unit of the picture; only used without a camera.
     """
     if isinstance(view, Perspective):
         return perspective(observed, view.camera, places, guess)

@@ -1,8 +1,8 @@
-"""Size of a motion unlike the prior: from the bones, not from the fit.
+"""Size of a motion unlike the prior, from the bones instead of the fit.
 
-A motion unlike those learnt fits best as a small body near the lens, where what does not fit is few metres.
-A change of size about the lens leaves the picture as it is; so the size may be taken from the bones, whose
-lengths per stature hardly depend on what a person does.
+A motion unlike those in training fits best as a small body near the lens, where its residuals are fewer
+metres. Scaling it about the lens does not change the picture, so the size can be taken from the bones, whose
+lengths relative to the stature hardly depend on what a person does.
 """
 
 from __future__ import annotations
@@ -19,21 +19,21 @@ from gait.lift.smooth.soft_constraints import BONES
 
 Floats = npt.NDArray[np.float64]
 
-PROPORTION_SD = 0.04  # relative, of the bones of people of one stature
-UNLIKELY = 2.0  # standard deviations of the size from which a motion that does not fit is not trusted with it
-IMPOSSIBLE = 4.0  # and one that fits
+PROPORTION_SD = 0.04  # relative sd of bones among people of one stature
+UNLIKELY = 2.0  # standard deviations of the size from which a motion that does not fit is resized
+IMPOSSIBLE = 4.0  # the same for a motion that fits
 
 
 @dataclass(frozen=True)
 class Resized:
-    """Motion whose size and standard deviations were checked.
+    """Motion after a check of its size and standard deviations.
 
     Attributes
     ----------
     places, sd, rooted_sd : (T, J, 3)
         Metres, as in `motion.Motion`.
     factor : float
-        By which the size was changed; 1 if it is a likely one.
+        Factor by which the size was changed; 1 if it was plausible.
     covariance : (T, 3 J, 3 J) or None
         As in `motion.Motion`.
     """
@@ -51,14 +51,16 @@ class Resized:
 
 
 def shows_distance(keypoints: Keypoints) -> bool:
-    """Whether hips and an ankle are seen in half of the frames: other parts leave the distance open."""
+    """Whether hips and an ankle are visible in half of the frames; other parts do not determine distance."""
     shares = dict(zip(keypoints.names, keypoints.visible.mean(axis=0).tolist(), strict=True))
     parts = (("l_hip", "r_hip", "pelvis"), ("l_ankle", "r_ankle"))
     return all(max(shares.get(name, 0.0) for name in part) >= 0.5 for part in parts)
 
 
 def bones_ratio(prior: SegmentPrior, places: Floats, stature: float) -> float:
-    """Median over bones and frames of their length in places (T, J, 3) over that of most people; 1 without.
+    """Median over bones and frames of the length in `places` (T, J, 3) over that of most people.
+
+    It is 1 if the prior has no bones.
 
     Parameters
     ----------
@@ -70,7 +72,7 @@ def bones_ratio(prior: SegmentPrior, places: Floats, stature: float) -> float:
         return 1.0
     first, last = (prior.index([bone[end] for bone in known]) for end in (0, 1))
     mean, modes = prior.mean[0], prior.modes[0]
-    # the prior has the second moments of what it was learnt from, and so the mean squares of lengths
+    # the prior has the second moments of its training set, and so the mean squares of lengths
     squares = ((mean[:, last] - mean[:, first]) ** 2).sum(axis=2)
     squares += ((modes[:, :, last] - modes[:, :, first]) ** 2).sum(axis=(0, 3))
     usual = stature * np.sqrt(squares.mean(axis=0))
@@ -83,19 +85,19 @@ def resized(
 ) -> Resized:
     """Divide a motion's size by `ratio` about the lens if it is off by `limit` standard deviations or more.
 
-    Standard deviations grow by the larger of how far off the size was and of the chi2, in standard deviations
-    (Birge's ratio), and by the size that the person's own bones may have.
+    Standard deviations are multiplied by the larger of the error of the size, in standard deviations, and the
+    root of chi2 (Birge's ratio), and then increased by the variation of people's bones.
 
     Parameters
     ----------
     found : Resized
-        With standard deviations as the fit has them.
+        Motion with the standard deviations of the fit.
     ratio : float
-        Of `bones_ratio`.
+        From `bones_ratio`.
     own : float
         Relative standard deviation of the size of one person's bones.
-    chi2_per_observation : float
-        As in `motion.Motion`.
+    chi2 : float
+        `chi2_per_observation` as in `motion.Motion`.
     """
     off = abs(float(np.log(ratio))) / own
     if off < limit:
@@ -107,9 +109,9 @@ def resized(
 
 
 def of_any_size(found: Resized, camera: Camera, own: float) -> Resized:
-    """Widen standard deviations by the relative standard deviation `own` of size and distance.
+    """Increase standard deviations by the relative standard deviation `own` of size and distance.
 
-    Covariances stay: neither angles nor the picture depend on it.
+    Covariances are unchanged, as neither angles nor the picture depend on size.
     """
     away = found.places - (-camera.R.T @ camera.t)
     rooted = away - away.mean(axis=1, keepdims=True)
@@ -121,5 +123,5 @@ def of_any_size(found: Resized, camera: Camera, own: float) -> Resized:
 
 
 def widened(found: Resized, chi2: float) -> Resized:
-    """Widen standard deviations by the root of chi2 per observation, if that is above 1."""
+    """Multiply standard deviations by the root of chi2 per observation, if that is above 1."""
     return found.grown(float(np.sqrt(max(chi2, 1.0))))

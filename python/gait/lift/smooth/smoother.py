@@ -1,10 +1,10 @@
 """Motion of a whole sequence from 2-D keypoints: the exact Gaussian smoother over overlapping segments.
 
-The chain of `gait.lift.chain` is multiplied by what is seen and by soft constraints
-(`gait.lift.soft_constraints`), all linear in the places of the markers on a time grid of the prior's rate;
-places between its frames are interpolated.  What is not linear (perspective, headings, stature, lengths of
-bones) is linearised again around each estimate until it stays (Gauss-Newton).  Standard deviations are those
-of the last linear problem.
+The chain (`gait.lift.smooth.chain`) is combined with the observations and soft constraints
+(`gait.lift.smooth.soft_constraints`), all linear in the markers' positions on a time grid at the prior's
+rate; positions between its frames are interpolated.  Whatever is not linear (perspective, headings, stature,
+lengths of bones) is linearised around each estimate until that converges (Gauss-Newton).  Standard deviations
+are those of the last linear problem.
 """
 
 from __future__ import annotations
@@ -33,31 +33,31 @@ Ints = npt.NDArray[np.intp]
 
 HIPS = ("l_hip", "r_hip")
 MOST_STEPS = 25
-SETTLED = 1e-3  # metres, rms change of the places at which the iteration stops
+SETTLED = 1e-3  # metres; rms change of the positions at which the iteration stops
 FREE_STEPS = 3  # first steps, without constraints on feet and bones
 DRIFT = 5e-4  # relative change of the scale's change from one frame to the next
 
 
 @dataclass(frozen=True)
 class Observed:
-    """What is seen of a sequence.
+    """Observations of a sequence.
 
     Attributes
     ----------
     time : (T,)
         Seconds.
     points : Observations
-        Of T frames and P points; their noise without what lasts.
+        Observations of P points in T frames; their noise does not include lasting errors.
     markers : (P,)
-        Which marker of the prior each point is.
+        Index of each point's marker in the prior.
     lasting_sd : (T, P) or None
-        Standard deviation along an axis of a detector's lasting errors, in the unit of the points.
+        Standard deviation, along an axis, of a detector's lasting errors, in the unit of the points.
     lasting_s : float
-        Seconds in which their correlation with themselves falls to 1/e.
+        Seconds in which their autocorrelation falls to 1/e.
     by_hand : (T, P) or None
-        Points given by hand, which are not outliers.
+        Whether a point was marked by hand, so that it cannot be an outlier.
     pins : Pins or None
-        Feet that stand at known places.
+        Feet that stand at known positions.
     """
 
     time: Floats
@@ -69,7 +69,7 @@ class Observed:
     pins: Pins | None = None
 
     def part(self, rows: Ints) -> Observed:
-        """Take some frames; what lasts is not cut."""
+        """Return some of the frames."""
         return replace(
             self,
             time=self.time[rows],
@@ -81,7 +81,7 @@ class Observed:
 
 @dataclass(frozen=True)
 class Start:
-    """First guess on the grid of B blocks: see `Around`; `lengths` (grid,) of a unit of the picture."""
+    """First guess on the grid of B blocks, see `Around`; `lengths` (grid,): of a unit of the picture."""
 
     heading: Floats
     component: Ints
@@ -97,34 +97,34 @@ class Lifted:
     Attributes
     ----------
     places, sd : (T, J, 3)
-        Metres at the frames of the video, and standard deviations.
+        Positions in the frames of the video, and their standard deviations, metres.
     rooted_sd : (T, J, 3)
-        Standard deviations of the places about the middle of the hips.
+        Standard deviations of positions relative to the middle of the hips.
     grid : (grid, J, 3)
-        Places at the frames of the prior's rate.
+        Positions in the frames of the grid.
     heading : (S,)
-        Of the segments, radians.
+        Headings of the segments, radians.
     stature : float
     lengths : (T,)
-        Metres of a unit of the picture, where the view has a scale.
+        Metres of a unit of the picture, if the view has a scale.
     contact : (grid - 1, feet)
-        How sure feet are to stand.
+        Probability that feet stand.
     steps : int
-        Iterations.
+        Number of iterations.
     settled : bool
-        Whether they came to rest.
+        Whether they converged.
     log_volume_ratio : float
-        Logarithm to base 10 of the posterior's volume over the prior's.
+        log10 of posterior over prior volume.
     evidence : float
-        Logarithm of the density of what is seen, without the soft constraints, but for a constant.
+        Log density of the observations, without soft constraints, up to a constant.
     outliers : (T, P)
-        Outliers, which were down-weighted.
+        Whether each point is an outlier, which was down-weighted.
     chi2_per_observation : float
-        Mean squared residual in standard deviations: about 1 if the motion is of the prior's kind.
+        Mean squared residual in standard deviations, about 1 if the motion is like the prior's.
     state : State
-        Where the iteration came to rest, to go on from.
+        The converged state, from which to continue.
     covariance : (T, 3 J, 3 J) or None
-        Of all coordinates of the places of a frame, square metres, if it was asked for.
+        Covariance of all coordinates of a frame, square metres, if asked for.
     """
 
     places: Floats
@@ -157,7 +157,7 @@ def smooth(
     balance: bool = False,
     covariance: bool = False,
 ) -> Lifted:
-    """Estimate the motion of all markers of a prior (`chain.restricted`) over a sequence."""
+    """Estimate the motion of all markers of a prior (from `SegmentPrior.restricted`) over a sequence."""
     problem = Problem(prior, observed, view, freedom, start, contact, bones, balance)
     state, settled = problem.first(start), False
     while not settled and state.steps < MOST_STEPS:
@@ -170,18 +170,18 @@ def smooth(
 def evidence(
     prior: Prior, observed: Observed, view: AnyView, freedom: Freedom, begun: Start | State
 ) -> tuple[float, Floats, State]:
-    """Logarithm of the density of what is seen, but for a constant, after the steps without constraints.
+    """Compute the log density of the observations, up to a constant, after the steps without constraints.
 
     Parameters
     ----------
     begun : Start or State
-        First guess, or the motion of nearly the same observations, which needs one more step.
+        First guess, or the state for similar observations, which needs only one more step.
 
     Returns
     -------
     density : float
     predicted : (T, P, 2)
-        Where the points are then expected in the picture.
+        Predicted points in the picture.
     state : State
     """
     problem = Problem(prior.segments, observed, view, freedom, begun, chained=prior)
@@ -197,49 +197,49 @@ def evidence(
 
 @dataclass(frozen=True)
 class State:
-    """Estimate on the grid, and the steps that it took."""
+    """Estimate on the grid, and the number of steps taken."""
 
     around: Around
     places: Floats
     lengths: Floats
-    lasting: Floats  #: numbers of the chain that last: stature, floor, offsets of markers
-    errors: Floats  #: numbers of `LastingErrors`
+    lasting: Floats  #: lasting unknowns of the chain: stature, floor, offsets of markers
+    errors: Floats  #: unknowns of `LastingErrors`
     steps: int
 
 
 @dataclass(frozen=True)
 class _System:
-    """One linear problem."""
+    """A linear problem and its solution."""
 
     found: block_arrowhead.Solution
     information: Information
     chain: Chain
-    fit: float  #: y' W y of what is seen
+    fit: float  #: y' W y of the observations
 
     @property
     def log_volume_ratio(self) -> float:
-        """Logarithm to base 10 of the posterior's volume over the prior's."""
+        """Return log10 of posterior over prior volume."""
         return (self.chain.log_det - self.found.log_det) / 2 / float(np.log(10))
 
     @property
     def square(self) -> float:
-        """Squared standard deviations of what is seen and of the motion from the prior, at the mean.
+        """Chi2 at the mean: squared residuals of observations and prior, in standard deviations.
 
         Raises
         ------
         LinAlgError
-            What is seen is so far from the prior that their difference has lost its digits.
+            If the observations are so far from the prior that rounding errors dominate.
         """
         explained = (self.information.vector * self.found.blocks).sum()
         explained += self.information.edge @ self.found.lasting
         square = self.fit + self.chain.constant - float(explained)
-        if not square > -1:  # none is below zero but for rounding
+        if not square > -1:  # negative only by rounding
             raise np.linalg.LinAlgError("squared standard deviations are negative")
         return max(square, 0.0)
 
     @property
     def evidence(self) -> float:
-        """Logarithm of the density of what is seen but for a constant, by Laplace's method."""
+        """Log density of the observations, up to a constant, by Laplace's method."""
         return 0.5 * (self.chain.log_det - self.found.log_det - self.square)
 
 
@@ -273,7 +273,7 @@ class Problem:
         self.layout = Layout(self.grid.blocks, self.grid.frames, len(prior.names), unit, self.errors.count)
 
     def part(self, first: int, end: int) -> Problem:
-        """Problem of the blocks `first` to before `end`; frames that reach beyond are left out."""
+        """Return the problem of blocks `first` <= block < `end`, without frames that need other blocks."""
         own, low, rows = copy(self), first * self.grid.frames, self.rows_of(first, end)
         own.grid = replace(self.grid, begin=float(self.grid.time[low]), blocks=end - first)
         own.at = self.at[0][rows] - low, self.at[1][rows]
@@ -284,7 +284,7 @@ class Problem:
         return own
 
     def rows_of(self, first: int, end: int) -> Ints:
-        """Frames of the video that the blocks `first` to before `end` alone determine."""
+        """Find frames of the video that need only the blocks `first` <= block < `end`."""
         block = self.at[0] // self.grid.frames
         return np.flatnonzero(((block >= first) & (block < end)).all(axis=1))
 
@@ -303,13 +303,13 @@ class Problem:
         self.points = points
 
     def predicted(self, state: State) -> Floats:
-        """Where points (T, P, 2) are expected in the picture."""
+        """Predict points (T, P, 2) in the picture."""
         places = self.at_video(state.places)[:, self.visible.markers]
         errors = self.errors.in_picture(state.errors)
         return self.view.project(places, self.at_video(state.lengths)) + errors
 
     def chain(self, state: State) -> Chain:
-        """Give the prior around an estimate."""
+        """Return the prior, linearised around an estimate."""
         return chain(self._chained, state.around, self.freedom)
 
     def system(self, state: State, prior: Chain, constrained: bool) -> _System:
@@ -318,7 +318,7 @@ class Problem:
         return _System(block_arrowhead.solve(information), information, prior, fit)
 
     def information(self, state: State, prior: Chain, constrained: bool) -> tuple[Information, float]:
-        """Linear problem around an estimate, and y' W y of what is seen."""
+        """Set up the linear problem around an estimate; also return y' W y of the observations."""
         shape = blended(state.around.places, self.grid.frames)
         rows = Rows(self.layout)
         self._observe(rows, shape, state)
@@ -362,7 +362,7 @@ class Problem:
             soft_constraints.pin(rows, self.visible.pins, self.at)
 
     def inner_step(self, state: State, held: tuple[bool, bool]) -> State:
-        """Estimate a part as `step` does, given what lasts and its first and last block if they are held."""
+        """Estimate a part as `step` does, given the lasting unknowns, and the end blocks if they are held."""
         prior = self.chain(state)
         found, _ = self.information(state, prior, constrained=True)
         first, end = int(held[0]), self.layout.blocks - int(held[1])
@@ -384,7 +384,7 @@ class Problem:
         return interpolated(values, *self.at)
 
     def step(self, state: State, constrained: bool) -> State:
-        """Estimate by the linear problem around another."""
+        """Make a new estimate from the linear problem around a state."""
         prior = self.chain(state)
         found = self.system(state, prior, constrained).found
         places = self.layout.places(found.blocks)
@@ -394,11 +394,11 @@ class Problem:
         return State(around, places, lengths, lasting, errors, state.steps + 1)
 
     def evidence(self, unconstrained: _System) -> float:
-        """Logarithm of the density of what is seen, but for a constant."""
+        """Return the log density of the observations, up to a constant."""
         return unconstrained.evidence - _cost(self.visible.points, self.points)
 
     def result(self, state: State, settled: bool, covariances: bool) -> Lifted:
-        """Covariances and figures of the last estimate."""
+        """Compute covariances and figures of the final estimate."""
         prior = self.chain(state)
         system = self.system(state, prior, constrained=True)
         unconstrained = self.system(state, prior, constrained=False)
@@ -427,7 +427,7 @@ class Problem:
         )
 
     def _rooted(self, own: Floats, diagonal: Floats, across: Floats) -> Floats:
-        """Variances (T, J, 3) about the middle of the hips; `own`, of the places, if there are no hips."""
+        """Compute variances (T, J, 3) relative to the middle of the hips; without hips return `own`."""
         every = np.arange(self.layout.markers)
         if not set(HIPS) <= set(self.prior.names):
             return own
@@ -440,7 +440,7 @@ class Problem:
         return np.asarray(own + middle - with_both)
 
     def _covariances(self, diagonal: Floats, across: Floats, first: Ints, second: Ints) -> Floats:
-        """Covariances (T, n, 3) by coordinate of interpolated places of markers (n,) with others (n,)."""
+        """Compute covariances (T, n, 3), by coordinate, of interpolated markers (n,) with others (n,)."""
         frames, weights = self.at
         layout, axes = self.layout, np.arange(3)
         total = np.zeros((len(frames), len(first), 3))
@@ -457,7 +457,7 @@ class Problem:
         return total
 
     def _frame_covariances(self, diagonal: Floats, across: Floats) -> Floats:
-        """Covariances (T, 3 J, 3 J) of the coordinates of all interpolated places of a frame."""
+        """Compute covariances (T, 3 J, 3 J) of the interpolated coordinates of each frame."""
         frames, weights = self.at
         every = np.arange(self.layout.markers)
         total = np.empty((len(frames), 3 * len(every), 3 * len(every)))
@@ -471,7 +471,7 @@ class Problem:
 
 
 def _entries(diagonal: Floats, across: Floats, s: Ints, row: Ints, o: Ints, column: Ints) -> Floats:
-    """Covariances of the numbers `row` of blocks `s` with the numbers `column` of blocks `o`."""
+    """Return covariances of unknowns `row` of blocks `s` with unknowns `column` of blocks `o`."""
     low, high = np.minimum(s, o), np.maximum(s, o)
     later, sooner = np.where(s >= o, row, column), np.where(s >= o, column, row)
     return np.where(
@@ -480,7 +480,7 @@ def _entries(diagonal: Floats, across: Floats, s: Ints, row: Ints, o: Ints, colu
 
 
 def weighted(points: Observations, predicted: Floats) -> Observations:
-    """Points with larger standard deviations where they are far from their predictions (T, P, 2)."""
+    """Enlarge the standard deviations of points that are far from their predictions (T, P, 2)."""
     sd = points.sd.copy()
     square = np.sum((points.uv - predicted) ** 2, axis=2) / sd**2
     for t, observed in enumerate(points.visible):
@@ -490,16 +490,16 @@ def weighted(points: Observations, predicted: Floats) -> Observations:
 
 
 def _cost(points: Observations, trusted: Observations) -> float:
-    """Logarithm of the points' density that larger standard deviations cost: two coordinates each."""
+    """Log density lost by larger standard deviations, with two coordinates per point."""
     observed = points.visible
     return 2 * float(np.log(trusted.sd[observed] / points.sd[observed]).sum())
 
 
 def _roots(variances: Floats) -> Floats:
-    """Square roots of variances, none of which is below zero but for rounding."""
+    """Square roots of variances, which are negative only by rounding."""
     return np.asarray(np.sqrt(np.maximum(variances, 0.0)))
 
 
 def _change(difference: Floats) -> float:
-    """Rms of a change (grid, J, 3) but for its mean, which a view from far away does not determine."""
+    """Rms of a change (grid, J, 3) without its mean, which an orthographic view does not determine."""
     return float(np.sqrt(np.mean((difference - difference.mean(axis=(0, 1))) ** 2)))

@@ -1,7 +1,7 @@
-"""Soft linear constraints on a sequence: observations, feet that stay put, bones of constant length.
+"""Linear rows about a sequence: observations, feet that do not slide, bones of constant length.
 
-All are rows of `A x = y` with a standard deviation each; every row touches frames of two neighbouring blocks
-at most, so that A' W A is block-block_arrowhead.
+All are rows of `A x = y`, each with a standard deviation.  A row contains frames of at most two neighbouring
+blocks, so that A' W A is a block arrowhead.
 """
 
 from __future__ import annotations
@@ -21,8 +21,8 @@ Ints = npt.NDArray[np.intp]
 
 FEET = ("l_toe", "r_toe", "l_heel", "r_heel")
 TRUNK = ("pelvis", "neck")
-CONTACT_SPEED = 0.2  # m/s: a foot on the ground is slower
-CONTACT_RISE = 0.04  # metres over its lowest place that a foot on the ground may be
+CONTACT_SPEED = 0.2  # m/s; a foot on the ground is slower
+CONTACT_RISE = 0.04  # metres; a foot on the ground is less than this above its lowest position
 CONTACT_SD = 0.1  # m/s, of a foot on the ground
 BONES = (
     *(
@@ -36,25 +36,25 @@ BONES = (
     ("l_hip", "r_hip"),
     ("l_shoulder", "r_shoulder"),
 )
-WEAK = 10.0  # relative standard deviation of a scale from its guess: as good as free
-FIXED = 1e-4  # relative change of a scale that does not change
-LEAST_SURE = 0.05  # that a foot stands, to matter
-SHORTEST = 0.02  # metres, of a bone
+WEAK = 10.0  # relative standard deviation of a scale about its guess; practically free
+FIXED = 1e-4  # relative change of a scale that is constant
+LEAST_SURE = 0.05  # least probability that a foot stands for which there is a row
+SHORTEST = 0.02  # metres; least length of a bone
 BONE_SD = 0.01  # relative change of a length from one frame to the next
 
 
 @dataclass(frozen=True)
 class Layout:
-    """Where numbers of a sequence are: blocks of b frames of J markers, then b lengths if the scale is open.
+    """Order of a sequence's unknowns: blocks of b frames of J markers, then b lengths if scale is unknown.
 
     Attributes
     ----------
     blocks, frames, markers : int
         B, b, J.
     unit : float or None
-        Metres in which lengths of a unit of the picture count, one per frame; None: there are none.
+        Metres in which the lengths of a unit of the picture are given, one per frame; None: there are none.
     errors : int
-        Numbers after all blocks, of the detector's lasting errors.
+        Number of unknowns of the detector's lasting errors, which follow all blocks.
     """
 
     blocks: int
@@ -65,12 +65,12 @@ class Layout:
 
     @property
     def size(self) -> int:
-        """Numbers of a block."""
+        """Number of unknowns of a block."""
         return self.frames * (3 * self.markers + (self.unit is not None))
 
     @property
     def grid(self) -> int:
-        """Frames of the sequence."""
+        """Number of frames of the sequence."""
         return self.blocks * self.frames
 
     def place(self, frame: Ints, marker: Ints | int) -> Ints:
@@ -84,29 +84,29 @@ class Layout:
         return np.asarray(block * self.size + 3 * self.frames * self.markers + inside)
 
     def error(self, number: Ints) -> Ints:
-        """Index of a number of the detector's lasting errors."""
+        """Index of an unknown of the detector's lasting errors."""
         return np.asarray(self.blocks * self.size + number)
 
     def places(self, values: Floats) -> Floats:
-        """Places (grid, J, 3) out of values (B, size)."""
+        """Extract positions (grid, J, 3) from values (B, size)."""
         used = 3 * self.frames * self.markers
         return values[:, :used].reshape(self.grid, self.markers, 3)
 
     def values(self, places: Floats, lengths: Floats) -> Floats:
-        """Values (B, size) out of places (grid, J, 3) and lengths (grid,)."""
+        """Make values (B, size) from positions (grid, J, 3) and lengths (grid,)."""
         own = [places.reshape(self.blocks, -1)]
         if self.unit is not None:
             own.append(lengths.reshape(self.blocks, -1) / self.unit)
         return np.concatenate(own, axis=1)
 
     def lengths(self, values: Floats) -> Floats:
-        """Lengths (grid,) out of values (B, size), metres; `unit` must be known."""
+        """Extract lengths (grid,), metres, from values (B, size); `unit` must be set."""
         assert self.unit is not None
         return self.unit * values[:, 3 * self.frames * self.markers :].reshape(-1)
 
 
 class Rows:
-    """Collects rows; `normal` gives A' W A and A' W y in blocks, with the lasting errors as their border."""
+    """Collects rows; `normal` forms A' W A and A' W y in blocks, with the lasting errors as border."""
 
     def __init__(self, layout: Layout) -> None:
         self.layout = layout
@@ -124,7 +124,7 @@ class Rows:
         self._count += len(columns)
 
     def normal(self) -> tuple[Information, float]:
-        """Give A' W A and A' W y in blocks, and y' W y."""
+        """Return A' W A and A' W y in blocks, and y' W y."""
         layout = self.layout
         shape, total = (layout.blocks, layout.size), layout.blocks * layout.size
         diagonal = np.zeros((*shape, layout.size))
@@ -156,20 +156,21 @@ def observe(
     scale: Floats | None,
     lasting: tuple[Ints, Floats],
 ) -> None:
-    """Add what is seen.
+    """Add the observations.
 
     Parameters
     ----------
-    visible : gait.lift.observe.Rows
-        Of T frames and P points.
+    observed : gait.lift.smooth.rows.Rows
+        Rows of P points in T frames.
     markers : (P,)
-        Which marker each point is.
+        Index of each point's marker.
     at : (T, w) and (T, w)
-        Frames of the grid and weights that give the places at the frames of the video.
+        Frames of the grid and weights that interpolate positions in the frames of the video.
     scale : (n, 2) or None
         Factors of the length of a unit of the picture, if that is unknown.
     lasting : (n, K) and (n, 2, K)
-        Numbers of the detector's lasting errors along the first axis (those of the second follow), factors.
+        Indices of the unknowns of the detector's lasting errors along the first axis (those of the second
+        follow), and factors.
     """
     frames, weights = at[0][observed.frame], at[1][observed.frame]
     columns = rows.layout.place(frames, markers[observed.marker][:, None])[..., None] + np.arange(3)
@@ -190,7 +191,7 @@ def observe(
 
 @dataclass(frozen=True)
 class Pins:
-    """Markers at known places in frames of the video: rows, markers (n,); places, their sd (n, 3), metres."""
+    """Markers at known positions in frames of the video: rows, markers (n,); positions, sd (n, 3), metres."""
 
     row: Ints
     marker: Ints
@@ -198,13 +199,13 @@ class Pins:
     sd: Floats
 
     def part(self, rows: Ints) -> Pins:
-        """Those in some frames, which are counted anew."""
+        """Return the pins in some frames, which are renumbered."""
         own = np.flatnonzero(np.isin(self.row, rows))
         return Pins(np.searchsorted(rows, self.row[own]), self.marker[own], self.place[own], self.sd[own])
 
 
 def pin(rows: Rows, pins: Pins, at: tuple[Ints, Floats]) -> None:
-    """Hold markers at known places; `at` as in `observe`."""
+    """Add rows that hold markers at known positions; `at` as in `observe`."""
     frames, weights = at[0][pins.row], at[1][pins.row]
     columns = rows.layout.place(frames, pins.marker[:, None])
     for axis in range(3):
@@ -212,15 +213,15 @@ def pin(rows: Rows, pins: Pins, at: tuple[Ints, Floats]) -> None:
 
 
 def contacts(rows: Rows, names: Sequence[str], places: Floats, rate: float) -> Floats:
-    """Let feet that are low and slow in `places` (grid, J, 3) stay put.
+    """Add rows that stop feet that are low and slow in `places` (grid, J, 3).
 
-    Speeds count in lengths of the trunk per second: in metres a smaller body would have slower feet, and the
+    Speeds are in lengths of the trunk per second; in metres, a smaller body would have slower feet, and the
     fit would shrink it.
 
     Returns
     -------
     sure : (grid - 1, feet)
-        How sure a foot stands from each frame to the next, from 0 to 1.
+        Probability that a foot stands from each frame to the next.
     """
     feet = np.array([names.index(name) for name in FEET if name in names], np.intp)
     if not len(feet):
@@ -240,7 +241,7 @@ def contacts(rows: Rows, names: Sequence[str], places: Floats, rate: float) -> F
 
 
 def _contact(feet: Floats, rate: float) -> Floats:
-    """How sure feet (grid, P, 3) stand from each frame to the next, from 0 to 1."""
+    """Probability that feet (grid, P, 3) stand from each frame to the next."""
     speed = np.linalg.norm(np.diff(feet, axis=0), axis=2) * rate
     lowest = np.quantile(feet[..., 2], 0.05, axis=0)
     rise = np.maximum(feet[:-1, :, 2], feet[1:, :, 2]) - lowest
@@ -248,7 +249,7 @@ def _contact(feet: Floats, rate: float) -> Floats:
 
 
 def trunk(layout: Layout, names: Sequence[str], places: Floats, frame: Ints) -> tuple[Ints, Floats]:
-    """Columns and factors (n, 6) of the trunk's length over its present one; none if it is not known."""
+    """Columns and factors (n, 6) of the trunk's length over its present one; empty without a trunk."""
     if not set(TRUNK) <= set(names):
         return np.zeros((len(frame), 0), np.intp), np.zeros((len(frame), 0))
     ends = [names.index(name) for name in TRUNK]
@@ -259,7 +260,7 @@ def trunk(layout: Layout, names: Sequence[str], places: Floats, frame: Ints) -> 
 
 
 def bones(rows: Rows, names: Sequence[str], places: Floats) -> None:
-    """Let the logarithms of bones' lengths stay as they are, linearised at `places` (grid, J, 3)."""
+    """Add rows that keep the logarithms of bones' lengths, linearised at `places` (grid, J, 3)."""
     pairs = np.array([[names.index(n) for n in bone] for bone in BONES if set(bone) <= set(names)], np.intp)
     if not len(pairs):
         return
@@ -273,18 +274,18 @@ def bones(rows: Rows, names: Sequence[str], places: Floats) -> None:
             start = rows.layout.place(frame + step, pairs[bone, end])
             columns.append(start[:, None] + np.arange(3))
             factors.append(sign * (1.0 if end else -1.0) * slope[frame + step, bone])
-    # each side is log L about L: log L' + slope (D - D') with slope D' = 1, which cancels
+    # each side is log L linearised at L': log L' + slope (D - D'), with slope D' = 1, which cancels
     right = np.log(length[frame, bone] / length[frame + 1, bone])
     rows.add(np.hstack(columns), np.hstack(factors), right, np.full(len(frame), BONE_SD))
 
 
 def steady_lengths(rows: Rows, lengths: Floats, drift: float | None) -> None:
-    """Tie the lengths (grid,) of a unit of the picture to each other.
+    """Add rows that couple the lengths (grid,) of a unit of the picture.
 
     Parameters
     ----------
     drift : float or None
-        Relative standard deviation of the change of their change from frame to frame; None: all are equal.
+        Relative standard deviation of their second differences over frames; None: all are equal.
     """
     grid, guess = rows.layout.grid, lengths / (rows.layout.unit or 1.0)
     at = rows.layout.length(np.arange(grid))

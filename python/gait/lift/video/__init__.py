@@ -1,1 +1,1 @@
-"""Lifting from a video: gradient sensors, corrections by hand, a figure of cylinders."""
+"""Lift a video's images: gradient sensors, corrections by hand, a figure of cylinders."""

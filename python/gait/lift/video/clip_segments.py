@@ -1,4 +1,4 @@
-"""The segments of a clip: which frames each covers, and its energy there."""
+"""The segments of a clip: the frames that each covers, and its energy."""
 
 from __future__ import annotations
 
@@ -32,28 +32,28 @@ from gait.lift.video.sensors import Film, View
 Floats = npt.NDArray[np.float64]
 Indices = npt.NDArray[np.intp]
 
-FAR = 10.0  # metres: a segment may start anywhere on the ground
-TURN = 10.0  # radians: and look anywhere
-CORRELATED = 6.0  # root of the sensors, or of the markers shared by segments, that count as one reading
-BODY = 0.01  # metres: where a joint is in a clothed body is seen no better, the whole segment long
-FIRST_SD = 1.0  # of a sensor, before anything is known
+FAR = 10.0  # metres; a segment may start anywhere on the ground
+TURN = 10.0  # radians; it may have any heading
+CORRELATED = 6.0  # root of the number of sensors, or markers shared by segments, that count as one
+BODY = 0.01  # metres; error of a joint's position in a clothed body, constant in a segment
+FIRST_SD = 1.0  # of a sensor, before it has been estimated
 
 
 @dataclass(frozen=True)
 class Settings:
-    """How sensors count and segments are joined.
+    """How sensors are weighted and segments are joined.
 
     Attributes
     ----------
     sensor_sd : float, optional
-        Standard deviation of a sensor; infinite leaves the sensors out.  If not given it is found from the
-        clip: `CORRELATED` times the rms difference of the sensors and the figure, because neighbours in the
-        grid and in time err alike.
+        Standard deviation of a sensor; infinity disables sensors.  By default it is estimated from the clip:
+        `CORRELATED` times the rms difference between sensors and figure, as neighbours in the grid and in
+        time have similar errors.
     gain, level : (float, float)
-        Mean and standard deviation of the logarithm of what a figure adds to a sensor, and of what the scene
-        does.
+        Mean and standard deviation of the logarithm of the figure's contribution to a sensor, and of the
+        scene's contribution.
     joined : bool
-        Segments are solved together; else one after the other, as in the paper.
+        Whether segments are solved together, or one after the other, as in the paper.
     """
 
     sensor_sd: float | None = None
@@ -64,19 +64,19 @@ class Settings:
 
 @dataclass(frozen=True)
 class ClipSegments:
-    """Segments every hop that cover a film, the first of them (`origin`) at the placement's frame.
+    """Segments, one per hop, that cover a film; one of them (`origin`) starts at the placement's frame.
 
     Attributes
     ----------
     prior : SegmentPrior
     view : View
     film : Film
-        Frame times count even where the sensors are left out.
+        Its frame times are used even if the sensors are not.
     placement : Placement
     corrections : sequence of Correction
     settings : Settings
     phase_prior : PhasePrior, optional
-        Prior of the first segment by the phase of walking.
+        Prior of the first segment from the phase of walking.
     """
 
     prior: SegmentPrior
@@ -89,7 +89,7 @@ class ClipSegments:
 
     @cached_property
     def shapes(self) -> list[Shape]:
-        """Gaussians of the prior for this person."""
+        """The prior's Gaussians for this person."""
         stature = self.placement.stature
         return [Shape.of(self.prior, c, stature) for c in range(self.prior.components)]
 
@@ -100,7 +100,7 @@ class ClipSegments:
 
     @cached_property
     def starts(self) -> Floats:
-        """Times (B,) at which segments start, seconds."""
+        """Start times (B,) of the segments, seconds."""
         film = self.film
         before = np.ceil((self.placed - film.times[0]) / self.hop - 1e-6)
         after = max(0.0, np.ceil((film.times[-1] - self.placed - self.span) / self.hop - 1e-6))
@@ -118,7 +118,7 @@ class ClipSegments:
 
     @property
     def span(self) -> float:
-        """Seconds of a segment."""
+        """Duration of a segment, seconds."""
         return (self.prior.frames - 1) / self.prior.fps
 
     @property
@@ -132,12 +132,12 @@ class ClipSegments:
         return FIRST_SD if self.settings.sensor_sd is None else self.settings.sensor_sd
 
     def frames(self, segment: int) -> Indices:
-        """Frames of the film (from its first) within a segment."""
+        """Find the frames of the film, counted from its first, within a segment."""
         since = self.film.times - self.starts[segment]
         return np.flatnonzero((since > -1e-6) & (since < max(self.span, self.hop) + 1e-6))
 
     def weights(self, segment: int) -> Floats:
-        """Interpolate (T, F) the segment's frames at those of the film: cubic splines."""
+        """Make weights (T, F) that interpolate a segment's frames at those of the film: cubic splines."""
         times = (self.film.times[self.frames(segment)] - self.starts[segment]) * self.prior.fps
         count = self.prior.frames
         if count == 1:
@@ -146,7 +146,7 @@ class ClipSegments:
         return np.asarray(spline(np.clip(times, 0, count - 1)))
 
     def mean_state(self) -> Floats:
-        """State (k + 6,) by the placement and the prior's mean."""
+        """State (k + 6,) from the placement and the prior's mean."""
         state = np.zeros(self.shapes[0].size)
         state[PLACE] = [*self.placement.ground, 0.0]
         state[HEADING] = self.placement.heading if self.shapes[0].turning else 0.0
@@ -154,7 +154,7 @@ class ClipSegments:
         return state
 
     def first_modes(self, component: int) -> tuple[Floats, Floats]:
-        """Mean and standard deviations (k,) of the modes of the first segment."""
+        """Return mean and standard deviations (k,) of the first segment's modes."""
         if self.phase_prior is None:
             return np.zeros(self.prior.size), np.ones(self.prior.size)
         return self.phase_prior.mean[component], self.phase_prior.sd[component]
@@ -168,13 +168,13 @@ class ClipSegments:
         anchor: Anchor | None = None,
         looking: bool = True,
     ) -> Energy:
-        """Energy of a segment.
+        """Make the energy of a segment.
 
         Parameters
         ----------
         segment, component : int
         near : (k + 6,)
-            State about which the sensors are laid and the corrections' strength is found.
+            State around which sensors are placed and the weights of corrections are computed.
         anchor : Anchor, optional
         looking : bool
             Whether there are sensors.
@@ -193,7 +193,7 @@ class ClipSegments:
         return replace(energy, reading=reading, corrections=self._corrections(segment, shape, near))
 
     def _reading(self, segment: int, energy: Energy, near: Floats) -> Reading | None:
-        """Sensors about the figure of a state; a state behind the lens sees nothing."""
+        """Read the sensors around the figure of a state; None if it is behind the lens."""
         if not np.isfinite(self.sensor_sd) or not len(energy.weights) or not energy.visible(near):
             return None
         places, _ = energy.shape.positions(near, energy.weights, self.sticks.markers)
@@ -205,10 +205,11 @@ class ClipSegments:
         return Reading(value, grid, np.full(len(grid), self.film.blur), self.sensor_sd)
 
     def _corrections(self, segment: int, shape: Shape, near: Floats) -> Corrections | None:
-        """Corrections in a segment's frames; what the prior leaves out at the marker weakens them.
+        """Collect the corrections in a segment's frames, with standard deviations.
 
-        That hardly changes within a segment, and its variance counts for that in every frame (gamma): one
-        correction of a marker has its share of it, and several of the same marker no more than one.
+        These include the part of the marker's position that the prior does not explain.  It hardly changes
+        within a segment, and `gamma` inflates its variance for that in every frame.  A correction has only
+        one frame's share of the variance, and several corrections of a marker together count as one.
         """
         frames = (self.frames(segment) + self.film.first).tolist()
         held = [c for c in self.corrections if c.frame in frames]

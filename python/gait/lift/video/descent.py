@@ -1,14 +1,12 @@
 """Levenberg-Marquardt over a chain of segments that share frames with their neighbours.
 
-Two neighbours describe the frames they share; their positions may differ by what both priors leave out.  The
-normal equations are block-tridiagonal, so a clip of any length costs its number of segments.
+Two neighbours both describe the frames that they share; positions there may differ by what the priors do not
+explain.  The normal equations are block-tridiagonal, so the time is proportional to the number of segments.
 
-What a clip gets wrong from end to end, and how far that moves the estimate.
-
-Clothes, hair and shoes lie where the stick figure does not, and a person's build looks nearer or further than
-the prior's.  Every frame brings the same error anew, so that no number of frames makes it less.  The estimate
-stays as it is; its covariance grows by how far each error, one standard deviation large, would move it
-(consider covariance, Schmidt 1966).
+`moves` accounts for errors that are common to a whole clip.  Clothes, hair and shoes are where the stick
+figure is not, and a person's build makes them look nearer or further than the prior's body.  As every frame
+has the same error, more frames do not reduce it.  The estimate is unchanged, but its covariance is increased
+by the effect of each error of one standard deviation (consider covariance, Schmidt 1966).
 """
 
 from __future__ import annotations
@@ -27,19 +25,19 @@ Floats = npt.NDArray[np.float64]
 
 ROUNDS = 15
 FLAT = 1e-3  # relative gain at which a descent ends
-DAMPING = (1e-6, 1e-3, 1e8)  # least, first and last
+DAMPING = (1e-6, 1e-3, 1e8)  # least, first and largest
 
 
 @dataclass(frozen=True)
 class Link:
-    """The frames that neighbouring segments share.
+    """Coupling of neighbouring segments in the frames that they share.
 
     Attributes
     ----------
     hop : int
         Frames from the start of a segment to that of the next.
     sd : (J,)
-        Standard deviation of the difference of a coordinate of each marker, metres.
+        Standard deviation, per coordinate, of the difference of each marker between the two, metres.
     """
 
     hop: int
@@ -48,7 +46,7 @@ class Link:
 
 @dataclass(frozen=True)
 class Normal:
-    """Gauss-Newton's equations: cost, information (B, n, n) and (B - 1, n, n) below, gradient (B, n)."""
+    """Gauss-Newton equations: cost; information, (B, n, n) and below (B - 1, n, n); gradient (B, n)."""
 
     cost: float
     diagonal: Floats
@@ -57,7 +55,7 @@ class Normal:
 
 
 def normal(chain: Sequence[Energy], link: Link | None, states: Floats) -> Normal:
-    """Linearise a chain at states (B, n); without a link segments do not know each other."""
+    """Linearise a chain at states (B, n); without a link the segments are independent."""
     count, size = states.shape
     diagonal, gradient = np.empty((count, size, size)), np.empty((count, size))
     below, cost = np.zeros((count - 1, size, size)), 0.0
@@ -81,7 +79,7 @@ def normal(chain: Sequence[Energy], link: Link | None, states: Floats) -> Normal
 
 
 def _ends(energy: Energy, state: Floats, link: Link) -> tuple[tuple[Floats, Floats], tuple[Floats, Floats]]:
-    """Places and slopes of the frames shared with the segment before and after; in standard deviations."""
+    """Compute positions and slopes in the frames shared with the neighbours, in standard deviations."""
     frames = energy.weights.shape[1]
     places, slope = energy.shape.positions(state, np.eye(frames), slice(None))
     places, slope = places / link.sd[:, None], slope / link.sd[:, None, None]
@@ -93,7 +91,7 @@ def _ends(energy: Energy, state: Floats, link: Link) -> tuple[tuple[Floats, Floa
 
 
 def descend(chain: Sequence[Energy], link: Link | None, states: Floats) -> tuple[Floats, float]:
-    """Find states (B, n) of least energy near a start; also the energy."""
+    """Find states (B, n) of least energy near a start; also return the energy."""
     states, now = states.copy(), normal(chain, link, states)
     least, damping, most = DAMPING
     diagonal = np.einsum("bii->bi", now.diagonal).copy()
@@ -114,7 +112,7 @@ def descend(chain: Sequence[Energy], link: Link | None, states: Floats) -> tuple
 
 
 def _stepped(chain: Sequence[Energy], states: Floats, now: Normal, damping: Floats) -> Floats | None:
-    """States after a damped step; None if it fails or leads behind the lens."""
+    """Return the states after a damped step; None if it fails or leads behind the lens."""
     information = now.diagonal + damping[:, :, None] * np.eye(damping.shape[1])
     try:
         trial = states - factor(information, now.below).solve(now.gradient)
@@ -125,27 +123,28 @@ def _stepped(chain: Sequence[Energy], states: Floats, now: Normal, damping: Floa
 
 
 def information(chain: Sequence[Energy], link: Link | None, states: Floats) -> Factor:
-    """Factor of the information matrix of a chain at states (B, n)."""
+    """Factor the information matrix of a chain at states (B, n)."""
     at = normal(chain, link, states)
     return factor(at.diagonal, at.below)
 
 
-# Nearly most likely on people of `gait simulate` and sticks of people left out, none of the published clips.
-SHIFT_SD = (0.03, 0.05)  # metres, across and along the picture: where sensors see the figure
-SIZE_SD = 0.03  # share by which they see it larger
+# Near the maximum likelihood on people of `gait simulate` and sticks of held-out people, not on the published
+# clips.
+SHIFT_SD = (0.03, 0.05)  # metres, across and down the picture, of the figure's apparent position
+SIZE_SD = 0.03  # of its apparent relative size
 
 
 def moves(chain: Sequence[Energy], factor: Factor, states: Floats, drifted: Floats) -> Floats:
-    """Move the states (B, n) by one sd of each error: two shifts, size, two drifts; shape (B, n, 5).
+    """Return moves (B, n, 5) of the states (B, n) by one sd of each error: two shifts, size, two drifts.
 
     Parameters
     ----------
     chain : sequence of B Energy
     factor : Factor
-        Of the chain's information matrix at the states.
+        Factor of the chain's information matrix at the states.
     drifted : (B,)
-        How far the figure may have drifted in each segment, metres, in one sense:
-        `gait.lift.fit_correlation`.
+        How far the figure may have drifted in each segment, metres, with sign; see
+        `gait.lift.video.fit_clip`.
     """
     pulls = np.stack([_pull(energy, state) for energy, state in zip(chain, states, strict=True)])
     drifts = pulls[..., :2] * drifted[:, None, None] / SHIFT_SD
@@ -153,7 +152,7 @@ def moves(chain: Sequence[Energy], factor: Factor, states: Floats, drifted: Floa
 
 
 def _pull(energy: Energy, state: Floats) -> Floats:
-    """Change (n, 3) of half the energy's gradient by one standard deviation of each error."""
+    """Compute the change (n, 3) of half the energy's gradient by one standard deviation of each error."""
     reading = energy.reading
     if reading is None or not len(reading.value):
         return np.zeros((len(state), 3))

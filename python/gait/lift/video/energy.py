@@ -1,20 +1,21 @@
-"""The stick figure seen by the sensors: blurred line segments, with exact derivatives.
+"""The energy of a segment in a clip, with the sensors' responses to the stick figure.
 
-A stick is a line of strength 1 per pixel of its length, convolved with the sensors' Gaussian blur of standard
-deviation s.  At a sensor it gives  exp(-d^2 / 2 s^2) (Phi((L - u) / s) - Phi(-u / s))  where u and d are the
-coordinates along and across the stick and L is its length: an endless stick through a sensor gives 1. Sticks
-that lie upon each other are not seen twice: a figure gives 1 - exp(-sum of its sticks).
+A stick is a line of strength 1 per pixel of length, convolved with the sensors' Gaussian blur of standard
+deviation s.  Its response at a sensor is  exp(-d^2 / 2 s^2) (Phi((L - u) / s) - Phi(-u / s)),  where u and d
+are the coordinates along and across the stick and L is its length: an infinite stick through a sensor gives
+1.  Since sticks that cover each other must not count twice, a figure gives 1 - exp(-sum of its sticks).
+Derivatives are exact.
 
-The energy of a segment seen in a clip (Leventon & Freeman 1998, eq. 7), as rows of least squares.
+The energy is that of Leventon & Freeman 1998, eq. 7, as rows of least squares:
 
     E = ||R - f(alpha)||^2 + lambda_1 alpha' Lambda^-1 alpha + lambda_2 sum_i ||I_i - P_i x_i(alpha)||^2
 
 R are the sensors, f the stick figure's responses, I the user's corrections.  Here every row is divided by its
-own standard deviation, so E is minus two log posterior: lambda_1 is the variance of a sensor, lambda_2 the
-ratio of that to a correction's variance.  The modes carry their standard deviations, so Lambda is 1.
+standard deviation, so E is minus two log posterior: lambda_1 is the variance of a sensor, lambda_2 the ratio
+of that to a correction's variance.  The modes include their standard deviations, so Lambda is 1.
 
-The state of a segment: alpha (k), place (3) of the first frame's pelvis on the ground and over it, heading
-(1), and the sensors' logarithm of gain and level: R = level + exp(gain) f.
+The state of a segment: alpha (k), position (3) of the first frame's pelvis on the ground and above it,
+heading (1), and the sensors' log gain and level: R = level + exp(gain) f.
 """
 
 from __future__ import annotations
@@ -33,9 +34,9 @@ from gait.lift.video.sensors import View
 
 Floats = npt.NDArray[np.float64]
 
-#: The bones that are drawn of people, and the outlines of the trunk.
+#: The sticks: bones, and the outlines of the trunk.
 STICKS = (*BONES, *((f"{s}_shoulder", f"{s}_hip") for s in "lr"))
-SHORTEST = 1e-3  # pixels; a stick that points at the viewer keeps a direction
+SHORTEST = 1e-3  # pixels; a stick that points at the viewer still has a direction
 _ROOT = 1 / np.sqrt(2 * np.pi)
 
 
@@ -46,7 +47,7 @@ class Sticks:
     Attributes
     ----------
     markers : (M,)
-        Indices of the markers at ends of sticks.
+        Indices of the markers at the ends of sticks.
     ends : (B, 2)
         Indices into `markers`.
     """
@@ -56,7 +57,7 @@ class Sticks:
 
     @staticmethod
     def of(names: Sequence[str]) -> Sticks:
-        """Sticks of a body whose markers are named.
+        """Make the sticks of a body from the names of its markers.
 
         Raises
         ------
@@ -74,7 +75,7 @@ class Sticks:
         return Sticks(markers, ends)
 
     def responses(self, uv: Floats, places: Floats, blur: Floats) -> tuple[Floats, Floats]:
-        """Responses of sensors to the figure, and their slopes.
+        """Compute the responses of sensors to the figure, and their slopes.
 
         Parameters
         ----------
@@ -83,25 +84,25 @@ class Sticks:
         places : (T, S, 2)
             Sensors, pixels.
         blur : (T,)
-            Standard deviation of their Gaussian, pixels.
+            Standard deviation of their Gaussian blur, pixels.
 
         Returns
         -------
         value : (T, S)
         slope : (T, S, M, 2)
-            By the markers' pixels.
+            Derivatives by the markers' pixels.
         """
         value, by_end = stick_responses(uv[:, self.ends], places, blur)
-        join = np.zeros((self.ends.size, len(self.markers)))  # markers are ends of several sticks
+        join = np.zeros((self.ends.size, len(self.markers)))  # a marker may be an end of several sticks
         join[np.arange(self.ends.size), self.ends.ravel()] = 1.0
         left = np.exp(-value.sum(axis=2))
         return 1 - left, np.swapaxes((by_end * left[:, :, None, None]) @ join, 2, 3)
 
 
 def stick_responses(ends: Floats, places: Floats, blur: Floats) -> tuple[Floats, Floats]:
-    """Responses (T, S, B) of sensors (T, S, 2) to sticks (T, B, 2, 2), and slopes (T, S, 2, B * 2).
+    """Compute responses (T, S, B) of sensors (T, S, 2) to sticks (T, B, 2, 2), and slopes (T, S, 2, B * 2).
 
-    Slopes are by column and row, then by sticks and their ends.
+    Slopes are ordered by column and row, then by sticks and their ends.
     """
     s = blur[:, None, None]
     along = ends[:, :, 1] - ends[:, :, 0]
@@ -115,7 +116,7 @@ def stick_responses(ends: Floats, places: Floats, blur: Floats) -> tuple[Floats,
     by_l = across * (_ROOT / s * np.exp(-0.5 * far * far))
     by_u = across * (_ROOT / s * np.exp(-0.5 * near * near)) - by_l
     by_d = -d / s**2 * value
-    # turning the stick by n . (step of its end 1 - step of its end 0) / L moves (u, d) by (d, -u) of it
+    # rotating the stick by an angle n . (step of end 1 - step of end 0) / L moves (u, d) by (d, -u) times it
     turn = (by_u * d - by_d * u) / long
     slope = np.empty((*value.shape[:2], 2, value.shape[2], 2))
     for i, (e, n) in enumerate(((ex, -ey), (ey, ex))):
@@ -139,9 +140,9 @@ class Shape:
     mean : (F, J, 3)
     modes : (F, J, 3, k)
     residual : (J,)
-        Standard deviation of each coordinate outside the modes, inflated as held-out people ask for.
+        Standard deviation of each coordinate that the modes do not explain, inflated by `gamma`.
     turning : bool
-        Whether the heading is part of the state; else segments are in the world's axes.
+        Whether the heading is part of the state; otherwise segments are in the world's axes.
     """
 
     mean: Floats
@@ -151,7 +152,7 @@ class Shape:
 
     @staticmethod
     def of(prior: SegmentPrior, component: int, stature: float) -> Shape:
-        """Take a component of a prior."""
+        """Make the shape of a component of a prior."""
         return Shape(
             mean=stature * prior.mean[component],
             modes=stature * np.moveaxis(prior.modes[component], 0, -1),
@@ -161,11 +162,11 @@ class Shape:
 
     @property
     def size(self) -> int:
-        """Entries of the state."""
+        """Number of entries of the state."""
         return self.modes.shape[-1] + EXTRA
 
     def positions(self, state: Floats, weights: Floats, markers: Indices | slice) -> tuple[Floats, Floats]:
-        """Markers at T instants and their slopes by the state.
+        """Compute markers at T times and their slopes by the state.
 
         Parameters
         ----------
@@ -196,7 +197,7 @@ class Shape:
 
 @dataclass(frozen=True)
 class Reading:
-    """Sensors of T frames: values (T, S), places (T, S, 2) and blur (T,) in pixels, sd of a value."""
+    """Sensors of T frames: values (T, S); positions (T, S, 2) and blur (T,) in pixels; sd of a value."""
 
     value: Floats
     places: Floats
@@ -206,7 +207,7 @@ class Reading:
 
 @dataclass(frozen=True)
 class Corrections:
-    """C corrections: frames (C,) among the T instants, markers (C,), pixels (C, 2) and their sd (C,)."""
+    """C corrections: indices (C,) among the T times, markers (C,), pixels (C, 2) and their sd (C,)."""
 
     frame: Indices
     marker: Indices
@@ -216,7 +217,7 @@ class Corrections:
 
 @dataclass(frozen=True)
 class Anchor:
-    """Places (A, J, 3) that all markers had in A frames of the segment, and their sd (J,), metres."""
+    """Known positions (A, J, 3) of all markers in A frames of the segment, and their sd (J,), metres."""
 
     frames: slice
     places: Floats
@@ -233,7 +234,7 @@ class Energy:
     view : View
     sticks : Sticks
     weights : (T, F)
-        Rows that interpolate the segment's frames at the instants of the video.
+        Rows that interpolate the segment's frames at the times of the video.
     mean, sd : (k + 6,)
         Normal prior of the state.
     reading : Reading, optional
@@ -252,12 +253,12 @@ class Energy:
     anchor: Anchor | None = None
 
     def visible(self, state: Floats) -> bool:
-        """Whether the whole body is before the lens."""
+        """Whether the whole body is in front of the lens."""
         places, _ = self.shape.positions(state, np.eye(self.weights.shape[1]), slice(None))
         return self.view.visible(places)
 
     def rows(self, state: Floats) -> tuple[Floats, Floats]:
-        """Residuals (R,) in standard deviations, and their slopes (R, k + 6) by the state."""
+        """Compute residuals (R,) in standard deviations, and their slopes (R, k + 6) by the state."""
         parts = [((state - self.mean) / self.sd, np.diag(1 / self.sd))]
         if self.reading is not None and len(self.reading.value):
             parts.append(self.sensor_rows(self.reading, state))
@@ -268,13 +269,13 @@ class Energy:
         return np.concatenate([r for r, _ in parts]), np.concatenate([slope for _, slope in parts])
 
     def residuals(self, state: Floats) -> Floats:
-        """Difference (T * S,) of what the figure gives and what the sensors read; empty without sensors."""
+        """Compute the figure's responses minus the sensors (T * S,); empty without sensors."""
         if self.reading is None:
             return np.zeros(0)
         return self.sensor_rows(self.reading, state)[0] * self.reading.sd
 
     def sensor_rows(self, reading: Reading, state: Floats) -> tuple[Floats, Floats]:
-        """Residuals (T * S,) of the sensors over their sd, and their slopes (T * S, k + 6) by the state."""
+        """Compute residuals (T * S,) of the sensors over their sd, and slopes (T * S, k + 6) by the state."""
         places, by_state = self.shape.positions(state, self.weights, self.sticks.markers)
         uv, by_place = self.view.project(places)
         response, by_uv = self.sticks.responses(uv, reading.places, reading.blur)
@@ -286,7 +287,7 @@ class Energy:
         return residual.ravel() / reading.sd, slope.reshape(-1, len(state)) / reading.sd
 
     def correction_rows(self, state: Floats) -> tuple[Floats, Floats]:
-        """Differences (2 C,) of markers and corrections over their sd, and their slopes (2 C, k + 6)."""
+        """Compute differences (2 C,) of markers and corrections over their sd, and slopes (2 C, k + 6)."""
         corrections = self.corrections
         if corrections is None or not len(corrections.frame):
             return np.zeros(0), np.zeros((0, len(state)))

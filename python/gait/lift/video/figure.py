@@ -1,9 +1,7 @@
-"""The cylinder figure: one body of constant bone lengths laid on markers by least squares, frame by frame.
+"""The cylinder figure: a body with constant bone lengths, fitted to markers by least squares, and drawn.
 
-The last step of Leventon & Freeman 1998; the fit is that of `gait.learn.solve.skeleton_fit`, which motion
-capture goes through as well.
-
-Draw the cylinder figure, its sticks and the user's corrections into a frame.
+This is the last step of Leventon & Freeman 1998; `gait.learn.solve.skeleton_fit` does the fit, as for motion
+capture.
 """
 
 from __future__ import annotations
@@ -28,15 +26,15 @@ from gait.report.drawing import draw_bones, tinted
 
 Floats = npt.NDArray[np.float64]
 
-JOINT_SD, SKIN_SD = 0.01, 0.02  # statures that a joint or a marker on the skin may lie elsewhere in its limb
-FEWEST = 8  # markers
+JOINT_SD, SKIN_SD = 0.01, 0.02  # statures; errors of a joint's, or skin marker's, position in its limb
+FEWEST = 8  # fewest markers
 _BODY = default_skeleton()
 LIMBS = tuple(_BODY.limbs)
 
 
 @dataclass(frozen=True)
 class Figure:
-    """A body of limbs that keep their lengths, in T poses.
+    """A body with limbs of constant length, in T poses.
 
     Attributes
     ----------
@@ -44,7 +42,7 @@ class Figure:
         Log length scales of the body (`gait.learn.solve.kinematics.SCALES`).
     pose : Pose
     residual : (T, M)
-        Distance from the markers used, metres.
+        Distances from the markers used, metres.
     """
 
     log_scales: Floats
@@ -53,12 +51,12 @@ class Figure:
 
     @staticmethod
     def fit(places: Floats, names: Sequence[str]) -> Figure:
-        """Lay a body on markers (T, J, 3), metres, world with z up; markers of other bodies are left out.
+        """Fit a body to markers (T, J, 3), metres, world with z up; unknown markers are ignored.
 
         Raises
         ------
         UserError
-            If hardly any marker is one of `gait.learn.segments.virtual_markers.MARKERS`.
+            If too few markers are among `gait.learn.segments.virtual_markers.MARKERS`.
         """
         used = [name for name in names if name in MARKERS]
         if len(used) < FEWEST:
@@ -75,18 +73,18 @@ class Figure:
 
     @property
     def stature(self) -> float:
-        """Height of the body, metres, as if all its parts were of usual proportions."""
+        """Height of the body, metres, if all its parts had usual proportions."""
         return float(np.exp(self.log_scales[0]))
 
     def joints(self) -> Floats:
-        """Places (T, 19, 3) of `gait.body.skeleton.JOINTS`, metres."""
+        """Compute the positions (T, 19, 3) of `gait.body.skeleton.JOINTS`, metres."""
         segment = _BODY.point_frames.astype(np.intp)
         local = segment_scales(self.log_scales)[segment] * _BODY.point_positions
         posed = pose_skeleton(self.pose, segment_origins(self.log_scales))
         return posed.points(local, segment)
 
     def lengths(self) -> dict[str, float]:
-        """Lengths of thighs, shanks, upper arms and forearms, metres."""
+        """Return the lengths of thighs, shanks, upper arms and forearms, metres."""
         place = dict(zip(JOINTS, self.joints()[0], strict=True))
         ends = {
             "thigh": ("hip", "knee"), "shank": ("knee", "ankle"),
@@ -99,7 +97,7 @@ class Figure:
         }
 
     def surfaces(self) -> Floats:
-        """Points (T, L, P, 3), metres, on the surfaces of `LIMBS`: each limb is the hull of its points."""
+        """Compute points (T, L, P, 3), metres, on the surfaces of `LIMBS`: each limb is their hull."""
         posed = pose_skeleton(self.pose, segment_origins(self.log_scales))
         segment = np.repeat(_BODY.limb_frames[:, 0], RING * SLICES).astype(np.intp)
         local = segment_scales(self.log_scales)[segment] * _SURFACE.reshape(-1, 3)
@@ -107,11 +105,11 @@ class Figure:
         return points.reshape(len(points), len(LIMBS), -1, 3)
 
 
-RING, SLICES = 20, 7  # points around a limb, and places along it
+RING, SLICES = 20, 7  # points around a limb, and rings along it
 
 
 def _surface(shape: int, row: Floats) -> Floats:
-    """Points (RING * SLICES, 3) on a limb in its segment, statures: LIMI and LIMF of model-format.md."""
+    """Make points (RING * SLICES, 3) on a limb in its frame, statures; LIMI, LIMF: see model-format.md."""
     start, end, (a0, b0, a1, b1) = row[:3], row[3:6], row[6:]
     axis = (end - start) / np.linalg.norm(end - start)
     first = np.array([0.0, 1.0, 0.0]) - axis[1] * axis
@@ -134,7 +132,7 @@ _SURFACE = np.stack(
 
 _DARK = (30, 30, 30)
 _CORRECTION = (90, 240, 255)  # BGR
-_BITS = 3  # of fraction in OpenCV's drawing coordinates
+_BITS = 3  # fractional bits of OpenCV's drawing coordinates
 
 
 def draw_figure(
@@ -144,7 +142,7 @@ def draw_figure(
     joints: Floats,
     corrections: Sequence[tuple[Correction, Floats]] = (),
 ) -> Image:
-    """Return a BGR picture with limbs, sticks and corrections.
+    """Draw limbs, sticks and corrections into a copy of a picture, BGR.
 
     Parameters
     ----------
@@ -153,9 +151,9 @@ def draw_figure(
     surfaces : (L, P, 3)
         Points whose hulls are the limbs, metres.
     joints : (19, 3)
-        `gait.body.skeleton.JOINTS`.
+        Positions of `gait.body.skeleton.JOINTS`, metres.
     corrections : sequence of (Correction, (3,))
-        Corrections of this frame and where their markers are, metres.
+        Corrections of this frame, and the positions of their markers, metres.
     """
     canvas = cv2.cvtColor(image, cv2.COLOR_GRAY2BGR) if image.ndim == 2 else image.copy()
     if not view.visible(surfaces):
@@ -180,7 +178,7 @@ def write_overlay(
     corrections: Sequence[tuple[Correction, Floats]],
     quiet: bool,
 ) -> None:
-    """Write the frames of a video from the first to the last of a motion, with the figure drawn into them.
+    """Write a video with the figure drawn into the frames from the first to the last of a motion.
 
     Parameters
     ----------
@@ -188,12 +186,12 @@ def write_overlay(
         Video to write.
     video : Video
     frame : (T,)
-        Numbers of the motion's frames; others between them are left as they are.
+        Numbers of the motion's frames; frames in between are not changed.
     views : sequence of T View
     figure : Figure
         In T poses.
     corrections : sequence of (Correction, (3,))
-        Corrections and where their markers are, metres.
+        Corrections, and the positions of their markers, metres.
     quiet : bool
         Show no progress.
     """
@@ -214,7 +212,7 @@ def write_overlay(
 
 
 def _limb_ids(size: tuple[int, ...], view: View, surfaces: Floats) -> npt.NDArray[np.uint8]:
-    """Limb index + 1 of every pixel, 0 for none; the nearest limbs are painted last."""
+    """Compute limb index + 1 of every pixel, 0 for none; the nearest limbs are painted last."""
     ids = np.zeros(size, np.uint8)
     uv, _ = view.project(surfaces)
     for limb in np.argsort(-view.depth(surfaces).mean(axis=1)):
@@ -225,7 +223,7 @@ def _limb_ids(size: tuple[int, ...], view: View, surfaces: Floats) -> npt.NDArra
 
 
 def _draw_correction(canvas: Image, wanted: Floats, found: Floats, width: int) -> None:
-    """Draw a line from where the user wants a marker, a circle, to where it is."""
+    """Draw a circle where the user wants a marker, and a line from there to where it is."""
     near, far = (tuple(np.clip(np.rint(p), -1e6, 1e6).astype(int).tolist()) for p in (wanted, found))
     cv2.line(canvas, near, far, _CORRECTION, width, cv2.LINE_AA)
     cv2.circle(canvas, near, 3 + 2 * width, _DARK, width + 2, cv2.LINE_AA)

@@ -1,14 +1,14 @@
-"""Fit a clip: correlation of sensors and stick figure, the fit, and the next corrections to suggest.
+"""Fit a clip, check the correlation of sensors and stick figure, and suggest corrections.
 
-Where the figure lies on the person it explains most of what the sensors read.  Where it explains little, they
-read edges of the scene, which stand still: the figure is held back, and the longer, the further.
+A clip has a segment every hop, each at the minimum of its energy.  A segment starts from the one before
+(Leventon & Freeman 1998), whose estimate of the common frames is an additional observation.  By default all
+segments are then solved together, with neighbours coupled where they overlap, so that a correction in one
+helps the others.  In the paper's way (`Settings.joined` False) they are not, but each is moved in depth so
+that it continues the one before. In either case they are blended linearly.
 
-The motion of a clip: segments every hop, each the minimum of its energy, joined to one sequence.
-
-Each segment starts from the one before (Leventon & Freeman 1998), and what both describe is one more
-observation of it.  By default all are then solved together, neighbours tied where they overlap, so that a
-correction in one helps the others.  The paper's way (`Settings.joined` False) leaves them as they are and
-moves each in depth until it goes on where the one before ended.  Either way they are blended linearly.
+Where the figure is on the person, it explains most of the sensors' readings.  If it explains little, the
+sensors read edges of the static scene, which hold the figure back, and it drifts further and further from the
+person.
 """
 
 from __future__ import annotations
@@ -27,16 +27,16 @@ from gait.lift.video.energy import HEADING, PLACE, Anchor, Energy
 
 Floats = npt.NDArray[np.float64]
 
-HELD = 0.9  # fit_correlation of figures that follow a person before a known background
-CHANCE = 0.3  # fit_correlation that a figure anywhere in a scene may have
-DRIFT_SD = 0.04  # metres a second at twice the noise of `HELD`; the likeliest without a background
-POOR_CORRELATION = 0.5  # below it figures left the person in half of the clips that this was found on
+HELD = 0.9  # fit correlation of figures that follow a person in front of a known background
+CHANCE = 0.3  # fit correlation that a figure anywhere in a scene may have
+DRIFT_SD = 0.04  # metres per second at twice the noise of `HELD`; maximum likelihood without a background
+POOR_CORRELATION = 0.5  # below it, figures lost the person in half of the clips used to choose it
 
 
 def fit_correlation(chain: Sequence[Energy], states: Floats) -> float:
-    """Correlation of what the sensors read and the figure gives at states (B, n); NaN without sensors.
+    """Correlation between sensors and the figure's responses at states (B, n); NaN without sensors.
 
-    Over all frames, each about its mean.
+    It is over all frames, with each frame's means subtracted.
     """
     products = np.zeros(3)
     for energy, state in zip(chain, states, strict=True):
@@ -51,12 +51,12 @@ def fit_correlation(chain: Sequence[Energy], states: Floats) -> float:
 
 
 def drift(alike: float) -> float:
-    """Speed error (sd, m/s) of a figure that the scene holds back; 0 if the figure explains enough."""
+    """Return the sd of the drift [m/s] of a figure held back by the scene; 0 if it explains enough."""
 
     def noise(value: float) -> float:
         return float(
             np.sqrt(1 / max(value, CHANCE) ** 2 - 1)
-        )  # unexplained over explained standard deviation
+        )  # standard deviation not explained over that explained
 
     return 0.0 if np.isnan(alike) else DRIFT_SD * max(0.0, noise(alike) / noise(HELD) - 1)
 
@@ -65,17 +65,17 @@ Indices = npt.NDArray[np.intp]
 Update = Callable[[int], None]
 Settled = tuple[float, int, Floats]  # energy, component and state of a segment
 
-LOOSE = 0.03  # statures that the segment before may be wrong, when the next one starts from it
-BEGINNINGS = 3  # explanations of the first segment that are followed through the clip
-DIFFERENT = 0.03  # statures: mean distance of markers in explanations that differ
-START_MODES, START_SD = 3, 1.5  # the first segment starts from the mean and from +- so many sd of these modes
-LEAST = 1e-3  # share of a segment in the blend at its ends
-PASSES = 2  # times the sensors are laid anew about the figure found
+LOOSE = 0.03  # statures; error of the segment before, when the next one starts from it
+BEGINNINGS = 3  # explanations of the first segment that are continued through the clip
+DIFFERENT = 0.03  # statures; mean distance of markers from which explanations are different
+START_MODES, START_SD = 3, 1.5  # the first segment starts from the mean, and +- this sd of these modes
+LEAST = 1e-3  # weight of a segment in the blend at its ends
+PASSES = 2  # times that sensors are placed again around the figure found
 
 
 @dataclass(frozen=True)
 class ClipStates:
-    """Chosen components (B,) and states (B, k + 6) of the segments of a clip, and their energy."""
+    """Components (B,) and states (B, k + 6) of a clip's segments, and their energy."""
 
     components: Indices
     states: Floats
@@ -98,9 +98,9 @@ class ClipFit:
         Posterior standard deviations.
     sequence : ClipStates
     covariance : (B, k + 6, k + 6)
-        Of the segments' states.
+        Covariances of the segments' states.
     fit_correlation : float
-        Correlation of what the sensors read and the figure gives; NaN without sensors.
+        Correlation between sensors and the figure's responses; NaN without sensors.
     """
 
     frame: Indices
@@ -119,9 +119,9 @@ def fit_clip(clip: ClipSegments, known: ClipStates | None = None, update: Update
     ----------
     clip : ClipSegments
     known : ClipStates, optional
-        Estimate with other corrections to start from, which is quicker.
+        Estimate with other corrections from which to start, which is faster.
     update : callable, optional
-        Called with the count of segments done, of `work(clip)`.
+        Called with the number of segments done, of `work(clip)`.
     """
     chains = [known] if known is not None else _chains(clip, update)
     found = min(chains, key=lambda c: c.energy)
@@ -131,30 +131,30 @@ def fit_clip(clip: ClipSegments, known: ClipStates | None = None, update: Update
         first = _first_segments(clip)[0]
         return _finished(clip, _continuous(clip, _one_after_the_other(clip, first, None)))
     starts = list(chains)
-    if clip.corrections:  # nearly linear without the sensors: no wrong valley to fall into
+    if clip.corrections:  # without sensors it is nearly linear, with no false minima
         starts.append(_together(clip, found, looking=False))
     tried = [_together(clip, start) for start in starts]
     return _finished(clip, min(tried, key=lambda t: t.energy))
 
 
 def work(clip: ClipSegments) -> int:
-    """Largest count of segments that `fit_clip` reports to its `update`."""
+    """Largest number of segments that `fit_clip` reports to its `update`."""
     return len(clip.starts) * BEGINNINGS
 
 
 def _chains(clip: ClipSegments, update: Update | None) -> list[ClipStates]:
-    """Sequences that go on from different explanations of the first segment."""
+    """Estimate sequences from different explanations of the first segment."""
     firsts = _first_segments(clip)[:BEGINNINGS]
     return [_one_after_the_other(clip, first, _part(update, k, clip)) for k, first in enumerate(firsts)]
 
 
 def _part(update: Update | None, chain: int, clip: ClipSegments) -> Update:
-    """Progress of one chain of several."""
+    """Make the update function for one chain of several."""
     return lambda done: None if update is None else update(chain * len(clip.starts) + done)
 
 
 def _first_segments(clip: ClipSegments) -> list[Settled]:
-    """Explanations of the segment at the placement, different ones, least energy first."""
+    """Find different explanations of the segment at the placement, least energy first."""
     tried = [
         _settled(clip, clip.origin, component, start, None)
         for component in range(len(clip.shapes))
@@ -172,7 +172,7 @@ def _first_segments(clip: ClipSegments) -> list[Settled]:
 
 
 def _one_after_the_other(clip: ClipSegments, first: Settled, update: Update | None) -> ClipStates:
-    """Segments from a first one on, then back before it, each started from its neighbour."""
+    """Estimate segments forwards from a first one, then backwards, each started from its neighbour."""
     count, origin = len(clip.starts), clip.origin
     components, states = np.zeros(count, np.intp), np.zeros((count, clip.shapes[0].size))
     energy, components[origin], states[origin] = first
@@ -191,7 +191,7 @@ def _one_after_the_other(clip: ClipSegments, first: Settled, update: Update | No
 
 
 def _first_starts(clip: ClipSegments, component: int) -> list[Floats]:
-    """Where the first segment's descent starts: the mean, and along the first modes to both sides."""
+    """List starts for the first segment: the mean, and both ways along the first modes."""
     mean, sd = clip.first_modes(component)
     start = clip.mean_state()
     start[: len(mean)] = mean
@@ -206,7 +206,7 @@ def _first_starts(clip: ClipSegments, component: int) -> list[Floats]:
 def _continued(
     clip: ClipSegments, component: int, old: int, state: Floats, step: int
 ) -> tuple[Floats, Anchor]:
-    """Start of the segment after (step 1) or before (-1) a known one, and what holds it to that one."""
+    """Return a start for the segment after (step 1) or before (-1) a known one, and the anchor to it."""
     frames, hop = clip.prior.frames, clip.prior.hop
     places, _ = clip.shapes[old].positions(state, np.eye(frames), slice(None))
     sd = CORRELATED * np.hypot(clip.shapes[component].residual, LOOSE * clip.placement.stature)
@@ -231,7 +231,7 @@ def _continued(
 
 
 def _broad(clip: ClipSegments) -> Floats:
-    """Give standard deviations of a state of which only the shape is known."""
+    """Return standard deviations of a state of which only the shape is known."""
     sd = np.ones(clip.shapes[0].size)
     sd[PLACE], sd[HEADING] = 1.0, 1.0
     return sd
@@ -240,7 +240,7 @@ def _broad(clip: ClipSegments) -> Floats:
 def _settled(
     clip: ClipSegments, segment: int, component: int, state: Floats, anchor: Anchor | None
 ) -> Settled:
-    """Energy, component and state of one segment; the sensors follow it."""
+    """Minimise the energy of one segment, with sensors that follow it; return energy, component and state."""
     cost = np.inf
     for _ in range(PASSES):
         energy = clip.energy(segment, component, state, anchor=anchor)
@@ -249,7 +249,7 @@ def _settled(
 
 
 def _with_noise(clip: ClipSegments, sequence: ClipStates) -> ClipSegments:
-    """Clip whose sensors have the standard deviation that an estimate shows."""
+    """Return the clip with the sensors' standard deviation estimated from a sequence."""
     chain, _ = _chain(clip, sequence, looking=True)
     residuals = [energy.residuals(state) for energy, state in zip(chain, sequence.states, strict=True)]
     rms = float(np.sqrt(np.mean(np.concatenate(residuals) ** 2))) if any(map(len, residuals)) else np.inf
@@ -257,7 +257,7 @@ def _with_noise(clip: ClipSegments, sequence: ClipStates) -> ClipSegments:
 
 
 def _chain(clip: ClipSegments, sequence: ClipStates, looking: bool) -> tuple[list[Energy], Link]:
-    """Energies of all segments about their states, and what ties them."""
+    """Make the energies of all segments around their states, and their link."""
     chain = [
         clip.energy(s, int(c), state, looking=looking)
         for s, (c, state) in enumerate(zip(sequence.components, sequence.states, strict=True))
@@ -267,7 +267,7 @@ def _chain(clip: ClipSegments, sequence: ClipStates, looking: bool) -> tuple[lis
 
 
 def _together(clip: ClipSegments, start: ClipStates, looking: bool = True) -> ClipStates:
-    """All segments of least energy near a start, tied to their neighbours."""
+    """Minimise the energy of all segments together near a start, coupled with their neighbours."""
     states, cost = start.states, np.inf
     for _ in range(PASSES if looking else 1):
         chain, link = _chain(clip, ClipStates(start.components, states, cost), looking)
@@ -276,7 +276,7 @@ def _together(clip: ClipSegments, start: ClipStates, looking: bool = True) -> Cl
 
 
 def _continuous(clip: ClipSegments, sequence: ClipStates) -> ClipStates:
-    """Move each segment along the line of sight by the mean difference in depth where it meets the last."""
+    """Move each segment along the line of sight by its mean difference in depth from the one before."""
     hop, frames = clip.prior.hop, clip.prior.frames
     states = sequence.states.copy()
     for segment in [*range(clip.origin + 1, len(states)), *reversed(range(clip.origin))]:
@@ -293,10 +293,10 @@ def _continuous(clip: ClipSegments, sequence: ClipStates) -> ClipStates:
 
 
 def _share(clip: ClipSegments, segment: int) -> Floats:
-    """Triangular weights (T,) of a segment's frames in the blend.
+    """Compute triangular weights (T,) of a segment's frames in the blend.
 
-    The triangle is half a frame longer than the segment at both ends: a segment that came in at full slope in
-    one frame would leave a kink there.
+    The triangle is half a frame longer than the segment at both ends, since a segment that started with the
+    full slope in one frame would cause a kink.
     """
     half = 0.5 / clip.prior.fps
     since = clip.film.times[clip.frames(segment)] - clip.starts[segment] + half
@@ -304,7 +304,7 @@ def _share(clip: ClipSegments, segment: int) -> Floats:
 
 
 def blended(clip: ClipSegments, sequence: ClipStates) -> Floats:
-    """Places (T, J, 3) of all markers, metres: segments blended linearly."""
+    """Blend segments linearly to positions (T, J, 3) of all markers, metres."""
     count = len(clip.film.times)
     places, total = np.zeros((count, len(clip.prior.names), 3)), np.zeros(count)
     for s, (component, state) in enumerate(zip(sequence.components, sequence.states, strict=True)):
@@ -316,16 +316,16 @@ def blended(clip: ClipSegments, sequence: ClipStates) -> Floats:
 
 
 def linearised(clip: ClipSegments, sequence: ClipStates) -> Normal:
-    """Gauss-Newton's equations of all segments together at an estimate."""
+    """Form the Gauss-Newton equations of all segments together at an estimate."""
     chain, link = _chain(_with_noise(clip, sequence), sequence, looking=True)
     return normal(chain, link if clip.settings.joined else None, sequence.states)
 
 
 def _finished(clip: ClipSegments, sequence: ClipStates) -> ClipFit:
-    """Blend the segments linearly, with sd from the information of all of them and what they share."""
+    """Blend the segments linearly, with standard deviations from their common information matrix."""
     chain, link = _chain(clip, sequence, looking=True)
     factor = information(chain, link if clip.settings.joined else None, sequence.states)
-    overlap = clip.prior.frames / clip.prior.hop  # every frame counts in so many segments
+    overlap = clip.prior.frames / clip.prior.hop  # number of segments that contain each frame
     alike = fit_correlation(chain, sequence.states)
     drifted = drift(alike) * (clip.starts + 0.5 * clip.span - clip.placed)
     pulled = moves(chain, factor, sequence.states, drifted)
@@ -352,14 +352,14 @@ def _finished(clip: ClipSegments, sequence: ClipStates) -> ClipFit:
     )
 
 
-ENOUGH = 0.03  # statures: joints known this well in the picture need no correction
-MOST = 2.0  # corrections per frame that are counted
+ENOUGH = 0.03  # statures; joints known this well in the picture need no correction
+MOST = 2.0  # most corrections suggested per frame
 
 
 def suggestions(clip: ClipSegments, fit: ClipFit) -> list[Suggestion]:
-    """Corrections, most useful first, until every joint is known within `ENOUGH` of the stature.
+    """Suggest corrections, most useful first, until every joint is known within `ENOUGH` statures.
 
-    At most `MOST` per frame.  A correction counts for the segment that its frame lies most in the middle of.
+    At most `MOST` per frame.  A correction is counted for the segment whose middle is nearest to its frame.
     """
     joints = [j for j in JOINTS if j in clip.prior.names]
     near = 0.5 * clip.hop / float(np.median(np.diff(clip.film.times))) if len(clip.film.times) > 1 else 1.0
@@ -370,7 +370,7 @@ def suggestions(clip: ClipSegments, fit: ClipFit) -> list[Suggestion]:
 
 
 def picture_sd(clip: ClipSegments, fit: ClipFit, joints: Indices) -> Floats:
-    """Give standard deviations (T, J) of joints along an axis of the picture, pixels."""
+    """Return standard deviations (T, J) of joints along an axis of the picture, pixels."""
     found = np.zeros((len(fit.frame), len(joints)))
     for posterior in _posteriors(clip, fit, joints):
         found[posterior.frame - clip.film.first] = posterior.off / np.sqrt(2)
@@ -378,7 +378,7 @@ def picture_sd(clip: ClipSegments, fit: ClipFit, joints: Indices) -> Floats:
 
 
 def joint_covariances(clip: ClipSegments, fit: ClipFit, joints: Indices) -> Floats:
-    """Covariances (T, 3 J, 3 J) of the coordinates of a frame's joints, square metres."""
+    """Compute covariances (T, 3 J, 3 J) of the coordinates of each frame's joints, square metres."""
     found = np.zeros((len(fit.frame), 3 * len(joints), 3 * len(joints)))
     for segment, rows, frames in _middles(clip):
         shape = clip.shapes[int(fit.sequence.components[segment])]
@@ -390,7 +390,7 @@ def joint_covariances(clip: ClipSegments, fit: ClipFit, joints: Indices) -> Floa
 
 
 def _posteriors(clip: ClipSegments, fit: ClipFit, joints: Indices) -> list[FramePosterior]:
-    """Frames by the segment that they lie most in the middle of."""
+    """Make a posterior for each segment, of the frames nearest to its middle."""
     found = []
     for segment, rows, frames in _middles(clip):
         shape = clip.shapes[int(fit.sequence.components[segment])]
@@ -402,7 +402,7 @@ def _posteriors(clip: ClipSegments, fit: ClipFit, joints: Indices) -> list[Frame
 
 
 def _middles(clip: ClipSegments) -> list[tuple[int, npt.NDArray[np.bool_], Indices]]:
-    """Segments, and the frames that lie most in their middle: which of their own, and their indices."""
+    """Yield each segment with the frames nearest to its middle: which of its own, and their indices."""
     owner = np.argmin(np.abs(clip.film.times[:, None] - (clip.starts + 0.5 * clip.span)), axis=1)
     found = []
     for segment in np.unique(owner).tolist():

@@ -1,7 +1,7 @@
-"""Solve a clip again for other corrections, in a fraction of the time of the whole.
+"""Solve a clip again for other corrections, in a fraction of the time for the whole.
 
-What the sensors read is kept as it was linearised at the estimate; the corrections alone are new.  It is one
-step of the whole's own descent.
+The sensors' part is kept, as it was linearised at the estimate; only the corrections are new.  This is one
+step of the descent of the whole.
 """
 
 from __future__ import annotations
@@ -28,22 +28,22 @@ class Interactive:
     Parameters
     ----------
     clip : ClipSegments
-        With the corrections that the estimate has.
+        With the corrections of the estimate.
     fit : ClipFit
     at : Normal
-        Of `gait.lift.video.fit_clip.linearised`.
+        From `gait.lift.video.fit_clip.linearised`.
     """
 
     def __init__(self, clip: ClipSegments, fit: ClipFit, at: Normal) -> None:
         self._clip, self._fit, self._at = clip, fit, at
 
     def solve(self, corrections: Sequence[Correction]) -> Floats:
-        """Places (T, J, 3) of all markers with other corrections, metres.
+        """Compute positions (T, J, 3) of all markers with other corrections, metres.
 
         Raises
         ------
         LinAlgError
-            The estimate does not hold together without those that it had.
+            If the equations are singular without the estimate's own corrections.
         """
         diagonal, gradient = self._at.diagonal.copy(), self._at.gradient.copy()
         sequence = self._fit.sequence

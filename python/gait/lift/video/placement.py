@@ -9,12 +9,9 @@ and without one, where heading 0 is to the right of the picture and +90 degrees 
 
     {"frame": 64, "pelvis_px": [1376, 734], "height_px": 415, "heading_rad": 3.14, "stature_m": 1.65}
 
-The phase of walking, from 0 (right heel strike) to 1, determines which leg is in front.
-
-The modes of a clip's first segment where the phase of walking is known: which leg is ahead.
-
-Seen from the side both legs look alike, and a segment with left and right swapped fits as well.  The mean
-cycle of a cyclic model at a phase, turned into modes of the segment prior, decides which it is.
+The phase of walking, from 0 (right heel strike) to 1, determines which leg is in front.  Seen from the side
+both legs look alike, and a segment with left and right swapped fits as well.  `PhasePrior` converts the mean
+cycle of a cyclic model at the given phase to modes of the segment prior, which decides between them.
 """
 
 from __future__ import annotations
@@ -36,26 +33,26 @@ from gait.io.fields import Fields
 
 Floats = npt.NDArray[np.float64]
 
-PLACE_SD = 0.3  # metres on the ground, and radians of heading, unless the placement gives it
+PLACE_SD = 0.3  # metres on the ground, and radians of heading, unless the placement states it
 HEADING_SD = 0.3
 STATURE_SD = 0.03  # metres
-PHASE_SD = 0.1  # strides: a phase estimated by a person
+PHASE_SD = 0.1  # strides; of a phase estimated by a user
 RATE_SD = 0.05  # strides per second
-HEIGHT_SD = 0.05  # metres of the body over the ground: the floor may not be at 0
-FURTHEST = 1e6  # pixels or metres
-_SPACE, _PICTURE = ("pelvis",), ("pelvis_px", "height_px")  # where the person is, with and without a camera
+HEIGHT_SD = 0.05  # metres, of the body above the ground, as the floor may not be at 0
+FURTHEST = 1e6  # largest coordinate, pixels or metres
+_SPACE, _PICTURE = ("pelvis",), ("pelvis_px", "height_px")  # keys of the position with and without a camera
 _KNOWN = ("frame", *_SPACE, *_PICTURE, "heading_rad", "stature_m", "phase", "stride_hz", "sd")
 
 
 @dataclass(frozen=True)
 class Placement:
-    """The rough place of the person in one frame.
+    """Rough position of the person in one frame.
 
     Attributes
     ----------
     frame : int
     ground : (2,)
-        Pelvis, metres on the ground; with a flat view, from the point shown at `pelvis_px`.
+        Pelvis on the ground, metres; in a flat view, relative to the point at `pelvis_px`.
     heading : float
         Radians about z.
     stature : float
@@ -64,14 +61,14 @@ class Placement:
     pelvis_px : (float, float), optional
         Without a camera: the pelvis in the picture.
     height_px : float, optional
-        Without a camera: how many pixels the standing person is high.
+        Without a camera: height of the standing person in pixels.
     phase : float, optional
-        Of walking, from 0 (right heel strike) to 1.
+        Phase of walking, from 0 (right heel strike) to 1.
     stride_hz : float, optional
         Strides per second.
     phase_sd, stride_hz_sd : float
     unused : tuple of str
-        Keys of the file that have no use in this view.
+        Keys of the file that are not used in this view.
     """
 
     frame: int
@@ -122,7 +119,7 @@ def read_placement(path: str | os.PathLike[str], prior: SegmentPrior, calibrated
 
 
 def _in_picture(fields: Fields) -> dict[str, Any]:
-    """Place and size of the person in the picture."""
+    """Read position and size of the person in the picture."""
     if "pelvis_px" not in fields:
         raise fields.fail("pelvis_px", "is missing", "give the pelvis in the picture, or --camera")
     u, v = fields.array("pelvis_px", (2,), "give column and row of the pelvis, pixels")
@@ -131,7 +128,7 @@ def _in_picture(fields: Fields) -> dict[str, Any]:
 
 
 def _optional(fields: Fields, key: str) -> float | None:
-    """Read a number as a start of the tracker has it; None if absent."""
+    """Read a number with the key and range of the tracker's start; None if absent."""
     name, remedy = SCALARS[key]
     return fields.number(key, *state_range(name), remedy) if key in fields else None
 
@@ -154,19 +151,19 @@ def _sd_of(sds: Fields, key: str, usual: float) -> float:
     return float(values.max())
 
 
-UNKNOWN_SD = 0.25  # strides: a phase less certain than that is useless
+UNKNOWN_SD = 0.25  # strides; a less certain phase is useless
 
 
 @dataclass(frozen=True)
 class PhasePrior:
-    """Mean and standard deviations (K, k) of the modes of the first segment, by component."""
+    """Mean and standard deviations (K, k) of the first segment's modes, by component."""
 
     mean: Floats
     sd: Floats
 
     @staticmethod
     def of(prior: SegmentPrior, cycle: Mapping[str, Any], placement: Placement) -> PhasePrior | None:
-        """Take the phase of a placement; None if it has none, or one that is hardly known.
+        """Compute the prior from the phase of a placement; None if that has none, or a very uncertain one.
 
         Parameters
         ----------
@@ -186,12 +183,12 @@ class PhasePrior:
 def _columns(
     prior: SegmentPrior, cycle: Mapping[str, Any], placement: Placement, markers: list[str]
 ) -> Floats:
-    """Mean cycle about the pelvis in a segment's frames, and its steps by one sd of the unknowns.
+    """Compute the mean cycle about the pelvis in a segment's frames, and changes by one sd of the unknowns.
 
     Returns
     -------
     (1 + 2 + q, F, M, 3)
-        Statures: the cycle at the phase; steps by phase, by rate and by each component of the motion.
+        Statures: the cycle at the phase; changes by phase, by rate and by each component of the motion.
     """
     rate, rate_sd = (float(value) for value in cycle["GAIT"][:2])
     if placement.stride_hz is not None:
@@ -219,7 +216,7 @@ def _columns(
 
 
 def _modes(prior: SegmentPrior, component: int, markers: list[str], columns: Floats) -> tuple[Floats, Floats]:
-    """Posterior mean and standard deviations (k,) of a component's modes, seeing markers about the pelvis."""
+    """Compute the posterior (mean and sd, (k,)) of a component's modes, given markers about the pelvis."""
     index, pelvis = prior.index(markers), prior.index(["pelvis"])
     mean = prior.mean[component, :, index].swapaxes(0, 1) - prior.mean[component][:, pelvis]
     modes = prior.modes[component][:, :, index] - prior.modes[component][:, :, pelvis]

@@ -1,4 +1,4 @@
-"""Lift the person in a video: sensors, corrections, cylinder figure."""
+"""Lift the images of a video: sensors, corrections, cylinder figure."""
 
 from __future__ import annotations
 
@@ -29,8 +29,8 @@ from gait.track.from_walk import Calibration
 
 Floats = npt.NDArray[np.float64]
 
-SMALLEST = 20.0  # pixels of a person whose limbs can be distinguished
-LARGEST = 4.0  # heights of the picture
+SMALLEST = 20.0  # pixels; in a smaller person limbs cannot be distinguished
+LARGEST = 4.0  # largest height of a person, in heights of the picture
 
 Warn = Callable[[str], None]
 
@@ -44,19 +44,19 @@ class Request:
     video, placement : str
         Files.
     model, camera, corrections : str, optional
-        Files; the shipped model, a view without a camera and no corrections if left out.
+        Files; by default the shipped model, a view without a camera, and no corrections.
     scale_camera : bool
-        Whether a camera of another resolution is resized to the video's.
+        Whether to resize a camera of another resolution to the video's.
     calibration : Calibration, optional
         Camera estimated from the walk instead; its uncertainty is added to the standard deviations.
     height : float, optional
-        Stature by which it was found, metres.
+        Stature with which it was estimated, metres.
     background : str
         An image, ``auto`` (median of the clip) or ``none``.
     start, stop : int, optional
         First frame to use, and the first not to use.
     joined : bool
-        Segments are solved together; else one after the other, as in the paper.
+        Whether segments are solved together, or one after the other, as in the paper.
     """
 
     video: str
@@ -75,7 +75,7 @@ class Request:
 
 @dataclass(frozen=True)
 class LiftedVideo:
-    """Estimates without and with the corrections, and the cylinder figure of the latter."""
+    """Estimates without and with corrections, and the cylinder figure of the latter."""
 
     video: Video
     clip: ClipSegments
@@ -85,7 +85,7 @@ class LiftedVideo:
 
     @property
     def names(self) -> tuple[str, ...]:
-        """Markers that are estimated."""
+        """Names of the markers that are estimated."""
         return self.clip.prior.names
 
 
@@ -106,7 +106,7 @@ def lift_video(request: Request, prior: SegmentPrior, warn: Warn, quiet: bool) -
 
 
 def open_clip(request: Request, prior: SegmentPrior, warn: Warn, quiet: bool) -> tuple[Video, ClipSegments]:
-    """Read everything and the sensors, as `lift_video` does before it estimates."""
+    """Read the files and compute the sensors, as `lift_video` does before it estimates."""
     video = Video(request.video)
     if video.broken:
         warn(video.broken)
@@ -133,7 +133,7 @@ def open_clip(request: Request, prior: SegmentPrior, warn: Warn, quiet: bool) ->
 
 
 def _on_floor(request: Request, placement: Placement, prior: SegmentPrior) -> Placement:
-    """Placement in the world of an estimated camera: the pelvis in the picture, at its height."""
+    """Convert a placement in the picture to the world of an estimated camera, by the pelvis's height."""
     assert request.calibration is not None and request.height is not None
     pelvis = request.height * prior.mean[0, 0, prior.index(["pelvis"])[0], 2]
     ground = request.calibration.camera.on_plane(np.array(placement.pelvis_px), pelvis)[:2]
@@ -153,7 +153,7 @@ def widened(request: Request, fit: ClipFit) -> ClipFit:
 
 
 def poor_correlation(request: Request, fit_correlation: float) -> str:
-    """Words on a figure that explains little of what the sensors read."""
+    """Return a warning if the figure explains little of the sensors' readings."""
     remedy = "--background or --corrections" if request.background == "none" else "--corrections"
     return (
         f"{request.video}: the sensors hardly show the person (correlation with the stick figure "
@@ -163,7 +163,7 @@ def poor_correlation(request: Request, fit_correlation: float) -> str:
 
 
 def _frames(request: Request, video: Video, placement: Placement) -> tuple[int, int]:
-    """First frame, and the first not used."""
+    """Return the first frame, and the first frame not to use."""
     first = placement.frame if request.start is None else request.start
     stop = video.count if request.stop is None else min(request.stop, video.count)
     if first >= stop:
@@ -180,7 +180,7 @@ def _frames(request: Request, video: Video, placement: Placement) -> tuple[int, 
 
 
 def _flat(placement: Placement, prior: SegmentPrior) -> FlatView:
-    """View without a camera: the placement gives the pixels per metre."""
+    """Make a view without a camera, with pixels per metre from the placement."""
     assert placement.pelvis_px is not None and placement.height_px is not None
     pixels = placement.height_px / placement.stature
     pelvis = placement.stature * prior.mean[0, 0, prior.index(["pelvis"])[0], 2]
@@ -188,7 +188,7 @@ def _flat(placement: Placement, prior: SegmentPrior) -> FlatView:
 
 
 def _cycle(model: str | None) -> Mapping[str, Any]:
-    """Sections with a cyclic model: the model's own, or those of the shipped one."""
+    """Return the sections of a cyclic model: the given one, or else the shipped one."""
     sections = decode(read_blob(model))
     return sections if "CURV" in sections else read_cyclic(None)
 
@@ -202,7 +202,7 @@ def _film(
     frames: tuple[int, int],
     quiet: bool,
 ) -> Film:
-    """Sensors of the frames used."""
+    """Compute the sensors of the frames used."""
     pelvis = np.append(placement.ground, placement.stature * prior.mean[0, 0, prior.index(["pelvis"])[0], 2])
     if not view.visible(pelvis):
         raise UserError(
@@ -224,7 +224,7 @@ def _film(
 
 
 def _require_in_picture(path: str, video: Video, pelvis: Floats, height: float) -> None:
-    """Refuse a placement of no person in the picture: `pelvis` (2,) and `height` in pixels."""
+    """Raise UserError if a placement is not in the picture: `pelvis` (2,) and `height` in pixels."""
     wide, high = video.size
     if not SMALLEST <= height <= LARGEST * high:
         raise UserError(
@@ -239,7 +239,7 @@ def _require_in_picture(path: str, video: Video, pelvis: Floats, height: float) 
 
 
 def _fits(clip: ClipSegments, quiet: bool) -> tuple[ClipFit, ClipFit]:
-    """Estimates without and with the corrections."""
+    """Fit the clip without and with the corrections."""
     with one_thread(), progress("segments", work(clip), quiet) as update:
         free = fit_clip(replace(clip, corrections=()), update=update)
     if not clip.corrections:
@@ -249,7 +249,7 @@ def _fits(clip: ClipSegments, quiet: bool) -> tuple[ClipFit, ClipFit]:
 
 
 def _marker(clip: ClipSegments, fit: ClipFit, correction: Correction) -> Floats:
-    """Place (3,) of a correction's marker in an estimate."""
+    """Return the position (3,) of a correction's marker in an estimate."""
     found = fit.places[correction.frame - clip.film.first, clip.prior.index([correction.joint])[0]]
     return np.asarray(found)
 
@@ -264,13 +264,13 @@ def draw_overlay(path: str, lifted: LiftedVideo, quiet: bool) -> None:
 
 
 def correction_errors(clip: ClipSegments, fit: ClipFit) -> Floats:
-    """Distances (C,) in pixels of the corrections' markers from the corrections."""
+    """Distances (C,) between corrections and their markers, pixels."""
     observed = [clip.view.project(_marker(clip, fit, c)[None])[0][0] - c.uv for c in clip.corrections]
     return np.linalg.norm(np.reshape(observed, (-1, 2)), axis=1)
 
 
 def summary(lifted: LiftedVideo, most: int) -> dict[str, Any]:
-    """Figures of ``--json``, with the `most` most useful corrections."""
+    """Return the figures of ``--json``, with at most `most` of the most useful corrections."""
     clip, free, fit, figure = lifted.clip, lifted.free, lifted.fit, lifted.figure
     frames, given = len(fit.frame), len(clip.corrections)
     pixels = float(np.median([clip.view.scale(body.mean(axis=0)) for body in fit.places]))

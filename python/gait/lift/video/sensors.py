@@ -1,12 +1,11 @@
-"""Sensors of the picture: gradient magnitude over local contrast, blurred, read on a grid about the person.
+"""Sensors of the picture, and views: a calibrated camera, or flat (scaled orthographic).
 
-After Leventon & Freeman 1998, eq. 7.  The blurred fields vary slowly, so they are kept at a lower
-resolution: a clip of any size takes little memory, and the grid may move while the estimate is found.
+Sensors are gradient magnitudes over local contrast, blurred, and read on a grid around the person, after
+Leventon & Freeman 1998, eq. 7.  As the blurred fields vary slowly, they are stored at a lower resolution; so
+a clip takes little memory, whatever its size, and the grid can move during the estimation.
 
-How a person is seen: through a calibrated camera, or flat (scaled orthographic) where there is none.
-
-A view maps points to pixels and gives the exact slope of that map.  Points are in the world with a camera;
-in a flat view they are in the picture's own axes: x to the right, y away from the viewer, z up, metres.
+A view maps points to pixels, with exact derivatives.  With a camera, points are in its world; in a flat view
+they are in the picture's own axes: x to the right, y away from the viewer, z up, metres.
 """
 
 from __future__ import annotations
@@ -28,17 +27,17 @@ Field = npt.NDArray[np.float32]
 
 ROWS, COLUMNS = 10, 8
 REACH = 1.15  # height of the grid, statures
-CONTRAST = 0.035  # standard deviation of the window of local contrast, statures: 8 pixels of a person of 230
-BLUR = 0.6  # standard deviation of the sensors' blur, steps of the grid
-TALL = 240.0  # pixels of a person; larger pictures are made smaller first
-GRAIN = 4.0  # grey levels added to the contrast: noise of the camera
-FLOOR = 2.0  # medians of the picture's gradients that every place has
-SAMPLES = 3.0  # stored per standard deviation of the blur
+CONTRAST = 0.035  # standard deviation of the window of local contrast, statures; 8 pixels for a person of 230
+BLUR = 0.6  # standard deviation of the sensors' blur, in steps of the grid
+TALL = 240.0  # pixels; pictures of taller people are reduced first
+GRAIN = 4.0  # grey levels added to the contrast, for the camera's noise
+FLOOR = 2.0  # multiple of the median gradient that is subtracted everywhere
+SAMPLES = 3.0  # samples stored per standard deviation of the blur
 CHANGE = 6.0  # standard deviations of the difference to the empty scene at which a gradient counts half
 
 
 def grid(middle: Floats, stature: Floats) -> Floats:
-    """Places (T, 80, 2) of the sensors about middles of persons (T, 2) of so many pixels (T,)."""
+    """Make positions (T, 80, 2) of the sensors around middles (T, 2) of a person of `stature` (T,) pixels."""
     step = REACH / ROWS * stature
     rows, columns = np.arange(ROWS) - (ROWS - 1) / 2, np.arange(COLUMNS) - (COLUMNS - 1) / 2
     lattice = np.stack(np.meshgrid(columns, rows), axis=-1).reshape(-1, 2)
@@ -46,13 +45,13 @@ def grid(middle: Floats, stature: Floats) -> Floats:
 
 
 def blur_of(stature: float) -> float:
-    """Give the standard deviation of the blur, pixels, for a person of so many pixels."""
+    """Return the standard deviation of the blur, pixels, for a person of `stature` pixels."""
     return BLUR * REACH / ROWS * stature
 
 
 @dataclass(frozen=True)
 class Film:
-    """Sensor fields of a interval of video.
+    """Sensor fields of an interval of video.
 
     Attributes
     ----------
@@ -63,7 +62,7 @@ class Film:
     fields : (T, h, w)
         Blurred normalised gradients.
     step : (2,)
-        Columns and rows of the picture from one of their values to the next, pixels.
+        Distance between their values along columns and rows, pixels of the picture.
     blur : float
         Standard deviation of the blur, pixels.
     """
@@ -75,9 +74,9 @@ class Film:
     blur: float
 
     def read(self, frames: npt.NDArray[np.intp], places: Floats) -> Floats:
-        """Sensors (T, S) at places (T, S, 2), pixels, of frames (T,), counted from the first of the film.
+        """Read sensors (T, S) at positions (T, S, 2), pixels, in frames (T,), counted from the film's first.
 
-        Beyond the picture's edge a sensor reads what the edge shows.
+        Beyond the picture's edge a sensor has the value at the edge.
         """
         at = ((places + 0.5) / self.step - 0.5).astype(np.float32)
         rows = [
@@ -102,9 +101,9 @@ class Film:
         stature : float
             Height of the person in the picture, pixels.
         plate : Image, optional
-            The empty scene: gradients where nothing has changed are left out.
+            The empty scene; gradients where nothing differs from it are suppressed.
         update : callable, optional
-            Called with the count of frames done.
+            Called with the number of frames done.
         """
         shrink = min(1.0, TALL / stature)
         window, numbers, times, fields = CONTRAST * stature * shrink, [], [], []
@@ -146,15 +145,15 @@ def normalised_gradient(grey: Field, window: float) -> Field:
 
 
 def above_usual(edges: Field) -> Field:
-    """Take from gradients (h, w) what noise and texture give everywhere.
+    """Subtract from gradients (h, w) the part that noise and texture cause everywhere.
 
-    Else the figure looks smaller than it is: next to it contrast is high and normalised noise low.
+    Otherwise the figure would look smaller, as near it contrast is high and normalised noise low.
     """
     return np.asarray(np.maximum(edges - FLOOR * np.median(edges), 0), np.float32)
 
 
 def changed(grey: Field, plate: Field, window: float) -> Field:
-    """How much of each pixel's neighbourhood differs from the empty scene, 0 to 1, (h, w)."""
+    """Compute how much each pixel's neighbourhood differs from the empty scene, 0 to 1, (h, w)."""
     difference = np.abs(grey - plate)
     noise = float(np.median(difference)) / 0.6745 + 1.0
     square = cv2.GaussianBlur(difference, (0, 0), max(window, 0.5)) ** 2
@@ -162,27 +161,27 @@ def changed(grey: Field, plate: Field, window: float) -> Field:
 
 
 def _blurred(edges: Field, blur: float) -> Field:
-    """Blurred field, sampled `SAMPLES` times per standard deviation of the blur."""
+    """Blur a field, sampled `SAMPLES` times per standard deviation of the blur."""
     height, width = edges.shape
     step = max(blur / SAMPLES, 1.0)
     count = max(2, round(width / step)), max(2, round(height / step))
-    means = cv2.resize(edges, count, interpolation=cv2.INTER_AREA)  # their square adds step^2 / 12
+    means = cv2.resize(edges, count, interpolation=cv2.INTER_AREA)  # adds a variance of step^2 / 12
     left = np.sqrt(max(blur**2 - step**2 / 12, 0.01)) / step
     return np.asarray(cv2.GaussianBlur(means, (0, 0), left, borderType=cv2.BORDER_REPLICATE), np.float32)
 
 
-NEAREST = 0.2  # metres before the lens; nothing that is drawn comes nearer
+NEAREST = 0.2  # metres in front of the lens; nothing is drawn nearer
 
 
 class View(Protocol):
-    """What the estimate from images asks of a view."""
+    """Interface of a view for lifting images."""
 
     def project(self, points: Floats) -> tuple[Floats, Floats]:
-        """Pixels (..., 2) of points (..., 3), and slopes (..., 2, 3) of pixels by points."""
+        """Project points (..., 3) to pixels (..., 2); also return slopes (..., 2, 3) of pixels by points."""
         ...
 
     def visible(self, points: Floats) -> bool:
-        """Whether all points are before the lens."""
+        """Whether all points are in front of the lens."""
         ...
 
     def depth(self, points: Floats) -> Floats:
@@ -194,7 +193,7 @@ class View(Protocol):
         ...
 
     def growth(self, points: Floats) -> Floats:
-        """How points (..., 3) move, per share that the person is larger, without moving in the picture."""
+        """How points (..., 3) move per relative growth of the person, without moving in the picture."""
         ...
 
     def away(self, point: Floats) -> Floats:
@@ -204,7 +203,7 @@ class View(Protocol):
 
 @dataclass(frozen=True)
 class CameraView:
-    """View of a calibrated camera, lens distortion included."""
+    """View of a calibrated camera, with lens distortion."""
 
     camera: Camera
 
@@ -215,16 +214,16 @@ class CameraView:
         uv, table = cv2.projectPoints(
             flat, turn, self.camera.t, self.camera.matrix, np.asarray(self.camera.distortion)
         )
-        # a step of the point turned into the camera's axes is a step of the translation
+        # a step of the point, rotated to the camera's axes, is a step of the translation
         slope = table[:, 3:6].reshape(-1, 2, 3) @ self.camera.R
         return np.asarray(uv, float).reshape(*points.shape[:-1], 2), slope.reshape(*points.shape[:-1], 2, 3)
 
     def visible(self, points: Floats) -> bool:
-        """Whether all points are before the lens."""
+        """Whether all points are in front of the lens."""
         return bool((self.depth(points) > NEAREST).all())
 
     def depth(self, points: Floats) -> Floats:
-        """Distance before the lens along its axis."""
+        """Distance in front of the lens along its axis."""
         return self.camera.depth(points)
 
     def scale(self, point: Floats) -> float:
@@ -232,7 +231,7 @@ class CameraView:
         return self.camera.fy / max(float(self.camera.depth(point)), NEAREST)
 
     def growth(self, points: Floats) -> Floats:
-        """Away from the lens: a larger person is further away."""
+        """Away from the lens, as a larger person is further away."""
         return np.asarray(points - self.camera.centre)
 
     def away(self, point: Floats) -> Floats:
@@ -243,16 +242,16 @@ class CameraView:
 
 @dataclass(frozen=True)
 class FlatView:
-    """Scaled orthographic view (Leventon & Freeman 1998, their P drops the depth).
+    """Scaled orthographic view (Leventon & Freeman 1998, whose P drops the depth).
 
     Attributes
     ----------
     pixels : float
-        Per metre.
+        Pixels per metre.
     origin : (2,)
         Pixel of the point (0, 0, 0).
     axes : (3, 3)
-        Right, down and ahead in the world as rows; level along y if left out.
+        Right, down and forward in the world, as rows; by default level along y.
     """
 
     pixels: float
@@ -266,7 +265,7 @@ class FlatView:
         return uv, np.broadcast_to(slope, (*points.shape[:-1], 2, 3))
 
     def visible(self, points: Floats) -> bool:
-        """Nothing is behind a flat view."""
+        """Return True, as nothing is behind a flat view."""
         return True
 
     def depth(self, points: Floats) -> Floats:
@@ -278,7 +277,7 @@ class FlatView:
         return self.pixels
 
     def growth(self, points: Floats) -> Floats:
-        """Nowhere: the placement's stature is the unit of length."""
+        """Return zeros, as the placement's stature is the unit of length."""
         return np.zeros_like(points)
 
     def away(self, point: Floats) -> Floats:
