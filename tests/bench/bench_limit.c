@@ -37,7 +37,7 @@ static float between(unsigned *seed, float low, float high)
     return low + (high - low) * (float)(next(seed) & 0xffff) / 65536.0f;
 }
 
-/* Limbs of one person 190 pixels tall, a little apart in every particle; half of the particles had children. */
+/* Limbs of one person 190 pixels tall, slightly displaced in every particle; half of the particles had children. */
 static void scatter(limit_limb *limb, int32_t *parent)
 {
     unsigned seed = 7;

@@ -6,14 +6,14 @@
 #include <stdlib.h>
 #include <string.h>
 
-enum { MAX_STEPS = 2000, TURN = 3 }; /* steps in turn: of the first alone the data are in no cache */
+enum { MAX_STEPS = 2000, TURN = 3 }; /* steps in a turn: only the first one finds no data in the caches */
 
-typedef struct times { /* of each step, milliseconds */
+typedef struct times { /* milliseconds of each step */
     double wall[MAX_STEPS], cpu[MAX_STEPS], limit_wall[MAX_STEPS], limit_cpu[2][MAX_STEPS];
     double stage[BENCH_STAGES][MAX_STEPS];
 } times;
 
-typedef struct runner { /* what takes turns: a tracker, or two at the same time */
+typedef struct runner { /* takes turns with others: a tracker, or two at the same time */
     bench_result *result;
     workers crew;
     unsigned char *memory;
@@ -106,7 +106,7 @@ static void run_limit(runner *r, const bench_limit *limit)
         r->limit_cpu[1] = limit_ns(limit, limit->kept);
 }
 
-/* From the start to the scene's end, again and again, until enough steps are there. */
+/* From the start to the end of the scene, repeatedly, until there are enough steps. */
 static bool take_turn(runner *r, int32_t steps, const bench_limit *limit, message *why)
 {
     int32_t const frames = r->result->plan.scene->frames;

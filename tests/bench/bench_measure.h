@@ -26,7 +26,7 @@ typedef struct bench_result {
     bench_plan plan;
     int32_t width, height;
     const char *isa;
-    int32_t particles;             /* in the last step: more than planned while the phase is searched */
+    int32_t particles;             /* in the last step: more than configured during acquisition */
     size_t bytes;                  /* of the tracker */
     double median_ms, p99_ms;      /* of a step, time of day */
     double cpu_ms, cpu_p99_ms;     /* of the calling thread, which other programs do not lengthen */
@@ -45,6 +45,6 @@ typedef struct bench_result {
     uint64_t digest;    /* after the first round */
 } bench_result;
 
-/* Measure by the plans that results[0 .. count) hold. */
+/* Measure by the plans in results[0 .. count). */
 bool bench_measure(const gait_model *model, bench_result *results, int32_t count, message *why);
 #endif

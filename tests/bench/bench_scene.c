@@ -28,7 +28,7 @@ static void draw_plate(bench_scene *s)
                 *p++ = (uint8_t)(64 + pattern(x, y, k) / 2);
 }
 
-/* Limbs in cloth over the empty scene: each its own colour with some detail. */
+/* Clothed limbs over the empty scene, each with its own colour and some detail. */
 static void draw_frame(const bench_scene *s, const uint8_t *ids, uint8_t *out)
 {
     memcpy(out, s->plate, picture_bytes(&s->camera));

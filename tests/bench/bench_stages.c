@@ -30,7 +30,7 @@ static struct {
     int64_t evaluated, counted; /* bodies; those whose points were counted */
 } b;
 
-enum { SPARSE = 64 }; /* counting takes time that the stages should not have */
+enum { SPARSE = 64 }; /* counting takes time, which must not count for the stages */
 
 /* ---- clocks: the thread's for whole stages, the CPU's counter for their parts, which are short ---- */
 static uint64_t now(void)
@@ -46,7 +46,7 @@ static uint64_t now(void)
 #endif
 }
 
-/* Time that another program had in between does not count. */
+/* Time that other programs used in between does not count. */
 static void add(int stage, uint64_t begin)
 {
     double const ticks = (double)(now() - begin) - b.cost;
@@ -257,7 +257,7 @@ WRAP(void, likelihood_step, (gait_tracker * t))
     b.in_likelihood = false;
 }
 
-/* Tasks that belong to no stage predict the particles, or begin stages of their own. */
+/* Tasks outside all stages predict the particles, or begin stages themselves. */
 WRAP(void, task_run_beside,
      (const gait_tasks *exec, int32_t tasks, void (*beside)(void *ctx), int32_t items, int32_t block,
       task_range_fn *fn, void *ctx))
@@ -321,7 +321,7 @@ WRAP(void, fixed_lag_record, (gait_tracker * t, const gait_estimate *e))
     WHOLE(STAGE_LAG, __real_fixed_lag_record(t, e));
 }
 
-/* Parts of the likelihood that are no kernels. */
+/* Parts of the likelihood that are not kernels. */
 WRAP(void, particle_set_bodies, (const state_layout *r, const particle_set *p, int32_t begin, kin_body *out))
 {
     PART(STAGE_KINEMATICS, __real_particle_set_bodies(r, p, begin, out));
@@ -332,7 +332,7 @@ WRAP(void, kin_points, (const gait_model *m, const kin_body *body, float (*xyz)[
     PART(STAGE_KINEMATICS, __real_kin_points(m, body, xyz));
 }
 
-/* The terms: what the kernels of the others do not take is that of the edges. */
+/* The terms: time that the kernels of the others do not take belongs to the edges. */
 WRAP(void, like_evaluate, (const like_body *body))
 {
     double const others = b.ticks[STAGE_TEXTURE] + b.ticks[STAGE_SILHOUETTE] + b.ticks[STAGE_TEMPLATE];

@@ -30,7 +30,7 @@ static int32_t points(const gait_model *m)
     return m->limbs * (LIKE_HALF + EDGE_POINTS);
 }
 
-/* One line; `more`: more is better. */
+/* One line; `more`: larger is better. */
 static void line(const char *what, double wanted, double reached, bool more, const char *unit)
 {
     bool const ok = more ? reached >= wanted : reached <= wanted;

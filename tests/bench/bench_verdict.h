@@ -1,4 +1,4 @@
-/* bench_verdict.h - what was asked of the tracker's speed beside what it reached in this run. */
+/* bench_verdict.h - targets for the tracker's speed, and what this run reached. */
 #ifndef BENCH_VERDICT_H
 #define BENCH_VERDICT_H
 #include "bench_measure.h"

@@ -89,7 +89,7 @@ static int by_size(const void *a, const void *b)
     return (x > y) - (x < y);
 }
 
-/* Points of a figure that walks to and fro before the camera; about the body's proportions. */
+/* Points of a figure that walks to and fro in front of the camera, with roughly a body's proportions. */
 static void see(double time, double *uv)
 {
     double const along = 1.5 * sin(0.5 * time);

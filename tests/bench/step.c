@@ -41,7 +41,7 @@ typedef struct bench {
     message *why;
 } bench;
 
-/* Steps enough for a stable figure, fewer where they are long. */
+/* Enough steps for a stable figure, fewer if they are long. */
 static int32_t steps_for(const bench *b, int32_t particles)
 {
     enum { LEAST = 24 };
@@ -70,7 +70,7 @@ static bool same_bits(bench *b, const bench_result *x, const bench_result *y)
                        (int)x->plan.particles);
 }
 
-/* Whole rounds, as many as a 99th percentile and a frame's least time want. */
+/* Whole rounds, as many as a 99th percentile and a frame's shortest time need. */
 static int32_t rounds_of(const bench *b, int32_t frames)
 {
     enum { ROUNDS = 5 };

@@ -81,7 +81,7 @@ int LLVMFuzzerTestOneInput(const uint8_t *data, size_t size)
     more = (further){0};
     start(&s, &lift, &cue, &path, &out, &more, fuzz_take(&b));
     receiver r = {.service = &s, .log = true, .snapshot = &snapshot};
-    while (b.left > 0) { /* kind, length, and the message, without its type unless that is to be wrong */
+    while (b.left > 0) { /* kind, length, and the message, without its type unless the type is damaged */
         uint8_t const kind = fuzz_take(&b);
         size_t const stated = (size_t)(fuzz_take(&b) << 8 | fuzz_take(&b)),
                      n = stated < b.left ? stated : b.left;

@@ -57,7 +57,7 @@ static void test_valid(void)
     CHECK(!camera_valid(&c));
 }
 
-/* Numbers of OpenCV's projectPoints, which works in double. */
+/* Values from OpenCV's projectPoints, which computes in double. */
 static void test_distort(void)
 {
     gait_camera c = toward_origin();

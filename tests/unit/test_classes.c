@@ -153,7 +153,7 @@ static gait_state truth(int n, int onwards)
 }
 
 typedef struct outcome {
-    int right[3], frames[3]; /* by true class: reported under `tracking`, and of the right class */
+    int right[3], frames[3]; /* by true class: frames with status `tracking`, and those of the right class */
     float far;               /* of the pelvis, metres */
     uint64_t hash;
 } outcome;

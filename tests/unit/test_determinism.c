@@ -10,7 +10,7 @@
 
 #include "check.h"
 
-/* To refresh after a deliberate change of the tracker's numbers: run this test, read the lines it prints. */
+/* To update after a deliberate change of the tracker's numbers, run this test and read the lines it prints. */
 #define GOLDEN        UINT64_C(0xab1c44506b053741)
 #define GOLDEN_PAPER  UINT64_C(0xe0eee00bb8f43ed7)
 #define GOLDEN_GIVEN  UINT64_C(0x4fcf9b46eccefafd)
@@ -193,7 +193,7 @@ static void test_a_crowd_in_pieces(void)
     }
 }
 
-/* Each instruction set alone with every film; of several the best is used, which one film is enough to show. */
+/* Each instruction set alone with every film; of several the best one is used, which one film suffices to show. */
 static void test_instruction_sets(void)
 {
     for (uint32_t mask = 0; mask < MASKS; mask++) {

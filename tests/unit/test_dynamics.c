@@ -153,7 +153,7 @@ static void test_phase_of_rate_before(void)
     }
 }
 
-/* Paper mode: the way depends on the rate, not on the noise of the phase (eq. 8). */
+/* Paper mode: the distance walked depends on the rate, not on the noise of the phase (eq. 8). */
 static void test_paper_way(void)
 {
     dynamics const d = quiet(GAIT_MODE_PAPER, 1);
@@ -232,7 +232,7 @@ static void test_variances(void)
     CHECK_NEAR(moments_of(sampled[0][F_X], DRAWS).mean, path, 0.02);
 }
 
-/* Noise ahead lies along the heading, noise aside at right angles to it, whatever the heading (eq. 8). */
+/* Forward noise is along the heading and lateral noise at right angles to it, whatever the heading (eq. 8). */
 static void test_noise_follows_heading(void)
 {
     static const float headings[] = {0.0f, 0.7f, 2.2f, -2.2f, -0.9f};
@@ -256,7 +256,7 @@ static void test_noise_follows_heading(void)
         }
 }
 
-/* Relaxing fields end at their stationary spread, exactly, whatever the frame rate; the start's rate noise is wider. */
+/* Relaxing fields end exactly at their stationary sd, at any frame rate; the start's rate noise is wider. */
 static void test_stationary(void)
 {
     static const float steps[] = {0.05f, 0.5f};

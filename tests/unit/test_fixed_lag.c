@@ -82,7 +82,7 @@ static void test_ancestors(void)
         CHECK(memcmp(&past.mean, &e.mean, sizeof e.mean) == 0 && memcmp(&past.sd, &e.sd, sizeof e.sd) == 0);
         CHECK(memcmp(&past.pose, &e.pose, sizeof e.pose) == 0 && past.ess == e.ess);
     }
-    CHECK(fewer > SHOTS / 2); /* there are indeed fewer and fewer ancestors */
+    CHECK(fewer > SHOTS / 2); /* the number of ancestors does decrease */
     free(t);
 }
 

@@ -8,7 +8,7 @@
 #if SANITIZED
 int main(void)
 {
-    return CHECK_DONE(); /* the sanitizer has a malloc of its own */
+    return CHECK_DONE(); /* the sanitizer has its own malloc */
 }
 #else
 #include "gait_pool.h"
@@ -28,7 +28,7 @@ static _Alignas(64) unsigned char heap[HEAP];
 static atomic_size_t used;
 static atomic_bool armed;
 
-/* Blocks are cut off the front and never given back; before each stands its size. */
+/* Blocks are taken from the front and never returned; each is preceded by its size. */
 static void *take(size_t align, size_t bytes)
 {
     if (armed) {
@@ -177,7 +177,7 @@ static void fall(int kind)
     _exit(0);
 }
 
-/* The guard does notice a malloc. */
+/* The guard detects a malloc. */
 static void test_the_guard(void)
 {
     for (int kind = 0; kind < 3; kind++) {

@@ -103,7 +103,7 @@ static double stature_sd(const gait_tracker *t)
     return sqrt(square - sum * sum);
 }
 
-/* Stature stays loose as long as left and right are open, and settles when they are known. */
+/* Stature varies while left and right are unknown, and settles when they are known. */
 static void test_stature_settles_when_all_is_known(void)
 {
     double sd[2];
@@ -163,7 +163,7 @@ static void test_a_search_takes_more(void)
     toy_tracker_free(other);
 }
 
-/* Status: ambiguous while the odds are open, never tracking. */
+/* Status: ambiguous while the odds are undecided, never tracking. */
 static void test_open_odds_are_ambiguous(void)
 {
     gait_tracker *const t = begin(0.5f);

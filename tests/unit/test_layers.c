@@ -104,7 +104,7 @@ static void test_columns(void)
     CHECK(narrow > 500 && wide > 500);
 }
 
-/* The nearer one hides the farther one, whatever their indices. */
+/* The nearer limb hides the farther one, whatever their indices. */
 static void test_hiding(void)
 {
     memset(&drawn, 0xff, sizeof drawn);

@@ -23,7 +23,7 @@ static double largest_error(void)
     return largest;
 }
 
-/* Without noise the body is found, wherever it looks and stands. */
+/* Without noise the body is found, whatever its heading and position. */
 static void test_exact(void)
 {
     gait_lift_config c = toy_lift_config(GAIT_LIFT_PERSPECTIVE);

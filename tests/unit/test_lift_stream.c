@@ -16,7 +16,7 @@ enum { STREAM = 120, RATE = 30 };
 static gait_lift_frame out;
 static double uv[TOY_MARKERS * 2], sds[TOY_MARKERS];
 
-/* A prior under which people continue to walk: a pose that stays, moved by as much every frame. */
+/* A prior in which people continue to walk: a constant pose, moved by the same amount every frame. */
 static void steady_model(void)
 {
     toy_segments_fill(&toy_lift_prior, 1, 0);
@@ -36,7 +36,7 @@ static int64_t utime_of(int frame)
     return 1000000 + (int64_t)frame * 1000000 / RATE;
 }
 
-/* Places of the markers in a frame of the film: on a straight way through (0, 0), heading 0.3. */
+/* Positions of the markers in a frame of the film: on a straight path through (0, 0), heading 0.3. */
 static void body(int frame, double (*X)[3])
 {
     static double segment[TOY_SEGMENT][3];
@@ -166,7 +166,7 @@ static void estimate_of(uint64_t report, uint32_t mask, gait_lift_frame *f)
     CHECK(gait_lift_estimate(l, f, NULL) == GAIT_OK);
 }
 
-/* Only what is asked for is estimated, the same as with all the others. */
+/* Only the requested markers are estimated, with the same result as together with all others. */
 static void test_report(void)
 {
     static gait_lift_frame all;

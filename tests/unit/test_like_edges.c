@@ -39,7 +39,7 @@ static like_body one_limb(int32_t shape, const float *x, const float *y)
     return body(LANE);
 }
 
-/* Every pixel of the map holds the tensor of an edge whose normal stands at this angle; share of a full response. */
+/* Every pixel of the map has the tensor of an edge whose normal is at this angle; share of a full response. */
 static void edge_field(double angle, double share, bool any_direction)
 {
     edge_cell const e = {.trace = (int8_t)(EDGE_ONE * share),
@@ -49,7 +49,7 @@ static void edge_field(double angle, double share, bool any_direction)
         v->f.edge[i] = e;
 }
 
-/* A straight limb of width 24 and length 120 leaning at an angle: its sides' normal stands at that angle. */
+/* A straight limb of width 24 and length 120 leaning at an angle, which is also that of its sides' normal. */
 static like_body leaning(double angle)
 {
     static const double along[4] = {-60, 60, 60, -60}, side[4] = {-12, -12, 12, 12};
@@ -148,7 +148,7 @@ static void test_hidden(void)
         for (int k = 0; k < 4; k++)
             v->f.edge[i * VIEW_SIZE + column[k]] = (edge_cell){.trace = EDGE_ONE, .xx_yy = EDGE_ONE};
     CHECK_NEAR(like_edges.log_likelihood(&b), 0.0, 0.03); /* all that is visible has an edge */
-    v->outline.limb[2].depth[LANE] = 5.0f; /* now it lies behind: the second is seen, without edges */
+    v->outline.limb[2].depth[LANE] = 5.0f; /* now it is behind: the second is visible, without edges */
     draw(LANE);
     CHECK_NEAR(like_edges.log_likelihood(&b), -1.0 / 3.0, 0.03);
     v->outline.limb[1].depth[LANE] = 0.0f; /* behind the camera: no part of the average */

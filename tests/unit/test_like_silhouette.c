@@ -111,7 +111,7 @@ static void test_silent(void)
     CHECK(like_silhouette.flag == GAIT_TERM_SILHOUETTE);
 }
 
-/* The person before the wall: nearly all its area is found, and nearly nothing else. */
+/* The person in front of the wall: nearly all of the area is found, and hardly anything else. */
 static void test_scene(void)
 {
     static uint8_t wall[SCENE_PIXELS], shot[SCENE_PIXELS];

@@ -49,7 +49,7 @@ static void test_update(void)
     CHECK(template[40] == -127 * TEMPLATE_ONE);
 }
 
-/* Every half of a limb teaches the points it shows, and finds what it taught. */
+/* Each half of a limb updates the points that it shows, and then finds them again. */
 static void test_turns(void)
 {
     toy_body *const v = toy_body_new(0, GAIT_MODE_DEFAULT);

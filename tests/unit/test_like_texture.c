@@ -56,7 +56,7 @@ static void test_robust(void)
                        mixture(cos_tilt[k], -cost(diff[i]), -1.6), 0.01);
             CHECK_NEAR(limb(GAIT_MODE_DEFAULT, cos_tilt[k], 8, diff[i]),
                        mixture(cos_tilt[k] * 8.0 / 12.8, -cost(diff[i]), -1.6), 0.01);
-            CHECK(limb(GAIT_MODE_DEFAULT, cos_tilt[k], 7, diff[i]) == -1.6f); /* too few: occluded */
+            CHECK(limb(GAIT_MODE_DEFAULT, cos_tilt[k], 7, diff[i]) == -1.6f); /* too few points: occluded */
         }
     /* Bounded on both sides: neither a match nor a mismatch of one limb decides alone. */
     CHECK_NEAR(limb(GAIT_MODE_DEFAULT, 1.0, 16, 0), 0.0, 1e-5);

@@ -233,7 +233,7 @@ static void check_camera(int camera)
     }
     for (int i = 0; i < IMAGE_TERMS; i++)
         for (int k = 0; k < SHAPES; k++) {
-            /* Texture alone hardly determines the posture: both frames are wrong in the same way. */
+            /* Texture alone hardly determines the posture, because both frames have the same error. */
             float const margin = i == 0 ? (k > 8 ? -0.4f : 0.1f) : i == 1 ? 0.03f : 0.06f;
             float const nearer = f_max(sum[k][0][i], sum[k][2][i]);
             if (!(sum[k][1][i] > nearer + margin))

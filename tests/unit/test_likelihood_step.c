@@ -42,7 +42,7 @@ static void test_cameras_add(void)
             toy_tracker_step(first, 20 + n, one, &e);
             toy_tracker_step(second, 20 + n, other, &e);
             if (n == 1 && terms & GAIT_TERM_TEMPLATE)
-                break; /* what each has learned comes from its own estimate */
+                break; /* each template was learnt from its own estimate */
             for (int32_t i = 0; i < N; i++) {
                 wrong += both->loglik_raw[i] != first->loglik_raw[i] + second->loglik_raw[i];
                 alike += first->loglik_raw[i] == first->loglik_raw[0];
@@ -135,7 +135,7 @@ static void test_ancestor(void)
                 shared += a->value[k] != TEXTURE_HIDDEN && b->value[k] != TEXTURE_HIDDEN;
         }
         CHECK(shared > 60);      /* the same person a frame later */
-        if (i == 5 || i == 25) { /* worked out again from the samples */
+        if (i == 5 || i == 25) { /* computed again from the samples */
             like_body const b = {.setup = t->like,
                                  .features = &t->camera[0].features,
                                  .outline = outline_of(t, i),

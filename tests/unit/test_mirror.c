@@ -1,4 +1,4 @@
-/* The mirror of left and right: the mirrored body half a stride on, at the same place. */
+/* The mirror of left and right: the mirrored body half a stride later, at the same place. */
 #include "api/kernels.h"
 #include "filter/mirror.h"
 
@@ -72,7 +72,7 @@ static void test_the_image_is_the_mirrored_body(void)
     }
 }
 
-/* Twice is nothing; place, rate, heading and stature never change. */
+/* Mirroring twice changes nothing; place, rate, heading and stature never change. */
 static void test_twice_is_nothing(void)
 {
     state_layout const r = rule(TOY_TRUNK);

@@ -123,7 +123,7 @@ static void test_follows(void)
     toy_tracker_free(again);
 }
 
-/* The empty scene of a frame counts in that frame alone; that of the config counts where the config has the camera. */
+/* The empty scene of a frame counts only in that frame; that of the config counts if the config has the camera. */
 static void test_background(void)
 {
     gait_camera const home = camera_at(0.0f, 0.0f), away = camera_at(0.4f, 0.1f);

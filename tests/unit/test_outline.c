@@ -111,7 +111,7 @@ static void test_front_cone(void)
         }
 }
 
-/* Pointing at the camera: nothing but the ends, not cos_tilt. */
+/* Pointing at the camera: only the ends are visible, and cos_tilt does not matter. */
 static void test_pointing_cone(void)
 {
     static const float number[LIMB_SHAPE] = {0, 0.2f, 0, 0, -0.2f, 0, 0.10f, 0.06f, 0.10f, 0.06f};
@@ -235,7 +235,7 @@ typedef struct fit { /* how well polygons cover their limbs */
     int points;
 } fit;
 
-/* The ends lie on the polygon's axis, the surface inside it, and it is no wider than need be. */
+/* The ends are on the polygon's axis, the surface is inside it, and it is no wider than necessary. */
 static void check_limb(const limb_geometry *g, const view_of_limb *v, const limb_polygon *p, fit *f)
 {
     int const n = outline_vertices(g);

@@ -84,7 +84,7 @@ static void test_broken(void)
         pf_resample_systematic(&p, 123456789u);
         for (int i = 0; i < N; i++)
             CHECK(p.parent[i] != 2 && p.parent[i] != 5 && p.weight[i] == 0.125);
-        /* All of them: the weights stay unchanged, and the summary reports it. */
+        /* If all are NaN, the weights stay unchanged, and the summary reports it. */
         pf_uniform(&p);
         for (uint32_t i = 0; i < N; i++)
             ll[i] = 3.0f * uniform(i, 1);

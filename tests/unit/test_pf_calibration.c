@@ -30,7 +30,7 @@ static void linear_ranks(double claimed, double chi2[DIM])
         chi2[k] = ranks_chi2(count[k]);
 }
 
-/* Ranks are uniform, and are not for a filter that trusts the observations twice as much as it should. */
+/* Ranks are uniform, but not for a filter that trusts the observations twice as much as it should. */
 static void test_linear(void)
 {
     double right[DIM], wrong[DIM], worst = 0.0;

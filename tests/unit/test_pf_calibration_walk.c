@@ -145,7 +145,7 @@ static void crowd_start(crowd *c, const gait_state *mean)
         c->now[i] = dynamics_draw(&c->d, mean, &sd, NULL, i);
 }
 
-/* Nearly 0: ranks people who walk straight on, whose turn rates are equal, at random. */
+/* Nearly 0: gives random ranks to people who walk straight on, whose turn rates are equal. */
 static double lot(uint64_t run, int field, int32_t i)
 {
     float n[4];
@@ -198,7 +198,7 @@ static void test_ranks(int32_t runs, int32_t particles, double noise)
 
 int main(void)
 {
-    test_ranks(2000, 256, 1e3); /* next to nothing is observed: prior and motion alone */
+    test_ranks(2000, 256, 1e3); /* hardly anything is observed: only prior and motion count */
     test_ranks(400, 4096, 3.5); /* particles enough for fourteen fields */
     return CHECK_DONE();
 }

@@ -85,7 +85,7 @@ static double distance(const double a[BINS], const double b[BINS])
     return sum;
 }
 
-/* What is observed of a walk. */
+/* Observations of a walk. */
 static double observed_phase(uint64_t seed, int frame)
 {
     float n[4];

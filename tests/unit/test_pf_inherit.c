@@ -27,7 +27,7 @@ static void draw(pf *p, int32_t before, uint32_t round)
     pf_resize(p, N, word(round));
 }
 
-/* Not in the order of the particles, which many share or, in rings, each has for itself. */
+/* Ancestors in any order: shared by many particles or, in rings, one for each. */
 static void mix(pf *p, int kind, uint32_t round)
 {
     for (uint32_t i = 0; i < N; i++)

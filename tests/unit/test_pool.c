@@ -1,4 +1,4 @@
-/* The pool calls every task once for any number of threads, and returns after the last; memory is the caller's. */
+/* The pool calls every task once with any number of threads and returns after the last; the caller owns the memory. */
 #include "gait_pool.h"
 
 #include "check.h"

@@ -189,7 +189,7 @@ static void test_no_walk(void)
     CHECK(h.chi2_per_observation > 3.0f); /* from which the caller sees that nothing fits */
 }
 
-/* Drawn again and again, nine of ten truths lie within 1.64 standard deviations. */
+/* Over many draws, nine of ten truths are within 1.64 standard deviations. */
 static void test_coverage(void)
 {
     int inside = 0, all = 0;
@@ -248,7 +248,7 @@ static void test_refused(void)
     free(s);
 }
 
-/* Four frames over 0.3 s are enough, as the error states; a microsecond less is not, nor are three. */
+/* Four frames over 0.3 s suffice, as the error states; a microsecond less does not, nor do three frames. */
 static void test_fewest_frames(void)
 {
     walk const w = usual();

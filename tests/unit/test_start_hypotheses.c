@@ -74,7 +74,7 @@ static void test_particles_follow_the_probabilities(void)
     toy_tracker_free(t);
 }
 
-/* Particles of one hypothesis have its correlation; one that is none is refused. */
+/* Particles of a hypothesis have its correlation; an invalid correlation is rejected. */
 static void test_particles_are_correlated(void)
 {
     enum { STATURE = 2, X = 4 };
@@ -160,7 +160,7 @@ static void test_no_person(void)
     }
 }
 
-/* With an open phase the search for it begins once the images show a person. */
+/* With an unknown phase, acquisition begins once the images show a person. */
 static void test_open_phase(void)
 {
     gait_tracker_config const cfg = config();

@@ -101,7 +101,7 @@ static void test_hidden_in_part(void)
     toy_tracker_free(t);
 }
 
-/* The empty scene with a dark screen carried behind x metres along the way. */
+/* The empty scene with a dark screen carried past, x metres along the path. */
 static const uint8_t *screen_behind(float x)
 {
     static uint8_t picture[SCENE_PIXELS];
@@ -177,7 +177,7 @@ static double sought_at(double belt)
     return sum / redrawn;
 }
 
-/* A person on a belt is sought where they were lost, on the floor a second's walk ahead. */
+/* A person on a belt is searched for where they were lost, a person on the floor a second's walk ahead. */
 static void test_belt(void)
 {
     double const ahead = (double)(toy_walk(1.0f).pelvis[0] - toy_walk(0.0f).pelvis[0]);

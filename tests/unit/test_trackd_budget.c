@@ -21,7 +21,7 @@ static void test_age(void)
     CHECK(!budget_allows(&b, 100, 101 + 40 * MS) && b.late == 1);
     b.step_us = 15 * MS; /* leaves 25 */
     CHECK(budget_allows(&b, 0, 25 * MS) && !budget_allows(&b, 0, 25 * MS + 1));
-    b.step_us = 90 * MS; /* leaves nothing: a quarter is for the way */
+    b.step_us = 90 * MS; /* leaves nothing: a quarter is reserved for transport */
     CHECK(budget_allows(&b, 0, 10 * MS) && !budget_allows(&b, 0, 10 * MS + 1));
     CHECK(b.late == 3 && b.dropped == 3);
 }
@@ -90,7 +90,7 @@ static void test_the_number_follows_the_time(void)
     CHECK(settle(&b, 1600, 1, 2000) == 4000);
 }
 
-/* Ten times over the budget: what fits is found with the second step, and no frame is refused for the steps before. */
+/* Ten times over the budget: the second step finds the right number, and no frame is refused for earlier steps. */
 static void test_far_over_the_budget_takes_two_steps(void)
 {
     budget b = {.limit_us = 50 * MS, .low = 100, .high = 40000};
@@ -138,7 +138,7 @@ static int changes(budget *b, int32_t *particles, int32_t most, int steps)
     return count;
 }
 
-/* The number used to double every three seconds for ever, and to be halved a second later. */
+/* The number used to double every three seconds forever, and to be halved a second later. */
 static void test_what_was_too_many_is_tried_less_and_less_often(void)
 {
     enum { SECOND = 30 };
@@ -153,7 +153,7 @@ static void test_what_was_too_many_is_tried_less_and_less_often(void)
     CHECK(changes(&b, &particles, 1022, 3 * SECOND) == 2 && particles == 1000);
     particles = 511;
     CHECK(changes(&b, &particles, 1022, 4 * SECOND) == 1 &&
-          particles == 1022); /* less than that is not waited for */
+          particles == 1022); /* the daemon does not wait for less than that */
 }
 
 static void test_a_step_that_is_too_long_is_the_reason(void)

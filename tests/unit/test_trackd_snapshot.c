@@ -140,7 +140,7 @@ static bool save(size_t at, int with)
     return !f.failed;
 }
 
-/* The data are on the disk before the file has its name, and the name is before anything is reported as written. */
+/* The data are on the disk before the file gets its name, and the name before anything is reported as written. */
 static void test_order(void)
 {
     CHECK(save(0, 0) && files() == 1);

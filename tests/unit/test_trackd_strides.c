@@ -103,7 +103,7 @@ static void swap_legs(int n, gait_estimate *e)
         e->mean.phase = (float)fmod((double)e->mean.phase + 0.5, 1.0);
 }
 
-/* A jump by half a stride, a pause and a new time begin anew: no stride reaches across. */
+/* After a jump by half a stride, a pause or a new time, strides begin anew: none reaches across. */
 static void test_breaks(void)
 {
     stride_meter m = {0};

@@ -74,7 +74,7 @@ static void test_no_plate(void)
     check_error(follow(&cfg, 1, NULL), 0.03, 0.03, 0.01, 0.03);
 }
 
-/* Paper mode: it runs, resamples in every step, and follows the person for a while from a good start. */
+/* Paper mode runs, resamples in every step, and follows the person for a while from a good start. */
 static void test_paper(void)
 {
     gait_tracker_config cfg = toy_config(1), own;

@@ -196,7 +196,7 @@ static void test_ambiguous(void)
     }
 }
 
-/* While it tracks, the tracker learns what the limbs look like in every camera that sees them. */
+/* While tracking, the tracker learns the appearance of the limbs in every camera that sees them. */
 static void test_appearance(void)
 {
     gait_tracker_config const cfg = toy_config(2);
@@ -225,7 +225,7 @@ static void test_appearance(void)
     toy_tracker_free(t);
 }
 
-/* Resampling happens where the weights of the frame before were uneven, and is flagged. */
+/* Resampling happens if the weights of the previous frame were uneven, and is flagged. */
 static void test_resampling(void)
 {
     gait_tracker_config cfg = toy_config(1);

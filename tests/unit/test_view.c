@@ -239,7 +239,7 @@ static double line_row(int32_t column)
     return weight > 300.0 ? sum / weight : -1.0;
 }
 
-/* A straight line of the world, captured through a lens that bends it, is straight in the working image. */
+/* A straight line, captured through a lens that bends it, is straight in the working image. */
 static void test_line(void)
 {
     static const float lens[][5] = {

@@ -1,4 +1,4 @@
-/* Paper mode notices when the surface under the body does not walk with it, and when it does again. */
+/* Paper mode notices when the surface under the body does not move with it, and when it does again. */
 #include "tracker/tracker.h"
 #include "tracker/walk_check.h"
 
