@@ -43,11 +43,11 @@ static double fps(const bench_result *r)
     return 1e3 / r->median_ms;
 }
 
-/* As measured; and with the time of a step as many times the quoted limit as it is this machine's limit. */
+/* As measured, and scaled to the quoted limit with this machine's ratio of a step to the limit. */
 static void rate_lines(const char *what, double wanted, const bench_result *r)
 {
     line(what, wanted, fps(r), true, "fps");
-    line("    reckoned with a limit of 17 ms (times limit here / 17 ms)", wanted,
+    line("    scaled to a limit of 17 ms (times limit here / 17 ms)", wanted,
          1e3 / (r->limit_ratio * LIMIT_MS), true, "fps");
 }
 
@@ -58,7 +58,7 @@ static void thread_lines(const by_threads *many)
     line("two threads against one, 10,000 particles", 1.8, 1 / many->two->ratio, true, "times");
     line("    against a tracker on each core at the same time", 0.9,
          0.5 * many->twins->ratio / many->two->ratio, true, "times");
-    printf("    those two do %.2f times the steps of one alone: more is not in these cores\n",
+    printf("    those two do %.2f times the steps of one alone: these cores cannot do more\n",
            2 / many->twins->ratio);
 }
 
@@ -67,8 +67,8 @@ static double tail(const bench_result *r)
     return r->p99_ms / r->median_ms;
 }
 
-/* The slowest steps of all, beside the slowest runs of the limit in turns with them, whose work never changes: that
- * share is the machine's.  And the slowest frame when each takes its least time over the rounds: what is the work's. */
+/* The slowest steps, and the slowest runs of the limit in turns with them: its work never changes, so its share is the
+ * machine's.  Then the slowest frame by the least time of each frame over the rounds, which is the work's share. */
 static void latency_line(const char *what, const bench_result *r, const bench_result *twins)
 {
     bool const alone = r->plan.threads == 1;
@@ -154,27 +154,28 @@ static void parsec_lines(const verdict *v, const gait_model *m)
         "    million samples a second: %.0f in a step (%.0f without the silhouette's); PARSEC %.0f to %.0f\n",
         rate * ours / step, rate * points_read / step, rate * PARSEC_SAMPLES / PARSEC_MS[1],
         rate * PARSEC_SAMPLES / PARSEC_MS[0]);
-    printf("    likelihood stage: %.0f ns a particle\n", ns);
-    printf("    whole step: %.0f thousand particles a second and core\n", best->particles / step);
+    printf("    likelihood stage: %.0f ns per particle\n", ns);
+    printf("    whole step: %.0f thousand particles per second and core\n", best->particles / step);
 }
 
 void verdict_print(const verdict *v, const gait_model *model)
 {
     double load = 0.0;
-    printf("\nthe texture-only limit takes %.1f ms here, in turns with the steps, and took %.0f ms at most "
+    printf("\nthe texture-only limit takes %.1f ms here, in turns with the steps, and took at most %.0f ms "
            "on the\n"
-           "machine that rates were wanted of: each rate is given as measured and, as a reckoning, at that "
-           "speed\n",
+           "machine for which the target rates were set: each rate is given as measured, and scaled to that "
+           "machine\n",
            v->many[0].one->limit_ms, LIMIT_MS);
     printf("\n%-65s %8s %10s\n", "", "wanted", "this run");
     speed_lines(v);
     kernel_lines(v);
     parsec_lines(v, model);
-    line("cost of a particle, most against least, by their number", 1.15, v->most / v->least, false, "times");
-    line("cost of a particle, 1920x1080 against 640x480", 1.1, v->picture[2]->particle_ratio, false, "times");
+    line("cost per particle by number of particles, most against least", 1.15, v->most / v->least, false,
+         "times");
+    line("cost per particle, 1920x1080 against 640x480", 1.1, v->picture[2]->particle_ratio, false, "times");
     line("memory of the tracker, 10,000 particles", 12, (double)v->many[0].one->bytes / 1e6, false, "MB");
     line("    with two threads", 12, (double)v->many[0].two->bytes / 1e6, false, "MB");
-    printf("threads, numbers of particles and picture sizes took turns: their ratios are medians of those of "
+    printf("threads, numbers of particles and picture sizes took turns: their ratios are medians over "
            "single steps\n");
     if (getloadavg(&load, 1) == 1 && load > 2.5)
         printf("the machine was busy (load %.1f): only CPU times and their ratios mean something\n", load);
