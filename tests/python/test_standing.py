@@ -4,9 +4,9 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from drawn_person import FPS, camera, state_at
+from drawn_person import FPS, SIZE, camera, state_at
 
-from gait import Estimate, Flag, Model, State, TrackStatus
+from gait import Camera, Estimate, Flag, Model, State, TrackStatus
 from gait.bindings.frame import FrameKeypoints
 from gait.bindings.model import read_blob
 from gait.io import blob
@@ -22,24 +22,27 @@ NAMES = ("l_hip", "r_hip", "l_ankle", "r_ankle")
 STANDS, WALKS = 20, 90  # frames
 
 
-def track(path, stands):
+def track(path, stands, view=None, rate=0.9, depth_sd=0.0):
     """Write the track of a person who stands for some frames while the estimated phase moves on; read it."""
+    view = view or camera()
     seconds = np.arange(stands + WALKS) / FPS
     order = [MODEL.joint_names.index(name) for name in NAMES]
     noise = np.random.default_rng(1)
     estimates, found = [], {}
     for k, time in enumerate(seconds):
-        state = state_at(MODEL, SECTIONS, max(0.0, time - seconds[stands]), phase=0.3)
+        state = state_at(MODEL, SECTIONS, max(0.0, time - seconds[stands]), phase=0.3, rate=rate)
         joints = MODEL.pose(state)[0]
-        found[k] = FrameKeypoints(NAMES, camera().project(joints[order]) + noise.normal(0, 0.3, (4, 2)))
+        found[k] = FrameKeypoints(NAMES, view.project(joints[order]) + noise.normal(0, 0.3, (4, 2)))
         phase = state.phase if k > stands else 0.3 - 0.1 * (1 - k / max(stands, 1))
-        mean, sd = replace(state, phase=phase), State(phase=0.02, stride_hz=0.02, coef=np.zeros(5))
+        pelvis = state.pelvis + [depth_sd * np.sin(6.0 * time), 0.0, 0.0]
+        mean = replace(state, phase=phase, pelvis=pelvis)
+        sd = State(phase=0.02, stride_hz=0.02, pelvis=np.array([depth_sd, 0.0, 0.0]), coef=np.zeros(5))
         estimates.append(
             Estimate(round(1e6 * time), k, TrackStatus.TRACKING, Flag(0), -80.0, 100.0, 1.0, 1.0, 1.2, mean,
                      sd, mean, joints, np.full((len(joints), 3), 0.02), np.zeros(24), MODEL.joint_names)
         )  # fmt: skip
     with TrackWriter(path, 5, MODEL.joint_names, MODEL.angle_names) as rows:
-        standing = Standing(PersonKeypoints(camera(), {1: found}, 1), camera(), [rows.write])
+        standing = Standing(PersonKeypoints(view, {1: found}, 1), view, [rows.write])
         for k, (time, one) in enumerate(zip(seconds, estimates, strict=True)):
             standing.add(Frame(k, time, None), one)
         standing.finish()
@@ -62,3 +65,9 @@ def test_strides_begin_when_both_feet_have_struck(tmp_path):
 
 def test_who_walks_keeps_every_phase(tmp_path):
     assert np.isfinite(track(tmp_path / "t.csv", 0).phase).all()
+
+
+def test_who_walks_slowly_towards_a_far_camera_keeps_every_phase(tmp_path):
+    far = Camera.looking((16.0, 0.0, 1.4), (0.0, 0.0, 0.9), SIZE, 1600.0)
+    rows = track(tmp_path / "t.csv", 0, far, rate=0.5, depth_sd=0.2)
+    assert np.isfinite(rows.phase).all()

@@ -2,8 +2,8 @@
 
 A model with only walking follows a person who stands, or takes half a step, with a phase that advances
 slowly. A person stands if for `_STILL` seconds neither ankle moves relative to the hips in the picture, and
-the pelvis covers only a small part of the strides' path.  As a stride is from strike to strike of one foot,
-there is none after that until both feet have struck.
+the pelvis certainly covers only a small part of the strides' path.  As a stride is from strike to strike of
+one foot, there is none after that until both feet have struck.
 """
 
 from __future__ import annotations
@@ -87,7 +87,8 @@ class Standing:
         place = [held.estimate.mean.pelvis[:2] for held in self._held]
         seconds = self._held[-1].frame.time - self._held[0].frame.time
         way = np.mean(speed * np.array([np.cos(heading), np.sin(heading)]), axis=1) * seconds
-        return bool((place[-1] - place[0]) @ way < _WAY * way @ way)
+        unsure = np.linalg.norm(self._held[-1].estimate.sd.pelvis[:2] * way)  # sd along the way, times it
+        return bool((place[-1] - place[0]) @ way + unsure < _WAY * way @ way)
 
     def _pass_on(self, held: _Held) -> None:
         half = int(2 * held.estimate.mean.phase)
