@@ -3,7 +3,7 @@
 
 The files are gcc's call graphs (-fcallgraph-info=su), read in the folder where gcc ran.  A call through a
 pointer reaches the kernels of that name or the functions in POINTERS, otherwise every function whose address
-is taken.  The stack of functions outside the graphs is not counted: libc's, and those of a caller's threads.
+is taken.  The stack of functions outside the graphs is not counted: that of libc and of a caller's threads.
 """
 
 import re
@@ -30,7 +30,7 @@ THREADS = {"pool.c:helper"}  # on a stack of their own
 
 
 class Function(NamedTuple):
-    """Name without what gcc adds, frame in bytes, sources that it is compiled from."""
+    """Name without gcc's additions, frame in bytes, sources from which it is compiled."""
 
     name: str
     stack: int
@@ -47,12 +47,12 @@ class Graph(NamedTuple):
 
 
 def read(paths: list[str]) -> Graph:
-    """All graphs as one; statics are titled by their object file as well."""
+    """All graphs as one; static functions also have their object file in the title."""
     graph = Graph({}, {}, {})
     for path in paths:
         text = Path(path).read_text(encoding="utf-8")
         unit = UNIT.findall(text)[0]
-        if not Path(unit).exists():  # a source that moved may have left its graph
+        if not Path(unit).exists():  # the graph of a source that moved may have remained
             continue
 
         def unique(title: str, path: str = path) -> str:
@@ -68,7 +68,7 @@ def read(paths: list[str]) -> Graph:
 
 
 def taken(graph: Graph) -> set[str]:
-    """Functions whose name stands in the sources as a value; of statics in their own."""
+    """Functions whose names are used as values in the sources; static ones only in their own source."""
     files = {f for function in graph.functions.values() for f in function.files}
     values = {f: set(VALUE.findall(NO_CODE.sub(" ", Path(f).read_text(encoding="utf-8")))) for f in files}
     return {
@@ -95,7 +95,7 @@ def reached(graph: Graph, values: set[str], name: str) -> set[str]:
 
 
 def resolve(graph: Graph) -> set[str]:
-    """Add what pointers reach to the calls; returns functions that are values of none."""
+    """Add what pointers reach to the calls; return functions that no pointer can hold."""
     values = taken(graph)
     left = values - THREADS
     for source, places in graph.places.items():

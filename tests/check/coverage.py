@@ -2,8 +2,8 @@
 """coverage.py BUILD [--least-library P] [--least-tools P] [--all]: branches that tests have taken, by gcov.
 
 Counts of a source that was compiled several times (kernels by instruction set, parts of the daemon inside
-tests) are added up.  Prints each file of which less than 97 % is taken, with --all every one, and fails below
-the least shares.
+tests) are added up.  Prints each file of which less than 97 % is taken, with --all every file, and fails
+below the least shares.
 """
 
 from __future__ import annotations
@@ -57,7 +57,7 @@ def share(counts: dict) -> float:
 
 
 def main() -> int:
-    """Print; 1 if a part is below its least share."""
+    """Print; exit code 1 if a part is below its least share."""
     options = argparse.ArgumentParser(description=__doc__)
     options.add_argument("build", type=Path)
     options.add_argument("--least-library", type=float, default=0.0)

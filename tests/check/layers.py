@@ -1,8 +1,8 @@
 #!/usr/bin/env python3
 """layers.py LAYERS FOLDER OBJECT...: includes and calls stay in their folder or go to one listed before it.
 
-An object calls what its undefined symbols name.  No files include or call each other in a circle either; a
-source, the header of its name and their objects count as one file.
+The calls of an object are its undefined symbols.  Files must not include or call each other in a circle
+either; a source, the header of its name and their objects count as one file.
 """
 
 import re
@@ -31,7 +31,7 @@ def read_layers(path: Path) -> dict[str, int]:
 
 
 def include_faults(source: Path, folder: Path, order: dict[str, int]) -> list[str]:
-    """What is wrong with the includes of one file."""
+    """Faults in the includes of one file."""
     own = order.get(source.relative_to(folder).parts[0])
     if own is None:
         return [f"{source}: folder {source.parent.name} is not in LAYERS"]
@@ -60,7 +60,7 @@ def unit(path: Path) -> str:
 
 
 def calls(objects: list[str]) -> dict[str, dict[str, str]]:
-    """For each file the files it calls, each with one of the symbols."""
+    """For each file the files that it calls, each with one of the symbols."""
     if not objects:
         return {}
     out = subprocess.run(["nm", "-g", "-A", *objects], check=True, capture_output=True, text=True).stdout

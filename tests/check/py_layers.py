@@ -2,7 +2,7 @@
 """py_layers.py LAYERS PACKAGE: each part of the package imports only itself and parts listed before it.
 
 A part is a module or folder of the package, or FOLDER/NAME of one of its folders; a module belongs to the
-longest part that holds it.  No modules import each other in a circle, inside functions either.
+longest part that contains it.  Modules must not import each other in a circle, even inside functions.
 """
 
 import ast
@@ -23,13 +23,13 @@ def read_layers(path: Path) -> dict[str, int]:
 
 
 def module_of(source: Path, package: Path) -> str:
-    """Name of a module in the package, with slashes; of a folder's __init__ the folder's."""
+    """Name of a module in the package, with slashes; for a folder's __init__ the folder's name."""
     name = source.relative_to(package).with_suffix("").as_posix()
     return name.removesuffix("/__init__")
 
 
 def imported(source: Path, package: Path, modules: set[str]) -> Iterator[tuple[int, str]]:
-    """Line and module of what a module imports of its own package, inside functions too."""
+    """Line and module of each import from the own package, including those inside functions."""
     for node in ast.walk(ast.parse(source.read_text(encoding="utf-8"))):
         if isinstance(node, ast.Import):
             names = [a.name for a in node.names]
@@ -47,7 +47,7 @@ def imported(source: Path, package: Path, modules: set[str]) -> Iterator[tuple[i
 
 
 def part_of(module: str, order: dict[str, int]) -> str | None:
-    """The longest part that holds a module."""
+    """The longest part that contains a module."""
     names = module.split("/")
     tried = ("/".join(names[:n]) for n in range(len(names), 0, -1))
     return next((part for part in tried if part in order), None)

@@ -1,5 +1,5 @@
 #!/usr/bin/env python3
-"""symbols.py HEADER... LIBRARY ARCHIVE: both define for others exactly what the headers mark GAIT_API."""
+"""symbols.py HEADER... LIBRARY ARCHIVE: both export exactly the functions that the headers mark GAIT_API."""
 
 import re
 import subprocess

@@ -43,7 +43,7 @@ WORDS = {
     "misfit misfits": "fit_threshold (config), chi2 (sum), chi2_per_observation (mean)",
     "whom": "plain words for who does what",
 }
-# The same, but only where the word is an identifier of code or a piece of one: in prose it is plain English.
+# The same, but only where the word is an identifier of code or a part of one: in prose it is plain English.
 NAMES = {
     "facing": "front_back",
     "look looks looked": "features, feature extraction",
@@ -109,7 +109,7 @@ PHRASE = [(re.compile(rf"\b(?:{p})\b", re.I), to) for p, to in PHRASES.items()]
 
 
 def allowed(word: str, before: str, line: str, at: int) -> bool:
-    """The word stands here in a context that ALLOWED lists, which may begin on the line before."""
+    """The word appears here in a context that ALLOWED lists, which may begin on the line before."""
     around = ALLOWED.get(word) or ALLOWED.get(word.removesuffix("s"))
     text, at = f"{before}\n{line}", len(before) + 1 + at
     return around is not None and any(m.start() <= at < m.end() for m in re.finditer(around, text))

@@ -1,7 +1,7 @@
 #!/usr/bin/env python3
-"""Good inputs of every fuzz target, from which fuzzing starts: seeds.py FOLDER.
+"""Valid inputs of every fuzz target, from which fuzzing starts: seeds.py FOLDER.
 
-What fuzzing found beside them is kept, at its smallest, in tests/fuzz/corpus (fuzz_long.py --keep).
+Further inputs that fuzzing found are kept, minimised, in tests/fuzz/corpus (fuzz_long.py --keep).
 """
 
 from __future__ import annotations
@@ -45,7 +45,7 @@ def picture(frame: int) -> np.ndarray:
 
 
 def part(kind: int, message: object) -> bytes:
-    """One message as fuzz_messages.c wants it: kind, length, bytes without the type."""
+    """One message in the form that fuzz_messages.c reads: kind, length, bytes without the type."""
     data = message.encode()[8:]  # type: ignore[attr-defined]
     return struct.pack(">BH", kind, len(data)) + data
 
@@ -79,7 +79,7 @@ def messages(choice: int, jpeg: int | None) -> bytes:
 
 
 def files(kind: int, text: str | bytes) -> bytes:
-    """A file of fuzz_files.c: its kind, then what it holds."""
+    """A file for fuzz_files.c: its kind, then its contents."""
     return bytes([kind]) + (text.encode() if isinstance(text, str) else text)
 
 

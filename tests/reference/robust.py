@@ -15,7 +15,7 @@ FEWEST = 5  # observations of a point
 
 
 def spikes(time: Floats, uv: Floats, sd: Floats) -> list[int]:
-    """Frames (T,) in which one point (T, 2) is a spike, in the order of their removal."""
+    """Frames (T,) in which one point (T, 2) is a spike, in the order in which they are removed."""
     gone: list[int] = []
     while True:
         rows = np.array([t for t in range(len(time)) if np.isfinite(uv[t]).all() and t not in gone])
@@ -45,7 +45,7 @@ def _distances(time: Floats, uv: Floats) -> Floats:
 
 
 def _culprit(apart: Floats, far: int) -> int:
-    """Of the two at an end the inner one only if the third is off too, by half as far or less."""
+    """Of the two points at an end, the inner one is a spike only if the third is off too, by at most half."""
     count, limit = len(apart), apart[far] / 4
     if far < 2:
         return int(apart[2] > limit)

@@ -59,7 +59,7 @@ class Gaussian:
         return np.asarray(self.mean + (flat @ scores).reshape(x.shape))
 
     def draw(self, rng: np.random.Generator, residual: bool = True) -> Floats:
-        """Segment (F, J, 3) from the prior."""
+        """Segment (F, J, 3) drawn from the prior."""
         x = self.mean + np.tensordot(rng.normal(size=len(self.modes)), self.modes, 1)
         return x + rng.normal(size=x.shape) * np.sqrt(self.residual)[:, None] * residual
 
@@ -108,7 +108,7 @@ def _moves(ground_sd: float, height_sd: float) -> list[tuple[float, Floats]]:
 
 @dataclass(frozen=True)
 class System:
-    """Measurements of a Gaussian: y = design alpha + noise, the noise white and of unit variance.
+    """Measurements of a Gaussian: y = design alpha + noise, with white noise of unit variance.
 
     Attributes
     ----------
@@ -140,7 +140,7 @@ def system(gaussian: Gaussian, rows: Rows) -> System:
 
 @dataclass(frozen=True)
 class Posterior:
-    """What the measurements leave of a Gaussian.
+    """Posterior of a Gaussian after the measurements.
 
     Attributes
     ----------
@@ -149,7 +149,7 @@ class Posterior:
     alpha : (m,)
         Mean of the scores.
     covariance : (m, m)
-        Q, theirs.
+        Q, their covariance.
     log_evidence : float
         Log density of the measurements.
     """
@@ -174,7 +174,7 @@ class Posterior:
 
     @property
     def points(self) -> Floats:
-        """Posterior mean of the markers (F, J, 3), what lies outside the modes included."""
+        """Posterior mean of the markers (F, J, 3), including what lies outside the modes."""
         rest = (self.system.y - self.system.design @ self.alpha).reshape(-1, 2)
         x = self.subspace
         np.add.at(x, (self.rows.frame, self.rows.marker), np.einsum("nia,na->ni", self._gain, rest))
@@ -182,7 +182,7 @@ class Posterior:
 
     @cached_property
     def _uncertainty(self) -> tuple[Floats, Floats]:
-        """Places by the scores (F, J, 3, m), and covariance (F, J, 3, 3) of each apart from them."""
+        """Places by the scores (F, J, 3, m), and the remaining covariance (F, J, 3, 3) of each."""
         by_scores = np.moveaxis(self.gaussian.modes, 0, -1).copy()  # (F, J, 3, m)
         frames, markers = self.gaussian.mean.shape[:2]
         outside = np.eye(3) * np.broadcast_to(self.gaussian.residual, (frames, markers))[..., None, None]
@@ -241,12 +241,12 @@ def infer(gaussian: Gaussian, rows: Rows) -> Posterior:
 
 
 def _standard_deviations(covariances: Floats) -> Floats:
-    """Square roots of the diagonals (..., 3) of covariances, none below zero but for rounding."""
+    """Square roots of the diagonals (..., 3) of covariances, which only rounding can make negative."""
     return np.sqrt(np.maximum(np.diagonal(covariances, axis1=-2, axis2=-1), 0))
 
 
 def _inverse(precision: Floats) -> Floats:
-    """Invert a positive definite matrix whose rows may be of very different size."""
+    """Invert a positive definite matrix whose rows may differ greatly in size."""
     scale = 1 / np.sqrt(np.diagonal(precision))
     root = np.linalg.inv(np.linalg.cholesky(precision * np.outer(scale, scale))) * scale
     return np.asarray(root.T @ root)
@@ -322,7 +322,7 @@ def explain(prior: SegmentPrior, measure: Measure, person: Person | None = None)
 def _refined(
     prior: SegmentPrior, component: int, measure: Measure, start: float, person: Person
 ) -> Explanation:
-    """Take Gauss-Newton passes from a start until heading and place settle; the share is not yet known."""
+    """Make Gauss-Newton passes from a start until heading and place settle; the share is not yet known."""
     heading, at, ground_sd, free = start, np.array(person.at), FAR_SD, prior.headings == 0
     places: Floats | None = None
     shape: Floats | None = None
@@ -379,7 +379,7 @@ def with_turn(gaussian: Gaussian, about: Floats, pivot: Floats, offset: float) -
 
 
 def _distinct(found: list[Explanation], prior: SegmentPrior) -> list[Explanation]:
-    """One of each kind with its share, the most probable first; those of one component that met are one."""
+    """One of each kind with its share, the most probable first; equal ones of a component are merged."""
     score = np.array([_evidence(e.posterior) + np.log(prior.weights[e.component]) for e in found])
     shares = np.exp(score - score.max())
     shares /= shares.sum()
@@ -395,7 +395,7 @@ def _distinct(found: list[Explanation], prior: SegmentPrior) -> list[Explanation
 
 
 def _evidence(posterior: Posterior) -> float:
-    """Log density of the observations in the picture: rows of farther points count by longer units."""
+    """Log density of the observations in the picture: rows of farther points have longer units."""
     return posterior.log_evidence + 0.5 * float(np.log(posterior.rows.variance).sum())
 
 
@@ -441,8 +441,8 @@ def log10_volume(gaussian: Gaussian, rows: Rows) -> float:
 def likelihood_only(gaussian: Gaussian, rows: Rows) -> Floats:
     """Segment (F, J, 3) in the span of the modes that fits the measurements best, without the prior.
 
-    Of all that do, the one nearest to the mean (least squares of minimum norm); the standard deviations of
-    the observations weight them, the prior has no part.
+    Of all such segments, the one nearest to the mean (least squares of minimum norm).  The standard
+    deviations of the observations weight them.
     """
     norm = np.linalg.norm(gaussian.modes.reshape(len(gaussian.modes), -1), axis=1)
     unit = gaussian.modes / norm[:, None, None, None]

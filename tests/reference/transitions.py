@@ -1,6 +1,6 @@
-"""Dynamics of the person's state in numpy, in double precision: proves gait.Tracker.predict.
+"""Dynamics of the person's state in numpy, in double precision: checks gait.Tracker.predict.
 
-The states are those of `gait.Tracker.particles` with the pelvis replaced by the path that it sways about.
+The states are those of `gait.Tracker.particles` with the pelvis replaced by the path about which it sways.
 """
 
 from __future__ import annotations
@@ -116,7 +116,7 @@ class Transitions:
         return (stature * np.stack([-sway * np.sin(heading), sway * np.cos(heading), height])).T
 
     def move(self, before: Array, step: Step, random: np.random.Generator) -> Array:
-        """Draw where each state is after a step, shape (N, columns), as ``dynamics_move`` in dynamics.c does.
+        """Draw the state after a step for each state, shape (N, columns), as ``dynamics_move`` in dynamics.c.
 
         Parameters
         ----------
@@ -155,7 +155,7 @@ class Transitions:
         return after
 
     def _turn_rates(self, before: Array, step: Step, noise: Array, random: np.random.Generator) -> Array:
-        """Keep the turn rates, or at times draw new ones, half of which are 0."""
+        """Keep the turn rates, or sometimes draw new ones, half of which are 0."""
         c = self.config
         if not (step.turning and c.turn_time > 0):
             return before
@@ -180,7 +180,7 @@ class Transitions:
 
 
 def wrap(x: Array, turn: float) -> Array:
-    """Fold into half a turn either way."""
+    """Fold into half a turn in either direction."""
     return np.asarray((x + turn / 2) % turn - turn / 2)
 
 
@@ -190,7 +190,7 @@ def _time(noise: float) -> float:
 
 
 def _reflect(rate: Array) -> Array:
-    """Fold stride rates back into their range, as eq. 7."""
+    """Reflect stride rates back into their range, as in eq. 7."""
     low, high = RATES
     folded = np.where(rate < low, 2 * low - rate, np.where(rate > high, 2 * high - rate, rate))
     return np.clip(folded, low, high)
