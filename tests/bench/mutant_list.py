@@ -119,7 +119,7 @@ MUTANTS = (
     ),
     Mutant(
         "O 2, Fig. 5, 6",
-        "components have their spread by the number of cycles, not one less",
+        "the sd of components divides by the number of cycles, not one less",
         "python/gait/learn/prior/components.py",
         "sd=singular[:components] / np.sqrt(max(rows - 1, 1)),",
         "sd=singular[:components] / np.sqrt(max(rows, 1)),",
@@ -159,7 +159,7 @@ MUTANTS = (
     ),
     Mutant(
         "O Fig. 5, 8",
-        "what was seen is replaced by the model, too",
+        "observed entries are replaced by the model, too",
         "python/gait/learn/prior/iterated_svd.py",
         "completed = np.where(mask, values, model)",
         "completed = model",
@@ -167,7 +167,7 @@ MUTANTS = (
     ),
     Mutant(
         "O Fig. 5, 8",
-        "what was missing stays at the mean of its column",
+        "missing entries stay at the mean of their column",
         "python/gait/learn/prior/iterated_svd.py",
         "completed = np.where(mask, values, model)",
         "completed = np.where(mask, values, completed)",
@@ -175,7 +175,7 @@ MUTANTS = (
     ),
     Mutant(
         "O Fig. 5, 9",
-        "the error counts what was filled as well",
+        "the error also counts filled entries",
         "python/gait/learn/prior/iterated_svd.py",
         "rest = (completed - model)[mask]",
         "rest = (completed - model)",
@@ -192,7 +192,7 @@ MUTANTS = (
     ),
     Mutant(
         "O 2, 3",
-        "angles are the mean's alone",
+        "angles are only those of the mean",
         "libgait/src/model/kinematics_simd.h",
         "k <= components; k++) {\n        const float *const curve",
         "k <= 0 * components; k++) {\n        const float *const curve",
@@ -272,7 +272,7 @@ MUTANTS = (
     ),
     Mutant(
         "O 8",
-        "the way is backwards",
+        "the person moves backwards",
         "libgait/src/filter/dynamics_kernel.c",
         "from->f[F_STATURE][lane] * speed[lane] * turn[lane] * s->travel +",
         "-from->f[F_STATURE][lane] * speed[lane] * turn[lane] * s->travel +",
@@ -312,7 +312,7 @@ MUTANTS = (
     ),
     Mutant(
         "O 8",
-        "the way does not grow with the stature",
+        "the distance walked does not grow with the stature",
         "libgait/src/filter/dynamics_kernel.c",
         "from->f[F_STATURE][lane] * speed[lane] * turn[lane] * s->travel",
         "1.75f * speed[lane] * turn[lane] * s->travel",
@@ -320,7 +320,7 @@ MUTANTS = (
     ),
     Mutant(
         "O 8",
-        "the paper's way follows the noise of the phase",
+        "the paper's distance follows the noise of the phase",
         "libgait/src/filter/dynamics_kernel.c",
         "turn[lane] = from->f[F_RATE][lane] * s->phase_dt;",
         "turn[lane] += 0.0f;",
@@ -384,7 +384,7 @@ MUTANTS = (
     ),
     Mutant(
         "O 11",
-        "the points count as many observations",
+        "each point counts as one observation",
         "libgait/src/likelihood/texture_kernel.c",
         "(float)squares / (2.0f * var * (float)i_max(both, 1));",
         "(float)squares / (2.0f * var);",
@@ -424,7 +424,7 @@ MUTANTS = (
     ),
     Mutant(
         "O 10",
-        "fewer points are all at one height",
+        "with fewer points all are at one height",
         "libgait/src/likelihood/likelihood.c",
         "int32_t const at = i ^ (i >> 2 & 1);",
         "int32_t const at = i;",
@@ -448,7 +448,7 @@ MUTANTS = (
     ),
     Mutant(
         "O 13, lost",
-        "where the surface stayed is compared with where it walked, the wrong way round",
+        "the comparison of where the surface stayed and where it walked is reversed",
         "libgait/src/tracker/walk_check.c",
         "w->nats >= -t->cfg.stayed_nats",
         "w->nats <= t->cfg.stayed_nats",
@@ -456,7 +456,7 @@ MUTANTS = (
     ),
     Mutant(
         "O 13, lost",
-        "the body does not walk on between the frames compared",
+        "the body does not move forward between the frames compared",
         "libgait/src/tracker/walk_check.c",
         "p.f[F_X] += way * cs;",
         "p.f[F_X] -= way * cs;",
@@ -497,7 +497,7 @@ MUTANTS = (
     ),
     Mutant(
         "L 5",
-        "the marker's own part beside the modes is left out",
+        "the marker's part outside the modes is left out",
         "libgait/src/lift/segment_posterior.c",
         "mean[i] += K[i][0] * left[0] + K[i][1] * left[1];",
         "mean[i] += 0.0 * (K[i][0] * left[0] + K[i][1] * left[1]);",
@@ -553,7 +553,7 @@ MUTANTS = (
     ),
     Mutant(
         "L 7",
-        "crossing sticks are seen twice",
+        "crossing sticks count twice",
         "python/gait/lift/video/energy.py",
         "left = np.exp(-value.sum(axis=2))",
         "left = 1 - value.sum(axis=2)",
@@ -562,7 +562,7 @@ MUTANTS = (
     # ---- Leventon & Freeman 1998, as gait paper has it literally ----
     Mutant(
         "L 2",
-        "the mean is not taken out before the decomposition",
+        "the mean is not subtracted before the decomposition",
         "python/gait/paper/leventon.py",
         "np.linalg.svd(rows - mean, full_matrices=False)",
         "np.linalg.svd(rows, full_matrices=False)",
@@ -578,7 +578,7 @@ MUTANTS = (
     ),
     Mutant(
         "L 4",
-        "copies are turned by a whole turn, not a quarter",
+        "copies are rotated by a full turn, not a quarter",
         "python/gait/paper/leventon.py",
         "axis_rotation(2, np.pi / 2).T",
         "axis_rotation(2, 2 * np.pi).T",
@@ -594,7 +594,7 @@ MUTANTS = (
     ),
     Mutant(
         "L 5",
-        "the view of the mean is not taken from what is seen",
+        "the view of the mean is not subtracted from the observations",
         "python/gait/paper/leventon.py",
         "rest = (y - _view(self.segment(np.zeros(0)))).ravel() / noise",
         "rest = y.ravel() / noise",
@@ -602,7 +602,7 @@ MUTANTS = (
     ),
     Mutant(
         "L 6",
-        "the prior counts by its variance instead of its precision",
+        "the prior has its variance in place of its precision",
         "python/gait/paper/leventon.py",
         "precision = np.diag(1 / self.variance) +",
         "precision = np.diag(self.variance) +",
@@ -618,7 +618,7 @@ MUTANTS = (
     ),
     Mutant(
         "L Fig. 5",
-        "the view alone explains half of what it shows",
+        "likelihood alone explains half of the view",
         "python/gait/paper/leventon.py",
         "np.linalg.lstsq(self.visible, rest, rcond=None)[0]",
         "np.linalg.lstsq(self.visible, 0.5 * rest, rcond=None)[0]",

@@ -1,5 +1,5 @@
 #!/usr/bin/env python3
-"""stack.py LIMIT FILE.su...: no function uses more than LIMIT bytes of stack, or an amount known only at run time."""
+"""stack.py LIMIT FILE.su...: no function uses over LIMIT bytes of stack, or an amount set at run time."""
 
 import sys
 from pathlib import Path
