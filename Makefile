@@ -73,7 +73,10 @@ LESS := $(if $(SMALL),$(if $(GCC),$(GCC_LESS) $(if $(findstring aarch64,$(MACHIN
 # Flags of a source by its file name; kernels and other sources differ where no list names them.
 listed = $(if $(filter $(1),$(VECTOR_SOURCES)),$(SMALL_VECTOR),$(if $(filter $(1),$(O2_SOURCES)),$(SMALL),$(2)))
 C_FLAGS = $(if $(filter $(1),$(O3_SOURCES)),,$(call listed,$(1),$(LEAST)))
-KERNEL_FLAGS = $(if $(filter $(1),$(O3_SOURCES)),$(FAST_FLAGS),$(call listed,$(1),$(SMALL_VECTOR) $(LESS)))
+LESS_OF = $(LESS) $(if $(LESS),$(GCC_LESS_$(1)))
+VECTOR_FLAGS = $(if $(filter $(1),$(O3_SOURCES)),$(FAST_FLAGS),$(call listed,$(1),$(SMALL_VECTOR) $(call LESS_OF,$(2))))
+SCALAR_FLAGS = $(if $(filter $(1),$(O2_SCALAR_SOURCES)),$(SMALL),$(LEAST))
+KERNEL_FLAGS = $(if $(filter scalar,$(2)),$(SCALAR_FLAGS),$(VECTOR_FLAGS)) # of a source and an instruction set
 FAST_FLAGS := $(if $(GCC),$(GCC_KERNEL))
 WARN   := -Wall -Wextra -Wpedantic -Wshadow -Wconversion -Wundef -Wvla $(if $(GCC),,-Wno-pass-failed) $(if $(werror),-Werror)
 CWARN  := $(WARN) -Wstrict-prototypes -Wmissing-prototypes
@@ -88,7 +91,7 @@ KERNEL_SRC := $(sort $(wildcard libgait/src/*/*_kernel.c))
 KERNEL_OBJ := $(foreach isa,$(KERNEL_ISAS),$(KERNEL_SRC:libgait/src/%.c=$(B)/src/%.$(isa).o))
 SRC := $(filter-out $(KERNEL_SRC),$(sort $(wildcard libgait/src/*/*.c libgait/src/*/*.cpp)))
 OBJ := $(SRC:libgait/src/%=$(B)/src/%.o) $(KERNEL_OBJ)
-GONE := $(filter-out $(notdir $(SRC) $(KERNEL_SRC)),$(O3_SOURCES) $(VECTOR_SOURCES) $(O2_SOURCES))
+GONE := $(filter-out $(notdir $(SRC) $(KERNEL_SRC)),$(O3_SOURCES) $(VECTOR_SOURCES) $(O2_SOURCES) $(O2_SCALAR_SOURCES))
 $(if $(GONE),$(error libgait/flags.mk lists $(GONE), which libgait/src does not have))
 SRC_DIRS := $(sort $(dir $(OBJ)))
 UNIT := $(patsubst tests/unit/%.c,$(B)/unit/%,$(sort $(wildcard tests/unit/test_*.c)))
@@ -193,7 +196,7 @@ $(B)/src/%.cpp.o: libgait/src/%.cpp Makefile $(MADE) | $(SRC_DIRS) $(if $(filter
 
 define kernel_rule
 $(B)/src/%.$(1).o: libgait/src/%.c Makefile $(MADE) | $(SRC_DIRS)
-	$$(call log,CC   $$< ($(1)))$(CC) -std=c11 $(LIBGAIT) $(CWARN) -DKERNEL_ISA=$(1) $(if $(filter scalar,$(1)),$(LEAST),$$(call KERNEL_FLAGS,$$(notdir $$<))) $(FLAGS_$(1)) $(CFLAGS) -c $$< -o $$@
+	$$(call log,CC   $$< ($(1)))$(CC) -std=c11 $(LIBGAIT) $(CWARN) -DKERNEL_ISA=$(1) $$(call KERNEL_FLAGS,$$(notdir $$<),$(1)) $(FLAGS_$(1)) $(CFLAGS) -c $$< -o $$@
 endef
 $(foreach isa,$(KERNEL_ISAS),$(eval $(call kernel_rule,$(isa))))
 

@@ -57,6 +57,17 @@ static inline void simd16_lookup_every(int32_t bytes, const void *table, const i
                                            _mm256_loadu_si256((const __m256i_u *)(take + i))));
 #endif
 }
+#elif defined(KERNEL_SCALAR)
+static inline void simd16_lookup_every(int32_t bytes, const void *table, const int32_t *index,
+                                       const int32_t *take, int32_t *out)
+{
+    for (int32_t i = 0; i < SIMD16; i++) {
+        int32_t found = 0;
+        if (take[i] < 0)
+            memcpy(&found, (const char *)table + (ptrdiff_t)bytes * index[i], sizeof found);
+        out[i] = found; /* out may be index */
+    }
+}
 #else /* word 0 is read where nothing is taken, which is cheaper than a branch; once per file, because long */
 static __attribute__((noinline, unused)) void
 simd16_lookup_every(int32_t bytes, const void *table, const int32_t *index, const int32_t *take, int32_t *out)
