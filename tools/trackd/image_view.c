@@ -130,7 +130,9 @@ bool image_view_open(image_view *v, const void *message_bytes, size_t size, mess
 bool image_view_pixels(const image_view *v, int32_t width, int32_t height, gait_image *out, message *why)
 {
     static const struct {
-        int32_t pixelformat, format, bytes;
+        int32_t pixelformat;
+        gait_pixel_format format;
+        int32_t bytes;
         const char *name;
     } formats[] = {
         {GAITMSG_IMAGE_T_PIXEL_FORMAT_GRAY, GAIT_GREY8, 1, "grey"},
