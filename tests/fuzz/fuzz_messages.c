@@ -1,5 +1,5 @@
-/* fuzz_messages.c - any messages, in any order: gait-trackd answers or complains, with lift, keypoints, a moving camera
- * and a further one. */
+/* fuzz_messages.c - any messages, in any order: gait-trackd answers or complains, with lift, keypoints (also those of
+ * one of several people), a moving camera and a further one. */
 #include "../../tools/trackd/receiver.c"
 
 #include "daemon.h"
@@ -33,6 +33,7 @@ static void start(service *s, lift_service *lift, keypoint_cue *cue, pose_path *
     if (choice & 1) {
         keypoint_cue_open(cue, s->track.model, s->track.info.joints, 4);
         s->cue = cue;
+        out->person = choice & 32 ? 2 : 0;
     }
     if (choice & 2) {
         ok = ok && lift_service_open(lift, segments.path, &set, out, &why);

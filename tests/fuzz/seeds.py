@@ -109,7 +109,7 @@ def main() -> int:
         "start": [bytes(range(9, 200)) * 20],
         "messages": [
             messages(choice, quality)
-            for choice, quality in ((0, None), (1, 80), (10, None), (13, 60), (17, 60))
+            for choice, quality in ((0, None), (1, 80), (10, None), (13, 60), (17, 60), (33, 60))
         ],
         "files": [
             files(0, json.dumps(CAMERA.to_dict())),
