@@ -93,6 +93,7 @@ def test_classes_that_do_not_fit_are_refused() -> None:
 def test_learn_makes_classes_and_info_shows_them(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     walks, out = mocap_files.write_trials(tmp_path / "walks", 4), tmp_path / "m.gait"
     words = ["learn", str(walks), "-o", str(out), "--segments", "none", "--quiet", "--json", "--jobs", "1"]
+    words += ["--report", str(tmp_path / "report")]
     assert main([*words, "--class", "stand", "--class", "backwards", "--class", "run"]) == 0
     figures = json.loads(capsys.readouterr().out)
     assert [one["name"] for one in figures["classes"]] == ["walk", "stand", "backwards"]  # no run among them
@@ -102,6 +103,9 @@ def test_learn_makes_classes_and_info_shows_them(tmp_path: Path, capsys: pytest.
     assert "class stand: derived from the walk, stands still, 4 components" in printed
     assert "class backwards: the curves of walk in reverse" in printed
     assert gait.Model(out).classes == ("walk", "stand", "backwards")
+    page = (tmp_path / "report" / "index.html").read_text()
+    assert '<a href="#classes">Classes of motion</a>' in page
+    assert "<td>stand</td><td>derived from the walk</td>" in page and ">walk 0.7, backwards 0.3<" in page
 
 
 def test_a_class_of_one_cycle_is_refused_and_nothing_is_written(
@@ -142,6 +146,8 @@ def test_classes_are_added_to_a_model(tmp_path: Path, capsys: pytest.CaptureFixt
     assert blob.read(out)["SGMD"].tobytes() == blob.read(SHIPPED)["SGMD"].tobytes()
     assert main(["learn", str(SHIPPED), "-o", str(out), "--class", "run"]) == 2
     assert "--class run: give recordings" in capsys.readouterr().err
+    assert main(["learn", str(SHIPPED), "-o", str(out), *words, "--report", str(tmp_path / "report")]) == 2
+    assert "--report: draws what is learnt from recordings" in capsys.readouterr().err
 
 
 @pytest.mark.parametrize(

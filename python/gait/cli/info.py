@@ -44,6 +44,7 @@ def describe(sections: Mapping[str, Any], size: int, crc: int, name: str = "blob
     from gait.body.model_curves import slope_of
     from gait.io import blob
     from gait.io.fields import json_of
+    from gait.learn.report import classes
     from gait.learn.segments import summary as segment_summary
 
     result: dict[str, Any] = {
@@ -61,8 +62,8 @@ def describe(sections: Mapping[str, Any], size: int, crc: int, name: str = "blob
         result["gait"] = dict(zip(GAIT, np.round(sections["GAIT"].astype(float), 4).tolist(), strict=False))
     if "SCST" in sections:
         result["scores"] = np.round(sections["SCST"].astype(float), 4).tolist()
-    if "CLNM" in sections:
-        result["classes"] = _classes(sections)
+    if found := classes.figures(sections):
+        result["classes"] = found
     if any(tag in sections for tag in TAGS):
         result["segments"] = segment_summary.summary(SegmentPrior.from_sections(sections, name))
     if "META" in sections:
@@ -108,40 +109,16 @@ def text(name: str, s: Mapping[str, Any]) -> str:
     return "\n".join(lines)
 
 
-def _classes(sections: Mapping[str, Any]) -> list[dict[str, Any]]:
-    """Return the figures of each class of motion: rate, speed, and how often people change from it."""
-    from gait.io import blob
-
-    names = blob.unpack_names(sections["CLNM"])
-    found = []
-    for name, row, change in zip(names, sections["CLIN"], sections["CLSW"], strict=True):
-        direction, source, cycles, recordings = (int(value) for value in row)
-        own = "" if source == 0 else str(source)
-        gait = sections[f"GAI{own}" if own else "GAIT"].astype(float)
-        curves = sections[f"CUR{own}" if own else "CURV"]
-        found.append({
-            "name": name,
-            "direction": direction,
-            "curves_of": names[source],
-            "components": len(curves) - 1,
-            "cycles": cycles,
-            "recordings": recordings,
-            "stride_hz": round(gait[0], 4) if direction else 0.0,
-            "speed_statures_s": round(direction * gait[0] * gait[3], 4),
-            "changes_per_s": {to: round(float(c[0]), 4) for to, c in zip(names, change, strict=True) if c[0]},
-        })  # fmt: skip
-    return found
-
-
 def _class_line(one: Mapping[str, Any]) -> str:
-    """Describe one class."""
-    what = f"of {one['cycles']} cycles" if one["cycles"] else "derived from the walk"
-    if one["curves_of"] != one["name"]:
-        what = f"the curves of {one['curves_of']} in reverse"
-    moves = f"{one['stride_hz']:.2f} strides/s, " if one["direction"] else "stands still, "
-    changes = ", ".join(f"{to} {rate:g}" for to, rate in one["changes_per_s"].items())
+    """One class in words."""
+    from gait.learn.report.classes import words
+
+    cells = words(one)
+    source = f"of {cells['from']}" if one["cycles"] and one["curves_of"] == one["name"] else cells["from"]
+    moves = f"{cells['strides/s']} strides/s" if one["direction"] else cells["strides/s"]
     return (
-        f"class {one['name']}: {what}, {moves}{one['components']} components; changes per second: {changes}"
+        f"class {cells['class']}: {source}, {moves}, {cells['components']} components; changes per second: "
+        f"{cells['changes per second']}"
     )
 
 

@@ -19,7 +19,7 @@ from gait.learn.mocap import points
 from gait.learn.mocap.markers import plain
 from gait.learn.options import LearnOptions
 from gait.learn.prior import fit, model
-from gait.learn.report import page, summary
+from gait.learn.report import classes, page, summary
 from gait.learn.segments import fit as segment_fit
 from gait.learn.segments import summary as segment_summary
 from gait.learn.segments.corpus import Corpus
@@ -31,12 +31,18 @@ MOST_LINES = 20  # about files left out
 MOST_NAMES = 6  # of labels
 
 Note = Callable[[str], None]
+Sections = dict[str, blob.Array]
 
 
-def run(options: LearnOptions, note: Note = lambda line: None) -> dict[str, Any]:
+def run(
+    options: LearnOptions,
+    note: Note = lambda line: None,
+    complete: Callable[[Sections], Sections] = lambda sections: sections,
+) -> dict[str, Any]:
     """Learn a model, write it and its report, and return the figures of `report.summary`.
 
-    `note` gets lines that a user should know.  UsageError or UserError with one line if it cannot be done.
+    `note` gets lines that a user should know.  `complete` adds to the sections of the model before they are
+    written.  UsageError or UserError with one line if it cannot be done.
     """
     check(options, note)
     with one_thread(), Corpus() as corpus:
@@ -47,11 +53,13 @@ def run(options: LearnOptions, note: Note = lambda line: None) -> dict[str, Any]
         summary.require_filled(learned)
         _note_all(summary.notes(learned, options), note)
         prior = _segment_prior(options, corpus, note)
-        sections = model.sections(learned, options)
-        data = blob.write(options.output, sections | (segment_fit.sections(prior) if prior else {}))
+        sections = model.sections(learned, options) | (segment_fit.sections(prior) if prior else {})
+        sections = complete(sections)
+        data = blob.write(options.output, sections)
         if options.report:
             try:
-                page.write(Path(options.report), learned, options, loaded.refused, options.quiet)
+                found = classes.figures(sections)
+                page.write(Path(options.report), learned, options, loaded.refused, found, options.quiet)
             except BaseException:
                 print(f"{options.output}: the model is written; the report is not", file=sys.stderr)
                 raise

@@ -16,6 +16,7 @@ from gait.learn.classes import standing
 from gait.learn.classes.join import Change, MotionClass, join
 from gait.learn.corpus.load import NothingLeft
 from gait.learn.options import LearnOptions, SegmentOptions
+from gait.learn.report.classes import figures as class_figures
 from gait.learn.run import Note, check, run
 
 WALK, STAND, BACKWARDS, RUN = "walk", "stand", "backwards", "run"
@@ -49,25 +50,22 @@ def learn(options: LearnOptions, note: Note) -> dict[str, Any]:
         for name, source in wanted.items()
         if source or name not in DERIVED
     }
+
+    def with_classes(walk: Mapping[str, blob.Array]) -> dict[str, blob.Array]:
+        classes = [_counted(MotionClass(options.activity), walk)]
+        for name in wanted:
+            one = learnt[name] if name in learnt else _derived(name, walk, options.activity)
+            classes += [one] if one is not None else []
+        names = [one.name for one in classes]
+        return join(walk, [replace(one, changes=_changes(one.name, names)) for one in classes])
+
     if adds_to_a_model(options):
-        walk: Mapping[str, blob.Array] = read_cyclic(options.sources[0])
-        figures: dict[str, Any] = {}
+        data = blob.write(options.output, with_classes(read_cyclic(options.sources[0])))
+        figures: dict[str, Any] = {"bytes": len(data), "crc32": f"{blob.checksum(data):08x}"}
     else:
-        figures = run(alone, note)
-        walk = blob.read(options.output)
-    classes = [_counted(MotionClass(options.activity), walk)]
-    for name in wanted:
-        one = learnt[name] if name in learnt else _derived(name, walk, options.activity)
-        classes += [one] if one is not None else []
-    names = [one.name for one in classes]
-    classes = [replace(one, changes=_changes(one.name, names)) for one in classes]
-    data = blob.write(options.output, join(walk, classes))
-    figures |= {"bytes": len(data), "crc32": f"{blob.checksum(data):08x}"}
-    figures["classes"] = [
-        {"name": one.name, "direction": one.direction, "cycles": one.cycles, "recordings": one.recordings}
-        for one in classes
-    ]
-    return figures
+        figures = run(alone, note, with_classes)
+        data = Path(options.output).read_bytes()
+    return figures | {"classes": class_figures(blob.decode(data))}
 
 
 def adds_to_a_model(options: LearnOptions) -> bool:
@@ -87,6 +85,8 @@ def _parsed(options: LearnOptions) -> dict[str, str]:
         if not source and (name not in (*DERIVED, RUN) or (name == RUN and adds_to_a_model(options))):
             raise UsageError(f"--class {text}: give recordings, --class {name}=FOLDER")
         wanted[name] = source
+    if options.report and adds_to_a_model(options):
+        raise UsageError("--report: draws what is learnt from recordings; leave it out, see gait info")
     if options.segments.source == "only":
         raise UsageError("--class: cannot be used with --segments only, which learns no cyclic model")
     return wanted

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import html
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 from gait.errors import UserError
 from gait.io.files import filling
@@ -12,6 +12,7 @@ from gait.learn.cycles.sequence import Sequence
 from gait.learn.options import LearnOptions
 from gait.learn.prior import model
 from gait.learn.prior.fit import Learned
+from gait.learn.report import classes as motion_classes
 from gait.progress import progress
 from gait.web import modules
 
@@ -26,7 +27,9 @@ _STYLE = """
 figure { margin: 0; } figcaption { color: var(--faint); margin: 0 0 .5em; }
 .n { text-align: right; } td.w { font-size: 85%; color: var(--faint); }
 """
-RIGHT = ("period, ms", "cycles", "SNR", "sharpness", "residual, °")  # columns of numbers
+#: Columns of numbers.
+RIGHT = ("period, ms", "cycles", "SNR", "sharpness", "residual, °")
+_OF_CLASSES = ("strides/s", "statures/s", "components")
 
 
 def require_own(folder: Path) -> None:
@@ -46,15 +49,21 @@ def require_own(folder: Path) -> None:
 
 
 def write(
-    folder: Path, learned: Learned, options: LearnOptions, refused: list[str], quiet: bool = True
+    folder: Path,
+    learned: Learned,
+    options: LearnOptions,
+    refused: list[str],
+    classes: list[dict[str, Any]],
+    quiet: bool = True,
 ) -> None:
     """Write `folder`/*.png and `folder`/index.html, which needs no other file; all of them or none.
 
+    `classes`: `gait.learn.report.classes.figures` of the model.
     UserError if the folder cannot be made or written.
     """
     try:
         with filling(folder) as new:
-            stems = _write_all(new, learned, options.activity, refused, quiet)
+            stems = _write_all(new, learned, options.activity, refused, classes, quiet)
         for old in folder.glob("strip-*.png"):  # of a run with more components
             if old.stem not in stems:
                 old.unlink()
@@ -62,7 +71,14 @@ def write(
         raise UserError(f"--report {folder}: {error.strerror}; choose another folder") from error
 
 
-def _write_all(folder: Path, learned: Learned, activity: str, refused: list[str], quiet: bool) -> set[str]:
+def _write_all(
+    folder: Path,
+    learned: Learned,
+    activity: str,
+    refused: list[str],
+    classes: list[dict[str, Any]],
+    quiet: bool,
+) -> set[str]:
     """Write the files into an empty folder and return the stems of the figures."""
     from gait.learn.report.figures import drawings  # Matplotlib is slow to import
 
@@ -73,12 +89,14 @@ def _write_all(folder: Path, learned: Learned, activity: str, refused: list[str]
             parts.append(_figure(folder, drawing))
             links.append((drawing.stem, drawing.heading))
     stems = {stem for stem, _ in links}
+    links += [("classes", "Classes of motion")] if classes else []
     links += [("sequences", "Sequences"), *([("left-out", "Left out")] if refused else [])]
     body = [
         f"<h1>Cyclic model of {html.escape(activity)}</h1>",
         _summary(learned, refused),
         "<nav>" + " ".join(f'<a href="#{to}">{html.escape(words)}</a>' for to, words in links) + "</nav>",
         *parts,
+        _classes(classes),
         _sequences(learned),
         _left_out(refused),
         f"<p>{model.CMU}</p>" if model.from_cmu(s.source for s in learned.sequences) else "",
@@ -119,15 +137,10 @@ def _summary(learned: Learned, refused: list[str]) -> str:
 def _sequences(learned: Learned) -> str:
     """Return the table of the sequences: what was found and cut off, residuals, and evidence."""
     names = ("sequence", "subject", *RIGHT, "frames kept", "taken as", "evidence")
-    head = "".join(f"<th{_class(n)}>{n}</th>" for n in names)
     rows = [
         dict(zip(names, _row(s, found), strict=True))
         for s, found in zip(learned.sequences, model.sequence_table(learned), strict=True)
     ]
-    body = "".join(
-        "<tr>" + "".join(f"<td{_class(n)}>{html.escape(cell)}</td>" for n, cell in row.items()) + "</tr>"
-        for row in rows
-    )
     return (
         '<h2 id="sequences">Sequences</h2><p>'
         "SNR: best signal-to-noise ratio of all periods tried, summed over the angles that move; it grows "
@@ -137,14 +150,36 @@ def _sequences(learned: Learned) -> str:
         "correlation with the next cycle; legs: cosine of the lag beyond half a cycle between left and right "
         "leg; flight: share of the time with both feet off the ground; lift and steps: rise of the feet and "
         "of the ground, statures; ahead: cosine of the angle between where the pelvis faces and where it "
-        "goes.</p>"
+        "goes.</p>" + _table(rows)
+    )
+
+
+def _classes(classes: list[dict[str, Any]]) -> str:
+    """Return the table of the classes of motion; empty if the model has one."""
+    if not classes:
+        return ""
+    return (
+        '<h2 id="classes">Classes of motion</h2>'
+        "<p>Mean stride rate and speed, and how often a person changes to another class, where in the stride "
+        "that is most likely.</p>" + _table([motion_classes.words(one) for one in classes])
+    )
+
+
+def _table(rows: list[dict[str, str]]) -> str:
+    """Return a table of rows with the same columns."""
+    head = "".join(f"<th{_class(n)}>{n}</th>" for n in rows[0])
+    body = "".join(
+        "<tr>" + "".join(f"<td{_class(n)}>{html.escape(cell)}</td>" for n, cell in row.items()) + "</tr>"
+        for row in rows
+    )
+    return (
         '<div class="movable" tabindex="0" role="group" aria-label="table">'
         f"<table><tr>{head}</tr>{body}</table></div>"
     )
 
 
 def _class(column: str) -> str:
-    return ' class="n"' if column in RIGHT else ' class="w"' if column == "evidence" else ""
+    return ' class="n"' if column in (*RIGHT, *_OF_CLASSES) else ' class="w"' if column == "evidence" else ""
 
 
 def _row(s: Sequence, found: list[object]) -> list[str]:

@@ -1,0 +1,49 @@
+"""The classes of motion of a model, in figures and in words."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import Any
+
+from gait.io import blob
+
+
+def figures(sections: Mapping[str, blob.Array]) -> list[dict[str, Any]]:
+    """Return for each class its rate, speed and how often people change from it; empty without classes."""
+    if "CLNM" not in sections:
+        return []
+    names = blob.unpack_names(sections["CLNM"])
+    found = []
+    for name, row, change in zip(names, sections["CLIN"], sections["CLSW"], strict=True):
+        direction, source, cycles, recordings = (int(value) for value in row)
+        own = "" if source == 0 else str(source)
+        gait = sections[f"GAI{own}" if own else "GAIT"].astype(float)
+        curves = sections[f"CUR{own}" if own else "CURV"]
+        found.append({
+            "name": name,
+            "direction": direction,
+            "curves_of": names[source],
+            "components": len(curves) - 1,
+            "cycles": cycles,
+            "recordings": recordings,
+            "stride_hz": round(gait[0], 4) if direction else 0.0,
+            "speed_statures_s": round(direction * gait[0] * gait[3], 4),
+            "changes_per_s": {to: round(float(c[0]), 4) for to, c in zip(names, change, strict=True) if c[0]},
+        })  # fmt: skip
+    return found
+
+
+def words(one: Mapping[str, Any]) -> dict[str, str]:
+    """Describe a class of `figures`, by column of a table."""
+    source = f"{one['cycles']} cycles" if one["cycles"] else "derived from the walk"
+    if one["curves_of"] != one["name"]:
+        source = f"the curves of {one['curves_of']} in reverse"
+    moves = one["direction"] != 0
+    return {
+        "class": one["name"],
+        "from": source,
+        "strides/s": f"{one['stride_hz']:.2f}" if moves else "stands still",
+        "statures/s": f"{one['speed_statures_s']:.2f}" if moves else "",
+        "components": str(one["components"]),
+        "changes per second": ", ".join(f"{to} {rate:g}" for to, rate in one["changes_per_s"].items()),
+    }
