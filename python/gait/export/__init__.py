@@ -1,1 +1,1 @@
-"""Motion in other tools' formats: one module per format, and `motion` for their common input."""
+"""Export motion to other tools' formats: one module per format, and `motion` for their common input."""

@@ -1,7 +1,7 @@
 """Joint angles of a motion: a skeleton of constant lengths fitted to the joints by least squares.
 
-The skeleton is the package's (libgait/doc/model-format.md), with the person's own lengths.  Joints alone do
-not determine how far the pelvis is tilted forwards or the head turned: these two angles are 0.
+The skeleton is the package's (libgait/doc/model-format.md), with the person's own lengths.  Joints do not
+determine the forward tilt of the pelvis or the rotation of the head, so these two angles are 0.
 """
 
 from __future__ import annotations
@@ -16,10 +16,10 @@ from gait.body.skeleton import CHANNELS, JOINTS, axis_rotation, default_skeleton
 Array = NDArray[np.float64]
 
 FIXED = ("root_forward", "root_sway", "root_height", "root_pitch", "neck_z")
-"""Channels that are 0: those of the path are kept as the pelvis's place, the others are undetermined."""
+"""Channels that are 0: the pelvis's position replaces those of the path, and the others are undetermined."""
 _FREE = tuple(i for i, name in enumerate(CHANNELS) if name not in FIXED)
-_ROUNDS, _STEPS = 6, 12  # of lengths and angles in turns; of Gauss and Newton within
-_RIDGE = 1e-8  # metres squared per radian squared: so small that it changes nothing that joints determine
+_ROUNDS, _STEPS = 6, 12  # alternations of lengths and angles; Gauss-Newton steps within each
+_RIDGE = 1e-8  # metres squared per radian squared; too small to change what the joints determine
 _SETTLED = 1e-10  # radians
 
 
@@ -27,21 +27,21 @@ _SETTLED = 1e-10  # radians
 class Fitted:
     """A skeleton that follows a motion of T frames."""
 
-    frames: tuple[str, ...]  #: F names, parents first
+    frames: tuple[str, ...]  #: names of the F frames, parents first
     parents: tuple[int, ...]  #: (F,) -1 for the first
-    #: For each frame the axes of its rotations, one after the other: (signed axis 1..3, channel).
+    #: For each frame its rotations in order: (signed axis 1..3, channel).
     rotations: tuple[tuple[tuple[int, int], ...], ...]
     origins: Array  #: (F, 3) metres, in the parent; 0 for the first
     point_frames: NDArray[np.int64]  #: (P,) frame of each joint
     points: Array  #: (P, 3) metres, in its frame
-    angles: Array  #: (T, C) radians by channel; NaN in frames that the motion leaves out
+    angles: Array  #: (T, C) radians by channel; NaN in frames that the motion lacks
     pelvis: Array  #: (T, 3) metres, world
-    rms: float  #: distance of its joints from those of the motion, metres
+    rms: float  #: rms distance of its joints from those of the motion, metres
 
     def pose(
         self, rows: slice | NDArray[np.bool_] = slice(None)
     ) -> tuple[Array, Array, list[tuple[int, int, Array]]]:
-        """Rotations (T, F, 3, 3), origins (T, F, 3), and (channel, frame, axes (T, 3)), all in the world."""
+        """Compute, in the world, rotations (T, F, 3, 3), origins (T, F, 3), (channel, frame, axes (T, 3))."""
         angles, pelvis = self.angles[rows], self.pelvis[rows]
         turns = np.empty((len(angles), len(self.frames), 3, 3))
         origins = np.empty((len(angles), len(self.frames), 3))
@@ -56,16 +56,16 @@ class Fitted:
         return turns, origins, axes
 
     def joints(self) -> Array:
-        """Joints (T, P, 3) in the world, metres."""
+        """Compute joints (T, P, 3) in the world, metres."""
         turns, origins, _ = self.pose()
         at = self.point_frames
         return np.asarray(origins[:, at] + np.einsum("tpij,pj->tpi", turns[:, at], self.points))
 
 
 def fit(places: Array) -> Fitted:
-    """Fit lengths and angles to joints, each in turns.
+    """Fit lengths and angles to joints, alternately.
 
-    `places` (T, P, 3): of `JOINTS`, metres, world with z up; NaN in frames that are left out.
+    `places` (T, P, 3): positions of `JOINTS`, metres, world with z up; NaN in missing frames.
     """
     skeleton = default_skeleton()
     present = np.isfinite(places).all(axis=(1, 2))
@@ -100,7 +100,7 @@ def fit(places: Array) -> Fitted:
 
 
 def _stature(joints: Array) -> float:
-    """Stature that the legs suggest, metres."""
+    """Estimate the stature from the legs, metres."""
 
     def length(a: str, b: str) -> float:
         return float(
@@ -112,13 +112,13 @@ def _stature(joints: Array) -> float:
 
 
 def _heading(joints: Array) -> Array:
-    """Heading (T,) of the pelvis, radians."""
+    """Compute the heading (T,) of the pelvis, radians."""
     left = joints[:, JOINTS.index("l_hip")] - joints[:, JOINTS.index("r_hip")]
     return np.unwrap(np.arctan2(-left[:, 0], left[:, 1]))
 
 
 def _with_angles(fitted: Fitted, wanted: Array) -> Fitted:
-    """Angles and pelvis that bring the joints nearest to those wanted, by Gauss and Newton."""
+    """Find angles and pelvis for which the joints are nearest to those wanted, by Gauss-Newton."""
     free = list(_FREE)
     for _ in range(_STEPS):
         joints, rows, normal = _equations(fitted)
@@ -136,7 +136,7 @@ def _with_angles(fitted: Fitted, wanted: Array) -> Fitted:
 
 
 def _equations(fitted: Fitted) -> tuple[Array, Array, Array]:
-    """Joints (T, P, 3), their slopes (T, 3 P, n) by the free angles and the pelvis, and the normal matrix."""
+    """Compute joints (T, P, 3), slopes (T, 3 P, n) by free angles and pelvis, and the normal matrix."""
     turns, origins, axes = fitted.pose()
     at, inside, free = fitted.point_frames, _descendants(fitted.parents), list(_FREE)
     joints = origins[:, at] + np.einsum("tpij,pj->tpi", turns[:, at], fitted.points)
@@ -153,14 +153,14 @@ def _equations(fitted: Fitted) -> tuple[Array, Array, Array]:
 
 
 def standard_deviations(fitted: Fitted, covariance: Array) -> Array:
-    """Give standard deviations (T, C) of the angles, radians, 0 of `FIXED` ones, by the joints' covariance.
+    """Compute standard deviations (T, C) of the angles, radians, from the joints' covariance; 0 if `FIXED`.
 
     Parameters
     ----------
     fitted : Fitted
-        Of a motion that has all its frames.
+        Skeleton of a motion without missing frames.
     covariance : (T, 3 P, 3 P)
-        Of the coordinates of the motion's joints in a frame, square metres.
+        Covariance of the coordinates of the motion's joints in each frame, square metres.
     """
     _, rows, normal = _equations(fitted)
     by_joint = np.linalg.solve(normal, rows.transpose(0, 2, 1))[:, : len(_FREE)]
@@ -171,9 +171,9 @@ def standard_deviations(fitted: Fitted, covariance: Array) -> Array:
 
 
 def _choose_branch(angles: Array, rotation: str, flexion: str) -> None:
-    """Make an arm's angles continuous, in place: turned by half a turn and bent backwards it is the same arm.
+    """Make an arm's angles continuous, in place: rotated by half a turn and bent backwards it is the same.
 
-    Where the elbow is bent most it is bent forwards.
+    The branch is chosen so that the elbow is bent forwards where it is bent most.
     """
     turn, bend = angles[:, CHANNELS.index(rotation)], angles[:, CHANNELS.index(flexion)]
     start = int(np.abs(bend).argmax())
@@ -193,7 +193,7 @@ def _wrapped(angle: float) -> float:
 
 
 def _descendants(parents: tuple[int, ...]) -> NDArray[np.bool_]:
-    """Which frames move with which: (F, F), row by the one that turns."""
+    """Return which frames move with which, (F, F): row i for rotations of frame i."""
     inside = np.eye(len(parents), dtype=bool)
     for i, parent in enumerate(parents):
         if parent >= 0:
@@ -202,9 +202,9 @@ def _descendants(parents: tuple[int, ...]) -> NDArray[np.bool_]:
 
 
 def _with_lengths(fitted: Fitted, wanted: Array) -> Fitted:
-    """Lengths of the person: means over the motion, in the frames as they turn.
+    """Set the person's lengths to means over the motion, in the rotating frames.
 
-    Where a frame's angles decide the direction, only the distance counts: arms, legs, the top of the head.
+    Where a frame's angles determine the direction (arms, legs, top of the head), only the distance is used.
     """
     turns, origins, _ = fitted.pose()
     place = dict(zip(JOINTS, np.moveaxis(wanted, 1, 0), strict=True))
@@ -225,14 +225,14 @@ def _with_lengths(fitted: Fitted, wanted: Array) -> Fitted:
     return replace(fitted, origins=new_origins, points=new_points)
 
 
-#: Joint at which each frame begins.
+#: Joint at the origin of each frame.
 _STARTS = {
     **{"upper_arm": "shoulder", "forearm": "elbow", "thigh": "hip", "shank": "knee", "foot": "ankle"},
 }
 
 
 def _mean_in(turns: Array, origins: Array, places: Array, before: Array) -> Array:
-    """Mean place (3,) of a point in a frame; along `before` alone if that lies on an axis."""
+    """Mean position (3,) of a point in a frame; only along `before` if that is on an axis."""
     local = np.einsum("tji,tj->ti", turns, places - origins)
     if np.count_nonzero(before) == 1:
         length = np.linalg.norm(places - origins, axis=1).mean()

@@ -1,4 +1,4 @@
-"""BVH: the fitted skeleton in centimetres, y up, facing z; bones named as most importers know them."""
+"""BVH: the fitted skeleton in centimetres, y up, facing z; bones have names that most importers know."""
 
 from __future__ import annotations
 
@@ -35,7 +35,7 @@ _ORDER = "Zrotation Xrotation Yrotation"
 
 
 def write(path: Path, motion: Motion, fitted: Fitted) -> int:
-    """Write the motion; return how many frames it lacks, which repeat the one before."""
+    """Write the motion; return the number of missing frames, which repeat the previous frame."""
     present = motion.present
     source = np.maximum.accumulate(np.where(present, np.arange(len(present)), 0))
     rows = _channels(fitted)[source]
@@ -52,7 +52,7 @@ def write(path: Path, motion: Motion, fitted: Fitted) -> int:
 
 
 def _hierarchy(fitted: Fitted, i: int, depth: int) -> Iterator[str]:
-    """Lines of a bone and its children, in the order of their frames."""
+    """Write the lines of a bone and its children, in the order of their frames."""
     gap, inner = "\t" * depth, "\t" * (depth + 1)
     frame = fitted.frames[i]
     place = "" if i else "Xposition Yposition Zposition "
@@ -78,7 +78,7 @@ def _offset(place: Array) -> str:
 
 
 def _order(fitted: Fitted, i: int = 0) -> Iterator[int]:
-    """Frames as `_hierarchy` lists them."""
+    """List the frames in the order of `_hierarchy`."""
     yield i
     for k, parent in enumerate(fitted.parents):
         if parent == i:
@@ -86,7 +86,7 @@ def _order(fitted: Fitted, i: int = 0) -> Iterator[int]:
 
 
 def _channels(fitted: Fitted) -> Array:
-    """Values (T, n): place of the hips, then degrees of every bone."""
+    """Compute values (T, n): position of the hips, then degrees of every bone."""
     turns, origins, _ = fitted.pose()
     columns = [_CENTIMETRES * origins[:, 0] @ GROUND.T]
     for i in _order(fitted):
@@ -97,7 +97,7 @@ def _channels(fitted: Fitted) -> Array:
 
 
 def _zxy(turn: Array) -> Array:
-    """Degrees (T, 3) z, x, y of rotations Rz Rx Ry."""
+    """Decompose rotations Rz Rx Ry to degrees (T, 3) z, x, y."""
     x = np.arcsin(np.clip(turn[:, 2, 1], -1, 1))
     z = np.arctan2(-turn[:, 0, 1], turn[:, 1, 1])
     y = np.arctan2(-turn[:, 2, 0], turn[:, 2, 2])

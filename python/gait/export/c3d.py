@@ -13,7 +13,7 @@ _SOFTWARE = "libgait"
 
 
 def write(path: Path, motion: Motion) -> int:
-    """Write the joints; return the number of events. Frames that the motion lacks are invalid points."""
+    """Write the joints; return the number of events. In missing frames, points are marked invalid."""
     import ezc3d
 
     file = ezc3d.c3d()

@@ -1,4 +1,4 @@
-"""Other tools' files, by suffix."""
+"""Write other tools' files, chosen by suffix."""
 
 from __future__ import annotations
 
@@ -11,31 +11,31 @@ from gait.io.files import replacing
 
 SUFFIXES = (".trc", ".c3d", ".bvh", ".mot", ".parquet", ".rrd", ".mcap")
 BESIDE = {".mot": ".osim"}
-"""Suffixes of files that come with a second one, of the same name."""
+"""Suffixes of files that are written with a second file of the same name."""
 
 
 def write(
     source: str, target: str, report: Callable[[str], None] = lambda words: None, ros2: bool = False
 ) -> dict[str, Any]:
-    """Write a track, a motion of ``gait lift`` or an LCM log in the format that the target's suffix names.
+    """Write a track, a motion of ``gait lift`` or an LCM log in the format of the target's suffix.
 
     Parameters
     ----------
     source, target : str
     report : callable
-        Called with a line on what the format cannot hold.
+        Called with a line about anything that the format cannot represent.
     ros2 : bool
-        Of .mcap: messages of ROS 2 instead of Foxglove's.
+        For .mcap: write messages of ROS 2 instead of Foxglove's.
 
     Returns
     -------
     dict
-        Figures by their words.
+        Figures, by their names in words.
 
     Raises
     ------
     UserError
-        If there is no such format, or the source does not go into it.
+        If the format is unknown, or cannot represent the source.
     """
     suffix = Path(target).suffix.lower()
     if suffix not in SUFFIXES:
@@ -57,8 +57,8 @@ def _to_ros2(source: str, target: str) -> dict[str, Any]:
 
 
 def _plain(source: str, target: str, suffix: str) -> dict[str, Any]:
-    """Write what needs no skeleton."""
-    from gait.export import c3d, mcap, motion, parquet, rerun  # each has packages of its own
+    """Write a format that needs no skeleton."""
+    from gait.export import c3d, mcap, motion, parquet, rerun  # each imports its own packages
     from gait.io.trc import write_trc
 
     if suffix == ".trc":
@@ -80,7 +80,7 @@ def _plain(source: str, target: str, suffix: str) -> dict[str, Any]:
 
 
 def _fitted(source: str, target: str, suffix: str, report: Callable[[str], None]) -> dict[str, Any]:
-    """Write the motion of a skeleton."""
+    """Write a format that needs a fitted skeleton."""
     from gait.export import angles, bvh, motion, opensim
 
     found = motion.read(source)

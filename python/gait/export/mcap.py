@@ -1,4 +1,4 @@
-"""MCAP with Foxglove's schemas in JSON: a motion, or an LCM log message for message."""
+"""MCAP with Foxglove's schemas in JSON: a motion, or all messages of an LCM log."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ from gait.export.motion import Motion
 Array = NDArray[np.float64]
 
 _FRAME = "world"
-_JOINT, _BONE = 0.03, 0.02  # metres
+_JOINT, _BONE = 0.03, 0.02  # metres; sizes
 _COLOUR = {"r": 0.2, "g": 0.5, "b": 1.0, "a": 1.0}
 
 _TIME = {"type": "object", "title": "time", "properties": {k: {"type": "integer"} for k in ("sec", "nsec")}}
@@ -93,7 +93,7 @@ _ANY = {"type": "object"}
 
 
 class _Writer:
-    """Channels of one file, made when they are first used."""
+    """Writes one file; channels are created when first used."""
 
     def __init__(self, stream: Any) -> None:
         from mcap.writer import Writer
@@ -107,7 +107,7 @@ class _Writer:
     def add(
         self, topic: str, schema: str, message: Mapping[str, Any], nanoseconds: int, number: int | None = None
     ) -> None:
-        """Add a message in JSON; `number`: within its channel, counted from 0 if left out."""
+        """Add a message in JSON; `number`: of the message in its channel, by default counted from 0."""
         data = json.dumps(message, allow_nan=False).encode()
         if topic not in self._channels:
             if schema not in self._schemas:
@@ -117,7 +117,7 @@ class _Writer:
         self._write(topic, data, nanoseconds, number)
 
     def add_bytes(self, topic: str, data: bytes, nanoseconds: int, number: int) -> None:
-        """Add a message as it is, of a type that is not known or damaged."""
+        """Add the bytes of a message that is damaged or of an unknown type."""
         channel = f"{topic} as bytes"
         if channel not in self._channels:
             self._channels[channel] = self._writer.register_channel(topic, "lcm", 0)
@@ -144,7 +144,7 @@ def _writing(path: Path) -> Iterator[_Writer]:
 
 
 def write_motion(path: Path, motion: Motion) -> int:
-    """Write the frames that a motion has: /person as a scene, /state as numbers; return their number."""
+    """Write a motion's frames: /person as a scene, /state as numbers; return the number of frames."""
     rows = np.flatnonzero(motion.present).tolist()
     with _writing(path) as writer:
         for row, k in enumerate(rows):
@@ -194,7 +194,7 @@ def _stamp(nanoseconds: int) -> dict[str, int]:
 
 
 def _plain(value: Any) -> Any:
-    """Value that JSON can hold; a number that is not finite is null."""
+    """Convert a value for JSON; numbers that are not finite become null."""
     if isinstance(value, float):
         return value if math.isfinite(value) else None
     if isinstance(value, bytes | bytearray):
@@ -207,7 +207,7 @@ def _plain(value: Any) -> Any:
 
 
 def is_lcm_log(path: str | os.PathLike[str]) -> bool:
-    """Whether a file begins as an LCM log does."""
+    """Whether a file begins like an LCM log."""
     try:
         with open(path, "rb") as file:
             return file.read(4) == b"\xed\xa1\xda\x01"
@@ -216,11 +216,11 @@ def is_lcm_log(path: str | os.PathLike[str]) -> bool:
 
 
 def write_log(path: Path, log: str | os.PathLike[str]) -> dict[str, int]:
-    """Write every event of an LCM log under its channel, at its time; return messages by topic.
+    """Write every event of an LCM log with its channel and time; return the number of messages by topic.
 
-    Pictures and cameras are in Foxglove's schemas, other messages of gaitmsg field for field, unknown ones as
-    they are.  Estimates are on CHANNEL/scene as well, as a foxglove.SceneUpdate.  UserError if the log is
-    damaged.
+    Pictures and cameras are written in Foxglove's schemas, other messages of gaitmsg field by field, and
+    unknown ones as bytes.  Estimates are also written to CHANNEL/scene, as foxglove.SceneUpdate.  UserError
+    if the log is damaged.
     """
     from gait.lcm.link import events_of, generated
 
@@ -236,7 +236,7 @@ def write_log(path: Path, log: str | os.PathLike[str]) -> dict[str, int]:
                 message = None if kind is None else kind.decode(event.data)
                 if message is not None:
                     writer.add(event.channel, *_foxglove(message, at), at, event.eventnum)
-            except Exception:  # damaged, or of numbers that JSON lacks
+            except Exception:  # damaged, or with numbers that JSON cannot represent
                 message = None
             if message is None:
                 writer.add_bytes(event.channel, event.data, at, event.eventnum)
@@ -250,7 +250,7 @@ def write_log(path: Path, log: str | os.PathLike[str]) -> dict[str, int]:
 
 
 def _foxglove(message: Any, nanoseconds: int) -> tuple[str, dict[str, Any]]:
-    """Return schema and content of a message of gaitmsg; stamped by its own utime."""
+    """Return schema and content of a message of gaitmsg, with its own utime as time stamp."""
     name = type(message).__name__
     stamp = {
         "timestamp": _stamp(1000 * message.utime if hasattr(message, "utime") else nanoseconds),

@@ -1,4 +1,4 @@
-"""A motion to be exported: joints at equal steps of time."""
+"""A motion to export: joints at a constant frame rate."""
 
 from __future__ import annotations
 
@@ -15,19 +15,19 @@ from gait.motion.footfalls import Events, find_events
 
 Array = NDArray[np.float64]
 
-_OFF = 0.6  # of a step by which a time may miss its frame's at a constant rate
+_OFF = 0.6  # largest difference of a time from that at a constant rate, in frame intervals
 
 
 @dataclass(frozen=True)
 class Motion:
     """Joints of a person; world with z up."""
 
-    name: str  #: of the file, without suffix
-    names: tuple[str, ...]  #: P joints
+    name: str  #: name of the file, without suffix
+    names: tuple[str, ...]  #: names of the P joints
     rate: float  #: frames per second
     first: float  #: time of the first frame, seconds
-    places: Array  #: (T, P, 3) metres; NaN in frames that the track leaves out
-    track: Track  #: as it was read: its rows only
+    places: Array  #: (T, P, 3) metres; NaN in frames that the track lacks
+    track: Track  #: the track as it was read, without missing frames
 
     @property
     def time(self) -> Array:
@@ -36,24 +36,24 @@ class Motion:
 
     @property
     def present(self) -> NDArray[np.bool_]:
-        """Which frames the track has (T,)."""
+        """Whether the track has each frame, (T,)."""
         return np.asarray(np.isfinite(self.places).all(axis=(1, 2)))
 
     def events(self) -> Events | None:
-        """Heel strikes and toe-offs, seconds; None where too few frames are there."""
+        """Heel strikes and toe-offs, seconds; None if there are too few frames."""
         return find_events(self.track) if len(self.track.frame) > 2 else None
 
 
 def read(path: str | os.PathLike[str]) -> Motion:
     """Read a track of ``gait track`` or a motion of ``gait lift``.
 
-    UserError if it is none, has fewer than two frames, or no constant rate.
+    UserError if it is another file, has fewer than two frames, or has no constant frame rate.
     """
     track = read_estimates(path)
     frame, time = track.frame, track.time
     if len(frame) < 2:
         raise UserError(f"{path}: has one frame; give a motion of at least two")
-    rate = round(float((frame[-1] - frame[0]) / (time[-1] - time[0])), 3)  # times are rounded, too
+    rate = round(float((frame[-1] - frame[0]) / (time[-1] - time[0])), 3)  # times are also rounded
     late = (time - time[0]) * rate - (frame - frame[0])
     if not np.abs(late).max() < _OFF:
         raise UserError(

@@ -1,7 +1,7 @@
 """OpenSim: a model (.osim) scaled to the person, and its coordinates over time (.mot).
 
-The ground is that of .trc files: x_trc = y, y_trc = z (up), z_trc = x.  Bodies have x forwards, y up, z to
-the right.
+The ground frame is that of .trc files: x_trc = y, y_trc = z (up), z_trc = x.  In bodies x is forward, y up
+and z to the right.
 """
 
 from __future__ import annotations
@@ -20,9 +20,9 @@ from gait.export.motion import Motion
 Array = NDArray[np.float64]
 
 GROUND = np.array([[0.0, 1, 0], [0, 0, 1], [1, 0, 0]])  #: world to ground of .trc
-BODY = np.array([[1.0, 0, 0], [0, 0, 1], [0, -1, 0]])  #: axes of the package's frames to those of bodies
+BODY = np.array([[1.0, 0, 0], [0, 0, 1], [0, -1, 0]])  #: axes of the package's frames to axes of bodies
 
-#: Names of coordinates by channel; those of both sides end in _l and _r.
+#: Names of coordinates by channel; names for the sides end in _l and _r.
 _NAMES = {
     "root_yaw": "pelvis_rotation",
     "root_pitch": "pelvis_tilt",
@@ -40,7 +40,7 @@ _NAMES = {
     **{f"{{s}}_{joint}_flexion": f"{joint}_flexion" for joint in ("elbow", "knee", "ankle")},
 }
 _PATH = ("pelvis_tx", "pelvis_ty", "pelvis_tz")
-#: Masses of bodies over the person's (Winter 2009, table 4.1); the head with the neck.
+#: Masses of bodies relative to the person's (Winter 2009, table 4.1); the head includes the neck.
 _MASSES = {
     **{"pelvis": 0.142, "torso": 0.355, "head": 0.081, "upper_arm": 0.028, "forearm": 0.022},
     **{"thigh": 0.1, "shank": 0.0465, "foot": 0.0145},
@@ -49,7 +49,7 @@ _MASS = 70.0  # kg; nominal
 
 
 def coordinate(channel: int) -> str:
-    """Name of a channel's coordinate."""
+    """Return the name of a channel's coordinate."""
     name = CHANNELS[channel]
     if name in _NAMES:
         return _NAMES[name]
@@ -57,7 +57,7 @@ def coordinate(channel: int) -> str:
 
 
 def coordinates(fitted: Fitted) -> tuple[list[str], Array]:
-    """Names of all coordinates and their values (T, n), degrees and metres."""
+    """Return the names of all coordinates and their values (T, n), degrees and metres."""
     channels = [channel for rotations in fitted.rotations for _, channel in rotations]
     path = fitted.pelvis @ BODY.T
     values = np.degrees(fitted.angles[:, channels])
@@ -65,7 +65,7 @@ def coordinates(fitted: Fitted) -> tuple[list[str], Array]:
 
 
 def write_mot(path: Path, motion: Motion, fitted: Fitted) -> None:
-    """Write the coordinates of frames that the motion has."""
+    """Write the coordinates in the frames that the motion has."""
     names, values = coordinates(fitted)
     rows = np.column_stack([motion.time, values])[motion.present]
     head = [
@@ -112,7 +112,7 @@ def _model(name: str, fitted: Fitted) -> Iterator[str]:
 
 
 def _joint(fitted: Fitted, i: int) -> Iterator[str]:
-    """Joint of a frame to its parent; the first is free in the ground."""
+    """Write the joint of a frame and its parent; the first frame is free in the ground."""
     frame, parent = fitted.frames[i], fitted.parents[i]
     above = "ground" if parent < 0 else fitted.frames[parent]
     turn = _angles(GROUND @ BODY.T) if parent < 0 else np.zeros(3)
@@ -156,7 +156,7 @@ def _offset(name: str, parent: str, place: Array, turn: Array) -> str:
 
 
 def _axis(name: str, axis: Array, coordinate: str) -> str:
-    """One axis of a joint; without a coordinate nothing turns or moves along it."""
+    """Write one axis of a joint; without a coordinate it is fixed."""
     function = (
         '<LinearFunction name="function"><coefficients>1 0</coefficients></LinearFunction>'
         if coordinate
@@ -169,13 +169,13 @@ def _axis(name: str, axis: Array, coordinate: str) -> str:
 
 
 def _completed(axes: list[Array]) -> list[Array]:
-    """Three independent axes that begin with those given."""
+    """Complete axes to three independent ones."""
     rest = [axis for axis in np.eye(3) if not any(abs(axis @ other) > 0.5 for other in axes)]
     return [*axes, *rest][:3]
 
 
 def _angles(turn: Array) -> Array:
-    """Angles x y z, one after the other about turned axes, of a rotation."""
+    """Decompose a rotation to angles about x, y, z, each about the axes rotated by those before."""
     y = np.arcsin(np.clip(turn[0, 2], -1, 1))
     return np.array([np.arctan2(-turn[1, 2], turn[2, 2]), y, np.arctan2(-turn[0, 1], turn[0, 0])])
 

@@ -1,4 +1,4 @@
-"""Parquet: every column of a table of the package (.csv), with its type; nothing is rounded."""
+"""Parquet: all columns of one of the package's tables (.csv), with their types, without rounding."""
 
 from __future__ import annotations
 

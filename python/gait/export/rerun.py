@@ -1,4 +1,4 @@
-"""Rerun (.rrd): joints and bones over time, and the numbers of the state."""
+"""Rerun (.rrd): joints and bones over time, and the state's numbers."""
 
 from __future__ import annotations
 
@@ -10,11 +10,11 @@ from gait.body.skeleton import BONES
 from gait.export.motion import Motion
 
 _JOINT, _BONE = 0.015, 0.008  # radii, metres
-_ID = "libgait"  # one file holds one recording
+_ID = "libgait"  # application id; a file contains one recording
 
 
 def write(path: Path, motion: Motion) -> int:
-    """Write the frames that the motion has; return their number."""
+    """Write the motion's frames; return their number."""
     import rerun as rr
 
     stream = rr.RecordingStream(_ID, recording_id=motion.name)

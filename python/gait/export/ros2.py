@@ -1,7 +1,7 @@
 """MCAP with messages of ROS 2 in CDR: estimates as TF and as bodies of REP 155 (ROS4HRI), without ROS.
 
-The person with number N is the body ``N``.  Frames of TF: ``body_N`` in ``world``, in the middle between
-the hips, x in the direction of walking, z up; joints in ``body_N`` with its axes, as ``l_knee_N``; cameras.
+The person with number N is the body ``N``.  TF frames: ``body_N`` in ``world``, midway between the hips, x in
+the direction of walking, z up; joints in ``body_N`` with its axes, such as ``l_knee_N``; cameras.
 """
 
 from __future__ import annotations
@@ -35,7 +35,7 @@ _HEADER |= {"builtin_interfaces/Time": "int32 sec\nuint32 nanosec"}
 _VECTOR = "float64 x\nfloat64 y\nfloat64 z"
 _QUATERNION = f"{_VECTOR}\nfloat64 w"
 _POINT = "hri_msgs/NormalizedPointOfInterest2D"
-#: Types that are written: their fields, and the types that these need.
+#: Types of messages: their fields, and the types of these.
 TYPES: dict[str, tuple[str, dict[str, str]]] = {
     _TF: (
         "geometry_msgs/TransformStamped[] transforms",
@@ -66,7 +66,7 @@ TYPES: dict[str, tuple[str, dict[str, str]]] = {
     ),
     "std_msgs/msg/String": ("string data", {}),
 }
-#: Points of hri_msgs/Skeleton2D in their order; of those that are None the tracker knows nothing.
+#: Points of hri_msgs/Skeleton2D in order; None: unknown to the tracker.
 SKELETON_2D = (
     *(None, "neck"),
     *(f"{side}_{joint}" for side in "rl" for joint in ("shoulder", "elbow", "wrist")),
@@ -76,7 +76,7 @@ SKELETON_2D = (
 
 
 class Message(NamedTuple):
-    """One message of ROS 2, its fields as mappings and sequences."""
+    """A message of ROS 2, with its fields as mappings and sequences."""
 
     topic: str
     type: str
@@ -84,14 +84,14 @@ class Message(NamedTuple):
 
 
 class Bodies:
-    """Makes the messages of ROS 2 from the estimates of one or several people, in the order of time."""
+    """Makes messages of ROS 2 from the estimates of one or several people, in order of time."""
 
     def __init__(self) -> None:
-        self._visible: dict[int, int] = {}  # person to nanoseconds
+        self._visible: dict[int, int] = {}  # person to time of the last estimate, nanoseconds
         self._camera: tuple[int, Camera] | None = None
 
     def camera(self, stream: int, camera: Camera, nanoseconds: int) -> list[Message]:
-        """State where a camera is; skeletons are drawn in the first one's picture."""
+        """Make the message with a camera's pose; skeletons are given in the first camera's picture."""
         from scipy.spatial.transform import Rotation
 
         if self._camera is None or self._camera[0] == stream:
@@ -109,16 +109,16 @@ class Bodies:
         heading: float,
         sd: tuple[Array, float] | None = None,
     ) -> list[Message]:
-        """Give the messages that state one estimate.
+        """Make the messages for one estimate.
 
         Parameters
         ----------
         person : int
-            Number, from 1.
+            Number of the person, from 1.
         status : str
-            ``init``, ``tracking``, ``ambiguous`` or ``lost``; the body is there while the person is visible.
+            ``init``, ``tracking``, ``ambiguous`` or ``lost``; the body exists while the person is visible.
         nanoseconds : int
-            Of the frame, since the Unix epoch.
+            Time of the frame since the Unix epoch.
         joints : mapping of str to ndarray of shape (3,)
             Metres, world with z up.
         heading : float
@@ -181,7 +181,7 @@ def _transform(header: dict[str, Any], child: str, at: Array, rotation: dict[str
 
 
 def _skeleton(joints: Mapping[str, Array], camera: Camera) -> list[dict[str, float]]:
-    """Points in shares of the picture; outside of it and unknown ones have confidence 0."""
+    """Compute points as fractions of the picture; those outside it or unknown have confidence 0."""
     size = np.array(camera.size) - 1.0
     points = []
     for name in SKELETON_2D:
@@ -209,7 +209,7 @@ class _Writer:
 
 
 def definition(kind: str) -> str:
-    """Definition of a type with those that it needs, as ``ros2msg`` has them."""
+    """Return the definition of a type with those of its fields' types, in the form of ``ros2msg``."""
     fields, needed = TYPES[kind]
     return f"\n{'=' * 80}\n".join([fields, *(f"MSG: {name}\n{text}" for name, text in needed.items())])
 
@@ -225,7 +225,7 @@ def _writing(path: Path) -> Iterator[_Writer]:
 
 
 def write_motion(path: Path, motion: Motion) -> dict[str, int]:
-    """Write the frames that a motion has; return messages by topic."""
+    """Write a motion's frames; return the number of messages by topic."""
     track = motion.track
     number = track.numbers.get("person")
     bodies, heading = Bodies(), track.numbers.get("heading_rad")
@@ -240,7 +240,7 @@ def write_motion(path: Path, motion: Motion) -> dict[str, int]:
 
 
 def write_log(path: Path, log: str | os.PathLike[str]) -> dict[str, int]:
-    """Write the estimates of an LCM log at the times of their frames; return messages by topic.
+    """Write the estimates of an LCM log at the times of their frames; return message counts by topic.
 
     UserError if the log is damaged or has no estimates.
     """

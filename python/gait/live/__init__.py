@@ -1,5 +1,5 @@
-"""The live page: a running tracker watched in browsers on this machine.
+"""The live page: watch a running tracker in browsers on this machine.
 
-`feed` takes estimates and frames from LCM, `server` hands them to browsers, `recording` keeps what the
-channels carry in a log.
+`feed` receives estimates and frames from LCM, `server` sends them to browsers, and `recording` writes all
+messages to logs.
 """

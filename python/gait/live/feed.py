@@ -1,7 +1,7 @@
 """Content of the live page: estimates drawn into their own frames, and numbers.
 
-A tracker follows one person.  Several people are trackers that listen on one URL, from which frames come, and
-publish each on channels of its own there (``gait-trackd --person``), or on a URL of its own.
+A tracker follows one person.  For several people there are several trackers, which all receive frames on one
+URL and publish either there, each on its own channels (``gait-trackd --person``), or each on its own URL.
 """
 
 from __future__ import annotations
@@ -27,20 +27,20 @@ from gait.lcm.messages import camera_of, decode, estimate_of, picture
 from gait.report.drawing import Overlay
 from gait.web.motion_data import curve, motion_data, rounded
 
-_KEPT = 64  # frames that wait for their estimate, at most, and their bytes
+_KEPT = 64  # most frames that wait for their estimate, and most bytes of them
 _KEPT_BYTES = 100_000_000
-_RECENT = 9  # frames that show a camera's interval
+_RECENT = 9  # frames from which a camera's frame interval is computed
 _QUEUED = 8  # frames that wait in LCM
-_FURTHEST = 1e6  # metres, or anything else that is drawn
-_LONGEST = 0.5  # seconds without a drawing while messages wait, or a tracker does not answer
+_FURTHEST = 1e6  # largest number that is drawn, in metres or another unit
+_LONGEST = 0.5  # longest time without a drawing [s], even if messages wait or a tracker does not answer
 _RATED = 2.0  # seconds over which estimates are counted
 KEPT_S = 20.0
-"""Seconds of the plots."""
+"""Duration of the plots, seconds."""
 
 
 @dataclass
 class _View:
-    """One camera: what it looks like, and its frames that wait for their estimate."""
+    """One camera, and its frames that wait for their estimate."""
 
     frames: dict[int, Any]
     given: bool
@@ -50,31 +50,31 @@ class _View:
     recent: deque[int] = field(default_factory=lambda: deque(maxlen=_RECENT))
 
     def add(self, image: Any) -> None:
-        """Keep a frame until its estimate comes."""
+        """Keep a frame until its estimate arrives."""
         self.frames[image.utime] = image
         self.recent.append(image.utime)
         while len(self.frames) > _KEPT or sum(len(one.data) for one in self.frames.values()) > _KEPT_BYTES:
             del self.frames[next(iter(self.frames))]
 
     def nearest(self, utime: int) -> int | None:
-        """Time of the frame of a moment: of cameras that run by themselves, half an interval off at most."""
+        """Return the time of the frame nearest to `utime`, within half a frame interval, or None."""
         found = min(self.frames, key=lambda one: abs(one - utime), default=None)
         return found if found is not None and abs(found - utime) <= self._apart() else None
 
     def take(self, utime: int) -> Any | None:
-        """Give the frame of a moment, if there is one, and forget it and those before."""
+        """Return the frame at a time, if there is one, and forget it and earlier ones."""
         found = self.nearest(utime)
         image = None if found is None else self.frames[found]
         self.forget(utime if found is None else found + self._apart() + 1)
         return image
 
     def forget(self, utime: int) -> None:
-        """Forget frames of moments before this one."""
+        """Forget frames before this time."""
         for old in [one for one in self.frames if one < utime - self._apart()]:
             del self.frames[old]
 
     def _apart(self) -> int:
-        """Half an interval between frames, microseconds."""
+        """Half a frame interval, microseconds."""
         return int(np.median(np.abs(np.diff(self.recent)))) // 2 if len(self.recent) > 1 else 0
 
     def use(self, camera: Camera, model: Model) -> None:
@@ -82,19 +82,19 @@ class _View:
 
 
 class Answers(NamedTuple):
-    """Where the tracker of a person publishes."""
+    """URL and channels on which a person's tracker publishes."""
 
     name: str
-    """Of the person."""
+    """Number of the person."""
     url: str
     channel: str
-    """Of its estimates."""
+    """Channel of the estimates."""
     ending: str
-    """Of its channels: ``_2`` of person 2."""
+    """Ending of all its channels, such as ``_2`` for person 2."""
 
 
 def answers(url: str, people: Sequence[str]) -> list[Answers]:
-    """Where trackers publish: numbers are people on `url`, others URLs; without any, one on `url`."""
+    """Parse `people`: numbers are people on `url`, others are URLs; without any, one person on `url`."""
     return [
         Answers(one, url, f"GAIT_ESTIMATE_{one}", f"_{one}")
         if one.isdigit()
@@ -105,14 +105,14 @@ def answers(url: str, people: Sequence[str]) -> list[Answers]:
 
 @dataclass
 class _Person:
-    """One tracker: when its estimates arrived, the frames it dropped, and when it was heard last."""
+    """One tracker: arrival times of its estimates, dropped frames, and time of the last message."""
 
     arrivals: deque[int]
     drops: Drops
     heard: float = -np.inf  # seconds, monotonic
 
     def rate(self) -> float | None:
-        """Take in an estimate that arrives now; return estimates per second."""
+        """Count an estimate that arrives now; return estimates per second."""
         self.heard = time.monotonic()
         self.arrivals.append(now())
         while self.arrivals[-1] - self.arrivals[0] > 1e6 * _RATED:
@@ -122,37 +122,37 @@ class _Person:
 
 
 class Feed:
-    """Follows the channels of one tracker or of several, and draws estimates into their own frames.
+    """Receives the channels of one or several trackers, and draws estimates into their own frames.
 
     Live, it draws the newest estimate when no message waits, or after `_LONGEST` at the latest, so that it
-    never falls behind; of a log, all.
+    never falls behind; from a log, it draws all.
 
     Parameters
     ----------
     url : str
-        From which frames come.
+        URL on which frames arrive.
     streams : sequence of int
         Numbers of the cameras.
     model : Model
-        Whose body is drawn.
+        Model whose body is drawn.
     cameras : mapping of int to Camera
-        Those that are known; others are taken from ``GAIT_CAMERA_<i>``.
+        Known cameras; others are received on ``GAIT_CAMERA_<i>``.
     show : callable
-        Gets the number of a camera and its finished BGR picture.
+        Called with the number of a camera and the finished BGR picture.
     report : callable, optional
-        Gets "sample" with the numbers of an estimate, or "health" with those of a status.
+        Called with "sample" and the numbers of an estimate, or "health" and those of a status.
     scale : bool
-        Whether cameras that were calibrated at another resolution are resized to the pictures.
+        Whether to resize cameras that were calibrated at another resolution to the pictures.
     watched : callable, optional
-        Whether to draw: the newest estimate waits until it is so.
+        Whether to draw; until then the newest estimate waits.
     people : sequence of str
-        Numbers of people whose trackers answer on `url`, or URLs on which they do; if left out, the one that
-        answers on `url`.
+        Numbers of people whose trackers publish on `url`, or URLs of trackers; by default the tracker that
+        publishes on `url` without a number.
 
     Attributes
     ----------
     damage : str or None
-        Describes what is wrong with the first message that could not be shown.
+        Describes the fault of the first message that could not be shown.
     """
 
     def __init__(
@@ -192,7 +192,7 @@ class Feed:
         self._links[url].subscribe(channel, handler).set_queue_capacity(most)
 
     def handle(self, seconds: float) -> bool:
-        """Take in messages, waiting at most so long, but for damaged ones; False at the end of a log."""
+        """Process messages, waiting at most this long; skip damaged ones; False at the end of a log."""
         more, links = True, list(self._links.values())
         try:
             if len(links) == 1:
@@ -209,7 +209,7 @@ class Feed:
         return more
 
     def _answered(self, late: bool) -> int | None:
-        """Capture time of the newest frame that all trackers at work have answered; if `late`, that any has.
+        """Return the time of the newest frame that all active trackers (if `late`, any) have answered.
 
         Older frames are forgotten.
         """
@@ -237,7 +237,7 @@ class Feed:
                     self._show(stream, view.overlay.draw_people(pixels, people))
 
     def _fitting(self, image: Any, view: _View) -> Image:
-        """Picture of the camera's size, or with `scale` a camera of the picture's."""
+        """Decode a picture of the camera's size, or, with `scale`, resize the camera to the picture."""
         pixels = picture(image)
         found = pixels.shape[1], pixels.shape[0]
         if found != view.size and self._scale and view.camera is not None and view.camera.same_aspect(found):
@@ -252,7 +252,7 @@ class Feed:
 
     def _on_camera(self, stream: int, channel: str, data: bytes) -> None:
         view = self._views[stream]
-        if not view.given:  # the newest counts: an earlier one may have been wrong
+        if not view.given:  # the newest counts, as an earlier one may have been wrong
             view.use(camera_of(decode(gaitmsg.camera_t, data, channel)), self._model)
 
     def _on_estimate(self, person: int, channel: str, data: bytes) -> None:
@@ -265,7 +265,7 @@ class Feed:
         if not _plausible(estimate):
             raise UserError(f"{channel}: an estimate with numbers that are not finite")
         self._origin = message.utime if self._origin is None else self._origin
-        # The panel shows seconds since the first frame, not the time of the day.
+        # The panel shows seconds since the first frame, not the time of day.
         estimate = replace(estimate, utime=message.utime - self._origin)
         if self._report:
             self._report("sample", self._sample(person, estimate, message))
@@ -273,7 +273,7 @@ class Feed:
             self._answers.setdefault(message.utime, {})[person] = estimate, message.frame
 
     def _sample(self, person: int, estimate: Estimate, message: Any) -> dict[str, Any]:
-        """Report an estimate: numbers of the page, joints of the figure, values of the plots."""
+        """Report an estimate: numbers for the page, joints of the figure, values of the plots."""
         mean = estimate.mean
         return {
             "person": person,
@@ -299,7 +299,7 @@ class Feed:
             self._report("health", {"person": person} | found)
 
     def page_data(self) -> dict[str, Any]:
-        """Make what scene.js and curves.js begin with, see motion_data.py: no frame yet."""
+        """Make the initial object for scene.js and curves.js, without frames; see motion_data.py."""
         names = self._model.joint_names
         camera = next((view.camera for view in self._views.values() if view.camera is not None), None)
         none = np.empty(0)
@@ -340,14 +340,14 @@ def _values(estimate: Estimate, angles: list[str]) -> list[float | None]:
 
 
 class Drops:
-    """Frames dropped: those counted when the page was opened and all since, over restarts of the tracker."""
+    """Count of dropped frames, including those before the page was opened, across restarts of the tracker."""
 
     def __init__(self) -> None:
         self._before, self._frames = 0, 0
         self.total = 0
 
     def add(self, reported: int, frames: int) -> int:
-        """Take in a tracker's counts of drops and frames, which begin anew with it; return all drops."""
+        """Add a tracker's counts of drops and frames, which restart with it; return all drops."""
         restarted = reported < self._before or frames < self._frames
         self.total += reported if restarted else reported - self._before
         self._before, self._frames = reported, frames
@@ -370,7 +370,7 @@ def health(message: Any, drops: Drops) -> dict[str, Any]:
 
 
 def _plausible(estimate: Estimate) -> bool:
-    """Whether all numbers that are drawn are finite and on this planet."""
+    """Whether all numbers that are drawn are finite and not absurdly large."""
     mean = [getattr(estimate.mean, name) for name in POSE_SCALARS]
     numbers = np.concatenate([estimate.joints.ravel(), estimate.joint_sd.ravel(), estimate.mean.pelvis, mean])
     shown = [estimate.speed, estimate.ess, estimate.hypothesis_weight, *estimate.angles]

@@ -1,4 +1,4 @@
-"""Record all messages of some URLs into LCM logs, from one press of a button to the next."""
+"""Record all messages of some URLs in LCM logs, between two presses of a button."""
 
 from __future__ import annotations
 
@@ -11,25 +11,25 @@ from pathlib import Path
 from gait.errors import UserError
 from gait.lcm.link import LogWriter, is_log, now, open_lcm, waiting
 
-_TURN = 0.1  # seconds
-_WAITING = 1000  # messages
-_OWN = "LCM_SELF_TEST"  # of LCM itself, when a program connects
+_TURN = 0.1  # seconds between polls
+_WAITING = 1000  # messages that may wait
+_OWN = "LCM_SELF_TEST"  # channel of LCM itself, used when a program connects
 
 
 class Recording:
-    """Logs that are being written, one for each URL, in a thread with connections of its own.
+    """Writes logs, one for each URL, in a thread with its own connections.
 
     Parameters
     ----------
     url : str
-        From which frames come.
+        URL on which frames arrive.
     people : sequence of str
-        URLs on which trackers answer, one for each person; those that are `url` have no log of their own.
+        URLs on which trackers publish, one for each person; `url` itself has only one log.
     folder : path
-        Gets ``gait-DATE-TIME.log`` and, for each further URL, ``gait-DATE-TIME-person-2.log``; a file that
-        exists is not touched.
+        Folder for ``gait-DATE-TIME.log`` and, for each further URL, ``gait-DATE-TIME-person-2.log``; existing
+        files are not changed.
     failed : callable
-        Called in the recording's thread when a log cannot be written; all have ended then.
+        Called in the recording's thread when a log cannot be written; all logs have then ended.
 
     Attributes
     ----------
@@ -40,7 +40,7 @@ class Recording:
     Raises
     ------
     UserError
-        If a file cannot be made, or the URL is a log already.
+        If a file cannot be created, or the URL is already a log.
     """
 
     def __init__(
@@ -76,7 +76,7 @@ class Recording:
             self.fault = str(error)
 
     def end(self) -> None:
-        """Write what waits, and close the logs."""
+        """Write waiting messages, and close the logs."""
         self._end.set()
         self._thread.join()
         for log in self._logs:
@@ -87,7 +87,7 @@ class Recording:
 
 
 def _unused(folder: Path, endings: Sequence[str]) -> list[Path]:
-    """Make empty files of names that no file has, one for each ending."""
+    """Create empty files with unused names, one for each ending."""
     stem = time.strftime("gait-%Y%m%d-%H%M%S")
     try:
         folder.mkdir(parents=True, exist_ok=True)

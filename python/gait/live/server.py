@@ -1,4 +1,4 @@
-"""Browsers get the newest pictures, all estimates, the state of the tracker; less often on a busy machine."""
+"""Send browsers the newest pictures, all estimates and the tracker's state, less often on a busy machine."""
 
 from __future__ import annotations
 
@@ -26,18 +26,18 @@ from gait.web import modules, serve
 _HERE = Path(__file__).parent
 _FILES = ("live.js", "live.css")
 _MOST = 16  # browsers at a time
-_ALIVE = 0.5  # seconds after which a quiet stream shows that it is there, or ends with the server
+_ALIVE = 0.5  # seconds after which a quiet stream sends a sign of life, or ends with the server
 _QUALITY = 80  # of JPEG pictures
-_KEPT = 256  # samples that a slow browser gets late, at most
-_FASTEST = 1 / 60  # seconds between messages to a browser
+_KEPT = 256  # most samples that a slow browser gets late
+_FASTEST = 1 / 60  # least seconds between messages to a browser
 _SLOWEST = 0.2  # the same at first and on a busy machine, times the number of browsers,
-_RAREST = 2.0  # but no more
+_RAREST = 2.0  # but at most this
 _MEASURED = 0.5  # seconds over which idle time is measured
 _BUSY, _IDLE = 0.15, 0.3  # share of idle time below which messages become rarer, above which more frequent
 
 
 def _picture(stream: int) -> str:
-    """Topic of a camera's pictures."""
+    """Return the topic of a camera's pictures."""
     return f"picture {stream}"
 
 
@@ -48,12 +48,12 @@ def _described(recording: Recording) -> dict[str, Any]:
 class Pace:
     """Time between messages to a browser: longer while no core is idle.
 
-    Browsers on this machine draw on the cores that track, and tracking comes first.
+    Browsers on this machine use the cores that track, and tracking has priority.
 
     Attributes
     ----------
     current : float
-        Seconds.
+        Present interval, seconds.
     """
 
     def __init__(self) -> None:
@@ -61,7 +61,7 @@ class Pace:
         self._at, self._before = 0.0, (0, 0)
 
     def interval(self) -> float:
-        """Seconds."""
+        """Present interval, seconds."""
         now = time.monotonic()
         if now - self._at > _MEASURED:
             found = _idle_time()
@@ -71,17 +71,17 @@ class Pace:
         return self.current
 
     def adapt(self, idle: float) -> None:
-        """Follow the share of idle time."""
+        """Adapt the interval to the share of idle time."""
         factor = 1.5 if idle < _BUSY else 0.8 if idle > _IDLE else 1.0
         self.current = min(max(factor * self.current, _FASTEST), self._slowest)
 
     def begin(self, browsers: int) -> None:
-        """Begin slowly, now that there are so many browsers."""
+        """Begin slowly with this number of browsers."""
         self.current = self._slowest = min(_SLOWEST * max(browsers, 1), _RAREST)
 
 
 def _idle_time() -> tuple[int, int]:
-    """Idle time and all time of the cores, ticks."""
+    """Read idle time and total time of the cores, ticks."""
     first = Path("/proc/stat").read_text(encoding="ascii").partition("\n")[0]
     times = [int(word) for word in first.split()[1:9]]
     return times[3] + times[4], sum(times)
@@ -90,8 +90,8 @@ def _idle_time() -> tuple[int, int]:
 class Hub:
     """The newest values of each topic, for any number of browsers.
 
-    `put` may be called in any thread; `newer` runs in the server's.  A browser that is slow misses values and
-    delays no other.
+    `put` may be called in any thread; `newer` runs in the server's.  A slow browser misses values but does
+    not delay others.
     """
 
     def __init__(self) -> None:
@@ -101,7 +101,7 @@ class Hub:
         self._lock = threading.Lock()
 
     def put(self, topic: str, value: Any, kept: int = 1) -> None:
-        """Make `value` the newest of its topic, of which so many are kept."""
+        """Make `value` the newest of its topic, of which the last `kept` are stored."""
         with self._lock:
             count, values = self._newest.get(topic, (0, deque(maxlen=kept)))
             values.append(value)
@@ -115,13 +115,13 @@ class Hub:
             event.set()
 
     def since(self, topic: str, than: int) -> tuple[int, list[Any]]:
-        """Count of values so far, and those that are kept of the later ones than that of a count."""
+        """Return the count of values so far, and the stored ones after the count `than`."""
         with self._lock:
             count, values = self._newest.get(topic, (0, deque()))
             return count, list(values)[max(len(values) - (count - than), 0) :]
 
     async def newer(self, topic: str, than: int, seconds: float) -> None:
-        """Wait at most so long for a later value than that of the count."""
+        """Wait at most this long for a value after the count `than`."""
         self._loop = asyncio.get_running_loop()
         event = self._news.setdefault(topic, asyncio.Event())
         if self.since(topic, than)[0] <= than:
@@ -130,25 +130,25 @@ class Hub:
 
 
 class Page:
-    """The live page, its server in a thread of its own.
+    """The live page, with its server in a separate thread.
 
     Parameters
     ----------
     port : int
-        Of 127.0.0.1; 0: any that is free.
+        Port of 127.0.0.1; 0: any free one.
     streams : sequence of int
         Numbers of the cameras.
     url : str
-        Of LCM, from which frames come; recorded.
+        LCM URL on which frames arrive; recorded.
     folder : path
-        Gets the recordings.
+        Folder for recordings.
     people : sequence of str
-        URLs on which the trackers answer whose estimates are shown; recorded. `url` if left out.
+        URLs of the trackers whose estimates are shown; recorded.  By default `url`.
 
     Attributes
     ----------
     address : str
-        What to open in a browser.
+        URL to open in a browser.
     """
 
     def __init__(
@@ -169,16 +169,16 @@ class Page:
         self._server, self._thread = serve.background(self._application(own.getsockname()[1]), own)
 
     def begin(self, data: Callable[[], dict[str, Any]]) -> None:
-        """State what the figure and the plots begin with."""
+        """Set the initial data of the figure and the plots."""
         self._data = data
 
     def show(self, stream: int, image: Image) -> None:
-        """Make a picture the newest of its camera; browsers that are informed ask for it."""
+        """Make a picture the newest of its camera; browsers are notified, and request it."""
         self._pictures[stream], self._shown = image, time.monotonic()
         self.hub.put(_picture(stream), stream)
 
     def report(self, topic: str, value: dict[str, Any]) -> None:
-        """Make a sample or the tracker's health the newest."""
+        """Make a sample, or the tracker's health, the newest of its topic."""
         of_person = f"{topic} {value['person']}" if "person" in value else topic
         text = json.dumps(value, allow_nan=False, separators=(",", ":"))
         self.hub.put(of_person, text, _KEPT if topic == "sample" else 1)
@@ -188,7 +188,7 @@ class Page:
         return self._open > 0 and time.monotonic() - self._shown > self._pace.interval()
 
     def close(self) -> None:
-        """Serve no more, and end a recording."""
+        """Stop the server and a recording."""
         self._server.should_exit = True
         self._thread.join()
         if self._recording is not None:
@@ -214,7 +214,7 @@ class Page:
         return {} if self._recording is None else _described(self._recording)
 
     async def _record(self, request: Request) -> Response:
-        """Begin a recording (``?on=1``) or end it (``?on=0``); what is so already stays."""
+        """Begin a recording (``?on=1``) or end it (``?on=0``), if that is not already so."""
         on = request.query_params.get("on") == "1"
         ended = self._recording
         if on and ended is None:
@@ -229,7 +229,7 @@ class Page:
         return JSONResponse(self._recorded() or ({} if ended is None else _described(ended)))
 
     def _report_recording(self) -> None:
-        """Report to all browsers whether a recording runs."""
+        """Report to all browsers whether a recording is running."""
         self.report("recording", self._recorded())
 
     def _frame(self, request: Request) -> Response:
@@ -238,7 +238,7 @@ class Page:
         if count == 0:
             return PlainTextResponse("no picture yet\n", 503 if stream in self._streams else 404)
         made, jpeg = self._jpeg.get(stream, (0, b""))
-        if made != count:  # the first browser that asks; the others get the same
+        if made != count:  # encoded for the first browser that asks; others get the same
             options = [cv2.IMWRITE_JPEG_QUALITY, _QUALITY]
             jpeg = cv2.imencode(".jpg", self._pictures[stream], options)[1].tobytes()
             self._jpeg[stream] = count, jpeg

@@ -1,4 +1,4 @@
-"""Curves under the film: angles of joints with their intervals, phase, and marks of heel strikes."""
+"""Curves under the film: joint angles with intervals, phase, and marks of heel strikes."""
 
 from __future__ import annotations
 
@@ -20,22 +20,22 @@ Floats = npt.NDArray[np.float64]
 Angles = dict[str, tuple[Floats, Floats]]
 
 ANGLES = ("hip_flexion", "knee_flexion", "elbow_flexion")
-"""Angles that are shown: those of the package's skeleton, with its signs."""
+"""Angles that are shown, with the signs of the package's skeleton."""
 LEGS = ("hip_flexion", "knee_flexion")
 SIDES = {"left": "l", "right": "r"}
 _PHASE = "0 to 1 between right heel strikes"
 
 
 def angles_of(names: Sequence[str], places: Floats, covariance: Floats) -> Angles:
-    """Angles (T,) and their standard deviations (T,), degrees, by channel; none if a joint is missing.
+    """Compute angles (T,) and their sd (T,), degrees, by channel; empty if a joint is missing.
 
     Parameters
     ----------
     names : sequence of J str
     places : (T, J, 3)
-        Metres.
+        Positions of the joints, metres.
     covariance : (T, 3 J, 3 J)
-        Of the coordinates of a frame's joints, square metres.
+        Covariance of the coordinates of each frame's joints, square metres.
     """
     if not set(JOINTS) <= set(names):
         return {}
@@ -52,7 +52,7 @@ def angles_of(names: Sequence[str], places: Floats, covariance: Floats) -> Angle
 
 
 def angle_curves(found: Angles) -> list[dict[str, Any]]:
-    """Curves of angles (`angles_of`) with 90 % intervals."""
+    """Make the curves of angles (from `angles_of`) with 90 % intervals."""
     curves = []
     for name in ANGLES if found else ():
         words, positive, _ = terms.angle(name)
@@ -64,7 +64,7 @@ def angle_curves(found: Angles) -> list[dict[str, Any]]:
 def events_of(
     frame: npt.NDArray[np.int64], time: Floats, names: Sequence[str], places: Floats
 ) -> Events | None:
-    """Heel strikes and toe-offs; None if joints are missing or no person walks."""
+    """Find heel strikes and toe-offs; None if joints are missing or the person does not walk."""
     by_name = {name: places[:, j] for j, name in enumerate(names)}
     try:
         return find_events(Joints(frame, time, by_name))
@@ -73,9 +73,9 @@ def events_of(
 
 
 def phase_curve(time: Floats, events: Events | None, found: Angles) -> list[dict[str, Any]]:
-    """Phase of walking, 0 to 1 between the heel strikes of the right foot and unknown elsewhere.
+    """Make the curve of the phase, 0 to 1 between heel strikes of the right foot and unknown elsewhere.
 
-    Its variance is that which the angles of the legs leave: 1 / sum of (rate / sd)^2.
+    Its variance follows from those of the legs' angles: 1 / sum of (rate / sd)^2.
     """
     strikes = np.sort(events.strike["right"]) if events else np.zeros(0)
     if len(strikes) < 2:
@@ -87,12 +87,12 @@ def phase_curve(time: Floats, events: Events | None, found: Angles) -> list[dict
             information += (np.gradient(values, time) * float(np.diff(strikes).mean()) / sd) ** 2
     sd = np.minimum(1 / np.sqrt(np.maximum(information, 1e-9)), 0.5)
     phase = count % 1
-    phase[1:][np.diff(phase) < 0] = np.nan  # no line from the end of a cycle to the beginning of the next
+    phase[1:][np.diff(phase) < 0] = np.nan  # so that no line joins the end of a cycle to the next
     return [curve("Phase", _PHASE, phase, sd if found else None, limits=(0, 1))]
 
 
 def phase_at(time: float, events: Events | None) -> dict[str, float]:
-    """Phase and rate at a time as a start of the tracker has them; empty where they are not known."""
+    """Return phase and stride rate at a time, with the keys of an init file; empty if unknown."""
     strikes = np.sort(events.strike["right"]) if events else np.zeros(0)
     after = int(np.searchsorted(strikes, time, "right"))
     if not 0 < after < len(strikes):
@@ -103,7 +103,7 @@ def phase_at(time: float, events: Events | None) -> dict[str, float]:
 
 
 def event_marks(events: Events | None) -> list[dict[str, Any]]:
-    """Give marks of heel strikes on the timeline."""
+    """Make the marks of heel strikes on the timeline."""
     if events is None:
         return []
     return [

@@ -24,7 +24,7 @@ from gait.studio.shown import NO_CAMERA, Nearby, Shown, Solved, curves_of
 
 Floats = npt.NDArray[np.float64]
 
-SUGGESTED = 8  # corrections that are named
+SUGGESTED = 8  # most corrections that are suggested
 
 
 class KeypointLift:
@@ -38,11 +38,11 @@ class KeypointLift:
     prepared : Prepared
         Keypoints without the detector's swaps and spikes.
     request : Request
-        How they are lifted.
+        How to lift them.
     video : str
         The film.
     more : list of str
-        Further words of the command that lifts the film itself.
+        Further arguments of the command that lifts the film itself.
     """
 
     def __init__(
@@ -69,11 +69,11 @@ class KeypointLift:
         return self._prepared.keypoints.frame
 
     def check(self, edits: Edits) -> None:
-        """Refuse corrections of frames and places that do not exist."""
+        """Raise UserError for corrections of frames or positions that do not exist."""
         pins(self._points(edits), edits, self.camera, self._prior)
 
     def _points(self, edits: Edits) -> Keypoints:
-        """Keypoints with corrections, which are checked before they are solved."""
+        """Apply and check corrections of the keypoints."""
         if self._corrected[0] is not edits:
             sd = self._prepared.options.pixel_sd
             self._corrected = edits, corrected(self._prepared.keypoints, edits, sd)
@@ -109,10 +109,10 @@ class KeypointLift:
                 "stature_m": round(float(motion.stature), 3),
             },
         )
-        return Solved(shown, replace(lifted, motion=replace(motion, covariance=None)))  # which is large
+        return Solved(shown, replace(lifted, motion=replace(motion, covariance=None)))  # it is large
 
     def follow(self, solved: Solved) -> None:
-        """Go on from a motion."""
+        """Continue from a motion."""
         lifted: Lifted = solved.lifted
         self._names, self._near = lifted.motion.names, None
         if lifted.motion.state is not None:
@@ -121,7 +121,7 @@ class KeypointLift:
                 self._near = Interactive(*known, lifted.motion)
 
     def near(self, edits: Edits, touched: range) -> Nearby | None:
-        """Solve the blocks around what was touched."""
+        """Solve the blocks around the frames that were touched."""
         keypoints = self._points(edits)
         if self._near is None or not set(keypoints.names) <= set(self._names):
             return None
@@ -132,7 +132,7 @@ class KeypointLift:
         return Nearby(found.rows, found.places[:, columns], found.uv[:, columns])
 
     def words(self) -> list[str]:
-        """Words of ``gait lift``."""
+        """Arguments of ``gait lift``."""
         request = self._request
         if request.calibration is None:
             found = ["gait lift", shlex.quote(self._path)]
@@ -143,7 +143,7 @@ class KeypointLift:
         return found + (["--height", f"{request.options.stature:g}"] if request.options.stature else [])
 
     def write_table(self, path: str, solved: Solved) -> None:
-        """Write all markers that are estimated."""
+        """Write all estimated markers."""
         motion, points = solved.lifted.motion, solved.lifted.keypoints
         write_lifted(path, points.frame, points.time, motion.names, motion.places, motion.sd)
 
@@ -153,5 +153,5 @@ class KeypointLift:
 
 
 def _columns(names: tuple[str, ...]) -> npt.NDArray[np.intp]:
-    """Markers that are joints."""
+    """Find the columns of markers that are joints."""
     return np.array([j for j, name in enumerate(names) if name in JOINTS], np.intp)

@@ -42,11 +42,11 @@ class PictureLift:
     Parameters
     ----------
     clip : ClipSegments
-        Without corrections.
+        The clip without corrections.
     request : Request
-        How the pictures are lifted.
+        How to lift the images.
     more : list of str
-        Further words of the command.
+        Further arguments of the command.
     """
 
     without = {
@@ -64,11 +64,11 @@ class PictureLift:
 
     @property
     def frames(self) -> npt.NDArray[np.int64]:
-        """Numbers of the frames from the placement on."""
+        """Numbers of the frames that are lifted."""
         return self._clip.film.first + np.arange(len(self._clip.film.times))
 
     def check(self, edits: Edits) -> None:
-        """Refuse what is for keypoints alone."""
+        """Raise UserError for edits that are only possible with keypoints."""
         if edits.hidden or edits.swapped or edits.floor:
             raise UserError(
                 "only corrections of joints are possible when images are lifted; remove the others"
@@ -109,7 +109,7 @@ class PictureLift:
         return Solved(shown, (edits, whole, at))
 
     def follow(self, solved: Solved) -> None:
-        """Go on from an estimate."""
+        """Continue from an estimate."""
         edits, fit, at = solved.lifted
         self._near = Interactive(replace(self._clip, corrections=edits.corrections), fit, at)
 
@@ -122,7 +122,7 @@ class PictureLift:
         return Nearby(np.arange(len(places)), places, self._clip.view.project(places)[0])
 
     def words(self) -> list[str]:
-        """Words of ``gait lift``."""
+        """Arguments of ``gait lift``."""
         request = self._request
         found = ["gait lift", shlex.quote(request.video), "--placement", shlex.quote(request.placement)]
         found += ["--camera", shlex.quote(request.camera)] if request.camera else []

@@ -1,6 +1,6 @@
 """Solve the whole motion in a separate process, so that the page never waits.
 
-The newest corrections win: while one is solved, those that arrive are kept until the last of them is taken.
+Only the newest corrections count: of requests that arrive during a solution, only the last is solved next.
 """
 
 from __future__ import annotations
@@ -19,14 +19,14 @@ from gait.studio.shown import Lift, Solved
 
 Answer = Callable[[int, "Solved | str"], None]
 LAST = -1
-"""Number of the answer that no other follows, because the process has ended."""
+"""Number of the last answer, which reports that the process has ended."""
 ENDED = "the process that solves the whole motion has died; corrections are saved, start gait studio again"
 
 
 def _serve(pipe: Connection, lift: Lift) -> None:
-    """Solve the newest of what arrives, until the other end closes."""
+    """Solve the newest request each time, until the other end closes."""
     signal.signal(signal.SIGINT, signal.SIG_IGN)  # the server ends this process
-    os.nice(10)  # what moves while the user looks on comes first
+    os.nice(10)  # the interactive part has priority
     while True:
         try:
             number, edits = pipe.recv()
@@ -47,17 +47,17 @@ def _serve(pipe: Connection, lift: Lift) -> None:
 
 
 class Refiner:
-    """Process that lifts with the corrections that it was given last.
+    """Process that lifts with the latest corrections.
 
     Parameters
     ----------
     lift : Lift
     answer : callable
-        Called in a thread with the number of a request, and the motion or what is wrong with it.
+        Called in a thread with the number of a request, and the motion or an error text.
     """
 
     def __init__(self, lift: Lift, answer: Answer) -> None:
-        context = multiprocessing.get_context("spawn")  # a copy would share the threads of the server
+        context = multiprocessing.get_context("spawn")  # a copied process would share the server's threads
         self._pipe, other = context.Pipe()
         self._process = context.Process(target=_serve, args=(other, lift), daemon=True)
         self._process.start()
@@ -66,7 +66,7 @@ class Refiner:
         threading.Thread(target=self._listen, daemon=True).start()
 
     def ask(self, number: int, edits: Edits) -> bool:
-        """Ask for the motion with corrections; the answer comes later. False: the process has ended."""
+        """Request the motion with corrections, answered later; return False if the process has ended."""
         try:
             self._pipe.send((number, edits))
         except OSError:

@@ -21,18 +21,18 @@ from gait.web import serve
 _HERE = Path(__file__).parent
 _FILES = ("studio.js", "studio.css")
 _LONGEST = 10_000  # bytes of a request
-_PERIOD = 0.05  # seconds between two checks of the version
-_ALIVE = 10.0  # seconds after which a quiet stream shows that it is there
+_PERIOD = 0.05  # seconds between checks of the version
+_ALIVE = 10.0  # seconds after which a quiet stream sends a sign of life
 
 
 class _Endpoints:
-    """What the page asks of a session."""
+    """Endpoints through which the page uses a session."""
 
     def __init__(self, session: Session) -> None:
         self._session = session
 
     def routes(self) -> list[Route]:
-        """Routes of all endpoints."""
+        """List the routes of all endpoints."""
         own = {name: (_HERE / name).read_bytes() for name in _FILES}
         session, posted = self._session, ["POST"]
         return [
@@ -49,7 +49,7 @@ class _Endpoints:
 
     @staticmethod
     def _action(act: Callable[[dict[str, Any]], Any]) -> Callable[[Request], Awaitable[Response]]:
-        """Endpoint that reads the JSON object of a request and acts on it."""
+        """Make an endpoint that reads the JSON object of a request and acts on it."""
 
         async def answer(request: Request) -> Response:
             try:
@@ -61,7 +61,7 @@ class _Endpoints:
         return answer
 
     def film(self, request: Request) -> Response:
-        """Answer with the film, or ranges of it."""
+        """Answer with the film, or with ranges of it."""
         return FileResponse(self._session.source.film, media_type="video/mp4")
 
     def export(self, request: Request) -> Response:
@@ -96,7 +96,7 @@ class _Endpoints:
 
 
 def _answered(act: Callable[[], Any]) -> Response:
-    """Answer with what is done, or with what is wrong."""
+    """Answer with the result of an action, or with its error."""
     try:
         return JSONResponse(act())
     except UserError as error:
@@ -104,7 +104,7 @@ def _answered(act: Callable[[], Any]) -> Response:
 
 
 def application(session: Session, port: int) -> ASGIApp:
-    """Application of a session's page, for browsers that name the port."""
+    """Make the application of a session's page, for requests to this port."""
     page = (_HERE / "page.html").read_text(encoding="utf-8")
     title = f"gait studio: {Path(session.source.video.path).name}"
     return serve.application(page, title, _Endpoints(session).routes(), port)

@@ -1,7 +1,7 @@
-"""A session of corrections: saved as they are made, undone and redone; what they move is solved at once.
+"""A session of corrections, with undo and redo: they are saved, and the motion is solved, as they are made.
 
-Each edit solves the motion around it (`Lift.near`) and asks for the whole in the background (`refine`); when
-that comes, it replaces what was shown.
+Each edit solves the motion around it (`Lift.near`) and requests the whole in the background (`refine`), which
+then replaces what is shown.
 """
 
 from __future__ import annotations
@@ -43,15 +43,15 @@ from gait.web.motion_data import frames, rounded
 Floats = npt.NDArray[np.float64]
 Point = TypeVar("Point", Correction, FloorPin)
 
-LEAST_SD, MOST_SD = 0.3, 50.0  # pixels, of a point given by hand
-LONGEST_WAIT = 60.0  # seconds, of an export for the whole motion
+LEAST_SD, MOST_SD = 0.3, 50.0  # pixels, of a point marked by hand
+LONGEST_WAIT = 60.0  # seconds that an export waits for the whole motion
 MOST_UNDONE = 500  # edits that can be undone
-LEAST_WAY = 0.05  # metres over the floor that show a direction
-ARROW = 0.7  # metres, of the arrow that shows it
+LEAST_WAY = 0.05  # metres on the floor that show a direction
+ARROW = 0.7  # metres; length of the arrow that shows it
 
 
 class NotSavedError(UserError):
-    """The corrections could not be written; every other refusal leaves them saved as they were."""
+    """The corrections could not be written; after any other error they are still saved as they were."""
 
 
 class Session:
@@ -64,15 +64,15 @@ class Session:
 
     def __init__(self, source: Source) -> None:
         self.source, self._lift = source, source.lift
-        self._lock = threading.Condition()  # notified when the whole is solved
+        self._lock = threading.Condition()  # notified when the whole has been solved
         used = range(int(source.lift.frames[0]), int(source.lift.frames[-1]) + 1)
         self._known = source.prior, used, source.video.size
         self._reader = EntryReader(*self._known)
         self.edits = self._read()
         self._undo: list[Edits] = []
         self._redo: list[Edits] = []
-        self._begun = time.time_ns()  # versions of another session count from 0 too
-        self.version = 0  #: of what is shown; the page asks again when it grows
+        self._begun = time.time_ns()  # distinguishes versions of different sessions, which count from 0
+        self.version = 0  #: of what is shown; the page reloads it when the version increases
         self._asked = 0
         self.fault = ""
         self._refiner = Refiner(source.lift, self._on_refined)
@@ -80,13 +80,13 @@ class Session:
         self.refining = False
 
     def close(self) -> None:
-        """End the process in the background."""
+        """End the background process."""
         self._refiner.close()
 
     # ---- what is shown
 
     def state(self) -> dict[str, Any]:
-        """Everything the page shows: the object of `gait.web.motion_data`, and the corrections."""
+        """Return everything that the page shows: the object of `gait.web.motion_data`, and corrections."""
         with self._lock:
             source = self.source
             data = page_data(self._solved.shown, self._uv, self._places, source.video, self._lift.camera)
@@ -94,7 +94,7 @@ class Session:
             return data | self._work() | also
 
     def _work(self) -> dict[str, Any]:
-        """Corrections and what can be done with them."""
+        """Return the corrections and the possible actions."""
         return {
             "begun": self._begun,
             "version": self.version,
@@ -110,44 +110,44 @@ class Session:
         }
 
     def command(self) -> str:
-        """Command that gives the same motion from the file."""
+        """Command that makes the same motion from the file."""
         words = [*self._lift.words(), *self.source.model_words, "--corrections"]
         return " ".join([*words, shlex.quote(str(self.source.corrections)), "-o", "motion.csv"])
 
     # ---- edits
 
     def edit(self, action: dict[str, Any]) -> dict[str, Any]:
-        """Do what the page asks for; give what moved.
+        """Perform an action of the page; return what moved.
 
         Raises
         ------
         UserError
-            If it asks for what cannot be.
+            If the action is not possible.
         """
         with self._lock:
             return self._change(self._after(action), [*self._undo, self.edits][-MOST_UNDONE:], [])
 
     def undo(self) -> dict[str, Any]:
-        """Take the last edit back."""
+        """Undo the last edit."""
         with self._lock:
             if not self._undo:
                 raise UserError("there is nothing to undo")
             return self._change(self._undo[-1], self._undo[:-1], [*self._redo, self.edits])
 
     def redo(self) -> dict[str, Any]:
-        """Do again what was taken back last."""
+        """Redo the edit that was undone last."""
         with self._lock:
             if not self._redo:
                 raise UserError("there is nothing to redo")
             return self._change(self._redo[-1], [*self._undo, self.edits], self._redo[:-1])
 
     def place_start(self, action: dict[str, Any]) -> dict[str, Any]:
-        """Write where `gait track --init` may start: a point of the floor, and one ahead of it.
+        """Write an init file for `gait track --init` from a point on the floor and one ahead of it.
 
         Raises
         ------
         UserError
-            If there is no camera, or the points are none of the floor.
+            If there is no camera, or the points are not on the floor.
         """
         with self._lock:
             camera, shown = self._lift.camera, self._solved.shown
@@ -168,7 +168,7 @@ class Session:
             }
             begin |= phase_at(float(self.source.video.times[frame]), shown.events)
             if not self.source.camera_words:
-                self._write_camera()  # gait track has to be given the one that was found
+                self._write_camera()  # gait track needs the camera that was estimated
             with replacing(self._start_file) as temporary:
                 temporary.write_text(json.dumps(begin, indent=1) + "\n", encoding="utf-8")
             return {"start": self._start()}
@@ -178,7 +178,7 @@ class Session:
         return self.source.folder / "init.json"
 
     def _start(self) -> dict[str, Any] | None:
-        """Where the start is in the picture, and the command that takes it; None without one."""
+        """Return the start's position in the picture, and the command that uses it; None if there is none."""
         camera = self._lift.camera
         if camera is None or not self._start_file.exists():
             return None
@@ -192,7 +192,7 @@ class Session:
         return {"frame": begin["frame"], "from": ends[0], "to": ends[1], "command": " ".join(words)}
 
     def _after(self, action: dict[str, Any]) -> Edits:
-        """Edits with one more, or one less."""
+        """Return the edits after an action, which adds or removes one."""
         kind, edits = action.get("do"), self.edits
         asked = Fields("the correction", {key: value for key, value in action.items() if key != "do"})
         if kind == "pull":
@@ -223,17 +223,17 @@ class Session:
         raise UserError(f"the page asked for {kind!r}, which is unknown; reload it")
 
     def _change(self, wanted: Edits, undo: list[Edits], redo: list[Edits]) -> dict[str, Any]:
-        """Save other edits, solve what they move, and ask for the whole; a refused edit changes nothing."""
+        """Save other edits, solve what they move, and request the whole; after an error nothing changes."""
         begin = time.perf_counter()
         touched = _touched(self.edits, wanted)
-        self._lift.check(wanted)  # refused before anything is saved
+        self._lift.check(wanted)  # raises before anything is saved
         with ThreadPoolExecutor(1) as other:
-            saving = other.submit(self._save, wanted)  # the disk works while the motion is solved
+            saving = other.submit(self._save, wanted)  # writes while the motion is solved
             answer = self._moved(wanted, touched) if touched else {}
         try:
             saving.result()
         except NotSavedError:
-            self._use(self._solved)  # not what moved
+            self._use(self._solved)  # discards what moved
             raise
         self.edits, self._undo, self._redo = wanted, undo, redo
         self.version += 1
@@ -245,7 +245,7 @@ class Session:
         return self._work() | answer | {"ms": round(1000 * seconds)}
 
     def _moved(self, wanted: Edits, touched: range) -> dict[str, Any]:
-        """Solve near what was touched; what moved, for the page."""
+        """Solve near the frames that were touched; return what moved, for the page."""
         try:
             near = self._lift.near(wanted, touched)
         except np.linalg.LinAlgError:
@@ -264,7 +264,7 @@ class Session:
         }
 
     def _on_refined(self, number: int, found: Solved | str) -> None:
-        """Take the whole motion, unless there were more edits since."""
+        """Show the whole motion, unless there have been more edits since."""
         with self._lock:
             if number not in (self._asked, LAST):
                 return
@@ -275,7 +275,7 @@ class Session:
             self._lock.notify_all()
 
     def _use(self, solved: Solved) -> None:
-        """Show a motion and go on from it."""
+        """Show a motion and continue from it."""
         self._solved = solved
         self._places, self._uv = solved.shown.places.copy(), solved.shown.uv.copy()
         self._lift.follow(solved)
@@ -294,7 +294,7 @@ class Session:
         return edits
 
     def save(self) -> None:
-        """Write the corrections; they appear whole or not at all."""
+        """Write the corrections, completely or not at all."""
         self._save(self.edits)
 
     def _save(self, edits: Edits) -> None:
@@ -306,9 +306,9 @@ class Session:
             raise NotSavedError(f"{self.source.corrections}: {why}") from error
 
     def export(self, kind: str) -> Path:
-        """Write what a command writes of the whole motion: a format of `gait export`, ``csv`` or ``mp4``.
+        """Write the whole motion as a command would: in a format of `gait export`, as ``csv`` or ``mp4``.
 
-        ``camera`` gives the camera, found or given.  Waits while the whole is being solved.
+        ``camera`` writes the camera, estimated or given.  Waits while the whole is being solved.
 
         Raises
         ------
@@ -347,11 +347,11 @@ class Session:
 EXPORTS = {"csv": "motion.csv", "mp4": "overlay.mp4", "camera": "camera.json"} | {
     suffix[1:]: f"motion{suffix}" for suffix in exports.SUFFIXES
 }
-"""Kinds of exports and their files in the folder beside the film."""
+"""Kinds of exports, and their files in the folder beside the film."""
 
 
 def _convert(table: str, path: Path) -> None:
-    """Write a motion in the format of another tool."""
+    """Convert a motion to the format of another tool."""
     try:
         exports.write(table, str(path))
     except ImportError as error:
@@ -360,7 +360,7 @@ def _convert(table: str, path: Path) -> None:
 
 
 def _zipped(*paths: Path) -> Path:
-    """Write an archive of files beside the first of them."""
+    """Write an archive of files, beside the first of them."""
     found = paths[0].with_suffix(f"{paths[0].suffix}.zip")
     with replacing(found) as temporary, zipfile.ZipFile(temporary, "w", zipfile.ZIP_DEFLATED) as archive:
         for path in paths:
@@ -369,13 +369,13 @@ def _zipped(*paths: Path) -> Path:
 
 
 def _tidy(point: Point) -> Point:
-    """Round a point given by hand to what a hand can give."""
+    """Round a point marked by hand to a sensible precision."""
     u, v = (round(x, 2) for x in point.uv)
     return replace(point, uv=(u, v), sd_px=round(min(max(point.sd_px, LEAST_SD), MOST_SD), 2))
 
 
 def _touched(old: Edits, new: Edits) -> range | None:
-    """Frames between the first and the last that an edit changes; None if there are none."""
+    """Return the range from the first to the last frame that an edit changes; None if there are none."""
     changed: list[int] = []
     for key in ("corrections", "hidden", "swapped", "floor"):
         for each in set(getattr(old, key)) ^ set(getattr(new, key)):

@@ -1,4 +1,4 @@
-"""The data of a motion that the page shows, and the JSON object that carries them."""
+"""The data of a motion that the page shows, their JSON object, and the interface of ways to lift."""
 
 from __future__ import annotations
 
@@ -29,26 +29,26 @@ class Shown:
     Attributes
     ----------
     frame : (T,)
-        Numbers in the film.
+        Frame numbers in the film.
     time : (T,)
         Seconds.
     names : tuple of str
     places, sd : (T, J, 3)
-        Metres, and standard deviations.
+        Positions of the joints, and their standard deviations, metres.
     uv : (T, J, 2)
-        Where the joints are in the picture, pixels.
+        The joints in the picture, pixels.
     uv_sd : (T, J)
         Standard deviations along an axis of the picture, pixels.
     off : (T, J)
-        How far joints may be from where they are drawn, pixels: what is uncertain, and what was missed.
+        How far joints may be from where they are drawn, pixels: uncertainty, and distance from the detection.
     curves : list
-        Of `gait.web.motion_data.curve`.
+        Curves, made by `gait.web.motion_data.curve`.
     events : Events or None
-        Heel strikes; None where no person walks.
+        Heel strikes; None if the person does not walk.
     suggestions : list of Suggestion
     warnings : list of str
     figures : dict
-        ``px`` from what was seen (None for pictures), ``sd_mm``, ``stature_m``.
+        ``px``, reprojection error (None if images are lifted); ``sd_mm``; ``stature_m``.
     """
 
     frame: Ints
@@ -79,7 +79,7 @@ NO_CAMERA = (
 
 @dataclass(frozen=True)
 class Solved:
-    """A motion of all corrections: what is shown of it, and what `Lift` needs to go on from it."""
+    """A motion with all corrections: what is shown of it, and what `Lift` needs to continue from it."""
 
     shown: Shown
     lifted: Any
@@ -87,7 +87,7 @@ class Solved:
 
 @dataclass(frozen=True)
 class Nearby:
-    """What a correction moved at once: rows (n,) of the frames, places (n, J, 3) and pixels (n, J, 2)."""
+    """What a correction moved: rows (n,) of the frames, positions (n, J, 3) and pixels (n, J, 2)."""
 
     rows: npt.NDArray[np.intp]
     places: Floats
@@ -95,10 +95,10 @@ class Nearby:
 
 
 class Lift(Protocol):
-    """A way to lift the film with corrections; another process gets a copy of it."""
+    """A way to lift the film with corrections; it is copied to another process."""
 
-    without: dict[str, str]  #: corrections (pin, hide, swap) that it does not take, and why
-    camera: Camera | None  #: whose world the motion is in
+    without: dict[str, str]  #: kinds of corrections (pin, hide, swap) that it does not support, and why
+    camera: Camera | None  #: in whose world the motion is
 
     @property
     def frames(self) -> Ints:
@@ -106,44 +106,44 @@ class Lift(Protocol):
         ...
 
     def check(self, edits: Edits) -> None:
-        """Refuse corrections that cannot be."""
+        """Raise UserError for impossible corrections."""
         ...
 
     def whole(self, edits: Edits) -> Solved:
-        """Solve as the batch command does."""
+        """Solve the whole motion, as the command does."""
         ...
 
     def follow(self, solved: Solved) -> None:
-        """Go on from a motion."""
+        """Continue from a motion."""
         ...
 
     def near(self, edits: Edits, touched: range) -> Nearby | None:
-        """Solve again near what was touched; None if that cannot be, LinAlgError if it fails."""
+        """Solve again near the frames touched; None if that is impossible, LinAlgError if it fails."""
         ...
 
     def words(self) -> list[str]:
-        """Words of the batch command but for the corrections and the output."""
+        """Arguments of the command, without corrections and output."""
         ...
 
     def write_table(self, path: str, solved: Solved) -> None:
-        """Write the motion as the batch command does."""
+        """Write the motion, as the command does."""
         ...
 
     def write_overlay(self, path: str, video: Video, solved: Solved) -> None:
-        """Write the film with the figure as the batch command does."""
+        """Write the film with the figure, as the command does."""
         ...
 
 
 def page_data(
     shown: Shown, uv: Floats, places: Floats, video: Video, camera: Camera | None
 ) -> dict[str, Any]:
-    """Give the object of `gait.web.motion_data`: of the film's frames from the motion's first to its last.
+    """Make the object of `gait.web.motion_data`, for the film's frames from the motion's first to its last.
 
     Parameters
     ----------
     shown : Shown
     uv, places : (T, J, 2), (T, J, 3)
-        Where the joints are now, which a correction may have moved.
+        Present positions of the joints, which a correction may have moved.
     """
     first, names = int(shown.frame[0]), shown.names
     number = np.arange(first, int(shown.frame[-1]) + 1)
@@ -188,14 +188,14 @@ def page_data(
 def curves_of(
     frame: Ints, time: Floats, names: Sequence[str], places: Floats, covariance: Floats
 ) -> tuple[list[dict[str, Any]], Events | None]:
-    """Curves of angles and phase, and the heel strikes they are measured from.
+    """Make the curves of angles and phase; also return the heel strikes that determine the phase.
 
     Parameters
     ----------
     places : (T, J, 3)
-        Metres.
+        Positions of the joints, metres.
     covariance : (T, 3 J, 3 J)
-        Of the coordinates of a frame's joints, square metres.
+        Covariance of the coordinates of each frame's joints, square metres.
     """
     events = curves.events_of(frame, time, names, places)
     found = curves.angles_of(names, places, covariance)

@@ -1,7 +1,8 @@
 """Input of the studio: a film, the keypoints of a person in it, the view, and a folder beside the film.
 
-The folder ``walk.studio`` beside ``walk.mp4`` holds what takes long to make or must not be lost: keypoints
-of the detector or of a track, film.mp4, which every browser plays frame by frame, and corrections.json.
+The folder ``walk.studio`` beside ``walk.mp4`` contains files that take long to make or must not be lost:
+keypoints of the detector or of a track; film.mp4, which every browser can play frame by frame; and
+corrections.json.
 """
 
 from __future__ import annotations
@@ -41,17 +42,17 @@ from gait.track.walk_camera import calibrate_film, expected_camera, find_people,
 
 Floats = npt.NDArray[np.float64]
 
-LARGEST = 1280  # pixels of the longer side of the film that browsers get
-DETECTED = "keypoints.csv"  # what the detector found, in the folder beside the film
-FURTHEST_TURN = 0.1  # of the picture's width, by which a camera turns that counts as still
-KEYFRAMES = 8  # frames from one that is shown alone to the next: seeking decodes no more
-LEAST_SD = 1.0  # pixels, of a track's joints
+LARGEST = 1280  # pixels; largest longer side of the film for browsers
+DETECTED = "keypoints.csv"  # the detector's keypoints, in the folder beside the film
+FURTHEST_TURN = 0.1  # of the picture's width; a camera that turns less counts as still
+KEYFRAMES = 8  # frames from one I-frame to the next, the most that seeking has to decode
+LEAST_SD = 1.0  # pixels; least standard deviation of a track's joints
 WITHOUT_PERSON = ("init", "lost")  # statuses of frames whose joints are not used
 
 
 @dataclass(frozen=True)
 class Wanted:
-    """What the command was given: files, None where they are left out; stature in metres; view in degrees."""
+    """Arguments of the command: files, None if not given; stature in metres; field of view in degrees."""
 
     video: str
     camera: str | None = None
@@ -68,29 +69,29 @@ class Wanted:
     model: str | None = None
 
     def more(self) -> list[str]:
-        """Words of ``gait lift`` that state which frames are lifted, and the field of view."""
+        """Arguments of ``gait lift`` for the frames to lift and the field of view."""
         given = {"--fov": self.fov, "--start": self.start, "--stop": self.stop}
         return [word for name, value in given.items() if value is not None for word in (name, f"{value:g}")]
 
 
 @dataclass(frozen=True)
 class Source:
-    """What is corrected.
+    """Input of a session.
 
     Attributes
     ----------
     video : Video
     folder : Path
-        Beside the film.
+        Folder beside the film.
     film : Path
-        Video for browsers; its frame k is that of the film.
+        Video for browsers; its frame k is frame k of the film.
     corrections : Path
         File of the corrections; may not exist yet.
     prior : SegmentPrior
     lift : Lift
-        How it is lifted.
+        How to lift it.
     camera_words, model_words : list of str
-        Options of commands that use the same camera, none if it was found, and model.
+        Options with which other commands use the same camera (none if it was estimated) and model.
     """
 
     video: Video
@@ -104,7 +105,7 @@ class Source:
 
 
 def open_source(wanted: Wanted, video: Video, folder: Path, warn: Warn, quiet: bool) -> Source:
-    """Find or read everything; what takes long is kept in the `folder` beside the film (`folder_of`).
+    """Find or read everything; results that take long are kept in the `folder` beside the film (`folder_of`).
 
     Raises
     ------
@@ -114,7 +115,7 @@ def open_source(wanted: Wanted, video: Video, folder: Path, warn: Warn, quiet: b
     camera = Camera.read(wanted.camera, video.size, wanted.scale_camera) if wanted.camera else None
     if camera is not None and wanted.camera is not None:
         camera.check_place(wanted.camera)
-    if video.broken and (wanted.keypoints or wanted.track):  # the detector and the pictures warn themselves
+    if video.broken and (wanted.keypoints or wanted.track):  # other inputs cause the warning later
         warn(video.broken)
     prior = lift_run.load_prior(wanted.model, warn)
     lift: Lift
@@ -153,7 +154,7 @@ def _keypoint_lift(
 
 
 def require_still(video: Video, camera: Camera, people: dict[int, Keypoints], warn: Warn) -> None:
-    """Refuse a film whose camera turns far: corrections are of one picture of the scene; report small motion.
+    """Raise UserError if the camera turns far, as corrections need a static view; warn about small motion.
 
     Parameters are as for `gait.track.stabilise.find_motion`.
     """
@@ -197,7 +198,7 @@ def _pictures(
 
 
 def _calibration(wanted: Wanted, video: Video, keypoints: Keypoints, quiet: bool) -> Calibration | None:
-    """Camera from the walk, where the stature is given and no camera."""
+    """Estimate the camera from the walk, if the stature is given and no camera."""
     if wanted.camera or not wanted.height:
         return None
     _, found = calibrate_film(video, {1: keypoints}, Model(None), wanted.height, wanted.fov, quiet)
@@ -207,9 +208,9 @@ def _calibration(wanted: Wanted, video: Video, keypoints: Keypoints, quiet: bool
 
 @contextmanager
 def folder_of(video: Video) -> Iterator[Path]:
-    """Folder beside the film, of this process alone: two of them would write over each other.
+    """Provide the folder beside the film, locked so that two processes do not overwrite each other's files.
 
-    If the block refuses the start, a folder that was not there before keeps only what the detector found.
+    If the block raises an error, a new folder keeps only the detector's keypoints.
     """
     folder = video.path.with_name(f"{video.path.name}.studio")
     before = folder.exists()
@@ -234,17 +235,17 @@ def _tidy(folder: Path) -> None:
     found = folder / DETECTED
     for file in set(folder.iterdir()) - ({found, _mark(found)} if _mark(found).exists() else set()):
         file.unlink()
-    with suppress(OSError):  # there are
+    with suppress(OSError):  # not empty
         folder.rmdir()
 
 
 def _mark(path: Path) -> Path:
-    """File that states what a kept file was made from."""
+    """Return the file that states from what a kept file was made."""
     return path.with_name(f".{path.name}.json")
 
 
 def _kept(path: Path, video: Video, make: Callable[[Path], None], **how: int | None) -> Path:
-    """Make a file unless it was made from this film before, in the same way."""
+    """Make a file, unless it has been made from this film in the same way."""
     mark = _mark(path)
     state = Path(video.path).stat()
     source = {"film": Path(video.path).name, "bytes": state.st_size, "changed": state.st_mtime_ns} | how
@@ -268,7 +269,7 @@ def _keypoints(
     warn: Warn,
     quiet: bool,
 ) -> tuple[str, Keypoints]:
-    """Keypoints given, of a track, or found by the detector; and the file that has them."""
+    """Return keypoints (given, from a track, or from the detector), and the file that contains them."""
     if wanted.keypoints:
         path = wanted.keypoints
     elif wanted.track:
@@ -302,9 +303,9 @@ def _keypoints(
 def _detected(
     wanted: Wanted, video: Video, folder: Path, quiet: bool, start: int = 0, stop: int | None = None
 ) -> str:
-    """File of the detector's keypoints in the frames from `start` to before `stop`.
+    """Make the file of the detector's keypoints in frames `start` <= frame < `stop`.
 
-    They are of the person whose walk gives the camera, if it is to be found.
+    If the camera is to be estimated, they are those of the person from whose walk it is.
     """
     height = None if wanted.camera else wanted.height
 
@@ -320,14 +321,14 @@ def _detected(
 
 
 def keypoints_of_track(path: str, camera: Camera) -> Keypoints:
-    """Joints of a track in the picture, with its standard deviations.
+    """Project the joints of a track to keypoints, with standard deviations.
 
     Parameters
     ----------
     path : str
-        What ``gait track`` wrote.
+        Track, from ``gait track``.
     camera : Camera
-        That it was tracked with.
+        Camera with which it was tracked.
     """
     track = read_track(path)
     names = tuple(track.places)
@@ -342,12 +343,12 @@ def keypoints_of_track(path: str, camera: Camera) -> Keypoints:
 
 
 def _picture_sd(project: Callable[[Floats], Floats], places: Floats, sd: Floats) -> Floats:
-    """Give standard deviations (T, J) along an axis of the picture, of places (T, J, 3) with sd (T, J, 3).
+    """Return standard deviations (T, J) along an axis of the picture, for positions and sd (T, J, 3).
 
     Parameters
     ----------
     project : callable
-        Pixels (T, J, 2) of places (T, J, 3).
+        Projects positions (T, J, 3) to pixels (T, J, 2).
     """
     here = project(places)
     moved = [project(places + sd * axis) - here for axis in np.eye(3)]
@@ -355,7 +356,7 @@ def _picture_sd(project: Callable[[Floats], Floats], places: Floats, sd: Floats)
 
 
 def _write_film(path: Path, video: Video, quiet: bool) -> None:
-    """Write the film as H.264 of constant rate, whose every frame a browser can show alone."""
+    """Write the film as H.264 with constant frame rate, so that a browser can show any single frame."""
     import cv2
 
     factor = min(1.0, LARGEST / max(video.size))

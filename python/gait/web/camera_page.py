@@ -22,33 +22,34 @@ from gait.errors import UserError
 from gait.io.files import replacing
 from gait.web import serve
 
-_MOST = 60  # marks
-_FURTHEST = 1e4  # metres, pixels
-_POLE = 1.75  # metres
-_BYTES = 1 << 16  # of a request
+_MOST = 60  # most marks
+_FURTHEST = 1e4  # largest coordinate, metres or pixels
+_POLE = 1.75  # metres; height of the pole that is drawn
+_BYTES = 1 << 16  # longest request
 _HERE = Path(__file__).parent
 
 
 @dataclass(frozen=True)
 class Scene:
-    """What is shown, and what comes of it.
+    """What the page shows, and the file that it writes.
 
     Attributes
     ----------
     name : str
-        Of the film or picture.
+        Name of the film or picture.
     size : (int, int)
     frames : int
+        Number of frames.
     picture : callable
-        Gives a frame by its number.
+        Returns a frame by its number.
     lens : Camera or None
-        None: the focal length is found from the marks too.
+        None: the focal length is also estimated from the marks.
     lens_words : str
-        Where the lens is from.
+        Where the lens is from, in words.
     output : str
         Camera file to write.
     first : int
-        Frame shown at first.
+        Frame shown first.
     """
 
     name: str
@@ -62,7 +63,7 @@ class Scene:
 
 
 def application(scene: Scene, port: int, written: Callable[[str], None] = lambda words: None) -> ASGIApp:
-    """Application of the page; `written` is called with a line when the camera file was written."""
+    """Make the page's application; `written` is called with a line when the camera file has been written."""
     own = {name: (_HERE / name).read_bytes() for name in ("camera_page.js", "camera_page.css")}
     page = _Page(scene, written)
     routes = [
@@ -77,13 +78,13 @@ def application(scene: Scene, port: int, written: Callable[[str], None] = lambda
 
 
 class _Page:
-    """Answers of the page."""
+    """Endpoints of the page."""
 
     def __init__(self, scene: Scene, written: Callable[[str], None]) -> None:
         self._scene, self._written = scene, written
 
     def about(self, request: Request) -> Response:
-        """State what is shown."""
+        """Answer with what the page shows."""
         scene = self._scene
         return JSONResponse(
             {
@@ -98,7 +99,7 @@ class _Page:
         )
 
     def frame(self, request: Request) -> Response:
-        """Give a frame of the film."""
+        """Answer with a frame of the film."""
         number = int(request.path_params["number"])
         if number >= self._scene.frames:
             return PlainTextResponse("not here\n", 404)
@@ -107,11 +108,11 @@ class _Page:
         return Response(data, media_type="image/jpeg")
 
     async def place(self, request: Request) -> Response:
-        """Place the camera by the marks."""
+        """Place the camera from the marks."""
         return await self._answer(request, lambda found: None)
 
     async def save(self, request: Request) -> Response:
-        """Place the camera by the marks and write its file."""
+        """Place the camera from the marks and write its file."""
         return await self._answer(request, self._save)
 
     async def _answer(self, request: Request, use: Callable[[dict[str, Any]], None]) -> Response:
@@ -134,7 +135,7 @@ class _Page:
 
 
 def solve(scene: Scene, marks: dict[str, Any]) -> dict[str, Any]:
-    """Place the camera by marks as the page sends them.
+    """Place the camera from marks sent by the page.
 
     Parameters
     ----------
@@ -145,14 +146,15 @@ def solve(scene: Scene, marks: dict[str, Any]) -> dict[str, Any]:
     Returns
     -------
     dict
-        ``camera``, its ``place``, ``focal`` length and that one's ``sd`` as a share; ``xy`` of the marks,
-        where they are ``shown``, ``off`` and ``rms`` in pixels; ``missed_m`` of each distance; lines of the
-        floor's ``grid`` and a ``pole`` as high as a person, in pixels.
+        ``camera``, its ``place``, ``focal`` length and relative ``sd`` of the latter; ``xy`` of the marks;
+        ``shown``: their projections; ``off`` and ``rms``: reprojection errors in pixels; ``missed_m``:
+        residual of each distance; lines of the floor's ``grid`` and a ``pole`` as high as a person, in
+        pixels.
 
     Raises
     ------
     UserError
-        With what is missing or contradicts itself.
+        Describing missing or contradictory marks.
     """
     uv = _numbers(marks.get("uv"), "pixels")
     if len(uv) < LEAST:

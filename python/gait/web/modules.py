@@ -1,7 +1,7 @@
 """JavaScript modules of our pages, and the head of a page: with modules served, or embedded.
 
-The modules import each other and their parts by plain names (``three``, ``gait/scene.js``), so the same files
-work in both kinds of page; an import map has their places.  There is no bundler.
+The modules import each other and third-party parts by plain names (``three``, ``gait/scene.js``), which an
+import map resolves, so the same files work in both kinds of page.  There is no bundler.
 """
 
 from __future__ import annotations
@@ -20,22 +20,22 @@ _HERE = Path(__file__).parent
 
 
 def available() -> bool:
-    """Whether the parts that draw figures and curves were fetched."""
+    """Whether the parts that draw figures and curves have been downloaded."""
     return all(parts.find(part) is not None for part in (*_PLAIN.values(), parts.ECHARTS))
 
 
 def own(name: str) -> str:
-    """Text of a module of ours or of style.css."""
+    """Read the text of one of our modules, or of style.css."""
     return (_HERE / name).read_text(encoding="utf-8")
 
 
 def served(drawing: bool = True) -> dict[str, bytes]:
-    """Files to serve below ``/web/`` for a page with `served_head`, by name.
+    """Return the files to serve below ``/web/`` for a page with `served_head`, by name.
 
     Raises
     ------
     UserError
-        If the parts were not fetched and are needed, for `drawing` figures or curves.
+        If the parts, needed for `drawing` figures or curves, have not been downloaded.
     """
     needed = (*_PLAIN.values(), parts.ECHARTS) if drawing else ()
     fetched = {part.file: parts.load(part) for part in needed}
@@ -43,14 +43,14 @@ def served(drawing: bool = True) -> dict[str, bytes]:
 
 
 def served_head(drawing: bool = True) -> tuple[str, str]:
-    """Head of a page whose server has `served()`, and the sources of its scripts for a security policy.
+    """Make the head of a page whose server has `served()`, and the allowed sources of its scripts.
 
     Returns
     -------
     head : str
         HTML: style, import map, and ECharts as ``window.echarts``.
     script_src : str
-        What ``Content-Security-Policy: script-src`` has to allow.
+        What ``Content-Security-Policy: script-src`` must allow.
     """
     imports = {name: f"/web/{part.file}" for name, part in _PLAIN.items()}
     imports |= {f"gait/{name}": f"/web/{name}" for name in OWN}
@@ -63,17 +63,17 @@ def served_head(drawing: bool = True) -> tuple[str, str]:
 
 
 def inlined_head(parts_too: bool = True) -> str:
-    """Head of a page that needs no other file (2.9 MB): style, import map and ECharts written into it.
+    """Make the head of a self-contained page (2.9 MB), with style, import map and ECharts embedded.
 
     Parameters
     ----------
     parts_too : bool
-        False leaves out the parts and what needs them: of our modules film.js is left.
+        False omits the parts and the modules that need them, so that only film.js is embedded.
 
     Raises
     ------
     UserError
-        If the parts were not fetched.
+        If the parts have not been downloaded.
     """
     modules = {name: parts.load(part) for name, part in _PLAIN.items() if parts_too}
     modules |= {f"gait/{name}": own(name).encode() for name in (OWN if parts_too else ("film.js",))}
@@ -92,14 +92,14 @@ def inlined_head(parts_too: bool = True) -> str:
 
 
 def inlined_json(name: str, data: object) -> str:
-    """Write an object into a page; a module reads it by ``JSON.parse(document.getElementById(name)...)``.
+    """Embed an object in a page; a module reads it with ``JSON.parse(document.getElementById(name)...)``.
 
     Parameters
     ----------
     name : str
         The element's id.
     data : object
-        JSON without NaN, such as `gait.web.motion_data.motion_data` gives.
+        JSON without NaN, such as from `gait.web.motion_data.motion_data`.
     """
     text = json.dumps(data, allow_nan=False, separators=(",", ":")).replace("<", "\\u003c")
     return f'<script type="application/json" id="{name}">{text}</script>'

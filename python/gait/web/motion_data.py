@@ -1,6 +1,6 @@
 """The JSON object that scene.js, film.js and curves.js draw.
 
-A page is handed one object, here by `motion_data`:
+A page gets one object, made by `motion_data`:
 
 =========== ======================= ==========================================================================
 key         shape                   meaning
@@ -50,10 +50,10 @@ from gait.body.skeleton import side_of
 Floats = npt.NDArray[np.float64]
 
 RADIUS = {"pelvis": 0.09, "chest": 0.09, "head": 0.08, "hip": 0.07, "knee": 0.06, "shoulder": 0.05}
-"""Radius of the cylinder that ends at a joint, metres, by the joint's name without its side."""
+"""Radius of the cylinder that ends at a joint, metres, by the joint's name without side."""
 _THIN = 0.04
 COVERAGE = 1.6449
-"""Standard deviations to both sides of the mean that hold 90 % of a Gaussian."""
+"""Half-width of the 90 % interval of a Gaussian, standard deviations."""
 
 
 def motion_data(
@@ -118,7 +118,7 @@ def curve(
 
 
 def rounded(values: npt.ArrayLike, digits: int = 4) -> list[Any]:
-    """Nested lists of an array, NaN as null."""
+    """Convert an array to nested lists, with NaN as null."""
     array = np.asarray(values, float)
     if np.isfinite(array).all():
         return list(np.round(array, digits).tolist())
@@ -126,13 +126,13 @@ def rounded(values: npt.ArrayLike, digits: int = 4) -> list[Any]:
 
 
 def frames(values: Floats, digits: int = 4) -> list[Any]:
-    """Nested lists by frame; null for a frame that is not finite."""
-    found = np.round(values, digits).tolist()  # of all frames at once, which takes a tenth of the time
+    """Convert an array to nested lists by frame; null for a frame that is not finite."""
+    found = np.round(values, digits).tolist()  # all frames at once, which is ten times as fast
     return [one if np.isfinite(each).all() else None for one, each in zip(found, values, strict=True)]
 
 
 def _either(one: str, other: str) -> str:
-    """Side of a bone by those of its ends."""
+    """Return the side of a bone, from the sides of its ends."""
     return other if one == "middle" else one
 
 

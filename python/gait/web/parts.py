@@ -1,6 +1,6 @@
 """Third-party components of web pages: three.js draws the 3-D figure, ECharts the curves.
 
-They come from the Python package ``nicegui``, which is downloaded but not installed.
+They are contained in the Python package ``nicegui``, which is downloaded but not installed.
 """
 
 from __future__ import annotations
@@ -8,7 +8,7 @@ from __future__ import annotations
 from gait.io.published import Published, Store
 
 FETCH = "run gait studio --fetch once, with a network connection"
-"""What a user does to get the parts."""
+"""How a user gets the parts."""
 
 _WHEEL = "nicegui==2.24.2"
 THREE = Published(

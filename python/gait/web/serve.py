@@ -1,4 +1,4 @@
-"""A local server: loopback only, Host and Origin checked, nothing outside the page's files."""
+"""A local server: loopback only, with checks of Host and Origin, serving only the page's files."""
 
 from __future__ import annotations
 
@@ -24,7 +24,7 @@ from gait.errors import UserError
 from gait.web import modules
 
 HOST = "127.0.0.1"
-STREAMS_END = 3  # seconds that streams of events have when the server ends
+STREAMS_END = 3  # seconds that event streams have to end when the server does
 _NAMES = (HOST, "localhost", "[::1]")
 _POLICY = (
     "default-src 'self'; script-src {scripts}; style-src 'self' 'unsafe-inline'; img-src 'self' blob: data:; "
@@ -33,10 +33,10 @@ _POLICY = (
 
 
 class Guard:
-    """Refuse requests that another site or machine caused.
+    """Rejects requests caused by another site or machine.
 
-    A page of another site can make a browser send requests here, and a name that it owns can point to this
-    machine: the first carry its Origin, the second its Host.
+    A page of another site can make a browser send requests here, which have its Origin.  It can also let a
+    host name of its own point to this machine; such requests have that Host.
     """
 
     def __init__(self, app: ASGIApp, port: int, scripts: str) -> None:
@@ -45,7 +45,7 @@ class Guard:
         self._origins = {f"http://{host}" for host in self._hosts}
 
     async def __call__(self, scope: Scope, receive: Receive, send: Send) -> None:
-        """Answer a request, or hand it on."""
+        """Reject a request, or pass it on."""
         if scope["type"] == "lifespan":
             await self._app(scope, receive, send)
             return
@@ -76,7 +76,7 @@ class Guard:
 def application(
     page: str, title: str, routes: Sequence[BaseRoute], port: int, drawing: bool = True
 ) -> ASGIApp:
-    """Application of one page.
+    """Make the application of a page.
 
     Parameters
     ----------
@@ -84,16 +84,16 @@ def application(
         HTML of the body, which loads its own script from one of the routes.
     title : str
     routes : sequence of starlette.routing.Route
-        What else it serves; ``/`` and ``/web/NAME`` are taken.
+        Further routes; ``/`` and ``/web/NAME`` are reserved.
     port : int
-        Port that browsers have to name.
+        Port that must be in the Host header.
     drawing : bool
-        Whether the page draws figures or curves, which need the fetched parts.
+        Whether the page draws figures or curves, which need the downloaded parts.
 
     Raises
     ------
     UserError
-        If the parts of pages were not fetched and it does.
+        If these parts are needed but have not been downloaded.
     """
     files = modules.served(drawing)
     head, scripts = modules.served_head(drawing)
@@ -112,7 +112,7 @@ def application(
 
 
 class RequestError(UserError):
-    """A request that is too long, or no JSON object; `status` is that of the answer."""
+    """A request that is too long, or not a JSON object; `status`: HTTP status of the answer."""
 
     def __init__(self, text: str, status: int = 400) -> None:
         super().__init__(text)
@@ -120,12 +120,12 @@ class RequestError(UserError):
 
 
 async def json_object(request: Request, most: int) -> dict[str, Any]:
-    """Read the JSON object of a request, of at most so many bytes.
+    """Read the JSON object of a request, of at most `most` bytes.
 
     Raises
     ------
     RequestError
-        If it is longer, or something else.
+        If it is longer, or not an object.
     """
     data = b""
     async for part in request.stream():
@@ -155,7 +155,7 @@ def _finite(text: str) -> float:
 
 
 def in_memory(files: Mapping[str, bytes]) -> Callable[[Request], Response]:
-    """Endpoint that serves files by their ``name`` in the path, and no others."""
+    """Make an endpoint that serves only these files, by their ``name`` in the path."""
 
     def answer(request: Request) -> Response:
         name = request.path_params["name"]
@@ -168,7 +168,7 @@ def in_memory(files: Mapping[str, bytes]) -> Callable[[Request], Response]:
 
 
 def listen(port: int) -> socket.socket:
-    """Socket on this machine's loopback; port 0 takes any that is free.
+    """Open a socket on this machine's loopback; port 0 means any free port.
 
     Raises
     ------
@@ -187,7 +187,7 @@ def listen(port: int) -> socket.socket:
 
 
 def address(own: socket.socket) -> str:
-    """URL of a server on a socket."""
+    """Return the URL of a server on a socket."""
     return f"http://{HOST}:{own.getsockname()[1]}/"
 
 
@@ -206,7 +206,7 @@ def background(app: ASGIApp, own: socket.socket) -> tuple[uvicorn.Server, thread
 
 
 def ending(request: Request) -> bool:
-    """Whether the server ends, so that a stream of events has to."""
+    """Whether the server is ending, so that event streams must end too."""
     return bool(request.scope["ending"]())
 
 
@@ -222,10 +222,10 @@ def _server(app: ASGIApp) -> uvicorn.Server:
 
 
 class _Server(uvicorn.Server):
-    """Closes what is left of its connections when it ends."""
+    """Server that closes remaining connections when it ends."""
 
     async def shutdown(self, sockets: list[socket.socket] | None = None) -> None:
         await super().shutdown(sockets)
-        for connection in list(self.server_state.connections):  # whose answers did not end in time
+        for connection in list(self.server_state.connections):  # whose answers have not ended in time
             connection.transport.abort()
-        await asyncio.sleep(0)  # in which they close
+        await asyncio.sleep(0)  # lets them close
