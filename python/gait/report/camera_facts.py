@@ -1,4 +1,4 @@
-"""A camera in words, for reports."""
+"""Describe a camera in words, for reports."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ from gait.camera.camera import Camera
 
 
 def camera_facts(camera: Camera) -> dict[str, str]:
-    """Describe a camera by name and words."""
+    """Describe a camera: names of facts, to words."""
     view = 2 * np.degrees(np.arctan(camera.width / 2 / camera.fx))
     tilt = np.degrees(np.arcsin(np.clip(-camera.R[2, 2], -1, 1)))
     return {

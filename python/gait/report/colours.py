@@ -1,4 +1,4 @@
-"""Colours of drawings: left sides of bodies are blue, right ones orange, on paper and over pictures."""
+"""Colours of drawings: left sides of bodies are blue, right sides orange, on paper and over pictures."""
 
 from __future__ import annotations
 
@@ -9,10 +9,10 @@ STATUS_TINTS = {"init": "#c8c8c8", "ambiguous": "#f4d06f", "lost": "#e07a7a"}
 
 ON_PAPER = {"left": BLUE, "right": ORANGE, "middle": DARK}
 OVER_PICTURES = {"left": (235, 165, 60), "right": (50, 125, 250), "middle": (190, 215, 120)}
-"""BGR; brighter, to show on dark clothes, and pale green for the middle."""
+"""BGR; brighter, to be visible on dark clothes, and pale green for the middle."""
 
 PEOPLE = (
     (235, 165, 60), (50, 125, 250), (110, 200, 90), (200, 110, 220),
     (60, 210, 240), (210, 210, 110), (150, 150, 250), (190, 190, 190),
 )  # fmt: skip
-"""BGR, of people in one picture."""
+"""BGR colours of several people in one picture."""

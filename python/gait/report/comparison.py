@@ -1,4 +1,4 @@
-"""A track compared with the truth: errors frame by frame, and the part of a report that shows them."""
+"""Compare a track with the truth: errors frame by frame, and the part of a report that shows them."""
 
 from __future__ import annotations
 
@@ -30,11 +30,11 @@ class Comparison:
     Attributes
     ----------
     measures : dict
-        Of `gait.motion.evaluate.evaluate`.
+        From `gait.motion.evaluate.evaluate`.
     time : ndarray of shape (k,)
         Seconds.
     abs_mm, root_mm : ndarray of shape (k,)
-        Mean over EVAL15 as it is, and with the hip midpoints laid on each other.
+        Mean error over EVAL15, unaligned and after aligning the hip midpoints.
     phase : ndarray of shape (k,) or None
         Estimate minus truth, cycles in [-0.5, 0.5).
     true_path : ndarray of shape (k, 2)
@@ -50,7 +50,7 @@ class Comparison:
 
 
 def compare(track: Track, truth: str, model: str | None, camera: Camera | None) -> Comparison:
-    """Put a track beside the file of the true motion; `model` and `camera` as for `evaluate`."""
+    """Compare a track with the file of the true motion; `model` and `camera` as for `evaluate`."""
     true = read_truth(truth)
     strikes = strikes_of(true, Path(truth).parent / "meta.json")
     measures = evaluate(track, true, strikes=strikes, model=read_cyclic(model), camera=camera)

@@ -1,4 +1,4 @@
-"""Draw bodies: an estimate over its frame with a panel of figures, or a model as a sheet of poses."""
+"""Draw bodies: an estimate over its frame with a panel of numbers, or a model as a sheet of poses."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ from gait.camera.camera import Camera
 from gait.io.video import Image
 from gait.report.colours import OVER_PICTURES
 
-_PANEL_SIZE = (236, 92)  # of the panel, pixels at scale 1
+_PANEL_SIZE = (236, 92)  # size of the panel, pixels at scale 1
 _INK = (240, 240, 240)
 _DIM = (170, 170, 170)
 _STATUS = {
@@ -41,12 +41,12 @@ _LEGEND = (
     ("Right side of the body", "right"),
 )
 LEGEND_SECONDS = 3.0
-"""How long a film shows what dial, ellipses and colours mean."""
+"""Seconds for which a film explains dial, ellipses and colours."""
 _FONT = cv2.FONT_HERSHEY_DUPLEX
 
 
 def draw_panel(canvas: Image, estimate: Estimate, frame: int, scale: float) -> None:
-    """Draw into the top left corner of a BGR picture, in place; `scale` 1 suits 540 lines."""
+    """Draw the panel into the top left corner of a BGR picture, in place; `scale` 1 suits 540 lines."""
     region = _panel(canvas, scale)
     lost = estimate.status == TrackStatus.LOST
     _dial(region, estimate, (round(46 * scale), round(46 * scale)), 32 * scale, scale)
@@ -71,13 +71,13 @@ def _panel(canvas: Image, scale: float) -> Image:
 
 
 def _darkened(region: Image) -> Image:
-    """Darken a part of a picture, so that words in it are readable whatever is behind them."""
+    """Darken a part of a picture, so that words in it are readable on any background."""
     region[:] = np.rint(0.2 * region + 0.8 * np.array([32, 28, 26])).astype(np.uint8)
     return region
 
 
 def _lines(region: Image, words: tuple[str, ...], colour: tuple[int, int, int], scale: float) -> None:
-    """Write the four lines of the panel, the first in a colour."""
+    """Write the panel's four lines, the first in colour."""
     left = round(96 * scale)
     rows = ((22, 0.52, colour), (43, 0.4, _INK), (61, 0.4, _INK), (80, 0.36, _DIM))
     for line, (row, size, ink) in zip(words, rows, strict=True):
@@ -85,7 +85,7 @@ def _lines(region: Image, words: tuple[str, ...], colour: tuple[int, int, int], 
 
 
 def _draw_legend(canvas: Image, scale: float) -> None:
-    """Explain dial, ellipses and colours in the top right corner, if that is free of the panel."""
+    """Explain dial, ellipses and colours in the top right corner, if the panel does not reach there."""
     size, edge, row = 0.4 * scale, round(8 * scale), 19 * scale
     width = max(cv2.getTextSize(words, _FONT, size, 1)[0][0] for words, _ in _LEGEND) + round(16 * scale)
     height = round(row * len(_LEGEND) + 8 * scale)
@@ -99,7 +99,7 @@ def _draw_legend(canvas: Image, scale: float) -> None:
 
 
 def _dial(region: Image, estimate: Estimate, at: tuple[int, int], radius: float, scale: float) -> None:
-    """Clock face of one stride: right heel strike at the top, the hand within two standard deviations.
+    """Draw the stride as a clock face: right heel strike at the top, a hand, and two standard deviations.
 
     Without a phase there is no hand.
     """
@@ -132,17 +132,17 @@ ENDS = ("l_wrist", "r_wrist", "l_ankle", "r_ankle")
 _DARK: Colour = (30, 30, 30)
 _FILL = 0.28  # opacity of the body
 _FADED = 0.45  # opacity of the figure of a lost person
-_ELLIPSE = 2.146  # standard deviations of the 90 % ellipse of a normal in the plane
-_SUBPIXEL = 4  # bits of fraction in OpenCV's drawing coordinates
+_ELLIPSE = 2.146  # standard deviations of the 90 % ellipse of a normal distribution in the plane
+_SUBPIXEL = 4  # fractional bits of OpenCV's drawing coordinates
 
 
 def side_colour(name: str) -> Colour:
-    """Colour of a joint or limb by its side."""
+    """Return the colour of a joint or limb, which depends on its side."""
     return OVER_PICTURES[side_of(name)]
 
 
 class Overlay:
-    """Draws into the frames of one camera. `camera`: its lens distortion is applied to what is drawn."""
+    """Draws into the frames of one camera, whose lens distortion is applied to the drawing."""
 
     def __init__(self, model: Model, camera: Camera) -> None:
         self.model, self.camera = model, camera
@@ -152,7 +152,7 @@ class Overlay:
     def draw(self, image: Image, estimate: Estimate, frame: int, *, legend: bool = False) -> Image:
         """Return a BGR picture: frame, body of the dominant hypothesis, mean joints, 90 % ellipses, panel.
 
-        The figure of a lost person is faded and has no body.  `legend`: explain what is drawn.
+        If the person is lost, the figure is faded and has no body.  `legend`: explain the drawing.
         """
         canvas = self._person(_in_colour(image), estimate)
         draw_panel(canvas, estimate, frame, self._scale)
@@ -163,10 +163,10 @@ class Overlay:
     def draw_people(
         self, image: Image, people: Mapping[str, Estimate], colours: Mapping[str, Colour] | None = None
     ) -> Image:
-        """Return a BGR picture: frame, and several people with their names over their heads, no panel.
+        """Return a BGR picture: frame, and several people with their names above their heads, without panel.
 
-        `people`: by name; one whose name is empty gets none.  `colours`: of each person, instead of those of
-        the sides of bodies.
+        `people`: by name; an empty name is not drawn.  `colours`: of each person, instead of colours of
+        sides.
         """
         canvas = _in_colour(image).copy()
         for name, estimate in people.items():
@@ -196,7 +196,7 @@ class Overlay:
         return canvas
 
     def draw_absent(self, image: Image, time: float, frame: int, *, legend: bool = False) -> Image:
-        """Return a BGR picture of a frame without an estimate, which states so; `time` in seconds."""
+        """Return a BGR picture of a frame, with the note that it has no estimate; `time` in seconds."""
         canvas = _in_colour(image).copy()
         words = ("no estimate", "person not found", "in this frame", f"frame {frame}   {time:.2f} s")
         _lines(_panel(canvas, self._scale), words, _DIM, self._scale)
@@ -205,13 +205,13 @@ class Overlay:
         return canvas
 
     def figure(self, canvas: Image, state: State) -> Image:
-        """Return `canvas` with body and skeleton of one hypothesis."""
+        """Return `canvas` with body and skeleton of a state."""
         canvas = self.body(canvas, state)
         self.skeleton(canvas, self.model.pose(state)[0])
         return canvas
 
     def body(self, canvas: Image, state: State, colour: Colour | None = None) -> Image:
-        """Tint the limbs and outline each where it shows, in one colour or that of its side."""
+        """Tint the limbs and outline their visible parts, in one colour or the colours of their sides."""
         ids = self.model.render(self.camera, state)
         if self._lens is not None:
             ids = np.asarray(cv2.remap(ids, *self._lens, cv2.INTER_NEAREST), np.uint8)
@@ -219,12 +219,12 @@ class Overlay:
         return tinted(canvas, ids, self.model.limb_names, width, colour)
 
     def skeleton(self, canvas: Image, joints: Array, colour: Colour | None = None) -> None:
-        """Draw bones and joints (P, 3) in place; what is behind the camera is left out."""
+        """Draw bones and joints (P, 3) in place, except behind the camera."""
         size = self._size(joints[self.model.joint_names.index("pelvis")])
         thick = max(1, round(2 * size))
         self.sticks(
             canvas, joints, thick + max(1, round(size)), _DARK
-        )  # a dark seam keeps lines readable on any clothes
+        )  # with a dark seam, lines are visible on any clothes
         self.sticks(canvas, joints, thick, None if colour is None else _brighter(colour))
         for name, at in zip(self.model.joint_names, self.camera.project(joints), strict=True):
             if np.isfinite(at).all():
@@ -232,7 +232,7 @@ class Overlay:
                 _dot(canvas, at, 2.4 * size, _brighter(colour or side_colour(name)))
 
     def sticks(self, canvas: Image, joints: Array, thick: int, colour: Colour | None = None) -> None:
-        """Draw bones as lines of `thick` pixels in place, in one colour or that of their side."""
+        """Draw bones as lines of `thick` pixels in place, in one colour or the colours of their sides."""
         uv = dict(zip(self.model.joint_names, self.camera.project(joints), strict=True))
         draw_bones(canvas, uv, thick, colour)
 
@@ -253,28 +253,28 @@ class Overlay:
             _ellipse(canvas, middle, radii, float(angle), side_colour(name), thick)
 
     def _size(self, place: Array) -> float:
-        """Scale of lines for a person at `place`: 1 where 1.7 m are 400 pixels."""
+        """Return the scale of lines for a person at `place`: 1 where 1.7 m are 400 pixels."""
         depth = max(float(self.camera.depth(place)), 0.1)
         return float(np.clip(1.7 * self.camera.fy / depth / 400, 0.3, 4.0))
 
 
 def _in_colour(image: Image) -> Image:
-    """Return a picture as BGR; it may be the same array."""
+    """Convert a picture to BGR; may return the same array."""
     return np.asarray(cv2.cvtColor(image, cv2.COLOR_GRAY2BGR), np.uint8) if image.ndim == 2 else image
 
 
 def tinted(
     canvas: Image, ids: NDArray[np.uint8], limbs: Sequence[str], width: int, colour: Colour | None = None
 ) -> Image:
-    """Return `canvas` (h, w, 3) with limbs tinted and outlined; `ids` (h, w) holds limb index + 1, or 0.
+    """Return `canvas` (h, w, 3) with limbs tinted and outlined; `ids` (h, w): limb index + 1, or 0.
 
-    `colour`: of all limbs, instead of those of their sides.
+    `colour`: of all limbs, instead of the colours of their sides.
     """
     rows, columns = (np.flatnonzero(ids.any(axis=axis)) for axis in (1, 0))
     out = canvas.copy()
     if not len(rows):
         return out
-    y, x = max(rows[0] - width, 0), max(columns[0] - width, 0)  # of the part that is drawn into
+    y, x = max(rows[0] - width, 0), max(columns[0] - width, 0)  # corner of the part that is drawn into
     part, ids = (one[y : rows[-1] + width + 1, x : columns[-1] + width + 1] for one in (out, ids))
     colours = [colour or side_colour(name) for name in limbs]
     table = np.array([(0, 0, 0), *colours], np.float32)
@@ -289,14 +289,14 @@ def tinted(
 
 
 def draw_bones(canvas: Image, uv: Mapping[str, Array], thick: int, colour: Colour | None = None) -> None:
-    """Draw bones between joints at pixels `uv` in place, in one colour or that of their side."""
+    """Draw bones between joints at pixels `uv` in place, in one colour or the colours of their sides."""
     for a, b in BONES:
         if np.isfinite([uv[a], uv[b]]).all():
             _line(canvas, [uv[a], uv[b]], colour or _brighter(side_colour(b)), thick)
 
 
 def _lens_map(camera: Camera) -> tuple[NDArray[np.float32], NDArray[np.float32]]:
-    """Column and row in the ideal picture of every pixel of the distorted one, each (h, w)."""
+    """Map every pixel of the distorted picture to column and row in the ideal one, each (h, w)."""
     grid = np.stack(np.meshgrid(np.arange(camera.width), np.arange(camera.height)), axis=2)
     in_camera = camera.rays(grid) @ camera.R.T
     ideal = in_camera[..., :2] / in_camera[..., 2:] * [camera.fx, camera.fy] + [camera.cx, camera.cy]
@@ -309,7 +309,7 @@ def _brighter(colour: Colour) -> Colour:
 
 
 def _fixed(point: Array) -> tuple[int, int]:
-    """Pixel in OpenCV's fixed-point drawing coordinates, kept within their range."""
+    """Convert a pixel to OpenCV's fixed-point drawing coordinates, clamped to their range."""
     x, y = np.clip(np.rint(point * (1 << _SUBPIXEL)), -(1 << 28), 1 << 28).astype(int)
     return int(x), int(y)
 
@@ -332,14 +332,14 @@ _PAPER = (246, 247, 248)
 _RULE = (214, 216, 218)
 _TEXT = (70, 70, 70)
 _LESS, _MEAN, _MORE = (190, 110, 40), (205, 205, 205), (40, 90, 230)
-_CELL = (176, 300)  # of the sheet, pixels
+_CELL = (176, 300)  # size of a cell of the sheet, pixels
 _PHASES = 8
 _MARGIN = (120, 44)  # left and top of the sheet, pixels
 _SHEET_FONT = cv2.FONT_HERSHEY_DUPLEX
 
 
 def default_view(state: State) -> Camera:
-    """Camera that shows a person from in front and the left, slightly from above."""
+    """Make a camera that shows a person from the front and left, slightly from above."""
     target = np.array([*state.pelvis[:2], 0.5 * state.stature])
     angle = state.heading + np.radians(50)
     away = np.array([np.cos(angle), np.sin(angle), 0.22]) * 3 * state.stature
@@ -347,13 +347,13 @@ def default_view(state: State) -> Camera:
 
 
 def draw_standing(model: Model, state: State, camera: Camera) -> Image:
-    """Draw a person on a ground of half-metre squares, (h, w, 3) BGR."""
+    """Draw a person on ground with half-metre squares, (h, w, 3) BGR."""
     canvas = np.full((camera.height, camera.width, 3), _PAPER, np.uint8)
     middle = np.round(2 * np.asarray(state.pelvis[:2])) / 2
     reach = np.arange(-3, 3.5, 0.5)
     for step in reach:
         for ends in ([(step, -3), (step, 3)], [(-3, step), (3, step)]):
-            along = np.linspace(ends[0], ends[1], 61) + middle  # short pieces: the lens may bend them
+            along = np.linspace(ends[0], ends[1], 61) + middle  # short pieces, as lenses bend lines
             uv = camera.project(np.column_stack([along, np.zeros(61)]))
             pieces = uv[np.isfinite(uv).all(axis=1)]
             line = np.clip(np.rint(16 * pieces), -(1 << 28), 1 << 28).astype(np.int32)
@@ -362,10 +362,10 @@ def draw_standing(model: Model, state: State, camera: Camera) -> Image:
 
 
 def draw_sheet(model: Model) -> Image:
-    """Draw the sheet, columns phases.
+    """Draw the sheet of a model.
 
-    Rows are the mean, then the stride rate (where the mean follows it) and each score at -2, 0 and +2
-    standard deviations.
+    Columns are phases.  Rows are the mean, then the stride rate (if the mean depends on it) and each score,
+    at -2, 0 and +2 standard deviations.
     """
     rows = _rows(model)
     left, top = _MARGIN
@@ -388,7 +388,7 @@ def draw_sheet(model: Model) -> Image:
 
 
 def _rows(model: Model) -> dict[str, list[State]]:
-    """States of each named row: at 0, -2 and +2 standard deviations, or the mean alone."""
+    """Make the states of each row, by name: at 0, -2 and +2 standard deviations, or only the mean."""
     info, turns = model.info, (0.0, -2.0, 2.0)
     mean = State(stride_hz=info.stride_hz, coef=np.zeros(info.components))
     rows = {"mean": [mean]}
@@ -401,7 +401,7 @@ def _rows(model: Model) -> dict[str, list[State]]:
 
 
 def _standing(model: Model, state: State, phase: float) -> State:
-    """Person of average size at a phase over the origin, heading along x."""
+    """Place a person of average size at a phase over the origin, heading along x."""
     state = replace(state, phase=phase, pelvis=np.zeros(3))
     state.pelvis[2] = model.pelvis_height(state)
     return state

@@ -1,4 +1,4 @@
-"""Errors against the truth in words: rows for the page of a run, and the same text for the terminal."""
+"""Errors against the truth in words: rows for the page of a run, and the same as text for the terminal."""
 
 from __future__ import annotations
 
@@ -7,7 +7,7 @@ from gait.report import terms
 
 HEAD = ("", "median", "mean", "9 of 10 frames below")
 """Columns of `error_rows`."""
-_LETTERS = 34  # letters of a row's words on the terminal
+_LETTERS = 34  # width of a row's name in the terminal, letters
 
 OTHER_WORLD = (
     "the track's camera was estimated from the walk, so its world is not the truth's: compare the pose, not "
@@ -20,7 +20,7 @@ Explained = dict[str, str]
 
 
 def error_rows(m: Measures) -> tuple[list[list[str]], Explained]:
-    """Cells of the table of errors under `HEAD`, and explanations by the words of its rows."""
+    """Return the cells of the table of errors, under `HEAD`, and explanations by the names of its rows."""
     free = m["free"]
     parts = {
         "abs": (m["abs"], 1.0, 0),
@@ -41,7 +41,7 @@ def error_rows(m: Measures) -> tuple[list[list[str]], Explained]:
 
 
 def share_rows(m: Measures) -> tuple[dict[str, str], Explained]:
-    """Single figures in words, and explanations by the same words."""
+    """Return single figures by name, and explanations by the same names."""
     found = {
         "within50": f"{m['coverage']['50']:.0%}",
         "within90": f"{m['coverage']['90']:.0%}",
@@ -59,7 +59,7 @@ def share_rows(m: Measures) -> tuple[dict[str, str], Explained]:
 
 
 def as_text(m: Measures) -> str:
-    """Lay the measures out for people, with what each of them means."""
+    """Format the measures for people, with the meaning of each."""
     (rows, errors), (shares, explained) = error_rows(m), share_rows(m)
     lines = [
         f"{words:{_LETTERS}}{median:>8}{mean:>8}{most:>22}" for words, median, mean, most in [HEAD, *rows]

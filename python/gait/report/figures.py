@@ -28,7 +28,7 @@ STICKS = {
 class Drawing:
     """A figure of a report."""
 
-    stem: str  #: of its PNG file
+    stem: str  #: name of its PNG file, without suffix
     heading: str
     caption: str
     figure: Figure
@@ -40,14 +40,14 @@ class Drawing:
         return buffer.getvalue()
 
     def write(self, folder: Path) -> str:
-        """Write the PNG file; return the picture as an address that a page can hold."""
+        """Write the PNG file; return the picture as a data URL."""
         data = self.png()
         (folder / f"{self.stem}.png").write_bytes(data)
         return address(data)
 
 
 def address(png: bytes) -> str:
-    """Return a PNG file as an address that a page can hold."""
+    """Return a PNG file as a data URL."""
     return "data:image/png;base64," + base64.b64encode(png).decode()
 
 
@@ -68,7 +68,7 @@ def grid(
 
 
 def plain(axes: Axes) -> None:
-    """Style axes: a faint grid and no box."""
+    """Style axes with a faint grid and no box."""
     axes.grid(alpha=0.25, lw=0.6)
     axes.spines[["top", "right"]].set_visible(False)
     axes.tick_params(labelsize=8)
@@ -77,7 +77,7 @@ def plain(axes: Axes) -> None:
 def line_legend(
     figure: Figure, entries: dict[str, str], centred: bool = False, title: str | None = None
 ) -> None:
-    """Add a legend above the figure: words to the colours of lines."""
+    """Add a legend above the figure; `entries`: words, to colours of lines."""
     figure.legend(
         [Line2D([], [], color=colour, lw=2) for colour in entries.values()], list(entries),
         loc="outside upper center" if centred else "outside upper right", ncols=len(entries),

@@ -15,12 +15,12 @@ import numpy as np
 
 from gait.io.video import FAST, Image, VideoWriter
 
-_BYTES = 5_000_000  # of a film in a page, at most about
-_PIXELS = 1280 * 720  # of its pictures, at most
-_BITS = 0.07  # per pixel and frame that x264 needs
-_LEAST = 320  # pixels across, however long the film
+_BYTES = 5_000_000  # approximate largest size of a film in a page
+_PIXELS = 1280 * 720  # largest size of its pictures
+_BITS = 0.07  # bits per pixel and frame that x264 needs
+_LEAST = 320  # least width in pixels, however long the film is
 _CRF = 24
-_SHOWN = 6  # pictures for paper
+_SHOWN = 6  # pictures shown when the page is printed
 
 
 @dataclass(frozen=True)
@@ -32,15 +32,15 @@ class PageFilm:
     data : str
         The file, base64.
     size : (int, int)
-        Pixels.
+        Width and height, pixels.
     captured : (int, int)
-        Pixels of the film that was tracked.
+        Width and height of the film that was tracked, pixels.
     frames : range
         Numbers of its frames in that film.
     rate : float
         Frames per second.
     pictures : list of (int, image)
-        A few frames by their numbers.
+        A few frames, with their numbers.
     """
 
     data: str
@@ -51,7 +51,7 @@ class PageFilm:
     pictures: list[tuple[int, Image]]
 
     def note(self) -> str:
-        """State whether the film was scaled down."""
+        """Describe the film's size, and whether it was scaled down."""
         (w, h), (a, b) = self.captured, self.size
         megabytes = f"{3 * len(self.data) / 4e6:.1f} MB"
         if (a, b) == (w + w % 2, h + h % 2):
@@ -60,18 +60,18 @@ class PageFilm:
 
 
 class Films:
-    """Writes drawn frames into the overlay video and the film of a page, whichever are wanted.
+    """Writes drawn frames to the overlay video and the film of a page, if wanted.
 
-    Use as a context manager; `page` is the page's film after it ended without error.
+    Use it as a context manager; after it has ended without error, `page` is the page's film.
 
     Parameters
     ----------
     overlay : str or None
         The overlay video.
     frames : range or None
-        Numbers of the frames that the page's film will have; None for no such film.
+        Numbers of the frames in the page's film; None for no such film.
     size : (int, int)
-        Pixels of the frames.
+        Width and height of the frames, pixels.
     rate : float
         Frames per second.
     """
@@ -132,7 +132,7 @@ class Films:
 
 
 def page_size(size: tuple[int, int], frames: int, rate: float) -> tuple[tuple[int, int], int]:
-    """Size in pixels of a page's film, and the bits per second that keep it to some megabytes."""
+    """Choose the size in pixels of a page's film, and the bit rate that limits it to some megabytes."""
     width, height = size
     bits = 8 * _BYTES * rate / max(frames, 1)
     pixels = min(bits / (rate * _BITS), _PIXELS)
@@ -143,7 +143,7 @@ def page_size(size: tuple[int, int], frames: int, rate: float) -> tuple[tuple[in
 
 
 def runs(status: list[str]) -> Iterator[tuple[str, int, int]]:
-    """Yield runs of equal statuses: word, first index, index after the last."""
+    """Yield runs of equal statuses: status, first index, index after the last."""
     edges = [0, *(k for k in range(1, len(status)) if status[k] != status[k - 1])]
     for first, after in zip(edges, [*edges[1:], len(status)], strict=True):
         yield status[first], first, after

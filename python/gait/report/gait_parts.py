@@ -1,4 +1,4 @@
-"""Parts of a report about how a person walks: parameters, footfalls, strides, angles over the norm."""
+"""Parts of a report about how a person walks: parameters, footfalls, strides, angles with the norm."""
 
 from __future__ import annotations
 
@@ -30,7 +30,7 @@ _BY_STRIDE = (
 
 
 def add_gait(page: Page, track: Track, parameters: Parameters, cycles: Mapping[str, AngleCycle]) -> None:
-    """Add all parts that a track with whole strides has."""
+    """Add all parts for a track with whole strides."""
     tips = {QUANTITIES[name]: words for name, words in terms.QUANTITIES.items()} | terms.COLUMNS
     page.grid("Gait", HEAD, parameter_rows(parameters), tips)
     if parameters.all_unsure:
@@ -56,7 +56,7 @@ def add_gait(page: Page, track: Track, parameters: Parameters, cycles: Mapping[s
 
 
 def add_norms(page: Page, norms: Sequence[Compared]) -> None:
-    """Add the parameters beside norms, with what is outside and how sure that is."""
+    """Add the parameters beside their norms, with a summary of those outside and how certain that is."""
     if not norms:
         return
     tips = {words: terms.NORMS[source] for source, words in _SOURCES.items()} | terms.COLUMNS
@@ -87,7 +87,7 @@ def norm_rows(norms: Sequence[Compared]) -> list[list[str]]:
 
 
 def add_angles(page: Page, cycles: Mapping[str, AngleCycle]) -> None:
-    """Add the angles over the stride and their departure from the norm."""
+    """Add the angles over the stride and their differences from the norm."""
     if not cycles:
         return
     page.heading("Angles over the stride")
@@ -127,7 +127,7 @@ def footfall_plot(track: Track, parameters: Parameters) -> str:
             foot = contacts(track, parameters.events, side, stride)
             begin, ends = foot.strike, np.where(np.isfinite(foot.off), foot.off, track.time[-1])
             first = parameters.events.off[side][:1]
-            if len(first) and (not len(begin) or first[0] < begin[0]):  # on the ground from the start
+            if len(first) and (not len(begin) or first[0] < begin[0]):  # on the ground at the start
                 begin, ends = np.append(track.time[0], begin), np.append(first, ends)
             axes.barh(np.full(len(ends), row), ends - begin, left=begin, height=0.5, color=ON_PAPER[side])
             for times, sds, bottom in (
@@ -168,7 +168,7 @@ def stride_plot(track: Track, parameters: Parameters) -> str:
 
 
 def angle_painter(name: str, cycles: Mapping[str, AngleCycle]) -> Painter:
-    """Paint an angle, of both sides where it has two, over the stride, with bands over the norm in grey."""
+    """Make a painter of an angle over the stride, on both sides if it has two, with the norm in grey."""
 
     def paint(axes: Axes) -> None:
         first = cycles.get(f"r_{name}") or cycles.get(f"l_{name}") or cycles[name]
@@ -189,7 +189,7 @@ def angle_painter(name: str, cycles: Mapping[str, AngleCycle]) -> Painter:
 
 
 def departure_plot(cycles: Mapping[str, AngleCycle]) -> str:
-    """Draw the departure of every angle from the norm over the cycle."""
+    """Draw the difference of every angle from the norm over the cycle."""
     order = [n for group in _GROUPS.values() for name in group for n in (f"r_{name}", f"l_{name}", name)]
     names = [name for name in order if name in cycles] + [name for name in cycles if name not in order]
 
@@ -213,7 +213,7 @@ def time_span(track: Track) -> tuple[float, float]:
 
 
 def tint(axes: Axes, track: Track) -> None:
-    """Tint the background of frames that are lost or ambiguous, run by run."""
+    """Tint the background of runs of frames that are lost or ambiguous."""
     half = 0.5 * float(np.median(np.diff(track.time))) if len(track.time) > 1 else 0.0
     for status, first, after in runs(track.status):
         if status in ("lost", "ambiguous"):
@@ -221,7 +221,7 @@ def tint(axes: Axes, track: Track) -> None:
             axes.axvspan(*span, color=STATUS_TINTS[status], alpha=0.5, lw=0)
 
 
-_OPEN = 100.0  # standard deviation from which an asymmetry, which is at most 200, means nothing
+_OPEN = 100.0  # standard deviation from which an asymmetry, which is at most 200, is meaningless
 HEAD = ("", "right", "left", "both", "asymmetry, %")
 """Columns of `parameter_rows`."""
 
@@ -241,7 +241,7 @@ def _cell(value: dict[str, Any] | None, name: str) -> str:
     digits = 1 if name.endswith(("percent", "spm")) else 3 if name.endswith("time_s") else 2
     if name == "percent" and value["sd"] > _OPEN:
         return "not determined"
-    text = f"{round(value['mean'], digits) + 0.0:.{digits}f}"  # no -0.0
+    text = f"{round(value['mean'], digits) + 0.0:.{digits}f}"  # avoids -0.0
     if np.isfinite(value["sd"]):
         text += f"\N{NO-BREAK SPACE}±\N{NO-BREAK SPACE}{value['sd']:.{digits}f}"
     between = value.get("between", np.nan)

@@ -12,17 +12,17 @@ from gait.io.video import Image
 from gait.web import modules
 
 Tips = Mapping[str, str]
-"""Explanations by the words that they explain."""
+"""Explanations, by the words that they explain."""
 
 
 class Page:
-    """Collects parts, then gives the whole text.
+    """Collects the parts of a page, then makes its text.
 
     Parameters
     ----------
     title : str
     lead : str
-        What the page states first, in a sentence or two.
+        First one or two sentences of the page.
     """
 
     def __init__(self, title: str, lead: str = "") -> None:
@@ -44,7 +44,7 @@ class Page:
         self._parts.append("<ul>" + "".join(f"<li>{escape(line)}</li>" for line in lines) + "</ul>")
 
     def table(self, heading: str, rows: Mapping[str, str], tips: Tips | None = None) -> None:
-        """Add a heading and rows of name and value; names that have a tip show it."""
+        """Add a heading and rows of name and value; names with a tip show it."""
         cells = "".join(
             f"<tr><th scope=row>{_explained(k, tips)}</th><td>{escape(v)}</td></tr>" for k, v in rows.items()
         )
@@ -54,7 +54,7 @@ class Page:
     def grid(
         self, heading: str, head: Sequence[str], rows: Sequence[Sequence[str]], tips: Tips | None = None
     ) -> None:
-        """Add a heading and a table of several columns, the first of which names the rows."""
+        """Add a heading and a table with several columns, the first of which names the rows."""
         top = "".join(
             f"<th scope=col>{_explained(cell, tips)}</th>" if cell else "<td></td>" for cell in head
         )
@@ -74,7 +74,7 @@ class Page:
         self._parts.append(f"<h2>{escape(heading)}</h2>{drawing}")
 
     def html(self, text: str) -> None:
-        """Add HTML as it stands."""
+        """Add HTML unchanged."""
         self._parts.append(text)
 
     def pictures(self, pictures: Sequence[tuple[int, Image]], kind: str = "") -> None:
@@ -91,7 +91,7 @@ class Page:
         return f'<!DOCTYPE html>\n<html lang="en"><head>{head}</head><body>{body}</body></html>\n'
 
     def _explain(self, tips: Tips | None) -> None:
-        """Add the explanations as text, for those who cannot hover: on a telephone or on paper."""
+        """Add the explanations as text, for phones and paper, where there is no hovering."""
         if tips:
             terms = "".join(f"<dt>{escape(k)}</dt><dd>{escape(v)}</dd>" for k, v in tips.items())
             self._parts.append(
@@ -105,11 +105,11 @@ def _explained(words: str, tips: Tips | None) -> str:
 
 
 def movable(table: str) -> str:
-    """Let a table that is larger than the page be moved sideways, by keyboard too."""
+    """Make a table that is wider than the page scroll sideways, also by keyboard."""
     return f'<div class="movable" tabindex="0" role="group" aria-label="table">{table}</div>'
 
 
 def jpeg(image: Image) -> str:
-    """Return a picture as an address that a page can hold."""
+    """Return a picture as a data URL."""
     data = cv2.imencode(".jpg", image, [cv2.IMWRITE_JPEG_QUALITY, 85])[1].tobytes()
     return "data:image/jpeg;base64," + base64.b64encode(data).decode("ascii")

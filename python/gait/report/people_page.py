@@ -1,4 +1,4 @@
-"""The page of several people tracked in one film: the film with everyone, and links to the page of each."""
+"""The page for several people in one film: the film with everyone, and links to the page of each."""
 
 from __future__ import annotations
 
@@ -12,18 +12,18 @@ from gait.report.page import Page, movable
 
 
 class Person(NamedTuple):
-    """A person as the page shows them."""
+    """A person on the page."""
 
     verdict: str
     """One sentence."""
     page: str
     """Name of their page, in the same folder."""
     colour: tuple[int, int, int]
-    """BGR, in the film."""
+    """BGR colour in the film."""
 
 
 def people_page(title: str, people: Mapping[str, Person], film: PageFilm) -> str:
-    """Return the page's text; `people` by their numbers in the film."""
+    """Make the page's text; `people`: by their numbers in the film."""
     page = Page(title, f"{len(people)} people tracked" if len(people) != 1 else "1 person tracked")
     page.html(
         f'<video controls playsinline style="width:100%" aria-label="the film with everyone" '

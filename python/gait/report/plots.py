@@ -1,4 +1,4 @@
-"""Plots as SVG text for self-contained pages, in the colours of their style, light or dark."""
+"""Plots as SVG text for self-contained pages, in the colours of the page, light or dark."""
 
 from __future__ import annotations
 
@@ -16,15 +16,15 @@ from gait.report.colours import BLUE, DARK, GREY, ORANGE
 
 Painter = Callable[[Axes], None]
 
-_LARGE, _NARROW = 10.4, 3.7  # inches: of a screen or paper, and of a telephone
+_LARGE, _NARROW = 10.4, 3.7  # inches; widths of a screen or paper, and of a phone
 _LEFT, _RIGHT, _TOP, _BOTTOM = 0.75, 0.15, 0.35, 0.5  # inches beside the axes of a plot over time
-_PANEL = (3.2, 2.2)  # inches of one of many panels
+_PANEL = (3.2, 2.2)  # inches; size of one of many panels
 _BESIDE_PANEL = (0.62, 0.08, 0.28, 0.46)  # inches left, right, above and below the axes of a panel
 _VARIABLES = {BLUE: "left", ORANGE: "right", DARK: "middle", GREY: "faint", "#000000": "ink"}
 
 
 def panels(painters: Sequence[Painter], label: str) -> str:
-    """Draw many small axes, which the page puts into as many columns as fit."""
+    """Draw many small axes, which the page arranges in as many columns as fit."""
     left, right, top, bottom = _BESIDE_PANEL
     width, height = _PANEL
     place = (left / width, bottom / height, 1 - (left + right) / width, 1 - (top + bottom) / height)
@@ -33,16 +33,16 @@ def panels(painters: Sequence[Painter], label: str) -> str:
 
 
 def for_screen_and_telephone(paint: Painter, height: float, label: str, narrow: float | None = None) -> str:
-    """Draw axes for a screen or paper and again for a telephone; heights in inches."""
+    """Draw axes once for a screen or paper and once for a phone; heights in inches."""
     large = _drawn(paint, (_LARGE, height), 10, label)
     small = _drawn(paint, (_NARROW, narrow or height), 8.5, label)
     return f'<div class="plot-large">{large}</div><div class="plot-narrow">{small}</div>'
 
 
 def time_plot(paint: Painter, span: tuple[float, float], height: float, title: str) -> str:
-    """Draw axes over `span` seconds across the page, on which its script moves a cursor.
+    """Draw axes over `span` seconds across the page, on which the page's script moves a cursor.
 
-    `height` in inches; `title` stands above the axes.
+    `height`: inches; `title`: shown above the axes.
     """
     parts = []
     for kind, width, font in (("large", _LARGE, 10.0), ("narrow", _NARROW, 8.5)):
@@ -66,7 +66,7 @@ def _drawn(
     label: str,
     place: tuple[float, float, float, float] | None = None,
 ) -> str:
-    """Draw axes on a figure of `size` inches; `place`: left, bottom, width and height as shares of it."""
+    """Draw axes on a figure of `size` inches; `place`: left, bottom, width and height as fractions of it."""
     with _settings(font):
         figure = Figure(figsize=size, layout=None if place else "constrained")
         _painted(figure.add_axes(place) if place else figure.add_subplot(), paint, font)
@@ -90,11 +90,11 @@ def _painted(axes: Axes, paint: Painter, font: float) -> None:
 
 
 def _text(figure: Figure, label: str) -> str:
-    """Return the SVG with the page's colours, so that it is readable on dark pages too."""
+    """Return the SVG with the page's colours, so that it is also readable on dark pages."""
     file = io.StringIO()
     nothing = dict.fromkeys(("Date", "Creator", "Format", "Type"))
     engine = figure.get_layout_engine()
-    if engine is not None:  # lays out here, as saving would draw everything twice for it
+    if engine is not None:  # do the layout here, as saving would draw everything twice
         FigureCanvasSVG(figure)
         engine.execute(figure)
         figure.set_layout_engine(None)

@@ -1,4 +1,4 @@
-"""The page of a run from its files: the track, the film, and camera and truth if available."""
+"""Make the page of a run from its files: the track, the film, and camera and truth if available."""
 
 from __future__ import annotations
 
@@ -41,17 +41,17 @@ class RunFiles:
     track, video, page : str
         The track, the clip that was tracked, the HTML file to write.
     camera : str, optional
-        The clip's camera; ``camera.json`` beside the track or the clip if left out.
+        The clip's camera; by default ``camera.json`` beside the track or the clip.
     scale_camera : bool
-        Whether a camera of another resolution is resized to the clip's.
+        Whether to resize a camera of another resolution to the clip's.
     overlay : str, optional
         Video to write.
     truth, draws : str, optional
         True motion; motions of ``gait track --smooth --draws``.
     model : str, optional
-        The model of the package if left out.
+        By default the package's model.
     age, sex : optional
-        Of the person, years and ``f`` or ``m``, for the norm of the speed.
+        Age of the person in years, and ``f`` or ``m``, for the norm of the speed.
     quiet : bool
         Suppress notes and progress.
     """
@@ -76,13 +76,13 @@ def write_report(
     facts: Mapping[str, dict[str, str]] | None = None,
     drawings: Mapping[str, str] | None = None,
 ) -> tuple[Verdict, Measures | None]:
-    """Write the page and the overlay video; return the verdict, and the errors if there is a truth.
+    """Write the page and the overlay video; return the verdict, and the errors if the truth is known.
 
     Parameters
     ----------
     files : RunFiles
     estimates : mapping of int to Estimate, optional
-        By frame, if more is known of them than the track has.
+        Estimates by frame, if they contain more than the track.
     facts, drawings : mapping, optional
         Further tables and drawings for the page, by heading.
 
@@ -133,9 +133,9 @@ def write_report(
 
 
 def estimates_of(track: Track, model: Model) -> dict[int, Estimate]:
-    """Estimates as far as a track has them, by frame, to be drawn.
+    """Make estimates for drawing, by frame, from the columns of a track.
 
-    Posture and proportions of the body are not in the file: they are those of the model.
+    Posture and proportions of the body are not in the file, so they are those of the model.
     """
     numbers, components = track.numbers, model.info.components
     joints = np.stack([track.places[name] for name in JOINTS], axis=1)
@@ -179,7 +179,7 @@ def estimates_of(track: Track, model: Model) -> dict[int, Estimate]:
 def _draw(
     files: RunFiles, video: Video, frames: range, estimates: Mapping[int, Estimate], overlay: Overlay | None
 ) -> PageFilm:
-    """Draw the frames that were to be tracked into the films."""
+    """Draw all frames that were to be tracked, and write them to the films."""
     begin = video.times[frames.start]
     with (
         Films(files.overlay, frames, video.size, video.fps) as films,
@@ -200,9 +200,9 @@ def _draw(
 
 
 def _camera(files: RunFiles, track: Track) -> tuple[str | None, str]:
-    """Camera that was given, or the file beside the track or the clip; and a remark, if it was not given.
+    """Read the given camera, or the file beside the track or the clip; also return a remark in that case.
 
-    A camera that was estimated from the walk has a world of its own, which no other file's camera shares.
+    A camera that was estimated from the walk has its own world, to which other camera files do not belong.
     """
     if files.camera is not None:
         return files.camera, ""

@@ -34,9 +34,9 @@ _OVER_TIME = (
     *("hip_flexion", "knee_flexion", "ankle_flexion", "elbow_flexion", "shoulder_flexion"),
     *("torso_y", "torso_x", "torso_z"),
 )
-_VAGUE = 0.15  # metres: from this standard deviation on the ellipsoids would hide the figure
-_LEAST_WAY = 1.0  # metres that the plot of the way shows at least
-_BROAD = 500.0  # pixels of axes above which a legend fits in one row
+_VAGUE = 0.15  # metres; with larger standard deviations, ellipsoids would hide the figure
+_LEAST_WAY = 1.0  # metres; least extent of the plot of the path
+_BROAD = 500.0  # pixels; on wider axes a legend fits in one row
 
 
 @dataclass(frozen=True)
@@ -53,15 +53,15 @@ class Run:
     cycles : mapping of str to AngleCycle
         Empty without strides.
     norms : sequence of Compared
-        Parameters beside norms.
+        Parameters compared with norms.
     film : PageFilm or None
     times : ndarray of shape (frames of the film,)
         Seconds; empty without a film.
     camera : Camera or None
     errors : Comparison or None
-        Against a truth.
+        Errors, if the truth is known.
     notes : list of str
-        Remarks on what was used.
+        Remarks about the inputs.
     facts : dict of str to dict of str to str
         Tables of names and values by heading: camera and settings, files, figures of a live run.
     drawings : dict of str to str
@@ -86,7 +86,7 @@ class Run:
 def cycles_of(
     track: Track, parameters: Parameters | None, curves: ModelCurves, draws: Draws | None = None
 ) -> dict[str, AngleCycle]:
-    """Angles over the stride; none without strides."""
+    """Compute the angles over the stride; empty without strides."""
     return {} if parameters is None else angle_cycles(track, parameters, curves, draws)
 
 
@@ -136,7 +136,7 @@ def run_page(run: Run) -> str:
 
 
 def _add_film(page: Page, run: Run, film: PageFilm) -> None:
-    """Add film and figure with their data and script, and pictures for paper."""
+    """Add film and figure with their data and script, and pictures for printing."""
     whole = modules.available()
     page.head = modules.inlined_head(whole)
     shape = film.size[0] / film.size[1]
@@ -165,13 +165,13 @@ _LEGEND = (
 
 
 def _statuses(track: Track, film: PageFilm) -> list[str]:
-    """Status of every frame of the film; empty where the track has no row."""
+    """List the status of every frame of the film, empty where the track has no row."""
     known = dict(zip(track.frame.tolist(), track.status, strict=True))
     return [known.get(number, "") for number in film.frames]
 
 
 def _strip(statuses: list[str]) -> str:
-    """Draw the statuses along the film, with a key of those that occur."""
+    """Draw the statuses along the film, with a legend of those that occur."""
     count = len(statuses)
     bars = "".join(
         f'<i class="s-{status or "absent"}" title="{escape(terms.STATUSES[status][0])}" '
@@ -187,7 +187,7 @@ def _strip(statuses: list[str]) -> str:
 
 
 def _data(run: Run, film: PageFilm, statuses: list[str], whole: bool) -> dict[str, object]:
-    """Object that the page's script reads, one entry for each frame of the film."""
+    """Make the object that the page's script reads, with an entry for each frame of the film."""
     track, count = run.track, len(film.frames)
     rows = track.frame - film.frames[0]
     use = (rows >= 0) & (rows < count)
@@ -228,13 +228,13 @@ def _data(run: Run, film: PageFilm, statuses: list[str], whole: bool) -> dict[st
 
 
 def _is_vague(track: Track) -> bool:
-    """Whether positions are uncertain by more than a hand, for example with an estimated camera."""
+    """Whether positions are too uncertain for ellipsoids, for example with an estimated camera."""
     sd = np.stack(list(track.sd.values()))
     return bool(np.median(sd.max(axis=2)) > _VAGUE)
 
 
 def _events(parameters: Parameters | None) -> list[dict[str, object]]:
-    """Heel strikes, for the film's timeline."""
+    """List heel strikes, for the film's timeline."""
     if parameters is None:
         return []
     return [
@@ -245,7 +245,7 @@ def _events(parameters: Parameters | None) -> list[dict[str, object]]:
 
 
 def way_plot(track: Track, parameters: Parameters | None, errors: Comparison | None = None) -> str:
-    """Draw the way of the pelvis and where the feet stood, seen from above, the longer side across."""
+    """Draw the path of the pelvis and the positions of the feet, from above, with the longer side across."""
     pelvis = track.places["pelvis"][:, :2]
     feet = {}
     if parameters is not None:
@@ -256,7 +256,7 @@ def way_plot(track: Track, parameters: Parameters | None, errors: Comparison | N
     low, high = every.min(axis=0), every.max(axis=0)
     grow = np.maximum(_LEAST_WAY - (high - low), 0.3) / 2
     low, high = low - grow, high + grow
-    turned = bool(np.diff(high - low)[0] > 0)  # further along y than along x
+    turned = bool(np.diff(high - low)[0] > 0)  # longer along y than along x
     across, up = (1, 0) if turned else (0, 1)
 
     def paint(axes: Axes) -> None:

@@ -38,7 +38,7 @@ ANGLES = {
     "shoulder_rotation": ("Shoulder rotation", "inwards +", "Rotation of the upper arm about its own axis."),
     "elbow_flexion": ("Elbow flexion", "forearm up +", "0 is a straight arm."),
 }
-"""Name in files, without its side, to name, direction that counts as positive, and explanation."""
+"""Name in files, without its side, to: name, positive direction, and explanation."""
 
 QUANTITIES = {
     "stride_time_s": "From a heel strike to the next one of the same foot.",
@@ -100,7 +100,7 @@ ERRORS = {
     "px": ("In the picture, px", "Distance of the joints from the true ones in the pixels of the film."),
     "phase": ("Phase, % of the stride", "Error of the phase, not counting swapped sides."),
 }
-"""Errors of which median, mean and 90th percentile are known: words and explanation."""
+"""Errors with median, mean and 90th percentile: words and explanation."""
 
 SHARES = {
     "within50": (

@@ -1,6 +1,6 @@
-"""Sticks and crutches: held in the hand, planted beside the foot of the other side while that stands.
+"""Sticks and crutches: held in the hand, and planted beside the other side's foot while that stands.
 
-The shaft is rigid and points at its place on the floor; as the arm does not give way to it, its tip may be
+The shaft is rigid and points at its position on the floor.  As the arm does not adapt to it, its tip may be
 some centimetres above or below the floor.
 """
 
@@ -13,27 +13,27 @@ from gait.simulate.geometry import Array, unit
 from gait.simulate.walk import Walk, smoothstep
 from gait.simulate.wardrobe import SHOE
 
-_STANDS = 0.55  # of the stride of the other side's foot, from its strike on
+_STANDS = 0.55  # share of the other foot's stride, from its strike, in which the tip is planted
 _ASIDE = 0.12  # metres from the hand outwards
 _RADIUS = 0.011  # metres
-_CUFF = 0.24  # metres that a crutch reaches above the hand
-_FLOOR = 0.01  # metres under the hand's lowest place at rest
+_CUFF = 0.24  # metres by which a crutch extends above the hand
+_FLOOR = 0.01  # metres below the hand's lowest position at rest
 
 
 def hands(aid: str, asymmetry: float) -> tuple[str, ...]:
-    """Sides whose hand holds something: a stick is on the side of the leg that is not spared, or right."""
+    """Return the sides whose hand holds an aid; a stick is opposite the spared leg, or on the right."""
     if aid == "none":
         return ()
     return SIDES if aid == "crutches" else ("l",) if asymmetry < 0 else ("r",)
 
 
 def length(body: Anatomy) -> float:
-    """From the hand to the tip, metres: the height of the wrist of a person who stands."""
+    """Length from the hand to the tip, metres: the height of a standing person's wrist."""
     return float(body.rest["l_wrist"][2] - (body.rest["l_ankle"][2] - body["ankle_height"])) - _FLOOR
 
 
 def parts(aid: str, sides: tuple[str, ...], body: Anatomy) -> list[Part]:
-    """Return the shafts, at rest upright under the wrist."""
+    """Return the shafts, which at rest are upright below the wrist."""
     out = []
     for side in sides:
         x, y, z = body.rest[f"{side}_wrist"]
@@ -48,7 +48,7 @@ X, Y = np.eye(3)[:2]
 
 
 def carry(walk: Walk, sides: tuple[str, ...]) -> None:
-    """Set the bones of what is held, in place."""
+    """Set the bones of the aids, in place."""
     for side, other in ((s, "r" if s == "l" else "l") for s in sides):
         wrist = walk.origins[:, BONE_INDEX[f"{side}_hand"]]
         shaft = unit(wrist - _tip(walk, wrist, side, other))
@@ -59,7 +59,7 @@ def carry(walk: Walk, sides: tuple[str, ...]) -> None:
 
 
 def _tip(walk: Walk, wrist: Array, side: str, other: str) -> Array:
-    """Where the shaft points (T, 3): still on the floor while the other foot stands, else on its way."""
+    """Compute the point (T, 3) at which the shaft points: fixed on the floor while the other foot stands."""
     sign = 1.0 if side == "l" else -1.0
     aside = sign * np.column_stack([-np.sin(walk.heading), np.cos(walk.heading)])
     beside = wrist[:, :2] + _ASIDE * aside

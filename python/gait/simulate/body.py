@@ -1,7 +1,7 @@
-"""The body of a simulated person: joints and proportions of its own, and surfaces bound to its bones.
+"""The body of a simulated person: its own joints and proportions, and surfaces bound to its bones.
 
 Nothing is shared with the tracker's model.  Surfaces are lofted through rings of superellipses, bound to
-bones and blended across joints.
+bones, and blended across joints.
 """
 
 from __future__ import annotations
@@ -21,7 +21,7 @@ from gait.simulate.geometry import Array, Floats, Ints
 
 SIDES = ("l", "r")
 
-# bone: parent; each turns about the joint of the same row in `JOINT_OF`
+# bone: parent; each bone rotates about its joint in `JOINT_OF`
 PARENTS: dict[str, str | None] = {"pelvis": None, "torso": "pelvis", "head": "torso"}
 JOINT_OF = {"pelvis": "pelvis", "torso": "spine", "head": "neck"}
 for _s in SIDES:
@@ -60,7 +60,7 @@ _UPRIGHT = ("ankle_height", "shank", "thigh", "hip_drop", "neck_up", "head_up")
 class Anatomy:
     """Lengths of one person."""
 
-    stature: float  #: height of the head's top over the ground in the rest pose, shoes on, metres
+    stature: float  #: height of the top of the head above the ground in the rest pose, with shoes, metres
     lengths: dict[str, float]  #: keys of the proportions table, metres
     #: (3,) joints and reported points in the rest pose (limbs hang, feet forward; x forward, y left, z up)
     #: relative to the pelvis joint, metres.
@@ -71,14 +71,14 @@ class Anatomy:
 
     @property
     def leg(self) -> float:
-        """Hip to ankle of the straight leg, metres."""
+        """Length of the straight leg from hip to ankle, metres."""
         return self["thigh"] + self["shank"]
 
 
 def draw_anatomy(stature: float, rng: np.random.Generator, model: Mapping[str, Any] | None = None) -> Anatomy:
     """Draw a person of `stature` metres: every proportion varies by about 4 % (standard deviation).
 
-    `model`: sections of a blob; what it has of the proportions of people is drawn from there instead.
+    `model`: sections of a blob; proportions that it describes are drawn from it instead.
     """
     share = {
         key: value * float(1 + 0.04 * np.clip(rng.standard_normal(), -2, 2)) for key, value in _MEAN.items()
@@ -157,7 +157,7 @@ class Part:
     faces: Ints  #: (m, 3) anticlockwise seen from outside
     uv: Array  #: (n, 2) texture coordinates: metres along the cloth, or 0..1 for a picture
     material: int  #: index of the texture
-    #: (n, 2) the bone towards the trunk and the one it blends into; the second turns about its own joint.
+    #: (n, 2) the bone nearer to the trunk and the one it blends into, which rotates about its own joint.
     bones: Ints
     blend: Array  #: (n,) share of the second bone
 
@@ -247,7 +247,7 @@ class Mesh:
     def pose(self, origins: Array, turns: Array) -> tuple[Floats, Floats]:
         """Return vertices (n, 3) relative to the pelvis and normals (n, 3) for bones (b, 3), (b, 3, 3).
 
-        The rotation is blended, not the positions, so that a bent knee keeps its girth.
+        Rotations are blended rather than positions, so that a bent knee keeps its girth.
         """
         a, b = self.pairs[:, 0], self.pairs[:, 1]
         turn = _blend(turns[a], turns[b], self.shares).astype(np.float32)
@@ -258,7 +258,7 @@ class Mesh:
 
 
 def _blend(a: Array, b: Array, share: Array) -> Array:
-    """Return rotations (r, 3, 3) between `a` and `b`: `share` of the way, exact for equal ends."""
+    """Interpolate rotations (r, 3, 3) from `a` to `b` by `share`; exact if both are equal."""
     mix = (1 - share)[:, None, None] * a + share[:, None, None] * b
     u, _, vt = np.linalg.svd(mix)
     return u @ vt

@@ -28,14 +28,14 @@ from gait.simulate.stage import Set, Stage, build_set, set_stage
 from gait.simulate.walk import TOE_OFF, Walk
 
 CRF = 14
-STEADY = "walk", "turn"  # motions throughout which a person walks forwards
+STEADY = "walk", "turn"  # motions in which a person always walks forwards
 
 
 def find_events(stage: Stage) -> dict[str, Array]:
-    """Return heel strikes and toe-offs as fractional frames, those just outside the clip included.
+    """Return heel strikes and toe-offs as fractional frames, including those just outside the clip.
 
-    A heel strikes where it is furthest ahead of the pelvis, the toes leave where they are furthest behind
-    (Zeni et al. 2008), found on the fine time grid.
+    A heel strike is when the heel is furthest ahead of the pelvis, a toe-off when the toe is furthest behind
+    it (Zeni et al. 2008), on the fine time grid.
     """
     walk = stage.walk
     if stage.scenario.motion not in STEADY:
@@ -52,7 +52,7 @@ def find_events(stage: Stage) -> dict[str, Array]:
 
 
 def planned_events(stage: Stage) -> dict[str, Array]:
-    """Return the events of a walk that stops or goes backwards, as its feet are planned."""
+    """Return the planned events of a walk that stops or goes backwards."""
     timing, first = stage.walk.timing, stage.frames[0]
     index = np.arange(len(timing.phase), dtype=float)
     forwards = timing.phase[-1] > timing.phase[0]
@@ -70,7 +70,7 @@ def planned_events(stage: Stage) -> dict[str, Array]:
 
 
 def _peaks(value: Array, walk: Walk) -> Array:
-    """Return grid positions of the largest value of each stride, between samples by a parabola."""
+    """Return grid positions of the largest value in each stride, refined by a parabola."""
     half = int(0.35 / (walk.timing.step * np.gradient(walk.timing.phase, walk.timing.step).mean()))
     inner = np.arange(half, len(value) - half)
     windows = np.lib.stride_tricks.sliding_window_view(value, 2 * half + 1)
@@ -81,7 +81,7 @@ def _peaks(value: Array, walk: Walk) -> Array:
 
 
 def cycles_at(strikes: Array, frames: Array) -> Array:
-    """Return unwrapped phase at frames: whole at right heel strikes, linear between them."""
+    """Return the unwrapped phase at frames: whole numbers at right heel strikes, linear in between."""
     return np.interp(frames, strikes, np.arange(len(strikes), dtype=float))
 
 
@@ -221,7 +221,7 @@ def _height_px(stage: Stage) -> Array:
 
 
 def _pole(stage: Stage, made: Set) -> list[dict[str, Any]]:
-    """Return place and effect of the pole: frames in which it hides joints, and the largest share hidden."""
+    """Return position and effect of the pole: frames in which it hides joints, and largest share hidden."""
     pole = made.layout.pole
     if pole is None:
         return []
@@ -246,16 +246,16 @@ def _pole(stage: Stage, made: Set) -> list[dict[str, Any]]:
 
 
 FILES = ("video.mp4", "background.png", "camera.json", "truth.csv", "init.json", "meta.json", "contact.jpg")
-_POSES = "poses.csv"  # instead of the empty scene, of a camera that moves
-_PERSON = ("truth.csv", "init.json", "meta.json")  # of each person; the first has no number
-_CAMERA = ("video.mp4", "background.png", "camera.json")  # of each camera; the first has no number
+_POSES = "poses.csv"  # instead of the empty scene, if the camera moves
+_PERSON = ("truth.csv", "init.json", "meta.json")  # for each person; names for the first have no number
+_CAMERA = ("video.mp4", "background.png", "camera.json")  # for each camera; the same
 _CONTACTS = (3, 2)  # pictures across and down in contact.jpg
 
 
 def pictures(stage: Stage, made: Set, number: int = 1) -> Iterator[Picture]:
     """Yield the frames of a camera, (h, w, 3) BGR; each depends only on the scenario and its own number.
 
-    `number`: of the camera, from 1.
+    `number`: number of the camera, from 1.
     """
     scenario = stage.scenario
     figures = [(made.mesh, made.appearance, stage.walk)]
@@ -286,7 +286,7 @@ def files(scenario: Scenario) -> tuple[str, ...]:
 
 
 def _numbered(name: str, number: int) -> str:
-    """Name of a file of the camera or person with this number, from 1."""
+    """Return the name of a file for the camera or person with this number, from 1."""
     path = Path(name)
     return name if number == 1 else f"{path.stem}_{number}{path.suffix}"
 
@@ -302,12 +302,12 @@ def simulate(
     progress: Callable[[int], None] | None = None,
     keep: bool = True,
 ) -> dict[str, Any]:
-    """Write a clip and everything known about it into `folder`, which is made if need be.
+    """Write a clip and its ground truth to `folder`, which is created if needed.
 
-    `folder`: gets the files of `files`, in the formats that `gait capture` and `gait eval` read; `progress`:
-    called with the number of frames done, of all cameras; `keep`: keep an unfinished video if interrupted.
-    Returns the contents of meta.json. UserError if the folder cannot be written or the options contradict
-    each other.
+    `folder`: receives the files of `files`, in the formats that `gait capture` and `gait eval` read;
+    `progress`: called with the number of frames done, over all cameras; `keep`: keep an unfinished video if
+    interrupted. Returns the contents of meta.json. UserError if the folder cannot be written or the options
+    contradict each other.
     """
     stage = set_stage(scenario)
     target = _folder(folder, files(scenario))
@@ -338,7 +338,7 @@ def simulate(
 
 
 def _folder(folder: str | os.PathLike[str], names: Iterable[str]) -> Path:
-    """Make the folder and check that every file can be put there, before the work."""
+    """Create the folder, and check before the work that every file can be written there."""
     target = Path(folder)
     try:
         target.mkdir(parents=True, exist_ok=True)

@@ -1,7 +1,7 @@
 """Joint angles over the walking cycle: a normative table with a personal style.
 
-The table is written from textbook gait curves (clinical signs, degrees, phase 0 = right heel strike) and owes
-nothing to the motion capture that models are learned from.
+The table follows textbook gait curves (clinical signs, degrees, phase 0 = right heel strike) and is
+independent of the motion capture from which models are learnt.
 """
 
 from __future__ import annotations
@@ -20,7 +20,7 @@ from gait.simulate.geometry import Array
 HARMONICS = 5
 _KINDS = 1 + 2 * HARMONICS
 
-# value at 0, 10, ... 90 % of the cycle; the right side's, the left is half a cycle later
+# values of the right side at 0, 10, ... 90 % of the cycle; the left side is half a cycle later
 _LIMBS = {
     "hip_flexion": (32, 25, 12, 1, -7, -12, -5, 13, 26, 32),
     "hip_abduction": (-1, -4, -5, -4, -3, 0, 4, 5, 3, 1),
@@ -60,7 +60,7 @@ class Curves:
     """One person's joint angles as Fourier series."""
 
     mean: Array  #: (channels, 1 + 2 harmonics) radians, rows in the order of `NAMES`
-    #: (modes, channels, 1 + 2 harmonics) how strides differ from one another, radians per unit score.
+    #: (modes, channels, 1 + 2 harmonics) differences between strides, radians per unit score.
     modes: Array
 
     def angles(self, phase: Array, scores: Array) -> dict[str, Array]:
@@ -71,7 +71,7 @@ class Curves:
 
 
 def normative(rng: np.random.Generator) -> Curves:
-    """Return the table's gait in one person's style: offsets and smooth departures of about 2 degrees."""
+    """Return the table's gait in a personal style: offsets and smooth changes of about 2 degrees."""
     middle = {name: _series(*row) for name, row in _MIDDLE.items()}
     limbs = {name: _interpolate(row) for name, row in _LIMBS.items()}
     arm_swing = float(rng.uniform(0.75, 1.25))
@@ -135,7 +135,7 @@ def _smooth(rng: np.random.Generator, sd: tuple[float, ...]) -> Array:
 
 
 def _calm(name: str) -> float:
-    """Return how much of the common variation a channel has: legs and pelvis vary less than arms."""
+    """Return a channel's share of the common variation: legs and pelvis vary less than arms."""
     return _CALM.get(name, 1.0)
 
 
@@ -145,12 +145,12 @@ _NEEDED = tuple(f"{side}_{name}" for side in "lr" for name in ("hip_flexion", "k
 
 
 def curves_of_model(path: str, rng: np.random.Generator, cadence: float, motion_class: str) -> Curves:
-    """Return the curves of a person drawn from the model at `path`; strides differ as in the model.
+    """Return the curves of a person drawn from the model at `path`; strides vary as in the model.
 
-    cadence : strides per second, which the mean cycle follows.
-    motion_class : the class whose curves they are, if the model has it, else the model's first.
+    cadence : strides per second, on which the mean cycle depends.
+    motion_class : class of motion whose curves to use, if the model has it, otherwise the model's first.
 
-    UserError if the file is not a sound model or lacks the legs' angles.
+    UserError if the file is not a valid model or lacks the legs' angles.
     """
     sections = blob.decode(read_blob(path), path)
     names = blob.unpack_names(sections["CLNM"]) if "CLNM" in sections else []

@@ -1,6 +1,6 @@
 """The surface of a simulated person: trunk, head, hair, arms, hands, legs, shoes, and creases in the clothes.
 
-Tables are centimetres for a stature of 1.75 m.
+Tables are in centimetres, for a stature of 1.75 m.
 """
 
 from __future__ import annotations
@@ -15,7 +15,7 @@ from gait.simulate.wardrobe import FACE, HAIR, LEGS, SHOE, SKIN, SOCK, SOLE, TOP
 
 X, Y, Z = np.eye(3)
 
-# height over the pelvis joint, forward shift, depth, width, exponent, share of hips' and shoulders' girth
+# height above the pelvis joint, forward shift, depth, width, exponent, shares of hips' and shoulders' girth
 _TOP = (
     (2, -0.4, 12.3, 17.2, 2.4, 1, 0), (10, 0.3, 11.3, 15.2, 2.4, 0.5, 0), (18, 0.5, 11.6, 15.6, 2.4, 0, 0.3),
     (27, 0.6, 12.3, 16.6, 2.4, 0, 0.8), (34, 0.2, 11.9, 17.2, 2.3, 0, 1), (40, -0.5, 10.4, 17.6, 2.2, 0, 1),
@@ -29,7 +29,7 @@ _SEAT = (
     (5, -0.6, 10.9, 15.6),
     (12, 0.2, 10.0, 14.0),
 )  # fmt: skip
-# height over the neck joint, forward shift, depth, width
+# height above the neck joint, forward shift, depth, width
 _NECK = (
     *((-2.5, 0.4, 4.6, 5.2), (1, 0.1, 4.9, 5.0), (4, 0.5, 5.3, 5.2)),
     *((8, 0.7, 5.6, 5.4), (11, 0.4, 5.0, 5.0)),
@@ -46,7 +46,7 @@ _NOSE = (
     *((11.4, 11.2, 1.0, 1.4), (10.8, 10.8, 0.2, 0.5)),
 )
 _EAR = ((11.2, 0.1, 0.1), (12, 1.2, 0.8), (14.5, 1.9, 1.0), (16.4, 1.8, 0.9), (17.2, 0.1, 0.1))
-# azimuth from the front, degrees: where the hair ends, height over the neck joint
+# azimuth from the front, degrees: height above the neck joint at which the hair ends
 _LINE_AT = (0, 35, 60, 80, 100, 130, 180)
 _SHORT, _LONG = (22.5, 22.0, 19.5, 16.0, 12.0, 8.5, 7.0), (22.5, 21.5, 16.0, 5.0, 1.0, -2.0, -3.0)
 
@@ -59,7 +59,7 @@ def trunk_parts(body: Anatomy, appearance: Appearance) -> list[Part]:
 
 
 def _top(body: Anatomy, appearance: Appearance, cm: float) -> Part:
-    """Return the shirt or jacket from its hem to the collar, stretched to this person's trunk."""
+    """Return the shirt or jacket from hem to collar, stretched to this person's trunk."""
     tall = body["neck_up"] / (52.9 * cm)
     hem = 100 * appearance.hem
     rows = [(-hem, -0.2, 14.0, 18.9, 2.3, 1, 0), (-hem / 2, -0.4, 13.4, 18.3, 2.3, 1, 0), *_TOP]

@@ -11,7 +11,7 @@ from gait.body.skeleton import axis_rotation as about
 
 Array = NDArray[np.float64]
 Floats = NDArray[np.floating[Any]]
-"""Single precision in the renderer's inner loops, where it halves the time."""
+"""Single precision, used in the renderer's inner loops, where it halves the time."""
 Ints = NDArray[np.integer[Any]]
 Picture = NDArray[np.uint8]
 """(h, w, 3) BGR."""
@@ -32,7 +32,7 @@ def limb(flexion: ArrayLike, abduction: ArrayLike, rotation: ArrayLike, sign: fl
 
 
 def apply(rotation: Array, vector: ArrayLike) -> Array:
-    """Turn vectors (..., 3) by rotations (..., 3, 3)."""
+    """Rotate vectors (..., 3) by rotations (..., 3, 3)."""
     return np.einsum("...ij,...j->...i", rotation, np.asarray(vector, np.float64))
 
 

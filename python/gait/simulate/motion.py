@@ -1,7 +1,7 @@
 """Motions in a clip other than walking straight: stopping, standing, walking backwards, turning, running.
 
 A stop slows the gait's clock until both feet are on the ground, while steps get shorter, so that the feet
-come together; a start is the same in reverse.  Backwards is a walk whose time runs backwards.
+come together; a start is the reverse.  Walking backwards is a walk in reversed time.
 """
 
 from __future__ import annotations
@@ -17,15 +17,15 @@ from gait.simulate.walk import Timing, Walk, smoothstep
 
 WALK, STAND, BACKWARDS, RUN = "walk", "stand", "backwards", "run"
 _RAMP = 0.8  # seconds from walking to standing
-_SHORTER = 0.3  # seconds before it in which steps begin to get shorter
+_SHORTER = 0.3  # seconds before that, when steps begin to get shorter
 _BOTH_FEET = 0.06  # phase, modulo half a stride, with both feet on the ground
-_MOVES = 0.25  # share of the usual stride rate from which a person walks rather than stands
-# how far arms, trunk and head move while standing, degrees and seconds
+_MOVES = 0.25  # share of the usual stride rate above which a person walks rather than stands
+# movements of arms, trunk and head while standing, degrees and seconds
 _IDLE = {"l_shoulder_flexion": 7, "r_shoulder_flexion": 7, "l_elbow_flexion": 10, "r_elbow_flexion": 10,
          "torso_z": 4, "torso_y": 2, "neck_z": 12, "neck_y": 4}  # fmt: skip
 _IDLE_TIME = 0.6
 _LEGS = {"hip_flexion": 3.0, "knee_flexion": 5.0}  # standing, degrees
-#: When a person stops and walks on, as shares of the clip.
+#: When a person stops and continues, as fractions of the clip.
 _STOPS = {"stop": (0.35, 0.75), "stand": (-0.15, 1.15)}
 
 
@@ -34,8 +34,8 @@ class Pause:
     """A stop on the time grid."""
 
     timing: Timing
-    clock: Array  #: (T,) time in the walk without it, seconds
-    share: Array  #: (T,) of the usual stride rate
+    clock: Array  #: (T,) time in the walk without the stop, seconds
+    share: Array  #: (T,) stride rate over the usual one
     amplitude: Array  #: (T,) of the steps: 1 walking, 0 feet together
 
 
@@ -46,14 +46,14 @@ def pause(timing: Timing, motion: str, frames: int) -> Pause | None:
     length = frames * timing.per_frame * timing.step
     stop, go = (share * length for share in _STOPS[motion])
     phase = timing.phase
-    aligned = np.abs((phase - _BOTH_FEET + 0.25) % 0.5 - 0.25)  # walking time at which both feet are down
+    aligned = np.abs((phase - _BOTH_FEET + 0.25) % 0.5 - 0.25)  # 0 when both feet are on the ground
     lowest = (aligned[1:-1] < aligned[:-2]) & (aligned[1:-1] <= aligned[2:])
     best = timing.time[1:-1][lowest].tolist()
     usable = [t for t in best if t - timing.time[0] > _RAMP + _SHORTER]
     end = min(usable, key=lambda t: abs(t + 0.5 * _RAMP - stop)) + 0.5 * _RAMP  # the clock lags half a ramp
     go = max(go, end + 0.2)
     share = 1 - smoothstep(timing.time, end - _RAMP, end) + smoothstep(timing.time, go, go + _RAMP)
-    # before the ramp walking time is the clip's
+    # before the ramp, walking time is clip time
     at = int(np.searchsorted(timing.time, end - _RAMP))
     clock = cumulative_trapezoid(share, timing.time, initial=0)
     clock += timing.time[at] - clock[at]
@@ -82,7 +82,7 @@ def posture(angles: dict[str, Array], stop: Pause, rng: np.random.Generator) -> 
 
 
 def reversed_in_time(walk: Walk) -> Walk:
-    """Return a walk played backwards: the body looks ahead and moves back."""
+    """Return a walk in reversed time: the body faces forwards and moves backwards."""
     timing = replace(walk.timing, phase=walk.timing.phase[::-1], scores=walk.timing.scores[::-1])
     return replace(
         walk,
@@ -96,7 +96,7 @@ def reversed_in_time(walk: Walk) -> Walk:
 
 
 def classes(motion: str, stop: Pause | None, count: int) -> list[str]:
-    """Class of motion at each of `count` steps of the time grid."""
+    """Return the class of motion at each of `count` steps of the time grid."""
     if stop is None:
         return [motion if motion in (BACKWARDS, RUN) else WALK] * count
     return [WALK if moving else STAND for moving in (stop.share > _MOVES).tolist()]

@@ -10,14 +10,14 @@ from scipy.ndimage import gaussian_filter1d
 from gait.camera.camera import Camera
 from gait.simulate.geometry import Array, euler
 
-_BEHIND, _HIGH = 1.0, 1.0  # metres: of the robot's camera behind the person, and over the floor
-_AIM = 0.85  # metres over the floor at which it looks
-_SMOOTH = 0.3  # seconds in which a robot, or who turns a camera, follows the person
-_EDGE = 0.06  # of the picture's half side that the person keeps free
+_BEHIND, _HIGH = 1.0, 1.0  # metres; distance of the robot's camera behind the person, and its height
+_AIM = 0.85  # metres; height at which it is aimed
+_SMOOTH = 0.3  # seconds; delay with which a robot, or a person turning a camera, follows
+_EDGE = 0.06  # margin that the person keeps free, as a fraction of half the picture
 _ROBOT = (0.004, 0.05, 0.006, np.radians(1.0), np.radians(0.25), np.radians(0.25))
-"""Of a robot: across, along, up [m]; yaw, pitch, roll [rad]: standard deviations of its wobble."""
+"""Standard deviations of a robot's wobble: across, along, up [m]; yaw, pitch, roll [rad]."""
 _HAND = (0.012, 0.012, 0.012, np.radians(0.6), np.radians(0.6), np.radians(0.4))
-"""The same of a hand that holds a camera."""
+"""The same for a hand-held camera."""
 
 
 def make_cameras(
@@ -36,17 +36,17 @@ def make_cameras(
     ----------
     kind : str
         ``follow``: a robot drives behind the person.  ``pan``: a camera on a stand is turned to the person.
-        ``shake``: a hand holds the still camera.
+        ``shake``: the static camera is hand-held.
     still : Camera
-        That would see the whole clip standing still.
+        Static camera that would see the whole clip.
     pelvis : ndarray of shape (frames, 3)
         Metres, world.
     reach : ndarray of shape (frames, points, 3)
-        All that the person's surface reaches in each frame, metres.
+        Points around the person's surface in each frame, metres.
     fps : float
     rng : Generator
     distance, height : float, optional
-        Metres, of a robot's camera from the person and over the floor.
+        Distance of a robot's camera from the person, and its height above the floor, metres.
     """
     path = gaussian_filter1d(pelvis[:, :2], _SMOOTH * fps, axis=0, mode="nearest")
     wobble = _wobble(len(pelvis), fps, _ROBOT if kind == "follow" else _HAND, rng)
@@ -67,7 +67,7 @@ def make_cameras(
 
 
 def _wobble(count: int, fps: float, sd: tuple[float, ...], rng: np.random.Generator) -> Array:
-    """Return smooth errors (count, 6) of standard deviations `sd`: four waves of 0.5 to 3 Hz each."""
+    """Return smooth errors (count, 6) with standard deviations `sd`, each of four waves of 0.5 to 3 Hz."""
     time = np.arange(count) / fps
     rate = rng.uniform(0.5, 3.0, (4, 6))
     phase = rng.uniform(0, 2 * np.pi, (4, 6))
@@ -76,7 +76,7 @@ def _wobble(count: int, fps: float, sd: tuple[float, ...], rng: np.random.Genera
 
 
 def _shaken(camera: Camera, error: Array) -> Camera:
-    """Return the camera moved across, along and up, and turned."""
+    """Return the camera moved across, along and up, and rotated."""
     yaw, pitch, roll = error[3:]
     turn = euler(roll, yaw, pitch)  # the camera's axes: z ahead, y down, x to the right
     R = turn @ camera.R

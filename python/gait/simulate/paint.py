@@ -13,13 +13,13 @@ from gait.simulate.wardrobe import linear, tile_noise
 Paint = Callable[[Floats, Floats], Floats]
 """(h, w) metres along and across -> (h, w, 3) linear RGB."""
 
-AMBIENT, SUN = 0.42, 0.64  # light of the whole sky and of the sun on a surface that faces it
+AMBIENT, SUN = 0.42, 0.64  # light of the whole sky, and of the sun on a surface that faces it
 
 _NOISE_SIZE = 512
 
 
 class Noise:
-    """Noise on the plane, mean 0, standard deviation about 1: fractal, or as fine as the grain of stone."""
+    """Noise on the plane, mean 0, standard deviation about 1: fractal, or fine like the grain of stone."""
 
     def __init__(self, rng: np.random.Generator, fine: bool = False) -> None:
         weights = ((256, 1.0), (128, 0.6)) if fine else ((8, 1.0), (24, 0.6), (72, 0.4), (200, 0.3))
@@ -28,7 +28,7 @@ class Noise:
         self.field = np.pad(field / field.std(), ((0, 1), (0, 1)), mode="wrap").astype(np.float32)
 
     def __call__(self, u: Floats, v: Floats, metres: float) -> Floats:
-        """Sample at (h, w) places; the pattern repeats after `metres`."""
+        """Sample at (h, w) positions; the pattern repeats after `metres`."""
         scale = _NOISE_SIZE / metres
         x = np.mod(u * scale, _NOISE_SIZE).astype(np.float32)
         y = np.mod(v * scale, _NOISE_SIZE).astype(np.float32)
@@ -36,7 +36,7 @@ class Noise:
 
 
 def _tint(i: Floats, j: Floats, table: Array) -> Floats:
-    """Look a random number up for every cell (i, j)."""
+    """Look up a random number for every cell (i, j)."""
     at = (i.astype(np.int64) * 73 + j.astype(np.int64) * 157) & (len(table) - 1)
     return table[at].astype(np.float32)
 

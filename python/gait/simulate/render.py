@@ -1,4 +1,4 @@
-"""Frames of the clip: figures with sun, self-shadow, cast shadow and motion blur laid over the scene."""
+"""Render frames: figures with sunlight, self-shadow, cast shadow and motion blur over the scene."""
 
 from __future__ import annotations
 
@@ -93,7 +93,7 @@ _FOOT_CELL, _FOOT_SIDE = 0.02, 96
 
 
 class SunView:
-    """Parallel projection along the sun's rays, renewed for each frame."""
+    """Parallel projection along the sun's rays, updated for each frame."""
 
     def __init__(self, scene: Scene) -> None:
         z = scene.to_sun
@@ -121,7 +121,7 @@ class SunView:
         self._centre = float(turned[:, 2].mean())
 
     def visible(self, places: Floats, normals: Floats, shift: Floats) -> Floats:
-        """Return 1 where places (n, 3) on the figure see the sun, 0 in its own shade; `shift` softens."""
+        """Return 1 where positions (n, 3) on the figure are sunlit, 0 in its own shade; `shift` softens."""
         turned = (places + np.float32(0.012) * normals) @ self._axes.T
         at = np.rint((turned[:, :2] - self._corner) / np.float32(_CELL) + 2.5 * shift).astype(np.int32)
         rows, columns = self._nearest.shape
@@ -130,7 +130,7 @@ class SunView:
         return np.where(inside & (depth > turned[:, 2] + _BIAS), 0, 1).astype(np.float32)
 
     def cast(self) -> Floats:
-        """Return how far the figure shades each pixel of the empty scene from the sun, 0..1, (h, w)."""
+        """Return how much the figure shades each pixel of the empty scene from the sun, 0..1, (h, w)."""
         mask = cv2.GaussianBlur(np.isfinite(self._nearest).astype(np.float32), (0, 0), _PENUMBRA)
         x = (self._plate[..., 0] - self._corner[0]) / np.float32(_CELL)
         y = (self._plate[..., 1] - self._corner[1]) / np.float32(_CELL)
@@ -161,11 +161,11 @@ class Contact:
         return np.asarray(dark * self._ground, np.float32)
 
 
-# sub-pixel shifts of the instants averaged over the open shutter: antialiasing and motion blur at once
+# sub-pixel shifts of the instants averaged over the open shutter, for both antialiasing and motion blur
 _SHIFTS = np.array([(-5, 1), (3, -3), (-1, -5), (5, 3), (-3, 5), (1, -1)], np.float32) / 12
 SHUTTER = 0.5  # share of the frame interval
 DEFOCUS_PX = 0.6
-_SLIP = 0.006  # metres by which cloth drifts along the body, once per stride
+_SLIP = 0.006  # metres by which cloth slides along the body, once per stride
 
 
 @dataclass(frozen=True)
@@ -177,7 +177,7 @@ class _Instant:
 
 
 Shutter = tuple[_Instant, _Instant]
-"""The figure as the shutter opens and closes."""
+"""The figure when the shutter opens and when it closes."""
 
 
 class Renderer:
@@ -194,10 +194,10 @@ class Renderer:
         self._tile = (SIZE / appearance.spans).astype(np.float32)
 
     def shadow(self, shutter: Shutter) -> tuple[Floats, Floats]:
-        """Return what the figure leaves of the sun's light and of the sky's at each pixel, (h, w, 1)."""
+        """Return the shares of the sun's and the sky's light left by the figure at each pixel, (h, w, 1)."""
         middle = _between(*shutter, 0.5)
         self._sun.update(middle.vertices, self.mesh.faces)
-        behind = 1 - self.scene.front  # what stands in front takes no shadow of the figure
+        behind = 1 - self.scene.front  # objects in front receive no shadow of the figure
         sunny = (1 - self._sun.cast() * behind)[..., None]
         return sunny, (1 - self._contact.dark(middle.vertices) * behind)[..., None]
 
@@ -207,7 +207,7 @@ class Renderer:
         return float(self.camera.depth(self.walk.origins[index, 0]))
 
     def shutter(self, frame: int) -> Shutter:
-        """Return the figure as the shutter opens and closes, a quarter interval either side of the frame."""
+        """Return the figure a quarter of a frame interval before and after the frame."""
         centre = self._zero + frame * self.walk.timing.per_frame
         half = self.walk.timing.per_frame // 4
         return self._pose(centre - half), self._pose(centre + half)
@@ -218,7 +218,7 @@ class Renderer:
         return _Instant(vertices + origins[0].astype(np.float32), normals)
 
     def over(self, picture: Floats, shutter: Shutter, frame: int) -> Floats:
-        """Lay the average of the instants over `picture`, behind what stands in front."""
+        """Draw the average of the instants over `picture`, behind objects in front."""
         opened, closed = shutter
         window = self._window(opened, closed)
         rows, columns = window
@@ -286,7 +286,7 @@ class Renderer:
 
 
 def light(people: Sequence[Renderer], frame: int) -> Floats:
-    """Return linear light (h, w, 3), RGB, before the lens and the sensor; all `people` are in one scene."""
+    """Return linear light (h, w, 3), RGB, without effects of lens and sensor; all `people` share a scene."""
     scene = people[0].scene
     shutters = [one.shutter(frame) for one in people]
     shadows = [one.shadow(shutter) for one, shutter in zip(people, shutters, strict=True)]

@@ -18,7 +18,7 @@ AIDS = ("none", "stick", "crutches")
 BODIES = ("table", "drawn")
 MOVING = ("none", "follow", "pan", "shake")
 COMPANY = {"one": 0, "crossing": 1, "abreast": 2, "overtaking": 1}
-"""How many walk beside the first person."""
+"""Number of people in addition to the first."""
 MOST_CAMERAS = 4
 
 # option: smallest and largest value
@@ -41,20 +41,20 @@ class Scenario:
     frames: int = 120
     fps: float = 30.0  #: frames per second
     size: tuple[int, int] = (640, 480)  #: width and height, even, pixels
-    stature: float | None = None  #: metres, shoes on
+    stature: float | None = None  #: metres, with shoes
     #: Metres per second, strides (two steps) per second; one implies the other.
     speed: float | None = None
     stride_hz: float | None = None
-    #: Of the camera from the middle of the path, horizontally, and over the ground, metres.
+    #: Horizontal distance of the camera from the middle of the path, and its height above the ground, metres.
     distance: float | None = None
     camera_height: float | None = None
     seed: int = 1  #: of everything random: body, clothes, gait, scene, noise
-    #: A pole before the path; a stronger background.
+    #: A pole in front of the path; a stronger background.
     pole: bool = False
     clutter: bool = False
     flicker: float = 0.0  #: standard deviation of the exposure, per cent
     noise: float = 2.0  #: standard deviation of the sensor noise, grey levels
-    #: One of `MOTIONS`: ``stop`` walks, stops, stands and walks on, ``turn`` goes round a corner, ``run``
+    #: One of `MOTIONS`: ``stop`` walks, stops, stands and continues, ``turn`` turns a corner, ``run``
     #: has the curves of runs, those of `gait` or of the package.
     motion: str = "walk"
     #: Per cent by which the left leg is spared, as with a prosthesis, negative the right one: it strikes
@@ -63,15 +63,15 @@ class Scenario:
     #: One of `AIDS`: a ``stick`` in the hand away from the spared leg, or forearm ``crutches``, each moving
     #: with the leg of the other side.
     aid: str = "none"
-    #: One of `BODIES`: proportions of textbooks, each with its own spread, or ``drawn`` from those of the
-    #: people that the package's model was learnt from.
+    #: One of `BODIES`: textbook proportions, varied independently, or ``drawn`` from those of the people from
+    #: which the package's model was learnt.
     body: str = "table"
     #: One of `MOVING`: a robot follows the person, a camera is turned to them, a hand holds it.
     moving: str = "none"
     #: One of `COMPANY`: another person comes the other way, three walk abreast, a faster person overtakes.
     people: str = "one"
-    cameras: int = 1  #: that film the walk at once, standing still
-    gait: str = GENERATOR  #: ``generator`` or the name of a ``.gait`` model whose curves are walked
+    cameras: int = 1  #: number of static cameras that film the walk
+    gait: str = GENERATOR  #: ``generator``, or the file of a ``.gait`` model whose curves to use
 
     def __post_init__(self) -> None:
         """Check every option; the message names it as on the command line."""

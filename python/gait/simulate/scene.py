@@ -1,7 +1,7 @@
 """The empty scene: ground, facade, boxes, bushes and perhaps a pole, ray-cast once per clip.
 
-Everything stands behind the person except the pole.  Light is kept in two layers, ambient and direct, so
-that the person's shadow can take away the direct one.
+Everything except the pole is behind the person.  Light is stored in two layers, ambient and direct, so that
+the person's shadow can remove the direct one.
 """
 
 from __future__ import annotations
@@ -31,7 +31,7 @@ class Block:
     tint: Array
 
     def distance(self, at: Floats) -> Floats:
-        """Return the horizontal distance of places (h, w, 3) from the box, metres."""
+        """Return the horizontal distance of positions (h, w, 3) from the box, metres."""
         dx = np.maximum(self.low[0] - at[..., 0], at[..., 0] - self.high[0])
         dy = np.maximum(self.low[1] - at[..., 1], at[..., 1] - self.high[1])
         return np.hypot(np.maximum(dx, 0), np.maximum(dy, 0))
@@ -39,7 +39,7 @@ class Block:
 
 @dataclass(frozen=True)
 class Panel:
-    """Rectangle of another kind on the wall, metres."""
+    """Rectangle on the wall with another paint, metres."""
 
     left: float
     right: float
@@ -85,9 +85,9 @@ def draw_layout(
 ) -> Layout:
     """Draw a yard or street behind the path.
 
-    `ground` (n, 2): the path on the ground, metres; `clutter`: more and stronger things behind the person;
-    `pole`: stand a pole between camera and path; `extent`: x range of the wall that a camera that moves may
-    show, metres, with nothing before it of which a picture is drawn by chance.
+    `ground` (n, 2): the path on the ground, metres; `clutter`: more and stronger objects behind the person;
+    `pole`: put a pole between camera and path; `extent`: x range of the wall that a moving camera may show,
+    metres, without objects that are painted randomly for each view.
     """
     wall_y = float(ground[:, 1].max() + rng.uniform(2.2, 3.4))
     side, high = rng.choice([-1.0, 1.0]), np.radians(rng.uniform(42, 58))
@@ -187,7 +187,7 @@ def _poster(rng: np.random.Generator) -> paint.Paint:
 
 
 def _hedge(left: float, right: float, y: float, low: float, rng: np.random.Generator) -> list[Bush]:
-    """Return trees that look over a low wall."""
+    """Return trees that are visible above a low wall."""
     out, x = [], left
     while x < right:
         size = rng.uniform(0.9, 1.7)
@@ -225,7 +225,7 @@ def _furnish(
 
 
 def _pole(camera: Camera, ground: Array, rng: np.random.Generator) -> Block:
-    """Return a pole a little before the middle of the path, three quarters of the way from the lens."""
+    """Return a pole about two thirds of the way from the lens to a point near the middle of the path."""
     aim = ground[int(len(ground) * rng.uniform(0.42, 0.58))]
     at = camera.centre[:2] + rng.uniform(0.66, 0.76) * (aim - camera.centre[:2])
     radius = float(rng.uniform(0.07, 0.10))
@@ -263,7 +263,7 @@ def draw_bush(
     lit = np.clip(out @ sun + 0.25 * rng.standard_normal(len(out)), 0, 1)
     tilt = rng.uniform(0, 180, len(out))
     slim = rng.uniform(0.35, 0.8, len(out))
-    fixed = 16  # steps a pixel in the fixed point of OpenCV
+    fixed = 16  # OpenCV's fixed-point steps per pixel
     at = np.rint(uv * fixed).astype(int)
     half = np.maximum(np.rint(np.stack([size * fixed, size * slim * fixed], axis=1)), 8).astype(int)
     sky, sunshine = (bush.colour * light[:, None] for light in (AMBIENT * shade, SUN * lit))
@@ -273,7 +273,7 @@ def draw_bush(
             cv2.ellipse(layer, centre, axes, turn, 0, 360, colour, -1, cv2.LINE_8, 4)
 
 
-_SAMPLES = 2  # rays per pixel, each way; 1 in a clip of a camera that moves, which casts them for each frame
+_SAMPLES = 2  # rays per pixel in each direction; 1 for a moving camera, which casts them for each frame
 
 
 @dataclass(frozen=True)
@@ -283,7 +283,7 @@ class Scene:
     #: (h, w, 3) linear light; their sum is the plate.
     ambient: Floats
     direct: Floats
-    position: Floats  #: (h, w, 3) world place of each pixel's surface, metres; far away for the sky
+    position: Floats  #: (h, w, 3) position of each pixel's surface in the world, metres; far away for the sky
     front: Floats  #: (h, w) share of the pixel covered by something in front of the person
     to_sun: Array  #: (3,) unit vector
 
@@ -297,10 +297,10 @@ _Coat = TypeVar("_Coat")
 
 
 class Coats:
-    """Paints of a scene, mixed in the order in which they are asked for.
+    """Paints of a scene, mixed in the order in which they are requested.
 
-    `keep`: mix each once, and also what a camera does not see, so that one scene can be painted for every
-    frame of a camera that moves.
+    `keep`: mix each only once, including those that are not visible, so that the same scene can be painted
+    for every frame of a moving camera.
     """
 
     def __init__(self, rng: np.random.Generator, *, keep: bool = False) -> None:
@@ -309,7 +309,7 @@ class Coats:
         self._next = 0
 
     def restart(self) -> None:
-        """Paint the scene anew."""
+        """Start again with the first paint."""
         self._next = 0
 
     def mix(self, make: Callable[[np.random.Generator], _Coat]) -> _Coat:
@@ -336,12 +336,12 @@ class _Caster:
         self.open = np.ones(u.shape, np.float32)  # share of the sky that lights it
 
     def position(self) -> Floats:
-        """World places (h, w, 3) of what was hit."""
+        """World positions (h, w, 3) of the points hit."""
         far = np.minimum(self.depth, 1e4)[..., None]
         return self.ray * far + self.origin.astype(np.float32)
 
     def plane(self, axis: int, level: float) -> tuple[Floats, Floats]:
-        """Return depth and world places where rays meet a plane across world axis `axis`."""
+        """Return depth and world positions where rays meet a plane perpendicular to world axis `axis`."""
         with np.errstate(divide="ignore", invalid="ignore"):
             depth = (level - self.origin[axis]) / self.ray[..., axis]
         depth = np.where(depth > 0.05, depth, np.inf).astype(np.float32)
@@ -351,7 +351,7 @@ class _Caster:
         self, hit: NDArray[np.bool_], depth: Floats, albedo: Floats, cosine: float, sky: Floats | float = 1.0,
         box: tuple[slice, slice] = (slice(None), slice(None)),
     ) -> None:  # fmt: skip
-        """Keep a surface, given in the window `box`, where it is nearer than what is there."""
+        """Store a surface, given in the window `box`, where it is nearer than the present one."""
         hit = hit & (depth < self.depth[box])
         self.depth[box][hit], self.albedo[box][hit] = depth[hit], albedo[hit]
         self.sun_cosine[box][hit] = cosine
@@ -394,7 +394,7 @@ def _paint_sky(cast: _Caster, coats: Coats) -> None:
 
 
 def _paint_ground(cast: _Caster, layout: Layout, coats: Coats) -> None:
-    """Paint pavement, and a strip of another kind along the wall behind a kerb."""
+    """Paint pavement, and a strip with another paint along the wall, behind a kerb."""
     depth, at = cast.plane(2, 0.0)
     turn = layout.paving_turn
     u = (at[..., 0] * np.cos(turn) - at[..., 1] * np.sin(turn)).astype(np.float32)
@@ -430,7 +430,7 @@ def _paint_wall(cast: _Caster, layout: Layout, coats: Coats) -> None:
 
 
 def _paint_block(cast: _Caster, block: Block, sun: Array, coats: Coats) -> None:
-    """Paint the faces of a box that look towards the camera."""
+    """Paint the faces of a box that face the camera."""
     finish = coats.mix(getattr(paint, block.finish))
     for axis, other in ((0, 1), (1, 0), (2, 0)):
         upper = cast.origin[axis] > 0.5 * (block.low[axis] + block.high[axis])
@@ -447,7 +447,7 @@ def _paint_block(cast: _Caster, block: Block, sun: Array, coats: Coats) -> None:
 
 
 def _bounds(mask: NDArray[np.bool_]) -> tuple[slice, slice]:
-    """Return the smallest window that holds all of a mask."""
+    """Return the smallest window that contains a mask."""
     rows, columns = np.flatnonzero(mask.any(1)), np.flatnonzero(mask.any(0))
     return slice(rows[0], rows[-1] + 1), slice(columns[0], columns[-1] + 1)
 

@@ -24,9 +24,9 @@ from gait.simulate.walk import RUN_TOE_OFF, TOE_OFF, Path, Shaped, Walk, draw_ti
 from gait.simulate.wardrobe import Appearance, draw_appearance
 
 CIRCLE_RADIUS = 2.5
-CORNER = np.radians(80.0)  # of a turn, to the far side of a camera at the side
-_CLOSEST = 2.2  # metres between lens and path
-_AROUND = 20.0  # metres before and after the path that several cameras, or one that moves, may show
+CORNER = np.radians(80.0)  # angle of a corner, away from a camera at the side
+_CLOSEST = 2.2  # least metres between lens and path
+_AROUND = 20.0  # metres before and after the path that several cameras, or a moving one, may show
 _TURNS = 60.0, -60.0, 30.0  # degrees about the middle of the path from the first camera to the others
 # heading of the path for left to right, degrees from world x; the camera looks along +y
 _HEADING = {"side": 0, "oblique": -45, "toward": -90, "away": 90, "above": -30, "circle": 0}
@@ -35,7 +35,7 @@ _AWAY = {"side": 6.5, "oblique": 5.0, "toward": 5.0, "away": 4.5, "above": 5.5, 
 
 
 def make_path(view: str, direction: str, seed_turn: float) -> Path:
-    """Return the path; `seed_turn` in -1..1 turns straight paths by up to 3 degrees and shifts the circle."""
+    """Return the path; `seed_turn` (-1..1) turns straight paths by up to 3 degrees and shifts the circle."""
     mirrored = direction == "rl"
     if view == "circle":
         return Path(np.pi * seed_turn, -CIRCLE_RADIUS if mirrored else CIRCLE_RADIUS)
@@ -48,9 +48,9 @@ def make_camera(
 ) -> Camera:
     """Place the camera at (0, -distance, height) with the longest lens that keeps all `points` in view.
 
-    `size`: width and height, pixels. `points` (n, 3): everything the person reaches, world,
-    metres. `distance`: from the origin, horizontally, metres; by default such that the person keeps well
-    away. `height`: metres. UsageError if the person would come too close to the lens.
+    `size`: width and height, pixels. `points` (n, 3): points around the person, world, metres. `distance`:
+    horizontal distance from the origin, metres; by default large enough for the person. `height`: metres.
+    UsageError if the person would come too close to the lens.
     """
     near = -float(points[:, 1].min())
     if distance is None:
@@ -95,7 +95,7 @@ _RUN = 2.5, 1.36  # m/s, strides/s
 _USUAL_SPEED, _USUAL_CADENCE, _USUAL_STATURE = 1.25, 0.92, 1.75  # m/s, strides/s, m
 _SURFACE = 0.10  # metres from a joint to the skin, hair or shoe around it
 _APART = (0.65, 0.95)  # metres between the paths of people who meet
-_FASTER = 1.4  # times the speed of a person who is overtaken
+_FASTER = 1.4  # speed over that of the person who is overtaken
 
 
 @dataclass(frozen=True)
@@ -106,14 +106,14 @@ class Stage:
     body: Anatomy
     walk: Walk
     camera: Camera
-    cameras: list[Camera]  #: of each frame, if it moves; `camera` is then the first
+    cameras: list[Camera]  #: camera of each frame, if it moves; `camera` is then the first
     frames: Ints  #: (frames,) index of each frame on the walk's time grid
     classes: list[str]  #: class of motion of each frame
-    others: list[Stage] = field(default_factory=list)  #: further people, before the same camera
-    beside: list[Camera] = field(default_factory=list)  #: further cameras, which stand still
+    others: list[Stage] = field(default_factory=list)  #: further people, in front of the same camera
+    beside: list[Camera] = field(default_factory=list)  #: further, static cameras
 
     def project(self, places: Array) -> Array:
-        """Return pixels (frames, ..., 2) of places (frames, ..., 3), each as its frame's camera sees it."""
+        """Project positions (frames, ..., 3) to pixels (frames, ..., 2), each by its frame's camera."""
         if not self.cameras:
             return self.camera.project(places)
         return np.array([camera.project(one) for camera, one in zip(self.cameras, places, strict=True)])
@@ -121,7 +121,7 @@ class Stage:
 
 @dataclass(frozen=True)
 class Set:
-    """What is needed to draw: the figure, those of `Stage.others`, and the empty scene."""
+    """Everything needed for drawing: the figure, those of `Stage.others`, and the empty scene."""
 
     mesh: Mesh
     appearance: Appearance
@@ -132,7 +132,7 @@ class Set:
 
 
 def set_stage(scenario: Scenario) -> Stage:
-    """Draw people and let them walk before a camera. UserError if the options contradict each other."""
+    """Draw people and make them walk in front of a camera. UserError if options contradict each other."""
     path = make_path(scenario.view, scenario.direction, float(scenario.stream("path").uniform(-1, 1)))
     if scenario.motion == "turn":
         path = replace(path, corner=CORNER if scenario.direction == "lr" else -CORNER)
@@ -154,7 +154,7 @@ def set_stage(scenario: Scenario) -> Stage:
 
 
 def _turned_camera(scenario: Scenario, points: Array, degrees: float) -> Camera:
-    """Place a camera as the first one, turned about the middle of the path."""
+    """Place a camera like the first one, rotated about the middle of the path."""
     turn = axis_rotation(2, np.radians(degrees))
     there = make_camera(
         scenario.view, scenario.size, points @ turn, scenario.distance, scenario.camera_height
@@ -163,7 +163,7 @@ def _turned_camera(scenario: Scenario, points: Array, degrees: float) -> Camera:
 
 
 def _cast(scenario: Scenario, path: Path) -> Stage:
-    """Draw a person who walks along a path, before the camera is placed: one that shows nothing."""
+    """Draw a person who walks along a path, with a dummy camera until the real one is placed."""
     rng = scenario.stream("body")
     stature = scenario.stature or float(np.clip(rng.normal(1.73, 0.08), 1.55, 1.95))
     model = blob.decode(read_blob(None)) if scenario.body == "drawn" else None
@@ -197,7 +197,7 @@ def _cast(scenario: Scenario, path: Path) -> Stage:
 
 
 def _company(scenario: Scenario, path: Path) -> list[tuple[Scenario, Path]]:
-    """Who else walks, and where: beside the first person's path, on either side of it."""
+    """Return who else walks, and where: beside the first person's path, on either side."""
     if scenario.people == "one":
         return []
     rng = scenario.stream("people")
@@ -226,7 +226,7 @@ def _company(scenario: Scenario, path: Path) -> list[tuple[Scenario, Path]]:
 
 
 def _another(scenario: Scenario, number: int) -> int:
-    """Seed of another person in the same clip."""
+    """Return the seed of another person in the same clip."""
     return (scenario.seed + 7919 * number) % 2**31
 
 
@@ -253,7 +253,7 @@ def _figure(stage: Stage) -> tuple[Mesh, Appearance]:
 
 
 def pace(scenario: Scenario, stature: float) -> tuple[float, float]:
-    """Return speed (m/s) and strides per second: they rise together, and taller people step slower."""
+    """Return speed (m/s) and strides per second, which increase together; taller people step more slowly."""
     rng = scenario.stream("pace")
     usual = _USUAL_CADENCE * np.sqrt(_USUAL_STATURE / stature) * rng.uniform(0.97, 1.03)
     speed, cadence = scenario.speed, scenario.stride_hz
@@ -268,7 +268,7 @@ def pace(scenario: Scenario, stature: float) -> tuple[float, float]:
 
 
 def _envelope(walk: Walk, frames: Ints) -> Array:
-    """Return points (frames, n, 3) around all that the person's surface reaches."""
+    """Return points (frames, n, 3) around the person's surface."""
     joints = np.stack(list(walk.points(frames).values()), axis=1)
     offsets = _SURFACE * np.array([(x, y, z) for x in (-1, 1) for y in (-1, 1) for z in (-0.3, 0.5)])
     return (joints[:, :, None] + offsets).reshape(len(frames), -1, 3)

@@ -1,8 +1,8 @@
 """A walk of given speed and cadence: pelvis, planted feet and every bone on a fine time grid.
 
 The joint angles give the shape of the movement.  The stance foot then gives the forward motion, each step is
-planted where it is on average while it stands, and the legs are solved so that planted feet neither slide
-nor sink.
+planted at its mean position while it stands, and the legs are solved so that planted feet neither slide nor
+sink.
 """
 
 from __future__ import annotations
@@ -29,11 +29,11 @@ class Path:
     """Curve on the ground by arc length; arc length 0 is the middle of the clip."""
 
     heading: float  #: direction of travel at arc length 0, radians from world x towards world y
-    #: Of the circle about the origin, metres, positive to the left (anticlockwise); 0 = straight.
+    #: Radius of the circle about the origin, metres, positive to the left (anticlockwise); 0 = straight.
     radius: float = 0.0
     #: Angle of a corner in the middle of the path, radians, positive to the left.
     corner: float = 0.0
-    #: Metres by which all of a straight path is moved to the left and ahead.
+    #: Metres by which a straight path is moved to the left and forward.
     aside: float = 0.0
     ahead: float = 0.0
 
@@ -56,7 +56,7 @@ class Path:
         return base + (left + self.aside)[..., None] * aside
 
     def _round_the_corner(self, along: Array) -> Array:
-        """World x, y (..., 2) at arc lengths (...), by the trapezoidal rule."""
+        """Compute world x, y (..., 2) at arc lengths (...), by the trapezoidal rule."""
         grid = np.linspace(-CORNER, CORNER, 401)
         h = self.direction(grid)
         inside = np.clip(along, -CORNER, CORNER)
@@ -70,13 +70,13 @@ class Path:
 
 CORNER = 0.7  # metres of the path before and after its middle in which a corner turns
 STRIDE_TIME_CV = 0.02
-# What a leg that is spared by a share s does, about as people do who walk on a prosthesis below the knee: it
-# strikes later by _LATE s of the stride and ahead by _AHEAD s of the step, stands shorter by _SHORT s while
-# the other one stands longer by _LONG s; its knee yields less under load, by _STRAIGHT s, and its foot pushes
-# off less, by _WEAK s.
+# Effects of sparing a leg by a share s, about as in people with a prosthesis below the knee: it strikes later
+# by _LATE s of the stride and further ahead by _AHEAD s of the step; it stands for a shorter time, by _SHORT
+# s, and the other one for a longer time, by _LONG s; its knee yields less under load, by _STRAIGHT s, and its
+# foot pushes off less, by _WEAK s.
 _LATE, _AHEAD, _SHORT, _LONG, _STRAIGHT, _WEAK = 0.12, 0.65, 0.5, 0.25, 4.0, 1.0
-TOE_OFF, RUN_TOE_OFF = 0.625, 0.37  # share of the cycle, of walks and of runs
-MARGIN_STRIDES = 2  # whole strides simulated before and after the clip, so that no foot is planned at an edge
+TOE_OFF, RUN_TOE_OFF = 0.625, 0.37  # share of the cycle, for walks and for runs
+MARGIN_STRIDES = 2  # whole strides simulated before and after the clip, so that the clip is not at an edge
 
 
 @dataclass(frozen=True)
@@ -86,13 +86,13 @@ class Timing:
     time: Array  #: (T,) seconds, uniform, 0 = first frame of the clip; the frames lie on the grid
     phase: Array  #: (T,) unwrapped strides of the right foot; whole numbers are right heel strikes
     scores: Array  #: (T, modes) smooth stride-to-stride scores, unit variance
-    #: Grid steps per frame, a multiple of 4 so that a half shutter opens and closes on the grid.
+    #: Grid steps per frame, a multiple of 4, so that a half-open shutter opens and closes on the grid.
     per_frame: int
-    #: Strides per second of walking, where the person also stands; 0: as the phase has it on average.
+    #: Strides per second while walking, if the person also stands; 0: the average from the phase.
     usual_hz: float = 0.0
-    #: Share by which the left leg is spared, negative the right one; see `Scenario.asymmetry`.
+    #: Share by which the left leg is spared, negative for the right leg; see `Scenario.asymmetry`.
     spared: float = 0.0
-    toe_off: float = TOE_OFF  #: share of the cycle at which a foot leaves the ground; below a half: a run
+    toe_off: float = TOE_OFF  #: share of the cycle at which a foot leaves the ground; below 0.5 for runs
 
     @property
     def stride_hz(self) -> float:
@@ -105,7 +105,7 @@ class Timing:
         return float(self.time[1] - self.time[0])
 
     def of_side(self, side: str) -> Array:
-        """Return the unwrapped phase of a foot, whole at its own heel strikes, in swing from `TOE_OFF` on."""
+        """Return a foot's unwrapped phase: whole at its own heel strikes, swinging from `TOE_OFF`."""
         phase = self.phase + (0.5 - _LATE * self.spared if side == "l" else 0.0)
         if not self.spared and self.toe_off == TOE_OFF:
             return phase
@@ -119,7 +119,7 @@ class Timing:
         return np.asarray(whole + warp(phase - whole))
 
     def sparing(self, side: str) -> float:
-        """Share by which this leg is spared; negative where the other one is."""
+        """Return the share by which this leg is spared; negative if the other one is."""
         return self.spared if side == "l" else -self.spared
 
 
@@ -143,7 +143,8 @@ def draw_timing(stride_hz: float, fps: float, frames: int, modes: int, rng: np.r
 # pitch of the foot, degrees, toes up positive
 _PITCH_PHASE = (0, 0.03, 0.065, 0.10, 0.34, 0.43, 0.50, 0.56, 0.61, 0.66, 0.71, 0.77, 0.83, 0.88, 0.93, 0.97)
 _PITCH_DEG = (20, 13, 4, 0, 0, -5, -15, -34, -56, -67, -60, -38, -11, 8, 18, 20.5)
-# bend of the toes against the foot, as a share of its downward pitch: flat on the ground, then rolling off
+# bend of the toes relative to the foot, as a share of its downward pitch: flat on the ground, then rolling
+# off
 _BEND_PHASE = (0, 0.50, 0.56, 0.60, 0.625, 0.66, 0.70, 0.75, 0.85)
 _BEND_SHARE = (1, 1, 0.88, 0.67, 0.55, 0.38, 0.20, 0.05, 0)
 
@@ -164,7 +165,7 @@ def foot_pitch(phase: Array, gain: float | Array) -> Array:
 
 
 def toe_bend(phase: Array, pitch: Array) -> Array:
-    """Return how far the toes bend up against the foot, radians."""
+    """Return how far the toes bend up relative to the foot, radians."""
     return np.maximum(-pitch, 0) * _BEND(phase % 1.0)
 
 
@@ -175,9 +176,10 @@ def smoothstep(x: Array, low: float, high: float) -> Array:
 
 
 def rolling_ankle(pitch: Array, bend: Array, body: Anatomy) -> tuple[Array, Array]:
-    """Return the ankle of a planted foot, forward and up of the ground under the flat foot's ankle, metres.
+    """Return a planted foot's ankle, forward and up from the ground under the flat foot's ankle, metres.
 
-    The foot turns about its heel while the toes are up, then about its ball, last about the tip of the toes.
+    The foot rotates about its heel while the toes are up, then about its ball, finally about the tip of the
+    toes.
     """
     c, s = np.cos(pitch), np.sin(pitch)
     toes = body["toe_forward"] - body["ball_forward"]
@@ -195,18 +197,18 @@ class Footfall:
     """One planted step."""
 
     stride: int  #: the foot's stride number: it is on the ground from phase `stride` to `stride` + TOE_OFF
-    place: Array  #: (2,) ground under the ankle of the flat foot, world, metres
+    place: Array  #: (2,) ground below the ankle of the flat foot, world, metres
     yaw: float  #: direction of the foot, radians
 
 
 def foot_track(
     phase: Array, free: Array, step: float, falls: list[Footfall], rolled: tuple[Array, Array]
 ) -> tuple[Array, Array]:
-    """Return the ankle (T, 3) and the yaw (T,) of a foot that stays where it is planted.
+    """Return the ankle (T, 3) and the yaw (T,) of a foot that does not slide when planted.
 
-    `phase` (T,): unwrapped phase of this foot. `free` (T, 3): ankle as the joint angles alone would carry it;
-    gives the swing its shape. `step`: grid step, seconds. `falls`: consecutive steps. `rolled` (T,): the
-    planted ankle, from `rolling_ankle`.
+    `phase` (T,): unwrapped phase of this foot. `free` (T, 3): ankle from the joint angles alone, which
+    determines the shape of the swing. `step`: grid step, seconds. `falls`: consecutive steps. `rolled` (T,):
+    the planted ankle, from `rolling_ankle`.
     """
     ankle, yaw = free.copy(), np.zeros(len(phase))
     forward, up = rolled
@@ -226,7 +228,7 @@ def foot_track(
 
 
 def _swing(ankle: Array, free: Array, first: int, last: int, step: float) -> None:
-    """Bend the free swing so that it leaves and meets the planted foot with equal place and velocity."""
+    """Bend the free swing so that it meets the planted foot with the same position and velocity."""
     ends = np.array([first, last])
     offset = ankle[ends] - free[ends]
     before = (ankle[first] - ankle[first - 2] - free[first] + free[first - 2]) / (2 * step)
@@ -241,7 +243,7 @@ def lift_swing(
 ) -> Array:
     """Raise a swinging foot (T, 3) smoothly where its sole would come within 12 mm of the ground.
 
-    `stride`: grid steps of a stride, by default those of the phase's average.
+    `stride`: grid steps of a stride, by default the average from the phase.
     """
     sole = np.min(
         [point_height(ankle[:, 2], pitch, bend, name, body) for name in ("heel", "ball", "tip")], axis=0
@@ -257,7 +259,7 @@ def lift_swing(
 
 
 def point_height(ankle_z: Array, pitch: Array, bend: Array, name: str, body: Anatomy) -> Array:
-    """Return the height of the sole under the heel, the ball or the tip of the toes, metres."""
+    """Return the height of the sole at the heel, the ball or the tip of the toes, metres."""
     c, s = np.cos(pitch), np.sin(pitch)
     if name == "heel":
         return ankle_z - body["heel_back"] * s - body["ankle_height"] * c
@@ -267,25 +269,25 @@ def point_height(ankle_z: Array, pitch: Array, bend: Array, name: str, body: Ana
     return ball + (body["toe_forward"] - body["ball_forward"]) * np.sin(pitch + bend)
 
 
-_REACH = 0.9985  # a leg is never straighter than this share of its length
-_LANDING = 0.90  # from this share of the cycle the swinging foot already binds the pelvis's height
+_REACH = 0.9985  # longest extension of a leg, as a share of its length
+_LANDING = 0.90  # share of the cycle from which the swinging foot limits the pelvis's height
 _SWAY = 0.012  # statures
-_SURGE = 0.05  # the pelvis is fastest in double support and slowest over the standing leg, share of the speed
+_SURGE = 0.05  # variation of the pelvis's speed: fastest in double support, slowest over the standing leg
 _HALF_WIDTH = 0.024  # of the step, statures
 _GRAVITY = 9.81  # m/s^2
-_LEAD = 0.010  # how far the pelvis is ahead of where the angles would have it over the feet, statures
+_LEAD = 0.010  # statures; how far the pelvis is ahead of its position over the feet from the angles
 
 
 @dataclass(frozen=True)
 class Walk:
-    """Pose of every bone at every step of the time grid."""
+    """Poses of all bones at every step of the time grid."""
 
     timing: Timing
     body: Anatomy
     origins: Array  #: (T, bones, 3) joint of each bone, world, metres
     turns: Array  #: (T, bones, 3, 3) bone to world
     heading: Array  #: (T,) direction of the path under the pelvis, radians
-    pelvis_yaw: Array  #: (T,) turn of the pelvis against that direction, radians
+    pelvis_yaw: Array  #: (T,) yaw of the pelvis relative to that direction, radians
     speed: Array  #: (T,) forward speed along the path, m/s, negative backwards
 
     def points(self, index: Ints | slice = slice(None)) -> dict[str, Array]:
@@ -314,9 +316,10 @@ def make_walk(
 ) -> Walk:
     """Compute a walk at `speed` m/s (mean over the grid) along `path`.
 
-    `shaped`: a stop; `timing` is then that of the walk without it, which gives the length of the steps.
+    `shaped`: a stop; `timing` is then that of the walk without the stop, which determines the length of the
+    steps.
 
-    UsageError if no step length of this person and cadence gives that speed.
+    UsageError if no step length of this person gives that speed at this cadence.
     """
     angles = _angles(curves, timing)
     usual = _stride_gain(angles, timing, body, speed)
@@ -349,7 +352,7 @@ def make_walk(
 
 
 def _angles(curves: Curves, timing: Timing) -> dict[str, Array]:
-    """Angles of the walk by channel; the limbs of each side go by the phase of its foot."""
+    """Compute the angles of the walk by channel; limbs follow the phase of their side's foot."""
     angles = curves.angles(timing.phase, timing.scores)
     if not timing.spared:
         return angles
@@ -361,17 +364,17 @@ def _angles(curves: Curves, timing: Timing) -> dict[str, Array]:
 
 @dataclass(frozen=True)
 class Shaped:
-    """How a walk with a stop differs from one without."""
+    """Differences of a walk with a stop from one without."""
 
     timing: Timing
     clock: Array  #: (T,) time in the walk without a stop, seconds
     amplitude: Array  #: (T,) of the steps
-    posture: Callable[[dict[str, Array]], dict[str, Array]]  #: of the joint angles
+    posture: Callable[[dict[str, Array]], dict[str, Array]]  #: changes joint angles
 
 
 @dataclass(frozen=True)
 class _Course:
-    """What both feet have in common: the pelvis's progress along the path and the joint angles."""
+    """What both feet share: the pelvis's progress along the path, and the joint angles."""
 
     timing: Timing
     body: Anatomy
@@ -402,7 +405,7 @@ def _stretched(angles: dict[str, Array], gain: float) -> dict[str, Array]:
 
 
 def _free_ankle(side: str, angles: dict[str, Array], body: Anatomy) -> Array:
-    """Return the ankle relative to the pelvis joint as the angles put it, path frame (T, 3)."""
+    """Return the ankle relative to the pelvis joint, from the angles, in the path's frame (T, 3)."""
     pelvis = euler(angles["pelvis_yaw"], angles["pelvis_pitch"], angles["pelvis_roll"])
     thigh = pelvis @ _ball_joint(angles, f"{side}_hip")
     shank = thigh @ about(1, angles[f"{side}_knee_flexion"])
@@ -414,7 +417,7 @@ def _free_ankle(side: str, angles: dict[str, Array], body: Anatomy) -> Array:
 
 
 def _ball_joint(angles: dict[str, Array], joint: str) -> Array:
-    """Return the rotation of a hip or shoulder, named with its side."""
+    """Return the rotation of a hip or shoulder, whose name includes the side."""
     sign = 1.0 if joint.startswith("l_") else -1.0
     return limb(angles[f"{joint}_flexion"], angles[f"{joint}_abduction"], angles[f"{joint}_rotation"], sign)
 
@@ -445,13 +448,13 @@ def _smoothed(value: Array, strides: float, timing: Timing) -> Array:
 
 
 def _pitch(side: str, timing: Timing, gain: float | Array) -> Array:
-    """Return the pitch of a foot; one that is spared pushes off less."""
+    """Return the pitch of a foot; a spared foot pushes off less."""
     pitch = foot_pitch(timing.of_side(side), _pitch_gain(gain))
     return np.where(pitch < 0, pitch * (1 - _WEAK * max(timing.sparing(side), 0.0)), pitch)
 
 
 def _pitch_gain(gain: float | Array) -> float | Array:
-    """Return how much the foot rolls: a third of the step's share more, not at all without a step."""
+    """Return the factor of the foot's roll: it varies by a third as much as the step's, 0 without a step."""
     return np.minimum(1 + (gain - 1) / 3, 3 * np.asarray(gain)) if np.ndim(gain) else 1 + (gain - 1) / 3
 
 
@@ -473,7 +476,7 @@ def _stride_gain(angles: dict[str, Array], timing: Timing, body: Anatomy, speed:
 
 
 def _plan_foot(side: str, course: _Course, rng: np.random.Generator) -> _FootPlan:
-    """Plant every step of one foot and carry the foot from one to the next."""
+    """Plant every step of one foot, and move the foot from each to the next."""
     phase = course.timing.of_side(side)
     pitch = _pitch(side, course.timing, course.gain)
     bend = toe_bend(phase, pitch)
@@ -493,7 +496,7 @@ def _plan_foot(side: str, course: _Course, rng: np.random.Generator) -> _FootPla
 def _footfalls(
     side: str, course: _Course, place: Array, left: float, rng: np.random.Generator
 ) -> list[Footfall]:
-    """Plant each step where the foot is on average while it stands: `place` (T,) along the path, metres."""
+    """Plant each step at the foot's mean position while it stands: `place` (T,) along the path, metres."""
     phase, stature = course.timing.of_side(side), course.body.stature
     toe_out = (1.0 if side == "l" else -1.0) * np.radians(rng.uniform(3, 9))
     steps = np.gradient(course.along, course.timing.step).mean() / course.timing.stride_hz / 2
@@ -527,7 +530,7 @@ def _pelvis_height(ground: Array, turn: Array, plans: dict[str, _FootPlan], cour
 
 
 def _running_height(ground: Array, turn: Array, plans: dict[str, _FootPlan], course: _Course) -> Array:
-    """Return the height of a runner's pelvis (T,), metres: legs bend by the angles, flight is free fall."""
+    """Return the height of a runner's pelvis (T,), metres: legs bend by the angles; flight is free fall."""
     body, step = course.body, course.timing.step
     height, stands = np.zeros(len(ground)), np.zeros(len(ground), bool)
     for side, plan in plans.items():
@@ -548,7 +551,7 @@ def _running_height(ground: Array, turn: Array, plans: dict[str, _FootPlan], cou
 
 
 def _carried(side: str, plan: _FootPlan, pelvis: Array, course: _Course) -> _FootPlan:
-    """Return the plan of a foot that the angles carry along with the pelvis (T, 3) while it swings."""
+    """Return the plan of a foot that moves with the pelvis (T, 3), by the angles, while it swings."""
     p = plan.phase % 1.0
     window = smoothstep(p, TOE_OFF, TOE_OFF + 0.1) * (1 - smoothstep(p, 0.85, 1.0))
     free = pelvis + apply(about(2, course.heading), _free_ankle(side, course.angles, course.body))
@@ -556,7 +559,7 @@ def _carried(side: str, plan: _FootPlan, pelvis: Array, course: _Course) -> _Foo
 
 
 def _bent(p: Array, yields: float) -> Array:
-    """Return the extension a stance leg aims for: yielding while it takes the load, then almost straight."""
+    """Return the target extension of a stance leg: yielding while it takes the load, then nearly straight."""
     load = smoothstep(p, 0.02, 0.13) * (1 - smoothstep(p, 0.18, 0.36))
     return _REACH - 0.0095 * yields * load
 
@@ -568,7 +571,7 @@ def _set(origins: Array, turns: Array, bone: str, origin: Array, turn: Array) ->
 def _solve_leg(
     side: str, origins: Array, turns: Array, plan: _FootPlan, pelvis_yaw: Array, body: Anatomy
 ) -> None:
-    """Set thigh, shank, foot and toes so that the ankle is where the foot wants it."""
+    """Set thigh, shank, foot and toes so that the ankle is where the foot's plan requires it."""
     pelvis = BONE_INDEX["pelvis"]
     hip = origins[:, pelvis] + apply(turns[:, pelvis], body.rest[f"{side}_hip"])
     reach = plan.ankle - hip

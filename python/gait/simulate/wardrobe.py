@@ -33,11 +33,11 @@ class Appearance:
     hips: float
     long_sleeves: bool
     long_hair: bool
-    hem: float  #: how far the top reaches below the pelvis joint, metres at 1.75 m stature
+    hem: float  #: length of the top below the pelvis joint, metres at 1.75 m stature
     loose: float  #: extra width of the trousers, 0 (slim) to 1
     tiles: Floats  #: (8, SIZE, SIZE, 3) linear RGB of each material, 0..1
     spans: Array  #: (8,) metres covered by one texture; 1 where texture coordinates run 0..1
-    notes: dict[str, str]  #: words for meta.json
+    notes: dict[str, str]  #: descriptions for meta.json
 
 
 def draw_appearance(rng: np.random.Generator) -> Appearance:
