@@ -32,7 +32,7 @@ from gait.lcm.link import private_url
 from gait.lcm.messages import image_message
 
 RATE = 30.0
-SHOWN = 60  # pictures, again and again: the person has to stay in view
+SHOWN = 60  # pictures, shown repeatedly: the person must stay in view
 PERIOD_S = 1.0  # between snapshots
 RESUMED = re.compile(r"following the person of frame (\d+)")
 WANTED_MS = 200.0

@@ -64,12 +64,12 @@ READINGS: tuple[tuple[str, str, dict[str, Settings]], ...] = (
     ("all", "as taken", {f"{TAKEN.surface_sd:.3g}": {}}),
     (
         "5",
-        "at the start scores spread like people (taken: by a share)",
+        "at the start scores vary as among people (taken: by a share of that)",
         {f"{TAKEN.surface_sd:.3g}": {"coef_start": 1.0}},
     ),
     (
         "8",
-        "the way ahead is bound to the rate (taken: noise of its own)",
+        "forward motion is bound to the rate (taken: it has its own noise)",
         {f"{TAKEN.surface_sd:.3g}": {"forward_noise": TAKEN.lateral_noise}},
     ),
     (
@@ -82,10 +82,10 @@ READINGS: tuple[tuple[str, str, dict[str, Settings]], ...] = (
         "the sum over n_s points (taken: their mean)",
         {f"{sd:.3g}": summed(sd) for sd in SUMS},
     ),
-    ("11", "sigma is constant (taken: grows with the angle)", tuned({"surface_tilt": 0.0})),
+    ("11", "sigma is constant (taken: it grows with the angle)", tuned({"surface_tilt": 0.0})),
     (
         "12",
-        "p_occluded is a difference of 2.5 sigma (taken: near that of a usual limb)",
+        "p_occluded equals a difference of 2.5 sigma (taken: near the density of a usual limb)",
         tuned({"occluded_density": 0.0018}),
     ),
 )

@@ -26,7 +26,7 @@ from facts import facts
 from gait.lcm.link import private_url
 from gait.lcm.messages import image_message
 
-SHOWN = 60  # pictures, again and again
+SHOWN = 60  # pictures, shown repeatedly
 SETTLED = 0.1  # share of the frames after which memory and files must not grow
 MOST_RATIO, MOST_KB = 3.0, 256
 

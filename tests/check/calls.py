@@ -26,7 +26,7 @@ POINTERS = {  # file and name of a pointer: functions it may point to
     "likelihood.c:log_likelihood": "log_likelihood",
     "likelihood.c:support": "support",
 }
-THREADS = {"pool.c:helper"}  # on a stack of their own
+THREADS = {"pool.c:helper"}  # on their own stacks
 
 
 class Function(NamedTuple):

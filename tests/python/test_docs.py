@@ -36,7 +36,7 @@ BIN = ROOT / ".venv/bin"
 SHORT = ["--frames", "32", "--fps", "12", "--size", "400x300", "--quiet"]
 FLAGS = ["-std=c11", "-Wall", "-Wextra", "-Wpedantic", "-Werror"]
 RUN = [ROOT / "README.md", *sorted(DOC.rglob("*.md"))]
-PAGES = [*RUN, ROOT / ".github/CONTRIBUTING.md"]  # the last has tests of its own
+PAGES = [*RUN, ROOT / ".github/CONTRIBUTING.md"]  # the last has separate tests
 ENV = {k: v for k, v in os.environ.items() if not k.startswith("MAKE")}
 # The README's lines of C stand among declarations that their names speak for.
 AMONG = """#include <gait.h>
@@ -192,7 +192,7 @@ def stand_in(clip, folder):
 def test_the_blocks_of_a_page_work(page, folder, clip, installed, monkeypatch):
     monkeypatch.chdir(folder)
     monkeypatch.setattr(Drawing, "png", lambda self: b"PNG")  # figures take most of the time of a page
-    monkeypatch.setattr(plots, "_text", lambda figure, label: "<svg></svg>")  # and have tests of their own
+    monkeypatch.setattr(plots, "_text", lambda figure, label: "<svg></svg>")  # and have separate tests
     todo = ALL[page]
     if any("pkg-config" in block.text for block in todo) and not shutil.which("pkg-config"):
         pytest.skip("pkg-config is not installed")

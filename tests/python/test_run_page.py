@@ -112,7 +112,7 @@ def test_a_page_of_a_part_of_the_film_states_the_same_as_the_tracker(folder, cap
     lead = re.search('<p class="lead">(.*?)</p>', (folder / "part.html").read_text())[1]
     assert "Tracked 75 of 80 frames" in lead and lead.endswith("not found in 2 frames.")
     assert f"uncertain in 4 frames: legs cross (2), {LEGS} (2)" in lead
-    # Its camera has a world of its own, in which the camera.json beside it is not.
+    # Its camera has its own world; the camera.json beside it belongs to another.
     track = read_track(folder / "part.csv")
     np.testing.assert_allclose(track.camera_change[-1], track.time[-1] * CHANGE, atol=1e-6)
     assert "camera was estimated from the walk; to see the figure" in capsys.readouterr().err

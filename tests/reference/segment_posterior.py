@@ -252,7 +252,7 @@ def _inverse(precision: Floats) -> Floats:
     return np.asarray(root.T @ root)
 
 
-STARTS = 8  # headings all round from which a latent one is looked for
+STARTS = 8  # headings all around, from which an unknown one is searched for
 TURN_SD = 0.4  # radians from a start: half of what lies between two
 PASSES = 12
 SETTLED = 1e-4  # radians, and metres of the mean place, between passes

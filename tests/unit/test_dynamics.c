@@ -395,7 +395,7 @@ static void test_circle(void)
         for (int32_t k = 0; k < steps; k++)
             w = move_one(&d, &w, (float)(quarter / rate) / (float)steps, 1.0f, (uint32_t)k, 3);
         CHECK_NEAR(w.f[F_HEADING], quarter, 1e-5);
-        CHECK_NEAR(w.f[F_X] / w.f[F_Y], 1.0, 0.05); /* but for the speed within the stride */
+        CHECK_NEAR(w.f[F_X] / w.f[F_Y], 1.0, 0.05); /* except for the speed within the stride */
         CHECK_NEAR(w.f[F_Y], 1.75 * 0.8 * (double)toy_model()->stride_hz / rate, 0.08);
     }
 }

@@ -112,7 +112,7 @@ static void compute(const kernels *run, const view_planes *im, const view_planes
         CHECK(guard_whole(&g[i]));
 }
 
-/* A plate, and a frame that equals it but for its exposure, some noise and a block. */
+/* A plate, and a frame that equals it except for exposure, some noise and a block. */
 static void maps_case(uint32_t n)
 {
     static uint8_t pixels[2 * PLANES][VIEW_PIXELS];

@@ -65,7 +65,7 @@ static void test_cameras_add(void)
     toy_tracker_free(first);
 }
 
-/* Each particle's number is the likelihood of its own body; its joints are its own too. */
+/* Each particle's number is the likelihood of its own body; its joints are also its own. */
 static void test_particles(void)
 {
     toy_body *const v = toy_body_new(1, GAIT_MODE_DEFAULT);

@@ -56,7 +56,7 @@ static void run_backwards(void *user, void (*task)(void *ctx, int32_t index), vo
         task(ctx, count);
 }
 
-/* Fifty frames there and back, again and again from a start; now and then a camera or both miss.  Returns the stages
+/* Fifty frames there and back, repeatedly from a start; now and then a camera or both miss.  Returns the stages
  * (bits) that left and right went through. */
 static uint32_t walk(gait_tracker *t, const gait_tracker_config *cfg, int steps)
 {

@@ -68,7 +68,7 @@ static void test_particles_follow_the_probabilities(void)
     CHECK(abs(particles_of(t, &h[2]) - t->cfg.particles / 5) < 3);
     toy_tracker_free(t);
     h[1].in_place = 1;           /* cannot be tracked along with the first */
-    h[2].mean.pelvis[0] += 1.0f; /* outside of the region in which the first is looked for */
+    h[2].mean.pelvis[0] += 1.0f; /* outside the region in which the first is searched for */
     t = begin(&cfg, h, 4);
     CHECK(t->cfg.particles == cfg.particles && particles_of(t, &h[0]) == cfg.particles);
     toy_tracker_free(t);

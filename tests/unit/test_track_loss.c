@@ -67,7 +67,7 @@ static void test_hidden(void)
     toy_tracker_free(t);
 }
 
-/* Frame n behind a post at x metres, half as wide as a body; the empty scene has the post, too. */
+/* Frame n behind a post at x metres, half as wide as a body; the empty scene also has the post. */
 static const uint8_t *behind_post(int n, float x)
 {
     static uint8_t picture[SCENE_PIXELS];
