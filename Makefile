@@ -98,7 +98,7 @@ UNIT := $(patsubst tests/unit/%.c,$(B)/unit/%,$(sort $(wildcard tests/unit/test_
 TOOLS := $(BIN)/gait-trackd
 LIBS := $(B)/libgait.so $(B)/libgait.a
 
-.PHONY: help setup lock lib tools test test-all built check unit python-test demo model paper bench bench-board bench-instructions size bench-lift detector-profile eval eval-body eval-camera eval-cameras eval-gait eval-moving eval-real eval-learn eval-lift eval-paper eval-people eval-studio soak kills mutants asan sanitizers tsan coverage unit-threads fuzz fuzz-run fuzz-long fuzz-targets golden-check \
+.PHONY: help setup lock lib tools test test-all built check unit python-test demo model paper bench bench-board bench-instructions bench-peers size bench-lift detector-profile eval eval-body eval-camera eval-cameras eval-gait eval-moving eval-real eval-learn eval-lift eval-paper eval-people eval-studio soak kills mutants asan sanitizers tsan coverage unit-threads fuzz fuzz-run fuzz-long fuzz-targets golden-check \
         docs screenshots sbom lint format wheel sdist wheel-check reproducible install install-daemon uninstall clean
 
 help: ## list the targets
@@ -443,6 +443,9 @@ size: $(B)/bench/size lib ## bytes of the default tracker, and of libgait.so's c
 
 bench-lift: $(B)/bench/lift | $(READY) ## time lifting a frame, a segment, by instruction set (ARGS='-m MODEL.gait'; --record)
 	@$(BENCH_RUN) --target bench-lift --title 'Speed of lifting' $(call BENCH_PAGE,bench_lift) $< $(filter-out --record,$(ARGS))
+
+bench-peers: setup lib ## the tracker beside BlazePose, MediaPipe and PARSEC's bodytrack (ARGS='--mediapipe PYTHON'; --record) *
+	@$(PY) tests/bench/peers.py $(ARGS)
 
 eval: setup lib ## errors on the clips, compared with their targets *
 	@$(PY) tests/bench/eval.py $(ARGS)
