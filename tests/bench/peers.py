@@ -66,9 +66,9 @@ while True:
     begun = time.process_time()
     found = pose.process(cv2.cvtColor(image, cv2.COLOR_BGR2RGB))
     seconds += time.process_time() - begun
-    high, wide = image.shape[:2]
+    height, width = image.shape[:2]
     both = found.pose_landmarks and zip(found.pose_world_landmarks.landmark, found.pose_landmarks.landmark)
-    out.append(both and [[p.x, p.y, p.z, q.x * wide, q.y * high] for p, q in both])
+    out.append(both and [[p.x, p.y, p.z, q.x * width, q.y * height] for p, q in both])
 print(json.dumps([seconds, out]))
 """
 
