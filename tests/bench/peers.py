@@ -5,7 +5,7 @@
 
 The tracker (one thread) and BlazePose, the network of `gait detect`, run on the clips of ../shared/data with
 true joints.  MediaPipe Pose runs on the same clips in a Python of its own that can import it, and bodytrack
-of PARSEC on PARSEC's own pictures, of four cameras; whatever is missing is left out, with a line that tells
+of PARSEC on PARSEC's own pictures, of four cameras; whatever is missing is left out, with a line on
 how to get it.
 """
 
