@@ -64,7 +64,7 @@ def main() -> int:
             update(done)
     head = ["clip", *(f"{status} %" for status in STATUSES), "good %", "swap %", "off %", "wrong %",
             "root mm", "abs mm", "heading deg", "stride rate %", "failed"]  # fmt: skip
-    note = f"{facts('tests/bench/eval_status.py')}\n\n{_READING}"
+    note = f"{facts(' '.join(['tests/bench/eval_status.py', *sys.argv[1:]]))}\n\n{_READING}"
     if args.record:
         table.publish("eval_status", "Status of unusual walks", head, rows, note)
     else:
