@@ -20,7 +20,7 @@ ROWS = 64  # rows (cycles, segments) in memory at a time
 
 
 def same_columns(visible: Mask) -> list[list[int]]:
-    """Group the columns of (T, M) by which rows are observed, so that one design serves each group."""
+    """Group the columns of (T, M) with the same observed rows, which can share a design matrix."""
     groups: dict[bytes, list[int]] = {}
     for k, column in enumerate(visible.T):
         groups.setdefault(column.tobytes(), []).append(k)
@@ -36,10 +36,10 @@ def disk_full(error: OSError) -> UserError:
 
 
 class ArrayFile:
-    """A temporary file of float arrays: a context to write them in; `views` reads them back and outlives it.
+    """A temporary file of float arrays: a context in which to write them; `views` remain valid after it.
 
-    The file has no name, so the system removes it however the process ends; it lies in the folder that TMPDIR
-    names.  The views are memory-mapped, and the system drops their pages when memory runs short.
+    The file is in the folder TMPDIR.  It has no name, so the system removes it however the process ends.  The
+    views are memory-mapped, and the system drops their pages when memory is short.
     """
 
     def __init__(self) -> None:
@@ -101,7 +101,7 @@ def release(*arrays: npt.NDArray[Any]) -> None:
 
 
 def _pages(array: npt.NDArray[Any]) -> mmap.mmap | None:
-    """Find the memory map that an array is a view of; None if the array lies in memory."""
+    """Find the memory map of which an array is a view; None if the array is in memory."""
     base: Any = array
     while isinstance(base, np.ndarray):
         base = base.base

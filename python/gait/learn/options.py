@@ -1,4 +1,4 @@
-"""The options of one learning run: created once by the command, passed down unchanged."""
+"""The options of a learning run, created once by the command and passed down unchanged."""
 
 from __future__ import annotations
 
@@ -12,16 +12,16 @@ if TYPE_CHECKING:
 
 DEFAULT_COMPONENTS = 8
 PAPER_COMPONENTS = 5
-MOST_COMPONENTS = 16  # the library reads no more
+MOST_COMPONENTS = 16  # the most that the library reads
 PRIORS = ("people", "paper")
 PERIOD_MODES = ("refined", "literal")
 #: Rules by which files belong to one person (`gait.learn.corpus.subjects`).
 SUBJECT_RULES = ("auto", "prefix", "folder", "file")
-#: Where joints of recorded skeletons are taken (`gait.learn.solve.anatomy`).
+#: Which joint centres of recorded skeletons to use (`gait.learn.solve.anatomy`).
 JOINT_CENTRES = ("recorded", "anatomical")
 SEGMENT_SOURCES = ("learnt", "all", "none", "only")
 SEGMENT_MARKERS = ("virtual", "recorded")
-#: Turned copies of each segment as the command names them, and as the blob stores them.
+#: Rotated copies of each segment, as the command names them and as the blob stores them.
 SEGMENT_HEADINGS = {"free" if count == 0 else str(count): count for count in abi.SEGMENT_HEADINGS}
 
 
@@ -35,15 +35,15 @@ class SegmentOptions:
     frames: int = 10  #: of a segment
     hop: int = 5  #: frames from one segment to the next
     fps: float = 20.0  #: frames per second of the segments
-    modes: int = 50  #: at most; a quarter of the segments if that is fewer
+    modes: int = 50  #: most modes; a quarter of the segments if that is fewer
     headings: int = 0  #: 0, 2 or 8 (`gait.bindings.segment_prior.SegmentPrior`)
-    mixture: int | None = 1  #: Gaussians; None: as many as predict held-out people best
+    mixture: int | None = 1  #: number of Gaussians; None: the number that predicts held-out people best
     markers: str = SEGMENT_MARKERS[0]  #: virtual: of the default skeleton; recorded: those of the files
     people: bool = True  #: also learn from people who were not recorded (`gait.learn.segments.motion`)
 
     @property
     def whole(self) -> bool:
-        """Whether whole recordings are used, whether or not the cyclic model accepts them."""
+        """Whether whole recordings are used, even if the cyclic model does not accept them."""
         return self.source in ("all", "only")
 
 
@@ -57,14 +57,14 @@ class LearnOptions:
     output: str = ""  #: path of the model
     report: str | None = None  #: folder of the report
     quiet: bool = False  #: no progress and no notes on stderr
-    activity: str = "walk"  #: recordings of another known activity are refused
+    activity: str = "walk"  #: recordings of another known activity are rejected
     subjects: str = SUBJECT_RULES[0]
     components: int | str | None = None  #: a number, "auto", or None for DEFAULT_COMPONENTS
     #: people: also of people who were not recorded; paper: the 19 angles of Ormoneit 2000 by its algorithm.
     prior: str = PRIORS[0]
     period_mode: str = PERIOD_MODES[0]
     fps: float | None = None  #: frames per second; None: from the file
-    markers: MarkerMap | None = None  #: for marker sets that are not known by themselves
+    markers: MarkerMap | None = None  #: for unknown marker sets
     joints: str = JOINT_CENTRES[0]  #: where the joints of CMU's skeletons are
     static: tuple[str, ...] = ()  #: static trials of the people (`gait.learn.solve.static_trial`)
     zeros_missing: bool = False  #: three or more exact zeros in a row are missing data

@@ -27,7 +27,7 @@ def from_angles(angles: Floats, axes: Sequence[int]) -> Floats:
 def frame_from(z: Floats, y: Floats, exact: str = "z") -> Floats:
     """Return frames (..., 3, 3), axes as columns, from two directions.
 
-    `exact` ("z" or "y") names the axis that lies exactly along its vector; the other is as near as possible.
+    `exact` ("z" or "y"): the axis that is exactly along its vector; the other is as near as possible.
     """
     x = unit(np.cross(y, z))
     if exact == "z":

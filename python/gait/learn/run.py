@@ -27,8 +27,8 @@ from gait.learn.solve.readers import SUFFIXES
 from gait.progress import progress
 from gait.reproducible import one_thread
 
-MOST_LINES = 20  # about files left out
-MOST_NAMES = 6  # of labels
+MOST_LINES = 20  # most lines about files left out
+MOST_NAMES = 6  # most labels in a line
 
 Note = Callable[[str], None]
 Sections = dict[str, blob.Array]
@@ -67,7 +67,7 @@ def run(
 
 
 def check(options: LearnOptions, note: Note = lambda line: None) -> None:
-    """Refuse before the work what would fail after it."""
+    """Raise errors, before the work, for what would fail after it."""
     if options.report and options.segments.source == "only":
         raise UsageError("--report draws the cyclic model; leave it out, or --segments only")
     if options.activity.lower() not in verdict.NAMES:
@@ -90,7 +90,7 @@ def check(options: LearnOptions, note: Note = lambda line: None) -> None:
 
 
 def _load(options: LearnOptions, corpus: Corpus, note: Note) -> load.Loaded:
-    """Find and prepare the files; report which were left out and what the readers noticed."""
+    """Find and prepare the files; report files that were left out, and the readers' observations."""
     files, closed = sources.find(options.sources, options.exclude, note)
     trials = {os.path.realpath(name) for name in options.static}
     files = [file for file in files if os.path.realpath(file[0]) not in trials]
@@ -118,7 +118,7 @@ def _load(options: LearnOptions, corpus: Corpus, note: Note) -> load.Loaded:
 
 
 def _hints(options: LearnOptions, notes: RunNotes) -> Iterator[str]:
-    """Yield what the readers noticed; a marker map may serve several sets, but not a misspelt label."""
+    """Yield the readers' observations; a marker map may have labels of several sets, but no misspelt ones."""
     if options.markers and notes.labels:
         absent = [repr(name) for name in options.markers.named if plain(name) not in notes.labels]
         if absent:
@@ -141,13 +141,13 @@ def _hints(options: LearnOptions, notes: RunNotes) -> Iterator[str]:
 
 
 def _more(files: list[Any]) -> str:
-    """Words about the files after the first."""
+    """Describe the files after the first."""
     others = len(files) - 1
     return f" (and similar in {others} more file{'s' * (others > 1)})" if others else ""
 
 
 def _segment_prior(options: LearnOptions, corpus: Corpus, note: Note) -> SegmentPrior | None:
-    """Learn the segment prior beside a cyclic model; without enough segments, note why instead of failing."""
+    """Learn a segment prior in addition to a cyclic model; if there are too few segments, only note why."""
     if options.segments.source == "none":
         return None
     try:

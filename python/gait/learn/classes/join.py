@@ -1,4 +1,4 @@
-"""Several classes of motion in one blob (model-format.md, sections of classes)."""
+"""Join several classes of motion in one blob (model-format.md, sections of classes)."""
 
 from __future__ import annotations
 
@@ -12,38 +12,38 @@ from gait.errors import UserError
 from gait.io import blob
 
 Sections = Mapping[str, blob.Array]
-#: Sections of a class of its own, with the tag for class k.
+#: Sections that a class may have itself, with their tags for class k.
 TAGS = {"CURV": "CUR{}", "CHST": "CHS{}", "SCST": "SCS{}", "GAIT": "GAI{}", "PACE": "PAC{}"}
 CYCLES, RECORDINGS = 2, 3  # columns of CLIN
 
 
 @dataclass(frozen=True)
 class Change:
-    """How often people change from one class to another, and where in the cycle."""
+    """How often people change from one class to another, and at which phase."""
 
-    rate: float  #: per second, at the phase and pace where it is most likely
-    concentration: float = 0.0  #: of the phases; 0: any
-    phase: float = 0.0  #: where it is most likely, the same half a stride later
-    slope: float = 0.0  #: of the logarithm of the rate with the pace
+    rate: float  #: per second, at the most likely phase and pace
+    concentration: float = 0.0  #: of the phases; 0: any phase
+    phase: float = 0.0  #: most likely phase; half a stride later is as likely
+    slope: float = 0.0  #: of the log rate with the pace
 
 
 @dataclass(frozen=True)
 class MotionClass:
-    """One class: sections of its own, or the curves of another."""
+    """One class, with its own sections or the curves of another."""
 
     name: str
     direction: int = 1  #: of the phase: 1 forwards, -1 backwards, 0 standing still
-    own: Sections | None = None  #: of a model with the same channels
-    source: str = ""  #: without `own`: the class whose curves it has
-    cycles: int = 0  #: that it is learnt from
+    own: Sections | None = None  #: sections of a model with the same channels
+    source: str = ""  #: without `own`: the class whose curves it uses
+    cycles: int = 0  #: number of cycles from which it was learnt
     recordings: int = 0
     changes: Mapping[str, Change] = field(default_factory=dict)  #: to other classes
 
 
 def join(first: Sections, classes: Sequence[MotionClass]) -> dict[str, blob.Array]:
-    """Return the sections of `first`, whose curves are those of classes[0], and of all classes.
+    """Return the sections of `first`, whose curves are those of classes[0], with those of all classes.
 
-    UserError if a class does not fit: other channels, a name twice, no source.
+    UserError if a class does not fit: it has other channels, an existing name, or no source.
     """
     names = [c.name for c in classes]
     if len(set(names)) < len(names) or len(names) > MAX_CLASSES:

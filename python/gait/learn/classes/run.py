@@ -1,4 +1,4 @@
-"""`gait learn --class`: one run for each class of motion, and all of them in one blob."""
+"""`gait learn --class`: one run for each class of motion, joined in one blob."""
 
 from __future__ import annotations
 
@@ -21,26 +21,26 @@ from gait.learn.run import Note, check, run
 
 WALK, STAND, BACKWARDS, RUN = "walk", "stand", "backwards", "run"
 DERIVED = STAND, BACKWARDS  # made from the walk
-_STEP = 6.0  # concentration: within about a twentieth of a stride, one sd
-#: Changes, per second where they are most likely.  Recordings of changes are rare, so these are what people
-#: do indoors and in streets: a walk lasts some seconds to a minute, both feet are on the ground at its end.
+_STEP = 6.0  # concentration with an sd of about a twentieth of a stride
+#: Changes, per second at their most likely phase and pace.  Recordings of changes are rare, so these describe
+#: typical behaviour indoors and in streets: a walk lasts from seconds to a minute, and ends with both feet on
+#: the ground.
 CHANGES: dict[str, dict[str, Change]] = {
     WALK: {STAND: Change(1.0, _STEP, 0.05), BACKWARDS: Change(0.002), RUN: Change(0.3, slope=1.0)},
     STAND: {WALK: Change(0.7, _STEP, 0.0), BACKWARDS: Change(0.3, _STEP, 0.0), RUN: Change(0.05)},
     BACKWARDS: {STAND: Change(1.0, _STEP, 0.05), WALK: Change(0.002)},
     RUN: {WALK: Change(0.5, slope=-1.0), STAND: Change(0.1)},
 }
-OTHER = Change(0.1)  # of a class of the user's, to and from the walk and standing
+OTHER = Change(0.1)  # between a user's class and walking or standing
 
 
 def learn(options: LearnOptions, note: Note) -> dict[str, Any]:
     """Learn each of ``options.classes`` that has recordings, then the walk, and write one blob.
 
-    A class is ``stand`` or ``backwards``, made from the walk; or ``NAME=SRC``, learnt from those recordings
-    (``backwards`` in reversed time, as a walk whose phase runs back) or taken from a model (``.gait``); or
-    ``run``, learnt from the runs among the sources.  Returns the
-    figures of the walk, with those of the classes under ``classes``.  UsageError or UserError with one line
-    if it cannot be done.
+    A class is ``stand`` or ``backwards``, derived from the walk; or ``NAME=SRC``, learnt from those
+    recordings (``backwards`` in reversed time, as a walk whose phase decreases) or taken from a model
+    (``.gait``); or ``run``, learnt from the runs among the sources.  Returns the figures of the walk, with
+    those of the classes under ``classes``.  UsageError or UserError with one line if it cannot be done.
     """
     wanted, alone = _parsed(options), replace(options, classes=())
     if not adds_to_a_model(options):
@@ -74,7 +74,7 @@ def adds_to_a_model(options: LearnOptions) -> bool:
 
 
 def _parsed(options: LearnOptions) -> dict[str, str]:
-    """Names of the classes and their sources."""
+    """Parse the names of the classes and their sources."""
     wanted: dict[str, str] = {}
     for text in options.classes:
         name, _, source = text.partition("=")
@@ -99,7 +99,7 @@ def _derived(name: str, walk: Mapping[str, blob.Array], activity: str) -> Motion
 
 
 def _learnt(name: str, source: str, options: LearnOptions, note: Note) -> MotionClass | None:
-    """Learn a class from recordings, or take it from a model; None if none of the sources is of it."""
+    """Learn a class from recordings, or take it from a model; None if no source belongs to it."""
     if Path(source).suffix == ".gait":
         return _counted(MotionClass(name, own=read_cyclic(source)), None)
     with tempfile.TemporaryDirectory() as folder:
@@ -126,7 +126,7 @@ def _learnt(name: str, source: str, options: LearnOptions, note: Note) -> Motion
 
 
 def _counted(one: MotionClass, walk: Mapping[str, blob.Array] | None) -> MotionClass:
-    """Return a class with the cycles and recordings that its META counts."""
+    """Return a class with the numbers of cycles and recordings in its META."""
     sections = one.own if one.own is not None else walk or {}
     meta = json.loads(sections["META"].tobytes()) if "META" in sections else {}
     recordings = meta.get("sequences", {}).get("count", 0)

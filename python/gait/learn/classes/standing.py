@@ -1,9 +1,9 @@
-"""Standing derived from the walk: legs as in mid-stance but under the hips, everything else average.
+"""Derive standing from the walk: legs as in mid-stance but below the hips, everything else average.
 
-Few recordings show people who stand, but every walk shows where its skeleton has a straight leg, a level
-foot and hanging arms, whatever zeros its angles have.  How people stand differs: components, in units of
-their standard deviation, are one foot before the other, the width of the stance, bent knees and weight on one
-leg; the height of the pelvis follows from the legs.
+Few recordings show people standing, but every walk shows which angles of its skeleton mean a straight leg, a
+level foot and hanging arms.  People stand in different ways: components, in units of their standard
+deviation, are one foot in front of the other, the width of the stance, bent knees and weight on one leg; the
+height of the pelvis follows from the legs.
 """
 
 from __future__ import annotations
@@ -15,8 +15,8 @@ import numpy as np
 from gait.io import blob
 from gait.learn.arrays import Floats
 
-PHASES = 8  # the fewest that a model may have: nothing moves
-STANCE = 0.15, 0.45  # phases of the right foot: it carries the body and is flat
+PHASES = 8  # the fewest that a model may have, as nothing moves
+STANCE = 0.15, 0.45  # phases in which the right foot carries the body and is flat
 COMPONENTS: tuple[dict[str, float], ...] = (
     {"l_hip_flexion": 9.0, "r_hip_flexion": -9.0, "l_ankle_flexion": -9.0, "r_ankle_flexion": 9.0},
     {"l_hip_abduction": 4.0, "r_hip_abduction": 4.0},
@@ -27,7 +27,7 @@ COMPONENTS: tuple[dict[str, float], ...] = (
     {"root_roll": 3.0, "l_hip_abduction": 4.0, "r_hip_abduction": -4.0, "torso_x": -3.0},
 )  # fmt: skip
 """Degrees for one standard deviation."""
-#: Posture's standard deviations, degrees: arms hang, fold, point and carry.
+#: Standard deviations of posture, degrees: arms may hang, fold, point or carry.
 POSTURE = {"shoulder_flexion": 25.0, "shoulder_abduction": 12.0, "shoulder_rotation": 20.0,
            "elbow_flexion": 35.0, "torso_y": 6.0, "torso_x": 4.0, "torso_z": 8.0}  # fmt: skip
 
@@ -71,11 +71,11 @@ def _stored(values: Floats) -> blob.Array:
 
 
 def _standing(walk: Mapping[str, blob.Array], names: list[str], mean: Floats) -> Floats:
-    """Mean channels (M,) of who stands with feet together."""
+    """Mean channels (M,) of a person who stands with feet together."""
     at = {name: k for k, name in enumerate(names)}
     posture = mean.mean(axis=0)
     first, last = (int(phase * len(mean)) for phase in STANCE)
-    knee = float(mean[first:last, at["r_knee_flexion"]].min())  # of the straightest leg
+    knee = float(mean[first:last, at["r_knee_flexion"]].min())  # when the leg is straightest
     ankle = [c[at["root_height"]] - _leg_height(walk, names, c, "r") for c in mean[first:last]]
     flat = mean[first + int(np.argmin(ankle))]  # the sole is on the ground
     pitch = flat[at["r_hip_flexion"]] - flat[at["r_knee_flexion"]] + flat[at["r_ankle_flexion"]]
@@ -102,7 +102,7 @@ def _standing(walk: Mapping[str, blob.Array], names: list[str], mean: Floats) ->
 
 
 def _lengths(walk: Mapping[str, blob.Array]) -> tuple[float, float]:
-    """Lengths of thigh and shank, statures."""
+    """Return the lengths of thigh and shank, statures."""
     frames = blob.unpack_names(walk["FRNM"])
     origin = np.asarray(walk["FRMF"], float)
     return -float(origin[frames.index("r_shank")][2]), -float(origin[frames.index("r_foot")][2])
@@ -111,7 +111,7 @@ def _lengths(walk: Mapping[str, blob.Array]) -> tuple[float, float]:
 def _leg_height(
     walk: Mapping[str, blob.Array], names: list[str], channels: Floats, sides: str = "lr"
 ) -> float:
-    """Height of the hips over the ankles, statures: of the longer leg."""
+    """Height of the hips above the ankles, statures, of the longer leg."""
     thigh, shank = _lengths(walk)
     at = {name: k for k, name in enumerate(names)}
     heights = []

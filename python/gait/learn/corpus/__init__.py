@@ -1,1 +1,1 @@
-"""Files of a run: finding them, identifying subjects, and preparing them in processes or on a cluster."""
+"""Files of a run: find them, identify subjects, and prepare them in processes or on a cluster."""

@@ -1,4 +1,4 @@
-"""Tasks on a Dask cluster; outcomes come in the order of the files.
+"""Run tasks on a Dask cluster; outcomes are in the order of the files.
 
 The workers read the files themselves, so they need the same paths as this machine, on a shared file system.
 They also need the same versions of this package, numpy, scipy and ezc3d, and the same kernels
@@ -55,8 +55,8 @@ class Mismatch:
 def prepared(tasks: Sequence[Task], address: str) -> Generator[Prepared, None, None]:
     """Yield the outcomes of tasks in their order, from the workers of the scheduler at `address`.
 
-    UserError if dask is not installed, nothing answers, or workers have other versions or do not see the
-    files.
+    UserError if dask is not installed, the scheduler does not answer, or workers have other versions or
+    cannot see the files.
     """
     with connected(address) as client:
         require_packages(client, address)
@@ -105,7 +105,7 @@ def connected(address: str) -> Iterator[Client]:
 
     log = logging.getLogger("distributed")
     before = log.level
-    log.setLevel(logging.CRITICAL)  # our one line about a lost connection, not its tracebacks
+    log.setLevel(logging.CRITICAL)  # we report a lost connection in one line, without its tracebacks
     try:
         with ExitStack() as stack:
             try:
@@ -123,7 +123,7 @@ def connected(address: str) -> Iterator[Client]:
 
 
 def require_packages(client: Client, address: str) -> None:
-    """Refuse workers without a package or with another version; they might not even unpickle a task."""
+    """Raise UserError if workers lack a package or have another version, as they might not unpickle tasks."""
     for package in SAME:
         for worker, there in client.run(metadata.version, package, on_error="return").items():
             if isinstance(there, metadata.PackageNotFoundError):

@@ -1,4 +1,4 @@
-"""The process that starts the workers: it imports what they need while this process continues."""
+"""The process that starts the workers; it imports what they need while this process continues."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ from multiprocessing.context import BaseContext
 from gait.signals import ending_signals
 
 STAGE = "gait.learn.corpus.stage"  # what workers run; by name, to avoid importing it here
-WORTH = 4 << 20  # bytes of recordings that take longer to read than workers to start (0.6 s per MB)
+WORTH = 4 << 20  # bytes of recordings from which reading takes longer than starting workers (0.6 s per MB)
 
 
 def cores() -> int:
@@ -24,7 +24,7 @@ def cores() -> int:
 
 
 def worth(sources: Iterable[str]) -> bool:
-    """Whether files and folders are so large, beside their first file, that workers will pay."""
+    """Whether files and folders, without their first file, are so large that workers save time."""
     total = 0
     for path in islice(_files(sources), 1, None):
         with suppress(OSError):  # its reader reports that
@@ -53,7 +53,7 @@ def context() -> BaseContext:
 def start() -> None:
     """Begin the imports; a request for a worker waits for their end."""
     context()
-    resource_tracker.ensure_running()  # started by the server, it would let interruptions through again
+    resource_tracker.ensure_running()  # if the server started it, it would unblock interruptions again
     with held_back():
         forkserver.ensure_running()
 
@@ -62,8 +62,9 @@ def start() -> None:
 def held_back() -> Iterator[None]:
     """Delay interruptions to the end of the block.
 
-    A half-started worker is not yet in the list of those to end, and would outlive its parent.  The signal
-    mask alone is not enough: another thread takes the signal, and Python still interrupts this one.
+    A worker that is just starting is not yet in the list of those to end, and would outlive its parent.  The
+    signal mask is not enough, since another thread may receive the signal, and Python would still interrupt
+    this one.
     """
     came: list[int] = []
     here = ending_signals() if threading.current_thread() is threading.main_thread() else ()

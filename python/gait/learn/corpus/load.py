@@ -1,8 +1,8 @@
-"""The files of a run, read and prepared; unusable files in folders are skipped.
+"""Read and prepare the files of a run; unusable files in folders are skipped.
 
-One body serves all recordings of a person with markers: what they show of the length scales adds up, together
-with what is known of people (the optimum of a joint fit, by one Gauss-Newton step).  The places of markers
-are each recording's own, as they are put on anew.
+All recordings of a person with markers share one body: their information about the length scales is added,
+together with that about people in general (the optimum of a joint fit, by one Gauss-Newton step).  Each
+recording has its own marker positions, since markers are attached anew.
 """
 
 from __future__ import annotations
@@ -37,8 +37,8 @@ Files = list[tuple[Path, bool]]  #: paths, and whether each was found in a folde
 USED = " (its segments are used nevertheless)"
 ONLY = "for gait lift only, give --segments only: all also needs recordings for a cyclic model"
 NOT_YET = np.zeros((0, 0))  # channels of a sequence until they are read back from disk
-SAME_PERSON = np.log(10)  # names are right about persons ten times as often as they are wrong
-MOST_NAMES = 4  # of files in a line
+SAME_PERSON = np.log(10)  # prior log odds that files with the same person's name are of one person: 10 to 1
+MOST_NAMES = 4  # most names of files in a line
 
 
 class NothingLeft(UserError):
@@ -53,15 +53,15 @@ class NothingLeft(UserError):
 
 @dataclass
 class RunNotes:
-    """What the readers noticed in the files of a run."""
+    """Observations of the readers in the files of a run."""
 
     labels: set[str] = field(default_factory=set)
     zeros: list[tuple[Path, str]] = field(default_factory=list)
     lacking: list[tuple[Path, tuple[str, ...]]] = field(default_factory=list)
-    belts: list[tuple[Path, float]] = field(default_factory=list)  #: of recordings that are learnt from
+    belts: list[tuple[Path, float]] = field(default_factory=list)  #: speeds, of recordings learnt from
 
     def add(self, path: Path, notes: FileNotes, learnt: bool) -> None:
-        """Add those of a file, which may be learnt from."""
+        """Add the notes of a file; `learnt`: whether it is learnt from."""
         if learnt and notes.belt is not None:
             self.belts.append((path, notes.belt))
         self.labels |= notes.labels
@@ -73,18 +73,18 @@ class RunNotes:
 
 @dataclass(frozen=True)
 class SharedLengths:
-    """Log length scales (S,) of a person, and the number of recordings they come from."""
+    """Log length scales (S,) of a person, and the number of recordings from which they were measured."""
 
     log_scales: Floats
     recordings: int
 
 
 class Loaded(NamedTuple):
-    """What the files of a run gave; the signals of the sequences are on disk."""
+    """Results of reading a run's files; the signals of the sequences are on disk."""
 
     sequences: list[Sequence]
     refused: list[str]  #: one line about each file that was left out
-    others: list[Measures]  #: bodies of people none of whose files can be used, in the order of their names
+    others: list[Measures]  #: bodies of people without usable files, in the order of their names
 
 
 def load_all(
@@ -98,10 +98,10 @@ def load_all(
 ) -> Loaded:
     """Read and prepare files; the result does not depend on the processes that do it.
 
-    `progress` gets the number of files done, `corpus` the motions for the segment prior (a file that gave one
-    is no error), `notes` what the readers noticed.  `shared` is what `shared_lengths` returned for these
-    files; without it each file is fitted by itself.  UserError if a file named by itself cannot be used, or
-    none can.
+    `progress` is called with the number of files done; `corpus` receives the motions for the segment prior (a
+    file that gave one is no error), `notes` the readers' observations.  `shared`: result of `shared_lengths`
+    for these files; without it each file is fitted by itself.  UserError if a file named explicitly, or every
+    file, cannot be used.
     """
     paths = [path for path, _ in files]
     shared = shared or [None] * len(paths)
@@ -156,7 +156,7 @@ def load_all(
 
 
 def _lonely(sequences: list[Sequence]) -> dict[str, str]:
-    """Return names of trials too short to be learnt without others of the person, and a line about each."""
+    """Return names of trials that are too short without others of the same person, and a line about each."""
     count = Counter(s.subject for s in sequences)
     return {
         s.name: f"{s.source}: the trial is too short by itself: {s.cycles:.2f} cycles (at least {CYCLES}); "
@@ -167,7 +167,7 @@ def _lonely(sequences: list[Sequence]) -> dict[str, str]:
 
 
 def _tasks(paths: list[Path], options: LearnOptions, shared: list[SharedLengths | None]) -> list[Task]:
-    """Return what to do with each file: with its person's static trial, else with the lengths of all."""
+    """Return the task for each file, with its person's static trial, or else with the shared lengths."""
     trials = static_trials(paths, options)
     found = {path: static_trial.calibrate(path, options) for path in dict.fromkeys(filter(None, trials))}
     tasks = []
@@ -181,7 +181,7 @@ def _tasks(paths: list[Path], options: LearnOptions, shared: list[SharedLengths 
 
 
 def static_trials(paths: list[Path], options: LearnOptions) -> list[Path | None]:
-    """Return the static trial that serves each file; None without one."""
+    """Return the static trial for each file, or None."""
     statics = [Path(name) for name in options.static]
     people = sources.subjects([*paths, *statics], options.subjects)
     return static_trial.serving(paths, people[: len(paths)], statics, people[len(paths) :])
@@ -205,7 +205,7 @@ def _other_bodies(persons: list[str], bodies: list[Measures | None], known: set[
 
 @dataclass
 class _Body:
-    """What recordings show of a body, and their files (indices)."""
+    """Information of recordings about a body, and their files (indices)."""
 
     found: LengthInformation = NO_INFORMATION
     files: list[int] = field(default_factory=list)
@@ -258,7 +258,7 @@ def shared_lengths(
 
 
 def _most_likely(bodies: list[_Body], found: LengthInformation) -> _Body:
-    """Return the body that a recording is most likely of; a new one if that is likelier."""
+    """Return the most likely body of a recording, which may be a new one."""
     each = [log_bayes_factor(body.found, found) for body in bodies]
     if not each or max(each) < -SAME_PERSON:
         bodies.append(_Body())
@@ -267,7 +267,7 @@ def _most_likely(bodies: list[_Body], found: LengthInformation) -> _Body:
 
 
 def _other_lengths(person: str, bodies: list[list[Path]]) -> list[str]:
-    """Return lines about the recordings that are not of the body of most."""
+    """Return lines about recordings whose body is not that of the majority."""
     most = max(bodies, key=len, default=[])
     return [
         f"{' '.join(map(str, files[:MOST_NAMES]))}{' ...' * (len(files) > MOST_NAMES)}: limb lengths differ "

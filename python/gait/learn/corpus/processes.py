@@ -1,7 +1,7 @@
-"""Tasks in several processes of this machine; outcomes come in the order of the files.
+"""Run tasks in several processes of this machine; outcomes are in the order of the files.
 
-Workers write outcomes to files and send only the names through the pipe.  A reader would wait forever for the
-rest of a message from a worker that was killed, but so short a message is written whole or not at all.
+Workers write outcomes to files and send only the names through the pipe.  If a worker were killed within a
+message, the reader would wait forever, but such short messages are written completely or not at all.
 """
 
 from __future__ import annotations
@@ -27,14 +27,14 @@ from gait.learn.corpus.stage import Prepared, Task
 
 #: Seconds to start the workers, which import the package again (measured: 0.4 to 0.6).
 START = 0.6
-AHEAD = 4  # files in flight per worker, which bounds the outcomes that wait
+AHEAD = 4  # files in flight per worker, which limits the outcomes that wait
 
 
 def prepared(tasks: Sequence[Task], jobs: int) -> Generator[Prepared, None, None]:
     """Yield the outcomes of tasks in their order.
 
-    Tasks run here until their time shows that a pool of up to `jobs` workers would finish the rest sooner;
-    the outcomes are the same.
+    Tasks run in this process until their time shows that a pool of up to `jobs` workers would finish the rest
+    sooner; the outcomes are the same.
     """
     sizes = [_size(task.path) for task in tasks]
     spent, done = 0.0, 0
@@ -53,7 +53,7 @@ def prepared(tasks: Sequence[Task], jobs: int) -> Generator[Prepared, None, None
 def _size(path: Path) -> int:
     try:
         return max(1, path.stat().st_size)
-    except OSError:  # gone since it was found; its reader reports that
+    except OSError:  # it has disappeared; its reader reports that
         return 1
 
 
@@ -76,7 +76,7 @@ def _pooled(tasks: Sequence[Task], workers: int) -> Generator[Prepared, None, No
 
 
 def _alone(task: Task) -> Prepared:
-    """Run one task in its own process, so that its death has a name."""
+    """Run one task in its own process, so that a crash can be attributed to it."""
     try:
         with _pool(1) as (pool, folder):
             return _fetched(_submit(pool, task, folder).result())
@@ -90,7 +90,7 @@ def _alone(task: Task) -> Prepared:
 
 @contextmanager
 def _pool(count: int) -> Iterator[tuple[ProcessPoolExecutor, str]]:
-    """Provide workers and their folder; both go at the end, at once if that is an exception."""
+    """Provide workers and their folder; both are removed at the end, immediately after an exception."""
     others = set(multiprocessing.active_children())
     with tempfile.TemporaryDirectory(prefix="gait-") as folder:
         context = forkserver.context()
@@ -107,13 +107,13 @@ def _pool(count: int) -> Iterator[tuple[ProcessPoolExecutor, str]]:
 
 
 def _submit(pool: ProcessPoolExecutor, task: Task, folder: str) -> Future[str]:
-    """Submit a task; workers started by this inherit that Ctrl-C is for their parent alone."""
+    """Submit a task; workers started by this ignore Ctrl-C, which only their parent handles."""
     with forkserver.held_back():
         return pool.submit(_stored, task, folder)
 
 
 def _stored(task: Task, folder: str) -> str:
-    """Run a task in a worker and return the name of the file in `folder` that has the outcome."""
+    """Run a task in a worker and return the name of the file in `folder` with the outcome."""
     outcome = task.run()
     try:
         with tempfile.NamedTemporaryFile(dir=folder, delete=False) as file:
@@ -132,7 +132,7 @@ def _fetched(name: str) -> Prepared:
 
 
 def _follow_parent(folder: str) -> None:
-    """End this worker and remove its folder when its parent is gone, even if killed."""
+    """End this worker and remove its folder when its parent has ended, even if that was killed."""
 
     def watch() -> None:
         parent = multiprocessing.parent_process()

@@ -16,14 +16,14 @@ def find(
 ) -> tuple[list[tuple[Path, bool]], list[str]]:
     """Find the motion files of files and folders.
 
-    `exclude` are globs that the end of a file's path matches, such as '02_*.amc' or 'cmu_walk/02/*', and
-    names of folders without wildcards, such as 'cmu_walk/02', for all that is inside.  `warn` gets a line
-    about each glob that no file matches.
+    `exclude`: globs for the end of a file's path, such as '02_*.amc' or 'cmu_walk/02/*', and names of folders
+    without wildcards, such as 'cmu_walk/02', whose whole contents are excluded.  `warn` is called with a line
+    about each glob that matches no file.
 
     Returns the files, sorted, each with whether it was found in a folder, and a line about each folder that
     cannot be read.  UserError if a source is missing, of an unknown kind, or nothing is left.
     """
-    found: dict[str, tuple[Path, bool]] = {}  # by the absolute path, however it is spelt
+    found: dict[str, tuple[Path, bool]] = {}  # by absolute path, however the user wrote it
     closed: list[str] = []
     for name in sources:
         source = Path(name)
@@ -56,7 +56,7 @@ def find(
 
 
 def _inside(folder: Path, closed: list[str]) -> Iterator[Path]:
-    """Yield the motion files in a folder and below, but hidden ones; links are followed, each once."""
+    """Yield the motion files in a folder and its subfolders, except hidden ones; follow each link once."""
     entered = {os.path.realpath(folder)}
 
     def note(error: OSError) -> None:
@@ -66,7 +66,7 @@ def _inside(folder: Path, closed: list[str]) -> Iterator[Path]:
 
     for at, folders, files in os.walk(folder, onerror=note, followlinks=True):
         shown = sorted((name for name in folders if name[0] != "."), reverse=True)
-        new = {os.path.realpath(Path(at, name)): name for name in shown}  # of several names the first
+        new = {os.path.realpath(Path(at, name)): name for name in shown}  # the first of several names
         folders[:] = [name for real, name in new.items() if real not in entered]
         entered |= set(new)
         for path in (Path(at, name) for name in files if name[0] != "."):
@@ -75,7 +75,7 @@ def _inside(folder: Path, closed: list[str]) -> Iterator[Path]:
 
 
 def matches(path: Path, glob: str) -> bool:
-    """Whether a glob, or a folder's name, means a file."""
+    """Whether a glob, or a folder's name, matches a file."""
     folder = glob.rstrip("/")
     return bool(folder) and (
         path.match(folder) or (not set(folder) & set("*?[") and any(p.match(folder) for p in path.parents))
@@ -100,10 +100,10 @@ def names(paths: Sequence[Path]) -> list[str]:
 def subjects(paths: Sequence[Path], rule: str = "auto") -> list[str]:
     """Name the person of each recording.
 
-    The rule prefix names a person by the part of the file's stem before '_', else the whole stem; folder
-    takes each folder as a person, file each file.  auto takes the prefix, or the folder where there is no
+    With the rule prefix, the person is the part of the file's stem before '_', or the whole stem; with
+    folder, each folder is a person, with file, each file.  auto uses the prefix, or the folder if there is no
     '_'; but if a prefix occurs in several folders that are not named like it (Anna/walk_01, Ben/walk_01),
-    each folder is one.
+    each folder is a person.
     """
     if rule == "file":
         return names(paths)

@@ -1,6 +1,6 @@
 """The task for each file, in any process: from a file to a sequence and its markers, or to an error.
 
-Before that, files of markers are measured whose person has several (`gait.learn.corpus.load.shared_lengths`).
+Before that, people with several files of markers are measured (`gait.learn.corpus.load.shared_lengths`).
 """
 
 from __future__ import annotations
@@ -41,20 +41,20 @@ class Task:
 
 @dataclass(frozen=True)
 class Prepared:
-    """What a file gave."""
+    """Result for a file."""
 
     sequence: Sequence | None = None
     refused: UserError | None = None  #: why there is no sequence
     motion: Motion | None = None  #: markers for the segment prior
-    body: Measures | None = None  #: of a file whose motion is refused
+    body: Measures | None = None  #: of a file whose motion cannot be used
     lengths: LengthInformation | None = None  #: of a file that was only measured
-    #: Whether the lengths are its own, because it was refused with those of the person's other recordings.
+    #: Whether the lengths are its own, as it could not be used with those of the person's other recordings.
     alone: bool = False
     notes: FileNotes = NO_NOTES
 
 
 def _measured(task: Task) -> Prepared:
-    """Measure the person by markers; errors are reported when the file is prepared."""
+    """Measure the person from markers; errors are reported when the file is prepared."""
     try:
         return Prepared(lengths=readers.length_information(task.path, task.options))
     except UserError:

@@ -1,1 +1,1 @@
-"""Recordings as cycles: the steady part, its period and verdict, the common phase, the cycles themselves."""
+"""From recordings to cycles: steady part, period, verdict, common phase, cutting."""

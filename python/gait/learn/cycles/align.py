@@ -1,8 +1,8 @@
-"""Phases of several sequences brought to one cycle (Ormoneit 2000, section 3.2 and Fig. 3).
+"""Align the phases of several sequences to a common cycle (Ormoneit 2000, section 3.2 and Fig. 3).
 
 Alternates between fitting a periodic cubic spline to all sequences and finding the best offset of each; both
-steps lower one weighted sum of squares.  The phase of frame j of a sequence is frac((j - offset) / period).
-One sequence at a time is in memory.
+steps reduce the same weighted sum of squares.  The phase of frame j of a sequence is frac((j - offset) /
+period).  Only one sequence at a time is in memory.
 """
 
 from __future__ import annotations
@@ -22,12 +22,12 @@ TOLERANCE = 1e-6  # relative change of the objective at which to stop
 KNOTS = 20  # of the periodic spline
 TABLE = 1024  # samples of a tabulated curve
 BINS = 256  # of the circular cross-correlation
-FINEST = 0.01  # frames, last step of the search for an offset
+FINEST = 0.01  # frames; last step of the search for an offset
 XCORR_ROUNDS = 3
-AMBIGUOUS = 0.75  # depth of a second-best phase relative to the best at which other starts are tried
-APART = 0.1  # cycles between those phases, at least
-STARTS = 4  # most sequences whose curve serves as the first one
-#: Columns of right and left hip flexion: phases are counted from where right minus left is largest.
+AMBIGUOUS = 0.75  # relative depth of a second-best phase from which other starts are tried
+APART = 0.1  # least cycles between those phases
+STARTS = 4  # most sequences whose curve is tried as the first one
+#: Columns of right and left hip flexion; phase 0 is where right minus left is largest.
 HIPS = (ANGLES.index("r_hip_flexion"), ANGLES.index("l_hip_flexion"))
 
 
@@ -36,11 +36,11 @@ class Alignment:
     """Result of `align`."""
 
     offsets: Floats  #: (n,) frames, in [0, period)
-    #: Weighted sum of squares after each iteration, falling but for rounding.
+    #: Weighted sum of squares after each iteration, which decreases except for rounding.
     objective: list[float] = field(default_factory=list)
-    #: (A,) of the angles: one over the variance that a smooth curve of each sequence leaves.
+    #: (A,) weights of the angles: one over the variance about a smooth curve of each sequence.
     weights: Floats = field(default_factory=lambda: np.ones(1))
-    #: Whether the objective stopped falling; False if it rose or the iterations ran out.
+    #: Whether the objective converged; False if it increased or the iterations ran out.
     converged: bool = False
 
 
@@ -99,7 +99,7 @@ class _Sequence:
         return np.mod((self.time - offset) / self.period, 1.0)
 
     def add_to(self, curve: _Curve, offset: float) -> None:
-        """Add this sequence to those that a curve is fitted to."""
+        """Add this sequence to the fit of a curve."""
         curve.add(self.phase(offset), self.values, self.visible)
 
     def squares(self, table: Floats, offset: float) -> Floats:
@@ -165,7 +165,7 @@ class _Problem:
     def gauged(self, offsets: Floats) -> Floats:
         """Fix the common phase of offsets: the first harmonic of right minus left hip flexion is a cosine.
 
-        It is computed from the frames themselves, so that a common shift of all phases drops out exactly.
+        It is computed from the frames themselves, so that a common shift of all phases cancels exactly.
         """
         if self.hips is None:
             return offsets
@@ -209,15 +209,15 @@ def common_curve(signals: list[Floats], periods: Floats, offsets: Floats) -> Flo
 def hip_phase(curve: Floats) -> float:
     """Return the phase of a curve (n, >= 24) at which the first harmonic of the hips' difference is largest.
 
-    It stands in for the right heel strike where the feet are not known; they are 0.02 of a cycle apart in the
-    mean of CMU's walks.
+    It replaces the right heel strike if the feet are unknown; in the mean of CMU's walks the two differ by
+    0.02 of a cycle.
     """
     right, left = HIPS
     return float(-np.angle(np.fft.fft(curve[:, right] - curve[:, left])[1]) / (2 * np.pi) % 1.0)
 
 
 def _descend(problem: _Problem, offsets: Floats, weights: Floats) -> Alignment:
-    """Alternate both steps until the objective stops falling; keep the better offsets if it rises."""
+    """Alternate both steps until the objective converges; if it increases, keep the better offsets."""
     now = before = problem.gauged(offsets)
     result = Alignment(now, weights=weights)
     for _ in range(ITERATIONS):
@@ -238,14 +238,14 @@ def _descend(problem: _Problem, offsets: Floats, weights: Floats) -> Alignment:
 def _without_drift(offsets: Floats, before: Floats, periods: Floats) -> Floats:
     """Remove the common part of a change from the offsets.
 
-    It changes the fit only through the places of the knots, towards which all phases would creep forever.
+    It affects the fit only through the positions of the knots, towards which all phases would drift forever.
     """
     turn = np.angle(np.mean(np.exp(2j * np.pi * (offsets - before) / periods))) / (2 * np.pi)
     return np.asarray((offsets - turn * periods) % periods)
 
 
 def _noise_weights(problem: _Problem) -> Floats:
-    """Return one over the variance that a spline of each sequence alone leaves, mean 1; 0 if never seen."""
+    """Return one over the variance about a spline of each sequence alone, mean 1; 0 if never visible."""
     columns = problem.signals[0].shape[1]
     rest, count = np.zeros(columns), np.zeros(columns)
     for s in problem.sequences():

@@ -1,4 +1,4 @@
-"""Sequences cut into cycles and resampled on a common grid of phases (Ormoneit 2000, Fig. 5 step 1)."""
+"""Cut sequences into cycles, and resample these on a common grid of phases (Ormoneit 2000, Fig. 5 step 1)."""
 
 from __future__ import annotations
 
@@ -12,10 +12,10 @@ from gait.learn.arrays import Floats, Indices, Mask, release, same_columns, stor
 
 INTERVALS = 16  # knot intervals per cycle
 PENALTY = 1e-3  # of the second differences, relative to the data's trace
-BRACKET = 0.75  # knot intervals within which an observed sample must lie on both sides
-NEXT = 1 + 1e-9  # frame intervals that this is at least: at low frame rates the next frame is farther away
-OBSERVED = 0.4  # share of the entries, in the channels of its sequence, that a cycle needs to be used
-END = 0.05  # share of the cycle over which its end levels are estimated
+BRACKET = 0.75  # knot intervals within which there must be an observed sample on both sides
+NEXT = 1 + 1e-9  # least value of that in frame intervals, for low frame rates
+OBSERVED = 0.4  # least share of a cycle's entries, in the channels of its sequence, that must be observed
+END = 0.05  # share of the cycle from which the levels of its ends are estimated
 
 
 @dataclass
@@ -40,8 +40,8 @@ def cut_cycles(
     """Cut sequences (T_i, M) into cycles and resample each on `samples` phases.
 
     Cycle k is the frames from offset + (k - 1) period to offset + k period.  Cycles with less than the share
-    OBSERVED of their entries, in the channels that the sequence has, are dropped.  With `closing` the line
-    that joins the ends of a cycle is subtracted from it; the paper leaves the ends apart.
+    OBSERVED of their entries, in the channels that the sequence has, are dropped.  With `closing`, the line
+    that joins the ends of a cycle is subtracted from it; in the paper the ends remain apart.
     """
     channels, rest = signals[0].shape[1], list[tuple[Mask, Floats, int, int]]()
 
@@ -70,7 +70,7 @@ def _slices(z: Floats, period: float, offset: float, samples: int) -> Iterator[t
 
 
 def fewest_cycles(z: Floats, period: float, samples: int) -> int:
-    """Return the least number of cycles that `cut_cycles` finds in a sequence (T, M), wherever they begin."""
+    """Return the least number of cycles that `cut_cycles` finds in a sequence (T, M), over all offsets."""
     u, visible = np.arange(len(z)) / period, np.isfinite(z)
     channels, reach = int(visible.any(axis=0).sum()), max(BRACKET / INTERVALS, NEXT / period)
     grid = np.arange(-samples, (int(np.ceil(u[-1])) + 1) * samples) / samples

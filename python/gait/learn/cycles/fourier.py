@@ -24,7 +24,7 @@ def encode(curves: Floats, basis: Floats) -> Floats:
 
 
 def encode_all(curves: Floats, basis: Floats) -> Floats:
-    """Encode curves (n, T, M) that lie on disk."""
+    """Encode curves (n, T, M) that are on disk."""
     coded = np.empty((len(curves), len(basis) * curves.shape[2]))
     for part in by_rows(curves):
         coded[part] = encode(curves[part], basis)
@@ -39,8 +39,8 @@ def decode(coded: Floats, basis: Floats, channels: int) -> Floats:
 def first_harmonic(signal: Floats, period: float, offset: float = 0.0) -> complex:
     """Fit one cycle per period and a constant to a signal (T,) by least squares: complex amplitude.
 
-    The signal is NaN where missing; 0 if hardly anything is seen.  Period and offset, where the cycle begins,
-    are frames.
+    The signal is NaN where missing; the result is 0 if almost nothing is visible.  Period and offset (the
+    beginning of the cycle) are frames.
     """
     visible = np.flatnonzero(np.isfinite(signal))
     if len(visible) < FEWEST:

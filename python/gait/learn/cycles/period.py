@@ -1,9 +1,9 @@
-"""Length of the cycle by its signal-to-noise ratio (Ormoneit 2000, eq. 1).
+"""Find the length of the cycle by its signal-to-noise ratio (Ormoneit 2000, eq. 1).
 
-The ratio is exactly the F of one-way analysis of variance with the phase as its groups.  The mode `literal`
+The ratio is exactly the F statistic of a one-way analysis of variance grouped by phase.  The mode `literal`
 is the paper's: whole frames, one bin per frame.  `refined` scores half frames with a fixed number of bins,
-prefers divisors (multiples of the period fit as well), then maximises the F of a harmonic regression.
-Signals are (T, A) with NaN for missing entries; periods are in frames.
+prefers divisors (as multiples of the period fit equally well), then maximises the F statistic of a harmonic
+regression.  Signals are (T, A) with NaN for missing entries; periods are in frames.
 """
 
 from __future__ import annotations
@@ -20,13 +20,13 @@ BINS = 50
 HARMONICS = 8
 DIVISORS = (5, 4, 3, 2)
 DIVISOR_ANGLES = 0.8  # share of the angles that must accept a divisor of the best period
-DIVISOR_SCORE = 0.5  # share of its best score that an accepting angle keeps at the divisor
-#: Cycles that a sequence needs.  A clean fold would want three, but the walks of CMU have 1.7 to 3.5 strides,
+DIVISOR_SCORE = 0.5  # share of its best score that an accepting angle has at the divisor
+#: Fewest cycles of a sequence.  Three would be better for folding, but CMU's walks have 1.7 to 3.5 strides,
 #: and their periods still agree with autocorrelation (tests/python/test_learn_cmu.py).
 CYCLES = 1.5
 SECONDS = (0.4, 2.1)
-LONGER = 4.0  # times the longest period, up to which `find_longer` looks
-LITERAL_SECONDS = (50 / 120, 250 / 120)  # the paper's 50 to 250 frames, taken as of 120 per second
+LONGER = 4.0  # multiple of the longest period up to which `find_longer` searches
+LITERAL_SECONDS = (50 / 120, 250 / 120)  # the paper's 50 to 250 frames, assumed at 120 per second
 
 
 @dataclass(frozen=True)
@@ -53,7 +53,7 @@ class Folder:
         mean = np.where(visible, signals, 0).sum(axis=0) / np.maximum(self.total, 1)
         values = np.where(visible, signals - mean, 0)
         self.squares = (values**2).sum(axis=0)
-        masks, self.mask = np.unique(visible, axis=1, return_inverse=True)  # mostly one for all angles
+        masks, self.mask = np.unique(visible, axis=1, return_inverse=True)  # usually the same for all angles
         self.stacked = np.concatenate([values, masks.astype(float)], axis=1)
 
     def literal(self, periods: ArrayLike) -> Floats:
@@ -164,12 +164,12 @@ def find_longer(signals: Floats, fps: float, mode: str = "refined") -> float:
 
 
 def refined(signals: Floats, frames: float) -> float:
-    """Return the best period, frames, near one that is nearly right."""
+    """Return the best period, frames, near one that is almost right."""
     return _refine(signals[:, _moving(signals)], frames)
 
 
 def seconds(mode: str) -> tuple[float, float]:
-    """Return the shortest and longest period that is looked for, seconds."""
+    """Return the shortest and longest period searched for, seconds."""
     return LITERAL_SECONDS if mode == "literal" else SECONDS
 
 
@@ -200,9 +200,8 @@ def _total(scores: Floats) -> float:
 def _divisor(folder: Folder, bins: int, signals: Floats, best: float, low: float) -> float:
     """Return the smallest of best/5 ... best/2 that most angles accept, refined; else the best.
 
-    Each angle votes by itself: in a sum of scores the trunk, which repeats every step, could outvote the
-    legs, and a multiple fitted to a recording hardly longer than itself scores a quarter above the period
-    (CMU 38_02).
+    Each angle has one vote.  In a sum of scores the trunk, which repeats every step, could outweigh the legs,
+    and a multiple that is almost as long as the recording scores a quarter more than the period (CMU 38_02).
     """
     whole, *parts = folder.binned([best, *(best / divisor for divisor in DIVISORS)], bins)
     for divisor, part in zip(DIVISORS, parts, strict=True):

@@ -1,4 +1,4 @@
-"""One learning sequence: a recording, whose steady part is levelled, retargeted, timed and checked."""
+"""One learning sequence: the steady part of a recording, levelled, retargeted, timed and checked."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ from gait.learn.solve import readers, retarget
 from gait.learn.solve.body import Body
 
 YAW = ROOTS.index("root_yaw")
-PHASES = 64  # at which the observed share of a cycle is counted
+PHASES = 64  # phases at which the observed share of a cycle is counted
 
 
 @dataclass
@@ -29,19 +29,19 @@ class Sequence:
     subject: str
     source: Path
     fps: float  #: frames per second
-    measures: retarget.Measures | None  #: None where the file has angles alone
+    measures: retarget.Measures | None  #: None if the file has only angles
     channels: Floats  #: (T, 30) angles and root channels, radians and statures; NaN where missing
-    heading: Floats  #: (T,) radians; NaN where the file does not have it
+    heading: Floats  #: (T,) radians; NaN if the file does not have it
     period: period.Period
-    #: (n,) Durations of single strides, seconds: between forward extremes of an ankle, or of a knee's flexion
-    #: where the file has angles alone.
+    #: (n,) durations of single strides, seconds: between forward extremes of an ankle, or of a knee's flexion
+    #: if the file has only angles.
     strides: Floats
     kept: tuple[int, int]  #: start and stop of these frames in the file
     cut: tuple[str, str]  #: why frames before and after them were left out; '' if none were
     verdict: verdict.Verdict
-    #: Whether it has less than `period.CYCLES` cycles and needs others of the person beside it.
+    #: Whether it has less than `period.CYCLES` cycles, so that other trials of the person are needed too.
     short: bool = False
-    recordings: int = 1  #: how many recordings of the person the lengths of the limbs come from
+    recordings: int = 1  #: number of the person's recordings from which limb lengths were estimated
 
     @property
     def cycles(self) -> float:
@@ -51,7 +51,7 @@ class Sequence:
 
 @dataclass
 class _Motion:
-    """What is known of some frames before the period is used; arrays are those of `Sequence`."""
+    """Data of some frames that do not depend on the period; arrays as in `Sequence`."""
 
     angles: Floats
     path: steady.RootPath
@@ -61,15 +61,15 @@ class _Motion:
 
 
 def load(path: Path, options: LearnOptions = DEFAULT) -> Sequence:
-    """Read and prepare one file; the part of its name before '_' stands for the person."""
+    """Read and prepare one file; the part of its name before '_' is the person's name."""
     return prepare(path, readers.read(path, options), options)
 
 
 def prepare(path: Path, read: Body | AngleTable, options: LearnOptions = DEFAULT) -> Sequence:
-    """Prepare what was read from a file.
+    """Prepare the data read from a file.
 
-    A trial of hardly more than a stride is prepared by its steps (`Sequence.short`).  UserError if the motion
-    is not cyclic, too short or of another activity.
+    A trial of little more than a stride is prepared from its steps (`Sequence.short`).  UserError if the
+    motion is not cyclic, is too short, or is of another activity.
     """
     read = read.reversed() if options.reverse else read
     try:
@@ -130,7 +130,7 @@ def _sequence(
     judged: tuple[verdict.Verdict, Floats, Floats],
     found: period.Period,
 ) -> Sequence:
-    """Put together what was found; `judged` is what `_judge` returned."""
+    """Make the sequence from its parts; `judged`: result of `_judge`."""
     why, channels, heading = judged
     return Sequence(
         name=path.stem,
@@ -149,7 +149,7 @@ def _sequence(
 
 
 def _too_long(angles: Floats, fps: float, options: LearnOptions) -> str:
-    """Return why no cycle was found if there is one longer than those that are looked for, or ''."""
+    """Explain that no cycle was found because it is too long, or return ''."""
     frames, longest = (
         period.find_longer(angles, fps, options.period_mode),
         period.seconds(options.period_mode)[1],
@@ -163,7 +163,7 @@ def _too_long(angles: Floats, fps: float, options: LearnOptions) -> str:
 
 
 def _too_short(angles: Floats, fps: float, found: float, options: LearnOptions) -> str:
-    """Return why the cycle found, of `found` frames, is several strides, each shorter than allowed, or ''."""
+    """Explain that the cycle found, of `found` frames, is several too short strides, or return ''."""
     shortest = period.seconds(options.period_mode)[0]
     for frames in (found / 2, found / 3):
         if frames / fps < shortest and _is_stride(angles, frames):
@@ -175,7 +175,7 @@ def _too_short(angles: Floats, fps: float, found: float, options: LearnOptions) 
 
 
 def _is_stride(angles: Floats, frames: float) -> bool:
-    """Whether angles (T, 24) repeat after `frames` frames and the legs take turns; NaN: no."""
+    """Whether angles (T, 24) repeat after `frames` frames and the legs alternate; NaN: no."""
     if not (np.isfinite(frames) and verdict.repeats(angles, frames) >= verdict.REPEATS):
         return False
     return bool(verdict.legs(angles, frames) >= verdict.LEGS)
@@ -188,7 +188,7 @@ def _refused(path: Path, wanted: str, reason: str, other: str = "") -> UserError
 
 
 def _unsteady(kept: steady.Kept, found: period.Period, fps: float) -> str:
-    """Return why the steady part is too short."""
+    """Explain why the steady part is too short."""
     if not np.isfinite(found.frames):
         return "no cycle found"
     frames = kept.stop - kept.start
@@ -199,7 +199,7 @@ def _unsteady(kept: steady.Kept, found: period.Period, fps: float) -> str:
 
 
 def _motion(read: Body | AngleTable) -> _Motion:
-    """Return the angles of what was read, and what else it shows."""
+    """Compute the angles and other data of a file's contents."""
     if isinstance(read, AngleTable):
         return _Motion(read.angles, steady.RootPath(), root=read.root)
     body = retarget.levelled(read)

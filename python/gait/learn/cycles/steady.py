@@ -1,8 +1,8 @@
-"""The steady part of a recording: starts, stops and turns are detected in the motion and cut off.
+"""Find the steady part of a recording: starts, stops and turns are detected in the motion and cut off.
 
-Three measures are constant in steady motion whatever the phase: how fast the joints turn, over half a cycle
-(one step); how far the pelvis travels in a step; and how far it turns in a whole cycle.  The longest interval
-in which they stay near their medians is kept.
+Three measures are constant in steady motion, whatever the phase: the joints' angular speed over half a cycle
+(one step); the distance that the pelvis travels in a step; and its turn in a whole cycle.  The longest
+interval in which they are near their medians is kept.
 """
 
 from __future__ import annotations
@@ -14,16 +14,16 @@ import numpy as np
 from gait.learn.arrays import Floats, Mask
 from gait.learn.cycles import period, stride
 
-QUIET = 0.3  # of the 90th percentile of the joints' speed: slower ends are not the motion
+QUIET = 0.3  # of the 90th percentile of the joints' speed; slower ends do not belong to the motion
 WINDOW = 0.5  # seconds over which that speed is averaged
-DERIVATIVE = 0.05  # seconds to either side in differences of angles
+DERIVATIVE = 0.05  # seconds to either side for differences of angles
 MOTION = 1.55  # factor by which the joints' speed may differ from its median
-TURN = np.radians(25.0)  # by which the turn within a cycle may differ from its median
-TRAVELLING = 0.3  # m/s, mean speed below which the position means nothing (treadmills)
-#: Share by which a step's travel may differ from the median: steady walks of CMU stay within 0.1.  The wider
-#: limits serve recordings without such an interval, as when a person speeds up throughout.
+TURN = np.radians(25.0)  # by which the turn in a cycle may differ from its median
+TRAVELLING = 0.3  # m/s; mean speed below which the position is meaningless (treadmills)
+#: Relative difference of a step's travel from the median: steady walks of CMU are within 0.1.  The wider
+#: limits are for recordings without such an interval, as when a person keeps speeding up.
 LIMITS = (0.12, 0.15, 0.2, 0.25)
-CYCLES = 1.8  # cycles an interval should have, or a wider limit is tried: most phases are then seen twice
+CYCLES = 1.8  # cycles that an interval should have, or a wider limit is tried; most phases then occur twice
 ROUNDS = 6  # most iterations of interval and medians
 PERIODS = 3  # most iterations of interval and period
 
@@ -36,14 +36,14 @@ class RootPath:
     yaw: Floats | None = None  #: (T,) direction of the pelvis, radians, continuous
 
     def part(self, start: int, stop: int) -> RootPath:
-        """Return frames start to stop."""
+        """Return frames start <= t < stop."""
         position = None if self.position is None else self.position[start:stop]
         return RootPath(position, None if self.yaw is None else self.yaw[start:stop])
 
 
 @dataclass(frozen=True)
 class Kept:
-    """Frames [start, stop) that are kept, and in words why those before and after are not ('' if none)."""
+    """Frames [start, stop) that are kept, and why those before and after are not, in words ('' if none)."""
 
     start: int
     stop: int
@@ -92,7 +92,7 @@ def longest_steady(angles: Floats, fps: float, cycle: float, path: RootPath) -> 
 
 
 def _within(angles: Floats, fps: float, cycle: float, path: RootPath, limit: float) -> Kept:
-    """Find the longest interval whose measures stay near their own medians over it."""
+    """Find the longest interval in which the measures are near their medians over that interval."""
     frames, step = len(angles), max(1, round(cycle / 2))
     if frames < 3 * step:
         return Kept(0, frames)
@@ -126,7 +126,7 @@ def _words(*reasons: str) -> str:
 
 
 def _speed(angles: Floats, fps: float) -> tuple[Floats, Floats]:
-    """Squared speed of the joints (T,), and its mean for the joints seen: their ratio is about 1."""
+    """Squared speed of the joints (T,), and its mean for the visible joints, so that the ratio is about 1."""
     reach = min(max(1, round(DERIVATIVE * fps)), (len(angles) - 1) // 2)
     change = np.full(angles.shape, np.nan)
     change[reach:-reach] = angles[2 * reach :] - angles[: -2 * reach]
@@ -139,7 +139,7 @@ def _speed(angles: Floats, fps: float) -> tuple[Floats, Floats]:
 
 
 def _motion(angles: Floats, fps: float, step: int) -> Floats:
-    """Speed of the joints in each window of a step, about 1; NaN where little is seen."""
+    """Speed of the joints in each window of a step, about 1; NaN where little is visible."""
     square, weight = (_window_sums(q, step) for q in _speed(angles, fps))
     enough = weight > 0.3 * weight.max()
     return np.where(enough, np.sqrt(square / np.maximum(weight, 1e-12)), np.nan)
@@ -172,14 +172,14 @@ def _median(measure: Floats, frames: int, start: int, stop: int) -> float:
 
 
 def _centred(flag: Mask, frames: int) -> Mask:
-    """Give each frame the flag of the window centred on it, or of the first or last window."""
+    """Return for each frame the flag of the window centred on it, or of the first or last window."""
     if not len(flag):
         return np.zeros(frames, bool)
     return flag[np.clip(np.arange(frames) - (frames - len(flag)) // 2, 0, len(flag) - 1)]
 
 
 def _covered(flag: Mask, frames: int) -> Mask:
-    """Frames that lie in some window with the flag; all if there are no windows."""
+    """Frames that are in a window with the flag; all if there are no windows."""
     if not len(flag):
         return np.ones(frames, bool)
     width = frames - len(flag) + 1

@@ -1,11 +1,11 @@
-"""The period of strides: that of the motion, or the multiple at which the legs alternate.
+"""Find the period of strides: that of the motion, or the multiple at which the legs alternate.
 
-A cycle fitted to a recording hardly longer than itself scores well at twice the stride, because noise, turns
-and changes of speed are then part of it; and where the trunk outvotes the legs, at half of it.  What a stride
-is, the legs show: left and right move alike half a stride apart.
+In a recording that is little longer than two strides, twice the stride also scores well, as noise, turns and
+changes of speed are then part of the cycle; so does half the stride if the trunk dominates the legs.  The
+legs show what a stride is: left and right move alike, half a stride apart.
 
-That also gives the period of trials too short to repeat, as laboratories have many of: a step of one side
-repeats that of the other.
+This also gives the period of trials that are too short to repeat, which are common in laboratories, since a
+step of one side repeats that of the other.
 """
 
 from __future__ import annotations
@@ -21,8 +21,8 @@ from gait.learn.cycles.fourier import first_harmonic
 
 SWING = ("hip_flexion", "knee_flexion")
 MULTIPLES = (1 / 3, 1 / 2, 2.0, 3.0)  # of the period found that may be the stride
-#: Alternation that a multiple needs, and by how much it has to exceed that of the period found.  Strides of
-#: recorded walks and runs have 0.4 to 0.95, twice and half the stride 0.15 at most.
+#: Alternation that a multiple needs, and by how much it must exceed that of the period found.  Strides of
+#: recorded walks and runs have 0.4 to 0.95, twice and half the stride at most 0.15.
 TURNS, MORE = 0.35, 0.25
 #: Angles whose left and right move alike half a stride apart, and harmonics of the stride in their difference
 #: and their sum.
@@ -30,13 +30,13 @@ PAIRED = ("hip_flexion", "knee_flexion", "ankle_flexion", "shoulder_flexion", "e
 UNEVEN, EVEN = (1, 3, 5), (2, 4, 6)
 SHORTEST = 1.05  # strides of a trial whose steps repeat each other
 STEP = 0.005  # seconds between periods tried
-NEAR = 0.1  # of a multiple, within which the best period is taken
+NEAR = 0.1  # relative distance from a multiple within which the best period is used
 
 
 def find(angles: Floats, fps: float, mode: str = "refined") -> period.Period:
     """Find the period of angles (T, 24), radians, NaN where missing; parameters are those of `period.find`.
 
-    The mode "literal" is the paper's, which does not ask the legs.
+    The mode "literal" is the paper's, which does not use the legs.
     """
     found = period.find(angles, fps, mode)
     if mode == "literal" or not np.isfinite(found.frames):
@@ -51,19 +51,20 @@ def find(angles: Floats, fps: float, mode: str = "refined") -> period.Period:
 
 
 def _best_near(found: period.Period, frames: float) -> float:
-    """Return the candidate of best score near a period, frames; the period itself if none is scored there.
+    """Return the best-scoring candidate near a period, frames; the period itself if there is none.
 
-    A multiple of a period that was found at the end of those looked for is only about the stride.
+    A multiple of a period at the end of the range searched is only roughly the stride.
     """
     near = np.isfinite(found.scores) & (np.abs(found.candidates / frames - 1) < NEAR)
     return float(found.candidates[near][np.argmax(found.scores[near])]) if near.any() else frames
 
 
 def find_by_steps(angles: Floats, fps: float) -> period.Period:
-    """Find the period of angles (T, 24) of hardly more than a stride, from what both sides have in common.
+    """Find the period of angles (T, 24) of little more than a stride, from what both sides have in common.
 
-    The difference of left and right has odd harmonics of the stride and their sum even ones.  Candidates are
-    periods of which SHORTEST are visible; their score is the mean log of total over remaining variance.
+    The difference of left and right consists of every second harmonic of the stride, from the first, their
+    sum of the even ones.  Candidates are periods of which SHORTEST are visible; their score is the mean log
+    of total over remaining variance.
     """
     low, high = period.SECONDS
     candidates = np.arange(low, min(high, len(angles) / SHORTEST / fps) + 1e-9, STEP) * fps
@@ -76,7 +77,7 @@ def find_by_steps(angles: Floats, fps: float) -> period.Period:
 
 
 def step_repeats(angles: Floats, frames: float) -> float:
-    """Return the correlation of each side with the other half a period later; NaN if nothing overlaps."""
+    """Return the correlation of each side with the other side half a period later; NaN without overlap."""
     columns = [[ANGLES.index(f"{s}_{name}") for name in PAIRED] for s in SIDES]
     left, right = (angles[:, k] - _mean(angles[:, k]) for k in columns)
     time = np.arange(max(0, int(np.ceil(len(angles) - 1 - frames / 2))))
@@ -110,7 +111,7 @@ def _sums_and_differences(angles: Floats) -> list[tuple[Floats, tuple[int, ...]]
 
 
 def _explained(signal: Floats, frames: float, harmonics: tuple[int, ...]) -> float:
-    """Return the log of the variance of a signal over what harmonics of a period and a constant leave."""
+    """Return the log of a signal's variance over that about a constant and harmonics of a period."""
     visible = np.flatnonzero(np.isfinite(signal))
     angle = 2 * np.pi * np.outer(visible / frames, harmonics)
     design = np.concatenate([np.ones((len(visible), 1)), np.cos(angle), np.sin(angle)], axis=1)
@@ -122,9 +123,9 @@ def _explained(signal: Floats, frames: float, harmonics: tuple[int, ...]) -> flo
 
 
 def alternation(angles: Floats, frames: float) -> float:
-    """Return how much of the legs' motion is one swing a period (frames), half a period apart left and right.
+    """Return the share of the legs' motion that is one swing per period (frames), left and right alternating.
 
-    1 if all of it is, 0 if there is none or it is unrelated, negative if both legs swing together.
+    1: all of it; 0: none, or unrelated; negative: both legs swing together.
     """
     swing, whole = 0.0, 0.0
     for name in SWING:
@@ -144,6 +145,6 @@ def _swing(signal: Floats, frames: float) -> float:
 
 
 def _sd(signal: Floats) -> float:
-    """Return the standard deviation of what is visible; 0 if nothing is."""
+    """Return the standard deviation of the visible values; 0 if there are none."""
     visible = signal[np.isfinite(signal)]
     return float(np.std(visible)) if len(visible) else 0.0

@@ -1,7 +1,7 @@
 """Check that a recording is cyclic and shows the activity to be learnt: evidence, and reasons in words.
 
-A runner has both feet off the ground at times, or the pelvis is lowest where that of a walk is highest: over
-the standing leg.
+In running both feet are off the ground at times, or the pelvis is lowest over the standing leg, where in
+walking it is highest.
 """
 
 from __future__ import annotations
@@ -26,12 +26,12 @@ STANCE = 15  # percentile of a joint's height that is its height in stance; a ru
 CLEAR = 0.018  # statures above that from which ankle and ball of a foot are both off the ground
 FLIGHT = 0.05  # share of the time in flight above which a person runs
 #: Correlation of the pelvis's height with the distance of the feet above which a person runs, with or without
-#: flight: the body is lowest over the standing leg.  Recorded walks have -1 to -0.1, runs 0.5
-#: to 0.9; slow runs, with a foot on the ground throughout, differ from walks in nothing else.
+#: flight, as the body is lowest over the standing leg.  Recorded walks have -1 to -0.1, runs 0.5 to 0.9; slow
+#: runs, with a foot always on the ground, differ from walks only in this.
 BOB = 0.3
 SHARPNESS = 3.0
 REPEATS = 0.75  # the walks of CMU reach 0.88 to 0.99; punching 0.69, dances and climbing less or nothing
-LEGS = 0.7  # legs that alternate to within an eighth of a cycle; the walks of CMU reach 0.96 and more
+LEGS = 0.7  # legs that alternate within an eighth of a cycle; the walks of CMU reach 0.96 and more
 LIFT = 0.02  # statures
 STEPS = 0.03  # statures
 AHEAD = 0.5  # the walks of CMU reach 0.98 and more, with left and right swapped -0.98 and less
@@ -41,13 +41,13 @@ SWING = ("hip_flexion", "knee_flexion")
 
 @dataclass(frozen=True)
 class Evidence:
-    """One measure and the limits within which it is accepted."""
+    """A measure, and the limits within which it is accepted."""
 
     name: str
-    value: float  #: NaN if it could not be measured, which is accepted
+    value: float  #: NaN, which is accepted, if it could not be measured
     least: float = -np.inf
     most: float = np.inf
-    words: str = ""  #: what a value outside the limits means
+    words: str = ""  #: meaning of a value outside the limits
 
     @property
     def accepted(self) -> bool:
@@ -64,9 +64,9 @@ class Evidence:
 
 @dataclass(frozen=True)
 class Verdict:
-    """What a recording shows."""
+    """Result of judging a recording."""
 
-    activity: str  #: 'walk', 'run', or '' where the feet do not show it
+    activity: str  #: 'walk', 'run', or '' if the feet do not show it
     evidence: tuple[Evidence, ...]
 
     @property
@@ -95,9 +95,9 @@ def judge(
 ) -> Verdict:
     """Judge the steady part of a recording: angles (T, 24), NaN where missing, and its period.
 
-    `feet` are None if they were not seen.  `wanted` is the activity to be learnt; names other than those of
-    walking and running only require cycles.  `yaw` (T,) is of the pelvis from its direction of travel,
-    radians, NaN where missing.  `by_steps`: the cycles need not repeat, but each side the other
+    `feet`: None if they are not visible.  `wanted`: activity to be learnt; names other than those of walking
+    and running only require cycles.  `yaw` (T,): yaw of the pelvis from its direction of travel, radians, NaN
+    where missing.  `by_steps`: cycles need not repeat, but each side must repeat the other
     (`stride.find_by_steps`).
     """
     kind = NAMES.get(wanted.lower(), "")
@@ -158,10 +158,10 @@ def _footing(feet: Footing, kind: str) -> list[Evidence]:
 
 
 def repeats(angles: Floats, period: float) -> float:
-    """Return the correlation of all angles with themselves a period later; NaN if nothing overlaps.
+    """Return the correlation of all angles with themselves a period later; NaN without overlap.
 
-    Each cycle is thus predicted by another.  Unlike the ratio that chooses the period, this does not profit
-    from a choice among many means.
+    Thus each cycle is predicted by another.  Unlike the ratio that chooses the period, this is not inflated
+    by the choice among many means.
     """
     time = np.arange(max(0, int(np.ceil(len(angles) - 1 - period))))
     at = time + period
@@ -176,11 +176,11 @@ def repeats(angles: Floats, period: float) -> float:
 
 
 def legs(angles: Floats, period: float) -> float:
-    """Return how exactly the legs alternate: 1 if half a cycle lies between them, -1 if they move together.
+    """Return how exactly the legs alternate: 1 if they are half a cycle apart, -1 if they move together.
 
     It is the cosine of the lag beyond half a cycle between left and right, from the first harmonics of hips
-    and knees, each joint weighted by the product of its amplitudes.  How far a leg swings does not count,
-    because people limp.  NaN if nothing moves or is seen.
+    and knees, each joint weighted by the product of its amplitudes.  Differences between the amplitudes of
+    left and right do not count, as people limp.  NaN if nothing moves or is visible.
     """
     left, right = (
         np.array([first_harmonic(angles[:, ANGLES.index(f"{s}_{name}")], period) for name in SWING])
@@ -199,7 +199,7 @@ def _about_mean(values: Floats) -> Floats:
 
 @dataclass(frozen=True)
 class Feet:
-    """The feet over T frames, statures above any one level; NaN where missing."""
+    """The feet over T frames, statures above an arbitrary level; NaN where missing."""
 
     ankle: Floats  #: (T, 2) left and right
     ball: Floats  #: (T, 2)
@@ -209,7 +209,7 @@ class Feet:
 
 @dataclass(frozen=True)
 class Footing:
-    """What the feet do over some cycles."""
+    """Measurements of the feet over some cycles."""
 
     flight: float  #: share of the time in which both feet are off the ground
     #: Correlation of the pelvis's height with the distance of the ankles: negative in walking, where the
@@ -244,7 +244,7 @@ def feet_of_channels(channels: Floats) -> Feet:
 
 
 def footing(feet: Feet, cycle: float) -> Footing | None:
-    """Measure the feet over at least one cycle (frames); None if they are seen for less."""
+    """Measure the feet over at least one cycle (frames); None if they are visible for less."""
     visible = np.isfinite(feet.ankle + feet.ball).all(axis=1) & np.isfinite(feet.pelvis + feet.apart)
     if visible.sum() < cycle:
         return None

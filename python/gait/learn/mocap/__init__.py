@@ -1,1 +1,1 @@
-"""Motion capture files as arrays: readers of .amc/.asf, .bvh, .c3d, .trc and .csv, and the marker sets."""
+"""Read motion capture files as arrays (.amc/.asf, .bvh, .c3d, .trc and .csv), and marker sets."""

@@ -37,7 +37,7 @@ class Bone:
 
     name: str
     direction: Floats = field(default_factory=lambda: np.zeros(3))
-    length: float = np.nan  # of the root 0
+    length: float = np.nan  # 0 for the root
     axis: Floats = field(default_factory=lambda: np.eye(3))
     dof: list[str] = field(default_factory=list)
     parent: int = -1
@@ -53,7 +53,7 @@ class Skeleton:
 
 
 def read(path: Path, fps: float | None = None, zeros_missing: bool = False) -> Recording:
-    """Read an .amc with the .asf of its folder; of several, the one whose stem is the part before '_'.
+    """Read an .amc with the .asf in its folder; of several, the one named like the part before '_'.
 
     `fps` defaults to the value in the file, else 120.  With `zeros_missing`, three or more exact zeros of a
     bone in a row are missing data.  UserError names file, line and remedy.
@@ -71,7 +71,7 @@ def read(path: Path, fps: float | None = None, zeros_missing: bool = False) -> R
 
 
 def _require_ranges(path: Path, skeleton: Skeleton, values: dict[str, Floats]) -> None:
-    """Refuse positions and angles that no person reaches."""
+    """Raise UserError for positions and angles that no person reaches."""
     turn, unit = (1.0, "degrees") if skeleton.degrees else (np.degrees(1.0), "degrees (radians in the file)")
     for bone in skeleton.bones:
         for k, name in enumerate(bone.dof if bone.name in values else []):
@@ -140,7 +140,7 @@ def read_skeleton(path: Path) -> Skeleton:
 
 
 def _degrees(path: Path, line: int, words: list[str]) -> bool:
-    """Whether the unit of angles is degrees and not radians."""
+    """Whether the unit of angles is degrees rather than radians."""
     unit = words[0].lower() if words else ""
     if not unit.startswith(("deg", "rad")):
         raise UserError(f"{path}:{line}: unknown angle unit {quoted(unit)}; write 'angle deg' or 'angle rad'")
@@ -302,7 +302,7 @@ def _by_lines(path: Path, moving: dict[str, Bone]) -> dict[str, Floats]:
 
 
 def _check_frame(rows: dict[str, list[Floats]], frame: int, path: Path, line: int) -> None:
-    """Require that the root and every bone of frame 1 are in every frame."""
+    """Raise UserError unless the root and every bone of frame 1 are in every frame."""
     lacking = [name for name, values in rows.items() if len(values) != frame and (values or name == "root")]
     if lacking:
         raise UserError(

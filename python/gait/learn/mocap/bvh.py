@@ -26,8 +26,8 @@ from gait.learn.mocap.recording import (
 from gait.learn.rotations import from_angles
 
 AXES = "XYZ"
-#: Metres per unit: metre, inch, CMU's unit (inch / 0.45), centimetre, millimetre.  Files do not name their
-#: unit; the one that brings the body nearest to an adult's height is taken.
+#: Metres per unit: metre, inch, CMU's unit (inch / 0.45), centimetre, millimetre.  Files do not state their
+#: unit; the one with which the body is nearest to an adult's height is used.
 UNITS = (1.0, 0.0254, 0.0254 / 0.45, 0.01, 0.001)
 HEIGHT = 1.7
 
@@ -212,7 +212,7 @@ def _rest(joints: list[Joint]) -> Floats:
 
 
 def _require_ranges(path: Path, joints: list[Joint], values: Floats, kind: str, limit: float) -> None:
-    """Refuse channels of a `kind`, "position" or "rotation", that no person reaches."""
+    """Raise UserError for channels of a `kind`, "position" or "rotation", that no person reaches."""
     named = [(joint.name, channel) for joint in joints for channel in joint.channels]
     for k, (name, channel) in enumerate(named):
         if channel.endswith(kind):
@@ -248,8 +248,8 @@ def _split(joint: Joint, values: Floats) -> tuple[Floats, Floats]:
 def _upright(start: Floats) -> tuple[Floats, float]:
     """Find the rotation to z up and the metres per unit from where bones begin in the frames, (T, B, 3).
 
-    Up is y or z, along which the body is longer; its length gives the unit.  The rest pose shows neither: in
-    some files all bones lie along one axis in it.
+    Up is y or z, whichever the body is longer along; its length gives the unit.  The rest pose does not show
+    this, as in some files all its bones are along one axis.
     """
     extents = np.ptp(start[np.isfinite(start).all(axis=(1, 2))], axis=1)
     posed = np.median(extents, axis=0) if len(extents) else np.ones(3)
@@ -258,11 +258,11 @@ def _upright(start: Floats) -> tuple[Floats, float]:
 
 
 def _trunk(joints: list[Joint]) -> int:
-    """Return the first joint that branches: those above it only place the body, which may be far away."""
+    """Return the first joint that branches; those above it only move the body, which may be far away."""
     children = [sum(other.parent == i for other in joints) for i in range(len(joints))]
     return next((i for i, count in enumerate(children) if count > 1), 0)
 
 
 def _unit(height: float) -> float:
-    """Metres per unit of a body of this height."""
+    """Return metres per unit, for a body of this height."""
     return UNITS[int(np.argmin(np.abs(np.log(np.array(UNITS) * max(height, 1e-9) / HEIGHT))))]

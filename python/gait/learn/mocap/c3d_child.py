@@ -1,7 +1,7 @@
-"""Reads one .c3d with ezc3d in its own process, because damaged files can crash that library.
+"""Read one .c3d with ezc3d in a separate process, because damaged files can crash that library.
 
-Run by path with the name of the file.  Writes labels, points (M, T, 3), rate, units and the parameters that
-the header states too as .npz to stdout; an error is one line on stderr and exit code 1.
+Run as a script with the name of the file.  Writes labels, points (M, T, 3), rate, units, and the parameters
+that the header also states, as .npz to stdout; an error is one line on stderr and exit code 1.
 """
 
 import io
@@ -39,7 +39,7 @@ def _labels(parameters: dict, key: str) -> list:  # type: ignore[type-arg]
 
 
 def _number(parameters: dict, group: str, name: str) -> float:  # type: ignore[type-arg]
-    """First value of a parameter; 0 if it is not there."""
+    """Return the first value of a parameter; 0 if it is missing."""
     value = parameters[group][name]["value"] if name in parameters.get(group, {}) else []
     return float(value[0]) if len(value) else 0.0
 

@@ -1,6 +1,6 @@
-"""Marker sets known by name, and marker maps: files that place the markers of other sets on the body.
+"""Known marker sets, and marker maps: files that define positions of other markers on the body.
 
-Positions of landmarks are approximate, of the centre of a 14 mm marker on an adult; the fit moves each by
+Positions of landmarks are approximate, for the centre of a 14 mm marker on an adult; the fit moves each by
 about its sd.  Sources: placement guides of Plug-in-Gait and Helen Hayes; hip joints after Bell and others
 (1990); the joint between neck and trunk after Reed and others (1999); heights after Drillis and Contini
 (1966).
@@ -20,8 +20,8 @@ A marker map (`gait learn --markers MAP.json`) is
 `set` (optional) is a known set to start from; `markers` adds to it or overrides it.  Labels are compared
 without the subject before ':', case, blanks and punctuation.  A value is a landmark (`LANDMARKS`), or a
 segment of the skeleton (libgait/doc/model-format.md) with the position `at` in its axes (x forward, y left, z
-up, from the segment's upper joint) and `sd`, how far the marker may be from there, both in statures; without
-`at` the marker is anywhere on the segment.  null leaves a marker out.
+up, from the segment's upper joint) and `sd`, the standard deviation of the position, both in statures;
+without `at` the marker is anywhere on the segment.  null excludes a marker.
 """
 
 from __future__ import annotations
@@ -45,7 +45,7 @@ SEGMENTS = default_skeleton().frames
 
 
 class Landmark(NamedTuple):
-    """A place on the body: segment, position in its axes and how far markers lie from there, statures."""
+    """A position on the body: segment, position in its axes, and standard deviation of markers, statures."""
 
     segment: str
     at: tuple[float, float, float]
@@ -57,13 +57,13 @@ class MarkerMap:
     """A marker map."""
 
     path: Path
-    landmarks: dict[str, Landmark]  #: by label, as `plain` gives it
-    named: tuple[str, ...]  #: the labels that the file itself names, as written
+    landmarks: dict[str, Landmark]  #: by label, as `plain` returns it
+    named: tuple[str, ...]  #: the labels in the file itself, as written
 
 
-#: Last letters of the points that stand for a segment: its origin, then one on each axis.
+#: Last letters of the points that represent a segment: its origin, then one on each axis.
 AXES = ("OALP", "OXYZ", "0123")
-SQUARE = 0.02  # cosine of axes at right angles; markers on skin are never so near
+SQUARE = 0.02  # largest cosine between perpendicular axes; markers on skin are never that exact
 
 BONE = 0.008  # palpable under the skin
 FLESH = 0.012  # beside a joint, but not at one bony point
@@ -102,7 +102,7 @@ _PAIRED: dict[str, Landmark] = {
     "head_front": Landmark("head", (0.070, 0.042, 0.100), FLESH),
     "head_back": Landmark("head", (-0.040, 0.042, 0.105), FLESH),
     "head_side": Landmark("head", (0.015, 0.047, 0.085), FLESH),
-    # Centres of joints, for files that hold them beside markers.
+    # Centres of joints, for files that contain them in addition to markers.
     "shoulder": Landmark("torso", _P.shoulder, BONE),
     "elbow": Landmark("upper_arm", (0.0, 0.0, -_P.upper_arm), BONE),
     "wrist_centre": Landmark("forearm", (0.0, 0.0, -_P.forearm), BONE),
@@ -137,7 +137,7 @@ LANDMARKS = {f"{s}_{name}": _mirrored(mark, s) for name, mark in _PAIRED.items()
 MIDDLES = {"pelvis": 0.03, "torso": 0.2, "head": 0.08, "thigh": -0.12, "shank": -0.12, "upper_arm": -0.08}
 MIDDLES |= {"forearm": -0.08, "foot": -0.025}
 
-#: Sets: labels, as `plain` gives them, to landmarks; {s} is the side, l or r, or the words left, right.
+#: Sets: labels, as `plain` returns them, to landmarks; {s} is the side, l or r, or the words left, right.
 _PLUG_IN_GAIT = {
     "{s}asi": "asis", "{s}psi": "psis", "sacr": "sacrum", "{s}thi": "thigh_side", "{s}kne": "knee_lateral",
     "{s}knee": "knee_lateral", "{s}knm": "knee_medial", "{s}knein": "knee_medial", "{s}mkne": "knee_medial",
@@ -185,8 +185,8 @@ _OPENSIM_SHORT = {
     **{f"{{s}}th{i}": "thigh_side" for i in range(1, 5)},
     **{f"{{s}}tb{i}": "shank_side" for i in range(1, 5)},
 }  # fmt: skip
-#: Landmarks of the skeleton by their anatomical abbreviations (Van Sint Jan 2007), as Qualisys and AnyBody
-#: users write them: L_IAS, L_FLE, CV7.
+#: Landmarks of the skeleton by their anatomical abbreviations (Van Sint Jan 2007), as written by users of
+#: Qualisys and AnyBody: L_IAS, L_FLE, CV7.
 _ANATOMICAL = {
     "{s}ias": "asis", "{s}ips": "psis", "{s}ict": "iliac_crest", "{s}ftc": "trochanter",
     "{s}ftl": "trochanter", "{s}fle": "knee_lateral", "{s}fme": "knee_medial", "{s}fax": "shank_side",
@@ -221,15 +221,15 @@ def _both_sides(patterns: dict[str, str]) -> dict[str, str]:
     return table
 
 
-#: Set to its labels (as `plain` gives them) and the names of their landmarks.
+#: For each set its labels (as `plain` returns them) and the names of their landmarks.
 SETS = {name: _both_sides(patterns) for name, patterns in _PATTERNS.items()}
 
 
 def segment_axes(labels: list[str], points: Floats) -> set[int]:
-    """Return the columns of points (T, M, 3) that are no markers but axes of segments.
+    """Return the columns of points (T, M, 3) that are not markers but axes of segments.
 
-    Models of labs write four points a segment, the origin and one on each axis (Plug-in-Gait: PELO PELA PELL
-    PELP, LCLO LCLA ...; Oxford foot: LFOF0 to LFOF3).  Such points stand at right angles about the origin.
+    Models of laboratories write four points per segment, the origin and one on each axis (Plug-in-Gait: PELO
+    PELA PELL PELP, LCLO LCLA ...; Oxford foot: LFOF0 to LFOF3), with right angles at the origin.
     """
     columns = {label.rsplit(":", 1)[-1].upper(): k for k, label in enumerate(labels)}
     found: set[int] = set()

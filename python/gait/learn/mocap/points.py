@@ -1,4 +1,4 @@
-"""Labelled points of .c3d and .trc files; ezc3d runs in a child process."""
+"""Read labelled points of .c3d and .trc files; ezc3d runs in a child process."""
 
 from __future__ import annotations
 
@@ -21,17 +21,17 @@ SUFFIXES = (".c3d", ".trc")
 CHILD = Path(__file__).with_name("c3d_child.py")
 PATIENCE = 120.0  # seconds for one file
 BLOCK = 512  # bytes; the first is the header, and its first byte is the block in which the parameters begin
-BIG_ENDIAN, DEC = 86, 85  # kinds of processor, fourth byte of the parameters
-RATE_OFF = 1e-3  # relative: rates that differ by more are two
-MANY = 65535  # frames: more do not fit into the header
+BIG_ENDIAN, DEC = 86, 85  # processor types, fourth byte of the parameters
+RATE_OFF = 1e-3  # relative difference from which rates are different
+MANY = 65535  # frames; more do not fit in the header
 
 
 def read(path: Path, fps: float | None = None) -> tuple[list[str], Floats, float]:
     """Read M labels, points (T, M, 3) in metres and the axes of the file, and the frame rate.
 
-    Points are NaN where missing; a point at exactly (0, 0, 0) is missing, because these formats write gaps
-    so.  `fps` is the rate if the user gives it.  UserError names the file and the remedy, also where the file
-    states a rate or a number twice, and differently.
+    Points are NaN where missing; a point at exactly (0, 0, 0) is missing, as this is how these formats write
+    gaps. `fps`: rate given by the user.  UserError names the file and the remedy, also if the file states a
+    rate or a number twice with different values.
     """
     labels, points, rate = (read_trc if path.suffix.lower() == ".trc" else read_c3d)(path, fps)
     require_frames(path, len(points))
@@ -55,7 +55,7 @@ def read_c3d(path: Path, fps: float | None = None) -> tuple[list[str], Floats, f
         ) from None
     if child.returncode:
         words = child.stderr.decode(errors="replace").strip().splitlines()
-        # The first sentence is the reason; the library's advice to programmers follows it.
+        # The first sentence is the reason; it is followed by the library's advice to programmers.
         reason = words[-1].split(". ")[0].rstrip(".") if child.returncode > 0 and words else ""
         raise UserError(
             f"{path}: not a readable .c3d ({reason or 'the reader crashed on it'}); export it again"
@@ -78,7 +78,7 @@ def read_c3d(path: Path, fps: float | None = None) -> tuple[list[str], Floats, f
 
 
 class Header(NamedTuple):
-    """What the header states; ezc3d corrects it silently by the parameters."""
+    """Contents of the header; ezc3d silently replaces them by the parameters."""
 
     points: int
     analog: int  #: values per frame of points
@@ -99,9 +99,9 @@ def _header(path: Path) -> Header:
 
 
 def _require_agreement(path: Path, header: Header, stated: Mapping[str, float], rated: bool) -> None:
-    """Refuse a header that differs from the parameters: one of them misplaces all values behind it.
+    """Raise UserError if header and parameters differ, as one of them misplaces all following values.
 
-    `rated`: whether the rate counts.
+    `rated`: whether to compare the rate.
     """
     point_rate, analog_rate = stated["POINT:RATE"], stated["ANALOG:RATE"]
     samples = analog_rate / point_rate if point_rate > 0 else 0.0

@@ -14,27 +14,27 @@ from gait.learn.arrays import Floats, Mask
 #: From x left, y up, z forward (ASF, BVH) to x forward, y left, z up.
 Y_UP = np.array([[0.0, 0, 1], [1, 0, 0], [0, 1, 0]])
 
-FEWEST = 3  # frames: fewer give no speeds
-FARTHEST = 1000.0  # metres from the file's origin; more is damage or another unit
+FEWEST = 3  # fewest frames that give speeds
+FARTHEST = 1000.0  # metres from the file's origin; more indicates damage or another unit
 DEGREES = 3600.0  # the largest plausible angle of a joint
-SHORT = 3  # frames in a row that are exactly 0 and so missing, if zeros are declared missing
-LONG = 5  # frames in a row in which a moving part does not stay at exactly 0
-#: Parts that must be 0 at once to be reported: an angle may be clipped at 0, but no joint stays at the
+SHORT = 3  # consecutive frames of exact zeros that are missing, if zeros are declared missing
+LONG = 5  # consecutive frames in which a moving part does not stay at exactly 0
+#: Parts that must be 0 together to be reported: an angle may be clipped at 0, but no joint stays at the
 #: origin.
 BONES, JOINTS, ANGLES = 3, 1, 3
 
 
 @dataclass(frozen=True)
 class FileNotes:
-    """What a reader found in a file that is no error but perhaps not what the user meant."""
+    """Observations of a reader that are no errors, but that the user may not have intended."""
 
-    #: Labels of the markers as `markers.plain` gives them, if a marker map is used.
+    #: Labels of the markers, as `markers.plain` returns them, if a marker map is used.
     labels: frozenset[str] = frozenset()
-    #: Which part is exactly 0, and in which frames, as if it were missing; empty if none is.
+    #: Which part is exactly 0 in which frames, as if it were missing; empty if there is none.
     zeros: str = ""
-    #: Bones or joints that the file lacks and that learning can do without.
+    #: Bones or joints that are missing in the file and not required.
     lacking: tuple[str, ...] = ()
-    #: Speed of the treadmill by the feet, metres/s; 0 if the person stays in place without; None overground.
+    #: Speed of the treadmill from the feet, m/s; 0 if the person stays in place without one; None overground.
     belt: float | None = None
 
 
@@ -48,7 +48,7 @@ class Recording:
     name: str  #: stem of the file
     source: Path
     fps: float  #: frames per second
-    bones: list[str]  #: as in the file
+    bones: list[str]  #: names as in the file
     start: Floats  #: (T, B, 3) metres, world with z up; NaN where missing
     end: Floats  #: (T, B, 3)
     rotation: Floats  #: (T, B, 3, 3) from the rest pose to the world
@@ -60,7 +60,7 @@ class Recording:
 
 
 def require_frames(path: Path, frames: int) -> None:
-    """Raise UserError if a file has hardly any frames."""
+    """Raise UserError if a file has too few frames."""
     if frames < FEWEST:
         raise UserError(f"{path}: too few frames ({frames}); a recording of a few seconds is needed")
 
@@ -80,7 +80,7 @@ def require_range(path: Path, what: str, values: Floats, limit: float, unit: str
 def mask_zero_runs(columns: Floats) -> Floats:
     """Copy values (T, k) of one part with NaN where SHORT or more rows in a row are exactly 0.
 
-    Some systems write 0 for what was occluded.  A part that is 0 throughout is fixed, not missing.
+    Some systems write 0 for occluded parts.  A part that is always 0 is fixed, not missing.
     """
     zero = (columns == 0).all(axis=1)
     result = columns.astype(float)
@@ -92,7 +92,7 @@ def mask_zero_runs(columns: Floats) -> Floats:
 def zero_run(parts: Mapping[str, Floats], together: int) -> str:
     """Describe the first run of LONG frames in which `together` of the parts (T, k) are exactly 0, or ''.
 
-    Parts that are 0 throughout are fixed and do not count.
+    Parts that are always 0 are fixed and do not count.
     """
     runs = {name: _long_zeros(columns) for name, columns in parts.items()}
     at_once = sum(runs.values(), np.zeros(len(next(iter(runs.values()), ())), int)) >= together

@@ -1,4 +1,4 @@
-"""Tables in .csv: joint angles (`read_angles`) and joint positions (`read_joints`) over time.
+"""Read tables in .csv: joint angles (`read_angles`) and joint positions (`read_joints`) over time.
 
 A table is `frame,time,...`, evenly sampled.  Joint positions are columns <joint>_x, <joint>_y, <joint>_z.
 Angles are columns named like `ANGLES` of `gait.body.skeleton` with `_deg`, `_rad` or no suffix (then degrees
@@ -32,14 +32,14 @@ from gait.learn.mocap.recording import (
 )
 from gait.learn.rotations import unwrap
 
-LONGEST = 10.0  # missing frames may extend a table to this many times its rows
-LOST = "lost"  # status of rows of a track without a person
+LONGEST = 10.0  # missing frames may extend a table to this multiple of its rows
+LOST = "lost"  # status of rows without a person in a track
 #: End of a column name to the largest plausible magnitude and its unit.
 LIMITS = dict.fromkeys(("_x", "_y", "_z"), (FARTHEST, "metres"))
 LIMITS |= {"_deg": (DEGREES, "degrees"), "_rad": (float(np.radians(DEGREES)), "radians")}
 QUANTITIES = {"time", "stature_m", *ANGLES, *ROOTS}  # other columns of numbers that are used
 
-#: Joints that a file of positions may have, and those that it must have.
+#: Joints that a file of positions may have, and joints that it must have.
 PARTS = ("shoulder", "elbow", "wrist", "hip", "knee", "ankle", "toe")
 JOINTS = ["neck", "head", *(f"{s}_{part}" for s in SIDES for part in PARTS)]
 NEEDED = [f"{s}_{part}" for s in SIDES for part in ("hip", "knee", "ankle")]
@@ -47,10 +47,10 @@ NEEDED = [f"{s}_{part}" for s in SIDES for part in ("hip", "knee", "ankle")]
 JOINT_ALIASES = {"head": ("headtop",), "l_toe": ("lbigtoe",), "r_toe": ("rbigtoe",)}
 
 SUFFIXES = ("_deg", "_rad", "")
-RADIANS = 4.0  # every walk has some angle of more degrees than that, and none of more radians
-LEGS = [f"{s}_{joint}_flexion" for s in SIDES for joint in ("hip", "knee")]  # angles that must be there
-LEAST_RANGE = 4.0  # degrees: a smaller range is probably radians in a column of degrees
-MOST_RANGE = 361.0  # degrees: no leg turns round
+RADIANS = 4.0  # every walk has an angle of more degrees than this, but none of more radians
+LEGS = [f"{s}_{joint}_flexion" for s in SIDES for joint in ("hip", "knee")]  # required angles
+LEAST_RANGE = 4.0  # degrees; a smaller range is probably radians in a column of degrees
+MOST_RANGE = 361.0  # degrees; no leg rotates further
 FARTHEST_ROOT = 100.0  # statures
 STATURE = 0.5, 2.5  # metres
 ROOT_LENGTHS = ("root_forward", "root_sway", "root_height")
@@ -58,10 +58,10 @@ ROOT_LENGTHS = ("root_forward", "root_sway", "root_height")
 
 @dataclass
 class Table:
-    """Columns of numbers, T rows."""
+    """Columns of numbers with T rows."""
 
     names: list[str]  #: as in the header
-    values: Floats  #: (T, n); NaN in empty cells, words, frames that are missing and rows that are lost
+    values: Floats  #: (T, n); NaN for empty cells, words, missing frames and rows with status `lost`
     fps: float  #: rows per second
     lines: Indices  #: (T,) lines of the file; 0 for missing frames
 
@@ -98,14 +98,14 @@ class AngleTable:
 
 
 def holds_angles(path: Path) -> bool:
-    """Whether a .csv has columns of angles, and not the positions of the legs' joints."""
+    """Whether a .csv has columns of angles rather than positions of the legs' joints."""
     names = [name.strip() for name in _lines(path)[0][1]]
     joints = find_joints([name[:-2] for name in names if name.endswith("_x")])
     return not set(NEEDED) <= set(joints) and bool(_columns(names, ANGLES))
 
 
 def find_joints(names: list[str]) -> dict[str, str]:
-    """Return joint to name for the names of points that are joints."""
+    """Map joints to the names of points that are joints."""
     plain = {name.rsplit(":", 1)[-1].lower().replace("_", "").replace(" ", ""): name for name in names}
     known = {joint: (*JOINT_ALIASES.get(joint, ()), joint.replace("_", "")) for joint in JOINTS}
     found = {joint: next((plain[n] for n in aliases if n in plain), None) for joint, aliases in known.items()}
@@ -180,7 +180,7 @@ def read_angles(path: Path, fps: float | None = None, zeros_missing: bool = Fals
 
 
 def _require_plausible(path: Path, columns: dict[str, list[str]], values: dict[str, Floats]) -> None:
-    """Refuse radians in columns of degrees (a knee that walks bends more than that), and the reverse."""
+    """Raise UserError for radians in columns of degrees (walking knees bend more), and the reverse."""
     ranges = {
         name: float(np.degrees(np.ptp(values[name][np.isfinite(values[name])])))
         for name in LEGS
@@ -201,7 +201,7 @@ def _require_plausible(path: Path, columns: dict[str, list[str]], values: dict[s
 
 
 def _columns(names: list[str], wanted: Sequence[str]) -> dict[str, list[str]]:
-    """Return the columns of each quantity that is there."""
+    """Return the columns of each quantity in the file."""
     found = {name: [name + suffix for suffix in SUFFIXES if name + suffix in names] for name in wanted}
     return {name: columns for name, columns in found.items() if columns}
 
@@ -250,7 +250,7 @@ def read(path: Path, fps: float | None = None) -> Table:
 
 
 def _require_ranges(path: Path, names: list[str], values: Floats, lines: list[int]) -> None:
-    """Refuse implausible angles and positions; the name of a column shows which it has."""
+    """Raise UserError for implausible angles and positions, which the names of columns distinguish."""
     for name, column in zip(names, values.T, strict=True):
         limit, unit = next((limits for end, limits in LIMITS.items() if name.endswith(end)), (np.inf, ""))
         beyond = np.abs(column) > limit
@@ -304,7 +304,7 @@ def _numbers(row: list[str], names: list[str], path: Path, line: int) -> Floats:
 
 
 def _number(cell: str, name: str, path: Path, line: int) -> float:
-    """Convert a cell; NaN if it is empty or nan, or a word in a column that is not used."""
+    """Convert a cell; NaN if it is empty or nan, or is a word in a column that is not used."""
     try:
         value = float(cell.strip() or "nan")
     except ValueError:

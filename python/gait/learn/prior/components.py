@@ -1,7 +1,7 @@
 """Functional principal components of cycles with missing entries (Ormoneit 2000, Fig. 5 steps 2-9).
 
-Rows are cycles on a grid of T phases for M channels.  The analysis works in the real orthonormal Fourier
-basis of the first harmonics, so that means and components close smoothly, and distances are those of the
+Rows are cycles on a grid of T phases for M channels.  The analysis uses the real orthonormal Fourier basis of
+the first harmonics, so that means and components are smooth and periodic, and distances are those of the
 curves.
 """
 
@@ -17,7 +17,7 @@ from gait.learn.cycles.fourier import decode, encode_all, fourier_basis
 from gait.learn.prior.imputation import Filling, complete, right_singular
 
 Fill = Callable[[Floats, Mask, int, Floats], Filling]
-"""Fills missing entries of values (R, T, M) by so many components in a Fourier basis (B, T)."""
+"""Fills missing entries of values (R, T, M) with this many components in a Fourier basis (B, T)."""
 
 
 @dataclass

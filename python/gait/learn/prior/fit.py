@@ -1,4 +1,4 @@
-"""The cyclic model: prepared sequences to mean curves, components and statistics."""
+"""Fit the cyclic model: from prepared sequences to mean curves, components and statistics."""
 
 from __future__ import annotations
 
@@ -30,15 +30,15 @@ from gait.learn.prior.components import Components
 from gait.learn.prior.people import ADULT_STATURE
 from gait.learn.solve.retarget import Measures, generic_proportions, known_parts
 
-SAMPLES = 120  # phases of a cycle: five components take less than 100 kB
-MOST_NAMES = 4  # of files in a message
-#: Radians that one unit of a root channel counts for in the components: a displacement of a stature is as
-#: much as a rotation of the leg by 1 / 0.3 rad (a leg's angle moves the joints below it by about 0.3 statures
-#: per radian).
+SAMPLES = 120  # phases of a cycle; five components take less than 100 kB
+MOST_NAMES = 4  # most files in a message
+#: Weight of a unit of a root channel in the components, in radians: a displacement by one stature counts like
+#: a rotation of the leg by 1 / 0.3 rad (a leg's angle moves the joints below it by about 0.3 statures per
+#: radian).
 ROOT_SCALE = {"root_forward": 1.0, "root_sway": 3.3, "root_height": 3.3}
 HEIGHT, FORWARD = CHANNELS.index("root_height"), CHANNELS.index("root_forward")
 HEIGHT_HARMONICS = 4  # of the pelvis's height within a stride
-USUAL_STRIDE = 0.8  # statures, where the legs show no plausible one
+USUAL_STRIDE = 0.8  # statures, if the legs show no plausible one
 PLAUSIBLE_STRIDE = (0.3, 1.6)  # statures
 LEAST_SUBJECTS, MOST_SUBJECTS = 3, 12  # of `Learned.by_subject`; each costs a fit
 MOST_CYCLES = 600
@@ -47,7 +47,7 @@ COMPARED = [JOINTS.index(name) for name in EVAL15 if name != "pelvis"]
 
 @dataclass
 class Residuals:
-    """What the components leave of R cycles."""
+    """Residuals of R cycles about the components."""
 
     squares: Floats  #: (R, M) sum of the squares over the observed phases
     count: Indices  #: (R, M) number of observed phases
@@ -60,17 +60,17 @@ class Residuals:
 
 @dataclass(frozen=True)
 class SubjectResiduals:
-    """Errors of n subjects with the model of all (row 0) and of all others (row 1); NaN if unseen."""
+    """Errors of n subjects with the model of all (row 0) and of all others (row 1); NaN if unknown."""
 
     degrees: Floats  #: (2, n) rms over the angles
-    #: (2, n) mean distance of 14 joints on one body with the pelvis aligned (position and orientation), over
-    #: the phases at which all angles are seen.
+    #: (2, n) mean distance of 14 joints, on the same body and with the pelvis aligned (position and
+    #: orientation), over the phases at which all angles are visible.
     millimetres: Floats
 
 
 @dataclass
 class Learned:
-    """Everything that `gait learn` finds out about n sequences."""
+    """Everything that `gait learn` learns from n sequences."""
 
     sequences: list[Sequence]
     subjects: list[str]  #: sorted names
@@ -78,15 +78,15 @@ class Learned:
     proportions: Proportions
     alignment: align.Alignment  #: offsets with phase 0 at the right heel strike
     cycles: cutting.Cycles  #: rows of the analysis, channels in their own units
-    #: In the channels' own units (gaps are filled, and `rmse` is, in units of `scale`); mean, components and
-    #: scores are of the cycles as they would be at the mean stride rate.
+    #: In the channels' own units (but gaps are filled, and `rmse` is given, in units of `scale`); mean,
+    #: components and scores are those of the cycles converted to the mean stride rate.
     components: Components
-    pace_curve: Floats  #: (T, M) how the mean curves follow the stride rate; 0 in the paper's model
+    pace_curve: Floats  #: (T, M) dependence of the mean curves on the stride rate; 0 in the paper's model
     paces: Floats  #: (n,) pace of each sequence
     scale: Floats  #: (M,)
     held_out: Floats  #: error on held-out data for 0, 1 ... components, scaled units; empty unless "auto"
-    lengths: Floats  #: (p, F + 1) section PROP: how limbs differ in length; empty in the paper's model
-    shifts: Floats  #: (p, F, 3) section SHFT: how the origins of frames (the shoulders') differ besides
+    lengths: Floats  #: (p, F + 1) section PROP: variation of limb lengths; empty in the paper's model
+    shifts: Floats  #: (p, F, 3) section SHFT: additional variation of the shoulders' origins
     static: Floats  #: (M,) sd over subjects of a person's constant offsets from the model
     paper: bool = False  #: whether the components are the paper's, of 19 angles, the other channels constant
 
@@ -131,7 +131,7 @@ def fit(
 ) -> Learned:
     """Learn the cyclic model of prepared sequences.
 
-    `others` are bodies of people whose motion is not learnt: they show how proportions differ.  UserError if
+    `others`: bodies of people whose motion is not learnt, which also show how proportions vary.  UserError if
     there are too few cycles for the components asked for.
     """
     subjects = sorted({s.subject for s in sequences})
@@ -185,7 +185,7 @@ def fit(
 
 
 def _aligned(signals: list[Floats], periods: Floats, paper: bool) -> align.Alignment:
-    """Align sequences (T, M) by their angles, or as the paper does: its 19, alike, from offsets 0."""
+    """Align sequences (T, M) by their angles, or as the paper does: by its 19, equally weighted, from 0."""
     if not paper:
         return align.align([z[:, : len(ANGLES)] for z in signals], periods, hips=align.HIPS)
     count = len(PAPER_ANGLES)
@@ -194,7 +194,7 @@ def _aligned(signals: list[Floats], periods: Floats, paper: bool) -> align.Align
 
 
 def _analysed(values: Floats, mask: Mask, count: int, paper: bool) -> Components:
-    """Fill and analyse cycles (R, T, M); the paper's components are of its angles, the rest is constant."""
+    """Fill and analyse cycles (R, T, M); in paper mode only the paper's angles vary, the rest is constant."""
     if not paper:
         return components.fit(values, mask, count)
     angles = len(PAPER_ANGLES)
@@ -215,14 +215,14 @@ def _analysed(values: Floats, mask: Mask, count: int, paper: bool) -> Components
 
 
 def _paces_removed(filled: Floats, mask: Mask, subject: Indices, paces: Floats) -> tuple[Floats, Floats]:
-    """Return how curves change with the pace (T, M), and the cycles (R, T, M) as at the mean pace."""
+    """Return the change of curves with the pace (T, M), and the cycles (R, T, M) at the mean pace."""
     whole = people.bounded(filled, mask, subject)
     slope = people.pace_slope(whole, subject, paces)
     return slope, people.at_mean_pace(whole, paces, slope)
 
 
 def most_components(cycles: int, wanted: int | str | None, files: list[str] | None = None) -> int:
-    """Return the components to learn from so many cycles of these files; with "auto", to try.
+    """Return the number of components to learn (with "auto", to try) from this many cycles of these files.
 
     UserError if there are too few cycles for the number asked for, or for any.
     """
@@ -251,7 +251,7 @@ def _times(rows: Floats, scale: Floats) -> Floats:
 
 
 def _bodies(sequences: list[Sequence], index: Indices, subjects: int) -> list[Measures | None]:
-    """Return a body of each subject, from the first recording that shows most of it and most agree on."""
+    """Return a body of each subject, from the first of the most complete and most consistent recordings."""
 
     def known(s: Sequence) -> tuple[int, int]:
         return known_parts(s.measures), s.recordings
@@ -278,12 +278,12 @@ def heel_strike(curve: Floats, proportions: Proportions) -> float:
 
 
 def made_up_channels(visible: Mask) -> list[str]:
-    """Return the root channels that `grounded` has to make up, for the channels (M,) observed."""
+    """Return the root channels that `grounded` must compute, given the channels (M,) observed."""
     return [CHANNELS[c] for c in (HEIGHT, FORWARD) if not visible[c]]
 
 
 def grounded(model: Components, visible: Mask, proportions: Proportions) -> Components:
-    """Set height and speed of the pelvis in mean curves, own units, where no recording (M,) shows them."""
+    """Set height and speed of the pelvis in mean curves, own units, if no recording (M,) shows them."""
     if not made_up_channels(visible):
         return model
     mean = model.mean.copy()
@@ -298,8 +298,8 @@ def grounded(model: Components, visible: Mask, proportions: Proportions) -> Comp
 def _from_legs(mean: Floats, proportions: Proportions) -> tuple[Floats, float]:
     """Return the height of the pelvis (T,), statures, and statures per stride, of mean curves (T, M).
 
-    The lower of toes and heels is on the ground.  The speed is the median of how fast it moves back under the
-    pelvis, or `USUAL_STRIDE` if that is implausible, as of a person who marches in place.
+    The lowest toe or heel is assumed to be on the ground.  The speed is the median speed at which it moves
+    back under the pelvis, or `USUAL_STRIDE` if that is implausible, as for a person who marches in place.
     """
     skeleton = default_skeleton(proportions)
     over = {"toe": proportions.sole + proportions.toe[2], "heel": proportions.sole + proportions.heel[2]}
@@ -322,7 +322,7 @@ def _subject_residuals(
     proportions: Proportions,
     paper: bool = False,
 ) -> SubjectResiduals | None:
-    """Fit the components of all, and of all but each subject; `proportions` are of the body compared on."""
+    """Fit the components of all, and of all but each subject; `proportions`: of the body for comparison."""
     values, mask = rows.values, rows.mask
     number = int(subject.max()) + 1
     if not LEAST_SUBJECTS <= number <= MOST_SUBJECTS or len(values) > MOST_CYCLES:

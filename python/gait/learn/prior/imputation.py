@@ -4,7 +4,7 @@ Model: row r is B' (mean + W' c_r) + noise, with c_r ~ N(0, I) and the coefficie
 h drawn from N(0, 1 / (precision_k roughness_h)).  Given the components, scores and missing entries of a row
 are treated jointly and exactly (Bishop 1999; Ilin and Raiko 2010, "Practical approaches to principal
 component analysis in the presence of missing values").  The precisions shrink components and harmonics that
-the data do not support to nothing, so too many of them hurt little.
+the data do not support to zero, so too many of them do little harm.
 """
 
 from __future__ import annotations
@@ -20,16 +20,16 @@ from gait.learn.cycles.fourier import decode, encode
 
 ITERATIONS = 2000  # 29 people, 10 of them recorded without arms and trunk, take 1216
 TOLERANCE = 1e-5  # rms change of the model between passes over the noise
-LEAST_CHANGE = 1e-7  # rms change that counts as none, in the data's units: a tenth of the last digit stored
+LEAST_CHANGE = 1e-7  # rms change that counts as none, in the data's units; a tenth of the last digit stored
 LEAST_GAIN = 2e-7  # of the bound in a pass, nats per observed entry
-PATIENCE = 20  # passes in a row of smaller gain, after which the data no longer decide what still moves
+PATIENCE = 20  # consecutive passes of smaller gain, after which the data do not determine what still changes
 LEAST_NOISE = 1e-10  # variance relative to the data's
-ROUNDING = 1e-9  # relative: the objective may rise by no more
+ROUNDING = 1e-9  # relative increase of the objective that rounding may cause
 QUENCHED = 1e9  # roughness above which the components do not use a harmonic
 MOST_LOG = 200.0  # of an extrapolated precision or noise
 MEMORY = 5  # steps that the extrapolation combines
 RIDGE = 1e-10  # of its normal equations, relative to their trace
-SMALLEST = 1e-14  # of the largest squared singular value: smaller is rounding
+SMALLEST = 1e-14  # of the largest squared singular value; smaller ones are rounding errors
 
 
 @dataclass
@@ -38,9 +38,9 @@ class Filling:
 
     filled: Floats  #: (R, T, M) the data where observed, the model elsewhere; on disk, read-only
     rmse: list[float]  #: data minus model over the observed entries, after each pass
-    objective: list[float]  #: what the passes minimise, after each; falls but for rounding
+    objective: list[float]  #: the objective after each pass; decreases except for rounding
     noise: float  #: standard deviation of the data about the model
-    converged: bool  #: False if the objective rose or the passes ran out
+    converged: bool  #: False if the objective increased or the passes ran out
 
 
 def column_mean(values: Floats, mask: Mask) -> Floats:
@@ -89,7 +89,7 @@ class Climb:
 def climb(
     problem: Problem, posterior: Posterior, tolerance: float = TOLERANCE, passes: int = ITERATIONS
 ) -> Climb:
-    """Raise the bound by turns (scores of the rows, then components) until it, or the model, hardly changes.
+    """Increase the bound, alternating scores and components, until it or the model hardly changes.
 
     `tolerance` is the rms change of the model between two passes, over the noise, at which to stop.
     """
@@ -102,7 +102,7 @@ def climb(
         at.converged = problem.change(at.rows, found) <= enough or slow >= PATIENCE
         at.objective.append(-found.bound / problem.observed)
         falls = not found.bound >= at.rows.bound
-        if falls:  # within rounding the climb has ended; a larger fall is an error
+        if falls:  # within rounding, the climb has ended; a larger decrease is an error
             at.converged = at.rows.bound - found.bound <= ROUNDING * abs(at.rows.bound)
         else:
             at.posterior, at.rows = after, found
@@ -115,7 +115,7 @@ def climb(
 def _pass(
     problem: Problem, history: _Extrapolation, posterior: Posterior, rows: Rows
 ) -> tuple[Posterior, Rows]:
-    """Extrapolate, or take the plain step if that is better; drop a component that does not help."""
+    """Extrapolate, or take the plain step if it is better; drop a component that does not help."""
     plain = problem.maximise(posterior, rows)
     after = _extrapolated(history, posterior, plain)
     after.noise = max(after.noise, problem.least)
@@ -151,7 +151,7 @@ class Rows:
 
 
 class Problem:
-    """The data, and the two half-steps that raise the bound."""
+    """The data, and the two half-steps that increase the bound."""
 
     def __init__(self, values: Floats, mask: Mask, basis: Floats) -> None:
         self.rows, self.shape = len(values), values.shape[1:]
@@ -262,7 +262,7 @@ class Problem:
     ) -> tuple[Floats, Floats]:
         """Change units so that the scores have mean 0 and covariance 1 and the components are orthogonal.
 
-        The model stays the same, and the bound is the best of all such changes (Luttinen and Ilin 2010).
+        The model is unchanged, and the bound is the best over all such changes (Luttinen and Ilin 2010).
         `moment` (1 + q, 1 + q) is the mean of (1, scores) (1, scores)' over the rows.
         """
         middle = moment[0, 1:]
@@ -311,7 +311,7 @@ def _harmonics(functions: int) -> Indices:
 
 
 def _with_prior(posterior: Posterior) -> Posterior:
-    """Set the precisions that are best for these components, then the roughness."""
+    """Set the precisions that are optimal for these components, then the roughness."""
     q, size = len(posterior.precision), posterior.loadings.shape[1]
     if not q:
         return posterior
@@ -335,7 +335,7 @@ def _divergence(posterior: Posterior) -> float:
 
 
 def _without_weakest(posterior: Posterior) -> Posterior | None:
-    """Drop the weakest component if it is weaker than its uncertainty, else None."""
+    """Drop the weakest component if it is weaker than its uncertainty; otherwise return None."""
     ratio = _strength(posterior).sum(axis=1) / _variance(posterior).sum(axis=1)
     return without_component(posterior, int(np.argmin(ratio))) if len(ratio) and ratio.min() < 1 else None
 
@@ -410,9 +410,9 @@ class _Extrapolation:
 def right_singular(rows: Floats, mean: Floats, factor: Floats | None = None) -> tuple[Floats, Floats]:
     """Decompose rows (R, P) minus their mean, each times its factor (R,), without the left vectors.
 
-    Many rows are decomposed through their products, in memory for P x P numbers only; the leading vectors are
-    as good, but singular values below 1e-8 of the largest are noise.  Returns the singular values (min(R,
-    P),), descending, and orthonormal right vectors (>= min(R, P), P).
+    Many rows are decomposed through their products, with memory for only P x P numbers; the leading vectors
+    are as accurate, but singular values below 1e-8 of the largest are noise.  Returns the singular values
+    (min(R, P),), descending, and orthonormal right vectors (>= min(R, P), P).
     """
     weight = np.ones(len(rows)) if factor is None else factor
     fewer = min(rows.shape)

@@ -1,9 +1,10 @@
 """Missing entries of cycles by an iterated singular value decomposition (Ormoneit 2000, Fig. 5 steps 3-9).
 
-As in the paper: the completed cycles are centred, described by their first Fourier coefficients, and cut to a
-few components by an SVD; what that gives where nothing was observed completes the cycles for the next pass.
-The basis is real and orthonormal, so distances are those of the curves, and the mean is in it too: then each
-pass finds the nearest model to the completed cycles, and the error on the observed entries cannot rise.
+As in the paper, the completed cycles are centred, described by their first Fourier coefficients, and reduced
+to a few components by an SVD, whose reconstruction of the missing entries completes the cycles for the next
+pass.  The basis is real and orthonormal, so distances are those of the curves, and contains the mean; then
+each pass finds the model nearest to the completed cycles, and the error on the observed entries cannot
+increase.
 """
 
 from __future__ import annotations

@@ -1,8 +1,8 @@
 """Variation of proportions between people of the same stature: sections PROP and SHFT of a blob.
 
-One factor scales the lengths of each frame of the skeleton (its points, its limbs, the origins of its
-children); shoulders also move by themselves, because they do not follow the neck.  The sections are the
-principal components of these changes, weighted by how far they move the joints.
+One factor scales all lengths of a frame of the skeleton (its points, its limbs, the origins of its children);
+shoulders also move independently, as they do not follow the neck.  The sections are the principal components
+of these changes, weighted by how far they move the joints.
 """
 
 from __future__ import annotations
@@ -38,7 +38,7 @@ def learn(
 ) -> tuple[Floats, Floats]:
     """Return relative changes of lengths and shifts of origins per standard deviation of each component.
 
-    There is one body per subject; those not seen whole are left out.  The joints are moved from the mean
+    There is one body per subject; incomplete ones are left out.  Effects on joints are computed at the mean
     curves (T, M).  The changes (p, F + 1) are PROP: of the lengths in each frame, and of the pelvis's height;
     empty with fewer than three subjects.  The shifts (p, F, 3) are SHFT: of the frames' origins, statures.
     """

@@ -1,4 +1,4 @@
-"""A learned model as the sections of a blob (libgait/doc/model-format.md)."""
+"""Convert a learnt model to the sections of a blob (libgait/doc/model-format.md)."""
 
 from __future__ import annotations
 
@@ -19,8 +19,8 @@ from gait.learn.options import LearnOptions
 from gait.learn.prior.fit import Learned
 from gait.learn.prior.people import ADULT_STATURE, LENGTH_SD, RATE_SD, TERMS, by_subject
 
-#: Decimals stored: a millionth of a radian or stature is far below what recordings show, and far above the
-#: last bits (1e-12) in which the algebra of two machines differs.
+#: Decimals stored: a millionth of a radian or stature is far below the accuracy of recordings, and far above
+#: the last bits (1e-12) in which results of two machines may differ.
 DIGITS = 6
 #: Limits of META for a large corpus: rows of a table, and characters of a name as JSON.
 MOST_ROWS, MOST_NAME = 12, 32
@@ -51,7 +51,7 @@ def sections(learned: Learned, options: LearnOptions) -> dict[str, blob.Array]:
 
 
 def rounded(values: Floats) -> npt.NDArray[np.float32]:
-    """Round values as they are stored, without the sign of a zero, which a last bit decides."""
+    """Round values as they are stored; zeros are positive, as their sign would depend on a last bit."""
     return (np.round(values, DIGITS) + 0.0).astype(np.float32)
 
 
@@ -61,7 +61,7 @@ def meta_section(meta: Mapping[str, Any]) -> npt.NDArray[np.uint8]:
 
 
 def origin(options: LearnOptions, sources: Iterable[Path]) -> dict[str, Any]:
-    """Return the entries of META about what a blob is and where it comes from."""
+    """Return the entries of META about the kind and origin of a blob."""
     made = {"activity": shortened(options.activity), "generator": GENERATOR, "seed": options.seed}
     return made | ({"acknowledgement": CMU} if from_cmu(sources) else {})
 
@@ -77,7 +77,7 @@ def shortened(name: str) -> str:
 
 
 def from_cmu(sources: Iterable[Path]) -> bool:
-    """Whether any recording has the format of the CMU database, whose terms ask for an acknowledgement."""
+    """Whether any recording has the format of the CMU database, whose terms require an acknowledgement."""
     return any(source.suffix.lower() == ".amc" for source in sources)
 
 
@@ -124,7 +124,8 @@ def anova(values: Floats, group: Indices) -> tuple[Floats, Floats]:
 def gait_statistics(learned: Learned) -> Floats:
     """Return GAIT (8,): stride rate, stride length, sample rate and stature.
 
-    Where no recording shows the path of the pelvis the stride is that of the mean curves (`fit.grounded`).
+    If no recording shows the path of the pelvis, the stride length is that of the mean curves
+    (`fit.grounded`).
     """
     rates = np.array([s.fps / s.period.frames for s in learned.sequences])
     column = CHANNELS.index("root_forward")
@@ -140,7 +141,7 @@ def gait_statistics(learned: Learned) -> Floats:
 
 
 def _observed(channels: Floats, column: int) -> Floats:
-    """Return the observed values of one of the channels (T, M) of a sequence, which lies on disk."""
+    """Return the observed values of one of the channels (T, M) of a sequence, which is on disk."""
     values = channels[np.isfinite(channels[:, column]), column]
     release(channels)
     return values
@@ -154,7 +155,7 @@ def stride_variation(learned: Learned) -> float:
 
 
 def meta(learned: Learned, options: LearnOptions) -> dict[str, Any]:
-    """Return META: what people and tools may want to know; degrees, metres, seconds."""
+    """Return META: information for people and tools; degrees, metres, seconds."""
     c = learned.components
     statures = [_stature(learned, name) for name in learned.subjects[:MOST_ROWS]]
     return {

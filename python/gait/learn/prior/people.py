@@ -1,14 +1,14 @@
 """A prior over people's walks that also covers people who were not recorded.
 
-The paper's components (`components`) describe the recorded cycles as well as possible.  With few subjects
-that is not what a new person needs, so the completed cycles are analysed again: each also mirrored (left and
-right swapped, half a cycle later), every subject counting alike, and channels weighted by how far they move
-the joints. What is left of a subject after the components of all others gives the standard deviation of
-static offsets.
+The paper's components (`components`) describe the recorded cycles as well as possible.  With few subjects,
+that is not the best for a new person, so the completed cycles are analysed again, together with their mirror
+images (left and right swapped, half a cycle later), with equal weights of subjects, and with channels
+weighted by how far they move the joints.  What the components of all others do not explain of a subject gives
+the standard deviation of static offsets.
 
-The mean cycle follows the stride rate: arms and legs swing further the faster a person walks.  People differ
-at one rate, and a person differs between rates; only the latter is regressed here.  A tracker knows the rate
-anyway (it is a state of the paper's, eq. 7), so what follows it costs no score.
+The mean cycle depends on the stride rate, as arms and legs swing further when a person walks faster.  People
+differ at the same rate, and a person differs between rates; only the latter is regressed here.  The tracker's
+state contains the rate anyway (as the paper's does, eq. 7), so this dependence needs no score.
 """
 
 from __future__ import annotations
@@ -27,21 +27,21 @@ from gait.learn.prior.components import Components
 from gait.learn.prior.imputation import leading_vectors, right_singular
 
 STEP = 1e-4  # of the numerical derivatives, radians and statures
-RIDGE = 1e-5  # squared statures per squared unit: channels that move no joint still count a little
-#: Weight of rotations of the whole body: a particle has a heading, pitch and roll of its own besides.
+RIDGE = 1e-5  # squared statures per squared unit, so that channels that move no joint still count a little
+#: Weight of rotations of the whole body, as particles also have a heading, pitch and roll.
 TURNING = {"root_roll": 0.3, "root_pitch": 0.3, "root_yaw": 0.3}
 #: Weight of root channels that displace the whole body, statures; forward speed is per stride.
 DISPLACING = {"root_forward": 0.3, "root_sway": 1.0, "root_height": 1.0}
 AGAINST = ("torso_x", "torso_z", "neck_x", "neck_z", "root_sway", "root_roll", "root_yaw")
-RATE_SD, LENGTH_SD = 0.07, 0.06  # of stride rate and length among people, share of the mean
+RATE_SD, LENGTH_SD = 0.07, 0.06  # relative sd of stride rate and length among people
 ADULT_STATURE = (1.70, 0.095)  # metres, mean and sd of adults of both sexes: a prior, not a training set's
-ENOUGH = 3  # subjects that show by themselves how people differ
-LEAST_SD = 0.01  # share of the mean: recordings that are all alike still leave some uncertainty
-#: Variance of the pace of an imaginary person who walks alike at any rate: with recordings of few people, or
-#: of hardly any other rates, the slope shrinks towards 0.
+ENOUGH = 3  # fewest subjects from which differences between people are estimated
+LEAST_SD = 0.01  # least relative sd, even if all recordings are alike
+#: Variance of the pace of an imaginary person who walks in the same way at any rate; with recordings of few
+#: people, or at similar rates, it shrinks the slope towards 0.
 UNMOVED = 1.0
-#: Does not follow the rate: how far people step at one rate differs much, and a tracker that hardly sees the
-#: distance, as from in front, accumulates the error of its speed.  The components have it.
+#: Does not depend on the rate, since step lengths at the same rate differ much, and a tracker that hardly
+#: sees the distance, as from the front, would accumulate the error of its speed.  The components contain it.
 LEFT_OUT = CHANNELS.index("root_forward")
 #: Coefficients of a channel's Fourier series, ten harmonics: higher ones move joints by 0.12 mm in a person
 #: whose rate is a standard deviation off (rms, `make eval-learn`), and a model stays small.
@@ -131,7 +131,7 @@ def _sign(curves: Floats) -> Floats:
 
 
 def static_sd(filled: Floats, subject: Indices, count: int, metric: Floats) -> Floats:
-    """Return the sd (M,) over people of their mean offset over the cycle from what all others explain.
+    """Return the sd (M,) over people of the mean over the cycle that the others' components do not explain.
 
     Zero if there are fewer than three subjects.
     """
@@ -145,7 +145,8 @@ def static_sd(filled: Floats, subject: Indices, count: int, metric: Floats) -> F
         weight /= weight.sum()
         mean = weight @ coded
         right = leading_vectors(coded, mean, np.sqrt(weight), count)
-        # The mean over a cycle is its first coefficient, and the residual of the mean that of the cycles.
+        # The mean over a cycle is its first coefficient, and the residual of the mean is the mean of
+        # residuals.
         rest = coded[: len(subject)][subject == held].mean(axis=0) - mean
         rest -= (right @ rest) @ right
         left.append(rest[: filled.shape[2]] / np.sqrt(filled.shape[1]) @ np.linalg.inv(metric))
@@ -155,8 +156,8 @@ def static_sd(filled: Floats, subject: Indices, count: int, metric: Floats) -> F
 def by_subject(values: Floats, group: Indices, usual: float) -> tuple[float, float]:
     """Return mean and sd of the subjects' means; NaN values do not count.
 
-    With fewer than `ENOUGH` subjects the variance is drawn towards that of people in general, whose sd is
-    `usual` of the mean, and is never below what the sequences show.
+    With fewer than `ENOUGH` subjects the variance is shrunk towards that of people in general, whose relative
+    sd is `usual`, but is never below that of the sequences.
     """
     group, values = group[np.isfinite(values)], values[np.isfinite(values)]
     if not len(values):
@@ -176,11 +177,11 @@ def paces(sequences: list[Sequence], subject: Indices) -> Floats:
 
 
 def pace_slope(filled: Floats, subject: Indices, paces: Floats, terms: int = TERMS) -> Floats:
-    """Return the change (T, M) of the cycle per unit of pace, as steep in every person, who all count alike.
+    """Return the change (T, M) of the cycle per unit of pace, common to all people, who have equal weights.
 
     It is the least-squares slope of the differences between a person's completed cycles (R, T, M), own units,
     and their mean, with their mirror images, as a Fourier series.  It is 0 with one person or one pace, and
-    for LEFT_OUT.  UserError if an angle changes more than any walk's, from turns of 360 degrees between
+    for LEFT_OUT.  UserError if an angle changes more than any walk's, as with jumps of 360 degrees between
     recordings.
     """
     together, variance = np.zeros(filled.shape[1:]), UNMOVED
@@ -190,7 +191,7 @@ def pace_slope(filled: Floats, subject: Indices, paces: Floats, terms: int = TER
         away = (paces[rows] - paces[rows].mean()) / len(rows)
         variance += float(np.sum(away**2)) * len(rows)
         for part in by_rows(rows):
-            # Differences of the pace sum to 0, so that the mean cycle need not be taken off.
+            # Differences of the pace sum to 0, so the mean cycle need not be subtracted.
             together += np.tensordot(away[part], filled[rows[part]], 1)
             release(filled)
     found = together[None] / variance
@@ -221,7 +222,7 @@ def never_shown(mask: Mask, subject: Indices) -> tuple[int, Mask]:
 
 
 def lacking(mask: Mask, subject: Indices) -> list[int]:
-    """Return the people who never show channels that others show, those who lack most first."""
+    """Return the people who never show channels that others show, beginning with those who lack most."""
     lacks = _lacking(mask, subject).sum(axis=1)
     order = np.argsort(-lacks, kind="stable")
     return [int(np.unique(subject)[k]) for k in order if lacks[k]]
@@ -234,21 +235,21 @@ def _lacking(mask: Mask, subject: Indices) -> Mask:
 
 
 def bounded(filled: Floats, mask: Mask, subject: Indices) -> Floats:
-    """Move channels that a person never shows no further from the mean than people usually are.
+    """Limit the distance from the mean of channels that a person never shows to what is usual among people.
 
-    Imputation predicts them from the others linearly and without bound: a person who walks unlike all others
-    would get arms that no person has, and they would count like a recording.  Takes and returns completed
-    cycles (R, T, M); the result is on disk, or `filled` itself if there is nothing to do.
+    Imputation predicts them linearly from the others, without bound: a person with an unusual walk would get
+    arms that no one has, which would count like a recording.  Takes and returns completed cycles (R, T, M);
+    the result is on disk, or is `filled` itself if there is nothing to do.
     """
     people = range(subject.max() + 1)
     shown = np.array([mask[subject == who].any(axis=(0, 1)) for who in people])
     if np.all(shown == shown.any(axis=0)):
         return filled
-    share = shown / np.maximum(shown.sum(axis=0), 1)  # (people, M): all who show a channel count alike
+    share = shown / np.maximum(shown.sum(axis=0), 1)  # (people, M): equal weights of all who show a channel
     mean = sum(share[who] * _mean(filled, subject == who) for who in people)
     away = np.array([_mean(filled, subject == who, mean) for who in people])
     usual = np.sum(share * away, axis=0)
-    # A channel that no person shows has no reference and stays as it is.
+    # A channel that no person shows has no reference and is unchanged.
     held = ~shown & shown.any(axis=0)
     keep = np.where(held, np.sqrt(np.minimum(1.0, usual / np.maximum(away, 1e-300))), 1.0)
     nearer = (_drawn(filled[part], mean, keep[subject[part], None]) for part in by_rows(filled))
@@ -256,7 +257,7 @@ def bounded(filled: Floats, mask: Mask, subject: Indices) -> Floats:
 
 
 def _drawn(cycles: Floats, mean: Floats, keep: Floats) -> Floats:
-    """Scale the distance of cycles from the mean by `keep`; what keeps all of it stays bit for bit."""
+    """Scale the distance of cycles from the mean by `keep`; where `keep` is 1, the bits are unchanged."""
     return np.where(keep < 1, mean + keep * (cycles - mean), cycles)
 
 

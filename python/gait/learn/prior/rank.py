@@ -1,4 +1,4 @@
-"""The number of components that predicts held-out entries best."""
+"""Choose the number of components that predicts held-out entries best."""
 
 from __future__ import annotations
 
@@ -12,12 +12,12 @@ from gait.learn.cycles.fourier import HARMONICS, fourier_basis
 from gait.learn.prior.imputation import Posterior, Problem, Rows, climb, column_mean, without_component
 
 LARGEST = 12  # components tried
-HELD_OUT = 0.05  # share of the observed entries held out if people are too few
+HELD_OUT = 0.05  # share of the observed entries held out if there are too few people
 BLOCK = 8  # a held-out block is a BLOCK-th of a cycle of one channel
 FEWEST_PEOPLE = 4
 MOST_FOLDS = 8
-DRAWS = 4  # of what is hidden of a person's cycles
-TOLERANCE, PASSES = 3e-2, 30  # of the fits, which are only compared
+DRAWS = 4  # draws of the hidden parts of a person's cycles
+TOLERANCE, PASSES = 3e-2, 30  # of the fits, which are only compared with each other
 
 
 def choose(
@@ -122,7 +122,7 @@ def _half(shape: tuple[int, ...], rng: np.random.Generator) -> Mask:
 
 
 def _descending(values: Floats, mask: Mask, basis: Floats, largest: int) -> Iterator[Posterior]:
-    """Yield fits with `largest` components, one less ... 0, each from the one before less its weakest."""
+    """Yield fits with `largest`, one fewer ... 0 components, each from the one before without its weakest."""
     problem = Problem(values, mask, basis)
     posterior = problem.begin(column_mean(values, mask), largest)
     for count in range(largest, -1, -1):

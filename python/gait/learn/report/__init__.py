@@ -1,1 +1,1 @@
-"""The report of a learned model: figures and one page."""
+"""The report of a learnt model: figures and one page."""

@@ -20,18 +20,18 @@ from gait.learn.report.figures_model import PHASE, PHASE_LABEL, SHOWN, mark_unob
 from gait.report.colours import BLUE, DARK, GREY, ORANGE
 from gait.report.figures import Drawing, grid, line_legend, plain
 
-MOST_LEGEND = 10  # entries
-FLAT = 5.0  # least top of a row's scale, so that the ratio of noise, about 1, looks flat
-MOST_NAMES = 60  # rows of the map that are named
+MOST_LEGEND = 10  # most entries of a legend
+FLAT = 5.0  # least top of a row's scale, so that noise, with a ratio of about 1, looks flat
+MOST_NAMES = 60  # most rows of the map with names
 GRID = np.linspace(0.4, 2.1, 171)  # seconds
 ALIGNED = ("r_hip_flexion", "r_knee_flexion", "l_shoulder_flexion")
-MOST_SEQUENCES = 40  # drawn before and after
-MOST_CYCLES = 300  # drawn
+MOST_SEQUENCES = 40  # most sequences drawn before and after
+MOST_CYCLES = 300  # most cycles drawn
 BINS, FEWEST_BINS = 64, 20  # of the mean curve of folded sequences
 IN_BIN = 5  # samples that a bin should have
-SCATTERED = 0.9  # observed share below which samples are dotted
-MOST_TICKS = 20  # subjects named in the map
-LINE = 0.03  # share of the map that a name takes
+SCATTERED = 0.9  # observed share below which samples are drawn as dots
+MOST_TICKS = 20  # most subjects named in the map
+LINE = 0.03  # height of a name, as a share of the map
 SNR = (
     "One recording folded at every whole period: the variance of each angle between the phases over that "
     "within them (names left, maxima right), and the sum. White noise stays near 1 at all periods."
@@ -241,7 +241,7 @@ def _folded(axes: Axes, learned: Learned, picked: Indices, k: int, after: bool) 
         curve = np.degrees(s.channels[:, k])
         phases.append(phase)
         values.append(curve)
-        wraps = np.flatnonzero(np.diff(phase) < 0) + 1  # a line must not run back over the panel
+        wraps = np.flatnonzero(np.diff(phase) < 0) + 1  # so that no line runs back over the panel
         axes.plot(
             np.insert(phase, wraps, np.nan), np.insert(curve, wraps, np.nan),
             color=shades[learned.subject_index[i]], lw=0.5, alpha=0.6, marker=".", ms=_dot(curve), mew=0,
@@ -251,7 +251,7 @@ def _folded(axes: Axes, learned: Learned, picked: Indices, k: int, after: bool) 
 
 
 def _dot(curve: Floats) -> float:
-    """Return the size of the dots on a curve, whose isolated samples make no line."""
+    """Return the size of the dots on a curve, for isolated samples, which make no line."""
     visible = np.isfinite(curve)
     return 2.0 if visible.any() and np.mean(visible) < SCATTERED else 0.0
 
@@ -333,7 +333,7 @@ def _name_subjects(axes: Axes, learned: Learned) -> None:
     middles, names = ends - counts / 2, []
     free = -np.inf
     for middle, subject in zip(middles / ends[-1], learned.subjects, strict=True):
-        names.append(subject if middle >= free else "")  # names must not lie over each other
+        names.append(subject if middle >= free else "")  # names must not overlap
         free = middle + LINE if names[-1] else free
     axes.set_yticks(middles, names)
     axes.set_ylabel("cycles of the subject")

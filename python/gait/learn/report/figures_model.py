@@ -1,4 +1,4 @@
-"""Figures of the model: mean and components as curves and stick figures (Ormoneit 2000, Fig. 6), errors."""
+"""Figures of the model: mean and components, as curves and stick figures (Ormoneit 2000, Fig. 6); errors."""
 
 from __future__ import annotations
 
@@ -73,7 +73,7 @@ def curves(learned: Learned, shown: Sequence[str] = SHOWN) -> Figure:
 def strip(learned: Learned, moved: Floats | None) -> Figure:
     """Draw stick figures over one cycle, from the side and from the front.
 
-    With `moved` (T, M) the mean plus and minus two of these changes is drawn over the mean.
+    With `moved` (T, M), the mean plus and minus twice this change is drawn over the mean.
     """
     figure, panels = grid(2, 1, 10, 4.6)
     turns = [0.0] if moved is None else [0.0, -2.0, 2.0]
@@ -108,8 +108,8 @@ def bodies(learned: Learned, cycle: Floats, phases: int = PHASES) -> Floats:
 def _draw(axes: Axes, figures: Floats, across: int, colour: str) -> None:
     """Draw stick figures side by side; the side nearer to the viewer (the right) is bolder.
 
-    `across` is the coordinate along the paper: 0 forward to the right, 1 seen from ahead (its left to the
-    right).
+    `across`: coordinate along the paper: 0: forward is to the right; 1: seen from the front, with the
+    person's left to the right.
     """
     for i, body in enumerate(figures):
         for side, chains in STICKS.items():
@@ -145,7 +145,7 @@ def spectrum(learned: Learned) -> Figure:
 
 
 def residuals(learned: Learned) -> Figure:
-    """Draw the rms of what the components leave of each angle."""
+    """Draw the rms of each angle's residuals about the components."""
     figure, (axes,) = grid(1, 1, 8, 3.8)
     squares, count = learned.residuals.squares.sum(axis=0), learned.residuals.count.sum(axis=0)
     rest = np.degrees(np.sqrt(squares / np.maximum(count, 1)))[: len(ANGLES)]

@@ -33,7 +33,7 @@ _OF_CLASSES = ("strides/s", "statures/s", "components")
 
 
 def require_own(folder: Path) -> None:
-    """Raise UserError if the folder has a page that is not of `gait learn`; call it before the long work."""
+    """Raise UserError if the folder has a page that is not from `gait learn`; call it before long work."""
     page = folder / PAGE
     if not page.exists():
         return

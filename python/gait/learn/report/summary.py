@@ -1,4 +1,4 @@
-"""A learnt model in figures and in words, and notes for its user."""
+"""Summarise a learnt model in figures and in words, with notes for its user."""
 
 from __future__ import annotations
 
@@ -24,7 +24,7 @@ MOST_NAMES = 8  # of subjects
 def summary(
     learned: Learned, data: bytes, refused: list[str], prior: SegmentPrior | None, report: bool
 ) -> dict[str, Any]:
-    """Return the figures of what was learnt and written, with a report also those of the subjects."""
+    """Return the figures of the model written, and, with a report, those of the subjects."""
     rate, rate_sd, variation, length, length_sd, fps = model.gait_statistics(learned)[:6].tolist()
     residual = learned.residuals.rms(columns=slice(len(ANGLES)))
     table = model.sequence_table(learned)
@@ -120,7 +120,7 @@ def _left_out(rows: list[dict[str, Any]]) -> list[str]:
 
 
 def notes(learned: Learned, options: LearnOptions) -> Iterator[str]:
-    """Yield what a user should know about what was learnt and may not expect."""
+    """Yield facts about the model that a user should know and may not expect."""
     cycles, kept = len(learned.components.scores), len(learned.components.sd)
     usual = PAPER_COMPONENTS if learned.paper else DEFAULT_COMPONENTS
     if options.components is None and kept < usual:
@@ -139,7 +139,7 @@ def notes(learned: Learned, options: LearnOptions) -> Iterator[str]:
 
 
 def require_filled(learned: Learned) -> None:
-    """Refuse a model whose gaps were still changing when the filling ended; UserError with the remedy."""
+    """Raise UserError, with the remedy, if gaps were still changing when their filling ended."""
     if learned.components.converged:
         return
     count, channels = people.never_shown(learned.cycles.mask, learned.row_subject)

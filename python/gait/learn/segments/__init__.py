@@ -1,1 +1,1 @@
-"""The segment prior: virtual markers, segments of a corpus, their Gaussian, sections of the blob."""
+"""Learn the segment prior: virtual markers, segments of a corpus, their Gaussian, sections of the blob."""

@@ -1,4 +1,4 @@
-"""Segments of recordings: motions on disk, cut and normalised for learning."""
+"""Cut recordings into segments, and normalise them for learning; motions are on disk."""
 
 from __future__ import annotations
 
@@ -15,8 +15,8 @@ from gait.learn.arrays import ArrayFile, Floats, Indices, Mask, release, stored
 from gait.learn.options import SegmentOptions
 from gait.learn.segments.motion import Motion
 
-MISSING = 0.2  # share of a segment's entries that may be missing; more, and it is left out
-USUAL = 0.5  # share of the frames, and of the recordings, in which a marker must be seen to be used
+MISSING = 0.2  # share of a segment's entries that may be missing
+USUAL = 0.5  # share of the frames, and of the recordings, in which a marker must be visible
 
 
 @dataclass(frozen=True)
@@ -28,7 +28,7 @@ class Recorded:
     source: Path
     names: tuple[str, ...]
     stature: float
-    table: Floats  #: (T, 3 J + 3) places and root, on disk
+    table: Floats  #: (T, 3 J + 3) positions and root, on disk
     people: list[Floats] = field(default_factory=list)  #: the same of people who were not recorded
 
     @property
@@ -43,7 +43,7 @@ class Recorded:
 
 
 class Corpus:
-    """Motions of recordings on disk: a context to put them in; `recordings` outlive it."""
+    """Motions of recordings on disk: a context in which to add them; `recordings` remain valid after it."""
 
     def __init__(self) -> None:
         self._file = ArrayFile()
@@ -72,12 +72,12 @@ class Corpus:
 
 @dataclass(frozen=True)
 class Table:
-    """N segments of F frames and J markers, one a row."""
+    """N segments of F frames and J markers, one per row."""
 
-    names: tuple[str, ...]  #: of the markers
+    names: tuple[str, ...]  #: names of the markers
     rows: Floats  #: (N, F * J * 3) on disk; statures, NaN where missing
-    recording: Indices  #: (N,) index into `recordings`, which are those that have segments
-    real: Mask  #: (N,) whether it was recorded, not of a made-up person
+    recording: Indices  #: (N,) index into `recordings`, which are those with segments
+    real: Mask  #: (N,) whether it was recorded rather than made for another person
     recordings: list[Recorded]
 
     @property
@@ -88,7 +88,7 @@ class Table:
 
 
 def usual_markers(recordings: Sequence[Recorded]) -> tuple[str, ...]:
-    """Return the markers that most of the recordings show most of the time, in their order."""
+    """Return the markers that most recordings show most of the time, in their order."""
     count: Counter[str] = Counter()
     for r in recordings:
         visible = np.isfinite(r.places).all(axis=2).mean(axis=0)
@@ -99,7 +99,7 @@ def usual_markers(recordings: Sequence[Recorded]) -> tuple[str, ...]:
 
 
 def tabulate(recordings: Sequence[Recorded], wanted: SegmentOptions) -> Table:
-    """Cut all recordings; with `headings` each segment is there as many times, rotated."""
+    """Cut all recordings; with `headings` there are that many rotated copies of each segment."""
     names = usual_markers(recordings)
     used: list[Recorded] = []
     recording: list[int] = []
@@ -123,9 +123,9 @@ def tabulate(recordings: Sequence[Recorded], wanted: SegmentOptions) -> Table:
 
 
 def segments(recorded: Recorded, names: Sequence[str], wanted: SegmentOptions, every: int = 1) -> Floats:
-    """Cut a recording into segments (n, F, J, 3) that are nearly whole, over the origin and facing +x.
+    """Cut a recording into segments (n, F, J, 3) that are nearly complete, above the origin and facing +x.
 
-    Only each `every`-th segment is taken.
+    Only every `every`-th segment is used.
     """
     columns = [recorded.names.index(name) if name in recorded.names else -1 for name in names]
     padded = np.concatenate([recorded.places, np.full((len(recorded.table), 1, 3), np.nan)], axis=1)
@@ -139,7 +139,7 @@ def segments(recorded: Recorded, names: Sequence[str], wanted: SegmentOptions, e
 
 
 def _of_others(recorded: Recorded, names: Sequence[str], wanted: SegmentOptions) -> Floats:
-    """Cut the people who were not recorded; each pair is cut at its own places in the recording."""
+    """Cut the motions of people who were not recorded; each pair has its own segments of the recording."""
     pairs = max(len(recorded.people) // 2, 1)
     found = [np.zeros((0, wanted.frames, len(names), 3))]
     for k, table in enumerate(recorded.people):
@@ -150,6 +150,6 @@ def _of_others(recorded: Recorded, names: Sequence[str], wanted: SegmentOptions)
 
 
 def _turned(cut: Floats, headings: int) -> list[Floats]:
-    """Return copies of segments: as they are; for 2 also rotated by 90 degrees, for 8 by each 45."""
+    """Return copies of segments: unrotated; for 2 also rotated by 90 degrees; for 8 by multiples of 45."""
     step = {0: 0.0, 2: np.pi / 2, 8: np.pi / 4}[headings]
     return [cut @ axis_rotation(2, step * k).T for k in range(max(headings, 1))]

@@ -1,11 +1,11 @@
-"""The segment prior: from segments to mean, modes, residual variance, and its uncertainty.
+"""Fit the segment prior: from segments to mean, modes and residual variance.
 
-The rest of the learning works in the main directions of all segments (`Basis`), where it is cheap.  The
-residuals of the people learnt from are too small for another person, so a factor of their variance is fitted
-to the likelihood of people left out in turn.  What lies outside the modes hardly changes within a segment,
-while the prior takes it as independent between frames: ten frames of it would count ten times.  So `gamma` is
-that factor times the number of frames that repeat each other.  The mixture of Gaussians over the scores, as
-the paper suggests, is fitted by expectation-maximisation.
+Most of the learning is done in the main directions of all segments (`Basis`), where it is cheap.  The
+residuals of the training subjects are too small for another person, so a factor of their variance is fitted
+to the likelihood of people left out in turn.  The variation outside the modes hardly changes within a
+segment, but the prior assumes that it is independent between frames, so ten frames would count ten times.
+Therefore `gamma` is that factor times the number of frames that repeat each other.  The mixture of Gaussians
+over the scores, suggested by the paper, is fitted by expectation-maximisation.
 """
 
 from __future__ import annotations
@@ -26,16 +26,16 @@ from gait.learn.prior.imputation import right_singular
 from gait.learn.prior.model import rounded
 from gait.learn.segments.corpus import Recorded, Table, tabulate
 
-FEWEST = 8  # segments
-EACH = 4  # segments per mode: with more modes they would be memorised
-USUAL_STATURE = 1.70  # metres, where no recording shows one
-DIRECTIONS = 160  # kept in the basis; a prior has 50 modes
-FILLING_ROUNDS = 10  # of filling in missing entries
+FEWEST = 8  # fewest segments
+EACH = 4  # segments per mode; with more modes they would be memorised
+USUAL_STATURE = 1.70  # metres, if no recording shows one
+DIRECTIONS = 160  # directions in the basis; a prior has 50 modes
+FILLING_ROUNDS = 10  # most rounds of filling missing entries
 FILLED = 1e-3  # relative change of their rms at which filling stops
-FOLDS = 10  # at most; with more people several are left out together
-LEAST_VARIANCE = 3.5e-7  # squared statures, about 1 mm^2: no joint is known better
-GAMMA = (1.0, 400.0)  # range of gamma: no person is nearer to the others than they are to each other
-MOST_COMPONENTS = 6  # Gaussians that are tried
+FOLDS = 10  # most folds; with more people, several are left out together
+LEAST_VARIANCE = 3.5e-7  # squared statures, about 1 mm^2; no joint is known better
+GAMMA = (1.0, 400.0)  # range of gamma; a new person is at least as unlike the others as these are
+MOST_COMPONENTS = 6  # most Gaussians that are tried
 EM_ROUNDS = 60
 EM_SETTLED = 1e-6  # relative gain of the log likelihood at which EM stops
 LEAST_WEIGHT = 1e-3  # of a component that is kept
@@ -70,7 +70,7 @@ def _prior(
     wanted: SegmentOptions,
     real: int,
 ) -> SegmentPrior:
-    """Convert the parts to statures; each component has its modes by their own variance."""
+    """Assemble the prior; each component has its own modes, by variance."""
     shape, means, modes, sds = (wanted.frames, len(table.names), 3), [], [], []
     for centre, covariance in zip(mixture.means, mixture.covariances, strict=True):
         values, turn = np.linalg.eigh(covariance)
@@ -108,12 +108,12 @@ def sections(prior: SegmentPrior) -> dict[str, blob.Array]:
 
 @dataclass(frozen=True)
 class Basis:
-    """Rows as mean + scores directions' + rest."""
+    """Rows, represented as mean + scores directions' + rest."""
 
     mean: Floats  #: (D,)
-    directions: Floats  #: (D, r) orthonormal, most variance first
+    directions: Floats  #: (D, r) orthonormal, largest variance first
     scores: Floats  #: (N, r)
-    rest: Floats  #: (N, J) squared length of what the directions leave of each marker
+    rest: Floats  #: (N, J) squared length of each marker's part that the directions do not explain
 
     def variance(self, moments: Floats) -> Floats:
         """Return the diagonal (D,) of directions moments directions', for moments (r, r)."""
@@ -137,7 +137,7 @@ def basis(rows: Floats, markers: int, most: int = DIRECTIONS) -> Basis:
 def filled(rows: Floats, modes: int) -> Floats:
     """Fill missing entries of rows (N, D) with their conditional means, on disk.
 
-    The Gaussian of so many modes and an isotropic rest is learnt from the filled rows in turn.
+    A Gaussian with this many modes and an isotropic rest is learnt from the filled rows, alternately.
     """
     gaps = [k for part in by_rows(rows) for k in _with_gaps(rows, part)]
     if not gaps:
@@ -209,14 +209,14 @@ def fitted(basis: Basis, rows: Mask, modes: int) -> Fitted:
 
 @dataclass(frozen=True)
 class Fold:
-    """Sums over the segments of people left out, sufficient for their likelihood."""
+    """Sums over the segments of people left out, which are sufficient for their likelihood."""
 
     signal: Floats  #: (k,) squared singular values of the modes in units of the residual
     along: Floats  #: (k,) mean squared coordinates of the segments along them
     beside: float  #: mean squared length of the rest
     size: int  #: number of coordinates D
     units: float  #: log determinant of the residual variances
-    alike: float  #: frames that repeat each other: 1 if the rest is new in each, F if it stays
+    alike: float  #: frames that repeat each other: 1 if the rest is new in each, F if it is constant
 
     def deviance(self, gamma: float) -> float:
         """Return twice the negative log likelihood of a segment, without constants."""
@@ -244,7 +244,7 @@ def fold(basis: Basis, model: Fitted, rows: Mask) -> Fold:
 
 
 def groups(subject: Indices, recording: Indices) -> list[Mask]:
-    """Return the rows to leave out together: of a person, or of a recording if there is one person."""
+    """Return the rows to leave out together: of a person, or of a recording if there is only one person."""
     of = subject if len(np.unique(subject)) > 1 else recording
     labels = np.unique(of)
     if len(labels) < 2:
@@ -253,7 +253,7 @@ def groups(subject: Indices, recording: Indices) -> list[Mask]:
 
 
 def gamma(folds: list[Fold]) -> float:
-    """Return the factor of the residual variance, every fold counting alike; 1 without folds."""
+    """Return the factor of the residual variance, with equal weights of folds; 1 without folds."""
     if not folds:
         return 1.0
 
@@ -286,11 +286,10 @@ class Mixture:
 def choose_mixture(
     basis: Basis, model: Fitted, folds: Sequence[Mask], real: Mask, components: int | None
 ) -> Mixture:
-    """Fit a mixture of so many components, or (None) of as many as predict the people left out best.
+    """Fit a mixture with this many components, or (None) with the number that predicts people left out best.
 
-    `model` is of all rows, and its modes are those of the mixture; `folds` are rows (N,) that are left out
-    together.  Only rows that are `real` (recorded) are predicted, but those of made-up people are left out
-    too.
+    `model`: of all rows; its modes are those of the mixture.  `folds`: rows (N,) that are left out together.
+    Only `real` (recorded) rows are predicted, but those of other people made from them are left out too.
     """
     scores = np.asarray((basis.scores - model.mean) @ model.vectors)
     if components is None:
@@ -300,7 +299,7 @@ def choose_mixture(
 
 
 def _held_out(scores: Floats, folds: Sequence[Mask], real: Mask, count: int) -> float:
-    """Return the mean log density of recorded scores left out, every fold counting alike."""
+    """Return the mean log density of recorded scores left out, with equal weights of folds."""
     found = []
     for out in folds:
         learnt = fit_mixture(scores[~out], count)

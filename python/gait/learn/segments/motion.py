@@ -1,11 +1,11 @@
-"""Markers of a recording from which segments are cut: at their rate, in statures, the floor at z = 0.
+"""Markers of a recording from which segments are cut: at the segments' rate, in statures, floor at z = 0.
 
-From joints or bones the markers are those of the default skeleton in the recording's pose and with the body's
-lengths; a file of angles alone has the default body, standing on its lower foot.
+From joints or bones, the markers are those of the default skeleton in the recording's pose and with the
+body's lengths; a file with only angles has the default body, standing on its lower foot.
 
-A few dozen recordings show a handful of people, and a prior of theirs alone is far too sure about the next
-one. So each recording also serves as it would look of people who hold their joints a little differently
-throughout and have longer or shorter limbs, in pairs of opposite changes.
+A few dozen recordings show only a few people, and a prior of only these is far too certain about the next
+person. Therefore each recording is also used as it would be of people who hold their joints a little
+differently throughout and have longer or shorter limbs, in pairs of opposite changes.
 """
 
 from __future__ import annotations
@@ -29,19 +29,19 @@ from gait.learn.segments.virtual_markers import MARKERS, marked_skeleton
 from gait.learn.solve import retarget
 from gait.learn.solve.body import RECORDED, Body
 
-PASS = 0.4  # of the segments' rate: faster motion is filtered out before sampling
+PASS = 0.4  # of the segments' rate; faster motion is filtered out before sampling
 ORDER = 4  # of the filter, forward and backward together
-STEEPEST = np.radians(2.5)  # a floor that slopes more is stairs or a climb
+STEEPEST = np.radians(2.5)  # a steeper floor is stairs or climbing
 TURNS = [CHANNELS.index(f"root_{name}") for name in ("yaw", "pitch", "roll")]
 ARMS = tuple(f"{s}_{joint}" for s in SIDES for joint in ("shoulder", "elbow"))
-PAIRS = 4  # of people per recording
-#: How differently people hold their joints in the same gait, degrees: about what the cyclic model leaves of a
-#: held-out person (section CHST).  Keys are a joint, or a joint and axis, which come first.
+PAIRS = 4  # pairs of people per recording
+#: Variation of people's joint angles in the same gait, degrees: about the residual of a held-out person in
+#: the cyclic model (section CHST).  Keys are a joint, or a joint and axis, which take precedence.
 POSTURE = {
     "neck": 6.0, "torso": 3.0, "shoulder_rotation": 12.0, "shoulder": 4.0, "elbow": 6.0, "hip_rotation": 4.0,
     "hip": 2.0, "knee": 3.0, "ankle": 3.0,
 }  # fmt: skip
-LENGTH = 0.05  # relative, of each length at the same stature
+LENGTH = 0.05  # relative sd of each length at the same stature
 FEET = [MARKERS.index(f"{s}_{part}") for s in SIDES for part in ("toe", "heel")]
 
 
@@ -67,13 +67,13 @@ class Motion:
     #: unknown.
     root: Floats
     stature: float  #: metres; NaN if the recording does not show it
-    people: Floats  #: (C, T, J, 3) places of people who were not recorded; C is 0 unless wanted
+    people: Floats  #: (C, T, J, 3) positions for people who were not recorded; C is 0 unless wanted
 
 
 def of(
     path: Path, read: Body | AngleTable, wanted: SegmentOptions, kept: tuple[int, int] | None = None
 ) -> Motion:
-    """Return the markers of what was read from a file, of all of it or the frames [start, stop) `kept`.
+    """Return the markers of a file's contents, in all frames or in the frames [start, stop) `kept`.
 
     UserError if the hips are hardly visible, or recorded markers are wanted from a file that has none.
     """
@@ -130,9 +130,9 @@ def _times(frames: int, fps: float, rate: float) -> Floats:
 
 
 def resample(places: Floats, fps: float, rate: float) -> Floats:
-    """Resample places (T, J, 3), NaN where missing, at another rate, without motion too fast for it.
+    """Resample positions (T, J, 3), NaN where missing, at another rate, without motion too fast for it.
 
-    A Butterworth filter forward and backward, then a cubic spline; gaps are bridged only for these.
+    A Butterworth filter forward and backward, then a cubic spline; gaps are bridged only within these.
     """
     frames, flat, at = len(places), places.reshape(len(places), -1), _times(len(places), fps, rate)
     result = np.full((len(at), flat.shape[1]), np.nan)
@@ -152,7 +152,7 @@ def resample(places: Floats, fps: float, rate: float) -> Floats:
 
 
 def _pose_of_angles(table: AngleTable) -> BodyPose:
-    """Return the pose of a person who faces +x; joints without any angle are at rest, such arms missing."""
+    """Return the pose of a person who faces +x; joints without angles are at rest, or missing in arms."""
     channels = np.zeros((table.frames, len(CHANNELS)))
     channels[:, : len(ANGLES)] = _at_rest(table.angles)
     if table.root is not None:
@@ -163,7 +163,7 @@ def _pose_of_angles(table: AngleTable) -> BodyPose:
 
 
 def _at_rest(angles: Floats) -> Floats:
-    """Set angles (T, A) that are never seen to 0, unless they are of an arm joint that is never seen."""
+    """Set angles (T, A) that are never known to 0, except of arm joints without any known angle."""
     result = angles.copy()
     joints = [name.rsplit("_", 1)[0] for name in ANGLES]
     visible = [bool(column.any()) for column in np.isfinite(angles).T]
@@ -191,9 +191,9 @@ def standing(place: Floats, body: Proportions) -> Floats:
 
 
 def displacements(pose: BodyPose, name: str) -> Floats:
-    """Return how far the markers of other people are from a person's, (2 PAIRS, T, J, 3), statures.
+    """Return displacements (2 PAIRS, T, J, 3), statures, of other people's markers from a person's.
 
-    `name` is that of the recording; its people are always the same ones.
+    `name`: of the recording, which determines the people.
     """
     rng = np.random.default_rng(zlib.crc32(name.encode()))
     skeleton = marked_skeleton(pose.proportions)
@@ -213,7 +213,7 @@ def displacements(pose: BodyPose, name: str) -> Floats:
 
 
 def _sunk(other: Floats, own: Floats) -> Floats:
-    """Return the vector (3,) by which another's lowest foot is higher than the person's on average."""
+    """Return the vector (3,) by which another's lowest foot is higher than this person's on average."""
     lowest = [places[:, FEET, 2].min(axis=1) for places in (other, own)]
     difference = lowest[0] - lowest[1]
     visible = difference[np.isfinite(difference)]

@@ -1,4 +1,4 @@
-"""A segment prior in figures and in words."""
+"""Summarise a segment prior in figures and in words."""
 
 from __future__ import annotations
 

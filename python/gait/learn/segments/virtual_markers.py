@@ -1,6 +1,6 @@
 """Virtual markers of the default skeleton: its joints, and points on the skin of its limbs (37 in all).
 
-A skin marker lies on the surface of a limb, at a share of the way from start to end and in a direction of the
+A skin marker is on the surface of a limb, at a share of the way from start to end and in a direction of the
 limb's frame (x forward, y left), so that it follows the body's proportions.
 """
 

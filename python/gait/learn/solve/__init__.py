@@ -1,1 +1,1 @@
-"""Recordings as bodies: fits of the skeleton to markers and joints, joint angles, lengths, pelvis motion."""
+"""From recordings to bodies: skeleton fits to markers and joints, joint angles, lengths, pelvis motion."""

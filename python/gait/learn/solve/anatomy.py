@@ -1,13 +1,14 @@
-"""Joint centres of Acclaim skeletons, moved to the anatomical ones of marker fits and ISB.
+"""Move joint centres of Acclaim skeletons to the anatomical ones of marker fits and ISB.
 
 ISB (Wu and others 2002, 2005) and marker fits put the knee midway between the epicondyles, the ankle midway
-between the malleoli, the shoulder at the head of the humerus.  The skeletons of the CMU database, which is
-learnt from most, have knees ahead of that and too high, ankles below, shoulders near the acromion and wrists
-in the hand: hips, knees and ankles flex more, by constants that are no one's gait.
+between the malleoli, and the shoulder at the head of the humerus.  In the skeletons of the CMU database, the
+main source of recordings, knees are too far forward and too high, ankles too low, shoulders near the acromion
+and wrists in the hand. Therefore hips, knees and ankles flex more, by constants that have nothing to do with
+gait.
 
 The constants are differences of means between people of CMU and people with markers from other laboratories
-(tests/bench/results/learn_people.md); where the knee divides the leg is anthropometric (Drillis and Contini
-1966), as CMU's skeletons differ in it.
+(tests/bench/results/learn_people.md); the ratio of thigh and shank is anthropometric (Drillis and Contini
+1966), as it varies among CMU's skeletons.
 """
 
 from __future__ import annotations
@@ -23,9 +24,9 @@ from gait.learn.rotations import frame_from, unit
 from gait.learn.solve import retarget
 from gait.learn.solve.body import Body
 
-BONES = {"lhipjoint", "rhipjoint", "lowerback"}  # that only Acclaim skeletons of CMU and their copies have
-THIGH = 0.506  # of the length of the leg: 0.245 of 0.245 + 0.239 statures, as in marker fits
-KNEE_AHEAD = 0.0135  # statures by which the knee is ahead of the anatomical one, in the thigh's axes
+BONES = {"lhipjoint", "rhipjoint", "lowerback"}  # only in Acclaim skeletons of CMU and their copies
+THIGH = 0.506  # share of the leg's length: 0.245 of 0.245 + 0.239 statures, as in marker fits
+KNEE_AHEAD = 0.0135  # statures by which the knee is in front of the anatomical one, in the thigh's axes
 ANKLE = (0.004, 0.0, 0.007)  # statures to the anatomical ankle, in the shank's axes
 SHOULDER = 0.019  # statures by which shoulders, and the arms with them, are too high
 WRIST = 0.014  # statures by which wrists are too far from the elbow

@@ -1,4 +1,4 @@
-"""Bodies: the joints and axes that the default skeleton needs, from the bones of recordings."""
+"""Bodies: the joints and axes needed for the default skeleton, from the bones of recordings."""
 
 from __future__ import annotations
 
@@ -14,9 +14,9 @@ from gait.learn.arrays import Floats
 from gait.learn.mocap.recording import NO_NOTES, FileNotes, Recording
 from gait.learn.rotations import frame_from, rotation_vectors, unit
 
-#: Names of bones in files; {S} = left/right, {s} = l/r.  Compared without case, punctuation and words that
-#: most bones begin or end with (Character1_, mixamorig:, Bip01, _jnt); the side may stand before or after the
-#: rest.  From CMU's ASF; cgspeed and Mixamo; Poser; 3ds Max; and bones named by the joint where they begin
+#: Names of bones in files; {S} = left/right, {s} = l/r.  Compared without case, punctuation and words with
+#: which most bones begin or end (Character1_, mixamorig:, Bip01, _jnt); the side may be before or after the
+#: rest.  From CMU's ASF; cgspeed and Mixamo; Poser; 3ds Max; and bones named by the joint at which they begin
 #: (Biovision, Xsens, SMPL).
 ALIASES = {
     "pelvis": ("hips", "pelvis", "hip", "root"),
@@ -39,16 +39,16 @@ ALIASES = {
     "{s}_hand": ("{s}hand", "{S}hand", "{S}wrist"),
 }
 REQUIRED = ("pelvis", "{s}_thigh", "{s}_shank", "{s}_foot")  #: without these there is no gait
-#: Why a body is refused that no rotation makes one.
+#: Why a body is rejected that cannot be rotated to a valid one.
 MIRRORED = (
     "axes are left-handed, or left and right are swapped: a mirror image fits a body; negate one axis, or "
     "swap the names"
 )
 RECORDED = "marker "  # prefix of names in `Body.joints` that are markers of the file
-UPRIGHT = 0.8  # of the leg's length by which the hips of a rest pose that stands are above the ankles
+UPRIGHT = 0.8  # least height of hips above ankles, over the leg's length, in an upright rest pose
 WORD = re.compile(r"[A-Z]+(?![a-z])|[A-Z]?[a-z]+|[0-9]+")
 SIDE_WORDS = {"l": "left", "left": "left", "r": "right", "right": "right"}
-MOST = 0.7  # share of the bones whose names begin or end with a word without meaning
+MOST = 0.7  # share of the bones whose names begin or end with a meaningless word
 BIPED = re.compile(r"^bip0*\d*")
 
 
@@ -56,7 +56,7 @@ BIPED = re.compile(r"^bip0*\d*")
 class Body:
     """Joints and axes of a person, T frames; metres, world with z up, NaN where missing."""
 
-    name: str  #: of the recording
+    name: str  #: name of the recording
     fps: float  #: frames per second
     #: Positions (T, 3): pelvis (the middle of the hips), neck, head (a point above the neck on the head's
     #: axis), {l,r}_{shoulder,elbow,wrist,hip,knee,ankle,toe}; markers of the file as RECORDED and their
@@ -75,7 +75,7 @@ class Body:
         return len(self.pelvis)
 
     def part(self, start: int, stop: int) -> Body:
-        """Return frames start to stop."""
+        """Return frames start <= t < stop."""
         return self._at(slice(start, stop))
 
     def reversed(self) -> Body:
@@ -91,7 +91,7 @@ class Body:
 def from_bones(recording: Recording) -> Body:
     """Return the body of a recorded skeleton; UserError if the pelvis or a bone of the legs is missing.
 
-    A neck that is missing begins where the head does; other parts are NaN.
+    A missing neck is assumed to begin at the head; other missing parts are NaN.
     """
     bones, lacking = _find_bones(recording)
     joints = _joints(recording, bones)
@@ -113,7 +113,7 @@ def from_bones(recording: Recording) -> Body:
 
 
 def level_pelvis(hips: Floats) -> Floats:
-    """Return the pelvis's axes (T, 3, 3) where only the vectors (T, 3) from right to left hip are known."""
+    """Return the pelvis's axes (T, 3, 3) if only the vectors (T, 3) from right to left hip are known."""
     return frame_from(np.broadcast_to([0.0, 0, 1], hips.shape), hips, exact="y")
 
 
@@ -122,7 +122,7 @@ def _plain(name: str) -> str:
 
 
 def _known_as(names: list[str]) -> dict[str, int]:
-    """Return the bone of each name that is looked for: of two the first, and a name as it is written."""
+    """Map each searched name to its bone (the first, if several), with the name as written."""
     known = {_plain(name): i for i, name in reversed(list(enumerate(names)))}
     for i, words in enumerate(_own_words([_words(name) for name in names])):
         stem = "".join(word for word in words if word not in SIDE_WORDS)
@@ -139,7 +139,7 @@ def _words(name: str) -> list[str]:
 
 
 def _own_words(names: list[list[str]]) -> list[list[str]]:
-    """Remove from names words with which most of them begin or end, such as that of the character."""
+    """Remove words with which most names begin or end, such as the character's name."""
     for at in (0, -1):
         while True:
             first = [words[at] for words in names if len(words) > 1 and words[at] not in SIDE_WORDS]
@@ -154,7 +154,7 @@ def _own_words(names: list[list[str]]) -> list[list[str]]:
 
 
 def _find_bones(recording: Recording) -> tuple[dict[str, int], tuple[str, ...]]:
-    """Return the bone of each key of ALIASES that is there, and the keys of bones that are not."""
+    """Return the bone for each key of ALIASES that exists, and the keys of missing bones."""
     known = _known_as(recording.bones)
     found, lacking = dict[str, int](), list[str]()
     for role, names in ALIASES.items():
@@ -195,7 +195,7 @@ def _joints(recording: Recording, bones: dict[str, int]) -> dict[str, Floats]:
 
 
 def _rest_stands(recording: Recording, bones: dict[str, int]) -> bool:
-    """Whether the rest pose is upright: the legs hang, and the head is above the hips."""
+    """Whether the rest pose is upright: legs point down, and the head is above the hips."""
     start = recording.rest_start
     for s in SIDES:
         hip, knee, ankle = (start[bones[f"{s}_{part}"]] for part in ("thigh", "shank", "foot"))
@@ -208,7 +208,7 @@ def _rest_stands(recording: Recording, bones: dict[str, int]) -> bool:
 def _rest_axes(
     recording: Recording, bones: dict[str, int], joints: dict[str, Floats]
 ) -> tuple[Floats, Floats]:
-    """Return the pelvis's axes as columns and the head's left, in the rest pose, which stands."""
+    """Return the pelvis's axes as columns, and the head's left, from an upright rest pose."""
     left, right = (recording.rest_start[bones[f"{s}_thigh"]] for s in SIDES)
     y = unit(np.array([left[0] - right[0], left[1] - right[1], 0.0]))
     return np.stack([np.cross(y, [0.0, 0, 1]), y, [0.0, 0, 1]], axis=-1), y
@@ -217,7 +217,7 @@ def _rest_axes(
 def _posed_axes(
     recording: Recording, bones: dict[str, int], joints: dict[str, Floats]
 ) -> tuple[Floats, Floats]:
-    """Return the same without a rest pose: on average the pelvis is level, and the head looks ahead."""
+    """Return the same without a rest pose, assuming that pelvis and head are level and forward on average."""
     pelvis, head = (recording.rotation[:, bones.get(part, 0)] for part in ("pelvis", "head"))
     hips = joints["l_hip"] - joints["r_hip"]
     axes = frame_from(_mean_in(pelvis, np.broadcast_to([0.0, 0, 1], hips.shape)), _mean_in(pelvis, hips), "y")
@@ -230,9 +230,9 @@ def _mean_in(frames: Floats, vectors: Floats) -> Floats:
 
 
 def _hinge(recording: Recording, upper: int, lower: int, stands: bool) -> Floats:
-    """Return the axis of a hinge in the rest pose: the file's own, else the main axis of its rotations.
+    """Return the axis of a hinge in the rest pose: the file's own, or else the main axis of its rotations.
 
-    Rotations are from the rest pose if it stands, where limbs are straight; else from the mean.
+    Rotations are relative to the rest pose if that is upright, with straight limbs, otherwise to the mean.
     """
     name = recording.bones[lower]
     if name in recording.hinges:
@@ -248,7 +248,7 @@ def _hinge(recording: Recording, upper: int, lower: int, stands: bool) -> Floats
 
 
 def _left_sign(joint: str, s: str, joints: dict[str, Floats], axis: Floats) -> float:
-    """Return the sign that makes the axis point left: knees bend back, elbows forward, on average."""
+    """Return the sign for which the axis points left: on average, knees bend back and elbows forward."""
     ends = ("hip", "knee", "ankle") if joint == "knee" else ("shoulder", "elbow", "wrist")
     a, b, c = (joints[f"{s}_{end}"] for end in ends)
     bends = np.einsum("ti,ti->t", np.cross(unit(b - a), unit(c - b)), axis)

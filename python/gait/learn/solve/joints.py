@@ -1,8 +1,8 @@
 """Bodies from joint positions: .csv like tracks and truth files, .trc of joint centres.
 
-Such files have no orientations: the pelvis is taken as level across the hips, and the hinge of a limb as
-across the bent limb, or across the body while the limb is straight.  Rotations about a limb's own axis are
-therefore rough.  A track also has the model's angles, which give the orientations.
+Such files have no orientations.  The pelvis is assumed level along the hips, and the hinge of a limb
+perpendicular to the bent limb, or, while it is straight, along the body's lateral axis.  Rotations about a
+limb's own axis are therefore rough.  A track also has the model's angles, which give the orientations.
 """
 
 from __future__ import annotations
@@ -25,19 +25,19 @@ from gait.learn.solve import skeleton_fit
 from gait.learn.solve.body import Body, level_pelvis
 from gait.learn.solve.kinematics import HINGES, ORIGINS, SEGMENTS, Pose, pose_skeleton
 
-STRAIGHT = 0.25  # sine of the bend at which limb and body count alike for the direction of the hinge
-#: Seconds from the middle of a gap within which a sample must lie on both sides for the gap to be bridged: as
-#: for samples of a cycle that count as observed (`gait.learn.cycles.cutting`), at a stride of 1.1 s.
+STRAIGHT = 0.25  # sine of the bend at which limb and body have equal weights for the direction of the hinge
+#: Seconds from the middle of a gap within which there must be a sample on both sides for the gap to be
+#: bridged, as for observed samples of a cycle (`gait.learn.cycles.cutting`), at a stride of 1.1 s.
 REACH = 0.75 / 16 * 1.1
-NEXT = 1 + 1e-9  # frames that the reach is at least
-FEWEST = 4  # samples that a bridging curve needs
+NEXT = 1 + 1e-9  # least reach in frames
+FEWEST = 4  # fewest samples for a bridging curve
 LIMB = ("shoulder", "elbow"), ("elbow", "wrist"), ("hip", "knee"), ("knee", "ankle"), ("ankle", "toe")
-#: Joints whose distance hardly changes.
+#: Pairs of joints whose distance hardly changes.
 BONES = (
     *(("neck", "head"), ("neck", "l_shoulder"), ("neck", "r_shoulder"), ("l_hip", "r_hip")),
     *((f"{s}_{upper}", f"{s}_{lower}") for s in SIDES for upper, lower in LIMB),
 )
-LONGEST = 2.0  # medians of a bone; unsmoothed joints triangulated from videos reach 1.4
+LONGEST = 2.0  # longest bone, over its median; unsmoothed joints triangulated from videos reach 1.4
 
 
 def from_table(path: Path, fps: float | None = None, zeros_missing: bool = False) -> Body:
@@ -94,7 +94,7 @@ def _hinge(joints: dict[str, Floats], s: str, chain: tuple[str, str, str]) -> Fl
 
 
 def _z_up(path: Path, places: dict[str, Floats]) -> dict[str, Floats]:
-    """Turn positions with y up to z up; up is from the ankles to the neck or, without one, to the hips."""
+    """Rotate positions with y up to z up; up is from the ankles to the neck or, without one, to the hips."""
     found = find_joints(list(places))
     tops = ("neck",) if "neck" in found else ("l_hip", "r_hip")
     if not {*tops, "l_ankle", "r_ankle"} <= set(found):
@@ -130,8 +130,8 @@ def _oriented(body: Body, angles: Floats) -> Body:
 def bridged(places: Floats, fps: float) -> Floats:
     """Fill short gaps in the coordinates (T, 3) of a joint, before angles are computed from several joints.
 
-    Gaps are filled where samples lie within REACH on both sides, 0.05 s or the next frame.  Rows in which a
-    coordinate stays missing are NaN.
+    Gaps are filled if there are samples within REACH on both sides, 0.05 s or the next frame.  Rows in which
+    a coordinate is still missing are NaN.
     """
     reach = max(REACH * fps, NEXT)
     result, frames = places.copy(), np.arange(len(places))
@@ -147,10 +147,10 @@ def bridged(places: Floats, fps: float) -> Floats:
 
 
 def require_whole(places: Mapping[str, Floats], where: Callable[[int], str]) -> None:
-    """Refuse positions (T, 3) by name in which a bone is far longer than usual; NaN is missing.
+    """Raise UserError for positions (T, 3), by name, in which a bone is far longer than usual; NaN: missing.
 
-    `where` describes a frame of the file, counted from 0, for the UserError, which names the misplaced joint
-    of the first such frame.
+    The error names the misplaced joint in the first such frame.  `where`: describes a frame of the file,
+    counted from 0, for the error.
     """
     names = find_joints(list(places))
     joints = {joint: places[name] for joint, name in names.items()}
@@ -175,7 +175,7 @@ def _distance(joints: Mapping[str, Floats], a: str, b: str) -> Floats:
 
 
 def _relative(lengths: Floats) -> Floats:
-    """Divide lengths (T,) by their median; NaN where there is none, or where the joints mostly coincide."""
+    """Divide lengths (T,) by their median; NaN if there is none, or if the joints mostly coincide."""
     visible = lengths[np.isfinite(lengths)]
     usual = float(np.median(visible)) if len(visible) else 0.0
     return lengths / usual if usual > 0 else np.full(len(lengths), np.nan)

@@ -41,14 +41,14 @@ def _moves() -> Mask:
 
 MOVES = _moves()
 
-#: The axes to the left of `gait.learn.solve.body.Body`, and the segments in which they are fixed.
+#: The axes of `gait.learn.solve.body.Body` that point left, and the segments in which they are fixed.
 HINGES = {"head": "head"} | {
     f"{s}_{joint}": f"{s}_{part}"
     for s in SIDES
     for joint, part in (("knee", "thigh"), ("elbow", "upper_arm"))
 }
 LIMBS = {"upper_arm": "z", "forearm": "z", "thigh": "z", "shank": "z", "foot": "x"}
-#: Length scales by which bodies differ: the stature, then logarithms of ratios, with the segments and axes
+#: Length scales in which bodies differ: the stature, then logarithms of ratios, with the segments and axes
 #: that they lengthen (1) or shorten (-1).  Scaling a segment also moves the origins of its children.
 SCALES: dict[str, list[tuple[str, str, float]]] = {
     "stature": [(name, "xyz", 1.0) for name in SEGMENTS],
@@ -59,7 +59,7 @@ SCALES: dict[str, list[tuple[str, str, float]]] = {
     **{part: [(f"{s}_{part}", axis, 1.0) for s in SIDES] for part, axis in LIMBS.items()},
     **{f"{part} left": [(f"l_{part}", axis, 1.0), (f"r_{part}", axis, -1.0)] for part, axis in LIMBS.items()},
 }
-#: Their standard deviations in people: of ratios to the stature, and of half the difference of the sides.
+#: Their standard deviations among people: of ratios to the stature, and of half the difference of the sides.
 SCALE_SD = np.array([0.25] + [0.04 if name.endswith(" left") else 0.08 for name in list(SCALES)[1:]])
 #: Table (F, 3, S): the log scale of a segment along each axis is this times the S log length scales.
 SCALE_TABLE = np.zeros((len(SEGMENTS), 3, len(SCALES)))
@@ -144,7 +144,7 @@ def segment_origins(log_scales: Floats) -> Floats:
 
 
 def pose_skeleton(pose: Pose, origins: Floats) -> PosedSkeleton:
-    """Put the skeleton with segment origins (F, 3) in the parents' axes into poses."""
+    """Pose the skeleton with segment origins (F, 3) in the parents' axes."""
     frames = len(pose)
     rotations, starts = np.empty((frames, len(SEGMENTS), 3, 3)), np.empty((frames, len(SEGMENTS), 3))
     axes, pivots = np.empty((2, frames, FREEDOMS - 3, 3))
@@ -173,7 +173,7 @@ def rotate_by(vectors: Floats) -> Floats:
 
 
 def _cross(a: Floats, b: Floats) -> Floats:
-    """Cross product over the last axis; faster than numpy's for many small vectors."""
+    """Compute the cross product over the last axis; faster than numpy's for many small vectors."""
     return np.stack(
         [
             a[..., 1] * b[..., 2] - a[..., 2] * b[..., 1],

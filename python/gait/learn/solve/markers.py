@@ -1,7 +1,7 @@
-"""Bodies from markers on the skin, by fitting the skeleton to them.
+"""Make bodies from markers on the skin, by fitting the skeleton to them.
 
-What the markers of a frame do not determine is missing there: a joint, an axis or the pelvis is NaN where its
-standard deviation by the fit's covariance is too large.  Nothing is interpolated.
+A joint, an axis or the pelvis is missing (NaN) in frames whose markers do not determine it, that is, if its
+standard deviation from the fit's covariance is too large.  Nothing is interpolated.
 """
 
 from __future__ import annotations
@@ -22,15 +22,15 @@ from gait.learn.solve.kinematics import HINGES, SEGMENTS, pose_skeleton, segment
 from gait.learn.solve.skeleton_fit import LengthInformation
 
 FEWEST_LABELS = 6
-EXTENT = 0.2, 4.0  # metres that a person's markers take up
-JOINT_SD = 0.03  # metres beyond which a joint is not known
-AXIS_SD = np.radians(15)  # beyond which a direction is not known
-WORST_RMS = 0.05  # metres: with a larger one, markers are not where their labels place them
-USUAL_RMS = 0.01  # metres: those of right-handed recordings are below
-BETTER = 0.6  # of the rms: with a mirror image that fits so well the axes are left-handed
+EXTENT = 0.2, 4.0  # metres; range of the extent of a person's markers
+JOINT_SD = 0.03  # metres; standard deviation from which a joint is unknown
+AXIS_SD = np.radians(15)  # standard deviation from which a direction is unknown
+WORST_RMS = 0.05  # metres; with a larger rms, markers are not where their labels place them
+USUAL_RMS = 0.01  # metres; those of right-handed recordings are smaller
+BETTER = 0.6  # if a mirror image has less than this share of the rms, the axes are left-handed
 UNKNOWN = 1e6  # variance, square metres or radians, of what a frame does not show
 CHUNK = 512  # frames processed at once
-#: What else to do about labels that are not known.
+#: Further remedy for unknown labels.
 STATIC = ", or give the trial in which knees and ankles were marked as --static"
 LEGS = [f"{s}_{joint}" for s in SIDES for joint in ("hip", "knee", "ankle")]
 
@@ -45,9 +45,9 @@ def from_markers(
 ) -> Body:
     """Fit the skeleton to markers (T, M, 3): metres, any axis up, NaN where missing.
 
-    Without a marker map the labels of known sets are used.  `log_scales` (S,) are the person's, if other
-    recordings show them too; by default they are fitted.  UserError if too few labels are known, or the
-    markers do not fit a body.
+    Without a marker map the labels of known sets are used.  `log_scales` (S,): the person's, if known from
+    several recordings; by default they are fitted.  UserError if too few labels are known, or the markers do
+    not fit a body.
     """
     points = np.where(np.isfinite(points).all(axis=2, keepdims=True), points, np.nan)
     columns, places = _placed(path, labels, points, marker_map)
@@ -74,7 +74,7 @@ def from_markers(
 def _without_bad_frames(fit: skeleton_fit.Fit) -> skeleton_fit.Fit:
     """Return the fit without the frames in which half of the markers are far from the body.
 
-    Nothing is known there.  Such frames are few; most show few markers, or another person's.
+    In these everything is unknown.  There are few of them; most have few markers, or another person's.
     """
     shown = np.flatnonzero(np.isfinite(fit.residual).any(axis=1))
     bad = shown[np.nanmedian(fit.residual[shown], axis=1) > WORST_RMS]
@@ -84,7 +84,7 @@ def _without_bad_frames(fit: skeleton_fit.Fit) -> skeleton_fit.Fit:
 
 
 def _require_right_handed(path: Path, observed: Floats, places: skeleton_fit.Points, rms: float) -> None:
-    """Refuse markers (T, K, 3) whose mirror image fits far better than they do, with `rms` metres."""
+    """Raise UserError for markers (T, K, 3) whose mirror image fits far better than `rms`, metres."""
     if rms < USUAL_RMS:
         return
     _, mirrored = skeleton_fit.length_information(observed * [1.0, 1.0, -1.0], places)
@@ -107,7 +107,7 @@ def length_information(
 def _placed(
     path: Path, labels: list[str], points: Floats, marker_map: MarkerMap | None
 ) -> tuple[list[int], skeleton_fit.Points]:
-    """Return the columns of the known markers and their places on the skeleton; some frames can be fitted."""
+    """Return columns and positions of the known markers; UserError if no frame can be fitted."""
     places = assign(path, labels, points, marker_map)
     columns, at = as_points(places)
     if not skeleton_fit.has_enough(points[:, columns]):
@@ -123,7 +123,7 @@ def _placed(
 
 
 def _require_size(path: Path, observed: Floats) -> None:
-    """Refuse markers (T, K, 3) whose extent is no person's, whatever their proportions."""
+    """Raise UserError for markers (T, K, 3) whose extent is impossible for a person."""
     shown = observed[np.isfinite(observed).all(axis=2).sum(axis=1) >= 2]
     extent = float(np.median(np.nanmax(np.nanmax(shown, axis=1) - np.nanmin(shown, axis=1), axis=1)))
     if not EXTENT[0] < extent < EXTENT[1]:
@@ -131,7 +131,7 @@ def _require_size(path: Path, observed: Floats) -> None:
 
 
 def as_points(places: Mapping[int, Landmark]) -> tuple[list[int], skeleton_fit.Points]:
-    """Return the columns of markers and their places as the fit takes them."""
+    """Return the columns of markers, and their positions as `Points` for the fit."""
     marks = list(places.values())
     return list(places), skeleton_fit.Points(
         segment=np.array([SEGMENTS.index(mark.segment) for mark in marks], np.intp),
@@ -143,9 +143,9 @@ def as_points(places: Mapping[int, Landmark]) -> tuple[list[int], skeleton_fit.P
 def assign(
     path: Path, labels: list[str], points: Floats, marker_map: MarkerMap | None
 ) -> dict[int, Landmark]:
-    """Return the landmark of each column whose marker is known and ever seen.
+    """Return the landmark of each column whose marker is known and sometimes visible.
 
-    In a file of several subjects ("Anna:LASI") the one with most known markers is taken.
+    In a file with several subjects ("Anna:LASI") the one with most known markers is used.
     """
     axes = segment_axes(labels, points)
     ever = np.asarray(np.isfinite(points).all(axis=2).any(axis=0))
@@ -201,7 +201,7 @@ def from_fit(
 
 
 def _certain(fit: skeleton_fit.Fit) -> tuple[Floats, Floats]:
-    """Joints (T, P, 3) and axes of `HINGES` (T, 5, 3), NaN where their standard deviation is too large."""
+    """Return joints (T, P, 3) and axes of `HINGES` (T, 5, 3), NaN where their sd is too large."""
     skeleton, origins = default_skeleton(), segment_origins(fit.log_scales)
     segment = np.array(skeleton.point_frames, np.intp)
     local = segment_scales(fit.log_scales)[segment] * skeleton.point_positions
@@ -226,7 +226,7 @@ def _sd(slopes: Floats, covariance: Floats) -> Floats:
 
 
 def _z_up(axes: Floats) -> Floats:
-    """Rotation to z up; up is the axis of the file that is nearest to the body's own, (T, 3)."""
+    """Return the rotation to z up; up is the file's axis nearest to the body's own, (T, 3)."""
     up = axes.mean(axis=0) if len(axes) else np.array([0.0, 0, 1])
     k = int(np.argmax(np.abs(up)))
     z = np.eye(3)[k] * np.sign(up[k])

@@ -1,4 +1,4 @@
-"""From files to bodies: the reader of each file format."""
+"""Read bodies from files: one reader per file format."""
 
 from __future__ import annotations
 
@@ -22,17 +22,17 @@ from gait.learn.solve.retarget import mean, median, overground
 from gait.learn.solve.skeleton_fit import LengthInformation
 
 RECORDINGS = {".amc": acclaim.read, ".bvh": bvh.read}
-LEG = 0.25, 1.5  #: metres from hip over knee to ankle: small children to more than the tallest man
-TOES, KNEES = 0.3, 0.05  #: cosine of toes and sine of knees that point back by more than noise
+LEG = 0.25, 1.5  #: metres from hip to knee to ankle: from small children to above the tallest adults
+TOES, KNEES = 0.3, 0.05  #: cosine of toes, and sine of knees, from which they point backwards beyond noise
 #: Suffixes of the files that can be read.
 SUFFIXES = (*RECORDINGS, *points.SUFFIXES, ".csv")
 
 
 def read(path: Path, options: LearnOptions = DEFAULT, log_scales: Floats | None = None) -> Body | AngleTable:
-    """Read a motion file by its suffix; a .csv may hold angles alone.
+    """Read a motion file, chosen by suffix; a .csv may contain only angles.
 
-    `log_scales` (S,) are the length scales of the person, for files of markers (`solve.markers`).  UserError
-    names file, place and remedy if the file is malformed or lacks a joint.
+    `log_scales` (S,): length scales of the person, for files of markers (`solve.markers`).  UserError names
+    file, place and remedy if the file is malformed or lacks a joint.
     """
     suffix = path.suffix.lower()
     if suffix == ".csv" and tables.holds_angles(path):
@@ -52,9 +52,9 @@ def read(path: Path, options: LearnOptions = DEFAULT, log_scales: Floats | None 
 
 
 def length_information(path: Path, options: LearnOptions = DEFAULT) -> LengthInformation | None:
-    """Return what a .c3d or .trc shows of the person's length scales; None if it holds no markers of a body.
+    """Return what a .c3d or .trc shows of the person's length scales; None if it has no markers of a body.
 
-    UserError if the file is malformed, or its markers are not known.
+    UserError if the file is malformed, or its markers are unknown.
     """
     labels, places, _ = points.read(path, options.fps)
     if _are_joints(labels, options):
@@ -63,7 +63,7 @@ def length_information(path: Path, options: LearnOptions = DEFAULT) -> LengthInf
 
 
 def _from_points(path: Path, options: LearnOptions, log_scales: Floats | None) -> Body:
-    """Read labelled points: centres of all joints (y up, as `gait track --trc` writes them), or markers."""
+    """Read labelled points: centres of all joints (y up, as from `gait track --trc`), or markers."""
     labels, places, fps = points.read(path, options.fps)
     if _are_joints(labels, options):
         upright = places @ Y_UP.T
@@ -80,12 +80,12 @@ def _are_joints(labels: list[str], options: LearnOptions) -> bool:
 
 
 def _require_size(path: Path, body: Body) -> None:
-    """Refuse legs that are not human, as positions in other units than metres make them."""
+    """Raise UserError for legs of impossible length, as with positions in other units than metres."""
     hip, knee, ankle = (
         np.stack([body.joints[f"{s}_{joint}"] for s in SIDES]) for joint in ("hip", "knee", "ankle")
     )
     legs = np.linalg.norm(hip - knee, axis=2) + np.linalg.norm(knee - ankle, axis=2)
-    if not np.isfinite(legs).any():  # later checks judge what is not seen
+    if not np.isfinite(legs).any():  # later checks deal with invisible joints
         return
     leg, (least, most) = float(np.nanmedian(legs)), LEG
     if not least <= leg <= most:
@@ -95,7 +95,7 @@ def _require_size(path: Path, body: Body) -> None:
 
 
 def _require_anatomy(path: Path, body: Body) -> None:
-    """Refuse a body that is mirrored or upside down: toes are ahead, and knees bend back in any motion."""
+    """Raise UserError for a mirrored or upside-down body: toes must point forward and knees bend back."""
     ahead, left = body.pelvis[:, :, 0], body.pelvis[:, :, 1]
     toes, knees, legs = list[Floats](), list[Floats](), list[Floats]()
     for s in SIDES:

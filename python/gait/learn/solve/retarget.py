@@ -1,8 +1,8 @@
-"""Bodies as channels of the default skeleton: lengths, the 24 angles, and the motion of the pelvis (root).
+"""Convert bodies to channels of the default skeleton: lengths, the 24 angles, and pelvis (root) motion.
 
-The frame of a limb has z against the limb and y along its hinge; angles are exact decompositions of the
-frames of neighbours (libgait/doc/model-format.md), continuous in time.  Root motion needs a level floor and a
-heading.
+In the frame of a limb, z points from its end to its start and y along its hinge; angles are exact
+decompositions of the frames of neighbours (libgait/doc/model-format.md), continuous in time.  Root motion
+needs a level floor and a heading.
 """
 
 from __future__ import annotations
@@ -18,9 +18,9 @@ from gait.learn.arrays import Floats, Indices
 from gait.learn.rotations import decompose, frame_from, unit, unwrap
 from gait.learn.solve.body import Body
 
-HEAD = 0.141  # neck to head top, statures: files end the head's bone at different heights
-#: Trunk and upper arms by anatomy, statures.  Recordings end the clavicle near the acromion and the spine
-#: near its back; here the shoulder's centre is lower, the neck further forward, the elbow nearer.
+HEAD = 0.141  # neck to top of the head, statures, as the head's bone ends at different heights in files
+#: Anatomical trunk and upper arms, statures.  In recordings the clavicle ends near the acromion and the spine
+#: near the back; here the shoulder's centre is lower, the neck further forward, and the elbow nearer.
 ANATOMICAL: dict[str, Any] = {
     "shoulder": (0.043, 0.1085, 0.2595),
     "neck": 0.3205,
@@ -28,25 +28,25 @@ ANATOMICAL: dict[str, Any] = {
     "head": (0.027, 0.0, 0.130),
     "upper_arm": 0.161,
 }
-#: Sine of the bend that a straight limb stays below in this share of the frames; elbows that bend in recorded
-#: walks reach 20 degrees at least.
+#: A straight limb has a smaller sine of the bend in this share of the frames; elbows that bend in recorded
+#: walks reach at least 20 degrees.
 STRAIGHT, MOSTLY = np.sin(np.radians(15)), 0.9
 BALL = 0.0235  # height of the ball of the foot in stance, statures
-#: Share of the height of a standing body of the parts that may be unknown, statures.
+#: Heights of the parts of a standing body that may be unknown, statures.
 SHARES = {"rise": Proportions().sole - BALL, "neck": Proportions().neck}
 HARMONICS = 4  # of the pelvis's path within a stride
-STANDING = 0.2  # m/s, mean speed below which the pelvis, not the path, gives the heading
-BELT = 0.4  # m/s, least speed of the ground under a person who stays in place on a treadmill
-STEADY = 0.4  # of the belt's speed: range of the velocities of feet that stand on it
-FEWEST = 20  # velocities of feet that show a belt
-STANCE_SHARE = 0.15  # share of frames in which a foot moves least: it is flat on the ground then
+STANDING = 0.2  # m/s; mean speed below which the heading is from the pelvis instead of the path
+BELT = 0.4  # m/s; least speed of a treadmill's belt
+STEADY = 0.4  # range of the velocities of feet that stand on a belt, over its speed
+FEWEST = 20  # fewest velocities of feet that show a belt
+STANCE_SHARE = 0.15  # share of frames, those in which a foot moves least, when it is flat on the ground
 
 
 @dataclass(frozen=True)
 class Measures:
     """A body's own lengths, metres: `gait.body.skeleton.Proportions` times the stature.
 
-    Lengths of parts that were never seen are NaN; the stature then follows from the rest.
+    Lengths of parts that are never visible are NaN; the stature then follows from the others.
     """
 
     stature: float
@@ -59,11 +59,11 @@ class Measures:
     shank: Floats
     foot: Floats  #: (2,) ankle to ball
     slope: Floats  #: (2,) of the line ankle to ball below the sole's direction, radians
-    sole: float  #: ankle over the ground in stance
+    sole: float  #: height of the ankle above the ground in stance
 
 
 def stance(body: Body, side: str) -> Indices:
-    """Return the frames in which the foot of a side lies flat: ankle and ball (if known) move least."""
+    """Return the frames in which the foot of a side is flat, as ankle and ball (if known) move least."""
     points = [body.joints[f"{side}_{joint}"] for joint in ("ankle", "toe")]
     known = [place for place in points if np.isfinite(place).any()]
     speed = sum((np.linalg.norm(np.gradient(p, axis=0), axis=1) for p in known), np.zeros(body.frames))
@@ -122,7 +122,7 @@ def _distance(a: Floats, b: Floats) -> float:
 
 
 def _in_frame(frames: Floats, vectors: Floats) -> Floats:
-    """Mean of vectors (T, 3) seen in frames (T, 3, 3)."""
+    """Mean of vectors (T, 3) in the axes of frames (T, 3, 3)."""
     visible = np.einsum("tji,tj->ti", frames, vectors)
     return np.asarray(np.nanmean(visible, axis=0)) if np.isfinite(visible).any() else np.full(3, np.nan)
 
@@ -163,9 +163,10 @@ def angles(body: Body, measures: Measures) -> Floats:
 
 
 def observed_angles(body: Body, measures: Measures, unknown: float = np.nan) -> Floats:
-    """Return `angles` with `unknown` rotations of limbs that stay straight: nothing shows these.
+    """Return `angles` with `unknown` for rotations of limbs that are always straight, as nothing shows them.
 
-    Their hinges have no direction, and a file's may be any; other angles are as if they were across the body.
+    The hinge of a straight limb has no direction, and that in a file is arbitrary; other angles are computed
+    as if it were along the body's lateral axis.
     """
     straight = _straight_limbs(body)
     across = {"elbow": torso_frames(body)[..., 1], "knee": body.pelvis[..., 1]}
@@ -208,10 +209,10 @@ def _centred(table: Floats) -> Floats:
 
 
 def generic_proportions(bodies: Sequence[Measures | None]) -> Proportions:
-    """Return proportions for people not measured: recorded legs and forearms, the rest `ANATOMICAL`.
+    """Return proportions for people who were not measured: recorded legs and forearms, the rest `ANATOMICAL`.
 
-    Where hips and neck lie in a body is a matter of definition that images cannot settle.  ANATOMICAL
-    minimises the tracker's errors on the rendered bodies (MakeHuman) of the development clips of
+    The positions of hips and neck in a body are a matter of definition, which images do not determine.
+    ANATOMICAL minimises the tracker's errors on the rendered bodies (MakeHuman) of the development clips of
     ../shared/data, which are therefore no independent test; tests/bench/learn_floor.py measures its cost on
     CMU's recordings.
     """
@@ -226,7 +227,8 @@ def own_proportions(m: Measures) -> Proportions:
 def mean_proportions(bodies: Sequence[Measures | None]) -> Proportions:
     """Return mean proportions of bodies in statures, made symmetric.
 
-    Each part is averaged over the bodies that have it, generic if none does; None is a body without any.
+    Each part is averaged over the bodies that have it, and generic if none does; None: a body without any
+    part.
     """
     generic, measured = Proportions(), [m for m in bodies if m is not None]
 
@@ -264,7 +266,7 @@ def mean_proportions(bodies: Sequence[Measures | None]) -> Proportions:
 def overground(body: Body) -> Body:
     """Move a person on a treadmill, or an animation in place, over the ground, and note the belt's speed.
 
-    Bodies that travel, and feet that do not slide at one speed, stay as they are.
+    Bodies that travel, or whose feet do not slide at a constant speed, are not changed.
     """
     path = body.joints["pelvis"]
     visible = np.flatnonzero(np.isfinite(path[:, 0]))
@@ -284,10 +286,10 @@ def overground(body: Body) -> Body:
 
 
 def _belt(body: Body) -> Floats:
-    """Return the velocity (2,) of the ground under a person who stays in place, metres/s; 0 if none shows.
+    """Return the velocity (2,) of the ground under a person who stays in place, m/s; 0 if there is none.
 
-    While a foot stands it moves with the belt, and at no other time at one velocity for long: the velocity is
-    where those of ankles or balls, whichever agree better, are densest.  Heights decide nothing, as
+    A standing foot moves with the belt, and at no other time has a constant velocity for long.  So the
+    velocity is where those of ankles or balls, whichever agree better, are densest.  Heights are not used, as
     belts may slope.
     """
     best, narrowest = np.zeros(2), STEADY
@@ -307,7 +309,7 @@ def _belt(body: Body) -> Floats:
 
 
 def _densest(values: Floats, share: float) -> Indices:
-    """Return the indices of the share of the values that lies closest together."""
+    """Return the indices of the share of the values that are closest together."""
     order = np.argsort(values, kind="stable")
     count = max(3, int(share * len(values)))
     width = values[order[count - 1 :]] - values[order[: len(order) - count + 1]]
@@ -336,9 +338,9 @@ def level(body: Body) -> tuple[Body, float]:
 
 
 def levelled(body: Body, steepest: float = np.inf) -> Body:
-    """Put a body on a level floor, with the pelvis axes in their standard place.
+    """Put a body on a level floor, with standard pelvis axes.
 
-    A floor that slopes more than `steepest`, radians, is stairs and stays.
+    A floor steeper than `steepest`, radians, is stairs and is not changed.
     """
     level_body, slope = level(body)
     return align_pelvis(level_body if abs(slope) < steepest else body)
@@ -347,8 +349,8 @@ def levelled(body: Body, steepest: float = np.inf) -> Body:
 def align_pelvis(body: Body) -> Body:
     """Make the pelvis axes independent of the placement of markers.
 
-    The left axis becomes the line between the hips, and the forward axis is level on average: the pelvis of a
-    file may be pitched by an unknown constant.
+    The left axis becomes the line between the hips, and the forward axis is level on average, as the pelvis
+    in a file may be pitched by an unknown constant.
     """
     if not np.isfinite(body.pelvis).any():
         return body
@@ -361,7 +363,7 @@ def align_pelvis(body: Body) -> Body:
 
 
 def _robust_line(design: Floats, values: Floats) -> Floats:
-    """Fit a line by least squares, then twice more without points farther than twice the median error."""
+    """Fit a line by least squares, then twice again without points farther than twice the median error."""
     keep = np.ones(len(values), bool)
     line: Floats = np.zeros(2)
     for _ in range(3):
@@ -381,8 +383,8 @@ def root_channels(body: Body, measures: Measures, period: float) -> tuple[Floats
     """Return root channels (T, 6) of a level body and its heading (T,); `period` is frames per stride.
 
     Channels are root_forward ... root_yaw: statures per stride, statures, statures, radians; NaN where the
-    pelvis is not seen.  The heading is the direction of travel, radians, constant before the pelvis is first
-    seen and after the last time; NaN if it is never seen.
+    pelvis is not visible.  The heading is the direction of travel, radians, constant before the pelvis is
+    first visible and after it is last visible; NaN if it never is.
     """
     path, frames = body.joints["pelvis"], body.frames
     visible = np.isfinite(path[:, 0])
@@ -410,7 +412,7 @@ def root_channels(body: Body, measures: Measures, period: float) -> tuple[Floats
 
 
 def ground_height(body: Body, stature: float) -> float:
-    """Return the height of the ground under the feet in stance, from their balls, else from their ankles."""
+    """Return the height of the ground under the feet in stance, from the balls, or else from the ankles."""
     for joint, height in (("toe", BALL), ("ankle", Proportions().sole)):
         lowest = median(np.array([median(body.joints[f"{s}_{joint}"][stance(body, s), 2]) for s in SIDES]))
         if np.isfinite(lowest):
@@ -419,7 +421,7 @@ def ground_height(body: Body, stature: float) -> float:
 
 
 def _smooth_path(path: Floats, period: float) -> tuple[Floats, Floats, Floats]:
-    """Return a slow polynomial through the path (T, 2), its derivative, and polynomial plus stride."""
+    """Return a slow polynomial through the path (T, 2), its derivative, and it plus a periodic stride."""
     frames = len(path)
     t = (np.arange(frames) - frames / 2) / period
     degree = 1 if frames < 1.5 * period else 2 if frames < 4 * period else 5
@@ -436,7 +438,7 @@ def _smooth_path(path: Floats, period: float) -> tuple[Floats, Floats, Floats]:
 
 
 def _mean_over(values: Floats, period: float) -> Floats:
-    """Return the mean (T,) over one stride about each frame, shorter at the ends, without NaN."""
+    """Return the mean (T,) over one stride around each frame, shorter at the ends, without NaN."""
     visible = np.isfinite(values)
     width = max(1, round(period))
     window = np.ones(width)

@@ -1,12 +1,12 @@
 """Least-squares fit of the default skeleton to points on a body: lengths of the subject, poses of all frames.
 
-The points are fixed to segments at places known roughly; they may be markers on the skin or joints.  First
-the subject's length scales and the points' true places are found together with the poses of some frames
-(Levenberg-Marquardt, the poses eliminated by their Schur complement), then the poses of all frames.  The loss
-is robust (Cauchy).  Weak priors fix what the points do not determine; the covariance shows it.
+The points are fixed to segments at roughly known positions; they may be skin markers or joints.  First the
+subject's length scales and the points' true positions are estimated together with the poses of some frames
+(Levenberg-Marquardt, eliminating the poses by the Schur complement), then the poses of all frames.  The loss
+is robust (Cauchy).  Weak priors fix what the points do not determine, which the covariance shows.
 
-Recordings of one person combine through `LengthInformation`: what each shows of the length scales, in
-information form, adds up.
+Recordings of one person are combined through `LengthInformation`, their information about the length scales,
+which is additive.
 """
 
 from __future__ import annotations
@@ -30,21 +30,21 @@ from gait.learn.solve.kinematics import (
 )
 
 SIZES = (0.5, 2.5)  # metres of stature to start from
-SUBJECT_FRAMES = 60  # frames from which the subject is found
-FEWEST = 3  # points in a frame that is fitted
-MANY = 0.7  # of the most points in a frame: frames with that many serve to find the subject
-BAD = 4  # times the median loss per point: the frame may be in a wrong minimum
+SUBJECT_FRAMES = 60  # frames from which the subject is estimated
+FEWEST = 3  # fewest points in a frame that is fitted
+MANY = 0.7  # share of the largest number of points that frames for estimating the subject must have
+BAD = 4  # multiple of the median loss per point from which a frame may be in a wrong minimum
 CHUNK = 128  # frames solved at once
-NOISE = 0.01  # metres: skin over bone, and what 24 angles cannot reproduce
-ANGLE_SD = 1.5  # radians about the rest pose: decides only what the points leave open
+NOISE = 0.01  # metres: skin over bone, and motion that 24 angles cannot reproduce
+ANGLE_SD = 1.5  # radians about the rest pose; only matters for what the points do not determine
 LIMIT_SD = 0.05  # radians beyond a limit that count as one sd
-ROOT_SD = 100.0  # metres and radians: fixes a pelvis that no point determines
-OUTLIERS = (30.0, 10.0, 3.0)  # residuals beyond this many NOISE lose weight: first rounds to last
-EFFECTIVE = 5.0  # independent frames that all frames are worth: neighbours share their errors
+ROOT_SD = 100.0  # metres and radians; fixes a pelvis that no point determines
+OUTLIERS = (30.0, 10.0, 3.0)  # residuals beyond this many NOISE lose weight, in first to last rounds
+EFFECTIVE = 5.0  # number of independent frames that all frames are worth, as neighbours share errors
 STATURE = 1.7  # metres, of the generic body
 #: Levenberg-Marquardt: most rounds, first damping, least, most, and its factors after a better or worse step.
 ROUNDS, DAMPING, LEAST_DAMPING, MOST_DAMPING, BETTER, WORSE = 30, 1e-3, 1e-7, 1e4, 0.2, 10.0
-GAIN = 1e-4  # of the loss: a step that gains less is the last
+GAIN = 1e-4  # relative gain of the loss; a step that gains less is the last
 _RANGES = {
     "neck": (-80, 80), "shoulder_flexion": (-120, 190), "shoulder_abduction": (-60, 120),
     "shoulder_rotation": (-120, 120), "elbow": (-5, 160), "hip_flexion": (-60, 140),
@@ -55,7 +55,7 @@ _RANGES = {
 LIMITS = np.radians(
     [[next(r[k] for part, r in _RANGES.items() if part in name) for name in ANGLES] for k in (0, 1)]
 )
-#: Weights of the segments' points in the rigid alignment: limbs move against the trunk.
+#: Weights of the segments' points in the rigid alignment, as limbs move relative to the trunk.
 TRUNK = np.array([1.0 if name in ("pelvis", "torso") else 0.05 for name in SEGMENTS])
 LENGTHS = len(SCALE_SD)
 _PRIOR_MEAN = np.array([np.log(STATURE)] + [0.0] * (LENGTHS - 1))  # log length scales of the generic body
@@ -63,7 +63,7 @@ _PRIOR_MEAN = np.array([np.log(STATURE)] + [0.0] * (LENGTHS - 1))  # log length 
 
 @dataclass(frozen=True)
 class LengthInformation:
-    """Gaussian over log length scales (S,) in information form: independent sources add."""
+    """Gaussian over log length scales (S,) in information form, in which independent sources add."""
 
     matrix: Floats  #: (S, S) inverse covariance; singular where nothing is known
     vector: Floats  #: (S,) the matrix times the mean
@@ -81,12 +81,12 @@ NO_INFORMATION = LengthInformation(np.zeros((LENGTHS, LENGTHS)), np.zeros(LENGTH
 
 
 def log_bayes_factor(one: LengthInformation, other: LengthInformation) -> float:
-    """Return the log of how much better one body explains two findings than two bodies do."""
+    """Return the log Bayes factor of one body against two bodies, given two measurements."""
     return _evidence(one + other) + _evidence(NO_INFORMATION) - _evidence(one) - _evidence(other)
 
 
 def _evidence(found: LengthInformation) -> float:
-    """Log probability of what was found of one person, up to a constant of the findings."""
+    """Log probability of measurements of one person, up to a constant of these."""
     known = PEOPLE + found
     return float(known.vector @ known.mean() - np.linalg.slogdet(known.matrix)[1]) / 2
 
@@ -96,8 +96,8 @@ class Points:
     """M points fixed to segments."""
 
     segment: Indices  #: (M,) indices into `kinematics.SEGMENTS`
-    at: Floats  #: (M, 3) places in the segments' axes, statures
-    sd: Floats  #: (M,) how far the points may be from there, statures
+    at: Floats  #: (M, 3) positions in the segments' axes, statures
+    sd: Floats  #: (M,) standard deviations of these positions, statures
 
 
 @dataclass
@@ -105,7 +105,7 @@ class Fit:
     """Result of `fit`: T frames, M points, S length scales."""
 
     log_scales: Floats  #: (S,) of the subject, in the order of `kinematics.SCALES`
-    local: Floats  #: (M, 3) places of the points in their segments, metres
+    local: Floats  #: (M, 3) positions of the points in their segments, metres
     pose: Pose
     residual: Floats  #: (T, M) distance from the observed points, metres; NaN where missing
     covariance: Floats  #: (T, 30, 30) of the poses, metres and radians
@@ -114,8 +114,8 @@ class Fit:
 def fit(observed: Floats, points: Points, log_scales: Floats | None = None) -> Fit:
     """Fit subject and poses to observed points (T, M, 3).
 
-    Points are metres in any right-handed axes, NaN where missing.  Log length scales (S,) are kept if they
-    are given; then only places of points and poses are found.  ValueError if no frame has three points.
+    Points are metres in any right-handed axes, NaN where missing.  If log length scales (S,) are given, they
+    are fixed, and only positions of points and poses are estimated.  ValueError if no frame has three points.
     """
     data = _observations(observed, points)
     picked = _frames_with_most(data.weight > 0)
@@ -140,7 +140,7 @@ def length_information(observed: Floats, points: Points) -> tuple[LengthInformat
 def usual_rms(residual: Floats) -> float:
     """Return the median over frames of the rms distance of their points (T, M), metres; NaN without any.
 
-    A few frames in which points are mistaken do not count against all others.
+    A few frames with wrong points therefore have no influence.
     """
     squares, count = np.nansum(residual**2, axis=1), np.isfinite(residual).sum(axis=1)
     known = count > 0
@@ -148,7 +148,7 @@ def usual_rms(residual: Floats) -> float:
 
 
 def pelvis_rotations(angles: Floats, points: Points, observed: Floats) -> Floats:
-    """Return the pelvis rotations (T, 3, 3) that lay bodies of given angles (T, 24) onto points.
+    """Return the pelvis rotations (T, 3, 3) that align bodies with given angles (T, 24) with points.
 
     `observed` is as for `fit`; NaN where fewer than three points or not all angles are known.
     """
@@ -182,11 +182,11 @@ def _observations(observed: Floats, points: Points) -> _Observations:
 
 @dataclass(frozen=True)
 class _Subject:
-    """Some frames of a subject, its shape and its poses in them."""
+    """Some frames of a subject, with its shape and its poses in them."""
 
     data: _Observations
     points: Points
-    shape: Floats  # (S + 3 M,) log length scales, then shifts of the points from where they should be, metres
+    shape: Floats  # (S + 3 M,) log length scales, then shifts of points from expected positions, metres
     pose: Pose
 
     @property
@@ -195,12 +195,12 @@ class _Subject:
 
     @property
     def share(self) -> float:
-        """How many times the errors of these frames are counted."""
+        """Weight of the errors of these frames."""
         return len(self.data.weight) / EFFECTIVE
 
     @property
     def local(self) -> Floats:
-        """Places (M, 3) of the points in their segments, metres."""
+        """Positions (M, 3) of the points in their segments, metres."""
         scale = segment_scales(self.log_scales)[self.points.segment]
         return scale * self.points.at + self.shape[LENGTHS:].reshape(-1, 3)
 
@@ -221,7 +221,7 @@ def _frames_with_most(visible: Mask) -> Indices:
 
 
 def _fit_subject(few: _Observations, points: Points, known: Floats | None) -> _Subject:
-    """Find a subject from some frames: first its size, then poses, then everything together."""
+    """Estimate a subject from some frames: first its size, then poses, then everything together."""
     start = _at_rest(len(few.weight))
     if known is None:
         size = np.median(_aligned(start, points.at, ORIGINS, few)[1])
@@ -238,7 +238,7 @@ def _fit_subject(few: _Observations, points: Points, known: Floats | None) -> _S
 
 
 def _refine(start: _Subject, fixed: bool) -> _Subject:
-    """Optimise shape and poses together from a start; log scales that are fixed stay as they are."""
+    """Optimise shape and poses together from a start; `fixed` log scales are not changed."""
     mean, sd = start.prior()
     weight, free = start.share / sd**2, slice(LENGTHS if fixed else 0, None)
 
@@ -271,14 +271,14 @@ def _refine(start: _Subject, fixed: bool) -> _Subject:
 
 
 def _information(subject: _Subject) -> LengthInformation:
-    """Return what the frames alone show of the length scales, with places of points and poses marginalised.
+    """Return the frames' information about the length scales, with points and poses marginalised out.
 
-    It is quadratic about the subject found (Gauss-Newton).
+    It is a quadratic approximation at the subject found (Gauss-Newton).
     """
     mean, sd = subject.prior()
     share = subject.share
     weight = share / sd**2
-    weight[:LENGTHS] = 0  # the prior is no observation
+    weight[:LENGTHS] = 0  # the prior is not an observation
     matrix, slope, _ = _reduced(subject, OUTLIERS[-1], 0.0, (weight, mean))
     solved = np.linalg.solve(matrix[LENGTHS:, LENGTHS:], np.c_[matrix[LENGTHS:, :LENGTHS], slope[LENGTHS:]])
     across = matrix[:LENGTHS, LENGTHS:]
@@ -291,10 +291,10 @@ def _information(subject: _Subject) -> LengthInformation:
 def _reduced(
     s: _Subject, outlier: float, damping: float, prior: tuple[Floats, Floats]
 ) -> tuple[Floats, Floats, Floats]:
-    """Set up the normal equations of the shape about a subject, the poses eliminated.
+    """Set up the normal equations of the shape about a subject, with poses eliminated.
 
-    `prior` are inverse variances and means of the shape.  Returns the matrix (S + 3 M, S + 3 M), the slope,
-    and what gives the steps of the poses back, (K, 30, S + 3 M + 1).
+    `prior`: inverse variances and means of the shape.  Returns the matrix (S + 3 M, S + 3 M), the slope, and
+    an array (K, 30, S + 3 M + 1) from which the steps of the poses follow.
     """
     few, pose = s.data, s.pose
     body = pose_skeleton(pose, segment_origins(s.log_scales))
@@ -326,7 +326,7 @@ def _reduced(
 
 
 def _fit_all_frames(data: _Observations, subject: _Subject, picked: Indices) -> Pose:
-    """Fit all frames, each started from the nearest picked one; bad ones again from good neighbours."""
+    """Fit all frames, each from the nearest picked one, and bad ones again from good neighbours."""
     local, origins = subject.local, segment_origins(subject.log_scales)
     frames = np.arange(len(data.weight))
     nearest = np.argmin(np.abs(frames[:, None] - picked[None]), axis=1)
@@ -365,7 +365,7 @@ def _at_rest(frames: int) -> Pose:
 
 
 def _aligned(pose: Pose, local: Floats, origins: Floats, data: _Observations) -> tuple[Pose, Floats]:
-    """Move bodies of given angles rigidly onto the points, trunk first; also ratios of their sizes (T,)."""
+    """Align bodies with given angles rigidly with the points, trunk first; also return size ratios (T,)."""
     still = _at_rest(len(pose))
     still.angles = pose.angles
     model = pose_skeleton(still, origins).points(local, data.segment)
@@ -386,7 +386,7 @@ def _aligned(pose: Pose, local: Floats, origins: Floats, data: _Observations) ->
 def _fit_poses(
     data: _Observations, local: Floats, origins: Floats, start: Pose, outlier: float
 ) -> tuple[Pose, Floats]:
-    """Find the poses of all frames from a start; poses and losses (T,)."""
+    """Find the poses of all frames from a start; return poses and losses (T,)."""
     pose, cost = start[:], np.empty(len(start))
     for first in range(0, len(start), CHUNK):
         chunk = np.arange(first, min(first + CHUNK, len(start)))
@@ -458,7 +458,7 @@ def _add_prior(hessian: Floats, gradient: Floats, angles: Floats) -> None:
 
 
 def _beyond(angles: Floats) -> Floats:
-    """How far angles are beyond the limits, radians."""
+    """Amount by which angles exceed their limits, radians."""
     return np.asarray(angles - np.clip(angles, *LIMITS))
 
 

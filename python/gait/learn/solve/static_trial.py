@@ -1,8 +1,8 @@
 """Static trials: a standing person with markers that the motion recordings lack.
 
-Laboratories mark knees and ankles while a person stands, then take those markers off and follow clusters of
-others.  The skeleton fitted to the static trial gives the person's lengths and the places of all markers in
-it, known by label or not; with both the recordings are fitted.
+Laboratories mark knees and ankles while a person stands, then remove those markers and record clusters of
+others. The skeleton fitted to the static trial gives the person's lengths and the positions of all its
+markers, including those with unknown labels; both are used to fit the recordings.
 """
 
 from __future__ import annotations
@@ -23,11 +23,11 @@ from gait.learn.options import LearnOptions
 from gait.learn.solve import markers, skeleton_fit
 from gait.learn.solve.kinematics import SEGMENTS, pose_skeleton, segment_origins, segment_scales
 
-FRAMES = 60  # of the trial that are fitted: all of a still person are alike
-SD = 0.004  # statures by which skin moves from where it was while standing
-CLEAR = 1.25  # times as far away as the nearest bone the next one has to be
-FARTHEST = 0.12  # statures from a bone: others sit on clothes, wands or the floor
-#: Bones by which markers of unknown labels find their segment: the joints at their ends.
+FRAMES = 60  # frames of the trial that are fitted, as all of a still person are alike
+SD = 0.004  # statures by which skin moves from its position while standing
+CLEAR = 1.25  # least ratio of the distances to the second nearest and the nearest bone
+FARTHEST = 0.12  # statures from a bone; markers further away are on clothes, wands or the floor
+#: Bones that determine the segment of markers with unknown labels: the joints at their ends.
 BONES = {"pelvis": ("l_hip", "r_hip"), "torso": ("pelvis", "neck"), "head": ("neck", "head_top")} | {
     f"{s}_{segment}": (f"{s}_{a}", f"{s}_{b}")
     for s in "lr"
@@ -43,9 +43,9 @@ BONES = {"pelvis": ("l_hip", "r_hip"), "torso": ("pelvis", "neck"), "head": ("ne
 
 @dataclass(frozen=True)
 class Calibration:
-    """What a static trial shows of a person."""
+    """Result of a static trial."""
 
-    markers: MarkerMap  #: places of the markers on the skeleton
+    markers: MarkerMap  #: positions of the markers on the skeleton
     log_scales: Floats  #: (S,) of the skeleton
 
 
@@ -57,7 +57,7 @@ def calibrate(path: Path, options: LearnOptions) -> Calibration:
     rows = np.unique(np.linspace(0, len(places) - 1, FRAMES).round().astype(int))
     places = places[rows]
     try:
-        markers.from_markers(path, labels, places, fps, options.markers)  # all its checks
+        markers.from_markers(path, labels, places, fps, options.markers)  # for its checks
     except UserError as error:
         words = "a static trial needs known markers at hips, knees and ankles"
         raise UserError(f"--static {error}; {words}") from None
@@ -77,13 +77,13 @@ def calibrate(path: Path, options: LearnOptions) -> Calibration:
 
 
 def _tuple(local: Floats, scales: Floats, mark: Landmark) -> tuple[float, float, float]:
-    """Return a place in the axes of a segment, metres, in statures."""
+    """Convert a position in the axes of a segment from metres to statures."""
     x, y, z = (local / scales[SEGMENTS.index(mark.segment)]).tolist()
     return x, y, z
 
 
 def _on_nearest_bone(place: Floats, fit: skeleton_fit.Fit) -> Landmark | None:
-    """Return where a marker of an unknown label (T, 3) sits; None if it is between bones or far from all."""
+    """Return the position of a marker (T, 3) with unknown label; None if between bones or far from all."""
     visible = np.isfinite(place).all(axis=1)
     if not visible.any():
         return None
@@ -114,10 +114,10 @@ def _distance(place: Floats, start: Floats, end: Floats) -> Floats:
 def serving(
     paths: Sequence[Path], persons: Sequence[str], statics: Sequence[Path], owners: Sequence[str]
 ) -> list[Path | None]:
-    """Return the static trial of each recording, None without: of its person, else of its folder.
+    """Return the static trial for each recording, or None: of its person, or else in its folder.
 
-    Of several it is the one whose name begins most alike.  `persons` and `owners` are the people of
-    recordings and trials.  UserError if a trial serves no recording.
+    Of several, it is the one whose name has the longest common beginning.  `persons`, `owners`: people of
+    recordings and trials.  UserError if a trial is not used.
     """
     result: list[Path | None] = []
     for path, person in zip(paths, persons, strict=True):
