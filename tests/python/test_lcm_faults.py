@@ -9,7 +9,7 @@ import pytest
 
 import gait
 from gait.bindings.abi import Mode
-from gait.bindings.config import TrackerConfig
+from gait.bindings.config import LiftConfig, TrackerConfig
 from gait.bindings.model import Model
 from gait.errors import GaitError
 from gait.track.tracker import Tracker
@@ -267,6 +267,8 @@ def test_help_names_the_defaults_of_the_library():
     printed = rig.run("--help").printed
     assert f"default {usual.particles}, paper mode {paper.particles}\n" in printed
     assert f"default {usual.acquisition_particles}, paper mode {paper.acquisition_particles}\n" in printed
+    lift = LiftConfig.default()
+    assert f"default {lift.sd:g} pixels" in printed and f"delayed, default {lift.lag}\n" in printed
     for item in TrackerConfig.settings():
         if isinstance(item.default, float):
             assert f"--{item.name.replace('_', '-')} X\n        {item.text}\n" in printed

@@ -342,6 +342,29 @@ static void test_nothing(void)
     CHECK(gait_lift_unknowns(NULL) == GAIT_ERR_ARG && !gait_lift_marker_name(NULL, 0));
 }
 
+/* A config from an older header, which lacks the later settings: they have their defaults. */
+static void test_an_older_config(void)
+{
+    enum { OLDER = offsetof(gait_lift_config, report) };
+    gait_lift_config cut, full = toy_lift_config(GAIT_LIFT_PERSPECTIVE);
+    gait_lift_config const set = full;
+    gait_lift_fit fit[2];
+    set_all_sds(0.02);
+    memset(&cut, 0xff, sizeof cut);
+    gait_lift_fill(&cut, OLDER);
+    CHECK(cut.struct_size == OLDER && isnan(cut.residual)); /* nothing is written past its end */
+    gait_lift_default(&full);
+    memcpy(&full, &set, OLDER);
+    full.struct_size = sizeof full;
+    memcpy(&cut, &full, OLDER);
+    cut.struct_size = OLDER;
+    toy_draw(&toy_lift_prior, 0, 1, 0.3, (double[]){0.4, 0.5, 0.02}, X);
+    toy_lift_see(&full, (const double (*)[3])X, TOY_SEGMENT, 0.0, 1, uv);
+    CHECK(gait_lift_segment(toy_lift_open(&full), uv, sds, &fit[0], NULL) == GAIT_OK);
+    CHECK(gait_lift_segment(toy_lift_open(&cut), uv, sds, &fit[1], NULL) == GAIT_OK);
+    CHECK(memcmp(&fit[0], &fit[1], sizeof fit[0]) == 0);
+}
+
 static void test_arguments(void)
 {
     gait_lift_config const good = toy_lift_config(GAIT_LIFT_PERSPECTIVE);
@@ -415,6 +438,7 @@ int main(void)
     test_robust();
     test_expected_and_unknown();
     test_nothing();
+    test_an_older_config();
     test_arguments();
     test_world_axes();
     return CHECK_DONE();

@@ -72,8 +72,8 @@ typedef struct parts { /* optional parts of the service */
 static bool load_lift(service *s, const settings *want, lift_service *lift, sink *out, message *why)
 {
     lift_settings const set = {.stature = want->lift_stature,
-                               .sd = want->lift_sd > 0 ? want->lift_sd : 3,
-                               .lag = want->lift_lag >= 0 ? want->lift_lag : 5,
+                               .sd = want->lift_sd,
+                               .lag = want->lift_lag,
                                .cpu_mask = (uint32_t)want->cpu_mask};
     const char *const model = want->lift_model[0] ? want->lift_model : want->model;
     if (!want->lift)

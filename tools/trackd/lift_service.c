@@ -20,8 +20,10 @@ bool lift_service_open(lift_service *s, const char *model, const lift_settings *
     s->last = -1;
     gait_lift_default(c);
     c->stature = (double)set->stature;
-    c->sd = (double)set->sd;
-    c->lag = set->lag;
+    if (set->sd > 0)
+        c->sd = (double)set->sd;
+    if (set->lag >= 0)
+        c->lag = set->lag;
     c->cpu_mask = set->cpu_mask;
     /* the memory does not depend on the camera */
     c->camera = (gait_camera){.width = 1, .height = 1, .fx = 1, .fy = 1, .R = {1, 0, 0, 0, 1, 0, 0, 0, 1}};

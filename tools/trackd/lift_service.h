@@ -12,8 +12,8 @@ enum { LIFT_SERVICE_PAST = 65 }; /* more than the longest lag */
 
 typedef struct lift_settings {
     float stature; /* metres; 0: mean of the training set */
-    float sd;      /* pixels, of a keypoint with confidence 1 */
-    int32_t lag;   /* frames */
+    float sd;      /* pixels, of a keypoint with confidence 1; 0: the library's default */
+    int32_t lag;   /* frames; -1: the library's default */
     uint32_t cpu_mask;
 } lift_settings;
 
