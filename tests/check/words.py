@@ -89,6 +89,7 @@ SUFFIXES = {
     ".in",
     ".cmake",
 }
+PAGES = {".js", ".css", ".html"}  # IN_NAMES are terms of the core; libraries of pages have `lookAt`, `wide`
 BARE_NAMES = {"Makefile", "LAYERS", "README", "CMakeLists.txt"}
 OWN = {
     "tests/check/words.py",
@@ -126,16 +127,16 @@ def is_name(line: str, token: re.Match[str], code: bool) -> bool:
     return bool(used) or before.endswith((".", "->", "&", "*"))
 
 
-def faults_of_line(before: str, line: str, code: bool) -> Iterator[tuple[str, str]]:
+def faults_of_line(before: str, line: str, code: bool, names: dict[str, str]) -> Iterator[tuple[str, str]]:
     """Private words of a line and what to write instead."""
     for token in TOKEN.finditer(line):
         name = None
         for piece in PIECE.finditer(token[0]):
             word, at = piece[0].lower(), token.start() + piece.start()
             to = ANYWHERE.get(word)
-            if to is None and word in IN_NAMES:
+            if to is None and word in names:
                 name = is_name(line, token, code) if name is None else name
-                to = IN_NAMES[word] if name else None
+                to = names[word] if name else None
             if to is not None and not allowed(word, before, line, at):
                 yield word, to
     for phrase, to in PHRASE:
@@ -146,9 +147,10 @@ def faults_of_line(before: str, line: str, code: bool) -> Iterator[tuple[str, st
 def faults(path: str, text: str) -> Iterator[tuple[int, str, str]]:
     """Line, word and replacement of each private word of a file and of its name (line 0)."""
     code = Path(path).suffix in {".c", ".cpp", ".h", ".py"}
+    names = {} if Path(path).suffix in PAGES else IN_NAMES
     before = ""
     for number, line in enumerate([Path(path).stem, *text.splitlines()]):
-        for word, to in faults_of_line(before, line, code):
+        for word, to in faults_of_line(before, line, code, names):
             yield number, word, to
         before = line
 
@@ -161,7 +163,7 @@ def tracked(root: Path, paths: list[str]) -> list[str]:
     if git.returncode:
         raise SystemExit(f"words: {root} is not a git checkout")
     names = [n for n in git.stdout.split("\0") if n and (root / n).is_file() and n not in OWN]
-    return [n for n in names if Path(n).suffix in SUFFIXES or Path(n).name in BARE_NAMES]
+    return [n for n in names if Path(n).suffix in SUFFIXES | PAGES or Path(n).name in BARE_NAMES]
 
 
 def main() -> int:

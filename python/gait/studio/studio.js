@@ -38,11 +38,11 @@ async function ask(path, body) {
   return found;
 }
 
-function say(text, seconds = 5) {
+function announce(text, seconds = 5) {
   at('message').textContent = text;
   at('message').classList.add('shown');
-  clearTimeout(say.timer);
-  say.timer = setTimeout(() => at('message').classList.remove('shown'), 1000 * seconds);
+  clearTimeout(announce.timer);
+  announce.timer = setTimeout(() => at('message').classList.remove('shown'), 1000 * seconds);
 }
 
 const hush = () => at('message').classList.remove('shown');
@@ -310,7 +310,7 @@ async function change(path, body = {}, begin = performance.now()) {
     if (pulled === moving) pulled = null;
     film.redraw();
     lists(error.refused ? 'saved' : 'not saved');
-    say(error.message);
+    announce(error.message);
   }
   asking -= 1;
   refresh();
@@ -402,7 +402,7 @@ function release(event) {
       data.start = found.start;
       lists();
       film.redraw();
-    }, (error) => { film.redraw(); say(error.message); }).finally(refresh);
+    }, (error) => { film.redraw(); announce(error.message); }).finally(refresh);
     return;
   }
   if (!pulled) return;
@@ -423,12 +423,12 @@ function remove(event) {
   }
   const index = (data.edits.hidden ?? []).findIndex((h) => h.joint === name && h.first <= frame && frame <= h.last);
   if (index >= 0) change('/edit', { do: 'remove', list: 'hidden', index });
-  else say('There is no correction here.', 2);
+  else announce('There is no correction here.', 2);
 }
 
 /** Whether there is such a tool here; the page states why not. */
 function allowed(name) {
-  if (name in data.without) say(`${data.without[name]}.`);
+  if (name in data.without) announce(`${data.without[name]}.`);
   return !(name in data.without);
 }
 
@@ -441,7 +441,7 @@ function hide() {
 function swap() {
   if (!allowed('swap')) return;
   const found = marked();
-  if (!found) return say('Mark a range first: “From” (I) at its first frame, “To” (O) at its last.');
+  if (!found) return announce('Mark a range first: “From” (I) at its first frame, “To” (O) at its last.');
   change('/edit', { do: 'swap', first: found[0], last: found[1] });
   mark(null, null);
 }
@@ -490,21 +490,21 @@ function go(frame, joint) {
 }
 
 function propose(k) {
-  if (!data.proposals.length) return say('There are no more suggestions.', 2);
+  if (!data.proposals.length) return announce('There are no more suggestions.', 2);
   proposal = k % data.proposals.length;
   const { frame, joint } = data.proposals[proposal];
   go(frame, joint);
   const uv = data.uv[film.index]?.[chosen];
   if (uv) film.picture.look(uv, Math.max(film.picture.zoom, near()));
-  say(`${words(joint)}, frame ${frame}: drag it to where you see it.`, 3);
+  announce(`${words(joint)}, frame ${frame}: drag it to where you see it.`, 3);
 }
 
 function choose(name) {
   if (!allowed(name)) return;
   tool = name;
   for (const each of ['pull', 'pin', 'start']) at(`tool-${each}`).setAttribute('aria-pressed', each === name);
-  if (name === 'start') say('Drag over the floor, from below the person in the direction of walking.', 3);
-  if (name === 'pin') say('Click the floor where a heel, toe or ankle stands.', 3);
+  if (name === 'start') announce('Drag over the floor, from below the person in the direction of walking.', 3);
+  if (name === 'pin') announce('Click the floor where a heel, toe or ankle stands.', 3);
 }
 
 const KEYS = {
@@ -569,13 +569,13 @@ document.addEventListener('click', (event) => {
   if (event.detail > 0) event.target.closest?.('button')?.blur();
 });
 at('copy').addEventListener('click', () => navigator.clipboard.writeText(data.command).then(
-  () => say(`Copied: ${data.command}`), () => say(data.command, 20)));
+  () => announce(`Copied: ${data.command}`), () => announce(data.command, 20)));
 at('export').addEventListener('change', async () => {
   const kind = at('export').value;
   at('export').value = '';
   if (!kind) return;
   const answer = await fetch(`/export/${kind}`);
-  if (!answer.ok) return say((await answer.json()).error);
+  if (!answer.ok) return announce((await answer.json()).error);
   const link = Object.assign(document.createElement('a'), { href: URL.createObjectURL(await answer.blob()) });
   link.download = /filename="?([^"]+)"?/.exec(answer.headers.get('content-disposition') ?? '')?.[1] ?? `motion.${kind}`;
   link.click();
