@@ -55,15 +55,16 @@ def test_every_public_function_is_declared():
 def test_enumerations_and_limits_equal_the_header():
     pairs = re.findall(r"\b(GAIT_\w+)\s*=?\s+(-?(?:0x[0-9a-fA-F]+|\d+))u?\b", HEADERS)
     values = {name: int(value, 0) for name, value in pairs}
-    ours = {f"GAIT_ERR_{s.name}": s for s in abi.Status if s} | {"GAIT_OK": abi.Status.OK}
+    ours = {f"GAIT_ERR_{s.name}": s for s in abi.Result if s} | {"GAIT_OK": abi.Result.OK}
     ours |= {f"GAIT_{p.name}": p for p in abi.PixelFormat}
     ours |= {f"GAIT_MODE_{m.name}": m for m in abi.Mode}
     ours |= {f"GAIT_TERM_{t.name}": t for t in abi.Term}
     ours |= {f"GAIT_TRACK_{s.name}": s for s in abi.TrackStatus}
     ours |= {f"GAIT_EST_{f.name}": f for f in abi.Flag}
-    ours |= {"GAIT_ABI": abi.ABI, "GAIT_ALIGN": abi.ALIGN, "GAIT_MAX_JOINTS": abi.MAX_JOINTS}
-    ours |= {"GAIT_MAX_ANGLES": abi.MAX_ANGLES, "GAIT_MAX_CAMERAS": abi.MAX_CAMERAS}
-    ours |= {"GAIT_MAX_COMPONENTS": abi.MAX_COMPONENTS, "GAIT_MAX_PIXELS": abi.MAX_PIXELS}
+    ours |= {"GAIT_ABI": abi.ABI, "GAIT_ALIGN": abi.ALIGN}
+    limits = "JOINTS ANGLES COMPONENTS PROPORTIONS CAMERAS CLASSES PIXELS"
+    ours |= {f"GAIT_MAX_{limit}": getattr(abi, f"MAX_{limit}") for limit in limits.split()}
+    ours |= {"GAIT_START_MAX_HYPOTHESES": abi.MAX_HYPOTHESES, "GAIT_START_MAX_PEOPLE": abi.MAX_PEOPLE}
     assert {name: values.get(name) for name in ours} == ours
     families = r"GAIT_(ERR|MODE|TERM|TRACK|EST)_\w+"
     assert {name for name in values if re.fullmatch(families, name)} <= ours.keys()

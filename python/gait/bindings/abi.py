@@ -1,7 +1,8 @@
 """The C interface in ctypes: enumerations, structures and one table of functions.
 
 The loaded library describes the fields of its structures (``gait_field_at``); `define` sets them on the
-classes below, so nothing here repeats the headers in libgait/include.
+classes below.  Enumerations and limits are repeated from libgait/include, and tests/python/test_abi.py
+compares them.
 """
 
 from __future__ import annotations
@@ -36,7 +37,7 @@ SEGMENT_HEADINGS = (
 )  # turned copies of training segments; 0: heading unknown when lifting
 
 
-class Status(IntEnum):
+class Result(IntEnum):
     """Outcome of a call, ``gait_result``."""
 
     OK = 0
@@ -359,7 +360,7 @@ def fields(library: ctypes.CDLL) -> list[Field]:
     """Read the library's description of its structs."""
     row = FieldC()
     rows: list[Field] = []
-    while library.gait_field_at(len(rows), ctypes.byref(row)) == Status.OK:
+    while library.gait_field_at(len(rows), ctypes.byref(row)) == Result.OK:
         words = [getattr(row, name).decode() for name in ("of", "name", "type", "array", "unit", "text")]
         rows.append(Field._make([*words, row.offset, row.size, row.low, row.high]))
     return rows

@@ -20,7 +20,7 @@ if TYPE_CHECKING:
 
 _HERE = Path(__file__).resolve().parents[1]
 _WHOLE = tuple("bBhHiIlLqQ")  # type codes of ctypes' integers
-_RAISES = {abi.Status.ARG: GaitArgumentError, abi.Status.LIMIT: GaitLimitError}
+_RAISES = {abi.Result.ARG: GaitArgumentError, abi.Result.LIMIT: GaitLimitError}
 
 
 def candidates() -> Iterator[str]:
@@ -99,7 +99,7 @@ def check(status: int, error: abi.Error | None = None) -> int:
     if status >= 0:
         return status
     name = library().gait_result_name(status).decode()
-    kind = _RAISES.get(abi.Status(status), GaitError)
+    kind = _RAISES.get(abi.Result(status), GaitError)
     text, index = (error.text.decode(errors="replace"), error.index) if error else ("", -1)
     raise kind(status, name, text, index)
 

@@ -301,7 +301,7 @@ class Lifter:
         try:
             self._call("estimate", c)
         except GaitError as exc:
-            if exc.status == abi.Status.STATE:
+            if exc.status == abi.Result.STATE:
                 return None
             raise
         count = self.info.markers

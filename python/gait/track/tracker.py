@@ -194,7 +194,7 @@ class Tracker:
         try:
             self._call("lagged", self.config.lag if back is None else back, out)
         except GaitError as exc:
-            if exc.status == abi.Status.STATE:
+            if exc.status == abi.Result.STATE:
                 return None
             raise
         return Estimate.from_c(out, self.model)
