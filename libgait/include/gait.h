@@ -302,7 +302,7 @@ typedef struct gait_tasks { GAIT_TASKS_FIELDS(GAIT_DECLARE) } gait_tasks;
           float, texture_weight, , "nats per unit cost", 0.2, 1, 0, 1e6)                                              \
     SETTING("Weight of the silhouette term.",                                                                         \
           float, silhouette_weight, , "nats per unit cost", 25, 0, 1e6)                                               \
-    SETTING("Weight of the edge term.",                                                                               \
+    SETTING("Weight of the edge term; also decides with what evidence a person is lost.",                             \
           float, edges_weight, , "nats per unit cost", 40, 0, 1e6)                                                    \
     SETTING("Weight of the template term.",                                                                           \
           float, template_weight, , "nats per unit cost", 4, 0, 1e6)                                                  \
