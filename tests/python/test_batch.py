@@ -234,10 +234,10 @@ def test_an_interrupt_ends_the_commands(place):
         ),
         (
             "[[clip]]\nvideo = 'a.mp4'\nheight = 1.7\nmake = ['lift', 'report']\n",
-            "make has lift beside track",
+            "make has lift together with track",
         ),
         ("[[clip]]\nvideo = 'a.mp4'\nheight = 1.7\npeople = 9\n", "people is 9, outside"),
-        ("[[clip]]\nvideo = 'a.mp4'\nheight = 1.7\npeople = 2\nmake = ['lift']\n", "people is beside lift"),
+        ("[[clip]]\nvideo = 'a.mp4'\nheight = 1.7\npeople = 2\nmake = ['lift']\n", "people cannot be combined with lift"),
         ("[[clip]\n", "not valid TOML"),
     ],
 )

@@ -253,7 +253,7 @@ def test_unusable_toml_cameras_are_refused(old, new, words, tmp_path):
         ("cam.json", "{", "not valid JSON"),
         ("cam.json", "[1]", "contains no JSON object"),
         ("cam.yaml", "{{{{", "not a YAML file"),
-        ("cam.txt", "", "is empty, so it is no camera file"),
+        ("cam.txt", "", "is empty; copy or make the camera file again"),
         ("cam.ini", "f=1", "unknown camera suffix; use .json"),
         ("none.json", None, "no such camera file"),
     ],

@@ -143,7 +143,7 @@ REFUSED = {
         lambda p: foreign_pickle(p / "a.pickle"),
         "not a camera of OpenCap .contains an object pathlib",
     ),
-    "text": (lambda p: written(p / "a.txt", "hello world\n"), "holds no camera; give a JSON camera file"),
+    "text": (lambda p: written(p / "a.txt", "hello world\n"), "contains no camera; give a JSON camera file"),
     "yaml": (lambda p: written(p / "a.yaml", "a: [1, 2\n"), "not a YAML file"),
     "list": (lambda p: written(p / "a.yaml", "- 1\n- 2\n"), "contains no camera"),
     "metashape": (

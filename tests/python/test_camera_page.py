@@ -57,7 +57,7 @@ def test_too_few_distances_are_counted():
 
 def test_a_wrong_distance_is_named():
     with pytest.raises(
-        UserError, match="contradict each other by .* m, most that of marks [A-E] and [A-E]; measure again"
+        UserError, match="contradict each other by .* m, above all that between [A-E] and [A-E]; measure again"
     ):
         coordinates(5, FAR | {(0, 1): 4.4})
 

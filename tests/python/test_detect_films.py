@@ -188,7 +188,7 @@ def test_a_film_of_noise_shows_no_person(command, tmp_path, capsys):
 def test_an_empty_file_is_no_film(command, tmp_path, capsys):
     (tmp_path / "film.mp4").write_bytes(b"")
     line = refused(capsys, tmp_path, *commands(tmp_path, "film.mp4")[command])
-    assert "film.mp4: is empty, so it is no video file; copy or make it anew" in line
+    assert "film.mp4: is empty; copy or make the video file again" in line
 
 
 @pytest.mark.parametrize("command", COMMANDS)

@@ -19,7 +19,7 @@ def test_files_to_read_are_files_that_hold_something(tmp_path):
     for path, words in (
         (tmp_path, "is a folder; give the video file itself"),
         (tmp_path / "none", "no such video file; check the name"),
-        (tmp_path / "empty", "is empty, so it is no video file"),
+        (tmp_path / "empty", "is empty; copy or make the video file again"),
     ):
         with pytest.raises(UserError, match=f"{path}: {words}"):
             require_file(path, "video file")

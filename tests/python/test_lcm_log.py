@@ -419,7 +419,7 @@ def test_reset_puts_the_init_file_in_force_again(tmp_path):
 @pytest.mark.parametrize(
     "url, words",
     [
-        ("file://{}/notes.txt", "notes.txt: is no LCM log; make one with gait record"),
+        ("file://{}/notes.txt", "notes.txt: is not an LCM log; make one with gait record"),
         ("file://{}/none.log", "none.log: no such LCM log; make one with gait record"),
         ("file://{}", "is a folder; give the LCM log itself"),
         ("udpm://10.0.0.1:7667", "10.0.0.1:7667: LCM needs a multicast address, .*; give udpm://239"),

@@ -243,7 +243,7 @@ def test_info_of_a_model_with_damaged_words_names_them(tmp_path, capsys, meta):
     blob.write(path, {"META": np.frombuffer(meta, np.uint8)})
     assert run("info", path) == 1
     err = capsys.readouterr().err
-    assert f"{path}: section META: " in err and "learn the model anew" in err and err.count("\n") == 1
+    assert f"{path}: section META: " in err and "learn the model again" in err and err.count("\n") == 1
 
 
 def test_the_shipped_model_is_small_and_acknowledges_its_source():

@@ -63,7 +63,7 @@ def test_faults_name_file_key_and_remedy(tmp_path, capsys):
         UserError, match=r"body.json: shank_m is 0.18, 0.4\d times .* between centres of joints"
     ):
         model_of(read(tmp_path, leg_m=0.60))
-    with pytest.raises(UserError, match="body.json: leg_m is there beside both of its parts"):
+    with pytest.raises(UserError, match="body.json: leg_m is given together with both of its parts"):
         read(tmp_path, shank_m=0.46)
     with pytest.raises(UserError, match="body.json: tigh_m is not a known key; use stature_m leg_m"):
         read(tmp_path, tigh_m=0.4)

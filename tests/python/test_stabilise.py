@@ -150,7 +150,7 @@ def test_the_median_of_a_camera_that_moves_is_no_background(tmp_path, capsys, sh
     )
     read = Scene.read(options)
     assert (read.plate is not None) == kept and read.moved != kept
-    assert ("its median is no background" in capsys.readouterr().err) != kept
+    assert ("its median is not a background" in capsys.readouterr().err) != kept
 
 
 def test_a_scene_without_texture_is_reported(tmp_path):

@@ -178,9 +178,11 @@ def _require(fields: Fields, clip: Clip) -> None:
     if not clip.video and not clip.keypoints:
         raise fields.fail("video", "and keypoints are missing", "give one of them")
     if clip.lifted and {"track", "overlay", "report"} & set(clip.make):
-        raise fields.fail("make", "has lift beside track, overlay or report", "make a clip of each")
+        raise fields.fail("make", "has lift together with track, overlay or report", "make a clip of each")
     if clip.people and (clip.lifted or clip.keypoints):
-        raise fields.fail("people", "is beside lift or keypoints", "several people are tracked in a video")
+        raise fields.fail(
+            "people", "cannot be combined with lift or keypoints", "several people are tracked in a video"
+        )
     if not clip.camera and clip.height is None and not (clip.lifted and clip.keypoints):
         raise fields.fail("camera", "and height are missing", "give one of them, here or in [defaults]")
 
@@ -188,7 +190,7 @@ def _require(fields: Fields, clip: Clip) -> None:
 def _text(fields: Fields, name: str) -> str:
     value = fields.get(name, "give text")
     if not isinstance(value, str) or not value:
-        raise fields.fail(name, "is no text", "give it in quotes")
+        raise fields.fail(name, "is not text", "give it in quotes")
     return value
 
 

@@ -65,7 +65,9 @@ class MeasuredBody:
         }
         for whole, parts in _SUMS.items():
             if all(name in lengths for name in (whole, *parts)):
-                raise fields.fail(f"{whole}_m", "is there beside both of its parts", "leave one of them out")
+                raise fields.fail(
+                    f"{whole}_m", "is given together with both of its parts", "leave one of them out"
+                )
         return MeasuredBody(stature, lengths, str(path))
 
 

@@ -501,7 +501,7 @@ def _refuse_other_lenses(fields: Fields, others: Mapping[str, Any]) -> None:
 
 def _toml_cameras(path: str) -> tuple[dict[str, Any], dict[str, Mapping[str, Any]]]:
     """Read a TOML file; return its content and those of its tables that are cameras."""
-    with parsing(path, "TOML", "export the calibration anew"):
+    with parsing(path, "TOML", "export the calibration again"):
         data = tomllib.loads(Path(path).read_text(encoding="utf-8-sig"))
     return data, {
         key: value for key, value in data.items() if isinstance(value, Mapping) and "matrix" in value

@@ -84,8 +84,8 @@ def _require_agreement(pairs: NDArray[np.int64], lengths: Array, off: Array) -> 
     if abs(off[worst]) > 0.05 * lengths[worst] + 0.02:
         i, j = map(_letter, pairs[worst])
         raise UserError(
-            f"marks: the distances contradict each other by {abs(off[worst]):.2f} m, most that of marks {i} "
-            f"and {j}; measure again"
+            f"marks: the distances contradict each other by {abs(off[worst]):.2f} m, above all that between "
+            f"{i} and {j}; measure again"
         )
 
 

@@ -139,7 +139,7 @@ def read_text(path: str, name: str | None) -> Entries:
     rows = [line.split() for line in lines if line.strip() and not line.startswith("#")]
     if not rows or not all(len(row) > 4 and row[1] in {*_COLMAP, *_COLMAP_OTHERS} for row in rows):
         raise UserError(
-            f"{path}: holds no camera; give a JSON camera file, or as text cameras.txt of COLMAP or a "
+            f"{path}: contains no camera; give a JSON camera file, or as text cameras.txt of COLMAP or a "
             "calibration of Qualisys"
         )
     return _colmap(path, rows, name)
@@ -209,7 +209,7 @@ def read_qualisys(path: str, name: str | None) -> Entries:
     try:
         root = ElementTree.fromstring(Path(path).read_bytes())
     except ElementTree.ParseError as error:
-        raise UserError(f"{path}: not an XML file ({error}); export the calibration anew") from None
+        raise UserError(f"{path}: not an XML file ({error}); export the calibration again") from None
     found = {
         str(camera.get("serial")): camera
         for camera in root.iter("camera")
@@ -248,7 +248,7 @@ def read_qualisys(path: str, name: str | None) -> Entries:
         centre = np.array([place[axis] for axis in "xyz"]) / 1000
     except (KeyError, ZeroDivisionError) as error:
         raise UserError(
-            f"{path}: camera {camera.get('serial')} lacks {error}; export the calibration anew"
+            f"{path}: camera {camera.get('serial')} lacks {error}; export the calibration again"
         ) from None
     turn = np.diag([1.0, -1.0, -1.0]) @ gl
     entries["distortion_coefficients"] = [*radial[:2], *tangential, radial[2]]
@@ -259,7 +259,7 @@ def _attributes(path: str, camera: ElementTree.Element, name: str) -> dict[str, 
     """Read the numbers in the attributes of a camera's element."""
     element = camera.find(name)
     if element is None:
-        raise UserError(f"{path}: camera {camera.get('serial')} lacks {name}; export the calibration anew")
+        raise UserError(f"{path}: camera {camera.get('serial')} lacks {name}; export the calibration again")
     return {key: float(value) for key, value in element.items() if re.fullmatch(r"[-+\d.eE]+", value)}
 
 

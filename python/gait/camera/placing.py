@@ -126,4 +126,4 @@ def _require_extent(points: Points) -> None:
     for what, values in (("u, v", points.uv), ("x, y, z", points.world)):
         size = np.linalg.svd(values - values.mean(axis=0), compute_uv=False)
         if not size[1] > _STRAIGHT * size[0]:
-            raise UserError(f"{points.path}: {what} are on a line; add points beside it")
+            raise UserError(f"{points.path}: {what} are on a line; add points off that line")

@@ -61,7 +61,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     )
     values.add_clip(parser, "send", init="none", background="none")
     parser.set_defaults(init=None, start=0)
-    values.add_model(parser, "model whose prior fills in what --init leaves open")
+    values.add_model(parser, "model whose prior supplies what --init does not give")
     add(
         "--rate",
         default="true",

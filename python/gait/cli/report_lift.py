@@ -191,7 +191,7 @@ def _facts(prior: SegmentPrior) -> dict[str, str]:
         "learnt from": f"{prior.segments} segments of {prior.recordings} recordings",
         "modes": f"{prior.size}" + (f" of each of {prior.components}" if prior.components > 1 else ""),
         "headings": "unknown" if prior.headings == 0 else f"{prior.headings} copies in the world's axes",
-        "inflation of what is outside the modes": f"{prior.gamma:.2f}",
+        "inflation of the variance outside the modes": f"{prior.gamma:.2f}",
     }
 
 

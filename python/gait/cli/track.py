@@ -16,7 +16,7 @@ decide between left and right.
 
 The person is also tracked backwards from the start.  A lost person is searched for near the last position.
 With keypoints the track resumes at the next second in which the same person walks; without them it starts
-anew with a person who walks in full view for a second (not with --smooth).
+again with a person who walks in full view for a second (not with --smooth).
 
 Several films of the same walk from static cameras locate the person much better than one.  OUT.csv has the
 frames of the first film, which also gives the start; the nearest frames in time of the others are used.
@@ -97,7 +97,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     add(
         "--body",
         metavar="BODY.json",
-        help="what was measured of the person, instead of --height: stature_m, and any of leg_m, arm_m or "
+        help="measurements of the person, instead of --height: stature_m, and any of leg_m, arm_m or "
         "their parts, hip_width_m, shoulder_width_m",
     )
     values.add_filter(parser, threads=1)

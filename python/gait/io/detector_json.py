@@ -62,7 +62,7 @@ def read_json_file(path: str | os.PathLike[str]) -> Detections:
         return _any(where, data, Path(path).name)
     except (KeyError, TypeError, ValueError, AttributeError, IndexError, OverflowError) as error:
         what = f"{type(error).__name__}: {error}"
-        raise UserError(f"{where}: JSON in an unknown layout ({what}); write the file anew") from None
+        raise UserError(f"{where}: JSON in an unknown layout ({what}); write the file again") from None
 
 
 def _any(where: str, data: Any, name: str) -> Detections:
@@ -91,7 +91,7 @@ def _load(path: str | os.PathLike[str]) -> Any:
         text = Path(path).read_bytes()
     except OSError as error:
         raise unreadable(path, error) from error
-    with parsing(str(path), "JSON", "write it anew"):
+    with parsing(str(path), "JSON", "write it again"):
         return json.loads(text.decode("utf-8-sig"))
 
 
@@ -110,7 +110,7 @@ def _triples(where: str, values: Any) -> Array:
         return points.reshape(-1, 3)
     except (TypeError, ValueError):
         raise UserError(
-            f"{where}: keypoints are not a list of u, v, confidence; write the file anew"
+            f"{where}: keypoints are not a list of u, v, confidence; write the file again"
         ) from None
 
 
@@ -133,7 +133,7 @@ def _layout(where: str, found: list[Detection], names: Sequence[str] = (), **mor
 
 def _openpose(where: str, people: Any, frame: int) -> Iterator[Detection]:
     if not isinstance(people, list):
-        raise UserError(f"{where}: people is not a list; write the file anew")
+        raise UserError(f"{where}: people is not a list; write the file again")
     for person in people:
         if not isinstance(person, Mapping) or _OPENPOSE not in person:
             raise UserError(f"{where}: a person has no {_OPENPOSE}; write 2-D keypoints")
@@ -202,7 +202,7 @@ def _frames(where: str, frames: list[Any], names: Sequence[str], first: bool = F
     shares = False
     numbers = [_number(entry, i) for i, entry in enumerate(frames)]
     if not all(isinstance(number, int) for number in numbers):
-        raise UserError(f"{where}: a frame number is not a whole number; write the file anew")
+        raise UserError(f"{where}: a frame number is not a whole number; write the file again")
     numbered = all(isinstance(entry, Mapping) and "frame_id" in entry for entry in frames)
     offset = int(first and numbered and min(numbers) > 0)
     for number, entry in zip(numbers, frames, strict=True):
@@ -245,7 +245,7 @@ def _people(where: str, entry: Any) -> Iterator[tuple[str | None, Array, bool]]:
         elif isinstance(person, Mapping):
             key = next((key for key in person if _LANDMARKS.fullmatch(key)), None)
             if key is None:
-                raise UserError(f"{where}: a frame has neither instances nor landmarks; write the file anew")
+                raise UserError(f"{where}: a frame has neither instances nor landmarks; write the file again")
             yield from _people(where, person[key]) if _holds_landmarks(person[key]) else ()
 
 
@@ -259,7 +259,9 @@ def _mmpose(where: str, person: Mapping[str, Any]) -> tuple[str | None, Array, b
         uv = np.asarray(person["keypoints"], np.float64).reshape(-1, np.shape(person["keypoints"])[-1])[:, :2]
         points = np.column_stack([uv, np.asarray(person["keypoint_scores"], np.float64).reshape(len(uv))])
     except (KeyError, TypeError, ValueError, IndexError):
-        raise UserError(f"{where}: keypoints and keypoint_scores do not match; write the file anew") from None
+        raise UserError(
+            f"{where}: keypoints and keypoint_scores do not match; write the file again"
+        ) from None
     track = person.get("track_id", person.get("instance_id"))
     return None if track is None else str(track), points, False
 
@@ -269,7 +271,7 @@ def _landmarks(where: str, landmarks: list[Any]) -> Array:
     try:
         points = np.array([[p["x"], p["y"], p.get("visibility", 1.0)] for p in landmarks], np.float64)
     except (KeyError, TypeError, ValueError, AttributeError):
-        raise UserError(f"{where}: a landmark has no numbers x and y; write the file anew") from None
+        raise UserError(f"{where}: a landmark has no numbers x and y; write the file again") from None
     if np.abs(points[:, :2]).max() > 10:
         raise UserError(f"{where}: landmarks are not fractions of the picture; write normalised landmarks")
     return points

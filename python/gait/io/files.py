@@ -134,7 +134,7 @@ def require_file(path: str | os.PathLike[str], what: str, remedy: str = "check t
     if not file.is_file():
         raise UserError(f"{path}: no such {what}; {remedy}")
     if file.stat().st_size == 0:
-        raise UserError(f"{path}: is empty, so it is no {what}; copy or make it anew")
+        raise UserError(f"{path}: is empty; copy or make the {what} again")
 
 
 def require_writable(path: str | os.PathLike[str]) -> None:

@@ -218,7 +218,7 @@ class Track(Joints):
                 f"{shown[k]:.2f} s, in {path} at {own[k]:.2f} s; give that film"
             )
         return (
-            f"{video.path}: is another file than the one that was tracked; unless it is a copy coded anew, "
+            f"{video.path}: is not the file that was tracked; unless it is a re-encoded copy, "
             f"give the film of {path}"
         )
 

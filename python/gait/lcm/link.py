@@ -248,7 +248,7 @@ def require_log(path: str | os.PathLike[str]) -> None:
     require_file(path, "LCM log", remedy)
     with open(path, "rb") as file:
         if file.read(4) != _SYNC.to_bytes(4, "big"):
-            raise UserError(f"{path}: is no LCM log; {remedy}")
+            raise UserError(f"{path}: is not an LCM log; {remedy}")
 
 
 def listener(url: str) -> lcm.LCM:

@@ -246,7 +246,7 @@ def _moves(
     if not moves(camera or expected_camera(video, options.fov), samples, people):
         return False
     note(
-        "the camera moves during the clip, so its median is no background: --stabilize auto estimates its "
+        "the camera moves during the clip, so its median is not a background: --stabilize auto estimates its "
         "rotation, --camera-path gives its poses",
         options.quiet,
     )

@@ -65,7 +65,7 @@ def drawings(learned: Learned) -> Iterator[Drawing]:
     yield Drawing(
         "residuals",
         "Residual by angle",
-        "Rms of what the components leave of all cycles; blue: left, orange: right, black: trunk and neck.",
+        "Rms of the residuals of all cycles; blue: left, orange: right, black: trunk and neck.",
         figures_model.residuals(learned),
     )
     subjects = errors(learned)

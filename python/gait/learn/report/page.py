@@ -146,11 +146,11 @@ def _sequences(learned: Learned) -> str:
         "SNR: best signal-to-noise ratio of all periods tried, summed over the angles that move; it grows "
         "with the number of cycles and angles, so compare it only with other periods of the same recording, "
         "and not with the figure, whose bins are single frames. Sharpness: SNR over the median of all "
-        "periods tried. Residual: rms over all angles of what the components leave. Evidence: repeats: "
-        "correlation with the next cycle; legs: cosine of the lag beyond half a cycle between left and right "
-        "leg; flight: share of the time with both feet off the ground; lift and steps: rise of the feet and "
-        "of the ground, statures; ahead: cosine of the angle between where the pelvis faces and where it "
-        "goes.</p>" + _table(rows)
+        "periods tried. Residual: rms over all angles of what the components do not explain. Evidence: "
+        "repeats: correlation with the next cycle; legs: cosine of the lag beyond half a cycle between left "
+        "and right leg; flight: share of the time with both feet off the ground; lift and steps: rise of the "
+        "feet and of the ground, statures; ahead: cosine of the angle between where the pelvis faces and "
+        "where it goes.</p>" + _table(rows)
     )
 
 

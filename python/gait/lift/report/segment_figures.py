@@ -147,7 +147,7 @@ def spectrum(c: Case) -> Drawing:
     return Drawing(
         "spectrum",
         "Spectrum",
-        f"Variances of the modes, and what is left of them when {c.what} was seen from behind with "
+        f"Variances of the modes before and after {c.what} is observed from behind with "
         f"{1000 * NOISE:.0f} mm of noise: the volume shrinks to 10^{c.log10_volume:.1f} of the prior's.",
         figure,
     )
@@ -204,8 +204,8 @@ def estimates(c: Case) -> Drawing:
     return Drawing(
         "estimates",
         "Estimates",
-        f"{c.what.capitalize()} was seen from behind, with {1000 * NOISE:.0f} mm of noise; drawn from the "
-        "side, where what was not seen shows. Grey: original. Mean distance of all markers.",
+        f"{c.what.capitalize()} was observed from behind with {1000 * NOISE:.0f} mm of noise and is drawn "
+        "from the side, which shows the unobserved depth. Grey: original. Mean distance of all markers.",
         strips.figure(),
     )
 
