@@ -50,7 +50,7 @@ int64_t clock_monotonic(void)
 bool clock_check(int64_t utime, message *why)
 {
     return (utime >= 0 && utime <= INT64_MAX / 2) ||
-           message_set(why, "time %" PRId64 " is none; send microseconds since 1970", utime);
+           message_set(why, "time %" PRId64 " is out of range; send microseconds since 1970", utime);
 }
 
 /* ---- memory ---- */

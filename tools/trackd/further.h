@@ -1,4 +1,4 @@
-/* further.h - cameras besides the first: their frames wait here for the frame of the first camera of the same time. */
+/* further.h - cameras besides the first one: keeps their frames until the first camera's frame of the same time arrives. */
 #ifndef TRACKD_FURTHER_H
 #define TRACKD_FURTHER_H
 #include "gaitmsg_camera_t.h"
@@ -6,8 +6,8 @@
 
 enum {
     FURTHER_MOST = GAIT_MAX_CAMERAS - 1,
-    FURTHER_PAST = 4,      /* frames of a camera that are kept */
-    FURTHER_APART = 100000 /* microseconds: frames further apart are never of one time */
+    FURTHER_PAST = 4,      /* frames kept of each camera */
+    FURTHER_APART = 100000 /* microseconds; frames further apart are never paired */
 };
 
 typedef struct further_camera {

@@ -67,7 +67,7 @@ int64_t log_scan(const char *path, message *why)
     return scan(path, &beyond, why);
 }
 
-/* Whether liblcm can read a log: it takes memory for what an event states, which may be more than the file has. */
+/* Whether liblcm can safely read a log: it allocates the length that an event states, which may exceed the file. */
 static bool log_readable(const char *path, message *why)
 {
     int64_t beyond = 0;

@@ -122,15 +122,15 @@ void service_complain(service *s, const char *format, ...) __attribute__((format
 void service_set_state(service *s, int8_t state, const char *text);
 /* Pixels of a frame or background in the format of the tracker. */
 bool service_pixels(service *s, const image_view *v, gait_image *out, message *why);
-/* Why none of the frames that arrived was tracked. */
+/* Explain why no frame has been tracked. */
 void service_lack(const service *s, message *why);
 /* GAIT_ESTIMATE, GAIT_ESTIMATE_LAG, GAIT_STRIDE and GAIT_PARTICLES of a frame that was tracked. */
 void service_send_estimate(service *s, const image_view *v, const gait_estimate *e, int64_t received,
                            int64_t step_us);
-/* Continue with the person of a restored tracker, who was followed up to this frame. */
+/* Continue tracking the person of a restored tracker, whose last tracked frame is this one. */
 void service_resume(service *s, int64_t utime, int64_t frame);
 void service_send_status(service *s);
-/* A status that was heard, sent at `utime`: one that this service did not send is another daemon's, which is reported. */
+/* A GAIT_STATUS message sent at `utime` was received.  If this service did not send it, another daemon did; report that. */
 void service_status(service *s, int64_t utime);
 uint64_t service_digest(const service *s); /* 0 before the camera is known */
 #endif

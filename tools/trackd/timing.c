@@ -44,15 +44,15 @@ int32_t histogram_quantile(const histogram *h, double share)
 
 /* ---- budget ---- */
 enum {
-    SAME_CLOCK_US = 1000000, /* no frame takes longer to arrive, unless its source has another clock */
+    SAME_CLOCK_US = 1000000, /* a frame older than this on arrival is from another clock */
     CHECK_EVERY = 30,        /* steps between two checks of the dropped frames */
     SETTLE = 8,              /* steps until step_us reflects a changed number of particles */
-    FAR = 2,                 /* steps in a row longer than the limit from which it is not chance */
-    TOO_MANY = 3,            /* frames dropped between two checks from which the number is halved */
+    FAR = 2,                 /* steps in a row longer than the limit before the number is reduced */
+    TOO_MANY = 3,            /* frames dropped between two checks for which the number is halved */
     CALM = 90,               /* fast steps in a row before the number doubles */
-    RETRY = 4,               /* frames refused because of the time of a step, before one is tried */
-    TRIAL = 900,             /* steps after a doubling in which a reduction means that it failed */
-    PATIENCE = 32,           /* longest wait before a failed number is tried again, multiples of CALM */
+    RETRY = 4,               /* frames in a row refused because steps are slow, before one is tried */
+    TRIAL = 900,             /* steps after a doubling during which a reduction means that it failed */
+    PATIENCE = 32,           /* longest wait before a failed number is tried again, in multiples of CALM */
 };
 
 void budget_reset(budget *b)

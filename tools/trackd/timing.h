@@ -1,4 +1,4 @@
-/* timing.h - quantiles of step times, and the latency budget: which frames are dropped, how many particles are used. */
+/* timing.h - quantiles of step times, and the latency budget: which frames to drop, how many particles to use. */
 #ifndef TRACKD_TIMING_H
 #define TRACKD_TIMING_H
 #include <stdbool.h>
@@ -18,7 +18,7 @@ void histogram_add(histogram *h, int64_t us);
 /* The value below which `share` of the times lie, microseconds; 0 when empty. */
 int32_t histogram_quantile(const histogram *h, double share);
 
-/* ---- latency budget: which frames are dropped, and how many particles are used. */
+/* ---- latency budget: which frames to drop, and how many particles to use. */
 /* Why the number of particles has changed. */
 typedef enum budget_reason { BUDGET_SLOW, BUDGET_DROPPED, BUDGET_SPARE } budget_reason;
 
@@ -50,17 +50,17 @@ void budget_reset(budget *b);
 /* The time from which the age of a frame counts: its capture, or its arrival if the source has another clock (a replay). */
 int64_t budget_birth(int64_t capture_utime, int64_t arrival_utime);
 
-/* Whether a frame whose age counts from `birth` can still be tracked in time.  At least a quarter of the limit is left for transport, and
- * after a few refusals in a row a frame no older than the limit is tried, so that some frames are tracked even if a step
- * takes longer. */
+/* Whether a frame whose age counts from `birth` can still be tracked in time.  At least a quarter of the limit is
+ * reserved for transport.  After a few refusals in a row, any frame no older than the limit is allowed, so that some
+ * frames are tracked even if every step is too slow. */
 bool budget_allows(budget *b, int64_t birth, int64_t now);
 
 /* A frame was dropped because a newer one has arrived. */
 void budget_missed(budget *b);
 
-/* A frame was tracked.  Returns the number of particles to continue with: half of it if steps are slow or frames are
- * dropped; what fits into half of the limit after two steps longer than the limit; twice as many after a while with time to
- * spare, a longer one if that number was too large last time. */
+/* A frame was tracked.  Returns the number of particles to continue with: half as many if steps are slow or frames are
+ * dropped; as many as fit into half of the limit after two steps longer than the limit; twice as many after a period of
+ * fast steps, which must be longer if that number was too large last time. */
 int32_t budget_stepped(budget *b, int64_t birth, int64_t now, int64_t step_us, int32_t particles);
 
 /* Whether steps with this number of particles exceed the limit although it cannot be reduced; true only once. */

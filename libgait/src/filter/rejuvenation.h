@@ -1,8 +1,8 @@
 /* rejuvenation.h - moves particles after resampling so that they do not depend on one ancestor (kernel
  * shrinkage).
  *
- * Most particles of a second ago have no descendants. A few are the ancestors of all, so all would have their
- * depth, stature and posture. Therefore every state becomes, after resampling,
+ * After a second of resampling, all particles descend from a few ancestors, and would share their depth, stature and
+ * posture. Therefore, after resampling, every state x becomes
  *
  * | x' = x + a (m - x) + sqrt(a (1 - a)) (j - k)
  *
@@ -17,10 +17,11 @@ typedef struct rejuvenation { /* parameters for one frame */
     const float *row;      /* rows of every particle that can be an ancestor: rejuvenation_rows() */
     const int32_t *parent; /* n: drawn by weight */
     int32_t n, split;      /* from `split` on particles are another hypothesis, rejuvenated separately */
-    const uint8_t
-        *origin; /* NULL: one class; otherwise the class of each particle's ancestor.  Then only particles */
-    int32_t begin;        /* begin .. n - 1 are rejuvenated together, those whose ancestors were of */
-    int32_t motion_class; /* this class, which is also theirs */
+    /* Class of each particle's ancestor, NULL: the model has one class.  With several, particles begin .. n - 1, which
+     * are of class motion_class, are rejuvenated together if their ancestors were of that class too. */
+    const uint8_t *origin;
+    int32_t begin;
+    int32_t motion_class;
     uint64_t seed;
     uint32_t frame;      /* counter of the random numbers */
     float shrink, noise; /* a and sqrt(a (1 - a)); 0: no change */
@@ -35,11 +36,10 @@ static inline int32_t rejuvenation_stride(int32_t fields)
     return (fields + 3) & ~3;
 }
 
-/* Rows of particles begin .. end - 1: a particle drawn at random is read from two cache lines, not from one
- * for each field. */
+/* Write the rows of particles begin .. end - 1.  A particle drawn at random is then read from two cache lines rather than
+ * from one per field. */
 void rejuvenation_rows(const particle_set *from, int32_t begin, int32_t end, float *row);
 
-/* Particles parent[first], parent[first + 1] ... after rejuvenation. The remaining lanes repeat the last
- * one. */
+/* Rejuvenate particles parent[first], parent[first + 1] ... into `out`; unused lanes repeat the last one. */
 void rejuvenate_block(const rejuvenation *m, int32_t first, int32_t lanes, particle_block *out);
 #endif

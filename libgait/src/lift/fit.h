@@ -4,8 +4,9 @@
 #define GAIT_LIFT_FIT_H
 #include "lift/segment_posterior.h"
 
-/* Headings from which the search for an unknown one starts, 45 degrees apart.  Each start is refined, so their number
- * hardly matters: what must hold is that the heading is found wherever it points. */
+/* Headings from which the search for an unknown one starts, 45 degrees apart, as STARTS of
+ * python/gait/lift/segment/explain.py.  Each start is refined, so their number hardly matters, as long as every heading
+ * is found. */
 enum { LIFT_HEADINGS = 8 };
 
 typedef struct lift_trial { /* a component and a heading, refined from one start */

@@ -33,7 +33,7 @@ static lift_observations weighted_frame(const lift_table *t, const lift_stream *
     return (lift_observations){.uv = s->past.uv + i * J * 2, .sd = s->past.sd + i * J};
 }
 
-/* The same with the standard deviations as observed. */
+/* Observations of a frame, with the standard deviations as observed. */
 static lift_observations raw_frame(const lift_table *t, const lift_stream *s, uint64_t frame)
 {
     lift_observations observed = weighted_frame(t, s, frame);

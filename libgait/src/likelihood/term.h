@@ -125,7 +125,7 @@ typedef struct like_body { /* the inputs of a term: one body in one camera */
     int32_t lane;
     const layers *layers;
     const like_patch *samples;  /* by limb: its surface in this frame */
-    const like_patch *ancestor; /* the same of its ancestor in the previous frame, or NULL */
+    const like_patch *ancestor; /* surface of its ancestor in the previous frame, or NULL */
     const gait_camera *camera;
     const float (*points)[3][BLOCK]; /* joints, metres, world; for the keypoint term */
     like_block *terms;               /* values of its block */

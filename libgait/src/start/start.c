@@ -174,7 +174,7 @@ static double rough_place(const gait_start *s, start_problem *p)
     return pixels;
 }
 
-/* Standard deviations of the keypoints, with `miss` pixels by which the model's joints miss the detector's. */
+/* Set the standard deviations of the keypoints; `miss`: pixels between the model's joints and the detector's. */
 static void set_noise(gait_start *s, double miss)
 {
     start_scratch *const w = s->scratch;

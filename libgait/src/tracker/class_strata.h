@@ -20,13 +20,14 @@ bool class_strata_due(const gait_tracker *t);
  * u: common offset, as in pf_draw(). */
 void class_strata_resample(gait_tracker *t, int32_t begin, int32_t end, int32_t n, uint32_t u);
 
-/* After particles were dealt to two hypotheses: set their strata, and weights that sum to share[h] in hypothesis h. */
+/* After the particles have been divided between two hypotheses, set their strata, and weights that sum to share[h] in
+ * hypothesis h. */
 void class_strata_split(gait_tracker *t, const double share[2]);
 
 /* Set t->origin, the class of each new particle's ancestor; `then`: strata of the generation before. */
 void class_strata_origins(gait_tracker *t, const strata *then);
 
-/* Of the particles from `first` on, all of one class, those whose ancestor was of another class enter this one. */
+/* For particles from `first` on, all of one class: those whose ancestor was of another class enter this class. */
 void class_strata_enter(const gait_tracker *t, uint32_t counter, int32_t first, int32_t lanes,
                         particle_block *p);
 

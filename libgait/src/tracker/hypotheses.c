@@ -32,8 +32,8 @@ static void enter(gait_tracker *t, int32_t stage)
                                              .log_odds = t->core->found ? 0.0 : t->core->hypotheses.log_odds};
 }
 
-/* Share of its log-likelihood that a frame contributes, so many seconds after the last one: errors of the image terms are
- * correlated over config evidence_time. */
+/* Share of a frame's log-likelihood that counts, `seconds` after the last frame: errors of the image terms are correlated
+ * over config evidence_time. */
 static float evidence_share(const gait_tracker *t, float seconds)
 {
     float const time = t->cfg.evidence_time;
@@ -199,7 +199,7 @@ static bool resample_all(gait_tracker *t, const uint32_t u, uint32_t counter)
     return true;
 }
 
-/* The same with several classes of motion. */
+/* Resample as above with several classes of motion. */
 static bool resample_classes(gait_tracker *t, const uint32_t u[2])
 {
     int32_t const before = t->filter.n, count = tracker_count(t);

@@ -15,7 +15,7 @@
 #include "tracker/walk_check.h"
 
 static const float KNOWN_PHASE_SD = 0.2f; /* strides: a start with less determines which leg is which */
-static const float SETTLE_TIME = 1.0f; /* seconds after a start in which no dominant hypothesis is normal */
+static const float SETTLE_TIME = 1.0f;    /* seconds after a start in which none may be dominant yet */
 static const float PHASE_DEPARTURE =
     0.2f; /* strides from the predicted phase above which a track is ambiguous */
 static const double DEGENERATE_ESS = 2.0;
@@ -25,8 +25,8 @@ static const float OTHER_CLASS = 0.1f; /* probability at a start that is divided
 static const float BESIDE =
     0.25f; /* statures by which competing hypotheses may be side by side in an image */
 
-/* Whether another hypothesis competes with the first: it is not improbable, walks on the floor or on a belt as that one
- * does, and is beside it in no image, so that one region of each shows both. */
+/* Whether hypothesis h competes with the first one: it is not improbable, both walk on the floor or both on a belt, and
+ * in every image they overlap, so that the same region shows either. */
 static bool competes(const gait_tracker *t, const gait_hypothesis *first, const gait_hypothesis *h)
 {
     bool same = h->probability > IMPROBABLE * first->probability && h->in_place == first->in_place;
