@@ -204,7 +204,7 @@ def test_a_standing_person_has_no_heading(tmp_path):
 @pytest.mark.parametrize(
     "count, words",
     [
-        (1, "only 1 frame to track; give at least a second, by --start"),
+        (1, "only 1 frame to track; give at least one second of film, and check --start"),
         (5, "only 5 frames to track, --init auto needs 8; give --init FILE"),
     ],
 )

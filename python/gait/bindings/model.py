@@ -80,7 +80,7 @@ class ModelInfo:
     stride_hz, stride_hz_sd : float
         Strides per second: mean of the training set, and standard deviation between subjects.
     stride_length, stride_length_sd : float
-        The same of the stride length, fractions of stature.
+        Stride length as a fraction of stature: mean and standard deviation, likewise.
     cyclic : int
         1 if the blob has a cyclic model, 0 if only a segment prior.
     posture_angles : int

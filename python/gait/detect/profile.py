@@ -43,7 +43,7 @@ class JointProfile:
     lasting_sd : float
         Standard deviation, along an axis, of the lasting error, as a fraction of the person's height.
     sd : float
-        The same of the error that changes from frame to frame.
+        Standard deviation of the error that changes from frame to frame, in the same unit.
     correlation_s : float
         Seconds over which changing errors count as one observation: twice the integral of their
         autocorrelation.

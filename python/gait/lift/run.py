@@ -207,8 +207,8 @@ def lift_views(
             found = find_offset(prepared[0].keypoints, cameras[0], one.keypoints, one.view.camera, given)
             if given is None and (found is None or not found.certain):
                 raise UserError(
-                    f"{path}: when it began against {views[0][0]} does not follow from the person's motion; "
-                    "give --offsets, by how many seconds each further film began later, and check the cameras"
+                    f"{path}: the person's motion does not show its time offset from {views[0][0]}; "
+                    "check the cameras, and give --offsets: how many seconds later each further film began"
                 )
             began.append(found.seconds if given is None and found is not None else given or 0.0)
             missed = "" if found is None else f", and rays miss each other by {found.mismatch:.1f} degrees"

@@ -59,10 +59,10 @@ class Removal:
 
 @dataclass(frozen=True)
 class Learning:
-    """What both ways of learning found."""
+    """Results of both ways of learning."""
 
-    walks: list[Walk]  #: with their refined periods
-    literal_walks: list[Walk]  #: the same with the paper's
+    walks: list[Walk]  #: with refined periods
+    literal_walks: list[Walk]  #: the same walks with the periods found as in the paper
     literal: Learned
     ours: Learned
     eight: Aligned

@@ -247,7 +247,7 @@ def _finders(
 def _no_person(count: int, misplaced: list[float]) -> str:
     """Explain why there is no start, and what to do."""
     if count == 1:
-        return "only 1 frame to track; give at least a second, by --start and --stop too"
+        return "only 1 frame to track; give at least one second of film, and check --start and --stop"
     if count < _ENOUGH:
         return f"only {count} frames to track, --init auto needs {_ENOUGH}; give --init FILE.json"
     if len(misplaced) < _ENOUGH:

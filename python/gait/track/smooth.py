@@ -40,7 +40,7 @@ _WIDTH = 1.5  # of the kernel, standard deviations of the successors
 _GROUP = (0.25, 0.8)  # strides and radians within which motions and particles belong together
 _NEAR = (0.15, 0.5)  # strides and radians around a hypothesis, as in estimate.c
 _SIZE_SD = 0.01  # relative sd of the size that pictures determine at best, as in estimate.c
-_SURE = 0.7  # least weight of the dominant hypothesis under `tracking`, DOMINANT_WEIGHT of estimate.h
+_SURE = 0.7  # least weight of the dominant hypothesis with status `tracking`: DOMINANT_WEIGHT of estimate.h
 
 
 class Spool:

@@ -22,9 +22,9 @@ from gait.learn.run import Note, check, run
 WALK, STAND, BACKWARDS, RUN = "walk", "stand", "backwards", "run"
 DERIVED = STAND, BACKWARDS  # made from the walk
 _STEP = 6.0  # concentration with an sd of about a twentieth of a stride
-#: Changes, per second at their most likely phase and pace.  Recordings of changes are rare, so these describe
-#: typical behaviour indoors and in streets: a walk lasts from seconds to a minute, and ends with both feet on
-#: the ground.
+#: Rates of change from one class to another, per second at the most likely phase and pace.  Changes are
+#: rarely recorded, so these are assumptions about people indoors and in streets: they walk for a few seconds
+#: up to a minute, and stop with both feet on the ground.
 CHANGES: dict[str, dict[str, Change]] = {
     WALK: {STAND: Change(1.0, _STEP, 0.05), BACKWARDS: Change(0.002), RUN: Change(0.3, slope=1.0)},
     STAND: {WALK: Change(0.7, _STEP, 0.0), BACKWARDS: Change(0.3, _STEP, 0.0), RUN: Change(0.05)},

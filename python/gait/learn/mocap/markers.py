@@ -226,10 +226,10 @@ SETS = {name: _both_sides(patterns) for name, patterns in _PATTERNS.items()}
 
 
 def segment_axes(labels: list[str], points: Floats) -> set[int]:
-    """Return the columns of points (T, M, 3) that are not markers but axes of segments.
+    """Return the columns of points (T, M, 3) that are not markers but represent the axes of segments.
 
-    Models of laboratories write four points per segment, the origin and one on each axis (Plug-in-Gait: PELO
-    PELA PELL PELP, LCLO LCLA ...; Oxford foot: LFOF0 to LFOF3), with right angles at the origin.
+    Gait models such as Plug-in-Gait (PELO PELA PELL PELP, LCLO LCLA ...) and Oxford Foot (LFOF0 to LFOF3)
+    write four virtual points per segment: the origin, and one on each axis, at right angles from the origin.
     """
     columns = {label.rsplit(":", 1)[-1].upper(): k for k, label in enumerate(labels)}
     found: set[int] = set()

@@ -117,8 +117,8 @@ def read_joints(
 ) -> tuple[Table, dict[str, Floats], dict[str, Floats], str]:
     """Read a .csv of joint positions.
 
-    Returns the table, the positions (T, 3) by name as in the file, the same without runs of exact zeros, and
-    a description of such zeros if they are not declared missing ('' if there are none).
+    Returns the table, the positions (T, 3) by name as in the file, these positions without runs of exact
+    zeros, and a description of such zeros if they are not declared missing ('' if there are none).
     """
     table = read(path, fps)
     names = [name[:-2] for name in table.names if name.endswith("_x")]

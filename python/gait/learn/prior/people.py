@@ -26,25 +26,27 @@ from gait.learn.cycles.sequence import Sequence
 from gait.learn.prior.components import Components
 from gait.learn.prior.imputation import leading_vectors, right_singular
 
-STEP = 1e-4  # of the numerical derivatives, radians and statures
-RIDGE = 1e-5  # squared statures per squared unit, so that channels that move no joint still count a little
-#: Weight of rotations of the whole body, as particles also have a heading, pitch and roll.
+STEP = 1e-4  # of numerical differentiation, radians or statures
+RIDGE = 1e-5  # squared statures per squared unit; gives channels that move no joint a small weight
+#: Weights of rotations of the whole body; low, as the particles have a heading, pitch and roll of their own.
 TURNING = {"root_roll": 0.3, "root_pitch": 0.3, "root_yaw": 0.3}
-#: Weight of root channels that displace the whole body, statures; forward speed is per stride.
+#: Weights of root channels that displace the whole body, statures; root_forward is per stride.
 DISPLACING = {"root_forward": 0.3, "root_sway": 1.0, "root_height": 1.0}
 AGAINST = ("torso_x", "torso_z", "neck_x", "neck_z", "root_sway", "root_roll", "root_yaw")
 RATE_SD, LENGTH_SD = 0.07, 0.06  # relative sd of stride rate and length among people
 ADULT_STATURE = (1.70, 0.095)  # metres, mean and sd of adults of both sexes: a prior, not a training set's
 ENOUGH = 3  # fewest subjects from which differences between people are estimated
 LEAST_SD = 0.01  # least relative sd, even if all recordings are alike
-#: Variance of the pace of an imaginary person who walks in the same way at any rate; with recordings of few
-#: people, or at similar rates, it shrinks the slope towards 0.
+#: Variance of the pace of one imaginary person whose gait does not change with the rate.  It shrinks the
+#: slopes towards 0 if only a few people were recorded, or all at similar rates.
 UNMOVED = 1.0
-#: Does not depend on the rate, since step lengths at the same rate differ much, and a tracker that hardly
-#: sees the distance, as from the front, would accumulate the error of its speed.  The components contain it.
+#: This channel does not depend on the rate: at the same rate step lengths differ widely between people, and a
+#: tracker that can hardly see the distance, as from the front, would accumulate the error in speed.  The
+#: components still contain it.
 LEFT_OUT = CHANNELS.index("root_forward")
-#: Coefficients of a channel's Fourier series, ten harmonics: higher ones move joints by 0.12 mm in a person
-#: whose rate is a standard deviation off (rms, `make eval-learn`), and a model stays small.
+#: Coefficients of a channel's Fourier series: a constant and ten harmonics, which keeps models small.  In a
+#: person whose rate is one standard deviation off, higher harmonics would move joints by only 0.12 mm (rms,
+#: `make eval-learn`).
 TERMS = 21
 #: Largest sum of a channel's coefficients, radians or statures per unit of pace; libgait refuses more.
 STEEPEST = 1.0

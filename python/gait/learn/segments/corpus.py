@@ -29,7 +29,7 @@ class Recorded:
     names: tuple[str, ...]
     stature: float
     table: Floats  #: (T, 3 J + 3) positions and root, on disk
-    people: list[Floats] = field(default_factory=list)  #: the same of people who were not recorded
+    people: list[Floats] = field(default_factory=list)  #: such tables of imaginary people
 
     @property
     def places(self) -> Floats:

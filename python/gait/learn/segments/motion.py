@@ -132,7 +132,8 @@ def _times(frames: int, fps: float, rate: float) -> Floats:
 def resample(places: Floats, fps: float, rate: float) -> Floats:
     """Resample positions (T, J, 3), NaN where missing, at another rate, without motion too fast for it.
 
-    A Butterworth filter forward and backward, then a cubic spline; gaps are bridged only within these.
+    Applies a Butterworth filter forward and backward, then a cubic spline.  Gaps are bridged for filter and
+    spline, but remain gaps in the result.
     """
     frames, flat, at = len(places), places.reshape(len(places), -1), _times(len(places), fps, rate)
     result = np.full((len(at), flat.shape[1]), np.nan)

@@ -217,7 +217,7 @@ def _rest_axes(
 def _posed_axes(
     recording: Recording, bones: dict[str, int], joints: dict[str, Floats]
 ) -> tuple[Floats, Floats]:
-    """Return the same without a rest pose, assuming that pelvis and head are level and forward on average."""
+    """Return `_rest_axes` without a rest pose: pelvis and head are level and face forward on average."""
     pelvis, head = (recording.rotation[:, bones.get(part, 0)] for part in ("pelvis", "head"))
     hips = joints["l_hip"] - joints["r_hip"]
     axes = frame_from(_mean_in(pelvis, np.broadcast_to([0.0, 0, 1], hips.shape)), _mean_in(pelvis, hips), "y")

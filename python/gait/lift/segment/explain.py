@@ -23,7 +23,7 @@ from gait.lift.segment.view import Perspective, View
 Floats = npt.NDArray[np.float64]
 
 FEWEST = 4  # fewest visible points of a segment that is estimated by itself
-STARTS = 8  # headings, all around, from which an unknown one is searched for
+STARTS = 8  # headings from which the search for an unknown one starts, as LIFT_HEADINGS of fit.h
 START_SD = round(np.pi / STARTS, 1)  # radians from a start: half the distance between two
 SAME = 0.2  # radians; explanations with closer headings are the same
 TURN_SD = 0.7  # radians; sd of the change of heading in half a segment

@@ -103,9 +103,9 @@ class Information:
         Information between blocks and lasting unknowns.
     corner : (G, G)
     vector : (B, n)
-        Information times mean, of the blocks.
+        Information times mean of the blocks.
     edge : (G,)
-        The same of the lasting unknowns.
+        Information times mean of the lasting unknowns.
     """
 
     diagonal: Floats

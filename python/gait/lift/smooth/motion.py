@@ -429,7 +429,7 @@ class Evidence:
     def __call__(self, keypoints: Keypoints, near: Reading | None = None) -> Reading:
         """Fit keypoints; -inf and NaN if the smoother fails.
 
-        `near`: reading of similar keypoints, from whose motion to start.
+        `near`: the result for similar keypoints, whose motion is the starting point.
         """
         try:
             return self._read(keypoints, near)
