@@ -17,9 +17,9 @@ typedef struct runner { /* takes turns with others: a tracker, or two at the sam
     bench_result *result;
     workers crew;
     unsigned char *memory;
-    size_t each; /* bytes of it for a tracker */
+    size_t each; /* bytes of memory per tracker */
     gait_tracker *tracker[2];
-    int32_t frame, count; /* next in the scene; steps measured */
+    int32_t frame, count; /* next frame of the scene; steps measured so far */
     times *spent;
     double limit_wall, limit_cpu[2]; /* nanoseconds, in this turn */
 } runner;

@@ -13,8 +13,8 @@ typedef struct bench_plan {
     const bench_scene *scene; /* until it is measured */
     int32_t mode, particles, threads;
     uint32_t cpu_mask;
-    int32_t steps;  /* of the first for all that take turns; or */
-    int32_t rounds; /* whole ones through the scene, every frame but the first measured in each */
+    int32_t steps;  /* to measure; the first plan's counts for all that take turns; 0: see rounds */
+    int32_t rounds; /* passes through the whole scene; each measures every frame but the first */
     bool stages;    /* time the stages as well, which takes a little time itself */
     bool
         limit; /* the texture-only limit takes turns with it, on one core and with the best instruction set */

@@ -6,12 +6,12 @@
 #include <stdio.h>
 #include <stdlib.h>
 
-/* PARSEC bodytrack, one camera, 10,000 particles x 1 layer, one core of such a machine: quoted, not measured here.  Its
- * samples are points of edges and points inside the limbs that are points_read up in a map of edges and in the foreground. */
+/* PARSEC bodytrack with one camera and 10,000 particles x 1 layer on one core of such a machine: quoted, not measured
+ * here.  Its samples are points on edges, which it looks up in an edge map, and points inside limbs, in the foreground. */
 static const double PARSEC_MS[2] = {43, 58};
 enum { PARSEC_SAMPLES = 481 };
-/* The texture-only limit on that machine, the most that was quoted: this machine's, in turns with what is judged, shows
- * how fast it is at the moment. */
+/* The texture-only limit on that machine, the largest figure quoted.  The limit measured here, in turns with what is judged,
+ * shows how fast this machine is at the moment. */
 static const double LIMIT_MS = 17;
 
 void verdict_size(verdict *v, const bench_result *r)
@@ -23,7 +23,7 @@ void verdict_size(verdict *v, const bench_result *r)
     v->most = cost > v->most ? cost : v->most;
 }
 
-/* Points of surface and edges that a body has; hidden ones are not read. */
+/* Points on the surface and the edges of a body; hidden ones are not read. */
 static int32_t points(const gait_model *m)
 {
     enum { EDGE_POINTS = 16 }; /* of a limb: edges_count */
@@ -51,8 +51,8 @@ static void rate_lines(const char *what, double wanted, const bench_result *r)
          1e3 / (r->limit_ratio * LIMIT_MS), true, "fps");
 }
 
-/* What a second thread adds, and whether that is as much as a second core adds to trackers that have nothing to do with
- * each other: two "cores" may be threads of one, as on virtual machines, and share its units and caches. */
+/* The gain of a second thread, compared with running two independent trackers at once: on virtual machines two "cores" may
+ * be hardware threads of one, which share its units and caches. */
 static void thread_lines(const by_threads *many)
 {
     line("two threads against one, 10,000 particles", 1.8, 1 / many->two->ratio, true, "times");

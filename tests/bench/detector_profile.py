@@ -26,14 +26,12 @@ from gait.progress import progress
 
 CLIPS = Path("build/detector-profile")
 MOST = 0.08  # person's heights; larger errors are outliers: swapped sides, another object
-RIDGE = 2e-3  # pulls offsets that the clips do not show to zero
+RIDGE = 2e-3  # shrinks offsets to zero that the clips do not show
 LAGS = 15  # frames over which errors may be correlated
 QUIET = 0.05  # a smaller correlation counts as none
-SPREAD = 1.4826  # median absolute deviation to standard deviation
-HELD, NORMAL = (
-    0.9,
-    1.645,
-)  # share of lasting errors within so many standard deviations; a few are far larger
+SPREAD = 1.4826  # standard deviation over median absolute deviation of a normal distribution
+#: The lasting sd is the HELD quantile of the errors over that of a normal distribution; a few are far larger.
+HELD, NORMAL = 0.9, 1.645
 WINDOW = 0.8  # seconds over which changing errors nearly average out; these are measured in two windows
 DURATIONS = np.geomspace(
     0.5, 10.0, 60

@@ -66,7 +66,7 @@ WANTED = {
 }  # mm
 COVERED = 0.80, 0.97  # of the coordinates of joints, in 90 % intervals
 DEARER = 1.35  # a step with three classes, as a multiple of one with one
-WRONG = 0.03  # of the frames under `tracking`: of another class, longer than DELAY after a change
+WRONG = 0.03  # of the frames with status `tracking`: in another class, longer than DELAY after a change
 
 TITLE = "Classes of motion"
 COLUMNS = (
@@ -89,7 +89,7 @@ other classes.
 
 - root: error with the hips aligned, median over frames, then over seeds; abs: error without alignment
 - in 90 %: share of the joints' coordinates in their 90 % intervals, target {COVERED[0]} to {COVERED[1]}
-- far: share of the frames under `tracking` that are more than {1000 * FAR:.0f} mm off (root)
+- far: share of the frames with status `tracking` that are more than {1000 * FAR:.0f} mm off (root)
 - wrong class: share of the same frames with another class, later than {DELAY} s after a change, target below
   {100 * WRONG:.0f} %; - : the model has one class"""
 
@@ -120,8 +120,8 @@ class Run:
     absolute: float  #: mm
     covered: float  #: share of the coordinates in their 90 % intervals
     tracking: float  #: share of the frames
-    far: float  #: share of the frames under `tracking` with more than FAR
-    wrong: float | None  #: share of the frames under `tracking` of a wrong class; None: the model has one
+    far: float  #: share of the frames with status `tracking` whose error exceeds FAR
+    wrong: float | None  #: share of the frames with status `tracking` in a wrong class; None: one class
 
 
 def main() -> None:

@@ -17,9 +17,8 @@ from gait.motion.footfalls import Strikes, strikes_by_zeni
 
 LOCK_AFTER = (1.0, 1.5)  # seconds after the start in which the phase must be right
 LOCK = 0.05  # cycles; largest error that still counts as locked
-WRONG = (
-    0.05  # a run is wrong if a larger share of the frames after the first second is flipped under `tracking`
-)
+#: A run is wrong if more than this share of the frames after the first second is flipped while `tracking`.
+WRONG = 0.05
 WITHIN = 2.0  # frames by which a heel strike may be off
 _DRAWS = 256  # particles whose poses give the covariance
 _SHRINK = 0.1  # shrinks the covariance towards its diagonal: limbs are rigid, so it is nearly singular

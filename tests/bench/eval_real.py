@@ -40,7 +40,7 @@ ARMS = ("auto", "nobg", "known", "nocam", *(f"{arm}{WITHOUT}" for arm in ("auto"
 MEAN = {"auto": 0.85, "nocam": 0.75, "known": 0.90}  # least mean share of good frames
 LEAST = {"auto": 0.65}  # and the least of each clip
 NEAR = {"nobg": ("auto", 0.05)}  # the mean may be this much lower than that of another arm
-WRONG = 0.02  # of the frames under `tracking`, at most
+WRONG = 0.02  # most of the frames with status `tracking`
 STRIDE = 0.03  # error of the stride rate, as a share, at most
 
 
@@ -49,10 +49,11 @@ Films of real people, compared with joints of BlazePose (full) that a person che
 guessed. libgait's detector uses the same network: errors that both share do not show, so scores with the
 detector are too good; those without it (eval_real_none) are not affected. good: knees and ankles within 9
 % of the person's height on average, hips in place; swap: left and right swapped; legs: hips in place, legs
-not; off: hips or legs elsewhere; none: frames not in the track.  wrong: frames under `tracking` that are
-not good.  Heel strikes: median distance of the track's heel strikes, from its phase, from those counted in
-the pictures (tests/bench/real_strikes.json).  Stride rate: over the frames that have a phase.  CPU s and
-frames/s are those of the whole command including the detector, in some rows with other programs running."""
+not; off: hips or legs elsewhere; none: frames not in the track.  wrong: frames with status
+`tracking` that are not good.  Heel strikes: median distance of the track's heel strikes, from its phase,
+from those counted in the pictures (tests/bench/real_strikes.json).  Stride rate: over the frames that have
+a phase.  CPU s and frames/s are those of the whole command including the detector, in some rows with other
+programs running."""
 
 
 @dataclass(frozen=True)

@@ -16,7 +16,7 @@ from pathlib import Path
 from gait.simulate.clip import simulate
 from gait.simulate.scenario import PRESETS, Scenario
 
-SIZE = (400, 300)  # pixels: the tracker looks at a person of 192
+SIZE = (400, 300)  # pixels; the tracker reduces the person to a height of 192
 CASES: dict[str, Scenario] = {
     **{name: PRESETS[name] for name in ("slow", "fast", "limping", "stick", "crutches")},
     "usual": Scenario(frames=120, seed=81),

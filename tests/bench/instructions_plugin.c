@@ -1,5 +1,5 @@
 /* instructions_plugin.c - a plugin of QEMU that prints how many instructions a program executed.
- * The declarations are those of its interface 1 (qemu-plugin.h), which Debian has no package of. */
+ * The declarations are copied from version 1 of its interface (qemu-plugin.h), which Debian does not package. */
 #include <stdint.h>
 #include <stdio.h>
 
@@ -26,7 +26,7 @@ static void finish(uint64_t id, void *user)
     (void)id;
     (void)user;
     printf("%llu\n", (unsigned long long)executed);
-    fflush(stdout); /* QEMU ends without */
+    fflush(stdout); /* QEMU exits without flushing */
 }
 
 int qemu_plugin_install(uint64_t id, const void *info, int argc, char **argv)

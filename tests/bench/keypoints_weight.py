@@ -34,7 +34,7 @@ WEIGHTS = (0.0, 2.0, 8.0, 32.0)
 _READING = """\
 `gait track` with all defaults except the weight; 0: images only, except for the start. Keypoints are those of
 the detector (full), with the errors of its profile. Rendered clips: root-aligned and absolute error of 15
-joints, median over the frames, mm. All films: good frames, and wrong ones under `tracking`, as in
+joints, median over the frames, mm. All films: good frames, and wrong ones with status `tracking`, as in
 `make eval-real`, compared with true joints or, for real films, with joints that a person checked, which come
 from such a detector as well; heel strikes: median distance from the true ones or from those counted in the
 pictures. Default: {default:g}."""

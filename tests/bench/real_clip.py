@@ -26,12 +26,9 @@ LEGS = ("l_knee", "r_knee", "l_ankle", "r_ankle")
 HIPS = ("l_hip", "r_hip")
 JOINTS = tuple(f"{side}_{joint}" for joint in ("shoulder", "elbow", "wrist") for side in "lr") + HIPS + LEGS
 KINDS = ("good", "swap", "legs", "off", "none")
-"""# kinds of frames: all in place; left and right swapped; legs elsewhere; hips or legs far off; no row"""
-_GOOD, _HIPS, _LEGS = (
-    0.09,
-    0.15,
-    0.20,
-)  # largest errors of good legs, and of hips and legs that are not far off, person's heights
+"""Kinds of frames: all in place; left and right swapped; legs elsewhere; hips or legs far off; no row."""
+#: Largest errors, person's heights, of legs that are good, and of hips and legs that are not far off.
+_GOOD, _HIPS, _LEGS = 0.09, 0.15, 0.20
 _EARS = 0.925  # height of the ears, person's heights
 _STRIKES = Path(__file__).parent / "real_strikes.json"
 _TILES, _TILE = 8, 300  # of a contact sheet; pixels
