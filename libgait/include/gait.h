@@ -401,7 +401,12 @@ typedef struct gait_keypoint { GAIT_KEYPOINT_FIELDS(GAIT_DECLARE) } gait_keypoin
 
 typedef struct gait_camera_pose { GAIT_CAMERA_POSE_FIELDS(GAIT_DECLARE) } gait_camera_pose;
 
-/* Observations at one time.  A field of 0 is not given. */
+/* Observations at one time.  A field of 0 is not given.
+ *
+ * Of several people, each with a tracker, one may hide another: where the nearest person in `people` is another than
+ * `person`, the silhouette is not compared.  The tracked person then counts as hidden there, not as absent, and the other's
+ * foreground as explained.  These pictures are the same for all trackers: draw each person with gait_render(), the
+ * farthest first. */
 #define GAIT_FRAME_FIELDS(FIELD)                                                                                      \
     FIELD("Size of this struct in the caller's header; 0: this one.",                                                 \
           uint64_t, struct_size, , "bytes")                                                                           \
@@ -414,7 +419,11 @@ typedef struct gait_camera_pose { GAIT_CAMERA_POSE_FIELDS(GAIT_DECLARE) } gait_c
     FIELD("Pose of each camera in this frame; NULL: the config's.  The state stays in world coordinates.",            \
           const gait_camera_pose *, pose, [GAIT_MAX_CAMERAS], "")                                                     \
     FIELD("Empty scene seen by each camera in this frame; data NULL: that of gait_tracker_set_background().",         \
-          gait_image, background, [GAIT_MAX_CAMERAS], "")
+          gait_image, background, [GAIT_MAX_CAMERAS], "")                                                             \
+    FIELD("Number of the nearest person in each undistorted pixel, or 0 (GREY8).",                                    \
+          gait_image, people, [GAIT_MAX_CAMERAS], "")                                                                 \
+    FIELD("That of the tracked one.",                                                                                 \
+          uint64_t, person, , "")
 
 typedef struct gait_frame { GAIT_FRAME_FIELDS(GAIT_DECLARE) } gait_frame;
 

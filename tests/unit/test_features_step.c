@@ -122,6 +122,44 @@ static void test_behind(void)
     toy_tracker_free(t);
 }
 
+static int32_t cells_inside(const features *f)
+{
+    int32_t cells = 0;
+    for (int32_t y = 0; y < GRID_SIZE; y++)
+        for (int32_t w = 0; w < GRID_WORDS; w++)
+            cells += grid_popcount(f->inside[y][w]);
+    return cells;
+}
+
+/* Cells that another person covers are neither foreground nor visible; the same picture changes nothing for that person. */
+static void test_others(void)
+{
+    static uint8_t nearest[SCENE_PIXELS];
+    gait_tracker *const t = tracker(1, GAIT_TERM_SILHOUETTE);
+    const features *const found = &t->camera[0].features;
+    gait_state const s = toy_walk(20.0f / 30.0f);
+    gait_camera const cam = toy_camera(0);
+    particle_state const there = {.f = {[F_X] = s.pelvis[0], [F_STATURE] = 1.75f}};
+    gait_frame f = toy_frame(20);
+    f.image[0] = toy_image(shot[0]);
+    CHECK(features_step(t, &f, &there) == 1);
+    int32_t const foreground = found->foreground_total, inside = cells_inside(found);
+    CHECK(gait_render(toy_model(), &cam, &s, nearest, SCENE_W, NULL) == GAIT_OK);
+    for (int32_t i = 0; i < SCENE_PIXELS; i++)
+        nearest[i] = nearest[i] ? 2 : 0;
+    f.people[0] = toy_image(nearest);
+    for (f.person = 1; f.person <= 2; f.person++) {
+        CHECK(features_step(t, &f, &there) == 1 && found->has_foreground);
+        bool const own = f.person == 2;
+        CHECK(own ? found->foreground_total == foreground : found->foreground_total < foreground / 4);
+        CHECK(own ? cells_inside(found) == inside
+                  : inside - cells_inside(found) > foreground / 2 / FOREGROUND_ONE);
+    }
+    f.people[0].width--;
+    CHECK(gait_tracker_step(t, &f, &(gait_estimate){0}, NULL) == GAIT_ERR_ARG);
+    toy_tracker_free(t);
+}
+
 int main(void)
 {
     for (int k = 0; k < SCENE_CAMERAS; k++) {
@@ -132,5 +170,6 @@ int main(void)
     test_plate();
     test_formats();
     test_behind();
+    test_others();
     return CHECK_DONE();
 }

@@ -213,6 +213,8 @@ static gait_result check_view(const gait_tracker *t, int32_t c, const gait_frame
         s = check_image(&t->home[c], c, &frame->image[c], "image", err);
     if (s == GAIT_OK && frame->background[c].data)
         s = check_image(&t->home[c], c, &frame->background[c], "background", err);
+    if (s == GAIT_OK && frame->people[c].data)
+        s = check_image(&t->home[c], c, &frame->people[c], "people", err);
     return s;
 }
 

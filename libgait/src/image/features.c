@@ -33,6 +33,23 @@ static void refresh_inside(const kernels *run, features *f, const gait_camera *c
     f->inside_map = *now;
 }
 
+/* Take out the cells whose middle shows another person. */
+static void leave_others(features *f)
+{
+    const gait_image *const p = f->people;
+    float const step = 2.0f / f->map.scale, first = 0.25f * step + 0.5f;
+    f->inside_map.scale = 0.0f;
+    for (int32_t i = 0; i < GRID_SIZE * GRID_SIZE; i++) {
+        int32_t const x = i % GRID_SIZE, y = i / GRID_SIZE;
+        float const u = f->map.u0 + first + step * (float)x, v = f->map.v0 + first + step * (float)y;
+        if (!(u >= 0.0f && v >= 0.0f && u < (float)p->width && v < (float)p->height))
+            continue;
+        uint8_t const who = p->data[(int32_t)v * (ptrdiff_t)p->stride + (int32_t)u];
+        if (who && who != f->person)
+            f->inside[y][x / 64] &= ~((uint64_t)1 << x % 64);
+    }
+}
+
 void features_begin(features *f, const gait_image *im, features_scratch *s)
 {
     f->has_image = im->data != NULL;
@@ -71,6 +88,8 @@ static void foreground(const kernels *run, features *f, const gait_camera *cam, 
 {
     view_planes const luma = {.channel = {s->grey}, .channels = 1};
     refresh_inside(run, f, cam);
+    if (f->people)
+        leave_others(f);
     f->has_foreground = plate != NULL;
     if (!f->has_foreground)
         return;

@@ -34,8 +34,10 @@ typedef struct features {
     uint16_t *pairs; /* VIEW_PIXELS: each value, and in the high byte the one below it */
     int32_t foreground_total; /* sum of the foreground over the grid, FOREGROUND_ONE = 1 */
     uint64_t (*foreground)[GRID_SIZE][GRID_WORDS]; /* FOREGROUND_PLANES bit planes of the probability */
-    uint64_t (*inside)[GRID_WORDS];                /* cells inside the camera's image */
-    view_map inside_map;                           /* region for which `inside` was computed */
+    uint64_t (*inside)[GRID_WORDS]; /* cells inside the camera's image that show no other person */
+    view_map inside_map; /* region for which `inside` was computed; scale 0: without cells of other people */
+    const gait_image *people; /* nearest person in each ideal pixel of this frame; NULL: not given */
+    uint64_t person;          /* the tracked one */
     /* The planes of foreground, then inside, in words that begin at each multiple of GRID_STEP columns, as
      * grid_mask's. */
     uint64_t (*words)[FOREGROUND_PLANES + 1][GRID_SIZE]; /* GRID_STARTS */

@@ -103,6 +103,8 @@ static void camera_features(gait_tracker *t, int32_t c, const gait_frame *frame,
         s->plate_stale = own;
     }
     features_begin(&s->features, &j.image, &t->planes);
+    s->features.people = frame->people[c].data ? &frame->people[c] : NULL;
+    s->features.person = frame->person;
     if (s->features.has_image) {
         task_run(&t->cfg.exec, t->cfg.tasks, FEATURES_BANDS, 1, sample_range, &j);
         task_run(&t->cfg.exec, t->cfg.tasks, FEATURES_MAPS, 1, map_range, &j);
