@@ -18,7 +18,7 @@ from gait.io.track_file import read_track
 from gait.io.video import Frame
 from gait.track import scene
 from gait.track.options import ClipOptions
-from gait.track.other_people import OtherPeople, Outline
+from gait.track.other_people import OTHER, OtherPeople, Outline
 
 MODEL = Model()
 NAMES = (
@@ -97,18 +97,18 @@ def test_a_start_takes_the_person_who_walks(crossing):
 def test_another_person_hides_and_is_not_missed(crossing):
     pictures, joints = crossing
     number = int(np.argmin(np.abs(joints[0, :, 0, 0] - joints[1, :, 0, 0])))
-    behind, before = (Outline(detected(one), 30) for one in joints)
-    frame, plate = Frame(number, number / 30, pictures[number]), wall()
-    changed = [
-        np.abs(OtherPeople(plate, own, [other]).plate(frame).astype(int) - plate).any(axis=2)
+    behind, before = (Outline(detected(one), 30, camera()) for one in joints)
+    frame = Frame(number, number / 30, pictures[number])
+    other = [
+        OtherPeople(camera(), own, [other]).nearest(frame) == OTHER
         for own, other in ((behind, before), (before, behind))
     ]
     chest = camera().project(joints[1, number, MODEL.joint_names.index("neck")] - (0, 0, 0.25))
     u, v = np.rint(chest).astype(int)
-    assert changed[0][v, u] and not changed[1][v, u]  # hidden there, and in front there
-    assert changed[0].sum() > 3 * changed[1].sum()
+    assert other[0][v, u] and not other[1][v, u]  # hidden there, and in front there
+    assert other[0].sum() > 3 * other[1].sum()
     away = frame._replace(number=FRAMES)
-    assert OtherPeople(plate, behind, [before]).plate(away) is None
+    assert OtherPeople(camera(), behind, [before]).nearest(away) is None
 
 
 @pytest.mark.parametrize("more", [["--init", "i.json"], ["--detector", "none"], ["--mode", "paper"]])

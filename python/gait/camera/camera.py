@@ -132,18 +132,26 @@ class Camera:
 
     def rays(self, pixels: ArrayLike) -> Array:
         """Find the rays through pixels (..., 2): unit directions (..., 3) in the world, from `centre`."""
+        plane = self._undistorted(pixels, np.eye(3))
+        direction = np.concatenate([plane, np.ones((*plane.shape[:-1], 1))], axis=-1) @ self.R
+        direction /= np.linalg.norm(direction, axis=-1, keepdims=True)
+        return np.asarray(direction)
+
+    def undistorted(self, pixels: ArrayLike) -> Array:
+        """Find the pixels (..., 2) at which the same would appear without the distortion of the lens."""
+        return self._undistorted(pixels, self.matrix)
+
+    def _undistorted(self, pixels: ArrayLike, matrix: Array) -> Array:
+        """Remove the distortion from pixels (..., 2), for a camera with this matrix (3, 3)."""
         import cv2  # as in project()
 
         uv = np.asarray(pixels, np.float64)
         flat = np.ascontiguousarray(uv.reshape(-1, 1, 2))
         if not flat.size:  # for which OpenCV returns None
-            return np.empty((*uv.shape[:-1], 3))
+            return np.empty(uv.shape)
         stop = (cv2.TERM_CRITERIA_COUNT | cv2.TERM_CRITERIA_EPS, 100, 1e-9)
-        same = np.eye(3)
-        plane = cv2.undistortPointsIter(flat, self.matrix, self.distortion, same, same, stop)[:, 0]
-        direction = np.column_stack([plane, np.ones(len(plane))]) @ self.R
-        direction /= np.linalg.norm(direction, axis=1, keepdims=True)
-        return direction.reshape(*uv.shape[:-1], 3)
+        found = cv2.undistortPointsIter(flat, self.matrix, self.distortion, np.eye(3), matrix, stop)
+        return np.asarray(np.reshape(found, uv.shape), np.float64)
 
     def on_plane(self, pixels: ArrayLike, height: float = 0.0) -> Array:
         """Intersect rays of pixels (..., 2) with the plane z = `height`: (..., 3), NaN if they miss it."""

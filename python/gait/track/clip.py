@@ -127,7 +127,7 @@ def _follower(
         find_again,
         auto_start,
         one_pass=options.smooth,
-        plate_of=scene.plate_of(),
+        nearest_of=scene.nearest_of(),
     )
 
 

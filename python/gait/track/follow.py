@@ -66,8 +66,8 @@ class Follower:
     one_pass : bool
         Whether all estimates come from one forward pass, as the smoother needs; tracking backwards then only
         finds an earlier start.
-    plate_of : callable
-        Returns the empty scene of a frame, if it is not the tracker's.
+    nearest_of : callable
+        Returns who is nearest in each pixel of a frame, as `gait.track.other_people` numbers them.
 
     Attributes
     ----------
@@ -85,12 +85,12 @@ class Follower:
         auto_start: BoxStart | None = None,
         *,
         one_pass: bool = False,
-        plate_of: Callable[[Frame], Image | None] = lambda frame: frame.plate,
+        nearest_of: Callable[[Frame], Image | None] = lambda _: None,
     ) -> None:
         self._tracker, self._video, self._keypoints = tracker, video, keypoints
         self._plausibility = plausibility
         self._find_again, self._auto_start, self._one_pass = find_again, auto_start, one_pass
-        self._plate_of = plate_of
+        self._nearest_of = nearest_of
         self._uncertain = False  # about left and right
         self.step_seconds: list[float] = []
 
@@ -194,7 +194,9 @@ class Follower:
         """Step with the person's keypoints, and judge the estimate."""
         joints = self._keypoints.of_cameras(frame, last)
         images = [frame.image, *(None if view is None else view.image for view in frame.others)]
-        found = tracker.step(images, utime, joints, poses=frame.pose, backgrounds=self._plate_of(frame))
+        found = tracker.step(
+            images, utime, joints, poses=frame.pose, backgrounds=frame.plate, people=self._nearest_of(frame)
+        )
         now = self._plausibility.judged(frame, found)
         self.step_seconds.append(tracker.step_seconds)
         sure = now.status != TrackStatus.TRACKING or not self._uncertain

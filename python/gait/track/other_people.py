@@ -1,8 +1,8 @@
 """Account for other people in a clip, who hide the tracked person and are foreground.
 
-Where another person covers the picture, the empty scene given to the tracker is changed so that a body there
-costs as much as none.  Then another person's foreground need not be explained, and a person behind them is
-hidden rather than absent.  The feet show who is nearer: on level ground nearer feet are lower in the picture.
+Where another person is nearest, the tracker does not compare the silhouette (``gait_frame``).  Then their
+foreground need not be explained, and a person behind them is hidden rather than absent.  The feet show who is
+nearer: on level ground nearer feet are lower in the picture.
 """
 
 from __future__ import annotations
@@ -13,12 +13,15 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
+from gait.camera.camera import Camera
 from gait.io.keypoints_file import Keypoints
 from gait.io.video import Frame, Image
 
 Array = NDArray[np.float64]
 
-_CHANGE = 11  # grey levels from the empty scene at which, with missed_weight, body and no body cost the same
+TRACKED, OTHER = 1, 2
+"""Numbers of the tracked person, and of all others, where they are nearest."""
+
 _HEIGHTS = 1.28  # height of a person over the distance from shoulder to ankle
 _HEAD = (0.115, 0.085)  # heights: centre of the head above the shoulders, and its radius
 _TRUNK = ("l_shoulder", "r_shoulder", "r_hip", "l_hip")
@@ -43,11 +46,13 @@ class Outline:
         Interpolated in frames in which the person was not found.
     fps : float
         Frames per second.
+    camera : Camera
+        Outlines are free of the distortion of its lens.
     """
 
-    def __init__(self, keypoints: Keypoints, fps: float) -> None:
+    def __init__(self, keypoints: Keypoints, fps: float, camera: Camera) -> None:
         self._first, self._names = int(keypoints.frame[0]), list(keypoints.names)
-        self._uv = _filled(keypoints.uv)
+        self._uv = camera.undistorted(_filled(keypoints.uv))
         ankles = self._uv[:, [self._names.index(name) for name in _FEET], 1].max(axis=1)
         reach = max(1, round(_STANCE * fps))
         padded = np.pad(ankles, reach, mode="edge")
@@ -66,15 +71,12 @@ class Outline:
         low, high = self._uv[row].min(axis=0), self._uv[row].max(axis=0)
         return np.array([low, high]) + _REACH * (high[1] - low[1]) * np.array([[-1.0], [1.0]])
 
-    def draw(self, number: int, canvas: Image, corner: Array, value: int) -> None:
-        """Set the pixels covered by the person, in a window (h, w) of the picture, in place.
-
-        `corner`: (u, v) of the window's first pixel.
-        """
+    def draw(self, number: int, canvas: Image, value: int) -> None:
+        """Set the pixels (h, w) that the person covers in a frame, in place."""
         row = number - self._first
         if self.box(number) is None:
             return
-        at = dict(zip(self._names, self._uv[row] - corner, strict=True))
+        at = dict(zip(self._names, self._uv[row], strict=True))
         shoulders, hips = (0.5 * (at[f"l_{name}"] + at[f"r_{name}"]) for name in ("shoulder", "hip"))
         ankle = max((at[name] for name in _FEET), key=lambda one: float(one[1]))
         tall = _HEIGHTS * float(np.hypot(*(shoulders - ankle)))
@@ -91,41 +93,41 @@ class Outline:
 
 
 class OtherPeople:
-    """Makes for each frame an empty scene that neutralises other people.
+    """Finds who is nearest in each pixel of a frame.
 
     Parameters
     ----------
-    plate : image or None
-        Empty scene; with a moving camera each frame has its own.
+    camera : Camera
     own : Outline
         The person who is tracked.
     others : sequence of Outline
     """
 
-    def __init__(self, plate: Image | None, own: Outline, others: Sequence[Outline]) -> None:
-        self._plate, self._own, self._others = plate, own, others
+    def __init__(self, camera: Camera, own: Outline, others: Sequence[Outline]) -> None:
+        self._size, self._own, self._others = camera.size, own, others
 
-    def plate(self, frame: Frame) -> Image | None:
-        """Make the empty scene for a frame; None if the tracker's own needs no change."""
-        empty = self._plate if frame.plate is None else frame.plate
-        if empty is None or empty.shape != frame.image.shape:
-            return frame.plate
-        near = [other for other in self._others if self._near(other, frame.number)]
+    def nearest(self, frame: Frame) -> Image | None:
+        """Find the nearest person in each pixel (h, w): `TRACKED`, `OTHER` or 0; None if no one else is near.
+
+        Where no one else is, the tracked person may be left out.
+        """
+        number = frame.number
+        near = [other for other in self._others if self._near(other, number)]
         if not near:
-            return frame.plate
-        size = np.array(frame.image.shape[1::-1])
-        boxes = np.array([other.box(frame.number) for other in near])
-        low = np.clip(np.floor(boxes[:, 0].min(axis=0)), 0, size).astype(int)
-        high = np.clip(np.ceil(boxes[:, 1].max(axis=0)), 0, size).astype(int)
-        if (high <= low).any():
-            return frame.plate
-        window = slice(low[1], high[1]), slice(low[0], high[0])
-        covered = self._covered(near, frame.number, low, high - low)
-        pixels = frame.image[window]
-        out = empty.copy()
-        changed = np.where(pixels >= _CHANGE, pixels - np.uint8(_CHANGE), pixels + np.uint8(_CHANGE))
-        out[window] = cv2.copyTo(changed, covered, out[window].copy())
-        return out
+            return None
+        foot = self._own.foot(number)
+        feet = [other.foot(number) for other in near]
+        behind = [foot is not None and theirs is not None and foot > theirs for theirs in feet]
+        canvas = np.zeros(self._size[::-1], np.uint8)
+        for other, hidden in zip(near, behind, strict=True):
+            if hidden:
+                other.draw(number, canvas, OTHER)
+        if any(behind):
+            self._own.draw(number, canvas, TRACKED)
+        for other, hidden in zip(near, behind, strict=True):
+            if not hidden:
+                other.draw(number, canvas, OTHER)
+        return canvas
 
     def _near(self, other: Outline, number: int) -> bool:
         """Whether another person may be in the part of the picture that the tracker uses."""
@@ -135,22 +137,6 @@ class OtherPeople:
         reach = _REGION * (mine[1, 1] - mine[0, 1])
         middle = mine.mean(axis=0)
         return bool((theirs[0] < middle + reach).all() and (theirs[1] > middle - reach).all())
-
-    def _covered(self, near: Sequence[Outline], number: int, corner: Array, size: Array) -> Image:
-        """Mask (h, w) of a window: pixels covered by others who are not behind the person."""
-        foot = self._own.foot(number)
-        feet = [other.foot(number) for other in near]
-        canvas = np.zeros(size[::-1], np.uint8)
-        behind = [foot is not None and theirs is not None and foot > theirs for theirs in feet]
-        for other, hidden in zip(near, behind, strict=True):
-            if hidden:
-                other.draw(number, canvas, corner, 255)
-        if any(behind):
-            self._own.draw(number, canvas, corner, 0)
-        for other, hidden in zip(near, behind, strict=True):
-            if not hidden:
-                other.draw(number, canvas, corner, 255)
-        return canvas
 
 
 def with_track(keypoints: Keypoints, joints: Mapping[int, Mapping[str, Array]], times: Array) -> Keypoints:

@@ -1,8 +1,8 @@
 """Track several people in a clip, each with a separate tracker.
 
 The detector identifies people, even when they cross.  Each person is tracked as if alone, except that the
-others' keypoints are left out, and that the areas they cover are neutral, counting neither as the person nor
-as the empty scene (`gait.track.other_people`).
+others' keypoints are left out, and that the silhouette is not compared where others are nearer
+(`gait.track.other_people`).
 """
 
 from __future__ import annotations
@@ -142,7 +142,7 @@ def _scene_of(scene: Scene, id: int, tracked: list[int], outlines: dict[int, Key
         people={other: one for other, one in scene.people.items() if other not in apart},
         keypoints={other: one for other, one in scene.keypoints.items() if other not in apart},
         apart={other: one for other, one in scene.keypoints.items() if other in apart},
-        outlines={other: Outline(one, scene.video.fps) for other, one in outlines.items()},
+        outlines={other: Outline(one, scene.video.fps, scene.camera) for other, one in outlines.items()},
     )
 
 

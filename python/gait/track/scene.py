@@ -124,12 +124,12 @@ class Scene:
         """Return the same scene without its plate."""
         return replace(self, plate=None, video=self.moving.without_panorama() if self.moving else self.video)
 
-    def plate_of(self) -> Callable[[Frame], Image | None]:
-        """Return the function that makes a frame's empty scene, which neutralises other tracked people."""
-        if not self.outlines:
-            return lambda frame: frame.plate
+    def nearest_of(self) -> Callable[[Frame], Image | None]:
+        """Return the function that finds who is nearest in each pixel of a frame."""
+        if not self.outlines or self.empty is None:
+            return lambda _: None
         others = [outline for id, outline in self.outlines.items() if id != self.person]
-        return OtherPeople(self.plate, self.outlines[self.person], others).plate
+        return OtherPeople(self.camera, self.outlines[self.person], others).nearest
 
     def others(self) -> list[int]:
         """Return the ids that are never in view together with the person, and so may be the same person."""

@@ -135,6 +135,8 @@ class Tracker:
         *,
         poses: CameraPose | Sequence[CameraPose | None] | None = None,
         backgrounds: Image | Sequence[Image | None] | None = None,
+        people: Image | Sequence[Image | None] | None = None,
+        person: int = 1,
     ) -> Estimate:
         """Process one frame and return the estimate.
 
@@ -151,16 +153,23 @@ class Tracker:
         backgrounds : image, or sequence of image or None, optional
             The empty scene seen by each camera in this frame.  The one from `set_background` is only used
             with the camera's original pose.
+        people : image, or sequence of image or None, optional
+            Number, 1 to 255, of the nearest person in each pixel of each camera's image (h, w) without lens
+            distortion; 0 where there is none.  The silhouette is not compared where others are.
+        person : int
+            Number of the tracked one.
         """
-        images, plates = (
+        images, plates, nearest = (
             [None if image is None else np.ascontiguousarray(image) for image in per_camera(pictures)]
-            for pictures in (frames, backgrounds)
+            for pictures in (frames, backgrounds, people)
         )
         placed = per_camera(poses)
-        if max(len(images), len(plates), len(placed)) > len(self.cameras):
+        if max(len(images), len(plates), len(placed), len(nearest)) > len(self.cameras):
             raise ValueError(f"{len(images)} images for {len(self.cameras)} cameras")
-        frame = abi.FrameC(utime=capture_time(utime), struct_size=ctypes.sizeof(abi.FrameC))
-        for what, field, views in (("frame", frame.image, images), ("background", frame.background, plates)):
+        size = ctypes.sizeof(abi.FrameC)
+        frame = abi.FrameC(utime=capture_time(utime), struct_size=size, person=person)
+        pictures = ("frame", frame.image, images), ("background", frame.background, plates)
+        for what, field, views in (*pictures, ("people", frame.people, nearest)):
             for i, image in enumerate(views):
                 if image is not None:
                     field[i] = image_view(image, self.cameras[i], what)
