@@ -1,5 +1,5 @@
 /* fuzz_messages.c - any messages, in any order: gait-trackd answers or complains, with lift, keypoints (also those of
- * one of several people), a moving camera and a further one. */
+ * one of several people, or of two), a moving camera and a further one. */
 #include "../../tools/trackd/receiver.c"
 
 #include "daemon.h"
@@ -11,7 +11,7 @@
 #include "gaitmsg_tracks_t.h"
 
 static void start(service *s, lift_service *lift, keypoint_cue *cue, pose_path *path, sink *out,
-                  further *more, uint8_t choice)
+                  further *more, service *second, keypoint_cue *second_cue, uint8_t choice)
 {
     static memory_file model, segments;
     static uint8_t blob[TOY_BYTES];
@@ -33,7 +33,7 @@ static void start(service *s, lift_service *lift, keypoint_cue *cue, pose_path *
     if (choice & 1) {
         keypoint_cue_open(cue, s->track.model, s->track.info.joints, 4);
         s->cue = cue;
-        out->person = choice & 32 ? 2 : 0;
+        s->person = choice & 32 ? 2 : 0;
     }
     if (choice & 2) {
         ok = ok && lift_service_open(lift, segments.path, &set, out, &why);
@@ -44,15 +44,22 @@ static void start(service *s, lift_service *lift, keypoint_cue *cue, pose_path *
         s->further = more;
     s->max_gap = 2;
     s->max_pixels = FUZZ_WIDTH * FUZZ_HEIGHT;
-    if (!ok || !service_open(s, out, 0, 1, NULL, choice & 8, &why))
+    ok = ok && service_open(s, out, 0, 1, NULL, choice & 8, &why);
+    if (choice & 64 && s->cue && !s->lift && !s->further) {
+        keypoint_cue_open(second_cue, s->track.model, s->track.info.joints, 4);
+        s->person = 1;
+        service_share(second, s, 2, second_cue);
+        ok = ok && service_open(second, out, 0, 1, NULL, choice & 8, &why);
+    }
+    if (!ok)
         abort();
 }
 
 int LLVMFuzzerTestOneInput(const uint8_t *data, size_t size)
 {
-    static service s;
+    static service s, second;
     static lift_service lift;
-    static keypoint_cue cue;
+    static keypoint_cue cue, second_cue;
     static pose_path path;
     static further more;
     static const struct handler {
@@ -75,12 +82,12 @@ int LLVMFuzzerTestOneInput(const uint8_t *data, size_t size)
     fuzz_bytes b = {data, size};
     sink out = {0};
     snapshot_file snapshot = {0};
-    s = (service){0};
+    s = second = (service){0};
     lift = (lift_service){0};
     cue = (keypoint_cue){0};
     path = (pose_path){.turn_sd = 0.01f, .place_sd = 0.01f};
     more = (further){0};
-    start(&s, &lift, &cue, &path, &out, &more, fuzz_take(&b));
+    start(&s, &lift, &cue, &path, &out, &more, &second, &second_cue, fuzz_take(&b));
     receiver r = {.service = &s, .log = true, .snapshot = &snapshot};
     while (b.left > 0) { /* kind, length, and the message, without its type unless the type is damaged */
         uint8_t const kind = fuzz_take(&b);
@@ -99,15 +106,18 @@ int LLVMFuzzerTestOneInput(const uint8_t *data, size_t size)
         lcm_recv_buf_t const buffer = {.data = message_bytes + (kind & 128 ? TYPE : 0),
                                        .data_size = (uint32_t)(n + (kind & 128 ? 0 : TYPE)),
                                        .recv_utime = 1};
-        h.call(&buffer, "FUZZ_1", &r);
+        h.call(&buffer, s.next && kind & 32 ? "FUZZ_2" : "FUZZ_1", &r);
         b.at += n;
         b.left -= n;
         free(message_bytes);
-        service_send_status(&s);
+        for (service *each = &s; each; each = each->next)
+            service_send_status(each);
     }
     flush_held(&r);
     if (s.lift)
         lift_service_close(s.lift);
+    if (s.next)
+        service_close(s.next);
     service_close(&s);
     further_close(&more);
     return 0;

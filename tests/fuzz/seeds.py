@@ -33,7 +33,8 @@ CAMERA = gait.Camera(
 )
 IMAGE, CAMERA_KIND, BACKGROUND, TRACKS, COMMAND, STATUS = range(6)
 FURTHER_CAMERA, FURTHER_BACKGROUND, FURTHER_IMAGE = 64, 65, 66
-WITH_FURTHER = 16  # bit of the choice
+WITH_FURTHER, WITH_SECOND_PERSON = 16, 64  # bits of the choice
+TO_SECOND_PERSON = 32  # bit of the kind
 START = {"phase": 0.2, "stride_hz": 0.9, "stature": 1.7, "heading": 0.0, "pelvis": [0.0, 0.0, 0.9]}
 
 
@@ -71,6 +72,12 @@ def messages(choice: int, jpeg: int | None) -> bytes:
             parts.append(part(FURTHER_IMAGE, image_message(picture(frame), utime, frame, jpeg)))
         parts.append(part(IMAGE, image_message(picture(frame), utime, frame, jpeg)))
         parts.append(part(TRACKS, tracks_message(names, uv, utime, frame)))
+        if choice & WITH_SECOND_PERSON:
+            parts.append(part(TO_SECOND_PERSON | TRACKS, tracks_message(names, uv + 4, utime, frame)))
+            if frame == 0:
+                start = {**START, "pelvis": [0.2, 0.0, 0.9]}
+                sd = dict.fromkeys(START, 0.1) | {"pelvis": [0.1] * 3}
+                parts.append(part(TO_SECOND_PERSON | COMMAND, command_message(kinds.START, 0, start, sd)))
     parts.append(part(COMMAND, command_message(kinds.STOP)))
     status = gaitmsg.status_t()
     status.version = status.text = "other"
@@ -109,7 +116,7 @@ def main() -> int:
         "start": [bytes(range(9, 200)) * 20],
         "messages": [
             messages(choice, quality)
-            for choice, quality in ((0, None), (1, 80), (10, None), (13, 60), (17, 60), (33, 60))
+            for choice, quality in ((0, None), (1, 80), (10, None), (13, 60), (17, 60), (33, 60), (65, 60))
         ],
         "files": [
             files(0, json.dumps(CAMERA.to_dict())),

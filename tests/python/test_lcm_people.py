@@ -1,9 +1,10 @@
-"""gait-trackd --person: one tracker for each of several people, distinguished by their keypoints."""
+"""gait-trackd --people and --person: a tracker for each person, distinguished by their keypoints."""
 
 from dataclasses import replace
 from functools import cache
 
 import cv2
+import lcm
 import lcm_rig as rig
 import numpy as np
 import pytest
@@ -14,6 +15,7 @@ from gait.io.track_file import read_track
 from gait.lcm.detect import Numbers
 from gait.lcm.link import gaitmsg
 from gait.lcm.messages import camera_message, image_message, tracks_message
+from gait.lcm.record import read_run
 from gait.live.feed import Feed
 
 FPS, WALK, BACK = 12, 42, 12 * 12  # frames: both walk, the second one is away, and comes back
@@ -45,30 +47,44 @@ def picture(frame):
     return image
 
 
+def time_of(frame):
+    return 1_000_000 + round(frame * 1e6 / FPS)
+
+
+def image(frame):
+    return image_message(picture(frame), time_of(frame), frame)
+
+
 def joints(person, frame):
     return rig.model().pose(state(person, frame))[0]
 
 
+def played(path, *options):
+    """Estimates of both people from a log, and what is printed."""
+    out = path.with_suffix(".out")
+    out.unlink(missing_ok=True)
+    words = ["--url", f"file://{path}?speed=0", "--out", f"file://{out}?mode=w", "--keypoints-term"]
+    outcome = rig.run(*rig.command(*words, "-n", 300, *options)[1:])
+    found = {person: rig.read_log(out, f"GAIT_ESTIMATE_{person}", gaitmsg.estimate_t) for person in (1, 2)}
+    return found, outcome.printed + outcome.words
+
+
 @pytest.fixture(scope="module")
 def streams(tmp_path_factory):
-    """Estimates of both people's trackers, and the log from which they were made."""
+    """Estimates of both people, and the log that was played."""
     rng, names = np.random.default_rng(1), list(rig.model().joint_names)
     camera = camera_message(rig.CAMERA, 1)
     log = [("GAIT_CAMERA_0", camera), ("GAIT_BACKGROUND_0", image_message(rig.plate(), 1, -1))]
     for frame in range(BACK + WALK):
-        at = 1_000_000 + round(frame * 1e6 / FPS)
-        log.append(("GAIT_IMAGE_0", image_message(picture(frame), at, frame)))
+        at = time_of(frame)
+        log.append(("GAIT_IMAGE_0", image(frame)))
         for person in (1, 2):
             if state(person, frame) is not None and (person == 2 or not 17 < frame < 24):  # hidden
                 uv = rig.CAMERA.project(joints(person, frame)) + 0.5 * rng.normal(size=(len(names), 2))
                 log.append((f"GAIT_TRACKS_0_{person}", tracks_message(names, uv, at, frame)))
     path = rig.write_log(tmp_path_factory.mktemp("people") / "a.log", log)
-    found = {}
-    for person in (1, 2):
-        out = path.with_name(f"{person}.log")
-        rig.run(*rig.command("--url", f"file://{path}?speed=0", "--out", f"file://{out}?mode=w",
-                             "--keypoints-term", "--person", person, "-n", 300)[1:])  # fmt: skip
-        found[person] = rig.read_log(out, f"GAIT_ESTIMATE_{person}", gaitmsg.estimate_t)
+    found, printed = played(path, "--people", 2)
+    assert "person 1 found" in printed and "person 2 found" in printed
     return found, path
 
 
@@ -84,6 +100,29 @@ def test_people_who_cross_keep_their_trackers(streams):
         assert len(walk) > 0.6 * WALK and {e.status for e in walk[6:]} <= {1, 2}
         assert max(off(person, e) for e in walk[6:]) < 0.35
         assert min(off(other, e) for e in walk[6:] if abs(e.frame - 21) > 8) > 0.6
+
+
+def test_people_together_are_tracked_the_same_on_every_run_and_better_than_alone(streams, tmp_path):
+    """One hides the other, whose foreground would otherwise be missed."""
+    events = [(e.channel, e.data) for e in lcm.EventLog(str(streams[1]), "r")]
+    last = next(k for k, (_, data) in enumerate(events) if data == image(WALK).encode())
+    path = rig.write_log(tmp_path / "walk.log", events[:last])
+    again = played(path, "--people", 2, "--threads", 2)[0]
+    for person in (1, 2):
+        first = [e.tracker_digest for e in streams[0][person] if e.frame < WALK]
+        assert [e.tracker_digest for e in again[person]] == first
+    alone, _ = played(path, "--person", 2)
+    assert not alone[1] and alone[2][0].tracker_digest == again[2][0].tracker_digest
+    together, apart = (np.mean([off(2, e) for e in one[2]]) for one in (again, alone))
+    assert together < 0.8 * apart
+
+
+@pytest.mark.parametrize(
+    "more", [["--snapshot", "s"], ["--lift"], ["--person", "1"], ["--further-streams", "1"]]
+)
+def test_what_is_for_one_person_is_refused_for_several(more):
+    outcome = rig.run(*rig.command("--keypoints-term", "--people", 2, *more)[1:])
+    assert outcome.code == 2 and "needs" in outcome.words and outcome.words.count("\n") == 1
 
 
 def test_a_person_who_comes_back_has_the_same_number(streams):
@@ -105,8 +144,7 @@ def test_the_page_and_the_recorder_take_people_by_number(streams, tmp_path):
     both = tmp_path / "both.log"
     frames = [("GAIT_CAMERA_0", camera_message(rig.CAMERA, 1))]
     for frame in range(20, 24):
-        at = 1_000_000 + round(frame * 1e6 / FPS)
-        frames.append(("GAIT_IMAGE_0", image_message(picture(frame), at, frame)))
+        frames.append(("GAIT_IMAGE_0", image(frame)))
         frames += [(f"GAIT_ESTIMATE_{k}", e) for k in found for e in found[k] if e.frame == frame]
     rig.write_log(both, frames)
     shown, heard = [], []
@@ -121,3 +159,5 @@ def test_the_page_and_the_recorder_take_people_by_number(streams, tmp_path):
     track = tmp_path / "track.csv"
     assert main(["record", "-o", str(track), "--url", f"file://{both}?speed=0", "--person", "2"]) == 0
     assert read_track(track).frame.tolist() == [20, 21, 22, 23]
+    assert track.read_text().splitlines()[1].endswith(",2")
+    assert read_run(str(both), 2).frame.tolist() == [20, 21, 22, 23]

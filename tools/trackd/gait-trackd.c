@@ -66,6 +66,8 @@ typedef struct parts { /* optional parts of the service */
     keypoint_cue cue;
     pose_path path;
     further further;
+    service other[PEOPLE_MOST - 1]; /* people besides the first */
+    keypoint_cue other_cue[PEOPLE_MOST - 1];
 } parts;
 
 /* Open the lifter, if requested. */
@@ -74,7 +76,8 @@ static bool load_lift(service *s, const settings *want, lift_service *lift, sink
     lift_settings const set = {.stature = want->lift_stature,
                                .sd = want->lift_sd,
                                .lag = want->lift_lag,
-                               .cpu_mask = (uint32_t)want->cpu_mask};
+                               .cpu_mask = (uint32_t)want->cpu_mask,
+                               .person = want->person};
     const char *const model = want->lift_model[0] ? want->lift_model : want->model;
     if (!want->lift)
         return true;
@@ -82,6 +85,24 @@ static bool load_lift(service *s, const settings *want, lift_service *lift, sink
         return false;
     s->lift = lift;
     s->track.memory_bytes += lift->file.bytes + lift->memory_bytes;
+    return true;
+}
+
+static void open_cue(service *s, const settings *want, keypoint_cue *cue)
+{
+    keypoint_cue_open(cue, s->track.model, s->track.info.joints,
+                      want->keypoints_sd > 0 ? want->keypoints_sd : 4);
+}
+
+/* The services of further people. */
+static bool add_people(service *s, const settings *want, parts *p, sink *out, message *why)
+{
+    for (int k = 0; k + 1 < want->people; k++) {
+        open_cue(s, want, &p->other_cue[k]);
+        service_share(&p->other[k], s, k + 2, &p->other_cue[k]);
+        if (!service_open(&p->other[k], out, want->stream, want->threads, NULL, want->particles_channel, why))
+            return false;
+    }
     return true;
 }
 
@@ -99,8 +120,7 @@ static bool load(service *s, const settings *want, parts *p, workers *threads, s
         !load_lift(s, want, &p->lift, out, why))
         return false;
     if (want->keypoints_term) {
-        keypoint_cue_open(&p->cue, s->track.model, s->track.info.joints,
-                          want->keypoints_sd > 0 ? want->keypoints_sd : 4);
+        open_cue(s, want, &p->cue);
         s->cue = &p->cue;
     }
     if (want->moving_camera) {
@@ -119,12 +139,16 @@ static bool load(service *s, const settings *want, parts *p, workers *threads, s
     s->pool_bytes = threads->bytes;
     s->track.memory_bytes += threads->bytes;
     if (!service_open(s, out, want->stream, want->threads, has_init ? &init : NULL, want->particles_channel,
-                      why))
+                      why) ||
+        !add_people(s, want, p, out, why))
         return false;
     if (want->camera[0] &&
         (!camera_file_read(want->camera, &camera, why) || !service_set_camera(s, &camera, why)))
         return false;
-    return read_background(s, want->background, why);
+    if (!read_background(s, want->background, why))
+        return false;
+    service_share_background(s);
+    return true;
 }
 
 static void print_summary(const service *s, bool live)
@@ -164,7 +188,10 @@ static bool check_result(const char *path, const service *s, message *why)
 {
     int64_t const keypoints = s->lift ? s->lift->frames : 0;
     message lack = s->complaint;
-    if (s->tracked > 0 || (s->lift && s->lift->lifted > 0))
+    for (const service *each = s; each; each = each->next)
+        if (each->tracked > 0)
+            return true;
+    if (s->lift && s->lift->lifted > 0)
         return true;
     if (s->arrived == 0 && keypoints == 0)
         return message_set(why, "%.120s: no frames on GAIT_IMAGE_%d%s; --stream selects another camera", path,
@@ -223,7 +250,7 @@ static bool serve(service *s, const settings *want, parts *p, workers *threads, 
     sink out = {0};
     message lost;
     bool const opened = !to || sink_open(&out, to, why);
-    out.person = want->person;
+    s->person = want->people ? 1 : want->person;
     bool const ready =
         opened && load(s, want, p, threads, &out, why) && receiver_open(&r, s, &snapshot, url, why);
     if (ready)
@@ -235,9 +262,13 @@ static bool serve(service *s, const settings *want, parts *p, workers *threads, 
     bool ok = ready && run(&r, call, why);
     if (ok) {
         snapshot_file_write(&snapshot, s, true);
-        service_send_status(s);
-        if (!want->quiet)
-            print_summary(s, !log);
+        for (service *each = s; each; each = each->next) {
+            service_send_status(each);
+            if (want->people && !want->quiet)
+                printf("person %d ", each->person);
+            if (!want->quiet)
+                print_summary(each, !log);
+        }
     }
     if (ok && log)
         ok = check_log(url, s, why);
@@ -273,6 +304,8 @@ int main(int argc, char **argv)
     if (ok) {
         ok = serve(&s, &want, &extra, &threads, &call, &why);
         workers_stop(&threads);
+        for (service *each = s.next; each; each = each->next)
+            service_close(each);
         service_close(&s);
         lift_service_close(&extra.lift);
         further_close(&extra.further);

@@ -208,10 +208,10 @@ static bool write_event(lcm_eventlog_t *log, const char *channel, const uint8_t 
     return lcm_eventlog_write_event(log, &e) == 0 && !ferror(log->f);
 }
 
-void sink_publish(sink *s, const char *base, const uint8_t *bytes, int size)
+void sink_publish(sink *s, const char *base, int person, const uint8_t *bytes, int size)
 {
     char name[LINK_CHANNEL];
-    const char *const channel = link_channel(base, s->person, name);
+    const char *const channel = link_channel(base, person, name);
     if (size <= 0)
         return;
     if (s->lcm && lcm_publish(s->lcm, channel, bytes, (unsigned)size) != 0) {

@@ -35,16 +35,15 @@ char link_log(const char *url, char path[LINK_PATH]);
 typedef struct sink {    /* all zero: no output */
     lcm_t *lcm;          /* or NULL */
     lcm_eventlog_t *log; /* or NULL */
-    int person;          /* whose channels these are; 0: people are not distinguished */
     int64_t failed;      /* messages that did not go out */
     message fault;       /* of the first of them */
 } sink;
 
 /* Open `url`; a log has ?mode=w (new) or a (append). */
 bool sink_open(sink *s, const char *url, message *why);
-/* Publish `size` bytes on the person's channel.  The first failure of LCM is reported on stderr; after a failure of a log
+/* Publish `size` bytes on the channel of a person, 0: of all.  The first failure of LCM is reported on stderr; after a failure of a log
  * nothing more is written. */
-void sink_publish(sink *s, const char *channel, const uint8_t *bytes, int size);
+void sink_publish(sink *s, const char *channel, int person, const uint8_t *bytes, int size);
 /* Whether writing the log has failed, so that the program should end. */
 bool sink_ended(const sink *s, message *why);
 /* Flush and close; false if anything was lost. */

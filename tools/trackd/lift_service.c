@@ -17,6 +17,7 @@ bool lift_service_open(lift_service *s, const char *model, const lift_settings *
     gait_error err = {.text = ""};
     gait_lift_config *const c = &s->config;
     s->out = out;
+    s->person = set->person;
     s->last = -1;
     gait_lift_default(c);
     c->stature = (double)set->stature;
@@ -135,7 +136,8 @@ static bool send(lift_service *s, int64_t step_us, message *why)
         s->rejected++;
         return message_set(why, "keypoints gave joints that are not finite; the lift restarts");
     }
-    sink_publish(s->out, "GAIT_LIFT", encoded, gaitmsg_estimate_t_encode(encoded, 0, MESSAGE_BYTES, &m));
+    sink_publish(s->out, "GAIT_LIFT", s->person, encoded,
+                 gaitmsg_estimate_t_encode(encoded, 0, MESSAGE_BYTES, &m));
     s->lifted++;
     return true;
 }

@@ -15,6 +15,7 @@ typedef struct lift_settings {
     float sd;      /* pixels, of a keypoint with confidence 1; 0: the library's default */
     int32_t lag;   /* frames; -1: the library's default */
     uint32_t cpu_mask;
+    int person; /* whose channel; 0: people are not distinguished */
 } lift_settings;
 
 typedef struct lift_past { /* one of the last frames */
@@ -23,6 +24,7 @@ typedef struct lift_past { /* one of the last frames */
 
 typedef struct lift_service {
     sink *out;
+    int person;
     model_file file;
     gait_lift_config config;
     gait_lift_info info;

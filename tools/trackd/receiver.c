@@ -54,6 +54,16 @@ static void flush_complete(receiver *r)
         flush_held(r);
 }
 
+/* The service of the person whose number ends the channel. */
+static service *service_of(const receiver *r, const char *channel)
+{
+    const char *const end = strrchr(channel, '_');
+    service *s = r->service;
+    for (service *each = s; end && each; each = each->next)
+        s = each->person == atoi(end + 1) ? each : s;
+    return s;
+}
+
 static void on_frame(const lcm_recv_buf_t *buf, const char *channel, void *user)
 {
     receiver *const r = user;
@@ -78,18 +88,19 @@ static void on_background(const lcm_recv_buf_t *buf, const char *channel, void *
 static void on_keypoints(const lcm_recv_buf_t *buf, const char *channel, void *user)
 {
     receiver *const r = user;
-    keypoint_cue *const cue = r->service->cue;
+    service *const s = service_of(r, channel);
+    keypoint_cue *const cue = s->cue;
     keypoints_view v;
     message why;
     if (!keypoints_view_open(&v, buf->data, buf->data_size, &why)) {
-        service_complain(r->service, "%.40s: %.180s", channel, why.text);
+        service_complain(s, "%.40s: %.180s", channel, why.text);
         return;
     }
     keypoints_view again = v; /* each reader consumes its view */
-    if (r->service->lift && !lift_service_keypoints(r->service->lift, &v, buf->recv_utime, &why))
-        service_complain(r->service, "%.40s: %.180s", channel, why.text);
+    if (s->lift && !lift_service_keypoints(s->lift, &v, buf->recv_utime, &why))
+        service_complain(s, "%.40s: %.180s", channel, why.text);
     if (cue && !keypoint_cue_take(cue, &again, &why))
-        service_complain(r->service, "%.40s: %.180s", channel, why.text);
+        service_complain(s, "%.40s: %.180s", channel, why.text);
     flush_complete(r);
 }
 
@@ -147,9 +158,9 @@ static void on_command(const lcm_recv_buf_t *buf, const char *channel, void *use
     receiver *const r = user;
     gaitmsg_command_t msg;
     if (gaitmsg_command_t_decode(buf->data, 0, (int)buf->data_size, &msg) < 0)
-        service_complain(r->service, DAMAGED, channel);
+        service_complain(service_of(r, channel), DAMAGED, channel);
     else
-        service_command(r->service, &msg);
+        service_command(service_of(r, channel), &msg);
 }
 
 static void on_status(const lcm_recv_buf_t *buf, const char *channel, void *user)
@@ -157,9 +168,8 @@ static void on_status(const lcm_recv_buf_t *buf, const char *channel, void *user
     receiver *const r = user;
     byte_reader bytes = {buf->data, buf->data_size, true};
     int64_t const type = bytes_int(&bytes, 8), utime = bytes_int(&bytes, 8);
-    (void)channel;
     if (bytes.ok && type == __gaitmsg_status_t_get_hash()) /* otherwise it is of another version */
-        service_status(r->service, utime);
+        service_status(service_of(r, channel), utime);
 }
 
 static bool subscribe_further(receiver *r, message *why)
@@ -181,25 +191,33 @@ static bool subscribe_further(receiver *r, message *why)
     return ok;
 }
 
+/* Channels of one person. */
+static bool subscribe_person(receiver *r, const service *s, message *why)
+{
+    char tracks[32], name[3][LINK_CHANNEL];
+    snprintf(tracks, sizeof tracks, "GAIT_TRACKS_%d", r->service->stream);
+    return ((!s->lift && !s->cue) || link_subscribe(r->others, link_channel(tracks, s->person, name[0]),
+                                                    on_keypoints, r, OTHERS_WAITING, why)) &&
+           link_subscribe(r->others, link_channel("GAIT_COMMAND", s->person, name[1]), on_command, r,
+                          OTHERS_WAITING, why) &&
+           (r->log || link_subscribe(r->others, link_channel("GAIT_STATUS", s->person, name[2]), on_status, r,
+                                     OTHERS_WAITING, why));
+}
+
 static bool subscribe(receiver *r, message *why)
 {
-    int const camera = r->service->stream, person = r->service->out->person;
-    char name[4][32], of_person[3][LINK_CHANNEL];
+    int const camera = r->service->stream;
+    char name[3][32];
     snprintf(name[0], sizeof name[0], "GAIT_IMAGE_%d", camera);
     snprintf(name[1], sizeof name[1], "GAIT_CAMERA_%d", camera);
     snprintf(name[2], sizeof name[2], "GAIT_BACKGROUND_%d", camera);
-    snprintf(name[3], sizeof name[3], "GAIT_TRACKS_%d", camera);
     r->frames = link_subscribe(r->images, name[0], on_frame, r, FRAMES_WAITING, why);
-    return r->frames && subscribe_further(r, why) &&
-           ((!r->service->lift && !r->service->cue) ||
-            link_subscribe(r->others, link_channel(name[3], person, of_person[0]), on_keypoints, r,
-                           OTHERS_WAITING, why)) &&
-           link_subscribe(r->others, name[1], on_camera, r, OTHERS_WAITING, why) &&
-           link_subscribe(r->others, name[2], on_background, r, OTHERS_WAITING, why) &&
-           link_subscribe(r->others, link_channel("GAIT_COMMAND", person, of_person[1]), on_command, r,
-                          OTHERS_WAITING, why) &&
-           (r->log || link_subscribe(r->others, link_channel("GAIT_STATUS", person, of_person[2]), on_status,
-                                     r, OTHERS_WAITING, why));
+    bool ok = r->frames && subscribe_further(r, why) &&
+              link_subscribe(r->others, name[1], on_camera, r, OTHERS_WAITING, why) &&
+              link_subscribe(r->others, name[2], on_background, r, OTHERS_WAITING, why);
+    for (const service *each = r->service; ok && each; each = each->next)
+        ok = subscribe_person(r, each, why);
+    return ok;
 }
 
 bool receiver_open(receiver *r, service *s, snapshot_file *snapshot, const char *url, message *why)
@@ -238,6 +256,15 @@ static struct timespec until(int64_t deadline)
     return (struct timespec){.tv_sec = (time_t)(us / 1000000), .tv_nsec = (long)(us % 1000000) * 1000};
 }
 
+/* Whether any state has changed since its last status. */
+static bool any_news(const receiver *r)
+{
+    const service *s = r->service;
+    while (s && !s->news)
+        s = s->next;
+    return s;
+}
+
 bool receiver_run(receiver *r, const volatile sig_atomic_t *quit, const sigset_t *unblocked, message *why)
 {
     int64_t due = 0, news = 0;
@@ -246,13 +273,16 @@ bool receiver_run(receiver *r, const volatile sig_atomic_t *quit, const sigset_t
     while (!*quit) {
         int64_t const now = clock_monotonic();
         snapshot_file_write(r->snapshot, r->service, false);
-        if (now >= due || (r->service->news && (r->log || now >= news))) {
-            service_send_status(r->service);
+        bool const any = any_news(r);
+        if (now >= due || (any && (r->log || now >= news))) {
+            for (service *each = r->service; each; each = each->next)
+                if (now >= due || each->news)
+                    service_send_status(each);
             manager_report("WATCHDOG=1");
-            due = now + STATUS_US;
+            due = now >= due || !r->service->next ? now + STATUS_US : due;
             news = now + NEWS_US;
         }
-        struct timespec const wait = until(r->service->news && news < due ? news : due);
+        struct timespec const wait = until(any_news(r) && news < due ? news : due);
         int const ready = ppoll(fd, r->log ? 1 : 2, &wait, unblocked);
         if (ready < 0 && errno != EINTR)
             return message_set(why, "cannot wait for messages: %s", strerror(errno));

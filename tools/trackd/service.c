@@ -46,7 +46,8 @@ void service_complain(service *s, const char *format, ...)
     vsnprintf(line.text, sizeof line.text, format, args);
     va_end(args);
     s->news = true;
-    if (strcmp(s->complaint.text, line.text) != 0 && may_log(s))
+    if (strcmp(s->complaint.text, line.text) != 0 &&
+        !(s->first && strcmp(s->first->complaint.text, line.text) == 0) && may_log(s))
         log_line("%s", line.text);
     s->text = s->complaint = line;
 }
@@ -151,9 +152,40 @@ static void set_further_backgrounds(service *s)
             gait_tracker_set_background(s->track.tracker, 1 + i, &s->further->camera[i].background, NULL);
 }
 
+void service_share(service *s, service *first, int person, keypoint_cue *cue)
+{
+    service *last = first;
+    while (last->next)
+        last = last->next;
+    last->next = s;
+    tracking_share(&s->track, &first->track);
+    s->first = first;
+    s->person = person;
+    s->path = first->path;
+    s->max_gap = first->max_gap;
+    s->max_pixels = first->max_pixels;
+    s->budget = first->budget;
+    s->cue = cue;
+}
+
+/* Make the tracker of one service for a camera. */
+static bool set_camera(service *s, const gait_camera *camera, message *why)
+{
+    if (!tracking_set_camera(&s->track, camera, why))
+        return false;
+    want_all(s);
+    bool const armed = s->start.armed;
+    s->start.armed = armed && start_usable(s, &s->start.mean, &s->start.sd);
+    if (s->start.armed == armed)
+        set_idle(s);
+    else
+        service_set_state(s, GAITMSG_STATUS_T_READY, NULL);
+    return true;
+}
+
 bool service_set_camera(service *s, const gait_camera *camera, message *why)
 {
-    s->first = *camera;
+    s->first_camera = *camera;
     s->first_given = true;
     if (s->further && further_unknown(s->further))
         return true;
@@ -161,25 +193,28 @@ bool service_set_camera(service *s, const gait_camera *camera, message *why)
         s->track.config.camera[1 + i] = s->further->camera[i].camera;
     s->track.config.cameras = 1 + (s->further ? s->further->count : 0);
     s->track.memory_bytes -= s->hold.capacity;
-    if (!tracking_set_camera(&s->track, camera, why) ||
-        ((s->cue || s->path || s->further) && !frame_hold_allocate(&s->hold, camera, why)) ||
+    bool made = set_camera(s, camera, why);
+    size_t bytes = s->track.memory_bytes;
+    int people = 1;
+    message later; /* the first fault is reported */
+    for (service *each = s->next; each; each = each->next, people++) {
+        made = set_camera(each, camera, made ? why : &later) && made;
+        bytes += each->track.memory_bytes;
+    }
+    if (!made || ((s->cue || s->path || s->further) && !frame_hold_allocate(&s->hold, camera, why)) ||
         (s->lift && !lift_service_camera(s->lift, camera, why)))
         return false;
     s->track.memory_bytes += s->hold.capacity;
     set_further_backgrounds(s);
     const tracking *const t = &s->track;
-    bool const armed = s->start.armed;
+    char trackers[32] = "tracker";
+    if (people > 1)
+        snprintf(trackers, sizeof trackers, "each of %d trackers", people);
     log_line("model %016" PRIx64 ", camera %dx%d, %d particles, %d thread%s, %s, %zu bytes (model %zu, "
-             "tracker %zu, pool %zu, pictures %zu)",
+             "%s %zu, pool %zu, pictures %zu)",
              t->info.digest, camera->width, camera->height, t->config.particles, s->threads,
-             s->threads == 1 ? "" : "s", gait_cpu_name(t->config.cpu_mask), t->memory_bytes, t->model_bytes,
-             t->tracker_bytes, s->pool_bytes, t->picture_bytes);
-    want_all(s);
-    s->start.armed = s->start.armed && start_usable(s, &s->start.mean, &s->start.sd);
-    if (s->start.armed == armed)
-        set_idle(s);
-    else
-        service_set_state(s, GAITMSG_STATUS_T_READY, NULL);
+             s->threads == 1 ? "" : "s", gait_cpu_name(t->config.cpu_mask), bytes + s->hold.capacity,
+             t->model_bytes, trackers, t->tracker_bytes, s->pool_bytes, t->picture_bytes);
     return true;
 }
 
@@ -242,8 +277,8 @@ void service_camera(service *s, const gaitmsg_camera_t *msg)
     }
     s->other_since = -1;
     bool const made = service_set_camera(s, &camera, &why);
-    if (known)
-        rearm(s);
+    for (service *each = s; known && each; each = each->next)
+        rearm(each);
     if (!made)
         service_complain(s, "%s", why.text);
 }
@@ -255,7 +290,7 @@ void service_further_camera(service *s, further_camera *c, const gaitmsg_camera_
     bool ok = further_take_camera(c, msg, s->max_pixels, &why);
     s->track.memory_bytes += ok && !known ? further_bytes(c) : 0;
     if (ok && !known && s->first_given)
-        ok = service_set_camera(s, &s->first, &why);
+        ok = service_set_camera(s, &s->first_camera, &why);
     if (!ok)
         service_complain(s, "%s", why.text);
 }
@@ -273,25 +308,49 @@ void service_further_background(service *s, further_camera *c, const image_view 
 bool service_pixels(service *s, const image_view *v, gait_image *out, message *why)
 {
     const gait_camera *const c = &s->track.config.camera[0];
-    if (v->pixelformat == GAITMSG_IMAGE_T_PIXEL_FORMAT_MJPEG)
-        return jpeg_decode(v->data, (size_t)v->size, c->width, c->height, s->track.pixels, out, why);
-    return image_view_pixels(v, c->width, c->height, out, why);
+    tracking *const t = s->first ? &s->first->track : &s->track;
+    if (v->pixelformat != GAITMSG_IMAGE_T_PIXEL_FORMAT_MJPEG)
+        return image_view_pixels(v, c->width, c->height, out, why);
+    if (!t->decoded.data &&
+        !jpeg_decode(v->data, (size_t)v->size, c->width, c->height, t->pixels, &t->decoded, why))
+        return false;
+    *out = t->decoded;
+    return true;
+}
+
+/* There is a background: state it, or what else is missing. */
+static void take_background(service *s, bool is_first)
+{
+    if (is_first && s->state == GAITMSG_STATUS_T_READY)
+        set_idle(s);
+    else
+        s->news = s->news || is_first;
+}
+
+void service_share_background(service *s)
+{
+    for (service *each = s->next; each; each = each->next) {
+        bool const is_first = !each->track.background.data;
+        tracking_share_background(&each->track);
+        take_background(each, is_first);
+    }
 }
 
 void service_background(service *s, const image_view *v)
 {
     gait_image plate;
     message why;
-    bool const first = !s->track.background.data;
+    bool const is_first = !s->track.background.data;
     if (!s->track.tracker)
         return; /* it is sent again every few seconds */
+    s->track.decoded.data = NULL;
     if (!service_pixels(s, v, &plate, &why) || !tracking_set_background(&s->track, &plate, &why)) {
         s->counts.rejected++;
         service_complain(s, "%s", why.text);
-    } else if (first && s->state == GAITMSG_STATUS_T_READY)
-        set_idle(s);
-    else
-        s->news = s->news || first;
+    } else {
+        take_background(s, is_first);
+        service_share_background(s);
+    }
     s->compared = false;
 }
 
@@ -346,7 +405,7 @@ static void send_particles(service *s, const image_view *v)
     s->cloud.n = n < 0 ? 0 : n;
     for (int32_t i = 0; i < s->cloud.n; i++)
         convert_state(&s->hypothesis[i], &s->track.info, &s->cloud.state[i]);
-    sink_publish(s->out, "GAIT_PARTICLES", s->particles,
+    sink_publish(s->out, "GAIT_PARTICLES", s->person, s->particles,
                  gaitmsg_particles_t_encode(s->particles, 0, (int)s->particles_bytes, &s->cloud));
 }
 
@@ -387,7 +446,8 @@ static void send_stride(service *s, const gait_estimate *e, int64_t frame)
         .speed = found.speed,
         .speed_sd = found.speed_sd,
     };
-    sink_publish(s->out, "GAIT_STRIDE", bytes, gaitmsg_stride_t_encode(bytes, 0, sizeof bytes, &m));
+    sink_publish(s->out, "GAIT_STRIDE", s->person, bytes,
+                 gaitmsg_stride_t_encode(bytes, 0, sizeof bytes, &m));
 }
 
 /* The estimate of the frame `lag` steps ago; steps that bridge a pause have no frame and are skipped. */
@@ -402,7 +462,7 @@ static void send_lagged(service *s)
         return;
     convert_estimate(s->track.model, &s->track.info, &e, &lagged);
     set_counters(&lagged.msg, s, p);
-    sink_publish(s->out, "GAIT_ESTIMATE_LAG", encoded,
+    sink_publish(s->out, "GAIT_ESTIMATE_LAG", s->person, encoded,
                  gaitmsg_estimate_t_encode(encoded, 0, MESSAGE_BYTES, &lagged.msg));
     send_stride(s, &e, p->frame);
 }
@@ -425,7 +485,8 @@ static void send_classes(service *s, const image_view *v, const gait_estimate *e
                                  .nclasses = n,
                                  .name = name,
                                  .probability = probability};
-    sink_publish(s->out, "GAIT_CLASSES", bytes, gaitmsg_classes_t_encode(bytes, 0, sizeof bytes, &m));
+    sink_publish(s->out, "GAIT_CLASSES", s->person, bytes,
+                 gaitmsg_classes_t_encode(bytes, 0, sizeof bytes, &m));
 }
 
 void service_send_estimate(service *s, const image_view *v, const gait_estimate *e, int64_t received,
@@ -436,7 +497,8 @@ void service_send_estimate(service *s, const image_view *v, const gait_estimate 
     past_frame *const now = &s->past[e->frame % SERVICE_PAST];
     *now = (past_frame){e->frame, v->frame, s->steps, received, (int32_t)step_us};
     set_counters(m, s, now);
-    sink_publish(s->out, "GAIT_ESTIMATE", encoded, gaitmsg_estimate_t_encode(encoded, 0, MESSAGE_BYTES, m));
+    sink_publish(s->out, "GAIT_ESTIMATE", s->person, encoded,
+                 gaitmsg_estimate_t_encode(encoded, 0, MESSAGE_BYTES, m));
     send_classes(s, v, e);
     if (s->track.config.lag > 0)
         send_lagged(s);
@@ -489,6 +551,7 @@ void service_send_status(service *s)
         .text = s->text.text,
     };
     s->sent[s->statuses++ % SERVICE_SENT] = msg.utime;
-    sink_publish(s->out, "GAIT_STATUS", encoded, gaitmsg_status_t_encode(encoded, 0, MESSAGE_BYTES, &msg));
+    sink_publish(s->out, "GAIT_STATUS", s->person, encoded,
+                 gaitmsg_status_t_encode(encoded, 0, MESSAGE_BYTES, &msg));
     s->news = false;
 }

@@ -11,6 +11,7 @@
 #include "keypoints.h"
 #include "lcm_link.h"
 #include "lift_service.h"
+#include "nearest.h"
 #include "pose_path.h"
 #include "strides.h"
 #include "timing.h"
@@ -43,14 +44,20 @@ enum {
     SERVICE_IDLE_SEARCHING
 };
 
+/* Of several people each has a service: a list, of which the first one receives what concerns all. */
 typedef struct service {
     tracking track;
+    struct service *first, *next; /* first: NULL for itself */
+    int person;                   /* whose channels these are; 0: people are not distinguished */
+    gait_state last;              /* last estimate */
+    int64_t nearest_utime;        /* of the frame whose people track.nearest shows; -1: none */
+    gait_track_status last_status;
     lift_service *lift; /* the second service; NULL: not requested */
     keypoint_cue *cue;  /* a detector's keypoints for the tracker; NULL: not requested */
     pose_path *path;    /* poses of a camera that moves; NULL: it stands still */
     further *further;   /* further cameras; NULL: there is one */
     bool first_given;   /* the first camera is known and waits for the others */
-    gait_camera first;
+    gait_camera first_camera;
     frame_hold hold; /* the frame that waits for keypoints, a pose or further cameras */
     sink *out;       /* where messages go */
     int threads;
@@ -102,7 +109,12 @@ bool service_open(service *s, sink *out, int stream, int threads, const init_sta
                   message *why);
 void service_close(service *s);
 
+/* Make a service for one more person, before it is opened and the camera is set. */
+void service_share(service *s, service *first, int person, keypoint_cue *cue);
+/* The following calls are of the first service, and concern everyone. */
 bool service_set_camera(service *s, const gait_camera *camera, message *why);
+/* Everyone's background is that of the first service. */
+void service_share_background(service *s);
 /* A camera was announced.  With a path it is a pose, if the lens is that of the camera in use.  A camera that differs from
  * the one in use replaces it, unless that is from a file, after only it has been announced for SERVICE_CAMERA_SILENT by the
  * times of the messages. */
@@ -111,8 +123,9 @@ void service_background(service *s, const image_view *v);
 /* The same for a further camera. */
 void service_further_camera(service *s, further_camera *c, const gaitmsg_camera_t *msg);
 void service_further_background(service *s, further_camera *c, const image_view *v);
+/* To one service. */
 void service_command(service *s, const gaitmsg_command_t *msg);
-/* Whether a frame should wait for its keypoints, for the pose of its camera or for frames of further cameras. */
+/* Whether a frame should wait for everyone's keypoints, for the pose of its camera or for frames of further cameras. */
 bool service_waits(const service *s, int64_t utime);
 /* A frame that arrived at `arrival_utime`; it is dropped if it is not the newest one. */
 void service_frame(service *s, const image_view *v, bool newest, int64_t arrival_utime);

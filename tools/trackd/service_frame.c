@@ -3,6 +3,7 @@
 
 #include <inttypes.h>
 #include <math.h>
+#include <stdio.h>
 #include <string.h>
 
 enum {
@@ -83,7 +84,7 @@ static bool begin(service *s, const image_view *v)
 static void leave(service *s)
 {
     stop(s);
-    message_set(&s->text, "person %d is out of view", s->out->person);
+    message_set(&s->text, "person %d is out of view", s->person);
     log_line("%s", s->text.text);
 }
 
@@ -117,7 +118,7 @@ static bool in_time(service *s, const image_view *v)
 static void compare_scene(service *s, const gait_image *frame)
 {
     int32_t other = 0;
-    if (s->compared || s->path || !s->track.background.data)
+    if (s->compared || s->path || s->first || !s->track.background.data)
         return;
     s->compared = true;
     (void)gait_start_other_scene(s->track.start, frame, &s->track.background, &other, NULL);
@@ -135,7 +136,7 @@ static bool observe(service *s, int64_t utime, const gait_image *frame)
 {
     gait_start *const start = s->track.start;
     const gait_keypoint *const found = s->cue ? keypoint_cue_at(s->cue, utime) : NULL;
-    bool const scene = s->track.background.data != NULL && !s->path && !s->out->person;
+    bool const scene = s->track.background.data != NULL && !s->path && !s->person;
     bool fine = true;
     gait_camera_pose pose;
     message why;
@@ -172,7 +173,10 @@ static bool try_auto_start(service *s, const image_view *v, const gait_image *fr
         return false;
     gait_start_reset(s->track.start);
     run(s, v, v->utime);
-    log_line("person found at frame %" PRId64 ": x %.2f y %.2f m, heading %.0f degrees", v->frame,
+    char number[12] = "";
+    if (s->person)
+        snprintf(number, sizeof number, " %d", s->person);
+    log_line("person%s found at frame %" PRId64 ": x %.2f y %.2f m, heading %.0f degrees", number, v->frame,
              (double)h->mean.pelvis[0], (double)h->mean.pelvis[1], (double)h->mean.heading * 57.29578);
     return true;
 }
@@ -255,6 +259,12 @@ static bool step(service *s, const image_view *v, int64_t received, int64_t birt
         frame.image[0].data = NULL; /* the camera's pose is unknown: only predict */
         service_complain(s, "%s", why.text);
     }
+    const service *const first = s->first ? s->first : s;
+    if (first->nearest_utime == v->utime) {
+        const gait_camera *const c = &s->track.config.camera[0];
+        frame.people[0] = (gait_image){first->track.nearest, c->width, c->height, c->width, GAIT_GREY8};
+        frame.person = (uint64_t)s->person;
+    }
     gait_result status = bridge(s, v->utime, &estimate, &err);
     if (status == GAIT_OK)
         status = gait_tracker_step(s->track.tracker, &frame, &estimate, &err);
@@ -265,6 +275,8 @@ static bool step(service *s, const image_view *v, int64_t received, int64_t birt
     }
     int64_t const step_us = clock_monotonic() - begun;
     s->last_utime = v->utime;
+    s->last = estimate.mean;
+    s->last_status = estimate.status;
     s->counts.frames++;
     s->tracked++;
     message_set(&s->text, "tracking");
@@ -273,7 +285,7 @@ static bool step(service *s, const image_view *v, int64_t received, int64_t birt
     s->steps++;
     histogram_add(&s->counts.latency, clock_wall() - v->utime);
     adapt(s, birth, step_us);
-    if (s->out->person && estimate.status == GAIT_TRACK_LOST && v->utime - s->cue->used_utime > AWAY)
+    if (s->person && estimate.status == GAIT_TRACK_LOST && v->utime - s->cue->used_utime > AWAY)
         leave(s); /* images alone would find another person */
     else if (estimate.status == GAIT_TRACK_LOST && frame.image[0].data)
         try_auto_start(s, v, &frame.image[0]);
@@ -304,8 +316,8 @@ static int idle_of(const service *s)
         return SERVICE_IDLE_NOT;
     if (!s->seek)
         return SERVICE_IDLE_START;
-    return (s->track.background.data && !s->path && !s->out->person) || s->cue ? SERVICE_IDLE_SEARCHING
-                                                                               : SERVICE_IDLE_SCENE;
+    return (s->track.background.data && !s->path && !s->person) || s->cue ? SERVICE_IDLE_SEARCHING
+                                                                          : SERVICE_IDLE_SCENE;
 }
 
 /* State what is missing. */
@@ -340,7 +352,7 @@ static void log_idle(service *s)
 {
     message why;
     int const idle = idle_of(s);
-    if (idle == s->idle)
+    if (idle == s->idle || s->first)
         return;
     s->idle = idle;
     set_lack(s, idle, &why);
@@ -362,12 +374,38 @@ bool service_waits(const service *s, int64_t utime)
 {
     gait_camera_pose pose;
     message why;
-    return (s->cue && !keypoint_cue_at(s->cue, utime)) ||
-           (s->path && pose_path_at(s->path, utime, &pose, &why) == POSE_LATER) ||
+    for (const service *each = s; each; each = each->next)
+        if (each->cue && !keypoint_cue_at(each->cue, utime))
+            return true;
+    return (s->path && pose_path_at(s->path, utime, &pose, &why) == POSE_LATER) ||
            (s->further && further_waits(s->further, utime));
 }
 
-void service_frame(service *s, const image_view *v, bool newest, int64_t arrival_utime)
+/* Draw who is nearest in a frame, if at least two people are followed. */
+static void draw_nearest(service *s, int64_t utime)
+{
+    nearest_body body[PEOPLE_MOST];
+    int count = 0;
+    s->nearest_utime = -1;
+    if (!s->next || !s->track.background.data)
+        return;
+    for (service *each = s; each; each = each->next) {
+        double const seconds = 1e-6 * (double)(utime - each->last_utime);
+        if (each->state != GAITMSG_STATUS_T_RUNNING || each->steps == 0 ||
+            each->last_status == GAIT_TRACK_INIT || each->last_status == GAIT_TRACK_LOST || seconds < 0)
+            continue;
+        body[count] = (nearest_body){each->person, each->last};
+        if (gait_tracker_predict(each->track.tracker, &body[count].state, 1, seconds, NULL) == GAIT_OK)
+            count++;
+    }
+    if (count < 2)
+        return;
+    nearest_draw(s->track.model, &s->track.config.camera[0], body, count, s->track.drawing, s->track.nearest);
+    s->nearest_utime = utime;
+}
+
+/* One person's part of service_frame(). */
+static void frame_of(service *s, const image_view *v, bool newest, int64_t arrival_utime)
 {
     int64_t const now = clock_wall(), birth = budget_birth(v->utime, arrival_utime);
     bool const repeated = s->state == GAITMSG_STATUS_T_RUNNING && is_repeated(s, v);
@@ -384,4 +422,13 @@ void service_frame(service *s, const image_view *v, bool newest, int64_t arrival
     s->counts.dropped -= repeated && s->missed;
     s->missed = !(fresh(s, newest, birth, now) && in_time(s, v) && step(s, v, now, birth)) && due;
     s->counts.dropped += s->missed;
+}
+
+void service_frame(service *s, const image_view *v, bool newest, int64_t arrival_utime)
+{
+    s->track.decoded.data = NULL;
+    if (s->track.tracker && newest)
+        draw_nearest(s, v->utime);
+    for (service *each = s; each; each = each->next)
+        frame_of(each, v, newest, arrival_utime);
 }

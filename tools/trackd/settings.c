@@ -3,6 +3,7 @@
 #include "gait_pool.h"
 #include "input_files.h"
 #include "lcm_link.h"
+#include "nearest.h"
 
 #include <math.h>
 #include <stddef.h>
@@ -139,7 +140,10 @@ static int make_table(settings *s, option *table)
         {"person", 0, "N",
          "of several people track person N, with the keypoints on GAIT_TRACKS_<i>_<N>, and answer on\n"
          "        GAIT_ESTIMATE_<N> and so on: all channels but those of the camera end in _<N>",
-         INT(person, 1, 8)},
+         INT(person, 1, PEOPLE_MOST)},
+        {"people", 0, "N",
+         "track persons 1 to N, each as --person does, and take into account that one may hide another",
+         INT(people, 1, PEOPLE_MOST)},
         {"mode", 0, "default|paper", "all likelihood terms, or those of Ormoneit et al. 2000", TEXT(mode)},
         {"budget-ms", 0, "MS",
          "live: drop and count frames that cannot be answered within MS milliseconds of their capture; a\n"
@@ -254,6 +258,12 @@ static bool check_dependencies(const settings *s, message *why)
         {"snapshot", "init auto", s->snapshot[0], strcmp(s->init, "auto") == 0},
         {"keypoints-sd", "keypoints-term", s->keypoints_sd > 0, s->keypoints_term},
         {"person", "keypoints-term", s->person > 0, s->keypoints_term},
+        {"people", "keypoints-term", s->people > 0, s->keypoints_term},
+        {"people", "init auto", s->people > 0, strcmp(s->init, "auto") == 0},
+        {"people", "a single camera", s->people > 0, !s->further_streams[0]},
+        {"people", "no --person", s->people > 0, !s->person},
+        {"lift", "a single person: --person", s->lift, !s->people},
+        {"snapshot", "a single person: --person", s->snapshot[0], !s->people},
         {"pose-turn-sd", "moving-camera", s->pose_turn_sd > 0, s->moving_camera},
         {"pose-place-sd", "moving-camera", s->pose_place_sd > 0, s->moving_camera},
         {"lift", "a static camera", s->lift, !s->moving_camera},

@@ -8,7 +8,7 @@ typedef struct settings { /* 0 or empty: not given, unless noted */
     char model[OPTION_TEXT], camera[OPTION_TEXT], background[OPTION_TEXT], init[OPTION_TEXT];
     char url[OPTION_TEXT], out[OPTION_TEXT], config[OPTION_TEXT], mode[OPTION_TEXT];
     char snapshot[OPTION_TEXT], further_streams[OPTION_TEXT];
-    int32_t stream, person, adapt_particles, threads, cpu_mask, max_pixels;
+    int32_t stream, person, people, adapt_particles, threads, cpu_mask, max_pixels;
     float max_gap, budget_ms, snapshot_s;
     char lift_model[OPTION_TEXT];
     float lift_stature, lift_sd;

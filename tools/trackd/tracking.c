@@ -87,6 +87,17 @@ bool tracking_open(tracking *t, const char *model_path, const gait_tracker_confi
     return message_set(why, "%.100s: %s", model_path, err.text);
 }
 
+void tracking_share(tracking *t, tracking *first)
+{
+    *t = (tracking){.first = first,
+                    .model = first->model,
+                    .info = first->info,
+                    .prior_mean = first->prior_mean,
+                    .prior_sd = first->prior_sd,
+                    .config = first->config};
+    first->several = true;
+}
+
 void tracking_close(tracking *t)
 {
     free(t->block);
@@ -100,10 +111,10 @@ static void drop_camera(tracking *t)
     t->memory_bytes -= t->tracker_bytes + t->picture_bytes;
     t->tracker_bytes = t->picture_bytes = 0;
     free(t->block);
-    t->block = t->plate = t->pixels = NULL;
+    t->block = t->plate = t->pixels = t->nearest = t->drawing = NULL;
     t->tracker = NULL;
     t->start = NULL;
-    t->background = (gait_image){0};
+    t->background = t->decoded = (gait_image){0};
 }
 
 bool tracking_set_camera(tracking *t, const gait_camera *camera, message *why)
@@ -111,8 +122,12 @@ bool tracking_set_camera(tracking *t, const gait_camera *camera, message *why)
     gait_error err = {.text = ""};
     gait_start_config start;
     size_t bytes = 0, start_bytes = 0;
-    size_t const picture = padded((size_t)camera->width * (size_t)camera->height * 3);
+    size_t const pixels = (size_t)camera->width * (size_t)camera->height;
+    size_t const picture = padded(3 * pixels), byte_each = t->several ? padded(pixels) : 0;
+    size_t const pictures = t->first ? 0 : 2 * picture + 2 * byte_each;
     drop_camera(t);
+    if (t->first && !t->first->block)
+        return message_set(why, "there is no tracker of the first person");
     t->config.camera[0] = *camera;
     gait_start_default(&start);
     start.camera = *camera;
@@ -122,7 +137,7 @@ bool tracking_set_camera(tracking *t, const gait_camera *camera, message *why)
         status = gait_start_bytes(t->model, &start, &start_bytes, &err);
     size_t const before = padded(bytes) + padded(start_bytes);
     if (status == GAIT_OK) {
-        t->block = aligned_memory(before + 2 * picture, "tracker", why);
+        t->block = aligned_memory(before + pictures, "tracker", why);
         if (!t->block)
             return false;
         status = gait_tracker_init(t->block, bytes, t->model, &t->config, &t->tracker, &err);
@@ -133,11 +148,17 @@ bool tracking_set_camera(tracking *t, const gait_camera *camera, message *why)
         drop_camera(t);
         return message_set(why, "cannot create the tracker: %s (%s)", err.text, gait_result_name(status));
     }
+    t->tracker_bytes = before;
+    t->picture_bytes = pictures;
+    t->memory_bytes += before + pictures;
+    if (t->first)
+        return true;
     t->plate = t->block + before;
     t->pixels = t->plate + picture;
-    t->tracker_bytes = before;
-    t->picture_bytes = 2 * picture;
-    t->memory_bytes += before + 2 * picture;
+    if (t->several) {
+        t->nearest = t->pixels + picture;
+        t->drawing = t->nearest + byte_each;
+    }
     return true;
 }
 
@@ -170,6 +191,13 @@ bool tracking_set_background(tracking *t, const gait_image *plate, message *why)
     t->background = (gait_image){t->plate, plate->width, plate->height, (int32_t)row, plate->format};
     gait_result const status = gait_tracker_set_background(t->tracker, 0, &t->background, NULL);
     return status == GAIT_OK || message_set(why, "background rejected: %s", gait_result_name(status));
+}
+
+void tracking_share_background(tracking *t)
+{
+    t->background = t->first->background;
+    if (t->tracker)
+        gait_tracker_set_background(t->tracker, 0, &t->background, NULL); /* it fits the first one's */
 }
 
 bool tracking_start(tracking *t, const gait_state *mean, const gait_state *sd, int64_t utime, message *why)

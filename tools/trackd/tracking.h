@@ -29,8 +29,11 @@ void start_trigger_by_time(start_trigger *a, const gait_state *mean, const gait_
 start_trigger_answer start_trigger_reached(start_trigger *a, const image_view *frame, double max_gap,
                                            int64_t *utime, message *why);
 
-/* ---- one model, one camera, one tracker, in one block of memory that is allocated once for a camera. */
+/* ---- one model, one camera, one tracker, in one block of memory that is allocated once for a camera.  Trackers of
+ * several people share the model and all pictures, which the first one has. */
 typedef struct tracking {
+    struct tracking *first; /* whose model and pictures these are; NULL: its own */
+    bool several;           /* there are others that share them: pictures of who is nearest are needed */
     model_file file;
     const gait_model *model;
     gait_model_info info;
@@ -38,9 +41,12 @@ typedef struct tracking {
     gait_tracker_config config;
     gait_tracker *tracker; /* NULL until the camera is known */
     gait_start *start;     /* the automatic start; NULL until then */
-    unsigned char *block;  /* tracker, start, background plate, pixels of a decoded JPEG frame */
+    unsigned char
+        *block; /* tracker, start; background plate, pixels of a decoded JPEG frame, `nearest`, `drawing` */
     uint8_t *plate, *pixels;
+    uint8_t *nearest, *drawing;          /* with `several`, a byte per pixel: see nearest.h; else NULL */
     gait_image background;               /* data NULL: none */
+    gait_image decoded;                  /* JPEG frame in `pixels`; data NULL: none */
     size_t model_bytes;                  /* blob and model */
     size_t tracker_bytes, picture_bytes; /* tracker and start; pixels */
     size_t memory_bytes;                 /* all of these */
@@ -48,11 +54,15 @@ typedef struct tracking {
 
 /* Load the model.  `config` is complete except for camera[0]. */
 bool tracking_open(tracking *t, const char *model_path, const gait_tracker_config *config, message *why);
+/* One more tracker with the model, the configuration and the pictures of `first`. */
+void tracking_share(tracking *t, tracking *first);
 void tracking_close(tracking *t);
-/* Allocate the block and create the tracker, in place of that of another camera, if there is one. */
+/* Allocate the block and create the tracker, in place of that of another camera, if there is one; first that of `first`. */
 bool tracking_set_camera(tracking *t, const gait_camera *camera, message *why);
 /* Copy the background, unless it is already in use.  It must have the camera's size. */
 bool tracking_set_background(tracking *t, const gait_image *plate, message *why);
+/* Use the background of `first`. */
+void tracking_share_background(tracking *t);
 /* Start from a state; an invalid one is rejected and changes nothing. */
 bool tracking_start(tracking *t, const gait_state *mean, const gait_state *sd, int64_t utime, message *why);
 #endif

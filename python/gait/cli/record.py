@@ -55,8 +55,7 @@ def run(args: argparse.Namespace) -> int:
 
     url = lcm_url(args.url)
     require_outputs((args.output, args.log), (log_of(url)[0] if is_log(url) else None,))
-    channel = (LAGGED if args.lagged else ESTIMATE) + (f"_{args.person}" if args.person else "")
-    recorder = Recorder(url, args.output, args.log, channel)
+    recorder = Recorder(url, args.output, args.log, LAGGED if args.lagged else ESTIMATE, args.person)
 
     def stop(number: int, frame: Any) -> None:
         recorder.stop = True

@@ -33,6 +33,12 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         "source", metavar="RUN", help="OUT.csv from gait track, or E.log from gait record --log or lcm-logger"
     )
     add("--track", metavar="OUT.csv", help="with a log: the track, from gait record")
+    add(
+        "--person",
+        type=values.whole(1, 8),
+        metavar="N",
+        help="with a log: of several people, the one with this number",
+    )
     add("--video", metavar="VIDEO", help="the clip that was tracked (required)")
     values.add_camera(parser, " (default: camera.json beside the track or the film)", scale=True)
     add(
@@ -69,8 +75,8 @@ def run(args: argparse.Namespace) -> int:
     if not args.video:
         raise UsageError("give --video VIDEO, the clip that was tracked")
     is_track = suffix == ".csv"
-    if is_track and args.track:
-        raise UsageError("--track: goes with a log; RUN is already a track")
+    if is_track and (args.track or args.person):
+        raise UsageError(f"--{'track' if args.track else 'person'}: goes with a log; RUN is already a track")
     if not is_track and not args.track:
         raise UsageError(f"{args.source}: is not a track OUT.csv; with a log, also give --track")
     values.require_age(args.age, args.sex)
@@ -97,7 +103,9 @@ def run(args: argparse.Namespace) -> int:
     else:
         from gait.lcm import link, report  # here, as reports of tracks do not need LCM
 
-        verdict, measures = report.write_report(args.source, files, live=not args.replayed)
+        verdict, measures = report.write_report(
+            args.source, files, live=not args.replayed, person=args.person
+        )
         damage = link.break_of(args.source)
     if args.json:
         print(json.dumps({"verdict": verdict.sentence()} | (measures or {})))

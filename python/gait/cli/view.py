@@ -61,7 +61,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         "--person",
         action="append",
         metavar="N|URL",
-        help="number of a person (gait-trackd --person), or URL on which a tracker publishes (its --out); "
+        help="number of a person (gait-trackd --people), or URL on which a tracker publishes (its --out); "
         "repeat for each person (default: the one on --url)",
     )
     add(

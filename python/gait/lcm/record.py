@@ -67,6 +67,11 @@ class Figures:
 ESTIMATE, LAGGED = "GAIT_ESTIMATE", "GAIT_ESTIMATE_LAG"
 
 
+def channel_of(person: int | None, channel: str = ESTIMATE) -> str:
+    """Return the channel of one of several people; None: people are not distinguished."""
+    return channel if person is None else f"{channel}_{person}"
+
+
 class Recorder:
     """Records estimates as they arrive.
 
@@ -75,10 +80,12 @@ class Recorder:
     url : str
     output : str
         Track file, as ``gait track`` writes it.
-    channel : str
-        ``GAIT_ESTIMATE``, or ``GAIT_ESTIMATE_LAG``: each frame estimated some frames later.
     log : str, optional
         LCM log to write the messages to, each with its time of arrival, for `read_run`.
+    channel : str
+        ``GAIT_ESTIMATE``, or ``GAIT_ESTIMATE_LAG``: each frame estimated some frames later.
+    person : int, optional
+        Number of the person to record, of several; the track then contains it.
 
     Attributes
     ----------
@@ -91,9 +98,17 @@ class Recorder:
         Describes the fault of the first message that was skipped.
     """
 
-    def __init__(self, url: str, output: str, log: str | None = None, channel: str = ESTIMATE) -> None:
+    def __init__(
+        self,
+        url: str,
+        output: str,
+        log: str | None = None,
+        channel: str = ESTIMATE,
+        person: int | None = None,
+    ) -> None:
         self._lcm, self._live, self._url = listener(url), not is_log(url), url
-        self._output, self._path, self._channel = output, log, channel
+        self._output, self._path, self._person = output, log, person
+        self._channel = channel_of(person, channel)
         self._waiting: list[Any] = []
         self._writer: TrackWriter | None = None
         self._log: LogWriter | None = None
@@ -104,7 +119,7 @@ class Recorder:
         self.stop = False
         self.other: str | None = None
         self.damage: str | None = None
-        self._lcm.subscribe(channel, self._on_estimate).set_queue_capacity(_QUEUE)
+        self._lcm.subscribe(self._channel, self._on_estimate).set_queue_capacity(_QUEUE)
 
     def run(
         self, frames: int | None = None, idle: float | None = None, patience: float | None = None
@@ -204,7 +219,9 @@ class Recorder:
         self._origin = first.utime - round(interval * _number(first))
         joints = tuple(joint.name for joint in first.joints)
         angles = tuple(angle.name for angle in first.angles)
-        self._writer = self._stack.enter_context(TrackWriter(self._output, first.mean.ncoef, joints, angles))
+        self._writer = self._stack.enter_context(
+            TrackWriter(self._output, first.mean.ncoef, joints, angles, person=self._person)
+        )
 
 
 def _number(message: Any) -> int:
@@ -264,17 +281,18 @@ class Run:
     remark: str | None = None
 
 
-def read_run(path: str) -> Run:
+def read_run(path: str, person: int | None = None) -> Run:
     """Read the ``GAIT_ESTIMATE`` messages of a log from ``gait record --log`` or ``lcm-logger``.
 
-    Only the first stream is used; a frame number that does not increase begins another.
+    `person` is the number of the person to read, of several.  Only the first stream is used; a frame number
+    that does not increase begins another.
     """
     require_log(path)
     messages: list[Any] = []
     remark, damage = None, None
     arrived: list[int] = []
     for event in events_of(path, whole=False):
-        if event.channel != "GAIT_ESTIMATE":
+        if event.channel != channel_of(person):
             continue
         try:
             message = estimate_after(event.data, path, messages[0] if messages else None)
@@ -288,7 +306,7 @@ def read_run(path: str) -> Run:
         arrived.append(event.timestamp)
     if not messages:
         why = damage or break_of(path) or "record while gait-trackd is tracking"
-        raise UserError(f"{path}: contains no GAIT_ESTIMATE message; {why}")
+        raise UserError(f"{path}: contains no {channel_of(person)} message; {why}")
     utime = np.array([m.utime for m in messages], np.int64)
     return Run(
         frame=np.array([m.frame for m in messages], np.int64),

@@ -19,7 +19,9 @@ from gait.report.plots import time_plot
 from gait.report.run_files import RunFiles
 
 
-def write_report(log: str, files: RunFiles, *, live: bool = True) -> tuple[Verdict, Measures | None]:
+def write_report(
+    log: str, files: RunFiles, *, live: bool = True, person: int | None = None
+) -> tuple[Verdict, Measures | None]:
     """Write the page and, if named, the overlay video; return the verdict, and errors if the truth is known.
 
     Parameters
@@ -30,13 +32,15 @@ def write_report(log: str, files: RunFiles, *, live: bool = True) -> tuple[Verdi
         The track recorded with them, the clip, and the files to write.
     live : bool
         Whether the stream was tracked live, so that its latency is meaningful.
+    person : int, optional
+        Number of the person to report, of several in the log.
 
     Raises
     ------
     UserError
         If a file cannot be read or written.
     """
-    run, times = read_run(log), Video(files.video).times
+    run, times = read_run(log, person), Video(files.video).times
     if run.remark:
         note(f"{log}: {run.remark}", files.quiet)
     numbers = run.frame.tolist()

@@ -1,7 +1,7 @@
 """Content of the live page: estimates drawn into their own frames, and numbers.
 
 A tracker follows one person.  For several people there are several trackers, which all receive frames on one
-URL and publish either there, each on its own channels (``gait-trackd --person``), or each on its own URL.
+URL and publish either there, each on its own channels (``gait-trackd --people``), or each on its own URL.
 """
 
 from __future__ import annotations
