@@ -121,6 +121,17 @@ def test_an_unusual_stature_is_reported(folder, capsys, monkeypatch):
         assert (words in printed) == reported and ("stature is" in printed) == reported
 
 
+def test_swapped_sides_are_blamed_and_not_the_camera(folder, capsys, monkeypatch):
+    lifted, uv = motion.lift, pixels()
+    for first in range(2, 30, 7):
+        uv[first : first + 3, 3:11] = uv[first : first + 3, [4, 3, 6, 5, 8, 7, 10, 9]]
+    save("u.csv", uv)
+    monkeypatch.setattr(motion, "lift", lambda *args: replace(lifted(*args), stature=1.1, resized=1.5))
+    printed = lift(capsys, "u.csv", "cam.json", "--method", "smooth", "--keep-sides")[1]
+    assert "left and right seem swapped in" in printed and "check left and right of the points" in printed
+    assert "focal length" not in printed and "the camera is wrong" not in printed
+
+
 @pytest.mark.parametrize("factor", [100, 1000])
 def test_a_camera_in_centimetres_or_millimetres_is_refused(folder, capsys, factor):
     camera = other_camera()

@@ -36,6 +36,7 @@ SHAKY = 1.3  # ratio of jitter to standard deviation from which a warning is pri
 FAR = 4.0  # standard deviations of a median distance; noise alone gives 1.2
 OFTEN = 3  # frames in which a point is an outlier; correct points are in one of a few thousand
 TOO_MANY = 0.18  # share of wrong points; one in seven does little harm, one in five may
+MANY_SWAPPED = 0.1  # share of pairs that seem swapped; of correct points none do
 UNUSUAL = 2.5  # standard deviations of a stature; one person in 80 is as unusual
 
 Warn = Callable[[str], None]
@@ -412,8 +413,16 @@ def warnings_of(lifted: Lifted, prior_stature: float) -> list[str]:
     lost = _share_lost(found, keypoints, int(lifted.repairs["spikes"]))
     believed, sd = motion.believed_stature(options, prior_stature)
     off = abs(found.stature - believed) / sd if found.steps else 0.0  # single segments do not
-    lens = "the camera's focal length" if camera else "--metres-per-unit"
+    strange = found.wider > 1 or found.alone or found.resized != 1 or off > UNUSUAL
+    one_view = not isinstance(lifted.view, Several)
+    swapped = swaps.share_suspected(keypoints, options.pixel_sd) if strange and one_view else 0.0
+    check = "the camera's focal length" if camera else "--metres-per-unit"
+    cause = "the motion is unlike those learnt, or the camera is wrong"
+    if swapped > MANY_SWAPPED:
+        check, cause = "left and right of the points", "left and right of the points are swapped"
     reasons = {
+        f"left and right seem swapped in {swapped:.0%} of the pairs of points: correct the keypoints, do "
+        "not rely on the result": swapped > MANY_SWAPPED,
         "hips and ankles, which determine the distance, are hardly visible: the person may be metres "
         "nearer or further away": camera and not size.shows_distance(keypoints),
         f"outliers, down-weighted because they are far from their predictions: {outliers}": bool(outliers),
@@ -422,12 +431,10 @@ def warnings_of(lifted: Lifted, prior_stature: float) -> list[str]:
         f"try --pixel-sd {shake:.2g}": shake > SHAKY * options.pixel_sd and found.wider > 1,
         f"the motion is unlike those learnt: the prior was widened {found.wider:g} times": found.wider > 1,
         "the smoother fails for such motions: segments are estimated alone (--method blend)": found.alone,
-        f"the estimated stature is {found.stature:.2f} m, expected {believed:.2f}: check {lens}, "
+        f"the estimated stature is {found.stature:.2f} m, expected {believed:.2f}: check {check}, "
         "time (the frame rate) and --height": off > UNUSUAL,
-        f"the size was taken from the bones ({found.resized:.2f} times the fit's): the motion is unlike "
-        "those learnt, or the camera is wrong; standard deviations are wide, do not rely on the positions": (
-            found.resized != 1
-        ),
+        f"the size was taken from the bones ({found.resized:.2f} times the fit's): {cause}; "
+        "standard deviations are wide, do not rely on the positions": found.resized != 1,
         f"the estimate did not converge in {found.steps} iterations: do not rely on it": not found.settled,
         f"the estimate is {far:.0f} times --pixel-sd from the keypoints: do not rely on it; check the "
         "camera, the names of the points, that v points down, and --pixel-sd": far > FAR,

@@ -250,12 +250,9 @@ def undo_swaps(keypoints: Keypoints, sd: float, evidence: Evidence) -> tuple[Key
     evidence : callable
         Model of the motion, called with some frames of the keypoints.
     """
-    joints = [
-        name[2:] for name in keypoints.names if name.startswith("l_") and f"r_{name[2:]}" in keypoints.names
-    ]
-    if not joints or len(keypoints.time) < 3 or np.median(np.diff(keypoints.time)) > SLOWEST:
+    joints, pairs = _paired(keypoints)
+    if not joints:
         return keypoints, []
-    pairs = np.array([[keypoints.names.index(f"{side}_{joint}") for side in "lr"] for joint in joints])
     observed = np.asarray(keypoints.visible[:, pairs].any(axis=2))
     steady = _without_spikes(keypoints, pairs, sd)
     wrong = _completed(keypoints, pairs, steady, suspected(steady, pairs, sd)) & observed
@@ -271,6 +268,26 @@ def undo_swaps(keypoints: Keypoints, sd: float, evidence: Evidence) -> tuple[Key
         if wrong[:, k].any()
     ]
     return _swapped(keypoints, pairs, wrong), found
+
+
+def share_suspected(keypoints: Keypoints, sd: float) -> float:
+    """Share of the pairs of left and right points that seem swapped, against most; `sd` as in `undo_swaps`."""
+    joints, pairs = _paired(keypoints)
+    if not joints:
+        return 0.0
+    observed = np.asarray(keypoints.visible[:, pairs].all(axis=2))
+    return float((suspected(keypoints, pairs, sd) & observed).sum() / max(observed.sum(), 1))
+
+
+def _paired(keypoints: Keypoints) -> tuple[list[str], Ints]:
+    """Joints that have both sides, and their columns (P, 2); none if frames are too few or too far apart."""
+    joints = [
+        name[2:] for name in keypoints.names if name.startswith("l_") and f"r_{name[2:]}" in keypoints.names
+    ]
+    if len(keypoints.time) < 3 or np.median(np.diff(keypoints.time)) > SLOWEST:
+        joints = []
+    columns = [[keypoints.names.index(f"{side}_{joint}") for side in "lr"] for joint in joints]
+    return joints, np.array(columns, np.intp).reshape(-1, 2)
 
 
 def _without_spikes(keypoints: Keypoints, pairs: Ints, sd: float) -> Keypoints:
