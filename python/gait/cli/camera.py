@@ -104,12 +104,12 @@ def _on_page(args: argparse.Namespace) -> int:
         lens, words = None, "The focal length is estimated from at least five marks; --lens makes it exact."
     scene = Scene(Path(args.page).name, size, frames, picture, lens, words, args.output, first)
     own = serve.listen(args.port)
-    note(f"gait camera: open {serve.address(own)} (Ctrl-C ends it)")
+    opened = f"gait camera: open {serve.address(own)} (Ctrl-C ends it)"
 
     def report(line: str) -> None:
         print(json.dumps({"written": args.output}) if args.json else line, flush=True)
 
-    serve.run(application(scene, own.getsockname()[1], report), own)
+    serve.run(application(scene, own.getsockname()[1], report), own, lambda: note(opened))
     return 0  # also if no camera was written, since the user ended the page
 
 

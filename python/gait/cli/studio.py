@@ -113,8 +113,7 @@ def run(args: argparse.Namespace) -> int:
         url = serve.address(own)
         figures = {"url": url, "corrections": str(source.corrections)}
         words = f"gait studio: open {url} (corrections in {source.corrections})"
-        print(json.dumps(figures) if args.json else words, flush=True)
-        server.run(session, own)
+        server.run(session, own, lambda: print(json.dumps(figures) if args.json else words, flush=True))
     return 0
 
 

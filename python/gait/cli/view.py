@@ -107,8 +107,8 @@ def _serve(
             url, streams, model, cameras, page.show, page.report, args.scale_camera, page.watched, people
         )
         page.begin(feed.page_data)
-        print(page.address, flush=True)
         with Interruptible(), contextlib.suppress(KeyboardInterrupt):  # this is how the user ends it
+            print(page.address, flush=True)
             while feed.handle(_TURN):
                 pass
     finally:

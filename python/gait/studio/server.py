@@ -110,9 +110,9 @@ def application(session: Session, port: int) -> ASGIApp:
     return serve.application(page, title, _Endpoints(session).routes(), port)
 
 
-def run(session: Session, own: socket.socket) -> None:
-    """Serve until interrupted."""
+def run(session: Session, own: socket.socket, ready: Callable[[], None]) -> None:
+    """Serve until interrupted; `ready` as for `gait.web.serve.run`."""
     try:
-        serve.run(application(session, own.getsockname()[1]), own)
+        serve.run(application(session, own.getsockname()[1]), own, ready)
     finally:
         session.close()

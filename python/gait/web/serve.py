@@ -191,15 +191,15 @@ def address(own: socket.socket) -> str:
     return f"http://{HOST}:{own.getsockname()[1]}/"
 
 
-def run(app: ASGIApp, own: socket.socket) -> None:
-    """Serve until the process is interrupted."""
+def run(app: ASGIApp, own: socket.socket, ready: Callable[[], None]) -> None:
+    """Serve until the process is interrupted; `ready` is called once an interrupt ends the server cleanly."""
     with contextlib.suppress(KeyboardInterrupt):
-        _server(app).run(sockets=[own])
+        _server(app, ready).run(sockets=[own])
 
 
 def background(app: ASGIApp, own: socket.socket) -> tuple[uvicorn.Server, threading.Thread]:
     """Serve in a thread, until the server's ``should_exit`` is set."""
-    server = _server(app)
+    server = _server(app, lambda: None)
     thread = threading.Thread(target=lambda: server.run(sockets=[own]), daemon=True)
     thread.start()
     return server, thread
@@ -210,19 +210,27 @@ def ending(request: Request) -> bool:
     return bool(request.scope["ending"]())
 
 
-def _server(app: ASGIApp) -> uvicorn.Server:
+def _server(app: ASGIApp, ready: Callable[[], None]) -> uvicorn.Server:
     async def informed(scope: Scope, receive: Receive, send: Send) -> None:
         await app(dict(scope) | {"ending": lambda: server.should_exit}, receive, send)
 
     config = uvicorn.Config(
         informed, log_level="error", access_log=False, lifespan="off", timeout_graceful_shutdown=STREAMS_END
     )
-    server = _Server(config)
+    server = _Server(config, ready)
     return server
 
 
 class _Server(uvicorn.Server):
-    """Server that closes remaining connections when it ends."""
+    """Server that reports that it is ready, and closes remaining connections when it ends."""
+
+    def __init__(self, config: uvicorn.Config, ready: Callable[[], None]) -> None:
+        super().__init__(config)
+        self._ready = ready
+
+    async def startup(self, sockets: list[socket.socket] | None = None) -> None:
+        await super().startup(sockets)
+        self._ready()
 
     async def shutdown(self, sockets: list[socket.socket] | None = None) -> None:
         await super().shutdown(sockets)
