@@ -18,6 +18,7 @@ from gait.bindings.segment_prior import SegmentPrior
 from gait.io import blob
 from gait.io.video import median_plate
 from gait.lift.video.run import Request, lift_video
+from gait.report.film import Films
 
 FAULTS = Path(__file__).resolve().parents[2] / "../shared/data/faults"
 
@@ -103,6 +104,11 @@ def test_what_fails_in_the_encoder_is_raised(tmp_path, monkeypatch):
         for i in range(20):
             writer.write(pattern(i))
     assert not list(tmp_path.iterdir())
+    with (
+        pytest.raises(UserError, match="run.html: No space left on device in .*set TMPDIR"),
+        Films(None, "run.html", range(20), (64, 48), 30.0) as films,
+    ):
+        films.write(pattern(0), 0)
 
 
 def test_frames_of_another_size_are_refused(tmp_path):

@@ -5,7 +5,7 @@ from __future__ import annotations
 import base64
 import tempfile
 from collections.abc import Iterator
-from contextlib import ExitStack
+from contextlib import ExitStack, contextmanager
 from dataclasses import dataclass
 from pathlib import Path
 from types import TracebackType
@@ -13,6 +13,7 @@ from types import TracebackType
 import cv2
 import numpy as np
 
+from gait.errors import UserError
 from gait.io.video import FAST, Image, VideoWriter
 
 _BYTES = 5_000_000  # approximate largest size of a film in a page
@@ -68,47 +69,80 @@ class Films:
     ----------
     overlay : str or None
         The overlay video.
-    frames : range or None
-        Numbers of the frames in the page's film; None for no such film.
+    report : str or None
+        The page that gets a film.
+    frames : range
+        Numbers of the frames that will be written.
     size : (int, int)
         Width and height of the frames, pixels.
     rate : float
         Frames per second.
+
+    Raises
+    ------
+    UserError
+        If a file cannot be written.
     """
 
-    def __init__(self, overlay: str | None, frames: range | None, size: tuple[int, int], rate: float) -> None:
-        self._overlay, self._frames, self._size, self._rate = overlay, frames, size, rate
+    def __init__(
+        self, overlay: str | None, report: str | None, frames: range, size: tuple[int, int], rate: float
+    ) -> None:
+        self._overlay, self._report, self._frames, self._size, self._rate = (
+            overlay,
+            report,
+            frames,
+            size,
+            rate,
+        )
         self._writers: list[VideoWriter] = []
         self._stack = ExitStack()
         self._pictures: list[tuple[int, Image]] = []
+        self._written: list[int] = []
         self.page: PageFilm | None = None
 
     @property
     def wanted(self) -> bool:
         """Whether any film is to be written."""
-        return self._overlay is not None or self._frames is not None
+        return self._overlay is not None or self._report is not None
 
     def __enter__(self) -> Films:
         if self._overlay is not None:
             writer = VideoWriter(self._overlay, self._rate, preset=FAST)
             self._writers.append(self._stack.enter_context(writer))
-        if self._frames is not None:
-            self._folder = Path(self._stack.enter_context(tempfile.TemporaryDirectory()))
-            self._written: list[int] = []
-            self._small, bits = page_size(self._size, len(self._frames), self._rate)
-            self._inside = VideoWriter(
-                self._folder / "film.mp4", self._rate, crf=_CRF, preset=FAST, bits_per_second=bits, keep=False
-            )
-            self._inside.__enter__()
-            shown = np.linspace(0, len(self._frames) - 1, min(_SHOWN, len(self._frames))).round()
-            self._shown = {self._frames[int(k)] for k in shown}
+        if self._report is not None:
+            self._inside = self._stack.enter_context(self._film_of_page(self._report))
         return self
+
+    @contextmanager
+    def _film_of_page(self, report: str) -> Iterator[VideoWriter]:
+        """Write the page's film in a temporary folder and, if all goes well, read it."""
+        self._small, bits = page_size(self._size, len(self._frames), self._rate)
+        shown = np.linspace(0, len(self._frames) - 1, min(_SHOWN, len(self._frames))).round()
+        self._shown = {self._frames[int(k)] for k in shown}
+        with tempfile.TemporaryDirectory() as folder:
+            file = Path(folder, "film.mp4")
+            film = VideoWriter(file, self._rate, crf=_CRF, preset=FAST, bits_per_second=bits, keep=False)
+            try:
+                with film:
+                    yield film
+            except UserError as error:
+                if not isinstance(error.__cause__, OSError):
+                    raise
+                where = f"{error.__cause__.strerror} in {tempfile.gettempdir()}, where its film is made"
+                raise UserError(
+                    f"{report}: {where}; set TMPDIR to a folder with more space"
+                ) from error.__cause__
+            if self._written:
+                data = base64.b64encode(file.read_bytes()).decode("ascii")
+                frames = range(self._written[0], self._written[0] + len(self._written))
+                size = self._small[0] + self._small[0] % 2, self._small[1] + self._small[1] % 2
+                self.page = PageFilm(data, size, self._size, frames, self._rate, self._pictures)
 
     def write(self, picture: Image, number: int) -> None:
         """Append a drawn frame with its number."""
         for writer in self._writers:
             writer.write(picture)
-        if self._frames is None:
+        if self._report is None:
             return
         small = picture
         if self._small != self._size:
@@ -121,13 +155,6 @@ class Films:
     def __exit__(
         self, kind: type[BaseException] | None, exc: BaseException | None, trace: TracebackType | None
     ) -> bool | None:
-        if self._frames is not None:
-            self._inside.__exit__(kind, exc, trace)
-            if kind is None and self._written:
-                data = base64.b64encode((self._folder / "film.mp4").read_bytes()).decode("ascii")
-                frames = range(self._written[0], self._written[0] + len(self._written))
-                size = self._small[0] + self._small[0] % 2, self._small[1] + self._small[1] % 2
-                self.page = PageFilm(data, size, self._size, frames, self._rate, self._pictures)
         return self._stack.__exit__(kind, exc, trace)
 
 

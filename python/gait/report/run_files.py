@@ -182,7 +182,7 @@ def _draw(
     """Draw all frames that were to be tracked, and write them to the films."""
     begin = video.times[frames.start]
     with (
-        Films(files.overlay, frames, video.size, video.fps) as films,
+        Films(files.overlay, files.page, frames, video.size, video.fps) as films,
         progress("film", len(frames), files.quiet) as update,
     ):
         for done, frame in enumerate(video.frames(frames.start, frames.stop), 1):

@@ -139,7 +139,7 @@ def write(
         if also is not None:
             sinks.append(also)
         size = Drawing.size(scene)
-        films = stack.enter_context(Films(options.overlay, span if options.report else None, size, video.fps))
+        films = stack.enter_context(Films(options.overlay, options.report, span, size, video.fps))
         if films.wanted:
             sinks.append(Drawing(model, scene, films).add)
         standing = None if keypoints is None else Standing(keypoints, scene.camera, sinks)

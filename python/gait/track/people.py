@@ -177,7 +177,7 @@ def _draw(options: ClipOptions, scene: Scene, found: dict[int, Estimates]) -> Pa
     still = Overlay(scene.model, scene.camera)
     size = (scene.camera.width, scene.camera.height)
     with (
-        Films(options.overlay, scene.frames if options.report else None, size, scene.video.fps) as films,
+        Films(options.overlay, options.report, scene.frames, size, scene.video.fps) as films,
         progress("drawing", len(scene.frames), options.quiet) as update,
     ):
         for frame in scene.video.frames(scene.frames.start, scene.frames.stop):

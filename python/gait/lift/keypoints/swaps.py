@@ -271,7 +271,7 @@ def undo_swaps(keypoints: Keypoints, sd: float, evidence: Evidence) -> tuple[Key
 
 
 def share_suspected(keypoints: Keypoints, sd: float) -> float:
-    """Share of the pairs of left and right points that seem swapped, against most; `sd` as in `undo_swaps`."""
+    """Share of pairs of left and right points that seem swapped, against most; `sd` as for `undo_swaps`."""
     joints, pairs = _paired(keypoints)
     if not joints:
         return 0.0
