@@ -1,5 +1,6 @@
 """The live page in a real Chromium: numbers, figure, plots, pause, what is missing, recording."""
 
+import os
 import time
 import urllib.request
 
@@ -11,6 +12,7 @@ import numpy as np
 import pytest
 
 from gait.lcm.link import private_url
+from gait.live import server
 from gait.live.feed import Feed
 from gait.live.server import Hub, Pace, Page
 
@@ -33,7 +35,7 @@ def reports(tmp_path_factory):
         rig.model(),
         {},
         lambda _, image: pictures.append(image),
-        lambda _, value: samples.append(value),
+        lambda topic, value: samples.append(value) if topic == "sample" else None,
     )
     while feed.handle(1.0):
         pass
@@ -62,6 +64,11 @@ def test_the_page_waits_and_then_shows_a_tracker(live, reports):
         page.goto(live.address)
         browser.until(page, "document.querySelector('#waiting').textContent.includes('gait-trackd')")
         assert reports[2].url in page.inner_text("#waiting")
+        assert "gait capture" in page.inner_text("#waiting")
+        live.report("frames", {"stream": 0})
+        words = "no tracker answers: start gait-trackd"
+        browser.until(page, f"document.querySelector('#waiting').textContent.includes('{words}')")
+        assert "gait capture" not in page.inner_text("#waiting")
         live.report(
             "health",
             {
@@ -74,7 +81,7 @@ def test_the_page_waits_and_then_shows_a_tracker(live, reports):
             },
         )
         browser.until(page, "document.querySelector('#text').textContent === 'waiting for a camera'")
-        assert "Start gait capture" in page.inner_text("#waiting")  # the tracker runs already
+        browser.until(page, "document.querySelector('#waiting').textContent.includes('Start gait capture')")
         send(live, reports, range(6))
         browser.until(page, "live.scene.data.times.length > 2 && live.curves.data.times.length > 2")
         last = reports[0][5]
@@ -252,15 +259,20 @@ def test_the_record_button_makes_a_log(live, tmp_path):
     assert len(list(tmp_path.glob("gait-*.log"))) == 1
 
 
-def test_browsers_get_less_often_what_a_busy_machine_shows_and_miss_no_sample():
+def test_browsers_get_less_often_what_a_busy_machine_shows_and_miss_no_sample(tmp_path, monkeypatch):
     pace, hub = Pace(), Hub()
-    for _ in range(20):
+    pace.begin(10)
+    for _ in range(6):
         pace.adapt(idle=0.8)
     assert pace.current < 1 / 30
-    pace.begin(10)
     for _ in range(20):
         pace.adapt(idle=0.0)
     assert pace.current == 2.0
+    monkeypatch.setattr(server, "_STAT", tmp_path / "no Linux")
+    monkeypatch.setattr(os, "getloadavg", lambda: (0.0, 0.0, 0.0))
+    pace.begin(1)
+    pace._at -= 1
+    assert pace.interval() < 0.2
     for k in range(5):
         hub.put("sample 0", k, kept=3)
         hub.put("health 0", k)

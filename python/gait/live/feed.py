@@ -33,6 +33,7 @@ _RECENT = 9  # frames from which a camera's frame interval is computed
 _QUEUED = 8  # frames that wait in LCM
 _FURTHEST = 1e6  # largest number that is drawn, in metres or another unit
 _LONGEST = 0.5  # longest time without a drawing [s], even if messages wait or a tracker does not answer
+_ANNOUNCED = 1.0  # seconds between reports that frames arrive
 _RATED = 2.0  # seconds over which estimates are counted
 KEPT_S = 20.0
 """Duration of the plots, seconds."""
@@ -140,7 +141,8 @@ class Feed:
     show : callable
         Called with the number of a camera and the finished BGR picture.
     report : callable, optional
-        Called with "sample" and the numbers of an estimate, or "health" and those of a status.
+        Called with "sample" and the numbers of an estimate, "health" and those of a status, or "frames", at
+        most once a second while frames arrive.
     scale : bool
         Whether to resize cameras that were calibrated at another resolution to the pictures.
     watched : callable, optional
@@ -177,7 +179,7 @@ class Feed:
         self._origin: int | None = None
         self._persons = [_Person(deque(), Drops()) for _ in self.people]
         self._answers: dict[int, dict[int, tuple[Estimate, int]]] = {}  # by capture time and person
-        self._drawn = 0.0
+        self._drawn, self._announced = 0.0, -np.inf
         self.damage: str | None = None
         for stream, camera in cameras.items():
             self._views[stream].use(camera, model)
@@ -249,6 +251,9 @@ class Feed:
 
     def _on_image(self, stream: int, channel: str, data: bytes) -> None:
         self._views[stream].add(decode(gaitmsg.image_t, data, channel))
+        if self._report and time.monotonic() - self._announced > _ANNOUNCED:
+            self._announced = time.monotonic()
+            self._report("frames", {"stream": stream})
 
     def _on_camera(self, stream: int, channel: str, data: bytes) -> None:
         view = self._views[stream]

@@ -139,30 +139,38 @@ function onHealth(one) {
   element('text').textContent = one.state === 'running' && one.text === 'tracking' ? '' : one.text;
   show('dropped here', String(one.dropped));
   show('particles', String(one.particles));
-  if (quiet()) explain(`The tracker is ${one.state}: ${one.text}.`);
+  if (quiet()) explain();
 }
 
 // ---- what is missing ----
+let arrived = -Infinity; // of the newest frames
 const quiet = () => performance.now() - people[chosen].last > QUIET_MS;
+const answers = () => performance.now() - people[chosen].heard < QUIET_MS;
 /** What to do about missing estimates; empty where the state of the tracker explains them. */
 function remedy() {
-  const { url, channel, name, health, heard } = people[chosen];
-  if (performance.now() - heard < QUIET_MS) {
+  const { url, channel, name, health } = people[chosen], sent = performance.now() - arrived < QUIET_MS;
+  if (answers()) {
+    if (sent) return '';
     if (!health.frames) return 'Start gait capture for a film or camera.';
     return health.state === 'running' ? 'No frames arrive any more: the film has ended or the camera stopped.' : '';
   }
-  if (channel !== 'GAIT_ESTIMATE') return `Start gait-trackd --person ${name} --keypoints-term, gait detect --lcm, and gait capture for a film or camera.`;
-  return url === start.url ? 'Start gait-trackd on the same URL (--url, or LCM_DEFAULT_URL), and gait capture for a film or camera.'
-    : `Start gait-trackd --url ${start.url} --out ${url}, and gait capture for a film or camera.`;
+  const tracker = channel !== 'GAIT_ESTIMATE' ? `gait-trackd --person ${name} --keypoints-term and gait detect --lcm`
+    : url === start.url ? 'gait-trackd on the same URL (--url, or LCM_DEFAULT_URL)' : `gait-trackd --url ${start.url} --out ${url}`;
+  return sent ? `Frames arrive, but no tracker answers: start ${tracker}.` : `Start ${tracker}, and gait capture for a film or camera.`;
 }
-function explain(text) {
+let explained = '';
+function explain() {
   if (paused) return;
   setStatus('', 'waiting');
-  const images = `GAIT_IMAGE_${start.streams.join(', GAIT_IMAGE_')} on ${start.url}`, { url, channel } = people[chosen];
-  const lines = [text, `Listening for ${channel} ${url === start.url ? '' : `on ${url} `}and ${images}.`, remedy()].filter(Boolean);
+  const images = `GAIT_IMAGE_${start.streams.join(', GAIT_IMAGE_')} on ${start.url}`, { url, channel, health } = people[chosen];
+  const lines = [
+    answers() ? `The tracker is ${health.state}: ${health.text}.` : 'No estimates arrive.',
+    `Listening for ${channel} ${url === start.url ? '' : `on ${url} `}and ${images}.`, remedy()].filter(Boolean);
+  if (lines.join() === explained && element('waiting').textContent) return;
+  explained = lines.join();
   element('waiting').replaceChildren(...lines.map((line) => Object.assign(document.createElement('p'), { textContent: line })));
 }
-setInterval(() => { if (quiet() && !element('waiting').textContent) explain('No estimates arrive.'); }, 500);
+setInterval(() => { if (quiet()) explain(); }, 500);
 
 // ---- pictures: the newest is fetched when the one before is there ----
 const images = new Map();
@@ -252,6 +260,7 @@ document.addEventListener('keydown', (event) => {
 const events = new EventSource('/events');
 events.addEventListener('sample', (event) => onSample(JSON.parse(event.data)));
 events.addEventListener('health', (event) => onHealth(JSON.parse(event.data)));
+events.addEventListener('frames', () => { arrived = performance.now(); });
 events.addEventListener('picture', (event) => onPicture(Number(event.data)));
 events.addEventListener('recording', (event) => onRecording(JSON.parse(event.data)));
 events.addEventListener('error', () => setStatus('away', 'gait view is not there'));

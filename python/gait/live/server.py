@@ -5,6 +5,7 @@ from __future__ import annotations
 import asyncio
 import contextlib
 import json
+import os
 import threading
 import time
 from collections import deque
@@ -25,6 +26,7 @@ from gait.web import modules, serve
 
 _HERE = Path(__file__).parent
 _FILES = ("live.js", "live.css")
+_STAT = Path("/proc/stat")
 _MOST = 16  # browsers at a time
 _ALIVE = 0.5  # seconds after which a quiet stream sends a sign of life, or ends with the server
 _QUALITY = 80  # of JPEG pictures
@@ -34,6 +36,7 @@ _SLOWEST = 0.2  # the same at first and on a busy machine, times the number of b
 _RAREST = 2.0  # but at most this
 _MEASURED = 0.5  # seconds over which idle time is measured
 _BUSY, _IDLE = 0.15, 0.3  # share of idle time below which messages become rarer, above which more frequent
+_QUICKEST = 0.4  # least factor by which the time between messages changes at one measurement
 
 
 def _picture(stream: int) -> str:
@@ -58,7 +61,7 @@ class Pace:
 
     def __init__(self) -> None:
         self.current = self._slowest = _SLOWEST
-        self._at, self._before = 0.0, (0, 0)
+        self._at, self._before = time.monotonic(), _idle_time()
 
     def interval(self) -> float:
         """Present interval, seconds."""
@@ -67,24 +70,36 @@ class Pace:
             found = _idle_time()
             idle, total = (a - b for a, b in zip(found, self._before, strict=True))
             self._at, self._before = now, found
-            self.adapt(idle / max(total, 1))
+            self.adapt(idle / total if total > 0 else _share_idle())
         return self.current
 
     def adapt(self, idle: float) -> None:
-        """Adapt the interval to the share of idle time."""
-        factor = 1.5 if idle < _BUSY else 0.8 if idle > _IDLE else 1.0
+        """Adapt the interval to the share of idle time.
+
+        Messages become more frequent by the factor that leaves `_IDLE` if all work is proportional to them.
+        """
+        factor = 1.5 if idle < _BUSY else min(max((1 - idle) / (1 - _IDLE), _QUICKEST), 1.0)
         self.current = min(max(factor * self.current, _FASTEST), self._slowest)
 
     def begin(self, browsers: int) -> None:
         """Begin slowly with this number of browsers."""
         self.current = self._slowest = min(_SLOWEST * max(browsers, 1), _RAREST)
+        self._at, self._before = time.monotonic(), _idle_time()
 
 
 def _idle_time() -> tuple[int, int]:
-    """Read idle time and total time of the cores, ticks."""
-    first = Path("/proc/stat").read_text(encoding="ascii").partition("\n")[0]
+    """Read idle time and total time of the cores, ticks; zeros on systems other than Linux."""
+    try:
+        first = _STAT.read_text(encoding="ascii").partition("\n")[0]
+    except OSError:
+        return 0, 0
     times = [int(word) for word in first.split()[1:9]]
     return times[3] + times[4], sum(times)
+
+
+def _share_idle() -> float:
+    """Share of idle time according to the load average of one minute."""
+    return 1 - os.getloadavg()[0] / (os.cpu_count() or 1)
 
 
 class Hub:
@@ -160,7 +175,7 @@ class Page:
         self._data: Callable[[], dict[str, Any]] = dict
         self._recording: Recording | None = None
         self._topics = [f"{topic} {k}" for topic in ("sample", "health") for k in range(len(self._people))]
-        self._topics += ["recording", *map(_picture, streams)]
+        self._topics += ["recording", "frames", *map(_picture, streams)]
         self._pictures: dict[int, Image] = {}
         self._jpeg: dict[int, tuple[int, bytes]] = {}
         self._open, self._pace, self._shown = 0, Pace(), 0.0
@@ -178,7 +193,7 @@ class Page:
         self.hub.put(_picture(stream), stream)
 
     def report(self, topic: str, value: dict[str, Any]) -> None:
-        """Make a sample, or the tracker's health, the newest of its topic."""
+        """Make a sample, the tracker's health, or the arrival of frames the newest of its topic."""
         of_person = f"{topic} {value['person']}" if "person" in value else topic
         text = json.dumps(value, allow_nan=False, separators=(",", ":"))
         self.hub.put(of_person, text, _KEPT if topic == "sample" else 1)

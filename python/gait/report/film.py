@@ -87,13 +87,8 @@ class Films:
     def __init__(
         self, overlay: str | None, report: str | None, frames: range, size: tuple[int, int], rate: float
     ) -> None:
-        self._overlay, self._report, self._frames, self._size, self._rate = (
-            overlay,
-            report,
-            frames,
-            size,
-            rate,
-        )
+        self._overlay, self._report, self._frames = overlay, report, frames
+        self._size, self._rate = size, rate
         self._writers: list[VideoWriter] = []
         self._stack = ExitStack()
         self._pictures: list[tuple[int, Image]] = []
