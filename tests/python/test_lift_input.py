@@ -126,7 +126,9 @@ def test_swapped_sides_are_blamed_and_not_the_camera(folder, capsys, monkeypatch
     for first in range(2, 30, 7):
         uv[first : first + 3, 3:11] = uv[first : first + 3, [4, 3, 6, 5, 8, 7, 10, 9]]
     save("u.csv", uv)
-    monkeypatch.setattr(motion, "lift", lambda *args: replace(lifted(*args), stature=1.1, resized=1.5))
+    monkeypatch.setattr(
+        motion, "lift", lambda *args: replace(lifted(*args), stature=1.1, resized=1.5, steps=5)
+    )
     printed = lift(capsys, "u.csv", "cam.json", "--method", "smooth", "--keep-sides")[1]
     assert "left and right seem swapped in" in printed and "check left and right of the points" in printed
     assert "focal length" not in printed and "the camera is wrong" not in printed
