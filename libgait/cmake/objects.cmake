@@ -1,5 +1,5 @@
 # Objects of the library's sources, compiled with the flags and levels of the Makefile, so that both make the same bits.
-# Gives the property gait_objects of the folder.
+# Gives the properties gait_objects and gait_object_targets of the folder.
 include(CheckCCompilerFlag)
 
 # Flags: every variable of flags.mk.  As in the Makefile, debug builds take no optimisation from it.
@@ -42,6 +42,7 @@ function(gait_objects name sources level)
     "SHELL:-iquote \"${CMAKE_CURRENT_SOURCE_DIR}/src\"" ${ARGN})
   set_target_properties(gait_${name} PROPERTIES C_STANDARD 11 C_EXTENSIONS OFF CXX_STANDARD 14 CXX_EXTENSIONS OFF)
   set_property(DIRECTORY APPEND PROPERTY gait_objects $<TARGET_OBJECTS:gait_${name}>)
+  set_property(DIRECTORY APPEND PROPERTY gait_object_targets gait_${name})
 endfunction()
 
 file(GLOB_RECURSE sources CONFIGURE_DEPENDS src/*.c src/*.cpp)
