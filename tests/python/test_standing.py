@@ -34,12 +34,12 @@ def track(path, stands, view=None, rate=0.9, depth_sd=0.0):
         joints = MODEL.pose(state)[0]
         found[k] = FrameKeypoints(NAMES, view.project(joints[order]) + noise.normal(0, 0.3, (4, 2)))
         phase = state.phase if k > stands else 0.3 - 0.1 * (1 - k / max(stands, 1))
-        pelvis = state.pelvis + [depth_sd * np.sin(6.0 * time), 0.0, 0.0]
+        pelvis = state.pelvis + [depth_sd * np.sin(3.5 * time), 0.0, 0.0]
         mean = replace(state, phase=phase, pelvis=pelvis)
         sd = State(phase=0.02, stride_hz=0.02, pelvis=np.array([depth_sd, 0.0, 0.0]), coef=np.zeros(5))
         estimates.append(
-            Estimate(round(1e6 * time), k, TrackStatus.TRACKING, Flag(0), -80.0, 100.0, 1.0, 1.0, 1.2, mean,
-                     sd, mean, joints, np.full((len(joints), 3), 0.02), np.zeros(24), MODEL.joint_names)
+            Estimate(round(1e6 * time), k, TrackStatus.TRACKING, Flag(0), -80.0, 100.0, 1.0, 1.0, 1.3 * rate,
+                     mean, sd, mean, joints, np.full((len(joints), 3), 0.02), np.zeros(24), MODEL.joint_names)
         )  # fmt: skip
     with TrackWriter(path, 5, MODEL.joint_names, MODEL.angle_names) as rows:
         standing = Standing(PersonKeypoints(view, {1: found}, 1), view, [rows.write])

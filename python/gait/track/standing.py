@@ -25,6 +25,7 @@ Sink = Callable[[Frame, Estimate], None]
 _STILL = 0.3  # seconds; longer than both feet are on the floor in a step
 _MOVES = 0.01  # person's heights; least standard deviation of the position of a moving ankle
 _WAY = 0.5  # share of the strides' path; a person who stands moves less
+_WITHIN = 1.645  # standard deviations of a 90 % interval, which must not hold the whole path
 _HIPS, _ANKLES = ("l_hip", "r_hip"), ("l_ankle", "r_ankle")
 
 
@@ -87,8 +88,9 @@ class Standing:
         place = [held.estimate.mean.pelvis[:2] for held in self._held]
         seconds = self._held[-1].frame.time - self._held[0].frame.time
         way = np.mean(speed * np.array([np.cos(heading), np.sin(heading)]), axis=1) * seconds
+        moved, whole = (place[-1] - place[0]) @ way, way @ way
         unsure = np.linalg.norm(self._held[-1].estimate.sd.pelvis[:2] * way)  # sd along the way, times it
-        return bool((place[-1] - place[0]) @ way + unsure < _WAY * way @ way)
+        return bool(moved < _WAY * whole and moved + _WITHIN * unsure < whole)
 
     def _pass_on(self, held: _Held) -> None:
         half = int(2 * held.estimate.mean.phase)
