@@ -150,11 +150,12 @@ def test_the_page_and_the_recorder_take_people_by_number(streams, tmp_path):
     shown, heard = [], []
     feed = Feed(
         f"file://{both}?speed=0", [0], rig.model(), {}, lambda _, image: shown.append(image),
-        lambda topic, value: heard.append((value["person"], value["frame"])), people=("1", "2"),
+        lambda topic, value: heard.append((topic, value)), people=("1", "2"),
     )  # fmt: skip
     while feed.handle(0.1):
         pass
-    assert sorted(heard) == [(k, frame) for k in (0, 1) for frame in range(20, 24)] and shown
+    samples = [(value["person"], value["frame"]) for topic, value in heard if topic == "sample"]
+    assert sorted(samples) == [(k, frame) for k in (0, 1) for frame in range(20, 24)] and shown
     assert cv2.absdiff(shown[-1], picture(23)).max() > 0 and feed.damage is None
     track = tmp_path / "track.csv"
     assert main(["record", "-o", str(track), "--url", f"file://{both}?speed=0", "--person", "2"]) == 0
