@@ -80,10 +80,11 @@ def _show(name: str, title: str, head: list[str], rows: list[list[object]], note
     print(note)
 
 
-def made(view: str, seed: int, frames: int, late: float) -> tuple[Path, float]:
+def made(view: str, seed: int, frames: int, late: float = 0.5, body: str = "table") -> tuple[Path, float]:
     """Make a clip unless it exists; return its folder, and when the second film begins, seconds."""
-    scenario = Scenario(view=view, seed=seed, frames=frames, cameras=2)
-    folder, cut = FOLDER / f"{view}_{seed}", round(late * scenario.fps)
+    scenario = Scenario(view=view, seed=seed, frames=frames, cameras=2, body=body)
+    name = f"{view}_{seed}" + ("" if body == "table" else f"_{body}")
+    folder, cut = FOLDER / name, round(late * scenario.fps)
     if not (folder / "late.mp4").is_file():
         simulate(scenario, folder)
         with VideoWriter(folder / "late.mp4", scenario.fps, crf=CRF) as writer:

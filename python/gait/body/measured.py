@@ -104,7 +104,7 @@ def _with_lengths(sections: Mapping[str, Any], body: MeasuredBody) -> dict[str, 
             places[np.asarray(sections["PTNI"]) == frame] *= factor
             limbs[np.asarray(sections["LIMI"])[:, 0] == frame, :6] *= factor
     longer = sum((factors.get(part, 1.0) - 1.0) * usual[part] for part in _SUMS["leg"])
-    scaled = {"FRMF": origins, "PTNF": places, "LIMF": limbs} | _raised(sections, longer)
+    scaled = {"FRMF": origins, "PTNF": places, "LIMF": limbs} | raised(sections, longer)
     return {**sections, **{tag: values.astype(np.float32) for tag, values in scaled.items()}}
 
 
@@ -138,7 +138,7 @@ def _factors(body: MeasuredBody, usual: Mapping[str, float]) -> dict[str, float]
     return factors
 
 
-def _raised(sections: Mapping[str, Any], longer: float) -> dict[str, Floats]:
+def raised(sections: Mapping[str, Any], longer: float) -> dict[str, Floats]:
     """Curves of all classes of motion, with the pelvis raised by `longer`, statures, as the legs are."""
     height = blob.unpack_names(sections["CHNM"]).index("root_height")
     factor = 1.0 + longer / float(np.mean(sections["CURV"][0, :, height]))

@@ -261,7 +261,7 @@ def pose(
     phase, stature, heading, pitch, roll = (np.broadcast_to(v, n) for v in scalars)
     channels = curves(sections, phase, np.broadcast_to(coef, (n, coef.shape[1])), stride_hz)
     angles = channels.copy()
-    angles[:, _root_columns(sections)] += np.stack([heading, pitch, roll], axis=1)
+    angles[:, root_columns(sections)] += np.stack([heading, pitch, roll], axis=1)
     positions = points(sections, angles, proportion) * stature[:, None, None] + np.asarray(
         pelvis, float
     ).reshape(-1, 1, 3)
@@ -332,6 +332,7 @@ def axis_rotation(axis: int, angle: npt.ArrayLike) -> Floats:
     return matrix
 
 
-def _root_columns(sections: Mapping[str, Any]) -> list[int]:
+def root_columns(sections: Mapping[str, Any]) -> list[int]:
+    """Columns of the channels that heading, pitch and roll of a state add to."""
     names = blobs.unpack_names(sections["CHNM"])
     return [names.index(f"root_{name}") for name in ("yaw", "pitch", "roll")]

@@ -96,9 +96,10 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     values.add_clip(parser, "track")
     add(
         "--body",
-        metavar="BODY.json",
+        metavar="BODY.json|auto",
         help="measurements of the person, instead of --height: stature_m, and any of leg_m, arm_m or "
-        "their parts, hip_width_m, shoulder_width_m",
+        "their parts, hip_width_m, shoulder_width_m. auto: with several films, estimate where the person's "
+        "joints are from a first pass",
     )
     values.add_filter(parser, threads=1)
     values.add_seed(parser, "the random numbers")
@@ -178,7 +179,10 @@ def run(args: argparse.Namespace) -> int:
         raise UsageError("--keypoints-sd: needs --keypoints")
     if args.person and not args.keypoints:
         raise UsageError("--person: needs --keypoints")
-    if args.body and args.height is not None:
+    own_body = args.body == "auto"
+    if own_body and (len(args.video) < 2 or args.detector == "none" or args.mode == "paper"):
+        raise UsageError("--body auto: needs several films and the detector; give a file, or leave it out")
+    if args.body and not own_body and args.height is not None:
         raise UsageError("--height: --body has the stature; leave out one of them")
     if args.people is not None:
         alone = {"--init": args.init != "auto", "--keypoints": args.keypoints, "--mode": args.mode == "paper"}
@@ -188,7 +192,8 @@ def run(args: argparse.Namespace) -> int:
                 raise UsageError(f"--people: needs the detector to find everyone; leave out {option}")
     films = args.video
     cameras = _cameras(args)
-    if not (args.camera or args.height or args.body):
+    file = None if own_body else args.body
+    if not (args.camera or args.height or file):
         raise UsageError("give --camera CAM, or --height M to estimate the camera from the walk")
     if not args.camera and args.init != "auto":
         raise UsageError("--init: needs --camera, which defines its world")
@@ -212,15 +217,20 @@ def run(args: argparse.Namespace) -> int:
             args.init,
             args.background,
             args.keypoints,
-            args.body,
+            file,
         ),
     )
-    body = MeasuredBody.read(args.body) if args.body else None
+    body = MeasuredBody.read(file) if file else None
     if args.report:
         import gait.report.run_page  # noqa: F401  so that a missing package is reported before long work
 
-    given = {name: getattr(args, name) for name in ClipOptions.__dataclass_fields__ if name != "further"}
-    given |= {"mode": Mode[args.mode.upper()], "keypoints_sd": args.keypoints_sd or KEYPOINTS_SD}
+    apart = ("further", "own_body")
+    given = {name: getattr(args, name) for name in ClipOptions.__dataclass_fields__ if name not in apart}
+    given |= {
+        "own_body": own_body,
+        "mode": Mode[args.mode.upper()],
+        "keypoints_sd": args.keypoints_sd or KEYPOINTS_SD,
+    }
     given |= {"body": body, "height": args.height if body is None else body.stature}
     given |= {"video": films[0], "camera": cameras[0] if cameras else None}
     given["further"] = tuple(zip(films[1:], cameras[1:], strict=True)) if films[1:] else ()

@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+import tempfile
+from dataclasses import replace
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -18,6 +21,7 @@ from gait.track.follow import Follower
 from gait.track.further_cameras import with_further_cameras
 from gait.track.keypoint_start import find_keypoint_start
 from gait.track.options import KEYPOINTS_SD, ClipOptions
+from gait.track.own_body import FirstPass, own_model
 from gait.track.person_keypoints import PersonKeypoints
 from gait.track.person_shapes import PersonShapes
 from gait.track.plausible import Plausibility
@@ -29,6 +33,11 @@ from gait.track.tracker import Tracker
 
 __all__ = ["KEYPOINTS_SD", "ClipOptions", "track_clip"]
 
+#: Options of a pass that only estimates the body: what to track, and no outputs.
+_OF_A_PASS = (
+    "model", "init", "background", "height", "further", "offsets", "mode", "particles", "seed", "threads",
+    "start", "stop", "detector",
+)  # fmt: skip
 _HARDLY_FOLLOWED = "the person was lost nearly all the time; check --camera and --init with --overlay"
 
 
@@ -41,7 +50,24 @@ def track_clip(options: ClipOptions) -> dict[str, Any]:
         If a file cannot be read, no person can be found to start with, or no frame can be tracked.
     """
     scene = with_further_cameras(options, Scene.read(options))
+    if options.own_body:
+        scene = _with_own_body(options, scene)
     return track_scene(options, scene, first_state(options, scene))
+
+
+def _with_own_body(options: ClipOptions, scene: Scene) -> Scene:
+    """Track once to estimate the person's body; return the scene with its model."""
+    first = FirstPass()
+    with tempfile.TemporaryDirectory() as folder:
+        once = ClipOptions(
+            options.video,
+            options.camera,
+            str(Path(folder) / "track.csv"),
+            **{name: getattr(options, name) for name in _OF_A_PASS},
+            quiet=True,
+        )
+        track_scene(once, scene, first_state(once, scene), first.add)
+    return replace(scene, model=own_model(options, scene, first))
 
 
 def track_scene(options: ClipOptions, scene: Scene, start: Start, also: Sink | None = None) -> dict[str, Any]:

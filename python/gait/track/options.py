@@ -46,6 +46,8 @@ class ClipOptions:
         The person's stature, metres.
     body : MeasuredBody, optional
         The person's measured body, with the stature of `height`.
+    own_body : bool
+        Whether the person's body is estimated from a first pass, which needs further films and keypoints.
     mode : Mode
     particles : int, optional
     seed, threads : int
@@ -80,6 +82,7 @@ class ClipOptions:
     background: str = "auto"
     height: float | None = None
     body: MeasuredBody | None = None
+    own_body: bool = False
     further: tuple[tuple[str, str], ...] = ()
     offsets: tuple[float, ...] | None = None
     scale_camera: bool = False
