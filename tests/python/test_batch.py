@@ -237,7 +237,10 @@ def test_an_interrupt_ends_the_commands(place):
             "make has lift together with track",
         ),
         ("[[clip]]\nvideo = 'a.mp4'\nheight = 1.7\npeople = 9\n", "people is 9, outside"),
-        ("[[clip]]\nvideo = 'a.mp4'\nheight = 1.7\npeople = 2\nmake = ['lift']\n", "people cannot be combined with lift"),
+        (
+            "[[clip]]\nvideo = 'a.mp4'\nheight = 1.7\npeople = 2\nmake = ['lift']\n",
+            "people cannot be combined with lift",
+        ),
         ("[[clip]\n", "not valid TOML"),
     ],
 )

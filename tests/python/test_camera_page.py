@@ -56,9 +56,8 @@ def test_too_few_distances_are_counted():
 
 
 def test_a_wrong_distance_is_named():
-    with pytest.raises(
-        UserError, match="contradict each other by .* m, above all that between [A-E] and [A-E]; measure again"
-    ):
+    words = "contradict each other by .* m, above all that between [A-E] and [A-E]; measure again"
+    with pytest.raises(UserError, match=words):
         coordinates(5, FAR | {(0, 1): 4.4})
 
 

@@ -134,7 +134,8 @@ def test_another_film_is_recognised(folder, tmp_path, capsys):
                 new.mux(packet)
     track = replace(read_track(folder / "run.csv"), film=film.digest)
     assert track.compare_film("run.csv", Video(tmp_path / "copy.mkv")) == ""
-    assert "anew.mp4: is not the file that was tracked" in track.compare_film("run.csv", Video(tmp_path / "anew.mp4"))
+    words = track.compare_film("run.csv", Video(tmp_path / "anew.mp4"))
+    assert "anew.mp4: is not the file that was tracked" in words
     with pytest.raises(UserError, match="slow.mp4: is not the film that was tracked: its frame"):
         track.compare_film("run.csv", Video(tmp_path / "slow.mp4"))
 
