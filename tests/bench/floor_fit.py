@@ -79,7 +79,7 @@ def walk(s: Sequence) -> Walk:
     joints = dict(body.joints)
     way = joints["head"] - joints["neck"]
     way /= np.linalg.norm(way, axis=1)[:, None]
-    joints["head_top"] = joints["neck"] + way * retarget.HEAD * measures.stature
+    joints["head_top"] = joints["neck"] + way * retarget.HEAD_LENGTH * measures.stature
     away = np.stack([joints[name] - joints["pelvis"] for name in COMPARED], axis=1)
     local = np.einsum("tji,tpj->tpi", body.pelvis, away)
     frames = np.arange(0, len(local), EVERY)

@@ -8,7 +8,7 @@ import numpy as np
 import numpy.typing as npt
 from scipy.interpolate import CubicSpline
 
-from gait.learn.cycles.fourier import HARMONICS, decode, encode, fourier_basis
+from gait.learn.cycles.fourier import CYCLE_HARMONICS, decode, encode, fourier_basis
 from gait.learn.prior import components as pca
 from gait.learn.prior.imputation import column_mean, right_singular
 
@@ -110,7 +110,7 @@ def _grams(visible: Floats, load: Floats) -> Floats:
 
 def paper(values: Floats, mask: Mask, components: int) -> Floats:
     """Functional components as in the paper."""
-    return _by_svd(values, mask, components, fourier_basis(values.shape[1], HARMONICS))
+    return _by_svd(values, mask, components, fourier_basis(values.shape[1], CYCLE_HARMONICS))
 
 
 def ours(values: Floats, mask: Mask, components: int) -> Floats:

@@ -19,7 +19,7 @@ import gait_generator as g
 import learn_cases as cases
 
 from gait.body.skeleton import CHANNELS, default_skeleton, points
-from gait.learn.cycles.fourier import HARMONICS, fourier_basis
+from gait.learn.cycles.fourier import CYCLE_HARMONICS, fourier_basis
 from gait.learn.cycles.sequence import load
 from gait.learn.prior import components as pca
 from gait.learn.prior import fit, imputation, rank
@@ -171,7 +171,7 @@ def _passes() -> Iterator[Row]:
         for seed in range(SEEDS):
             case = cases.walks(_rng(12, seed), missing=share)
             found = pca.fit(case.values, case.mask, 5)
-            zero, basis = np.zeros(case.values.shape[1:]), fourier_basis(g.GRID, HARMONICS)
+            zero, basis = np.zeros(case.values.shape[1:]), fourier_basis(g.GRID, CYCLE_HARMONICS)
             other = imputation.complete(case.values, case.mask, 5, basis, zero)
             passes += [len(found.objective), len(other.objective)]
             rise += [_rise(found.objective), _rise(other.objective)]
@@ -249,6 +249,6 @@ def _recorded(mocap: Path) -> list[Row]:
         count, errors = rank.choose(values, mask, np.random.default_rng(1), groups)
         where = f"{len(files)} walks of CMU, {name}"
         rows.append(("auto", where, "components", count, "", ""))
-        for q in (0, 2, 5, 8, rank.LARGEST):
+        for q in (0, 2, 5, 8, rank.MOST_TRIED_COMPONENTS):
             rows.append(("auto", where, f"RMSE with {q}, degrees", float(np.degrees(errors[q])), "", ""))
     return rows

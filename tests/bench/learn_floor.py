@@ -179,7 +179,7 @@ def _alike(filled: Floats, subject: Indices, metric: Floats) -> Floats:
 
 def own_cycle(s: Sequence) -> Sections:
     """Model of one walk: its mean cycle, no components, the person's own lengths."""
-    rows = cutting.cut_cycles([s.channels], np.array([s.period.frames]), np.zeros(1), fit.SAMPLES)
+    rows = cutting.cut_cycles([s.channels], np.array([s.period.frames]), np.zeros(1), fit.CYCLE_SAMPLES)
     mean = components.fit(rows.values, rows.mask, 0).mean
     return {"CURV": mean[None], **default_skeleton(retarget.own_proportions(s.measures)).sections()}
 

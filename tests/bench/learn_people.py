@@ -125,7 +125,9 @@ def walk_of(one: Person) -> floor_fit.Walk | None:
         joints["head"] = joints["neck"] + HEAD * unit(joints["neck"] - joints["pelvis"])
     body = retarget.levelled(replace(body, joints=joints))
     joints, stature = dict(body.joints), s.measures.stature
-    joints["head_top"] = joints["neck"] + unit(joints["head"] - joints["neck"]) * retarget.HEAD * stature
+    joints["head_top"] = (
+        joints["neck"] + unit(joints["head"] - joints["neck"]) * retarget.HEAD_LENGTH * stature
+    )
     away = np.stack([joints[name] - joints["pelvis"] for name in floor_fit.COMPARED], axis=1)
     local = np.einsum("tji,tpj->tpi", body.pelvis, away)[:: max(1, round(EVERY * s.fps))]
     frames = np.arange(len(s.channels))[:: max(1, round(EVERY * s.fps))]

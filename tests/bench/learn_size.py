@@ -18,7 +18,7 @@ from gait.body.model_curves import series, waves
 from gait.body.skeleton import default_skeleton, points
 from gait.errors import UserError
 from gait.io import blob
-from gait.learn.cycles.fourier import HARMONICS
+from gait.learn.cycles.fourier import CYCLE_HARMONICS
 from gait.learn.cycles.sequence import load
 from gait.learn.options import LearnOptions
 from gait.learn.prior import fit, model, people
@@ -27,8 +27,8 @@ from gait.reproducible import one_thread
 Floats = npt.NDArray[np.float64]
 
 COMPONENTS, LIMIT = 5, 100_000  # target, bytes
-TERMS = 2 * HARMONICS + 1  # harmonics of the curves as they are learnt; none is cut off
-PHASES = (fit.SAMPLES, 128)  # the second is the reference's
+TERMS = 2 * CYCLE_HARMONICS + 1  # harmonics of the curves as they are learnt; none is cut off
+PHASES = (fit.CYCLE_SAMPLES, 128)  # the second is the reference's
 FINE = 32  # points between two phases
 COLUMNS = ("measure", "case", "figure", "value", "wanted", "met")
 

@@ -53,7 +53,7 @@ def test_a_rise_too_small_to_act_on_is_the_end_and_taken_back(monkeypatch):
     spoil(monkeypatch, len(good.objective) - 1, 0.01)
     end = align.align(signals, periods, start=good.offsets)
     rise = end.objective[-1] / end.objective[-2] - 1
-    assert 0 < rise < align.TOLERANCE and end.converged
+    assert 0 < rise < align.ALIGNMENT_TOLERANCE and end.converged
     assert np.array_equal(end.offsets, good.offsets)
 
 
@@ -95,7 +95,7 @@ def test_the_hips_gauge_is_a_cosine_of_right_minus_left():
     first = np.fft.fft(curve[:, HIPS[0]] - curve[:, HIPS[1]])[1]
     assert abs(np.angle(first)) / (2 * np.pi) < 2e-3
     broad = np.zeros((len(curve), 24))
-    broad[:, align.HIPS] = np.roll(curve[:, HIPS], 100, axis=0)
+    broad[:, align.HIP_COLUMNS] = np.roll(curve[:, HIPS], 100, axis=0)
     assert align.hip_phase(broad) == pytest.approx(100 / len(curve), abs=2e-3)
 
 
@@ -129,7 +129,7 @@ def test_a_first_sequence_of_trunk_alone_is_ambiguous_and_others_start_too():
         found = align.align(signals, periods)
         assert np.max(np.abs(gauge_free(found.offsets[1:], true[1:], periods[1:]))) < 1
         starts = list(align._xcorr_starts(align._Problem(signals, periods, None), found.weights))
-        assert len(starts) == align.STARTS
+        assert len(starts) == align.MOST_FIRST_SEQUENCES
         alone = align.align(signals, periods, start=starts[0])
         assert found.objective[-1] <= alone.objective[-1]
         lower += found.objective[-1] < alone.objective[-1]

@@ -82,7 +82,9 @@ def test_sections_are_those_of_the_format(learned):
     s = blob.read(learned)
     assert blob.unpack_names(s["CHNM"]) == CHANNELS and blob.unpack_names(s["PTNM"]) == JOINTS
     assert (
-        s["CURV"].shape == (4, fit.SAMPLES, 30) and s["CHST"].shape == (30, 4) and s["SCST"].shape == (3, 3)
+        s["CURV"].shape == (4, fit.CYCLE_SAMPLES, 30)
+        and s["CHST"].shape == (30, 4)
+        and s["SCST"].shape == (3, 3)
     )
     assert np.isfinite(s["CURV"]).all()
     assert np.all(s["CHST"][:, 0] >= 0) and np.all(s["CHST"][:, 1] <= s["CHST"][:, 2])
@@ -94,11 +96,11 @@ def test_sections_are_those_of_the_format(learned):
 
 def test_the_mean_cycle_is_a_walk_and_phase_0_its_right_heel_strike(learned):
     s = blob.read(learned)
-    phase = np.arange(fit.SAMPLES) / fit.SAMPLES
+    phase = np.arange(fit.CYCLE_SAMPLES) / fit.CYCLE_SAMPLES
     joints, angles = skeleton.pose(s, phase, np.zeros(3), 1.7, 0.0, 0.0, 0.0, np.zeros(3))
     right, left = (joints[:, JOINTS.index(f"{side}_heel"), 0] for side in "rl")
-    assert min(np.argmax(right), fit.SAMPLES - np.argmax(right)) <= 1
-    assert abs(np.argmax(left) - fit.SAMPLES // 2) <= 6
+    assert min(np.argmax(right), fit.CYCLE_SAMPLES - np.argmax(right)) <= 1
+    assert abs(np.argmax(left) - fit.CYCLE_SAMPLES // 2) <= 6
     knee = np.degrees(angles[:, ANGLES.index("r_knee_flexion")])
     assert 50 < knee.max() < 80 and 0.6 < phase[np.argmax(knee)] < 0.85
     assert s["CURV"][0, :, CHANNELS.index("root_forward")].mean() == pytest.approx(s["GAIT"][3], rel=0.1)
@@ -201,7 +203,11 @@ def test_people_get_a_few_lines_however_many_files(walks, tmp_path, capsys):
 def test_info_shows_what_was_learnt(learned, capsys):
     assert run("info", learned, "--json") == 0
     reported = json.loads(capsys.readouterr().out)
-    assert reported["components"] == 3 and reported["phases"] == fit.SAMPLES and len(reported["joints"]) == 19
+    assert (
+        reported["components"] == 3
+        and reported["phases"] == fit.CYCLE_SAMPLES
+        and len(reported["joints"]) == 19
+    )
     assert reported["bytes"] == learned.stat().st_size
     assert reported["meta"]["subjects"] == ["01", "02", "03", "04"] and reported["meta"]["activity"] == "walk"
     assert run("info", learned) == 0
@@ -252,13 +258,13 @@ def test_the_shipped_model_is_small_and_acknowledges_its_source():
     assert SHIPPED.stat().st_size < 375_000  # with fifty modes of 37 markers over ten frames
     meta = json.loads(s["META"].tobytes())
     assert meta["acknowledgement"] == model.CMU and meta["sequences"]["count"] == 51
-    assert s["CURV"].shape == (9, fit.SAMPLES, 30) and s["PROP"].shape == (4, len(s["FRMI"]) + 1)
+    assert s["CURV"].shape == (9, fit.CYCLE_SAMPLES, 30) and s["PROP"].shape == (4, len(s["FRMI"]) + 1)
 
 
 def test_the_curves_of_the_shipped_model_have_no_seam():
     curves = blob.read(SHIPPED)["CURV"].astype(float)
     assert max(cases.seam(curve) for curve in curves) <= 2
-    ramp = 0.01 * np.ptp(curves[0], axis=0) * np.arange(fit.SAMPLES)[:, None] / fit.SAMPLES
+    ramp = 0.01 * np.ptp(curves[0], axis=0) * np.arange(fit.CYCLE_SAMPLES)[:, None] / fit.CYCLE_SAMPLES
     assert cases.seam(curves[0] + ramp) > 2  # a jump of a hundredth of each channel's range shows
 
 

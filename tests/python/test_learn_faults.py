@@ -149,7 +149,7 @@ def test_a_rest_pose_that_does_not_stand_gives_the_same_motion(walking, tmp_path
     assert np.abs(other.rest_start - standing.rest_start).max() > 0.5
     both = []
     for recording in (standing, other):
-        monkeypatch.setitem(readers.RECORDINGS, ".bvh", lambda *_, found=recording: found)
+        monkeypatch.setitem(readers.READERS, ".bvh", lambda *_, found=recording: found)
         body = readers.read(path)
         both.append(np.degrees(retarget.angles(body, retarget.measure(body))))
     difference = np.abs(both[1] - both[0]).mean(axis=0)

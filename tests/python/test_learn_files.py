@@ -17,7 +17,7 @@ from gait.learn.cycles import cutting, sequence
 from gait.learn.cycles.sequence import load
 from gait.learn.mocap import acclaim, markers, tables
 from gait.learn.options import LearnOptions
-from gait.learn.prior.fit import SAMPLES
+from gait.learn.prior.fit import CYCLE_SAMPLES
 from gait.learn.solve import body, joints, readers, retarget
 from gait.learn.solve.body import from_bones
 
@@ -195,9 +195,9 @@ def person(tmp_path_factory):
 def write(path, person, share, seed=0, every=1, unseen=()):
     """Joint positions of every `every`-th frame with a share of empty cells, without the joints `unseen`."""
     rng = np.random.default_rng(seed)
-    rows = [",".join(["time", *(f"{name}_{axis}" for name in tables.JOINTS for axis in "xyz")])]
+    rows = [",".join(["time", *(f"{name}_{axis}" for name in tables.TABLE_JOINTS for axis in "xyz")])]
     for t in sorted(set(range(0, person.frames, every)) - set(unseen)):
-        numbers = np.concatenate([person.joints[name][t] for name in tables.JOINTS])
+        numbers = np.concatenate([person.joints[name][t] for name in tables.TABLE_JOINTS])
         cells = [f"{v:.5f}" if rng.random() >= share else "" for v in numbers]
         rows.append(",".join([f"{t / RATE:.6f}", *cells]))
     path.write_text("\n".join(rows) + "\n")
@@ -205,7 +205,7 @@ def write(path, person, share, seed=0, every=1, unseen=()):
 
 
 def sliced(found):
-    return cutting.cut_cycles([found.channels], [found.period.frames], [0.0], SAMPLES)
+    return cutting.cut_cycles([found.channels], [found.period.frames], [0.0], CYCLE_SAMPLES)
 
 
 @pytest.mark.parametrize("every", [1, 4])

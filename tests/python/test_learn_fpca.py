@@ -7,10 +7,10 @@ import pytest
 from learn_measures import falls
 
 from gait.learn.cycles import cutting
-from gait.learn.cycles.fourier import HARMONICS, fourier_basis
+from gait.learn.cycles.fourier import CYCLE_HARMONICS, fourier_basis
 from gait.learn.prior import components, imputation
 from gait.learn.prior.model import anova
-from gait.learn.prior.rank import LARGEST, choose
+from gait.learn.prior.rank import MOST_TRIED_COMPONENTS, choose
 
 
 @pytest.fixture(
@@ -54,13 +54,13 @@ def test_passes_stop_when_the_bound_hardly_gains():
     """A channel that half of the people never show still changes when the others have converged."""
     case = cases.people(np.random.default_rng(26), missing=0.1)
     cases.without_channel(case, [10], np.flatnonzero(case.subject % 2 == 0))
-    problem = imputation.Problem(case.values, case.mask, fourier_basis(g.GRID, HARMONICS))
+    problem = imputation.Problem(case.values, case.mask, fourier_basis(g.GRID, CYCLE_HARMONICS))
     start = problem.begin(imputation.column_mean(case.values, case.mask), 8)
     found = imputation.climb(problem, start, tolerance=0.0)  # the model may not move at all
     gains = -np.diff(found.objective)
     assert found.converged and len(gains) < 200
-    assert np.all(gains[-imputation.PATIENCE :] < imputation.LEAST_GAIN)
-    assert gains[-imputation.PATIENCE - 1] >= imputation.LEAST_GAIN
+    assert np.all(gains[-imputation.SLOW_PASSES :] < imputation.LEAST_GAIN)
+    assert gains[-imputation.SLOW_PASSES - 1] >= imputation.LEAST_GAIN
 
 
 def test_a_pass_that_makes_it_worse_is_shown_and_not_called_convergence(monkeypatch):
@@ -84,7 +84,7 @@ def test_a_pass_that_makes_it_worse_is_shown_and_not_called_convergence(monkeypa
 
 def test_start_of_the_missing_entries_does_not_matter(imputed):
     case, by_mean, _ = imputed
-    basis = fourier_basis(g.GRID, HARMONICS)
+    basis = fourier_basis(g.GRID, CYCLE_HARMONICS)
     by_zero = imputation.complete(case.values, case.mask, 5, basis, np.zeros(case.values.shape[1:]))
     assert np.max(np.abs(by_mean.filled - by_zero.filled)) < 1e-3
 
@@ -175,7 +175,7 @@ def test_automatic_number_of_components_is_the_generators():
     for groups in (None, case.subject):
         count, errors = choose(case.values, case.mask, np.random.default_rng(1), groups)
         assert abs(count - 5) <= 1
-        assert len(errors) == LARGEST + 1 and errors[0] > 4 * errors[count]
+        assert len(errors) == MOST_TRIED_COMPONENTS + 1 and errors[0] > 4 * errors[count]
 
 
 def test_people_held_out_need_no_more_components_than_they_share():
@@ -201,7 +201,7 @@ def test_without_gaps_it_is_the_truncated_svd_of_the_band_limited_data():
     found = components.fit(values, np.ones(values.shape, bool), 3)
     assert len(found.rmse) == 1 and found.converged
     spectrum = np.fft.rfft(values, axis=1)
-    spectrum[:, HARMONICS + 1 :] = 0
+    spectrum[:, CYCLE_HARMONICS + 1 :] = 0
     smooth = np.fft.irfft(spectrum, g.GRID, axis=1).reshape(30, -1)
     mean = smooth.mean(axis=0)
     u, s, v = np.linalg.svd(smooth - mean, full_matrices=False)

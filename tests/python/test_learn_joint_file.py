@@ -24,7 +24,7 @@ def person(tmp_path_factory):
 
 
 def write_csv(path, person):
-    names = {n: "head_top" if n == "head" else n for n in tables.JOINTS}
+    names = {n: "head_top" if n == "head" else n for n in tables.TABLE_JOINTS}
     header = ["frame", "time", "status"] + [f"{names[n]}_{axis}" for n in names for axis in "xyz"]
     rows = [",".join(header)]
     for t in range(person.frames):
@@ -35,7 +35,7 @@ def write_csv(path, person):
 
 
 def write_trc(path, person):
-    names = {n: TRC_NAMES.get(n, n[0].upper() + n[2:].title()) for n in tables.JOINTS}
+    names = {n: TRC_NAMES.get(n, n[0].upper() + n[2:].title()) for n in tables.TABLE_JOINTS}
     head = "DataRate\tCameraRate\tNumFrames\tNumMarkers\tUnits"
     lines = [f"PathFileType\t4\t(X/Y/Z)\t{path.name}", head]
     lines += [
@@ -54,7 +54,7 @@ def test_csv_and_trc_hold_the_same_joints(person, tmp_path):
     first = joints.from_table(write_csv(tmp_path / "a.csv", person))
     second = readers.read(write_trc(tmp_path / "a.trc", person))
     assert first.fps == pytest.approx(120, rel=1e-3) and second.fps == 120
-    for name in tables.JOINTS:
+    for name in tables.TABLE_JOINTS:
         assert first.joints[name] == pytest.approx(person.joints[name], abs=1e-4), name
         assert second.joints[name] == pytest.approx(person.joints[name], abs=1e-4), name
 
@@ -95,8 +95,8 @@ def test_joint_centres_at_the_origin_are_missing(person, tmp_path, kind):
     if kind == "trc":
         write_trc(path, hidden)
     else:
-        places = np.stack([hidden.joints[n] for n in tables.JOINTS], axis=1)
-        write_c3d(path, tables.JOINTS, places @ Y_UP)
+        places = np.stack([hidden.joints[n] for n in tables.TABLE_JOINTS], axis=1)
+        write_c3d(path, tables.TABLE_JOINTS, places @ Y_UP)
     sequence = load(path)
     assert np.flatnonzero(np.isnan(sequence.channels).any(axis=1)).tolist() == list(range(50, 70))
 
@@ -187,10 +187,12 @@ def moved(person, joint, by, frames=(50,)):
     return replace(person, joints={**person.joints, joint: place})
 
 
-@pytest.mark.parametrize("joint", tables.JOINTS)
+@pytest.mark.parametrize("joint", tables.TABLE_JOINTS)
 @pytest.mark.parametrize("by", [(900, 0, 0), (0, 3, 0), (-0.8, 0.8, 0)])
 def test_the_joint_that_is_off_the_body_is_named(person, joint, by):
-    places = {name: place for name, place in moved(person, joint, by).joints.items() if name in tables.JOINTS}
+    places = {
+        name: place for name, place in moved(person, joint, by).joints.items() if name in tables.TABLE_JOINTS
+    }
     with pytest.raises(UserError, match=rf"^50: {joint} is \S+ m from .*, usually \S+ m; .* or empty it$"):
         joints.require_whole(places, str)
 
@@ -237,6 +239,6 @@ def test_few_zeros_are_off_the_body_unless_they_are_missing(person, tmp_path):
 
 @pytest.mark.parametrize("value", [0, np.nan])
 def test_joints_without_places_are_not_judged(value):
-    places = {name: np.full((5, 3), float(value)) for name in tables.JOINTS}
+    places = {name: np.full((5, 3), float(value)) for name in tables.TABLE_JOINTS}
     joints.require_whole(places, str)
     joints.require_whole({"hat": places["head"]}, str)

@@ -49,7 +49,7 @@ def people(count, rng, sd):
     """Bodies whose groups' factors less 1, and shoulders, are scores @ sd, (k, 7 or 10)."""
     changes = rng.normal(size=(count, len(sd))) @ sd
     changes -= changes.mean(axis=0)
-    changes = np.pad(changes, ((0, 0), (0, lengths.CHANGES - len(sd[0]))))
+    changes = np.pad(changes, ((0, 0), (0, lengths.CHANGE_COUNT - len(sd[0]))))
     groups, shoulders = np.split(changes, [len(lengths.GROUPS)], axis=1)
     return [
         body(rng.uniform(1.5, 1.9), shoulder, **dict(zip(lengths.GROUPS, 1 + f, strict=True)))
@@ -82,7 +82,7 @@ def test_planted_components_of_lengths_are_found():
 
 def test_shoulders_move_apart_from_the_neck():
     """Shoulders forward and wide on a trunk of any length: SHFT contains them, and PROP the trunk alone."""
-    planted = np.zeros((2, lengths.CHANGES))
+    planted = np.zeros((2, lengths.CHANGE_COUNT))
     planted[0, 7:] = 0.02, 0.01, -0.015
     planted[1, GROUP["torso"]] = 0.02
     bodies = people(40, np.random.default_rng(7), planted)
@@ -102,7 +102,7 @@ def test_shoulders_move_apart_from_the_neck():
 
 def test_left_and_right_change_together_and_the_sign_is_fixed():
     table, _ = lengths.learn(people(9, np.random.default_rng(2), 0.03 * np.eye(7)), MEAN, POSE)
-    assert table.shape == (lengths.COUNT, len(FRAMES) + 1)
+    assert table.shape == (lengths.MOST_LENGTH_COMPONENTS, len(FRAMES) + 1)
     for name in FRAMES:
         if name.startswith("l_"):
             twin = FRAMES.index("r_" + name[2:])
@@ -113,7 +113,7 @@ def test_left_and_right_change_together_and_the_sign_is_fixed():
 
 def test_changes_are_bounded():
     table, shift = lengths.learn(people(5, np.random.default_rng(3), 0.3 * np.eye(10)), MEAN, POSE)
-    assert np.abs(table).max() == lengths.LARGEST and np.abs(shift).max() == lengths.LARGEST
+    assert np.abs(table).max() == lengths.LARGEST_CHANGE and np.abs(shift).max() == lengths.LARGEST_CHANGE
 
 
 @pytest.mark.parametrize("count", [0, 1, 2])

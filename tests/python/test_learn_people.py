@@ -72,7 +72,7 @@ def test_metric_is_the_displacement_of_the_joints():
         whole = sum((w * step[CHANNELS.index(name)]) ** 2 for name, w in people.DISPLACING.items())
         counted = step * [people.TURNING.get(name, 1.0) for name in CHANNELS]
         moved = points(SECTIONS, mean + counted) - points(SECTIONS, mean)
-        expected = np.mean(np.sum(moved**2, axis=2)) + whole + people.RIDGE * np.sum(step**2)
+        expected = np.mean(np.sum(moved**2, axis=2)) + whole + people.SLOPE_RIDGE * np.sum(step**2)
         assert np.sum((step @ metric) ** 2) == pytest.approx(expected, rel=0.02)
 
 
@@ -206,7 +206,7 @@ def test_the_slope_is_that_within_people_drawn_towards_none():
     paces = [np.array([-1.0, 1.0]), np.array([0.5, 1.5, 1.0]), np.array([-2.0])]
     found = people.pace_slope(*persons(rng, slope, paces))
     visible = 1 + 0.5 / 3  # variances of the people's paces; a single cycle shows nothing
-    np.testing.assert_allclose(found, slope * visible / (visible + people.UNMOVED), atol=1e-12)
+    np.testing.assert_allclose(found, slope * visible / (visible + people.CONSTANT_GAIT_VARIANCE), atol=1e-12)
 
 
 def test_turns_within_a_person_are_no_slope():

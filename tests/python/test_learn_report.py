@@ -19,7 +19,7 @@ from gait.learn.options import LearnOptions
 from gait.learn.prior import fit
 from gait.learn.report import figures, figures_model
 from gait.learn.report import page as pages
-from gait.learn.report.figures_model import SHOWN
+from gait.learn.report.figures_model import SHOWN_ANGLES
 from gait.report.figures import Drawing
 from gait.reproducible import one_thread
 
@@ -228,7 +228,7 @@ def many_subjects(sequences):
 @pytest.mark.filterwarnings("error::RuntimeWarning:gait.learn.prior.model")
 @pytest.mark.parametrize("make", [one_file, lower_body, many_subjects])
 def test_unusual_input_gives_a_report_too(sequences, tmp_path, monkeypatch, make):
-    monkeypatch.setattr(figures, "MOST_NAMES", 10)
+    monkeypatch.setattr(figures, "MOST_NAMED_ROWS", 10)
     monkeypatch.setattr(figures, "MOST_SEQUENCES", 10)
     monkeypatch.setattr(Drawing, "png", lambda self: self.figure.draw_without_rendering() or b"PNG")
     unusual = make(sequences)
@@ -238,7 +238,7 @@ def test_unusual_input_gives_a_report_too(sequences, tmp_path, monkeypatch, make
     assert len(page.pictures) >= 10 and page.cells == 10 * len(unusual.sequences)
     assert ("subjects" in page.ids) == (make is lower_body)
     texts = [t.get_text() for axes in figures.cycles(unusual).axes for t in axes.texts]
-    unseen = [name for name in SHOWN if not unusual.cycles.mask[:, :, CHANNELS.index(name)].any()]
+    unseen = [name for name in SHOWN_ANGLES if not unusual.cycles.mask[:, :, CHANNELS.index(name)].any()]
     assert texts == ["not observed"] * len(unseen) and bool(unseen) == (make is lower_body)
 
 

@@ -63,7 +63,7 @@ def test_generic_proportions_take_trunk_and_upper_arms_by_anatomy_the_rest_from_
     own, generic = retarget.own_proportions(measures), retarget.generic_proportions([measures, measures])
     for name, value in retarget.ANATOMICAL.items():
         assert getattr(generic, name) == value != getattr(own, name)
-    assert np.linalg.norm(generic.head) == pytest.approx(retarget.HEAD, abs=0.01)
+    assert np.linalg.norm(generic.head) == pytest.approx(retarget.HEAD_LENGTH, abs=0.01)
     for name in ("hip", "forearm", "thigh", "shank", "toe", "heel", "sole"):
         assert getattr(generic, name) == getattr(own, name)
 

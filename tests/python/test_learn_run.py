@@ -152,8 +152,8 @@ def test_the_pelvis_of_the_shipped_model_follows_from_its_legs():
     plain = mean.copy()
     plain[:, CHANNELS.index("root_forward") :] = 0
     height, stride = fit._from_legs(plain, Proportions())
-    assert height == pytest.approx(mean[:, fit.HEIGHT], abs=0.02)
-    assert stride == pytest.approx(mean[:, fit.FORWARD].mean(), rel=0.2)
+    assert height == pytest.approx(mean[:, fit.HEIGHT_COLUMN], abs=0.02)
+    assert stride == pytest.approx(mean[:, fit.FORWARD_COLUMN].mean(), rel=0.2)
     still = np.zeros_like(mean)
     assert fit._from_legs(still, Proportions())[1] == fit.USUAL_STRIDE
 
@@ -395,7 +395,10 @@ def learned(tmp_path_factory):
 @pytest.mark.long
 def test_five_components_take_less_than_100_kB(learned):
     sections = blob.read(learned)
-    assert sections["PACE"].shape == (people.TERMS, 30) and len(sections["PROP"]) == lengths.COUNT
+    assert (
+        sections["PACE"].shape == (people.TERMS, 30)
+        and len(sections["PROP"]) == lengths.MOST_LENGTH_COMPONENTS
+    )
     meta = json.loads(sections["META"].tobytes())
     assert meta["subject_count"] == SIZE_PEOPLE and meta["sequences"]["count"] == 2 * SIZE_PEOPLE
     assert len(meta["subjects"]) == len(meta["sequences"]["rows"]) == model.MOST_ROWS
@@ -434,7 +437,7 @@ def test_machines_that_calculate_otherwise_write_the_same_bytes(tmp_path):
 
 def test_gaps_that_are_still_changing_are_an_error_with_a_remedy(walks, tmp_path, capsys, monkeypatch):
     """Nothing is written, and the people whose parts are missing are named; the search converges."""
-    monkeypatch.setattr(imputation.climb, "__defaults__", (imputation.TOLERANCE, 2))
+    monkeypatch.setattr(imputation.climb, "__defaults__", (imputation.MODEL_TOLERANCE, 2))
     options = ("-o", tmp_path / "m.gait", "--segments", "none")
     legs = tmp_path / "03_01.csv"
     angles = readers.read(walks / "01/01_01.amc")

@@ -15,7 +15,12 @@ from gait.learn.options import DEFAULT, LearnOptions
 from gait.learn.prior import fit
 from gait.learn.solve import kinematics, markers, retarget, skeleton_fit
 from gait.learn.solve.kinematics import SCALES, SEGMENTS
-from gait.learn.solve.skeleton_fit import NO_INFORMATION, PEOPLE, LengthInformation, log_bayes_factor
+from gait.learn.solve.skeleton_fit import (
+    NO_INFORMATION,
+    POPULATION_LENGTHS,
+    LengthInformation,
+    log_bayes_factor,
+)
 from gait.reproducible import one_thread
 
 pytestmark = pytest.mark.long
@@ -48,7 +53,7 @@ def without(points, names, frames=slice(None)):
 
 
 def pooled(*found):
-    return sum(found, PEOPLE).mean()
+    return sum(found, POPULATION_LENGTHS).mean()
 
 
 @pytest.fixture(scope="module")
@@ -110,7 +115,10 @@ def test_bayes_factors_of_one_body_are_right():
     rng, size = np.random.default_rng(0), len(SCALES)
     same, unusual = rng.random(3000) < 0.5, []
     for one in same:
-        people = [PEOPLE.mean() + rng.normal(size=size) / np.sqrt(np.diag(PEOPLE.matrix)) for _ in range(2)]
+        people = [
+            POPULATION_LENGTHS.mean() + rng.normal(size=size) / np.sqrt(np.diag(POPULATION_LENGTHS.matrix))
+            for _ in range(2)
+        ]
         found = []
         for body in (people[0], people[0] if one else people[1]):
             slope = rng.normal(scale=5, size=(size, 6))
@@ -128,7 +136,7 @@ def test_what_shows_nothing_separates_no_people():
 
 def body(stature, error=0.0, precision=1e4):
     """Estimates of a person's stature with an error of the log stature."""
-    matrix = np.zeros(PEOPLE.matrix.shape)
+    matrix = np.zeros(POPULATION_LENGTHS.matrix.shape)
     matrix[0, 0] = precision
     return LengthInformation(matrix, matrix[0] * (np.log(stature) + error))
 

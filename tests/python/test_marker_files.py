@@ -119,7 +119,7 @@ def test_a_mapping_may_start_from_a_set_and_drop_markers(tmp_path):
     )
     table = markers.read_map(path).landmarks
     assert "lkne" not in table and table["rkne"] == markers.LANDMARKS["r_knee_lateral"]
-    assert table["plate1"].segment == "l_thigh" and table["plate1"].sd == markers.LOOSE
+    assert table["plate1"].segment == "l_thigh" and table["plate1"].sd == markers.LOOSE_SD_M
 
 
 @pytest.mark.parametrize(

@@ -74,7 +74,7 @@ def test_people_who_were_not_recorded_come_in_opposite_pairs_on_the_same_floor(m
     pairs = apart.reshape(motions.PAIRS, 2, *apart.shape[1:])
     assert np.abs(pairs.sum(axis=1)).mean() < 0.2 * np.abs(apart).mean()
     assert 0.005 < np.sqrt(np.mean(apart**2)) < 0.06  # statures
-    heights = [x[:, motions.FEET, 2].min(axis=1).mean() for x in (motion.places, *motion.people)]
+    heights = [x[:, motions.FOOT_COLUMNS, 2].min(axis=1).mean() for x in (motion.places, *motion.people)]
     assert np.ptp(heights) < 1e-3
 
 

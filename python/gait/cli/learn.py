@@ -27,12 +27,12 @@ from gait.errors import UsageError
 from gait.learn.corpus import forkserver
 from gait.learn.options import (
     DEFAULT_COMPONENTS,
+    HEADINGS_BY_NAME,
     JOINT_CENTRES,
-    MOST_COMPONENTS,
+    MOST_READ_COMPONENTS,
     PAPER_COMPONENTS,
     PERIOD_MODES,
     PRIORS,
-    SEGMENT_HEADINGS,
     SEGMENT_MARKERS,
     SEGMENT_SOURCES,
     SUBJECT_RULES,
@@ -151,11 +151,11 @@ def _add_model(group: argparse._ArgumentGroup) -> None:
     )
     group.add_argument(
         "--components",
-        type=lambda text: _auto_or(text, MOST_COMPONENTS),
+        type=lambda text: _auto_or(text, MOST_READ_COMPONENTS),
         metavar="auto|N",
-        help=f"number of components of the variation about the mean walk, 1 to {MOST_COMPONENTS}. auto: the "
-        f"number that predicts held-out data best. Default: {DEFAULT_COMPONENTS} ({PAPER_COMPONENTS} with "
-        "--prior paper), or two less than the number of cycles if that is fewer",
+        help=f"number of components of the variation about the mean walk, 1 to {MOST_READ_COMPONENTS}. "
+        f"auto: the number that predicts held-out data best. Default: {DEFAULT_COMPONENTS} "
+        f"({PAPER_COMPONENTS} with --prior paper), or two less than the number of cycles if that is fewer",
     )
     group.add_argument(
         "--prior",
@@ -196,7 +196,7 @@ def _add_segments(group: argparse._ArgumentGroup) -> None:
         group.add_argument(f"--segment-{name}", type=values.whole(*limits), metavar=metavar, help=help)
     group.add_argument(
         "--segment-headings",
-        choices=list(SEGMENT_HEADINGS),
+        choices=list(HEADINGS_BY_NAME),
         help="free (default): gait lift estimates the heading. 2: every segment also rotated by 90 degrees, "
         "as in the paper; 8: by each multiple of 45 degrees; the prior then includes headings in the world",
     )
@@ -282,7 +282,7 @@ def _segment_options(args: argparse.Namespace) -> SegmentOptions:
     if hop > frames:
         raise UsageError(f"--segment-hop {hop}: at most the {frames} of --segment-frames")
     if "headings" in given:
-        given["headings"] = SEGMENT_HEADINGS[given["headings"]]
+        given["headings"] = HEADINGS_BY_NAME[given["headings"]]
     if given.get("mixture") == AUTO:
         given["mixture"] = None
     return SegmentOptions(source=args.segments, people=args.prior == "people", **given)

@@ -12,7 +12,7 @@ if TYPE_CHECKING:
 
 DEFAULT_COMPONENTS = 8
 PAPER_COMPONENTS = 5
-MOST_COMPONENTS = 16  # the most that the library reads
+MOST_READ_COMPONENTS = 16  # the most that the library reads
 PRIORS = ("people", "paper")
 PERIOD_MODES = ("refined", "literal")
 #: Rules by which files belong to one person (`gait.learn.corpus.subjects`).
@@ -22,7 +22,7 @@ JOINT_CENTRES = ("recorded", "anatomical")
 SEGMENT_SOURCES = ("learnt", "all", "none", "only")
 SEGMENT_MARKERS = ("virtual", "recorded")
 #: Rotated copies of each segment, as the command names them and as the blob stores them.
-SEGMENT_HEADINGS = {"free" if count == 0 else str(count): count for count in abi.SEGMENT_HEADINGS}
+HEADINGS_BY_NAME = {"free" if count == 0 else str(count): count for count in abi.SEGMENT_HEADINGS}
 
 
 @dataclass(frozen=True)

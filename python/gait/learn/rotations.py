@@ -13,7 +13,7 @@ from gait.body.skeleton import axis_rotation
 from gait.learn.arrays import Floats
 
 GIMBAL = 0.05  # cosine of the middle angle below which the outer two cannot be separated
-CLEAR = 0.3  # cosine above which the two branches cannot be confused
+CLEAR_COSINE = 0.3  # cosine above which the two branches cannot be confused
 
 
 def from_angles(angles: Floats, axes: Sequence[int]) -> Floats:
@@ -80,7 +80,7 @@ def _continuous(angles: Floats, inner: Callable[[int, float], Floats]) -> Floats
 
     (a, b, c) and (a + pi, pi - b, c + pi) are the same rotation; near |b| = 90 degrees only a +- c is known.
     """
-    if not np.any(np.cos(angles[:, 1]) < CLEAR):
+    if not np.any(np.cos(angles[:, 1]) < CLEAR_COSINE):
         return unwrap(angles)
     result = angles.copy()
     visible = [int(t) for t in np.flatnonzero(np.isfinite(angles).all(axis=1))]

@@ -28,7 +28,7 @@ from gait.progress import progress
 from gait.reproducible import one_thread
 
 MOST_LINES = 20  # most lines about files left out
-MOST_NAMES = 6  # most labels in a line
+MOST_NAMED_LABELS = 6  # most labels in a line
 
 Note = Callable[[str], None]
 Sections = dict[str, blob.Array]
@@ -122,14 +122,16 @@ def _hints(options: LearnOptions, notes: RunNotes) -> Iterator[str]:
     if options.markers and notes.labels:
         absent = [repr(name) for name in options.markers.named if plain(name) not in notes.labels]
         if absent:
-            names = ", ".join(absent[:MOST_NAMES]) + (" ..." if len(absent) > MOST_NAMES else "")
+            names = ", ".join(absent[:MOST_NAMED_LABELS]) + (
+                " ..." if len(absent) > MOST_NAMED_LABELS else ""
+            )
             yield f"--markers {options.markers.path}: no file has the marker {names}; check the spelling"
     if notes.zeros:
         path, zeros = notes.zeros[0]
         yield f"{path}: exactly 0: {zeros}{_more(notes.zeros)}; if that is missing data, give --zeros-missing"
     if notes.lacking:
         path, parts = notes.lacking[0]
-        names = ", ".join(parts[:MOST_NAMES]) + (" ..." if len(parts) > MOST_NAMES else "")
+        names = ", ".join(parts[:MOST_NAMED_LABELS]) + (" ..." if len(parts) > MOST_NAMED_LABELS else "")
         yield f"{path}: has no {names}{_more(notes.lacking)}: learnt without; rename them if they are there"
     belts = [(path, speed) for path, speed in notes.belts if speed]
     if belts:

@@ -121,7 +121,7 @@ def _aligned(walks: list[Walk], angles: int, *, literally: bool) -> Aligned:
     signals = [w.channels[:, :angles] for w in walks]
     periods = np.array([w.period.frames for w in walks])
     start, weights = (np.zeros(len(walks)), np.ones(angles)) if literally else (None, None)
-    return Aligned(walks, align.align(signals, periods, start, align.HIPS, weights), angles)
+    return Aligned(walks, align.align(signals, periods, start, align.HIP_COLUMNS, weights), angles)
 
 
 def _removal(learned: Learned) -> Removal:

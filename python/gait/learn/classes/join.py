@@ -13,8 +13,8 @@ from gait.io import blob
 
 Sections = Mapping[str, blob.Array]
 #: Sections that a class may have itself, with their tags for class k.
-TAGS = {"CURV": "CUR{}", "CHST": "CHS{}", "SCST": "SCS{}", "GAIT": "GAI{}", "PACE": "PAC{}"}
-CYCLES, RECORDINGS = 2, 3  # columns of CLIN
+CLASS_TAGS = {"CURV": "CUR{}", "CHST": "CHS{}", "SCST": "SCS{}", "GAIT": "GAI{}", "PACE": "PAC{}"}
+CYCLES_COLUMN, RECORDINGS_COLUMN = 2, 3  # columns of CLIN
 
 
 @dataclass(frozen=True)
@@ -55,7 +55,7 @@ def join(first: Sections, classes: Sequence[MotionClass]) -> dict[str, blob.Arra
         info[k] = (one.direction, _source(one, k, classes), one.cycles, one.recordings)
         if k and one.own is not None:
             _require_channels(first, one)
-            out |= {TAGS[tag].format(k): one.own[tag] for tag in TAGS if tag in one.own}
+            out |= {CLASS_TAGS[tag].format(k): one.own[tag] for tag in CLASS_TAGS if tag in one.own}
         for to, change in one.changes.items():
             if to in names:
                 changes[k, names.index(to)] = (change.rate, change.concentration, change.phase, change.slope)

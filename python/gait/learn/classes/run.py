@@ -21,17 +21,25 @@ from gait.learn.run import Note, check, run
 
 WALK, STAND, BACKWARDS, RUN = "walk", "stand", "backwards", "run"
 DERIVED = STAND, BACKWARDS  # made from the walk
-_STEP = 6.0  # concentration with an sd of about a twentieth of a stride
+STEP_CONCENTRATION = 6.0  # concentration with an sd of about a twentieth of a stride
 #: Rates of change from one class to another, per second at the most likely phase and pace.  Changes are
 #: rarely recorded, so these are assumptions about people indoors and in streets: they walk for a few seconds
 #: up to a minute, and stop with both feet on the ground.
-CHANGES: dict[str, dict[str, Change]] = {
-    WALK: {STAND: Change(1.0, _STEP, 0.05), BACKWARDS: Change(0.002), RUN: Change(0.3, slope=1.0)},
-    STAND: {WALK: Change(0.7, _STEP, 0.0), BACKWARDS: Change(0.3, _STEP, 0.0), RUN: Change(0.05)},
-    BACKWARDS: {STAND: Change(1.0, _STEP, 0.05), WALK: Change(0.002)},
+CLASS_CHANGES: dict[str, dict[str, Change]] = {
+    WALK: {
+        STAND: Change(1.0, STEP_CONCENTRATION, 0.05),
+        BACKWARDS: Change(0.002),
+        RUN: Change(0.3, slope=1.0),
+    },
+    STAND: {
+        WALK: Change(0.7, STEP_CONCENTRATION, 0.0),
+        BACKWARDS: Change(0.3, STEP_CONCENTRATION, 0.0),
+        RUN: Change(0.05),
+    },
+    BACKWARDS: {STAND: Change(1.0, STEP_CONCENTRATION, 0.05), WALK: Change(0.002)},
     RUN: {WALK: Change(0.5, slope=-1.0), STAND: Change(0.1)},
 }
-OTHER = Change(0.1)  # between a user's class and walking or standing
+OTHER_CHANGE = Change(0.1)  # between a user's class and walking or standing
 
 
 def learn(options: LearnOptions, note: Note) -> dict[str, Any]:
@@ -134,8 +142,10 @@ def _counted(one: MotionClass, walk: Mapping[str, blob.Array] | None) -> MotionC
 
 
 def _changes(name: str, names: list[str]) -> dict[str, Change]:
-    known = CHANGES.get(name)
+    known = CLASS_CHANGES.get(name)
     if known is None:
-        return {other: OTHER for other in (names[0], STAND) if other in names and other != name}
-    others = {other: OTHER for other in names if other not in CHANGES and name in (names[0], STAND)}
+        return {other: OTHER_CHANGE for other in (names[0], STAND) if other in names and other != name}
+    others = {
+        other: OTHER_CHANGE for other in names if other not in CLASS_CHANGES and name in (names[0], STAND)
+    }
     return {other: change for other, change in (known | others).items() if other in names}

@@ -15,9 +15,9 @@ import numpy as np
 from gait.io import blob
 from gait.learn.arrays import Floats
 
-PHASES = 8  # the fewest that a model may have, as nothing moves
-STANCE = 0.15, 0.45  # phases in which the right foot carries the body and is flat
-COMPONENTS: tuple[dict[str, float], ...] = (
+STANDING_PHASES = 8  # the fewest that a model may have, as nothing moves
+STANCE_PHASES = 0.15, 0.45  # phases in which the right foot carries the body and is flat
+STANDING_COMPONENTS: tuple[dict[str, float], ...] = (
     {"l_hip_flexion": 9.0, "r_hip_flexion": -9.0, "l_ankle_flexion": -9.0, "r_ankle_flexion": 9.0},
     {"l_hip_abduction": 4.0, "r_hip_abduction": 4.0},
     {
@@ -28,7 +28,7 @@ COMPONENTS: tuple[dict[str, float], ...] = (
 )  # fmt: skip
 """Degrees for one standard deviation."""
 #: Standard deviations of posture, degrees: arms may hang, fold, point or carry.
-POSTURE = {"shoulder_flexion": 25.0, "shoulder_abduction": 12.0, "shoulder_rotation": 20.0,
+STANDING_POSTURE_SD_DEG = {"shoulder_flexion": 25.0, "shoulder_abduction": 12.0, "shoulder_rotation": 20.0,
            "elbow_flexion": 35.0, "torso_y": 6.0, "torso_x": 4.0, "torso_z": 8.0}  # fmt: skip
 
 
@@ -38,7 +38,7 @@ def sections(walk: Mapping[str, blob.Array]) -> dict[str, blob.Array]:
     mean = np.asarray(walk["CURV"], float)[0]
     posture = _standing(walk, names, mean)
     rows = [posture]
-    for component in COMPONENTS:
+    for component in STANDING_COMPONENTS:
         change = np.zeros(len(names))
         for name, degrees in component.items():
             change[names.index(name)] = np.radians(degrees)
@@ -47,14 +47,14 @@ def sections(walk: Mapping[str, blob.Array]) -> dict[str, blob.Array]:
         )
         change[names.index("root_height")] = min(height - _leg_height(walk, names, posture), 0.0) / 2
         rows.append(change)
-    curves = np.repeat(np.array(rows)[:, None, :], PHASES, axis=1)
+    curves = np.repeat(np.array(rows)[:, None, :], STANDING_PHASES, axis=1)
     statistics = np.array(walk["CHST"], float)
     for k, name in enumerate(names):
-        for part, degrees in POSTURE.items():
+        for part, degrees in STANDING_POSTURE_SD_DEG.items():
             if name.endswith(part):
                 statistics[k, 3] = np.radians(degrees)
     statistics[:, 1:3] = posture[:, None]
-    scores = np.zeros((len(COMPONENTS), 3))
+    scores = np.zeros((len(STANDING_COMPONENTS), 3))
     scores[:, 1] = 1.0
     gait = np.array(walk["GAIT"], float)
     gait[3:5] = 0.0
@@ -74,7 +74,7 @@ def _standing(walk: Mapping[str, blob.Array], names: list[str], mean: Floats) ->
     """Mean channels (M,) of a person who stands with feet together."""
     at = {name: k for k, name in enumerate(names)}
     posture = mean.mean(axis=0)
-    first, last = (int(phase * len(mean)) for phase in STANCE)
+    first, last = (int(phase * len(mean)) for phase in STANCE_PHASES)
     knee = float(mean[first:last, at["r_knee_flexion"]].min())  # when the leg is straightest
     ankle = [c[at["root_height"]] - _leg_height(walk, names, c, "r") for c in mean[first:last]]
     flat = mean[first + int(np.argmin(ankle))]  # the sole is on the ground

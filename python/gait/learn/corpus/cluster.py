@@ -26,9 +26,9 @@ if TYPE_CHECKING:
 
 ADDRESS = re.compile(r"(tcp://|tls://)?[^/\s]+:\d{1,5}")
 CONNECT = 5.0  # seconds for a scheduler to answer and to have a worker
-PATIENCE = 10.0  # seconds between checks whether there still are workers
-AHEAD = 4  # files in flight per thread of the workers
-SAME = ("libgait", "numpy", "scipy", "ezc3d")  # packages on which the results depend
+WORKER_CHECK_S = 10.0  # seconds between checks whether there still are workers
+FILES_PER_THREAD = 4  # files in flight per thread of the workers
+SAME_PACKAGES = ("libgait", "numpy", "scipy", "ezc3d")  # packages on which the results depend
 
 
 @dataclass(frozen=True)
@@ -61,7 +61,7 @@ def prepared(tasks: Sequence[Task], address: str) -> Generator[Prepared, None, N
     with connected(address) as client:
         require_packages(client, address)
         wanted = _environment()
-        ahead = AHEAD * max(1, sum(client.nthreads().values()))
+        ahead = FILES_PER_THREAD * max(1, sum(client.nthreads().values()))
         waiting, flying = deque(tasks), deque[tuple[Path, "Future"]]()
         while waiting or flying:
             while waiting and len(flying) < ahead:
@@ -77,7 +77,7 @@ def prepared(tasks: Sequence[Task], address: str) -> Generator[Prepared, None, N
 
 def _environment() -> dict[str, str]:
     """Return what results depend on besides the task: versions of packages, and the kernels."""
-    return {package: metadata.version(package) for package in SAME} | reproducible.chosen()
+    return {package: metadata.version(package) for package in SAME_PACKAGES} | reproducible.chosen()
 
 
 def _run(task: Task, wanted: dict[str, str]) -> Prepared | Mismatch | None:
@@ -88,7 +88,7 @@ def _run(task: Task, wanted: dict[str, str]) -> Prepared | Mismatch | None:
     from distributed import get_worker
 
     if (here := _environment()) != wanted:
-        package = next((p for p in SAME if here[p] != wanted[p]), "")
+        package = next((p for p in SAME_PACKAGES if here[p] != wanted[p]), "")
         return Mismatch(get_worker().address, package, here.get(package, ""))
     reproducible.one_thread_for_good()
     return task.run() if task.path.is_file() else None
@@ -124,7 +124,7 @@ def connected(address: str) -> Iterator[Client]:
 
 def require_packages(client: Client, address: str) -> None:
     """Raise UserError if workers lack a package or have another version, as they might not unpickle tasks."""
-    for package in SAME:
+    for package in SAME_PACKAGES:
         for worker, there in client.run(metadata.version, package, on_error="return").items():
             if isinstance(there, metadata.PackageNotFoundError):
                 raise Mismatch(worker, package, "none").refusal(address)
@@ -140,7 +140,7 @@ def _result(client: Client, address: str, path: Path, future: Future) -> Prepare
     lost = UserError(f"--dask {address}: the connection was lost at {path}; start again")
     while True:
         try:
-            outcome: Prepared | Mismatch | None = future.result(timeout=PATIENCE)
+            outcome: Prepared | Mismatch | None = future.result(timeout=WORKER_CHECK_S)
             return outcome
         except KilledWorker:
             killed = UserError(

@@ -22,7 +22,7 @@ from gait.errors import UserError
 from gait.learn.arrays import ArrayFile, Floats
 from gait.learn.corpus import cluster, processes, sources
 from gait.learn.corpus.stage import Prepared, Task
-from gait.learn.cycles.period import CYCLES
+from gait.learn.cycles.period import FEWEST_CYCLES
 from gait.learn.cycles.sequence import Sequence
 from gait.learn.mocap import points
 from gait.learn.mocap.recording import FileNotes
@@ -30,7 +30,12 @@ from gait.learn.options import DEFAULT, LearnOptions
 from gait.learn.segments.corpus import Corpus
 from gait.learn.solve import static_trial
 from gait.learn.solve.retarget import Measures, known_parts
-from gait.learn.solve.skeleton_fit import NO_INFORMATION, PEOPLE, LengthInformation, log_bayes_factor
+from gait.learn.solve.skeleton_fit import (
+    NO_INFORMATION,
+    POPULATION_LENGTHS,
+    LengthInformation,
+    log_bayes_factor,
+)
 
 Files = list[tuple[Path, bool]]  #: paths, and whether each was found in a folder
 
@@ -38,7 +43,7 @@ USED = " (its segments are used nevertheless)"
 ONLY = "for gait lift only, give --segments only: all also needs recordings for a cyclic model"
 NOT_YET = np.zeros((0, 0))  # channels of a sequence until they are read back from disk
 SAME_PERSON = np.log(10)  # prior log odds that files with the same person's name are of one person: 10 to 1
-MOST_NAMES = 4  # most names of files in a line
+MOST_NAMED_FILES = 4  # most names of files in a line
 
 
 class NothingLeft(UserError):
@@ -159,8 +164,8 @@ def _lonely(sequences: list[Sequence]) -> dict[str, str]:
     """Return names of trials that are too short without others of the same person, and a line about each."""
     count = Counter(s.subject for s in sequences)
     return {
-        s.name: f"{s.source}: the trial is too short by itself: {s.cycles:.2f} cycles (at least {CYCLES}); "
-        f"add more trials of {s.subject!r} (gait learn has --subjects), or leave it out"
+        s.name: f"{s.source}: the trial is too short by itself: {s.cycles:.2f} cycles (at least "
+        f"{FEWEST_CYCLES}); add more trials of {s.subject!r} (gait learn has --subjects), or leave it out"
         for s in sequences
         if s.short and count[s.subject] == 1
     }
@@ -249,7 +254,7 @@ def shared_lengths(
                 progress(number)
             for body in bodies:
                 if len(body.files) > 1:
-                    shared = SharedLengths((PEOPLE + body.found).mean(), len(body.files))
+                    shared = SharedLengths((POPULATION_LENGTHS + body.found).mean(), len(body.files))
                     for i in body.files:
                         result[i] = shared
             for line in _other_lengths(person, [[paths[i] for i in body.files] for body in bodies]):
@@ -270,8 +275,8 @@ def _other_lengths(person: str, bodies: list[list[Path]]) -> list[str]:
     """Return lines about recordings whose body is not that of the majority."""
     most = max(bodies, key=len, default=[])
     return [
-        f"{' '.join(map(str, files[:MOST_NAMES]))}{' ...' * (len(files) > MOST_NAMES)}: limb lengths differ "
-        f"from {most[0]}, which also counts as {person!r}; measured separately. "
+        f"{' '.join(map(str, files[:MOST_NAMED_FILES]))}{' ...' * (len(files) > MOST_NAMED_FILES)}: limb "
+        f"lengths differ from {most[0]}, which also counts as {person!r}; measured separately. "
         "If these are two people, give each a folder (gait learn has --subjects)"
         for files in bodies
         if files is not most

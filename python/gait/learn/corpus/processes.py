@@ -27,7 +27,7 @@ from gait.learn.corpus.stage import Prepared, Task
 
 #: Seconds to start the workers, which import the package again (measured: 0.4 to 0.6).
 START = 0.6
-AHEAD = 4  # files in flight per worker, which limits the outcomes that wait
+FILES_PER_WORKER = 4  # files in flight per worker, which limits the outcomes that wait
 
 
 def prepared(tasks: Sequence[Task], jobs: int) -> Generator[Prepared, None, None]:
@@ -64,7 +64,7 @@ def _pooled(tasks: Sequence[Task], workers: int) -> Generator[Prepared, None, No
         try:
             with _pool(workers) as (pool, folder):
                 while waiting or flying:
-                    while waiting and len(flying) < AHEAD * workers:
+                    while waiting and len(flying) < FILES_PER_WORKER * workers:
                         flying.append((waiting[0], _submit(pool, waiting[0], folder)))
                         waiting.popleft()
                     outcome = _fetched(flying[0][1].result())

@@ -17,18 +17,18 @@ from gait.body.skeleton import ANGLES
 from gait.learn.arrays import Floats, Mask
 from gait.learn.cycles.fourier import first_harmonic
 
-ITERATIONS = 100
-TOLERANCE = 1e-6  # relative change of the objective at which to stop
+MOST_ALIGNMENT_PASSES = 100
+ALIGNMENT_TOLERANCE = 1e-6  # relative change of the objective at which to stop
 KNOTS = 20  # of the periodic spline
 TABLE = 1024  # samples of a tabulated curve
-BINS = 256  # of the circular cross-correlation
+CORRELATION_BINS = 256  # of the circular cross-correlation
 FINEST = 0.01  # frames; last step of the search for an offset
 XCORR_ROUNDS = 3
 AMBIGUOUS = 0.75  # relative depth of a second-best phase from which other starts are tried
-APART = 0.1  # least cycles between those phases
-STARTS = 4  # most sequences whose curve is tried as the first one
+LEAST_OFFSET_CYCLES = 0.1  # least cycles between those phases
+MOST_FIRST_SEQUENCES = 4  # most sequences whose curve is tried as the first one
 #: Columns of right and left hip flexion; phase 0 is where right minus left is largest.
-HIPS = (ANGLES.index("r_hip_flexion"), ANGLES.index("l_hip_flexion"))
+HIP_COLUMNS = (ANGLES.index("r_hip_flexion"), ANGLES.index("l_hip_flexion"))
 
 
 @dataclass
@@ -115,25 +115,28 @@ class _Sequence:
         return float(self.squares(table, offset) @ weights)
 
     def correlation(self, table: Floats, weights: Floats) -> Floats:
-        """Return the cost (BINS,) at offsets of whole bins by circular correlation, up to a constant."""
-        bins = np.minimum((self.phase(0.0) * BINS).astype(int), BINS - 1)
-        sums, counts = np.zeros((BINS, self.values.shape[1])), np.zeros((BINS, self.values.shape[1]))
+        """Return the cost (CORRELATION_BINS,), up to a constant, at offsets of whole bins."""
+        bins = np.minimum((self.phase(0.0) * CORRELATION_BINS).astype(int), CORRELATION_BINS - 1)
+        sums, counts = (
+            np.zeros((CORRELATION_BINS, self.values.shape[1])),
+            np.zeros((CORRELATION_BINS, self.values.shape[1])),
+        )
         np.add.at(sums, bins, self.values)
         np.add.at(counts, bins, self.visible)
         sums_hat, counts_hat = np.fft.rfft(sums, axis=0), np.fft.rfft(counts, axis=0)
-        mean = table.reshape(BINS, -1, table.shape[1]).mean(axis=1)
+        mean = table.reshape(CORRELATION_BINS, -1, table.shape[1]).mean(axis=1)
         spectrum = np.conj(np.fft.rfft(mean**2 * weights, axis=0)) * counts_hat
         spectrum -= 2 * np.conj(np.fft.rfft(mean * weights, axis=0)) * sums_hat
-        return np.asarray(np.fft.irfft(spectrum.sum(axis=1), BINS))
+        return np.asarray(np.fft.irfft(spectrum.sum(axis=1), CORRELATION_BINS))
 
     def best_offset(self, table: Floats, weights: Floats, now: float) -> float:
         """Return the offset of least cost by correlation, then smaller steps and a parabola."""
-        coarse = float(np.argmin(self.correlation(table, weights))) * self.period / BINS
+        coarse = float(np.argmin(self.correlation(table, weights))) * self.period / CORRELATION_BINS
         best, cost = now, self.cost(table, weights, now)
         rough = self.cost(table, weights, coarse)
         if rough < cost:
             best, cost = coarse, rough
-        step = self.period / BINS
+        step = self.period / CORRELATION_BINS
         while step > FINEST:
             left, right = (self.cost(table, weights, best + d) for d in (-step, step))
             bend = left - 2 * cost + right
@@ -212,7 +215,7 @@ def hip_phase(curve: Floats) -> float:
     It replaces the right heel strike if the feet are unknown; in the mean of CMU's walks the two differ by
     0.02 of a cycle.
     """
-    right, left = HIPS
+    right, left = HIP_COLUMNS
     return float(-np.angle(np.fft.fft(curve[:, right] - curve[:, left])[1]) / (2 * np.pi) % 1.0)
 
 
@@ -220,12 +223,12 @@ def _descend(problem: _Problem, offsets: Floats, weights: Floats) -> Alignment:
     """Alternate both steps until the objective converges; if it increases, keep the better offsets."""
     now = before = problem.gauged(offsets)
     result = Alignment(now, weights=weights)
-    for _ in range(ITERATIONS):
+    for _ in range(MOST_ALIGNMENT_PASSES):
         table = problem.curve(now).table()
         cost = sum(s.cost(table, weights, o) for s, o in zip(problem.sequences(), now, strict=True))
         result.objective.append(cost)
-        if len(result.objective) > 1 and cost > result.objective[-2] * (1 - TOLERANCE):
-            result.converged = cost <= result.objective[-2] * (1 + TOLERANCE)
+        if len(result.objective) > 1 and cost > result.objective[-2] * (1 - ALIGNMENT_TOLERANCE):
+            result.converged = cost <= result.objective[-2] * (1 + ALIGNMENT_TOLERANCE)
             now = before if cost > result.objective[-2] else now
             break
         steps = zip(problem.sequences(), now, strict=True)
@@ -266,7 +269,7 @@ def _xcorr_starts(problem: _Problem, weights: Floats) -> Iterator[Floats]:
     offsets, ambiguous = _xcorr_start(problem, weights, 0)
     yield offsets
     if ambiguous:
-        others = np.linspace(0, len(offsets), STARTS, endpoint=False)[1:].astype(int)
+        others = np.linspace(0, len(offsets), MOST_FIRST_SEQUENCES, endpoint=False)[1:].astype(int)
         for first in sorted(set(others.tolist()) - {0}):
             yield _xcorr_start(problem, weights, first)[0]
 
@@ -283,16 +286,16 @@ def _xcorr_start(problem: _Problem, weights: Floats, first: int) -> tuple[Floats
         ambiguous = False
         for i, s in enumerate(problem.sequences()):
             cost = s.correlation(reference, weights)
-            offsets[i] = np.argmin(cost) * s.period / BINS
+            offsets[i] = np.argmin(cost) * s.period / CORRELATION_BINS
             ambiguous |= _second(cost) > AMBIGUOUS
         reference = problem.curve(offsets).table()
     return offsets, ambiguous
 
 
 def _second(cost: Floats) -> float:
-    """Return the depth of the second-best valley of the cost (BINS,) relative to the deepest."""
-    reach, best = round(APART * BINS), int(np.argmin(cost))
-    far = np.roll(cost, -best)[reach : BINS - reach]
+    """Return the depth of the second-best valley of the cost (CORRELATION_BINS,) relative to the deepest."""
+    reach, best = round(LEAST_OFFSET_CYCLES * CORRELATION_BINS), int(np.argmin(cost))
+    far = np.roll(cost, -best)[reach : CORRELATION_BINS - reach]
     valley = int(np.argmin(far))
     depth = float(cost.mean() - cost[best])
     if depth <= 0 or valley in (0, len(far) - 1):

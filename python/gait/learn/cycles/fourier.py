@@ -6,11 +6,11 @@ import numpy as np
 
 from gait.learn.arrays import Floats, by_rows
 
-HARMONICS = 19
-FEWEST = 4  # samples: one more than a constant, a cosine and a sine
+CYCLE_HARMONICS = 19
+FEWEST_SAMPLES = 4  # samples: one more than a constant, a cosine and a sine
 
 
-def fourier_basis(samples: int, harmonics: int = HARMONICS) -> Floats:
+def fourier_basis(samples: int, harmonics: int = CYCLE_HARMONICS) -> Floats:
     """Return the real orthonormal basis (1 + 2 harmonics, samples): constant, cosines and sines."""
     j = np.arange(samples) / samples
     angle = 2 * np.pi * np.outer(np.arange(1, harmonics + 1), j)
@@ -43,7 +43,7 @@ def first_harmonic(signal: Floats, period: float, offset: float = 0.0) -> comple
     beginning of the cycle) are frames.
     """
     visible = np.flatnonzero(np.isfinite(signal))
-    if len(visible) < FEWEST:
+    if len(visible) < FEWEST_SAMPLES:
         return 0j
     angle = 2 * np.pi * (visible - offset) / period
     design = np.stack([np.ones(len(visible)), np.cos(angle), np.sin(angle)], axis=1)

@@ -16,14 +16,14 @@ from numpy.typing import ArrayLike
 
 from gait.learn.arrays import Floats, Indices, Mask, same_columns
 
-BINS = 50
-HARMONICS = 8
+PHASE_BINS = 50
+PERIOD_HARMONICS = 8
 DIVISORS = (5, 4, 3, 2)
 DIVISOR_ANGLES = 0.8  # share of the angles that must accept a divisor of the best period
 DIVISOR_SCORE = 0.5  # share of its best score that an accepting angle has at the divisor
 #: Fewest cycles of a sequence.  Three would be better for folding, but CMU's walks have 1.7 to 3.5 strides,
 #: and their periods still agree with autocorrelation (tests/python/test_learn_cmu.py).
-CYCLES = 1.5
+FEWEST_CYCLES = 1.5
 SECONDS = (0.4, 2.1)
 LONGER = 4.0  # multiple of the longest period up to which `find_longer` searches
 LITERAL_SECONDS = (50 / 120, 250 / 120)  # the paper's 50 to 250 frames, assumed at 120 per second
@@ -101,7 +101,7 @@ def _centred_groups(signals: Floats) -> list[tuple[Mask, Floats]]:
 def _harmonic_f(groups: list[tuple[Mask, Floats]], period: float) -> float:
     """Return the F of the regression on a constant and harmonics, summed over columns."""
     frames = len(groups[0][0])
-    angle = 2 * np.pi / period * np.outer(np.arange(frames), np.arange(1, HARMONICS + 1))
+    angle = 2 * np.pi / period * np.outer(np.arange(frames), np.arange(1, PERIOD_HARMONICS + 1))
     design = np.concatenate([np.ones((frames, 1)), np.cos(angle), np.sin(angle)], axis=1)
     terms, score = design.shape[1], 0.0
     for rows, values in groups:
@@ -128,7 +128,7 @@ def curves(signals: Floats, fps: float, mode: str = "refined") -> tuple[Floats, 
     literal = mode == "literal"
     low, high = _bounds(fps, mode)
     candidates = np.arange(np.ceil(low - 1e-9), high + 0.1, 1.0 if literal else 0.5)
-    folder, longest, bins = Folder(signals[:, moving]), len(signals) / CYCLES, _bins(low)
+    folder, longest, bins = Folder(signals[:, moving]), len(signals) / FEWEST_CYCLES, _bins(low)
     ratios = np.full((len(candidates), signals.shape[1]), np.nan)
     if literal:
         ratios[:, moving] = folder.literal(candidates)
@@ -156,10 +156,10 @@ def find(signals: Floats, fps: float, mode: str = "refined") -> Period:
 def find_longer(signals: Floats, fps: float, mode: str = "refined") -> float:
     """Find the best period, frames, among those too long for `find`; NaN if the signals are too short."""
     moving, longest = signals[:, _moving(signals)], _bounds(fps, mode)[1]
-    candidates = np.arange(longest + 1, min(LONGER * longest, len(signals) / CYCLES), 0.5)
+    candidates = np.arange(longest + 1, min(LONGER * longest, len(signals) / FEWEST_CYCLES), 0.5)
     if not moving.size or not len(candidates):
         return float("nan")
-    scores = np.array([_total(row) for row in Folder(moving).binned(candidates, BINS)])
+    scores = np.array([_total(row) for row in Folder(moving).binned(candidates, PHASE_BINS)])
     return _refine(moving, float(candidates[np.nanargmax(scores)])) if np.isfinite(scores).any() else np.nan
 
 
@@ -181,7 +181,7 @@ def _bounds(fps: float, mode: str) -> tuple[float, float]:
 
 def _bins(low: float) -> int:
     """Return the number of phase bins, at most the frames of the shortest cycle."""
-    return int(np.clip(1.05 * low, 8, BINS))
+    return int(np.clip(1.05 * low, 8, PHASE_BINS))
 
 
 def _moving(signals: Floats) -> Mask:

@@ -18,7 +18,7 @@ from gait.learn.solve import readers, retarget
 from gait.learn.solve.body import Body
 
 YAW = ROOTS.index("root_yaw")
-PHASES = 64  # phases at which the observed share of a cycle is counted
+OBSERVED_PHASES = 64  # phases at which the observed share of a cycle is counted
 
 
 @dataclass
@@ -39,7 +39,7 @@ class Sequence:
     kept: tuple[int, int]  #: start and stop of these frames in the file
     cut: tuple[str, str]  #: why frames before and after them were left out; '' if none were
     verdict: verdict.Verdict
-    #: Whether it has less than `period.CYCLES` cycles, so that other trials of the person are needed too.
+    #: Whether it has fewer cycles than `period.FEWEST_CYCLES`, so that more trials of the person are needed.
     short: bool = False
     recordings: int = 1  #: number of the person's recordings from which limb lengths were estimated
 
@@ -89,10 +89,10 @@ def _short(path: Path, read: Body | AngleTable, options: LearnOptions) -> Sequen
         kept = steady.active_part(_motion(read).angles, read.fps)
     motion = _motion(read.part(kept.start, kept.stop))
     found = stride.find_by_steps(motion.angles, read.fps)
-    if not kept.stop - kept.start < period.CYCLES * found.frames:
+    if not kept.stop - kept.start < period.FEWEST_CYCLES * found.frames:
         return None
     judged, channels, heading = _judge(motion, found, options.activity, by_steps=True)
-    if not judged.accepted or not cutting.fewest_cycles(channels, found.frames, PHASES):
+    if not judged.accepted or not cutting.fewest_cycles(channels, found.frames, OBSERVED_PHASES):
         return None
     made = _sequence(path, read.fps, motion, kept, (judged, channels, heading), found)
     return replace(made, short=True)
@@ -104,7 +104,7 @@ def _long(path: Path, read: Body | AngleTable, options: LearnOptions) -> Sequenc
     kept, found, mode, activity = steady.Kept(0, read.frames), None, options.period_mode, options.activity
     if options.trim:
         kept, found = steady.steady_part(motion.angles, read.fps, mode, motion.path)
-        if not kept.stop - kept.start >= period.CYCLES * found.frames:
+        if not kept.stop - kept.start >= period.FEWEST_CYCLES * found.frames:
             reason = _too_long(motion.angles, read.fps, options) or _unsteady(kept, found, read.fps)
             raise _refused(path, activity, reason)
     if found is None or kept.stop - kept.start < read.frames:
@@ -117,7 +117,7 @@ def _long(path: Path, read: Body | AngleTable, options: LearnOptions) -> Sequenc
         other = judged.activity if {judged.activity, activity} == {"walk", "run"} else ""
         too_long = "" if judged.cyclic else _too_long(motion.angles, read.fps, options)
         raise _refused(path, activity, too_long or judged.reason, other)
-    if not cutting.fewest_cycles(channels, found.frames, PHASES):
+    if not cutting.fewest_cycles(channels, found.frames, OBSERVED_PHASES):
         raise _refused(path, activity, "too little of each cycle is observed")
     return _sequence(path, read.fps, motion, kept, (judged, channels, heading), found)
 
@@ -178,7 +178,7 @@ def _is_stride(angles: Floats, frames: float) -> bool:
     """Whether angles (T, 24) repeat after `frames` frames and the legs alternate; NaN: no."""
     if not (np.isfinite(frames) and verdict.repeats(angles, frames) >= verdict.REPEATS):
         return False
-    return bool(verdict.legs(angles, frames) >= verdict.LEGS)
+    return bool(verdict.legs(angles, frames) >= verdict.LEAST_LEG_ALTERNATION)
 
 
 def _refused(path: Path, wanted: str, reason: str, other: str = "") -> UserError:
@@ -194,7 +194,7 @@ def _unsteady(kept: steady.Kept, found: period.Period, fps: float) -> str:
     frames = kept.stop - kept.start
     return (
         f"no steady motion: at most {frames / fps:.1f} s at a time, {frames / found.frames:.2f} cycles "
-        f"(at least {period.CYCLES})"
+        f"(at least {period.FEWEST_CYCLES})"
     )
 
 

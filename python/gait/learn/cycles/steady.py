@@ -15,16 +15,17 @@ from gait.learn.arrays import Floats, Mask
 from gait.learn.cycles import period, stride
 
 QUIET = 0.3  # of the 90th percentile of the joints' speed; slower ends do not belong to the motion
-WINDOW = 0.5  # seconds over which that speed is averaged
+SPEED_WINDOW_S = 0.5  # seconds over which that speed is averaged
 DERIVATIVE = 0.05  # seconds to either side for differences of angles
 MOTION = 1.55  # factor by which the joints' speed may differ from its median
-TURN = np.radians(25.0)  # by which the turn in a cycle may differ from its median
+TURN_LIMIT = np.radians(25.0)  # by which the turn in a cycle may differ from its median
 TRAVELLING = 0.3  # m/s; mean speed below which the position is meaningless (treadmills)
 #: Relative difference of a step's travel from the median: steady walks of CMU are within 0.1.  The wider
 #: limits are for recordings without such an interval, as when a person keeps speeding up.
-LIMITS = (0.12, 0.15, 0.2, 0.25)
-CYCLES = 1.8  # cycles that an interval should have, or a wider limit is tried; most phases then occur twice
-ROUNDS = 6  # most iterations of interval and medians
+TRAVEL_LIMITS = (0.12, 0.15, 0.2, 0.25)
+#: Cycles that an interval should have, or a wider limit is tried; most phases then occur twice.
+WANTED_CYCLES = 1.8
+MOST_INTERVAL_PASSES = 6  # most iterations of interval and medians
 PERIODS = 3  # most iterations of interval and period
 
 
@@ -60,7 +61,7 @@ def steady_part(angles: Floats, fps: float, mode: str, path: RootPath) -> tuple[
         if not np.isfinite(found.frames):
             break
         before, kept = kept, longest_steady(angles, fps, found.frames, path)
-        if kept == before or kept.stop - kept.start < period.CYCLES * found.frames:
+        if kept == before or kept.stop - kept.start < period.FEWEST_CYCLES * found.frames:
             break
         found = stride.find(angles[kept.start : kept.stop], fps, mode)
     why = _words(moving.before, kept.before), _words(moving.after, kept.after)
@@ -70,7 +71,7 @@ def steady_part(angles: Floats, fps: float, mode: str, path: RootPath) -> tuple[
 def active_part(angles: Floats, fps: float) -> Kept:
     """Cut off the ends in which nothing moves or nothing is observed; angles (T, A), NaN where missing."""
     square, weight = _speed(angles, fps)
-    width = max(1, round(WINDOW * fps))
+    width = max(1, round(SPEED_WINDOW_S * fps))
     window = np.ones(min(width, len(angles)))
     share = np.convolve(square, window, "same") / np.maximum(np.convolve(weight, window, "same"), 1e-12)
     speed = np.where(weight > 0, np.sqrt(share), 0.0)
@@ -84,9 +85,9 @@ def active_part(angles: Floats, fps: float) -> Kept:
 def longest_steady(angles: Floats, fps: float, cycle: float, path: RootPath) -> Kept:
     """Find the longest steady interval of angles (T, A); `cycle` is the frames of a cycle."""
     kept = Kept(0, len(angles))
-    for limit in LIMITS:
+    for limit in TRAVEL_LIMITS:
         kept = _within(angles, fps, cycle, path, limit)
-        if kept.stop - kept.start >= CYCLES * cycle:
+        if kept.stop - kept.start >= WANTED_CYCLES * cycle:
             break
     return kept
 
@@ -99,14 +100,14 @@ def _within(angles: Floats, fps: float, cycle: float, path: RootPath, limit: flo
     motion, travel, turn = _motion(angles, fps, step), _travel(path, fps, step), _turn(path, round(cycle))
     start, stop = 0, frames
     bad: dict[str, Mask] = {}
-    for _ in range(ROUNDS):
+    for _ in range(MOST_INTERVAL_PASSES):
         m, d, y = (_median(q, frames, start, stop) for q in (motion, travel, turn))
         bad = {
             "standing": _centred(motion < m / MOTION, frames),
             "hurrying": _centred(motion > m * MOTION, frames),
             "slower": _centred(travel < d * (1 - limit), frames),
             "faster": _centred(travel > d * (1 + limit), frames),
-            "turning": ~_covered(~(np.abs(turn - y) > TURN), frames),
+            "turning": ~_covered(~(np.abs(turn - y) > TURN_LIMIT), frames),
         }
         run = _longest(~np.any(list(bad.values()), axis=0))
         if run in ((start, stop), (0, 0)):

@@ -19,18 +19,18 @@ from gait.learn.arrays import Floats
 from gait.learn.cycles import period
 from gait.learn.cycles.fourier import first_harmonic
 
-SWING = ("hip_flexion", "knee_flexion")
+SWING_ANGLES = ("hip_flexion", "knee_flexion")
 MULTIPLES = (1 / 3, 1 / 2, 2.0, 3.0)  # of the period found that may be the stride
 #: Alternation that a multiple needs, and by how much it must exceed that of the period found.  Strides of
 #: recorded walks and runs have 0.4 to 0.95, twice and half the stride at most 0.15.
-TURNS, MORE = 0.35, 0.25
+LEAST_ALTERNATION, MORE = 0.35, 0.25
 #: Angles whose left and right move alike half a stride apart, and harmonics of the stride in their difference
 #: and their sum.
 PAIRED = ("hip_flexion", "knee_flexion", "ankle_flexion", "shoulder_flexion", "elbow_flexion")
 UNEVEN, EVEN = (1, 3, 5), (2, 4, 6)
-SHORTEST = 1.05  # strides of a trial whose steps repeat each other
-STEP = 0.005  # seconds between periods tried
-NEAR = 0.1  # relative distance from a multiple within which the best period is used
+FEWEST_STRIDES = 1.05  # strides of a trial whose steps repeat each other
+PERIOD_STEP_S = 0.005  # seconds between periods tried
+MULTIPLE_TOLERANCE = 0.1  # relative distance from a multiple within which the best period is used
 
 
 def find(angles: Floats, fps: float, mode: str = "refined") -> period.Period:
@@ -41,11 +41,11 @@ def find(angles: Floats, fps: float, mode: str = "refined") -> period.Period:
     found = period.find(angles, fps, mode)
     if mode == "literal" or not np.isfinite(found.frames):
         return found
-    longest = min(period.SECONDS[1] * fps, len(angles) / period.CYCLES)
+    longest = min(period.SECONDS[1] * fps, len(angles) / period.FEWEST_CYCLES)
     others = [_best_near(found, found.frames * multiple) for multiple in MULTIPLES]
     others = [p for p in others if period.SECONDS[0] * fps <= p <= longest]
     best = max(others, key=lambda p: alternation(angles, p), default=found.frames)
-    if alternation(angles, best) < max(TURNS, alternation(angles, found.frames) + MORE):
+    if alternation(angles, best) < max(LEAST_ALTERNATION, alternation(angles, found.frames) + MORE):
         return found
     return replace(found, frames=period.refined(angles, best))
 
@@ -55,7 +55,7 @@ def _best_near(found: period.Period, frames: float) -> float:
 
     A multiple of a period at the end of the range searched is only roughly the stride.
     """
-    near = np.isfinite(found.scores) & (np.abs(found.candidates / frames - 1) < NEAR)
+    near = np.isfinite(found.scores) & (np.abs(found.candidates / frames - 1) < MULTIPLE_TOLERANCE)
     return float(found.candidates[near][np.argmax(found.scores[near])]) if near.any() else frames
 
 
@@ -63,11 +63,11 @@ def find_by_steps(angles: Floats, fps: float) -> period.Period:
     """Find the period of angles (T, 24) of little more than a stride, from what both sides have in common.
 
     The difference of left and right consists of every second harmonic of the stride, from the first, their
-    sum of the even ones.  Candidates are periods of which SHORTEST are visible; their score is the mean log
-    of total over remaining variance.
+    sum of the even ones.  Candidates are periods of which `FEWEST_STRIDES` are visible; their score is the
+    mean log of total over remaining variance.
     """
     low, high = period.SECONDS
-    candidates = np.arange(low, min(high, len(angles) / SHORTEST / fps) + 1e-9, STEP) * fps
+    candidates = np.arange(low, min(high, len(angles) / FEWEST_STRIDES / fps) + 1e-9, PERIOD_STEP_S) * fps
     signals = _sums_and_differences(angles)
     if not signals or not len(candidates):
         return period.Period(float("nan"), candidates, np.full(len(candidates), np.nan), 0.0)
@@ -128,7 +128,7 @@ def alternation(angles: Floats, frames: float) -> float:
     1: all of it; 0: none, or unrelated; negative: both legs swing together.
     """
     swing, whole = 0.0, 0.0
-    for name in SWING:
+    for name in SWING_ANGLES:
         sides = [angles[:, ANGLES.index(f"{s}_{name}")] for s in SIDES]
         left, right = (first_harmonic(side, frames) for side in sides)
         apart = float(np.angle(left * np.conj(right)))

@@ -14,7 +14,7 @@ from gait.body.skeleton import ANGLES, JOINTS, SIDES, default_skeleton, points
 from gait.learn.arrays import Floats
 from gait.learn.cycles import stride
 from gait.learn.cycles.fourier import first_harmonic
-from gait.learn.cycles.period import CYCLES, Period
+from gait.learn.cycles.period import FEWEST_CYCLES, Period
 from gait.learn.solve.body import Body
 
 #: Names that users may give to the two activities that can be recognised.
@@ -22,8 +22,9 @@ NAMES = {
     **dict.fromkeys(("walk", "walking", "gait"), "walk"),
     **dict.fromkeys(("run", "running", "jog", "jogging"), "run"),
 }
-STANCE = 15  # percentile of a joint's height that is its height in stance; a runner's foot stands for 30 %
-CLEAR = 0.018  # statures above that from which ankle and ball of a foot are both off the ground
+#: Percentile of a joint's height that is its height in stance; a runner's foot stands for 30 %.
+STANCE_PERCENTILE = 15
+FLIGHT_CLEARANCE = 0.018  # statures above that from which ankle and ball of a foot are both off the ground
 FLIGHT = 0.05  # share of the time in flight above which a person runs
 #: Correlation of the pelvis's height with the distance of the feet above which a person runs, with or without
 #: flight, as the body is lowest over the standing leg.  Recorded walks have -1 to -0.1, runs 0.5 to 0.9; slow
@@ -31,12 +32,13 @@ FLIGHT = 0.05  # share of the time in flight above which a person runs
 BOB = 0.3
 SHARPNESS = 3.0
 REPEATS = 0.75  # the walks of CMU reach 0.88 to 0.99; punching 0.69, dances and climbing less or nothing
-LEGS = 0.7  # legs that alternate within an eighth of a cycle; the walks of CMU reach 0.96 and more
+#: Legs that alternate within an eighth of a cycle; the walks of CMU reach 0.96 and more.
+LEAST_LEG_ALTERNATION = 0.7
 LIFT = 0.02  # statures
 STEPS = 0.03  # statures
-AHEAD = 0.5  # the walks of CMU reach 0.98 and more, with left and right swapped -0.98 and less
+LEAST_FORWARD_SHARE = 0.5  # the walks of CMU reach 0.98 and more, with left and right swapped -0.98 and less
 CYCLIC = ("cycles", "sharpness", "repeats")  # names of evidence
-SWING = ("hip_flexion", "knee_flexion")
+SWING_ANGLES = ("hip_flexion", "knee_flexion")
 
 
 @dataclass(frozen=True)
@@ -104,7 +106,11 @@ def judge(
     evidence = _repeating_steps(angles, found) if by_steps else _cyclic(angles, found)
     known = ""
     if kind and np.isfinite(found.frames):
-        evidence.append(Evidence("legs", legs(angles, found.frames), LEGS, words="the legs do not alternate"))
+        evidence.append(
+            Evidence(
+                "legs", legs(angles, found.frames), LEAST_LEG_ALTERNATION, words="the legs do not alternate"
+            )
+        )
     if feet is not None:
         legged = all(e.accepted for e in evidence) and feet.lift >= LIFT
         known = ("run" if feet.running else "walk") if legged else ""
@@ -112,26 +118,26 @@ def judge(
             evidence += _footing(feet, kind)
     if kind and yaw is not None and np.isfinite(yaw).any():
         words = "the walk is backwards, or left and right are swapped"
-        evidence.append(Evidence("ahead", float(np.nanmean(np.cos(yaw))), AHEAD, words=words))
+        evidence.append(Evidence("ahead", float(np.nanmean(np.cos(yaw))), LEAST_FORWARD_SHARE, words=words))
     return Verdict(known, tuple(evidence))
 
 
 def _cyclic(angles: Floats, found: Period) -> list[Evidence]:
     """Return the evidence for cycles of any kind."""
     if not np.isfinite(found.frames):
-        return [Evidence("cycles", 0.0, CYCLES, words="no cycle found")]
+        return [Evidence("cycles", 0.0, FEWEST_CYCLES, words="no cycle found")]
     return [
-        Evidence("cycles", len(angles) / found.frames, CYCLES, words="the steady part is too short"),
+        Evidence("cycles", len(angles) / found.frames, FEWEST_CYCLES, words="the steady part is too short"),
         Evidence("sharpness", found.sharpness, SHARPNESS, words="no period stands out"),
         Evidence("repeats", repeats(angles, found.frames), REPEATS, words="the cycles do not repeat"),
     ]
 
 
 def _repeating_steps(angles: Floats, found: Period) -> list[Evidence]:
-    """Return the evidence for steps of left and right that are alike, in less than `CYCLES` cycles."""
+    """Return the evidence for steps of left and right that are alike, in less than `FEWEST_CYCLES` cycles."""
     cycles, alike = len(angles) / found.frames, stride.step_repeats(angles, found.frames)
     return [
-        Evidence("cycles", cycles, stride.SHORTEST, words="the trial is too short"),
+        Evidence("cycles", cycles, stride.FEWEST_STRIDES, words="the trial is too short"),
         Evidence("repeats", alike, REPEATS, words="left and right steps do not match"),
     ]
 
@@ -183,7 +189,7 @@ def legs(angles: Floats, period: float) -> float:
     left and right do not count, as people limp.  NaN if nothing moves or is visible.
     """
     left, right = (
-        np.array([first_harmonic(angles[:, ANGLES.index(f"{s}_{name}")], period) for name in SWING])
+        np.array([first_harmonic(angles[:, ANGLES.index(f"{s}_{name}")], period) for name in SWING_ANGLES])
         for s in SIDES
     )
     products = left * right.conj()
@@ -249,9 +255,9 @@ def footing(feet: Feet, cycle: float) -> Footing | None:
     if visible.sum() < cycle:
         return None
     ankle, ball = feet.ankle[visible], feet.ball[visible]
-    over = np.minimum(*(z - np.percentile(z, STANCE, axis=0) for z in (ankle, ball)))
+    over = np.minimum(*(z - np.percentile(z, STANCE_PERCENTILE, axis=0) for z in (ankle, ball)))
     return Footing(
-        flight=float((over > CLEAR).all(axis=1).mean()),
+        flight=float((over > FLIGHT_CLEARANCE).all(axis=1).mean()),
         bob=_correlation(feet.pelvis[visible], feet.apart[visible]),
         lift=float(np.min(np.percentile(ankle, 95, axis=0) - np.percentile(ankle, 5, axis=0))),
         steps=float(np.max(_ground(feet, cycle))),

@@ -12,10 +12,10 @@ from gait.errors import UserError, quoted
 from gait.io.files import text_lines
 from gait.learn.arrays import Floats
 from gait.learn.mocap.recording import (
-    BONES,
     DEGREES,
-    FARTHEST,
+    FARTHEST_POSITION_M,
     Y_UP,
+    ZERO_BONES,
     FileNotes,
     Recording,
     mask_zero_runs,
@@ -26,7 +26,7 @@ from gait.learn.mocap.recording import (
 from gait.learn.rotations import from_angles
 
 INCH = 0.0254
-FPS = 120.0  # of the CMU database, whose files do not state it
+CMU_FPS = 120.0  # of the CMU database, whose files do not state it
 AXES = "xyz"
 DOF = {"rx", "ry", "rz", "tx", "ty", "tz", "l"}
 
@@ -63,11 +63,11 @@ def read(path: Path, fps: float | None = None, zeros_missing: bool = False) -> R
     if zeros_missing:
         values = {name: mask_zero_runs(columns) for name, columns in values.items()}
     else:
-        zeros = zero_run(values, BONES)
+        zeros = zero_run(values, ZERO_BONES)
     degrees, stated = _declared(path)
     skeleton.degrees = skeleton.degrees if degrees is None else degrees
     _require_ranges(path, skeleton, values)
-    return replace(assemble(path, skeleton, values, fps or stated or FPS), notes=FileNotes(zeros=zeros))
+    return replace(assemble(path, skeleton, values, fps or stated or CMU_FPS), notes=FileNotes(zeros=zeros))
 
 
 def _require_ranges(path: Path, skeleton: Skeleton, values: dict[str, Floats]) -> None:
@@ -79,7 +79,7 @@ def _require_ranges(path: Path, skeleton: Skeleton, values: dict[str, Floats]) -
             if name[0] == "r":
                 require_range(path, what, turn * column, DEGREES, unit)
             else:
-                require_range(path, what, skeleton.metres * column, FARTHEST, "metres")
+                require_range(path, what, skeleton.metres * column, FARTHEST_POSITION_M, "metres")
 
 
 def find_skeleton(path: Path) -> Path:

@@ -12,10 +12,10 @@ from gait.errors import UserError, quoted
 from gait.io.files import text_lines
 from gait.learn.arrays import Floats
 from gait.learn.mocap.recording import (
-    BONES,
     DEGREES,
-    FARTHEST,
+    FARTHEST_POSITION_M,
     Y_UP,
+    ZERO_BONES,
     FileNotes,
     Recording,
     mask_zero_runs,
@@ -29,7 +29,7 @@ AXES = "XYZ"
 #: Metres per unit: metre, inch, CMU's unit (inch / 0.45), centimetre, millimetre.  Files do not state their
 #: unit; the one with which the body is nearest to an adult's height is used.
 UNITS = (1.0, 0.0254, 0.0254 / 0.45, 0.01, 0.001)
-HEIGHT = 1.7
+NOMINAL_STATURE_M = 1.7
 
 
 @dataclass
@@ -186,7 +186,7 @@ def assemble(
         )
         end[:, i] = start[:, i] + rotation[:, i] @ heirs[i]
     turn_up, metres = _upright(start[:, _trunk(joints) :])
-    _require_ranges(path, joints, metres * values, "position", FARTHEST)
+    _require_ranges(path, joints, metres * values, "position", FARTHEST_POSITION_M)
     return Recording(
         name=path.stem,
         source=path,
@@ -197,7 +197,7 @@ def assemble(
         rotation=turn_up @ rotation @ turn_up.T,
         rest_start=rest[0] @ turn_up.T * metres,
         rest_end=rest[1] @ turn_up.T * metres,
-        notes=FileNotes(zeros="" if zeros_missing else zero_run(parts, BONES)),
+        notes=FileNotes(zeros="" if zeros_missing else zero_run(parts, ZERO_BONES)),
     )
 
 
@@ -265,4 +265,4 @@ def _trunk(joints: list[Joint]) -> int:
 
 def _unit(height: float) -> float:
     """Return metres per unit, for a body of this height."""
-    return UNITS[int(np.argmin(np.abs(np.log(np.array(UNITS) * max(height, 1e-9) / HEIGHT))))]
+    return UNITS[int(np.argmin(np.abs(np.log(np.array(UNITS) * max(height, 1e-9) / NOMINAL_STATURE_M))))]

@@ -62,26 +62,26 @@ class MarkerMap:
 
 
 #: Last letters of the points that represent a segment: its origin, then one on each axis.
-AXES = ("OALP", "OXYZ", "0123")
+AXIS_ENDINGS = ("OALP", "OXYZ", "0123")
 SQUARE = 0.02  # largest cosine between perpendicular axes; markers on skin are never that exact
 
 BONE = 0.008  # palpable under the skin
 FLESH = 0.012  # beside a joint, but not at one bony point
-LOOSE = 0.045  # somewhere on the segment
+LOOSE_SD_M = 0.045  # somewhere on the segment
 
 #: Left landmarks, named without their side; the right ones mirror them.
 _PAIRED: dict[str, Landmark] = {
     "asis": Landmark("pelvis", (0.045, 0.070, 0.045), FLESH),
     "psis": Landmark("pelvis", (-0.055, 0.027, 0.058), FLESH),
     "iliac_crest": Landmark("pelvis", (0.005, 0.085, 0.075), FLESH),
-    "pelvis_wand": Landmark("pelvis", (-0.150, 0.010, 0.060), 2 * LOOSE),
+    "pelvis_wand": Landmark("pelvis", (-0.150, 0.010, 0.060), 2 * LOOSE_SD_M),
     "trochanter": Landmark("thigh", (0.0, 0.048, 0.0), FLESH),
-    "thigh_side": Landmark("thigh", (0.0, 0.055, -0.140), LOOSE),
-    "thigh_front": Landmark("thigh", (0.045, 0.0, -0.140), LOOSE),
+    "thigh_side": Landmark("thigh", (0.0, 0.055, -0.140), LOOSE_SD_M),
+    "thigh_front": Landmark("thigh", (0.045, 0.0, -0.140), LOOSE_SD_M),
     "knee_lateral": Landmark("thigh", (0.0, 0.033, -_P.thigh), BONE),
     "knee_medial": Landmark("thigh", (0.0, -0.033, -_P.thigh), BONE),
-    "shank_side": Landmark("shank", (0.0, 0.040, -0.120), LOOSE),
-    "shank_front": Landmark("shank", (0.025, 0.0, -0.120), LOOSE),
+    "shank_side": Landmark("shank", (0.0, 0.040, -0.120), LOOSE_SD_M),
+    "shank_front": Landmark("shank", (0.025, 0.0, -0.120), LOOSE_SD_M),
     "ankle_lateral": Landmark("shank", (0.0, 0.024, -_P.shank), BONE),
     "ankle_medial": Landmark("shank", (0.0, -0.024, -_P.shank + 0.005), BONE),
     "heel": Landmark("foot", (-0.042, 0.0, -0.028), BONE),
@@ -91,11 +91,11 @@ _PAIRED: dict[str, Landmark] = {
     "toe_tip": Landmark("foot", (0.105, -0.010, -0.026), FLESH),
     "acromion": Landmark("torso", (0.0, 0.100, 0.300), FLESH),
     "clavicle": Landmark("torso", (0.040, 0.050, 0.290), FLESH),
-    "back": Landmark("torso", (-0.065, 0.050, 0.240), LOOSE),
-    "upper_arm_side": Landmark("upper_arm", (0.0, 0.030, -0.090), LOOSE),
+    "back": Landmark("torso", (-0.065, 0.050, 0.240), LOOSE_SD_M),
+    "upper_arm_side": Landmark("upper_arm", (0.0, 0.030, -0.090), LOOSE_SD_M),
     "elbow_lateral": Landmark("upper_arm", (0.0, 0.024, -_P.upper_arm), BONE),
     "elbow_medial": Landmark("upper_arm", (0.0, -0.024, -_P.upper_arm), BONE),
-    "forearm_side": Landmark("forearm", (0.0, 0.025, -0.080), LOOSE),
+    "forearm_side": Landmark("forearm", (0.0, 0.025, -0.080), LOOSE_SD_M),
     "wrist": Landmark("forearm", (0.0, 0.015, -_P.forearm), FLESH),
     "wrist_radial": Landmark("forearm", (0.020, 0.010, -_P.forearm), FLESH),
     "wrist_ulnar": Landmark("forearm", (-0.020, 0.010, -_P.forearm), FLESH),
@@ -234,7 +234,7 @@ def segment_axes(labels: list[str], points: Floats) -> set[int]:
     columns = {label.rsplit(":", 1)[-1].upper(): k for k, label in enumerate(labels)}
     found: set[int] = set()
     for name in columns:
-        for ends in AXES:
+        for ends in AXIS_ENDINGS:
             four = [columns.get(name[:-1] + end) for end in ends] if name[-1:] == ends[0] else []
             known = [k for k in four if k is not None]
             if len(known) == len(ends) and _are_axes(points[:, known]):
@@ -316,7 +316,7 @@ def _landmark(path: Path, label: str, value: Any) -> Landmark:
     segment = _known(path, label, value.get("segment"), SEGMENTS)
     middle = MIDDLES[segment.removeprefix("l_").removeprefix("r_")]
     at = _numbers(path, f"{label}: at", value.get("at", [0.0, 0.0, middle]), 3, -1.0)
-    (sd,) = _numbers(path, f"{label}: sd", [value.get("sd", BONE if "at" in value else LOOSE)], 1, 1e-4)
+    (sd,) = _numbers(path, f"{label}: sd", [value.get("sd", BONE if "at" in value else LOOSE_SD_M)], 1, 1e-4)
     return Landmark(segment, (at[0], at[1], at[2]), sd)
 
 

@@ -15,15 +15,16 @@ import numpy as np
 from gait.errors import UserError
 from gait.io.trc import METRES, read_trc
 from gait.learn.arrays import Floats
-from gait.learn.mocap.recording import FARTHEST, require_frames, require_range
+from gait.learn.mocap.recording import FARTHEST_POSITION_M, require_frames, require_range
 
 SUFFIXES = (".c3d", ".trc")
 CHILD = Path(__file__).with_name("c3d_child.py")
-PATIENCE = 120.0  # seconds for one file
-BLOCK = 512  # bytes; the first is the header, and its first byte is the block in which the parameters begin
+READ_TIMEOUT_S = 120.0  # seconds for one file
+#: Bytes; the first is the header, and its first byte is the block in which the parameters begin.
+BLOCK_BYTES = 512
 BIG_ENDIAN, DEC = 86, 85  # processor types, fourth byte of the parameters
-RATE_OFF = 1e-3  # relative difference from which rates are different
-MANY = 65535  # frames; more do not fit in the header
+RATE_TOLERANCE = 1e-3  # relative difference from which rates are different
+MOST_HEADER_FRAMES = 65535  # frames; more do not fit in the header
 
 
 def read(path: Path, fps: float | None = None) -> tuple[list[str], Floats, float]:
@@ -36,7 +37,7 @@ def read(path: Path, fps: float | None = None) -> tuple[list[str], Floats, float
     labels, points, rate = (read_trc if path.suffix.lower() == ".trc" else read_c3d)(path, fps)
     require_frames(path, len(points))
     for k, label in enumerate(labels):
-        require_range(path, f"a coordinate of point {label!r}", points[:, k], FARTHEST, "metres")
+        require_range(path, f"a coordinate of point {label!r}", points[:, k], FARTHEST_POSITION_M, "metres")
     points[(points == 0).all(axis=2)] = np.nan
     return labels, points, rate
 
@@ -47,11 +48,14 @@ def read_c3d(path: Path, fps: float | None = None) -> tuple[list[str], Floats, f
         raise UserError(f"{path}: no such file; check the name")
     try:
         child = subprocess.run(
-            [sys.executable, "-I", str(CHILD), str(path)], capture_output=True, timeout=PATIENCE, check=False
+            [sys.executable, "-I", str(CHILD), str(path)],
+            capture_output=True,
+            timeout=READ_TIMEOUT_S,
+            check=False,
         )
     except subprocess.TimeoutExpired:
         raise UserError(
-            f"{path}: not read after {PATIENCE:.0f} s; the file is damaged, export it again"
+            f"{path}: not read after {READ_TIMEOUT_S:.0f} s; the file is damaged, export it again"
         ) from None
     if child.returncode:
         words = child.stderr.decode(errors="replace").strip().splitlines()
@@ -88,13 +92,13 @@ class Header(NamedTuple):
 
 def _header(path: Path) -> Header:
     with path.open("rb") as file:
-        header = file.read(BLOCK)
-        file.seek((header[0] - 1) * BLOCK)
+        header = file.read(BLOCK_BYTES)
+        file.seek((header[0] - 1) * BLOCK_BYTES)
         kind = file.read(4)[3]
     order = ">" if kind == BIG_ENDIAN else "<"
     points, analog, first, last = struct.unpack_from(f"{order}4H", header, 2)
     (rate,) = struct.unpack_from(f"{order}f", header, 20)
-    frames = 0 if last >= MANY else max(0, last - first + 1)
+    frames = 0 if last >= MOST_HEADER_FRAMES else max(0, last - first + 1)
     return Header(points, analog, frames, float("nan") if kind == DEC else rate)
 
 
@@ -114,7 +118,7 @@ def _require_agreement(path: Path, header: Header, stated: Mapping[str, float], 
             f"{header.analog} analog values per frame, ANALOG:USED and ANALOG:RATE {analog} "
             f"({stated['ANALOG:USED']:g} channels at {analog_rate:g} Hz)"
         )
-    elif rated and point_rate > 0 and abs(header.rate / point_rate - 1) > RATE_OFF:
+    elif rated and point_rate > 0 and abs(header.rate / point_rate - 1) > RATE_TOLERANCE:
         fault = f"{header.rate:g} frames per second, POINT:RATE {point_rate:g}"
     if fault:
         remedy = "export it again" + ", or give --fps" * ("per second" in fault)

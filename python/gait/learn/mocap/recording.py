@@ -14,14 +14,14 @@ from gait.learn.arrays import Floats, Mask
 #: From x left, y up, z forward (ASF, BVH) to x forward, y left, z up.
 Y_UP = np.array([[0.0, 0, 1], [1, 0, 0], [0, 1, 0]])
 
-FEWEST = 3  # fewest frames that give speeds
-FARTHEST = 1000.0  # metres from the file's origin; more indicates damage or another unit
+FEWEST_FRAMES = 3  # fewest frames that give speeds
+FARTHEST_POSITION_M = 1000.0  # metres from the file's origin; more indicates damage or another unit
 DEGREES = 3600.0  # the largest plausible angle of a joint
 SHORT = 3  # consecutive frames of exact zeros that are missing, if zeros are declared missing
 LONG = 5  # consecutive frames in which a moving part does not stay at exactly 0
 #: Parts that must be 0 together to be reported: an angle may be clipped at 0, but no joint stays at the
 #: origin.
-BONES, JOINTS, ANGLES = 3, 1, 3
+ZERO_BONES, ZERO_JOINTS, ZERO_ANGLES = 3, 1, 3
 
 
 @dataclass(frozen=True)
@@ -61,7 +61,7 @@ class Recording:
 
 def require_frames(path: Path, frames: int) -> None:
     """Raise UserError if a file has too few frames."""
-    if frames < FEWEST:
+    if frames < FEWEST_FRAMES:
         raise UserError(f"{path}: too few frames ({frames}); a recording of a few seconds is needed")
 
 

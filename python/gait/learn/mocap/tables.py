@@ -22,7 +22,7 @@ from gait.learn.arrays import Floats, Indices
 from gait.learn.mocap import recording
 from gait.learn.mocap.recording import (
     DEGREES,
-    FARTHEST,
+    FARTHEST_POSITION_M,
     NO_NOTES,
     FileNotes,
     mask_zero_runs,
@@ -32,27 +32,27 @@ from gait.learn.mocap.recording import (
 )
 from gait.learn.rotations import unwrap
 
-LONGEST = 10.0  # missing frames may extend a table to this multiple of its rows
+MOST_ROW_GROWTH = 10.0  # missing frames may extend a table to this multiple of its rows
 LOST = "lost"  # status of rows without a person in a track
 #: End of a column name to the largest plausible magnitude and its unit.
-LIMITS = dict.fromkeys(("_x", "_y", "_z"), (FARTHEST, "metres"))
-LIMITS |= {"_deg": (DEGREES, "degrees"), "_rad": (float(np.radians(DEGREES)), "radians")}
-QUANTITIES = {"time", "stature_m", *ANGLES, *ROOTS}  # other columns of numbers that are used
+COLUMN_LIMITS = dict.fromkeys(("_x", "_y", "_z"), (FARTHEST_POSITION_M, "metres"))
+COLUMN_LIMITS |= {"_deg": (DEGREES, "degrees"), "_rad": (float(np.radians(DEGREES)), "radians")}
+USED_COLUMNS = {"time", "stature_m", *ANGLES, *ROOTS}  # other columns of numbers that are used
 
 #: Joints that a file of positions may have, and joints that it must have.
 PARTS = ("shoulder", "elbow", "wrist", "hip", "knee", "ankle", "toe")
-JOINTS = ["neck", "head", *(f"{s}_{part}" for s in SIDES for part in PARTS)]
+TABLE_JOINTS = ["neck", "head", *(f"{s}_{part}" for s in SIDES for part in PARTS)]
 NEEDED = [f"{s}_{part}" for s in SIDES for part in ("hip", "knee", "ankle")]
 #: Other names of joints in files, compared without case, '_' and blanks.
 JOINT_ALIASES = {"head": ("headtop",), "l_toe": ("lbigtoe",), "r_toe": ("rbigtoe",)}
 
-SUFFIXES = ("_deg", "_rad", "")
+ANGLE_SUFFIXES = ("_deg", "_rad", "")
 RADIANS = 4.0  # every walk has an angle of more degrees than this, but none of more radians
-LEGS = [f"{s}_{joint}_flexion" for s in SIDES for joint in ("hip", "knee")]  # required angles
+LEG_ANGLES = [f"{s}_{joint}_flexion" for s in SIDES for joint in ("hip", "knee")]  # required angles
 LEAST_RANGE = 4.0  # degrees; a smaller range is probably radians in a column of degrees
 MOST_RANGE = 361.0  # degrees; no leg rotates further
 FARTHEST_ROOT = 100.0  # statures
-STATURE = 0.5, 2.5  # metres
+PLAUSIBLE_STATURE_M = 0.5, 2.5  # metres
 ROOT_LENGTHS = ("root_forward", "root_sway", "root_height")
 
 
@@ -107,7 +107,7 @@ def holds_angles(path: Path) -> bool:
 def find_joints(names: list[str]) -> dict[str, str]:
     """Map joints to the names of points that are joints."""
     plain = {name.rsplit(":", 1)[-1].lower().replace("_", "").replace(" ", ""): name for name in names}
-    known = {joint: (*JOINT_ALIASES.get(joint, ()), joint.replace("_", "")) for joint in JOINTS}
+    known = {joint: (*JOINT_ALIASES.get(joint, ()), joint.replace("_", "")) for joint in TABLE_JOINTS}
     found = {joint: next((plain[n] for n in aliases if n in plain), None) for joint, aliases in known.items()}
     return {joint: name for joint, name in found.items() if name is not None}
 
@@ -128,7 +128,7 @@ def read_joints(
         raise UserError(
             f"{path}:1: column {error.args[0].split()[0]} is missing; each joint needs x, y, z"
         ) from None
-    zeros = "" if zeros_missing else zero_run(places, recording.JOINTS)
+    zeros = "" if zeros_missing else zero_run(places, recording.ZERO_JOINTS)
     masked = places
     if zeros_missing or zeros:
         masked = {name: mask_zero_runs(place) for name, place in places.items()}
@@ -143,7 +143,7 @@ def read_angles(path: Path, fps: float | None = None, zeros_missing: bool = Fals
     """
     table = read(path, fps)
     columns = _columns(table.names, ANGLES + ROOTS)
-    lacking = next((name for name in LEGS if name not in columns), None)
+    lacking = next((name for name in LEG_ANGLES if name not in columns), None)
     if lacking is not None:
         raise UserError(f"{path}:1: no column {lacking}_deg or {lacking}_rad; add it, or leave out the file")
     twice = next((name for name, found in columns.items() if len(found) > 1), None)
@@ -154,21 +154,24 @@ def read_angles(path: Path, fps: float | None = None, zeros_missing: bool = Fals
     if zeros_missing:
         values = {name: mask_zero_runs(column)[:, 0] for name, column in columned.items()}
     else:
-        zeros = zero_run(columned, recording.ANGLES)
+        zeros = zero_run(columned, recording.ZERO_ANGLES)
     for name, column in values.items():
         if name in ROOT_LENGTHS:
             require_range(path, name, column, FARTHEST_ROOT, "statures")
         else:
             require_range(path, name, np.degrees(column), DEGREES, "degrees")
     _require_plausible(path, columns, values)
-    empty = next((name for name in LEGS if not np.isfinite(values[name]).any()), None)
+    empty = next((name for name in LEG_ANGLES if not np.isfinite(values[name]).any()), None)
     if empty is not None:
         raise UserError(f"{path}: column {columns[empty][0]} is empty; leave out the file")
     missing = np.full(len(table.values), np.nan)
     angles, root = (np.stack([values.get(n, missing) for n in names], axis=1) for names in (ANGLES, ROOTS))
     stature = table["stature_m"] if "stature_m" in table.names else missing
-    if ((stature < STATURE[0]) | (stature > STATURE[1])).any():
-        raise UserError(f"{path}: stature_m is not from {STATURE[0]:g} to {STATURE[1]:g}; write metres")
+    if ((stature < PLAUSIBLE_STATURE_M[0]) | (stature > PLAUSIBLE_STATURE_M[1])).any():
+        raise UserError(
+            f"{path}: stature_m is not from {PLAUSIBLE_STATURE_M[0]:g} to {PLAUSIBLE_STATURE_M[1]:g}; "
+            "write metres"
+        )
     return AngleTable(
         path.stem,
         table.fps,
@@ -183,7 +186,7 @@ def _require_plausible(path: Path, columns: dict[str, list[str]], values: dict[s
     """Raise UserError for radians in columns of degrees (walking knees bend more), and the reverse."""
     ranges = {
         name: float(np.degrees(np.ptp(values[name][np.isfinite(values[name])])))
-        for name in LEGS
+        for name in LEG_ANGLES
         if np.isfinite(values[name]).any()
     }
     wide = next((name for name, degrees in ranges.items() if degrees > MOST_RANGE), None)
@@ -202,7 +205,7 @@ def _require_plausible(path: Path, columns: dict[str, list[str]], values: dict[s
 
 def _columns(names: list[str], wanted: Sequence[str]) -> dict[str, list[str]]:
     """Return the columns of each quantity in the file."""
-    found = {name: [name + suffix for suffix in SUFFIXES if name + suffix in names] for name in wanted}
+    found = {name: [name + suffix for suffix in ANGLE_SUFFIXES if name + suffix in names] for name in wanted}
     return {name: columns for name, columns in found.items() if columns}
 
 
@@ -252,7 +255,9 @@ def read(path: Path, fps: float | None = None) -> Table:
 def _require_ranges(path: Path, names: list[str], values: Floats, lines: list[int]) -> None:
     """Raise UserError for implausible angles and positions, which the names of columns distinguish."""
     for name, column in zip(names, values.T, strict=True):
-        limit, unit = next((limits for end, limits in LIMITS.items() if name.endswith(end)), (np.inf, ""))
+        limit, unit = next(
+            (limits for end, limits in COLUMN_LIMITS.items() if name.endswith(end)), (np.inf, "")
+        )
         beyond = np.abs(column) > limit
         if beyond.any():
             row = int(np.argmax(beyond))
@@ -269,7 +274,7 @@ def _places(path: Path, times: Floats, lines: list[int]) -> tuple[Indices, float
         line = lines[1 + int(np.argmin(np.nan_to_num(steps, nan=-1.0) > 0))]
         raise UserError(f"{path}:{line}: the times do not increase; correct column 'time'")
     frames = np.maximum(1.0, np.round(steps / np.median(steps)))
-    if frames.sum() > LONGEST * len(times):
+    if frames.sum() > MOST_ROW_GROWTH * len(times):
         jump = int(np.argmax(frames))
         raise UserError(
             f"{path}:{lines[1 + jump]}: {steps[jump]:.3g} s after the row before; cut the file there"
@@ -311,7 +316,7 @@ def _number(cell: str, name: str, path: Path, line: int) -> float:
         value = np.inf
     if not np.isinf(value):
         return value
-    if name in QUANTITIES or name.endswith(tuple(LIMITS)):
+    if name in USED_COLUMNS or name.endswith(tuple(COLUMN_LIMITS)):
         raise UserError(
             f"{path}:{line}: {name}: {quoted(cell.strip())} is not a number; correct it or empty it"
         )

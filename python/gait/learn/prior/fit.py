@@ -30,19 +30,19 @@ from gait.learn.prior.components import Components
 from gait.learn.prior.people import ADULT_STATURE
 from gait.learn.solve.retarget import Measures, generic_proportions, known_parts
 
-SAMPLES = 120  # phases of a cycle; five components take less than 100 kB
-MOST_NAMES = 4  # most files in a message
+CYCLE_SAMPLES = 120  # phases of a cycle; five components take less than 100 kB
+MOST_NAMED_FILES = 4  # most files in a message
 #: Weight of a unit of a root channel in the components, in radians: a displacement by one stature counts like
 #: a rotation of the leg by 1 / 0.3 rad (a leg's angle moves the joints below it by about 0.3 statures per
 #: radian).
 ROOT_SCALE = {"root_forward": 1.0, "root_sway": 3.3, "root_height": 3.3}
-HEIGHT, FORWARD = CHANNELS.index("root_height"), CHANNELS.index("root_forward")
+HEIGHT_COLUMN, FORWARD_COLUMN = CHANNELS.index("root_height"), CHANNELS.index("root_forward")
 HEIGHT_HARMONICS = 4  # of the pelvis's height within a stride
 USUAL_STRIDE = 0.8  # statures, if the legs show no plausible one
 PLAUSIBLE_STRIDE = (0.3, 1.6)  # statures
 LEAST_SUBJECTS, MOST_SUBJECTS = 3, 12  # of `Learned.by_subject`; each costs a fit
-MOST_CYCLES = 600
-COMPARED = [JOINTS.index(name) for name in EVAL15 if name != "pelvis"]
+MOST_COMPARED_CYCLES = 600
+COMPARED_JOINTS = [JOINTS.index(name) for name in EVAL15 if name != "pelvis"]
 
 
 @dataclass
@@ -145,7 +145,7 @@ def fit(
     start = heel_strike(align.common_curve(signals, periods, alignment.offsets), proportions)
     alignment.offsets = (alignment.offsets + start * periods) % periods
     release(*signals)
-    rows = cutting.cut_cycles(signals, periods, alignment.offsets, SAMPLES, closing=not paper)
+    rows = cutting.cut_cycles(signals, periods, alignment.offsets, CYCLE_SAMPLES, closing=not paper)
     asked = PAPER_COMPONENTS if paper and options.components is None else options.components
     wanted = most_components(len(rows.values), asked, [str(s.source) for s in sequences])
     scale = channel_scale()
@@ -187,10 +187,10 @@ def fit(
 def _aligned(signals: list[Floats], periods: Floats, paper: bool) -> align.Alignment:
     """Align sequences (T, M) by their angles, or as the paper does: by its 19, equally weighted, from 0."""
     if not paper:
-        return align.align([z[:, : len(ANGLES)] for z in signals], periods, hips=align.HIPS)
+        return align.align([z[:, : len(ANGLES)] for z in signals], periods, hips=align.HIP_COLUMNS)
     count = len(PAPER_ANGLES)
     start, weights = np.zeros(len(signals)), np.ones(count)
-    return align.align([z[:, :count] for z in signals], periods, start, align.HIPS, weights)
+    return align.align([z[:, :count] for z in signals], periods, start, align.HIP_COLUMNS, weights)
 
 
 def _analysed(values: Floats, mask: Mask, count: int, paper: bool) -> Components:
@@ -230,11 +230,16 @@ def most_components(cycles: int, wanted: int | str | None, files: list[str] | No
     if isinstance(wanted, int):
         least = wanted
     else:
-        least, wanted = 1, min(rank.LARGEST if wanted == "auto" else DEFAULT_COMPONENTS, allowed)
+        least, wanted = (
+            1,
+            min(rank.MOST_TRIED_COMPONENTS if wanted == "auto" else DEFAULT_COMPONENTS, allowed),
+        )
     if allowed < least:
         what = "1 component" if least == 1 else f"{least} components"
         more = f" or ask for {allowed} at most" if allowed >= 1 else ", 3 cycles at least"
-        named = " ".join((files or [])[:MOST_NAMES]) + (" ..." if len(files or []) > MOST_NAMES else "")
+        named = " ".join((files or [])[:MOST_NAMED_FILES]) + (
+            " ..." if len(files or []) > MOST_NAMED_FILES else ""
+        )
         held = "1 cycle is" if cycles == 1 else f"{cycles} cycles are"
         raise UserError(f"{named}{': ' * bool(named)}{held} too few for {what}; add recordings{more}")
     return wanted
@@ -279,7 +284,7 @@ def heel_strike(curve: Floats, proportions: Proportions) -> float:
 
 def made_up_channels(visible: Mask) -> list[str]:
     """Return the root channels that `grounded` must compute, given the channels (M,) observed."""
-    return [CHANNELS[c] for c in (HEIGHT, FORWARD) if not visible[c]]
+    return [CHANNELS[c] for c in (HEIGHT_COLUMN, FORWARD_COLUMN) if not visible[c]]
 
 
 def grounded(model: Components, visible: Mask, proportions: Proportions) -> Components:
@@ -288,10 +293,10 @@ def grounded(model: Components, visible: Mask, proportions: Proportions) -> Comp
         return model
     mean = model.mean.copy()
     height, stride = _from_legs(mean, proportions)
-    if not visible[HEIGHT]:
-        mean[:, HEIGHT] = height
-    if not visible[FORWARD]:
-        mean[:, FORWARD] = stride
+    if not visible[HEIGHT_COLUMN]:
+        mean[:, HEIGHT_COLUMN] = height
+    if not visible[FORWARD_COLUMN]:
+        mean[:, FORWARD_COLUMN] = stride
     return replace(model, mean=mean)
 
 
@@ -325,7 +330,7 @@ def _subject_residuals(
     """Fit the components of all, and of all but each subject; `proportions`: of the body for comparison."""
     values, mask = rows.values, rows.mask
     number = int(subject.max()) + 1
-    if not LEAST_SUBJECTS <= number <= MOST_SUBJECTS or len(values) > MOST_CYCLES:
+    if not LEAST_SUBJECTS <= number <= MOST_SUBJECTS or len(values) > MOST_COMPARED_CYCLES:
         return None
 
     def learnt(some: Mask) -> Components:
@@ -363,4 +368,4 @@ def _joints(channels: Floats, proportions: Proportions) -> Floats:
     """Return joints (n, 14, 3) in the axes of the pelvis, statures, of channels (n, M)."""
     still = channels.copy()
     still[:, len(ANGLES) :] = 0
-    return points(default_skeleton(proportions).sections(), still)[:, COMPARED]
+    return points(default_skeleton(proportions).sections(), still)[:, COMPARED_JOINTS]

@@ -18,18 +18,19 @@ import scipy.linalg
 from gait.learn.arrays import Floats, Indices, Mask, by_rows, stored
 from gait.learn.cycles.fourier import decode, encode
 
-ITERATIONS = 2000  # 29 people, 10 of them recorded without arms and trunk, take 1216
-TOLERANCE = 1e-5  # rms change of the model between passes over the noise
+MOST_POSTERIOR_PASSES = 2000  # 29 people, 10 of them recorded without arms and trunk, take 1216
+MODEL_TOLERANCE = 1e-5  # rms change of the model between passes over the noise
 LEAST_CHANGE = 1e-7  # rms change that counts as none, in the data's units; a tenth of the last digit stored
 LEAST_GAIN = 2e-7  # of the bound in a pass, nats per observed entry
-PATIENCE = 20  # consecutive passes of smaller gain, after which the data do not determine what still changes
+#: Consecutive passes of smaller gain, after which the data do not determine what still changes.
+SLOW_PASSES = 20
 LEAST_NOISE = 1e-10  # variance relative to the data's
 ROUNDING = 1e-9  # relative increase of the objective that rounding may cause
 QUENCHED = 1e9  # roughness above which the components do not use a harmonic
 MOST_LOG = 200.0  # of an extrapolated precision or noise
 MEMORY = 5  # steps that the extrapolation combines
-RIDGE = 1e-10  # of its normal equations, relative to their trace
-SMALLEST = 1e-14  # of the largest squared singular value; smaller ones are rounding errors
+RELATIVE_RIDGE = 1e-10  # of its normal equations, relative to their trace
+LEAST_SQUARED_VALUE = 1e-14  # of the largest squared singular value; smaller ones are rounding errors
 
 
 @dataclass
@@ -87,7 +88,10 @@ class Climb:
 
 
 def climb(
-    problem: Problem, posterior: Posterior, tolerance: float = TOLERANCE, passes: int = ITERATIONS
+    problem: Problem,
+    posterior: Posterior,
+    tolerance: float = MODEL_TOLERANCE,
+    passes: int = MOST_POSTERIOR_PASSES,
 ) -> Climb:
     """Increase the bound, alternating scores and components, until it or the model hardly changes.
 
@@ -99,7 +103,7 @@ def climb(
         after, found = _pass(problem, history, at.posterior, at.rows)
         enough = max(tolerance * np.sqrt(after.noise), LEAST_CHANGE)
         slow = slow + 1 if found.bound - at.rows.bound < LEAST_GAIN * problem.observed else 0
-        at.converged = problem.change(at.rows, found) <= enough or slow >= PATIENCE
+        at.converged = problem.change(at.rows, found) <= enough or slow >= SLOW_PASSES
         at.objective.append(-found.bound / problem.observed)
         falls = not found.bound >= at.rows.bound
         if falls:  # within rounding, the climb has ended; a larger decrease is an error
@@ -402,7 +406,7 @@ class _Extrapolation:
         steps = np.array([(g - x)[:leading] for x, g in zip(self._points, self._images, strict=True)])
         change = np.diff(steps, axis=0)
         normal = change @ change.T
-        normal += (RIDGE * np.trace(normal) + 1e-300) * np.eye(len(normal))
+        normal += (RELATIVE_RIDGE * np.trace(normal) + 1e-300) * np.eye(len(normal))
         weight = np.linalg.solve(normal, change @ steps[-1])
         return np.asarray(image - weight @ np.diff(np.array(self._images), axis=0))
 
@@ -437,5 +441,5 @@ def leading_vectors(rows: Floats, mean: Floats, factor: Floats, count: int) -> F
     some = (rows - mean) * factor[:, None]
     first = max(len(rows) - count, 0)
     squares, left = scipy.linalg.eigh(some @ some.T, subset_by_index=(first, len(rows) - 1))
-    kept = squares > SMALLEST * squares[-1]
+    kept = squares > LEAST_SQUARED_VALUE * squares[-1]
     return np.asarray(((left[:, kept] / np.sqrt(squares[kept])).T @ some)[::-1])

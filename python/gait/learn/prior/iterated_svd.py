@@ -15,8 +15,8 @@ from gait.learn.arrays import Floats, Mask, by_rows, stored
 from gait.learn.cycles.fourier import decode, encode
 from gait.learn.prior.imputation import Filling, column_mean
 
-ITERATIONS = 500
-TOLERANCE = 1e-6  # relative decrease of the error at which to stop
+MOST_ITERATIONS = 500
+ERROR_TOLERANCE = 1e-6  # relative decrease of the error at which to stop
 
 
 def complete(values: Floats, mask: Mask, components: int, basis: Floats) -> Filling:
@@ -25,7 +25,7 @@ def complete(values: Floats, mask: Mask, components: int, basis: Floats) -> Fill
     completed = np.where(mask, values, column_mean(values, mask))
     errors: list[float] = []
     converged = False
-    while not converged and len(errors) < ITERATIONS:
+    while not converged and len(errors) < MOST_ITERATIONS:
         coded = encode(completed, basis)
         mean = coded.mean(axis=0)
         left, singular, right = np.linalg.svd(coded - mean, full_matrices=False)
@@ -34,6 +34,6 @@ def complete(values: Floats, mask: Mask, components: int, basis: Floats) -> Fill
         rest = (completed - model)[mask]
         errors.append(float(np.sqrt(np.mean(rest**2))))
         completed = np.where(mask, values, model)
-        converged = bool(mask.all()) or (len(errors) > 1 and errors[-1] >= errors[-2] * (1 - TOLERANCE))
+        converged = bool(mask.all()) or (len(errors) > 1 and errors[-1] >= errors[-2] * (1 - ERROR_TOLERANCE))
     filled = stored((completed[part] for part in by_rows(completed)), values.shape[1:])
     return Filling(filled, errors, list(errors), errors[-1] if rows else 0.0, converged)

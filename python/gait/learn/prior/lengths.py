@@ -16,14 +16,15 @@ from gait.body.skeleton import SIDES, Proportions, default_skeleton, points
 from gait.learn.arrays import Floats
 from gait.learn.solve.retarget import Measures, own_proportions
 
-COUNT = 4  # components kept, fewer with few subjects
-LARGEST = 0.09  # relative change, or shift in statures, per standard deviation; the library accepts 0.1
-STEP = 1e-3
+MOST_LENGTH_COMPONENTS = 4  # components kept, fewer with few subjects
+#: Relative change, or shift in statures, per standard deviation; the library accepts 0.1.
+LARGEST_CHANGE = 0.09
+LENGTH_STEP = 1e-3
 #: Ends of the names of frames that change together; three coordinates of the shoulders follow them in a
 #: change.
 GROUPS = ("pelvis", "torso", "upper_arm", "forearm", "thigh", "shank", "foot")
 TORSO = GROUPS.index("torso")
-CHANGES = len(GROUPS) + 3
+CHANGE_COUNT = len(GROUPS) + 3
 
 
 def spans(p: Proportions) -> Floats:
@@ -34,7 +35,7 @@ def spans(p: Proportions) -> Floats:
 
 
 def learn(
-    bodies: Sequence[Measures | None], mean: Proportions, pose: Floats, count: int = COUNT
+    bodies: Sequence[Measures | None], mean: Proportions, pose: Floats, count: int = MOST_LENGTH_COMPONENTS
 ) -> tuple[Floats, Floats]:
     """Return relative changes of lengths and shifts of origins per standard deviation of each component.
 
@@ -44,15 +45,15 @@ def learn(
     """
     whole = [m for m in bodies if m is not None and np.isfinite(_lengths(m)).all()]
     if len(whole) < 3:
-        return tables(np.zeros((0, CHANGES)), mean)
+        return tables(np.zeros((0, CHANGE_COUNT)), mean)
     changes = _changes(whole)
-    metric = np.asarray(np.linalg.cholesky(_effect(mean, pose) + 1e-9 * np.eye(CHANGES)), float)
+    metric = np.asarray(np.linalg.cholesky(_effect(mean, pose) + 1e-9 * np.eye(CHANGE_COUNT)), float)
     _, singular, right = np.linalg.svd(changes @ metric, full_matrices=False)
     kept = min(count, len(whole) - 2)
     rows = right[:kept] @ np.linalg.inv(metric) * (singular[:kept, None] / np.sqrt(len(whole) - 1))
     rows *= np.sign(rows[np.arange(kept), np.abs(rows).argmax(axis=1)])[:, None]
     table, shift = tables(rows, mean)
-    return np.clip(table, -LARGEST, LARGEST), np.clip(shift, -LARGEST, LARGEST)
+    return np.clip(table, -LARGEST_CHANGE, LARGEST_CHANGE), np.clip(shift, -LARGEST_CHANGE, LARGEST_CHANGE)
 
 
 def tables(changes: Floats, mean: Proportions) -> tuple[Floats, Floats]:
@@ -86,8 +87,8 @@ def _effect(mean: Proportions, pose: Floats) -> Floats:
     sections: dict[str, Any] = default_skeleton(mean).sections()
     base = points(sections, pose)
     moves = []
-    for row in np.eye(CHANGES) * STEP:
+    for row in np.eye(CHANGE_COUNT) * LENGTH_STEP:
         table, shift = tables(row[None], mean)
         moved = points({**sections, "PROP": table, "SHFT": shift}, pose, [1.0])
-        moves.append(((moved - base) / STEP).ravel())
+        moves.append(((moved - base) / LENGTH_STEP).ravel())
     return np.asarray(np.array(moves) @ np.array(moves).T / (base.size / 3))

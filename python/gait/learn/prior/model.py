@@ -17,7 +17,7 @@ from gait.io import blob
 from gait.learn.arrays import Floats, Indices, Mask, by_rows, release
 from gait.learn.options import LearnOptions
 from gait.learn.prior.fit import Learned
-from gait.learn.prior.people import ADULT_STATURE, LENGTH_SD, RATE_SD, TERMS, by_subject
+from gait.learn.prior.people import ADULT_STATURE, RELATIVE_LENGTH_SD, RELATIVE_RATE_SD, TERMS, by_subject
 
 #: Decimals stored: a millionth of a radian or stature is far below the accuracy of recordings, and far above
 #: the last bits (1e-12) in which results of two machines may differ.
@@ -132,11 +132,11 @@ def gait_statistics(learned: Learned) -> Floats:
     speeds = [_observed(s.channels, column) for s in learned.sequences]
     lengths = np.array([speed.mean() if len(speed) else np.nan for speed in speeds])
     fps = float(np.median([s.fps for s in learned.sequences]))
-    rate = by_subject(rates, learned.subject_index, RATE_SD)
-    length = by_subject(lengths, learned.subject_index, LENGTH_SD)
+    rate = by_subject(rates, learned.subject_index, RELATIVE_RATE_SD)
+    length = by_subject(lengths, learned.subject_index, RELATIVE_LENGTH_SD)
     if not np.isfinite(lengths).any():
         made_up = float(learned.components.mean[:, column].mean())
-        length = made_up, 2 * LENGTH_SD * made_up
+        length = made_up, 2 * RELATIVE_LENGTH_SD * made_up
     return np.array([*rate, stride_variation(learned), *length, fps, *ADULT_STATURE])
 
 

@@ -21,35 +21,35 @@ from gait.body.model_curves import pace, series, waves
 from gait.body.skeleton import CHANNELS, SIDES, Proportions, default_skeleton, points
 from gait.errors import UserError
 from gait.learn.arrays import Floats, Indices, Mask, by_rows, release, stored
-from gait.learn.cycles.fourier import HARMONICS, decode, encode, fourier_basis
+from gait.learn.cycles.fourier import CYCLE_HARMONICS, decode, encode, fourier_basis
 from gait.learn.cycles.sequence import Sequence
 from gait.learn.prior.components import Components
 from gait.learn.prior.imputation import leading_vectors, right_singular
 
-STEP = 1e-4  # of numerical differentiation, radians or statures
-RIDGE = 1e-5  # squared statures per squared unit; gives channels that move no joint a small weight
+CHANNEL_STEP = 1e-4  # of numerical differentiation, radians or statures
+SLOPE_RIDGE = 1e-5  # squared statures per squared unit; gives channels that move no joint a small weight
 #: Weights of rotations of the whole body; low, as the particles have a heading, pitch and roll of their own.
 TURNING = {"root_roll": 0.3, "root_pitch": 0.3, "root_yaw": 0.3}
 #: Weights of root channels that displace the whole body, statures; root_forward is per stride.
 DISPLACING = {"root_forward": 0.3, "root_sway": 1.0, "root_height": 1.0}
 AGAINST = ("torso_x", "torso_z", "neck_x", "neck_z", "root_sway", "root_roll", "root_yaw")
-RATE_SD, LENGTH_SD = 0.07, 0.06  # relative sd of stride rate and length among people
+RELATIVE_RATE_SD, RELATIVE_LENGTH_SD = 0.07, 0.06  # relative sd of stride rate and length among people
 ADULT_STATURE = (1.70, 0.095)  # metres, mean and sd of adults of both sexes: a prior, not a training set's
-ENOUGH = 3  # fewest subjects from which differences between people are estimated
-LEAST_SD = 0.01  # least relative sd, even if all recordings are alike
+FEWEST_SUBJECTS = 3  # fewest subjects from which differences between people are estimated
+LEAST_RELATIVE_SD = 0.01  # least relative sd, even if all recordings are alike
 #: Variance of the pace of one imaginary person whose gait does not change with the rate.  It shrinks the
 #: slopes towards 0 if only a few people were recorded, or all at similar rates.
-UNMOVED = 1.0
+CONSTANT_GAIT_VARIANCE = 1.0
 #: This channel does not depend on the rate: at the same rate step lengths differ widely between people, and a
 #: tracker that can hardly see the distance, as from the front, would accumulate the error in speed.  The
 #: components still contain it.
-LEFT_OUT = CHANNELS.index("root_forward")
+WITHOUT_RATE = CHANNELS.index("root_forward")
 #: Coefficients of a channel's Fourier series: a constant and ten harmonics, which keeps models small.  In a
 #: person whose rate is one standard deviation off, higher harmonics would move joints by only 0.12 mm (rms,
 #: `make eval-learn`).
 TERMS = 21
 #: Largest sum of a channel's coefficients, radians or statures per unit of pace; libgait refuses more.
-STEEPEST = 1.0
+STEEPEST_SLOPE = 1.0
 
 
 def mirrored(rows: Floats) -> Floats:
@@ -74,10 +74,10 @@ def joint_metric(mean: Floats, proportions: Proportions) -> Floats:
     moves = np.empty((len(CHANNELS), base.size))
     for k in range(len(CHANNELS)):
         moved = mean.copy()
-        moved[:, k] += STEP
-        moves[k] = TURNING.get(CHANNELS[k], 1.0) * ((points(sections, moved) - base) / STEP).ravel()
+        moved[:, k] += CHANNEL_STEP
+        moves[k] = TURNING.get(CHANNELS[k], 1.0) * ((points(sections, moved) - base) / CHANNEL_STEP).ravel()
     whole = np.array([DISPLACING.get(name, 0.0) ** 2 for name in CHANNELS])
-    gram = moves @ moves.T / (base.size / 3) + np.diag(whole + RIDGE)
+    gram = moves @ moves.T / (base.size / 3) + np.diag(whole + SLOPE_RIDGE)
     return np.asarray(np.linalg.cholesky(gram), float)
 
 
@@ -96,7 +96,7 @@ def mirrored_components(
 ) -> tuple[Floats, Floats, Floats, Floats, Floats]:
     """Compute mean, curves, scores, sd and shares of the variance of cycles and their mirror images."""
     samples, channels = filled.shape[1:]
-    basis = fourier_basis(samples, HARMONICS)
+    basis = fourier_basis(samples, CYCLE_HARMONICS)
     coded = _with_images(filled, metric, basis)
     weight = np.tile(1 / np.bincount(subject)[subject], 2)
     weight /= weight.sum()
@@ -139,7 +139,7 @@ def static_sd(filled: Floats, subject: Indices, count: int, metric: Floats) -> F
     """
     if subject.max() < 2:
         return np.zeros(filled.shape[2])
-    basis = fourier_basis(filled.shape[1], HARMONICS)
+    basis = fourier_basis(filled.shape[1], CYCLE_HARMONICS)
     coded, image = _with_images(filled, metric, basis), np.tile(subject, 2)
     left = []
     for held in np.unique(subject):
@@ -158,8 +158,8 @@ def static_sd(filled: Floats, subject: Indices, count: int, metric: Floats) -> F
 def by_subject(values: Floats, group: Indices, usual: float) -> tuple[float, float]:
     """Return mean and sd of the subjects' means; NaN values do not count.
 
-    With fewer than `ENOUGH` subjects the variance is shrunk towards that of people in general, whose relative
-    sd is `usual`, but is never below that of the sequences.
+    With fewer than `FEWEST_SUBJECTS` subjects the variance is shrunk towards that of people in general, whose
+    relative sd is `usual`, but is never below that of the sequences.
     """
     group, values = group[np.isfinite(values)], values[np.isfinite(values)]
     if not len(values):
@@ -167,15 +167,15 @@ def by_subject(values: Floats, group: Indices, usual: float) -> tuple[float, flo
     means = np.array([values[group == g].mean() for g in np.unique(group)])
     middle, sample = float(means.mean()), means if len(means) > 1 else values
     visible = float(sample.std(ddof=1)) if len(sample) > 1 else 0.0
-    share = min((len(means) - 1) / (ENOUGH - 1), 1.0)
+    share = min((len(means) - 1) / (FEWEST_SUBJECTS - 1), 1.0)
     variance = share * visible**2 + (1 - share) * max(visible, usual * middle) ** 2
-    return middle, max(float(np.sqrt(variance)), LEAST_SD * middle)
+    return middle, max(float(np.sqrt(variance)), LEAST_RELATIVE_SD * middle)
 
 
 def paces(sequences: list[Sequence], subject: Indices) -> Floats:
     """Return the pace (n,) of sequences: their stride rates as `gait.body.model_curves` defines it."""
     rates = np.array([s.fps / s.period.frames for s in sequences])
-    return pace(by_subject(rates, subject, RATE_SD), rates)
+    return pace(by_subject(rates, subject, RELATIVE_RATE_SD), rates)
 
 
 def pace_slope(filled: Floats, subject: Indices, paces: Floats, terms: int = TERMS) -> Floats:
@@ -183,10 +183,10 @@ def pace_slope(filled: Floats, subject: Indices, paces: Floats, terms: int = TER
 
     It is the least-squares slope of the differences between a person's completed cycles (R, T, M), own units,
     and their mean, with their mirror images, as a Fourier series.  It is 0 with one person or one pace, and
-    for LEFT_OUT.  UserError if an angle changes more than any walk's, as with jumps of 360 degrees between
-    recordings.
+    for `WITHOUT_RATE`.  UserError if an angle changes more than any walk's, as with jumps of 360 degrees
+    between recordings.
     """
-    together, variance = np.zeros(filled.shape[1:]), UNMOVED
+    together, variance = np.zeros(filled.shape[1:]), CONSTANT_GAIT_VARIANCE
     people = np.unique(subject)
     for person in people if len(people) > 1 else ():
         rows = np.flatnonzero(subject == person)
@@ -197,10 +197,10 @@ def pace_slope(filled: Floats, subject: Indices, paces: Floats, terms: int = TER
             together += np.tensordot(away[part], filled[rows[part]], 1)
             release(filled)
     found = together[None] / variance
-    found[..., LEFT_OUT] = 0.0
+    found[..., WITHOUT_RATE] = 0.0
     slope = series(0.5 * (found + mirrored(found))[0], terms)
     channel = int(np.abs(slope).sum(axis=0).argmax())
-    if np.abs(slope[:, channel]).sum() > STEEPEST:
+    if np.abs(slope[:, channel]).sum() > STEEPEST_SLOPE:
         raise UserError(
             f"{CHANNELS[channel]}: recordings of one person differ more than walks at two rates can; "
             "remove turns of 360 degrees from the angles, or leave recordings out with --exclude"

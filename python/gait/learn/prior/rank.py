@@ -8,16 +8,16 @@ import numpy as np
 from numpy.typing import NDArray
 
 from gait.learn.arrays import Floats, Indices, Mask, by_rows, release, stored
-from gait.learn.cycles.fourier import HARMONICS, fourier_basis
+from gait.learn.cycles.fourier import CYCLE_HARMONICS, fourier_basis
 from gait.learn.prior.imputation import Posterior, Problem, Rows, climb, column_mean, without_component
 
-LARGEST = 12  # components tried
+MOST_TRIED_COMPONENTS = 12  # components tried
 HELD_OUT = 0.05  # share of the observed entries held out if there are too few people
-BLOCK = 8  # a held-out block is a BLOCK-th of a cycle of one channel
+BLOCKS_PER_CYCLE = 8  # blocks of one channel that are held out
 FEWEST_PEOPLE = 4
 MOST_FOLDS = 8
-DRAWS = 4  # draws of the hidden parts of a person's cycles
-TOLERANCE, PASSES = 3e-2, 30  # of the fits, which are only compared with each other
+HIDDEN_DRAWS = 4  # draws of the hidden parts of a person's cycles
+COMPARISON_TOLERANCE, COMPARISON_PASSES = 3e-2, 30  # of the fits, which are only compared with each other
 
 
 def choose(
@@ -25,8 +25,8 @@ def choose(
     mask: Mask,
     rng: np.random.Generator,
     groups: Indices | None = None,
-    harmonics: int = HARMONICS,
-    largest: int = LARGEST,
+    harmonics: int = CYCLE_HARMONICS,
+    largest: int = MOST_TRIED_COMPONENTS,
 ) -> tuple[int, Floats]:
     """Choose the number of components (>= 1) by held-out data; also return the rmse with 0, 1 ... of them.
 
@@ -57,7 +57,7 @@ def _of_people(
     fewest = min(int(np.sum(fold != f)) for f in np.unique(fold))
     for f in np.unique(fold):
         # Each draw is a copy of the person's cycles with other parts hidden.
-        out, rest = np.tile(np.flatnonzero(fold == f), DRAWS), np.flatnonzero(fold != f)
+        out, rest = np.tile(np.flatnonzero(fold == f), HIDDEN_DRAWS), np.flatnonzero(fold != f)
         truth, visible = _picked(values, out), mask[out]
         hidden = _half(truth.shape, rng)
         there, held, errors = Problem(truth, visible & ~hidden, basis), visible & hidden, []
@@ -101,9 +101,9 @@ def _squares(rows: Rows, values: Floats, held: Mask) -> Iterator[tuple[slice, Fl
 
 
 def hold_out(mask: Mask, share: float, rng: np.random.Generator) -> NDArray[np.int32]:
-    """Draw blocks, each a BLOCK-th of a cycle of one channel: their numbers (R, T, M), -1 outside."""
+    """Draw blocks of one channel, `BLOCKS_PER_CYCLE` in a cycle: their numbers (R, T, M), -1 outside."""
     rows, samples, channels = mask.shape
-    length = samples // BLOCK
+    length = samples // BLOCKS_PER_CYCLE
     chosen: NDArray[np.int32] = np.full(mask.shape, -1, np.int32)
     for k in range(max(int(share * mask.sum() / length), 1)):
         r, m, t = int(rng.integers(rows)), int(rng.integers(channels)), int(rng.integers(samples))
@@ -129,5 +129,5 @@ def _descending(values: Floats, mask: Mask, basis: Floats, largest: int) -> Iter
         if len(posterior.precision) > count:
             weakest = int(np.argmin(np.sum(posterior.loadings[1:] ** 2, axis=1)))
             posterior = without_component(posterior, weakest)
-        posterior = climb(problem, posterior, TOLERANCE, PASSES).posterior
+        posterior = climb(problem, posterior, COMPARISON_TOLERANCE, COMPARISON_PASSES).posterior
         yield posterior

@@ -16,18 +16,18 @@ from gait.learn.cycles.sequence import Sequence
 from gait.learn.prior.fit import Learned
 from gait.learn.prior.people import ADULT_STATURE
 from gait.learn.report import figures_model
-from gait.learn.report.figures_model import PHASE, PHASE_LABEL, SHOWN, mark_unobserved, words
+from gait.learn.report.figures_model import PHASE_AXIS, PHASE_LABEL, SHOWN_ANGLES, mark_unobserved, words
 from gait.report.colours import BLUE, DARK, GREY, ORANGE
 from gait.report.figures import Drawing, grid, line_legend, plain
 
 MOST_LEGEND = 10  # most entries of a legend
-FLAT = 5.0  # least top of a row's scale, so that noise, with a ratio of about 1, looks flat
-MOST_NAMES = 60  # most rows of the map with names
+LEAST_SCALE_TOP = 5.0  # least top of a row's scale, so that noise, with a ratio of about 1, looks flat
+MOST_NAMED_ROWS = 60  # most rows of the map with names
 GRID = np.linspace(0.4, 2.1, 171)  # seconds
 ALIGNED = ("r_hip_flexion", "r_knee_flexion", "l_shoulder_flexion")
 MOST_SEQUENCES = 40  # most sequences drawn before and after
-MOST_CYCLES = 300  # most cycles drawn
-BINS, FEWEST_BINS = 64, 20  # of the mean curve of folded sequences
+MOST_DRAWN_CYCLES = 300  # most cycles drawn
+MOST_BINS, FEWEST_BINS = 64, 20  # of the mean curve of folded sequences
 IN_BIN = 5  # samples that a bin should have
 SCATTERED = 0.9  # observed share below which samples are drawn as dots
 MOST_TICKS = 20  # most subjects named in the map
@@ -138,7 +138,7 @@ def ratios(s: Sequence, angles: int = len(ANGLES)) -> Figure:
 
 def _row(axes: Axes, candidates: Floats, ratio: Floats, name: str) -> None:
     """Draw one angle: its curve, its name to the left and its maximum to the right."""
-    top = max(float(np.nanmax(ratio)), FLAT)
+    top = max(float(np.nanmax(ratio)), LEAST_SCALE_TOP)
     axes.plot(candidates, ratio, color=BLUE if name != "white noise" else GREY, lw=1)
     axes.set(ylim=(0, 1.05 * top), yticks=[])
     axes.spines[["top", "right", "left"]].set_visible(False)
@@ -171,7 +171,7 @@ def periods(learned: Learned) -> Figure:
     """Draw the ratio against the period for all sequences, one row each, with the period found."""
     sequences = learned.sequences
     rows = np.array([_resampled(s) for s in sequences])
-    named = len(sequences) <= MOST_NAMES
+    named = len(sequences) <= MOST_NAMED_ROWS
     figure, (axes,) = grid(1, 1, 8, float(np.clip(0.14 * len(rows), 1.3, 8)) + 1.2)
     axes.grid(visible=False)
     axes.set_facecolor("#e8e8e8")
@@ -261,7 +261,7 @@ def _binned(phase: Floats, values: Floats) -> tuple[Floats, Floats]:
     visible = np.isfinite(values)
     if not visible.any():
         return np.zeros(0), np.zeros(0)
-    number = int(np.clip(visible.sum() // IN_BIN, FEWEST_BINS, BINS))
+    number = int(np.clip(visible.sum() // IN_BIN, FEWEST_BINS, MOST_BINS))
     bins = np.minimum((phase[visible] * number).astype(int), number - 1)
     count = np.bincount(bins, minlength=number)
     middles, filled = np.arange(number), np.flatnonzero(count)  # empty bins are bridged
@@ -275,12 +275,12 @@ def _binned(phase: Floats, values: Floats) -> tuple[Floats, Floats]:
 def cycles(learned: Learned) -> Figure:
     """Draw the cycles on the common phase and their mean."""
     figure, panels = grid(2, 3, 10, 5.6, sharex=True)
-    picked = evenly(len(learned.cycles.values), MOST_CYCLES)
+    picked = evenly(len(learned.cycles.values), MOST_DRAWN_CYCLES)
     mask = learned.cycles.mask[picked]
     values = np.degrees(np.where(mask, learned.cycles.values[picked], np.nan))
     mean, visible = np.degrees(learned.curves[0]), learned.cycles.visible
     shades = colours(len(learned.subjects))
-    for axes, name in zip(panels, SHOWN, strict=True):
+    for axes, name in zip(panels, SHOWN_ANGLES, strict=True):
         k = CHANNELS.index(name)
         axes.set_title(words(name), fontsize=10)
         axes.set(xlim=(0, 1))
@@ -288,8 +288,8 @@ def cycles(learned: Learned) -> Figure:
             mark_unobserved(axes)
             continue
         for row, subject in zip(values[:, :, k], learned.row_subject[picked], strict=True):
-            axes.plot(PHASE, row, color=shades[subject], lw=0.4, alpha=0.6)
-        axes.plot(PHASE, mean[:, k], "k", lw=2)
+            axes.plot(PHASE_AXIS, row, color=shades[subject], lw=0.4, alpha=0.6)
+        axes.plot(PHASE_AXIS, mean[:, k], "k", lw=2)
     for axes in panels[3:]:
         axes.set_xlabel(PHASE_LABEL)
     for axes in panels[::3]:

@@ -11,20 +11,20 @@ from matplotlib.ticker import MaxNLocator
 
 from gait.body.skeleton import ANGLES, CHANNELS, JOINTS, default_skeleton, points, side_of
 from gait.learn.arrays import Floats
-from gait.learn.prior.fit import SAMPLES, Learned
+from gait.learn.prior.fit import CYCLE_SAMPLES, Learned
 from gait.report.colours import BLUE, DARK, GREY, ON_PAPER, ORANGE
 from gait.report.figures import STICKS, grid, line_legend, plain
 
-SHOWN = (
+SHOWN_ANGLES = (
     *("r_hip_flexion", "r_knee_flexion", "r_ankle_flexion", "r_shoulder_flexion", "r_elbow_flexion"),
     "torso_z",
 )
-PHASE = np.arange(SAMPLES) / SAMPLES
+PHASE_AXIS = np.arange(CYCLE_SAMPLES) / CYCLE_SAMPLES
 PHASE_LABEL = "phase (0: right heel strike)"
-PHASES = 8  # of a strip
-TURNS = {"+2 sd": ORANGE, "mean": GREY, "-2 sd": BLUE}
-STEP = 0.75  # statures from one stick figure to the next
-MOST_COMPONENTS = 8  # drawn as curves
+STRIP_PHASES = 8  # of a strip
+DEVIATION_COLOURS = {"+2 sd": ORANGE, "mean": GREY, "-2 sd": BLUE}
+FIGURE_SPACING = 0.75  # statures from one stick figure to the next
+MOST_DRAWN_COMPONENTS = 8  # drawn as curves
 MOST_SPECTRUM = 20
 JOINT_ORDER = ("hip", "knee", "ankle", "shoulder", "elbow", "torso", "neck")
 
@@ -41,9 +41,9 @@ def mark_unobserved(axes: Axes) -> None:
     axes.text(0.5, 0, "not observed", ha="center", va="center", color=GREY, fontsize=9)
 
 
-def curves(learned: Learned, shown: Sequence[str] = SHOWN) -> Figure:
+def curves(learned: Learned, shown: Sequence[str] = SHOWN_ANGLES) -> Figure:
     """Draw mean and two standard deviations of the stride rate and of each component, angle by angle."""
-    mean_curve, *turns = np.degrees(learned.curves[: 1 + MOST_COMPONENTS])
+    mean_curve, *turns = np.degrees(learned.curves[: 1 + MOST_DRAWN_COMPONENTS])
     names, visible = [f"component {k + 1}" for k in range(len(turns))], learned.cycles.visible
     if learned.pace_curve.any():
         names, turns = ["stride rate", *names], [np.degrees(learned.pace_curve), *turns]
@@ -57,15 +57,15 @@ def curves(learned: Learned, shown: Sequence[str] = SHOWN) -> Figure:
                 mark_unobserved(axes)
             else:
                 mean, turn = mean_curve[:, c], 2 * turns[k][:, c]
-                axes.fill_between(PHASE, mean - turn, mean + turn, color=GREY, alpha=0.2, lw=0)
-                axes.plot(PHASE, mean + turn, color=ORANGE, lw=1)
-                axes.plot(PHASE, mean, color=DARK, lw=1)
-                axes.plot(PHASE, mean - turn, color=BLUE, lw=1)
+                axes.fill_between(PHASE_AXIS, mean - turn, mean + turn, color=GREY, alpha=0.2, lw=0)
+                axes.plot(PHASE_AXIS, mean + turn, color=ORANGE, lw=1)
+                axes.plot(PHASE_AXIS, mean, color=DARK, lw=1)
+                axes.plot(PHASE_AXIS, mean - turn, color=BLUE, lw=1)
             axes.set(xlim=(0, 1))
             if k == 0:
                 axes.set_title(words(name), fontsize=9)
         row[0].set_ylabel(f"{names[k]}\ndegrees", fontsize=8)
-    line_legend(figure, {**TURNS, "mean": DARK})
+    line_legend(figure, {**DEVIATION_COLOURS, "mean": DARK})
     figure.supxlabel(PHASE_LABEL, fontsize=9)
     return figure
 
@@ -88,18 +88,25 @@ def strip(learned: Learned, moved: Floats | None) -> Figure:
         axes.set_aspect("equal")
         axes.grid(visible=False)
         axes.axhline(0, color="#cccccc", lw=0.8, zorder=0)
-        axes.set(xlim=(-0.6 * STEP, (PHASES - 0.4) * STEP), ylim=(-0.04, top + 0.03), yticks=[], ylabel=name)
+        axes.set(
+            xlim=(-0.6 * FIGURE_SPACING, (STRIP_PHASES - 0.4) * FIGURE_SPACING),
+            ylim=(-0.04, top + 0.03),
+            yticks=[],
+            ylabel=name,
+        )
         axes.spines[["left", "bottom"]].set_visible(False)
-        axes.set_xticks(STEP * np.arange(PHASES), [f"{i / PHASES:g}" for i in range(PHASES)])
+        axes.set_xticks(
+            FIGURE_SPACING * np.arange(STRIP_PHASES), [f"{i / STRIP_PHASES:g}" for i in range(STRIP_PHASES)]
+        )
     panels[1].set_xlabel(PHASE_LABEL)
     if moved is not None:
-        line_legend(figure, TURNS)
+        line_legend(figure, DEVIATION_COLOURS)
     return figure
 
 
-def bodies(learned: Learned, cycle: Floats, phases: int = PHASES) -> Floats:
+def bodies(learned: Learned, cycle: Floats, phases: int = STRIP_PHASES) -> Floats:
     """Return joints (phases, P, 3) of a cycle (T, M) in statures, the lowest point on the ground."""
-    at = np.arange(phases) * len(PHASE) // phases
+    at = np.arange(phases) * len(PHASE_AXIS) // phases
     joints = points(default_skeleton(learned.proportions).sections(), cycle[at])
     joints[:, :, 2] -= joints[:, :, 2].min(axis=1, keepdims=True)
     return joints
@@ -116,7 +123,7 @@ def _draw(axes: Axes, figures: Floats, across: int, colour: str) -> None:
             for chain in chains:
                 joints = body[[JOINTS.index(name) for name in chain]]
                 axes.plot(
-                    joints[:, across] + i * STEP, joints[:, 2], color=colour,
+                    joints[:, across] + i * FIGURE_SPACING, joints[:, 2], color=colour,
                     lw=0.9 if side == "l" else 1.8, alpha=0.7 if side == "l" else 1,
                     solid_capstyle="round",
                 )  # fmt: skip

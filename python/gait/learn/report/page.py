@@ -21,14 +21,14 @@ if TYPE_CHECKING:
 
 PAGE = "index.html"
 MARK = ": gait learn</title>"  # end of the title of our pages
-HEAD = 4096  # bytes that include the title of our pages
+TITLE_BYTES = 4096  # bytes that include the title of our pages
 
 _STYLE = """
 figure { margin: 0; } figcaption { color: var(--faint); margin: 0 0 .5em; }
 .n { text-align: right; } td.w { font-size: 85%; color: var(--faint); }
 """
 #: Columns of numbers.
-RIGHT = ("period, ms", "cycles", "SNR", "sharpness", "residual, °")
+NUMBER_COLUMNS = ("period, ms", "cycles", "SNR", "sharpness", "residual, °")
 _OF_CLASSES = ("strides/s", "statures/s", "components")
 
 
@@ -39,7 +39,7 @@ def require_own(folder: Path) -> None:
         return
     try:
         with page.open("rb") as file:
-            own = MARK.encode() in file.read(HEAD)
+            own = MARK.encode() in file.read(TITLE_BYTES)
     except OSError as error:
         raise UserError(f"--report {folder}: {PAGE}: {error.strerror}; choose another folder") from error
     if not own:
@@ -136,7 +136,7 @@ def _summary(learned: Learned, refused: list[str]) -> str:
 
 def _sequences(learned: Learned) -> str:
     """Return the table of the sequences: what was found and cut off, residuals, and evidence."""
-    names = ("sequence", "subject", *RIGHT, "frames kept", "taken as", "evidence")
+    names = ("sequence", "subject", *NUMBER_COLUMNS, "frames kept", "taken as", "evidence")
     rows = [
         dict(zip(names, _row(s, found), strict=True))
         for s, found in zip(learned.sequences, model.sequence_table(learned), strict=True)
@@ -179,7 +179,13 @@ def _table(rows: list[dict[str, str]]) -> str:
 
 
 def _class(column: str) -> str:
-    return ' class="n"' if column in (*RIGHT, *_OF_CLASSES) else ' class="w"' if column == "evidence" else ""
+    return (
+        ' class="n"'
+        if column in (*NUMBER_COLUMNS, *_OF_CLASSES)
+        else ' class="w"'
+        if column == "evidence"
+        else ""
+    )
 
 
 def _row(s: Sequence, found: list[object]) -> list[str]:

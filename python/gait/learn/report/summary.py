@@ -18,7 +18,7 @@ from gait.learn.prior import model, people
 from gait.learn.prior.fit import Learned, made_up_channels
 from gait.learn.segments import summary as segment_summary
 
-MOST_NAMES = 8  # of subjects
+MOST_NAMED_SUBJECTS = 8  # of subjects
 
 
 def summary(
@@ -164,7 +164,7 @@ def _words(names: list[str]) -> str:
 
 def _listed(names: list[str]) -> str:
     """Join the first few names."""
-    return " ".join(names[:MOST_NAMES]) + (" ..." if len(names) > MOST_NAMES else "")
+    return " ".join(names[:MOST_NAMED_SUBJECTS]) + (" ..." if len(names) > MOST_NAMED_SUBJECTS else "")
 
 
 def _count(number: int, what: str) -> str:

@@ -26,16 +26,16 @@ from gait.learn.prior.imputation import right_singular
 from gait.learn.prior.model import rounded
 from gait.learn.segments.corpus import Recorded, Table, tabulate
 
-FEWEST = 8  # fewest segments
+FEWEST_SEGMENTS = 8  # fewest segments
 EACH = 4  # segments per mode; with more modes they would be memorised
 USUAL_STATURE = 1.70  # metres, if no recording shows one
-DIRECTIONS = 160  # directions in the basis; a prior has 50 modes
+BASIS_DIRECTIONS = 160  # directions in the basis; a prior has 50 modes
 FILLING_ROUNDS = 10  # most rounds of filling missing entries
 FILLED = 1e-3  # relative change of their rms at which filling stops
 FOLDS = 10  # most folds; with more people, several are left out together
 LEAST_VARIANCE = 3.5e-7  # squared statures, about 1 mm^2; no joint is known better
 GAMMA = (1.0, 400.0)  # range of gamma; a new person is at least as unlike the others as these are
-MOST_COMPONENTS = 6  # most Gaussians that are tried
+MOST_GAUSSIANS = 6  # most Gaussians that are tried
 EM_ROUNDS = 60
 EM_SETTLED = 1e-6  # relative gain of the log likelihood at which EM stops
 LEAST_WEIGHT = 1e-3  # of a component that is kept
@@ -45,11 +45,11 @@ def fit(recordings: Sequence[Recorded], wanted: SegmentOptions) -> SegmentPrior:
     """Learn the segment prior of recordings; UserError if there are too few segments."""
     table = tabulate(recordings, wanted)
     real = int(table.real.sum()) // max(wanted.headings, 1)
-    if real < FEWEST:
+    if real < FEWEST_SEGMENTS:
         seconds = wanted.frames / wanted.fps
         raise UserError(
-            f"the recordings contain {real} segments of {seconds:g} s, fewer than {FEWEST}; add recordings, "
-            "or leave out the prior (--segments none)"
+            f"the recordings contain {real} segments of {seconds:g} s, fewer than {FEWEST_SEGMENTS}; add "
+            "recordings, or leave out the prior (--segments none)"
         )
     modes = min(wanted.modes, max(1, real // EACH))
     found = basis(filled(table.rows, modes), len(table.names))
@@ -120,7 +120,7 @@ class Basis:
         return np.asarray(np.einsum("dr,rs,ds->d", self.directions, moments, self.directions, optimize=True))
 
 
-def basis(rows: Floats, markers: int, most: int = DIRECTIONS) -> Basis:
+def basis(rows: Floats, markers: int, most: int = BASIS_DIRECTIONS) -> Basis:
     """Find the main directions of rows (N, F * J * 3), frame by frame, marker by marker."""
     mean = np.sum([rows[part].sum(axis=0) for part in by_rows(rows)], axis=0) / len(rows)
     singular, right = right_singular(rows, mean)
@@ -293,7 +293,7 @@ def choose_mixture(
     """
     scores = np.asarray((basis.scores - model.mean) @ model.vectors)
     if components is None:
-        gains = [_held_out(scores, folds, real, count) for count in range(1, MOST_COMPONENTS + 1)]
+        gains = [_held_out(scores, folds, real, count) for count in range(1, MOST_GAUSSIANS + 1)]
         components = 1 + int(np.argmax(gains)) if folds else 1
     return fit_mixture(scores, components)
 

@@ -31,18 +31,18 @@ from gait.learn.solve.body import RECORDED, Body
 
 PASS = 0.4  # of the segments' rate; faster motion is filtered out before sampling
 ORDER = 4  # of the filter, forward and backward together
-STEEPEST = np.radians(2.5)  # a steeper floor is stairs or climbing
-TURNS = [CHANNELS.index(f"root_{name}") for name in ("yaw", "pitch", "roll")]
+STEEPEST_FLOOR = np.radians(2.5)  # a steeper floor is stairs or climbing
+ROTATION_COLUMNS = [CHANNELS.index(f"root_{name}") for name in ("yaw", "pitch", "roll")]
 ARMS = tuple(f"{s}_{joint}" for s in SIDES for joint in ("shoulder", "elbow"))
 PAIRS = 4  # pairs of people per recording
 #: Variation of people's joint angles in the same gait, degrees: about the residual of a held-out person in
 #: the cyclic model (section CHST).  Keys are a joint, or a joint and axis, which take precedence.
-POSTURE = {
+WALKING_POSTURE_SD_DEG = {
     "neck": 6.0, "torso": 3.0, "shoulder_rotation": 12.0, "shoulder": 4.0, "elbow": 6.0, "hip_rotation": 4.0,
     "hip": 2.0, "knee": 3.0, "ankle": 3.0,
 }  # fmt: skip
 LENGTH = 0.05  # relative sd of each length at the same stature
-FEET = [MARKERS.index(f"{s}_{part}") for s in SIDES for part in ("toe", "heel")]
+FOOT_COLUMNS = [MARKERS.index(f"{s}_{part}") for s in SIDES for part in ("toe", "heel")]
 
 
 @dataclass(frozen=True)
@@ -85,7 +85,7 @@ def of(
         places = about + standing(about, pose.proportions)[:, None]
         hips = places[:, [MARKERS.index(f"{s}_hip") for s in SIDES]]
     else:
-        body = retarget.levelled(read, STEEPEST)
+        body = retarget.levelled(read, STEEPEST_FLOOR)
         measures = retarget.measure(body)
         stature = measures.stature
         floor = np.array([0.0, 0.0, retarget.ground_height(body, stature)])
@@ -120,7 +120,7 @@ def _pose_of_body(body: Body, measures: retarget.Measures) -> BodyPose:
     """Return the pose of the default skeleton with the lengths of the body."""
     channels = np.zeros((body.frames, len(CHANNELS)))
     channels[:, : len(ANGLES)] = retarget.observed_angles(body, measures, unknown=0.0)
-    channels[:, TURNS] = decompose(body.pelvis, "zyx")
+    channels[:, ROTATION_COLUMNS] = decompose(body.pelvis, "zyx")
     return BodyPose(retarget.generic_proportions([measures]), channels)
 
 
@@ -200,7 +200,9 @@ def displacements(pose: BodyPose, name: str) -> Floats:
     skeleton = marked_skeleton(pose.proportions)
     groups = (*GROUPS, "head")
     member = np.array([[frame.endswith(group) for frame in skeleton.frames] for group in groups], float)
-    posture = np.radians([next(v for part, v in POSTURE.items() if part in angle) for angle in ANGLES])
+    posture = np.radians(
+        [next(v for part, v in WALKING_POSTURE_SD_DEG.items() if part in angle) for angle in ANGLES]
+    )
     sections, own = skeleton.sections(), pose.places()
     found = []
     for _ in range(PAIRS):
@@ -215,7 +217,7 @@ def displacements(pose: BodyPose, name: str) -> Floats:
 
 def _sunk(other: Floats, own: Floats) -> Floats:
     """Return the vector (3,) by which another's lowest foot is higher than this person's on average."""
-    lowest = [places[:, FEET, 2].min(axis=1) for places in (other, own)]
+    lowest = [places[:, FOOT_COLUMNS, 2].min(axis=1) for places in (other, own)]
     difference = lowest[0] - lowest[1]
     visible = difference[np.isfinite(difference)]
     return np.array([0.0, 0.0, visible.mean() if len(visible) else 0.0])

@@ -8,7 +8,7 @@ import numpy as np
 
 from gait.bindings.segment_prior import SegmentPrior
 
-SHARE = 0.91  # of the variance, as in the paper's figure 3
+VARIANCE_SHARE = 0.91  # of the variance, as in the paper's figure 3
 
 
 def summary(prior: SegmentPrior) -> dict[str, Any]:
@@ -24,7 +24,7 @@ def summary(prior: SegmentPrior) -> dict[str, Any]:
         "components": prior.components,
         "weights": np.round(prior.weights, 4).tolist(),
         "modes": prior.size,
-        f"modes_for_{100 * SHARE:.0f}_percent": modes_for(prior, SHARE),
+        f"modes_for_{100 * VARIANCE_SHARE:.0f}_percent": modes_for(prior, VARIANCE_SHARE),
         "variance_explained": round(float(prior.explained()[-1]), 4),
         "gamma": round(prior.gamma, 3),
         "stature_m": round(prior.stature, 3),
@@ -53,6 +53,6 @@ def text(s: dict[str, Any]) -> str:
 def lines(s: dict[str, Any]) -> list[str]:
     """Format the figures and the names of the markers for people."""
     heading = "latent" if not s["headings"] else f"{s['headings']} in the prior"
-    enough = s[f"modes_for_{100 * SHARE:.0f}_percent"]
-    needed = f", {enough} modes explain {100 * SHARE:.0f} %" if enough else ""
+    enough = s[f"modes_for_{100 * VARIANCE_SHARE:.0f}_percent"]
+    needed = f", {enough} modes explain {100 * VARIANCE_SHARE:.0f} %" if enough else ""
     return [text(s) + needed, f"heading {heading}; markers: {' '.join(s['markers'])}"]

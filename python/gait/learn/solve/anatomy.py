@@ -24,7 +24,7 @@ from gait.learn.rotations import frame_from, unit
 from gait.learn.solve import retarget
 from gait.learn.solve.body import Body
 
-BONES = {"lhipjoint", "rhipjoint", "lowerback"}  # only in Acclaim skeletons of CMU and their copies
+CMU_BONES = {"lhipjoint", "rhipjoint", "lowerback"}  # only in Acclaim skeletons of CMU and their copies
 THIGH = 0.506  # share of the leg's length: 0.245 of 0.245 + 0.239 statures, as in marker fits
 KNEE_AHEAD = 0.0135  # statures by which the knee is in front of the anatomical one, in the thigh's axes
 ANKLE = (0.004, 0.0, 0.007)  # statures to the anatomical ankle, in the shank's axes
@@ -34,7 +34,7 @@ WRIST = 0.014  # statures by which wrists are too far from the elbow
 
 def is_acclaim(recording: Recording) -> bool:
     """Whether a skeleton is one of CMU's, also if it was converted to .bvh."""
-    return {"".join(c for c in bone.lower() if c.isalnum()) for bone in recording.bones} >= BONES
+    return {"".join(c for c in bone.lower() if c.isalnum()) for bone in recording.bones} >= CMU_BONES
 
 
 def anatomical(body: Body) -> Body:

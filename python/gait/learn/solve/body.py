@@ -48,7 +48,7 @@ RECORDED = "marker "  # prefix of names in `Body.joints` that are markers of the
 UPRIGHT = 0.8  # least height of hips above ankles, over the leg's length, in an upright rest pose
 WORD = re.compile(r"[A-Z]+(?![a-z])|[A-Z]?[a-z]+|[0-9]+")
 SIDE_WORDS = {"l": "left", "left": "left", "r": "right", "right": "right"}
-MOST = 0.7  # share of the bones whose names begin or end with a meaningless word
+MOST_AFFIXED_SHARE = 0.7  # share of the bones whose names begin or end with a meaningless word
 BIPED = re.compile(r"^bip0*\d*")
 
 
@@ -144,7 +144,7 @@ def _own_words(names: list[list[str]]) -> list[list[str]]:
         while True:
             first = [words[at] for words in names if len(words) > 1 and words[at] not in SIDE_WORDS]
             word, count = Counter(first).most_common(1)[0] if first else ("", 0)
-            if count < MOST * len(names):
+            if count < MOST_AFFIXED_SHARE * len(names):
                 break
             names = [
                 words[1 + at : len(words) + at] if len(words) > 1 and words[at] == word else words

@@ -19,25 +19,27 @@ from gait.body.skeleton import JOINTS as POINTS
 from gait.errors import UserError
 from gait.learn.arrays import Floats
 from gait.learn.mocap.recording import Y_UP, FileNotes, mask_zero_runs
-from gait.learn.mocap.tables import JOINTS, NEEDED, find_joints, read_joints
+from gait.learn.mocap.tables import NEEDED, TABLE_JOINTS, find_joints, read_joints
 from gait.learn.rotations import unit
 from gait.learn.solve import skeleton_fit
 from gait.learn.solve.body import Body, level_pelvis
 from gait.learn.solve.kinematics import HINGES, ORIGINS, SEGMENTS, Pose, pose_skeleton
 
-STRAIGHT = 0.25  # sine of the bend at which limb and body have equal weights for the direction of the hinge
+#: Sine of the bend at which limb and body have equal weights for the direction of the hinge.
+STRAIGHT_BEND_SINE = 0.25
 #: Seconds from the middle of a gap within which there must be a sample on both sides for the gap to be
 #: bridged, as for observed samples of a cycle (`gait.learn.cycles.cutting`), at a stride of 1.1 s.
-REACH = 0.75 / 16 * 1.1
+BRIDGE_REACH_S = 0.75 / 16 * 1.1
 NEXT = 1 + 1e-9  # least reach in frames
-FEWEST = 4  # fewest samples for a bridging curve
+FEWEST_BRIDGE_SAMPLES = 4  # fewest samples for a bridging curve
 LIMB = ("shoulder", "elbow"), ("elbow", "wrist"), ("hip", "knee"), ("knee", "ankle"), ("ankle", "toe")
 #: Pairs of joints whose distance hardly changes.
-BONES = (
+RIGID_PAIRS = (
     *(("neck", "head"), ("neck", "l_shoulder"), ("neck", "r_shoulder"), ("l_hip", "r_hip")),
     *((f"{s}_{upper}", f"{s}_{lower}") for s in SIDES for upper, lower in LIMB),
 )
-LONGEST = 2.0  # longest bone, over its median; unsmoothed joints triangulated from videos reach 1.4
+#: Longest bone, over its median; unsmoothed joints triangulated from videos reach 1.4.
+LONGEST_BONE_RATIO = 2.0
 
 
 def from_table(path: Path, fps: float | None = None, zeros_missing: bool = False) -> Body:
@@ -63,7 +65,7 @@ def from_joints(path: Path, places: dict[str, Floats], fps: float) -> Body:
     UserError if a joint of the legs is missing or never visible; others that are missing are NaN.
     """
     columns = find_joints(list(places))
-    lacking = tuple(joint for joint in JOINTS if joint not in columns)
+    lacking = tuple(joint for joint in TABLE_JOINTS if joint not in columns)
     needed = next((joint for joint in NEEDED if joint in lacking), None)
     if needed is not None:
         raise UserError(
@@ -81,8 +83,8 @@ def from_joints(path: Path, places: dict[str, Floats], fps: float) -> Body:
     for s in SIDES:
         knee = _hinge(joints, s, ("hip", "knee", "ankle"))
         elbow = _hinge(joints, s, ("shoulder", "elbow", "wrist"))
-        lateral[f"{s}_knee"] = unit(knee + STRAIGHT * unit(hips))
-        lateral[f"{s}_elbow"] = unit(-elbow + STRAIGHT * unit(shoulders))
+        lateral[f"{s}_knee"] = unit(knee + STRAIGHT_BEND_SINE * unit(hips))
+        lateral[f"{s}_elbow"] = unit(-elbow + STRAIGHT_BEND_SINE * unit(shoulders))
     notes = FileNotes(lacking=lacking)
     return Body(path.stem, fps, joints, level_pelvis(hips), lateral, notes=notes)
 
@@ -130,14 +132,14 @@ def _oriented(body: Body, angles: Floats) -> Body:
 def bridged(places: Floats, fps: float) -> Floats:
     """Fill short gaps in the coordinates (T, 3) of a joint, before angles are computed from several joints.
 
-    Gaps are filled if there are samples within REACH on both sides, 0.05 s or the next frame.  Rows in which
-    a coordinate is still missing are NaN.
+    Gaps are filled if there are samples within `BRIDGE_REACH_S` on both sides, 0.05 s or the next frame.
+    Rows in which a coordinate is still missing are NaN.
     """
-    reach = max(REACH * fps, NEXT)
+    reach = max(BRIDGE_REACH_S * fps, NEXT)
     result, frames = places.copy(), np.arange(len(places))
     for column in result.T:
         visible = np.flatnonzero(np.isfinite(column))
-        if not FEWEST <= len(visible) < len(column):
+        if not FEWEST_BRIDGE_SAMPLES <= len(visible) < len(column):
             continue
         after = np.searchsorted(visible, frames)
         left, right = visible[np.maximum(after - 1, 0)], visible[np.minimum(after, len(visible) - 1)]
@@ -154,9 +156,9 @@ def require_whole(places: Mapping[str, Floats], where: Callable[[int], str]) -> 
     """
     names = find_joints(list(places))
     joints = {joint: places[name] for joint, name in names.items()}
-    bones = [bone for bone in BONES if set(bone) <= set(joints)]
+    bones = [bone for bone in RIGID_PAIRS if set(bone) <= set(joints)]
     ratios = np.array([_relative(_distance(joints, *bone)) for bone in bones], ndmin=2)
-    torn = (ratios > LONGEST).any(axis=0)
+    torn = (ratios > LONGEST_BONE_RATIO).any(axis=0)
     if not torn.any():
         return
     frame = int(np.argmax(torn))

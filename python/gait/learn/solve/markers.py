@@ -23,16 +23,16 @@ from gait.learn.solve.skeleton_fit import LengthInformation
 
 FEWEST_LABELS = 6
 EXTENT = 0.2, 4.0  # metres; range of the extent of a person's markers
-JOINT_SD = 0.03  # metres; standard deviation from which a joint is unknown
+UNKNOWN_JOINT_SD = 0.03  # metres; standard deviation from which a joint is unknown
 AXIS_SD = np.radians(15)  # standard deviation from which a direction is unknown
 WORST_RMS = 0.05  # metres; with a larger rms, markers are not where their labels place them
 USUAL_RMS = 0.01  # metres; those of right-handed recordings are smaller
-BETTER = 0.6  # if a mirror image has less than this share of the rms, the axes are left-handed
+MIRROR_RMS_SHARE = 0.6  # if a mirror image has less than this share of the rms, the axes are left-handed
 UNKNOWN = 1e6  # variance, square metres or radians, of what a frame does not show
-CHUNK = 512  # frames processed at once
+FRAMES_AT_ONCE = 512  # frames processed at once
 #: Further remedy for unknown labels.
-STATIC = ", or give the trial in which knees and ankles were marked as --static"
-LEGS = [f"{s}_{joint}" for s in SIDES for joint in ("hip", "knee", "ankle")]
+STATIC_REMEDY = ", or give the trial in which knees and ankles were marked as --static"
+LEG_JOINTS = [f"{s}_{joint}" for s in SIDES for joint in ("hip", "knee", "ankle")]
 
 
 def from_markers(
@@ -62,11 +62,11 @@ def from_markers(
         )
     own = {labels[k].rsplit(":", 1)[-1]: points[:, k] for k in columns}
     body = from_fit(path.stem, fps, _without_bad_frames(fit), own)
-    unknown = [name for name in LEGS if not np.isfinite(body.joints[name]).any()]
+    unknown = [name for name in LEG_JOINTS if not np.isfinite(body.joints[name]).any()]
     if unknown:
         raise UserError(
             f"{path}: the known markers do not determine {unknown[0]!r}; name more in a --markers "
-            f"file{STATIC}"
+            f"file{STATIC_REMEDY}"
         )
     return body
 
@@ -88,7 +88,7 @@ def _require_right_handed(path: Path, observed: Floats, places: skeleton_fit.Poi
     if rms < USUAL_RMS:
         return
     _, mirrored = skeleton_fit.length_information(observed * [1.0, 1.0, -1.0], places)
-    if mirrored < BETTER * rms:
+    if mirrored < MIRROR_RMS_SHARE * rms:
         raise UserError(f"{path}: {MIRRORED}")
 
 
@@ -117,7 +117,7 @@ def _placed(
         if not {f"{side}_thigh", f"{side}_shank"} & {mark.segment for mark in places.values()}:
             raise UserError(
                 f"{path}: no known marker is on the {word} thigh or shank; name those that are in a "
-                f"--markers file{STATIC}"
+                f"--markers file{STATIC_REMEDY}"
             )
     return columns, at
 
@@ -164,7 +164,9 @@ def assign(
                 f"{path}: {len(best)} markers ({examples}) do not show a body: {FEWEST_LABELS} are needed, "
                 "and on each leg some on thigh or shank; record more"
             )
-        remedy = 'name more in it, or its "set"' if marker_map else f"name them in a --markers file{STATIC}"
+        remedy = (
+            'name more in it, or its "set"' if marker_map else f"name them in a --markers file{STATIC_REMEDY}"
+        )
         where = f" with {marker_map.path}" if marker_map else ""
         raise UserError(
             f"{path}: {len(best)} of {len(visible)} marker labels are known{where} ({examples} ...); {remedy}"
@@ -207,11 +209,11 @@ def _certain(fit: skeleton_fit.Fit) -> tuple[Floats, Floats]:
     local = segment_scales(fit.log_scales)[segment] * skeleton.point_positions
     hinged = np.array([SEGMENTS.index(part) for part in HINGES.values()])
     points, axes = [], []
-    for first in range(0, len(fit.pose), CHUNK):
-        chunk = slice(first, first + CHUNK)
+    for first in range(0, len(fit.pose), FRAMES_AT_ONCE):
+        chunk = slice(first, first + FRAMES_AT_ONCE)
         posed, covariance = pose_skeleton(fit.pose[chunk], origins), fit.covariance[chunk]
         place, left = posed.points(local, segment), posed.rotations[:, hinged][..., 1]
-        unsure = _sd(posed.by_pose(place, segment), covariance) > JOINT_SD
+        unsure = _sd(posed.by_pose(place, segment), covariance) > UNKNOWN_JOINT_SD
         points.append(np.where(unsure[..., None], np.nan, place))
         unsure = _sd(posed.directions_by_pose(left, hinged), covariance) > AXIS_SD
         axes.append(np.where(unsure[..., None], np.nan, left))

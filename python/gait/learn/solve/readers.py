@@ -21,11 +21,11 @@ from gait.learn.solve.body import MIRRORED, Body, from_bones
 from gait.learn.solve.retarget import mean, median, overground
 from gait.learn.solve.skeleton_fit import LengthInformation
 
-RECORDINGS = {".amc": acclaim.read, ".bvh": bvh.read}
-LEG = 0.25, 1.5  #: metres from hip to knee to ankle: from small children to above the tallest adults
+READERS = {".amc": acclaim.read, ".bvh": bvh.read}
+LEG_LENGTH_M = 0.25, 1.5  #: metres from hip to knee to ankle: from small children to above the tallest adults
 TOES, KNEES = 0.3, 0.05  #: cosine of toes, and sine of knees, from which they point backwards beyond noise
 #: Suffixes of the files that can be read.
-SUFFIXES = (*RECORDINGS, *points.SUFFIXES, ".csv")
+SUFFIXES = (*READERS, *points.SUFFIXES, ".csv")
 
 
 def read(path: Path, options: LearnOptions = DEFAULT, log_scales: Floats | None = None) -> Body | AngleTable:
@@ -37,8 +37,8 @@ def read(path: Path, options: LearnOptions = DEFAULT, log_scales: Floats | None 
     suffix = path.suffix.lower()
     if suffix == ".csv" and tables.holds_angles(path):
         return tables.read_angles(path, options.fps, options.zeros_missing)
-    if suffix in RECORDINGS:
-        recording = RECORDINGS[suffix](path, options.fps, options.zeros_missing)
+    if suffix in READERS:
+        recording = READERS[suffix](path, options.fps, options.zeros_missing)
         body = from_bones(recording)
         if options.joints == "anatomical" and anatomy.is_acclaim(recording):
             body = anatomy.anatomical(body)
@@ -76,7 +76,7 @@ def _from_points(path: Path, options: LearnOptions, log_scales: Floats | None) -
 
 def _are_joints(labels: list[str], options: LearnOptions) -> bool:
     """Whether points are centres of joints."""
-    return options.markers is None and set(tables.JOINTS) <= set(tables.find_joints(labels))
+    return options.markers is None and set(tables.TABLE_JOINTS) <= set(tables.find_joints(labels))
 
 
 def _require_size(path: Path, body: Body) -> None:
@@ -87,7 +87,7 @@ def _require_size(path: Path, body: Body) -> None:
     legs = np.linalg.norm(hip - knee, axis=2) + np.linalg.norm(knee - ankle, axis=2)
     if not np.isfinite(legs).any():  # later checks deal with invisible joints
         return
-    leg, (least, most) = float(np.nanmedian(legs)), LEG
+    leg, (least, most) = float(np.nanmedian(legs)), LEG_LENGTH_M
     if not least <= leg <= most:
         raise UserError(
             f"{path}: legs of {leg:.3g} m; {least:g} to {most:g} m are plausible; correct the file's units"
@@ -108,7 +108,7 @@ def _require_anatomy(path: Path, body: Body) -> None:
     )
     if backwards:
         raise UserError(f"{path}: {MIRRORED}")
-    if median(np.array(legs)) < -LEG[0]:
+    if median(np.array(legs)) < -LEG_LENGTH_M[0]:
         raise UserError(
             f"{path}: the body is upside down: z, or y of .bvh and .trc, must point up; rotate the data"
         )

@@ -18,7 +18,8 @@ from gait.learn.arrays import Floats, Indices
 from gait.learn.rotations import decompose, frame_from, unit, unwrap
 from gait.learn.solve.body import Body
 
-HEAD = 0.141  # neck to top of the head, statures, as the head's bone ends at different heights in files
+#: Neck to top of the head, statures, as the head's bone ends at different heights in files.
+HEAD_LENGTH = 0.141
 #: Anatomical trunk and upper arms, statures.  In recordings the clavicle ends near the acromion and the spine
 #: near the back; here the shoulder's centre is lower, the neck further forward, and the elbow nearer.
 ANATOMICAL: dict[str, Any] = {
@@ -30,15 +31,15 @@ ANATOMICAL: dict[str, Any] = {
 }
 #: A straight limb has a smaller sine of the bend in this share of the frames; elbows that bend in recorded
 #: walks reach at least 20 degrees.
-STRAIGHT, MOSTLY = np.sin(np.radians(15)), 0.9
+STRAIGHT_KNEE_SINE, MOSTLY = np.sin(np.radians(15)), 0.9
 BALL = 0.0235  # height of the ball of the foot in stance, statures
 #: Heights of the parts of a standing body that may be unknown, statures.
-SHARES = {"rise": Proportions().sole - BALL, "neck": Proportions().neck}
-HARMONICS = 4  # of the pelvis's path within a stride
+UNKNOWN_HEIGHTS = {"rise": Proportions().sole - BALL, "neck": Proportions().neck}
+PELVIS_HARMONICS = 4  # of the pelvis's path within a stride
 STANDING = 0.2  # m/s; mean speed below which the heading is from the pelvis instead of the path
 BELT = 0.4  # m/s; least speed of a treadmill's belt
-STEADY = 0.4  # range of the velocities of feet that stand on a belt, over its speed
-FEWEST = 20  # fewest velocities of feet that show a belt
+BELT_VELOCITY_RANGE = 0.4  # range of the velocities of feet that stand on a belt, over its speed
+FEWEST_FOOT_VELOCITIES = 20  # fewest velocities of feet that show a belt
 STANCE_SHARE = 0.15  # share of frames, those in which a foot moves least, when it is flat on the ground
 
 
@@ -85,7 +86,12 @@ def measure(body: Body) -> Measures:
     foot, neck = distances("ankle", "toe"), _distance(j["pelvis"], j["neck"])
     thigh, shank = distances("hip", "knee"), distances("knee", "ankle")
     parts = {"rise": mean(rise), "thigh": mean(thigh), "shank": mean(shank), "neck": neck}
-    known = 1 - HEAD - BALL - sum(share for part, share in SHARES.items() if np.isnan(parts[part]))
+    known = (
+        1
+        - HEAD_LENGTH
+        - BALL
+        - sum(share for part, share in UNKNOWN_HEIGHTS.items() if np.isnan(parts[part]))
+    )
     stature = float(sum(length for length in parts.values() if np.isfinite(length))) / known
     return Measures(
         stature=stature,
@@ -187,7 +193,7 @@ def _straight_limbs(body: Body) -> list[tuple[str, str]]:
             ends = unit(middle - body.joints[f"{s}_{upper}"]), unit(body.joints[f"{s}_{lower}"] - middle)
             bend = np.linalg.norm(np.cross(*ends), axis=1)
             bend = bend[np.isfinite(bend)]
-            if len(bend) and np.quantile(bend, MOSTLY) < STRAIGHT:
+            if len(bend) and np.quantile(bend, MOSTLY) < STRAIGHT_KNEE_SINE:
                 found.append((s, joint))
     return found
 
@@ -252,7 +258,7 @@ def mean_proportions(bodies: Sequence[Measures | None]) -> Proportions:
         hip=(0.0, offset("hip")[1], 0.0),
         shoulder=offset("shoulder"),
         neck=part(lambda m: m.neck, generic.neck),
-        head=(0.0, 0.0, HEAD),
+        head=(0.0, 0.0, HEAD_LENGTH),
         upper_arm=part(lambda m: m.upper_arm, generic.upper_arm),
         forearm=part(lambda m: m.forearm, generic.forearm),
         thigh=part(lambda m: m.thigh, generic.thigh),
@@ -292,11 +298,11 @@ def _belt(body: Body) -> Floats:
     velocity is where those of ankles or balls, whichever agree better, are densest.  Heights are not used, as
     belts may slope.
     """
-    best, narrowest = np.zeros(2), STEADY
+    best, narrowest = np.zeros(2), BELT_VELOCITY_RANGE
     for joint in ("ankle", "toe"):
         feet = [np.gradient(body.joints[f"{s}_{joint}"][:, :2], axis=0) * body.fps for s in SIDES]
         velocity = np.concatenate([v[np.isfinite(v).all(axis=1)] for v in feet])
-        if len(velocity) < FEWEST:
+        if len(velocity) < FEWEST_FOOT_VELOCITIES:
             continue
         _, _, axes = np.linalg.svd(velocity - np.median(velocity, axis=0), full_matrices=False)
         along = velocity @ axes[0]
@@ -425,7 +431,7 @@ def _smooth_path(path: Floats, period: float) -> tuple[Floats, Floats, Floats]:
     frames = len(path)
     t = (np.arange(frames) - frames / 2) / period
     degree = 1 if frames < 1.5 * period else 2 if frames < 4 * period else 5
-    angle = 2 * np.pi * np.outer(t, np.arange(1, HARMONICS + 1))
+    angle = 2 * np.pi * np.outer(t, np.arange(1, PELVIS_HARMONICS + 1))
     powers = np.vander(t, degree + 1, increasing=True)
     design = np.concatenate([powers, np.cos(angle), np.sin(angle)], axis=1)
     visible = np.isfinite(path[:, 0])

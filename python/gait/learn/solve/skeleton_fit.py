@@ -29,22 +29,30 @@ from gait.learn.solve.kinematics import (
     segment_scales,
 )
 
-SIZES = (0.5, 2.5)  # metres of stature to start from
+START_STATURE_M = (0.5, 2.5)  # metres of stature to start from
 SUBJECT_FRAMES = 60  # frames from which the subject is estimated
-FEWEST = 3  # fewest points in a frame that is fitted
-MANY = 0.7  # share of the largest number of points that frames for estimating the subject must have
+FEWEST_POINTS = 3  # fewest points in a frame that is fitted
+#: Share of the largest number of points that frames for estimating the subject must have.
+LEAST_VISIBLE_SHARE = 0.7
 BAD = 4  # multiple of the median loss per point from which a frame may be in a wrong minimum
-CHUNK = 128  # frames solved at once
-NOISE = 0.01  # metres: skin over bone, and motion that 24 angles cannot reproduce
+SOLVED_AT_ONCE = 128  # frames solved at once
+MARKER_SD_M = 0.01  # metres: skin over bone, and motion that 24 angles cannot reproduce
 ANGLE_SD = 1.5  # radians about the rest pose; only matters for what the points do not determine
 LIMIT_SD = 0.05  # radians beyond a limit that count as one sd
 ROOT_SD = 100.0  # metres and radians; fixes a pelvis that no point determines
-OUTLIERS = (30.0, 10.0, 3.0)  # residuals beyond this many NOISE lose weight, in first to last rounds
+OUTLIERS = (30.0, 10.0, 3.0)  # residuals beyond this many MARKER_SD_M lose weight, in first to last rounds
 EFFECTIVE = 5.0  # number of independent frames that all frames are worth, as neighbours share errors
-STATURE = 1.7  # metres, of the generic body
+GENERIC_STATURE_M = 1.7  # metres, of the generic body
 #: Levenberg-Marquardt: most rounds, first damping, least, most, and its factors after a better or worse step.
-ROUNDS, DAMPING, LEAST_DAMPING, MOST_DAMPING, BETTER, WORSE = 30, 1e-3, 1e-7, 1e4, 0.2, 10.0
-GAIN = 1e-4  # relative gain of the loss; a step that gains less is the last
+MOST_STEPS, FIRST_DAMPING, LEAST_DAMPING, MOST_DAMPING, DAMPING_DECREASE, DAMPING_INCREASE = (
+    30,
+    1e-3,
+    1e-7,
+    1e4,
+    0.2,
+    10.0,
+)
+LEAST_GAIN = 1e-4  # relative gain of the loss; a step that gains less is the last
 _RANGES = {
     "neck": (-80, 80), "shoulder_flexion": (-120, 190), "shoulder_abduction": (-60, 120),
     "shoulder_rotation": (-120, 120), "elbow": (-5, 160), "hip_flexion": (-60, 140),
@@ -52,13 +60,15 @@ _RANGES = {
     "ankle": (-80, 50),
 }  # fmt: skip
 #: Least and largest values (2, 24) of the angles of a living body, radians.
-LIMITS = np.radians(
+ANGLE_LIMITS = np.radians(
     [[next(r[k] for part, r in _RANGES.items() if part in name) for name in ANGLES] for k in (0, 1)]
 )
 #: Weights of the segments' points in the rigid alignment, as limbs move relative to the trunk.
-TRUNK = np.array([1.0 if name in ("pelvis", "torso") else 0.05 for name in SEGMENTS])
-LENGTHS = len(SCALE_SD)
-_PRIOR_MEAN = np.array([np.log(STATURE)] + [0.0] * (LENGTHS - 1))  # log length scales of the generic body
+ALIGNMENT_WEIGHTS = np.array([1.0 if name in ("pelvis", "torso") else 0.05 for name in SEGMENTS])
+SCALE_COUNT = len(SCALE_SD)
+_PRIOR_MEAN = np.array(
+    [np.log(GENERIC_STATURE_M)] + [0.0] * (SCALE_COUNT - 1)
+)  # log length scales of the generic body
 
 
 @dataclass(frozen=True)
@@ -76,8 +86,10 @@ class LengthInformation:
         return np.asarray(np.linalg.solve(self.matrix, self.vector), float)
 
 
-PEOPLE = LengthInformation(np.diag(SCALE_SD**-2), SCALE_SD**-2 * _PRIOR_MEAN)  #: people in general
-NO_INFORMATION = LengthInformation(np.zeros((LENGTHS, LENGTHS)), np.zeros(LENGTHS))
+POPULATION_LENGTHS = LengthInformation(
+    np.diag(SCALE_SD**-2), SCALE_SD**-2 * _PRIOR_MEAN
+)  #: people in general
+NO_INFORMATION = LengthInformation(np.zeros((SCALE_COUNT, SCALE_COUNT)), np.zeros(SCALE_COUNT))
 
 
 def log_bayes_factor(one: LengthInformation, other: LengthInformation) -> float:
@@ -87,7 +99,7 @@ def log_bayes_factor(one: LengthInformation, other: LengthInformation) -> float:
 
 def _evidence(found: LengthInformation) -> float:
     """Log probability of measurements of one person, up to a constant of these."""
-    known = PEOPLE + found
+    known = POPULATION_LENGTHS + found
     return float(known.vector @ known.mean() - np.linalg.slogdet(known.matrix)[1]) / 2
 
 
@@ -153,7 +165,7 @@ def pelvis_rotations(angles: Floats, points: Points, observed: Floats) -> Floats
     `observed` is as for `fit`; NaN where fewer than three points or not all angles are known.
     """
     data = _observations(observed, points)
-    known = (data.weight.sum(axis=1) >= FEWEST) & np.isfinite(angles).all(axis=1)
+    known = (data.weight.sum(axis=1) >= FEWEST_POINTS) & np.isfinite(angles).all(axis=1)
     pose = _at_rest(len(angles))
     pose.angles[known] = angles[known]
     rotation = _aligned(pose, points.at, ORIGINS, data)[0].rotation
@@ -162,7 +174,7 @@ def pelvis_rotations(angles: Floats, points: Points, observed: Floats) -> Floats
 
 def has_enough(observed: Floats) -> bool:
     """Whether any frame has enough points (T, M, 3) to be fitted."""
-    return bool((np.isfinite(observed).all(axis=2).sum(axis=1) >= FEWEST).any())
+    return bool((np.isfinite(observed).all(axis=2).sum(axis=1) >= FEWEST_POINTS).any())
 
 
 @dataclass
@@ -191,7 +203,7 @@ class _Subject:
 
     @property
     def log_scales(self) -> Floats:
-        return self.shape[:LENGTHS]
+        return self.shape[:SCALE_COUNT]
 
     @property
     def share(self) -> float:
@@ -202,20 +214,20 @@ class _Subject:
     def local(self) -> Floats:
         """Positions (M, 3) of the points in their segments, metres."""
         scale = segment_scales(self.log_scales)[self.points.segment]
-        return scale * self.points.at + self.shape[LENGTHS:].reshape(-1, 3)
+        return scale * self.points.at + self.shape[SCALE_COUNT:].reshape(-1, 3)
 
     def prior(self) -> tuple[Floats, Floats]:
         """Means and standard deviations of the shape."""
         mean = np.concatenate([_PRIOR_MEAN, np.zeros(self.points.at.size)])
-        return mean, np.concatenate([SCALE_SD, np.repeat(self.points.sd, 3) * STATURE])
+        return mean, np.concatenate([SCALE_SD, np.repeat(self.points.sd, 3) * GENERIC_STATURE_M])
 
 
 def _frames_with_most(visible: Mask) -> Indices:
     """Pick frames spread over the recording in which many points are seen."""
     count = visible.sum(axis=1)
-    if not (count >= FEWEST).any():
+    if not (count >= FEWEST_POINTS).any():
         raise ValueError("no frame has three points")
-    good = np.flatnonzero(count >= max(FEWEST, MANY * count.max()))
+    good = np.flatnonzero(count >= max(FEWEST_POINTS, LEAST_VISIBLE_SHARE * count.max()))
     bins = np.array_split(good, min(SUBJECT_FRAMES, len(good)))
     return np.array([frames[np.argmax(count[frames])] for frames in bins])
 
@@ -225,8 +237,8 @@ def _fit_subject(few: _Observations, points: Points, known: Floats | None) -> _S
     start = _at_rest(len(few.weight))
     if known is None:
         size = np.median(_aligned(start, points.at, ORIGINS, few)[1])
-        log_scales = np.zeros(LENGTHS)
-        log_scales[0] = np.log(np.clip(size, *SIZES))
+        log_scales = np.zeros(SCALE_COUNT)
+        log_scales[0] = np.log(np.clip(size, *START_STATURE_M))
     else:
         log_scales = known
     local = segment_scales(log_scales)[points.segment] * points.at
@@ -240,7 +252,7 @@ def _fit_subject(few: _Observations, points: Points, known: Floats | None) -> _S
 def _refine(start: _Subject, fixed: bool) -> _Subject:
     """Optimise shape and poses together from a start; `fixed` log scales are not changed."""
     mean, sd = start.prior()
-    weight, free = start.share / sd**2, slice(LENGTHS if fixed else 0, None)
+    weight, free = start.share / sd**2, slice(SCALE_COUNT if fixed else 0, None)
 
     def objective(s: _Subject, outlier: float) -> float:
         body = pose_skeleton(s.pose, segment_origins(s.log_scales))
@@ -250,8 +262,8 @@ def _refine(start: _Subject, fixed: bool) -> _Subject:
 
     subject = start
     for outlier in OUTLIERS:
-        damping, cost = DAMPING, objective(subject, outlier)
-        for _ in range(ROUNDS):
+        damping, cost = FIRST_DAMPING, objective(subject, outlier)
+        for _ in range(MOST_STEPS):
             matrix, slope, solved = _reduced(subject, outlier, damping, (weight, mean))
             step = np.zeros(len(slope))
             step[free] = -np.linalg.solve(matrix[free, free], slope[free])
@@ -260,11 +272,11 @@ def _refine(start: _Subject, fixed: bool) -> _Subject:
             tried = objective(trial, outlier)
             if tried < cost:
                 gain, cost, subject = cost - tried, tried, trial
-                damping = max(BETTER * damping, LEAST_DAMPING)
-                if gain < GAIN * cost:
+                damping = max(DAMPING_DECREASE * damping, LEAST_DAMPING)
+                if gain < LEAST_GAIN * cost:
                     break
             else:
-                damping *= WORSE
+                damping *= DAMPING_INCREASE
                 if damping > MOST_DAMPING:
                     break
     return subject
@@ -278,12 +290,14 @@ def _information(subject: _Subject) -> LengthInformation:
     mean, sd = subject.prior()
     share = subject.share
     weight = share / sd**2
-    weight[:LENGTHS] = 0  # the prior is not an observation
+    weight[:SCALE_COUNT] = 0  # the prior is not an observation
     matrix, slope, _ = _reduced(subject, OUTLIERS[-1], 0.0, (weight, mean))
-    solved = np.linalg.solve(matrix[LENGTHS:, LENGTHS:], np.c_[matrix[LENGTHS:, :LENGTHS], slope[LENGTHS:]])
-    across = matrix[:LENGTHS, LENGTHS:]
-    found = (matrix[:LENGTHS, :LENGTHS] - across @ solved[:, :-1]) / share
-    left = (slope[:LENGTHS] - across @ solved[:, -1]) / share
+    solved = np.linalg.solve(
+        matrix[SCALE_COUNT:, SCALE_COUNT:], np.c_[matrix[SCALE_COUNT:, :SCALE_COUNT], slope[SCALE_COUNT:]]
+    )
+    across = matrix[:SCALE_COUNT, SCALE_COUNT:]
+    found = (matrix[:SCALE_COUNT, :SCALE_COUNT] - across @ solved[:, :-1]) / share
+    left = (slope[:SCALE_COUNT] - across @ solved[:, -1]) / share
     found = (found + found.T) / 2
     return LengthInformation(found, found @ subject.log_scales - left)
 
@@ -300,13 +314,13 @@ def _reduced(
     body = pose_skeleton(pose, segment_origins(s.log_scales))
     world = body.points(s.local, few.segment)
     residual, weight, _ = _residuals(world, few, outlier)
-    by_pose = _rows(body.by_pose(world, few.segment) / NOISE)
+    by_pose = _rows(body.by_pose(world, few.segment) / MARKER_SD_M)
     by_shape = np.zeros((*world.shape, len(s.shape)))
-    by_shape[..., :LENGTHS] = body.by_scales(s.log_scales, s.points.at, few.segment)
+    by_shape[..., :SCALE_COUNT] = body.by_scales(s.log_scales, s.points.at, few.segment)
     for m, segment in enumerate(few.segment):
-        first = LENGTHS + 3 * m
+        first = SCALE_COUNT + 3 * m
         by_shape[:, m, :, first : first + 3] = body.rotations[:, segment]
-    by_shape = _rows(by_shape / NOISE)
+    by_shape = _rows(by_shape / MARKER_SD_M)
     rest, heavy = _rows(residual[..., None]), np.repeat(weight, 3, axis=1)[..., None]
     left = np.swapaxes(by_pose * heavy, 1, 2)
     inner, mixed, pose_slope = left @ by_pose, left @ by_shape, left @ rest
@@ -334,8 +348,8 @@ def _fit_all_frames(data: _Observations, subject: _Subject, picked: Indices) -> 
     pose, cost = _fit_poses(data, local, origins, start, OUTLIERS[-1])
     count = (data.weight > 0).sum(axis=1)
     mean = cost / np.maximum(count, 1)
-    good = (mean <= BAD * np.median(mean[count >= FEWEST])) & (count >= FEWEST)
-    bad = np.flatnonzero(~good & (count >= FEWEST))
+    good = (mean <= BAD * np.median(mean[count >= FEWEST_POINTS])) & (count >= FEWEST_POINTS)
+    bad = np.flatnonzero(~good & (count >= FEWEST_POINTS))
     if good.any() and len(bad):
         closest = np.flatnonzero(good)[np.argmin(np.abs(bad[:, None] - np.flatnonzero(good)[None]), axis=1)]
         start = _aligned(pose[closest], local, origins, data[bad])[0]
@@ -350,8 +364,8 @@ def _with_covariance(data: _Observations, subject: _Subject, pose: Pose) -> Fit:
     local, origins = subject.local, segment_origins(subject.log_scales)
     covariance = np.empty((len(pose), FREEDOMS, FREEDOMS))
     residual = np.empty(data.weight.shape)
-    for first in range(0, len(pose), CHUNK):
-        chunk = np.arange(first, min(first + CHUNK, len(pose)))
+    for first in range(0, len(pose), SOLVED_AT_ONCE):
+        chunk = np.arange(first, min(first + SOLVED_AT_ONCE, len(pose)))
         world = pose_skeleton(pose[chunk], origins).points(local, data.segment)
         residual[chunk] = np.linalg.norm(world - data.observed[chunk], axis=2)
         hessian = _normal_equations(pose[chunk], local, origins, data[chunk], OUTLIERS[-1])[0]
@@ -369,7 +383,7 @@ def _aligned(pose: Pose, local: Floats, origins: Floats, data: _Observations) ->
     still = _at_rest(len(pose))
     still.angles = pose.angles
     model = pose_skeleton(still, origins).points(local, data.segment)
-    w = (data.weight * TRUNK[data.segment])[..., None] + 1e-12 * data.weight[..., None]
+    w = (data.weight * ALIGNMENT_WEIGHTS[data.segment])[..., None] + 1e-12 * data.weight[..., None]
     total = np.maximum(w.sum(axis=1), 1e-30)
     middle, goal = (w * model).sum(axis=1) / total, (w * data.observed).sum(axis=1) / total
     a, b = (model - middle[:, None]) * np.sqrt(w), (data.observed - goal[:, None]) * np.sqrt(w)
@@ -388,8 +402,8 @@ def _fit_poses(
 ) -> tuple[Pose, Floats]:
     """Find the poses of all frames from a start; return poses and losses (T,)."""
     pose, cost = start[:], np.empty(len(start))
-    for first in range(0, len(start), CHUNK):
-        chunk = np.arange(first, min(first + CHUNK, len(start)))
+    for first in range(0, len(start), SOLVED_AT_ONCE):
+        chunk = np.arange(first, min(first + SOLVED_AT_ONCE, len(start)))
         pose[chunk], cost[chunk] = _descend(pose[chunk], data[chunk], local, origins, outlier)
     return pose, cost
 
@@ -403,9 +417,9 @@ def _descend(
         world = pose_skeleton(pose, origins).points(local, data.segment)
         return _residuals(world, some, outlier)[2] + _prior_cost(pose.angles)
 
-    cost, damping = objective(pose, data), np.full(len(pose), DAMPING)
+    cost, damping = objective(pose, data), np.full(len(pose), FIRST_DAMPING)
     active = np.arange(len(pose))
-    for _ in range(ROUNDS):
+    for _ in range(MOST_STEPS):
         hessian, gradient = _normal_equations(pose[active], local, origins, data[active], outlier)
         diagonal = np.einsum("tii->ti", hessian)
         diagonal *= 1 + damping[active, None]
@@ -416,8 +430,10 @@ def _descend(
         gain = (cost[active] - tried) / np.maximum(cost[active], 1e-9)
         won = active[better]
         pose[won], cost[won] = moved[np.flatnonzero(better)], tried[better]
-        damping[active] = np.maximum(damping[active] * np.where(better, BETTER, WORSE), LEAST_DAMPING)
-        active = active[(better & (gain > GAIN)) | (~better & (damping[active] < MOST_DAMPING))]
+        damping[active] = np.maximum(
+            damping[active] * np.where(better, DAMPING_DECREASE, DAMPING_INCREASE), LEAST_DAMPING
+        )
+        active = active[(better & (gain > LEAST_GAIN)) | (~better & (damping[active] < MOST_DAMPING))]
         if not len(active):
             break
     return pose, cost
@@ -430,7 +446,7 @@ def _normal_equations(
     body = pose_skeleton(pose, origins)
     world = body.points(local, data.segment)
     residual, weight, _ = _residuals(world, data, outlier)
-    slope = _rows(body.by_pose(world, data.segment) / NOISE)
+    slope = _rows(body.by_pose(world, data.segment) / MARKER_SD_M)
     weighted = np.swapaxes(slope * np.repeat(weight, 3, axis=1)[..., None], 1, 2)
     hessian, gradient = weighted @ slope, (weighted @ _rows(residual[..., None]))[..., 0]
     _add_prior(hessian, gradient, pose.angles)
@@ -438,8 +454,8 @@ def _normal_equations(
 
 
 def _residuals(world: Floats, data: _Observations, outlier: float) -> tuple[Floats, Floats, Floats]:
-    """Residuals (T, M, 3) in units of NOISE, robust weights (T, M) and loss (T,)."""
-    residual = (world - data.observed) / NOISE
+    """Residuals (T, M, 3) in units of MARKER_SD_M, robust weights (T, M) and loss (T,)."""
+    residual = (world - data.observed) / MARKER_SD_M
     square = (residual**2).sum(axis=2) / outlier**2
     return residual, data.weight / (1 + square), (data.weight * outlier**2 * np.log1p(square)).sum(axis=1)
 
@@ -459,7 +475,7 @@ def _add_prior(hessian: Floats, gradient: Floats, angles: Floats) -> None:
 
 def _beyond(angles: Floats) -> Floats:
     """Amount by which angles exceed their limits, radians."""
-    return np.asarray(angles - np.clip(angles, *LIMITS))
+    return np.asarray(angles - np.clip(angles, *ANGLE_LIMITS))
 
 
 def _rows(table: Floats) -> Floats:

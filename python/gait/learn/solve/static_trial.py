@@ -23,12 +23,12 @@ from gait.learn.options import LearnOptions
 from gait.learn.solve import markers, skeleton_fit
 from gait.learn.solve.kinematics import SEGMENTS, pose_skeleton, segment_origins, segment_scales
 
-FRAMES = 60  # frames of the trial that are fitted, as all of a still person are alike
+STATIC_FRAMES = 60  # frames of the trial that are fitted, as all of a still person are alike
 SD = 0.004  # statures by which skin moves from its position while standing
-CLEAR = 1.25  # least ratio of the distances to the second nearest and the nearest bone
-FARTHEST = 0.12  # statures from a bone; markers further away are on clothes, wands or the floor
+LEAST_DISTANCE_RATIO = 1.25  # least ratio of the distances to the second nearest and the nearest bone
+FARTHEST_MARKER = 0.12  # statures from a bone; markers further away are on clothes, wands or the floor
 #: Bones that determine the segment of markers with unknown labels: the joints at their ends.
-BONES = {"pelvis": ("l_hip", "r_hip"), "torso": ("pelvis", "neck"), "head": ("neck", "head_top")} | {
+SEGMENT_BONES = {"pelvis": ("l_hip", "r_hip"), "torso": ("pelvis", "neck"), "head": ("neck", "head_top")} | {
     f"{s}_{segment}": (f"{s}_{a}", f"{s}_{b}")
     for s in "lr"
     for segment, a, b in (
@@ -54,7 +54,7 @@ def calibrate(path: Path, options: LearnOptions) -> Calibration:
     if path.suffix.lower() not in points.SUFFIXES:
         raise UserError(f"--static {path}: is not {' or '.join(points.SUFFIXES)}; give the trial's markers")
     labels, places, fps = points.read(path, options.fps)
-    rows = np.unique(np.linspace(0, len(places) - 1, FRAMES).round().astype(int))
+    rows = np.unique(np.linspace(0, len(places) - 1, STATIC_FRAMES).round().astype(int))
     places = places[rows]
     try:
         markers.from_markers(path, labels, places, fps, options.markers)  # for its checks
@@ -93,10 +93,10 @@ def _on_nearest_bone(place: Floats, fit: skeleton_fit.Fit) -> Landmark | None:
     joints = posed.points(scales[segment] * skeleton.point_positions, segment)
     away = {
         name: float(np.median(_distance(place[visible], *(joints[:, JOINTS.index(end)] for end in ends))))
-        for name, ends in BONES.items()
+        for name, ends in SEGMENT_BONES.items()
     }
     (nearest, near), (_, next_one) = sorted(away.items(), key=lambda item: item[1])[:2]
-    if near > FARTHEST * np.exp(fit.log_scales[0]) or next_one < CLEAR * near:
+    if near > FARTHEST_MARKER * np.exp(fit.log_scales[0]) or next_one < LEAST_DISTANCE_RATIO * near:
         return None
     k = SEGMENTS.index(nearest)
     local = np.einsum("tji,tj->ti", posed.rotations[:, k], place[visible] - posed.origins[:, k])
