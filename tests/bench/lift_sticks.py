@@ -13,7 +13,7 @@ from gait.body.skeleton import BONES
 from gait.camera.camera import Camera
 from gait.io.video import Frame, Image
 from gait.lift.video.clip_segments import ClipSegments, Settings
-from gait.lift.video.energy import PLACE
+from gait.lift.video.energy import PLACE_COLUMNS
 from gait.lift.video.fit_clip import ClipFit, Sequence
 from gait.lift.video.placement import Placement
 from gait.lift.video.sensors import CameraView, Film
@@ -79,7 +79,7 @@ def depth_gaps(clip: ClipSegments, sequence: Sequence) -> Array:
         clip.shapes[int(c)].positions(state, np.eye(frames), slice(None))[0]
         for c, state in zip(sequence.components, sequence.states, strict=True)
     ]
-    away = [clip.view.away(state[PLACE]) for state in sequence.states[1:]]
+    away = [clip.view.away(state[PLACE_COLUMNS]) for state in sequence.states[1:]]
     pairs = zip(places[:-1], places[1:], away, strict=True)
     return np.array([((early[hop:] - late[: frames - hop]) @ line).mean() for early, late, line in pairs])
 

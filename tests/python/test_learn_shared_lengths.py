@@ -16,8 +16,8 @@ from gait.learn.prior import fit
 from gait.learn.solve import kinematics, markers, retarget, skeleton_fit
 from gait.learn.solve.kinematics import SCALES, SEGMENTS
 from gait.learn.solve.skeleton_fit import (
+    LENGTHS_OF_PEOPLE,
     NO_INFORMATION,
-    POPULATION_LENGTHS,
     LengthInformation,
     log_bayes_factor,
 )
@@ -53,7 +53,7 @@ def without(points, names, frames=slice(None)):
 
 
 def pooled(*found):
-    return sum(found, POPULATION_LENGTHS).mean()
+    return sum(found, LENGTHS_OF_PEOPLE).mean()
 
 
 @pytest.fixture(scope="module")
@@ -116,7 +116,7 @@ def test_bayes_factors_of_one_body_are_right():
     same, unusual = rng.random(3000) < 0.5, []
     for one in same:
         people = [
-            POPULATION_LENGTHS.mean() + rng.normal(size=size) / np.sqrt(np.diag(POPULATION_LENGTHS.matrix))
+            LENGTHS_OF_PEOPLE.mean() + rng.normal(size=size) / np.sqrt(np.diag(LENGTHS_OF_PEOPLE.matrix))
             for _ in range(2)
         ]
         found = []
@@ -136,7 +136,7 @@ def test_what_shows_nothing_separates_no_people():
 
 def body(stature, error=0.0, precision=1e4):
     """Estimates of a person's stature with an error of the log stature."""
-    matrix = np.zeros(POPULATION_LENGTHS.matrix.shape)
+    matrix = np.zeros(LENGTHS_OF_PEOPLE.matrix.shape)
     matrix[0, 0] = precision
     return LengthInformation(matrix, matrix[0] * (np.log(stature) + error))
 

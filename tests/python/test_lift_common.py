@@ -120,7 +120,9 @@ def test_fit_correlation_is_the_share_of_the_sensors_that_the_figure_explains(ch
 
 
 def test_a_figure_that_explains_little_may_have_drifted():
-    drifts = [fit_clip.drift(alike) for alike in (np.nan, 1.0, fit_clip.HELD, 0.6, 0.3, -0.5)]
+    drifts = [
+        fit_clip.drift(alike) for alike in (np.nan, 1.0, fit_clip.FOLLOWING_CORRELATION, 0.6, 0.3, -0.5)
+    ]
     assert drifts[:3] == [0.0, 0.0, 0.0]
     assert 0 < drifts[3] < drifts[4] == drifts[5] < 0.3
 

@@ -17,9 +17,9 @@ from gait.lift.keypoints.corrections import CLICK_SD, as_json, read_corrections
 from gait.lift.video import sensors
 from gait.lift.video.descent import Link, normal
 from gait.lift.video.energy import (
-    GAIN,
-    HEADING,
-    PLACE,
+    GAIN_COLUMN,
+    HEADING_COLUMN,
+    PLACE_COLUMNS,
     Anchor,
     Corrections,
     Energy,
@@ -115,7 +115,7 @@ def test_the_energy_has_an_exact_jacobian(view, headings):
     assert np.abs(slope - wanted).max() < 1e-5 * np.abs(slope).max()
     columns = np.abs(slope - wanted).max(axis=0) / np.maximum(np.abs(slope).max(axis=0), 1e-9)
     assert columns.max() < 1e-5
-    assert (np.abs(slope[:, HEADING]) > 0).sum() > (1 if headings == 0 else 0)
+    assert (np.abs(slope[:, HEADING_COLUMN]) > 0).sum() > (1 if headings == 0 else 0)
 
 
 def test_the_energy_is_eq_7():
@@ -126,7 +126,7 @@ def test_the_energy_is_eq_7():
     corrections, reading = energy.corrections, energy.reading
     pulled = uv[corrections.frame, corrections.marker] - corrections.uv
     value, _ = energy.sticks.responses(uv[:, energy.sticks.markers], reading.places, reading.blur)
-    observed = state[-1] + np.exp(state[GAIN]) * value - reading.value
+    observed = state[-1] + np.exp(state[GAIN_COLUMN]) * value - reading.value
     wanted = ((pulled / corrections.sd[:, None]) ** 2).sum() + (observed**2).sum() / reading.sd**2
     assert rows @ rows == pytest.approx(wanted + (state**2).sum() / 4)
 
@@ -270,7 +270,7 @@ def test_a_prior_of_other_markers_is_refused():
 
 
 def test_place_is_a_slice_of_the_state():
-    assert np.arange(10)[PLACE].tolist() == [4, 5, 6]
+    assert np.arange(10)[PLACE_COLUMNS].tolist() == [4, 5, 6]
 
 
 def test_a_phase_shows_which_leg_is_ahead(tmp_path):

@@ -11,7 +11,7 @@ from toy_segments import toy_blob, toy_prior
 
 from gait.camera.camera import Camera
 from gait.cli import main
-from gait.cli.lift import PIXEL_SD
+from gait.cli.lift import DEFAULT_PIXEL_SD
 from gait.io.keypoints_file import Keypoints, read, shared_place, write
 from gait.lift import run as lift_run
 from gait.lift.keypoints import noise
@@ -227,5 +227,5 @@ def test_outliers_are_no_noise(folder):
     uv[outliers] += rng.normal(0, 60, (outliers.sum(), 2))
     save("outliers.csv", uv)
     keypoints = read("outliers.csv", toy_prior(FRAMES, MARKERS, 4, seed=5).names)[0]
-    assert noise.shake(keypoints) > 1.3 * PIXEL_SD
-    assert lift_run.measured_noise(keypoints, print) == PIXEL_SD
+    assert noise.shake(keypoints) > 1.3 * DEFAULT_PIXEL_SD
+    assert lift_run.measured_noise(keypoints, print) == DEFAULT_PIXEL_SD

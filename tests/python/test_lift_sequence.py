@@ -260,7 +260,7 @@ def test_contacts_hold_slow_low_feet_only():
     places[:, moving, 0] += np.arange(BLOCKS * 3) * 0.1  # 2 m/s
     rows = rows_of(prior)
     sure = soft_constraints.contacts(rows, prior.names, places, 20.0)
-    feet = [name for name in soft_constraints.FEET if name in names]
+    feet = [name for name in soft_constraints.FLOOR_JOINTS if name in names]
     assert sure[:, feet.index("l_toe")].min() > 0.9
     assert sure[:, feet.index("r_toe")].max() < 0.01
     slid = places.copy()
@@ -370,7 +370,7 @@ def test_sd_about_the_hips_are_those_of_differences(method):
     options = Options(method=method, stature=1.7, pixel_sd=0.01, contact=False, bones=False)
     found = motion.lift(prior, keypoints, view, options, prior.names)
     assert found.sd[..., 1].min() > 5 and found.rooted_sd[..., 1].max() < 1  # metres
-    hips = [prior.names.index(name) for name in smoother.HIPS]
+    hips = [prior.names.index(name) for name in smoother.HIP_JOINTS]
     both = found.rooted_sd[:, hips]
     np.testing.assert_allclose(both[:, 0], both[:, 1], rtol=1e-4)  # opposite ends of one difference
 

@@ -7,7 +7,7 @@ import pytest
 
 from gait.io.keypoints_file import Keypoints
 from gait.lift.keypoints import swaps
-from gait.lift.keypoints.swaps import CLEAR, Reading, undo_swaps
+from gait.lift.keypoints.swaps import SWAP_EVIDENCE, Reading, undo_swaps
 
 NAMES = ("pelvis", "l_knee", "r_knee", "l_ankle", "r_ankle")
 LEFT, RIGHT = [1, 3], [2, 4]
@@ -114,11 +114,11 @@ def test_what_the_motion_explains_no_better_is_not_tried():
 
 
 def test_what_fits_hardly_better_stays():
-    """Each pair has to gain `CLEAR` nats: two here."""
+    """Each pair has to gain `SWAP_EVIDENCE` nats: two here."""
     right = walking()
     spoilt = swapped(right, 30, 50)
     gain = model(right)[0] - model(spoilt)[0]
-    for nats, put in ((0.7 * 2 * CLEAR, False), (1.5 * 2 * CLEAR, True)):
+    for nats, put in ((0.7 * 2 * SWAP_EVIDENCE, False), (1.5 * 2 * SWAP_EVIDENCE, True)):
         share = nats / gain
 
         def scaled(keypoints, near, share=share):

@@ -67,7 +67,7 @@ def test_exact_pixels_of_the_prior_are_lifted_to_their_depth(walk, monkeypatch, 
     headings, components = np.zeros(segments), np.zeros(segments, int)
     with monkeypatch.context() as near:  # draws that stay in the picture
         near.setattr(chain, "GROUND_SD", 0.5)
-        near.setattr(chain, "HEADING_SD", 0.02)
+        near.setattr(chain, "UNKNOWN_HEADING_SD", 0.02)
         shapes = overlapping(mean, half)
         around = Around(headings, components, STATURE, shapes, shapes)
         motions = [drawn(prior, around, np.random.default_rng(seed)) for seed in range(4)]

@@ -9,7 +9,7 @@ from gait.io.keypoints_file import Keypoints
 from gait.lift.segment.view import Perspective
 from gait.lift.smooth import balance, motion
 from gait.lift.smooth.options import Options
-from gait.lift.smooth.soft_constraints import BONES, FEET, Layout, Rows
+from gait.lift.smooth.soft_constraints import FLOOR_JOINTS, LIMB_BONES, Layout, Rows
 from gait.reproducible import one_thread
 from gait.simulate.scenario import Scenario
 from gait.simulate.stage import set_stage
@@ -46,8 +46,8 @@ def figures(stage):
                 SegmentPrior.load(), keypoints, Perspective(stage.camera), options, tuple(JOINTS)
             )
         places = dict(zip(found.names, np.moveaxis(found.places, 1, 0), strict=True))
-        slide = [speed(places[f])[speed(points[f]) < STANDING] for f in FEET if f in places]
-        lengths = [np.linalg.norm(places[a] - places[b], axis=1).std() for a, b in BONES]
+        slide = [speed(places[f])[speed(points[f]) < STANDING] for f in FLOOR_JOINTS if f in places]
+        lengths = [np.linalg.norm(places[a] - places[b], axis=1).std() for a, b in LIMB_BONES]
         order = [found.names.index(name) for name in JOINTS]
         out = out_of_polygon(grids[-1].grid[:, order], grids[-1].contact)
         return (
@@ -107,7 +107,7 @@ def test_the_nearest_place_of_a_polygon(point, place):
 
 def out_of_polygon(places, sure):
     """Distance of the ground's force from the polygon in the middle frames, in lengths of the trunk."""
-    share, feet = balance.masses(JOINTS), [JOINTS.index(name) for name in FEET]
+    share, feet = balance.masses(JOINTS), [JOINTS.index(name) for name in FLOOR_JOINTS]
     middle = places.swapaxes(1, 2) @ share
     off = []
     for t in range(1, len(places) - 1):

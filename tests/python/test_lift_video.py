@@ -19,14 +19,14 @@ from gait.io.video import Video, VideoWriter
 from gait.lift.keypoints.corrections import CLICK_SD, Correction, as_json, read_edits
 from gait.lift.video import run as lift_video
 from gait.lift.video.clip_segments import Settings
-from gait.lift.video.figure import LIMBS, Figure, draw_figure
+from gait.lift.video.figure import BODY_LIMBS, Figure, draw_figure
 from gait.lift.video.fit_clip import _share, fit_clip, suggestions
 from gait.lift.video.placement import (
-    HEADING_SD,
     PHASE_SD,
     PLACE_SD,
-    RATE_SD,
-    STATURE_SD,
+    PLACED_HEADING_SD,
+    RATE_SD_HZ,
+    STATURE_SD_M,
     read_placement,
 )
 from gait.motion.evaluate import root_errors
@@ -162,7 +162,7 @@ def test_the_cylinder_figure_keeps_its_bones(corrected, prior):
         assert each == pytest.approx(np.full(24, length), abs=1e-9)
     assert np.nanmedian(figure.residual) < 0.02
     assert abs(figure.stature / STATURE - 1) < 0.1
-    assert figure.surfaces().shape[:2] == (24, len(LIMBS))
+    assert figure.surfaces().shape[:2] == (24, len(BODY_LIMBS))
 
 
 def test_the_figure_is_drawn_where_the_body_is(corrected, clip, prior):
@@ -304,7 +304,7 @@ def test_the_documented_files_are_read(prior, tmp_path):
     pulled = found.corrections
     assert [c.joint for c in pulled] == ["l_knee", "r_ankle"] and pulled[1].sd_px == CLICK_SD
     assert len(found.hidden) == len(found.swapped) == len(found.floor) == 1
-    usual = f"{PLACE_SD:g} m, {HEADING_SD:g}, {STATURE_SD:g} m, {PHASE_SD:g}, {RATE_SD:g} |"
+    usual = f"{PLACE_SD:g} m, {PLACED_HEADING_SD:g}, {STATURE_SD_M:g} m, {PHASE_SD:g}, {RATE_SD_HZ:g} |"
     assert usual in page and f"| {CLICK_SD:g} |" in page
 
 

@@ -4,7 +4,7 @@
 #define GAIT_LIFT_FIT_H
 #include "lift/segment_posterior.h"
 
-/* Headings from which the search for an unknown one starts, 45 degrees apart, as STARTS of
+/* Headings from which the search for an unknown one starts, 45 degrees apart, as HEADING_STARTS of
  * python/gait/lift/segment/explain.py.  Each start is refined, so their number hardly matters, as long as every heading
  * is found. */
 enum { LIFT_HEADINGS = 8 };

@@ -54,7 +54,7 @@ examples:
   gait lift left.csv right.csv --camera calibration.toml -o motion.csv
   gait lift walk.mp4 --camera camera.json --placement init.json -o motion.csv --suggest 5
 """
-FILES = """\
+FILES_HELP = """\
 P.json gives the person's rough position in one frame.  With --camera it has the format of gait track --init:
   {"frame": 64, "pelvis": [-0.1, 5.5, 0.9], "heading_rad": -1.57, "stature_m": 1.65}
 Without a camera, or with one that is estimated from the walk (--height), it is in pixels; the result is then
@@ -77,8 +77,8 @@ _ONLY_ONE_VIEW = (
     *("placement", "orthographic", "metres_per_unit", "stabilize", "corrections", "suggest", "balance"),
     *("video", "fov", "scale_camera", "camera_out"),
 )
-PIXEL_SD, FLOOR_SD = Options.pixel_sd, Options.floor_sd  # pixels, metres
-WHOLE = 0.5  # share of a displacement's energy from which it counts as moving the whole body
+DEFAULT_PIXEL_SD, DEFAULT_FLOOR_SD = Options.pixel_sd, Options.floor_sd  # pixels, metres
+WHOLE_BODY_SHARE = 0.5  # share of a displacement's energy from which it counts as moving the whole body
 UNKNOWN_MM = 1000.0  # a less certain displacement is the distance, in a view without perspective
 
 
@@ -87,7 +87,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     _add_common(parser)
     _add_keypoints(parser.add_argument_group("from keypoints"))
     _add_video(parser.add_argument_group("from a video"))
-    _add_pictures(parser.add_argument_group("from a video's images", FILES))
+    _add_pictures(parser.add_argument_group("from a video's images", FILES_HELP))
 
 
 def _add_common(parser: argparse.ArgumentParser) -> None:
@@ -167,14 +167,14 @@ def _add_keypoints(group: argparse._ArgumentGroup) -> None:
         type=values.between(1e-6, 1e6, "a standard deviation"),
         metavar="SD",
         help="standard deviation of u and v at full confidence, in their unit (default: how much the points "
-        f"jitter from frame to frame, at least {PIXEL_SD:g})",
+        f"jitter from frame to frame, at least {DEFAULT_PIXEL_SD:g})",
     )
     add(
         "--floor-sd",
         type=values.between(1e-4, 100, "metres"),
         metavar="M",
         help="standard deviation of the floor's height around z = 0 in metres, with --camera and "
-        f"--method smooth (default: {FLOOR_SD:g}; larger on steps)",
+        f"--method smooth (default: {DEFAULT_FLOOR_SD:g}; larger on steps)",
     )
     add(
         "--method",
@@ -476,8 +476,8 @@ def _options(args: argparse.Namespace) -> Options:
     return Options(
         args.method or METHODS[0],
         args.height,
-        args.pixel_sd or PIXEL_SD,
-        args.floor_sd or FLOOR_SD,
+        args.pixel_sd or DEFAULT_PIXEL_SD,
+        args.floor_sd or DEFAULT_FLOOR_SD,
         not args.no_contact,
         not args.no_bones,
         args.balance,
@@ -559,7 +559,7 @@ def _left(segments: dict[str, Any]) -> str:
     modes = segments["least_certain"]
     each = []
     for mode in modes:
-        moved = "the whole body" if mode["rigid"] > WHOLE else " ".join(mode["joints"])
+        moved = "the whole body" if mode["rigid"] > WHOLE_BODY_SHARE else " ".join(mode["joints"])
         each.append(f"{moved} {mode['sd_mm']:.0f} mm ({100 * mode['in_depth']:.0f} % in depth)")
     words = f"least certain in a single segment: {', '.join(each)}"
     unknown = modes[0]["sd_mm"] > UNKNOWN_MM

@@ -28,13 +28,15 @@ from gait.reproducible import one_thread
 from gait.track.from_walk import Calibration
 from gait.track.synchronise import find_offset
 
-FEW = 4  # recordings; with two of one person, 90 % intervals for other people contained as little as 70 %
+#: Recordings; with two of one person, 90 % intervals for other people contained as little as 70 %.
+FEW_RECORDINGS = 4
 MOST_NAMED = 5  # most spikes and changes of person that a message lists
 MOST_SPANS = 4  # most intervals that a message lists
-OUTSIDE = 0.1  # share of points outside the picture; with fewer, the picture's edge cuts the person off
+#: Share of points outside the picture; with fewer, the picture's edge cuts the person off.
+MOST_OUTSIDE_SHARE = 0.1
 SHAKY = 1.3  # ratio of jitter to standard deviation from which a warning is printed
-FAR = 4.0  # standard deviations of a median distance; noise alone gives 1.2
-OFTEN = 3  # frames in which a point is an outlier; correct points are in one of a few thousand
+FAR_SDS = 4.0  # standard deviations of a median distance; noise alone gives 1.2
+OUTLIER_FRAMES = 3  # frames in which a point is an outlier; correct points are in one of a few thousand
 TOO_MANY = 0.18  # share of wrong points; one in seven does little harm, one in five may
 MANY_SWAPPED = 0.1  # share of pairs that seem swapped; of correct points none do
 UNUSUAL = 2.5  # standard deviations of a stature; one person in 80 is as unusual
@@ -132,7 +134,7 @@ class Lifted:
 def load_prior(model: str | None, warn: Warn) -> SegmentPrior:
     """Load the prior of a model (None: the shipped one); warn if it was learnt from few recordings."""
     prior = SegmentPrior.load(model)
-    if 0 < prior.recordings < FEW:
+    if 0 < prior.recordings < FEW_RECORDINGS:
         count = "one recording" if prior.recordings == 1 else f"{prior.recordings} recordings"
         warn(
             f"{model}: learnt from {count}, too few to learn how people differ: standard deviations may be "
@@ -309,7 +311,7 @@ def _view(keypoints: Keypoints, request: Request, warn: Warn) -> View:
         camera = Camera.read(request.camera, request.size, scale=True)
         camera.check_place(request.camera)
         outside = keypoints.outside(camera.size)
-        if outside > OUTSIDE and not request.stabilised:
+        if outside > MOST_OUTSIDE_SHARE and not request.stabilised:
             picture = "{}x{}".format(*camera.size)
             warn(
                 f"{outside:.0%} of the points lie outside the camera's {picture} picture: is "
@@ -437,7 +439,7 @@ def warnings_of(lifted: Lifted, prior_stature: float) -> list[str]:
         "standard deviations are wide, do not rely on the positions": found.resized != 1,
         f"the estimate did not converge in {found.steps} iterations: do not rely on it": not found.settled,
         f"the estimate is {far:.0f} times --pixel-sd from the keypoints: do not rely on it; check the "
-        "camera, the names of the points, that v points down, and --pixel-sd": far > FAR,
+        "camera, the names of the points, that v points down, and --pixel-sd": far > FAR_SDS,
     }
     return [words for words, holds in reasons.items() if holds]
 
@@ -453,4 +455,4 @@ def _named_outliers(found: Motion, names: tuple[str, ...]) -> str:
     if found.outliers is None:
         return ""
     counts = zip(names, found.outliers.sum(axis=0).tolist(), strict=True)
-    return ", ".join(f"{name} in {count} frames" for name, count in counts if count >= OFTEN)
+    return ", ".join(f"{name} in {count} frames" for name, count in counts if count >= OUTLIER_FRAMES)

@@ -31,8 +31,8 @@ from gait.learn.segments.corpus import Corpus
 from gait.learn.solve import static_trial
 from gait.learn.solve.retarget import Measures, known_parts
 from gait.learn.solve.skeleton_fit import (
+    LENGTHS_OF_PEOPLE,
     NO_INFORMATION,
-    POPULATION_LENGTHS,
     LengthInformation,
     log_bayes_factor,
 )
@@ -254,7 +254,7 @@ def shared_lengths(
                 progress(number)
             for body in bodies:
                 if len(body.files) > 1:
-                    shared = SharedLengths((POPULATION_LENGTHS + body.found).mean(), len(body.files))
+                    shared = SharedLengths((LENGTHS_OF_PEOPLE + body.found).mean(), len(body.files))
                     for i in body.files:
                         result[i] = shared
             for line in _other_lengths(person, [[paths[i] for i in body.files] for body in bodies]):

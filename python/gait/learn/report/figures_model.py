@@ -22,7 +22,7 @@ SHOWN_ANGLES = (
 PHASE_AXIS = np.arange(CYCLE_SAMPLES) / CYCLE_SAMPLES
 PHASE_LABEL = "phase (0: right heel strike)"
 STRIP_PHASES = 8  # of a strip
-DEVIATION_COLOURS = {"+2 sd": ORANGE, "mean": GREY, "-2 sd": BLUE}
+SD_COLOURS = {"+2 sd": ORANGE, "mean": GREY, "-2 sd": BLUE}
 FIGURE_SPACING = 0.75  # statures from one stick figure to the next
 MOST_DRAWN_COMPONENTS = 8  # drawn as curves
 MOST_SPECTRUM = 20
@@ -65,7 +65,7 @@ def curves(learned: Learned, shown: Sequence[str] = SHOWN_ANGLES) -> Figure:
             if k == 0:
                 axes.set_title(words(name), fontsize=9)
         row[0].set_ylabel(f"{names[k]}\ndegrees", fontsize=8)
-    line_legend(figure, {**DEVIATION_COLOURS, "mean": DARK})
+    line_legend(figure, {**SD_COLOURS, "mean": DARK})
     figure.supxlabel(PHASE_LABEL, fontsize=9)
     return figure
 
@@ -100,7 +100,7 @@ def strip(learned: Learned, moved: Floats | None) -> Figure:
         )
     panels[1].set_xlabel(PHASE_LABEL)
     if moved is not None:
-        line_legend(figure, DEVIATION_COLOURS)
+        line_legend(figure, SD_COLOURS)
     return figure
 
 

@@ -86,9 +86,7 @@ class LengthInformation:
         return np.asarray(np.linalg.solve(self.matrix, self.vector), float)
 
 
-POPULATION_LENGTHS = LengthInformation(
-    np.diag(SCALE_SD**-2), SCALE_SD**-2 * _PRIOR_MEAN
-)  #: people in general
+LENGTHS_OF_PEOPLE = LengthInformation(np.diag(SCALE_SD**-2), SCALE_SD**-2 * _PRIOR_MEAN)  #: people in general
 NO_INFORMATION = LengthInformation(np.zeros((SCALE_COUNT, SCALE_COUNT)), np.zeros(SCALE_COUNT))
 
 
@@ -99,7 +97,7 @@ def log_bayes_factor(one: LengthInformation, other: LengthInformation) -> float:
 
 def _evidence(found: LengthInformation) -> float:
     """Log probability of measurements of one person, up to a constant of these."""
-    known = POPULATION_LENGTHS + found
+    known = LENGTHS_OF_PEOPLE + found
     return float(known.vector @ known.mean() - np.linalg.slogdet(known.matrix)[1]) / 2
 
 

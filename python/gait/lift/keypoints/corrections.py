@@ -37,8 +37,8 @@ Size = tuple[int, int]
 _LARGEST = MAX_PIXELS, MAX_PIXELS  # largest picture of a camera
 CLICK_SD = 4.0  # pixels, unless the correction states it
 ERRS_FOR = 0.25  # seconds in which the autocorrelation of a detector's error falls to 1/e
-FLOOR_SD = 0.02  # metres, of a foot that stands at a point of the floor
-FEET = ("toe", "heel", "ankle")
+STANDING_FOOT_SD_M = 0.02  # metres, of a foot that stands at a point of the floor
+FOOT_JOINTS = ("toe", "heel", "ankle")
 
 
 @dataclass(frozen=True)
@@ -143,7 +143,7 @@ class EntryReader:
         """Read an entry of ``floor``."""
         fields.only(("frame", "joint", "uv", "sd_px"))
         joint = self._joint(fields)
-        if not joint.endswith(FEET):
+        if not joint.endswith(FOOT_JOINTS):
             raise fields.fail("joint", f"is {joint!r}", "only a toe, heel or ankle can stand on the floor")
         return FloorPin(self.frame(fields, "frame"), joint, self.pixel(fields, "uv"), _sd(fields))
 
@@ -310,9 +310,9 @@ def corrected(keypoints: Keypoints, edits: Edits, sd: float) -> Keypoints:
 
 def found_alike(names: Sequence[str], joint: str) -> list[int]:
     """List the columns of points with the same errors as a joint: itself, or all points of its foot."""
-    if not joint.endswith(FEET):
+    if not joint.endswith(FOOT_JOINTS):
         return [names.index(joint)]
-    return [k for k, name in enumerate(names) if name[:2] == joint[:2] and name.endswith(FEET)]
+    return [k for k, name in enumerate(names) if name[:2] == joint[:2] and name.endswith(FOOT_JOINTS)]
 
 
 def _rows(keypoints: Keypoints, first: int, last: int) -> npt.NDArray[np.intp]:
@@ -386,10 +386,10 @@ def pins(keypoints: Keypoints, edits: Edits, camera: Camera | None, prior: Segme
         if pin.frame not in rows_of or not np.isfinite(at).all():
             raise UserError(f"floor: {pin.joint} in frame {pin.frame} is not on the floor; remove it")
         beside = camera.on_plane(np.array(pin.uv) + [0.0, pin.sd_px], 0.0)
-        along = float(np.linalg.norm(beside - at)) if np.isfinite(beside).all() else FLOOR_SD
+        along = float(np.linalg.norm(beside - at)) if np.isfinite(beside).all() else STANDING_FOOT_SD_M
         index = prior.index([pin.joint])[0]
         height = prior.stature * float(prior.mean[:, :, index, 2].min())
         row.append(rows_of[pin.frame])
         place.append([at[0], at[1], height])
-        sd.append([np.hypot(FLOOR_SD, along)] * 2 + [FLOOR_SD])
+        sd.append([np.hypot(STANDING_FOOT_SD_M, along)] * 2 + [STANDING_FOOT_SD_M])
     return Pins(np.array(row), tuple(pin.joint for pin in edits.floor), np.array(place), np.array(sd))

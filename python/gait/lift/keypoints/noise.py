@@ -54,9 +54,10 @@ def shake(keypoints: Keypoints) -> float:
     )
 
 
-FEWEST = 4  # fewest points seen in both frames
-FAR = 0.25  # of the person's extent in the picture; no person moves this much more than in the frames around
-AROUND = 5  # frames before and after that show how the points move
+FEWEST_COMMON_POINTS = 4  # fewest points seen in both frames
+#: Of the person's extent in the picture; no person moves this much more than in the frames around.
+FAR_OF_EXTENT = 0.25
+FRAMES_AROUND = 5  # frames before and after that show how the points move
 SOON = 2.0  # times the usual frame time; after a longer step a person may be anywhere
 
 
@@ -77,20 +78,20 @@ def _changes(keypoints: Keypoints) -> NDArray[np.bool_]:
     jumped = np.zeros(len(moves), bool)
     for t in np.flatnonzero(step <= SOON * np.median(step)):
         both = np.isfinite(excess[t]).all(axis=1)
-        if both.sum() < FEWEST:
+        if both.sum() < FEWEST_COMMON_POINTS:
             continue
         extent = float(np.ptp(keypoints.uv[t, both], axis=0).max())
         shift = np.median(excess[t, both], axis=0)
         length = float(np.linalg.norm(shift))
         alike = np.linalg.norm(excess[t, both] - shift, axis=1) < length / 2
-        jumped[t] = length > FAR * extent and alike.mean() > 0.5
+        jumped[t] = length > FAR_OF_EXTENT * extent and alike.mean() > 0.5
     return jumped
 
 
 def _around(moves: Array) -> Array:
     """Median of each point's moves (T, J, 2) in the frames around, or its own move if there are none."""
-    padded = np.pad(moves, ((AROUND, AROUND), (0, 0), (0, 0)), constant_values=np.nan)
-    windows = np.lib.stride_tricks.sliding_window_view(padded, 2 * AROUND + 1, axis=0)
+    padded = np.pad(moves, ((FRAMES_AROUND, FRAMES_AROUND), (0, 0), (0, 0)), constant_values=np.nan)
+    windows = np.lib.stride_tricks.sliding_window_view(padded, 2 * FRAMES_AROUND + 1, axis=0)
     known = np.where(np.isfinite(windows), windows, np.inf)
     ordered, count = np.sort(known, axis=-1), np.isfinite(windows).sum(axis=-1)
     middle = np.maximum(count - 1, 0)[..., None] // 2

@@ -27,17 +27,18 @@ Floats = npt.NDArray[np.float64]
 Ints = npt.NDArray[np.intp]
 Flags = npt.NDArray[np.bool_]
 
-LONGEST = 0.3  # seconds without a pair after which its continuation is unknown
+LONGEST_BREAK_S = 0.3  # seconds without a pair after which its continuation is unknown
 CAP = 20.0  # largest -log density of an observation, which may be an outlier
 RARE = 9.0  # -log probability that a swap begins or ends between two observations,
-OFTEN = 1.0  # the same where another pair's does,
+SWAP_RATE_AFTER_OTHER = 1.0  # the same where another pair's does,
 STAY = 0.4  # and -log probability that an observation differs from the other pairs'
-ROUNDS = 3  # passes, in each of which pairs use the others' results
+PAIR_PASSES = 3  # passes, in each of which pairs use the others' results
 HALF = float(np.sqrt(2 * np.log(2)))  # median length of normal noise in a plane, standard deviations
-STEADY = 0.02  # least variance of the acceleration in second differences, relative to that of the noise
+#: Least variance of the acceleration in second differences, relative to that of the noise.
+LEAST_ACCELERATION = 0.02
 UNKNOWN = 1e6  # variance, relative to an observation's, where nothing is known
 SIGNS = np.array([1.0, -1.0])  # of an observed difference: as it is, swapped
-OTHER = 1.0 - np.eye(2)
+SWITCHED = 1.0 - np.eye(2)
 
 
 def suspected(keypoints: Keypoints, pairs: Ints, sd: float) -> Flags:
@@ -100,13 +101,13 @@ def _acceleration(time: Floats, apart: Floats, variance: Floats) -> float:
     line = (1 - share)[:, None] * apart[:-2] + share[:, None] * apart[2:]
     noise = np.median(variance[1:-1] + (1 - share) ** 2 * variance[:-2] + share**2 * variance[2:])
     off = np.median(np.sum((apart[1:-1] - line) ** 2, axis=1)) / HALF**2 - noise
-    return float(max(off, STEADY * noise) / np.median(step[:-1] * step[1:] / 2) ** 2)
+    return float(max(off, LEAST_ACCELERATION * noise) / np.median(step[:-1] * step[1:] / 2) ** 2)
 
 
 def _most_probable(pairs: _Pairs) -> Flags:
     """Find the most probable frames (T, P) in which pairs are swapped."""
     wrong = _course(pairs, np.zeros(pairs.visible.shape, bool), np.zeros(pairs.visible.shape))
-    for _ in range(ROUNDS):
+    for _ in range(PAIR_PASSES):
         flips = _flips(wrong, pairs.visible)
         others = flips.sum(axis=1, keepdims=True) > flips
         state, count = (wrong & pairs.visible).sum(axis=1), pairs.visible.sum(axis=1)
@@ -135,7 +136,7 @@ def _course(pairs: _Pairs, easy: Flags, others: Floats) -> Flags:
     for t, observed in enumerate(pairs.visible):
         since |= easy[t]
         off, square = filters.predict(t)
-        flip = np.where(since, OFTEN, RARE)[:, None, None] * OTHER
+        flip = np.where(since, SWAP_RATE_AFTER_OTHER, RARE)[:, None, None] * SWITCHED
         stay = STAY * np.stack([others[t], 1 - others[t]], axis=1)[:, None]
         table = total[:, :, None] + np.minimum(0.5 * square, CAP) + flip + stay
         before = np.where(observed[:, None], table.argmin(axis=1), [0, 1])
@@ -164,7 +165,7 @@ class _Filters:
     def predict(self, t: int) -> tuple[Floats, Floats]:
         """Predict a frame; return errors of observations (P, before, now, 2), and squares in variances."""
         dt = self._pairs.time[t] - self._last
-        known, noise = dt <= LONGEST, self._pairs.variance[t]
+        known, noise = dt <= LONGEST_BREAK_S, self._pairs.variance[t]
         dt = np.where(known, dt, 0.0)
         p, c, v, q = self._p, self._c, self._v, self._pairs.acceleration
         self._moved = (
@@ -195,11 +196,11 @@ class _Filters:
 
 
 SLOWEST = 0.11  # seconds from frame to frame; with longer steps a step looks like a swap
-MOST = 1 / 3  # of a pair's frames; if more are swapped, it is unknown which are right
-AROUND = 1.0  # seconds before and after an interval that are lifted with it
-NEAR = 0.5  # seconds between intervals that are judged together
-LIMBS = (("hip", "knee", "ankle", "heel", "toe"), ("shoulder", "elbow", "wrist", "hand"))
-CLEAR = 9.0  # log evidence that a swap must gain for each pair
+MOST_SWAPPED_SHARE = 1 / 3  # of a pair's frames; if more are swapped, it is unknown which are right
+SECONDS_AROUND = 1.0  # seconds before and after an interval that are lifted with it
+NEAR_INTERVALS_S = 0.5  # seconds between intervals that are judged together
+LIMB_JOINTS = (("hip", "knee", "ankle", "heel", "toe"), ("shoulder", "elbow", "wrist", "hand"))
+SWAP_EVIDENCE = 9.0  # log evidence that a swap must gain for each pair
 
 
 class Reading(NamedTuple):
@@ -256,7 +257,7 @@ def undo_swaps(keypoints: Keypoints, sd: float, evidence: Evidence) -> tuple[Key
     observed = np.asarray(keypoints.visible[:, pairs].any(axis=2))
     steady = _without_spikes(keypoints, pairs, sd)
     wrong = _completed(keypoints, pairs, steady, suspected(steady, pairs, sd)) & observed
-    wrong &= wrong.sum(axis=0) <= MOST * observed.sum(axis=0)
+    wrong &= wrong.sum(axis=0) <= MOST_SWAPPED_SHARE * observed.sum(axis=0)
     for first, end in list(_intervals(keypoints, wrong)):
         part = _around(keypoints, first, end)
         own = slice(first - part.start, end - part.start)
@@ -327,16 +328,18 @@ def _along(time: Floats, rows: Ints, uv: Floats) -> Floats:
 
 
 def _intervals(keypoints: Keypoints, wrong: Flags) -> Iterator[tuple[int, int]]:
-    """Yield first row, and the row after the last, of intervals with `wrong` pairs more than `NEAR` apart."""
+    """Yield first row, and row after the last, of intervals with `wrong` pairs, `NEAR_INTERVALS_S` apart."""
     rows = np.flatnonzero(wrong.any(axis=1))
-    parts = np.split(rows, np.flatnonzero(np.diff(keypoints.time[rows]) > NEAR) + 1)
+    parts = np.split(rows, np.flatnonzero(np.diff(keypoints.time[rows]) > NEAR_INTERVALS_S) + 1)
     return ((int(part[0]), int(part[-1]) + 1) for part in parts if part.size)
 
 
 def _around(keypoints: Keypoints, first: int, end: int) -> slice:
     """Return the rows of an interval and its surroundings."""
-    begin = np.searchsorted(keypoints.time, keypoints.time[first] - AROUND)
-    return slice(int(begin), int(np.searchsorted(keypoints.time, keypoints.time[end - 1] + AROUND, "right")))
+    begin = np.searchsorted(keypoints.time, keypoints.time[first] - SECONDS_AROUND)
+    return slice(
+        int(begin), int(np.searchsorted(keypoints.time, keypoints.time[end - 1] + SECONDS_AROUND, "right"))
+    )
 
 
 def _swapped(keypoints: Keypoints, pairs: Ints, wrong: Flags) -> Keypoints:
@@ -367,7 +370,7 @@ def _judged(
 
     def score(flags: Flags, near: Reading | None = None) -> tuple[float, Reading]:
         found = evidence(_swapped(keypoints, pairs, flags), near)
-        return found.density - CLEAR * int(flags[own].any(axis=0).sum()), found
+        return found.density - SWAP_EVIDENCE * int(flags[own].any(axis=0).sum()), found
 
     def cost(flags: Flags) -> float:
         off = _swapped(keypoints, pairs, flags).uv - motion.predicted
@@ -396,7 +399,9 @@ def _judged(
 def _limbs(keypoints: Keypoints, pairs: Ints) -> list[Ints]:
     """Group the pairs: legs, arms, and the others."""
     joints = [keypoints.names[left][2:] for left in pairs[:, 0]]
-    limb = np.array([next((k for k, limb in enumerate(LIMBS) if joint in limb), -1) for joint in joints])
+    limb = np.array(
+        [next((k for k, limb in enumerate(LIMB_JOINTS) if joint in limb), -1) for joint in joints]
+    )
     return [np.flatnonzero(limb == k) for k in np.unique(limb)]
 
 

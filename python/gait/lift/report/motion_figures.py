@@ -22,17 +22,17 @@ from gait.report.figures import STICKS, Drawing, plain
 
 Floats = npt.NDArray[np.float64]
 
-SHOWN = 5  # frames of a segment that are drawn
-STEP = 0.75  # statures; least distance between figures of a row
-GAP = 0.1  # statures; least gap between figures
-WIDTH, LABEL = 8.5, 1.2  # inches; width of the whole, and of the labels left of the rows
+SHOWN_FRAMES = 5  # frames of a segment that are drawn
+LEAST_FIGURE_SPACING = 0.75  # statures; least distance between figures of a row
+LEAST_FIGURE_GAP = 0.1  # statures; least gap between figures
+WIDTH_INCHES, LABEL = 8.5, 1.2  # inches; width of the whole, and of the labels left of the rows
 ABOVE = 0.5  # inches; height of legend and times
 FAINT = "#c8c8c4"
 HALO = 2.5  # points by which lines underneath are wider, so that they show where both agree
 BAR = 0.5  # metres; length of the scale bar
 BELOW = 0.1  # statures; distance of the bar below the last row
 SIDE = np.array([1.0, 0.0, 0.0])  # to the right on the paper: seen from the person's right
-AHEAD = np.array([0.0, 1.0, 0.0])  # seen from ahead
+VIEWED_FROM_AHEAD = np.array([0.0, 1.0, 0.0])  # seen from ahead
 
 
 @dataclass(frozen=True)
@@ -86,7 +86,7 @@ class Strips:
         path : (F, J, 3), optional
             Motion at whose middle each figure is placed; by default its own.
         """
-        self._frames = np.linspace(0, len(places) - 1, min(SHOWN, len(places))).round().astype(int)
+        self._frames = np.linspace(0, len(places) - 1, min(SHOWN_FRAMES, len(places))).round().astype(int)
         middle = (places if path is None else path)[self._frames].mean(axis=1, keepdims=True)
         body = places[self._frames]
         flat = np.stack([(body - middle) @ across, body[..., 2]], axis=2)
@@ -95,16 +95,16 @@ class Strips:
     def figure(self) -> Figure:
         """Draw all rows, as large as possible while figures do not overlap."""
         pitch, (left, right), (low, high) = self._extents()
-        gap = GAP * self._size
+        gap = LEAST_FIGURE_GAP * self._size
         heights = np.full(len(self._titles), high - low + gap)
         heights[-1] += 2 * BELOW * self._size
-        scale = (WIDTH - LABEL) / (right - left)
+        scale = (WIDTH_INCHES - LABEL) / (right - left)
         tall = scale * heights.sum() + ABOVE
-        figure = Figure(figsize=(WIDTH, tall))
+        figure = Figure(figsize=(WIDTH_INCHES, tall))
         bottoms = scale * (heights.sum() - np.cumsum(heights))
         panels = []
         for title, height, bottom in zip(self._titles, heights, bottoms, strict=True):
-            box = (LABEL / WIDTH, bottom / tall, 1 - LABEL / WIDTH, scale * height / tall)
+            box = (LABEL / WIDTH_INCHES, bottom / tall, 1 - LABEL / WIDTH_INCHES, scale * height / tall)
             panels.append(_row(figure, box, title))
             panels[-1].set(xlim=(left, right), ylim=(high + gap / 2 - height, high + gap / 2))
         for each in self._drawn:
@@ -122,11 +122,11 @@ class Strips:
         for each in self._drawn:
             lows[each.row] = np.minimum(lows[each.row], each.flat.min(axis=1))
             highs[each.row] = np.maximum(highs[each.row], each.flat.max(axis=1))
-        apart = highs[:, :-1, 0] - lows[:, 1:, 0] + GAP * self._size
-        pitch = float(max(STEP * self._size, apart.max(initial=0.0)))
+        apart = highs[:, :-1, 0] - lows[:, 1:, 0] + LEAST_FIGURE_GAP * self._size
+        pitch = float(max(LEAST_FIGURE_SPACING * self._size, apart.max(initial=0.0)))
         at = np.arange(len(self._frames)) * pitch
         across = float((lows[..., 0] + at).min()), float((highs[..., 0] + at).max())
-        edge = GAP / 2 * self._size
+        edge = LEAST_FIGURE_GAP / 2 * self._size
         up = float(min(lows[..., 1].min(), 0.0)), float(highs[..., 1].max())
         return pitch, (across[0] - edge, across[1] + edge), up
 
@@ -171,7 +171,9 @@ def scale_bar(axes: Axes, x: float, y: float, words: str = "") -> None:
 
 def clip(keypoints: Keypoints, motion: Motion, view: View, name: str) -> Drawing:
     """Draw frames of a clip: its points with the estimate, and the estimate rotated by 90 degrees."""
-    frames = np.linspace(0, len(keypoints.frame) - 1, min(SHOWN, len(keypoints.frame))).round().astype(int)
+    frames = (
+        np.linspace(0, len(keypoints.frame) - 1, min(SHOWN_FRAMES, len(keypoints.frame))).round().astype(int)
+    )
     figure = Figure(figsize=(9, 4.8), layout="constrained")
     panels = figure.subplots(2, len(frames), squeeze=False)
     _, down, ahead = view.axes

@@ -10,16 +10,16 @@ import numpy.typing as npt
 
 from gait.bindings.lifter import LiftConfig, Lifter
 from gait.bindings.segment_prior import SegmentPrior
-from gait.lift.report.motion_figures import AHEAD, SIDE, Strips
+from gait.lift.report.motion_figures import SIDE, VIEWED_FROM_AHEAD, Strips
 from gait.report.colours import BLUE, DARK, GREY, ORANGE
 from gait.report.figures import Drawing, grid, line_legend
 
 Floats = npt.NDArray[np.float64]
 
 SYNTHESIS = 40  # modes of the paper's fig. 2
-NOISE = 0.02  # metres, of the observed points in figs. 3, 5 and 6
-DRAWS = MODES = 3
-SWING = 2.0  # standard deviations by which uncertain modes are drawn
+OBSERVED_NOISE_M = 0.02  # metres, of the observed points in figs. 3, 5 and 6
+DRAWN_SEGMENTS = DRAWN_MODES = 3
+MODE_SDS = 2.0  # standard deviations by which uncertain modes are drawn
 
 
 @dataclass(frozen=True)
@@ -77,7 +77,7 @@ class Case:
         Posterior variances of the modes' scores.
     log10_volume : float
         log10 of posterior over prior volume.
-    uncertain : (MODES, F, J, 3)
+    uncertain : (DRAWN_MODES, F, J, 3)
         Least certain displacements, one standard deviation long, longest first.
     """
 
@@ -97,10 +97,10 @@ def case(model: str | None, truth: Floats | None, stature: float, what: str, see
     prior, rng = SegmentPrior.load(model), np.random.default_rng(seed)
     gaussian = Gaussian.of(prior, stature)
     x = gaussian.draw(rng) if truth is None else truth
-    axes = np.stack([AHEAD, [0.0, 0.0, 1.0]])
-    uv = x @ axes.T + NOISE * rng.normal(size=(*x.shape[:2], 2))
+    axes = np.stack([VIEWED_FROM_AHEAD, [0.0, 0.0, 1.0]])
+    uv = x @ axes.T + OBSERVED_NOISE_M * rng.normal(size=(*x.shape[:2], 2))
     lifter = Lifter(model, axes, placed_as_learnt(stature))
-    fit = lifter.segment(uv, NOISE)
+    fit = lifter.segment(uv, OBSERVED_NOISE_M)
     if fit.component:
         gaussian = Gaussian.of(prior, stature, fit.component)
     return Case(
@@ -112,7 +112,7 @@ def case(model: str | None, truth: Floats | None, stature: float, what: str, see
         likelihood=lifter.least_squares(),
         variance=np.diag(lifter.posterior()[1])[: len(gaussian.modes)],
         log10_volume=fit.log10_volume,
-        uncertain=lifter.uncertain(MODES)[1],
+        uncertain=lifter.uncertain(DRAWN_MODES)[1],
     )
 
 
@@ -148,7 +148,8 @@ def spectrum(c: Case) -> Drawing:
         "spectrum",
         "Spectrum",
         f"Variances of the modes before and after {c.what} is observed from behind with "
-        f"{1000 * NOISE:.0f} mm of noise: the volume shrinks to 10^{c.log10_volume:.1f} of the prior's.",
+        f"{1000 * OBSERVED_NOISE_M:.0f} mm of noise: the volume shrinks to 10^{c.log10_volume:.1f} of "
+        "the prior's.",
         figure,
     )
 
@@ -158,7 +159,7 @@ def synthesis(c: Case) -> Drawing:
     used = c.gaussian.modes[:SYNTHESIS]
     projected = c.gaussian.projected(c.truth, SYNTHESIS)
     strips = _strips(c, ("from the side", "from ahead"))
-    for row, across in enumerate((SIDE, AHEAD)):
+    for row, across in enumerate((SIDE, VIEWED_FROM_AHEAD)):
         strips.add(row, c.truth, across, DARK, ghost=True)
         strips.add(row, projected, across, ORANGE, path=c.truth)
     figure = strips.figure()
@@ -180,10 +181,10 @@ def _apart(found: Floats, truth: Floats) -> float:
 def draws(c: Case, seed: int) -> Drawing:
     """Draw random segments from the prior (fig. 4)."""
     rng = np.random.default_rng(seed)
-    strips = _strips(c, [f"draw {k + 1}" for k in range(DRAWS)])
-    for row in range(DRAWS):
+    strips = _strips(c, [f"draw {k + 1}" for k in range(DRAWN_SEGMENTS)])
+    for row in range(DRAWN_SEGMENTS):
         strips.add(row, c.gaussian.draw(rng, residual=False), SIDE, BLUE)
-    caption = f"{DRAWS} segments drawn from the prior, seen from the side."
+    caption = f"{DRAWN_SEGMENTS} segments drawn from the prior, seen from the side."
     return Drawing("draws", "Random draws", caption, strips.figure())
 
 
@@ -204,25 +205,26 @@ def estimates(c: Case) -> Drawing:
     return Drawing(
         "estimates",
         "Estimates",
-        f"{c.what.capitalize()} was observed from behind with {1000 * NOISE:.0f} mm of noise and is drawn "
-        "from the side, which shows the unobserved depth. Grey: original. Mean distance of all markers.",
+        f"{c.what.capitalize()} was observed from behind with {1000 * OBSERVED_NOISE_M:.0f} mm of "
+        "noise and is drawn from the side, which shows the unobserved depth. Grey: original. Mean distance "
+        "of all markers.",
         strips.figure(),
     )
 
 
 def uncertain(c: Case) -> Drawing:
     """Draw the least certain displacements, from where they are most visible (fig. 6)."""
-    length = np.linalg.norm(c.uncertain.reshape(MODES, -1), axis=1) / np.sqrt(c.truth[..., 0].size)
+    length = np.linalg.norm(c.uncertain.reshape(DRAWN_MODES, -1), axis=1) / np.sqrt(c.truth[..., 0].size)
     titles = [f"mode {k + 1}\n{1000 * each:.0f} mm" for k, each in enumerate(length)]
     strips = _strips(c, titles)
     for row, mode in enumerate(c.uncertain):
         strips.add(row, c.bayes, SIDE, DARK, ghost=True)
         for sign, colour in ((1, ORANGE), (-1, BLUE)):
-            moved = c.bayes + sign * SWING * mode
+            moved = c.bayes + sign * MODE_SDS * mode
             strips.add(row, moved, SIDE, colour, path=c.bayes)
     depth = [float(np.sum(mode[..., 0] ** 2) / np.sum(mode**2)) for mode in c.uncertain]
     figure = strips.figure()
-    line_legend(figure, {f"+{SWING:g} sd": ORANGE, f"-{SWING:g} sd": BLUE})
+    line_legend(figure, {f"+{MODE_SDS:g} sd": ORANGE, f"-{MODE_SDS:g} sd": BLUE})
     return Drawing(
         "uncertain",
         "What is least certain",

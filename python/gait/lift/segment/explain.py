@@ -22,16 +22,17 @@ from gait.lift.segment.view import Perspective, View
 
 Floats = npt.NDArray[np.float64]
 
-FEWEST = 4  # fewest visible points of a segment that is estimated by itself
-STARTS = 8  # headings from which the search for an unknown one starts, as LIFT_HEADINGS of fit.h
-START_SD = round(np.pi / STARTS, 1)  # radians from a start: half the distance between two
-SAME = 0.2  # radians; explanations with closer headings are the same
+FEWEST_VISIBLE = 4  # fewest visible points of a segment that is estimated by itself
+HEADING_STARTS = 8  # headings from which the search for an unknown one starts, as LIFT_HEADINGS of fit.h
+HEADING_START_SD = round(np.pi / HEADING_STARTS, 1)  # radians from a start: half the distance between two
+SAME_HEADING = 0.2  # radians; explanations with closer headings are the same
 TURN_SD = 0.7  # radians; sd of the change of heading in half a segment
 GROUND_SD = 10.0  # metres, of the position on the ground
-FLOOR_SD = 0.05  # metres, of the floor's height, on which a single segment depends less than a sequence
+#: Metres, of the floor's height, on which a single segment depends less than a sequence.
+SEGMENT_FLOOR_SD_M = 0.05
 ANY_HEIGHT = 10.0  # metres, of the floor's height without a camera
 MOST_SEARCHES = 5  # most searches while the position found is far from the expected one
-FLAT = 100.0  # factor of the modes' standard deviations that leaves almost no prior
+FLAT_PRIOR = 100.0  # factor of the modes' standard deviations that leaves almost no prior
 
 
 @dataclass(frozen=True)
@@ -106,7 +107,7 @@ class SegmentLifter:
     """
 
     def __init__(self, prior: SegmentPrior, view: View, stature: float, stature_sd: float) -> None:
-        height_sd = FLOOR_SD if view.grounded else ANY_HEIGHT
+        height_sd = SEGMENT_FLOOR_SD_M if view.grounded else ANY_HEIGHT
         config = LiftConfig.default(
             stature=stature, stature_sd=stature_sd, place_sd=(GROUND_SD, GROUND_SD, height_sd), lag=-1
         )
@@ -127,13 +128,16 @@ class SegmentLifter:
         return found
 
     def _explanations(self, observed: Observations) -> list[Explanation]:
-        if observed.visible.sum() < FEWEST:
+        if observed.visible.sum() < FEWEST_VISIBLE:
             return []
         fit, weighted = self._robust(observed)
         points = Observations(observed.uv, np.where(weighted > 0, weighted, np.inf))
         if not self._latent:
             return [Explanation(fit.heading, fit.component, fit.place, 1.0, points)]
-        fits = [self._fit(points, start, self._place) for start in 2 * np.pi / STARTS * np.arange(STARTS)]
+        fits = [
+            self._fit(points, start, self._place)
+            for start in 2 * np.pi / HEADING_STARTS * np.arange(HEADING_STARTS)
+        ]
         score = np.array([f.log_evidence + np.log(self._prior.weights[f.component]) for f in fits])
         shares = np.exp(score - score.max())
         shares /= shares.sum()
@@ -165,7 +169,7 @@ class SegmentLifter:
     def _fit(self, observed: Observations, heading: float, place: Floats) -> Fit:
         """Fit a segment near a heading and a position."""
         if self._latent:
-            self._lifter.expect((place[0], place[1], 0.0), heading, START_SD)
+            self._lifter.expect((place[0], place[1], 0.0), heading, HEADING_START_SD)
         return self._lifter.segment(observed.uv, observed.sd)
 
     def _robust(self, observed: Observations) -> tuple[Fit, Floats]:
@@ -184,7 +188,7 @@ class SegmentLifter:
 
 def _same(a: Explanation, b: Explanation) -> bool:
     apart = (a.heading - b.heading + np.pi) % (2 * np.pi) - np.pi
-    return a.component == b.component and bool(abs(apart) < SAME)
+    return a.component == b.component and bool(abs(apart) < SAME_HEADING)
 
 
 def explanations(
@@ -220,7 +224,7 @@ def without_prior(
     UserError
         If the observations of a segment do not determine all modes.
     """
-    flat = SegmentLifter(replace(prior, modes=FLAT * prior.modes), view, stature, stature_sd)
+    flat = SegmentLifter(replace(prior, modes=FLAT_PRIOR * prior.modes), view, stature, stature_sd)
     for each in chosen:
         count, left = prior.size, round(flat.open_modes(each))
         if left:
@@ -270,11 +274,11 @@ class Uncertain:
     ----------
     log10_volume : float
         log10 of posterior over prior volume.
-    sd : (COUNT,)
+    sd : (DISPLACEMENTS,)
         Standard deviations of the least certain displacements, rms per marker, metres, largest first.
-    along, rigid : (COUNT,)
+    along, rigid : (DISPLACEMENTS,)
         Shares of their energy that are along the line of sight, and that move the whole body rigidly.
-    shares : (COUNT, J)
+    shares : (DISPLACEMENTS, J)
         Shares of their energy by marker.
     """
 
@@ -285,7 +289,7 @@ class Uncertain:
     shares: Floats
 
 
-COUNT = 3  # displacements, as in the paper's fig. 6
+DISPLACEMENTS = 3  # displacements, as in the paper's fig. 6
 
 
 def summarise(segments: Sequence[SegmentFit], view: View) -> Uncertain:
@@ -296,9 +300,9 @@ def summarise(segments: Sequence[SegmentFit], view: View) -> Uncertain:
 
 
 def _least_certain(found: SegmentFit, view: View) -> Floats:
-    """Return sd, share along the line of sight, rigid share, and shares by marker, (COUNT, 3 + J)."""
+    """Return sd, share along the line of sight, rigid share, and shares by marker, (DISPLACEMENTS, 3 + J)."""
     ahead, size = view.direction(found.places), np.sqrt(found.places[..., 0].size)
-    rows = zip(found.mode_sd[:COUNT].tolist(), found.modes[:COUNT], strict=True)
+    rows = zip(found.mode_sd[:DISPLACEMENTS].tolist(), found.modes[:DISPLACEMENTS], strict=True)
     return np.array(
         [
             [s / size, share_along(m, ahead), share_rigid(m), *np.sum(m**2, axis=(0, 2)) / np.sum(m**2)]

@@ -16,7 +16,7 @@ from gait.lift.keypoints.observations import Observations
 
 Floats = npt.NDArray[np.float64]
 
-AXES = {"x": (1.0, 0, 0), "y": (0, 1.0, 0), "z": (0, 0, 1.0)}
+VIEW_AXES = {"x": (1.0, 0, 0), "y": (0, 1.0, 0), "z": (0, 0, 1.0)}
 
 
 @dataclass(frozen=True)
@@ -165,12 +165,12 @@ def looking_along(text: str) -> Floats:
     """
     name = text.lstrip("+-")
     try:
-        ahead = np.array(AXES[name] if name in AXES else [float(v) for v in text.split(",")], float)
+        ahead = np.array(VIEW_AXES[name] if name in VIEW_AXES else [float(v) for v in text.split(",")], float)
         if ahead.shape != (3,) or not 0 < np.linalg.norm(ahead) < np.inf:
             raise ValueError
     except ValueError:
         raise UsageError(f"--orthographic {text}: give x, y, z, with - the other way, or X,Y,Z") from None
-    ahead = ahead / np.linalg.norm(ahead) * (-1 if name in AXES and text.startswith("-") else 1)
+    ahead = ahead / np.linalg.norm(ahead) * (-1 if name in VIEW_AXES and text.startswith("-") else 1)
     right = np.cross(ahead, [0.0, 0, 1])
     right = right / np.linalg.norm(right) if np.linalg.norm(right) > 1e-6 else np.array([1.0, 0, 0])
     return np.stack([right, np.cross(ahead, right), ahead])

@@ -16,7 +16,7 @@ from itertools import combinations
 import numpy as np
 import numpy.typing as npt
 
-from gait.lift.smooth.soft_constraints import FEET, Rows, trunk
+from gait.lift.smooth.soft_constraints import FLOOR_JOINTS, Rows, trunk
 
 Floats = npt.NDArray[np.float64]
 
@@ -24,8 +24,8 @@ GRAVITY = 9.81  # m/s^2
 STANDS = 0.5  # probability of standing from which a foot may bear weight
 BALANCE_SD = 0.05  # metres outside the polygon, as feet are lines here and bodies are not pendulums
 EDGE = 0.03  # metres outside the polygon below which a row fades, so that rows do not switch on and off
-LEAST = 1e-3  # metres outside the polygon from which there is a row
-FLAT = 1e-6  # square metres; smaller triangles are degenerate
+LEAST_OUTSIDE_M = 1e-3  # metres outside the polygon from which there is a row
+FLAT_AREA = 1e-6  # square metres; smaller triangles are degenerate
 _LIMBS = (  # from, to, share of the mass, relative position of its centre between them
     ("shoulder", "elbow", 0.0263, 0.576),
     ("elbow", "wrist", 0.0208, 0.61),  # including the hand beyond the wrist, 0.6 % of the mass
@@ -33,7 +33,7 @@ _LIMBS = (  # from, to, share of the mass, relative position of its centre betwe
     ("knee", "ankle", 0.0457, 0.444),
     ("heel", "toe", 0.0133, 0.421),
 )
-SEGMENTS = (
+MASS_SEGMENTS = (
     ("head_top", "neck", 0.0681, 0.594),
     ("neck", "pelvis", 0.4302, 0.432),
     *((f"{s}_{upper}", f"{s}_{lower}", mass, at) for s in "lr" for upper, lower, mass, at in _LIMBS),
@@ -42,10 +42,10 @@ SEGMENTS = (
 
 def masses(names: Sequence[str]) -> Floats | None:
     """Share of the body's mass (J,) that each marker represents; None if an end of a segment is missing."""
-    if not {name for *ends, _, _ in SEGMENTS for name in ends} <= set(names):
+    if not {name for *ends, _, _ in MASS_SEGMENTS for name in ends} <= set(names):
         return None
     share = np.zeros(len(names))
-    for first, second, mass, at in SEGMENTS:
+    for first, second, mass, at in MASS_SEGMENTS:
         share[names.index(first)] += (1 - at) * mass
         share[names.index(second)] += at * mass
     return np.asarray(share / share.sum())
@@ -66,7 +66,7 @@ def balance(rows: Rows, names: Sequence[str], places: Floats, sure: Floats, rate
     share, every = masses(names), np.arange(len(names))
     if share is None:
         return
-    feet, middle = np.array([names.index(name) for name in FEET]), places.swapaxes(1, 2) @ share
+    feet, middle = np.array([names.index(name) for name in FLOOR_JOINTS]), places.swapaxes(1, 2) @ share
     for t in range(1, len(places) - 1):
         on = feet[np.maximum(sure[t - 1], sure[t]) > STANDS]
         if not on.size:
@@ -77,7 +77,7 @@ def balance(rows: Rows, names: Sequence[str], places: Floats, sure: Floats, rate
         corners = nearest(places[t, on, :2], force)
         out = force - corners @ places[t, on, :2]
         away = float(np.hypot(*out))
-        if away < LEAST:
+        if away < LEAST_OUTSIDE_M:
             continue
         size, across = trunk(rows.layout, names, places, np.array([t]))
         columns, factors = [size[0]], [-away * across[0]]
@@ -99,7 +99,7 @@ def nearest(corners: Floats, point: Floats) -> Floats:
     count, every = len(corners), np.eye(len(corners))
     for triangle in map(list, combinations(range(count), 3)):
         system = np.vstack([corners[triangle].T, np.ones(3)])
-        if abs(np.linalg.det(system)) > FLAT:
+        if abs(np.linalg.det(system)) > FLAT_AREA:
             inside = np.linalg.solve(system, np.append(point, 1.0))
             if (inside >= 0).all():
                 return np.asarray(inside @ every[triangle])
@@ -107,6 +107,6 @@ def nearest(corners: Floats, point: Floats) -> Floats:
     found = []
     for first, last in edges:
         along = corners[last] - corners[first]
-        part = np.clip((point - corners[first]) @ along / max(float(along @ along), FLAT), 0.0, 1.0)
+        part = np.clip((point - corners[first]) @ along / max(float(along @ along), FLAT_AREA), 0.0, 1.0)
         found.append((1 - part) * every[first] + part * every[last])
     return min(found, key=lambda weights: float(np.hypot(*(weights @ corners - point))))

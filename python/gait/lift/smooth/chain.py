@@ -23,16 +23,17 @@ from scipy.linalg import blas, lapack
 
 from gait.bindings.segment_prior import SegmentPrior
 from gait.body.skeleton import axis_rotation
+from gait.lift.segment.explain import GROUND_SD
 from gait.lift.smooth.block_arrowhead import Information
 
 Floats = npt.NDArray[np.float64]
 
-GROUND_SD = 10.0  # metres, of the position on the ground
 LASTING = 0.7  # share of the variance outside the modes that is constant within a segment
 THROUGHOUT = 0.5  # share of the latter that is constant in the whole sequence
 OFFSET_SD = 0.009  # statures, of the offsets of a person's joints
-HEADING_SD = 2.0  # radians around the present estimate; practically unknown
-WHOLE = 2  # lasting unknowns that move the whole body: stature and floor; each marker's offset follows
+UNKNOWN_HEADING_SD = 2.0  # radians around the present estimate; practically unknown
+#: Lasting unknowns that move the whole body: stature and floor; each marker's offset follows.
+WHOLE_BODY_UNKNOWNS = 2
 LEADING = 3  # modes in the shapes around which views are linearised
 
 
@@ -181,7 +182,7 @@ class Prior:
 def chain(prior: Prior, around: Around, freedom: Freedom) -> Chain:
     """Make the chain of a prior (from `SegmentPrior.restricted`) with 2 b frames per segment."""
     segments, frames, markers = around.places.shape[:3]
-    size, lasting = 3 * markers * frames // 2, WHOLE + 3 * markers
+    size, lasting = 3 * markers * frames // 2, WHOLE_BODY_UNKNOWNS + 3 * markers
     diagonal, below = _common_information(prior, around, size)
     border, corner = np.zeros((segments + 1, size, lasting)), np.eye(lasting)
     vector, edge, constant, log_det = np.zeros((segments + 1, size)), np.zeros(lasting), 0.0, 0.0
@@ -293,12 +294,15 @@ class Segment:
         mean = own + _over_ground(place) - _over_ground(own) + (freedom.stature - stature) * growth
         floor = np.zeros(place.shape)
         floor[..., 2] = freedom.height_sd
-        self.own = np.stack([mean, freedom.stature_sd * growth, floor]).reshape(1 + WHOLE, -1)
+        self.own = np.stack([mean, freedom.stature_sd * growth, floor]).reshape(1 + WHOLE_BODY_UNKNOWNS, -1)
         self._modes = known.modes[component].reshape(-1, own.size)
         rigid = np.zeros((3, *place.shape))
         rigid[0, ..., 0] = rigid[1, ..., 1] = GROUND_SD
         if known.headings == 0:
-            rigid[2, ..., 0], rigid[2, ..., 1] = -HEADING_SD * shape[..., 1], HEADING_SD * shape[..., 0]
+            rigid[2, ..., 0], rigid[2, ..., 1] = (
+                -UNKNOWN_HEADING_SD * shape[..., 1],
+                UNKNOWN_HEADING_SD * shape[..., 0],
+            )
         self.rigid = rigid.reshape(3, -1)
         self._offset_sd = stature * _offset_sd(known.gamma * known.residual[component])
         self._stature = stature
@@ -349,8 +353,8 @@ class Segment:
 
     def explained(self, places: Floats, lasting: Floats) -> tuple[float, Floats, Floats]:
         """Return the turn of positions (F, J, 3), radians, and their shapes by leading and by all modes."""
-        middle = self.own[0] + lasting[:WHOLE] @ self.own[1:]
-        offsets = lasting[WHOLE:].reshape(-1, 3) * self._offset_sd[:, None]
+        middle = self.own[0] + lasting[:WHOLE_BODY_UNKNOWNS] @ self.own[1:]
+        offsets = lasting[WHOLE_BODY_UNKNOWNS:].reshape(-1, 3) * self._offset_sd[:, None]
         off = ((places @ self._turn - offsets).ravel() - middle) / self.sd
         rigid = np.linalg.solve(self._lower.T, self._rigid_thin @ off)
         rest = self._common.thin @ off - rigid @ self._across
@@ -358,7 +362,7 @@ class Segment:
         leading = middle + rigid @ self.rigid + modes[:LEADING] @ self._modes[:LEADING]
         full = leading + modes[LEADING:] @ self._modes[LEADING:]
         leading, full = (self._in_world(shape).reshape(places.shape) for shape in (leading, full))
-        return HEADING_SD * float(rigid[2]), leading, full
+        return UNKNOWN_HEADING_SD * float(rigid[2]), leading, full
 
 
 def _circle(heading: Floats) -> Floats:

@@ -24,7 +24,7 @@ from gait.lift.smooth.smoother import Problem, Start, State
 
 Floats = npt.NDArray[np.float64]
 
-AROUND = 3  # blocks before and after the corrected ones that are also solved again
+BLOCKS_AROUND = 3  # blocks before and after the corrected ones that are also solved again
 
 
 @dataclass(frozen=True)
@@ -83,8 +83,8 @@ class Interactive:
         state = replace(self._state, errors=self._errors(problem, keypoints.names))
         corrected = np.flatnonzero((keypoints.frame >= frames.start) & (keypoints.frame < frames.stop))
         blocks = problem.at[0][corrected] // problem.grid.frames
-        first = max(int(blocks.min()) - AROUND - 1, 0)
-        end = min(int(blocks.max()) + AROUND + 2, problem.grid.blocks)
+        first = max(int(blocks.min()) - BLOCKS_AROUND - 1, 0)
+        end = min(int(blocks.max()) + BLOCKS_AROUND + 2, problem.grid.blocks)
         part, own = problem.part(first, end), _part(state, first, end, problem.grid.frames)
         held = first > 0, end < problem.grid.blocks
         before = part.at_video(own.places)

@@ -29,7 +29,7 @@ from gait.lift.keypoints.corrections import Pins
 from gait.lift.keypoints.observations import LONGEST_GAP, Grid, Observations, interpolated, resampled
 from gait.lift.keypoints.swaps import Reading
 from gait.lift.segment import explain
-from gait.lift.segment.explain import FEWEST, Explanation, SegmentFit, SegmentLifter, Uncertain
+from gait.lift.segment.explain import FEWEST_VISIBLE, Explanation, SegmentFit, SegmentLifter, Uncertain
 from gait.lift.segment.view import AnyView, Parallel, Perspective, Several, View
 from gait.lift.smooth import size, smoother, soft_constraints
 from gait.lift.smooth.chain import Freedom, Prior, blended, in_turn
@@ -113,7 +113,7 @@ class Unlike(UserError):
 # Largest height of a camera that sees feet, over the distance that follows from the person's size in the
 # picture.
 HIGH = 4.0
-SIZES = (0.6, 1.6)  # range of the extent over that of the mean body; no person is smaller or larger
+EXTENT_RANGE = (0.6, 1.6)  # range of the extent over that of the mean body; no person is smaller or larger
 
 
 def require_metres(
@@ -144,7 +144,9 @@ def require_visible(found: list[list[Explanation]], grid: Grid, keypoints: Keypo
                 f"{1 / step:.2g} frames per second with points are too few to follow a motion; give "
                 f"{np.ceil(1 / LONGEST_GAP):.0f} or more (and check time: seconds)"
             )
-        raise UserError(f"fewer than {FEWEST} points are visible in every segment; give more keypoints")
+        raise UserError(
+            f"fewer than {FEWEST_VISIBLE} points are visible in every segment; give more keypoints"
+        )
     empty = next((s for s, choices in enumerate(found) if not choices), None)
     if alone and empty is not None:
         at = grid.time[empty * grid.frames]
@@ -156,7 +158,7 @@ def require_visible(found: list[list[Explanation]], grid: Grid, keypoints: Keypo
 def require_size(places: Floats, prior: SegmentPrior, stature: float) -> None:
     """Raise Unlike for an estimate that shrank or grew to fit a motion unlike the prior's."""
     ratio = _extent(places) / (stature * _extent(prior.mean[0]))
-    if not SIZES[0] < ratio < SIZES[1]:
+    if not EXTENT_RANGE[0] < ratio < EXTENT_RANGE[1]:
         raise Unlike(
             f"the estimate is {ratio:.2f} times a person's size: the motion is unlike the model's, or "
             "the camera wrong (R, t: world to camera, t in metres?); learn a model with such motions, or use "
@@ -404,7 +406,7 @@ class Evidence:
 
     def __init__(self, prior: SegmentPrior, names: tuple[str, ...], view: AnyView, options: Options) -> None:
         self._view, self._options = view, replace(options, method="smooth")
-        self._prior = prior.restricted(tuple(n for n in prior.names if n in {*names, *smoother.HIPS}))
+        self._prior = prior.restricted(tuple(n for n in prior.names if n in {*names, *smoother.HIP_JOINTS}))
 
     @cached_property
     def _lifter(self) -> SegmentLifter:
@@ -442,7 +444,7 @@ def _lift(of: _Sequence) -> Motion:
     """Estimate all markers of a prior."""
     if of.options.method != "smooth":
         return _alone(of, _task(of, displacements=None))
-    task = _task(of, displacements=explain.COUNT)
+    task = _task(of, displacements=explain.DISPLACEMENTS)
     found = smoother.smooth(
         of.prior,
         task.observed,
@@ -511,8 +513,8 @@ def _alone(of: _Sequence, task: _Task) -> Motion:
     at = grid.between(of.keypoints.time)
     placed, scale = interpolated(join(places, grid.frames), *at), interpolated(task.lengths, *at)
     rooted, about_hips = places, sds
-    if set(smoother.HIPS) <= set(prior.names):
-        hips = prior.index(smoother.HIPS)
+    if set(smoother.HIP_JOINTS) <= set(prior.names):
+        hips = prior.index(smoother.HIP_JOINTS)
         rooted = places - places[:, :, hips].mean(axis=2, keepdims=True)
         about_hips = np.stack([fit.rooted_sd(hips) for fit in fits])
     sd, rooted_sd = (

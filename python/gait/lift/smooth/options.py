@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-FLOOR_SD = 0.03  # metres, of the floor's height
+FLOOR_HEIGHT_SD_M = 0.03  # metres, of the floor's height
 METHODS = ("smooth", "blend", "segment", "likelihood")
 
 
@@ -32,7 +32,7 @@ class Options:
     method: str = "smooth"
     stature: float | None = None
     pixel_sd: float = 3.0
-    floor_sd: float = FLOOR_SD
+    floor_sd: float = FLOOR_HEIGHT_SD_M
     contact: bool = True
     bones: bool = True
     balance: bool = False

@@ -27,9 +27,9 @@ from gait.lift.segment.view import AnyView, Perspective, Several
 
 Floats = npt.NDArray[np.float64]
 
-NEAREST = 0.1  # metres in front of the lens; least depth for the noise
-NEAR = 0.5  # metres from the ray within which a guess is good enough for the projection's derivatives
-NOISE = 5.0  # standard deviations from the ray that noise alone may cause, so that the guess is also good
+LEAST_DEPTH_M = 0.1  # metres in front of the lens; least depth for the noise
+NEAR_RAY_M = 0.5  # metres from the ray within which a guess is good enough for the projection's derivatives
+NOISE_SDS = 5.0  # standard deviations from the ray that noise alone may cause, so that the guess is also good
 
 
 @dataclass(frozen=True)
@@ -89,13 +89,13 @@ def perspective(observed: Observations, camera: Camera, about: Floats, guess: Fl
     rays = camera.rays(observed.uv[frame, marker]) @ camera.R.T
     ideal = rays[:, :2] / rays[:, 2:]
     places = np.broadcast_to(about, (*observed.sd.shape, 3))[frame, marker]
-    depth = np.maximum(camera.depth(places), NEAREST)
+    depth = np.maximum(camera.depth(places), LEAST_DEPTH_M)
     sd = observed.sd[frame, marker, None] * depth[:, None] / (camera.fx, camera.fy)
     there = places if guess is None else guess[frame, marker]
     guessed, predicted = _ideal(camera, places), _ideal(camera, there)
     miss = (ideal - predicted) * depth[:, None]
     near = np.linalg.norm(miss, axis=1, keepdims=True) < np.maximum(
-        NEAR, NOISE * sd.max(axis=1, keepdims=True)
+        NEAR_RAY_M, NOISE_SDS * sd.max(axis=1, keepdims=True)
     )
     direction = camera.R[:2] - np.where(near, guessed, ideal)[:, :, None] * camera.R[2]
     tangent = miss + np.einsum("nai,ni->na", direction, there)
@@ -104,7 +104,7 @@ def perspective(observed: Observations, camera: Camera, about: Floats, guess: Fl
 
 def _ideal(camera: Camera, places: Floats) -> Floats:
     """Project positions (n, 3) to ideal image coordinates (n, 2)."""
-    depth = np.maximum(camera.depth(places), NEAREST)[:, None]
+    depth = np.maximum(camera.depth(places), LEAST_DEPTH_M)[:, None]
     return np.asarray((places @ camera.R[:2].T + camera.t[:2]) / depth)
 
 

@@ -15,7 +15,7 @@ import numpy.typing as npt
 from gait.bindings.segment_prior import SegmentPrior
 from gait.camera.camera import Camera
 from gait.io.keypoints_file import Keypoints
-from gait.lift.smooth.soft_constraints import BONES
+from gait.lift.smooth.soft_constraints import LIMB_BONES
 
 Floats = npt.NDArray[np.float64]
 
@@ -67,7 +67,7 @@ def bones_ratio(prior: SegmentPrior, places: Floats, stature: float) -> float:
     stature : float
         Metres.
     """
-    known = [bone for bone in BONES if set(bone) <= set(prior.names)]
+    known = [bone for bone in LIMB_BONES if set(bone) <= set(prior.names)]
     if not known:
         return 1.0
     first, last = (prior.index([bone[end] for bone in known]) for end in (0, 1))

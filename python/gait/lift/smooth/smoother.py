@@ -23,7 +23,17 @@ from gait.lift.segment.view import AnyView, Parallel
 from gait.lift.smooth import block_arrowhead, soft_constraints
 from gait.lift.smooth.balance import balance as keep_balance
 from gait.lift.smooth.block_arrowhead import Information
-from gait.lift.smooth.chain import WHOLE, Around, Chain, Freedom, Prior, blended, chain, moved, overlapping
+from gait.lift.smooth.chain import (
+    WHOLE_BODY_UNKNOWNS,
+    Around,
+    Chain,
+    Freedom,
+    Prior,
+    blended,
+    chain,
+    moved,
+    overlapping,
+)
 from gait.lift.smooth.lasting_errors import LastingErrors
 from gait.lift.smooth.rows import rows_of, scale_free
 from gait.lift.smooth.soft_constraints import Layout, Pins, Rows
@@ -31,11 +41,11 @@ from gait.lift.smooth.soft_constraints import Layout, Pins, Rows
 Floats = npt.NDArray[np.float64]
 Ints = npt.NDArray[np.intp]
 
-HIPS = ("l_hip", "r_hip")
+HIP_JOINTS = ("l_hip", "r_hip")
 MOST_STEPS = 25
 SETTLED = 1e-3  # metres; rms change of the positions at which the iteration stops
 FREE_STEPS = 3  # first steps, without constraints on feet and bones
-DRIFT = 5e-4  # relative change of the scale's change from one frame to the next
+SCALE_DRIFT = 5e-4  # relative change of the scale's change from one frame to the next
 
 
 @dataclass(frozen=True)
@@ -292,7 +302,7 @@ class Problem:
         """Linearise the chain around the first guess."""
         shape = overlapping(start.places, self.grid.frames)
         around = Around(start.heading, start.component, start.stature, shape, shape)
-        lasting = np.zeros(WHOLE + 3 * len(self.prior.names))
+        lasting = np.zeros(WHOLE_BODY_UNKNOWNS + 3 * len(self.prior.names))
         return State(around, start.places, start.lengths, lasting, np.zeros(self.errors.count), 0)
 
     def weight(self, state: State) -> None:
@@ -353,7 +363,7 @@ class Problem:
         factors = None
         if isinstance(self.view, Parallel) and self.view.scaled:
             observed, factors = scale_free(observed, near[:, self.visible.markers], scale)
-            soft_constraints.steady_lengths(rows, state.lengths, None if self.view.steady else DRIFT)
+            soft_constraints.steady_lengths(rows, state.lengths, None if self.view.steady else SCALE_DRIFT)
         numbers, pixels = self.errors.factors(observed.frame, observed.marker)
         unit = np.sqrt(observed.variance) / self.points.sd[observed.frame, observed.marker, None]
         lasting = numbers, unit[:, :, None] * pixels[:, None]
@@ -429,9 +439,9 @@ class Problem:
     def _rooted(self, own: Floats, diagonal: Floats, across: Floats) -> Floats:
         """Compute variances (T, J, 3) relative to the middle of the hips; without hips return `own`."""
         every = np.arange(self.layout.markers)
-        if not set(HIPS) <= set(self.prior.names):
+        if not set(HIP_JOINTS) <= set(self.prior.names):
             return own
-        left, right = self.prior.index(HIPS)
+        left, right = self.prior.index(HIP_JOINTS)
         with_left, with_right = (
             self._covariances(diagonal, across, every, np.full_like(every, hip)) for hip in (left, right)
         )

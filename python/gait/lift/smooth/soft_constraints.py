@@ -19,12 +19,12 @@ from gait.lift.smooth.block_arrowhead import Information
 Floats = npt.NDArray[np.float64]
 Ints = npt.NDArray[np.intp]
 
-FEET = ("l_toe", "r_toe", "l_heel", "r_heel")
-TRUNK = ("pelvis", "neck")
+FLOOR_JOINTS = ("l_toe", "r_toe", "l_heel", "r_heel")
+TRUNK_JOINTS = ("pelvis", "neck")
 CONTACT_SPEED = 0.2  # m/s; a foot on the ground is slower
 CONTACT_RISE = 0.04  # metres; a foot on the ground is less than this above its lowest position
 CONTACT_SD = 0.1  # m/s, of a foot on the ground
-BONES = (
+LIMB_BONES = (
     *(
         (f"{s}_{upper}", f"{s}_{lower}")
         for s in "lr"
@@ -37,9 +37,9 @@ BONES = (
     ("l_shoulder", "r_shoulder"),
 )
 WEAK = 10.0  # relative standard deviation of a scale about its guess; practically free
-FIXED = 1e-4  # relative change of a scale that is constant
+CONSTANT_SCALE_SD = 1e-4  # relative change of a scale that is constant
 LEAST_SURE = 0.05  # least probability that a foot stands for which there is a row
-SHORTEST = 0.02  # metres; least length of a bone
+LEAST_BONE_M = 0.02  # metres; least length of a bone
 BONE_SD = 0.01  # relative change of a length from one frame to the next
 
 
@@ -223,7 +223,7 @@ def contacts(rows: Rows, names: Sequence[str], places: Floats, rate: float) -> F
     sure : (grid - 1, feet)
         Probability that a foot stands from each frame to the next.
     """
-    feet = np.array([names.index(name) for name in FEET if name in names], np.intp)
+    feet = np.array([names.index(name) for name in FLOOR_JOINTS if name in names], np.intp)
     if not len(feet):
         return np.zeros((len(places) - 1, 0))
     sure = _contact(places[:, feet], rate)
@@ -250,9 +250,9 @@ def _contact(feet: Floats, rate: float) -> Floats:
 
 def trunk(layout: Layout, names: Sequence[str], places: Floats, frame: Ints) -> tuple[Ints, Floats]:
     """Columns and factors (n, 6) of the trunk's length over its present one; empty without a trunk."""
-    if not set(TRUNK) <= set(names):
+    if not set(TRUNK_JOINTS) <= set(names):
         return np.zeros((len(frame), 0), np.intp), np.zeros((len(frame), 0))
-    ends = [names.index(name) for name in TRUNK]
+    ends = [names.index(name) for name in TRUNK_JOINTS]
     along = places[frame, ends[1]] - places[frame, ends[0]]
     along /= np.sum(along**2, axis=1, keepdims=True)
     columns = [layout.place(frame, end)[:, None] + np.arange(3) for end in ends]
@@ -261,11 +261,13 @@ def trunk(layout: Layout, names: Sequence[str], places: Floats, frame: Ints) -> 
 
 def bones(rows: Rows, names: Sequence[str], places: Floats) -> None:
     """Add rows that keep the logarithms of bones' lengths, linearised at `places` (grid, J, 3)."""
-    pairs = np.array([[names.index(n) for n in bone] for bone in BONES if set(bone) <= set(names)], np.intp)
+    pairs = np.array(
+        [[names.index(n) for n in bone] for bone in LIMB_BONES if set(bone) <= set(names)], np.intp
+    )
     if not len(pairs):
         return
     along = places[:, pairs[:, 1]] - places[:, pairs[:, 0]]
-    length = np.maximum(np.linalg.norm(along, axis=2), SHORTEST)
+    length = np.maximum(np.linalg.norm(along, axis=2), LEAST_BONE_M)
     slope = along / length[..., None] ** 2
     frame, bone = (part.ravel() for part in np.indices((len(places) - 1, len(pairs))))
     columns, factors = [], []
@@ -290,7 +292,7 @@ def steady_lengths(rows: Rows, lengths: Floats, drift: float | None) -> None:
     grid, guess = rows.layout.grid, lengths / (rows.layout.unit or 1.0)
     at = rows.layout.length(np.arange(grid))
     rows.add(at[:, None], np.ones((grid, 1)), guess, np.full(grid, WEAK))
-    factors, sd = ([-1.0, 1.0], FIXED) if drift is None else ([1.0, -2.0, 1.0], drift)
+    factors, sd = ([-1.0, 1.0], CONSTANT_SCALE_SD) if drift is None else ([1.0, -2.0, 1.0], drift)
     count = grid - len(factors) + 1
     columns = np.stack([at[i : i + count] for i in range(len(factors))], axis=1)
     rows.add(columns, np.tile(factors, (count, 1)), np.zeros(count), np.full(count, sd))

@@ -12,13 +12,14 @@ from scipy.interpolate import make_interp_spline
 
 from gait.bindings.segment_prior import SegmentPrior
 from gait.lift.keypoints.corrections import Correction
+from gait.lift.segment.explain import GROUND_SD
 from gait.lift.video import sensors
 from gait.lift.video.energy import (
     EXTRA,
-    GAIN,
-    HEADING,
-    LEVEL,
-    PLACE,
+    GAIN_COLUMN,
+    HEADING_COLUMN,
+    LEVEL_COLUMN,
+    PLACE_COLUMNS,
     Anchor,
     Corrections,
     Energy,
@@ -32,10 +33,9 @@ from gait.lift.video.sensors import Film, View
 Floats = npt.NDArray[np.float64]
 Indices = npt.NDArray[np.intp]
 
-FAR = 10.0  # metres; a segment may start anywhere on the ground
-TURN = 10.0  # radians; it may have any heading
+ANY_HEADING_SD = 10.0  # radians; it may have any heading
 CORRELATED = 6.0  # root of the number of sensors, or markers shared by segments, that count as one
-BODY = 0.01  # metres; error of a joint's position in a clothed body, constant in a segment
+CLOTHED_JOINT_SD = 0.01  # metres; error of a joint's position in a clothed body, constant in a segment
 FIRST_SD = 1.0  # of a sensor, before it has been estimated
 
 
@@ -148,9 +148,9 @@ class ClipSegments:
     def mean_state(self) -> Floats:
         """State (k + 6,) from the placement and the prior's mean."""
         state = np.zeros(self.shapes[0].size)
-        state[PLACE] = [*self.placement.ground, 0.0]
-        state[HEADING] = self.placement.heading if self.shapes[0].turning else 0.0
-        state[[GAIN, LEVEL]] = self.settings.gain[0], self.settings.level[0]
+        state[PLACE_COLUMNS] = [*self.placement.ground, 0.0]
+        state[HEADING_COLUMN] = self.placement.heading if self.shapes[0].turning else 0.0
+        state[[GAIN_COLUMN, LEVEL_COLUMN]] = self.settings.gain[0], self.settings.level[0]
         return state
 
     def first_modes(self, component: int) -> tuple[Floats, Floats]:
@@ -184,9 +184,9 @@ class ClipSegments:
         placement, first = self.placement, segment == self.origin
         if first:
             mean[:-EXTRA], sd[:-EXTRA] = self.first_modes(component)
-        sd[PLACE] = [*[placement.ground_sd if first else FAR] * 2, HEIGHT_SD]
-        sd[HEADING] = placement.heading_sd if first else TURN
-        sd[[GAIN, LEVEL]] = self.settings.gain[1], self.settings.level[1]
+        sd[PLACE_COLUMNS] = [*[placement.ground_sd if first else GROUND_SD] * 2, HEIGHT_SD]
+        sd[HEADING_COLUMN] = placement.heading_sd if first else ANY_HEADING_SD
+        sd[[GAIN_COLUMN, LEVEL_COLUMN]] = self.settings.gain[1], self.settings.level[1]
         shape, weights = self.shapes[component], self.weights(segment)
         energy = Energy(shape, self.view, self.sticks, weights, mean, sd, anchor=anchor)
         reading = self._reading(segment, energy, near) if looking else None
@@ -216,8 +216,8 @@ class ClipSegments:
         if not held:
             return None
         marker = self.prior.index([c.joint for c in held])
-        lasting = BODY**2 + shape.residual[marker] ** 2 / self.prior.frames
-        skin = self.view.scale(near[PLACE]) * np.sqrt(np.bincount(marker)[marker] * lasting)
+        lasting = CLOTHED_JOINT_SD**2 + shape.residual[marker] ** 2 / self.prior.frames
+        skin = self.view.scale(near[PLACE_COLUMNS]) * np.sqrt(np.bincount(marker)[marker] * lasting)
         return Corrections(
             frame=np.array([frames.index(c.frame) for c in held], np.intp),
             marker=marker,

@@ -19,13 +19,13 @@ import numpy.typing as npt
 from scipy.linalg import LinAlgError
 
 from gait.lift.smooth.block_arrowhead import Factor, factor
-from gait.lift.video.energy import GAIN, Energy
+from gait.lift.video.energy import GAIN_COLUMN, Energy
 
 Floats = npt.NDArray[np.float64]
 
-ROUNDS = 15
-FLAT = 1e-3  # relative gain at which a descent ends
-DAMPING = (1e-6, 1e-3, 1e8)  # least, first and largest
+MOST_DESCENT_STEPS = 15
+LEAST_DESCENT_GAIN = 1e-3  # relative gain at which a descent ends
+DAMPING_RANGE = (1e-6, 1e-3, 1e8)  # least, first and largest
 
 
 @dataclass(frozen=True)
@@ -93,16 +93,16 @@ def _ends(energy: Energy, state: Floats, link: Link) -> tuple[tuple[Floats, Floa
 def descend(chain: Sequence[Energy], link: Link | None, states: Floats) -> tuple[Floats, float]:
     """Find states (B, n) of least energy near a start; also return the energy."""
     states, now = states.copy(), normal(chain, link, states)
-    least, damping, most = DAMPING
+    least, damping, most = DAMPING_RANGE
     diagonal = np.einsum("bii->bi", now.diagonal).copy()
-    for _ in range(ROUNDS):
+    for _ in range(MOST_DESCENT_STEPS):
         trial = _stepped(chain, states, now, damping * diagonal)
         then = None if trial is None else normal(chain, link, trial)
         if trial is not None and then is not None and then.cost < now.cost:
             gain, states, now = now.cost - then.cost, trial, then
             diagonal = np.einsum("bii->bi", now.diagonal).copy()
             damping = max(0.2 * damping, least)
-            if gain < FLAT * now.cost:
+            if gain < LEAST_DESCENT_GAIN * now.cost:
                 break
         else:
             damping *= 8
@@ -163,6 +163,6 @@ def _pull(energy: Energy, state: Floats) -> Floats:
     from_middle = uv - (uv.min(axis=1, keepdims=True) + uv.max(axis=1, keepdims=True)) / 2
     by_shift = pixels[:, None, None] * SHIFT_SD * by_uv.sum(axis=2)
     by_size = SIZE_SD * (by_uv * from_middle[:, None]).sum(axis=(2, 3))
-    by_error = np.exp(state[GAIN]) * np.concatenate([by_shift, by_size[..., None]], axis=-1)
+    by_error = np.exp(state[GAIN_COLUMN]) * np.concatenate([by_shift, by_size[..., None]], axis=-1)
     _, slope = energy.sensor_rows(reading, state)
     return np.asarray(slope.T @ by_error.reshape(len(slope), -1) / reading.sd)

@@ -35,9 +35,9 @@ from gait.lift.video.sensors import View
 Floats = npt.NDArray[np.float64]
 
 #: The sticks: bones, and the outlines of the trunk.
-STICKS = (*BONES, *((f"{s}_shoulder", f"{s}_hip") for s in "lr"))
-SHORTEST = 1e-3  # pixels; a stick that points at the viewer still has a direction
-_ROOT = 1 / np.sqrt(2 * np.pi)
+STICK_ENDS = (*BONES, *((f"{s}_shoulder", f"{s}_hip") for s in "lr"))
+LEAST_STICK_PX = 1e-3  # pixels; a stick that points at the viewer still has a direction
+DENSITY_AT_0 = 1 / np.sqrt(2 * np.pi)
 
 
 @dataclass(frozen=True)
@@ -64,14 +64,14 @@ class Sticks:
         UserError
             If a joint of the stick figure is not among them.
         """
-        joints = list(dict.fromkeys(joint for stick in STICKS for joint in stick))
+        joints = list(dict.fromkeys(joint for stick in STICK_ENDS for joint in stick))
         missing = [joint for joint in joints if joint not in names]
         if missing:
             raise UserError(
                 f"prior: has no marker {' '.join(missing)}; learn it with --segment-markers virtual"
             )
         markers = np.array([list(names).index(joint) for joint in joints], np.intp)
-        ends = np.array([[joints.index(a), joints.index(b)] for a, b in STICKS], np.intp)
+        ends = np.array([[joints.index(a), joints.index(b)] for a, b in STICK_ENDS], np.intp)
         return Sticks(markers, ends)
 
     def responses(self, uv: Floats, places: Floats, blur: Floats) -> tuple[Floats, Floats]:
@@ -106,15 +106,15 @@ def stick_responses(ends: Floats, places: Floats, blur: Floats) -> tuple[Floats,
     """
     s = blur[:, None, None]
     along = ends[:, :, 1] - ends[:, :, 0]
-    length = np.maximum(np.hypot(along[..., 0], along[..., 1]), SHORTEST)
+    length = np.maximum(np.hypot(along[..., 0], along[..., 1]), LEAST_STICK_PX)
     ex, ey = (along[:, None, :, i] / length[:, None] for i in (0, 1))
     x, y = (places[:, :, None, i] - ends[:, None, :, 0, i] for i in (0, 1))
     u, d, long = x * ex + y * ey, y * ex - x * ey, length[:, None]
     across = np.exp(-0.5 * (d / s) ** 2)
     near, far = u / s, (u - long) / s
     value = across * (ndtr(near) - ndtr(far))
-    by_l = across * (_ROOT / s * np.exp(-0.5 * far * far))
-    by_u = across * (_ROOT / s * np.exp(-0.5 * near * near)) - by_l
+    by_l = across * (DENSITY_AT_0 / s * np.exp(-0.5 * far * far))
+    by_u = across * (DENSITY_AT_0 / s * np.exp(-0.5 * near * near)) - by_l
     by_d = -d / s**2 * value
     # rotating the stick by an angle n . (step of end 1 - step of end 0) / L moves (u, d) by (d, -u) times it
     turn = (by_u * d - by_d * u) / long
@@ -128,7 +128,7 @@ def stick_responses(ends: Floats, places: Floats, blur: Floats) -> tuple[Floats,
 Indices = npt.NDArray[np.intp]
 
 EXTRA = 6  # entries of the state after alpha
-PLACE, HEADING, GAIN, LEVEL = slice(-6, -3), -3, -2, -1
+PLACE_COLUMNS, HEADING_COLUMN, GAIN_COLUMN, LEVEL_COLUMN = slice(-6, -3), -3, -2, -1
 
 
 @dataclass(frozen=True)
@@ -183,16 +183,16 @@ class Shape:
         """
         modes = np.tensordot(weights, self.modes[:, markers], axes=1)
         body = np.tensordot(weights, self.mean[:, markers], axes=1) + modes @ state[:-EXTRA]
-        heading = state[HEADING] if self.turning else 0.0
+        heading = state[HEADING_COLUMN] if self.turning else 0.0
         c, s = np.cos(heading), np.sin(heading)
         turn = np.array([[c, -s, 0], [s, c, 0], [0, 0, 1]])
         by_turn = np.array([[-s, -c, 0], [c, -s, 0], [0, 0, 0]])
         slope = np.zeros((*body.shape, self.size))
         slope[..., :-EXTRA] = turn @ modes
-        slope[..., PLACE] = np.eye(3)
+        slope[..., PLACE_COLUMNS] = np.eye(3)
         if self.turning:
-            slope[..., HEADING] = body @ by_turn.T
-        return body @ turn.T + state[PLACE], slope
+            slope[..., HEADING_COLUMN] = body @ by_turn.T
+        return body @ turn.T + state[PLACE_COLUMNS], slope
 
 
 @dataclass(frozen=True)
@@ -280,10 +280,10 @@ class Energy:
         uv, by_place = self.view.project(places)
         response, by_uv = self.sticks.responses(uv, reading.places, reading.blur)
         drawn = (by_place @ by_state).reshape(len(uv), -1, len(state))  # (T, M * 2, n)
-        gain = np.exp(state[GAIN])
+        gain = np.exp(state[GAIN_COLUMN])
         slope = gain * (by_uv.reshape(*response.shape, -1) @ drawn)
-        slope[..., GAIN], slope[..., LEVEL] = gain * response, 1.0
-        residual = state[LEVEL] + gain * response - reading.value
+        slope[..., GAIN_COLUMN], slope[..., LEVEL_COLUMN] = gain * response, 1.0
+        residual = state[LEVEL_COLUMN] + gain * response - reading.value
         return residual.ravel() / reading.sd, slope.reshape(-1, len(state)) / reading.sd
 
     def correction_rows(self, state: Floats) -> tuple[Floats, Floats]:

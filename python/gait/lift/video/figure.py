@@ -26,10 +26,10 @@ from gait.report.drawing import draw_bones, tinted
 
 Floats = npt.NDArray[np.float64]
 
-JOINT_SD, SKIN_SD = 0.01, 0.02  # statures; errors of a joint's, or skin marker's, position in its limb
-FEWEST = 8  # fewest markers
+FIGURE_JOINT_SD, SKIN_SD = 0.01, 0.02  # statures; errors of a joint's, or skin marker's, position in its limb
+FEWEST_MARKERS = 8  # fewest markers
 _BODY = default_skeleton()
-LIMBS = tuple(_BODY.limbs)
+BODY_LIMBS = tuple(_BODY.limbs)
 
 
 @dataclass(frozen=True)
@@ -59,14 +59,14 @@ class Figure:
             If too few markers are among `gait.learn.segments.virtual_markers.MARKERS`.
         """
         used = [name for name in names if name in MARKERS]
-        if len(used) < FEWEST:
-            raise UserError(f"the cylinder figure needs {FEWEST} markers of {' '.join(MARKERS)}")
+        if len(used) < FEWEST_MARKERS:
+            raise UserError(f"the cylinder figure needs {FEWEST_MARKERS} markers of {' '.join(MARKERS)}")
         body = marked_skeleton()
         row = [body.points.index(name) for name in used]
         points = skeleton_fit.Points(
             segment=body.point_frames[row].astype(np.intp),
             at=body.point_positions[row],
-            sd=np.array([SKIN_SD if name in SKIN else JOINT_SD for name in used]),
+            sd=np.array([SKIN_SD if name in SKIN else FIGURE_JOINT_SD for name in used]),
         )
         found = skeleton_fit.fit(places[:, [list(names).index(name) for name in used]], points)
         return Figure(found.log_scales, found.pose, found.residual)
@@ -97,12 +97,12 @@ class Figure:
         }
 
     def surfaces(self) -> Floats:
-        """Compute points (T, L, P, 3), metres, on the surfaces of `LIMBS`: each limb is their hull."""
+        """Compute points (T, L, P, 3), metres, on the surfaces of `BODY_LIMBS`: each limb is their hull."""
         posed = pose_skeleton(self.pose, segment_origins(self.log_scales))
         segment = np.repeat(_BODY.limb_frames[:, 0], RING * SLICES).astype(np.intp)
         local = segment_scales(self.log_scales)[segment] * _SURFACE.reshape(-1, 3)
         points = posed.points(local, segment)
-        return points.reshape(len(points), len(LIMBS), -1, 3)
+        return points.reshape(len(points), len(BODY_LIMBS), -1, 3)
 
 
 RING, SLICES = 20, 7  # points around a limb, and rings along it
@@ -160,7 +160,9 @@ def draw_figure(
         return np.asarray(canvas, np.uint8)
     size = max(0.3, 1.7 * view.scale(joints[JOINTS.index("pelvis")]) / 400)
     width = max(1, round(1.5 * size))
-    canvas = tinted(np.asarray(canvas, np.uint8), _limb_ids(canvas.shape[:2], view, surfaces), LIMBS, width)
+    canvas = tinted(
+        np.asarray(canvas, np.uint8), _limb_ids(canvas.shape[:2], view, surfaces), BODY_LIMBS, width
+    )
     uv = dict(zip(JOINTS, view.project(joints)[0], strict=True))
     draw_bones(canvas, uv, width + 2, _DARK)
     draw_bones(canvas, uv, width)

@@ -23,13 +23,14 @@ from gait.body.skeleton import JOINTS
 from gait.lift.keypoints.suggestions import FramePosterior, Suggestion, suggest
 from gait.lift.video.clip_segments import CORRELATED, ClipSegments
 from gait.lift.video.descent import Link, Normal, descend, information, moves, normal
-from gait.lift.video.energy import HEADING, PLACE, Anchor, Energy
+from gait.lift.video.energy import HEADING_COLUMN, PLACE_COLUMNS, Anchor, Energy
 
 Floats = npt.NDArray[np.float64]
 
-HELD = 0.9  # fit correlation of figures that follow a person in front of a known background
+FOLLOWING_CORRELATION = 0.9  # fit correlation of figures that follow a person in front of a known background
 CHANCE = 0.3  # fit correlation that a figure anywhere in a scene may have
-DRIFT_SD = 0.04  # metres per second at twice the noise of `HELD`; maximum likelihood without a background
+#: Metres per second at twice the noise of `FOLLOWING_CORRELATION`; maximum likelihood without a background.
+DRIFT_SD = 0.04
 POOR_CORRELATION = 0.5  # below it, figures lost the person in half of the clips used to choose it
 
 
@@ -58,19 +59,19 @@ def drift(alike: float) -> float:
             np.sqrt(1 / max(value, CHANCE) ** 2 - 1)
         )  # standard deviation not explained over that explained
 
-    return 0.0 if np.isnan(alike) else DRIFT_SD * max(0.0, noise(alike) / noise(HELD) - 1)
+    return 0.0 if np.isnan(alike) else DRIFT_SD * max(0.0, noise(alike) / noise(FOLLOWING_CORRELATION) - 1)
 
 
 Indices = npt.NDArray[np.intp]
 Update = Callable[[int], None]
 Settled = tuple[float, int, Floats]  # energy, component and state of a segment
 
-LOOSE = 0.03  # statures; error of the segment before, when the next one starts from it
+PREVIOUS_SEGMENT_SD = 0.03  # statures; error of the segment before, when the next one starts from it
 BEGINNINGS = 3  # explanations of the first segment that are continued through the clip
 DIFFERENT = 0.03  # statures; mean distance of markers from which explanations are different
-START_MODES, START_SD = 3, 1.5  # the first segment starts from the mean, and +- this sd of these modes
-LEAST = 1e-3  # weight of a segment in the blend at its ends
-PASSES = 2  # times that sensors are placed again around the figure found
+START_MODES, START_MODE_SD = 3, 1.5  # the first segment starts from the mean, and +- this sd of these modes
+LEAST_BLEND_WEIGHT = 1e-3  # weight of a segment in the blend at its ends
+SENSOR_PASSES = 2  # times that sensors are placed again around the figure found
 
 
 @dataclass(frozen=True)
@@ -197,7 +198,7 @@ def _first_starts(clip: ClipSegments, component: int) -> list[Floats]:
     start[: len(mean)] = mean
     starts = [start]
     for mode in range(min(START_MODES, clip.prior.size)):
-        for side in (-START_SD, START_SD):
+        for side in (-START_MODE_SD, START_MODE_SD):
             starts.append(start.copy())
             starts[-1][mode] += side * sd[mode]
     return starts
@@ -209,15 +210,15 @@ def _continued(
     """Return a start for the segment after (step 1) or before (-1) a known one, and the anchor to it."""
     frames, hop = clip.prior.frames, clip.prior.hop
     places, _ = clip.shapes[old].positions(state, np.eye(frames), slice(None))
-    sd = CORRELATED * np.hypot(clip.shapes[component].residual, LOOSE * clip.placement.stature)
+    sd = CORRELATED * np.hypot(clip.shapes[component].residual, PREVIOUS_SEGMENT_SD * clip.placement.stature)
     shared = slice(hop, None) if step > 0 else slice(frames - hop)
     there = slice(frames - hop) if step > 0 else slice(hop, None)
     anchor = Anchor(there, places[shared], sd)
     start = state.copy()
-    start[: PLACE.start] = 0.0
+    start[: PLACE_COLUMNS.start] = 0.0
     pelvis = places[:, clip.prior.names.index("pelvis")]
     ahead = pelvis[min(hop, frames - 1), :2]
-    start[PLACE][:2] = ahead if step > 0 else 2 * pelvis[0, :2] - ahead
+    start[PLACE_COLUMNS][:2] = ahead if step > 0 else 2 * pelvis[0, :2] - ahead
     blind = Energy(
         clip.shapes[component],
         clip.view,
@@ -233,7 +234,7 @@ def _continued(
 def _broad(clip: ClipSegments) -> Floats:
     """Return standard deviations of a state of which only the shape is known."""
     sd = np.ones(clip.shapes[0].size)
-    sd[PLACE], sd[HEADING] = 1.0, 1.0
+    sd[PLACE_COLUMNS], sd[HEADING_COLUMN] = 1.0, 1.0
     return sd
 
 
@@ -242,7 +243,7 @@ def _settled(
 ) -> Settled:
     """Minimise the energy of one segment, with sensors that follow it; return energy, component and state."""
     cost = np.inf
-    for _ in range(PASSES):
+    for _ in range(SENSOR_PASSES):
         energy = clip.energy(segment, component, state, anchor=anchor)
         (state,), cost = descend([energy], None, state[None])
     return cost - 2 * float(np.log(clip.prior.weights[component])), component, state
@@ -269,7 +270,7 @@ def _chain(clip: ClipSegments, sequence: ClipStates, looking: bool) -> tuple[lis
 def _together(clip: ClipSegments, start: ClipStates, looking: bool = True) -> ClipStates:
     """Minimise the energy of all segments together near a start, coupled with their neighbours."""
     states, cost = start.states, np.inf
-    for _ in range(PASSES if looking else 1):
+    for _ in range(SENSOR_PASSES if looking else 1):
         chain, link = _chain(clip, ClipStates(start.components, states, cost), looking)
         states, cost = descend(chain, link, states)
     return ClipStates(start.components, states, cost)
@@ -286,9 +287,9 @@ def _continuous(clip: ClipSegments, sequence: ClipStates) -> ClipStates:
             clip.shapes[int(sequence.components[s])].positions(states[s], np.eye(frames), slice(None))[0]
             for s in pair
         )
-        away = clip.view.away(states[segment][PLACE])
+        away = clip.view.away(states[segment][PLACE_COLUMNS])
         gap = step * float(((early[hop:] - late[: frames - hop]) @ away).mean())
-        states[segment, PLACE] += gap * away
+        states[segment, PLACE_COLUMNS] += gap * away
     return ClipStates(sequence.components, states, sequence.energy)
 
 
@@ -300,7 +301,7 @@ def _share(clip: ClipSegments, segment: int) -> Floats:
     """
     half = 0.5 / clip.prior.fps
     since = clip.film.times[clip.frames(segment)] - clip.starts[segment] + half
-    return np.maximum(1 - np.abs(2 * since / (clip.span + 2 * half) - 1), LEAST)
+    return np.maximum(1 - np.abs(2 * since / (clip.span + 2 * half) - 1), LEAST_BLEND_WEIGHT)
 
 
 def blended(clip: ClipSegments, sequence: ClipStates) -> Floats:
@@ -352,21 +353,22 @@ def _finished(clip: ClipSegments, sequence: ClipStates) -> ClipFit:
     )
 
 
-ENOUGH = 0.03  # statures; joints known this well in the picture need no correction
-MOST = 2.0  # most corrections suggested per frame
+KNOWN_SD = 0.03  # statures; joints known this well in the picture need no correction
+MOST_CORRECTIONS_PER_FRAME = 2.0  # most corrections suggested per frame
 
 
 def suggestions(clip: ClipSegments, fit: ClipFit) -> list[Suggestion]:
-    """Suggest corrections, most useful first, until every joint is known within `ENOUGH` statures.
+    """Suggest corrections, most useful first, until every joint is known within `KNOWN_SD` statures.
 
-    At most `MOST` per frame.  A correction is counted for the segment whose middle is nearest to its frame.
+    At most `MOST_CORRECTIONS_PER_FRAME`.  A correction is counted for the segment whose middle is nearest to
+    its frame.
     """
     joints = [j for j in JOINTS if j in clip.prior.names]
     near = 0.5 * clip.hop / float(np.median(np.diff(clip.film.times))) if len(clip.film.times) > 1 else 1.0
     scale = float(np.median([clip.view.scale(body.mean(axis=0)) for body in fit.places]))
-    enough = ENOUGH * clip.placement.stature * scale
+    enough = KNOWN_SD * clip.placement.stature * scale
     posteriors = _posteriors(clip, fit, clip.prior.index(joints))
-    return suggest(posteriors, joints, near, enough, int(MOST * len(fit.frame)))
+    return suggest(posteriors, joints, near, enough, int(MOST_CORRECTIONS_PER_FRAME * len(fit.frame)))
 
 
 def picture_sd(clip: ClipSegments, fit: ClipFit, joints: Indices) -> Floats:

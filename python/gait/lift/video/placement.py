@@ -34,10 +34,10 @@ from gait.io.fields import Fields
 Floats = npt.NDArray[np.float64]
 
 PLACE_SD = 0.3  # metres on the ground, and radians of heading, unless the placement states it
-HEADING_SD = 0.3
-STATURE_SD = 0.03  # metres
+PLACED_HEADING_SD = 0.3
+STATURE_SD_M = 0.03  # metres
 PHASE_SD = 0.1  # strides; of a phase estimated by a user
-RATE_SD = 0.05  # strides per second
+RATE_SD_HZ = 0.05  # strides per second
 HEIGHT_SD = 0.05  # metres, of the body above the ground, as the floor may not be at 0
 FURTHEST = 1e6  # largest coordinate, pixels or metres
 _SPACE, _PICTURE = ("pelvis",), ("pelvis_px", "height_px")  # keys of the position with and without a camera
@@ -76,14 +76,14 @@ class Placement:
     heading: float
     stature: float
     ground_sd: float = PLACE_SD
-    heading_sd: float = HEADING_SD
-    stature_sd: float = STATURE_SD
+    heading_sd: float = PLACED_HEADING_SD
+    stature_sd: float = STATURE_SD_M
     pelvis_px: tuple[float, float] | None = None
     height_px: float | None = None
     phase: float | None = None
     stride_hz: float | None = None
     phase_sd: float = PHASE_SD
-    stride_hz_sd: float = RATE_SD
+    stride_hz_sd: float = RATE_SD_HZ
     unused: tuple[str, ...] = ()
 
 
@@ -107,12 +107,12 @@ def read_placement(path: str | os.PathLike[str], prior: SegmentPrior, calibrated
         ),
         stature=stature,
         ground_sd=_sd_of(sds, "pelvis", PLACE_SD),
-        heading_sd=_sd_of(sds, "heading_rad", HEADING_SD),
-        stature_sd=_sd_of(sds, "stature_m", STATURE_SD),
+        heading_sd=_sd_of(sds, "heading_rad", PLACED_HEADING_SD),
+        stature_sd=_sd_of(sds, "stature_m", STATURE_SD_M),
         phase=_optional(fields, "phase"),
         stride_hz=_optional(fields, "stride_hz"),
         phase_sd=_sd_of(sds, "phase", PHASE_SD),
-        stride_hz_sd=_sd_of(sds, "stride_hz", RATE_SD),
+        stride_hz_sd=_sd_of(sds, "stride_hz", RATE_SD_HZ),
         unused=tuple(key for key in (_PICTURE if calibrated else _SPACE) if key in fields),
     )
     return placed if calibrated else replace(placed, **_in_picture(fields))

@@ -20,7 +20,15 @@ from gait.io.video import Video, background
 from gait.lift.keypoints.corrections import Correction, read_corrections
 from gait.lift.video.clip_segments import ClipSegments, Settings
 from gait.lift.video.figure import Figure, write_overlay
-from gait.lift.video.fit_clip import ENOUGH, HELD, POOR_CORRELATION, ClipFit, fit_clip, suggestions, work
+from gait.lift.video.fit_clip import (
+    FOLLOWING_CORRELATION,
+    KNOWN_SD,
+    POOR_CORRELATION,
+    ClipFit,
+    fit_clip,
+    suggestions,
+    work,
+)
 from gait.lift.video.placement import PhasePrior, Placement, read_placement
 from gait.lift.video.sensors import CameraView, Film, FlatView, View
 from gait.progress import progress
@@ -29,8 +37,8 @@ from gait.track.from_walk import Calibration
 
 Floats = npt.NDArray[np.float64]
 
-SMALLEST = 20.0  # pixels; in a smaller person limbs cannot be distinguished
-LARGEST = 4.0  # largest height of a person, in heights of the picture
+SMALLEST_PERSON_PX = 20.0  # pixels; in a smaller person limbs cannot be distinguished
+LARGEST_PERSON_HEIGHTS = 4.0  # largest height of a person, in heights of the picture
 
 Warn = Callable[[str], None]
 
@@ -157,8 +165,8 @@ def poor_correlation(request: Request, fit_correlation: float) -> str:
     remedy = "--background or --corrections" if request.background == "none" else "--corrections"
     return (
         f"{request.video}: the sensors hardly show the person (correlation with the stick figure "
-        f"{fit_correlation:.2f}, {HELD:g} before a known background): the figure may have lost the person, "
-        f"so standard deviations are widened; check with --overlay and give {remedy}"
+        f"{fit_correlation:.2f}, {FOLLOWING_CORRELATION:g} before a known background): the figure may have "
+        f"lost the person, so standard deviations are widened; check with --overlay and give {remedy}"
     )
 
 
@@ -226,10 +234,11 @@ def _film(
 def _require_in_picture(path: str, video: Video, pelvis: Floats, height: float) -> None:
     """Raise UserError if a placement is not in the picture: `pelvis` (2,) and `height` in pixels."""
     wide, high = video.size
-    if not SMALLEST <= height <= LARGEST * high:
+    if not SMALLEST_PERSON_PX <= height <= LARGEST_PERSON_HEIGHTS * high:
         raise UserError(
             f"{path}: the person would be {height:.3g} px tall in a picture of {wide}x{high}; give position "
-            f"and stature, or height_px, of a person of {SMALLEST:g} to {LARGEST * high:g} px"
+            f"and stature, or height_px, of a person of {SMALLEST_PERSON_PX:g} to "
+            f"{LARGEST_PERSON_HEIGHTS * high:g} px"
         )
     if (np.maximum(-pelvis, pelvis - (wide - 1, high - 1)) > height / 2).any():
         raise UserError(
@@ -274,7 +283,7 @@ def summary(lifted: LiftedVideo, most: int) -> dict[str, Any]:
     clip, free, fit, figure = lifted.clip, lifted.free, lifted.fit, lifted.figure
     frames, given = len(fit.frame), len(clip.corrections)
     pixels = float(np.median([clip.view.scale(body.mean(axis=0)) for body in fit.places]))
-    enough = ENOUGH * clip.placement.stature * pixels
+    enough = KNOWN_SD * clip.placement.stature * pixels
     before, after = correction_errors(clip, free), correction_errors(clip, fit)
     wanted = suggestions(clip, fit)
     joints = clip.prior.index([j for j in JOINTS if j in clip.prior.names])

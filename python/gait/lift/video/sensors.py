@@ -25,28 +25,31 @@ from gait.lift.segment.view import looking_along
 Floats = npt.NDArray[np.float64]
 Field = npt.NDArray[np.float32]
 
-ROWS, COLUMNS = 10, 8
-REACH = 1.15  # height of the grid, statures
+GRID_ROWS, GRID_COLUMNS = 10, 8
+GRID_HEIGHT = 1.15  # height of the grid, statures
 CONTRAST = 0.035  # standard deviation of the window of local contrast, statures; 8 pixels for a person of 230
 BLUR = 0.6  # standard deviation of the sensors' blur, in steps of the grid
-TALL = 240.0  # pixels; pictures of taller people are reduced first
+TALL_PX = 240.0  # pixels; pictures of taller people are reduced first
 GRAIN = 4.0  # grey levels added to the contrast, for the camera's noise
-FLOOR = 2.0  # multiple of the median gradient that is subtracted everywhere
-SAMPLES = 3.0  # samples stored per standard deviation of the blur
+SUBTRACTED_MEDIANS = 2.0  # multiple of the median gradient that is subtracted everywhere
+SAMPLES_PER_SD = 3.0  # samples stored per standard deviation of the blur
 CHANGE = 6.0  # standard deviations of the difference to the empty scene at which a gradient counts half
 
 
 def grid(middle: Floats, stature: Floats) -> Floats:
     """Make positions (T, 80, 2) of the sensors around middles (T, 2) of a person of `stature` (T,) pixels."""
-    step = REACH / ROWS * stature
-    rows, columns = np.arange(ROWS) - (ROWS - 1) / 2, np.arange(COLUMNS) - (COLUMNS - 1) / 2
+    step = GRID_HEIGHT / GRID_ROWS * stature
+    rows, columns = (
+        np.arange(GRID_ROWS) - (GRID_ROWS - 1) / 2,
+        np.arange(GRID_COLUMNS) - (GRID_COLUMNS - 1) / 2,
+    )
     lattice = np.stack(np.meshgrid(columns, rows), axis=-1).reshape(-1, 2)
     return np.asarray(middle[:, None] + step[:, None, None] * lattice)
 
 
 def blur_of(stature: float) -> float:
     """Return the standard deviation of the blur, pixels, for a person of `stature` pixels."""
-    return BLUR * REACH / ROWS * stature
+    return BLUR * GRID_HEIGHT / GRID_ROWS * stature
 
 
 @dataclass(frozen=True)
@@ -105,7 +108,7 @@ class Film:
         update : callable, optional
             Called with the number of frames done.
         """
-        shrink = min(1.0, TALL / stature)
+        shrink = min(1.0, TALL_PX / stature)
         window, numbers, times, fields = CONTRAST * stature * shrink, [], [], []
         scene = None if plate is None else _grey(plate, shrink)
         for done, frame in enumerate(frames, 1):
@@ -149,7 +152,7 @@ def above_usual(edges: Field) -> Field:
 
     Otherwise the figure would look smaller, as near it contrast is high and normalised noise low.
     """
-    return np.asarray(np.maximum(edges - FLOOR * np.median(edges), 0), np.float32)
+    return np.asarray(np.maximum(edges - SUBTRACTED_MEDIANS * np.median(edges), 0), np.float32)
 
 
 def changed(grey: Field, plate: Field, window: float) -> Field:
@@ -161,16 +164,16 @@ def changed(grey: Field, plate: Field, window: float) -> Field:
 
 
 def _blurred(edges: Field, blur: float) -> Field:
-    """Blur a field, sampled `SAMPLES` times per standard deviation of the blur."""
+    """Blur a field, sampled `SAMPLES_PER_SD` times per standard deviation of the blur."""
     height, width = edges.shape
-    step = max(blur / SAMPLES, 1.0)
+    step = max(blur / SAMPLES_PER_SD, 1.0)
     count = max(2, round(width / step)), max(2, round(height / step))
     means = cv2.resize(edges, count, interpolation=cv2.INTER_AREA)  # adds a variance of step^2 / 12
     left = np.sqrt(max(blur**2 - step**2 / 12, 0.01)) / step
     return np.asarray(cv2.GaussianBlur(means, (0, 0), left, borderType=cv2.BORDER_REPLICATE), np.float32)
 
 
-NEAREST = 0.2  # metres in front of the lens; nothing is drawn nearer
+NEAREST_DRAWN_M = 0.2  # metres in front of the lens; nothing is drawn nearer
 
 
 class View(Protocol):
@@ -220,7 +223,7 @@ class CameraView:
 
     def visible(self, points: Floats) -> bool:
         """Whether all points are in front of the lens."""
-        return bool((self.depth(points) > NEAREST).all())
+        return bool((self.depth(points) > NEAREST_DRAWN_M).all())
 
     def depth(self, points: Floats) -> Floats:
         """Distance in front of the lens along its axis."""
@@ -228,7 +231,7 @@ class CameraView:
 
     def scale(self, point: Floats) -> float:
         """Pixels per metre at a point."""
-        return self.camera.fy / max(float(self.camera.depth(point)), NEAREST)
+        return self.camera.fy / max(float(self.camera.depth(point)), NEAREST_DRAWN_M)
 
     def growth(self, points: Floats) -> Floats:
         """Away from the lens, as a larger person is further away."""
