@@ -27,16 +27,15 @@ from facts import facts
 from gait import Camera, Video, VideoWriter
 from gait.cli import main as gait
 from gait.detect import profile
-from gait.detect.networks import JOINTS, Crop, LandmarkNetwork, crop_about
+from gait.detect.networks import LANDMARK_JOINTS, Crop, LandmarkNetwork, crop_about
 from gait.detect.people import detect as detect_people
 from gait.io.keypoints_file import Keypoints, read
 from gait.io.track_file import Joints, read_track, read_truth
 
 Floats = npt.NDArray[np.float64]
 NETWORK = "lite"
-RADIUS = (
-    0.56  # of the circle around the person in a crop, in lengths of head, trunk and legs: as the network's
-)
+#: Of the circle around the person in a crop, in lengths of head, trunk and legs: as the network's.
+RADIUS = 0.56
 LEAST_SCORE = 0.5  # of a person in a crop, as in gait.detect.people
 RIGHT = 0.05  # error of the median joint that counts as right, in person's heights
 HIDDEN_S = 1.0
@@ -63,8 +62,12 @@ def main() -> int:
 
 def _rows(clip: Path) -> list[list[object]]:
     """Rows of a clip, one for each source of crops."""
-    true, _ = read(clip / "truth.csv", tuple(JOINTS), ignore_unknown=True)
-    true = replace(true, uv=true.uv[:, [true.names.index(name) for name in JOINTS]], names=tuple(JOINTS))
+    true, _ = read(clip / "truth.csv", tuple(LANDMARK_JOINTS), ignore_unknown=True)
+    true = replace(
+        true,
+        uv=true.uv[:, [true.names.index(name) for name in LANDMARK_JOINTS]],
+        names=tuple(LANDMARK_JOINTS),
+    )
     height = profile.picture_height(true)
     video = Video(clip / "video.mp4")
     hidden = (video.count / 2 + 0.5 * HIDDEN_S * video.fps * np.array([-1, 1])).astype(int).tolist()
@@ -108,7 +111,7 @@ def _distance(uv: Floats, true: Floats) -> Floats:
 
 def _searched(clip: Path, video: Video, true: Keypoints, folder: Path) -> dict[str, Floats]:
     """Joints (T, J, 2) with each source of crops, pixels, moved to the model's; NaN where none are found."""
-    landmarks = np.full((video.count, len(JOINTS), 2), np.nan)
+    landmarks = np.full((video.count, len(LANDMARK_JOINTS), 2), np.nan)
     for person in detect_people(video, NETWORK).values():  # the one nearest to the truth in each frame
         nearer = _distance(person.uv, true.uv[person.frame]) < _distance(
             landmarks[person.frame], true.uv[person.frame]
@@ -156,14 +159,19 @@ def _predicted(camera: Camera, track: Joints) -> dict[int, Crop]:
 def _from_joints(video: Video, crops: dict[int, Crop]) -> Floats:
     """Joints (T, J, 2) that the network finds in crops, moved to the model's; NaN where it finds none."""
     network = LandmarkNetwork(NETWORK)
-    uv, confidence = np.full((video.count, len(JOINTS), 2), np.nan), np.zeros((video.count, len(JOINTS)))
+    uv, confidence = (
+        np.full((video.count, len(LANDMARK_JOINTS), 2), np.nan),
+        np.zeros((video.count, len(LANDMARK_JOINTS))),
+    )
     for frame in video.frames():
         if frame.number in crops:
             person = network(frame.image, crops[frame.number])
             if person.score >= LEAST_SCORE:
                 uv[frame.number], confidence[frame.number] = person.uv, person.confidence
     frames = np.arange(video.count)
-    return profile.corrected(Keypoints(frames, frames / video.fps, tuple(JOINTS), uv, confidence), NETWORK).uv
+    return profile.corrected(
+        Keypoints(frames, frames / video.fps, tuple(LANDMARK_JOINTS), uv, confidence), NETWORK
+    ).uv
 
 
 if __name__ == "__main__":

@@ -19,7 +19,7 @@ import numpy as np
 
 from gait.detect.people import detect, main_person
 from gait.detect.profile import FILE, picture_height, vectors
-from gait.detect.weights import LANDMARKS
+from gait.detect.weights import LANDMARK_NETWORKS
 from gait.io.keypoints_file import read
 from gait.io.video import Video
 from gait.progress import progress
@@ -218,7 +218,7 @@ def main() -> None:
     if len(folders) < 2:
         sys.exit(f"{folder}: needs folders of two clips or more with video.mp4 and truth.csv")
     networks = {}
-    for network in LANDMARKS:
+    for network in LANDMARK_NETWORKS:
         networks[network] = learn([clip_joints(each, network) for each in folders])
         print(network, json.dumps(networks[network]), flush=True)
     source = f"{len(folders)} rendered walks of as many people ({', '.join(f.name for f in folders)})"

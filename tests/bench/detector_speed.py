@@ -38,7 +38,9 @@ Row = list[object]
 def main() -> int:
     """Measure, print and, if asked to, record; exit code 0 also if weights or film are absent."""
     load = os.getloadavg()[0]
-    absent = [w.file for w in (weights.PERSON, *weights.LANDMARKS.values()) if weights.find(w) is None]
+    absent = [
+        w.file for w in (weights.PERSON, *weights.LANDMARK_NETWORKS.values()) if weights.find(w) is None
+    ]
     if absent or not FILM.is_dir():
         print(f"detector_speed: {absent[0] if absent else FILM} is not there, left out", file=sys.stderr)
         return 0
@@ -71,7 +73,7 @@ def _people(name: str) -> list[Row]:
     )
     for runtime, load in both:
         network = LandmarkNetwork(name)
-        loaded = load(weights.load(weights.LANDMARKS[name]))
+        loaded = load(weights.load(weights.LANDMARK_NETWORKS[name]))
         if loaded is None:
             continue
         network._network = loaded

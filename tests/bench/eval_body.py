@@ -27,7 +27,7 @@ from gait.bindings.model import Model, read_cyclic
 from gait.body.measured import MeasuredBody, model_of
 from gait.camera.camera import Camera, read_camera
 from gait.io.track_file import Joints, Track, read_track, read_truth
-from gait.motion.evaluate import BODY, HIPS, body_axes, evaluate
+from gait.motion.evaluate import BODY_COLUMNS, HIP_COLUMNS, body_axes, evaluate
 from gait.motion.footfalls import strikes_of
 from gait.progress import progress
 from gait.simulate.clip import simulate
@@ -151,8 +151,8 @@ def without_constant(track: Track, truth: Joints, camera: Camera) -> tuple[float
     """Root error (mm) without its constant part in the body's frame, and without that across the view."""
     _, ours, theirs = np.intersect1d(track.frame, truth.frame, return_indices=True)
     found, true = track.eval15()[ours], truth.eval15()[theirs]
-    middle = true[:, HIPS].mean(axis=1, keepdims=True)
-    off = found - found[:, HIPS].mean(axis=1, keepdims=True) - (true - middle)
+    middle = true[:, HIP_COLUMNS].mean(axis=1, keepdims=True)
+    off = found - found[:, HIP_COLUMNS].mean(axis=1, keepdims=True) - (true - middle)
     turns = body_axes(truth)[theirs]
     constant = np.einsum("nij,pj->npi", turns, np.einsum("nji,npj->pi", turns, off) / len(off))
     way = middle - camera.centre
@@ -160,7 +160,7 @@ def without_constant(track: Track, truth: Joints, camera: Camera) -> tuple[float
     depth = (constant * way).sum(axis=2, keepdims=True) * way
 
     def error(rest: NDArray[np.float64]) -> float:
-        return float(1000 * np.median(np.linalg.norm(rest, axis=2)[:, BODY].mean(axis=1)))
+        return float(1000 * np.median(np.linalg.norm(rest, axis=2)[:, BODY_COLUMNS].mean(axis=1)))
 
     return error(off - constant), error(off - constant + depth)
 

@@ -40,7 +40,7 @@ from gait.io import blob
 from gait.io.track_file import Joints, Track, read_track, read_truth
 from gait.motion.evaluate import free_run, static_pose
 from gait.motion.footfalls import Draws, strikes_of
-from gait.motion.parameters import MIRRORED, QUANTITIES, measured
+from gait.motion.parameters import MIRRORED_PARAMETERS, PARAMETER_LABELS, measured
 from gait.progress import progress
 
 OUT = eval_clips.ROOT / "build" / "eval-gait"
@@ -399,10 +399,20 @@ def _angle_row(runs: list[Run], clip: str | None, arm: str) -> list[Any] | None:
 
 
 def _coverage_rows(runs: list[Run]) -> Iterator[list[Any]]:
-    names = [*EVENTS, *QUANTITIES, *(f"mean:{n}" for n in QUANTITIES), *(f"asymmetry:{n}" for n in MIRRORED)]
+    names = [
+        *EVENTS,
+        *PARAMETER_LABELS,
+        *(f"mean:{n}" for n in PARAMETER_LABELS),
+        *(f"asymmetry:{n}" for n in MIRRORED_PARAMETERS),
+    ]
     groups = [(name, [name]) for name in names]
-    groups += [("all events", list(EVENTS)), ("all strides", list(QUANTITIES))]
-    groups.append(("all means", [f"mean:{n}" for n in QUANTITIES] + [f"asymmetry:{n}" for n in MIRRORED]))
+    groups += [("all events", list(EVENTS)), ("all strides", list(PARAMETER_LABELS))]
+    groups.append(
+        (
+            "all means",
+            [f"mean:{n}" for n in PARAMETER_LABELS] + [f"asymmetry:{n}" for n in MIRRORED_PARAMETERS],
+        )
+    )
     groups.append(("all", names))
     for title, members in groups:
         row: list[Any] = [title]

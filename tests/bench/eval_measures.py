@@ -12,7 +12,7 @@ from gait import Camera, Model, State
 from gait.bindings.estimate import Estimate
 from gait.body.skeleton import EVAL15
 from gait.io.track_file import STATUSES, Joints, Track, read_truth
-from gait.motion.evaluate import APART, LOST_MM, root_errors
+from gait.motion.evaluate import INDEPENDENT_FRAMES, LOST_MM, root_errors
 from gait.motion.footfalls import Strikes, strikes_by_zeni
 
 LOCK_AFTER = (1.0, 1.5)  # seconds after the start in which the phase must be right
@@ -151,13 +151,13 @@ class Uncertainty:
         self._true = None if self._truth is None else self._truth.eval15()
         self._model = model
         self._joints = [model.joint_names.index(name) for name in EVAL15]
-        self._next = APART  # the start determines the first frames
+        self._next = INDEPENDENT_FRAMES  # the start determines the first frames
 
     def wants(self, frame: int) -> bool:
         """Is this one of the frames, far enough apart, that are measured?"""
         if frame not in self._rows or frame < self._next:
             return False
-        self._next = frame + APART
+        self._next = frame + INDEPENDENT_FRAMES
         return True
 
     def nees(self, frame: int, estimate: Estimate, states: np.ndarray, weights: np.ndarray) -> float:

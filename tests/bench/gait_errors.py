@@ -15,10 +15,10 @@ from numpy.typing import NDArray
 
 from gait.errors import UserError
 from gait.io.track_file import Joints
-from gait.motion.footfalls import NEAR, SIDES, Events, find_events, same_events
+from gait.motion.footfalls import MATCHING_STRIKES_S, STRIKE_SIDES, Events, find_events, same_events
 from gait.motion.parameters import (
-    MIRRORED,
-    QUANTITIES,
+    MIRRORED_PARAMETERS,
+    PARAMETER_LABELS,
     Parameters,
     Strides,
     asymmetry,
@@ -58,7 +58,9 @@ def true_events(truth: Joints, meta: Path) -> Events:
     """Events in seconds: those that the file `meta` lists if it exists and is complete, else the truth's."""
     stated = json.loads(meta.read_text(encoding="utf-8")) if meta.is_file() else {}
     listed = stated.get("events_video_frames", {})
-    names = {kind: {side: f"{side[0]}_{kind}" for side in SIDES} for kind in ("heel_strike", "toe_off")}
+    names = {
+        kind: {side: f"{side[0]}_{kind}" for side in STRIKE_SIDES} for kind in ("heel_strike", "toe_off")
+    }
     if not all(name in listed for each in names.values() for name in each.values()):
         return find_events(truth)
     rate = float((truth.frame[-1] - truth.frame[0]) / (truth.time[-1] - truth.time[0]))
@@ -72,9 +74,9 @@ def true_events(truth: Joints, meta: Path) -> Events:
 def gait_errors(parameters: Parameters, truth: Joints, events: Events) -> dict[str, Compared]:
     """Compare what `measure` found with the truth.
 
-    `truth`: with heels and toes. `events`: its own, seconds. Returns by name: `EVENTS`; `QUANTITIES` stride
-    by stride; ``mean:NAME`` of each, over the strides that both have (k = 1); ``asymmetry:NAME``, per cent.
-    Only strides without unsure frames count. UserError if the truth has no heels or toes.
+    `truth`: with heels and toes. `events`: its own, seconds. Returns by name: `EVENTS`; `PARAMETER_LABELS`
+    stride by stride; ``mean:NAME`` of each, over the strides that both have (k = 1); ``asymmetry:NAME``, per
+    cent.  Only strides without unsure frames count. UserError if the truth has no heels or toes.
     """
     lacking = [
         name for name in (f"{s}_{p}" for s in "rl" for p in ("heel", "toe")) if name not in truth.places
@@ -83,9 +85,9 @@ def gait_errors(parameters: Parameters, truth: Joints, events: Events) -> dict[s
         raise UserError(f"truth: has no {lacking[0]}; gait parameters need heels and toes")
     out = _of_events(parameters, events)
     true = strides_of(truth, events)
-    pairs = {side: _matched(parameters.strides[side], true[side]) for side in SIDES}
-    for name in QUANTITIES:
-        both = [_values(parameters.strides[side], true[side], name, *pairs[side]) for side in SIDES]
+    pairs = {side: _matched(parameters.strides[side], true[side]) for side in STRIKE_SIDES}
+    for name in PARAMETER_LABELS:
+        both = [_values(parameters.strides[side], true[side], name, *pairs[side]) for side in STRIKE_SIDES]
         found, right, draws = (np.concatenate(parts, axis=-1) for parts in zip(*both, strict=True))
         out[name] = Compared(found, right, sd_of(draws))
         if not len(found):
@@ -93,7 +95,7 @@ def gait_errors(parameters: Parameters, truth: Joints, events: Events) -> dict[s
         out[f"mean:{name}"] = Compared(
             found.mean(keepdims=True), right.mean(keepdims=True), sd_of(mean_of(draws, 1))[None]
         )
-        if name in MIRRORED and all(len(values[0]) for values in both):
+        if name in MIRRORED_PARAMETERS and all(len(values[0]) for values in both):
             index = [asymmetry(*(values[k].mean() for values in both)) for k in (0, 1)]
             sd = sd_of(asymmetry(*(mean_of(values[2], 1) for values in both)))
             out[f"asymmetry:{name}"] = Compared(*(np.array([value]) for value in (*index, sd)))
@@ -106,7 +108,7 @@ def _of_events(parameters: Parameters, events: Events) -> dict[str, Compared]:
     out = {}
     for name, kind in zip(EVENTS, ("strike", "off"), strict=True):
         found, true, sd = [], [], []
-        for side in SIDES:
+        for side in STRIKE_SIDES:
             have, wanted = getattr(parameters.events, kind)[side], getattr(events, kind)[side]
             at = getattr(matched, kind)[side]
             seen = np.isfinite(at)
@@ -123,7 +125,7 @@ def _matched(found: Strides, true: Strides) -> tuple[list[int], list[int]]:
     rows, theirs = [], []
     for i in np.flatnonzero(found.sure):
         off = np.maximum(np.abs(true.start - found.start[i]), np.abs(true.end - found.end[i]))
-        if len(off) and off.min() <= NEAR:
+        if len(off) and off.min() <= MATCHING_STRIKES_S:
             rows.append(int(i))
             theirs.append(int(off.argmin()))
     return rows, theirs

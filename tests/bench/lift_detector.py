@@ -26,9 +26,9 @@ from facts import facts
 
 from gait.body.skeleton import EVAL15
 from gait.detect import profile
-from gait.detect.networks import JOINTS
+from gait.detect.networks import LANDMARK_JOINTS
 from gait.detect.people import detect, main_person
-from gait.detect.weights import LANDMARKS
+from gait.detect.weights import LANDMARK_NETWORKS
 from gait.io import keypoints_file
 from gait.io.keypoints_file import Keypoints
 from gait.io.track_file import read_estimates, read_truth
@@ -54,7 +54,7 @@ def joints(clip: Path, network: str) -> Keypoints:
         people = detect(Video(str(video)), network, correct=False)
         KEPT.mkdir(parents=True, exist_ok=True)
         keypoints_file.write(kept, people[main_person(people)])
-    return keypoints_file.read(kept, tuple(JOINTS))[0]
+    return keypoints_file.read(kept, tuple(LANDMARK_JOINTS))[0]
 
 
 def lifted(
@@ -126,7 +126,7 @@ def main() -> int:
     if not clips:
         print(f"eval-lift: {eval_clips.DATA} is not there, left out", file=sys.stderr)
         return 0
-    jobs = [(network, clip) for network in LANDMARKS for clip in clips]
+    jobs = [(network, clip) for network in LANDMARK_NETWORKS for clip in clips]
     jobs += [("full", film) for film in films]
     rows = []
     with tempfile.TemporaryDirectory() as folder, progress("clips", len(jobs)) as update:

@@ -35,7 +35,7 @@ from gait.io.track_file import read_track
 from gait.motion.evaluate import root_errors
 from gait.paper import ladder
 from gait.paper.scene import Run, reported
-from gait.paper.tracking import CRITERION, FRAMES
+from gait.paper.tracking import CRITERION, FIGURE_FRAMES
 from gait.progress import progress
 from gait.track.clip import ClipOptions, track_clip
 
@@ -116,15 +116,15 @@ def climbed(f: Footage, paths: dict[str, dict[str, Path]], seeds: int, rung_seed
     models = {name: Model(each) for name, each in blobs.items()}
     without, runs, filmed = dict[str, float](), dict[str, list[Run]](), dict[str, list[float]]()
     if f.scene is not None:
-        base = {name: f.scene.baselines(blob.decode(blobs[name])) for name in ladder.COMPARED}
+        base = {name: f.scene.baselines(blob.decode(blobs[name])) for name in ladder.COMPARED_MODELS}
         without = {ladder.FREE[name]: each["free"] for name, each in base.items()}
-        without |= {ladder.STATIC: base["people"]["static"]}
-    for rung in ladder.RUNGS if f.scene is not None else (ladder.PAPER,):
-        count = seeds if rung in (ladder.PAPER, ladder.RUNGS[-1]) else rung_seeds
+        without |= {ladder.STATIC_POSE: base["people"]["static"]}
+    for rung in ladder.RUNGS if f.scene is not None else (ladder.PAPER_RUNG,):
+        count = seeds if rung in (ladder.PAPER_RUNG, ladder.RUNGS[-1]) else rung_seeds
         runs[rung.name] = [
             f.run(models[rung.model], rung.mode, seed, rung.changes) for seed in range(1, count + 1)
         ]
-    if f.scene is not None and weights.find(weights.LANDMARKS["full"]):
+    if f.scene is not None and weights.find(weights.LANDMARK_NETWORKS["full"]):
         for name in FILMED:
             filmed[name] = [tracked(f, files["people"], name, seed) for seed in range(1, rung_seeds + 1)]
     return Climbed(f, without, runs, filmed)
@@ -139,7 +139,7 @@ def tracked(f: Footage, model: Path, name: str, seed: int) -> float:
         init.write_text(json.dumps(start))
         own = {"init": str(init)} if name == TRUE_START else {"height": start["stature_m"]}
         files = {"video": str(f.clip.video), "camera": str(f.clip.camera), "background": str(f.clip.plate)}
-        options = {"model": str(model), "seed": seed, "stop": FRAMES + 1, "quiet": True}
+        options = {"model": str(model), "seed": seed, "stop": FIGURE_FRAMES + 1, "quiet": True}
         track_clip(ClipOptions(**files, output=str(output), **options, **own, **FILMED[name]))
         track = read_track(output)
     found = np.stack([track.places[joint] for joint in EVAL15], axis=1)
@@ -148,7 +148,7 @@ def tracked(f: Footage, model: Path, name: str, seed: int) -> float:
 
 def paper_row(found: Climbed) -> list[Any]:
     """Return the row of a clip in paper mode."""
-    runs, root = found.runs[ladder.PAPER.name], np.array(found.roots(ladder.PAPER.name))
+    runs, root = found.runs[ladder.PAPER_RUNG.name], np.array(found.roots(ladder.PAPER_RUNG.name))
     return [
         found.footage.clip.name,
         f"{sum(r.held for r in runs)} of {len(runs)}",
@@ -187,7 +187,7 @@ def draw(errors: dict[str, float], range_of: dict[str, tuple[float, float]]) -> 
 
 def about(seeds: int, found: list[Climbed]) -> str:
     """State how the runs were made, and how often a run is reported as lost."""
-    runs = [run for each in found for run in each.runs[ladder.PAPER.name]]
+    runs = [run for each in found for run in each.runs[ladder.PAPER_RUNG.name]]
     return f"""{facts(f"paper_ladder.py --record --seeds {seeds}")}
 
 Frames 0 to 50 (outdoor: from the first frame in full view), 10,000 particles, models of 19 angles and 5
@@ -206,7 +206,7 @@ images."""
 
 def reached(found: list[Climbed]) -> str:
     """State on how many clips the target is met."""
-    paper = ladder.PAPER.name
+    paper = ladder.PAPER_RUNG.name
     free = ladder.FREE["paper"]
     both = [
         each.footage.clip.name

@@ -18,7 +18,7 @@ from gait.bindings.abi import Mode
 from gait.io import blob
 from gait.io.video import Frame, Image, read_plate
 from gait.paper.scene import Run, Scene, follow, share_lost
-from gait.paper.tracking import FRAMES, TAIL, followed, joints_of, picture_height
+from gait.paper.tracking import FIGURE_FRAMES, TAIL, followed, joints_of, picture_height
 
 
 class Footage:
@@ -27,7 +27,7 @@ class Footage:
     def __init__(self, clip: Clip) -> None:
         video = Video(clip.video)
         self.clip, self.camera = clip, Camera.read(str(clip.camera), video.size)
-        self.frames: list[Frame] = list(video.frames(clip.first, clip.first + FRAMES + 1))
+        self.frames: list[Frame] = list(video.frames(clip.first, clip.first + FIGURE_FRAMES + 1))
         self.plate: Image | None = None if clip.plate is None else read_plate(clip.plate, video.size)
         self.scene: Scene | None = None
         if clip.truth:

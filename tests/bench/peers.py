@@ -29,11 +29,11 @@ from facts import facts
 from gait import Camera, Model, Start, Tracker, TrackerConfig, Video
 from gait.body.skeleton import EVAL15
 from gait.detect import weights
-from gait.detect.networks import JOINTS
+from gait.detect.networks import LANDMARK_JOINTS
 from gait.detect.people import PeopleDetector
 from gait.io.track_file import read_truth
 from gait.io.video import read_plate
-from gait.motion.evaluate import LIMBS, root_errors
+from gait.motion.evaluate import LIMB_COLUMNS, root_errors
 
 GET = {
     "weights": "BlazePose: run `.venv/bin/gait detect --fetch` for the weights",
@@ -43,7 +43,7 @@ GET = {
     "simlarge or native, then give --bodytrack PROGRAM FOLDER, the folder of pictures, such as sequenceB_4",
 }
 PARTICLES, LAYERS = 4000, 5  # of bodytrack, in PARSEC's inputs 'simlarge' and 'native'
-NAMES = [EVAL15[i] for i in LIMBS]
+NAMES = [EVAL15[i] for i in LIMB_COLUMNS]
 HEAD = ["clip", "peer", "likelihoods/s", "frames/s", "12 joints, mm", "12 joints, px"]
 
 NOTE = """\
@@ -116,8 +116,10 @@ def _truth(clip: Clip) -> tuple[Joints, Camera]:
 
 def _errors(pose: Joints, flat: Joints, true: Joints, camera: Camera) -> list[float]:
     """Median errors in space (mm, hips aligned) and in the picture; pose: (15, 3), flat: (12, 2) by frame."""
-    off = [np.linalg.norm(uv - camera.project(true[n][LIMBS]), axis=1).mean() for n, uv in flat.items()]
-    root = [root_errors(at[None], true[n][None], LIMBS) for n, at in pose.items()]
+    off = [
+        np.linalg.norm(uv - camera.project(true[n][LIMB_COLUMNS]), axis=1).mean() for n, uv in flat.items()
+    ]
+    root = [root_errors(at[None], true[n][None], LIMB_COLUMNS) for n, at in pose.items()]
     return [float(np.median(root)) if root else np.nan, float(np.median(off))]
 
 
@@ -139,7 +141,7 @@ def _tracker(clip: Clip, blob: Path) -> Row:
         seconds += time.process_time() - begun
         evaluated += len(tracker.particles()[1])
         pose[frame.number] = estimate.joints[order]
-    flat = {n: camera.project(at[LIMBS]) for n, at in pose.items()}
+    flat = {n: camera.project(at[LIMB_COLUMNS]) for n, at in pose.items()}
     rates = [evaluated / seconds, len(pose) / seconds]
     return [clip.name, "libgait, default", *rates, *_errors(pose, flat, true, camera)]
 
@@ -148,7 +150,7 @@ def _blazepose(clip: Clip) -> Row:
     """Row of the network of `gait detect`."""
     true, camera = _truth(clip)
     detector, flat, seconds, frames = PeopleDetector("full"), {}, 0.0, 0
-    order = [list(JOINTS).index(name) for name in NAMES]
+    order = [list(LANDMARK_JOINTS).index(name) for name in NAMES]
     for frame in Video(clip.video).frames():
         begun = time.process_time()
         found = detector.step(frame)
@@ -166,13 +168,13 @@ def _mediapipe(clip: Clip, python: Path) -> Row:
     if done.returncode:
         raise SystemExit(f"peers: {python} cannot run MediaPipe: {done.stderr.strip().splitlines()[-1]}")
     seconds, frames = json.loads(done.stdout)
-    order = [JOINTS[name] for name in NAMES]
+    order = [LANDMARK_JOINTS[name] for name in NAMES]
     pose, flat = {}, {}
     for number, points in enumerate(frames):
         if points:
             at = np.array(points)[order]
             pose[number] = np.zeros((len(EVAL15), 3))
-            pose[number][LIMBS] = at[:, :3] @ camera.R
+            pose[number][LIMB_COLUMNS] = at[:, :3] @ camera.R
             flat[number] = at[:, 3:]
     return [clip.name, "MediaPipe Pose", None, len(frames) / seconds, *_errors(pose, flat, true, camera)]
 

@@ -34,7 +34,7 @@ from paper_runs import Footage
 from gait import Mode, Model
 from gait.paper import ladder
 from gait.paper.scene import Run, reported
-from gait.paper.tracking import FRAMES
+from gait.paper.tracking import FIGURE_FRAMES
 from gait.progress import progress
 from gait.simulate.clip import simulate
 from gait.simulate.scenario import Scenario
@@ -262,9 +262,9 @@ share of runs that leave the person.  All settings are tried with one seed; the 
 with {len(MORE)} other seeds, which alone decide between them.  phase_noise and n_s ended at a bound of the
 search.
 
-The clips (480 x 360, {FRAMES + 1} frames used) are made by `gait simulate` with the gaits of people {people},
-who are neither in the model nor in a development clip.  The noise of a pixel (3 grey levels) is not searched,
-because only its sum with sigma matters."""
+The clips (480 x 360, {FIGURE_FRAMES + 1} frames used) are made by `gait simulate` with the gaits of people
+{people}, who are neither in the model nor in a development clip.  The noise of a pixel (3 grey levels)
+is not searched, because only its sum with sigma matters."""
 
 
 if __name__ == "__main__":

@@ -33,7 +33,9 @@ def fetched(monkeypatch):
     from gait.detect import weights  # here, after the settings above
 
     folder = Path(sys.prefix) / "share/gait/weights"
-    if not all((folder / one.file).is_file() for one in (weights.PERSON, *weights.LANDMARKS.values())):
+    if not all(
+        (folder / one.file).is_file() for one in (weights.PERSON, *weights.LANDMARK_NETWORKS.values())
+    ):
         pytest.skip("the detector's weights are absent: gait detect --fetch")
     monkeypatch.setenv("GAIT_WEIGHTS", str(folder))
     return folder

@@ -8,7 +8,7 @@ import pytest
 
 from gait import Camera, Model, Video, cli
 from gait.detect import networks, people, weights
-from gait.detect.networks import JOINTS, Crop, Person
+from gait.detect.networks import LANDMARK_JOINTS, Crop, Person
 from gait.errors import UserError
 from gait.io.keypoints_file import Keypoints, read
 from gait.io.video import Frame
@@ -120,7 +120,9 @@ def test_the_main_person_is_in_view_long_and_large():
     def keypoints(frames, height):
         uv = np.zeros((frames, 16, 2))
         uv[:, 14:, 1] = height
-        return Keypoints(np.arange(frames), np.arange(frames) / 25, tuple(JOINTS), uv, np.ones((frames, 16)))
+        return Keypoints(
+            np.arange(frames), np.arange(frames) / 25, tuple(LANDMARK_JOINTS), uv, np.ones((frames, 16))
+        )
 
     assert people.main_person({1: keypoints(100, 50), 2: keypoints(60, 200)}) == 2
 
@@ -188,7 +190,7 @@ def test_usage(words, capsys):
 
 
 def test_both_runtimes_give_the_same_landmarks(fetched):
-    data = weights.load(weights.LANDMARKS["full"])
+    data = weights.load(weights.LANDMARK_NETWORKS["full"])
     x = np.random.default_rng(1).random((1, 256, 256, 3)).astype(np.float32)
     lite, opencv = networks._litert(data), networks._opencv(data)
     if lite is None:
@@ -219,7 +221,7 @@ def test_a_simulated_walk_is_found(fetched, tmp_path, capsys):
     capsys.readouterr()
     assert cli.main(["detect", str(clip / "video.mp4"), "-o", str(out), "--json"]) == 0
     assert json.loads(capsys.readouterr().out)["person"] == 1
-    keypoints, _ = read(out, tuple(JOINTS))
+    keypoints, _ = read(out, tuple(LANDMARK_JOINTS))
     assert len(keypoints.frame) >= 6
 
 

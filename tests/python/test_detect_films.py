@@ -8,7 +8,7 @@ import pytest
 
 from gait import Camera, Video, VideoWriter, cli
 from gait.detect import weights
-from gait.detect.networks import JOINTS
+from gait.detect.networks import LANDMARK_JOINTS
 from gait.detect.people import detect
 from gait.io.keypoints_file import read
 from gait.io.track_file import read_track
@@ -29,8 +29,8 @@ def walk(tmp_path_factory):
     size = "x".join(map(str, SIZE))
     words = ["simulate", "-o", str(folder), "--frames", str(FRAMES), "--size", size, "--quiet"]
     assert cli.main(words) == 0
-    true, _ = read(folder / "truth.csv", tuple(JOINTS), ignore_unknown=True)
-    joints = true.uv[:, [true.names.index(name) for name in JOINTS]]
+    true, _ = read(folder / "truth.csv", tuple(LANDMARK_JOINTS), ignore_unknown=True)
+    joints = true.uv[:, [true.names.index(name) for name in LANDMARK_JOINTS]]
     return folder, [frame.image for frame in Video(folder / "video.mp4").frames()], joints
 
 
@@ -91,7 +91,7 @@ def test_a_person_in_portrait_video_is_found_and_tracked(walk, tmp_path):
     assert cli.main([str(word) for word in words]) == 0
     track = read_track(tmp_path / "track.csv")
     assert track.frame.tolist() == list(range(FRAMES)) and "lost" not in track.status
-    joints = np.stack([track.places[name] for name in JOINTS], axis=1)
+    joints = np.stack([track.places[name] for name in LANDMARK_JOINTS], axis=1)
     seen = Camera.read(str(tmp_path / "camera.json"), (360, 480)).project(joints)
     height = np.ptp(true[..., 1], axis=1).mean()
     assert np.median(np.hypot(*(seen - true + [left, 0]).T)) < 0.04 * height
@@ -197,7 +197,7 @@ def test_wrong_weights_are_refused(
     fault, command, walk, fetched, tmp_path, tmp_path_factory, monkeypatch, capsys
 ):
     folder = tmp_path_factory.mktemp("weights")
-    full, lite = (weights.LANDMARKS[name].file for name in ("full", "lite"))
+    full, lite = (weights.LANDMARK_NETWORKS[name].file for name in ("full", "lite"))
     (folder / weights.PERSON.file).symlink_to(fetched / weights.PERSON.file)
     for name, other in ((full, lite), (lite, full)):
         data = (fetched / other).read_bytes() if fault != "cut off" else (fetched / name).read_bytes()[:-9]

@@ -8,17 +8,17 @@ import numpy as np
 import pytest
 
 from gait.detect import profile
-from gait.detect.networks import JOINTS
-from gait.detect.weights import LANDMARKS
+from gait.detect.networks import LANDMARK_JOINTS
+from gait.detect.weights import LANDMARK_NETWORKS
 from gait.errors import UserError
-from gait.io.keypoints_file import STRIDE, Keypoints, read, write
+from gait.io.keypoints_file import TYPICAL_STRIDE_S, Keypoints, read, write
 from gait.track.keypoint_start import keypoint_noise
 
 sys.path.insert(0, str(Path(__file__).resolve().parents[1] / "bench"))
 
 import detector_profile
 
-NAMES = tuple(JOINTS)
+NAMES = tuple(LANDMARK_JOINTS)
 
 
 def points(frames=4, rate=25.0, seed=0):
@@ -28,7 +28,7 @@ def points(frames=4, rate=25.0, seed=0):
     return Keypoints(np.arange(frames), np.arange(frames) / rate, NAMES, uv, np.ones(uv.shape[:2]))
 
 
-@pytest.mark.parametrize("network", list(LANDMARKS))
+@pytest.mark.parametrize("network", list(LANDMARK_NETWORKS))
 def test_every_network_has_a_profile_of_every_joint_and_its_source(network):
     found = profile.load(network)
     assert set(found.joints) == {name[2:] for name in NAMES}
@@ -88,7 +88,7 @@ def test_errors_that_last_are_written_and_read(tmp_path):
 
 
 def test_errors_that_come_again_in_every_stride_count_once_in_a_sequence():
-    found = profile.corrected(points(frames=round(25 * 11 * STRIDE) + 1), "full")
+    found = profile.corrected(points(frames=round(25 * 11 * TYPICAL_STRIDE_S) + 1), "full")
     grown = found.changing(0.0, whole=True) / found.changing(0.0)
     np.testing.assert_allclose(grown, np.sqrt(1 + 10 * found.repeated), rtol=2e-3)
 

@@ -19,7 +19,7 @@ from gait.io import blob
 from gait.io.track_file import Joints, Track, read_estimates, read_truth, write_lifted
 from gait.learn.segments import fit as segment_fit
 from gait.motion.evaluate import (
-    LIMBS,
+    LIMB_COLUMNS,
     calibration,
     coverage,
     crps,
@@ -143,9 +143,9 @@ def test_the_12_limb_joints_leave_trunk_and_head_out():
     found = TRUTH.eval15()
     for name in ("neck", "head_top", "pelvis"):
         found[:, EVAL15.index(name)] += [0.3, 0.0, 0.0]
-    assert root_errors(found, TRUTH.eval15(), LIMBS).max() == pytest.approx(0, abs=1e-9)
+    assert root_errors(found, TRUTH.eval15(), LIMB_COLUMNS).max() == pytest.approx(0, abs=1e-9)
     found[:, EVAL15.index("r_ankle")] += [0.0, 0.12, 0.0]
-    assert root_errors(found, TRUTH.eval15(), LIMBS) == pytest.approx(np.full(100, 10.0))
+    assert root_errors(found, TRUTH.eval15(), LIMB_COLUMNS) == pytest.approx(np.full(100, 10.0))
 
 
 def test_procrustes_takes_off_any_similarity_but_no_mirror():

@@ -11,7 +11,7 @@ from walking_track import walking_track
 from gait import UserError
 from gait.io.track_file import Joints
 from gait.motion.footfalls import find_events
-from gait.motion.parameters import QUANTITIES, measure
+from gait.motion.parameters import PARAMETER_LABELS, measure
 
 sys.path.insert(0, str(Path(__file__).resolve().parents[1] / "bench"))
 from gait_errors import gait_errors, true_events
@@ -31,7 +31,7 @@ def test_a_known_error_of_each_kind_is_found():
         places[name] = moved * [large, large, 1]
     track = replace(walking_track(seconds=6), places=places)
     found = gait_errors(measure(track), truth, find_events(truth))
-    assert set(QUANTITIES) <= set(found)
+    assert set(PARAMETER_LABELS) <= set(found)
     np.testing.assert_allclose(found["heel_strike_s"].error[2:-2], late, atol=0.006)
     np.testing.assert_allclose(found["stride_time_s"].error, 0, atol=0.006)
     length = found["mean:stride_length_m"]

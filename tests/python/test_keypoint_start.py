@@ -4,7 +4,7 @@ import pytest
 from gait import Camera, Model, State
 from gait.bindings.frame import FrameKeypoints
 from gait.bindings.start_fit import StartFit
-from gait.detect.networks import JOINTS
+from gait.detect.networks import LANDMARK_JOINTS
 from gait.errors import GaitError
 from gait.io.keypoints_file import Keypoints
 from gait.track.keypoint_start import find_keypoint_start, keypoint_noise
@@ -32,10 +32,12 @@ def walk(model, camera, frames, *, heading=0.3, speed=1.3, stands=0, noise=2.0):
         way = speed * t * np.array([np.cos(heading), np.sin(heading)])
         state.pelvis[:] = *(np.array([-1.0, 5.0]) + way), model.pelvis_height(state)
         joints = dict(zip(model.joint_names, model.pose(state)[0], strict=True))
-        uv.append(camera.project(np.array([joints[name] for name in JOINTS])))
-    uv = np.array(uv) + noise * rng.standard_normal((frames, len(JOINTS), 2))
+        uv.append(camera.project(np.array([joints[name] for name in LANDMARK_JOINTS])))
+    uv = np.array(uv) + noise * rng.standard_normal((frames, len(LANDMARK_JOINTS), 2))
     number = np.arange(frames)
-    return Keypoints(number, number / FPS, tuple(JOINTS), uv, np.ones((frames, len(JOINTS))))
+    return Keypoints(
+        number, number / FPS, tuple(LANDMARK_JOINTS), uv, np.ones((frames, len(LANDMARK_JOINTS)))
+    )
 
 
 def test_a_walk_is_found_at_its_first_frame(model, camera):

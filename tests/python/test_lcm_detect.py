@@ -10,7 +10,7 @@ import pytest
 from gait import Camera, Video, cli
 from gait.bindings.initial import Start
 from gait.detect import profile
-from gait.detect.networks import JOINTS, Crop, Person
+from gait.detect.networks import LANDMARK_JOINTS, Crop, Person
 from gait.detect.people import Followed
 from gait.errors import UserError
 from gait.io.keypoints_file import Keypoints
@@ -19,8 +19,8 @@ from gait.lcm.link import gaitmsg, private_url
 from gait.lcm.messages import camera_message, command_message, image_message
 from gait.track.keypoint_start import keypoint_noise
 
-UV = np.random.default_rng(1).uniform(100, 300, (len(JOINTS), 2))
-CONFIDENCE = np.linspace(0.3, 1, len(JOINTS))
+UV = np.random.default_rng(1).uniform(100, 300, (len(LANDMARK_JOINTS), 2))
+CONFIDENCE = np.linspace(0.3, 1, len(LANDMARK_JOINTS))
 
 
 class FakePeople:
@@ -92,16 +92,16 @@ def test_joints_are_the_models_of_the_person_in_view_longest(rigged):
     _, _, send, sent = rigged
     for n in range(3):
         send(90, 40_000 * n, n)
-    raw = Keypoints(np.zeros(1, int), np.zeros(1), tuple(JOINTS), UV[None], CONFIDENCE[None])
+    raw = Keypoints(np.zeros(1, int), np.zeros(1), tuple(LANDMARK_JOINTS), UV[None], CONFIDENCE[None])
     tracks = next(message for channel, message in reversed(sent) if channel == "GAIT_TRACKS_3").tracks
-    assert [t.name for t in tracks] == list(JOINTS)
+    assert [t.name for t in tracks] == list(LANDMARK_JOINTS)
     found = profile.corrected(raw, "full")
     np.testing.assert_allclose([(t.u, t.v) for t in tracks], found.uv[0], atol=1e-3)
     np.testing.assert_allclose([t.confidence for t in tracks], CONFIDENCE, atol=1e-6)
     # Errors as in gait track and gait lift, which read the same keypoints from a film.
     np.testing.assert_allclose([t.sd for t in tracks], keypoint_noise(found)[0].sd, rtol=1e-6)
     np.testing.assert_allclose([t.lasting_sd for t in tracks], found.lasting_sd[0], rtol=1e-6)
-    of_joint = [profile.load("full").joint(name).correlation_s for name in JOINTS]
+    of_joint = [profile.load("full").joint(name).correlation_s for name in LANDMARK_JOINTS]
     np.testing.assert_allclose([t.correlation for t in tracks], of_joint, rtol=1e-6)
 
 

@@ -86,7 +86,7 @@ def test_nothing_is_drawn_until_a_browser_is_there_and_then_the_newest(log):
 def test_several_people_are_drawn_into_one_frame(log, monkeypatch):
     """A frame is drawn when all running trackers have answered it."""
     rig.need_multicast()
-    monkeypatch.setattr(feeds, "_LONGEST", 1e6)
+    monkeypatch.setattr(feeds, "_LONGEST_PAUSE_S", 1e6)
     shown, heard, urls = [], [], [private_url(), private_url()]
     feed = Feed(
         private_url(), [0], rig.model(), {0: rig.CAMERA}, lambda _, image: shown.append(image),
@@ -199,7 +199,7 @@ def test_drops_are_counted_over_restarts():
 
 @pytest.fixture
 def page(monkeypatch, tmp_path):
-    monkeypatch.setattr(server, "_ALIVE", 0.05)
+    monkeypatch.setattr(server, "_ALIVE_S", 0.05)
     found = Page(0, [0], private_url(), tmp_path)
     yield found
     found.close()
@@ -441,7 +441,7 @@ def test_other_hosts_are_refused(host, page):
 
 
 def test_browsers_are_bounded_and_their_places_come_free(page, monkeypatch):
-    monkeypatch.setattr(server, "_MOST", 3)
+    monkeypatch.setattr(server, "_MOST_BROWSERS", 3)
     page.report("health", {"person": 0})
     open_now = [get(page, "events") for _ in range(3)]
     for stream in open_now:

@@ -131,7 +131,11 @@ ADDED = (  # settings that change from rung to rung, with the mode and the model
 
 
 def test_the_ladder_goes_from_the_paper_to_the_default_and_adds_one_thing_a_rung():
-    assert not ladder.PAPER.changes and ladder.PAPER.mode == Mode.PAPER and ladder.PAPER.model == "paper"
+    assert (
+        not ladder.PAPER_RUNG.changes
+        and ladder.PAPER_RUNG.mode == Mode.PAPER
+        and ladder.PAPER_RUNG.model == "paper"
+    )
     assert not ladder.RUNGS[-1].changes and ladder.RUNGS[-1].mode == Mode.DEFAULT
     fields = [item.name for item in TrackerConfig.settings()]
     settings = [
@@ -160,7 +164,7 @@ def test_the_models_of_the_ladder_differ_in_one_thing_a_rung():
 
 
 def test_the_plot_of_the_ladder_has_each_rungs_own_cycle():
-    without = {name: 40.0 + k for k, name in enumerate((ladder.STATIC, *ladder.FREE.values()))}
+    without = {name: 40.0 + k for k, name in enumerate((ladder.STATIC_POSE, *ladder.FREE.values()))}
     tracked = {rung.name: 60.0 - k for k, rung in enumerate(ladder.RUNGS)}
     axes = ladder.plot(without | tracked).axes[0]
     assert [bar.get_width() for bar in axes.patches] == [*without.values(), *tracked.values()]
@@ -173,17 +177,17 @@ def test_the_page_holds_every_figure_and_needs_no_other_file(walks, learning, tm
     """A whole run on toy walks and a small rendered clip."""
     small = replace(PRESETS[clips.PRESET], size=(320, 240), frames=16)
     monkeypatch.setitem(PRESETS, clips.PRESET, small)
-    monkeypatch.setattr(tracking, "FRAMES", 12)
-    monkeypatch.setattr(tracking, "SHOWN", (0, 6, 12))
-    monkeypatch.setattr(tracking, "PARTICLES", 200)
+    monkeypatch.setattr(tracking, "FIGURE_FRAMES", 12)
+    monkeypatch.setattr(tracking, "FIGURE_SHOWN", (0, 6, 12))
+    monkeypatch.setattr(tracking, "PAPER_PARTICLES", 200)
     monkeypatch.setattr(tracking, "SEEDS", 2)
     monkeypatch.setattr(ladder, "SEEDS", 1)
     few = {"particles": 200}
     monkeypatch.setattr(ladder, "RUNGS", [replace(rung, changes=rung.changes | few) for rung in ladder.RUNGS])
-    monkeypatch.setattr(ladder, "PAPER", ladder.RUNGS[1])
-    monkeypatch.setattr(scene, "VIEWS", {"side": "demo"})
-    monkeypatch.setattr(scene, "SIZE", (320, 240))
-    monkeypatch.setattr(lifting, "FRAMES", 14)
+    monkeypatch.setattr(ladder, "PAPER_RUNG", ladder.RUNGS[1])
+    monkeypatch.setattr(scene, "PRESET_VIEWS", {"side": "demo"})
+    monkeypatch.setattr(scene, "VIEW_SIZE_PX", (320, 240))
+    monkeypatch.setattr(lifting, "LIFTED_FRAMES", 14)
     monkeypatch.setattr(recordings, "ECLECTIC", 4)
     monkeypatch.setattr(recordings, "cores", lambda: 1)
     monkeypatch.setattr(ormoneit, "learn", lambda *_: learning)  # of the same walks
@@ -197,7 +201,7 @@ def test_the_page_holds_every_figure_and_needs_no_other_file(walks, learning, tm
     assert re.search(r"without any image, .* likelihood (gains|loses) \d+ mm", text)
     edges, total = (
         [float(x) for x in re.findall(r"<td>([-+.\d]+)", re.search(rf">{name}.*?</tr>", text)[0])]
-        for name in (freeze.LAST, "log-likelihood, their sum")
+        for name in (freeze.LAST_CASE, "log-likelihood, their sum")
     )
     assert len(edges) == len(total) == 3 and np.abs(edges).max() < 0.3 < np.abs(total[:2]).min()
     for heading in (name for each in found.values() for name in each):

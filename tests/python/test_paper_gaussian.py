@@ -19,7 +19,7 @@ def alone():
 
 def planted(rng, count=60, size=6):
     """Segments of a Gaussian of `size` modes about a body."""
-    shape = (leventon.FRAMES, len(MARKERS), 3)
+    shape = (leventon.SEGMENT_FRAMES, len(MARKERS), 3)
     body = rng.normal(size=shape) * 0.3
     modes = np.linalg.qr(rng.normal(size=(body.size, size)))[0] * np.geomspace(3.0, 0.5, size)
     return body + (rng.normal(size=(count, size)) @ modes.T).reshape(count, *shape)
@@ -101,9 +101,9 @@ def test_the_posterior_holds_what_was_drawn_and_equals_the_papers_form():
 def test_joined_segments_continue_in_depth():
     """Segments of one motion that differ only in depth are joined to that motion."""
     rng = np.random.default_rng(3)
-    x = rng.normal(size=(leventon.WINDOW, len(MARKERS), 3))
+    x = rng.normal(size=(leventon.WINDOW_FRAMES, len(MARKERS), 3))
     depth = np.eye(3)[leventon.DEPTH]
-    parts = [x[s : s + leventon.FRAMES] + k * depth for k, s in enumerate(leventon.STARTS)]
+    parts = [x[s : s + leventon.SEGMENT_FRAMES] + k * depth for k, s in enumerate(leventon.SEGMENT_STARTS)]
     assert leventon.blended(np.array(parts)) == pytest.approx(x)
 
 
@@ -117,7 +117,7 @@ def test_the_gaussian_serves_as_a_prior_of_the_package():
 
 def test_overlapping_segments_are_weighted_linearly():
     """Where two overlap, the later one counts 1 to 5 sixths."""
-    parts = np.zeros((len(leventon.STARTS), leventon.FRAMES, len(MARKERS), 3))
+    parts = np.zeros((len(leventon.SEGMENT_STARTS), leventon.SEGMENT_FRAMES, len(MARKERS), 3))
     parts[1, ..., 0] = 6.0
     joined = leventon.blended(parts)[:, 0, 0]
     assert joined[:10] == pytest.approx([0, 0, 0, 0, 0, 1, 2, 3, 4, 5])

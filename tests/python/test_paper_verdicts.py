@@ -61,7 +61,7 @@ def found():
     score = leventon.Score(
         0.02, mean=90, floor=5, likelihood=60, bayes=30, covered=0.4, ours=20, ours_covered=0.9
     )
-    windows = leventon.cut(motions[3], leventon.WINDOW)
+    windows = leventon.cut(motions[3], leventon.WINDOW_FRAMES)
     held = leventon.HeldOut("m3", windows, gaussian, prior, leventon.USUAL_STATURE, (score,) * 3)
     everything = leventon.learn_all(motions)
     return leventon_figures.Segments(motions, everything, [held], held, leventon.example(held))

@@ -15,8 +15,8 @@ from gait.body.model_curves import ModelCurves
 from gait.io import blob
 from gait.io.fields import read_json
 from gait.io.track_file import read_truth
-from gait.motion.footfalls import SIDES, Draws, find_events, maxima, stride_time, strikes_from_meta
-from gait.motion.parameters import QUANTITIES, angle_cycles, measure
+from gait.motion.footfalls import STRIKE_SIDES, Draws, find_events, maxima, stride_time, strikes_from_meta
+from gait.motion.parameters import PARAMETER_LABELS, angle_cycles, measure
 from gait.motion.verdict import verdict_of
 
 MODEL = Model()
@@ -60,12 +60,12 @@ def test_a_walk_by_rule_has_its_own_parameters():
     }
     for name, (value, tolerance) in want.items():
         assert summary[name]["both"]["mean"] == pytest.approx(value, abs=tolerance), name
-    right, left = (summary["step_length_m"][side]["mean"] for side in SIDES)
+    right, left = (summary["step_length_m"][side]["mean"] for side in STRIKE_SIDES)
     assert right == pytest.approx(1.3 * (1 - STEP["left"]), abs=0.005)
     assert left == pytest.approx(1.3 * STEP["left"], abs=0.005)
     uneven = summary["step_length_m"]["asymmetry_percent"]
     assert uneven["mean"] == pytest.approx(200 * (right - left) / (right + left)) and uneven["mean"] < -5
-    assert set(summary) == set(QUANTITIES)
+    assert set(summary) == set(PARAMETER_LABELS)
 
 
 def test_sd_follow_those_of_the_track_and_last():
@@ -129,7 +129,7 @@ def test_strides_with_lost_or_ambiguous_frames_do_not_count():
         status = list(track.status)
         status[70] = word
         parameters = measure(replace(track, status=status))
-        sure = np.concatenate([parameters.strides[side].sure for side in SIDES])
+        sure = np.concatenate([parameters.strides[side].sure for side in STRIKE_SIDES])
         assert (~sure).sum() == 2
     hidden = measure(replace(track, status=["lost"] * len(track.time)))
     assert all(row["both"] is None for row in hidden.summary().values())
@@ -206,7 +206,7 @@ def test_true_motions_have_their_listed_events_and_parameters(meta):
     """The clips list their events by the same rule, from 120 frames a second."""
     truth, reported = read_truth(meta.parent / "truth.csv"), read_json(meta, "meta")
     events, listed = find_events(truth), strikes_from_meta(meta)
-    for side in SIDES:
+    for side in STRIKE_SIDES:
         found = np.interp(events.strike[side], truth.time, truth.frame)
         want = getattr(listed, side)
         want = want[(want > 3) & (want < truth.frame[-1] - 3)]

@@ -12,7 +12,7 @@ from test_parameters import drawn
 from walking_track import walking_track, write_track
 
 from gait.cli import main
-from gait.motion.parameters import QUANTITIES, measure
+from gait.motion.parameters import PARAMETER_LABELS, measure
 from gait.report.colours import BLUE, ORANGE
 from gait.report.drawing import side_colour
 from gait.report.gait_parts import footfall_plot
@@ -49,7 +49,7 @@ def test_files_state_the_same_as_the_library(folder, capsys):
     assert times == sorted(times) and float(events[0]["frame"]) == pytest.approx(7 + 30 * times[0], abs=1e-3)
     strides = table(out / "strides.csv")
     assert len(strides) == sum(len(s.start) for s in known.strides.values())
-    assert set(QUANTITIES) <= set(strides[0]) and float(strides[0]["stride_time_s_sd"]) > 0
+    assert set(PARAMETER_LABELS) <= set(strides[0]) and float(strides[0]["stride_time_s_sd"]) > 0
     curves = table(out / "curves.csv")
     assert len(curves) == 101 and float(curves[50]["l_hip_flexion_norm_sd_deg"]) > 1
     pelvis = {"root_pitch", "root_roll", "root_yaw"}

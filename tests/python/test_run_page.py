@@ -22,7 +22,7 @@ from gait.errors import UserError
 from gait.io import blob
 from gait.io.track_file import TrackWriter, read_track
 from gait.io.video import VideoWriter
-from gait.motion.verdict import LEGS, verdict_of
+from gait.motion.verdict import WHICH_LEG, verdict_of
 from gait.report.film import page_size
 
 pytestmark = pytest.mark.long
@@ -111,7 +111,7 @@ def test_a_page_of_a_part_of_the_film_states_the_same_as_the_tracker(folder, cap
     assert main([str(word) for word in words]) == 0
     lead = re.search('<p class="lead">(.*?)</p>', (folder / "part.html").read_text())[1]
     assert "Tracked 75 of 80 frames" in lead and lead.endswith("not found in 2 frames.")
-    assert f"uncertain in 4 frames: legs cross (2), {LEGS} (2)" in lead
+    assert f"uncertain in 4 frames: legs cross (2), {WHICH_LEG} (2)" in lead
     # Its camera has its own world; the camera.json beside it belongs to another.
     track = read_track(folder / "part.csv")
     np.testing.assert_allclose(track.camera_change[-1], track.time[-1] * CHANGE, atol=1e-6)

@@ -17,9 +17,9 @@ from gait.errors import UserError
 from gait.io import blob
 from gait.io.video import Video
 from gait.simulate import aids
-from gait.simulate.body import BONE_INDEX, PARENTS, POINT_BONE, POINTS, Mesh, draw_anatomy
-from gait.simulate.clip import FILES, background, files, find_events, pictures, planned_events, simulate
-from gait.simulate.curves import NAMES, fourier, normative
+from gait.simulate.body import BONE_INDEX, PARENT_BONES, POINT_BONE, POINTS, Mesh, draw_anatomy
+from gait.simulate.clip import CLIP_FILES, background, files, find_events, pictures, planned_events, simulate
+from gait.simulate.curves import CURVE_NAMES, fourier, normative
 from gait.simulate.render import Renderer, light, rasterise
 from gait.simulate.scenario import PRESETS, VIEWS, Scenario
 from gait.simulate.stage import Stage, build_set, set_stage
@@ -78,7 +78,7 @@ def test_a_frame_does_not_depend_on_the_frames_before_it() -> None:
 
 @pytest.mark.long
 def test_a_folder_holds_every_file(clip: Path) -> None:
-    assert sorted(p.name for p in clip.iterdir()) == sorted(FILES)
+    assert sorted(p.name for p in clip.iterdir()) == sorted(CLIP_FILES)
     video = Video(clip / "video.mp4")
     assert (video.size, video.count, video.fps) == ((240, 180), 50, 30)
     assert Camera.read(str(clip / "camera.json"), video.size).size == (240, 180)
@@ -329,7 +329,7 @@ def write_model(path: Path, knee: str = "r_knee_flexion") -> None:
     """Write a two-component model whose curves are the normative ones."""
     curves = normative(np.random.default_rng(1))
     samples = (fourier(np.arange(64) / 64) @ curves.mean.T).astype(np.float32)
-    names = [name.replace("pelvis_", "root_") for name in NAMES]
+    names = [name.replace("pelvis_", "root_") for name in CURVE_NAMES]
     names[names.index("r_knee_flexion")] = knee
     blob.write(
         path,
@@ -439,7 +439,7 @@ def test_a_model_that_cannot_be_walked_leaves_no_folder(tmp_path: Path) -> None:
 
 def test_every_bone_and_point_hangs_together() -> None:
     shown: set[str] = set()
-    for bone, parent in PARENTS.items():
+    for bone, parent in PARENT_BONES.items():
         assert parent is None or parent in shown
         shown.add(bone)
     assert set(POINT_BONE.values()) <= shown

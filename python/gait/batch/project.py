@@ -20,8 +20,8 @@ if sys.version_info >= (3, 11):
 else:
     import tomli as tomllib
 
-EXPORTS = ("trc", "c3d", "bvh", "mot", "parquet", "rrd", "mcap")
-MADE = ("track", "lift", "overlay", "report", *EXPORTS)
+EXPORT_FORMATS = ("trc", "c3d", "bvh", "mot", "parquet", "rrd", "mcap")
+MADE = ("track", "lift", "overlay", "report", *EXPORT_FORMATS)
 _FILES = ("video", "keypoints", "camera")
 _KEYS = ("subject", "height", "person", "people", "start", "stop", "make", "options", *_FILES)
 
@@ -72,7 +72,7 @@ class Clip:
         found = []
         if "report" in self.make and not self.lifted:
             found.append(["report", "track", result, "-o", str(folder / f"report{ending}"), "--json"])
-        for suffix in EXPORTS:
+        for suffix in EXPORT_FORMATS:
             if suffix in self.make:
                 found.append(["export", result, "-o", str(folder / f"{stem}.{suffix}"), "--json"])
         return found

@@ -23,7 +23,7 @@ from gait.signals import die_with_parent
 
 DONE, FAILED = "done", "failed"
 RECORD = "done.json"  #: written to the folder of a clip when it is done
-GAIT = (sys.executable, "-m", "gait")
+GAIT_COMMAND = (sys.executable, "-m", "gait")
 _COUNTS = ("frames", "init", "tracking", "ambiguous", "lost")
 _GRACE = 5.0  # seconds that commands have to end after an interrupt
 
@@ -40,7 +40,7 @@ class Runner:
         First words of each command line: the program.
     """
 
-    def __init__(self, output: Path, gait: Sequence[str] = GAIT) -> None:
+    def __init__(self, output: Path, gait: Sequence[str] = GAIT_COMMAND) -> None:
         self.output, self.gait = output, tuple(gait)
         self._running: set[subprocess.Popen[str]] = set()
         self._lock, self._ended = threading.Lock(), False

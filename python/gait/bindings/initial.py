@@ -17,9 +17,9 @@ from gait.io.fields import Fields, read_json
 # Standard deviations of values for which an init file gives none.
 DEFAULT_SD = {"pelvis": 0.05, "heading_rad": 0.1, "phase": 0.05, "stride_hz": 0.05, "stature_m": 0.03}
 KEYS = ("frame", *DEFAULT_SD, "sd")
-OUTSIDE = "the start is outside the picture; check pelvis and camera"
+OUTSIDE_PICTURE = "the start is outside the picture; check pelvis and camera"
 
-SCALARS = {  # key in the file: attribute of State, remedy
+FILE_SCALARS = {  # key in the file: attribute of State, remedy
     "heading_rad": ("heading", "give the walking direction about z in radians, 0 = along +x"),
     "phase": ("phase", "give the phase of the stride from 0 (right heel strike) to 1"),
     "stride_hz": ("stride_hz", "give strides (two steps) per second, about 0.9"),
@@ -83,7 +83,7 @@ class Start:
                 raise fields.fail("frame", f"is {own}, --start is {frame}", "leave one of them out")
             frame = own
         mean, sd = model.prior()
-        for key, (name, remedy) in SCALARS.items():
+        for key, (name, remedy) in FILE_SCALARS.items():
             if key in fields:
                 setattr(mean, name, fields.number(key, *state_range(name), remedy))
                 setattr(sd, name, DEFAULT_SD[key])

@@ -14,10 +14,10 @@ from gait.bindings import abi
 from gait.bindings.library import library, struct_fields
 
 Array = NDArray[np.float64]
-LIMITS = {"coef": abi.MAX_COMPONENTS, "offset": abi.MAX_ANGLES, "proportion": abi.MAX_PROPORTIONS}
+ARRAY_LIMITS = {"coef": abi.MAX_COMPONENTS, "offset": abi.MAX_ANGLES, "proportion": abi.MAX_PROPORTIONS}
 LEAST_STATURE = 0.3  # metres; the smallest that particles may have (particles.h)
 POSE_SCALARS = ("phase", "stride_hz", "stature", "heading", "pitch", "roll")  # scalars that a pose depends on
-SCALARS = (*POSE_SCALARS, "turn_rate")
+STATE_SCALARS = (*POSE_SCALARS, "turn_rate")
 
 
 @cache
@@ -74,7 +74,7 @@ class State:
         """Copy a ``gait_state``, with `components` scores and `angles` offsets."""
         arrays = {"pelvis": c.pelvis, "coef": c.coef[:components], "offset": c.offset[:angles]}
         arrays["proportion"] = c.proportion[:]
-        values: dict[str, Any] = {name: float(getattr(c, name)) for name in SCALARS}
+        values: dict[str, Any] = {name: float(getattr(c, name)) for name in STATE_SCALARS}
         values |= {name: np.array(numbers, float) for name, numbers in arrays.items()}
         return State(**values, motion_class=c.motion_class)
 
@@ -87,14 +87,16 @@ class State:
             If `pelvis` does not have 3 numbers, or another array has more than the library allows.
         """
         pelvis: Sequence[float] = np.asarray(self.pelvis, float).tolist()
-        if len(pelvis) != 3 or any(np.size(getattr(self, name)) > most for name, most in LIMITS.items()):
-            limits = ", ".join(f"{name} at most {most}" for name, most in LIMITS.items())
+        if len(pelvis) != 3 or any(
+            np.size(getattr(self, name)) > most for name, most in ARRAY_LIMITS.items()
+        ):
+            limits = ", ".join(f"{name} at most {most}" for name, most in ARRAY_LIMITS.items())
             raise ValueError(f"state: pelvis has 3 numbers, {limits}")
         library()  # loading it defines the structures
-        c = abi.StateC(**{name: float(getattr(self, name)) for name in SCALARS})
+        c = abi.StateC(**{name: float(getattr(self, name)) for name in STATE_SCALARS})
         c.motion_class = self.motion_class
         c.pelvis[:] = pelvis
-        for name in LIMITS:
+        for name in ARRAY_LIMITS:
             numbers: Sequence[float] = np.asarray(getattr(self, name), float).tolist()
             getattr(c, name)[: len(numbers)] = numbers
         return c

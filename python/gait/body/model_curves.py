@@ -18,12 +18,12 @@ from gait.io import blob
 
 Floats = npt.NDArray[np.float64]
 
-MOST = 2.0
+MOST_PACE_SDS = 2.0
 """Standard deviations between people: as far from the mean rate as is learnt (kinematics.h)."""
 
 
 def pace(statistics: npt.ArrayLike, stride_hz: npt.ArrayLike) -> Floats:
-    """Pace (...): stride rates minus the mean, in standard deviations between people, limited to `MOST`.
+    """Pace (...): stride rate minus its mean, in standard deviations between people, at most `MOST_PACE_SDS`.
 
     `statistics` (2, ...): mean and standard deviation of the stride rate, the first values of section GAIT;
     `stride_hz` (...): 0 where unknown, for which the pace is 0.
@@ -32,7 +32,7 @@ def pace(statistics: npt.ArrayLike, stride_hz: npt.ArrayLike) -> Floats:
     rate = np.asarray(stride_hz, float)
     if not sd > 0:
         return np.zeros(rate.shape)
-    return np.where(rate > 0, np.clip((rate - mean) / sd, -MOST, MOST), 0.0)
+    return np.where(rate > 0, np.clip((rate - mean) / sd, -MOST_PACE_SDS, MOST_PACE_SDS), 0.0)
 
 
 @cache

@@ -17,19 +17,22 @@ from gait.io.video import Video
 
 Array = NDArray[np.float64]
 
-LEAST, MOST = 6, 40  # fewest and most pictures, of different poses, of a calibration
-_RATE = 8.0  # frames per second of a film that are searched
+FEWEST_POSES, MOST_POSES = 6, 40  # fewest and most pictures, of different poses, of a calibration
+_SEARCHED_FPS = 8.0  # frames per second of a film that are searched
 _BLURRED = 6.0  # pixels; width of edges from which a picture counts as blurred
-_APART = 0.12  # least difference between poses: fractions of the picture, and sines of tilts
+_LEAST_POSE_DIFFERENCE = 0.12  # least difference between poses: fractions of the picture, and sines of tilts
 _WIDTH = 1280.0  # pixels along the longer side; in larger pictures the limits in pixels grow in proportion
 _RMS = 1.0  # pixels; largest reprojection error
 _FOCAL_SD = 0.02  # largest standard deviation, as a fraction of the focal length
 _CHANGED = 0.02  # change of the focal length that is refused, in addition to three standard deviations
 _OFF_MIDDLE = 0.15  # largest offset of the principal point, as a fraction of the picture
-_WRONG = 3.0, 0.5  # a picture is left out if its error exceeds this many times the median, and these pixels
+_WRONG_PICTURE = (
+    3.0,
+    0.5,
+)  # a picture is left out if its error exceeds this many times the median, and these pixels
 _CORNER = 0.3  # size of a corner of the picture, as a fraction of its sides
 _TILT, _LEAST_TILT = 15.0, 20.0  # degrees: tilt to each side asked for; range of tilts below which we refuse
-_NEAR, _NEARER = 0.4, 1.3  # length of the board over that of the picture; nearest over farthest
+_NEAR_WIDTH, _NEARER = 0.4, 1.3  # length of the board over that of the picture; nearest over farthest
 _TRIED = 5  # pictures searched for another kind of board
 
 
@@ -94,7 +97,7 @@ class Lens:
 
 def calibrate_film(video: Video, board: Board, progress: Callable[[int], None]) -> Lens:
     """Calibrate from a film in which the board or the camera moves; errors as in `calibrate_pictures`."""
-    step = max(1, round(video.fps / _RATE))
+    step = max(1, round(video.fps / _SEARCHED_FPS))
     wanted = range(0, video.count, step)
 
     def pictures() -> Iterator[tuple[str, Grey]]:
@@ -157,7 +160,7 @@ def _calibrate(where: str, pictures: Iterator[tuple[str, Grey]], board: Board, s
         else:
             sharp.append(View(tried, name, number, uv, width, _pose(board, number, uv, size)))
     views = sorted(different(sharp), key=lambda view: view.order)
-    if len(views) < LEAST:
+    if len(views) < FEWEST_POSES:
         raise UserError(f"{where}: {_too_few(board, len(sharp), len(views), blurred, tried, others)}")
     lens = _without_wrong(board, views, size)
     _require_good(where, board, lens)
@@ -175,27 +178,27 @@ def _too_few(
             if others
             else (f"no {board} in {tried} pictures; show all of it, flat and evenly lit, or give --board")
         )
-    if sharp < LEAST and blurred > sharp:
+    if sharp < FEWEST_POSES and blurred > sharp:
         return (
             f"the board is blurred in {blurred} of {sharp + blurred} pictures; move it slowly, in good "
             "light, and stop at each pose"
         )
     poses = f"{different} pose{'s' if different != 1 else ''}"
     return (
-        f"the board is seen sharply in {poses}, {LEAST} are needed; show it in 10 or more: in every "
+        f"the board is seen sharply in {poses}, {FEWEST_POSES} are needed; show it in 10 or more: in every "
         "corner of the picture, tilted to all sides, near and far"
     )
 
 
 def different(views: Sequence[View]) -> list[View]:
-    """Choose at most `MOST` views whose poses differ, sharp ones first."""
+    """Choose at most `MOST_POSES` views whose poses differ, sharp ones first."""
     left = sorted(views, key=lambda view: view.blur)
     if not left:
         return []
     chosen, poses = [left[0]], np.array([view.pose for view in left])
     apart = np.linalg.norm(poses - poses[0], axis=1)
-    while len(chosen) < MOST:
-        far = apart > _APART
+    while len(chosen) < MOST_POSES:
+        far = apart > _LEAST_POSE_DIFFERENCE
         if not far.any():
             break
         score = np.where(far, apart - 0.02 * np.array([view.blur for view in left]), -np.inf)
@@ -219,10 +222,10 @@ def _pose(board: Board, number: NDArray[np.int64], uv: Array, size: tuple[int, i
 def _without_wrong(board: Board, views: Sequence[View], size: tuple[int, int]) -> Lens:
     """Calibrate, then again without the views that do not fit the others."""
     first = fit(board, views, size)
-    times, pixels = _WRONG
+    times, pixels = _WRONG_PICTURE
     limit = max(times * float(np.median(first.error)), pixels * max(1.0, max(size) / _WIDTH))
     kept = [view for view, error in zip(views, first.error, strict=True) if error <= limit]
-    if len(kept) == len(views) or len(kept) < LEAST:
+    if len(kept) == len(views) or len(kept) < FEWEST_POSES:
         return first
     names = tuple(view.name for view in views if view not in kept)
     return replace(fit(board, kept, size), left_out=names)
@@ -300,7 +303,7 @@ def _require_one_focal(where: str, board: Board, lens: Lens) -> None:
     """Raise UserError if the earlier and the later pictures have different focal lengths."""
     middle = len(lens.views) // 2
     halves = lens.views[:middle], lens.views[middle:]
-    if len(halves[0]) < LEAST:
+    if len(halves[0]) < FEWEST_POSES:
         return
     found = [fit(board, half, lens.camera.size) for half in halves]
     if any(min(np.ptp(_tilts(board, half), axis=0)) < _LEAST_TILT for half in found):
@@ -333,7 +336,7 @@ def missing(board: Board, lens: Lens) -> Iterator[str]:
         if most < _TILT:
             yield f"the board tilted by 30 degrees, {words}"
     sizes = np.array([view.pose[2] for view in lens.views])
-    if sizes.max() < _NEAR:
+    if sizes.max() < _NEAR_WIDTH:
         yield "the board nearer, so that it fills half of the picture"
     elif sizes.max() < _NEARER * sizes.min():
         yield "the board at another distance"

@@ -22,7 +22,7 @@ _MATRIX = (*_ROTATION, "tx", "ty", "tz")
 _QUATERNION = ("x", "y", "z", "qx", "qy", "qz", "qw")
 _SD_COLUMNS = ("turn_sd_deg", "place_sd_m")
 _LENS = ("fx", "fy", "cx", "cy")
-LONGEST_GAP = 0.5  #: seconds; poses are not interpolated across longer gaps
+LONGEST_POSE_GAP_S = 0.5  #: seconds; poses are not interpolated across longer gaps
 _SLACK = 0.02  # seconds before the first and after the last pose in which these are used
 _FASTEST = 20.0  # metres, and radians, per second: anything faster is a jump, not a motion
 _ROTATED = 1e-3  # by which rows of a rotation may differ from orthonormal
@@ -165,10 +165,10 @@ class CameraPath:
         """Raise UserError instead of interpolating across a gap or a jump."""
         left, then = self.poses[right - 1], self.poses[right]
         where = f"{self.path}: between {self.at[right - 1]:g} and {self.at[right]:g}"
-        if seconds > LONGEST_GAP:
+        if seconds > LONGEST_POSE_GAP_S:
             raise UserError(
                 f"{where}, where frame {number} is, poses are {seconds:.2f} s apart; give one every "
-                f"{LONGEST_GAP:g} s or more often"
+                f"{LONGEST_POSE_GAP_S:g} s or more often"
             )
         moved = float(np.linalg.norm(then.centre - left.centre))
         turned = float(np.linalg.norm(_turn(left.R, then.R)))

@@ -18,10 +18,10 @@ from gait.io.files import require_file
 
 Array = NDArray[np.float64]
 
-LEAST = 4  # points on the ground needed to place a camera
+FEWEST_GROUND_POINTS = 4  # points on the ground needed to place a camera
 _COLUMNS = ("u", "v", "x", "y")
 _STRAIGHT = 0.02  # ratio of width to length below which points count as being on a line
-_FURTHEST = 1e6  # pixels or metres; largest coordinate accepted
+_LARGEST_COORDINATE = 1e6  # pixels or metres; largest coordinate accepted
 
 
 @dataclass(frozen=True)
@@ -68,8 +68,8 @@ def read_points(path: str | os.PathLike[str]) -> Points:
     values = np.array(
         [[_cell(path, line, cells, at, name) for name, at in where] for line, cells in rows[1:]]
     )
-    if len(values) < LEAST:
-        raise UserError(f"{path}: has {len(values)} points; give {LEAST} or more")
+    if len(values) < FEWEST_GROUND_POINTS:
+        raise UserError(f"{path}: has {len(values)} points; give {FEWEST_GROUND_POINTS} or more")
     world = values[:, 2:] if "z" in head else np.pad(values[:, 2:], ((0, 0), (0, 1)))
     return Points(
         str(path),
@@ -85,7 +85,7 @@ def _cell(path: str | os.PathLike[str], line: int, cells: list[str], at: int, na
         value = float(text)
     except ValueError:
         value = np.nan
-    if not abs(value) <= _FURTHEST:
+    if not abs(value) <= _LARGEST_COORDINATE:
         unit = "pixels" if name in "uv" else "metres"
         raise UserError(f"{path}: line {line}: {name} is {text[:20]!r}; give a number of {unit}")
     return value

@@ -25,7 +25,7 @@ from gait.progress import progress
 if TYPE_CHECKING:
     from gait.camera.calibrating import Lens
 
-PAPERS = ("a4", "letter", "a3")
+PAPER_NAMES = ("a4", "letter", "a3")
 
 EXAMPLES = """\
 examples:
@@ -52,7 +52,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         help="write the board to print, true to size",
     )
     parser.add_argument(
-        "--paper", choices=PAPERS, default="a4", help="paper of --print-board, landscape (default: a4)"
+        "--paper", choices=PAPER_NAMES, default="a4", help="paper of --print-board, landscape (default: a4)"
     )
 
 

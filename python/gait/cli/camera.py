@@ -36,7 +36,7 @@ if TYPE_CHECKING:
     from gait.track.from_walk import Calibration
 
 _OUTSIDE, _FILLED = 0.05, 0.72  # shares of the points, and of the picture's sides
-_LARGE = 3.0  # pixels rms; above it the points should be checked
+_LARGE_ERROR_PX = 3.0  # pixels rms; above it the points should be checked
 
 EXAMPLES = """\
 examples:
@@ -149,7 +149,7 @@ def _from_points(args: argparse.Namespace) -> int:
     camera, off = place(read_camera(args.lens, placed=False), points)
     _write(args.output, camera)
     worst, rms = int(off.argmax()), float(np.sqrt((off**2).mean()))
-    if rms > _LARGE:
+    if rms > _LARGE_ERROR_PX:
         line = points.line[worst]
         text = f"{args.points}: reprojection error {rms:.1f} px rms; check line {line} and the lens"
         note(text, args.quiet)

@@ -219,7 +219,7 @@ def _moving(args: argparse.Namespace, source: FileSource | DeviceSource) -> tupl
 
 
 def _start(args: argparse.Namespace, source: FileSource | DeviceSource, setup: Setup) -> Start:
-    from gait.bindings.initial import OUTSIDE, Start
+    from gait.bindings.initial import OUTSIDE_PICTURE, Start
     from gait.bindings.model import Model
     from gait.lcm.capture import DeviceSource
 
@@ -227,7 +227,7 @@ def _start(args: argparse.Namespace, source: FileSource | DeviceSource, setup: S
     if args.init != "auto":
         start = Start.read(args.init, model, height=args.height)
         if setup.camera and not setup.camera.shows(model.pose(start.mean)[0]):
-            note(f"{args.init}: {OUTSIDE}", args.quiet)
+            note(f"{args.init}: {OUTSIDE_PICTURE}", args.quiet)
         return start
     if isinstance(source, DeviceSource) or setup.camera is None:
         raise UsageError("--init auto: needs a video file and --camera; give an init file")

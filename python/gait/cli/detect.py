@@ -42,7 +42,10 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     )
     parser.add_argument("--fetch", action="store_true", help="download the weights (38 MB) and check them")
     parser.add_argument(
-        "--network", choices=list(weights.LANDMARKS), default="full", help="landmark network (default: full)"
+        "--network",
+        choices=list(weights.LANDMARK_NETWORKS),
+        default="full",
+        help="landmark network (default: full)",
     )
     parser.add_argument(
         "--person",

@@ -109,7 +109,7 @@ def check_weights() -> Iterator[Finding]:
     from gait.detect import weights
     from gait.errors import UserError
 
-    for name, file in {"people": weights.PERSON, **weights.LANDMARKS}.items():
+    for name, file in {"people": weights.PERSON, **weights.LANDMARK_NETWORKS}.items():
         optional = name in ("lite", "heavy")
         if not weights.find(file):
             state = "note" if optional else "fault"

@@ -28,7 +28,7 @@ from gait.progress import note
 if TYPE_CHECKING:
     from gait.io.track_file import Joints
 
-DRIFT = 0.1  # seconds by which the times of paired frames may drift apart
+MOST_TIME_DRIFT_S = 0.1  # seconds by which the times of paired frames may drift apart
 
 EXAMPLES = """\
 examples:
@@ -63,7 +63,7 @@ def run(args: argparse.Namespace) -> int:
     camera = args.camera or (beside / "camera.json" if there else None)
     track = read_estimates(args.track)
     apart = _drift(track, truth)
-    if apart > DRIFT:
+    if apart > MOST_TIME_DRIFT_S:
         note(
             f"{args.track}: frames are paired by number, but their times run apart by {apart:.2f} s: number "
             "them as the truth does",

@@ -33,7 +33,7 @@ examples:
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Add the command's options."""
-    suffixes = " ".join(files.SUFFIXES)
+    suffixes = " ".join(files.EXPORT_SUFFIXES)
     parser.add_argument(
         "input", metavar="TRACK", help="a track, a motion of gait lift, or for .mcap an LCM log"
     )

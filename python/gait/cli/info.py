@@ -8,7 +8,7 @@ import os
 from collections.abc import Mapping
 from typing import Any
 
-GAIT = (
+GAIT_KEYS = (
     "stride_hz", "stride_hz_sd", "stride_time_cv", "stride_length", "stride_length_sd", "fps", "stature_m",
     "stature_sd_m",
 )  # fmt: skip
@@ -59,7 +59,9 @@ def describe(sections: Mapping[str, Any], size: int, crc: int, name: str = "blob
         slope_of(sections, name)  # raises UserError if no tracker could use it
         result |= {"components": len(sections["CURV"]) - 1, "phases": sections["CURV"].shape[1]}
     if "GAIT" in sections:
-        result["gait"] = dict(zip(GAIT, np.round(sections["GAIT"].astype(float), 4).tolist(), strict=False))
+        result["gait"] = dict(
+            zip(GAIT_KEYS, np.round(sections["GAIT"].astype(float), 4).tolist(), strict=False)
+        )
     if "SCST" in sections:
         result["scores"] = np.round(sections["SCST"].astype(float), 4).tolist()
     if found := classes.figures(sections):

@@ -50,7 +50,7 @@ examples:
 
 AUTO = "auto"
 #: Ranges of the options for segments.
-FRAMES, FPS, MODES, MIXTURE = (4, 60), (5, 240), (1, 120), (1, 16)
+FRAMES_RANGE, FPS_RANGE, MODES_RANGE, MIXTURE_RANGE = (4, 60), (5, 240), (1, 120), (1, 16)
 SEGMENT = ("frames", "hop", "fps", "modes", "headings", "mixture", "markers")  # options --segment-...
 
 
@@ -187,10 +187,15 @@ def _add_segments(group: argparse._ArgumentGroup) -> None:
         "but without a cyclic model, so that gait track cannot use the file",
     )
     numbers = (
-        ("frames", "F", FRAMES, f"frames of a segment (default: {usual.frames})"),
-        ("hop", "H", (1, FRAMES[1]), "frames from one segment to the next (default: half of F)"),
-        ("fps", "R", FPS, f"frames per second of a segment (default: {usual.fps:g})"),
-        ("modes", "K", MODES, f"modes kept, at most a quarter of the segments (default: {usual.modes})"),
+        ("frames", "F", FRAMES_RANGE, f"frames of a segment (default: {usual.frames})"),
+        ("hop", "H", (1, FRAMES_RANGE[1]), "frames from one segment to the next (default: half of F)"),
+        ("fps", "R", FPS_RANGE, f"frames per second of a segment (default: {usual.fps:g})"),
+        (
+            "modes",
+            "K",
+            MODES_RANGE,
+            f"modes kept, at most a quarter of the segments (default: {usual.modes})",
+        ),
     )
     for name, metavar, limits, help in numbers:
         group.add_argument(f"--segment-{name}", type=values.whole(*limits), metavar=metavar, help=help)
@@ -202,7 +207,7 @@ def _add_segments(group: argparse._ArgumentGroup) -> None:
     )
     group.add_argument(
         "--segment-mixture",
-        type=lambda text: _auto_or(text, MIXTURE[1]),
+        type=lambda text: _auto_or(text, MIXTURE_RANGE[1]),
         metavar="auto|K",
         help=f"Gaussians in the segment prior (default: {usual.mixture}); auto: the number that predicts "
         "people left out best",

@@ -84,10 +84,10 @@ def run(args: argparse.Namespace) -> int:
 
 def _text(parameters: Parameters, norms: Sequence[Compared]) -> str:
     """Format tables for the terminal."""
-    from gait.report.gait_parts import HEAD, NORM_HEAD, norm_rows, parameter_rows
+    from gait.report.gait_parts import NORM_HEAD, PARAMETER_HEADER, norm_rows, parameter_rows
 
     notes = f"mean ± its standard deviation (between strides); uncertainty from {parameters.source}"
-    lines = [*_table([list(HEAD), *parameter_rows(parameters)]), notes]
+    lines = [*_table([list(PARAMETER_HEADER), *parameter_rows(parameters)]), notes]
     if norms:
         lines += ["", *_table([list(NORM_HEAD), *norm_rows(norms)])]
     return "\n".join(lines)

@@ -10,9 +10,9 @@ from gait.bindings.abi import Mode
 from gait.bindings.config import TrackerConfig
 from gait.errors import LibraryError, UsageError
 
-PARTICLES = (16, 1 << 20)  # as in gait.h and gait-trackd, like the ranges below
+PARTICLES_RANGE = (16, 1 << 20)  # as in gait.h and gait-trackd, like the ranges below
 THREADS = (1, 256)  # GAIT_POOL_MAX
-SEED = (0, (1 << 64) - 1)
+SEED_RANGE = (0, (1 << 64) - 1)
 STREAM = (0, 30)
 PICTURES = (".jpg", ".jpeg", ".png", ".bmp", ".tif", ".tiff", ".webp")
 PAGES = (".html", ".htm")
@@ -192,7 +192,7 @@ def add_model(parser: ArgumentParser, what: str = "walking model") -> None:
 def add_seed(parser: _ActionsContainer, of: str) -> None:
     """Add ``--seed``; `of`: what it is the seed of, for the help."""
     help = f"seed of {of} (default: 1)"
-    parser.add_argument("--seed", type=whole(*SEED), default=1, metavar="S", help=help)
+    parser.add_argument("--seed", type=whole(*SEED_RANGE), default=1, metavar="S", help=help)
 
 
 def add_url(parser: ArgumentParser) -> None:
@@ -235,9 +235,9 @@ def add_filter(parser: ArgumentParser, threads: int) -> None:
     usual, paper = _particles(Mode.DEFAULT), _particles(Mode.PAPER)
     parser.add_argument(
         "--particles",
-        type=whole(*PARTICLES),
+        type=whole(*PARTICLES_RANGE),
         metavar="N",
-        help=f"size of the particle set, {PARTICLES[0]} to {PARTICLES[1]} "
+        help=f"size of the particle set, {PARTICLES_RANGE[0]} to {PARTICLES_RANGE[1]} "
         f"(default: {usual}, in paper mode {paper})",
     )
     parser.add_argument(

@@ -32,7 +32,7 @@ _HEAT_RADIUS, _LEAST_HEAT = 3, 0.5
 _CROP_MARGIN = 1.25  # side of a crop over the diameter of the person's circle
 _THREADS = 2  # threads of LiteRT: faster than one, with the same bits
 
-JOINTS = {
+LANDMARK_JOINTS = {
     "l_shoulder": 11, "r_shoulder": 12, "l_elbow": 13, "r_elbow": 14, "l_wrist": 15, "r_wrist": 16,
     "l_hip": 23, "r_hip": 24, "l_knee": 25, "r_knee": 26, "l_ankle": 27, "r_ankle": 28,
     "l_heel": 29, "r_heel": 30, "l_toe": 31, "r_toe": 32,
@@ -57,7 +57,7 @@ class Person(NamedTuple):
     score: float
     """Probability that there is a person in the crop."""
     uv: Array
-    """Joints in the order of `JOINTS`, pixels, shape (16, 2)."""
+    """Joints in the order of `LANDMARK_JOINTS`, pixels, shape (16, 2)."""
     confidence: Array
     """Probability that each joint is in the picture and not hidden, shape (16,)."""
     crop: Crop
@@ -133,7 +133,7 @@ class LandmarkNetwork:
     """
 
     def __init__(self, name: str = "full") -> None:
-        data = weights.load(weights.LANDMARKS[name])
+        data = weights.load(weights.LANDMARK_NETWORKS[name])
         self._network = _litert(data) or _opencv(data)
 
     def __call__(self, image: Image, crop: Crop) -> Person:
@@ -148,7 +148,7 @@ class LandmarkNetwork:
         out = self._network((square[None, ..., ::-1] / 255.0).astype(np.float32))
         marks = out["Identity"].reshape(_LANDMARKS, 5)
         place = _refined(marks[:, :2].astype(np.float64), out["Identity_3"][0]) @ turn.T + shift
-        joints = list(JOINTS.values())
+        joints = list(LANDMARK_JOINTS.values())
         confidence = _sigmoid(marks[:, 3]) * _sigmoid(marks[:, 4])
         return Person(
             float(out["Identity_1"].ravel()[0]),

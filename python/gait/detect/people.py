@@ -18,7 +18,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from gait.detect import profile
-from gait.detect.networks import JOINTS, Crop, LandmarkNetwork, Person, PersonNetwork, whole_picture
+from gait.detect.networks import LANDMARK_JOINTS, Crop, LandmarkNetwork, Person, PersonNetwork, whole_picture
 from gait.errors import UserError
 from gait.io.keypoints_file import Keypoints
 from gait.io.video import Frame, Image, Video
@@ -31,8 +31,9 @@ _LEAST_SCORE = 0.5  # of a person in a crop
 _SCAN_PERIOD = 1.0  # seconds between scans of the whole picture
 _RETRY = 0.2  # the same while a person is lost or none has been found
 _FORGET = 60.0  # seconds after which a person who comes back gets a new id
-_SAME = 0.25  # crop sides between the centres of crops around the same person
-_REACH = 0.8  # crop sides per second by which a lost person may leave their course, in addition to `_SAME`
+_SAME_CROP = 0.25  # crop sides between the centres of crops around the same person
+#: Crop sides per second by which a lost person may leave their course, in addition to `_SAME_CROP`.
+_CROP_SPEED = 0.8
 _COURSE = 0.3  # seconds from which the speed on a course is computed
 _CONTACT = 0.35  # crop sides; people closer than this may be mistaken for each other
 _LONG_CONTACT = 1.0  # seconds, after which people walk together and their courses are computed afresh
@@ -40,16 +41,17 @@ _OFF_COURSE = (
     0.12,
     0.15,
 )  # crop sides, and crop sides per second in contact, that a person may be off their course
-_ALIKE = 0.6  # overlap of the colours of one person; 5 % of the frames of a film in sun and shade have less
-_CLEARLY = 0.1  # by which the overlap with another person's colours must be larger
-_MOST = 8  # people
+#: Overlap of the colours of one person; 5 % of the frames of a film in sun and shade have less.
+_COLOUR_OVERLAP = 0.6
+_CLEAR_OVERLAP_GAIN = 0.1  # by which the overlap with another person's colours must be larger
+_MOST_PEOPLE = 8  # people
 _LEAST_FRAMES = 3  # frames in which a person must be found
 _LEAST_FEET = 0.3  # seconds for which both ankles must be in view where feet are needed
 _BINS = (6, 12, 12)  # of L, a and b
 _RANGES = (0, 256, 80, 176, 80, 176)
 _BLUR = [0.5 * np.eye(n) + 0.25 * (np.eye(n, k=1) + np.eye(n, k=-1)) for n in _BINS]
 _SAMPLE = 5  # frames between samples of colours
-_TORSO = [list(JOINTS).index(name) for name in ("l_shoulder", "r_shoulder", "r_hip", "l_hip")]
+_TORSO = [list(LANDMARK_JOINTS).index(name) for name in ("l_shoulder", "r_shoulder", "r_hip", "l_hip")]
 
 
 @dataclass
@@ -122,7 +124,7 @@ class PeopleDetector:
         If the weights are missing or damaged.
     """
 
-    def __init__(self, network: str = "full", most: int = _MOST, everyone: bool = False) -> None:
+    def __init__(self, network: str = "full", most: int = _MOST_PEOPLE, everyone: bool = False) -> None:
         self._network = network
         self._find = PersonNetwork()
         self._landmarks = LandmarkNetwork(network)
@@ -205,8 +207,8 @@ class PeopleDetector:
         colours = _colours(frame.image, person)
         own = _alike(colours, one.colours)
         if near:
-            return off or any(_alike(colours, other.colours) > own + _CLEARLY for other in near)
-        return own < _ALIKE
+            return off or any(_alike(colours, other.colours) > own + _CLEAR_OVERLAP_GAIN for other in near)
+        return own < _COLOUR_OVERLAP
 
     def _scan(self, frame: Frame, found: list[tuple[Followed, Person]]) -> None:
         """Search for people who are not followed, where people were hidden and in the picture.
@@ -225,7 +227,7 @@ class PeopleDetector:
         """Add people in crops who have not been found yet; return whether there is one."""
         count = len(found)
         for crop in crops:
-            if len(found) >= self._most or any(_apart(crop, p.crop) < _SAME / 2 for _, p in found):
+            if len(found) >= self._most or any(_apart(crop, p.crop) < _SAME_CROP / 2 for _, p in found):
                 continue
             person = self._landmarks(frame.image, crop)
             if person.score < _LEAST_SCORE or any(_same(person, p) for _, p in found):
@@ -247,9 +249,9 @@ class PeopleDetector:
         best, least = None, np.inf
         for one in self.people:
             gap, alike = frame.time - one.times[-1], _alike(colours, one.colours)
-            if not one.lost or gap > _FORGET or alike < _ALIKE:
+            if not one.lost or gap > _FORGET or alike < _COLOUR_OVERLAP:
                 continue
-            reach = _SAME + _REACH * gap
+            reach = _SAME_CROP + _CROP_SPEED * gap
             stayed = _apart(person.crop, one.keypoints[-1].crop) / reach
             off = min(one.off_course(frame.time, person) / reach, 0.5 + 0.5 * stayed)  # few people stop
             if off < 1 and off - alike < least:
@@ -278,7 +280,7 @@ class PeopleDetector:
 def detect(
     video: Video,
     network: str = "full",
-    most: int = _MOST,
+    most: int = _MOST_PEOPLE,
     *,
     first: int = 0,
     stop: int | None = None,
@@ -327,13 +329,13 @@ def detect(
 def _keypoints(one: Followed, times: Mapping[int, float] | Array) -> Keypoints:
     """Make the keypoints of a person, NaN in frames where the person was not found."""
     frames = np.arange(one.frames[0], one.frames[-1] + 1)
-    uv = np.full((len(frames), len(JOINTS), 2), np.nan)
+    uv = np.full((len(frames), len(LANDMARK_JOINTS), 2), np.nan)
     confidence = np.zeros(uv.shape[:2])
     rows = np.array(one.frames) - frames[0]
     uv[rows] = [person.uv for person in one.keypoints]
     confidence[rows] = [person.confidence for person in one.keypoints]
     time = np.array([times[int(n)] for n in frames])
-    return Keypoints(frames, time, tuple(JOINTS), uv, confidence)
+    return Keypoints(frames, time, tuple(LANDMARK_JOINTS), uv, confidence)
 
 
 def height(keypoints: Keypoints) -> float:
@@ -388,10 +390,10 @@ def _apart(a: Crop, b: Crop) -> float:
 
 def _same(a: Person, b: Person) -> bool:
     """Whether two sets of landmarks are of the same person."""
-    if _apart(a.crop, b.crop) < _SAME / 2:
+    if _apart(a.crop, b.crop) < _SAME_CROP / 2:
         return True
     off = np.median(np.hypot(*(a.uv - b.uv).T))
-    return bool(off < _SAME / 4 * min(a.crop.side, b.crop.side))
+    return bool(off < _SAME_CROP / 4 * min(a.crop.side, b.crop.side))
 
 
 def _colours(image: Image, person: Person) -> Colours:

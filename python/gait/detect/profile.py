@@ -28,7 +28,7 @@ from gait.io.keypoints_file import LEAST_CONFIDENCE, Keypoints
 Array = NDArray[np.float64]
 
 FILE = Path(__file__).with_name("profile.json")
-LEG, TRUNK = 0.49, 0.28  # fractions of a person's height: hip to ankle, shoulder to hip
+LEG_LENGTH, TRUNK_LENGTH = 0.49, 0.28  # fractions of a person's height: hip to ankle, shoulder to hip
 _ARMS = ("shoulder", "elbow", "wrist", "hip")
 
 
@@ -114,7 +114,7 @@ def picture_height(keypoints: Keypoints) -> Array:
     places = [keypoints.names.index(f"{side}_{joint}") for joint in joints for side in "lr"]
     middles = keypoints.uv[:, places].reshape(-1, len(joints), 2, 2).mean(axis=2)
     length = np.hypot(*np.diff(middles, axis=1).T).sum(axis=0)
-    height = length / (LEG if len(joints) == 2 else TRUNK + LEG)
+    height = length / (LEG_LENGTH if len(joints) == 2 else TRUNK_LENGTH + LEG_LENGTH)
     return np.asarray(np.where(np.isfinite(height), height, np.nanmedian(height)))
 
 

@@ -18,7 +18,7 @@ PERSON = Published(
     "mediapipe/modules/pose_detection/pose_detection.tflite",
     "9ba9dd3d42efaaba86b4ff0122b06f29c4122e756b329d89dca1e297fd8f866c",
 )
-LANDMARKS = {
+LANDMARK_NETWORKS = {
     "full": Published(
         "pose_landmark_full.tflite",
         _WHEEL,
@@ -45,7 +45,7 @@ STORE = Store(
     "GAIT_WEIGHTS",
     "the detector's weights",
     FETCH,
-    (PERSON, *LANDMARKS.values()),
+    (PERSON, *LANDMARK_NETWORKS.values()),
     f"BlazePose networks by Google, licence Apache-2.0 (LICENSE), from {_WHEEL} and {_NPM}.\n",
 )
 find, load, fetch = STORE.find, STORE.load, STORE.fetch

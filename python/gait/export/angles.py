@@ -15,9 +15,9 @@ from gait.body.skeleton import CHANNELS, JOINTS, axis_rotation, default_skeleton
 
 Array = NDArray[np.float64]
 
-FIXED = ("root_forward", "root_sway", "root_height", "root_pitch", "neck_z")
+FIXED_CHANNELS = ("root_forward", "root_sway", "root_height", "root_pitch", "neck_z")
 """Channels that are 0: the pelvis's position replaces those of the path, and the others are undetermined."""
-_FREE = tuple(i for i, name in enumerate(CHANNELS) if name not in FIXED)
+_FREE = tuple(i for i, name in enumerate(CHANNELS) if name not in FIXED_CHANNELS)
 _ROUNDS, _STEPS = 6, 12  # alternations of lengths and angles; Gauss-Newton steps within each
 _RIDGE = 1e-8  # metres squared per radian squared; too small to change what the joints determine
 _SETTLED = 1e-10  # radians
@@ -153,7 +153,7 @@ def _equations(fitted: Fitted) -> tuple[Array, Array, Array]:
 
 
 def standard_deviations(fitted: Fitted, covariance: Array) -> Array:
-    """Compute standard deviations (T, C) of the angles, radians, from the joints' covariance; 0 if `FIXED`.
+    """Compute standard deviations (T, C), radians, from the joints' covariance; 0 for `FIXED_CHANNELS`.
 
     Parameters
     ----------

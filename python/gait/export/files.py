@@ -9,7 +9,7 @@ from typing import Any
 from gait.errors import UsageError, UserError
 from gait.io.files import replacing
 
-SUFFIXES = (".trc", ".c3d", ".bvh", ".mot", ".parquet", ".rrd", ".mcap")
+EXPORT_SUFFIXES = (".trc", ".c3d", ".bvh", ".mot", ".parquet", ".rrd", ".mcap")
 BESIDE = {".mot": ".osim"}
 """Suffixes of files that are written with a second file of the same name."""
 
@@ -38,8 +38,8 @@ def write(
         If the format is unknown, or cannot represent the source.
     """
     suffix = Path(target).suffix.lower()
-    if suffix not in SUFFIXES:
-        raise UserError(f"{target}: not a supported format; use one of {' '.join(SUFFIXES)}")
+    if suffix not in EXPORT_SUFFIXES:
+        raise UserError(f"{target}: not a supported format; use one of {' '.join(EXPORT_SUFFIXES)}")
     if ros2 and suffix != ".mcap":
         raise UsageError(f"--ros2: is for .mcap, not for {target}")
     if suffix in (".bvh", ".mot"):

@@ -14,13 +14,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from gait.body.skeleton import CHANNELS, JOINTS
-from gait.export.angles import FIXED, Fitted
+from gait.export.angles import FIXED_CHANNELS, Fitted
 from gait.export.motion import Motion
 
 Array = NDArray[np.float64]
 
 GROUND = np.array([[0.0, 1, 0], [0, 0, 1], [1, 0, 0]])  #: world to ground of .trc
-BODY = np.array([[1.0, 0, 0], [0, 0, 1], [0, -1, 0]])  #: axes of the package's frames to axes of bodies
+BODY_AXES = np.array([[1.0, 0, 0], [0, 0, 1], [0, -1, 0]])  #: axes of the package's frames to axes of bodies
 
 #: Names of coordinates by channel; names for the sides end in _l and _r.
 _NAMES = {
@@ -59,7 +59,7 @@ def coordinate(channel: int) -> str:
 def coordinates(fitted: Fitted) -> tuple[list[str], Array]:
     """Return the names of all coordinates and their values (T, n), degrees and metres."""
     channels = [channel for rotations in fitted.rotations for _, channel in rotations]
-    path = fitted.pelvis @ BODY.T
+    path = fitted.pelvis @ BODY_AXES.T
     values = np.degrees(fitted.angles[:, channels])
     return [*(coordinate(channel) for channel in channels), *_PATH], np.hstack([values, path])
 
@@ -106,7 +106,8 @@ def _model(name: str, fitted: Fitted) -> Iterator[str]:
     for joint, frame, place in zip(JOINTS, fitted.point_frames, fitted.points, strict=True):
         yield (
             f'<Marker name="{joint}"><socket_parent_frame>/bodyset/{fitted.frames[frame]}'
-            f"</socket_parent_frame><location>{_three(BODY @ place)}</location><fixed>false</fixed></Marker>"
+            f"</socket_parent_frame><location>{_three(BODY_AXES @ place)}</location><fixed>false</fixed>"
+            "</Marker>"
         )
     yield "</objects></MarkerSet></Model></OpenSimDocument>"
 
@@ -115,19 +116,22 @@ def _joint(fitted: Fitted, i: int) -> Iterator[str]:
     """Write the joint of a frame and its parent; the first frame is free in the ground."""
     frame, parent = fitted.frames[i], fitted.parents[i]
     above = "ground" if parent < 0 else fitted.frames[parent]
-    turn = _angles(GROUND @ BODY.T) if parent < 0 else np.zeros(3)
-    rotations = [(BODY @ (np.sign(a) * np.eye(3)[abs(a) - 1]), c) for a, c in fitted.rotations[i]]
+    turn = _angles(GROUND @ BODY_AXES.T) if parent < 0 else np.zeros(3)
+    rotations = [(BODY_AXES @ (np.sign(a) * np.eye(3)[abs(a) - 1]), c) for a, c in fitted.rotations[i]]
     yield f'<CustomJoint name="{above}_{frame}">'
     yield f"<socket_parent_frame>{above}_offset</socket_parent_frame>"
     yield f"<socket_child_frame>{frame}_offset</socket_child_frame><coordinates>"
     for _, channel in rotations:
-        locked = CHANNELS[channel] in FIXED
+        locked = CHANNELS[channel] in FIXED_CHANNELS
         yield _coordinate(coordinate(channel), "rotational", locked)
     if parent < 0:
         yield from (_coordinate(name, "translational", False) for name in _PATH)
     yield "</coordinates><frames>"
     yield _offset(
-        f"{above}_offset", "/ground" if parent < 0 else f"/bodyset/{above}", BODY @ fitted.origins[i], turn
+        f"{above}_offset",
+        "/ground" if parent < 0 else f"/bodyset/{above}",
+        BODY_AXES @ fitted.origins[i],
+        turn,
     )
     yield _offset(f"{frame}_offset", f"/bodyset/{frame}", np.zeros(3), np.zeros(3))
     yield "</frames><SpatialTransform>"

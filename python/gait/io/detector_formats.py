@@ -11,7 +11,7 @@ from gait.errors import UserError, unreadable
 from gait.io import detector_json, detector_tables
 from gait.io.detections import Detections
 
-_HEAD = 1 << 16  # bytes at the beginning from which the format is recognised
+_HEADER_BYTES = 1 << 16  # bytes at the beginning from which the format is recognised
 _CSV = "keypoints are CSV with one row per frame of one person: frame,time,<joint>_u,<joint>_v[,<joint>_c]"
 Reader = Callable[[str | os.PathLike[str]], Detections]
 
@@ -56,7 +56,7 @@ def reader_of(path: str | os.PathLike[str]) -> Reader | None:
         return detector_json.read_folder
     try:
         with Path(path).open("rb") as file:
-            head = file.read(_HEAD)
+            head = file.read(_HEADER_BYTES)
     except OSError as error:
         raise unreadable(path, error) from error
     if head.startswith(b"\x89HDF"):

@@ -18,8 +18,9 @@ from gait.errors import UserError, unreadable
 from gait.progress import note
 
 #: Disk full, user's quota exceeded, file too large, or a disk error.
-FULL = (errno.ENOSPC, errno.EDQUOT, errno.EFBIG, errno.EIO)
-_SETTLED = 60.0  # seconds after which an unlocked temporary file must be left over from a killed command
+WRITE_ERRORS = (errno.ENOSPC, errno.EDQUOT, errno.EFBIG, errno.EIO)
+#: Seconds after which an unlocked temporary file must be left over from a killed command.
+_LEFTOVER_AGE_S = 60.0
 
 
 @contextmanager
@@ -55,7 +56,7 @@ def replacing(path: str | os.PathLike[str], partial: Callable[[Path], bool] | No
             _keep(temporary, target, "not finished; what was written")
         if not isinstance(error, OSError):
             raise
-        if error.errno not in FULL and error.filename != str(temporary):
+        if error.errno not in WRITE_ERRORS and error.filename != str(temporary):
             raise
         raise UserError(f"{path}: {error.strerror}; choose another place") from error
     finally:
@@ -104,7 +105,9 @@ def _keep(left: Path, target: Path, what: str) -> None:
 def _ends_early(error: BaseException) -> bool:
     """Whether the error is an interrupt or a full disk, after which finished work is worth keeping."""
     cause = error.__cause__ if isinstance(error, UserError) else error
-    return isinstance(cause, KeyboardInterrupt) or (isinstance(cause, OSError) and cause.errno in FULL)
+    return isinstance(cause, KeyboardInterrupt) or (
+        isinstance(cause, OSError) and cause.errno in WRITE_ERRORS
+    )
 
 
 def _is_left(temporary: Path) -> bool:
@@ -116,7 +119,7 @@ def _is_left(temporary: Path) -> bool:
     try:
         fcntl.flock(descriptor, fcntl.LOCK_EX | fcntl.LOCK_NB)
         is_file = stat.S_ISREG(os.fstat(descriptor).st_mode)
-        return is_file and time.time() - os.fstat(descriptor).st_mtime > _SETTLED
+        return is_file and time.time() - os.fstat(descriptor).st_mtime > _LEFTOVER_AGE_S
     except OSError:
         return False
     finally:

@@ -32,11 +32,11 @@ Array = NDArray[np.float64]
 LEAST_CONFIDENCE = 0.1  # points with less count as not seen
 
 LASTS = 1.0  # seconds for which a lasting error counts as one observation, unless modelled separately
-STRIDE = 1.1  # seconds; typical stride time
+TYPICAL_STRIDE_S = 1.1  # seconds; typical stride time
 LONGEST_STEP = 1.0  # seconds between frames; about one stride
 SHORTEST_STEP = 1e-5  # seconds between frames; no camera is this fast
-LONGEST_GAP = 10.0  # seconds without a row that lifting bridges; nothing is known in the middle of it
-RATE_OFF = 0.05  # relative difference between the rates of keypoints and video; phones vary less
+LONGEST_ROW_GAP_S = 10.0  # seconds without a row that lifting bridges; nothing is known in the middle of it
+RATE_DIFFERENCE = 0.05  # relative difference between the rates of keypoints and video; phones vary less
 TIME_OFF = 0.6  # frames; times are often rounded to half a frame
 FURTHEST = 1e6  # largest coordinate, in pixels or units of an orthographic view
 
@@ -122,7 +122,7 @@ class Keypoints:
         own, shown = self.time[shared], times[self.frame[shared]]
         interval = float(np.median(np.diff(times)))
         rate = float(own[-1] - own[0]) / float(shown[-1] - shown[0])
-        if not abs(rate - 1) <= RATE_OFF:
+        if not abs(rate - 1) <= RATE_DIFFERENCE:
             step = float(shown[-1] - shown[0]) / float(np.ptp(self.frame[shared]))
             raise UserError(
                 f"{path}: time increases by {rate * step:.4g} s a frame, the video by {step:.4g} s; frame "
@@ -140,11 +140,11 @@ class Keypoints:
         if len(self.time) < 2:
             raise UserError(f"{path}: has one frame; lifting needs motion, so give at least two")
         gap = np.diff(self.time)
-        if gap.max() > LONGEST_GAP:
+        if gap.max() > LONGEST_ROW_GAP_S:
             line = int(gap.argmax()) + 3
             raise UserError(
                 f"{path}: line {line}: {gap.max():.3g} s after the frame before; lift the parts before and "
-                f"after a gap of more than {LONGEST_GAP:g} s separately"
+                f"after a gap of more than {LONGEST_ROW_GAP_S:g} s separately"
             )
 
     def standard_deviations(self, sd: float) -> Array:
@@ -165,7 +165,7 @@ class Keypoints:
         jitter = self.standard_deviations(sd)
         if self.sd is None:
             return jitter
-        strides = max((self.time[-1] - self.time[0]) / STRIDE, 1.0) if whole else 1.0
+        strides = max((self.time[-1] - self.time[0]) / TYPICAL_STRIDE_S, 1.0) if whole else 1.0
         lasting = np.nan_to_num(self.sd) * np.sqrt(1 + self.repeated * (strides - 1))
         return self._with_hand(np.hypot(jitter, lasting))
 
@@ -398,9 +398,9 @@ def _table(path: str | os.PathLike[str]) -> tuple[list[str], list[list[str]]]:
     return head, lines[1:]
 
 
-MANY = 10  # points at exactly the same position, which noise would not produce
+EQUAL_POINTS = 10  # points at exactly the same position, which noise would not produce
 COINCIDE = 4  # joints at one position: from the side, hips and pelvis or shoulders and neck meet, not more
-APART = 0.5  # distance from the other points, as a fraction of their extent, at which feet do not meet
+FEET_APART = 0.5  # distance from the other points, as a fraction of their extent, at which feet do not meet
 
 
 def refuse_sentinels(path: str | os.PathLike[str], names: Sequence[str], uv: Array) -> None:
@@ -425,7 +425,7 @@ def shared_place(uv: Array) -> tuple[Array, int] | None:
     observed = np.isfinite(uv).all(axis=2)
     pairs, which, counts = np.unique(uv[observed], axis=0, return_inverse=True, return_counts=True)
     column = np.nonzero(observed)[1]
-    for k in np.argsort(-counts)[: len(counts[counts >= MANY])]:
+    for k in np.argsort(-counts)[: len(counts[counts >= EQUAL_POINTS])]:
         at = which.ravel() == k
         shared = len(set(column[at].tolist()))
         if shared >= COINCIDE or (shared > 1 and _beside(pairs[k], uv[observed][~at])):
@@ -438,4 +438,4 @@ def _beside(place: Array, others: Array) -> bool:
     if not len(others):
         return False
     low, high = others.min(axis=0), others.max(axis=0)
-    return bool((np.maximum(low - place, place - high) > APART * (high - low).max()).any())
+    return bool((np.maximum(low - place, place - high) > FEET_APART * (high - low).max()).any())

@@ -19,9 +19,9 @@ from typing import BinaryIO
 _KEY = "com.apple.quicktime.camera.focal_length.35mm_equivalent"
 _NAMES = (_KEY, "focallengthin35mmfilm", "focallengthin35mmformat")
 _DIAGONAL = math.hypot(36.0, 24.0)  # millimetres, of a picture on 35 mm film
-_SHORTEST, _LONGEST = 5.0, 1000.0  # millimetres; other values are mistakes
+_SHORTEST, _LONGEST_FOCAL_MM = 5.0, 1000.0  # millimetres; other values are mistakes
 _FOLDERS = (b"moov", b"trak", b"udta")  # boxes that may contain metadata
-_LARGEST = 1 << 20  # most bytes of metadata
+_MOST_METADATA_BYTES = 1 << 20  # most bytes of metadata
 _NUMBERS = {21: ">i", 22: ">I", 23: ">f", 24: ">d"}  # well-known types of QuickTime: signed, unsigned, floats
 _EXIF_IFD, _EXIF_35MM = 0x8769, 0xA405
 
@@ -38,7 +38,7 @@ def equivalent_mm(tag: str) -> float | None:
     """Parse a tag such as ``26.00mm`` to millimetres; None if it is not a plausible focal length."""
     number = re.fullmatch(r"\s*(\d+(?:\.\d+)?)\s*(?:mm)?\s*", tag)
     mm = float(number[1]) if number else 0.0
-    return mm if _SHORTEST <= mm <= _LONGEST else None
+    return mm if _SHORTEST <= mm <= _LONGEST_FOCAL_MM else None
 
 
 def view_across(mm: float, size: tuple[int, int]) -> float:
@@ -70,7 +70,7 @@ def _metadata(file: BinaryIO, begin: int, end: int, depth: int) -> Iterator[byte
         after = end if size == 0 else begin + size
         if after > end or after < begin + head:
             return
-        if kind == b"meta" and after - begin <= _LARGEST:
+        if kind == b"meta" and after - begin <= _MOST_METADATA_BYTES:
             yield file.read(after - begin - head)
         elif kind in _FOLDERS and depth:
             yield from _metadata(file, begin + head, after, depth - 1)

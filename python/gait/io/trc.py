@@ -17,8 +17,11 @@ Array = NDArray[np.float64]
 
 METRES = {"m": 1.0, "mm": 0.001, "cm": 0.01}  #: units of a file, in metres
 NAMED = {"DataRate", "NumMarkers", "Units"}  #: fields that a header must have
-_RATE_OFF, _GAP = 0.02, 1.7  # largest relative difference of rates; frame times from which a step is a gap
-HEAD = 5  # lines of the header; an empty line may follow
+_RATE_OFF, _COLUMN_GAP = (
+    0.02,
+    1.7,
+)  # largest relative difference of rates; frame times from which a step is a gap
+HEADER_LINES = 5  # lines of the header; an empty line may follow
 
 
 def read_trc(path: Path, fps: float | None = None) -> tuple[list[str], Array, float]:
@@ -39,7 +42,7 @@ def read_trc_table(
 ) -> tuple[list[str], Array, float, list[tuple[int, float]]]:
     """Read labels, points (T, M, 3) times their unit's factor in `scales`, DataRate, and lines with times."""
     lines = text_lines(path)
-    if len(lines) < HEAD or not set(lines[1].split()) >= NAMED:
+    if len(lines) < HEADER_LINES or not set(lines[1].split()) >= NAMED:
         raise UserError(f"{path}: not a .trc header of five lines; export the file again")
     head = dict(zip(lines[1].split(), lines[2].split(), strict=False))
     labels = [cell.strip() for cell in lines[3].split("\t")[2:] if cell.strip()]
@@ -47,7 +50,7 @@ def read_trc_table(
     if head.get("NumMarkers") != str(count):
         promised = quoted(head.get("NumMarkers", ""))
         raise UserError(f"{path}:4: {count} labels where NumMarkers is {promised}; correct it")
-    numbered = [(i, line) for i, line in enumerate(lines[HEAD:], HEAD + 1) if line.strip()]
+    numbered = [(i, line) for i, line in enumerate(lines[HEADER_LINES:], HEADER_LINES + 1) if line.strip()]
     rows = [_row(line, 2 + 3 * count, f"{path}:{i}") for i, line in numbered]
     if len(rows) < 3:
         raise UserError(f"{path}: too few frames ({len(rows)}); a recording of a few seconds is needed")
@@ -92,7 +95,7 @@ def _require_rate(path: Path, rate: float, times: list[tuple[int, float]]) -> No
     steps = np.diff(seconds)
     measured = len(steps) / float(seconds[-1] - seconds[0])  # mean rate, as times are rounded
     gap = int(np.argmax(steps))
-    if steps[gap] > _GAP / rate and steps[gap] > _GAP * np.median(steps):
+    if steps[gap] > _COLUMN_GAP / rate and steps[gap] > _COLUMN_GAP * np.median(steps):
         raise UserError(
             f"{path}:{times[gap + 1][0]}: {steps[gap]:.3g} s after the row before, at {rate:g} per second; "
             "add rows with empty cells for frames that are missing, or cut the file there"

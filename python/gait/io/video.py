@@ -34,7 +34,7 @@ Image = NDArray[np.uint8]
 
 _ONE = 1 << 16  # the number 1 in a display matrix, which is in fixed point
 _CHUNK_BYTES = 100_000_000  # most bytes of pictures in memory when they are read backwards
-SAMPLES = 40  # frames of a clip whose median is the empty scene
+EMPTY_SCENE_FRAMES = 40  # frames of a clip whose median is the empty scene
 _WAITING = 4  # pictures that may wait for the encoder
 _END = 3  # frames by which the stated duration may exceed that of the pictures
 FAST = "veryfast"
@@ -352,7 +352,7 @@ class VideoWriter:
 
 
 def sample_frames(
-    video: Video, samples: int = SAMPLES, progress: Callable[[int], None] | None = None
+    video: Video, samples: int = EMPTY_SCENE_FRAMES, progress: Callable[[int], None] | None = None
 ) -> list[Frame]:
     """Read `samples` frames spread evenly over the clip.
 
@@ -371,7 +371,7 @@ def median(images: Sequence[Image]) -> Image:
 
 
 def median_plate(
-    video: Video, samples: int = SAMPLES, progress: Callable[[int], None] | None = None
+    video: Video, samples: int = EMPTY_SCENE_FRAMES, progress: Callable[[int], None] | None = None
 ) -> Image:
     """Estimate the empty scene as the median over time of `samples` frames spread over the clip, BGR.
 

@@ -152,8 +152,8 @@ def _end(process: subprocess.Popen[str], deadline: float) -> None:
 
 RESULTS = ("track.csv", "overlay.mp4", "report.html")
 _READY = 60.0  # seconds that the tracker has to confirm camera and start
-_LARGE = 1 << 21  # bytes of a colour frame above which receivers cannot keep up
-_IDLE = 2.0  # seconds without an estimate after which the recording ends
+_LARGE_FRAME_BYTES = 1 << 21  # bytes of a colour frame above which receivers cannot keep up
+_IDLE_S = 2.0  # seconds without an estimate after which the recording ends
 _END = 30.0  # seconds that a process has to end when its work is done
 _BESIDE = {"camera": "camera.json", "init": "init.json", "background": "background.png", "truth": "truth.csv"}
 
@@ -306,7 +306,7 @@ class Demo:
         if session.start("gait-trackd", [self.trackd, "--version"]).result(_END).strip().endswith("jpeg yes"):
             note("frames are larger than half the receive buffer: sent as JPEG", self.quiet)
             return ["--jpeg", "90"]
-        if 3 * width * height <= _LARGE:
+        if 3 * width * height <= _LARGE_FRAME_BYTES:
             return []
         note(
             "frames are larger than half the receive buffer and gait-trackd has no JPEG: sent in grey",
@@ -339,7 +339,7 @@ class Demo:
 
     def _record(self, url: str) -> list[str]:
         files = ["-o", str(self.output / "track.csv"), "--log", str(self.output / "estimates.log")]
-        return [*_gait("record"), "--url", url, *files, "--until-idle", str(_IDLE), "--json"]
+        return [*_gait("record"), "--url", url, *files, "--until-idle", str(_IDLE_S), "--json"]
 
     def _capture(self) -> list[str]:
         """Make the command line of gait capture, without the URL."""

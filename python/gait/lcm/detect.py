@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 
 from gait.detect import profile
-from gait.detect.networks import JOINTS
+from gait.detect.networks import LANDMARK_JOINTS
 from gait.detect.people import Followed, PeopleDetector
 from gait.errors import UserError
 from gait.io.keypoints_file import Keypoints
@@ -15,7 +15,7 @@ from gait.io.video import Frame
 from gait.lcm.link import gaitmsg, handle, is_log, open_lcm
 from gait.lcm.messages import decode, frame_number, picture, tracks_message
 
-_KEPT = 1  # frames that wait while the detector is busy; older ones are dropped
+_KEPT_FRAMES = 1  # frames that wait while the detector is busy; older ones are dropped
 
 
 _KEEPS = 10.0  # seconds out of view after which a person's number may be reused
@@ -86,7 +86,7 @@ class LiveDetector:
         self._numbers = Numbers(people)
         self._lcm = open_lcm(url)
         self._channel = f"GAIT_TRACKS_{stream}"
-        self._lcm.subscribe(f"GAIT_IMAGE_{stream}", self._on_image).set_queue_capacity(_KEPT)
+        self._lcm.subscribe(f"GAIT_IMAGE_{stream}", self._on_image).set_queue_capacity(_KEPT_FRAMES)
         self._origin: int | None = None
         self.frames = self.found = 0
         self.damage: str | None = None
@@ -121,10 +121,12 @@ class LiveDetector:
         """Make the message with a person's joints in the newest frame, converted to the model's."""
         last = one.keypoints[-1]
         frame, time = np.array(one.frames[-1:]), np.array(one.times[-1:])
-        raw = Keypoints(frame, time, tuple(JOINTS), last.uv[None], last.confidence[None])
+        raw = Keypoints(frame, time, tuple(LANDMARK_JOINTS), last.uv[None], last.confidence[None])
         found = profile.corrected(raw, self._network)
         assert found.frame_sd is not None and found.lasting_sd is not None
         correlation = profile.changing_sd(raw, self._network)[1]
         errors = np.stack([found.frame_sd[0], found.lasting_sd[0], correlation], axis=1)
         number = frame_number(image)
-        return tracks_message(list(JOINTS), found.uv[0], image.utime, number, last.confidence, errors=errors)
+        return tracks_message(
+            list(LANDMARK_JOINTS), found.uv[0], image.utime, number, last.confidence, errors=errors
+        )

@@ -61,9 +61,9 @@ PREFIX = "file://"
 MULTICAST = "udpm://"
 _FORM = "udpm://239.255.76.67:7667?ttl=0"
 _SYNC = 0xEDA1DA01
-_HEAD = struct.Struct(">Iqqii")  # sync, number, time, lengths of channel and data
+_EVENT_HEADER = struct.Struct(">Iqqii")  # sync, number, time, lengths of channel and data
 _LATEST = 2**63 // 1000  # microseconds; nanoseconds must fit 64 bits
-_LONGEST = 1000  # bytes of a channel's name that LCM accepts
+_LONGEST_CHANNEL_BYTES = 1000  # bytes of a channel's name that LCM accepts
 
 
 def log_of(url: str) -> tuple[str, str]:
@@ -104,12 +104,12 @@ def _scan(path: str | os.PathLike[str]) -> tuple[str | None, bool]:
     size, at, events, beyond = Path(path).stat().st_size, 0, 0, False
     with open(path, "rb") as file:
         while at < size:
-            head = file.read(_HEAD.size)
-            if len(head) < _HEAD.size:
+            head = file.read(_EVENT_HEADER.size)
+            if len(head) < _EVENT_HEADER.size:
                 break
-            sync, _, _, channel, data = _HEAD.unpack(head)
-            end = at + _HEAD.size + channel + data
-            if sync != _SYNC or not 0 < channel < _LONGEST or data < 0:
+            sync, _, _, channel, data = _EVENT_HEADER.unpack(head)
+            end = at + _EVENT_HEADER.size + channel + data
+            if sync != _SYNC or not 0 < channel < _LONGEST_CHANNEL_BYTES or data < 0:
                 break
             if end > size:
                 beyond = end - at > size
@@ -149,7 +149,7 @@ class LogWriter:
         """Append an event with time `utime`, microseconds since the Unix epoch."""
         name = channel.encode("utf-8")
         try:
-            self._file.write(_HEAD.pack(_SYNC, self._events, utime, len(name), len(data)) + name)
+            self._file.write(_EVENT_HEADER.pack(_SYNC, self._events, utime, len(name), len(data)) + name)
             self._file.write(data)
         except OSError as error:
             raise self._fault(error) from None

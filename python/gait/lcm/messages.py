@@ -21,7 +21,7 @@ from gait.lcm.link import gaitmsg
 
 _FRAME_KEY = "frame"
 _UNKNOWN = math.nan
-_FURTHEST = 1e9  # largest magnitude of a camera's numbers
+_LARGEST_CAMERA_NUMBER = 1e9  # largest magnitude of a camera's numbers
 _ROTATION = 1e-3  # by which rows of a rotation may differ from orthonormal, as in the library
 
 
@@ -213,7 +213,7 @@ def camera_of(message: Any) -> Camera:
     turn = np.reshape(message.R, (3, 3)).astype(float)
     numbers = np.array([*plain.values(), *message.R, *message.t, *message.distortion], float)
     sized = all(1 <= plain[side] <= MAX_PIXELS for side in ("width", "height"))
-    if not (sized and (np.abs(numbers) < _FURTHEST).all() and min(plain["fx"], plain["fy"]) > 0):
+    if not (sized and (np.abs(numbers) < _LARGEST_CAMERA_NUMBER).all() and min(plain["fx"], plain["fy"]) > 0):
         raise UserError("camera: size, focal lengths or other numbers out of range; send pixels and metres")
     if np.abs(turn @ turn.T - np.eye(3)).max() > _ROTATION or np.linalg.det(turn) < 0:
         raise UserError("camera: R is not a rotation; send orthogonal rows of length 1")

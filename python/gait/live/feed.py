@@ -27,12 +27,13 @@ from gait.lcm.messages import camera_of, decode, estimate_of, picture
 from gait.report.drawing import Overlay
 from gait.web.motion_data import curve, motion_data, rounded
 
-_KEPT = 64  # most frames that wait for their estimate, and most bytes of them
+_KEPT_FRAMES = 64  # most frames that wait for their estimate, and most bytes of them
 _KEPT_BYTES = 100_000_000
 _RECENT = 9  # frames from which a camera's frame interval is computed
 _QUEUED = 8  # frames that wait in LCM
-_FURTHEST = 1e6  # largest number that is drawn, in metres or another unit
-_LONGEST = 0.5  # longest time without a drawing [s], even if messages wait or a tracker does not answer
+_LARGEST_NUMBER = 1e6  # largest number that is drawn, in metres or another unit
+#: Longest time without a drawing [s], even if messages wait or a tracker does not answer.
+_LONGEST_PAUSE_S = 0.5
 _ANNOUNCED = 1.0  # seconds between reports that frames arrive
 _RATED = 2.0  # seconds over which estimates are counted
 KEPT_S = 20.0
@@ -54,7 +55,10 @@ class _View:
         """Keep a frame until its estimate arrives."""
         self.frames[image.utime] = image
         self.recent.append(image.utime)
-        while len(self.frames) > _KEPT or sum(len(one.data) for one in self.frames.values()) > _KEPT_BYTES:
+        while (
+            len(self.frames) > _KEPT_FRAMES
+            or sum(len(one.data) for one in self.frames.values()) > _KEPT_BYTES
+        ):
             del self.frames[next(iter(self.frames))]
 
     def nearest(self, utime: int) -> int | None:
@@ -125,7 +129,7 @@ class _Person:
 class Feed:
     """Receives the channels of one or several trackers, and draws estimates into their own frames.
 
-    Live, it draws the newest estimate when no message waits, or after `_LONGEST` at the latest, so that it
+    Live, it draws the newest estimate when no message waits, or after `_LONGEST_PAUSE_S`, so that it
     never falls behind; from a log, it draws all.
 
     Parameters
@@ -187,8 +191,10 @@ class Feed:
             self._subscribe(url, f"GAIT_IMAGE_{stream}", partial(self._on_image, stream), _QUEUED)
             self._subscribe(url, f"GAIT_CAMERA_{stream}", partial(self._on_camera, stream), 1)
         for person, one in enumerate(self.people):
-            self._subscribe(one.url, one.channel, partial(self._on_estimate, person), _KEPT)
-            self._subscribe(one.url, f"GAIT_STATUS{one.ending}", partial(self._on_status, person), _KEPT)
+            self._subscribe(one.url, one.channel, partial(self._on_estimate, person), _KEPT_FRAMES)
+            self._subscribe(
+                one.url, f"GAIT_STATUS{one.ending}", partial(self._on_status, person), _KEPT_FRAMES
+            )
 
     def _subscribe(self, url: str, channel: str, handler: Callable[[str, bytes], None], most: int) -> None:
         self._links[url].subscribe(channel, handler).set_queue_capacity(most)
@@ -202,7 +208,7 @@ class Feed:
             else:
                 for link in waiting(links, seconds):
                     link.handle()
-            late = time.monotonic() > self._drawn + _LONGEST
+            late = time.monotonic() > self._drawn + _LONGEST_PAUSE_S
             utime = self._answered(late)
             if utime is not None and self._watched() and (self._log or late or not waiting(links)):
                 self._draw(utime)
@@ -215,7 +221,7 @@ class Feed:
 
         Older frames are forgotten.
         """
-        begun = time.monotonic() - _LONGEST
+        begun = time.monotonic() - _LONGEST_PAUSE_S
         working = {k for k, person in enumerate(self._persons) if person.heard > begun}
         whole = [utime for utime, found in self._answers.items() if working <= found.keys()]
         newest = max(whole or (self._answers if late else ()), default=None)
@@ -379,4 +385,4 @@ def _plausible(estimate: Estimate) -> bool:
     mean = [getattr(estimate.mean, name) for name in POSE_SCALARS]
     numbers = np.concatenate([estimate.joints.ravel(), estimate.joint_sd.ravel(), estimate.mean.pelvis, mean])
     shown = [estimate.speed, estimate.ess, estimate.hypothesis_weight, *estimate.angles]
-    return bool((np.abs([*numbers, *shown]) < _FURTHEST).all())  # False for NaN
+    return bool((np.abs([*numbers, *shown]) < _LARGEST_NUMBER).all())  # False for NaN

@@ -27,10 +27,10 @@ from gait.web import modules, serve
 _HERE = Path(__file__).parent
 _FILES = ("live.js", "live.css")
 _STAT = Path("/proc/stat")
-_MOST = 16  # browsers at a time
-_ALIVE = 0.5  # seconds after which a quiet stream sends a sign of life, or ends with the server
+_MOST_BROWSERS = 16  # browsers at a time
+_ALIVE_S = 0.5  # seconds after which a quiet stream sends a sign of life, or ends with the server
 _QUALITY = 80  # of JPEG pictures
-_KEPT = 256  # most samples that a slow browser gets late
+_KEPT_SAMPLES = 256  # most samples that a slow browser gets late
 _FASTEST = 1 / 60  # least seconds between messages to a browser
 _SLOWEST = 0.2  # the same at first and on a busy machine, times the number of browsers,
 _RAREST = 2.0  # but at most this
@@ -196,7 +196,7 @@ class Page:
         """Make a sample, the tracker's health, or the arrival of frames the newest of its topic."""
         of_person = f"{topic} {value['person']}" if "person" in value else topic
         text = json.dumps(value, allow_nan=False, separators=(",", ":"))
-        self.hub.put(of_person, text, _KEPT if topic == "sample" else 1)
+        self.hub.put(of_person, text, _KEPT_SAMPLES if topic == "sample" else 1)
 
     def watched(self) -> bool:
         """Whether a browser shows the page, and it is time for a picture."""
@@ -263,7 +263,9 @@ class Page:
         async def lines() -> AsyncIterator[bytes]:
             counts = dict.fromkeys(self._topics, 0)
             while not serve.ending(request):
-                waits = [asyncio.ensure_future(self.hub.newer(name, counts[name], _ALIVE)) for name in counts]
+                waits = [
+                    asyncio.ensure_future(self.hub.newer(name, counts[name], _ALIVE_S)) for name in counts
+                ]
                 await asyncio.wait(waits, return_when=asyncio.FIRST_COMPLETED)
                 for wait in waits:
                     wait.cancel()
@@ -275,7 +277,7 @@ class Page:
                 yield text or b": here\n\n"
                 await asyncio.sleep(self._pace.interval())
 
-        if self._open >= _MOST:
+        if self._open >= _MOST_BROWSERS:
             return PlainTextResponse("too many browsers\n", 503)
 
         async def counted() -> AsyncIterator[bytes]:

@@ -19,11 +19,11 @@ from gait.camera.camera import Camera
 from gait.errors import UserError
 from gait.io.blob import unpack_names
 from gait.io.track_file import STATUSES, Joints, Track
-from gait.motion.footfalls import STRIDE, Strikes, walking_direction
+from gait.motion.footfalls import ASSUMED_STRIDE_S, Strikes, walking_direction
 
 Array = NDArray[np.float64]
 
-HIPS = [EVAL15.index("l_hip"), EVAL15.index("r_hip")]
+HIP_COLUMNS = [EVAL15.index("l_hip"), EVAL15.index("r_hip")]
 _PHASES = np.arange(64) / 64
 _BONES = [(f"{s}_{a}", f"{s}_{b}") for s in "lr" for a, b in (("hip", "knee"), ("knee", "ankle"))]
 _BONES += [(f"{s}_{a}", f"{s}_{b}") for s in "lr" for a, b in (("shoulder", "elbow"), ("elbow", "wrist"))]
@@ -36,7 +36,7 @@ def static_pose(model: dict[str, Any], truth: Joints, names: Sequence[str] = EVA
     `names`: P joints, beginning with those of EVAL15.
     """
     joints = _poses(model, _PHASES, stature(model, truth), names=names).mean(axis=0)
-    joints -= joints[HIPS].mean(axis=0)
+    joints -= joints[HIP_COLUMNS].mean(axis=0)
     turned = np.einsum("nij,pj->npi", body_axes(truth), joints)
     return np.asarray(turned + _hip_midpoint(truth)[:, None])
 
@@ -58,7 +58,7 @@ def free_run(
     joints = _poses(model, cycles[0] + advance, size, 1 / stride, names)
     joints += size * root_path(model, cycles[0] + advance, 1 / stride)[:, None]
     joints = np.einsum("ij,npj->npi", body_axes(truth, stride)[first], joints)
-    return np.asarray(joints - joints[first, HIPS].mean(axis=0) + _hip_midpoint(truth)[first])
+    return np.asarray(joints - joints[first, HIP_COLUMNS].mean(axis=0) + _hip_midpoint(truth)[first])
 
 
 def stature(model: dict[str, Any], truth: Joints) -> float:
@@ -94,7 +94,7 @@ def root_path(model: dict[str, Any], cycles: Array, rate: float = 0.0) -> Array:
     return np.stack([np.interp(cycles, fine, path) for path in (forward, sway, height)], axis=1)
 
 
-def body_axes(truth: Joints, stride: float = STRIDE) -> Array:
+def body_axes(truth: Joints, stride: float = ASSUMED_STRIDE_S) -> Array:
     """Return rotations (n, 3, 3) from body axes (x forward, y left, z up) to the world."""
     forward = walking_direction(truth, stride)
     up = np.broadcast_to([0.0, 0.0, 1.0], forward.shape)
@@ -105,7 +105,7 @@ def _hip_midpoint(truth: Joints) -> Array:
     return 0.5 * (truth.places["l_hip"] + truth.places["r_hip"])
 
 
-APART = 15  # frames after which errors count as independent
+INDEPENDENT_FRAMES = 15  # frames after which errors count as independent
 _BINS = 10
 _HALF = {"50": 0.6744898, "90": 1.6448536}  # half-widths of normal intervals, standard deviations
 _TINY = 1e-9  # metres; smallest standard deviation
@@ -124,14 +124,15 @@ def calibration(found: Array, sd: Array, true: Array) -> dict[str, Any]:
     """Measure how well standard deviations describe the errors, beyond the coverage of intervals.
 
     `found`, `sd`, `true` (n, 15, 3): EVAL15 in metres, for consecutive frames. Returns ``pit``: shares of 10
-    equal bins of the probability integral transform over frames `APART` apart, ``pit_chi2`` their chi-square
-    statistic against a flat distribution and ``pit_p`` its p-value as if coordinates were independent (they
-    are not, so use it only for ranking); ``z2``: mean squared error in variances, 1 if the standard
-    deviations are right; ``crps_mm``: continuous ranked probability score of a normal distribution (Gneiting
-    and Raftery 2007), lower is better; ``width_mm``: mean width of the 90 % intervals.
+    equal bins of the probability integral transform over frames `INDEPENDENT_FRAMES` apart, ``pit_chi2``
+    their chi-square statistic against a flat distribution and ``pit_p`` its p-value as if coordinates
+    were independent (they are not, so use it only for ranking); ``z2``: mean squared error in variances,
+    1 if the standard deviations are right; ``crps_mm``: continuous ranked probability score of a normal
+    distribution (Gneiting and Raftery 2007), lower is better; ``width_mm``: mean width of the 90 %
+    intervals.
     """
     z = (true - found) / np.maximum(sd, _TINY)
-    counts, _ = np.histogram(ndtr(z[::APART]), _BINS, (0.0, 1.0))
+    counts, _ = np.histogram(ndtr(z[::INDEPENDENT_FRAMES]), _BINS, (0.0, 1.0))
     chi2 = float(np.sum((counts - counts.mean()) ** 2) / counts.mean())  # against equal bins
     return {
         "pit": (counts / counts.sum()).tolist(),
@@ -152,8 +153,8 @@ def crps(z: Array, sd: Array) -> Array:
 Measures = dict[str, Any]
 
 LOST_MM = 150.0
-BODY = [i for i, name in enumerate(EVAL15) if name != "pelvis"]
-LIMBS = [i for i, name in enumerate(EVAL15) if name not in ("pelvis", "neck", "head_top")]
+BODY_COLUMNS = [i for i, name in enumerate(EVAL15) if name != "pelvis"]
+LIMB_COLUMNS = [i for i, name in enumerate(EVAL15) if name not in ("pelvis", "neck", "head_top")]
 
 
 def evaluate(
@@ -187,7 +188,7 @@ def evaluate(
         "coverage": coverage(found, track.eval15_sd()[ours], true),
         "static": pose_errors(still, true),
         "free": None if free is None else pose_errors(free[theirs], true),
-        "root12": summary(root_errors(found, true, LIMBS)),
+        "root12": summary(root_errors(found, true, LIMB_COLUMNS)),
         "proc": summary(procrustes_errors(found, true)),
         "status": {word: float((status == word).mean()) for word in STATUSES},
         "trust": trust(root_errors(found, true), status),
@@ -212,10 +213,10 @@ def pose_errors(found: Array, true: Array, given_up: NDArray[np.bool_] | None = 
     return {"abs": summary(absolute), "root": summary(root), "lost": float(lost.mean())}
 
 
-def root_errors(found: Array, true: Array, joints: list[int] = BODY) -> Array:
+def root_errors(found: Array, true: Array, joints: list[int] = BODY_COLUMNS) -> Array:
     """Mean distance (n,) in mm of `joints` (by default all but the pelvis), after aligning hip midpoints."""
-    found = found - found[:, HIPS].mean(axis=1, keepdims=True)
-    true = true - true[:, HIPS].mean(axis=1, keepdims=True)
+    found = found - found[:, HIP_COLUMNS].mean(axis=1, keepdims=True)
+    true = true - true[:, HIP_COLUMNS].mean(axis=1, keepdims=True)
     return np.asarray(1000 * np.linalg.norm(found - true, axis=2)[:, joints].mean(axis=1))
 
 

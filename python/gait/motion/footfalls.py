@@ -25,9 +25,9 @@ from gait.io.track_file import Joints, Track
 
 Array = NDArray[np.float64]
 
-STRIDE = 1.1  # seconds; stride time assumed where the true one is unknown
-_APART = 0.5  # least seconds between strikes of one foot
-_REACH = 0.1  # least metres that a foot swings past the pelvis
+ASSUMED_STRIDE_S = 1.1  # seconds; stride time assumed where the true one is unknown
+_LEAST_STRIKE_GAP_S = 0.5  # least seconds between strikes of one foot
+_SWING_REACH_M = 0.1  # least metres that a foot swings past the pelvis
 
 
 @dataclass(frozen=True)
@@ -95,7 +95,7 @@ def strikes_by_zeni(truth: Joints) -> Strikes:
     return Strikes(right, left)
 
 
-def walking_direction(truth: Joints, stride: float = STRIDE) -> Array:
+def walking_direction(truth: Joints, stride: float = ASSUMED_STRIDE_S) -> Array:
     """Return the unit direction of travel along the ground at each frame, shape (n, 3).
 
     It is the direction in which the pelvis moves during one stride of `stride` seconds around the frame, so
@@ -120,7 +120,7 @@ def furthest(time: Array, reach: Array) -> Array:
     `time` (n,); `reach` (n,): how far a foot is ahead of the pelvis (or behind it, to find toe-offs), metres.
     """
     step = float(np.median(np.diff(time)))
-    peaks = maxima(reach, _REACH, max(1, round(_APART / step)))
+    peaks = maxima(reach, _SWING_REACH_M, max(1, round(_LEAST_STRIKE_GAP_S / step)))
     before, top, after = reach[peaks - 1], reach[peaks], reach[peaks + 1]
     bend = before - 2 * top + after
     shift = np.where(bend < 0, 0.5 * (before - after) / np.where(bend < 0, bend, 1), 0.0)
@@ -159,11 +159,11 @@ def _times(events: Fields, key: str) -> Array:
     return times
 
 
-SIDES = ("right", "left")
+STRIKE_SIDES = ("right", "left")
 
-_STANCE = np.linspace(0.10, 0.30, 5)  # strides after the strike, when the foot is flat
+_FLAT_FOOT_STRIDES = np.linspace(0.10, 0.30, 5)  # strides after the strike, when the foot is flat
 _SWING = np.linspace(0.12, 0.26, 8)  # strides before the strike, when the toe passes the other foot
-NEAR = 0.25  # seconds; events further apart are not the same
+MATCHING_STRIKES_S = 0.25  # seconds; events further apart are not the same
 
 
 @dataclass(frozen=True)
@@ -198,7 +198,7 @@ def find_events(joints: Joints) -> Events:
     """Find the strikes and toe-offs of a motion of at least three frames."""
     ahead, pelvis = walking_direction(joints), joints.places["pelvis"]
     strike, off = {}, {}
-    for side in SIDES:
+    for side in STRIKE_SIDES:
         heel, toe = (joints.places[f"{side[0]}_{part}"] - pelvis for part in ("heel", "toe"))
         strike[side] = furthest(joints.time, np.sum(heel * ahead, axis=1))
         off[side] = furthest(joints.time, -np.sum(toe * ahead, axis=1))
@@ -212,11 +212,11 @@ def same_events(found: Events, wanted: Events) -> Events:
         if not len(have):
             return np.full(len(want), np.nan)
         nearest = have[np.argmin(np.abs(have[:, None] - want), axis=0)] if len(want) else np.zeros(0)
-        return np.where(np.abs(nearest - want) <= NEAR, nearest, np.nan)
+        return np.where(np.abs(nearest - want) <= MATCHING_STRIKES_S, nearest, np.nan)
 
     return Events(
-        {side: pick(found.strike[side], wanted.strike[side]) for side in SIDES},
-        {side: pick(found.off[side], wanted.off[side]) for side in SIDES},
+        {side: pick(found.strike[side], wanted.strike[side]) for side in STRIKE_SIDES},
+        {side: pick(found.off[side], wanted.off[side]) for side in STRIKE_SIDES},
     )
 
 
@@ -239,7 +239,7 @@ def at(time: Array, values: Array, when: Array) -> Array:
 
 def stride_time(events: Events) -> float:
     """Return the median time between strikes of one foot, seconds; NaN if no foot strikes twice."""
-    gaps = np.concatenate([np.diff(events.strike[side]) for side in SIDES])
+    gaps = np.concatenate([np.diff(events.strike[side]) for side in STRIKE_SIDES])
     return float(np.median(gaps)) if len(gaps) else float("nan")
 
 
@@ -263,7 +263,7 @@ def _flat(time: Array, ankle: Array, strike: Array, stride: float) -> Array:
     """Mean position of the ankle while the foot is flat; NaN if the track ends before."""
     out = np.full((len(strike), 3), np.nan)
     for k, begun in enumerate(strike):
-        when = begun + stride * _STANCE
+        when = begun + stride * _FLAT_FOOT_STRIDES
         when = when[when <= time[-1]]
         if len(when):
             out[k] = at(time, ankle, when).mean(axis=0)
@@ -273,8 +273,8 @@ def _flat(time: Array, ankle: Array, strike: Array, stride: float) -> Array:
 def _clearance(time: Array, toe: Array, strike: Array, stride: float) -> Array:
     """Least height of the toe in the middle of the swing, above its height while the foot was flat before."""
     swing = np.interp(strike[:, None] - stride * _SWING, time, toe)
-    flat = np.interp(strike[:, None] - stride * (1 - _STANCE), time, toe)
-    begun = strike - stride * (1 - _STANCE[0]) >= time[0]
+    flat = np.interp(strike[:, None] - stride * (1 - _FLAT_FOOT_STRIDES), time, toe)
+    begun = strike - stride * (1 - _FLAT_FOOT_STRIDES[0]) >= time[0]
     return np.where(begun, swing.min(axis=1) - flat.mean(axis=1), np.nan)
 
 

@@ -20,8 +20,8 @@ from gait.body.skeleton import points
 from gait.errors import UserError
 from gait.io.blob import unpack_names
 from gait.io.track_file import Joints, Track
-from gait.motion.footfalls import SIDES, find_events
-from gait.motion.parameters import MIRRORED, QUANTITIES, Parameters, asymmetry, strides_of
+from gait.motion.footfalls import STRIKE_SIDES, find_events
+from gait.motion.parameters import MIRRORED_PARAMETERS, PARAMETER_LABELS, Parameters, asymmetry, strides_of
 
 Array = NDArray[np.float64]
 
@@ -35,7 +35,7 @@ SPEED = {
 AGES = (20, 79)  # years that `SPEED` covers
 BY_PACE = (
     *("step_width_m", "foot_clearance_m", "stance_percent", "double_support_percent"),
-    *(f"asymmetry:{name}" for name in MIRRORED),
+    *(f"asymmetry:{name}" for name in MIRRORED_PARAMETERS),
 )
 """Parameters whose norm comes from people with the same stride rate."""
 
@@ -50,7 +50,7 @@ _cdf = NormalDist().cdf  # importing SciPy would take longer than everything els
 class Compared:
     """A parameter and its norm."""
 
-    name: str  #: one of `QUANTITIES`, or ``asymmetry:NAME``
+    name: str  #: one of `PARAMETER_LABELS`, or ``asymmetry:NAME``
     #: Value and standard deviation (NaN: unknown) of the track; mean and standard deviation among people.
     value: float
     sd: float
@@ -134,7 +134,7 @@ def beside_norms(
         found = row.get("asymmetry_percent") if name.startswith("asymmetry:") else row["both"]
         if found is not None and np.isfinite(found["mean"]):
             out.append(Compared(name, found["mean"], found["sd"], float(mean), float(sd), source))
-    order = [*QUANTITIES, *(f"asymmetry:{name}" for name in MIRRORED)]
+    order = [*PARAMETER_LABELS, *(f"asymmetry:{name}" for name in MIRRORED_PARAMETERS)]
     return sorted(out, key=lambda compared: order.index(compared.name))
 
 
@@ -201,10 +201,10 @@ def _walk(
     except UserError:
         return {}
     out = {}
-    for name in QUANTITIES:
-        each = [strides[side].values[name] for side in SIDES]
+    for name in PARAMETER_LABELS:
+        each = [strides[side].values[name] for side in STRIKE_SIDES]
         means = [float(np.nanmean(v)) if np.isfinite(v).any() else np.nan for v in each]
         out[name] = float(np.mean(means))
-        if name in MIRRORED:
+        if name in MIRRORED_PARAMETERS:
             out[f"asymmetry:{name}"] = float(asymmetry(*(np.float64(mean) for mean in means)))
     return out

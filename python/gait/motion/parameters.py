@@ -21,7 +21,7 @@ from gait.body.model_curves import ModelCurves
 from gait.errors import UserError
 from gait.io.track_file import Joints, Track
 from gait.motion.footfalls import (
-    SIDES,
+    STRIKE_SIDES,
     Contacts,
     Draws,
     Events,
@@ -33,7 +33,7 @@ from gait.motion.uncertainty import draw_contacts
 
 Array = NDArray[np.float64]
 
-QUANTITIES = {
+PARAMETER_LABELS = {
     "stride_time_s": "stride time, s",
     "cadence_spm": "cadence, steps/min",
     "stride_length_m": "stride length, m",
@@ -47,9 +47,9 @@ QUANTITIES = {
 }
 """Names in files, with names and units for people."""
 
-_UNSURE = {"lost", "ambiguous"}
+_UNSURE_STATUSES = {"lost", "ambiguous"}
 _STEADY = 0.8  # of the median speed; at the ends of the walk, slower strides are starting or stopping
-MIRRORED = ("step_time_s", "step_length_m", "stance_percent")
+MIRRORED_PARAMETERS = ("step_time_s", "step_length_m", "stance_percent")
 """Quantities for which left and right are compared."""
 
 
@@ -61,10 +61,10 @@ class Strides:
     #: (k,) seconds.
     start: Array
     end: Array
-    #: (k,) `QUANTITIES` and their standard deviations; NaN where the track does not show them.
+    #: (k,) `PARAMETER_LABELS` and their standard deviations; NaN where the track does not show them.
     values: dict[str, Array]
     sd: dict[str, Array]
-    draws: dict[str, Array]  #: (D, k) `QUANTITIES` in each draw
+    draws: dict[str, Array]  #: (D, k) `PARAMETER_LABELS` in each draw
     #: (k,) whether the stride counts: none of its frames is lost or ambiguous (if all strides have ambiguous
     #: frames, none is lost), and the person neither starts nor stops in it
     sure: NDArray[np.bool_]
@@ -85,12 +85,12 @@ class Parameters:
     @property
     def speed(self) -> float | None:
         """Mean over the sure strides of both feet, metres per second."""
-        found = self._mean("speed_m_s", SIDES)
+        found = self._mean("speed_m_s", STRIKE_SIDES)
         return None if found is None else found["mean"]
 
     def counted(self) -> str:
         """Describe the strides over which the means are taken."""
-        right, left = (int(self.strides[side].sure.sum()) for side in SIDES)
+        right, left = (int(self.strides[side].sure.sum()) for side in STRIKE_SIDES)
         text = f"{right} right and {left} left strides"
         left_out = sum(len(s.sure) for s in self.strides.values()) - right - left
         if not left_out:
@@ -107,10 +107,10 @@ class Parameters:
         between strides; ``"asymmetry_percent"`` is 200 (right - left) / (right + left) (Robinson 1987).
         """
         out = {}
-        for name in QUANTITIES:
-            row: dict[str, Any] = {side: self._mean(name, (side,)) for side in SIDES}
-            row["both"] = self._mean(name, SIDES)
-            if name in MIRRORED:
+        for name in PARAMETER_LABELS:
+            row: dict[str, Any] = {side: self._mean(name, (side,)) for side in STRIKE_SIDES}
+            row["both"] = self._mean(name, STRIKE_SIDES)
+            if name in MIRRORED_PARAMETERS:
                 row["asymmetry_percent"] = self._asymmetry(name)
             out[name] = row
         return out
@@ -131,7 +131,7 @@ class Parameters:
         return {"mean": float(values.mean()), "sd": float(sd_of(mean_of(draws, 1))), "between": between}
 
     def _asymmetry(self, name: str) -> dict[str, float] | None:
-        right, left = (self._sure(name, (side,)) for side in SIDES)
+        right, left = (self._sure(name, (side,)) for side in STRIKE_SIDES)
         if not len(right[0]) or not len(left[0]):
             return None
 
@@ -160,10 +160,10 @@ def measure(track: Track, draws: Draws | None = None) -> Parameters:
     if not np.isfinite(stride):
         seconds = track.time[-1] - track.time[0]
         raise UserError(f"has no whole stride in {seconds:.2f} s; track at least two strides")
-    feet = {side: contacts(track, events, side, stride) for side in SIDES}
+    feet = {side: contacts(track, events, side, stride) for side in STRIKE_SIDES}
     drawn, event_sd, source = draw_contacts(track, events, stride, draws)
     strides = {}
-    for side, other in (SIDES, SIDES[::-1]):
+    for side, other in (STRIKE_SIDES, STRIKE_SIDES[::-1]):
         between = _between(feet[side].strike, feet[other].strike)
         values = stride_quantities(feet[side], feet[other], between)
         many = stride_quantities(drawn[side], drawn[other], between)
@@ -176,7 +176,9 @@ def measure(track: Track, draws: Draws | None = None) -> Parameters:
             {name: value[whole] for name, value in values.items()},
             {name: sd_of(value[:, whole]) for name, value in many.items()},
             {name: value[:, whole] for name, value in many.items()},
-            np.array([_is_free(track, _UNSURE, *ends) for ends in zip(start, end, strict=True)], bool)[whole],
+            np.array(
+                [_is_free(track, _UNSURE_STATUSES, *ends) for ends in zip(start, end, strict=True)], bool
+            )[whole],
         )
     some = any(s.sure.any() for s in strides.values())
     if not some:  # better than nothing, since left and right seldom swap in only some frames
@@ -209,9 +211,9 @@ def strides_of(motion: Joints, events: Events) -> dict[str, Strides]:
     stride = stride_time(events)
     if not np.isfinite(stride):
         raise UserError("the true motion has no whole stride; give a longer one")
-    feet = {side: contacts(motion, events, side, stride) for side in SIDES}
+    feet = {side: contacts(motion, events, side, stride) for side in STRIKE_SIDES}
     out = {}
-    for side, other in (SIDES, SIDES[::-1]):
+    for side, other in (STRIKE_SIDES, STRIKE_SIDES[::-1]):
         values = stride_quantities(feet[side], feet[other], _between(feet[side].strike, feet[other].strike))
         start, end = feet[side].strike[:-1], feet[side].strike[1:]
         whole = _whole(start, end, stride)
@@ -236,7 +238,7 @@ def measured(track: Track, draws: Draws | None = None) -> Parameters | None:
 
 
 def stride_quantities(foot: Contacts, other: Contacts, between: NDArray[np.int64]) -> dict[str, Array]:
-    """Compute `QUANTITIES` of the strides of a foot, shape (..., k - 1) for k strikes.
+    """Compute `PARAMETER_LABELS` of the strides of a foot, shape (..., k - 1) for k strikes.
 
     A stride's step is its second one, from the other foot's strike to the end of the stride.
 
@@ -448,7 +450,7 @@ def as_json(track: Track, parameters: Parameters, cycles: Mapping[str, AngleCycl
 def event_rows(track: Track, parameters: Parameters) -> Iterator[dict[str, Any]]:
     """List strikes and toe-offs in order of time."""
     rows: list[dict[str, Any]] = []
-    for side in SIDES:
+    for side in STRIKE_SIDES:
         for kind in ("strike", "off"):
             times = getattr(parameters.events, kind)[side]
             for time, sd in zip(times, getattr(parameters.event_sd, kind)[side], strict=True):
@@ -464,12 +466,12 @@ _EVENT = {"strike": "heel_strike", "off": "toe_off"}
 def stride_rows(parameters: Parameters) -> Iterator[dict[str, Any]]:
     """List strides in order of their start, each quantity with its standard deviation."""
     rows = []
-    for side in SIDES:
+    for side in STRIKE_SIDES:
         s = parameters.strides[side]
         for k in range(len(s.start)):
             row: dict[str, Any] = {"side": side, "start_s": float(s.start[k]), "end_s": float(s.end[k])}
             row["sure"] = bool(s.sure[k])
-            for name in QUANTITIES:
+            for name in PARAMETER_LABELS:
                 row[name], row[f"{name}_sd"] = float(s.values[name][k]), float(s.sd[name][k])
             rows.append(row)
     yield from sorted(rows, key=lambda row: row["start_s"])

@@ -26,7 +26,7 @@ from numpy.typing import NDArray
 
 from gait.io.track_file import Joints, Track
 from gait.motion.footfalls import (
-    SIDES,
+    STRIKE_SIDES,
     Contacts,
     Draws,
     Events,
@@ -39,18 +39,18 @@ from gait.motion.footfalls import (
 
 Array = NDArray[np.float64]
 
-JOINTS = ("pelvis", *(f"{s}_{part}" for s in "rl" for part in ("ankle", "heel", "toe")))
+UNCERTAIN_JOINTS = ("pelvis", *(f"{s}_{part}" for s in "rl" for part in ("ankle", "heel", "toe")))
 """Joints from which contacts are found."""
 
 _COUNT = 100  # motions drawn if the track has none; a standard deviation is then known to 7 %
 # Shares of the variance of a joint and of the phase, if only the standard deviations of frames are known;
 # chosen on people of `gait simulate` who are in no reported result.
 _PERSON, _WANDER = 0.5, 0.15
-_LATE = 0.6  # share of the variance of the phase that lasts
+_LASTING_PHASE_SHARE = 0.6  # share of the variance of the phase that lasts
 _CONSTANT = 0.5  # share of the person's variance that is constant; the rest are `_WAVES` waves of the stride
 _WAVES = 2
-_SECONDS = 0.12  # duration over which errors within a stride are smooth
-_SIZE = 0.7  # error of the size over the person's part of a joint: many joints determine the size
+_SMOOTH_S = 0.12  # duration over which errors within a stride are smooth
+_SIZE_SHARE = 0.7  # error of the size over the person's part of a joint: many joints determine the size
 
 
 def draw_contacts(
@@ -58,13 +58,13 @@ def draw_contacts(
 ) -> tuple[dict[str, Contacts], Events, str]:
     """Draw contacts by side, shape (D, ...); also return the events' standard deviations and their source."""
     if draws is None and "phase_sd" not in track.numbers:
-        nothing = {side: _unknown(contacts(track, events, side, stride)) for side in SIDES}
+        nothing = {side: _unknown(contacts(track, events, side, stride)) for side in STRIKE_SIDES}
         return nothing, _event_sd([events], unknown=True), "unknown: the track has no column phase_sd"
-    drawn: dict[str, list[Contacts]] = {side: [] for side in SIDES}
+    drawn: dict[str, list[Contacts]] = {side: [] for side in STRIKE_SIDES}
     found = []
     for motion in _motions(track, draws):
         found.append(same_events(find_events(motion), events))
-        for side in SIDES:
+        for side in STRIKE_SIDES:
             drawn[side].append(contacts(motion, found[-1], side, stride))
     source = "the standard deviations of each frame, whose errors last"
     if draws is not None:
@@ -72,15 +72,15 @@ def draw_contacts(
             f"{len(found)} motions drawn from the posterior, plus the variation that the model cannot express"
         )
     source += "" if track.camera_change is None else "; camera errors are common to all frames"
-    return {side: stack(drawn[side]) for side in SIDES}, _event_sd(found), source
+    return {side: stack(drawn[side]) for side in STRIKE_SIDES}, _event_sd(found), source
 
 
 def _motions(track: Track, draws: Draws | None) -> Iterator[Joints]:
-    """Yield motions of `JOINTS` that agree with the track's standard deviations."""
+    """Yield motions of `UNCERTAIN_JOINTS` that agree with the track's standard deviations."""
     random = np.random.default_rng(0)
     count = _COUNT if draws is None else len(draws.phase)
-    moved = {name: _moved(track, name) for name in JOINTS}
-    sd = {name: _without_camera(track.sd[name], moved[name]) for name in JOINTS}
+    moved = {name: _moved(track, name) for name in UNCERTAIN_JOINTS}
+    sd = {name: _without_camera(track.sd[name], moved[name]) for name in UNCERTAIN_JOINTS}
     own = _person_sd(sd, draws)
     size = _size_sd(track, own, draws)
     waves = _waves(track.phase)
@@ -89,7 +89,7 @@ def _motions(track: Track, draws: Draws | None) -> Iterator[Joints]:
         start, scale = places["pelvis"][0].copy(), 1 + size * random.standard_normal()
         camera = random.standard_normal(4)
         out = {}
-        for name in JOINTS:
+        for name in UNCERTAIN_JOINTS:
             lasting = waves @ (random.standard_normal((waves.shape[1], 3)) * own[name])
             out[name] = start + scale * (places[name] - start) + lasting
             if draws is None:
@@ -115,9 +115,9 @@ def _without_camera(sd: Array, moved: Array) -> Array:
 def _person_sd(sd: dict[str, Array], draws: Draws | None) -> dict[str, Array]:
     """Return the standard deviations (3,) of the person's part, by joint, metres."""
     if draws is None:
-        return {name: np.sqrt(_PERSON) * np.median(sd[name], axis=0) for name in JOINTS}
+        return {name: np.sqrt(_PERSON) * np.median(sd[name], axis=0) for name in UNCERTAIN_JOINTS}
     out = {}
-    for name in JOINTS:
+    for name in UNCERTAIN_JOINTS:
         drawn = draws.joints[:, :, draws.joint_names.index(name)].astype(float).var(axis=0)
         out[name] = np.sqrt(np.median(np.maximum(sd[name] ** 2 - drawn, 0), axis=0))
     return out
@@ -135,7 +135,7 @@ def _size_sd(track: Track, own: dict[str, Array], draws: Draws | None) -> float:
             np.linalg.norm(a - b, axis=2).mean(axis=1) for a, b in zip(legs, legs[1:], strict=False)
         )
         stated = np.sqrt(max(stated**2 - (lengths.std() / lengths.mean()) ** 2, 0.0))
-    fitted = _SIZE * float(np.mean([own[f"{s}_heel"][2] for s in "rl"])) / stature
+    fitted = _SIZE_SHARE * float(np.mean([own[f"{s}_heel"][2] for s in "rl"])) / stature
     return float(np.hypot(stated, fitted))
 
 
@@ -155,18 +155,20 @@ def _warped(track: Track, random: np.random.Generator) -> dict[str, Array]:
     rate = np.maximum(track.numbers["stride_hz"], 0.1)
     sd = np.minimum(track.numbers["phase_sd"], 0.29) / rate  # 0.29: sd of a uniform phase
     wander = _wander(track.time, 1, random)[:, 0]
-    late = np.nan_to_num(sd) * (np.sqrt(_LATE) * random.standard_normal() + np.sqrt(1 - _LATE) * wander)
+    late = np.nan_to_num(sd) * (
+        np.sqrt(_LASTING_PHASE_SHARE) * random.standard_normal() + np.sqrt(1 - _LASTING_PHASE_SHARE) * wander
+    )
     return {
         name: np.stack(
             [np.interp(track.time - late, track.time, axis) for axis in track.places[name].T], axis=1
         )
-        for name in JOINTS
+        for name in UNCERTAIN_JOINTS
     }
 
 
 def _wander(time: Array, count: int, random: np.random.Generator) -> Array:
     """Smooth noise (n, count) of unit variance."""
-    width = max(_SECONDS / float(np.median(np.diff(time))), 0.1)
+    width = max(_SMOOTH_S / float(np.median(np.diff(time))), 0.1)
     reach = int(4 * width + 0.5)
     bell = np.exp(-0.5 * (np.arange(-reach, reach + 1) / width) ** 2)
     noise = np.pad(random.standard_normal((len(time), count)), ((reach, reach), (0, 0)), "symmetric")
@@ -182,8 +184,8 @@ def _event_sd(found: list[Events], unknown: bool = False) -> Events:
         return np.where(enough, np.nanstd(np.where(enough, stacked, 0.0), axis=0), np.nan)
 
     return Events(
-        {side: sd([e.strike[side] for e in found]) for side in SIDES},
-        {side: sd([e.off[side] for e in found]) for side in SIDES},
+        {side: sd([e.strike[side] for e in found]) for side in STRIKE_SIDES},
+        {side: sd([e.off[side] for e in found]) for side in STRIKE_SIDES},
     )
 
 

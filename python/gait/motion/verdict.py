@@ -10,10 +10,11 @@ import numpy as np
 from gait.io.track_file import STATUSES, Track
 from gait.motion.parameters import Parameters, measured
 
-LEGS = "the images do not show which leg is the right one"
+WHICH_LEG = "the images do not show which leg is the right one"
 """Why the tracker itself leaves left and right undecided."""
-_MOVES = 0.25  # a person whose pelvis moves slower than this share of the strides' speed walks in place
-_SECONDS = 0.5  # shortest track, and interval, whose positions give a speed
+#: A person whose pelvis moves slower than this share of the strides' speed walks in place.
+_LEAST_SPEED_SHARE = 0.25
+_SHORTEST_S = 0.5  # shortest track, and interval, whose positions give a speed
 
 
 @dataclass(frozen=True)
@@ -66,7 +67,7 @@ class Verdict:
             parts.append(f"{self.speed:.2f} m/s" + (" in place" if self.in_place else ""))
         text = ", ".join(parts)
         if self.counts["ambiguous"]:
-            what = "left and right uncertain" if set(self.why) == {LEGS} else "uncertain"
+            what = "left and right uncertain" if set(self.why) == {WHICH_LEG} else "uncertain"
             text += f"; {what} in {count_of(self.counts['ambiguous'], 'frame')}"
             why = [f"{reason} ({count})" for reason, count in self.why.items()]
             text += f": {', '.join(why if len(why) > 1 else self.why)}" if why else ""
@@ -111,7 +112,7 @@ def verdict_of(
     reasons: Counter[str] = Counter()
     if track.reason:
         unsure = [k for k, status in enumerate(track.status) if status == "ambiguous"]
-        reasons.update(track.reason[k] or LEGS for k in unsure)
+        reasons.update(track.reason[k] or WHICH_LEG for k in unsure)
     speed, in_place = _speed(track)
     if parameters is not None and not in_place:
         speed = parameters.speed or speed
@@ -139,14 +140,14 @@ def _speed(track: Track) -> tuple[float | None, bool]:
     speed = track.numbers["speed_m_s"][followed]
     of_strides = float(np.median(speed[np.isfinite(speed)])) if np.isfinite(speed).any() else 0.0
     time, place = track.time[followed], track.places["pelvis"][followed, :2]
-    if time[-1] - time[0] < _SECONDS:
+    if time[-1] - time[0] < _SHORTEST_S:
         return of_strides, False
     # To exclude sideways sway, the path is measured between positions at least half a second apart.
-    steps = int((time[-1] - time[0]) / _SECONDS)
+    steps = int((time[-1] - time[0]) / _SHORTEST_S)
     knots = np.searchsorted(time, np.linspace(time[0], time[-1], steps + 1))
     way = float(np.linalg.norm(np.diff(place[knots], axis=0), axis=1).sum())
     moved = way / float(time[knots[-1]] - time[knots[0]])
-    in_place = moved < _MOVES * of_strides
+    in_place = moved < _LEAST_SPEED_SHARE * of_strides
     return (of_strides if in_place else moved), in_place
 
 

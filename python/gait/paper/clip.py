@@ -20,8 +20,8 @@ from gait.simulate.scenario import PRESETS
 PRESET = "demo"
 POINTING = 3.0  # pixels, sd of a simulated click
 CLICKED = [name for name in EVAL15 if name not in ("pelvis", "neck", "head_top")]
-STRIDE = 7  # joints from one click to the next
-LEFT_OUT = 5  # one click of so many is not used: it is judged by
+JOINTS_PER_CLICK = 7  # joints from one click to the next
+CHECK_INTERVAL = 5  # one click of so many is not used: it is judged by
 
 
 @dataclass(frozen=True)
@@ -57,7 +57,7 @@ class Clip:
         return str(path)
 
     def clicks_within(self, frames: range, folder: Path) -> tuple[str | None, list[dict[str, Any]]]:
-        """Write the corrections of some frames but for every LEFT_OUT-th; return the file, None without any.
+        """Write the corrections of some frames without every `CHECK_INTERVAL`-th; return the file or None.
 
         Those that are left out are returned, as they stand in the file.
         """
@@ -65,10 +65,10 @@ class Clip:
             return None, []
         known = json.loads(Path(self.corrections).read_text(encoding="utf-8"))
         within = [c for c in known["corrections"] if c["frame"] in frames]
-        known["corrections"] = [c for k, c in enumerate(within, 1) if k % LEFT_OUT]
+        known["corrections"] = [c for k, c in enumerate(within, 1) if k % CHECK_INTERVAL]
         path = folder / "clicks.json"
         path.write_text(json.dumps(known), encoding="utf-8")
-        return str(path), within[LEFT_OUT - 1 :: LEFT_OUT]
+        return str(path), within[CHECK_INTERVAL - 1 :: CHECK_INTERVAL]
 
     def joints(self) -> tuple[list[int], dict[str, Floats]]:
         """Return frames and places of the true joints."""
@@ -87,7 +87,7 @@ def rendered(folder: Path, update: Callable[[int], None]) -> Clip:
     camera, rng = Camera.read(clip.camera), np.random.default_rng(1)
     listed = []
     for k, frame in enumerate(frames):
-        joint = CLICKED[STRIDE * k % len(CLICKED)]
+        joint = CLICKED[JOINTS_PER_CLICK * k % len(CLICKED)]
         at = camera.project(places[joint][k]) + POINTING * rng.normal(size=2)
         listed.append({"frame": frame, "joint": joint, "uv": at.tolist(), "sd_px": POINTING})
     path = folder / "corrections.json"

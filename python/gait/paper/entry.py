@@ -11,7 +11,7 @@ from gait.paper import verdicts
 from gait.report.figures import Drawing, address
 from gait.report.page import Page, movable
 
-HEAD = ("", "theirs", "literal", "ours", "verdict")
+ENTRY_HEADER = ("", "theirs", "literal", "ours", "verdict")
 
 
 @dataclass(frozen=True)
@@ -36,7 +36,7 @@ class Entry:
 
     def statements(self) -> dict[str, str]:
         """Return the results of each side and the verdict, by column of the page."""
-        return dict(zip(HEAD[1:], (self.theirs, self.literal, self.ours, self.verdict), strict=True))
+        return dict(zip(ENTRY_HEADER[1:], (self.theirs, self.literal, self.ours, self.verdict), strict=True))
 
 
 def picture(drawing: Drawing) -> Picture:
@@ -77,7 +77,7 @@ def page(title: str, about: Sequence[str], papers: Sequence[Paper]) -> str:
     made.html(_counts(papers))
     for paper in papers:
         rows = [(e.heading, *e.statements().values()) for e in paper.entries]
-        made.grid(f"{paper.short}: {paper.title}", HEAD, rows)
+        made.grid(f"{paper.short}: {paper.title}", ENTRY_HEADER, rows)
     for paper in papers:
         for entry in paper.entries:
             heading = escape(f"{paper.short}, {entry.heading}")

@@ -23,19 +23,22 @@ from gait.paper.entry import Picture, table
 from gait.paper.pictures import image, labelled
 from gait.paper.preference import PLACES, Place, Probe
 from gait.paper.scene import Scene
-from gait.paper.tracking import CUT_OUT, SHOWN, cut
+from gait.paper.tracking import CUT_OUT, FIGURE_SHOWN, cut
 from gait.report.drawing import Overlay, draw_bones
 
-GREY = 128
+GREY_LEVEL = 128
 PIXEL_VARIANCE = 9.0  # grey levels squared, of either frame
-FEW = 2.0**-20, 2.0**-19  # densities of an occluded limb, so small that only hidden limbs use them
+HIDDEN_DENSITIES = (
+    2.0**-20,
+    2.0**-19,
+)  # densities of an occluded limb, so small that only hidden limbs use them
 Q = "q: turned from the image, or seen in part"
 OCCLUDED = "p_occluded: limbs that are hidden"
 WIDTHS = "sigma(alpha): widths"
 TRUTH = (60, 230, 250)  # BGR
 RIM = 3  # pixels around a limb that are shown with it, since points at its edge are interpolated
-LAST = "E, beyond the edges of limbs"
-FULL = 0.6  # nats that a limb drawn in full red costs
+LAST_CASE = "E, beyond the edges of limbs"
+FULL_RED_NATS = 0.6  # nats that a limb drawn in full red costs
 
 
 @dataclass(frozen=True)
@@ -93,7 +96,7 @@ class _Probes:
         usual = preference.config(Mode.PAPER)
         self.density, self.whole = usual.occluded_density, probe()
         self.even = probe(surface_tilt=0.0)
-        self.hidden = [probe(surface_tilt=0.0, occluded_density=few) for few in FEW]
+        self.hidden = [probe(surface_tilt=0.0, occluded_density=few) for few in HIDDEN_DENSITIES]
         self.ideal = -0.5 * float(np.log(2 * np.pi * (2 * PIXEL_VARIANCE + usual.surface_sd**2)))
 
     def split(self, place: Place, speed: float) -> Body:
@@ -103,17 +106,20 @@ class _Probes:
         return Body(terms, float(np.mean([total for _, total in found])))
 
     def _frame(self, k: int, place: Place, speed: float) -> tuple[dict[str, float], float]:
-        blank = np.full_like(self.scene.frames[k].image, GREY)
+        blank = np.full_like(self.scene.frames[k].image, GREY_LEVEL)
         total, after = self.whole.step(k, place, speed)
 
         def on_grey(probe: Probe) -> float:
             return probe.step(k, place, speed, (blank, blank))[0]
 
         less, more = (on_grey(probe) for probe in self.hidden)
-        limbs, hidden = len(self.model.limb_names), round((more - less) / float(np.log(FEW[1] / FEW[0])))
+        limbs, hidden = (
+            len(self.model.limb_names),
+            round((more - less) / float(np.log(HIDDEN_DENSITIES[1] / HIDDEN_DENSITIES[0]))),
+        )
         seen = (limbs - hidden) * self.ideal
         one, each = on_grey(self.even), on_grey(self.whole)
-        q = less - hidden * float(np.log(FEW[0])) - seen
+        q = less - hidden * float(np.log(HIDDEN_DENSITIES[0])) - seen
         terms = {Q: q, OCCLUDED: one - limbs * self.ideal - q, WIDTHS: each - one}
         bodies = self.whole.state(k, *place), after
         ids = [self.model.render(self.scene.camera, state) for state in bodies]
@@ -125,7 +131,7 @@ class _Probes:
                 part[where] = frame[where]
             after_it = self.whole.step(k, place, speed, (shown[0], shown[1]))[0]
             terms[f"E, {name.replace('_', ' ')}"], before = after_it - before, after_it
-        return terms | {LAST: total - before}, total - limbs * self.ideal
+        return terms | {LAST_CASE: total - before}, total - limbs * self.ideal
 
 
 def _widened(where: np.ndarray) -> np.ndarray:
@@ -159,7 +165,7 @@ def pictures(found: Freeze, estimates: Sequence[Estimate], seed: int) -> list[Pi
     """Draw the estimates of a run that leaves the person over the frames, and the bodies of the table."""
     overlay = Overlay(found.model, found.scene.camera)
     cells = []
-    for k in (k for k in SHOWN if k < len(estimates)):
+    for k in (k for k in FIGURE_SHOWN if k < len(estimates)):
         drawn = overlay.body(_colour(found.scene.frames[k].image), estimates[k].mean)
         _truth(found.scene, drawn, k)
         cells.append(_about(found.scene, drawn, k, f"frame {k}"))
@@ -172,7 +178,8 @@ def pictures(found: Freeze, estimates: Sequence[Estimate], seed: int) -> list[Pi
         Picture(
             f"What eq. 11 compares in one step, {found.scene.name}: the true, walking body and the "
             f"motionless one {found.place}. The redder a limb, the more the image under it has changed since "
-            f"the frame before (E; saturated at {FULL:g} nats). On the background hardly anything changes.",
+            f"the frame before (E; saturated at {FULL_RED_NATS:g} nats). On the background hardly anything "
+            "changes.",
             image(_costs(found), "limbs of the walking and of the motionless body by their cost"),
         ),
     ]
@@ -191,7 +198,7 @@ def _costs(found: Freeze) -> Image:
         ids = found.model.render(found.scene.camera, probe.state(k, *PLACES[place]))
         for limb, name in enumerate(found.model.limb_names, 1):
             cost = -body.terms[f"E, {name.replace('_', ' ')}"]
-            pale = 235 * (1 - float(np.clip(cost / FULL, 0, 1)))
+            pale = 235 * (1 - float(np.clip(cost / FULL_RED_NATS, 0, 1)))
             colour = np.array([pale, pale, 235])
             where = ids == limb
             drawn[where] = np.rint(0.25 * drawn[where] + 0.75 * colour).astype(np.uint8)

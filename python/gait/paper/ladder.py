@@ -27,19 +27,25 @@ from gait.paper.preference import Probe, Row
 from gait.paper.scene import Run, Scene, follow, reported
 from gait.report.figures import Drawing
 
-SEED, SEEDS = 1, 10  # of the rungs; runs of the paper's filter in each view
+RUNG_SEED, SEEDS = 1, 10  # of the rungs; runs of the paper's filter in each view
 CAPTION = (
     "Root-aligned joint error in mm: the median over frames and views, with the range over the views. Each "
     "rung adds one thing to the rung above. Grey bars use no image. Dashed lines show the rung's own model "
     "running free, without images, from the exact true state; the rungs themselves start with some error."
 )
-STATIC = "static pose"
-_FREE = tuple(
+STATIC_POSE = "static pose"
+_FREE_RUNNING = tuple(
     f"free-running cycle, {whose}" for whose in ("the paper's model", "people, 19 angles", "people")
 )
 #: The free-running cycle that a rung is compared with, by `Rung.model`.
-FREE = {"paper": _FREE[0], "rigid": _FREE[1], "plain": _FREE[2], "root": _FREE[2], "people": _FREE[2]}
-COMPARED = "paper", "rigid", "people"  # models of these cycles
+FREE = {
+    "paper": _FREE_RUNNING[0],
+    "rigid": _FREE_RUNNING[1],
+    "plain": _FREE_RUNNING[2],
+    "root": _FREE_RUNNING[2],
+    "people": _FREE_RUNNING[2],
+}
+COMPARED_MODELS = "paper", "rigid", "people"  # models of these cycles
 #: Settings of the default mode that later rungs add, switched off.
 _WITHOUT: dict[str, Any] = {
     "evidence_time": 0.0,
@@ -104,10 +110,10 @@ def _default(terms: Term, *added: str) -> dict[str, Any]:
 def _usual(*names: str) -> dict[str, Any]:
     """Return the named settings as the default mode has them, and its number of components."""
     usual = TrackerConfig.default()
-    return {"components": COMPONENTS} | {name: getattr(usual, name) for name in names}
+    return {"components": RUNG_COMPONENTS} | {name: getattr(usual, name) for name in names}
 
 
-COMPONENTS = 5  # of each model: those of the paper, the first of the default's
+RUNG_COMPONENTS = 5  # of each model: those of the paper, the first of the default's
 _FILTER = *_RELAXING, *_TURNING, "particles", "resample_ess"
 _CUES = Term.TEXTURE | Term.SILHOUETTE, Term.TEXTURE | Term.SILHOUETTE | Term.EDGES
 _ALL = Term.TEXTURE | Term.SILHOUETTE | Term.EDGES | Term.TEMPLATE
@@ -132,7 +138,7 @@ RUNGS = (
     Rung("+ posture", Mode.DEFAULT, "people", _default(_ALL, *_LATER)),
     Rung("+ stature: the default", Mode.DEFAULT, "people"),
 )
-PAPER = RUNGS[1]
+PAPER_RUNG = RUNGS[1]
 
 
 def config_of(rung: Rung, seed: int) -> TrackerConfig:
@@ -188,8 +194,8 @@ def climb(scenes: Sequence[tuple[Scene, str]], learning: Learning, update: Calla
     learnt = blobs(blob_of(learning.literal, "paper"), blob_of(learning.ours, "people"))
     known = {name: Model(each) for name, each in learnt.items()}
     base = {p: [scene.baselines(decode(each)) for scene, _ in scenes] for p, each in learnt.items()}
-    rungs = {STATIC: [each["static"] for each in base["people"]]}
-    rungs |= {FREE[prior]: [each["free"] for each in base[prior]] for prior in COMPARED}
+    rungs = {STATIC_POSE: [each["static"] for each in base["people"]]}
+    rungs |= {FREE[prior]: [each["free"] for each in base[prior]] for prior in COMPARED_MODELS}
     done = 0
 
     def followed(rung: Rung, scene: Scene, init: str, seed: int) -> list[Estimate]:
@@ -201,11 +207,13 @@ def climb(scenes: Sequence[tuple[Scene, str]], learning: Learning, update: Calla
         return found
 
     for rung in RUNGS:
-        rungs[rung.name] = [scene.judged(followed(rung, scene, init, SEED)).root for scene, init in scenes]
+        rungs[rung.name] = [
+            scene.judged(followed(rung, scene, init, RUNG_SEED)).root for scene, init in scenes
+        ]
     held, paper, far = list[int](), list[float](), list[tuple[float, int, int, list[Estimate]]]()
     every = list[Run]()
     for k, (scene, init) in enumerate(scenes):
-        found = [followed(PAPER, scene, init, seed) for seed in range(1, SEEDS + 1)]
+        found = [followed(PAPER_RUNG, scene, init, seed) for seed in range(1, SEEDS + 1)]
         runs = [scene.judged(each) for each in found]
         every += runs
         held.append(sum(r.held for r in runs))
@@ -217,7 +225,7 @@ def climb(scenes: Sequence[tuple[Scene, str]], learning: Learning, update: Calla
     def prefers(k: int, prior: str, mode: Mode) -> list[Row]:
         return Probe(scenes[k][0], known[prior], preference.config(mode), sizes[prior][k]).table()
 
-    rungs[PAPER.name] = paper
+    rungs[PAPER_RUNG.name] = paper
     views = range(len(scenes))
     preferred = [(prefers(k, "paper", Mode.PAPER), prefers(k, "people", Mode.DEFAULT)) for k in views]
     frozen = [freeze.examine(scenes[k][0], known["paper"], sizes["paper"][k], preferred[k][0]) for k in views]
@@ -272,8 +280,8 @@ def _reach(found: Climbed) -> Entry:
         "The paper's likelihood does not keep track of a person in every view. It compares a limb only with "
         "what it covered in the frame before. A static background always looks like itself, so a motionless "
         f"body on the background fits best. Median root-aligned errors of rendered walks, by view, frames 0 "
-        f"to {tracking.FRAMES}. {each}. Reported as lost: {found.lost[0]} runs that leave the person, and "
-        f"{found.lost[1]} that stay on the person.",
+        f"to {tracking.FIGURE_FRAMES}. {each}. Reported as lost: {found.lost[0]} runs that leave the person, "
+        f"and {found.lost[1]} that stay on the person.",
         "Silhouette, edges and template also compare with the background. The ladder shows the errors.",
         f"{verdicts.held(found.held, SEEDS, found.paper, found.free)}; {verdicts.at_rest(gains)}",
         (
@@ -319,15 +327,16 @@ def _ladder(found: Climbed) -> Entry:
     return Entry(
         "Ladder: what each later addition gains",
         "Not in the paper, which shows tracking on one clip.",
-        f"{median[PAPER.name]:.0f} mm root-aligned over frames 0 to {tracking.FRAMES}, the median of "
-        f"{len(names)} views; {median[RUNGS[0].name]:.0f} mm with sigmas set by hand.",
+        f"{median[PAPER_RUNG.name]:.0f} mm root-aligned over frames 0 to {tracking.FIGURE_FRAMES}, the "
+        f"median of {len(names)} views; {median[RUNGS[0].name]:.0f} mm with sigmas set by hand.",
         f"{median[RUNGS[-1].name]:.0f} mm.",
-        verdicts.without_image(*(gain(found.rungs, rung.name) for rung in (PAPER, RUNGS[-1]))),
+        verdicts.without_image(*(gain(found.rungs, rung.name) for rung in (PAPER_RUNG, RUNGS[-1]))),
         (
             "Sigmas, epsilon, p_occluded, sigma(alpha) and n_s were searched on simulated clips. Here each "
-            f"rung has one seed ({SEED}) and the paper's filter {SEEDS}, so differences of a few millimetres "
-            "may be chance. tests/bench/results/paper_ladder.md of the sources has the same table for clips "
-            "of real motion, with further rungs for a detector's keypoints and automatic starts.",
+            f"rung has one seed ({RUNG_SEED}) and the paper's filter {SEEDS}, so differences of a few "
+            "millimetres may be chance. tests/bench/results/paper_ladder.md of the sources has the same "
+            "table for clips of real motion, with further rungs for a detector's keypoints and automatic "
+            "starts.",
             "Each rung adds one thing and keeps the rest. Robust texture is that of the default mode, which "
             "resamples systematically. All rungs have 5 components.",
             "The baselines without images start from the exact truth, but the rungs from the clip's init "
@@ -355,7 +364,7 @@ def plot(errors: dict[str, float], spread: dict[str, tuple[float, float]] | None
         axes = figure.subplots()
         names = list(errors)
         values = [errors[name] for name in names]
-        blind = STATIC, *_FREE
+        blind = STATIC_POSE, *_FREE_RUNNING
         colours = ["#b8b8b8" if name in blind else "#2a6f97" for name in names]
         axes.barh(range(len(names)), values, color=colours)
         for k, name in enumerate(names):

@@ -25,28 +25,28 @@ from gait.learn.segments.fit import USUAL_STATURE
 from gait.learn.segments.virtual_markers import MARKERS
 from gait.lift.segment.view import looking_along
 
-FRAMES, HOP, FPS = 10, 5, 20.0  # of a segment
-MODES = 50
-SHARE = 0.91  # of the variance that 50 modes explain in the paper
-WINDOW = 20  # frames of three overlapping segments
-STARTS = tuple(range(0, WINDOW - FRAMES + 1, HOP))
-NOISES = (0.005, 0.02, 0.05, 0.1, 0.2)  # metres: sd of what is seen
-TRIED = NOISES[:3]  # in the table of errors
-NOISE = TRIED[-1]  # in figures 3, 5 and 6: the nearest to what the paper's volume implies
-MOST = 12  # segments tried of a sequence
+SEGMENT_FRAMES, HOP, SEGMENT_FPS = 10, 5, 20.0  # of a segment
+PAPER_MODES = 50
+PAPER_VARIANCE_SHARE = 0.91  # of the variance that 50 modes explain in the paper
+WINDOW_FRAMES = 20  # frames of three overlapping segments
+SEGMENT_STARTS = tuple(range(0, WINDOW_FRAMES - SEGMENT_FRAMES + 1, HOP))
+NOISES_M = (0.005, 0.02, 0.05, 0.1, 0.2)  # metres: sd of what is seen
+TRIED = NOISES_M[:3]  # in the table of errors
+FIGURE_NOISE_M = TRIED[-1]  # in figures 3, 5 and 6: the nearest to what the paper's volume implies
+MOST_SEGMENTS = 12  # segments tried of a sequence
 WITHIN = 1.645  # standard deviations that hold 90 %
 VIEW = looking_along("y")  # rows right, down, ahead
 PICTURE = np.stack([VIEW[0], -VIEW[1]])  # right and up
 DEPTH = 1  # coordinate that is not seen
 PELVIS = MARKERS.index("pelvis")
 _ENDS = ("hip", "knee"), ("knee", "ankle"), ("shoulder", "elbow"), ("elbow", "wrist")
-LIMBS = np.array([[MARKERS.index(f"{side}_{end}") for end in ends] for side in "lr" for ends in _ENDS])
+LIMB_COLUMNS = np.array([[MARKERS.index(f"{side}_{end}") for end in ends] for side in "lr" for ends in _ENDS])
 LN10 = float(np.log(10))
 
 
 @dataclass(frozen=True)
 class Gaussian:
-    """Segments x = mean + modes alpha, alpha ~ N(0, diag(variance)), with D = FRAMES * J * 3 coordinates."""
+    """Segments x = mean + modes alpha, alpha ~ N(0, diag(variance)); D = SEGMENT_FRAMES * J * 3."""
 
     mean: Floats  #: (D,)
     modes: Floats  #: (D, k) orthonormal, most variance first
@@ -57,7 +57,7 @@ class Gaussian:
     @property
     def visible(self) -> Floats:
         """Modes as the view shows them, (D * 2 / 3, k)."""
-        return _visible(self.modes.T.reshape(-1, FRAMES, len(MARKERS), 3)).T
+        return _visible(self.modes.T.reshape(-1, SEGMENT_FRAMES, len(MARKERS), 3)).T
 
     def explained(self) -> Floats:
         """Share of the variance that the first modes explain."""
@@ -65,9 +65,9 @@ class Gaussian:
 
     def segment(self, alpha: Floats) -> Floats:
         """Return the segment (F, J, 3) of some scores (k,)."""
-        return (self.mean + self.modes[:, : len(alpha)] @ alpha).reshape(FRAMES, -1, 3)
+        return (self.mean + self.modes[:, : len(alpha)] @ alpha).reshape(SEGMENT_FRAMES, -1, 3)
 
-    def projected(self, x: Floats, count: int = MODES) -> Floats:
+    def projected(self, x: Floats, count: int = PAPER_MODES) -> Floats:
         """Return the nearest segment in the span of the first modes."""
         return self.segment(np.asarray(self.modes[:, :count].T @ (x.ravel() - self.mean)))
 
@@ -111,7 +111,9 @@ def metres(recorded: Recorded) -> Floats:
     return np.asarray(stature * recorded.places)
 
 
-def cut(recorded: Recorded, frames: int = FRAMES, hop: int = HOP, heading: float | None = None) -> Floats:
+def cut(
+    recorded: Recorded, frames: int = SEGMENT_FRAMES, hop: int = HOP, heading: float | None = None
+) -> Floats:
     """Return the whole segments (n, frames, J, 3) of a recording, rooted; turned to a heading, if given."""
     places, found = metres(recorded), []
     for k in range(0, len(places) - frames + 1, hop):
@@ -134,7 +136,7 @@ def learn(segments: Floats, turned: bool = True) -> Gaussian:
     mean = rows.mean(axis=0)
     _, singular, right = np.linalg.svd(rows - mean, full_matrices=False)
     spectrum = singular**2 / (len(rows) - 1)
-    count = min(MODES, int(np.sum(spectrum > 1e-9 * spectrum[0])))
+    count = min(PAPER_MODES, int(np.sum(spectrum > 1e-9 * spectrum[0])))
     return Gaussian(mean, right[:count].T, spectrum[:count], spectrum, len(segments))
 
 
@@ -145,11 +147,11 @@ def learn_all(motions: Sequence[Recorded], turned: bool = True) -> Gaussian:
 
 def prior_of(gaussian: Gaussian, stature: float) -> SegmentPrior:
     """Return a Gaussian as a prior for the package's energy: nothing lies outside its modes."""
-    sd, shape = np.sqrt(gaussian.variance) / stature, (FRAMES, len(MARKERS), 3)
+    sd, shape = np.sqrt(gaussian.variance) / stature, (SEGMENT_FRAMES, len(MARKERS), 3)
     return SegmentPrior(
         names=MARKERS,
         hop=HOP,
-        fps=FPS,
+        fps=SEGMENT_FPS,
         headings=2,
         weights=np.ones(1),
         mean=(gaussian.mean / stature).reshape(1, *shape),
@@ -181,7 +183,7 @@ class HeldOut:
     """A sequence that neither prior was learnt from."""
 
     name: str
-    windows: Floats  #: (n, WINDOW, J, 3) metres
+    windows: Floats  #: (n, WINDOW_FRAMES, J, 3) metres
     gaussian: Gaussian
     prior: SegmentPrior  #: the package's
     stature: float
@@ -193,12 +195,14 @@ def hold_out(motions: Sequence[Recorded], update: Callable[[int], None] = lambda
     found = []
     for k, out in enumerate(motions):
         others = [m for m in motions if m.source != out.source]
-        windows = cut(out, WINDOW, HOP)
+        windows = cut(out, WINDOW_FRAMES, HOP)
         if len(windows):
             found.append(_held_out(out, windows, learn_all(others), _ours(others)))
         update(k + 1)
     if not found:
-        raise UserError(f"no motion shows all markers for {WINDOW / FPS:g} s; add recordings without gaps")
+        raise UserError(
+            f"no motion shows all markers for {WINDOW_FRAMES / SEGMENT_FPS:g} s; add recordings without gaps"
+        )
     return found
 
 
@@ -209,7 +213,7 @@ def _ours(motions: Sequence[Recorded]) -> SegmentPrior:
 def _held_out(out: Recorded, windows: Floats, gaussian: Gaussian, prior: SegmentPrior) -> HeldOut:
     stature = out.stature if np.isfinite(out.stature) else USUAL_STATURE
     segments = cut(out)
-    picked = segments[np.unique(np.linspace(0, len(segments) - 1, MOST).round().astype(int))]
+    picked = segments[np.unique(np.linspace(0, len(segments) - 1, MOST_SEGMENTS).round().astype(int))]
     scores = tuple(_score(picked, gaussian, prior, stature, noise) for noise in TRIED)
     return HeldOut(out.name, windows, gaussian, prior, stature, scores)
 
@@ -245,7 +249,7 @@ def lifter_of(prior: SegmentPrior, stature: float) -> Lifter:
 def marker_sd(gaussian: Gaussian, found: Posterior) -> Floats:
     """Return the standard deviations (F, J, 3) of a posterior, as the paper has them: of the modes alone."""
     variance = np.einsum("dk,kl,dl->d", gaussian.modes, found.covariance, gaussian.modes, optimize=True)
-    return np.sqrt(variance).reshape(FRAMES, -1, 3)
+    return np.sqrt(variance).reshape(SEGMENT_FRAMES, -1, 3)
 
 
 def apart(found: Floats, truth: Floats) -> float:
@@ -255,7 +259,7 @@ def apart(found: Floats, truth: Floats) -> float:
 
 def limbs(x: Floats) -> Floats:
     """Return the lengths (..., 8) of thighs, shanks, upper arms and forearms of bodies (..., J, 3)."""
-    return np.asarray(np.linalg.norm(x[..., LIMBS[:, 0], :] - x[..., LIMBS[:, 1], :], axis=-1))
+    return np.asarray(np.linalg.norm(x[..., LIMB_COLUMNS[:, 0], :] - x[..., LIMB_COLUMNS[:, 1], :], axis=-1))
 
 
 def _covered(error: Floats, sd: Floats) -> float:
@@ -264,7 +268,7 @@ def _covered(error: Floats, sd: Floats) -> float:
 
 @dataclass(frozen=True)
 class Example:
-    """A window of a sequence left out, estimated from one view (figure 5); motions are (WINDOW, J, 3)."""
+    """A window of a left-out sequence, estimated from one view (figure 5): motions (WINDOW_FRAMES, J, 3)."""
 
     truth: Floats
     likelihood: Floats
@@ -278,15 +282,15 @@ def example(held: HeldOut) -> Example:
     windows = held.windows
     x = windows[int(windows.var(axis=1).sum(axis=(1, 2)).argmax())]
     rng = np.random.default_rng(1)
-    y = _view(x) + NOISE * rng.normal(size=(*x.shape[:2], 2))
+    y = _view(x) + FIGURE_NOISE_M * rng.normal(size=(*x.shape[:2], 2))
     lifter, first = lifter_of(held.prior, held.stature), None
     parts: tuple[list[Floats], ...] = ([], [], [])
-    for start in STARTS:
+    for start in SEGMENT_STARTS:
         across = np.array([y[start, PELVIS, 0], 0.0, 0.0])  # where a segment stands is seen but for the depth
-        part = y[start : start + FRAMES] - across[[0, 2]]
-        found = held.gaussian.posterior(part, NOISE)
+        part = y[start : start + SEGMENT_FRAMES] - across[[0, 2]]
+        found = held.gaussian.posterior(part, FIGURE_NOISE_M)
         first = first or found
-        lifter.segment(part, NOISE)
+        lifter.segment(part, FIGURE_NOISE_M)
         alone, bayes = held.gaussian.likelihood_only(part), held.gaussian.segment(found.alpha)
         for each, estimate in zip(parts, (alone, bayes, lifter.positions()[0]), strict=True):
             each.append(estimate + across)
@@ -297,14 +301,14 @@ def example(held: HeldOut) -> Example:
 
 def blended(parts: Floats) -> Floats:
     """Join overlapping segments (n, F, J, 3): each continues the depth of the one before; linear weights."""
-    total, weight = np.zeros((WINDOW, *parts.shape[2:])), np.zeros(WINDOW)
-    ramp = np.minimum(np.arange(1, FRAMES + 1), np.arange(FRAMES, 0, -1)).astype(float)
+    total, weight = np.zeros((WINDOW_FRAMES, *parts.shape[2:])), np.zeros(WINDOW_FRAMES)
+    ramp = np.minimum(np.arange(1, SEGMENT_FRAMES + 1), np.arange(SEGMENT_FRAMES, 0, -1)).astype(float)
     before = parts[0]
-    for start, part in zip(STARTS, parts, strict=True):
+    for start, part in zip(SEGMENT_STARTS, parts, strict=True):
         if start:
             part = part + np.eye(3)[DEPTH] * (before[HOP:] - part[:-HOP])[..., DEPTH].mean()
-        total[start : start + FRAMES] += ramp[:, None, None] * part
-        weight[start : start + FRAMES] += ramp
+        total[start : start + SEGMENT_FRAMES] += ramp[:, None, None] * part
+        weight[start : start + SEGMENT_FRAMES] += ramp
         before = part
     return total / weight[:, None, None]
 
@@ -319,7 +323,7 @@ def least_certain(gaussian: Gaussian, found: Posterior, count: int) -> tuple[Flo
     values, vectors = np.linalg.eigh(found.covariance)
     sd = np.sqrt(values[::-1][:count])
     modes = (gaussian.modes @ (vectors[:, ::-1][:, :count] * sd)).T
-    return sd, modes.reshape(count, FRAMES, -1, 3)
+    return sd, modes.reshape(count, SEGMENT_FRAMES, -1, 3)
 
 
 def noise_of(gaussian: Gaussian, log10_volume: float) -> float:

@@ -20,12 +20,12 @@ from gait.report.figures import Drawing, grid, line_legend
 
 SHOWN_MOTIONS = 5  # of figure 1
 SYNTHESIS = 40  # modes of figure 2
-DRAWS = UNCERTAIN = 3
-MANY = 200  # draws whose limbs are measured
-SWING = 2.0  # standard deviations
-TALL = 1.75  # metres, of the figures' rows
+DRAWN_SEGMENTS = UNCERTAIN = 3
+MEASURED_DRAWS = 200  # draws whose limbs are measured
+MODE_SDS = 2.0  # standard deviations
+ROW_HEIGHT_M = 1.75  # metres, of the figures' rows
 ACROSS = np.array([0.0, 1.0, 0.0])  # the depth, drawn to the right
-SHARE = 14  # orders of magnitude by which the paper's volume shrinks
+VOLUME_MAGNITUDES = 14  # orders of magnitude by which the paper's volume shrinks
 
 
 @dataclass(frozen=True)
@@ -58,7 +58,7 @@ def entries(found: Segments) -> Iterator[Entry]:
 
 
 def _strips(titles: Sequence[str]) -> Strips:
-    return Strips(titles, MARKERS, TALL, leventon.FPS)
+    return Strips(titles, MARKERS, ROW_HEIGHT_M, leventon.SEGMENT_FPS)
 
 
 def _across(x: Floats) -> Floats:
@@ -100,11 +100,11 @@ def _training(found: Segments) -> Entry:
 
 
 def _synthesis(found: Segments) -> Entry:
-    gaussian, truth = found.shown.gaussian, found.example.truth[: leventon.FRAMES]
+    gaussian, truth = found.shown.gaussian, found.example.truth[: leventon.SEGMENT_FRAMES]
     own = found.everything.projected(truth, SYNTHESIS)
     left_out = gaussian.projected(truth, SYNTHESIS)
     share = 100 * found.everything.explained()
-    need = int(np.searchsorted(share, 100 * leventon.SHARE)) + 1
+    need = int(np.searchsorted(share, 100 * leventon.PAPER_VARIANCE_SHARE)) + 1
     placed, rooted = (_needed(found.motions, absolute) for absolute in (True, False))
     strips = _strips(("from the view", "from the side"))
     for row, across in enumerate((SIDE, ACROSS)):
@@ -120,7 +120,7 @@ def _synthesis(found: Segments) -> Entry:
         f"Error with 40 modes: {leventon.apart(own, truth):.0f} mm per marker for a segment of the training "
         f"data (which is {far:.0f} mm from the mean), {leventon.apart(left_out, truth):.0f} mm if its "
         f"sequence was left out. 40 modes explain {share[SYNTHESIS - 1]:.2f} % of the variance, 50 modes "
-        f"{share[leventon.MODES - 1]:.2f} %; {need} modes explain 91 %.",
+        f"{share[leventon.PAPER_MODES - 1]:.2f} %; {need} modes explain 91 %.",
         f"{found.shown.prior.size} modes of segments that all face one way explain "
         f"{100 * explained[-1]:.1f} %.",
         verdicts.synthesis(leventon.apart(own, truth) / far, need),
@@ -143,12 +143,12 @@ def _needed(motions: Sequence[Recorded], absolute: bool) -> int:
     else:
         whole = [leventon.metres(m) for m in motions]
         frames = [
-            x[k : k + leventon.FRAMES]
+            x[k : k + leventon.SEGMENT_FRAMES]
             for x in whole
-            for k in range(0, len(x) - leventon.FRAMES + 1, leventon.HOP)
+            for k in range(0, len(x) - leventon.SEGMENT_FRAMES + 1, leventon.HOP)
         ]
         gaussian = leventon.learn(np.array([x for x in frames if np.isfinite(x).all()]))
-    return int(np.searchsorted(gaussian.explained(), leventon.SHARE)) + 1
+    return int(np.searchsorted(gaussian.explained(), leventon.PAPER_VARIANCE_SHARE)) + 1
 
 
 def _spectrum(found: Segments) -> Entry:
@@ -165,13 +165,14 @@ def _spectrum(found: Segments) -> Entry:
     return Entry(
         "Fig. 3: variances before and after",
         "The diagonals of the prior's and the posterior's covariance: most variances shrink strongly.",
-        f"With {1000 * leventon.NOISE:.0f} mm of noise, the variances shrink to {ratio.min():.1g} to "
-        f"{ratio.max():.2g} of the prior's, least in modes {', '.join(map(str, open_modes))}.",
+        f"With {1000 * leventon.FIGURE_NOISE_M:.0f} mm of noise, the variances shrink to {ratio.min():.1g} "
+        f"to {ratio.max():.2g} of the prior's, least in modes {', '.join(map(str, open_modes))}.",
         "The library uses the same equations, with position, heading and stature as further unknowns.",
         verdicts.spectrum(ratio.tolist()),
         (
-            f"The noise: a standard deviation of {1000 * leventon.NOISE:.0f} mm of each observed coordinate. "
-            "Sigma is a variance in the text, squared in eq. 4, and multiplies the identity in eq. 5.",
+            f"The noise: a standard deviation of {1000 * leventon.FIGURE_NOISE_M:.0f} mm of each observed "
+            "coordinate. Sigma is a variance in the text, squared in eq. 4, and multiplies the identity in "
+            "eq. 5.",
             "Where eqs. 5 and 6 have S, the covariance of the scores is used. Eq. 6 is computed as the "
             "inverse of the sum of both precisions, which is equal.",
         ),
@@ -188,10 +189,10 @@ def _spectrum(found: Segments) -> Entry:
 def _draws(found: Segments) -> Entry:
     rng = np.random.default_rng(1)
     gaussian = found.everything
-    scores = rng.normal(size=(MANY, len(gaussian.variance))) * np.sqrt(gaussian.variance)
+    scores = rng.normal(size=(MEASURED_DRAWS, len(gaussian.variance))) * np.sqrt(gaussian.variance)
     drawn = np.array([gaussian.segment(alpha) for alpha in scores])
-    strips = _strips([f"draw {k + 1}" for k in range(DRAWS)])
-    for row, x in enumerate(drawn[:DRAWS]):
+    strips = _strips([f"draw {k + 1}" for k in range(DRAWN_SEGMENTS)])
+    for row, x in enumerate(drawn[:DRAWN_SEGMENTS]):
         strips.add(row, x, _across(x), BLUE)
     learnt = leventon.limbs(np.concatenate([leventon.cut(m) for m in found.motions]))
     usual = learnt.mean(axis=(0, 1))
@@ -199,8 +200,8 @@ def _draws(found: Segments) -> Entry:
     return Entry(
         "Fig. 4: draws from the prior",
         "Segments drawn at random from the prior.",
-        f"{DRAWS} draws from the Gaussian. In {MANY} draws, limb lengths vary by {100 * differ[0]:.0f} % "
-        "(rms).",
+        f"{DRAWN_SEGMENTS} draws from the Gaussian. In {MEASURED_DRAWS} draws, limb lengths vary by "
+        f"{100 * differ[0]:.0f} % (rms).",
         "The same kind of prior, but all segments face the same way, so that no draw mixes two headings.",
         verdicts.draws(*differ),
         (
@@ -223,7 +224,7 @@ def _estimates(found: Segments) -> Entry:
             strips.add(row, e.truth, ACROSS, DARK, ghost=True)
         strips.add(row, x, ACROSS, (DARK, BLUE, ORANGE, "#3a7d44")[row - 1], path=e.truth)
     means = [_mean(held, k) for k in range(len(leventon.TRIED))]
-    shown = means[leventon.TRIED.index(leventon.NOISE)]
+    shown = means[leventon.TRIED.index(leventon.FIGURE_NOISE_M)]
     caption = (
         f"20 frames of {found.shown.name}, which was left out: three overlapping segments, blended linearly. "
         "The camera looks along the depth; in the rows below the first, depth is drawn to the right. Grey: "
@@ -254,7 +255,7 @@ def _estimates(found: Segments) -> Entry:
             "A segment is placed where its pelvis is observed; in depth it continues the segment before. "
             "Overlapping segments are blended linearly.",
             f"The noise: {', '.join(f'{1000 * n:.0f}' for n in leventon.TRIED)} mm; shown with "
-            f"{1000 * leventon.NOISE:.0f}. The camera looks along y, level and orthographic.",
+            f"{1000 * leventon.FIGURE_NOISE_M:.0f}. The camera looks along y, level and orthographic.",
         ),
         (picture(Drawing("", "estimates", caption, strips.figure())), _table(means)),
     )
@@ -293,9 +294,9 @@ def _uncertain(found: Segments) -> Entry:
     for row, mode in enumerate(modes):
         strips.add(row, centre, ACROSS, DARK, ghost=True)
         for sign, colour in ((1, ORANGE), (-1, BLUE)):
-            strips.add(row, centre + sign * SWING * mode, ACROSS, colour, path=centre)
+            strips.add(row, centre + sign * MODE_SDS * mode, ACROSS, colour, path=centre)
     figure = strips.figure()
-    line_legend(figure, {f"+{SWING:g} sd": ORANGE, f"-{SWING:g} sd": BLUE})
+    line_legend(figure, {f"+{MODE_SDS:g} sd": ORANGE, f"-{MODE_SDS:g} sd": BLUE})
     shares = ", ".join(f"{100 * s:.0f} %" for s in along)
     return Entry(
         "Fig. 6: modes of greatest posterior variance",
@@ -317,21 +318,25 @@ def _uncertain(found: Segments) -> Entry:
 
 def _volume(found: Segments) -> Entry:
     gaussian = found.shown.gaussian
-    view = np.zeros((leventon.FRAMES, len(MARKERS), 2))
-    ratios = [gaussian.posterior(view, noise).log10_volume for noise in leventon.NOISES]
-    same = leventon.noise_of(gaussian, -SHARE)
+    view = np.zeros((leventon.SEGMENT_FRAMES, len(MARKERS), 2))
+    ratios = [gaussian.posterior(view, noise).log10_volume for noise in leventon.NOISES_M]
+    same = leventon.noise_of(gaussian, -VOLUME_MAGNITUDES)
     figure, (axes,) = grid(1, 1, 6, 3)
-    axes.semilogx([1000 * n for n in leventon.NOISES], ratios, "o-", ms=4, color=DARK)
-    axes.axhline(-SHARE, color=ORANGE, lw=1, ls="--", label=f"the paper's: 10^-{SHARE}")
+    axes.semilogx([1000 * n for n in leventon.NOISES_M], ratios, "o-", ms=4, color=DARK)
+    axes.axhline(
+        -VOLUME_MAGNITUDES, color=ORANGE, lw=1, ls="--", label=f"the paper's: 10^-{VOLUME_MAGNITUDES}"
+    )
     axes.set(xlabel="noise of what is observed, mm", ylabel="log10 of posterior over prior volume")
     axes.legend(fontsize=8, frameon=False)
-    words = ", ".join(f"{1000 * n:.0f} mm: 10^{r:.0f}" for n, r in zip(leventon.NOISES, ratios, strict=True))
+    words = ", ".join(
+        f"{1000 * n:.0f} mm: 10^{r:.0f}" for n, r in zip(leventon.NOISES_M, ratios, strict=True)
+    )
     return Entry(
         "Volume of the posterior",
         "The volume shrinks by a factor of 10^14 in 50 dimensions (printed the other way round).",
         f"{words}. It is 10^-14 with {1000 * same:.0f} mm of noise.",
         "gait report lift prints the volume for any segment.",
-        verdicts.volume(ratios, same, leventon.NOISES),
+        verdicts.volume(ratios, same, leventon.NOISES_M),
         (
             "The paper does not state the noise sigma, which is a standard deviation here.",
             "The ratio is printed as prior over posterior, which could not be small. Here it is the square "

@@ -23,20 +23,20 @@ from gait.lift.video.run import LiftedVideo, Request, lift_video
 from gait.lift.video.sensors import FlatView
 from gait.motion.evaluate import root_errors
 from gait.paper import leventon, verdicts
-from gait.paper.clip import LEFT_OUT, Clip
+from gait.paper.clip import CHECK_INTERVAL, Clip
 from gait.paper.entry import Entry, Picture, picture
 from gait.paper.pictures import image, labelled
-from gait.paper.tracking import HELD
+from gait.paper.tracking import FOLLOWED_ERROR
 from gait.report.colours import BLUE, ORANGE
 from gait.report.drawing import draw_bones
 from gait.report.figures import Drawing, grid
 
-FRAMES = 100
-SHOWN = 6
-TURN = np.radians(30.0)
-SIZE = 250  # pixels of a picture
+LIFTED_FRAMES = 100
+SHOWN_COUNT = 6
+TURN_ANGLE = np.radians(30.0)
+PICTURE_PX = 250  # pixels of a picture
 CUT_OUT = 1.35  # statures, side of a picture
-PAPER = (248, 247, 246)
+PAPER_COLOUR = (248, 247, 246)
 
 
 @dataclass(frozen=True)
@@ -67,7 +67,7 @@ def lift(clip: Clip, motions: Sequence[Recorded], folder: Path, quiet: bool) -> 
     video = Video(clip.video)
     calibrated = clip.calibration(video.size)
     placement = read_placement(clip.init, prior, calibrated is not None)
-    stop = min(placement.frame + FRAMES, video.count)
+    stop = min(placement.frame + LIFTED_FRAMES, video.count)
     clicks, left_out = clip.clicks_within(range(placement.frame, stop), folder)
     turned = np.concatenate([leventon.cut(m, heading=placement.heading) for m in motions])
     literal = leventon.prior_of(leventon.learn(turned), prior.stature)
@@ -131,8 +131,8 @@ def entry(both: Both) -> Entry:
             "The training motions are turned to the heading of the placement, and by 90 degrees from it.",
             "The camera is calibrated and the floor is known; the paper has an orthographic view.",
             "At the start, position, heading and stature are given by hand.",
-            f"Every {LEFT_OUT}th click is left out, to judge the result. The person counts as followed if "
-            "the error there is below a tenth of the stature in the picture.",
+            f"Every {CHECK_INTERVAL}th click is left out, to judge the result. The person counts as followed "
+            "if the error there is below a tenth of the stature in the picture.",
             "The clicks are the joints marked in the clip's corrections." if both.clip.real
             else "The clicks: one joint per frame, with an error of 3 pixels.",
         ),
@@ -145,7 +145,7 @@ def _verdict(both: Both) -> str:
     if not len(off[0]):
         return "no counterpart: no clicks to judge by; see the pictures"
     height = both.ours.clip.placement.stature * _pixels(both.ours)
-    return verdicts.sequence([float(np.median(each)) for each in off], height, HELD)
+    return verdicts.sequence([float(np.median(each)) for each in off], height, FOLLOWED_ERROR)
 
 
 def _pixels(lifted: LiftedVideo) -> float:
@@ -198,7 +198,7 @@ def _energy(energies: Sequence[Floats]) -> Figure:
 def _film(both: Both, lifted: LiftedVideo) -> Image:
     """Draw overlays, markers and cylinder figures of some frames, one row each."""
     clip, fit = lifted.clip, lifted.fit
-    picked = np.linspace(0, len(fit.frame) - 1, SHOWN).round().astype(int)
+    picked = np.linspace(0, len(fit.frame) - 1, SHOWN_COUNT).round().astype(int)
     surfaces, joints = lifted.figure.surfaces(), lifted.figure.joints()
     markers = clip.prior.index(JOINTS)
     frames = {f.number: f.image for f in lifted.video.pick(fit.frame[picked].tolist())}
@@ -229,33 +229,37 @@ def _overlay(lifted: LiftedVideo, picture: Image, k: int, markers: Indices) -> I
             at = np.rint(correction.uv).astype(int).tolist()
             cv2.circle(canvas, at, 3 * width, (90, 240, 255), width, cv2.LINE_AA)
     middle = view.project(body.mean(axis=0)[None])[0][0]
-    zoom = SIZE / (CUT_OUT * lifted.clip.placement.stature * scale)
-    matrix = np.array([[zoom, 0, SIZE / 2 - zoom * middle[0]], [0, zoom, SIZE / 2 - zoom * middle[1]]])
-    return np.asarray(cv2.warpAffine(canvas, matrix, (SIZE, SIZE), flags=cv2.INTER_AREA), np.uint8)
+    zoom = PICTURE_PX / (CUT_OUT * lifted.clip.placement.stature * scale)
+    matrix = np.array(
+        [[zoom, 0, PICTURE_PX / 2 - zoom * middle[0]], [0, zoom, PICTURE_PX / 2 - zoom * middle[1]]]
+    )
+    return np.asarray(
+        cv2.warpAffine(canvas, matrix, (PICTURE_PX, PICTURE_PX), flags=cv2.INTER_AREA), np.uint8
+    )
 
 
 def _turned(lifted: LiftedVideo, k: int) -> Floats:
     """Return the axes (3, 3) of a level view from 30 degrees beside the camera: right, away, up."""
     away = lifted.clip.view.away(lifted.fit.places[k].mean(axis=0)) * (1, 1, 0)
-    away = axis_rotation(2, TURN) @ (away / np.linalg.norm(away))
+    away = axis_rotation(2, TURN_ANGLE) @ (away / np.linalg.norm(away))
     return np.stack([np.cross(away, [0.0, 0.0, 1.0]), away, [0.0, 0.0, 1.0]])
 
 
 def _blank() -> Image:
-    return np.full((SIZE, SIZE, 3), PAPER, np.uint8)
+    return np.full((PICTURE_PX, PICTURE_PX, 3), PAPER_COLOUR, np.uint8)
 
 
 def _dots(body: Floats, stature: float) -> Image:
     """Draw markers (J, 3) in the axes of a view."""
     canvas = _blank()
-    zoom = SIZE / (CUT_OUT * stature)
+    zoom = PICTURE_PX / (CUT_OUT * stature)
     for x, _, z in body[np.argsort(-body[:, 1])]:
-        at = round(SIZE / 2 + zoom * x), round(SIZE / 2 - zoom * z)
+        at = round(PICTURE_PX / 2 + zoom * x), round(PICTURE_PX / 2 - zoom * z)
         cv2.circle(canvas, at, 3, (40, 40, 40), -1, cv2.LINE_AA)
     return canvas
 
 
 def _cylinders(surfaces: Floats, joints: Floats, stature: float) -> Image:
     """Draw the cylinder figure in the axes of a view."""
-    view = FlatView(SIZE / (CUT_OUT * stature), (SIZE / 2, SIZE / 2))
+    view = FlatView(PICTURE_PX / (CUT_OUT * stature), (PICTURE_PX / 2, PICTURE_PX / 2))
     return draw_figure(_blank(), view, surfaces, joints)

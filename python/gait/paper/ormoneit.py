@@ -22,8 +22,8 @@ EIGHT = 8  # walking sequences of their figure 4
 PAPER_FPS = 120.0  # at which their 126 frames are a usual stride
 LONG_PERIOD, LONG_FRAMES, LONG_NOISE = 80.3, 5000, 5.0  # frames, and degrees: what whole periods cannot fold
 REMOVED = 0.2  # of the entries, in blocks
-SEED = 1
-COUNT = len(PAPER_ANGLES)
+HOLD_OUT_SEED = 1
+PAPER_ANGLE_COUNT = len(PAPER_ANGLES)
 
 
 @dataclass(frozen=True)
@@ -107,7 +107,7 @@ def learn(walks: list[Walk], update: Callable[[int], None] = lambda done: None) 
         literal_walks,
         literal,
         ours,
-        _aligned(some, COUNT, literally=True),
+        _aligned(some, PAPER_ANGLE_COUNT, literally=True),
         _aligned(refined, len(ANGLES), literally=False),
         _removal(literal),
         _long(literal),
@@ -126,9 +126,9 @@ def _aligned(walks: list[Walk], angles: int, *, literally: bool) -> Aligned:
 
 def _removal(learned: Learned) -> Removal:
     """Remove blocks of entries of the cycles, and fill them again."""
-    values = np.array(learned.cycles.values[:, :, :COUNT])
-    mask = learned.cycles.mask[:, :, :COUNT]
-    blocks = rank.hold_out(mask, REMOVED, np.random.default_rng(SEED))
+    values = np.array(learned.cycles.values[:, :, :PAPER_ANGLE_COUNT])
+    mask = learned.cycles.mask[:, :, :PAPER_ANGLE_COUNT]
+    blocks = rank.hold_out(mask, REMOVED, np.random.default_rng(HOLD_OUT_SEED))
     visible, held, kept = mask & (blocks < 0), mask & (blocks >= 0), len(learned.components.sd)
     literal = components.fit(values, visible, kept, fill=iterated_svd.complete)
     ours = components.fit(values, visible, kept)
@@ -152,11 +152,11 @@ def _rms(values: Floats, where: Mask) -> float:
 
 def _long(learned: Learned) -> tuple[float, float]:
     """Find the period of many cycles of the mean walk that last no whole number of frames."""
-    mean = learned.curves[0][:, :COUNT]
+    mean = learned.curves[0][:, :PAPER_ANGLE_COUNT]
     at = np.arange(LONG_FRAMES) / LONG_PERIOD % 1.0 * len(mean)
     closed = np.concatenate([mean, mean[:1]])
-    rng = np.random.default_rng(SEED)
-    noise = np.radians(LONG_NOISE) * rng.normal(size=(LONG_FRAMES, COUNT))
+    rng = np.random.default_rng(HOLD_OUT_SEED)
+    noise = np.radians(LONG_NOISE) * rng.normal(size=(LONG_FRAMES, PAPER_ANGLE_COUNT))
     signals = noise + np.stack([np.interp(at, np.arange(len(closed)), c) for c in closed.T], axis=1)
     literal, refined = (period.find(signals, PAPER_FPS, mode).frames for mode in ("literal", "refined"))
     return float(literal), float(refined)
@@ -181,7 +181,7 @@ def closure(curves: Floats) -> float:
 
 def printed_mean(learned: Learned) -> Floats:
     """Return the mean (T, 19) of the completed cycles as printed: not in the Fourier basis."""
-    return np.asarray(np.array(learned.components.filled[:, :, :COUNT]).mean(axis=0))
+    return np.asarray(np.array(learned.components.filled[:, :, :PAPER_ANGLE_COUNT]).mean(axis=0))
 
 
 def left_by_mean(learned: Learned) -> float:

@@ -37,18 +37,18 @@ NOTED = (
     "l_hip_abduction",
     "l_knee_flexion",
 )
-SHOWN = ("l_hip_flexion", "l_knee_flexion")  # of figures 3 and 4
+SHOWN_ANGLES = ("l_hip_flexion", "l_knee_flexion")  # of figures 3 and 4
 COURSES = "Error after each pass, relative to the last."
 REPEATED = (
     "The walks before and after, each repeated over two cycles, with one colour per walk. Black: the fitted "
     "periodic spline."
 )
-SWING = 2.0  # standard deviations
-CURVES = f"The paper's components as curves: mean and {SWING:g} sd."
+MODE_SDS = 2.0  # standard deviations
+CURVES = f"The paper's components as curves: mean and {MODE_SDS:g} sd."
 AXIS = 0.10  # metres
-AXES = {0: (60, 60, 220), 1: (70, 160, 60), 2: (220, 120, 40)}  # BGR of x, y, z
+AXIS_COLOURS = {0: (60, 60, 220), 1: (70, 160, 60), 2: (220, 120, 40)}  # BGR of x, y, z
 JOINTED = {"head": 3, "upper_arm": 3, "forearm": 1, "thigh": 3, "shank": 1}  # angles of a joint by its frame
-PHASES = 24  # of moving figures
+MOVING_PHASES = 24  # of moving figures
 STIFF = 1e-6  # radians over a cycle, below which an angle does not move
 NOISE_FLAT = 0.25  # change of the ratio of white noise below which it is flat
 
@@ -115,7 +115,7 @@ def _articulated(model: Model, literal: Learned) -> Image:
         ends = at + AXIS * turn.T
         start, *tips = np.rint(camera.project(np.vstack([at, ends]))).astype(int).tolist()
         for axis, tip in enumerate(tips):
-            cv2.arrowedLine(image, start, tip, AXES[axis], 2, cv2.LINE_AA, tipLength=0.25)
+            cv2.arrowedLine(image, start, tip, AXIS_COLOURS[axis], 2, cv2.LINE_AA, tipLength=0.25)
         words = str(count) if count else "6"
         aside, down = (10, 20) if name.startswith("l_") else (-22, 4) if count else (-5, 24)
         place = start[0] + aside, start[1] + down
@@ -207,9 +207,9 @@ def _courses(learning: Learning) -> Figure:
 
 def _repeated(aligned: Aligned) -> Figure:
     """Draw walks on two cycles with offsets 0 and with those found, and the spline."""
-    figure, panels = grid(len(SHOWN), 2, 9, 4.6, sharex=True, sharey="row")
+    figure, panels = grid(len(SHOWN_ANGLES), 2, 9, 4.6, sharex=True, sharey="row")
     curve = aligned.curve()
-    for row, name in enumerate(SHOWN):
+    for row, name in enumerate(SHOWN_ANGLES):
         k = PAPER_ANGLES.index(name)
         for axes, after in zip(panels[2 * row : 2 * row + 2], (False, True), strict=True):
             for i, walk in enumerate(aligned.walks):
@@ -233,7 +233,7 @@ def _repeated(aligned: Aligned) -> Figure:
 def _passes(learning: Learning) -> Entry:
     literal, removal = learning.literal, learning.removal
     errors = np.degrees(literal.components.rmse)
-    missing = 100 * float(1 - literal.cycles.mask[:, :, : ormoneit.COUNT].mean())
+    missing = 100 * float(1 - literal.cycles.mask[:, :, : ormoneit.PAPER_ANGLE_COUNT].mean())
     falling = bool(np.all(np.diff(errors) <= 1e-9) and np.all(np.diff(removal.passes) <= 1e-9))
     figure, panels = grid(1, 2, 9, 2.9)
     for axes, course, title in (
@@ -275,9 +275,10 @@ def _components(learning: Learning) -> Entry:
     literal, ours = learning.literal, learning.ours
     shares = [100 * np.cumsum(m.components.spectrum)[len(m.components.sd) - 1] for m in (literal, ours)]
     printed, closed = (
-        ormoneit.closure(c) for c in (ormoneit.printed_mean(literal), literal.curves[0][:, : ormoneit.COUNT])
+        ormoneit.closure(c)
+        for c in (ormoneit.printed_mean(literal), literal.curves[0][:, : ormoneit.PAPER_ANGLE_COUNT])
     )
-    steps = [ormoneit.closure(c[:, : ormoneit.COUNT]) for c in literal.curves]
+    steps = [ormoneit.closure(c[:, : ormoneit.PAPER_ANGLE_COUNT]) for c in literal.curves]
     out = [_left_out(m) for m in (literal, ours)]
     return Entry(
         "Components",
@@ -299,8 +300,9 @@ def _components(learning: Learning) -> Entry:
         ),
         (
             Picture(
-                f"The paper's components as moving figures: the mean (grey) and {SWING:g} sd to either side "
-                "of it (orange +, blue -), seen from the right and from the front. Right limbs are bold.",
+                f"The paper's components as moving figures: the mean (grey) and {MODE_SDS:g} sd to either "
+                "side of it (orange +, blue -), seen from the right and from the front. Right limbs are "
+                "bold.",
                 _moving(literal),
             ),
             picture(Drawing("", "curves", CURVES, figures_model.curves(literal, NOTED))),
@@ -336,7 +338,7 @@ def _moving(learned: Learned) -> str:
         cells.append((f"mean{view}", [_flat(learned, mean, across, DARK)]))
         for k, turn in enumerate(turns, 1):
             bodies = [
-                _flat(learned, mean + sign * SWING * turn, across, colour)
+                _flat(learned, mean + sign * MODE_SDS * turn, across, colour)
                 for sign, colour in ((0, GREY), (1, ORANGE), (-1, BLUE))
             ]
             cells.append((f"component {k}{view}", bodies))
@@ -344,4 +346,4 @@ def _moving(learned: Learned) -> str:
 
 
 def _flat(learned: Learned, cycle: Floats, across: int, colour: str) -> Moving:
-    return Moving(figures_model.bodies(learned, cycle, PHASES)[:, :, [across, 2]], colour)
+    return Moving(figures_model.bodies(learned, cycle, MOVING_PHASES)[:, :, [across, 2]], colour)

@@ -18,9 +18,9 @@ from gait.paper.scene import Scene
 from gait.track.tracker import Tracker
 
 EVERY = 4  # frames
-STEP = 33_333  # microseconds from frame to frame
-NOISES = ("phase", "rate", "forward", "lateral", "vertical", "heading", "tilt", "coef")
-STILL = {f"{name}_noise": 0.0 for name in NOISES}
+FRAME_US = 33_333  # microseconds from frame to frame
+NOISE_NAMES = ("phase", "rate", "forward", "lateral", "vertical", "heading", "tilt", "coef")
+STILL = {f"{name}_noise": 0.0 for name in NOISE_NAMES}
 #: Displacements along the direction of walking (m), across it (m), and in phase (strides).
 PLACES = {
     "on the person": (0.0, 0.0, 0.0),
@@ -33,12 +33,12 @@ BACKGROUND = "0.7 m behind", "0.7 m beside"  # where a body covers the backgroun
 Place = tuple[float, float, float]
 Seen = tuple[Image, Image]
 Row = tuple[str, float, float]  #: a body, and its log-likelihoods walking and at rest
-_WHOLE = {"evidence_time": 0.0, "rejuvenation_time": 0.0}  # every frame counts in full
+_FULL_EVIDENCE = {"evidence_time": 0.0, "rejuvenation_time": 0.0}  # every frame counts in full
 
 
 def config(mode: Mode, **changes: float) -> TrackerConfig:
     """Return settings with a few particles and no noise, so that all remain the same body."""
-    whole = {} if mode == Mode.PAPER else _WHOLE
+    whole = {} if mode == Mode.PAPER else _FULL_EVIDENCE
     return TrackerConfig.default(mode, particles=16, **STILL, **whole, **changes)
 
 
@@ -72,7 +72,7 @@ class Probe:
         return replace(
             self.mean,
             phase=float((self.cycles[k] + late) % 1.0),
-            stride_hz=float((self.cycles[k + 1] - self.cycles[k]) * 1e6 / STEP),
+            stride_hz=float((self.cycles[k + 1] - self.cycles[k]) * 1e6 / FRAME_US),
             heading=turn,
             pelvis=pelvis + along * way + across * left,
         )
@@ -84,9 +84,9 @@ class Probe:
         seen : two images that replace frames k and k + 1.
         """
         now, then = seen or (self.scene.frames[k].image, self.scene.frames[k + 1].image)
-        self.tracker.start(self.state(k, *place), self.exactly, STEP)
-        self.tracker.step(now, STEP)
-        later = 2 * STEP if speed == 1 else STEP + max(1, round(speed * STEP))
+        self.tracker.start(self.state(k, *place), self.exactly, FRAME_US)
+        self.tracker.step(now, FRAME_US)
+        later = 2 * FRAME_US if speed == 1 else FRAME_US + max(1, round(speed * FRAME_US))
         found = self.tracker.step(then, later)
         return found.log_evidence, found.mean
 

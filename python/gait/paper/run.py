@@ -89,7 +89,7 @@ def _ormoneit(found: recordings.Recordings, used: Clip, folder: Path, quiet: boo
         learning = ormoneit.learn(found.walks, update)
     with progress("tracking both ways", 2 * tracking.SEEDS, quiet) as update:
         tracked = tracking.track(used, learning, cores(), update)
-    with progress("rendering walks", len(scene.VIEWS), quiet) as update:
+    with progress("rendering walks", len(scene.PRESET_VIEWS), quiet) as update:
         scenes = scene.rendered(folder, update)
     with progress("ladder", ladder.steps(len(scenes)), quiet) as update:
         climbed = ladder.climb(scenes, learning, update)

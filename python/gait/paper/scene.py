@@ -26,8 +26,8 @@ from gait.simulate.clip import simulate
 from gait.simulate.scenario import PRESETS
 from gait.track.tracker import Tracker
 
-VIEWS = {"side": "demo", "oblique": "oblique", "toward": "toward"}  # presets by name
-SIZE = (480, 360)  # pixels of a rendered view
+PRESET_VIEWS = {"side": "demo", "oblique": "oblique", "toward": "toward"}  # presets by name
+VIEW_SIZE_PX = (480, 360)  # pixels of a rendered view
 SPARE = 20  # frames after those used, so that the last steps are whole
 
 
@@ -125,9 +125,9 @@ def follow(
 def rendered(folder: Path, update: Callable[[int], None]) -> list[tuple[Scene, str]]:
     """Render a walk seen from several sides; return scenes, and the init files of their true starts."""
     found = []
-    for k, (name, preset) in enumerate(VIEWS.items()):
-        place, frames = folder / name, tracking.FRAMES + 1
-        simulate(replace(PRESETS[preset], size=SIZE, frames=frames + SPARE), place, keep=False)
+    for k, (name, preset) in enumerate(PRESET_VIEWS.items()):
+        place, frames = folder / name, tracking.FIGURE_FRAMES + 1
+        simulate(replace(PRESETS[preset], size=VIEW_SIZE_PX, frames=frames + SPARE), place, keep=False)
         video = Video(str(place / "video.mp4"))
         camera = Camera.read(str(place / "camera.json"), video.size)
         plate = background(str(place / "background.png"), video)

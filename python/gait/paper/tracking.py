@@ -30,19 +30,19 @@ from gait.paper.pictures import image, labelled
 from gait.report.drawing import Overlay, default_view, draw_standing
 from gait.track.tracker import Tracker
 
-FRAMES = 50  # of the paper's figure
-SHOWN = tuple(range(0, FRAMES + 1, 10))
-PARTICLES = 10_000
-HELD = 0.1  # mean joint error in the picture, in statures, below which a person counts as followed
+FIGURE_FRAMES = 50  # of the paper's figure
+FIGURE_SHOWN = tuple(range(0, FIGURE_FRAMES + 1, 10))
+PAPER_PARTICLES = 10_000
+FOLLOWED_ERROR = 0.1  # mean joint error in the picture, in statures, below which a person counts as followed
 MARKED = 0.15  # the same if joints are marked by hand, which places them differently from the model
 TAIL = 10  # last frames, which decide whether a person is followed to the end
 CRITERION = (
-    f"over the last {TAIL} frames, the median of the mean joint error in the picture is below {HELD:g} of "
-    f"the person's height from head to ankle; where joints are marked by hand, below {MARKED:g} of the "
-    "height at the start, over the frames with marks"
+    f"over the last {TAIL} frames, the median of the mean joint error in the picture is below "
+    f"{FOLLOWED_ERROR:g} of the person's height from head to ankle; where joints are marked by hand, below "
+    f"{MARKED:g} of the height at the start, over the frames with marks"
 )
 CUT_OUT = 1.35  # statures, side of a picture cut out around the person
-SIZE = 250  # pixels of a picture
+PICTURE_PX = 250  # pixels of a picture
 SEEDS = 10  # runs each way
 
 
@@ -77,7 +77,7 @@ def track(clip: Clip, learning: Learning, tasks: int, update: Callable[[int], No
     camera = clip.calibration(video.size)
     plate = background(clip.background, video)
     first = Start.read(clip.init, Model()).frame
-    frames = list(video.frames(first, first + FRAMES + 1))
+    frames = list(video.frames(first, first + FIGURE_FRAMES + 1))
     found = list[Tracked]()
     for learned, prior, mode in (
         (learning.literal, "paper", Mode.PAPER),
@@ -87,7 +87,7 @@ def track(clip: Clip, learning: Learning, tasks: int, update: Callable[[int], No
         start = Start.read(clip.init, model)
         held, unnoticed, shown, errors = 0, 0, list[Estimate](), None
         for seed in range(1, SEEDS + 1):
-            config = TrackerConfig.default(mode, particles=PARTICLES, seed=seed)
+            config = TrackerConfig.default(mode, particles=PAPER_PARTICLES, seed=seed)
             tracker = Tracker(model, camera, config, background=plate, tasks=tasks)
             tracker.start(start.mean, start.sd, frames[0].utime)
             estimates = [tracker.step(frame.image, frame.utime) for frame in frames]
@@ -100,7 +100,7 @@ def track(clip: Clip, learning: Learning, tasks: int, update: Callable[[int], No
             update(len(found) * SEEDS + seed)
         assert errors is not None
         found.append(Tracked(model, shown, *errors, held, unnoticed))
-    images = [frames[k].image for k in SHOWN]
+    images = [frames[k].image for k in FIGURE_SHOWN]
     return Both(clip, camera, first, images, found[0], found[1])
 
 
@@ -109,10 +109,10 @@ def checks(clip: Clip) -> list[Callable[[], object]]:
 
     def long_enough() -> None:
         count, first = Video(clip.video).count, Start.read(clip.init, Model()).frame
-        if count - first <= FRAMES:
+        if count - first <= FIGURE_FRAMES:
             raise UserError(
                 f"{clip.video}: has {count - first} frames from {first} on, figure 6 needs "
-                f"{FRAMES + 1}; give a longer clip or an earlier frame in {clip.init}"
+                f"{FIGURE_FRAMES + 1}; give a longer clip or an earlier frame in {clip.init}"
             )
 
     def corrections() -> None:
@@ -239,7 +239,7 @@ def _words(tracked: Tracked) -> str:
 def _near(tracked: Tracked) -> list[tuple[int, int]]:
     """Return index and frame of the errors nearest to the frames shown."""
     frames = np.array(tracked.frames)
-    index = dict.fromkeys(int(np.argmin(np.abs(frames - k))) for k in SHOWN)
+    index = dict.fromkeys(int(np.argmin(np.abs(frames - k))) for k in FIGURE_SHOWN)
     return [(i, tracked.frames[i]) for i in index]
 
 
@@ -256,7 +256,7 @@ def picture_height(camera: Camera, joints: Floats) -> float:
 
 def _tail(frames: list[int], errors: Floats) -> Floats:
     """Return the errors of the last TAIL frames."""
-    return errors[np.array(frames, int) > FRAMES - TAIL]
+    return errors[np.array(frames, int) > FIGURE_FRAMES - TAIL]
 
 
 def followed(tail: Floats, height: float, marked: bool) -> bool:
@@ -265,14 +265,14 @@ def followed(tail: Floats, height: float, marked: bool) -> bool:
     tail : (n,) mean joint error in the picture, pixels, in those of the last TAIL frames where it is known.
     marked : whether the joints are marked by hand.
     """
-    return len(tail) > 0 and bool(np.median(tail) < (MARKED if marked else HELD) * height)
+    return len(tail) > 0 and bool(np.median(tail) < (MARKED if marked else FOLLOWED_ERROR) * height)
 
 
 def _overlays(both: Both, tracked: Tracked) -> Image:
     """Draw the expected bodies over the frames, cut out around our estimate of the person."""
     overlay = Overlay(tracked.model, both.camera)
     cells = []
-    for picture, k in zip(both.images, SHOWN, strict=True):
+    for picture, k in zip(both.images, FIGURE_SHOWN, strict=True):
         estimate, about = tracked.estimates[k], both.ours.estimates[k].mean
         canvas = cv2.cvtColor(picture, cv2.COLOR_GRAY2BGR) if picture.ndim == 2 else picture.copy()
         drawn = overlay.figure(np.asarray(canvas, np.uint8), estimate.mean)
@@ -282,19 +282,25 @@ def _overlays(both: Both, tracked: Tracked) -> Image:
 
 
 def cut(picture: Image, middle: Floats, side: float) -> Image:
-    """Cut a square of `side` pixels out of a picture and scale it to SIZE pixels."""
-    scale = SIZE / side
-    matrix = np.array([[scale, 0, SIZE / 2 - scale * middle[0]], [0, scale, SIZE / 2 - scale * middle[1]]])
-    return np.asarray(cv2.warpAffine(picture, matrix, (SIZE, SIZE), flags=cv2.INTER_AREA), np.uint8)
+    """Cut a square of `side` pixels out of a picture and scale it to PICTURE_PX pixels."""
+    scale = PICTURE_PX / side
+    matrix = np.array(
+        [[scale, 0, PICTURE_PX / 2 - scale * middle[0]], [0, scale, PICTURE_PX / 2 - scale * middle[1]]]
+    )
+    return np.asarray(
+        cv2.warpAffine(picture, matrix, (PICTURE_PX, PICTURE_PX), flags=cv2.INTER_AREA), np.uint8
+    )
 
 
 def _standing(tracked: Tracked) -> Image:
     """Draw the expected bodies, seen from the front left."""
     cells = []
-    for k in SHOWN:
+    for k in FIGURE_SHOWN:
         mean = tracked.estimates[k].mean
         drawn = draw_standing(tracked.model, mean, default_view(mean))
         height, width = drawn.shape[:2]
-        small = cv2.resize(drawn, (round(SIZE * width / height), SIZE), interpolation=cv2.INTER_AREA)
+        small = cv2.resize(
+            drawn, (round(PICTURE_PX * width / height), PICTURE_PX), interpolation=cv2.INTER_AREA
+        )
         cells.append(labelled(np.asarray(small, np.uint8), f"frame {k}"))
     return np.asarray(np.hstack(cells))

@@ -4,10 +4,10 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
-ANGLES = 19  # of the first paper
+FIRST_PAPER_ANGLES = 19  # of the first paper
 THEIR_MOTIONS, THEIR_LENGTHS, THEIR_MODES = 10, (120, 240), 50  # of the second
 ALIKE = 0.1  # share of a cycle within which offsets agree
-NEAR = (
+NEAR_ORIGINAL = (
     1 - 0.91
 ) ** 0.5  # distance from the original over distance from the mean, with the paper's own modes (rms)
 FAR_BETTER = 0.6  # remaining error over that of the view alone, below which Bayes is far better
@@ -31,7 +31,7 @@ def kind(verdict: str) -> str:
 
 def body(angles: int) -> str:
     """Fig. 1 of the first paper: how many relative angles move."""
-    return "reproduced" if angles == ANGLES else f"not reproduced: {angles} angles move"
+    return "reproduced" if angles == FIRST_PAPER_ANGLES else f"not reproduced: {angles} angles move"
 
 
 def periods(flat: bool, agreeing: float, failed: int, long_failed: bool) -> str:
@@ -163,7 +163,7 @@ def synthesis(left: float, needed: int) -> str:
     left : distance from the original over distance from the mean.
     needed : number of modes that explain as much variance as the paper's.
     """
-    words = "reproduced" if left < NEAR else "not reproduced: the synthesis is far from the original"
+    words = "reproduced" if left < NEAR_ORIGINAL else "not reproduced: the synthesis is far from the original"
     if needed == THEIR_MODES:
         return f"{words}; as many modes are needed as in the paper"
     return f"{words}; {'fewer' if needed < THEIR_MODES else 'more'} modes are needed than in the paper"

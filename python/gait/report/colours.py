@@ -11,7 +11,7 @@ ON_PAPER = {"left": BLUE, "right": ORANGE, "middle": DARK}
 OVER_PICTURES = {"left": (235, 165, 60), "right": (50, 125, 250), "middle": (190, 215, 120)}
 """BGR; brighter, to be visible on dark clothes, and pale green for the middle."""
 
-PEOPLE = (
+PERSON_COLOURS = (
     (235, 165, 60), (50, 125, 250), (110, 200, 90), (200, 110, 220),
     (60, 210, 240), (210, 210, 110), (150, 150, 250), (190, 190, 190),
 )  # fmt: skip

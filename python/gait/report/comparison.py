@@ -15,7 +15,7 @@ from gait.io.track_file import Joints, Track, read_truth
 from gait.motion.evaluate import Measures, evaluate, root_errors
 from gait.motion.footfalls import Strikes, strikes_of
 from gait.report.colours import BLUE, GREY, ORANGE
-from gait.report.error_table import HEAD, OTHER_WORLD, error_rows, share_rows
+from gait.report.error_table import ERROR_HEADER, OTHER_WORLD, error_rows, share_rows
 from gait.report.gait_parts import time_span, tint
 from gait.report.page import Page
 from gait.report.plots import time_plot
@@ -74,7 +74,7 @@ def _by_frame(measures: Measures, track: Track, truth: Joints, strikes: Strikes)
 def add_errors(page: Page, track: Track, errors: Comparison) -> None:
     """Add tables and plots of the errors."""
     rows, tips = error_rows(errors.measures)
-    page.grid("Error against the truth", HEAD, rows, tips)
+    page.grid("Error against the truth", ERROR_HEADER, rows, tips)
     if track.camera_change is not None:
         page.words(f"{OTHER_WORLD[0].upper()}{OTHER_WORLD[1:]}.", "warning")
     shares, explained = share_rows(errors.measures)

@@ -5,7 +5,7 @@ from __future__ import annotations
 from gait.motion.evaluate import Measures
 from gait.report import terms
 
-HEAD = ("", "median", "mean", "9 of 10 frames below")
+ERROR_HEADER = ("", "median", "mean", "9 of 10 frames below")
 """Columns of `error_rows`."""
 _LETTERS = 34  # width of a row's name in the terminal, letters
 
@@ -20,7 +20,7 @@ Explained = dict[str, str]
 
 
 def error_rows(m: Measures) -> tuple[list[list[str]], Explained]:
-    """Return the cells of the table of errors, under `HEAD`, and explanations by the names of its rows."""
+    """Return the cells of the table of errors, under `ERROR_HEADER`, and explanations by name of row."""
     free = m["free"]
     parts = {
         "abs": (m["abs"], 1.0, 0),
@@ -54,15 +54,16 @@ def share_rows(m: Measures) -> tuple[dict[str, str], Explained]:
     if m["phase"] is not None:
         found["flips"] = f"{m['phase']['flips']:.1%}"
         found["bias"] = f"{100 * m['phase']['bias']:+.1f} %"
-    words = {terms.SHARES[name][0]: value for name, value in found.items()}
-    return words, {terms.SHARES[name][0]: terms.SHARES[name][1] for name in found}
+    words = {terms.SHARE_TERMS[name][0]: value for name, value in found.items()}
+    return words, {terms.SHARE_TERMS[name][0]: terms.SHARE_TERMS[name][1] for name in found}
 
 
 def as_text(m: Measures) -> str:
     """Format the measures for people, with the meaning of each."""
     (rows, errors), (shares, explained) = error_rows(m), share_rows(m)
     lines = [
-        f"{words:{_LETTERS}}{median:>8}{mean:>8}{most:>22}" for words, median, mean, most in [HEAD, *rows]
+        f"{words:{_LETTERS}}{median:>8}{mean:>8}{most:>22}"
+        for words, median, mean, most in [ERROR_HEADER, *rows]
     ]
     lines += [f"{words:{_LETTERS}}{value:>8}" for words, value in shares.items()]
     status = ", ".join(f"{word} {share:.1%}" for word, share in m["status"].items() if share)

@@ -15,7 +15,7 @@ from matplotlib.lines import Line2D
 _DPI = 110
 _ARM, _LEG = ("shoulder", "elbow", "wrist"), ("hip", "knee", "ankle", "toe")
 #: Chains of joints of a stick figure: centre, left, right.
-STICKS = {
+STICK_CHAINS = {
     "c": [["head_top", "neck", "pelvis"], ["l_shoulder", "neck", "r_shoulder"], ["l_hip", "pelvis", "r_hip"]],
     **{
         s: [[f"{s}_{j}" for j in _ARM], [f"{s}_{j}" for j in _LEG], [f"{s}_ankle", f"{s}_heel", f"{s}_toe"]]

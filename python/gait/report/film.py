@@ -16,7 +16,7 @@ import numpy as np
 from gait.errors import UserError
 from gait.io.video import FAST, Image, VideoWriter
 
-_BYTES = 5_000_000  # approximate largest size of a film in a page
+_MOST_FILM_BYTES = 5_000_000  # approximate largest size of a film in a page
 _PIXELS = 1280 * 720  # largest size of its pictures
 _BITS = 0.07  # bits per pixel and frame that x264 needs
 _LEAST = 320  # least width in pixels, however long the film is
@@ -156,7 +156,7 @@ class Films:
 def page_size(size: tuple[int, int], frames: int, rate: float) -> tuple[tuple[int, int], int]:
     """Choose the size in pixels of a page's film, and the bit rate that limits it to some megabytes."""
     width, height = size
-    bits = 8 * _BYTES * rate / max(frames, 1)
+    bits = 8 * _MOST_FILM_BYTES * rate / max(frames, 1)
     pixels = min(bits / (rate * _BITS), _PIXELS)
     scale = min(1.0, max(float(np.sqrt(pixels / (width * height))), _LEAST / max(width, height)))
     if scale == 1.0:

@@ -9,9 +9,9 @@ import numpy as np
 from matplotlib.axes import Axes
 
 from gait.io.track_file import Track
-from gait.motion.footfalls import SIDES, contacts, stride_time
+from gait.motion.footfalls import STRIKE_SIDES, contacts, stride_time
 from gait.motion.norms import Compared
-from gait.motion.parameters import PERCENT, QUANTITIES, AngleCycle, Parameters
+from gait.motion.parameters import PARAMETER_LABELS, PERCENT, AngleCycle, Parameters
 from gait.report import terms
 from gait.report.colours import DARK, GREY, ON_PAPER, STATUS_TINTS
 from gait.report.film import runs
@@ -31,8 +31,10 @@ _BY_STRIDE = (
 
 def add_gait(page: Page, track: Track, parameters: Parameters, cycles: Mapping[str, AngleCycle]) -> None:
     """Add all parts for a track with whole strides."""
-    tips = {QUANTITIES[name]: words for name, words in terms.QUANTITIES.items()} | terms.COLUMNS
-    page.grid("Gait", HEAD, parameter_rows(parameters), tips)
+    tips = {
+        PARAMETER_LABELS[name]: words for name, words in terms.QUANTITY_TERMS.items()
+    } | terms.COLUMN_TERMS
+    page.grid("Gait", PARAMETER_HEADER, parameter_rows(parameters), tips)
     if parameters.all_unsure:
         page.words(
             "Every stride has uncertain frames. The values are means over these strides anyway: left and "
@@ -59,7 +61,7 @@ def add_norms(page: Page, norms: Sequence[Compared]) -> None:
     """Add the parameters beside their norms, with a summary of those outside and how certain that is."""
     if not norms:
         return
-    tips = {words: terms.NORMS[source] for source, words in _SOURCES.items()} | terms.COLUMNS
+    tips = {words: terms.NORMS[source] for source, words in _SOURCES.items()} | terms.COLUMN_TERMS
     page.grid("Beside norms", NORM_HEAD, norm_rows(norms), tips)
     page.words(
         "Mean ± standard deviation. A value is outside if it is more than two standard deviations from the "
@@ -79,7 +81,9 @@ def norm_rows(norms: Sequence[Compared]) -> list[list[str]]:
     for c in norms:
         plain = c.name.removeprefix("asymmetry:")
         uneven = plain != c.name
-        name = f"asymmetry of {QUANTITIES[plain].split(',')[0]}, %" if uneven else QUANTITIES[plain]
+        name = (
+            f"asymmetry of {PARAMETER_LABELS[plain].split(',')[0]}, %" if uneven else PARAMETER_LABELS[plain]
+        )
         unit = "percent" if uneven else plain
         pairs = ({"mean": c.value, "sd": c.sd}, {"mean": c.norm, "sd": c.norm_sd})
         rows.append([name, *(_cell(pair, unit) for pair in pairs), _SOURCES[c.source], c.words])
@@ -123,7 +127,7 @@ def footfall_plot(track: Track, parameters: Parameters) -> str:
 
     def paint(axes: Axes) -> None:
         tint(axes, track)
-        for row, side in enumerate(SIDES):
+        for row, side in enumerate(STRIKE_SIDES):
             foot = contacts(track, parameters.events, side, stride)
             begin, ends = foot.strike, np.where(np.isfinite(foot.off), foot.off, track.time[-1])
             first = parameters.events.off[side][:1]
@@ -136,7 +140,7 @@ def footfall_plot(track: Track, parameters: Parameters) -> str:
             ):
                 at = np.full(len(times), row + bottom)
                 axes.errorbar(times, at, xerr=2 * sds, fmt="|", color=DARK, capsize=2, lw=1)
-        axes.set(yticks=[0, 1], yticklabels=SIDES, ylim=(-0.6, 1.6))
+        axes.set(yticks=[0, 1], yticklabels=STRIKE_SIDES, ylim=(-0.6, 1.6))
         axes.grid(axis="y", visible=False)
 
     return time_plot(paint, time_span(track), 1.9, "Feet on the floor")
@@ -147,7 +151,7 @@ def stride_plot(track: Track, parameters: Parameters) -> str:
 
     def painter(name: str) -> Painter:
         def paint(axes: Axes) -> None:
-            for side in SIDES:
+            for side in STRIKE_SIDES:
                 s = parameters.strides[side]
                 middle = (s.start + s.end) / 2
                 seen = np.isfinite(s.values[name])
@@ -158,7 +162,7 @@ def stride_plot(track: Track, parameters: Parameters) -> str:
                         fmt="o" if side == "right" else "s", ms=4, lw=1, color=ON_PAPER[side],
                         mfc=ON_PAPER[side] if sure else "none",
                     )  # fmt: skip
-            axes.set(title=QUANTITIES[name], xlabel="time, s")
+            axes.set(title=PARAMETER_LABELS[name], xlabel="time, s")
             axes.set_xlim(*time_span(track))
             axes.margins(y=0.25)
 
@@ -221,17 +225,17 @@ def tint(axes: Axes, track: Track) -> None:
             axes.axvspan(*span, color=STATUS_TINTS[status], alpha=0.5, lw=0)
 
 
-_OPEN = 100.0  # standard deviation from which an asymmetry, which is at most 200, is meaningless
-HEAD = ("", "right", "left", "both", "asymmetry, %")
+_MEANINGLESS_SD = 100.0  # standard deviation from which an asymmetry, which is at most 200, is meaningless
+PARAMETER_HEADER = ("", "right", "left", "both", "asymmetry, %")
 """Columns of `parameter_rows`."""
 
 
 def parameter_rows(parameters: Parameters) -> list[list[str]]:
-    """Return the cells of the table of parameters, under `HEAD`."""
+    """Return the cells of the table of parameters, under `PARAMETER_HEADER`."""
     rows = []
     for name, row in parameters.summary().items():
         cells = [_cell(row[side], name) for side in ("right", "left", "both")]
-        rows.append([QUANTITIES[name], *cells, _cell(row.get("asymmetry_percent"), "percent")])
+        rows.append([PARAMETER_LABELS[name], *cells, _cell(row.get("asymmetry_percent"), "percent")])
     return rows
 
 
@@ -239,7 +243,7 @@ def _cell(value: dict[str, Any] | None, name: str) -> str:
     if value is None:
         return ""
     digits = 1 if name.endswith(("percent", "spm")) else 3 if name.endswith("time_s") else 2
-    if name == "percent" and value["sd"] > _OPEN:
+    if name == "percent" and value["sd"] > _MEANINGLESS_SD:
         return "not determined"
     text = f"{round(value['mean'], digits) + 0.0:.{digits}f}"  # avoids -0.0
     if np.isfinite(value["sd"]):

@@ -14,7 +14,7 @@ from gait.body.model_curves import ModelCurves
 from gait.body.skeleton import BONES, JOINTS
 from gait.camera.camera import Camera
 from gait.io.track_file import Track
-from gait.motion.footfalls import SIDES, Draws, contacts, stride_time
+from gait.motion.footfalls import STRIKE_SIDES, Draws, contacts, stride_time
 from gait.motion.norms import Compared
 from gait.motion.parameters import AngleCycle, Parameters, angle_cycles
 from gait.motion.verdict import Verdict
@@ -174,13 +174,13 @@ def _strip(statuses: list[str]) -> str:
     """Draw the statuses along the film, with a legend of those that occur."""
     count = len(statuses)
     bars = "".join(
-        f'<i class="s-{status or "absent"}" title="{escape(terms.STATUSES[status][0])}" '
+        f'<i class="s-{status or "absent"}" title="{escape(terms.STATUS_TERMS[status][0])}" '
         f'style="left: {100 * a / count:.3f}%; width: {100 * (b - a) / count:.3f}%"></i>'
         for status, a, b in runs(statuses)
     )
     key = "".join(
         f'<li><i class="s-{status or "absent"}"></i>{escape(words)}: {escape(meaning)}</li>'
-        for status, (words, meaning) in terms.STATUSES.items()
+        for status, (words, meaning) in terms.STATUS_TERMS.items()
         if status in statuses
     )
     return f'<div class="statuses" id="run-statuses">{bars}</div><ul class="key">{key}</ul>'
@@ -219,7 +219,7 @@ def _data(run: Run, film: PageFilm, statuses: list[str], whole: bool) -> dict[st
         begin=begin,
         size=list(film.size),
         camera=None if run.camera is None else run.camera.centre,
-        status=[terms.STATUSES[status][0] for status in statuses],
+        status=[terms.STATUS_TERMS[status][0] for status in statuses],
         curves=curves,
         events=_events(run.parameters),
         parts=whole,
@@ -239,7 +239,7 @@ def _events(parameters: Parameters | None) -> list[dict[str, object]]:
         return []
     return [
         {"time": round(float(time), 4), "name": f"{side} heel strike", "side": side}
-        for side in SIDES
+        for side in STRIKE_SIDES
         for time in parameters.events.strike[side]
     ]
 
@@ -250,7 +250,9 @@ def way_plot(track: Track, parameters: Parameters | None, errors: Comparison | N
     feet = {}
     if parameters is not None:
         stride = stride_time(parameters.events)
-        places = {side: contacts(track, parameters.events, side, stride).place[:, :2] for side in SIDES}
+        places = {
+            side: contacts(track, parameters.events, side, stride).place[:, :2] for side in STRIKE_SIDES
+        }
         feet = {side: place[np.isfinite(place).all(axis=1)] for side, place in places.items()}
     every = np.concatenate([pelvis, *feet.values()])
     low, high = every.min(axis=0), every.max(axis=0)

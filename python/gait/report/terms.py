@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-ANGLES = {
+ANGLE_TERMS = {
     "root_pitch": (
         "Pelvic tilt",
         "forward +",
@@ -40,7 +40,7 @@ ANGLES = {
 }
 """Name in files, without its side, to: name, positive direction, and explanation."""
 
-QUANTITIES = {
+QUANTITY_TERMS = {
     "stride_time_s": "From a heel strike to the next one of the same foot.",
     "cadence_spm": "Steps per minute: two steps make a stride.",
     "stride_length_m": "Distance along the path between two stances of the same foot.",
@@ -61,11 +61,11 @@ NORMS = {
 }
 """Source of a norm to explanation."""
 
-COLUMNS = {
+COLUMN_TERMS = {
     "asymmetry, %": "200 (right − left) / (right + left): 0 if both sides are equal.",
 }
 
-STATUSES = {
+STATUS_TERMS = {
     "tracking": ("tracking", "left and right are known"),
     "ambiguous": (
         "uncertain",
@@ -102,7 +102,7 @@ ERRORS = {
 }
 """Errors with median, mean and 90th percentile: words and explanation."""
 
-SHARES = {
+SHARE_TERMS = {
     "within50": (
         "Truth within the 50 % intervals",
         "Share of coordinates; 50 % is right, less means overconfident.",
@@ -155,7 +155,7 @@ CONVENTIONS = (
 def angle(name: str) -> tuple[str, str, str]:
     """Return name, positive direction and explanation of an angle by its name in files."""
     plain = name[2:] if name[:2] in ("l_", "r_") else name
-    return ANGLES.get(plain, (plain.replace("_", " "), "", ""))
+    return ANGLE_TERMS.get(plain, (plain.replace("_", " "), "", ""))
 
 
 def sided(name: str) -> str:

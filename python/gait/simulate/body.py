@@ -22,18 +22,22 @@ from gait.simulate.geometry import Array, Floats, Ints
 SIDES = ("l", "r")
 
 # bone: parent; each bone rotates about its joint in `JOINT_OF`
-PARENTS: dict[str, str | None] = {"pelvis": None, "torso": "pelvis", "head": "torso"}
+PARENT_BONES: dict[str, str | None] = {"pelvis": None, "torso": "pelvis", "head": "torso"}
 JOINT_OF = {"pelvis": "pelvis", "torso": "spine", "head": "neck"}
 for _s in SIDES:
-    PARENTS |= {f"{_s}_upper_arm": "torso", f"{_s}_forearm": f"{_s}_upper_arm", f"{_s}_hand": f"{_s}_forearm"}
-    PARENTS |= {f"{_s}_thigh": "pelvis", f"{_s}_shank": f"{_s}_thigh", f"{_s}_foot": f"{_s}_shank"}
-    PARENTS |= {f"{_s}_toes": f"{_s}_foot", f"{_s}_aid": f"{_s}_hand"}
+    PARENT_BONES |= {
+        f"{_s}_upper_arm": "torso",
+        f"{_s}_forearm": f"{_s}_upper_arm",
+        f"{_s}_hand": f"{_s}_forearm",
+    }
+    PARENT_BONES |= {f"{_s}_thigh": "pelvis", f"{_s}_shank": f"{_s}_thigh", f"{_s}_foot": f"{_s}_shank"}
+    PARENT_BONES |= {f"{_s}_toes": f"{_s}_foot", f"{_s}_aid": f"{_s}_hand"}
     JOINT_OF |= {f"{_s}_upper_arm": f"{_s}_shoulder", f"{_s}_forearm": f"{_s}_elbow"}
     JOINT_OF |= {f"{_s}_hand": f"{_s}_wrist", f"{_s}_thigh": f"{_s}_hip", f"{_s}_shank": f"{_s}_knee"}
     JOINT_OF |= {f"{_s}_foot": f"{_s}_ankle", f"{_s}_toes": f"{_s}_toe"}
     JOINT_OF |= {f"{_s}_aid": f"{_s}_wrist"}  # a stick or crutch, held in the hand
-BONES = tuple(PARENTS)
-BONE_INDEX = {name: i for i, name in enumerate(BONES)}
+BODY_BONES = tuple(PARENT_BONES)
+BONE_INDEX = {name: i for i, name in enumerate(BODY_BONES)}
 
 # reported point: the bone it is fixed to
 POINT_BONE = {
@@ -266,7 +270,7 @@ def _blend(a: Array, b: Array, share: Array) -> Array:
 
 def merge(parts: list[Part], body: Anatomy) -> Mesh:
     """Join parts, compute smooth normals per part and group the vertices that move together."""
-    joints = np.array([body.rest[JOINT_OF[bone]] for bone in BONES])
+    joints = np.array([body.rest[JOINT_OF[bone]] for bone in BODY_BONES])
     vertices = np.concatenate([part.vertices for part in parts])
     bones = np.concatenate([part.bones for part in parts])
     blend = np.round(np.concatenate([part.blend for part in parts]), 2)

@@ -28,7 +28,7 @@ from gait.simulate.stage import Set, Stage, build_set, set_stage
 from gait.simulate.walk import TOE_OFF, Walk
 
 CRF = 14
-STEADY = "walk", "turn"  # motions in which a person always walks forwards
+FORWARD_MOTIONS = "walk", "turn"  # motions in which a person always walks forwards
 
 
 def find_events(stage: Stage) -> dict[str, Array]:
@@ -38,7 +38,7 @@ def find_events(stage: Stage) -> dict[str, Array]:
     it (Zeni et al. 2008), on the fine time grid.
     """
     walk = stage.walk
-    if stage.scenario.motion not in STEADY:
+    if stage.scenario.motion not in FORWARD_MOTIONS:
         return planned_events(stage)
     points = walk.points()
     ahead = np.column_stack([np.cos(walk.heading), np.sin(walk.heading)])
@@ -90,7 +90,7 @@ def write_truth(path: Path, stage: Stage, strikes: Array) -> None:
     walk, frames = stage.walk, stage.frames
     count = np.arange(len(frames), dtype=float)
     heading = _wrapped(walk.heading[frames])
-    steady = stage.scenario.motion in STEADY
+    steady = stage.scenario.motion in FORWARD_MOTIONS
     columns: dict[str, Array] = {
         "phase": (cycles_at(strikes, count) if steady else walk.timing.phase[frames]) % 1.0,
         "heading_rad": heading,
@@ -137,7 +137,7 @@ def first_state(stage: Stage, strikes: Array) -> dict[str, Any]:
     """Return the init file: the truth at frame 0 with an error drawn from its own standard deviations."""
     rng, walk, at = stage.scenario.stream("init"), stage.walk, stage.frames[0]
     cycles = cycles_at(strikes, np.array([0.0, 1.0]))
-    if stage.scenario.motion not in STEADY:
+    if stage.scenario.motion not in FORWARD_MOTIONS:
         cycles = walk.timing.phase[at] + np.array([0.0, walk.timing.stride_hz / stage.scenario.fps])
     truth = {
         "heading_rad": float(_wrapped(walk.heading[at])),
@@ -169,7 +169,7 @@ def describe(stage: Stage, made: Set, events: dict[str, Array]) -> dict[str, Any
         "width": stage.camera.width,
         "height": stage.camera.height,
         "motion": _source(scenario.gait),
-        "steady": scenario.motion in STEADY,
+        "steady": scenario.motion in FORWARD_MOTIONS,
         "moving": scenario.moving,
         "view": scenario.view,
         "direction": "left to right" if scenario.direction == "lr" else "right to left",
@@ -245,7 +245,15 @@ def _pole(stage: Stage, made: Set) -> list[dict[str, Any]]:
     ]
 
 
-FILES = ("video.mp4", "background.png", "camera.json", "truth.csv", "init.json", "meta.json", "contact.jpg")
+CLIP_FILES = (
+    "video.mp4",
+    "background.png",
+    "camera.json",
+    "truth.csv",
+    "init.json",
+    "meta.json",
+    "contact.jpg",
+)
 _POSES = "poses.csv"  # instead of the empty scene, if the camera moves
 _PERSON = ("truth.csv", "init.json", "meta.json")  # for each person; names for the first have no number
 _CAMERA = ("video.mp4", "background.png", "camera.json")  # for each camera; the same
@@ -277,7 +285,7 @@ def pictures(stage: Stage, made: Set, number: int = 1) -> Iterator[Picture]:
 def files(scenario: Scenario) -> tuple[str, ...]:
     """Return the names of the files of a clip."""
     more = [_numbered(name, k) for k in range(2, 2 + COMPANY[scenario.people]) for name in _PERSON]
-    names = [*FILES, *more]
+    names = [*CLIP_FILES, *more]
     for number in range(2, scenario.cameras + 1):
         names += [_numbered(name, number) for name in _CAMERA]
     if scenario.moving == "none":

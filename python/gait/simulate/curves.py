@@ -17,8 +17,8 @@ from gait.errors import UserError
 from gait.io import blob
 from gait.simulate.geometry import Array
 
-HARMONICS = 5
-_KINDS = 1 + 2 * HARMONICS
+CURVE_HARMONICS = 5
+_KINDS = 1 + 2 * CURVE_HARMONICS
 
 # values of the right side at 0, 10, ... 90 % of the cycle; the left side is half a cycle later
 _LIMBS = {
@@ -43,15 +43,15 @@ _MIDDLE = {
     "neck_y": (-3, (0, 0), (-0.8, -0.2)),
     "neck_x": (0, (0.4, -1.2), (0, 0)),
 }
-NAMES = tuple(_MIDDLE) + tuple(f"{side}_{name}" for side in "lr" for name in _LIMBS)
+CURVE_NAMES = tuple(_MIDDLE) + tuple(f"{side}_{name}" for side in "lr" for name in _LIMBS)
 _CALM = {"pelvis_yaw": 0.35, "pelvis_pitch": 0.25, "pelvis_roll": 0.25}
 _CALM |= {"hip_flexion": 0.6, "knee_flexion": 0.5, "hip_abduction": 0.4, "hip_rotation": 0.6}
 
 
 def fourier(phase: ArrayLike) -> Array:
     """Return 1, cos 2 pi p, sin 2 pi p, cos 4 pi p ... of phases (T,), shape (T, 1 + 2 harmonics)."""
-    turn = 2 * np.pi * np.asarray(phase, np.float64)[..., None] * np.arange(1, HARMONICS + 1)
-    pairs = np.stack([np.cos(turn), np.sin(turn)], axis=-1).reshape(*turn.shape[:-1], 2 * HARMONICS)
+    turn = 2 * np.pi * np.asarray(phase, np.float64)[..., None] * np.arange(1, CURVE_HARMONICS + 1)
+    pairs = np.stack([np.cos(turn), np.sin(turn)], axis=-1).reshape(*turn.shape[:-1], 2 * CURVE_HARMONICS)
     return np.concatenate([np.ones((*turn.shape[:-1], 1)), pairs], axis=-1)
 
 
@@ -59,7 +59,7 @@ def fourier(phase: ArrayLike) -> Array:
 class Curves:
     """One person's joint angles as Fourier series."""
 
-    mean: Array  #: (channels, 1 + 2 harmonics) radians, rows in the order of `NAMES`
+    mean: Array  #: (channels, 1 + 2 harmonics) radians, rows in the order of `CURVE_NAMES`
     #: (modes, channels, 1 + 2 harmonics) differences between strides, radians per unit score.
     modes: Array
 
@@ -67,7 +67,7 @@ class Curves:
         """Return radians (T,) per channel at phases (T,) and stride scores (T, modes)."""
         basis = fourier(phase)
         value = basis @ self.mean.T + np.einsum("tk,tm,mck->tc", basis, scores, self.modes)
-        return {name: value[:, i] for i, name in enumerate(NAMES)}
+        return {name: value[:, i] for i, name in enumerate(CURVE_NAMES)}
 
 
 def normative(rng: np.random.Generator) -> Curves:
@@ -82,13 +82,13 @@ def normative(rng: np.random.Generator) -> Curves:
     for name, row in right.items():
         rows[f"r_{name}"] = row
         rows[f"l_{name}"] = shifted(row, 0.5) + _calm(name) * _smooth(rng, (0.8, 0.5, 0.3, 0.1))
-    mean = np.radians([rows[name] for name in NAMES])
+    mean = np.radians([rows[name] for name in CURVE_NAMES])
     return Curves(mean, stride_modes(rng))
 
 
 def stride_modes(rng: np.random.Generator) -> Array:
     """Return random directions in which strides differ, about 1 degree rms for a unit score."""
-    kinds = [name[2:] if name[1] == "_" else name for name in NAMES]
+    kinds = [name[2:] if name[1] == "_" else name for name in CURVE_NAMES]
     draw = [[_calm(kind) * _smooth(rng, (0.7, 0.8, 0.4, 0.2)) for kind in kinds] for _ in range(2)]
     return np.radians(np.array(draw))
 
@@ -96,7 +96,7 @@ def stride_modes(rng: np.random.Generator) -> Array:
 def shifted(row: Array, by: float) -> Array:
     """Return the series of f(p + by) from that of f(p)."""
     out = row.copy()
-    for k in range(1, HARMONICS + 1):
+    for k in range(1, CURVE_HARMONICS + 1):
         c, s = np.cos(2 * np.pi * k * by), np.sin(2 * np.pi * k * by)
         a, b = row[2 * k - 1], row[2 * k]
         out[2 * k - 1], out[2 * k] = a * c + b * s, b * c - a * s
@@ -116,7 +116,7 @@ def _interpolate(row: ArrayLike) -> Array:
     out = np.zeros(_KINDS)
     out[0] = value[0].real
     out[1::2], out[2::2] = 2 * value[1:].real, -2 * value[1:].imag
-    out[2 * HARMONICS - 1] = value[5].real
+    out[2 * CURVE_HARMONICS - 1] = value[5].real
     return out
 
 
@@ -182,8 +182,8 @@ def _rows(names: list[str], samples: Array) -> Array:
     """Return series for every channel of the simulator; channels that the model lacks stay at zero."""
     series = fit_series(samples.T)
     at = {name: i for i, name in enumerate(names)}
-    out = np.zeros((len(NAMES), series.shape[1]))
-    for row, name in enumerate(NAMES):
+    out = np.zeros((len(CURVE_NAMES), series.shape[1]))
+    for row, name in enumerate(CURVE_NAMES):
         source = _ROOT.get(name, name)
         if source in at:
             out[row] = series[at[source]]

@@ -34,7 +34,7 @@ _NECK = (
     *((-2.5, 0.4, 4.6, 5.2), (1, 0.1, 4.9, 5.0), (4, 0.5, 5.3, 5.2)),
     *((8, 0.7, 5.6, 5.4), (11, 0.4, 5.0, 5.0)),
 )
-_HEAD = (
+_HEAD_OUTLINE = (
     (4.4, 4.6, 2.2, 2.2), (5.2, 4.1, 5.0, 3.9), (7.2, 3.0, 7.1, 5.3), (10.5, 2.2, 8.4, 6.5),
     (14.2, 1.7, 9.2, 7.2),
     (18, 1.3, 9.6, 7.5), (21.5, 1.0, 9.4, 7.4), (24.3, 0.8, 8.0, 6.3), (26.2, 0.7, 5.2, 4.2),
@@ -93,7 +93,7 @@ def _head(body: Anatomy, appearance: Appearance, cm: float) -> list[Part]:
 
     throat = loft([ring(x, 0, z, d, w) for z, x, d, w in _NECK], 10, 18, SKIN, X, Y)
     throat.bind_chain(["torso", "head"], body, Z, 6 * cm)
-    skull = loft([ring(x, 0, z, d, w) for z, x, d, w in _HEAD], 26, 28, FACE, -X, -Y)
+    skull = loft([ring(x, 0, z, d, w) for z, x, d, w in _HEAD_OUTLINE], 26, 28, FACE, -X, -Y)
     angle = np.arange(29) / 28
     skull.uv[:, 0] = np.tile(angle, 26)
     skull.uv[:, 1] = (skull.vertices[:, 2] - neck[2]) / (27.2 * cm) * 1.18 - 0.18
@@ -108,7 +108,7 @@ def _hair(body: Anatomy, appearance: Appearance, cm: float) -> Part:
     """Return a cap a little larger than the skull that dives under the skin below the hairline."""
     neck = body.rest["neck"]
     cm = cm * body["head_up"] / (27.6 * cm)
-    rows = [(z, x, d, w) for z, x, d, w in _HEAD if z > 9]
+    rows = [(z, x, d, w) for z, x, d, w in _HEAD_OUTLINE if z > 9]
     low = ((-3.5, -1.8, 6.5, 7.2), (2, -0.8, 7.2, 7.4)) if appearance.long_hair else ((6.5, 0.5, 7.2, 6.4),)
     stations = [
         (neck[0] + (x - 0.25) * cm, 0, neck[2] + z * cm, d * cm, w * cm, 2.1) for z, x, d, w in (*low, *rows)

@@ -16,7 +16,7 @@ from gait.simulate.geometry import Floats, Ints, Picture
 from gait.simulate.paint import AMBIENT, SUN
 from gait.simulate.scene import Scene
 from gait.simulate.walk import Walk
-from gait.simulate.wardrobe import FACE, LEGS, SIZE, TOP, Appearance
+from gait.simulate.wardrobe import FACE, LEGS, TEXTURE_SIZE, TOP, Appearance
 
 
 class Hits(NamedTuple):
@@ -191,7 +191,7 @@ class Renderer:
         self._cloth = np.zeros(len(mesh.rest), np.float32)
         for material in (TOP, LEGS):
             self._cloth[mesh.faces[mesh.material == material]] = _SLIP
-        self._tile = (SIZE / appearance.spans).astype(np.float32)
+        self._tile = (TEXTURE_SIZE / appearance.spans).astype(np.float32)
 
     def shadow(self, shutter: Shutter) -> tuple[Floats, Floats]:
         """Return the shares of the sun's and the sky's light left by the figure at each pixel, (h, w, 1)."""
@@ -281,8 +281,10 @@ class Renderer:
 
     def _albedo(self, uv: Floats, material: Ints) -> Floats:
         texel = np.floor(uv * self._tile[material][:, None]).astype(np.int32)
-        row = np.where(material == FACE, np.clip(texel[:, 1], 0, SIZE - 1), texel[:, 1] % SIZE)
-        return self.appearance.tiles[material, row, texel[:, 0] % SIZE]
+        row = np.where(
+            material == FACE, np.clip(texel[:, 1], 0, TEXTURE_SIZE - 1), texel[:, 1] % TEXTURE_SIZE
+        )
+        return self.appearance.tiles[material, row, texel[:, 0] % TEXTURE_SIZE]
 
 
 def light(people: Sequence[Renderer], frame: int) -> Floats:

@@ -24,7 +24,7 @@ from gait.simulate.walk import RUN_TOE_OFF, TOE_OFF, Path, Shaped, Walk, draw_ti
 from gait.simulate.wardrobe import Appearance, draw_appearance
 
 CIRCLE_RADIUS = 2.5
-CORNER = np.radians(80.0)  # angle of a corner, away from a camera at the side
+CORNER_ANGLE = np.radians(80.0)  # angle of a corner, away from a camera at the side
 _CLOSEST = 2.2  # least metres between lens and path
 _AROUND = 20.0  # metres before and after the path that several cameras, or a moving one, may show
 _TURNS = 60.0, -60.0, 30.0  # degrees about the middle of the path from the first camera to the others
@@ -135,7 +135,7 @@ def set_stage(scenario: Scenario) -> Stage:
     """Draw people and make them walk in front of a camera. UserError if options contradict each other."""
     path = make_path(scenario.view, scenario.direction, float(scenario.stream("path").uniform(-1, 1)))
     if scenario.motion == "turn":
-        path = replace(path, corner=CORNER if scenario.direction == "lr" else -CORNER)
+        path = replace(path, corner=CORNER_ANGLE if scenario.direction == "lr" else -CORNER_ANGLE)
     first, *others = [_cast(one, way) for one, way in [(scenario, path), *_company(scenario, path)]]
     reach, follows = _envelope(first.walk, first.frames), scenario.moving == "follow"
     away, high = (None, None) if follows else (scenario.distance, scenario.camera_height)

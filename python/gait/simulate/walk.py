@@ -19,7 +19,7 @@ from scipy.optimize import brentq
 
 from gait.body.skeleton import axis_rotation as about
 from gait.errors import UsageError
-from gait.simulate.body import BONE_INDEX, BONES, JOINT_OF, POINT_BONE, POINTS, SIDES, Anatomy
+from gait.simulate.body import BODY_BONES, BONE_INDEX, JOINT_OF, POINT_BONE, POINTS, SIDES, Anatomy
 from gait.simulate.curves import Curves
 from gait.simulate.geometry import Array, Ints, apply, euler, limb, unit
 
@@ -41,7 +41,7 @@ class Path:
         """Return the heading at arc lengths (...), radians, unwrapped."""
         along = np.asarray(along, np.float64)
         if self.corner:
-            return self.heading + self.corner * (smoothstep(along, -CORNER, CORNER) - 0.5)
+            return self.heading + self.corner * (smoothstep(along, -CORNER_M, CORNER_M) - 0.5)
         return self.heading + (along / self.radius if self.radius else np.zeros_like(along))
 
     def point(self, along: ArrayLike, left: ArrayLike = 0.0) -> Array:
@@ -57,9 +57,9 @@ class Path:
 
     def _round_the_corner(self, along: Array) -> Array:
         """Compute world x, y (..., 2) at arc lengths (...), by the trapezoidal rule."""
-        grid = np.linspace(-CORNER, CORNER, 401)
+        grid = np.linspace(-CORNER_M, CORNER_M, 401)
         h = self.direction(grid)
-        inside = np.clip(along, -CORNER, CORNER)
+        inside = np.clip(along, -CORNER_M, CORNER_M)
         end = self.direction(along)
         out = []
         for turned, last in ((np.cos(h), np.cos(end)), (np.sin(h), np.sin(end))):
@@ -68,7 +68,7 @@ class Path:
         return np.stack(out, axis=-1)
 
 
-CORNER = 0.7  # metres of the path before and after its middle in which a corner turns
+CORNER_M = 0.7  # metres of the path before and after its middle in which a corner turns
 STRIDE_TIME_CV = 0.02
 # Effects of sparing a leg by a share s, about as in people with a prosthesis below the knee: it strikes later
 # by _LATE s of the stride and further ahead by _AHEAD s of the step; it stands for a shorter time, by _SHORT
@@ -302,7 +302,7 @@ class Walk:
 
 
 def _joint_name(bone: int) -> str:
-    return JOINT_OF[BONES[bone]]
+    return JOINT_OF[BODY_BONES[bone]]
 
 
 def make_walk(
@@ -343,7 +343,7 @@ def make_walk(
     pelvis = np.column_stack([ground, height])
     if runs:
         plans = {side: _carried(side, plan, pelvis, course) for side, plan in plans.items()}
-    origins, turns = np.zeros((len(along), len(BONES), 3)), np.zeros((len(along), len(BONES), 3, 3))
+    origins, turns = np.zeros((len(along), len(BODY_BONES), 3)), np.zeros((len(along), len(BODY_BONES), 3, 3))
     _set(origins, turns, "pelvis", pelvis, turn)
     for side in SIDES:
         _solve_leg(side, origins, turns, plans[side], yaw, body)

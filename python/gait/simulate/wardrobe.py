@@ -10,7 +10,7 @@ import numpy as np
 from gait.simulate.geometry import Array, Floats
 
 TOP, LEGS, SKIN, FACE, HAIR, SHOE, SOLE, SOCK = range(8)
-SIZE = 256  # texels of a texture, square
+TEXTURE_SIZE = 256  # texels of a texture, square
 CLOTH_TILE = 0.40  # metres of cloth in one texture
 
 _SKINS = ((224, 178, 150), (205, 155, 122), (168, 117, 86), (120, 80, 58), (236, 196, 170))
@@ -35,7 +35,7 @@ class Appearance:
     long_hair: bool
     hem: float  #: length of the top below the pelvis joint, metres at 1.75 m stature
     loose: float  #: extra width of the trousers, 0 (slim) to 1
-    tiles: Floats  #: (8, SIZE, SIZE, 3) linear RGB of each material, 0..1
+    tiles: Floats  #: (8, TEXTURE_SIZE, TEXTURE_SIZE, 3) linear RGB of each material, 0..1
     spans: Array  #: (8,) metres covered by one texture; 1 where texture coordinates run 0..1
     notes: dict[str, str]  #: descriptions for meta.json
 
@@ -45,7 +45,7 @@ def draw_appearance(rng: np.random.Generator) -> Appearance:
     top_pattern = str(rng.choice(["plain", "stripes", "checks", "weave"]))
     legs_pattern = str(rng.choice(["plain", "denim", "plain", "weave"]))
     skin, hair = _pick(_SKINS, rng), _pick(_HAIRS, rng)
-    tiles = np.zeros((8, SIZE, SIZE, 3), np.float32)
+    tiles = np.zeros((8, TEXTURE_SIZE, TEXTURE_SIZE, 3), np.float32)
     tiles[TOP] = _cloth(top_pattern, _pick(_TOPS, rng), rng)
     tiles[LEGS] = _cloth(legs_pattern, _pick(_TROUSERS, rng), rng)
     shoe = _pick(_SHOES, rng)
@@ -71,7 +71,7 @@ def linear(rgb: object) -> Array:
     return (np.asarray(rgb, np.float64) / 255) ** 2
 
 
-def tile_noise(rng: np.random.Generator, cells: tuple[int, int], size: int = SIZE) -> Floats:
+def tile_noise(rng: np.random.Generator, cells: tuple[int, int], size: int = TEXTURE_SIZE) -> Floats:
     """Return smooth noise (size, size) that tiles, mean 0, variance 1: `cells` bumps down and across."""
     coarse = rng.standard_normal(cells).astype(np.float32)
     wrapped = np.pad(coarse, 2, mode="wrap")
@@ -96,8 +96,8 @@ def _cloth(pattern: str, base: Array, rng: np.random.Generator) -> Floats:
     """Return a woven texture; rows run along the body."""
     second = base * rng.uniform(0.25, 0.55) if base.mean() > 0.12 else base * 2.6 + 0.1
     second = np.clip(second, 0, 1)
-    y, x = np.mgrid[0:SIZE, 0:SIZE] / SIZE
-    share = np.zeros((SIZE, SIZE))
+    y, x = np.mgrid[0:TEXTURE_SIZE, 0:TEXTURE_SIZE] / TEXTURE_SIZE
+    share = np.zeros((TEXTURE_SIZE, TEXTURE_SIZE))
     if pattern == "stripes":
         count, width = int(rng.integers(4, 9)), rng.uniform(0.25, 0.5)
         share = _band((y * count) % 1.0, width)
@@ -124,13 +124,13 @@ def _band(x: Array, width: float) -> Array:
 
 def _face(skin: Array, hair: Array, rng: np.random.Generator) -> Floats:
     """Paint a face: lids, brows, mouth and cheeks; u = 0.5 is the front, v runs from the chin up."""
-    face = np.tile(skin.astype(np.float32), (SIZE, SIZE, 1)) * _grain(rng, 0.03)
+    face = np.tile(skin.astype(np.float32), (TEXTURE_SIZE, TEXTURE_SIZE, 1)) * _grain(rng, 0.03)
     picture = np.ascontiguousarray(face)
 
     def spot(u: float, v: float, ru: float, rv: float, colour: Array, share: float) -> None:
-        mask = np.zeros((SIZE, SIZE), np.float32)
-        centre = (round(u * SIZE), round(v * SIZE))
-        radii = (max(round(ru * SIZE), 1), max(round(rv * SIZE), 1))
+        mask = np.zeros((TEXTURE_SIZE, TEXTURE_SIZE), np.float32)
+        centre = (round(u * TEXTURE_SIZE), round(v * TEXTURE_SIZE))
+        radii = (max(round(ru * TEXTURE_SIZE), 1), max(round(rv * TEXTURE_SIZE), 1))
         cv2.ellipse(mask, centre, radii, 0, 0, 360, 1.0, -1, cv2.LINE_AA)
         mask = cv2.GaussianBlur(mask, (0, 0), 1.2)[..., None] * share
         picture[:] = picture * (1 - mask) + mask * colour.astype(np.float32)

@@ -19,10 +19,10 @@ from gait.web.motion_data import curve
 Floats = npt.NDArray[np.float64]
 Angles = dict[str, tuple[Floats, Floats]]
 
-ANGLES = ("hip_flexion", "knee_flexion", "elbow_flexion")
+CURVE_ANGLES = ("hip_flexion", "knee_flexion", "elbow_flexion")
 """Angles that are shown, with the signs of the package's skeleton."""
-LEGS = ("hip_flexion", "knee_flexion")
-SIDES = {"left": "l", "right": "r"}
+LEG_ANGLES = ("hip_flexion", "knee_flexion")
+SIDE_PREFIXES = {"left": "l", "right": "r"}
 _PHASE = "0 to 1 between right heel strikes"
 
 
@@ -45,8 +45,8 @@ def angles_of(names: Sequence[str], places: Floats, covariance: Floats) -> Angle
     sds = angles.standard_deviations(fitted, covariance[:, rows[:, None], rows])
     return {
         f"{letter}_{name}": (np.degrees(fitted.angles[:, channel]), np.degrees(sds[:, channel]))
-        for name in ANGLES
-        for letter in SIDES.values()
+        for name in CURVE_ANGLES
+        for letter in SIDE_PREFIXES.values()
         for channel in [CHANNELS.index(f"{letter}_{name}")]
     }
 
@@ -54,9 +54,9 @@ def angles_of(names: Sequence[str], places: Floats, covariance: Floats) -> Angle
 def angle_curves(found: Angles) -> list[dict[str, Any]]:
     """Make the curves of angles (from `angles_of`) with 90 % intervals."""
     curves = []
-    for name in ANGLES if found else ():
+    for name in CURVE_ANGLES if found else ():
         words, positive, _ = terms.angle(name)
-        for side, letter in SIDES.items():
+        for side, letter in SIDE_PREFIXES.items():
             curves.append(curve(words, f"°, {positive}", *found[f"{letter}_{name}"], side))
     return curves
 
@@ -83,7 +83,7 @@ def phase_curve(time: Floats, events: Events | None, found: Angles) -> list[dict
     count = np.interp(time, strikes, np.arange(len(strikes)), left=np.nan, right=np.nan)
     information = np.zeros(len(time))
     for name, (values, sd) in found.items():
-        if name[2:] in LEGS:
+        if name[2:] in LEG_ANGLES:
             information += (np.gradient(values, time) * float(np.diff(strikes).mean()) / sd) ** 2
     sd = np.minimum(1 / np.sqrt(np.maximum(information, 1e-9)), 0.5)
     phase = count % 1

@@ -18,7 +18,7 @@ from gait.lift.keypoints.corrections import Edits
 from gait.studio.shown import Lift, Solved
 
 Answer = Callable[[int, "Solved | str"], None]
-LAST = -1
+LAST_ANSWER = -1
 """Number of the last answer, which reports that the process has ended."""
 ENDED = "the process that solves the whole motion has died; corrections are saved, start gait studio again"
 
@@ -83,6 +83,6 @@ class Refiner:
             try:
                 number, found = self._pipe.recv()
             except (EOFError, OSError):
-                self._answer(LAST, ENDED)
+                self._answer(LAST_ANSWER, ENDED)
                 return
             self._answer(number, found)

@@ -20,9 +20,9 @@ from gait.web import serve
 
 _HERE = Path(__file__).parent
 _FILES = ("studio.js", "studio.css")
-_LONGEST = 10_000  # bytes of a request
+_LONGEST_REQUEST_BYTES = 10_000  # bytes of a request
 _PERIOD = 0.05  # seconds between checks of the version
-_ALIVE = 10.0  # seconds after which a quiet stream sends a sign of life
+_ALIVE_S = 10.0  # seconds after which a quiet stream sends a sign of life
 
 
 class _Endpoints:
@@ -53,7 +53,7 @@ class _Endpoints:
 
         async def answer(request: Request) -> Response:
             try:
-                action = await serve.json_object(request, _LONGEST)
+                action = await serve.json_object(request, _LONGEST_REQUEST_BYTES)
             except serve.RequestError as error:
                 return JSONResponse({"error": str(error)}, error.status)
             return await run_in_threadpool(_answered, lambda: act(action))
@@ -88,7 +88,7 @@ class _Endpoints:
             if self._session.version != reported:
                 reported, quiet = self._session.version, 0.0
                 yield f"data: {reported}\n\n"
-            elif quiet >= _ALIVE:
+            elif quiet >= _ALIVE_S:
                 quiet = 0.0
                 yield ": here\n\n"
             await asyncio.sleep(_PERIOD)

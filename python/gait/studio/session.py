@@ -35,7 +35,7 @@ from gait.lift.keypoints.corrections import (
     read_edits,
 )
 from gait.studio.curves import phase_at
-from gait.studio.refine import ENDED, LAST, Refiner
+from gait.studio.refine import ENDED, LAST_ANSWER, Refiner
 from gait.studio.shown import NO_CAMERA, Solved, page_data
 from gait.studio.source import Source
 from gait.web.motion_data import frames, rounded
@@ -43,7 +43,7 @@ from gait.web.motion_data import frames, rounded
 Floats = npt.NDArray[np.float64]
 Point = TypeVar("Point", Correction, FloorPin)
 
-LEAST_SD, MOST_SD = 0.3, 50.0  # pixels, of a point marked by hand
+LEAST_MARK_SD_PX, MOST_MARK_SD_PX = 0.3, 50.0  # pixels, of a point marked by hand
 LONGEST_WAIT = 60.0  # seconds that an export waits for the whole motion
 MOST_UNDONE = 500  # edits that can be undone
 LEAST_WAY = 0.05  # metres on the floor that show a direction
@@ -186,7 +186,7 @@ class Session:
         here = np.array([*begin["pelvis"][:2], 0.0])
         ahead = here + ARROW * np.array([np.cos(begin["heading_rad"]), np.sin(begin["heading_rad"]), 0.0])
         words = ["gait track", shlex.quote(str(self.source.video.path)), "--init"]
-        found = ["--camera", shlex.quote(str(self.source.folder / EXPORTS["camera"]))]
+        found = ["--camera", shlex.quote(str(self.source.folder / EXPORT_FILES["camera"]))]
         words += [shlex.quote(str(self._start_file)), *(self.source.camera_words or found), "-o track.csv"]
         ends = rounded(camera.project(np.stack([here, ahead])), 2)
         return {"frame": begin["frame"], "from": ends[0], "to": ends[1], "command": " ".join(words)}
@@ -266,7 +266,7 @@ class Session:
     def _on_refined(self, number: int, found: Solved | str) -> None:
         """Show the whole motion, unless there have been more edits since."""
         with self._lock:
-            if number not in (self._asked, LAST):
+            if number not in (self._asked, LAST_ANSWER):
                 return
             self.refining, self.fault = False, found if isinstance(found, str) else ""
             if not isinstance(found, str):
@@ -315,7 +315,7 @@ class Session:
         UserError
             If the whole is not solved in time, or there is no such file.
         """
-        if kind not in EXPORTS:
+        if kind not in EXPORT_FILES:
             raise UserError(f"{kind}: unknown export")
         with self._lock:
             if not self._lock.wait_for(lambda: not self.refining, LONGEST_WAIT):
@@ -323,13 +323,13 @@ class Session:
             if self.fault:
                 raise UserError(f"the last corrections are not yet in the whole motion: {self.fault}")
             solved, folder = self._solved, self.source.folder
-        path = folder / EXPORTS[kind]
+        path = folder / EXPORT_FILES[kind]
         if kind == "camera":
             self._write_camera()
         elif kind == "mp4":
             self._lift.write_overlay(str(path), self.source.video, solved)
         else:
-            table = str(folder / EXPORTS["csv"])
+            table = str(folder / EXPORT_FILES["csv"])
             self._lift.write_table(table, solved)
             if kind != "csv":
                 _convert(table, path)
@@ -340,12 +340,12 @@ class Session:
     def _write_camera(self) -> None:
         if self._lift.camera is None:
             raise UserError("there is no camera; give --camera, or --height for one from the walk")
-        with replacing(self.source.folder / EXPORTS["camera"]) as temporary:
+        with replacing(self.source.folder / EXPORT_FILES["camera"]) as temporary:
             write_camera(temporary, self._lift.camera)
 
 
-EXPORTS = {"csv": "motion.csv", "mp4": "overlay.mp4", "camera": "camera.json"} | {
-    suffix[1:]: f"motion{suffix}" for suffix in exports.SUFFIXES
+EXPORT_FILES = {"csv": "motion.csv", "mp4": "overlay.mp4", "camera": "camera.json"} | {
+    suffix[1:]: f"motion{suffix}" for suffix in exports.EXPORT_SUFFIXES
 }
 """Kinds of exports, and their files in the folder beside the film."""
 
@@ -371,7 +371,7 @@ def _zipped(*paths: Path) -> Path:
 def _tidy(point: Point) -> Point:
     """Round a point marked by hand to a sensible precision."""
     u, v = (round(x, 2) for x in point.uv)
-    return replace(point, uv=(u, v), sd_px=round(min(max(point.sd_px, LEAST_SD), MOST_SD), 2))
+    return replace(point, uv=(u, v), sd_px=round(min(max(point.sd_px, LEAST_MARK_SD_PX), MOST_MARK_SD_PX), 2))
 
 
 def _touched(old: Edits, new: Edits) -> range | None:

@@ -42,11 +42,11 @@ from gait.track.walk_camera import calibrate_film, expected_camera, find_people,
 
 Floats = npt.NDArray[np.float64]
 
-LARGEST = 1280  # pixels; largest longer side of the film for browsers
+LARGEST_SIDE_PX = 1280  # pixels; largest longer side of the film for browsers
 DETECTED = "keypoints.csv"  # the detector's keypoints, in the folder beside the film
 FURTHEST_TURN = 0.1  # of the picture's width; a camera that turns less counts as still
 KEYFRAMES = 8  # frames from one I-frame to the next, the most that seeking has to decode
-LEAST_SD = 1.0  # pixels; least standard deviation of a track's joints
+LEAST_JOINT_SD_PX = 1.0  # pixels; least standard deviation of a track's joints
 WITHOUT_PERSON = ("init", "lost")  # statuses of frames whose joints are not used
 
 
@@ -336,9 +336,14 @@ def keypoints_of_track(path: str, camera: Camera) -> Keypoints:
     sd = np.stack([track.sd[name] for name in names], axis=1)
     tracked = ~np.isin(track.status, WITHOUT_PERSON)
     uv = np.where(tracked[:, None, None], camera.project(places), np.nan)
-    pixels = np.maximum(_picture_sd(camera.project, places, sd), LEAST_SD)
+    pixels = np.maximum(_picture_sd(camera.project, places, sd), LEAST_JOINT_SD_PX)
     return Keypoints(
-        track.frame, track.time, names, uv, np.ones(uv.shape[:2]), np.nan_to_num(pixels, nan=LEAST_SD)
+        track.frame,
+        track.time,
+        names,
+        uv,
+        np.ones(uv.shape[:2]),
+        np.nan_to_num(pixels, nan=LEAST_JOINT_SD_PX),
     )
 
 
@@ -359,7 +364,7 @@ def _write_film(path: Path, video: Video, quiet: bool) -> None:
     """Write the film as H.264 with constant frame rate, so that a browser can show any single frame."""
     import cv2
 
-    factor = min(1.0, LARGEST / max(video.size))
+    factor = min(1.0, LARGEST_SIDE_PX / max(video.size))
     writer = VideoWriter(path, video.fps, crf=23, preset=FAST, keyframes=KEYFRAMES)
     with writer as film, progress("film", video.count, quiet) as update:
         for frame in video.frames():

@@ -20,18 +20,18 @@ from gait.detect.shapes import PLAUSIBLE, find_people
 from gait.errors import GaitError, UserError
 from gait.io.video import Frame, Image, Video
 
-_ENOUGH = 8  # fewest frames with a person
+_FEWEST_FRAMES = 8  # fewest frames with a person
 _SELDOM = 0.09  # least seconds between frames searched without a background, which is slow
-_WINDOW = 1.0  # seconds of boxes that are fitted
+_BOX_WINDOW_S = 1.0  # seconds of boxes that are fitted
 _LEAST_WINDOW = 0.3  # least seconds in a short clip
 _PROBES = 6  # frames of a clip, at least one of which must show a person
-_STEP = 0.1  # seconds from one fit to the next
+_FIT_STEP_S = 0.1  # seconds from one fit to the next
 _GOES_ON = 1.5  # seconds searched after the first window with a walk, which may show only its beginning
 _ONLY_STANDING = (
     "--init auto found a person who stays in place but none who walks along the floor; give --init FILE.json "
     f"or use the detector ({weights.FETCH})"
 )
-_STATURE_SD = 0.03  # metres, of a stature given by the user
+_GIVEN_STATURE_SD_M = 0.03  # metres, of a stature given by the user
 _BEYOND = 4.0  # standard deviations from which an apparent stature contradicts the expected one
 
 
@@ -61,9 +61,9 @@ class BoxStart:
         plate: Image | None,
         model: Model,
         height: float | None = None,
-        window: float = _WINDOW,
+        window: float = _BOX_WINDOW_S,
     ) -> None:
-        known = {} if height is None else {"stature": height, "stature_sd": _STATURE_SD}
+        known = {} if height is None else {"stature": height, "stature_sd": _GIVEN_STATURE_SD_M}
         self._fit = StartFit(model, camera, box_time=window, **known)
         self._expected = model.prior()[0].stature if height is None else height
         self._plate, self._window = plate, window
@@ -115,7 +115,7 @@ class BoxStart:
         """Return a start at the frame just observed if a person walks there, otherwise None."""
         if not self._times or self._times[-1][0] != frame.number:
             return None
-        if 0 <= frame.time - self._last_fit < _STEP:
+        if 0 <= frame.time - self._last_fit < _FIT_STEP_S:
             return None
         self._last_fit = frame.time
         found = self.best(frame, latest=True)
@@ -184,7 +184,7 @@ def find_start(
     """
     misplaced: list[float] = []
     count = min(video.count, video.count if stop is None else stop) - first
-    window = float(np.clip(0.8 * count / video.fps, _LEAST_WINDOW, _WINDOW))
+    window = float(np.clip(0.8 * count / video.fps, _LEAST_WINDOW, _BOX_WINDOW_S))
     standing: Start | None = None
     for finder in _finders(camera, plate, model, height, window, shapes, shapes_first):
         if not finder.worth(video, first, first + count):
@@ -211,7 +211,7 @@ def _search(finder: BoxStart, frames: Iterable[Frame]) -> tuple[Start | None, St
     last_fit, until = -np.inf, np.inf
     for frame in frames:
         finder.observe(frame)
-        if frame.time - last_fit < _STEP:
+        if frame.time - last_fit < _FIT_STEP_S:
             continue
         last_fit = frame.time
         found = finder.best(frame)
@@ -248,10 +248,10 @@ def _no_person(count: int, misplaced: list[float]) -> str:
     """Explain why there is no start, and what to do."""
     if count == 1:
         return "only 1 frame to track; give at least one second of film, and check --start and --stop"
-    if count < _ENOUGH:
-        return f"only {count} frames to track, --init auto needs {_ENOUGH}; give --init FILE.json"
-    if len(misplaced) < _ENOUGH:
-        return f"--init auto found no person in full view for {_ENOUGH} frames; give --init FILE.json"
+    if count < _FEWEST_FRAMES:
+        return f"only {count} frames to track, --init auto needs {_FEWEST_FRAMES}; give --init FILE.json"
+    if len(misplaced) < _FEWEST_FRAMES:
+        return f"--init auto found no person in full view for {_FEWEST_FRAMES} frames; give --init FILE.json"
     tall = np.nanmedian(misplaced) if np.isfinite(misplaced).any() else np.nan
     what = f"makes {tall:.2g} m tall" if tall > 0 else "puts upside down"
     if np.isnan(misplaced).mean() > 0.5:

@@ -18,13 +18,17 @@ from gait.track.walk_start import CameraPrior, choose_frames
 Array = NDArray[np.float64]
 
 _TALLER = 0.12  # relative error of the apparent stature that contradicts a camera
-_PEOPLE = (1.4, 2.1)  # metres; apparent statures accepted if the person's is unknown
+_STATURE_RANGE_M = (1.4, 2.1)  # metres; apparent statures accepted if the person's is unknown
 _PARTS = ("focal length", "tilt", "roll")
 _GIVEN_SD = np.array([0.1, np.radians(2.0), np.radians(1.5), 0.1])  # of the given camera, as in CameraPrior
-_WRONG = np.array([0.25, np.radians(6.0), np.radians(5.0)])  # differences of `_PARTS` that are reported
+_REPORTED_DIFFERENCES = np.array(
+    [0.25, np.radians(6.0), np.radians(5.0)]
+)  # differences of `_PARTS` that are reported
 _CERTAIN = 2.0  # standard deviations of the estimate that a difference must exceed as well
-_FITS = 1.4  # squared robust error per coordinate; worse fits, as with moving cameras, prove nothing
-_UPRIGHT = 35.0  # degrees by which a walking body may lean in the picture
+_CHECKED_FIT_CHI2 = (
+    1.4  # squared robust error per coordinate; worse fits, as with moving cameras, prove nothing
+)
+_UPRIGHT_DEG = 35.0  # degrees by which a walking body may lean in the picture
 
 
 def contradiction(given: Camera, keypoints: Keypoints, model: Model, height: float | None) -> str | None:
@@ -81,7 +85,7 @@ def _walk(keypoints: Keypoints, model: Model) -> Keypoints | None:
 
 def _wrong_size(appears: float, height: float | None) -> str | None:
     """Report a person who appears too tall or too short."""
-    low, high = _PEOPLE if height is None else (height * (1 - _TALLER), height * (1 + _TALLER))
+    low, high = _STATURE_RANGE_M if height is None else (height * (1 - _TALLER), height * (1 + _TALLER))
     if low < appears < high:
         return None
     known = "give --height if that is right" if height is None else f"--height is {height:g}"
@@ -95,10 +99,10 @@ def _wrong_part(given: Camera, walk: Keypoints, model: Model, stature: float) ->
         found = calibrate(walk, given.size, model, stature, near=CameraPrior(expected, _GIVEN_SD))
     except UserError:
         return None
-    if found.chi2_per_observation > _FITS:
+    if found.chi2_per_observation > _CHECKED_FIT_CHI2:
         return None
     off = np.abs(_parameters(found.camera) - expected)[:3]
-    wrong = (off > _WRONG) & (off > _CERTAIN * found.sd[:3])
+    wrong = (off > _REPORTED_DIFFERENCES) & (off > _CERTAIN * found.sd[:3])
     return f"the walk contradicts its {_PARTS[int(wrong.argmax())]}" if wrong.any() else None
 
 
@@ -123,10 +127,10 @@ def _turned_frames(given: Camera, walk: Keypoints, model: Model) -> str | None:
 
 def _fits(camera: Camera, walk: Keypoints, model: Model) -> bool:
     """Whether bodies are upright and a walk fits."""
-    if camera.centre[2] <= 0 or abs(_lean(camera, walk)) > _UPRIGHT:
+    if camera.centre[2] <= 0 or abs(_lean(camera, walk)) > _UPRIGHT_DEG:
         return False
     start = find_keypoint_start(walk, camera, model)
-    return start is not None and _PEOPLE[0] < start.mean.stature < _PEOPLE[1]
+    return start is not None and _STATURE_RANGE_M[0] < start.mean.stature < _STATURE_RANGE_M[1]
 
 
 def _lean(camera: Camera, walk: Keypoints) -> float:

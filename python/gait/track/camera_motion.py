@@ -24,17 +24,17 @@ Box = tuple[float, float, float, float]
 
 _SIDE = 640  # pixels; largest longer side of the pictures in which corners are tracked
 CELLS = 18  # cells along it; with one corner each, so that objects with much texture do not dominate
-_EDGE = 8  # pixels; margin of the picture without corners
-_CORNER = 3e-4  # least value of cornerMinEigenVal at a corner
-_WINDOW, _LEVELS = (21, 21), 3  # of Lucas-Kanade
-FEWEST = 20  # fewest corners that agree
-_STILL = 0.75  # pixels; corners of a still camera move less, by noise and compression
+_CORNER_MARGIN_PX = 8  # pixels; margin of the picture without corners
+_LEAST_CORNER_VALUE = 3e-4  # least value of cornerMinEigenVal at a corner
+_FLOW_WINDOW, _LEVELS = (21, 21), 3  # of Lucas-Kanade
+FEWEST_CORNERS = 20  # fewest corners that agree
+_STILL_PX = 0.75  # pixels; corners of a still camera move less, by noise and compression
 _SHARE = 0.3  # least share of the corners that agree
 _AREA = 0.2  # least area that these cover, relative to corners all over the picture
 _FEW_LEFT = 0.5  # share of a key frame's corners below which a new key frame is taken
 TUKEY, SHARPEST, BLUNTEST = 4.685, 0.15, 2.0  # standard deviations to weight 0; least and most sd, pixels
 _ZOOM = 1e-4  # variance of the logarithm of the zoom
-ITERATIONS, COARSE = 20, 4  # iterations of the fit; the first ones use the sd of all corners
+FIT_ITERATIONS, COARSE = 20, 4  # iterations of the fit; the first ones use the sd of all corners
 
 
 @dataclass(frozen=True)
@@ -69,7 +69,7 @@ class View:
         return replace(reference, R=R, t=t, fx=self.zoom * reference.fx, fy=self.zoom * reference.fy)
 
 
-UNMOVED = View(np.eye(3))
+UNMOVED_VIEW = View(np.eye(3))
 
 
 class CameraMotion:
@@ -89,22 +89,22 @@ class CameraMotion:
     def __init__(self, camera: Camera) -> None:
         self.scale = working_scale(camera)
         self._camera = replace(camera.scaled(self.scale), R=np.eye(3), t=np.zeros(3))
-        self._last = self._key_view = UNMOVED
+        self._last = self._key_view = UNMOVED_VIEW
         self._key = self._previous = np.zeros((0, 0), np.uint8)
         self._people: Iterable[Box] = ()
         self._corners = np.zeros((0, 2), np.float32)
 
     def start(self, image: Image, people: Iterable[Box] = ()) -> None:
         """Set the reference, (h, w) grey or (h, w, 3) BGR, with boxes of the people in it."""
-        self._set_key(small_picture(image, self._camera), people, UNMOVED)
+        self._set_key(small_picture(image, self._camera), people, UNMOVED_VIEW)
 
     def still(self, image: Image) -> bool:
         """Whether the camera has the same view as in the key frame."""
-        after = self._track(small_picture(image, self._camera), UNMOVED)
+        after = self._track(small_picture(image, self._camera), UNMOVED_VIEW)
         if after is None:
             return False
         off = np.hypot(*(after - self._corners)[np.isfinite(after[:, 0])].T)
-        return bool((off < _STILL).mean() > _SHARE)
+        return bool((off < _STILL_PX).mean() > _SHARE)
 
     def step(self, image: Image, people: Iterable[Box] = ()) -> View:
         """Find the view of the next frame; if that fails, return the last one, with residual NaN."""
@@ -132,7 +132,7 @@ class CameraMotion:
         visible = np.isfinite(after[:, 0])
         places = after[visible].astype(float)
         view, agree = fit_view(self._camera, self._corners[visible].astype(float), places, guess)
-        enough = agree.sum() >= FEWEST and self._everywhere(places[agree])
+        enough = agree.sum() >= FEWEST_CORNERS and self._everywhere(places[agree])
         found = enough and agree.mean() > _SHARE and view.residual < BLUNTEST
         return view.after(self._key_view) if found else None, agree.sum() / len(after)
 
@@ -143,7 +143,7 @@ class CameraMotion:
 
     def _track(self, small: Image, guess: View) -> NDArray[np.float32] | None:
         """Find the key frame's corners (N, 2), NaN where not visible; None if too few are."""
-        if len(self._corners) < FEWEST:
+        if len(self._corners) < FEWEST_CORNERS:
             return None
         expected = map_pixels(self._corners.astype(float), self._camera, guess.camera(self._camera))
         places, found, _ = cv2.calcOpticalFlowPyrLK(
@@ -151,14 +151,14 @@ class CameraMotion:
             small,
             self._corners[:, None],
             np.ascontiguousarray(expected[:, None], np.float32),
-            winSize=_WINDOW,
+            winSize=_FLOW_WINDOW,
             maxLevel=_LEVELS,
             flags=cv2.OPTFLOW_USE_INITIAL_FLOW,
         )
         after = np.asarray(places[:, 0], np.float32)
         inside = ((after > 2) & (after < np.array(self._camera.size) - 3)).all(axis=1)
         after[(found[:, 0] == 0) | ~inside] = np.nan
-        return after if np.isfinite(after[:, 0]).sum() >= FEWEST else None
+        return after if np.isfinite(after[:, 0]).sum() >= FEWEST_CORNERS else None
 
 
 def working_scale(camera: Camera) -> float:
@@ -179,7 +179,7 @@ def find_corners(grey: Image, people: Array) -> NDArray[np.float32]:
     strength = cv2.cornerMinEigenVal(grey, 7)
     for left, top, right, bottom in np.maximum(people, 0).astype(int):
         strength[top:bottom, left:right] = 0
-    inner = strength[_EDGE:-_EDGE, _EDGE:-_EDGE]
+    inner = strength[_CORNER_MARGIN_PX:-_CORNER_MARGIN_PX, _CORNER_MARGIN_PX:-_CORNER_MARGIN_PX]
     side = max(grey.shape) / CELLS
     rows, columns = (np.arange(0, size, side).astype(int) for size in inner.shape)
     found = []
@@ -187,13 +187,13 @@ def find_corners(grey: Image, people: Array) -> NDArray[np.float32]:
         for left in columns:
             cell = inner[top : top + int(side), left : left + int(side)]
             v, u = np.unravel_index(cell.argmax(), cell.shape)
-            if cell[v, u] > _CORNER:
-                found.append((_EDGE + left + u, _EDGE + top + v))
+            if cell[v, u] > _LEAST_CORNER_VALUE:
+                found.append((_CORNER_MARGIN_PX + left + u, _CORNER_MARGIN_PX + top + v))
     return np.array(found, np.float32).reshape(-1, 2)
 
 
 def fit_view(
-    camera: Camera, before: Array, after: Array, start: View = UNMOVED
+    camera: Camera, before: Array, after: Array, start: View = UNMOVED_VIEW
 ) -> tuple[View, NDArray[np.bool_]]:
     """Fit a view to points that moved from `before` to `after`, pixels (N, 2), N > 1.
 
@@ -201,7 +201,7 @@ def fit_view(
     """
     rays, view, sd = replace(camera, R=np.eye(3), t=np.zeros(3)).rays(before), start, np.inf
     off = np.zeros(len(before))
-    for iteration in range(ITERATIONS):
+    for iteration in range(FIT_ITERATIONS):
         expected, slope = _motion(rays, view, camera)
         miss = after - expected
         off = np.hypot(*miss.T)

@@ -23,8 +23,8 @@ from gait.track.camera_motion import (
     BLUNTEST,
     CELLS,
     COARSE,
-    FEWEST,
-    ITERATIONS,
+    FEWEST_CORNERS,
+    FIT_ITERATIONS,
     SHARPEST,
     TUKEY,
     Box,
@@ -35,15 +35,15 @@ from gait.track.camera_motion import (
 
 Array = NDArray[np.float64]
 
-_WINDOW, _LEVELS = (9, 9), 3  # of Lucas-Kanade
-_RETURNS = 0.5  # pixels; largest distance of a corner tracked forwards and back from its origin
-_EDGE = 4  # pixels from the picture's edge at which a landmark is dropped
-_FURTHEST = 40.0  # metres to the furthest landmark on the floor
+_FLOW_WINDOW, _LEVELS = (9, 9), 3  # of Lucas-Kanade
+_RETURN_PX = 0.5  # pixels; largest distance of a corner tracked forwards and back from its origin
+_DROPPED_MARGIN_PX = 4  # pixels from the picture's edge at which a landmark is dropped
+_FURTHEST_LANDMARK_M = 40.0  # metres to the furthest landmark on the floor
 _INVERSE, _INVERSE_SD = 0.1, 0.3  # 1/m; prior of the inverse distance of other landmarks
 _NEAREST = 5.0  # 1/m; largest inverse distance
 _DRIFT = 3.0  # pixels; sd of a tracked corner over the time for which it is seen
 _MISSES = 2  # frames in which a landmark may not fit
-_TURN_SD, _PLACE_SD = np.radians(0.25), 0.01  # of a pose; about the errors with simulated robots
+_CAMERA_TURN_SD, _PLACE_SD = np.radians(0.25), 0.01  # of a pose; about the errors with simulated robots
 
 
 @dataclass
@@ -75,7 +75,7 @@ class _Landmarks:
         ray = camera.rays(pixels.astype(float))
         ray /= np.linalg.norm(ray, axis=1, keepdims=True)
         inverse = -ray[:, 2] / camera.centre[2]
-        below = floor & (inverse > 1 / _FURTHEST)
+        below = floor & (inverse > 1 / _FURTHEST_LANDMARK_M)
         return _Landmarks(
             pixels,
             np.tile(camera.centre, (len(ray), 1)),
@@ -136,12 +136,12 @@ class CameraTravel:
         boxes = self._boxes(people)
         self._track(small_picture(image, self._camera), boxes)
         visible = self._landmarks
-        if len(visible.pixels) < FEWEST:
+        if len(visible.pixels) < FEWEST_CORNERS:
             return None
         ideal = self._ideal(visible.pixels)
         floor, about, sd = visible.variance == 0, self._camera, np.inf
         # Use the floor first: most of the picture may be sky, which does not show that the camera travels.
-        if floor.sum() >= FEWEST:
+        if floor.sum() >= FEWEST_CORNERS:
             about, sd, _ = _fit(about, visible.where(floor), ideal[floor])
         self._camera, sd, fits = _fit(about, visible, ideal, sd)
         visible.improve(self._camera, ideal, sd, fits)
@@ -151,9 +151,9 @@ class CameraTravel:
         raised = _Landmarks.at(self._camera, visible.pixels[wrong & floor], floor=False)
         self._landmarks = visible.where(~wrong).and_(raised)
         self._add(boxes)
-        if sd > BLUNTEST or fits.sum() < FEWEST:
+        if sd > BLUNTEST or fits.sum() < FEWEST_CORNERS:
             return None
-        return CameraPose(self._camera.R, self._camera.t, float(_TURN_SD), _PLACE_SD)
+        return CameraPose(self._camera.R, self._camera.t, float(_CAMERA_TURN_SD), _PLACE_SD)
 
     def _boxes(self, people: Iterable[Box]) -> Array:
         return self._scale * np.array(list(people), float).reshape(-1, 4)
@@ -179,10 +179,10 @@ class CameraTravel:
         there, found = _moved(before, picture, old.pixels)
         back, again = _moved(picture, before, there)
         size = np.array(picture.shape[::-1])
-        inside = ((there >= _EDGE) & (there < size - _EDGE)).all(axis=1)
+        inside = ((there >= _DROPPED_MARGIN_PX) & (there < size - _DROPPED_MARGIN_PX)).all(axis=1)
         point = there[:, None]
         within = np.all((point > boxes[:, :2]) & (point < boxes[:, 2:]), axis=2)
-        returns = np.hypot(*(back - old.pixels).T) < _RETURNS
+        returns = np.hypot(*(back - old.pixels).T) < _RETURN_PX
         old.pixels = there
         self._landmarks = old.where(found & again & returns & inside & ~np.any(within, axis=1))
 
@@ -196,7 +196,7 @@ def _moved(
         after,
         pixels[:, None],
         None,
-        winSize=_WINDOW,
+        winSize=_FLOW_WINDOW,
         maxLevel=_LEVELS,
     )
     return np.asarray(places[:, 0], np.float32), found[:, 0] > 0
@@ -239,7 +239,7 @@ def _fit(
     `sd`: sd of a pixel, if `camera` is already about right.
     """
     off = np.zeros(len(pixels))
-    for iteration in range(0 if np.isinf(sd) else COARSE, ITERATIONS):
+    for iteration in range(0 if np.isinf(sd) else COARSE, FIT_ITERATIONS):
         expected, slope, by_inverse = _project(camera, visible)
         ahead = np.isfinite(expected[:, 0])
         miss = np.where(ahead[:, None], pixels - expected, 1e3)

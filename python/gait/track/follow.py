@@ -21,7 +21,7 @@ _LONGEST_GAP = 1.0  # seconds for which a lost person is still tracked backwards
 _LEAST_BEFORE = 0.5  # seconds before a track that are worth searching for an earlier start
 _CONTRADICTED = 0.5  # seconds of keypoints elsewhere after which the person is lost
 _OPEN_PHASE = 0.2  # strides; sd of the phase from which a start does not determine left and right
-_SETTLED = 0.2  # seconds of status `tracking` after which they are known
+_SETTLED_S = 0.2  # seconds of status `tracking` after which they are known
 _SETTLES = 4.0  # seconds after a start within which that must happen
 _DRAWS = 3  # draws of particles that must agree
 _SAME_SIDE = 0.2  # strides between the phases of draws that agree
@@ -168,7 +168,7 @@ class Follower:
             now = self._step(tracker, frame, utime, now)
             if now.status != TrackStatus.TRACKING:
                 since = frame.time
-            if abs(frame.time - since) >= _SETTLED:
+            if abs(frame.time - since) >= _SETTLED_S:
                 return _start_from(now, frame.number, start)
             if abs(frame.time - begun) > _SETTLES:
                 break

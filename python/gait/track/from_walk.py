@@ -26,7 +26,7 @@ from gait.track.walk_fit import WalkFit
 from gait.track.walk_model import WalkingBody, WalkModel
 from gait.track.walk_start import (
     GIVEN_FOV_SD,
-    WINDOW,
+    WALK_WINDOW_S,
     CameraPrior,
     choose_frames,
     find_starts,
@@ -39,8 +39,8 @@ Array = NDArray[np.float64]
 _WORST = 6.0  # squared robust error per coordinate up to which a result is accepted
 _POOR = 1.2  # the same, above which left and right may be swapped
 _LEAST_RATE = 0.4  # strides per second; a slower person stands
-_UNKNOWN = 0.2  # relative sd from which the focal length counts as poorly determined
-_OPEN = 1.0  # relative sd of the focal length from which the camera is rejected
+_POOR_FOCAL_SD = 0.2  # relative sd from which the focal length counts as poorly determined
+_REJECTED_FOCAL_SD = 1.0  # relative sd of the focal length from which the camera is rejected
 
 
 @dataclass(frozen=True)
@@ -89,7 +89,7 @@ class Calibration:
             f"roll {np.degrees(self.roll):.1f} +- {np.degrees(sd[2]):.1f} deg, "
             f"height {height:.2f} +- {height * sd[3]:.2f} m"
         ]
-        if sd[0] > _UNKNOWN:
+        if sd[0] > _POOR_FOCAL_SD:
             why = "in place" if self.in_place else "with little change of distance"
             lines.append(
                 f"a walk {why} determines the focal length poorly: distances are uncertain by "
@@ -194,7 +194,7 @@ def calibrate(
             f"{where}: a camera needs {sorted(missing)[0]}; give keypoints of shoulders to ankles"
         )
     chosen = choose_frames(keypoints)
-    if len(chosen.frame) < 8 or chosen.time[-1] - chosen.time[0] < WINDOW - 0.4:
+    if len(chosen.frame) < 8 or chosen.time[-1] - chosen.time[0] < WALK_WINDOW_S - 0.4:
         raise UserError(
             f"{where}: shows the whole person for less than a second; film a walk in full view or give "
             "--camera"
@@ -222,7 +222,7 @@ def _calibrate(
     if best.rate < _LEAST_RATE:
         raise UserError(f"{where}: the person stands; film a walk in full view, or give --camera")
     found = _result(best, size)
-    if found.sd[0] > _OPEN:
+    if found.sd[0] > _REJECTED_FOCAL_SD:
         raise UserError(
             f"{where}: the walk does not determine the focal length; film a walk towards or away from the "
             "camera, or give --camera"
@@ -241,7 +241,7 @@ def _first_fit(
     """Return the best fit of a part of the clip; None if no start was found."""
     best: WalkFit | None = None
     for start in find_starts(chosen, size, model, height, prior):
-        near = start.time - WINDOW / 2, start.time + WINDOW / 2
+        near = start.time - WALK_WINDOW_S / 2, start.time + WALK_WINDOW_S / 2
         expected = WalkModel(chosen, size, body, height, prior, in_place=start.walk.in_place, interval=near)
         fit = WalkFit(expected, start)
         fit.refine(6)

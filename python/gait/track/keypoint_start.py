@@ -20,10 +20,13 @@ from gait.detect.profile import frame_sd
 from gait.errors import GaitError
 from gait.io.keypoints_file import Keypoints
 
-_WINDOW = 1.0  # seconds of keypoints that are fitted
-_STEP = 0.2  # seconds from one window to the next
-_FITS_BEST = 4.0  # chi-square per coordinate up to which the best window is used if no window shows a walk
-_STATURE_SD = 0.05  # metres, of a stature given by the user; a detector's skeleton may have another size
+_KEYPOINT_WINDOW_S = 1.0  # seconds of keypoints that are fitted
+_WINDOW_STEP_S = 0.2  # seconds from one window to the next
+_BEST_WINDOW_CHI2 = (
+    4.0  # chi-square per coordinate up to which the best window is used if no window shows a walk
+)
+#: Metres, of a stature given by the user; a detector's skeleton may have another size.
+_GIVEN_STATURE_SD_M = 0.05
 
 
 def keypoint_noise(keypoints: Keypoints) -> dict[int, FrameKeypoints]:
@@ -77,7 +80,7 @@ def find_keypoint_start(
     """
     if not {"l_hip", "r_hip", "l_ankle", "r_ankle"} <= set(keypoints.names):
         return None
-    known = {} if height is None else {"stature": height, "stature_sd": _STATURE_SD}
+    known = {} if height is None else {"stature": height, "stature_sd": _GIVEN_STATURE_SD_M}
     fit = StartFit(model, camera, **known)
     by_frame = keypoint_noise(keypoints)
     chosen = (keypoints.frame >= first) & (keypoints.frame < (np.inf if stop is None else stop))
@@ -86,7 +89,7 @@ def find_keypoint_start(
     best: tuple[Start, Hypothesis] | None = None
     begin = -np.inf
     for at, time in enumerate(times):
-        if time < begin + _STEP:
+        if time < begin + _WINDOW_STEP_S:
             continue
         begin = time
         found = _fit_window(fit, by_frame, frames, times, at, poses or {})
@@ -97,7 +100,7 @@ def find_keypoint_start(
             return start
         if best is None or hypothesis.chi2_per_observation < best[1].chi2_per_observation:
             best = found
-    return best[0] if best is not None and best[1].chi2_per_observation < _FITS_BEST else None
+    return best[0] if best is not None and best[1].chi2_per_observation < _BEST_WINDOW_CHI2 else None
 
 
 def _fit_window(
@@ -114,7 +117,7 @@ def _fit_window(
     """
     fit.reset()
     for frame, time in zip(frames[at:], times[at:], strict=True):
-        if time > times[at] + _WINDOW:
+        if time > times[at] + _KEYPOINT_WINDOW_S:
             break
         if int(frame) in poses:
             fit.set_pose(poses[int(frame)])

@@ -21,7 +21,7 @@ from gait.io.video import Frame, Image, Video
 Array = NDArray[np.float64]
 
 _WIDEST = 1.0  # most picture sizes added on each side
-_STEP = 16  # pixels; grid of points that are mapped exactly; pixels in between are interpolated
+_GRID_STEP_PX = 16  # pixels; grid of points that are mapped exactly; pixels in between are interpolated
 _COVERED = 0.98  # least share of a frame that the picture of the scene covers
 _FEWEST = 5  # fewest samples from which the median is computed
 
@@ -53,7 +53,7 @@ class Panorama:
 
     def plate_for(self, camera: Camera) -> Image | None:
         """Return the empty scene as seen by a camera in the same place; None if a part is unknown."""
-        u, v = (np.arange(0, size, _STEP, dtype=float) for size in camera.size)
+        u, v = (np.arange(0, size, _GRID_STEP_PX, dtype=float) for size in camera.size)
         places = map_pixels(np.stack(np.meshgrid(u, v), axis=-1), camera, self.camera)
         with np.errstate(invalid="ignore"):
             inside = ((places >= 0) & (places <= np.array(self.camera.size) - 1)).all(axis=-1)
@@ -67,11 +67,11 @@ def map_pixels(pixels: Array, source: Camera, target: Camera) -> Array:
 
 def warped(image: Image, source: Camera, target: Camera, out: Image | None = None) -> Image:
     """Warp a picture of `source` to the view of `target` in the same place; `out` where it shows nothing."""
-    u, v = (np.arange(0, size + _STEP, _STEP, dtype=float) for size in target.size)
+    u, v = (np.arange(0, size + _GRID_STEP_PX, _GRID_STEP_PX, dtype=float) for size in target.size)
     places = map_pixels(np.stack(np.meshgrid(u, v), axis=-1), target, source)
     places = np.nan_to_num(places, nan=-1e4).astype(np.float32)
-    # Grid point (i, j) is at pixel _STEP (i, j); resize() would place it half a step further.
-    fine = np.array([[1 / _STEP, 0, 0], [0, 1 / _STEP, 0]])
+    # Grid point (i, j) is at pixel _GRID_STEP_PX (i, j); resize() would place it half a step further.
+    fine = np.array([[1 / _GRID_STEP_PX, 0, 0], [0, 1 / _GRID_STEP_PX, 0]])
     flags = cv2.INTER_LINEAR | cv2.WARP_INVERSE_MAP
     maps = cv2.warpAffine(places, fine, target.size, flags=flags, borderMode=cv2.BORDER_REPLICATE)
     across, down = cv2.split(maps)

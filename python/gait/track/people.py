@@ -24,7 +24,7 @@ from gait.io.files import replacing
 from gait.io.keypoints_file import Keypoints
 from gait.io.video import Frame
 from gait.progress import note, progress
-from gait.report.colours import PEOPLE
+from gait.report.colours import PERSON_COLOURS
 from gait.report.drawing import Overlay
 from gait.report.film import Films, PageFilm
 from gait.report.people_page import Person, people_page
@@ -36,7 +36,7 @@ from gait.track.scene import Scene, require_scene
 
 Array = NDArray[np.float64]
 
-MOST = 8
+MOST_PEOPLE = 8
 """Most people tracked in one clip."""
 
 Estimates = dict[int, Estimate]
@@ -165,7 +165,7 @@ def _joints(scene: Scene, found: Estimates) -> dict[int, dict[str, Array]]:
 
 def _colours(found: dict[int, Estimates]) -> dict[int, tuple[int, int, int]]:
     """Choose a colour for each person, BGR."""
-    return {id: PEOPLE[k % len(PEOPLE)] for k, id in enumerate(sorted(found))}
+    return {id: PERSON_COLOURS[k % len(PERSON_COLOURS)] for k, id in enumerate(sorted(found))}
 
 
 def _draw(options: ClipOptions, scene: Scene, found: dict[int, Estimates]) -> PageFilm | None:

@@ -18,9 +18,9 @@ from gait.camera.camera import Camera
 from gait.io.video import Frame
 
 _GATE = 0.25  # person's heights; keypoints with a larger median distance are not the person's
-_NEAR = 0.15  # person's heights; up to this distance they support the estimate
+_SUPPORTING_DISTANCE = 0.15  # person's heights; up to this distance they support the estimate
 _AGREE = 0.08  # person's heights; mean distance up to which knees and ankles agree with the estimate
-_LEGS = ("l_knee", "r_knee", "l_ankle", "r_ankle")
+_LEG_JOINTS = ("l_knee", "r_knee", "l_ankle", "r_ankle")
 
 
 class PersonKeypoints:
@@ -94,7 +94,10 @@ class PersonKeypoints:
 
     def _near(self, frame: Frame, estimate: Estimate) -> bool | None:
         """Answer the same for the first camera."""
-        if any(self._distance(frame, estimate, keypoints) < _NEAR for keypoints in self._found(frame.number)):
+        if any(
+            self._distance(frame, estimate, keypoints) < _SUPPORTING_DISTANCE
+            for keypoints in self._found(frame.number)
+        ):
             return True
         return None if self._own(frame.number) is None and not self._taken(frame, estimate) else False
 
@@ -111,7 +114,7 @@ class PersonKeypoints:
         keypoints = self.choose(frame, estimate)
         if keypoints is None:
             return False
-        legs = self._distances(frame, estimate, keypoints, _LEGS)
+        legs = self._distances(frame, estimate, keypoints, _LEG_JOINTS)
         return not len(legs) or bool(legs.mean() < _AGREE)
 
     def _views(self, frame: Frame) -> Iterator[tuple[PersonKeypoints, Frame]]:
@@ -123,7 +126,7 @@ class PersonKeypoints:
     def _taken(self, frame: Frame, estimate: Estimate) -> bool:
         """Whether a person who has their own track was found near the estimate."""
         there = (one[frame.number] for one in self._apart.values() if frame.number in one)
-        return any(self._distance(frame, estimate, keypoints) < _NEAR for keypoints in there)
+        return any(self._distance(frame, estimate, keypoints) < _SUPPORTING_DISTANCE for keypoints in there)
 
     def _own(self, frame: int) -> FrameKeypoints | None:
         """List the keypoints with the person's ids in a frame."""

@@ -24,12 +24,12 @@ from gait.io.video import Frame
 Array = NDArray[np.float64]
 
 _SELDOM = 0.09  # least seconds between searches
-_PATIENCE = 0.5  # seconds without the person's shape after which the person is not visible
+_HIDDEN_AFTER_S = 0.5  # seconds without the person's shape after which the person is not visible
 _PELVIS = 0.48  # height of the pelvis over that of the box
 _SD = (0.03, 0.04, 0.04)  # person's heights: crown, pelvis, lowest point (build, clothes, shadows)
 _LOW = 0.01  # heights by which the soles of a shape are too low
 _MEDIAN_OF = 5  # searches whose median is judged
-_HEAD = 0.07  # heights; largest difference of the crown
+_HEAD_DIFFERENCE = 0.07  # heights; largest difference of the crown
 _SOLES = (-0.085, 0.035)  # heights; range of the difference of the soles, positive downwards
 
 
@@ -94,7 +94,7 @@ class PersonShapes:
         """Return False if shapes contradict an estimate, else None: they do not show whether legs agree."""
         if self._searched is frame and self._found is not None:
             self._off.append(_difference(self._box(frame, estimate), self._found))
-        missing = self._last is not None and abs(frame.time - self._last) > _PATIENCE
+        missing = self._last is not None and abs(frame.time - self._last) > _HIDDEN_AFTER_S
         return False if not self._fits() or missing else None
 
     def near(self, frame: Frame, estimate: Estimate) -> bool:
@@ -116,7 +116,7 @@ class PersonShapes:
         if not self._off:
             return True
         x, crown, soles = np.median(self._off, axis=0)
-        return bool(np.hypot(x, crown) < _HEAD and _SOLES[0] < soles < _SOLES[1])
+        return bool(np.hypot(x, crown) < _HEAD_DIFFERENCE and _SOLES[0] < soles < _SOLES[1])
 
 
 def _difference(box: Box | None, shape: Box) -> Array:

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from gait.bindings.abi import Mode
 from gait.bindings.frame import FrameKeypoints
-from gait.bindings.initial import OUTSIDE, Start
+from gait.bindings.initial import OUTSIDE_PICTURE, Start
 from gait.bindings.model import Model
 from gait.bindings.start_fit import StartFit
 from gait.body.measured import model_of
@@ -37,12 +37,12 @@ from gait.track.walk_camera import calibrate_film, expected_camera, note_camera
 
 Array = NDArray[np.float64]
 
-_COLOUR = 4.0  # grey levels; least difference between channels, in half of a colour picture
+_COLOUR_LEVELS = 4.0  # grey levels; least difference between channels, in half of a colour picture
 _TRUNK = ("l_shoulder", "r_shoulder", "l_hip", "r_hip")
 _TRUNKS = 200  # frames whose trunks are compared, evenly spread over the clip
 _SHAPES = 16  # frames searched for people's shapes, which is slow
 _TRUNK_HEIGHTS = (0.52, 0.81)  # of hips and shoulders, fractions of a person's height
-_HALF_WIDTH = 0.2  # of a trunk seen from the side, as a fraction of its height
+_TRUNK_HALF_WIDTH = 0.2  # of a trunk seen from the side, as a fraction of its height
 _STAYS = 0.45  # share of a clip's frames from which the median may show a person
 
 
@@ -297,7 +297,7 @@ def _read_start(
         )
     there = poses[start.frame].camera(camera) if start.frame in poses else camera
     if not there.shows(model.pose(start.mean)[0]):
-        raise UserError(f"{options.init}: {OUTSIDE}")
+        raise UserError(f"{options.init}: {OUTSIDE_PICTURE}")
     return start
 
 
@@ -322,7 +322,7 @@ def stays(scene: Scene) -> bool:
     low, high, shown = _trunks(scene) if scene.people else _shape_trunks(scene)
     if not len(low):
         return False
-    reach = _HALF_WIDTH * (high - low)[:, 1:] * (1, 0)  # half of a trunk seen from the side
+    reach = _TRUNK_HALF_WIDTH * (high - low)[:, 1:] * (1, 0)  # half of a trunk seen from the side
     middle = (low + high)[:, None] / 2
     covered = ((middle > low - reach) & (middle < high + reach)).all(axis=2)  # (middles, frames)
     return bool(covered.mean(axis=1).max() * shown > _STAYS)
@@ -449,7 +449,7 @@ def require_scene(options: ClipOptions, scene: Scene, first: int) -> None:
 def one_is_grey(image: Image, plate: Image) -> bool:
     """Whether one of two BGR pictures is entirely grey and the other in colour."""
     colour = [float(np.median(np.ptp(one[::4, ::4], axis=2))) for one in (image, plate)]
-    return min(colour) == 0 and max(colour) > _COLOUR
+    return min(colour) == 0 and max(colour) > _COLOUR_LEVELS
 
 
 def _detect(options: ClipOptions, video: Video, frames: range) -> tuple[dict[int, Keypoints], int]:
@@ -510,7 +510,7 @@ def _require_detector(options: ClipOptions) -> None:
     """Raise UserError, before long work, if weights are damaged, or missing although asked for."""
     if _detects(options):
         weights.load(weights.PERSON)
-        weights.load(weights.LANDMARKS[options.network])
+        weights.load(weights.LANDMARK_NETWORKS[options.network])
 
 
 def _detects(options: ClipOptions) -> bool:
@@ -528,7 +528,7 @@ def finds_shapes(options: ClipOptions) -> bool:
 
 def _has_detector(options: ClipOptions) -> bool:
     """Whether the weights are on this machine."""
-    needed = (weights.PERSON, weights.LANDMARKS.get(options.network))
+    needed = (weights.PERSON, weights.LANDMARK_NETWORKS.get(options.network))
     return all(weight is not None and weights.find(weight) for weight in needed)
 
 

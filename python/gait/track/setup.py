@@ -9,7 +9,7 @@ import numpy as np
 from gait.bindings.abi import Mode
 from gait.bindings.initial import Start
 from gait.camera.path import one_place
-from gait.io.video import SAMPLES
+from gait.io.video import EMPTY_SCENE_FRAMES
 from gait.report.camera_facts import camera_facts
 from gait.track.options import ClipOptions
 from gait.track.scene import Scene
@@ -90,7 +90,7 @@ def _background(options: ClipOptions, scene: Scene, used: bool) -> str:
         return "none, as asked"
     if options.background != "auto":
         return options.background
-    median = f"the median of {SAMPLES} frames of the film"
+    median = f"the median of {EMPTY_SCENE_FRAMES} frames of the film"
     if not used and scene.poses and not one_place(list(scene.poses.values())):
         return "none: the camera travels"
     if scene.moved:

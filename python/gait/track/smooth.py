@@ -33,14 +33,15 @@ from gait.track.tracker import Tracker
 Array = NDArray[np.float64]
 Table = NDArray[np.floating[Any]]
 
-PHASE, HEADING = 0, 3  # columns of a table, which are the numbers of a ``gait_state``
+PHASE_FIELD, HEADING_FIELD = 0, 3  # columns of a table, which are the numbers of a ``gait_state``
 
 _PAIRS = 1000  # particles with successors, per frame
-_WIDTH = 1.5  # of the kernel, standard deviations of the successors
+_KERNEL_WIDTH = 1.5  # of the kernel, standard deviations of the successors
 _GROUP = (0.25, 0.8)  # strides and radians within which motions and particles belong together
-_NEAR = (0.15, 0.5)  # strides and radians around a hypothesis, as in estimate.c
+_SAME_HYPOTHESIS = (0.15, 0.5)  # strides and radians around a hypothesis, as in estimate.c
 _SIZE_SD = 0.01  # relative sd of the size that pictures determine at best, as in estimate.c
-_SURE = 0.7  # least weight of the dominant hypothesis with status `tracking`: DOMINANT_WEIGHT of estimate.h
+#: Least weight of the dominant hypothesis with status `tracking`: DOMINANT_WEIGHT of estimate.h.
+_DOMINANT_WEIGHT = 0.7
 
 
 class Spool:
@@ -154,7 +155,7 @@ def draw_motions(
             frames.append(drawn)
         update(len(frames))
     out = np.stack(frames[::-1], axis=1)
-    out[..., PHASE] %= 1.0
+    out[..., PHASE_FIELD] %= 1.0
     return out
 
 
@@ -170,22 +171,22 @@ def _before(before: Table, after: Table, s: Table, random: np.random.Generator) 
     root = np.linalg.cholesky(scatter)
     gap = _difference(s[:, None], after)[..., varying]  # (M, N, columns)
     distance = np.sum(np.linalg.solve(root, gap.reshape(-1, columns).T) ** 2, axis=0)
-    logs = -0.5 * distance.reshape(len(s), -1) / _WIDTH**2
+    logs = -0.5 * distance.reshape(len(s), -1) / _KERNEL_WIDTH**2
     weights = np.exp(logs - logs.max(axis=1, keepdims=True))
     sums = np.cumsum(weights, axis=1)
     chosen = np.sum(sums < random.random((len(s), 1)) * sums[:, -1:], axis=1)
     chosen = np.minimum(chosen, len(after) - 1)
     out = before[chosen].astype(float)
     out[:, varying] += gap[np.arange(len(s)), chosen] @ gain.T
-    out[:, HEADING] = wrap(out[:, HEADING], 2 * np.pi)
+    out[:, HEADING_FIELD] = wrap(out[:, HEADING_FIELD], 2 * np.pi)
     return out
 
 
 def _difference(a: Table, b: Table) -> Array:
     """Return a - b, with phase and heading wrapped to the shorter way."""
     out = np.subtract(a, b, dtype=float)
-    out[..., PHASE] = wrap(out[..., PHASE], 1.0)
-    out[..., HEADING] = wrap(out[..., HEADING], 2 * np.pi)
+    out[..., PHASE_FIELD] = wrap(out[..., PHASE_FIELD], 1.0)
+    out[..., HEADING_FIELD] = wrap(out[..., HEADING_FIELD], 2 * np.pi)
     return out
 
 
@@ -204,8 +205,10 @@ def _regression(b: Array, a: Array) -> tuple[Array, Array]:
 
 def _near(states: Table, one: Table) -> NDArray[np.bool_]:
     """Which states are similar to `one` in phase and heading."""
-    phase = np.abs(wrap(states[:, PHASE] - one[PHASE], 1.0)) < _GROUP[0]
-    return np.asarray(phase & (np.abs(wrap(states[:, HEADING] - one[HEADING], 2 * np.pi)) < _GROUP[1]))
+    phase = np.abs(wrap(states[:, PHASE_FIELD] - one[PHASE_FIELD], 1.0)) < _GROUP[0]
+    return np.asarray(
+        phase & (np.abs(wrap(states[:, HEADING_FIELD] - one[HEADING_FIELD], 2 * np.pi)) < _GROUP[1])
+    )
 
 
 def _groups(states: Table) -> list[NDArray[np.int64]]:
@@ -225,7 +228,7 @@ def _pick(weights: Table, count: int, random: np.random.Generator) -> NDArray[np
     return np.minimum(np.searchsorted(np.cumsum(weights), at, side="right"), len(weights) - 1)
 
 
-MOTIONS = 100
+DRAWN_MOTIONS = 100
 _NOTHING = np.empty((0, 0, 3), np.uint8)
 
 
@@ -262,7 +265,7 @@ class Smoother:
         return len(self._filtered)
 
     def finish(
-        self, count: int = MOTIONS, update: Callable[[int], None] = lambda done: None
+        self, count: int = DRAWN_MOTIONS, update: Callable[[int], None] = lambda done: None
     ) -> tuple[list[tuple[Frame, Estimate]], Draws]:
         """Draw `count` motions; return the frames with smoothed estimates, and the motions."""
         model = self._tracker.model
@@ -366,8 +369,8 @@ def _pace(then: State, now: State) -> float:
 def _dominant(states: NDArray[np.void]) -> tuple[NDArray[np.bool_], float]:
     """Which states belong to the largest hypothesis, and their share."""
     phase, heading = states["phase"].astype(float), states["heading"].astype(float)
-    near = np.abs(wrap(phase[:, None] - phase, 1.0)) < _NEAR[0]
-    near &= np.abs(wrap(heading[:, None] - heading, 2 * np.pi)) < _NEAR[1]
+    near = np.abs(wrap(phase[:, None] - phase, 1.0)) < _SAME_HYPOTHESIS[0]
+    near &= np.abs(wrap(heading[:, None] - heading, 2 * np.pi)) < _SAME_HYPOTHESIS[1]
     use = near[np.argmax(near.sum(axis=1))]
     return use, float(use.mean())
 
@@ -382,6 +385,6 @@ def _circular(values: Array, use: NDArray[np.bool_], turn: float) -> tuple[float
 
 def _status(then: TrackStatus, weight: float) -> TrackStatus:
     """Decide the status of a smoothed frame: lost frames stay lost; the motions decide about ambiguity."""
-    if then == TrackStatus.LOST or (weight < _SURE and then == TrackStatus.INIT):
+    if then == TrackStatus.LOST or (weight < _DOMINANT_WEIGHT and then == TrackStatus.INIT):
         return then
-    return TrackStatus.TRACKING if weight >= _SURE else TrackStatus.AMBIGUOUS
+    return TrackStatus.TRACKING if weight >= _DOMINANT_WEIGHT else TrackStatus.AMBIGUOUS

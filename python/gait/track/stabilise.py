@@ -17,16 +17,17 @@ from gait.camera.path import CameraPose
 from gait.io.keypoints_file import Keypoints
 from gait.io.video import Frame, Image, Video
 from gait.progress import note, progress
-from gait.track.camera_motion import FEWEST, Box, CameraMotion, View, fit_view
+from gait.track.camera_motion import FEWEST_CORNERS, Box, CameraMotion, View, fit_view
 from gait.track.camera_travel import CameraTravel
 from gait.track.moving_video import map_pixels
 
 Array = NDArray[np.float64]
 
-_MARGIN = 0.15  # of a person's height, around the keypoints
+_KEYPOINT_MARGIN = 0.15  # of a person's height, around the keypoints
 _MOSTLY = 0.8  # share of the frames in which the camera must be found, or be still
 _TRAVELS = 1.0  # pixels in a picture 640 wide; median residual from which the camera does not only turn
-_AWAY = 0.15  # metres in a second from which it travels, if the floor is seen; more than a hand moves
+#: Metres in a second from which it travels, if the floor is seen; more than a hand moves.
+_TRAVEL_M_PER_S = 0.15
 
 
 @dataclass(frozen=True)
@@ -193,7 +194,7 @@ def find_travel(
     centres = np.array([pose.centre for pose in poses.values()])
     second = min(max(1, round(video.fps)), len(centres) - 1)
     away = np.linalg.norm(centres[second:] - centres[:-second], axis=1).max()
-    if away < _AWAY or np.mean(np.array(on_floor) >= FEWEST) < _MOSTLY:
+    if away < _TRAVEL_M_PER_S or np.mean(np.array(on_floor) >= FEWEST_CORNERS) < _MOSTLY:
         return {}
     far = float(np.linalg.norm(centres - centres[0], axis=1).max())
     note(
@@ -236,7 +237,7 @@ def _boxes(people: Mapping[int, Keypoints]) -> dict[int, list[Box]]:
             uv = uv[np.isfinite(uv).all(axis=1)]
             if len(uv):
                 (left, top), (right, bottom) = uv.min(axis=0), uv.max(axis=0)
-                edge = _MARGIN * (bottom - top)
+                edge = _KEYPOINT_MARGIN * (bottom - top)
                 boxes.setdefault(frame, []).append((left - edge, top - edge, right + edge, bottom + edge))
     return boxes
 

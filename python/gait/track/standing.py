@@ -1,7 +1,7 @@
 """Standing people take no strides: phase, stride rate and speed stay undefined until strides begin.
 
 A model with only walking follows a person who stands, or takes half a step, with a phase that advances
-slowly. A person stands if for `_STILL` seconds neither ankle moves relative to the hips in the picture, and
+slowly. A person stands if for `_STILL_S` seconds neither ankle moves relative to the hips in the picture, and
 the pelvis certainly covers only a small part of the strides' path.  As a stride is from strike to strike of
 one foot, there is none after that until both feet have struck.
 """
@@ -22,8 +22,8 @@ from gait.track.person_keypoints import PersonKeypoints
 
 Sink = Callable[[Frame, Estimate], None]
 
-_STILL = 0.3  # seconds; longer than both feet are on the floor in a step
-_MOVES = 0.01  # person's heights; least standard deviation of the position of a moving ankle
+_STILL_S = 0.3  # seconds; longer than both feet are on the floor in a step
+_LEAST_ANKLE_SD = 0.01  # person's heights; least standard deviation of the position of a moving ankle
 _WAY = 0.5  # share of the strides' path; a person who stands moves less
 _WITHIN = 1.645  # standard deviations of a 90 % interval, which must not hold the whole path
 _HIPS, _ANKLES = ("l_hip", "r_hip"), ("l_ankle", "r_ankle")
@@ -58,9 +58,9 @@ class Standing:
     def add(self, frame: Frame, estimate: Estimate) -> None:
         """Add the next frame, and pass on those that are decided."""
         self._held.append(_Held(frame, estimate, self._ankles(frame, estimate)))
-        while len(self._held) > 1 and frame.time - self._held[1].frame.time >= _STILL:
+        while len(self._held) > 1 and frame.time - self._held[1].frame.time >= _STILL_S:
             self._pass_on(self._held.popleft())
-        if frame.time - self._held[0].frame.time >= _STILL and self._still():
+        if frame.time - self._held[0].frame.time >= _STILL_S and self._still():
             for held in self._held:
                 held.stands = True
 
@@ -81,7 +81,7 @@ class Standing:
     def _still(self) -> bool:
         """Whether the person stands in all waiting frames."""
         sd = np.std([held.ankles for held in self._held], axis=0)
-        if not np.hypot(*sd.T).max() < _MOVES:  # also false if any is NaN
+        if not np.hypot(*sd.T).max() < _LEAST_ANKLE_SD:  # also false if any is NaN
             return False
         heading = [held.estimate.mean.heading for held in self._held]
         speed = [held.estimate.speed for held in self._held]

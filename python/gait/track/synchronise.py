@@ -20,11 +20,11 @@ Array = NDArray[np.float64]
 
 _OVERLAP = 1.0  # least seconds that both films must show
 _SHARE = 0.3  # least share of the shorter film that both must show
-_MOST = 300  # most frames compared
-_GAP = 0.15  # seconds; joints are not interpolated across longer gaps
+_MOST_FRAMES = 300  # most frames compared
+_LONGEST_GAP_S = 0.15  # seconds; joints are not interpolated across longer gaps
 _LEAST_SINE = 0.05  # of the angle between a ray and the direction to the other camera
-_ELSEWHERE = 0.2  # seconds; offsets further from the best count as others
-_CLEARLY = 1.25  # least ratio of any other offset's mismatch to the best one's
+_OTHER_OFFSET_S = 0.2  # seconds; offsets further from the best count as others
+_CLEAR_RATIO = 1.25  # least ratio of any other offset's mismatch to the best one's
 _FINE = 10  # steps per frame of the final search
 _TOGETHER = 1.1  # films began together if that has up to this times the best mismatch, a frame away
 
@@ -84,11 +84,11 @@ def find_offset(
     if not np.isfinite(coarse).any():
         return None
     at = float(offsets[np.nanargmin(coarse)])
-    elsewhere = coarse[np.abs(offsets - at) > _ELSEWHERE]
+    elsewhere = coarse[np.abs(offsets - at) > _OTHER_OFFSET_S]
     fine = at + step * np.arange(-_FINE, _FINE + 1) / _FINE
     near = np.array([_mismatch(planes, times, rays, other.time, offset) for offset in fine])
     best = float(np.nanmin(near))
-    certain = not bool((elsewhere < _CLEARLY * best).any())
+    certain = not bool((elsewhere < _CLEAR_RATIO * best).any())
     together = _mismatch(planes, times, rays, other.time, 0.0)
     if abs(at) < 1.5 * step and together < _TOGETHER * best:
         return Offset(0.0, together, certain)
@@ -97,7 +97,7 @@ def find_offset(
 
 def _planes(keypoints: Keypoints, names: list[str], camera: Camera, baseline: Array) -> tuple[Array, Array]:
     """Return unit normals (T, J, 3) of the planes through both cameras and each joint, and times (T,)."""
-    every = slice(None, None, len(keypoints.time) // _MOST + 1)
+    every = slice(None, None, len(keypoints.time) // _MOST_FRAMES + 1)
     rays = _rays(keypoints, names, camera)[every]
     normals = np.cross(baseline / np.linalg.norm(baseline), rays)
     sine = np.linalg.norm(normals, axis=-1, keepdims=True)
@@ -121,7 +121,7 @@ def _mismatch(planes: Array, times: Array, rays: Array, ray_times: Array, offset
     after = np.searchsorted(ray_times, wanted).clip(1, len(ray_times) - 1)
     begin, end = ray_times[after - 1], ray_times[after]
     share = (wanted - begin) / (end - begin)
-    known = (share >= 0) & (share <= 1) & (end - begin < _GAP)
+    known = (share >= 0) & (share <= 1) & (end - begin < _LONGEST_GAP_S)
     between = rays[after - 1] + share[:, None, None] * (rays[after] - rays[after - 1])
     sine = (planes * between).sum(axis=-1)[known]
     if np.isfinite(sine).sum() < _SHARE / 3 * planes.shape[1] * len(times):

@@ -11,7 +11,7 @@ from gait.track.walk_start import WalkStart
 Array = NDArray[np.float64]
 
 _GROWTH = 1.0  # seconds by which the fitted part grows at either end
-_FITS = 9.0  # squared robust error per coordinate up to which further frames fit the walk
+_FIT_CHI2 = 9.0  # squared robust error per coordinate up to which further frames fit the walk
 
 
 class WalkFit:
@@ -86,8 +86,8 @@ class WalkFit:
             chi2 = self.model.frame_chi2(self.q)
             early, late = self.model.time < ends[0] - 1e-9, self.model.time > ends[1] + 1e-9
             bad = {
-                -1: early.any() and chi2[early].mean() > _FITS,
-                1: late.any() and chi2[late].mean() > _FITS,
+                -1: early.any() and chi2[early].mean() > _FIT_CHI2,
+                1: late.any() and chi2[late].mean() > _FIT_CHI2,
             }
             if bad[-1] or bad[1]:
                 low, high = (ends[0] if bad[-1] else low), (ends[1] if bad[1] else high)

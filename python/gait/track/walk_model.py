@@ -18,7 +18,7 @@ from gait.bindings.model import Model
 from gait.bindings.state import State
 from gait.detect.profile import changing_sd, load, picture_height
 from gait.io.keypoints_file import Keypoints
-from gait.track.walk_start import STATURE_SD, CameraPrior, make_camera, swap_sides
+from gait.track.walk_start import RELATIVE_STATURE_SD, CameraPrior, make_camera, swap_sides
 
 Array = NDArray[np.float64]
 
@@ -37,7 +37,7 @@ _LEAN_SD, _SIDE_LEAN_SD, _TRUNK_SD = 0.021, 0.013, 0.040  # radians, between rec
 _SLIDE_SD = 0.05  # metres per second; sliding of feet on the floor, along the heading
 _SIDEWAYS_SD = 0.05  # metres per second; speed across the heading
 _STILL_SD = 0.03  # metres per second; speed on a treadmill
-_BEND_SD, _TURN_SD, _HURRY_SD = 0.05, 0.12, 0.02  # changes of slope at a knot: metres, radians, strides
+_BEND_SD, _WALK_TURN_SD, _HURRY_SD = 0.05, 0.12, 0.02  # changes of slope at a knot: metres, radians, strides
 _CURVE_SD = 0.3  # radians per second; average turn rate
 _SCORES = 5  # components of the model that are fitted
 _SWAPPED = 16.0  # twice the log odds from which left and right of a frame are swapped
@@ -276,11 +276,11 @@ class WalkModel:
             many = np.sqrt(len(step))  # as one uncertainty of the whole walk
             speed = [(ahead - usual) / _SLIDE_SD / many, aside / _SIDEWAYS_SD / many]
         faster = np.diff(np.stack([ahead, aside], axis=-1), axis=-2) * np.diff(self._middles())[:, None]
-        bends = np.diff(knots[..., 2:], 2, axis=-2) / np.array([_TURN_SD, _HURRY_SD])
+        bends = np.diff(knots[..., 2:], 2, axis=-2) / np.array([_WALK_TURN_SD, _HURRY_SD])
         turn = (heading[..., -1:] - heading[..., :1]) / (self.knot_time[-1] - self.knot_time[0])
         return np.concatenate([
             _heavy_tailed((q[..., :4] - self._prior.mean) / self._prior.sd),
-            q[..., 4:5] / STATURE_SD,
+            q[..., 4:5] / RELATIVE_STATURE_SD,
             parts,
             offsets / self.body.offset_sd,
             *speed,

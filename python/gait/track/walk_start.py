@@ -22,19 +22,28 @@ from gait.track.keypoint_start import keypoint_noise
 
 Array = NDArray[np.float64]
 
-WINDOW = 1.2  # seconds of walking to start with
-STATURE_SD = 0.015  # of the stature, including shoes
+WALK_WINDOW_S = 1.2  # seconds of walking to start with
+RELATIVE_STATURE_SD = 0.015  # of the stature, including shoes
 _USUAL_FOV = 65.0  # degrees along the longer side of the picture, of a typical phone
 _FOV_SD = 0.45  # of the log focal length; with --fov:
 GIVEN_FOV_SD = 0.05
 _KNOWN_SD = 0.15  # sd of the log focal length below which a fit starts only from the expected one
-_HEIGHT, _HEIGHT_SD = 1.3, 0.5  # metres; sd of the logarithm
-_TILT, _TILT_SD, _ROLL_SD = 0.05, 0.2, 0.02  # radians
+_CAMERA_HEIGHT_M, _LOG_HEIGHT_SD = 1.3, 0.5  # metres; sd of the logarithm
+_TILT_MEAN, _TILT_SD, _ROLL_SD = 0.05, 0.2, 0.02  # radians
 _STICK_SD = 0.025  # relative sd of the height of hips above ankles
-_STARTS = (0.6, 0.85, 1.2, 2.2, 4.0)  # focal lengths to start from, as multiples of the picture's longer side
-_LONGEST = 12.0  # most seconds of a walk that are used
-_LEVEL_STEPS, _SETTLED = 30, 1e-9  # most steps of the fit of sticks; relative change of cost that ends it
-_RATE = 10.0  # frames per second that are used
+_FOCAL_STARTS = (
+    0.6,
+    0.85,
+    1.2,
+    2.2,
+    4.0,
+)  # focal lengths to start from, as multiples of the picture's longer side
+_LONGEST_WALK_S = 12.0  # most seconds of a walk that are used
+_LEVEL_STEPS, _LEAST_COST_CHANGE = (
+    30,
+    1e-9,
+)  # most steps of the fit of sticks; relative change of cost that ends it
+_FPS = 10.0  # frames per second that are used
 
 
 @dataclass(frozen=True)
@@ -50,8 +59,8 @@ class CameraPrior:
         side, angle, sd = (max(size), _USUAL_FOV, _FOV_SD) if fov is None else (size[0], fov, fov_sd)
         focal = 0.5 * side / np.tan(np.radians(angle) / 2)
         return CameraPrior(
-            np.array([np.log(focal), _TILT, 0.0, np.log(_HEIGHT)]),
-            np.array([sd, _TILT_SD, _ROLL_SD, _HEIGHT_SD]),
+            np.array([np.log(focal), _TILT_MEAN, 0.0, np.log(_CAMERA_HEIGHT_M)]),
+            np.array([sd, _TILT_SD, _ROLL_SD, _LOG_HEIGHT_SD]),
         )
 
 
@@ -73,22 +82,24 @@ def usual_camera(size: tuple[int, int], fov: float | None = None) -> Camera:
 
 
 def choose_frames(keypoints: Keypoints) -> Keypoints:
-    """Choose some frames with hips and ankles, from the `_LONGEST` seconds in which size varies most."""
+    """Choose frames with hips and ankles from the `_LONGEST_WALK_S` seconds in which size varies most."""
     legs = [keypoints.names.index(name) for name in ("l_hip", "r_hip", "l_ankle", "r_ankle")]
     whole = np.isfinite(keypoints.uv[:, legs]).all(axis=(1, 2))
     time = keypoints.time[whole]
     rows = np.flatnonzero(whole)
     if len(rows) > 1:
-        step = max(1, round(1.0 / _RATE / max(float(np.median(np.diff(time))), 1e-6)))
+        step = max(1, round(1.0 / _FPS / max(float(np.median(np.diff(time))), 1e-6)))
         rows = rows[::step]
         time = keypoints.time[rows]
-        if time[-1] - time[0] > _LONGEST:
+        if time[-1] - time[0] > _LONGEST_WALK_S:
             size = picture_height(keypoints)[rows]
             begin = max(
-                time[time <= time[-1] - _LONGEST],
-                key=lambda t: np.ptp(np.log(np.maximum(size[(time >= t) & (time <= t + _LONGEST)], 1.0))),
+                time[time <= time[-1] - _LONGEST_WALK_S],
+                key=lambda t: np.ptp(
+                    np.log(np.maximum(size[(time >= t) & (time <= t + _LONGEST_WALK_S)], 1.0))
+                ),
             )
-            rows = rows[(time >= begin) & (time <= begin + _LONGEST)]
+            rows = rows[(time >= begin) & (time <= begin + _LONGEST_WALK_S)]
     return Keypoints(
         keypoints.frame[rows], keypoints.time[rows], keypoints.names, keypoints.uv[rows],
         keypoints.confidence[rows],
@@ -125,15 +136,17 @@ def find_starts(
     found = []
     span = keypoints.time[-1] - keypoints.time[0]
     middles = np.unique(np.round(keypoints.time[0] + span * np.array([0.3, 0.5, 0.75]), 3))
-    for share in _STARTS:
+    for share in _FOCAL_STARTS:
         q = prior.mean.copy()
         if prior.sd[0] > _KNOWN_SD:
             q[0] = np.log(share * max(size))
         q = _level(q, keypoints, size, height, prior)
         best: WalkStart | None = None
         for middle in middles:
-            fit = StartFit(model, make_camera(q, size), stature=height, stature_sd=STATURE_SD * height)
-            near = np.abs(keypoints.time - middle) <= 0.5 * WINDOW
+            fit = StartFit(
+                model, make_camera(q, size), stature=height, stature_sd=RELATIVE_STATURE_SD * height
+            )
+            near = np.abs(keypoints.time - middle) <= 0.5 * WALK_WINDOW_S
             for frame, time in zip(keypoints.frame[near], keypoints.time[near], strict=True):
                 fit.add(round(1e6 * time), noise[int(frame)])
             try:
@@ -168,7 +181,7 @@ def _level(q: Array, keypoints: Keypoints, size: tuple[int, int], height: float,
             [off / _STICK_SD / np.sqrt(len(off)) * 3, (p - prior.mean[[1, 3]]) / prior.sd[[1, 3]]]
         )
 
-    starts = [_descent(residuals, np.array([tilt, np.log(_HEIGHT)])) for tilt in (0.05, 0.4)]
+    starts = [_descent(residuals, np.array([tilt, np.log(_CAMERA_HEIGHT_M)])) for tilt in (0.05, 0.4)]
     q[1], q[3] = min(starts, key=lambda p: float(np.sum(residuals(p) ** 2)))
     return q
 
@@ -182,7 +195,7 @@ def _descent(residuals: Callable[[Array], Array], p: Array) -> Array:
         matrix = slope.T @ slope
         step = np.linalg.solve(matrix + damping * np.diag(np.diag(matrix)), -slope.T @ here)
         now = float(np.sum(residuals(p + step) ** 2))
-        if abs(cost - now) <= _SETTLED * cost:
+        if abs(cost - now) <= _LEAST_COST_CHANGE * cost:
             break
         p, cost, damping = (p + step, now, 0.2 * damping) if now < cost else (p, cost, 6.0 * damping)
     return p

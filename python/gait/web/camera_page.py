@@ -17,15 +17,15 @@ from starlette.types import ASGIApp
 
 from gait.camera.camera import Camera, write_camera
 from gait.camera.marks import coordinates, floor_lines, place_marks, place_unknown
-from gait.camera.placing import LEAST
+from gait.camera.placing import FEWEST_GROUND_POINTS
 from gait.errors import UserError
 from gait.io.files import replacing
 from gait.web import serve
 
-_MOST = 60  # most marks
-_FURTHEST = 1e4  # largest coordinate, metres or pixels
+_MOST_MARKS = 60  # most marks
+_LARGEST_COORDINATE = 1e4  # largest coordinate, metres or pixels
 _POLE = 1.75  # metres; height of the pole that is drawn
-_BYTES = 1 << 16  # longest request
+_LONGEST_REQUEST_BYTES = 1 << 16  # longest request
 _HERE = Path(__file__).parent
 
 
@@ -93,7 +93,7 @@ class _Page:
                 "frames": scene.frames,
                 "first": scene.first,
                 "lens": scene.lens_words,
-                "least": LEAST,
+                "least": FEWEST_GROUND_POINTS,
                 "output": Path(scene.output).name,
             }
         )
@@ -117,7 +117,7 @@ class _Page:
 
     async def _answer(self, request: Request, use: Callable[[dict[str, Any]], None]) -> Response:
         try:
-            marks = await serve.json_object(request, _BYTES)
+            marks = await serve.json_object(request, _LONGEST_REQUEST_BYTES)
             found = await run_in_threadpool(solve, self._scene, marks)
             use(found)
         except UserError as error:
@@ -157,8 +157,8 @@ def solve(scene: Scene, marks: dict[str, Any]) -> dict[str, Any]:
         Describing missing or contradictory marks.
     """
     uv = _numbers(marks.get("uv"), "pixels")
-    if len(uv) < LEAST:
-        lacking = LEAST - len(uv)
+    if len(uv) < FEWEST_GROUND_POINTS:
+        lacking = FEWEST_GROUND_POINTS - len(uv)
         raise UserError(f"marks: click {lacking} more mark{'s' if lacking > 1 else ''} on the floor")
     missed: list[float] = []
     if mirrored := "distances" in marks:
@@ -195,7 +195,7 @@ def _numbers(rows: Any, unit: str) -> np.ndarray[Any, np.dtype[np.float64]]:
         found = np.asarray(rows, np.float64).reshape(-1, 2)
     except (TypeError, ValueError):
         found = np.full((1, 2), np.nan)
-    if len(found) > _MOST or not (np.abs(found) <= _FURTHEST).all():
+    if len(found) > _MOST_MARKS or not (np.abs(found) <= _LARGEST_COORDINATE).all():
         raise UserError(f"marks: give numbers of {unit} for every mark")
     return found
 
@@ -205,7 +205,7 @@ def _distances(rows: Any, count: int) -> dict[tuple[int, int], float]:
     try:
         for i, j, metres in rows:
             pair, length = (int(min(i, j)), int(max(i, j))), float(metres)
-            if not (0 <= pair[0] < pair[1] < count and 0 < length <= _FURTHEST):
+            if not (0 <= pair[0] < pair[1] < count and 0 < length <= _LARGEST_COORDINATE):
                 raise ValueError
             found[pair] = length
     except (TypeError, ValueError):

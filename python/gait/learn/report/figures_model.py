@@ -13,7 +13,7 @@ from gait.body.skeleton import ANGLES, CHANNELS, JOINTS, default_skeleton, point
 from gait.learn.arrays import Floats
 from gait.learn.prior.fit import CYCLE_SAMPLES, Learned
 from gait.report.colours import BLUE, DARK, GREY, ON_PAPER, ORANGE
-from gait.report.figures import STICKS, grid, line_legend, plain
+from gait.report.figures import STICK_CHAINS, grid, line_legend, plain
 
 SHOWN_ANGLES = (
     *("r_hip_flexion", "r_knee_flexion", "r_ankle_flexion", "r_shoulder_flexion", "r_elbow_flexion"),
@@ -119,7 +119,7 @@ def _draw(axes: Axes, figures: Floats, across: int, colour: str) -> None:
     person's left to the right.
     """
     for i, body in enumerate(figures):
-        for side, chains in STICKS.items():
+        for side, chains in STICK_CHAINS.items():
             for chain in chains:
                 joints = body[[JOINTS.index(name) for name in chain]]
                 axes.plot(

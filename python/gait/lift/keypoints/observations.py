@@ -10,7 +10,7 @@ import numpy.typing as npt
 from gait.bindings.segment_prior import SegmentPrior
 
 Floats = npt.NDArray[np.float64]
-LONGEST_GAP = 0.15  # seconds; keypoints are not interpolated across longer gaps
+LONGEST_KEYPOINT_GAP_S = 0.15  # seconds; keypoints are not interpolated across longer gaps
 
 
 @dataclass(frozen=True)
@@ -61,7 +61,7 @@ def resampled(points: Observations, time: Floats, at: Floats) -> Observations:
         a, b = known[after - 1], known[after]
         gap = time[b] - time[a]
         share = (at - time[a]) / gap
-        near = (share > -1e-6) & (share < 1 + 1e-6) & (gap < LONGEST_GAP)
+        near = (share > -1e-6) & (share < 1 + 1e-6) & (gap < LONGEST_KEYPOINT_GAP_S)
         uv[near, j] = (points.uv[a, j] + share[:, None] * (points.uv[b, j] - points.uv[a, j]))[near]
         sd[near, j] = np.hypot((1 - share) * points.sd[a, j], share * points.sd[b, j])[near]
     return Observations(uv, sd)

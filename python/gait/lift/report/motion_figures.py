@@ -18,7 +18,7 @@ from gait.io.keypoints_file import Keypoints
 from gait.lift.segment.view import Perspective, View
 from gait.lift.smooth.motion import Motion
 from gait.report.colours import DARK, GREY, ON_PAPER
-from gait.report.figures import STICKS, Drawing, plain
+from gait.report.figures import STICK_CHAINS, Drawing, plain
 
 Floats = npt.NDArray[np.float64]
 
@@ -132,7 +132,7 @@ class Strips:
 
     def _draw(self, axes: Axes, each: _Drawn, pitch: float) -> None:
         for column, body in enumerate(each.flat):
-            for side, chains in STICKS.items():
+            for side, chains in STICK_CHAINS.items():
                 for chain in chains:
                     known = [self._index[name] for name in chain if name in self._index]
                     axes.plot(
@@ -184,7 +184,7 @@ def clip(keypoints: Keypoints, motion: Motion, view: View, name: str) -> Drawing
         sides = [observed, np.column_stack([body @ ahead, body @ -down])]
         for axes, flat in zip(panels[:, column], sides, strict=True):
             hide_axes(axes)
-            for side, chains in STICKS.items():
+            for side, chains in STICK_CHAINS.items():
                 for chain in chains:
                     known = [index[joint] for joint in chain if joint in index]
                     axes.plot(*flat[known].T, color=ON_PAPER[side_of(f"{side}_")], lw=1.6)

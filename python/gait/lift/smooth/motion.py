@@ -26,7 +26,13 @@ from gait.camera.camera import Camera
 from gait.errors import GaitError, UsageError, UserError
 from gait.io.keypoints_file import Keypoints
 from gait.lift.keypoints.corrections import Pins
-from gait.lift.keypoints.observations import LONGEST_GAP, Grid, Observations, interpolated, resampled
+from gait.lift.keypoints.observations import (
+    LONGEST_KEYPOINT_GAP_S,
+    Grid,
+    Observations,
+    interpolated,
+    resampled,
+)
 from gait.lift.keypoints.swaps import Reading
 from gait.lift.segment import explain
 from gait.lift.segment.explain import FEWEST_VISIBLE, Explanation, SegmentFit, SegmentLifter, Uncertain
@@ -139,10 +145,10 @@ def require_visible(found: list[list[Explanation]], grid: Grid, keypoints: Keypo
     """Raise UserError if almost nothing is visible, or nothing in a segment if each is estimated `alone`."""
     if not any(found):
         step = float(np.median(np.diff(keypoints.time[keypoints.visible.any(axis=1)], append=np.inf)))
-        if LONGEST_GAP <= step < np.inf:
+        if LONGEST_KEYPOINT_GAP_S <= step < np.inf:
             raise UserError(
                 f"{1 / step:.2g} frames per second with points are too few to follow a motion; give "
-                f"{np.ceil(1 / LONGEST_GAP):.0f} or more (and check time: seconds)"
+                f"{np.ceil(1 / LONGEST_KEYPOINT_GAP_S):.0f} or more (and check time: seconds)"
             )
         raise UserError(
             f"fewer than {FEWEST_VISIBLE} points are visible in every segment; give more keypoints"

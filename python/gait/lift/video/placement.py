@@ -24,7 +24,7 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
-from gait.bindings.initial import SCALARS, frame_number, read_start
+from gait.bindings.initial import FILE_SCALARS, frame_number, read_start
 from gait.bindings.segment_prior import SegmentPrior
 from gait.bindings.state import state_range
 from gait.body.skeleton import pose
@@ -129,7 +129,7 @@ def _in_picture(fields: Fields) -> dict[str, Any]:
 
 def _optional(fields: Fields, key: str) -> float | None:
     """Read a number with the key and range of the tracker's start; None if absent."""
-    name, remedy = SCALARS[key]
+    name, remedy = FILE_SCALARS[key]
     return fields.number(key, *state_range(name), remedy) if key in fields else None
 
 
