@@ -308,7 +308,7 @@ from gait.learn.options import LearnOptions
 from gait.reproducible import one_thread
 from gait.learn import arrays
 
-align.ITERATIONS = 2  # more passes take time but no more memory
+align.MOST_ALIGNMENT_PASSES = 2  # more passes take time but no more memory
 imputation.climb = partial(imputation.climb, passes=2)
 
 def copy(s, k):
