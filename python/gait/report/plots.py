@@ -19,7 +19,7 @@ Painter = Callable[[Axes], None]
 _LARGE, _NARROW = 10.4, 3.7  # inches; widths of a screen or paper, and of a phone
 _LEFT, _RIGHT, _TOP, _BOTTOM = 0.75, 0.15, 0.35, 0.5  # inches beside the axes of a plot over time
 _PANEL = (3.2, 2.2)  # inches; size of one of many panels
-_BESIDE_PANEL = (0.62, 0.08, 0.28, 0.46)  # inches left, right, above and below the axes of a panel
+_BESIDE_PANEL = (0.62, 0.17, 0.28, 0.46)  # inches left, right, above and below the axes of a panel
 _VARIABLES = {BLUE: "left", ORANGE: "right", DARK: "middle", GREY: "faint", "#000000": "ink"}
 
 
