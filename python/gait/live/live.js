@@ -1,7 +1,8 @@
 // The live page: pictures, figure, numbers and plots of the tracker as it runs.
 const element = (id) => document.getElementById(id);
 const DRAW_MS = 250; // between two drawings of the plots
-const FIGURE_MS = 200; // between two drawings of the figure where the processor draws it
+const SLOW_DRAW_MS = 1000; // the same where the processor draws the page
+const FIGURE_MS = 500; // between two drawings of the figure where the processor draws it
 const GAP = 1; // seconds without an estimate that no line crosses
 const KEPT = 1200; // samples
 const QUIET_MS = 3000; // without an estimate the page reports that there is none
@@ -47,7 +48,7 @@ function draw() {
   }, Math.round(start.seconds * Math.max(5, found.at(-1).rate ?? 30)));
   scene.append({});
 }
-setInterval(draw, DRAW_MS);
+setInterval(draw, software ? SLOW_DRAW_MS : DRAW_MS);
 
 /** Draw the figure of the newest sample. */
 function showFigure() {
@@ -121,6 +122,7 @@ function onSample(one) {
   show('step', unit(one.step_ms, 1, 'ms'));
   show('left/right sure', `${Math.round(100 * one.sure)} %`);
   show('frame', one.frame < 0 ? '–' : String(one.frame));
+  element('hand').removeAttribute('hidden');
   element('hand').setAttribute('transform', `rotate(${360 * one.phase})`);
   waiting.push(one);
   if (waiting.length > KEPT) waiting.shift(); // while the page is hidden
@@ -164,7 +166,7 @@ function explain() {
   setStatus('', 'waiting');
   const images = `GAIT_IMAGE_${start.streams.join(', GAIT_IMAGE_')} on ${start.url}`, { url, channel, health } = people[chosen];
   const lines = [
-    answers() ? `The tracker is ${health.state}: ${health.text}.` : 'No estimates arrive.',
+    answers() ? `The tracker is ${health.text.startsWith(health.state) ? '' : `${health.state}: `}${health.text}.` : 'No estimates arrive.',
     `Listening for ${channel} ${url === start.url ? '' : `on ${url} `}and ${images}.`, remedy()].filter(Boolean);
   if (lines.join() === explained && element('waiting').textContent) return;
   explained = lines.join();
