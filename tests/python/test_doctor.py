@@ -66,15 +66,19 @@ def test_a_missing_package(monkeypatch):
 def test_weights_that_are_missing_or_damaged(monkeypatch, tmp_path):
     monkeypatch.setenv("GAIT_WEIGHTS", str(tmp_path))
     found = lines(doctor.check_weights)
-    assert (
-        found[0]
-        == "fault weights people: are not installed; run gait detect --fetch once, with a network connection"
-    )
+    remedy = "run gait detect --fetch once, with a network connection"
+    assert found[0] == f"fault detector weights (people): not installed; {remedy}"
     assert [line.split()[0] for line in found] == ["fault", "fault", "note", "note"]
+    with monkeypatch.context() as only_numpy:  # which cannot run the detector
+        only_numpy.setattr("gait.extras.find_spec", lambda module: None)
+        assert {line.split()[0] for line in lines(doctor.check_weights)} == {"note"}
     (tmp_path / "pose_detection.tflite").write_bytes(b"damaged")
     first = lines(doctor.check_weights)[0]
-    assert first.startswith("fault weights people: ") and first.endswith(
-        "run gait detect --fetch once, with a network connection"
+    assert first.startswith("fault detector weights (people): ") and first.endswith(remedy)
+    monkeypatch.setenv("GAIT_WEIGHTS", str(tmp_path / "none"))
+    assert all(
+        line.startswith("fault") and "none is not a folder; unset it" in line
+        for line in lines(doctor.check_weights)
     )
 
 

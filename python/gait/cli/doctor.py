@@ -106,21 +106,23 @@ def check_extras() -> Iterator[Finding]:
 
 def check_weights() -> Iterator[Finding]:
     """Check that the detector's weights are present and undamaged."""
+    from gait import extras
     from gait.detect import weights
     from gait.errors import UserError
 
+    unused = bool(extras.remedy("it", ("video",)))  # nothing can run the detector
     for name, file in {"people": weights.PERSON, **weights.LANDMARK_NETWORKS}.items():
-        optional = name in ("lite", "heavy")
-        if not weights.find(file):
-            state = "note" if optional else "fault"
-            yield Finding(f"weights {name}", state, "are not installed", weights.FETCH)
-            continue
+        what = f"detector weights ({name})"
         try:
-            weights.load(file)
+            if weights.find(file):
+                weights.load(file)
+                yield Finding(what, "ok", "installed")
+            else:
+                state = "note" if unused or name in ("lite", "heavy") else "fault"
+                yield Finding(what, state, "not installed", weights.FETCH)
         except UserError as error:
-            yield Finding(f"weights {name}", "fault", str(error), weights.FETCH)
-            continue
-        yield Finding(f"weights {name}", "ok", "there")
+            text, _, remedy = str(error).rpartition("; ")
+            yield Finding(what, "fault", text, remedy)
 
 
 def check_network() -> Iterator[Finding]:
