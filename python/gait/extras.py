@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
 from importlib.util import find_spec
 
 EXTRAS = {
@@ -39,6 +40,8 @@ def remedy(user: str, extras: Sequence[str], module: str | None = None) -> str:
     module : str, optional
         A module that could not be imported; if none of `extras` installs it, an extra that does is added.
     """
+    if module == "numpy":  # without which nothing else works
+        return f"{user} needs NumPy: pip install numpy"
     if module and not any(module in EXTRAS[extra] for extra in extras):
         extras = [*extras, *[extra for extra in EXTRAS if module in EXTRAS[extra]][:1]]
     lacking = {e: [label for m, label in EXTRAS[e].items() if find_spec(m) is None] for e in extras}
@@ -47,3 +50,12 @@ def remedy(user: str, extras: Sequence[str], module: str | None = None) -> str:
         return ""
     words = " and ".join(filter(None, [", ".join(labels[:-1]), labels[-1]]))
     return f"{user} needs {words}: pip install 'libgait[{','.join(e for e in lacking if lacking[e])}]'"
+
+
+@contextmanager
+def importing(user: str, *extras: str) -> Iterator[None]:
+    """Name the packages that `user` lacks, and how to install them, if an import in this block fails."""
+    try:
+        yield
+    except ModuleNotFoundError as error:
+        raise ModuleNotFoundError(remedy(user, extras) or str(error), name=error.name) from None

@@ -1,6 +1,7 @@
 """Extras: pyproject.toml, constraints.txt and the table of gait.extras name the same packages."""
 
 import re
+import subprocess
 import sys
 from pathlib import Path
 
@@ -82,3 +83,33 @@ def test_a_command_without_its_extra_ends_with_one_line(monkeypatch, capsys):
     monkeypatch.setattr(extras, "find_spec", lambda module: None if module in ("av", "cv2") else object())
     assert main(["track"]) == 1
     assert capsys.readouterr().err == "gait track needs OpenCV and PyAV: pip install 'libgait[video]'\n"
+
+
+def alone(tmp_path, code, *lacking):
+    """Lines that Python code writes to stderr without these modules, weights and parts of pages."""
+    gone = f"import sys; sys.modules.update(dict.fromkeys({lacking!r}))\n"
+    env = {"GAIT_WEIGHTS": str(tmp_path), "GAIT_WEB": str(tmp_path), "PYTHONPATH": str(PYTHON)}
+    command = [sys.executable, "-c", gone + code]
+    done = subprocess.run(command, cwd=tmp_path, env=env, capture_output=True, text=True, check=False)
+    return done.stderr.splitlines()
+
+
+@pytest.mark.parametrize(
+    "call",
+    [
+        "import gait; gait.Camera.read('cam.yaml')",
+        "import gait; gait.Camera.looking((0, -4, 1), (0, 0, 1), (640, 480), 500).project((0, 0, 1))",
+        "from gait.cli import main; sys.exit(main(['studio', 'x.mp4']))",
+    ],
+)
+def test_with_numpy_alone_the_extra_is_named_first(call, tmp_path):
+    (tmp_path / "cam.yaml").write_text("%YAML:1.0\n---\nimage_width: 640\n")
+    modules = {module for extra in extras.EXTRAS.values() for module in extra}
+    last = alone(tmp_path, call, *modules)[-1]
+    assert " needs OpenCV, PyAV, SciPy" in last and "pip install 'libgait[video" in last
+
+
+@pytest.mark.parametrize("words", [["info", "x.gait"], ["doctor"]])
+def test_a_command_without_numpy_ends_with_one_line(words, tmp_path):
+    call = f"from gait.cli import main; sys.exit(main({words!r}))"
+    assert alone(tmp_path, call, "numpy") == [f"gait {words[0]} needs NumPy: pip install numpy"]

@@ -17,6 +17,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from gait import extras
 from gait.bindings.abi import MAX_PIXELS, CameraC
 from gait.camera import other_files
 from gait.camera.lens import AGREE, agreeing
@@ -114,7 +115,8 @@ class Camera:
 
     def project(self, points: ArrayLike) -> Array:
         """Project world points (..., 3) to pixels (..., 2), with lens distortion; NaN behind the camera."""
-        import cv2  # here, so that models can be used without OpenCV
+        with extras.importing("gait.Camera", "video"):
+            import cv2  # here, so that models can be used without OpenCV
 
         world = np.asarray(points, np.float64)
         flat = np.ascontiguousarray(world.reshape(-1, 3))
@@ -143,7 +145,8 @@ class Camera:
 
     def _undistorted(self, pixels: ArrayLike, matrix: Array) -> Array:
         """Remove the distortion from pixels (..., 2), for a camera with this matrix (3, 3)."""
-        import cv2  # as in project()
+        with extras.importing("gait.Camera", "video"):
+            import cv2  # as in project()
 
         uv = np.asarray(pixels, np.float64)
         flat = np.ascontiguousarray(uv.reshape(-1, 1, 2))
@@ -564,7 +567,8 @@ def _rotation(fields: Fields, key: str) -> Array:
 
 
 def _rodrigues(fields: Fields, key: str) -> Array:
-    import cv2
+    with extras.importing("gait.Camera", "video"):
+        import cv2
 
     vector = fields.array(key, (3,), "give the rotation vector from world to camera, radians")
     return np.asarray(cv2.Rodrigues(vector)[0], np.float64)

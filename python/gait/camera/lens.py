@@ -5,6 +5,8 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
+from gait import extras
+
 Array = NDArray[np.float64]
 
 AGREE = 0.5  #: pixels by which the approximation may differ anywhere in the picture
@@ -21,7 +23,8 @@ def agreeing(
     `size`: width and height in pixels.  Returns the coefficients (5,), the factor for the focal lengths, and
     the largest difference in pixels; None if some pixel has no ray in front of the camera, or more than one.
     """
-    import cv2
+    with extras.importing("gait.Camera", "video"):
+        import cv2
 
     step = max(size) / _CELLS
     u, v = (np.linspace(-0.5, n - 0.5, max(2, round(n / step)) + 1) for n in size)

@@ -92,8 +92,6 @@ def run(args: argparse.Namespace) -> int:
     if not args.video:
         raise UsageError("give VIDEO, or --fetch")
     _check(args)
-    for part in parts.STORE.files:  # to fail early if one is missing
-        parts.load(part)
     # Imported here, as they import numpy, OpenCV and the server.
     from gait.io.files import require_writable
     from gait.io.video import Video
@@ -102,6 +100,8 @@ def run(args: argparse.Namespace) -> int:
     from gait.studio.source import Wanted, folder_of, open_source
     from gait.web import serve
 
+    for part in parts.STORE.files:  # to fail early if one is missing
+        parts.load(part)
     if args.corrections:
         require_writable(args.corrections)
     wanted = Wanted(**{each.name: getattr(args, each.name) for each in fields(Wanted)})

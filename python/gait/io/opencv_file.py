@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from gait import extras
 from gait.errors import UserError
 
 if TYPE_CHECKING:
@@ -19,7 +20,8 @@ def read_storage(path: str) -> dict[str, Any]:
 
     UserError if the file is not a FileStorage file, is damaged, or has a name twice or an incomplete matrix.
     """
-    import cv2
+    with extras.importing(f"reading {path}", "video"):
+        import cv2
 
     broken = UserError(f"{path}: not an OpenCV FileStorage file; write it with cv2.FileStorage")
     text = Path(path).read_bytes().removeprefix(BOM_UTF8).decode("latin-1")  # only ASCII matters
