@@ -3,7 +3,7 @@
 #include <math.h>
 #include <string.h>
 
-static const double FASTEST =
+static const double FASTEST_POSE =
     20.0; /* metres or radians per second above which a change is a jump, not a motion */
 
 static const timed_pose *pose_at(const pose_path *p, int64_t index)
@@ -97,7 +97,7 @@ static bool between(const timed_pose *a, const timed_pose *b, int64_t utime, gai
         way[k] = b->centre[k] - a->centre[k];
     if (b->utime - a->utime > POSE_PATH_GAP)
         return message_set(why, "no camera pose for %.2f s: its frames are not used", seconds);
-    if (length(way) > FASTEST * seconds || length(turn) > FASTEST * seconds)
+    if (length(way) > FASTEST_POSE * seconds || length(turn) > FASTEST_POSE * seconds)
         return message_set(why, "the camera jumped by %.2f m and %.0f degrees: frames between are not used",
                            length(way), length(turn) * 57.29578);
     *out = b->sent;

@@ -28,7 +28,7 @@ typedef struct setting {
 #define FIELD(...)
 
 static const setting SETTINGS[] = {GAIT_TRACKER_CONFIG_FIELDS(SETTING, PAPER, FIELD)};
-enum { COUNT = sizeof SETTINGS / sizeof *SETTINGS };
+enum { SETTING_COUNT = sizeof SETTINGS / sizeof *SETTINGS };
 
 static bool kind_of(const setting *s, option_kind *kind)
 {
@@ -48,7 +48,7 @@ static bool kind_of(const setting *s, option_kind *kind)
 /* "rejuvenation-time" */
 static const char *option_name(const setting *s)
 {
-    static char names[COUNT][32];
+    static char names[SETTING_COUNT][32];
     char *const name = names[s - SETTINGS];
     snprintf(name, sizeof names[0], "%s", s->name);
     for (char *c = name; *c; c++)
@@ -59,7 +59,7 @@ static const char *option_name(const setting *s)
 /* Meaning, unit, default. */
 static const char *option_help(const setting *s)
 {
-    static char helps[COUNT][256];
+    static char helps[SETTING_COUNT][256];
     char *const help = helps[s - SETTINGS];
     char paper[40] = "";
     if (s->paper != s->usual)
@@ -73,7 +73,7 @@ static const char *option_help(const setting *s)
 static int tracker_options(gait_tracker_config *config, option *table)
 {
     int count = 0;
-    for (int i = 0; i < COUNT; i++) {
+    for (int i = 0; i < SETTING_COUNT; i++) {
         const setting *const s = &SETTINGS[i];
         option_kind kind;
         if (kind_of(s, &kind))

@@ -47,12 +47,12 @@ enum {
     SAME_CLOCK_US = 1000000, /* a frame older than this on arrival is from another clock */
     CHECK_EVERY = 30,        /* steps between two checks of the dropped frames */
     SETTLE = 8,              /* steps until step_us reflects a changed number of particles */
-    FAR = 2,                 /* steps in a row longer than the limit before the number is reduced */
+    SLOW_STEPS = 2,          /* steps in a row longer than the limit before the number is reduced */
     TOO_MANY = 3,            /* frames dropped between two checks for which the number is halved */
     CALM = 90,               /* fast steps in a row before the number doubles */
     RETRY = 4,               /* frames in a row refused because steps are slow, before one is tried */
     TRIAL = 900,             /* steps after a doubling during which a reduction means that it failed */
-    PATIENCE = 32,           /* longest wait before a failed number is tried again, in multiples of CALM */
+    LONGEST_WAIT = 32,       /* longest wait before a failed number is tried again, in multiples of CALM */
 };
 
 void budget_reset(budget *b)
@@ -97,7 +97,7 @@ static int32_t choose(budget *b, int64_t step_us, int32_t particles)
 {
     b->reason = BUDGET_SLOW;
     b->took_us = b->step_us;
-    if (b->slow >= FAR && particles > b->low) {
+    if (b->slow >= SLOW_STEPS && particles > b->low) {
         b->took_us = step_us < b->before_us ? step_us : b->before_us;
         return fitting(b, b->took_us, particles);
     }
@@ -121,7 +121,7 @@ static void learn_patience(budget *b, int32_t wanted, int32_t particles)
         b->trial = TRIAL;
     } else if (wanted < particles && b->trial > 0) {
         b->patience = b->patience ? 2 * b->patience : 2;
-        b->patience = b->patience < PATIENCE ? b->patience : PATIENCE;
+        b->patience = b->patience < LONGEST_WAIT ? b->patience : LONGEST_WAIT;
         b->wait = CALM * b->patience;
         b->failed = particles;
         b->trial = 0;

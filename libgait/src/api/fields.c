@@ -46,8 +46,8 @@ typedef struct limit {
 #define FREE(meaning, type, name, array, ...)    {sizeof(type array), ROW_FREE},
 #define LIMITED(meaning, type, name, array, ...) {sizeof(type array), ROW_LIMITED},
 #define ROWS_OF(T, ...)                          {sizeof(T), ROW_STRUCT}, __VA_ARGS__
-static const row ROWS[] = {STRUCTS(ROWS_OF, FREE, LIMITED, LIMITED, LIMITED)};
-enum { COUNT = sizeof ROWS / sizeof *ROWS };
+static const row FIELD_ROWS[] = {STRUCTS(ROWS_OF, FREE, LIMITED, LIMITED, LIMITED)};
+enum { ROW_COUNT = sizeof FIELD_ROWS / sizeof *FIELD_ROWS };
 
 #define NO_LIMIT(...)
 #define LIMIT(meaning, type, name, array, unit, low, high)                     {low, high},
@@ -94,9 +94,9 @@ static const char *next_text(cursor *c)
 static bool next_field(cursor *c)
 {
     gait_field *const f = &c->field;
-    if (c->index >= COUNT)
+    if (c->index >= ROW_COUNT)
         return false;
-    const row *const r = &ROWS[c->index++];
+    const row *const r = &FIELD_ROWS[c->index++];
     const char *const name = next_text(c);
     if (r->kind == ROW_STRUCT)
         *f = (gait_field){.of = name, .name = ""};
@@ -132,7 +132,7 @@ static bool next_field_of(cursor *c, const char *of)
 gait_result gait_field_at(uint32_t index, gait_field *out)
 {
     cursor c = first_field();
-    if (!out || index >= COUNT)
+    if (!out || index >= ROW_COUNT)
         return GAIT_ERR_ARG;
     while (c.index <= index)
         (void)next_field(&c);
@@ -201,11 +201,11 @@ gait_result fields_check_sd(const char *of, const void *values, double most, con
 
 gait_result fields_check_size(const char *of, uint64_t struct_size, const char *filled_by, gait_error *err)
 {
-    enum { LEAST = 16 }; /* bytes: size, and mode or projection */
+    enum { LEAST_BYTES = 16 }; /* bytes: size, and mode or projection */
     uint64_t end = 0;
     for (cursor c = first_field(); end != struct_size && next_field_of(&c, of);)
         end = c.field.offset + c.field.size;
-    if (end == struct_size && end >= LEAST)
+    if (end == struct_size && end >= LEAST_BYTES)
         return GAIT_OK;
     if (struct_size > end)
         return base_fail(err, GAIT_ERR_STRUCT, -1,

@@ -3,9 +3,9 @@
 
 static const float STEPS = 2.0f; /* both legs change class alike: phases count modulo half a stride */
 static const float ANY = 4.0f;   /* sd of a phase, strides: in effect uniform */
-static const float JITTER_HEADING = 0.1f; /* sd, radians: people who change class often turn a little */
-static const float RATE_SD = 0.07f;       /* relative; that of the people learnt from, if it is larger */
-static const float POSTURE_SHARE = 0.3f;  /* of the posture's sd: by this the posture changes at once */
+static const float JITTER_HEADING = 0.1f;    /* sd, radians: people who change class often turn a little */
+static const float RELATIVE_RATE_SD = 0.07f; /* relative; that of the people learnt from, if it is larger */
+static const float POSTURE_SHARE = 0.3f;     /* of the posture's sd: by this the posture changes at once */
 
 float class_change_rate(const gait_model *m, int32_t to, float phase, float stride_hz)
 {
@@ -46,8 +46,8 @@ void class_change_enter(const class_entry *e, int32_t from, int32_t i, particle_
     else if (before->direction == 0)
         p->f[F_PHASE] = first_phase(change, n[1], n[3]);
     if (m->direction != 0 && (before->direction == 0 || other_curves))
-        p->f[F_RATE] =
-            dynamics_reflect_rate(m->stride_hz + f_max(m->stride_hz_sd, RATE_SD * m->stride_hz) * n[2]);
+        p->f[F_RATE] = dynamics_reflect_rate(m->stride_hz +
+                                             f_max(m->stride_hz_sd, RELATIVE_RATE_SD * m->stride_hz) * n[2]);
     for (int32_t k = 0; other_curves && k < r->curve_components; k++) {
         if (k % 4 == 0)
             normals(e, i, 2 + k / 4, n);

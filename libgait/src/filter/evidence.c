@@ -1,10 +1,10 @@
 #include "filter/evidence.h"
 #include "base/fmath.h"
 
-enum { CHUNK = 64 };               /* particles whose exponentials are computed at once */
-static const double NONE = -1e300; /* log of 0 */
-static const double ENOUGH = 0.2;  /* effective sample size that must remain, as a share of the particles */
-static const float LEAST = 0.05f;  /* smallest power */
+enum { CHUNK = 64 };                 /* particles whose exponentials are computed at once */
+static const double NONE = -1e300;   /* log of 0 */
+static const double ESS_SHARE = 0.2; /* effective sample size that must remain, as a share of the particles */
+static const float LEAST_POWER = 0.05f; /* smallest power */
 
 double evidence_of(const pf *p, const float *loglik)
 {
@@ -62,7 +62,7 @@ void evidence_temper(float *loglik, int32_t n, float power)
 void evidence_anneal(const pf *p, float *loglik)
 {
     float power = 1.0f;
-    while (power > LEAST && ess_after(p, loglik, power) < ENOUGH * (double)p->n)
+    while (power > LEAST_POWER && ess_after(p, loglik, power) < ESS_SHARE * (double)p->n)
         power *= 0.5f;
     evidence_temper(loglik, p->n, power);
 }

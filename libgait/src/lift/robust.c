@@ -13,8 +13,9 @@ enum {
 static const double SPIKE = 8.0;        /* standard deviations from the line */
 static const double MEDIAN_SD = 1.4826; /* standard deviation over median distance */
 static const double LINE_VARIANCE =
-    1.5;                       /* of a point's distance from the middle of its neighbours, over its own */
-static const double FAR = 4.0; /* standard deviations; fewer than one correct point in 1000 is so far away */
+    1.5; /* of a point's distance from the middle of its neighbours, over its own */
+static const double FAR_SDS =
+    4.0; /* standard deviations; fewer than one correct point in 1000 is so far away */
 static const double FAR_MEDIAN = 3.0; /* times the median of the frame's points */
 static const double POOR_FIT = 4.0;   /* chi2 per observation from which outliers may have misled a search */
 static const double ROUGH =
@@ -90,7 +91,7 @@ int32_t lift_weight_points(int32_t points, const double *square, double *sd, dou
 {
     memcpy(scratch, square, (size_t)points * sizeof *scratch);
     double const usual = FAR_MEDIAN * FAR_MEDIAN * m_median(scratch, points),
-                 limit = usual > FAR * FAR ? usual : FAR * FAR;
+                 limit = usual > FAR_SDS * FAR_SDS ? usual : FAR_SDS * FAR_SDS;
     int32_t outliers = 0;
     for (int32_t j = 0; j < points; j++) {
         double const far = square[j] / limit;
@@ -138,7 +139,7 @@ int32_t lift_weight_frame(const lift_table *t, const segment_posterior *b, doubl
     int32_t const rows = lift_rows(t, &unchanged, at, observed, NULL, 0.0, &residuals), J = t->prior.markers;
     int32_t count = 0, next = 0;
     memcpy(sd, observed->sd, (size_t)J * sizeof *sd);
-    if (largest(square, rows) <= FAR * FAR)
+    if (largest(square, rows) <= FAR_SDS * FAR_SDS)
         return 0;
     if (!known)
         predict(t, b, rows, variance);

@@ -4,7 +4,7 @@
 
 #include <string.h>
 
-static const double SLOWEST = 10.0; /* frames per second down to which `lag` frames are kept */
+static const double LEAST_LAG_FPS = 10.0; /* frames per second down to which `lag` frames are kept */
 static const double MANY_OUTLIERS =
     0.25; /* share of outliers among a segment's numbers from which the segment is wrong, not the points */
 static const double FIRST =
@@ -140,7 +140,8 @@ void lift_stream_layout(arena *a, const lift_table *t, lift_stream *s)
     s->span = (double)(p->frames - 1) / (double)p->fps;
     s->step = (double)p->hop / (double)p->fps;
     s->past.capacity = i_max(round_up(s->span * t->cfg.max_rate) + 2, t->cfg.lag + 1);
-    s->segments = round_up((double)p->frames / (double)p->hop) + round_up(t->cfg.lag / SLOWEST / s->step) + 1;
+    s->segments =
+        round_up((double)p->frames / (double)p->hop) + round_up(t->cfg.lag / LEAST_LAG_FPS / s->step) + 1;
     size_t const capacity = (size_t)s->past.capacity;
     s->past.utime = TAKE(a, int64_t, capacity);
     s->past.uv = TAKE(a, double, capacity * J * 2);

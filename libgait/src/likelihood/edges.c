@@ -1,7 +1,7 @@
 /* The edge term: image gradient along the visible outlines of the limbs, normal to them. */
 #include "likelihood/term.h"
 
-enum { ENOUGH = 16 }; /* fewest points of an outline that count as visible */
+enum { FEWEST_POINTS = 16 }; /* fewest points of an outline that count as visible */
 
 static like_edge_tally count(const like_body *b)
 {
@@ -19,7 +19,7 @@ static float most(int32_t points)
 static float log_likelihood(const like_body *b)
 {
     like_edge_tally const t = count(b);
-    return t.points < ENOUGH ? -1.0f : (float)t.response / most(t.points) - 1.0f;
+    return t.points < FEWEST_POINTS ? -1.0f : (float)t.response / most(t.points) - 1.0f;
 }
 
 /* Log likelihood ratio against an empty scene, where the outline meets edges of any direction.  The response must exceed
@@ -28,13 +28,14 @@ static float support(const like_body *b)
 {
     float const least = 0.005f;
     like_edge_tally const t = count(b);
-    return t.points < ENOUGH ? -1.0f : ((float)t.response - 1.1f * (float)t.chance) / most(t.points) - least;
+    return t.points < FEWEST_POINTS ? -1.0f
+                                    : ((float)t.response - 1.1f * (float)t.chance) / most(t.points) - least;
 }
 
 float like_edges_along(const like_body *b, float *chance)
 {
     like_edge_tally const t = count(b);
-    float const all = most(i_max(t.points, ENOUGH));
+    float const all = most(i_max(t.points, FEWEST_POINTS));
     *chance = (float)t.chance / all;
     return (float)t.response / all;
 }

@@ -5,9 +5,9 @@
 #include "image/camera.h"
 #include "base/fmath.h"
 
-#define STRANGE 8.0f /* standard deviations at which a keypoint is as likely as without a person */
-#define BEHIND  1e6f /* squared standard deviations of a joint behind the camera */
-#define ANOTHER 4.0f /* nats: minus the log probability that the keypoints are not of this person */
+#define STRANGE           8.0f /* standard deviations at which a keypoint is as likely as without a person */
+#define BEHIND_CAMERA     1e6f /* squared standard deviations of a joint behind the camera */
+#define OTHER_PERSON_NATS 4.0f /* nats: minus the log probability that the keypoints are not of this person */
 
 /* Student-t with 4 degrees of freedom in two dimensions: squared standard deviations to nats. */
 static float cost(float square)
@@ -29,10 +29,10 @@ static float mean_cost(const like_body *b)
         float uv[2] = {0.0f};
         float const depth = camera_project(b->camera, X, uv);
         float const du = weight * (uv[0] - found->u[p]), dv = weight * (uv[1] - found->v[p]);
-        sum += cost(depth > CAMERA_NEAR ? f_min(du * du + dv * dv, BEHIND) : BEHIND);
+        sum += cost(depth > CAMERA_NEAR ? f_min(du * du + dv * dv, BEHIND_CAMERA) : BEHIND_CAMERA);
     }
     return f_min(sum / (float)found->count,
-                 cost(STRANGE * STRANGE) + ANOTHER / b->setup->weight[LIKE_KEYPOINTS]);
+                 cost(STRANGE * STRANGE) + OTHER_PERSON_NATS / b->setup->weight[LIKE_KEYPOINTS]);
 }
 
 static float log_likelihood(const like_body *b)

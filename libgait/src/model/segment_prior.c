@@ -5,9 +5,9 @@
 
 enum { COUNTS = 8, RATES = 8 };
 
-#define SLOWEST 1.0f /* frames per second, so that times and the memory for them stay in range */
-#define FASTEST 1000.0f
-#define TALLEST 10.0f /* metres */
+#define LEAST_FPS 1.0f /* frames per second, so that times and the memory for them stay in range */
+#define MOST_FPS  1000.0f
+#define TALLEST   10.0f /* metres */
 
 static void read_counts(sections *s, segment_prior *p)
 {
@@ -36,7 +36,8 @@ static void read_rates(sections *s, segment_prior *p)
     p->fps = r[0];
     p->gamma = r[1];
     p->stature = r[2];
-    sections_require(s, r[0] >= SLOWEST && r[0] <= FASTEST && r[1] > 0.0f && r[2] > 0.0f && r[2] <= TALLEST,
+    sections_require(s,
+                     r[0] >= LEAST_FPS && r[0] <= MOST_FPS && r[1] > 0.0f && r[2] > 0.0f && r[2] <= TALLEST,
                      "SGRT", "holds a rate, factor or stature out of range");
 }
 

@@ -10,14 +10,14 @@
 
 /* Corners are clamped to this many cells from the grid's first, and slopes to SHALLOW: a line that crosses
  * two rows cannot be shallower, and one that crosses a single row is exact there. */
-#define FAR     512.0f
-#define SHALLOW (2.0f * FAR) /* cells in a row */
-#define NOWHERE 1e6f         /* column of a line that does not bound anything */
+#define FAR_CELLS 512.0f
+#define SHALLOW   (2.0f * FAR_CELLS) /* cells in a row */
+#define NOWHERE   1e6f               /* column of a line that does not bound anything */
 
 /* Working pixels to grid cells: the centre of cell c is working pixel 2 c + 1/2. */
 static float to_cell(float v)
 {
-    return f_clamp(0.5f * v - 0.25f, -FAR, FAR);
+    return f_clamp(0.5f * v - 0.25f, -FAR_CELLS, FAR_CELLS);
 }
 
 /* First row whose centre is at or below y. */

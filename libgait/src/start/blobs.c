@@ -4,7 +4,7 @@
 enum {
     LEAST_STEP = 14,   /* smallest change that counts, grey levels */
     NOISE_STEPS = 5,   /* the same in robust standard deviations of the image noise */
-    ANOTHER = 18,      /* change of half of an image from which it shows another scene, grey levels */
+    SCENE_CHANGE = 18, /* change of half of an image from which it shows another scene, grey levels */
     GAP = 3,           /* cells of low contrast that may interrupt a body */
     LEAST_HEIGHT = 15, /* of a person, cells */
     PEOPLE_PART =
@@ -148,7 +148,7 @@ blob_finder blob_finder_layout(arena *a, int32_t width, int32_t height)
 bool blob_other_scene(const blob_finder *f, const gait_image *image, const gait_image *background)
 {
     compare(f, image, background);
-    return smooth(f) > 4 * ANOTHER;
+    return smooth(f) > 4 * SCENE_CHANGE;
 }
 
 int32_t blob_find(const blob_finder *f, const gait_image *image, const gait_image *background, gait_box *out,

@@ -4,9 +4,9 @@
 #include <string.h>
 
 static const double SHORTEST = 1.2, TALLEST = 2.4; /* metres; shadows make people appear taller */
-static const double BLUR = 0.25;   /* heights by which a foot point may move by errors alone */
-static const double FASTEST = 2.0; /* heights per second */
-static const double STANDS = 0.5;  /* probability of a person who stays, against one who walks */
+static const double BLUR = 0.25;         /* heights by which a foot point may move by errors alone */
+static const double HEIGHTS_PER_S = 2.0; /* heights per second */
+static const double STANDS = 0.5;        /* probability of a person who stays, against one who walks */
 
 start_view start_view_of(const gait_camera *c)
 {
@@ -49,7 +49,7 @@ static double far_from(const start_person *p, int64_t utime, const start_box *b)
     const start_box *const was = &p->box[last];
     double const seconds = 1e-6 * (double)(utime - p->utime[last]);
     return people_distance(b->foot, was->foot) /
-           ((BLUR + FASTEST * seconds) * people_distance(was->head, was->foot));
+           ((BLUR + HEIGHTS_PER_S * seconds) * people_distance(was->head, was->foot));
 }
 
 /* The person in a box: one known from earlier frames, a new one, or NULL if there are too many. */

@@ -7,14 +7,14 @@
 
 enum { N = START_UNKNOWNS, LD = START_LD };
 
-static const double RATE_SD = 0.15;     /* strides per second: people in films walk as slowly as they like */
+static const double RATE_SD_HZ = 0.15;  /* strides per second: people in films walk as slowly as they like */
 static const double SPEED_SD = 0.4;     /* metres per second, about the speed of the steps */
 static const double STILL_SD = 0.1;     /* metres per second, in place */
 static const double FLOOR_SD = 0.03;    /* metres: a camera's height is not exact */
 static const double PLACE_SD = 3.0;     /* metres, about where the length of the legs puts the person */
 static const double IN_PLACE = 8.0;     /* twice the log odds of walking along a path over walking in place */
 static const double DEGREES = 4.0;      /* of freedom of the keypoints' errors */
-static const double BEHIND = 1e3;       /* standard deviations for joints behind the camera */
+static const double BEHIND_SDS = 1e3;   /* standard deviations for joints behind the camera */
 static const double LEAD = 0.1;         /* statures: the foot lower in the image is nearer than the body */
 static const double FOOT_SD = 0.06;     /* metres by which all foot points of a person may be off */
 static const double BOX_PLACE = 0.1;    /* metres by which shadows and clothes move all boxes of a person */
@@ -64,7 +64,7 @@ static void point_residuals(const gait_start *s, const gait_camera *cam, const f
 {
     start_scratch *const w = s->scratch;
     float uv[2];
-    double du = BEHIND, dv = BEHIND;
+    double du = BEHIND_SDS, dv = BEHIND_SDS;
     if (camera_project(cam, X, uv) > CAMERA_NEAR) {
         du = ((double)uv[0] - u) * weight;
         dv = ((double)uv[1] - v) * weight;
@@ -134,7 +134,7 @@ static void prior_residuals(const gait_start *s, const double *q, bool in_place,
     r[START_Y] = (q[START_Y] - p->place[1]) / PLACE_SD;
     r[START_HEADING] = r[START_PHASE] = 0.0;
     r[START_SPEED] = in_place ? q[START_SPEED] / STILL_SD : (q[START_SPEED] - usual) / SPEED_SD;
-    r[START_RATE] = (q[START_RATE] - (double)m->stride_hz) / RATE_SD;
+    r[START_RATE] = (q[START_RATE] - (double)m->stride_hz) / RATE_SD_HZ;
     r[START_STATURE] = (q[START_STATURE] - (double)s->cfg.stature) / (double)s->cfg.stature_sd;
     r[START_FLOOR] = q[START_FLOOR] / (p->person ? FOOT_SD : FLOOR_SD);
     for (int32_t k = 0; k < START_SCORES; k++)

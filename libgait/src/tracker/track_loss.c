@@ -4,7 +4,7 @@
 #include "tracker/walk_check.h"
 #include <string.h>
 
-static const float PATIENCE = 0.33f;     /* seconds without support after which the person is lost */
+static const float LOST_AFTER_S = 0.33f; /* seconds without support after which the person is lost */
 static const float PHASE_TIME = 1.5f;    /* seconds over which the phase of a lost person can be predicted */
 static const float PHASE_WITHIN = 0.15f; /* strides from the prediction that count as agreement */
 static const float LOG_HIDDEN = -4.0f;   /* log probability of being hidden in a frame */
@@ -18,7 +18,7 @@ enum { REDRAWN = 8 };                 /* one particle in eight is redrawn */
 
 bool track_loss_is_lost(const gait_tracker *t)
 {
-    return seconds_unsupported(t) > PATIENCE;
+    return seconds_unsupported(t) > LOST_AFTER_S;
 }
 
 /* Class of the last supported estimate. */
