@@ -87,6 +87,12 @@ def test_points_behind_are_not_a_number_and_shapes_are_kept():
     assert np.isnan(uv[0, 1]).all()
 
 
+def test_lists_serve_as_arrays():
+    turn = [[1, 0, 0], [0, 0, -1], [0, 1, 0]]
+    view = Camera(640, 480, 800, 800, 320, 240, R=turn, t=[0, 1.4, 8])
+    assert np.allclose(view.centre, [0, -8, 1.4]) and np.allclose(view.project([0, 0, 1.4]), [320, 240])
+
+
 def test_no_pixels_have_no_rays():
     camera = Camera.looking((0.0, -5.0, 1.5), (0.0, 0.0, 1.0), (640, 480), 800.0)
     assert camera.rays(np.empty((0, 2))).shape == (0, 3)

@@ -97,6 +97,8 @@ def test_a_drawn_walk_is_followed():
     assert abs((last.mean.phase - TRUE[-1].phase + 0.5) % 1 - 0.5) < 0.03
     assert last.frame == len(FRAMES) - 1 and last.utime == utime(len(FRAMES) - 1)
     assert np.array_equal(last.joint("r_knee"), last.joints[MODEL.joint_names.index("r_knee")])
+    with pytest.raises(ValueError, match="joint 'nose': unknown; give one of .* r_knee "):
+        last.joint("nose")
     assert last.speed == pytest.approx(1.3, abs=0.35) and not last.flags & Flag.NO_IMAGE
 
 
@@ -254,7 +256,7 @@ def test_calls_out_of_order_are_refused():
     tracker = Tracker(MODEL, VIEW, SMALL)
     with pytest.raises(GaitError) as caught:
         tracker.step(FRAMES[0], 0)
-    assert caught.value.name == "GAIT_ERR_STATE"
+    assert caught.value.name == "GAIT_ERR_STATE" and "call Tracker.start() first" in str(caught.value)
     tracker.start(TRUE[0], uncertainty(), 0)
     tracker.step(FRAMES[0], 0)
     tracker.step(FRAMES[1], 33333)
@@ -319,6 +321,7 @@ def test_settings_beyond_the_capacity_of_the_library_are_named(change, words):
     [
         (("x.gait", VIEW), {}, r"model: 'x.gait' is not a gait.Model; give gait.Model\(FILE\)"),
         ((MODEL, None), {}, "cameras: None; give a gait.Camera or a list of them"),
+        ((VIEW, MODEL), {}, "^model: a Camera is not a gait.Model"),
         ((MODEL, [VIEW, "c.json"]), {}, "give a gait.Camera or a list"),
         ((MODEL, VIEW), {"tasks": 1.5}, "tasks: 1.5; give a number of threads, a callable or a pool"),
     ],

@@ -73,7 +73,9 @@ class Estimate:
     class_probability: Array = field(default_factory=lambda: np.ones(1))
 
     def joint(self, name: str) -> Array:
-        """Position of one joint in the world, shape (3,), metres."""
+        """Position of one joint in the world, shape (3,), metres; ValueError unless the model has it."""
+        if name not in self.joint_names:
+            raise ValueError(f"joint {name!r}: unknown; give one of {' '.join(self.joint_names)}")
         return np.asarray(self.joints[self.joint_names.index(name)])
 
     @staticmethod

@@ -67,6 +67,11 @@ class Camera:
     t: Array
     distortion: Array = field(default_factory=lambda: np.zeros(5))
 
+    def __post_init__(self) -> None:
+        """Make arrays of lists."""
+        for name in ("R", "t", "distortion"):
+            object.__setattr__(self, name, np.asarray(getattr(self, name), np.float64))
+
     @staticmethod
     def read(path: str, size: tuple[int, int] | None = None, scale: bool = False) -> Camera:
         """Read a camera file of any supported kind; see `read_camera`."""

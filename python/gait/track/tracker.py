@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import ctypes
+import re
 import time
 from collections.abc import Sequence
 
@@ -62,7 +63,7 @@ class Tracker:
         tasks: int | Runner | TaskSource = 1,
     ) -> None:
         if not isinstance(model, Model):
-            raise ValueError(f"model: {model!r} is not a gait.Model; give gait.Model(FILE)")
+            raise ValueError(f"model: {_brief(model)} is not a gait.Model; give gait.Model(FILE)")
         self.model = model
         self.cameras = _camera_list(cameras)
         self._tasks, config = _task_source(tasks), config or TrackerConfig.default()
@@ -259,6 +260,9 @@ class Tracker:
         """Call a function of the tracker; raise the exception of a callback, or else the function's error."""
         try:
             return call(f"gait_tracker_{name}", self._handle, *arguments)
+        except GaitError as error:
+            text = re.sub(r"gait_tracker_(\w+)", r"Tracker.\1", error.text)
+            raise type(error)(error.status, error.name, text, error.index) from None
         finally:
             if self._tasks is not None:
                 self._tasks.reraise()
@@ -275,11 +279,18 @@ class Tracker:
         return c
 
 
+def _brief(value: object) -> str:
+    """Short words for an argument of the wrong kind: plain values as they are, others by their class."""
+    if value is None or isinstance(value, str | int | float):
+        return repr(value)
+    return f"a {type(value).__name__}"
+
+
 def _camera_list(cameras: Camera | Sequence[Camera]) -> list[Camera]:
     if isinstance(cameras, Camera):
         return [cameras]
     if not isinstance(cameras, Sequence) or not all(isinstance(c, Camera) for c in cameras):
-        raise ValueError(f"cameras: {cameras!r}; give a gait.Camera or a list of them")
+        raise ValueError(f"cameras: {_brief(cameras)}; give a gait.Camera or a list of them")
     return list(cameras)
 
 
