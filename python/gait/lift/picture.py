@@ -14,7 +14,7 @@ from gait.lift.keypoints.suggestions import FramePosterior, Suggestion, suggest
 from gait.lift.run import Lifted
 from gait.lift.segment.view import Perspective
 from gait.lift.video.figure import Figure, write_overlay
-from gait.lift.video.fit_clip import KNOWN_SD
+from gait.lift.video.fit_clip import KNOWN_JOINT_SD
 from gait.lift.video.sensors import CameraView, FlatView, View
 from gait.track.moving_video import map_pixels
 from gait.track.stabilise import CameraTurns
@@ -116,7 +116,9 @@ def suggestions(lifted: Lifted, most: int) -> list[Suggestion]:
         )
         for t, own in enumerate(covariances(lifted))
     ]
-    enough = KNOWN_SD * motion.stature * float(np.median(np.linalg.norm(by_place, axis=(2, 3)))) / np.sqrt(2)
+    enough = (
+        KNOWN_JOINT_SD * motion.stature * float(np.median(np.linalg.norm(by_place, axis=(2, 3)))) / np.sqrt(2)
+    )
     near = NEAR_S / float(np.median(np.diff(points.time) / np.diff(points.frame)))
     return suggest(posteriors, joints, near, enough, most)
 

@@ -21,7 +21,7 @@ from gait.progress import progress
 FEWEST_WALKS, FEWEST_MOTIONS = 3, 3
 ALIKE = 0.1  # share of the period within which the paper's agrees with the refined one
 ECLECTIC = 10  # sequences of the second paper
-FEWEST_FRAMES, MOST_FRAMES = 120, 240  # frames of them
+FEWEST_MOTION_FRAMES, MOST_MOTION_FRAMES = 120, 240  # frames of them
 EVERYTHING = SegmentOptions(source="all")
 
 
@@ -68,12 +68,12 @@ def _eclectic(motions: list[Recorded], walks: set[object]) -> list[Recorded]:
     parts = [p for m in motions if len(m.table) >= 2 * EVERYTHING.frames for p in _parts(m)]
     others = [p for p in parts if p.source not in walks]
     walking = list({p.subject: p for p in reversed(parts) if p.source in walks}.values())[::-1]
-    return sorted([*others, *walking], key=lambda p: len(p.table) < FEWEST_FRAMES)[:ECLECTIC]
+    return sorted([*others, *walking], key=lambda p: len(p.table) < FEWEST_MOTION_FRAMES)[:ECLECTIC]
 
 
 def _parts(motion: Recorded) -> list[Recorded]:
-    """Return a motion of at most MOST_FRAMES frames, or the equal parts of a longer one that are so short."""
-    count = -(-len(motion.table) // MOST_FRAMES)
+    """Return a motion of at most `MOST_MOTION_FRAMES`, or the equal parts of a longer one."""
+    count = -(-len(motion.table) // MOST_MOTION_FRAMES)
     if count == 1:
         return [motion]
     size = len(motion.table) // count

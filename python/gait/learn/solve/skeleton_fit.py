@@ -44,7 +44,7 @@ OUTLIERS = (30.0, 10.0, 3.0)  # residuals beyond this many MARKER_SD_M lose weig
 EFFECTIVE = 5.0  # number of independent frames that all frames are worth, as neighbours share errors
 GENERIC_STATURE_M = 1.7  # metres, of the generic body
 #: Levenberg-Marquardt: most rounds, first damping, least, most, and its factors after a better or worse step.
-MOST_STEPS, FIRST_DAMPING, LEAST_DAMPING, MOST_DAMPING, DAMPING_DECREASE, DAMPING_INCREASE = (
+MOST_FIT_STEPS, FIRST_DAMPING, LEAST_DAMPING, MOST_DAMPING, DAMPING_DECREASE, DAMPING_INCREASE = (
     30,
     1e-3,
     1e-7,
@@ -52,7 +52,7 @@ MOST_STEPS, FIRST_DAMPING, LEAST_DAMPING, MOST_DAMPING, DAMPING_DECREASE, DAMPIN
     0.2,
     10.0,
 )
-LEAST_GAIN = 1e-4  # relative gain of the loss; a step that gains less is the last
+LEAST_FIT_GAIN = 1e-4  # relative gain of the loss; a step that gains less is the last
 _RANGES = {
     "neck": (-80, 80), "shoulder_flexion": (-120, 190), "shoulder_abduction": (-60, 120),
     "shoulder_rotation": (-120, 120), "elbow": (-5, 160), "hip_flexion": (-60, 140),
@@ -261,7 +261,7 @@ def _refine(start: _Subject, fixed: bool) -> _Subject:
     subject = start
     for outlier in OUTLIERS:
         damping, cost = FIRST_DAMPING, objective(subject, outlier)
-        for _ in range(MOST_STEPS):
+        for _ in range(MOST_FIT_STEPS):
             matrix, slope, solved = _reduced(subject, outlier, damping, (weight, mean))
             step = np.zeros(len(slope))
             step[free] = -np.linalg.solve(matrix[free, free], slope[free])
@@ -271,7 +271,7 @@ def _refine(start: _Subject, fixed: bool) -> _Subject:
             if tried < cost:
                 gain, cost, subject = cost - tried, tried, trial
                 damping = max(DAMPING_DECREASE * damping, LEAST_DAMPING)
-                if gain < LEAST_GAIN * cost:
+                if gain < LEAST_FIT_GAIN * cost:
                     break
             else:
                 damping *= DAMPING_INCREASE
@@ -417,7 +417,7 @@ def _descend(
 
     cost, damping = objective(pose, data), np.full(len(pose), FIRST_DAMPING)
     active = np.arange(len(pose))
-    for _ in range(MOST_STEPS):
+    for _ in range(MOST_FIT_STEPS):
         hessian, gradient = _normal_equations(pose[active], local, origins, data[active], outlier)
         diagonal = np.einsum("tii->ti", hessian)
         diagonal *= 1 + damping[active, None]
@@ -431,7 +431,7 @@ def _descend(
         damping[active] = np.maximum(
             damping[active] * np.where(better, DAMPING_DECREASE, DAMPING_INCREASE), LEAST_DAMPING
         )
-        active = active[(better & (gain > LEAST_GAIN)) | (~better & (damping[active] < MOST_DAMPING))]
+        active = active[(better & (gain > LEAST_FIT_GAIN)) | (~better & (damping[active] < MOST_DAMPING))]
         if not len(active):
             break
     return pose, cost

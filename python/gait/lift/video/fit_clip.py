@@ -353,12 +353,12 @@ def _finished(clip: ClipSegments, sequence: ClipStates) -> ClipFit:
     )
 
 
-KNOWN_SD = 0.03  # statures; joints known this well in the picture need no correction
+KNOWN_JOINT_SD = 0.03  # statures; joints known this well in the picture need no correction
 MOST_CORRECTIONS_PER_FRAME = 2.0  # most corrections suggested per frame
 
 
 def suggestions(clip: ClipSegments, fit: ClipFit) -> list[Suggestion]:
-    """Suggest corrections, most useful first, until every joint is known within `KNOWN_SD` statures.
+    """Suggest corrections, most useful first, until every joint is known within `KNOWN_JOINT_SD` statures.
 
     At most `MOST_CORRECTIONS_PER_FRAME`.  A correction is counted for the segment whose middle is nearest to
     its frame.
@@ -366,7 +366,7 @@ def suggestions(clip: ClipSegments, fit: ClipFit) -> list[Suggestion]:
     joints = [j for j in JOINTS if j in clip.prior.names]
     near = 0.5 * clip.hop / float(np.median(np.diff(clip.film.times))) if len(clip.film.times) > 1 else 1.0
     scale = float(np.median([clip.view.scale(body.mean(axis=0)) for body in fit.places]))
-    enough = KNOWN_SD * clip.placement.stature * scale
+    enough = KNOWN_JOINT_SD * clip.placement.stature * scale
     posteriors = _posteriors(clip, fit, clip.prior.index(joints))
     return suggest(posteriors, joints, near, enough, int(MOST_CORRECTIONS_PER_FRAME * len(fit.frame)))
 

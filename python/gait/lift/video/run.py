@@ -22,7 +22,7 @@ from gait.lift.video.clip_segments import ClipSegments, Settings
 from gait.lift.video.figure import Figure, write_overlay
 from gait.lift.video.fit_clip import (
     FOLLOWING_CORRELATION,
-    KNOWN_SD,
+    KNOWN_JOINT_SD,
     POOR_CORRELATION,
     ClipFit,
     fit_clip,
@@ -283,7 +283,7 @@ def summary(lifted: LiftedVideo, most: int) -> dict[str, Any]:
     clip, free, fit, figure = lifted.clip, lifted.free, lifted.fit, lifted.figure
     frames, given = len(fit.frame), len(clip.corrections)
     pixels = float(np.median([clip.view.scale(body.mean(axis=0)) for body in fit.places]))
-    enough = KNOWN_SD * clip.placement.stature * pixels
+    enough = KNOWN_JOINT_SD * clip.placement.stature * pixels
     before, after = correction_errors(clip, free), correction_errors(clip, fit)
     wanted = suggestions(clip, fit)
     joints = clip.prior.index([j for j in JOINTS if j in clip.prior.names])
