@@ -636,8 +636,8 @@ MUTANTS = (
         "L Fig. 5",
         "overlapping segments have equal weights",
         "python/gait/paper/leventon.py",
-        "ramp = np.minimum(np.arange(1, FRAMES + 1), np.arange(FRAMES, 0, -1)).astype(float)",
-        "ramp = np.ones(FRAMES)",
+        "ramp = np.minimum(np.arange(1, SEGMENT_FRAMES + 1), np.arange(SEGMENT_FRAMES, 0, -1)).astype(float)",
+        "ramp = np.ones(SEGMENT_FRAMES)",
         "test_paper_gaussian.py",
     ),
     Mutant(

@@ -20,6 +20,7 @@ from typing import NamedTuple
 
 from gait.errors import UserError
 from gait.io.files import replacing
+from gait.progress import note
 
 
 class Published(NamedTuple):
@@ -104,7 +105,7 @@ class Store:
     def fetch(self, report: Callable[[str], None]) -> Path:
         """Download the packages, check their files, and store them with the licence of their package.
 
-        npm packages are skipped if ``npm`` is not installed.
+        npm packages are skipped, with a line on stderr, if ``npm`` is not installed.
 
         Parameters
         ----------
@@ -130,7 +131,7 @@ class Store:
                 continue
             npm = "==" not in package
             if npm and not shutil.which("npm"):
-                report(f"npm is not installed: {' and '.join(w.file for w in wanted)} skipped")
+                note(f"npm is not installed: {' and '.join(w.file for w in wanted)} skipped")
                 continue
             report(f"downloading {package}")
             with tempfile.TemporaryDirectory() as temporary:

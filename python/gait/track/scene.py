@@ -282,6 +282,9 @@ def first_state(options: ClipOptions, scene: Scene) -> Start:
         require_scene(options, scene, scene.frames.start)
         start = _find_first_state(options, scene)
         _note_start(options, scene, start)
+    wanted = options.detector == "auto" and not options.keypoints and options.mode != Mode.PAPER
+    if wanted and not _has_detector(options):
+        note(f"without a detector start and track are less reliable: {weights.FETCH}", options.quiet)
     return start
 
 
@@ -362,8 +365,6 @@ def _note_start(options: ClipOptions, scene: Scene, start: Start) -> None:
         f"stature {at.stature:.2f} m, heading {turn:.0f} +- {turn_sd:.0f} deg",
         options.quiet,
     )
-    if not scene.people and options.detector == "auto" and options.mode != Mode.PAPER:
-        note(f"without a detector the start is less reliable: {weights.FETCH}", options.quiet)
     if start.apparent_stature:
         remedy = "check --height and" if options.height else "give --height or check"
         note(
@@ -376,6 +377,7 @@ def _note_start(options: ClipOptions, scene: Scene, start: Start) -> None:
 def _find_first_state(options: ClipOptions, scene: Scene) -> Start:
     """Find the first state from the keypoints or, if these do not fit a walk, from the pictures."""
     camera, model, frames, height = scene.camera, scene.model, scene.frames, options.height
+    against_camera = ""
     if scene.people:
         keypoints = scene.people[scene.person]
         found = find_keypoint_start(
@@ -387,20 +389,23 @@ def _find_first_state(options: ClipOptions, scene: Scene) -> Start:
             height=height,
             poses=scene.poses,
         )
-        _check_camera(options, scene)
+        against_camera = _check_camera(options, scene)
         if found is not None:
             return replace(found, source="the joints detected in the images")
-    found = find_start(
-        scene.video,
-        camera,
-        scene.empty,
-        model,
-        first=frames.start,
-        stop=options.stop,
-        height=height,
-        shapes=not _detects(options),  # slow, and useless if the detector found no person
-        shapes_first=finds_shapes(options),  # a median may show people
-    )
+    try:
+        found = find_start(
+            scene.video,
+            camera,
+            scene.empty,
+            model,
+            first=frames.start,
+            stop=options.stop,
+            height=height,
+            shapes=not _detects(options),  # slow, and useless if the detector found no person
+            shapes_first=finds_shapes(options),  # a median may show people
+        )
+    except UserError as exc:
+        raise UserError(against_camera or str(exc)) from exc
     return replace(found, source="the shape of a person in the images")
 
 
@@ -412,13 +417,16 @@ def _in_reference(scene: Scene) -> Keypoints | None:
     return scene.motion.in_reference(keypoints) if scene.motion is not None else None
 
 
-def _check_camera(options: ClipOptions, scene: Scene) -> None:
-    """Print a warning if the camera file contradicts the walk."""
+def _check_camera(options: ClipOptions, scene: Scene) -> str:
+    """Print a warning if the camera file contradicts the walk, and return it; empty if it does not."""
     keypoints = _in_reference(scene)
     if options.camera is None or keypoints is None:
-        return
-    if words := contradiction(scene.camera, keypoints, scene.model, options.height):
-        note(f"{options.camera}: {words}", options.quiet)
+        return ""
+    words = contradiction(scene.camera, keypoints, scene.model, options.height)
+    if not words:
+        return ""
+    note(f"{options.camera}: {words}", options.quiet)
+    return f"{options.camera}: {words}"
 
 
 def require_scene(options: ClipOptions, scene: Scene, first: int) -> None:
