@@ -228,7 +228,7 @@ def test_tracks_of_other_frames_are_refused(scene, tracks, capsys):
 
 FAULTS = [
     (["--camera", "{}/none.json"], "none.json: no such camera file"),
-    (["--init", "{}/none.json"], "none.json: no such init file"),
+    (["--init", "{}/none.json"], "none.json: no such start file"),
     (["--init", "{}/init.json", "--start", "3"], "init.json: frame is 0, --start is 3"),
     (["--background", "{}/none.png"], "none.png: no such background image"),
     (["--background", "{}/small.png"], "small.png: is 32x24, the video 320x240"),

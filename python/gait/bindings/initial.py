@@ -76,7 +76,7 @@ class Start:
         UserError
             One line naming file, key and remedy.
         """
-        fields, sds = read_start(path, "init", KEYS)
+        fields, sds = read_start(path, "start", KEYS)
         if "frame" in fields:
             own = frame_number(fields)
             if frame not in (None, own):

@@ -87,7 +87,7 @@ def main(argv: Sequence[str] | None = None) -> int:
     command = f" {words[0]}" if words and words[0] in COMMANDS else ""
     try:
         with Interruptible(ignored=True):
-            args = _parser(words).parse_args(list(_joined(words)))
+            args = _parse(words)
             code = int(args.run(args))
             sys.stdout.flush()  # at exit, Python would report a closed pipe
             return code
@@ -113,6 +113,18 @@ def main(argv: Sequence[str] | None = None) -> int:
         return _failed(command, f"{exc.filename or 'file'}: {exc.strerror or exc}")
     except KeyboardInterrupt:
         return _failed(command, "interrupted")
+
+
+def _parse(words: Sequence[str]) -> argparse.Namespace:
+    """Parse the command line; exit with code 2 after an error, which names the command."""
+    parser = _parser(words)
+    if not words:
+        parser.error("give a COMMAND; see gait --help")
+    args, unknown = parser.parse_known_args(list(_joined(words)))
+    if unknown:  # which the parser itself would report without the command
+        parser.prog = f"gait {args.command}"
+        parser.error(f"unrecognized arguments: {' '.join(unknown)}; see {parser.prog} --help")
+    return args
 
 
 def _failed(command: str, text: str) -> int:

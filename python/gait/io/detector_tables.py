@@ -126,7 +126,7 @@ def _rows(path: str | os.PathLike[str]) -> list[list[str]]:
     except OSError as error:
         raise unreadable(path, error) from error
     except (UnicodeDecodeError, csv.Error) as error:
-        raise UserError(f"{path}: not a CSV file ({error})") from None
+        raise UserError(f"{path}: not a CSV file in UTF-8 ({error}); export it again") from None
 
 
 def _numbers(where: str, cells: Sequence[str], width: int) -> list[float]:

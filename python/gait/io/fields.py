@@ -127,7 +127,7 @@ def read_json(path: str | os.PathLike[str], what: str) -> Fields:
     """Read a JSON object. `what`: what the file is, for messages: ``"camera"``."""
     require_file(path, f"{what} file")
     data = json_object(
-        path, f"correct it, or write the {what} again", f"{what} files are objects of keys in braces"
+        path, f"correct it, or write the {what} file again", f"{what} files are objects of keys in braces"
     )
     return Fields(str(path), data)
 

@@ -385,7 +385,7 @@ def _table(path: str | os.PathLike[str]) -> tuple[list[str], list[list[str]]]:
         text = Path(path).read_text(encoding="utf-8-sig")
         lines = [row for _, row in table_rows(text) if row]
     except (UnicodeDecodeError, csv.Error) as exc:
-        raise UserError(f"{path}: not a CSV file ({exc})") from None
+        raise UserError(f"{path}: not a CSV file in UTF-8 ({exc}); write or export it again") from None
     if len(lines) < 2:
         raise UserError(f"{path}: has no rows; keypoints are a header and one row per frame")
     head = [name.strip() for name in lines[0]]

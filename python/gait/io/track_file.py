@@ -299,12 +299,12 @@ class _Table:
     def __init__(self, path: str | os.PathLike[str], what: str) -> None:
         self.path, self.what = path, what
         require_file(path, f"{what} file")
+        form = f"give a {what} CSV with a header and one row per frame"
         try:
             with open(path, newline="", encoding="utf-8-sig") as file:
                 lines = list(csv.reader(file))
         except (UnicodeDecodeError, csv.Error) as exc:
-            raise UserError(f"{path}: not a CSV file ({exc})") from None
-        form = f"give a {what} CSV with a header and one row per frame"
+            raise UserError(f"{path}: not a CSV file in UTF-8 ({exc}); {form}") from None
         if len(lines) < 2:
             raise UserError(f"{path}: has no rows; {form}")
         names, *rows = lines

@@ -382,5 +382,5 @@ def _frame_of(init: str) -> int:
     """Read the frame of an init file, before which frames need not be sent."""
     if init == "auto":
         return 0
-    fields = read_json(init, "init")
+    fields = read_json(init, "start")
     return fields.integer("frame", 0, 1 << 31, "give the frame number, from 0") if "frame" in fields else 0

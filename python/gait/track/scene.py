@@ -160,7 +160,7 @@ class Scene:
         given = None if options.background in ("auto", "none") else background(options.background, video)
         with ThreadPoolExecutor(1) as pool:
             # Another core computes the median of the clip while the detector runs.
-            beside = pool.submit(_sample, options, video, poses) if _detects(options) else None
+            beside = pool.submit(_sample, options, video, poses) if detects(options) else None
             if beside is None:
                 with progress("background", video.count, options.quiet) as update:
                     samples, plate = _sample(options, video, poses, update)
@@ -357,19 +357,23 @@ def _shape_trunks(scene: Scene) -> tuple[Array, Array, float]:
     return np.minimum(*trunk), np.maximum(*trunk), len(found) / len(samples)
 
 
+def start_words(start: Start) -> str:
+    """Where the person starts, how tall and in which direction, in words."""
+    at, turn, turn_sd = start.mean, np.degrees(start.mean.heading), np.degrees(start.sd.heading)
+    return (
+        f"x {at.pelvis[0]:.2f} y {at.pelvis[1]:.2f} m, stature {at.stature:.2f} m, "
+        f"heading {turn:.0f} +- {turn_sd:.0f} deg"
+    )
+
+
 def _note_start(options: ClipOptions, scene: Scene, start: Start) -> None:
     """Print where the start is, and what makes it uncertain."""
-    at, turn, turn_sd = start.mean, np.degrees(start.mean.heading), np.degrees(start.sd.heading)
-    note(
-        f"start found at frame {start.frame}: x {at.pelvis[0]:.2f} y {at.pelvis[1]:.2f} m, "
-        f"stature {at.stature:.2f} m, heading {turn:.0f} +- {turn_sd:.0f} deg",
-        options.quiet,
-    )
+    note(f"start found at frame {start.frame}: {start_words(start)}", options.quiet)
     if start.apparent_stature:
         remedy = "check --height and" if options.height else "give --height or check"
         note(
             f"the person appears {start.apparent_stature:.2f} m tall by the camera, taken for "
-            f"{at.stature:.2f} m: {remedy} the camera",
+            f"{start.mean.stature:.2f} m: {remedy} the camera",
             options.quiet,
         )
 
@@ -401,7 +405,7 @@ def _find_first_state(options: ClipOptions, scene: Scene) -> Start:
             first=frames.start,
             stop=options.stop,
             height=height,
-            shapes=not _detects(options),  # slow, and useless if the detector found no person
+            shapes=not detects(options),  # slow, and useless if the detector found no person
             shapes_first=finds_shapes(options),  # a median may show people
         )
     except UserError as exc:
@@ -462,7 +466,7 @@ def one_is_grey(image: Image, plate: Image) -> bool:
 
 def _detect(options: ClipOptions, video: Video, frames: range) -> tuple[dict[int, Keypoints], int]:
     """Find everyone's keypoints with the detector, and the main person; empty without a detector."""
-    if not _detects(options):
+    if not detects(options):
         return {}, -1
     from gait.detect import people as detector  # here, as it loads the networks' runtime
 
@@ -516,12 +520,12 @@ def _who_starts(
 
 def _require_detector(options: ClipOptions) -> None:
     """Raise UserError, before long work, if weights are damaged, or missing although asked for."""
-    if _detects(options):
+    if detects(options):
         weights.load(weights.PERSON)
         weights.load(weights.LANDMARK_NETWORKS[options.network])
 
 
-def _detects(options: ClipOptions) -> bool:
+def detects(options: ClipOptions) -> bool:
     """Whether to run the detector: not with a file of keypoints, and with ``auto`` only if it has weights."""
     if options.keypoints or options.detector == "none" or options.mode == Mode.PAPER:
         return False
@@ -531,7 +535,7 @@ def _detects(options: ClipOptions) -> bool:
 def finds_shapes(options: ClipOptions) -> bool:
     """Whether to search people's shapes: if there are no keypoints, and no empty scene was given."""
     given = options.keypoints or options.background not in ("auto", "none")
-    return not (given or options.mode == Mode.PAPER or _detects(options))
+    return not (given or options.mode == Mode.PAPER or detects(options))
 
 
 def _has_detector(options: ClipOptions) -> bool:

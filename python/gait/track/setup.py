@@ -4,15 +4,13 @@ from __future__ import annotations
 
 from pathlib import Path
 
-import numpy as np
-
 from gait.bindings.abi import Mode
 from gait.bindings.initial import Start
 from gait.camera.path import one_place
 from gait.io.video import EMPTY_SCENE_FRAMES
 from gait.report.camera_facts import camera_facts
 from gait.track.options import ClipOptions
-from gait.track.scene import Scene
+from gait.track.scene import Scene, detects, start_words
 
 _BESIDE = {"init": "init.json", "camera": "camera.json"}
 
@@ -78,11 +76,7 @@ def _same(path: Path, other: str | None) -> bool:
 def _start(options: ClipOptions, start: Start) -> str:
     if options.init != "auto":
         return f"{options.init}, frame {start.frame}"
-    turn, sd = np.degrees(start.mean.heading), np.degrees(start.sd.heading)
-    return (
-        f"found at frame {start.frame} from {start.source}: x {start.mean.pelvis[0]:.2f} y "
-        f"{start.mean.pelvis[1]:.2f} m, stature {start.mean.stature:.2f} m, heading {turn:.0f} ± {sd:.0f}°"
-    )
+    return f"found at frame {start.frame} from {start.source}: {start_words(start)}"
 
 
 def _background(options: ClipOptions, scene: Scene, used: bool) -> str:
@@ -110,5 +104,7 @@ def _keypoints(options: ClipOptions, scene: Scene) -> str:
     if options.keypoints:
         return f"from {options.keypoints}"
     if not scene.people:
-        return "none: without the detector"
+        if options.detector == "none" or options.mode == Mode.PAPER:
+            return "none: without the detector"
+        return "none" if detects(options) else "none (no detector weights: gait detect --fetch)"
     return f"by the detector, network {options.network}"
