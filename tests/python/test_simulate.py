@@ -430,6 +430,17 @@ def test_a_file_in_place_of_the_folder_is_refused(tmp_path: Path) -> None:
         simulate(TINY, tmp_path / "taken")
 
 
+def test_an_interrupt_leaves_no_empty_folder_but_keeps_the_users(tmp_path: Path) -> None:
+    def interrupt(done: int) -> None:
+        raise KeyboardInterrupt
+
+    (tmp_path / "there").mkdir()
+    for name in ("new", "there"):
+        with pytest.raises(KeyboardInterrupt):
+            simulate(TINY, tmp_path / name, interrupt, keep=False)
+    assert [path.name for path in tmp_path.iterdir()] == ["there"]
+
+
 def test_a_model_that_cannot_be_walked_leaves_no_folder(tmp_path: Path) -> None:
     (tmp_path / "old.gait").write_bytes(b"no model")
     with pytest.raises(UserError, match="old.gait"):

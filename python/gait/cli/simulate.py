@@ -7,7 +7,7 @@ contact.jpg; for further people truth_2.csv, init_2.json, meta_2.json and so on;
 video_2.mp4, background_2.png, camera_2.json and so on (pixels in truth.csv are those of the first).  The same
 options and seed give the same pictures.
 
-presets (other options change them):
+presets (other options change them; the defaults below are those of demo):
   demo     side view, left to right, 4 s
   side     side view, right to left, the exposure flickers by 1 %
   oblique  at 45 degrees, coming nearer
@@ -27,6 +27,7 @@ import argparse
 import json
 import time
 from dataclasses import fields, replace
+from functools import partial
 from typing import Any
 
 from gait.progress import progress
@@ -61,68 +62,75 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "--preset", choices=PRESETS, default="demo", help="scenario to start from (default: demo)"
     )
-    parser.add_argument("--view", choices=VIEWS, help="direction of view")
-    parser.add_argument(
-        "--direction", choices=DIRECTIONS, help="walk left to right (lr) or right to left (rl)"
-    )
-    parser.add_argument(
+    add = partial(_add, parser)
+    add("--view", choices=VIEWS, help="direction of view")
+    add("--direction", choices=DIRECTIONS, help="walk left to right (lr) or right to left (rl)")
+    add(
         "--motion",
         choices=MOTIONS,
         help="stop: walk, stop, stand and walk on; turn: turn a corner; run: as in --gait, or like the "
         "package's runners",
     )
-    parser.add_argument(
+    add(
         "--asymmetry",
         type=float,
         metavar="PCT",
         help="how much the left leg (negative: the right) is spared, as with a prosthesis, per cent",
     )
-    parser.add_argument("--aid", choices=AIDS, help="walk with a stick or with forearm crutches")
-    parser.add_argument(
+    add("--aid", choices=AIDS, help="walk with a stick or with forearm crutches")
+    add(
         "--body",
         choices=BODIES,
-        help="drawn: proportions drawn from the people that the model was learnt from",
+        help="table: textbook proportions, varied at random; drawn: those of the people that the model was "
+        "learnt from",
     )
-    parser.add_argument(
+    add(
         "--moving",
         choices=MOVING,
         help="follow: a robot follows the person at 1 m; pan: the camera turns to them; shake: it is "
         "hand-held",
     )
-    parser.add_argument(
+    add(
         "--people",
         choices=COMPANY,
         help="a second person comes the other way, three walk abreast, or a faster person overtakes",
     )
-    parser.add_argument(
+    add(
         "--cameras",
         type=int,
         metavar="N",
         help=f"film with several cameras at once, up to {MOST_CAMERAS}: video_2.mp4, camera_2.json and so on",
     )
-    parser.add_argument("--frames", type=int, metavar="N")
-    parser.add_argument("--fps", type=float, metavar="HZ")
-    parser.add_argument("--size", type=_size, metavar="WxH", help="pixels, even")
-    parser.add_argument("--stature", type=float, metavar="M", help="metres")
-    parser.add_argument("--speed", type=float, metavar="M_S", help="metres per second")
-    parser.add_argument("--stride-hz", type=float, metavar="HZ", help="strides (two steps) per second")
-    parser.add_argument("--distance", type=float, metavar="M", help="camera to the middle of the path")
-    parser.add_argument("--camera-height", type=float, metavar="M")
-    parser.add_argument(
-        "--seed", type=int, metavar="S", help="seed for person, clothes, gait, scene and noise"
-    )
-    parser.add_argument("--pole", action="store_true", default=None, help="put a pole in front of the path")
-    parser.add_argument("--clutter", action="store_true", default=None, help="use a busier background")
-    parser.add_argument(
-        "--flicker", type=float, metavar="PCT", help="standard deviation of the exposure, per cent"
-    )
-    parser.add_argument("--noise", type=float, metavar="SIGMA", help="sensor noise, grey levels")
-    parser.add_argument(
+    add("--frames", type=int, metavar="N", help="number of frames")
+    add("--fps", type=float, metavar="HZ", help="frames per second")
+    add("--size", type=_size, metavar="WxH", help="pixels, even")
+    add("--stature", type=float, metavar="M", help="of the person, metres")
+    add("--speed", type=float, metavar="M_S", help="metres per second")
+    add("--stride-hz", type=float, metavar="HZ", help="strides (two steps) per second")
+    add("--distance", type=float, metavar="M", help="camera to the middle of the path, metres")
+    add("--camera-height", type=float, metavar="M", help="camera above the ground, metres")
+    add("--seed", type=int, metavar="S", help="seed for person, clothes, gait, scene and noise")
+    add("--pole", action="store_true", default=None, help="put a pole in front of the path")
+    add("--clutter", action="store_true", default=None, help="use a busier background")
+    add("--flicker", type=float, metavar="PCT", help="standard deviation of the exposure, per cent")
+    add("--noise", type=float, metavar="SIGMA", help="sensor noise, grey levels")
+    add(
         "--gait",
         "--model",
         metavar=f"M.gait|{GENERATOR}",
         help="walk like a model, or with a normative gait",
     )
+
+
+def _add(parser: argparse.ArgumentParser, option: str, *more: str, help: str, **settings: Any) -> None:
+    """Add an option of a scenario; its help ends with the value in the preset demo."""
+    value = getattr(PRESETS["demo"], option.removeprefix("--").replace("-", "_"))
+    if isinstance(value, tuple):
+        value = "x".join(map(str, value))
+    elif isinstance(value, float):
+        value = f"{value:g}"
+    default = "" if isinstance(value, bool) else f" (default: {value or 'by the seed'})"
+    parser.add_argument(option, *more, help=help + default, **settings)
 
 
 def run(args: argparse.Namespace) -> int:

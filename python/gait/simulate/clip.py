@@ -6,6 +6,7 @@ import csv
 import json
 import os
 from collections.abc import Callable, Iterable, Iterator
+from contextlib import contextmanager, suppress
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
@@ -318,45 +319,56 @@ def simulate(
     contradict each other.
     """
     stage = set_stage(scenario)
-    target = _folder(folder, files(scenario))
-    made = build_set(stage)
-    figures = [(made.mesh, made.appearance), *made.others]
-    for number in range(1, scenario.cameras + 1):
-        _write_video(target, stage, made, number, progress, keep)
-    if stage.cameras:
-        times = [frame / scenario.fps for frame in range(scenario.frames)]
-        poses = [CameraPose.of(camera) for camera in stage.cameras]
-        with replacing(target / _POSES) as temporary:
-            write_path(temporary, times, poses, by_frame=False)
-    else:
-        _write_picture(target / "background.png", background(made.scene))
-    _write_json(target / "camera.json", stage.camera.to_dict())
-    for number, camera in enumerate(stage.beside, 2):
-        scene = build_scene(camera, made.layout, made.coats)
-        _write_picture(target / _numbered("background.png", number), background(scene))
-        _write_json(target / _numbered("camera.json", number), camera.to_dict())
-    metas = []
-    for k, (one, (_, appearance)) in enumerate(zip([stage, *stage.others], figures, strict=True), 1):
-        events = find_events(one)
-        write_truth(target / _numbered("truth.csv", k), one, events["r_heel_strike"])
-        _write_json(target / _numbered("init.json", k), first_state(one, events["r_heel_strike"]))
-        metas.append(describe(one, replace(made, appearance=appearance), events))
-        _write_json(target / _numbered("meta.json", k), metas[-1])
-    return metas[0]
+    with _folder(folder, files(scenario)) as target:
+        made = build_set(stage)
+        figures = [(made.mesh, made.appearance), *made.others]
+        for number in range(1, scenario.cameras + 1):
+            _write_video(target, stage, made, number, progress, keep)
+        if stage.cameras:
+            times = [frame / scenario.fps for frame in range(scenario.frames)]
+            poses = [CameraPose.of(camera) for camera in stage.cameras]
+            with replacing(target / _POSES) as temporary:
+                write_path(temporary, times, poses, by_frame=False)
+        else:
+            _write_picture(target / "background.png", background(made.scene))
+        _write_json(target / "camera.json", stage.camera.to_dict())
+        for number, camera in enumerate(stage.beside, 2):
+            scene = build_scene(camera, made.layout, made.coats)
+            _write_picture(target / _numbered("background.png", number), background(scene))
+            _write_json(target / _numbered("camera.json", number), camera.to_dict())
+        metas = []
+        for k, (one, (_, appearance)) in enumerate(zip([stage, *stage.others], figures, strict=True), 1):
+            events = find_events(one)
+            write_truth(target / _numbered("truth.csv", k), one, events["r_heel_strike"])
+            _write_json(target / _numbered("init.json", k), first_state(one, events["r_heel_strike"]))
+            metas.append(describe(one, replace(made, appearance=appearance), events))
+            _write_json(target / _numbered("meta.json", k), metas[-1])
+        return metas[0]
 
 
-def _folder(folder: str | os.PathLike[str], names: Iterable[str]) -> Path:
-    """Create the folder, and check before the work that every file can be written there."""
+@contextmanager
+def _folder(folder: str | os.PathLike[str], names: Iterable[str]) -> Iterator[Path]:
+    """Create the folder, and check before the work that every file can be written there.
+
+    A folder that did not exist is removed if the block fails before anything is written.
+    """
     target = Path(folder)
+    new = not target.exists()
     try:
         target.mkdir(parents=True, exist_ok=True)
     except (FileExistsError, NotADirectoryError):
         raise UserError(f"{target}: is a file; give the name of a folder") from None
     except OSError as exc:
         raise UserError(f"{target}: cannot be created ({exc.strerror}); choose another place") from None
-    for name in names:
-        require_writable(target / name)
-    return target
+    try:
+        for name in names:
+            require_writable(target / name)
+        yield target
+    except BaseException:
+        if new:
+            with suppress(OSError):  # if it is not empty
+                target.rmdir()
+        raise
 
 
 def _write_video(
