@@ -61,7 +61,12 @@ def test_the_installed_daemon_runs_by_itself(installed):
     assert done.stdout.startswith("gait-trackd ")
     log = ["--config", installed / "trackd.toml", "--url", "file:///nothing?speed=0"]
     done = subprocess.run([*daemon, *log], capture_output=True, text=True, env={}, check=False)
+    assert "--snapshot: a log is played from its start" in done.stderr
+    several = re.sub("^snapshot = .*$", "keypoints-term = true\npeople = 2", config, flags=re.M)
+    (installed / "trackd.toml").write_text(several)
+    done = subprocess.run([*daemon, *log], capture_output=True, text=True, env={}, check=False)
     assert "cannot open this log" in done.stderr  # model and options are fine
+    assert "--snapshot" not in (prefix / "lib/systemd/system/gait-trackd.service").read_text()
 
 
 def test_the_unit_is_one_that_systemd_accepts(installed):
