@@ -121,6 +121,14 @@ def test_a_lifted_motion(tmp_path):
     ahead = turned(trees[3].transforms[0].transform.rotation, np.array([1.0, 0.0, 0.0]))
     assert ahead @ (places_in[3] - places_in[0])[JOINTS.index("pelvis")] > 0  # from the hips
 
+    head, *rows = source.read_text().splitlines()
+    source.write_text("\n".join([f"{head},person", *(f"{row},2" for row in rows)]))
+    for name, more in (("b", ["--ros2"]), ("c", [])):
+        assert gait.cli.main(["export", str(source), "-o", str(tmp_path / f"{name}.mcap"), *more]) == 0
+    topics = Counter(topic for _, topic, _ in read(tmp_path / "b.mcap"))
+    assert topics == {"/tf": 4, "/humans/bodies/tracked": 4, "/gait/2/status": 4}
+    assert b"/person_2" in (tmp_path / "c.mcap").read_bytes()
+
 
 def test_faults_end_in_one_line(tmp_path, capsys):
     (tmp_path / "a.log").write_bytes(b"\xed\xa1\xda\x01")

@@ -144,20 +144,21 @@ def _writing(path: Path) -> Iterator[_Writer]:
 
 
 def write_motion(path: Path, motion: Motion) -> int:
-    """Write a motion's frames: /person as a scene, /state as numbers; return the number of frames."""
+    """Write a motion's frames: /person or /person_N as a scene, /state as numbers; return their count."""
     rows = np.flatnonzero(motion.present).tolist()
     with _writing(path) as writer:
         for row, k in enumerate(rows):
             at = round(float(motion.track.time[row]) * 1e9)
-            writer.add("/person", "foxglove.SceneUpdate", scene(motion.names, motion.places[k], at), at)
+            update = scene(motion.names, motion.places[k], at, motion.person)
+            writer.add(f"/{motion.person}", "foxglove.SceneUpdate", update, at)
             state = {name: _plain(float(values[row])) for name, values in motion.track.numbers.items()}
             state |= {"frame": int(motion.track.frame[row]), "status": motion.track.status[row]}
             writer.add("/state", "gait.State", state, at)
     return len(rows)
 
 
-def scene(names: Sequence[str], joints: Array, nanoseconds: int) -> dict[str, Any]:
-    """Make a foxglove.SceneUpdate of a person's joints (P, 3), metres."""
+def scene(names: Sequence[str], joints: Array, nanoseconds: int, person: str = "person") -> dict[str, Any]:
+    """Make a foxglove.SceneUpdate of a person's joints (P, 3), metres; `person`: identifier of the entity."""
     place = dict(zip(names, joints.tolist(), strict=True))
     points = [_point(place[end]) for bone in BONES if all(e in place for e in bone) for end in bone]
     still = {"x": 0.0, "y": 0.0, "z": 0.0, "w": 1.0}
@@ -178,7 +179,7 @@ def scene(names: Sequence[str], joints: Array, nanoseconds: int) -> dict[str, An
         **{"scale_invariant": False, "points": points, "color": _COLOUR, "colors": [], "indices": []},
     }
     entity = {
-        **{"timestamp": _stamp(nanoseconds), "frame_id": _FRAME, "id": "person", "lifetime": _stamp(0)},
+        **{"timestamp": _stamp(nanoseconds), "frame_id": _FRAME, "id": person, "lifetime": _stamp(0)},
         **{"frame_locked": False, "metadata": [], "spheres": spheres, "lines": [line]},
         **{kind: [] for kind in ("arrows", "cubes", "cylinders", "triangles", "texts", "models")},
     }

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from gait.body.skeleton import JOINTS
 from gait.errors import UserError
-from gait.io.track_file import Track, read_estimates
+from gait.io.track_file import PERSON_COLUMN, Track, read_estimates
 from gait.motion.footfalls import Events, find_events
 
 Array = NDArray[np.float64]
@@ -38,6 +38,12 @@ class Motion:
     def present(self) -> NDArray[np.bool_]:
         """Whether the track has each frame, (T,)."""
         return np.asarray(np.isfinite(self.places).all(axis=(1, 2)))
+
+    @property
+    def person(self) -> str:
+        """Name of the person: ``person``, or ``person_N`` if the track states a number."""
+        number = self.track.numbers.get(PERSON_COLUMN)
+        return "person" if number is None else f"person_{number[0]:.0f}"
 
     def events(self) -> Events | None:
         """Heel strikes and toe-offs, seconds; None if there are too few frames."""

@@ -27,9 +27,9 @@ def write(path: Path, motion: Motion) -> int:
         stream.set_time("time", duration=float(motion.time[k]))
         stream.set_time("frame", sequence=int(motion.track.frame[row]))
         joints = motion.places[k]
-        stream.log("person/joints", rr.Points3D(joints, radii=_JOINT))
-        stream.log("person/bones", rr.LineStrips3D([joints[[a, b]] for a, b in pairs], radii=_BONE))
-        stream.log("person/status", rr.TextLog(motion.track.status[row]))
+        stream.log(f"{motion.person}/joints", rr.Points3D(joints, radii=_JOINT))
+        stream.log(f"{motion.person}/bones", rr.LineStrips3D([joints[[a, b]] for a, b in pairs], radii=_BONE))
+        stream.log(f"{motion.person}/status", rr.TextLog(motion.track.status[row]))
         for name, values in motion.track.numbers.items():
             stream.log(f"state/{name}", rr.Scalars(float(values[row])))
     stream.flush()

@@ -19,6 +19,7 @@ from numpy.typing import NDArray
 from gait.camera.camera import Camera
 from gait.errors import UserError
 from gait.export.motion import Motion
+from gait.io.track_file import PERSON_COLUMN
 
 Array = NDArray[np.float64]
 
@@ -227,7 +228,7 @@ def _writing(path: Path) -> Iterator[_Writer]:
 def write_motion(path: Path, motion: Motion) -> dict[str, int]:
     """Write a motion's frames; return the number of messages by topic."""
     track = motion.track
-    number = track.numbers.get("person")
+    number = track.numbers.get(PERSON_COLUMN)
     bodies, heading = Bodies(), track.numbers.get("heading_rad")
     with _writing(path) as writer:
         for row, k in enumerate(np.flatnonzero(motion.present).tolist()):

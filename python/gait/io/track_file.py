@@ -38,6 +38,7 @@ STATUSES = ("init", "tracking", "ambiguous", "lost")
 CLASS_COLUMN = "motion_class"
 CLIP_COLUMNS = ("reason", "first_frame", "last_frame")
 FILM_COLUMN = "film"
+PERSON_COLUMN = "person"
 CAMERA_COLUMNS = tuple(f"camera_{k}_{what}" for k in range(1, 5) for what in ("x", "y", "heading"))
 
 
@@ -95,7 +96,7 @@ class TrackWriter:
         self._header = header(components, angle_names, classes)
         self._header += CLIP_COLUMNS if frames is not None else ()
         self._header += CAMERA_COLUMNS if camera_change is not None else ()
-        self._last = {"person": person, FILM_COLUMN: film}
+        self._last = {PERSON_COLUMN: person, FILM_COLUMN: film}
         self._last = {name: value for name, value in self._last.items() if value is not None}
         self._header += self._last
         self._stack = ExitStack()
@@ -289,7 +290,7 @@ def _camera_change(table: _Table) -> Array:
 
 def _is_number(column: str) -> bool:
     """Whether a column belongs in `Track.numbers`."""
-    known = column in STATE_COLUMNS[3:] or column in SD_COLUMNS or column.endswith("_deg")
+    known = column in (*STATE_COLUMNS[3:], *SD_COLUMNS, PERSON_COLUMN) or column.endswith("_deg")
     return known or column.startswith("p_") or re.fullmatch(r"c_\d+(_sd)?", column) is not None
 
 
