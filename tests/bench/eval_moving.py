@@ -69,12 +69,13 @@ def main() -> int:
             add(kind, "noisy", folder, camera_path="noisy.csv")
             add(kind, "noisy, sd not given", folder, camera_path="unstated.csv")
             add(kind, "estimated", folder, stabilize="auto")
-    rows, missed = [], False
+    rows, missed = [], []
     for (kind, arm), values in roots.items():
         still = np.median(roots[STILL.get(kind, kind), "still"])
         ratio = float(np.median(values) / still)
         bound = WANTED.get(arm)
-        missed |= bound is not None and ratio > bound
+        if bound is not None and ratio > bound:
+            missed.append(f"{kind} {arm} {ratio:.3f} (wanted {bound:.3f})")
         extremes = f"{min(values):.0f}-{max(values):.0f}"
         rows.append(
             [kind, arm, float(np.median(values)), extremes, ratio, bound, float(np.median(places[kind, arm])),
@@ -89,10 +90,10 @@ def main() -> int:
         "the range in brackets. to still: relative to a still camera with that view. noisy: errors of "
         f"{np.degrees(TURN_SD):.1f} degrees and {100 * PLACE_SD:.0f} cm, drawn anew for each frame; sd "
         "not given: without standard deviations in the file. follow: the camera is on a robot 1 m "
-        "behind. lost: frames with the status lost."
+        f"behind. lost: frames with the status lost. Missed: {', '.join(missed) or 'none'}."
     )
     (table.publish if args.record else _show)("moving", title, head, rows, note)
-    return int(missed)
+    return int(bool(missed))
 
 
 def _show(name: str, title: str, head: list[str], rows: list[list[object]], note: str) -> None:

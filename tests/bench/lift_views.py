@@ -100,8 +100,9 @@ def main() -> int:
         "and in the world; errors of the angles at elbows, hips and knees are in degrees, over frames "
         "and joints. Coverage is that of 90 % intervals. Pose2Sim's published errors of joint angles are "
         "2 to 6 degrees; they are for other motions and relative to markers, so only the order of "
-        "magnitude can be compared. The films themselves are not lifted, because they are cut to 1080 "
-        "columns and the calibration is for 1088."
+        "magnitude can be compared. The films themselves are not lifted: those of cam_01 and cam_02 "
+        "are cut to 1080 columns while their calibration is for 1088; those of cam_03 and cam_04 match "
+        "theirs."
     )
     title = "A real motion by one camera and by several"
     table.publish("lift_views", title, head, rows, note) if record else table.show(title, head, rows)

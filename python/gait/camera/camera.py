@@ -325,6 +325,8 @@ def read_camera(
         camera, stated = _from_entries(file, _entries(file, suffix, name), size, placed)
     elif suffix == ".toml":
         camera = _from_toml(file, name)
+    elif suffix == ".bin":
+        raise UserError(f"{file}: binary; convert it with colmap model_converter --output_type TXT")
     else:
         raise UserError(
             f"{file}: unknown camera suffix; use .json, .yaml, .yml, .xml, .toml, .txt or .pickle"
@@ -602,7 +604,7 @@ def _lens(
     matrix = np.array([[fx, 0, cx], [0, fy, cy], [0, 0, 1.0]])
     found = agreeing("fisheye" if fisheye else "opencv", given, matrix, size)
     if found is None or found[2] > AGREE:
-        best = "none" if found is None else f"{found[2]:.2g} px off at best"
+        best = "no lens fits" if found is None else f"{found[2]:.2g} px off at best"
         kind = f"describes a {'fisheye ' * fisheye}lens"
         what = f"{kind} that k1 k2 p1 p2 k3 cannot replace within {AGREE:g} px ({best})"
         raise fields.fail(key, what, "undistort the video, or calibrate with k1 k2 p1 p2 [k3]")
