@@ -242,6 +242,7 @@ def test_the_command_smooths_and_repeats_itself(folder):
         np.testing.assert_allclose(draws.joints[:, :, i].mean(axis=0), smooth.places[name], atol=2e-5)
 
 
+@pytest.mark.long  # reads the draws of the test above
 def test_draws_need_smoothing_and_their_own_track(folder, capsys):
     assert track(folder, "x.csv", "--draws", str(folder / "x.npz")) == 2
     assert "--smooth" in capsys.readouterr().err and not (folder / "x.csv").exists()

@@ -223,7 +223,7 @@ class Script:
         self.starts.append(round(utime * 30 / 1e6))
         self.gone = False
 
-    def step(self, image, utime, keypoints, poses, backgrounds):
+    def step(self, image, utime, keypoints, poses, backgrounds, people):
         self.gone |= round(abs(utime) * 30 / 1e6) == self.leaves
         return replace(self.estimate, joints=JOINTS[-1] + [self.gone * 1.0, 0, 0])
 

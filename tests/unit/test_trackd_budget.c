@@ -147,7 +147,7 @@ static void test_what_was_too_many_is_tried_less_and_less_often(void)
     CHECK(changes(&b, &particles, 1022, 600 * SECOND) < 24);
     int const tries = changes(&b, &particles, 1022, 600 * SECOND);
     CHECK(tries > 4 && tries < 16); /* it keeps trying */
-    CHECK(b.failed == 2044 && b.patience == PATIENCE);
+    CHECK(b.failed == 2044 && b.patience == LONGEST_WAIT);
     changes(&b, &particles, 4000, 600 * SECOND); /* whatever took the time is gone */
     CHECK(particles == 4000 && b.failed == 0 && b.patience == 0);
     CHECK(changes(&b, &particles, 1022, 3 * SECOND) == 2 && particles == 1000);
