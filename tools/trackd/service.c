@@ -252,8 +252,11 @@ void service_camera(service *s, const gaitmsg_camera_t *msg)
     gait_camera camera;
     message why;
     bool const known = s->track.tracker != NULL;
+    message const before = s->refused;
     s->refused.text[0] = '\0';
     if (!take_camera(s, msg, &camera, &why)) {
+        if (strcmp(before.text, why.text) != 0)
+            s->idle = SERVICE_IDLE_NOT; /* frames now have another reason not to be tracked, which is reported */
         s->refused = why;
         service_complain(s, "%s", why.text);
         return;
