@@ -352,7 +352,7 @@ golden-check: ## tracker and lifter have their pinned digests at -O0, -O2 and -O
 pass = $(foreach v,VIDEO CAMERA INIT BACKGROUND HEIGHT START STOP,$(if $($(v)),--$(shell echo $(v) | tr A-Z a-z) '$($(v))'))
 
 demo: ## clip -> LCM -> gait-trackd -> report (VIDEO CAMERA INIT BACKGROUND HEIGHT START STOP)
-	@$(MAKE) --no-print-directory $(JOBS) setup lib tools
+	@$(MAKE) --no-print-directory --silent $(JOBS) setup lib tools
 	@$(VENV)/bin/gait demo $(pass) $(ARGS)
 
 MOCAP ?= ../shared/data/mocap/cmu_walk

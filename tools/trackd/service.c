@@ -256,7 +256,7 @@ void service_camera(service *s, const gaitmsg_camera_t *msg)
     s->refused.text[0] = '\0';
     if (!take_camera(s, msg, &camera, &why)) {
         if (strcmp(before.text, why.text) != 0)
-            s->idle = SERVICE_IDLE_NOT; /* frames now have another reason not to be tracked, which is reported */
+            s->idle = SERVICE_IDLE_NOT; /* the new reason is reported with the next frame */
         s->refused = why;
         service_complain(s, "%s", why.text);
         return;
