@@ -72,14 +72,14 @@ def films(stop: int, joints: Joints, names: list[str]) -> tuple[list[object], st
     with tempfile.TemporaryDirectory() as folder:
         out = Path(folder) / "motion.csv"
         done = subprocess.run([*map(str, words), "-o", str(out)], capture_output=True, text=True, check=False)
-        said = "; ".join(re.findall(r"the estimate(?:d stature)? is .*", done.stderr))
+        warnings = "; ".join(re.findall(r"the estimate(?:d stature)? is .*", done.stderr))
         if done.returncode:
-            return [head, *[None] * 8], f"{stop} frames are refused: {said or done.stderr}"
+            return [head, *[None] * 8], f"{stop} frames are refused: {warnings or done.stderr}"
         found = read_estimates(out)
     places, sd = (np.stack([of[name] for name in names], axis=1) for of in (found.places, found.sd))
     truth = np.stack([joints.places[name][found.frame] for name in names], axis=1)
     inside = float((np.abs(places - truth) < lift_tracks.WITHIN * sd).mean())
-    return [head, *measures(places, sd, truth, names), inside, None, None], f"{stop} frames: {said}"
+    return [head, *measures(places, sd, truth, names), inside, None, None], f"{stop} frames: {warnings}"
 
 
 def main() -> int:
@@ -106,11 +106,11 @@ def main() -> int:
         order = [found.names.index(name) for name in names]
         cells = measures(found.places[:, order], found.sd[:, order], truth, names)
         rows.append([" ".join(views), *cells, *lift_tracks.coverage(found, truth, order), found.wider])
-    said = []
+    warnings = []
     for stop in STOPS:
         row, words = films(stop, joints, names)
         rows.append(row)
-        said.append(words)
+        warnings.append(words)
     head = [
         "views",
         "root mm",
@@ -131,7 +131,7 @@ def main() -> int:
         "and joints. Coverage is that of 90 % intervals. Pose2Sim's published errors of joint angles are "
         "2 to 6 degrees; they are for other motions and relative to markers, so only the order of "
         "magnitude can be compared. films: gait lift of two films themselves, with the "
-        f"detector, and its warnings. {'. '.join(said)}. The films of cam_01 and cam_02 are cut to 1080 "
+        f"detector, and its warnings. {'. '.join(warnings)}. The films of cam_01 and cam_02 are cut to 1080 "
         "columns while their calibration is for 1088."
     )
     title = "A real motion by one camera and by several"
