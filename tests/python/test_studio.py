@@ -130,7 +130,9 @@ def drag(page, frame, joint, target):
     page.mouse.down()
     page.mouse.move(x, y, steps=3)
     page.mouse.up()
-    browser.until(page, f"studio.data.version > {version} && studio.sent > 0")
+    made = f"c.frame === {frame} && c.joint === '{joint}'"  # a whole motion of the drag before counts as well
+    there = f"(studio.data.edits.corrections ?? []).some((c) => {made})"
+    browser.until(page, f"studio.data.version > {version} && studio.sent > 0 && {there}")
 
 
 def rest(page):
