@@ -66,6 +66,7 @@ def test_the_matrix_of_a_film_is_honoured(turned, walk, tmp_path):
     assert np.abs(frame.astype(float) - picture).mean() < 4
 
 
+@pytest.mark.long
 def test_a_person_in_portrait_video_is_found_and_tracked(walk, tmp_path):
     folder, pictures, true = walk
     left = 100

@@ -21,7 +21,10 @@ from gait.learn.corpus import cluster, load, sources
 from gait.learn.options import LearnOptions
 
 distributed = pytest.importorskip("distributed", reason="Dask is not installed: make setup")
-pytestmark = pytest.mark.filterwarnings("ignore")  # those of distributed are not ours to mend
+pytestmark = [
+    pytest.mark.long,
+    pytest.mark.filterwarnings("ignore"),  # those of distributed are not ours to mend
+]
 LEARN = ["learn", "--components", "2"]
 
 
@@ -76,7 +79,6 @@ def scheduler(local):
     return local.scheduler_address
 
 
-@pytest.mark.long
 def test_a_cluster_gives_the_same_model(walks, alone, scheduler, tmp_path, monkeypatch, capsys):
     monkeypatch.chdir(walks.parent)  # the workers have another folder
     model = tmp_path / "dask.gait"

@@ -161,6 +161,7 @@ def test_a_lost_person_is_found_again_within_a_second_in_full_view(known, folder
     assert off[again].max() < 0.15 and "lost" not in np.array(rows.status)[again]
 
 
+@pytest.mark.long
 def test_a_film_of_noise_ends_with_a_warning(folder, capsys):
     random = np.random.default_rng(1)
     write(folder / "walk.mp4", random.integers(0, 255, (40, 240, 320, 3), dtype=np.uint8))
