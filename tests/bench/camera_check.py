@@ -48,7 +48,7 @@ def main() -> int:
         return 0
     folders = [eval_clips.DATA / "eval" / "dev", eval_clips.DATA / "real"]
     clips = [c for folder in folders for c in sorted(folder.iterdir()) if (c / "camera.json").is_file()]
-    chosen = [clip for clip in clips if not sys.argv[1:] or clip.name in sys.argv[1:]]
+    chosen = eval_clips.chosen(clips)
     rows = [_clip(clip) for clip in chosen]
     counts = np.array([[cell != "" for cell in row[1:]] for row in rows]).sum(axis=0)
     rows.append(["reported", *(f"{count} of {len(chosen)}" for count in counts)])

@@ -46,7 +46,7 @@ def main() -> int:
     if eval_clips.absent():
         return 0
     folder = eval_clips.DATA / "eval" / "dev"
-    clips = [c for c in sorted(folder.iterdir()) if not sys.argv[1:] or c.name in sys.argv[1:]]
+    clips = eval_clips.chosen(folder.iterdir())
     rows = [row for clip in clips for row in _rows(clip)]
     head = ["clip", "crops", "found %", "median %", "95th percentile %", "found, hidden %", "back after s"]
     note = (

@@ -7,7 +7,7 @@ import hashlib
 import json
 import subprocess
 import sys
-from collections.abc import Callable
+from collections.abc import Callable, Iterable
 from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
 from typing import Any
@@ -93,6 +93,16 @@ def meta_of(folder: Path) -> dict[str, Any]:
     """Contents of a clip's meta.json, empty if there is none."""
     path = folder / "meta.json"
     return dict(json.loads(path.read_text())) if path.is_file() else {}
+
+
+def chosen(clips: Iterable[Path]) -> list[Path]:
+    """Of the folders of clips, those that the command line names, or all; SystemExit for an unknown name."""
+    all_of_them, names = sorted(clips), sys.argv[1:]
+    unknown = set(names) - {clip.name for clip in all_of_them}
+    if unknown:
+        known = " ".join(clip.name for clip in all_of_them)
+        raise SystemExit(f"{Path(sys.argv[0]).stem}: no clip {' '.join(sorted(unknown))}; there are {known}")
+    return [clip for clip in all_of_them if not names or clip.name in names]
 
 
 def absent() -> bool:
