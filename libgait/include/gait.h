@@ -404,9 +404,9 @@ typedef struct gait_camera_pose { GAIT_CAMERA_POSE_FIELDS(GAIT_DECLARE) } gait_c
 /* Observations at one time.  A field of 0 is not given.
  *
  * Of several people, each with a tracker, one may hide another: where the nearest person in `people` is another than
- * `person`, the silhouette is not compared.  The tracked person then counts as hidden there, not as absent, and the other's
- * foreground as explained.  These pictures are the same for all trackers: draw each person with gait_render(), the
- * farthest first. */
+ * `person`, the silhouette is not compared.  The tracked person then counts as hidden there, not as absent, and the
+ * other's foreground as explained.  These pictures are the same for all trackers: draw each person with
+ * gait_render(), the farthest first. */
 #define GAIT_FRAME_FIELDS(FIELD)                                                                                      \
     FIELD("Size of this struct in the caller's header; 0: this one.",                                                 \
           uint64_t, struct_size, , "bytes")                                                                           \

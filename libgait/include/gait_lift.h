@@ -140,9 +140,9 @@ typedef struct gait_lift_fit { GAIT_LIFT_FIT_FIELDS(GAIT_DECLARE) } gait_lift_fi
  * not positive, or its uv is NaN, beyond 1e6 or, in perspective, exactly (0, 0) or (-1, -1), as detectors write it. */
 GAIT_API gait_result gait_lift_segment(gait_lift *l, const double *uv, const double *sd, gait_lift_fit *out,
                                        gait_error *err);
-/* Fit one segment with outliers down-weighted: a point more than four standard deviations from the fit has little influence.
- * weighted [F][J] receives the effective standard deviations, above `sd` for outliers.  If outliers may have misled
- * the search, it is repeated with all points down-weighted at first. */
+/* Fit one segment with outliers down-weighted: a point more than four standard deviations from the fit has little
+ * influence.  weighted [F][J] receives the effective standard deviations, above `sd` for outliers.  If outliers may
+ * have misled the search, it is repeated with all points down-weighted at first. */
 GAIT_API gait_result gait_lift_segment_robust(gait_lift *l, const double *uv, const double *sd, double *weighted,
                                               gait_lift_fit *out, gait_error *err);
 /* Expect the person of the following segments at this position and heading instead of the config's; heading_sd as

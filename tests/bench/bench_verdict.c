@@ -6,12 +6,13 @@
 #include <stdio.h>
 #include <stdlib.h>
 
-/* PARSEC bodytrack with one camera and 10,000 particles x 1 layer on one core of such a machine: quoted, not measured
- * here.  Its samples are points on edges, which it looks up in an edge map, and points inside limbs, in the foreground. */
+/* PARSEC bodytrack with one camera and 10,000 particles x 1 layer on one core of such a machine: quoted, not
+ * measured here.  Its samples are points on edges, which it looks up in an edge map, and points inside limbs, in the
+ * foreground. */
 static const double PARSEC_MS[2] = {43, 58};
 enum { PARSEC_SAMPLES = 481 };
-/* The texture-only limit on that machine, the largest figure quoted.  The limit measured here, in turns with what is judged,
- * shows how fast this machine is at the moment. */
+/* The texture-only limit on that machine, the largest figure quoted.  The limit measured here, in turns with what is
+ * judged, shows how fast this machine is at the moment. */
 static const double LIMIT_MS = 17;
 
 void verdict_size(verdict *v, const bench_result *r)
@@ -51,8 +52,8 @@ static void rate_lines(const char *what, double wanted, const bench_result *r)
          1e3 / (r->limit_ratio * LIMIT_MS), true, "fps");
 }
 
-/* The gain of a second thread, compared with running two independent trackers at once: on virtual machines two "cores" may
- * be hardware threads of one, which share its units and caches. */
+/* The gain of a second thread, compared with running two independent trackers at once: on virtual machines two
+ * "cores" may be hardware threads of one, which share its units and caches. */
 static void thread_lines(const by_threads *many)
 {
     line("two threads against one, 10,000 particles", 1.8, 1 / many->two->ratio, true, "times");

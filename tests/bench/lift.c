@@ -1,5 +1,6 @@
-/* lift.c - speed of lifting with each instruction set: microseconds of CPU per frame of a stream of 15 points, including
- * the estimate; segments per second, with one gain for all and one by one; and whether the fastest set reaches the targets. */
+/* lift.c - speed of lifting with each instruction set: microseconds of CPU per frame of a stream of 15 points,
+ * including the estimate; segments per second, with one gain for all and one by one; and whether the fastest set
+ * reaches the targets. */
 #include "gait_lift.h"
 #include "trackd/common.h"
 #include "trackd/options.h"

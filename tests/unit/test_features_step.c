@@ -131,7 +131,8 @@ static int32_t cells_inside(const features *f)
     return cells;
 }
 
-/* Cells that another person covers are neither foreground nor visible; the same picture changes nothing for that person. */
+/* Cells that another person covers are neither foreground nor visible; the same picture changes nothing for that
+ * person. */
 static void test_others(void)
 {
     static uint8_t nearest[SCENE_PIXELS];

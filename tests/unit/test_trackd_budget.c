@@ -26,7 +26,8 @@ static void test_age(void)
     CHECK(b.late == 3 && b.dropped == 3);
 }
 
-/* Frames are never refused forever: if a step takes longer than the budget, a frame is tried after a few were refused. */
+/* Frames are never refused forever: if a step takes longer than the budget, a frame is tried after a few were
+ * refused. */
 static void test_a_slow_step_does_not_starve(void)
 {
     enum { FRAMES = 100, AGE = 12 * MS };

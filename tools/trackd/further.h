@@ -1,4 +1,5 @@
-/* further.h - cameras besides the first one: keeps their frames until the first camera's frame of the same time arrives. */
+/* further.h - cameras besides the first one: keeps their frames until the first camera's frame of the same time
+ * arrives. */
 #ifndef TRACKD_FURTHER_H
 #define TRACKD_FURTHER_H
 #include "gaitmsg_camera_t.h"

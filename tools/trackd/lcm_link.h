@@ -41,8 +41,8 @@ typedef struct sink {    /* all zero: no output */
 
 /* Open `url`; a log has ?mode=w (new) or a (append). */
 bool sink_open(sink *s, const char *url, message *why);
-/* Publish `size` bytes on the channel of a person, 0: of all.  The first failure of LCM is reported on stderr; after a failure of a log
- * nothing more is written. */
+/* Publish `size` bytes on the channel of a person, 0: of all.  The first failure of LCM is reported on stderr; after
+ * a failure of a log nothing more is written. */
 void sink_publish(sink *s, const char *channel, int person, const uint8_t *bytes, int size);
 /* Whether writing the log has failed, so that the program should end. */
 bool sink_ended(const sink *s, message *why);

@@ -153,7 +153,8 @@ static void cut_comment(char *line)
     }
 }
 
-/* The text of a TOML string, or the value itself if it is not a string; NULL: it has escapes, or its quotes do not close. */
+/* The text of a TOML string, or the value itself if it is not a string; NULL: it has escapes, or its quotes do not
+ * close. */
 static const char *unquote(char *value)
 {
     size_t const n = strlen(value);

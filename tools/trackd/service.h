@@ -143,7 +143,8 @@ void service_send_estimate(service *s, const image_view *v, const gait_estimate 
 /* Continue tracking the person of a restored tracker, whose last tracked frame is this one. */
 void service_resume(service *s, int64_t utime, int64_t frame);
 void service_send_status(service *s);
-/* A GAIT_STATUS message sent at `utime` was received.  If this service did not send it, another daemon did; report that. */
+/* A GAIT_STATUS message sent at `utime` was received.  If this service did not send it, another daemon did; report
+ * that. */
 void service_status(service *s, int64_t utime);
 uint64_t service_digest(const service *s); /* 0 before the camera is known */
 #endif

@@ -12,8 +12,8 @@
 #include <string.h>
 #include <unistd.h>
 
-/* Header of the file; the tracker's snapshot follows.  Only a daemon on the same machine and with the same version of the
- * library reads it. */
+/* Header of the file; the tracker's snapshot follows.  Only a daemon on the same machine and with the same version
+ * of the library reads it. */
 typedef struct head {
     char magic[8];
     gait_camera camera;

@@ -39,11 +39,10 @@ typedef struct tracking {
     gait_model_info info;
     gait_state prior_mean, prior_sd;
     gait_tracker_config config;
-    gait_tracker *tracker; /* NULL until the camera is known */
-    gait_start *start;     /* the automatic start; NULL until then */
-    unsigned char
-        *block; /* tracker, start; background plate, pixels of a decoded JPEG frame, `nearest`, `drawing` */
-    uint8_t *plate, *pixels;
+    gait_tracker *tracker;               /* NULL until the camera is known */
+    gait_start *start;                   /* the automatic start; NULL until then */
+    unsigned char *block;                /* memory of tracker and start, and of the pictures that follow */
+    uint8_t *plate, *pixels;             /* background; decoded JPEG frame */
     uint8_t *nearest, *drawing;          /* with `several`, a byte per pixel: see nearest.h; else NULL */
     gait_image background;               /* data NULL: none */
     gait_image decoded;                  /* JPEG frame in `pixels`; data NULL: none */
@@ -57,7 +56,8 @@ bool tracking_open(tracking *t, const char *model_path, const gait_tracker_confi
 /* One more tracker with the model, the configuration and the pictures of `first`. */
 void tracking_share(tracking *t, tracking *first);
 void tracking_close(tracking *t);
-/* Allocate the block and create the tracker, in place of that of another camera, if there is one; first that of `first`. */
+/* Allocate the block and create the tracker, in place of that of another camera, if there is one; first that of
+ * `first`. */
 bool tracking_set_camera(tracking *t, const gait_camera *camera, message *why);
 /* Copy the background, unless it is already in use.  It must have the camera's size. */
 bool tracking_set_background(tracking *t, const gait_image *plate, message *why);

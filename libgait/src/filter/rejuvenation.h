@@ -36,8 +36,8 @@ static inline int32_t rejuvenation_stride(int32_t fields)
     return (fields + 3) & ~3;
 }
 
-/* Write the rows of particles begin .. end - 1.  A particle drawn at random is then read from two cache lines rather than
- * from one per field. */
+/* Write the rows of particles begin .. end - 1.  A particle drawn at random is then read from two cache lines rather
+ * than from one per field. */
 void rejuvenation_rows(const particle_set *from, int32_t begin, int32_t end, float *row);
 
 /* Rejuvenate particles parent[first], parent[first + 1] ... into `out`; unused lanes repeat the last one. */

@@ -32,8 +32,8 @@ static void enter(gait_tracker *t, int32_t stage)
                                              .log_odds = t->core->found ? 0.0 : t->core->hypotheses.log_odds};
 }
 
-/* Share of a frame's log-likelihood that counts, `seconds` after the last frame: errors of the image terms are correlated
- * over config evidence_time. */
+/* Share of a frame's log-likelihood that counts, `seconds` after the last frame: errors of the image terms are
+ * correlated over config evidence_time. */
 static float evidence_share(const gait_tracker *t, float seconds)
 {
     float const time = t->cfg.evidence_time;
