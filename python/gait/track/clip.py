@@ -11,10 +11,12 @@ import numpy as np
 
 from gait.bindings.abi import Term
 from gait.bindings.config import TrackerConfig
+from gait.bindings.estimate import Estimate
 from gait.bindings.initial import Start, set_height
 from gait.bindings.start_fit import StartFit
 from gait.io.trc import write_trc
-from gait.progress import note
+from gait.io.video import Frame
+from gait.progress import note, progress
 from gait.track.box_start import BoxStart
 from gait.track.clip_output import write
 from gait.track.follow import Follower
@@ -66,7 +68,13 @@ def _with_own_body(options: ClipOptions, scene: Scene) -> Scene:
             **{name: getattr(options, name) for name in _OF_A_PASS},
             quiet=True,
         )
-        track_scene(once, scene, first_state(once, scene), first.add)
+        with progress("first pass", len(scene.frames), options.quiet) as update:
+
+            def also(frame: Frame, estimate: Estimate) -> None:
+                first.add(frame, estimate)
+                update(frame.number - scene.frames.start)
+
+            track_scene(once, scene, first_state(once, scene), also)
     return replace(scene, model=own_model(options, scene, first))
 
 

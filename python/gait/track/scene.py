@@ -273,14 +273,20 @@ def _calibrate(
 
 def first_state(options: ClipOptions, scene: Scene) -> Start:
     """Return the first state, from the init file or found in the clip."""
+    against_camera = _against_camera(options, scene)
     if options.init != "auto":
         start = _read_start(options, scene.video, scene.camera, scene.poses, scene.model)
         require_scene(options, scene, start.frame)
         start = replace(start, in_place=_in_place(scene, start.frame))
-        _check_camera(options, scene)
     else:
         require_scene(options, scene, scene.frames.start)
-        start = _find_first_state(options, scene)
+        try:
+            start = _find_first_state(options, scene)
+        except UserError as error:
+            raise UserError(against_camera or str(error)) from error
+    if against_camera:
+        note(against_camera, options.quiet)
+    if options.init == "auto":
         _note_start(options, scene, start)
     wanted = options.detector == "auto" and not options.keypoints and options.mode != Mode.PAPER
     if wanted and not _has_detector(options):
@@ -381,7 +387,6 @@ def _note_start(options: ClipOptions, scene: Scene, start: Start) -> None:
 def _find_first_state(options: ClipOptions, scene: Scene) -> Start:
     """Find the first state from the keypoints or, if these do not fit a walk, from the pictures."""
     camera, model, frames, height = scene.camera, scene.model, scene.frames, options.height
-    against_camera = ""
     if scene.people:
         keypoints = scene.people[scene.person]
         found = find_keypoint_start(
@@ -393,23 +398,19 @@ def _find_first_state(options: ClipOptions, scene: Scene) -> Start:
             height=height,
             poses=scene.poses,
         )
-        against_camera = _check_camera(options, scene)
         if found is not None:
             return replace(found, source="the joints detected in the images")
-    try:
-        found = find_start(
-            scene.video,
-            camera,
-            scene.empty,
-            model,
-            first=frames.start,
-            stop=options.stop,
-            height=height,
-            shapes=not detects(options),  # slow, and useless if the detector found no person
-            shapes_first=finds_shapes(options),  # a median may show people
-        )
-    except UserError as exc:
-        raise UserError(against_camera or str(exc)) from exc
+    found = find_start(
+        scene.video,
+        camera,
+        scene.empty,
+        model,
+        first=frames.start,
+        stop=options.stop,
+        height=height,
+        shapes=not detects(options),  # slow, and useless if the detector found no person
+        shapes_first=finds_shapes(options),  # a median may show people
+    )
     return replace(found, source="the shape of a person in the images")
 
 
@@ -421,16 +422,13 @@ def _in_reference(scene: Scene) -> Keypoints | None:
     return scene.motion.in_reference(keypoints) if scene.motion is not None else None
 
 
-def _check_camera(options: ClipOptions, scene: Scene) -> str:
-    """Print a warning if the camera file contradicts the walk, and return it; empty if it does not."""
+def _against_camera(options: ClipOptions, scene: Scene) -> str:
+    """State how the camera file contradicts the walk; empty if it does not."""
     keypoints = _in_reference(scene)
     if options.camera is None or keypoints is None:
         return ""
     words = contradiction(scene.camera, keypoints, scene.model, options.height)
-    if not words:
-        return ""
-    note(f"{options.camera}: {words}", options.quiet)
-    return f"{options.camera}: {words}"
+    return f"{options.camera}: {words}" if words else ""
 
 
 def require_scene(options: ClipOptions, scene: Scene, first: int) -> None:
