@@ -205,17 +205,22 @@ def play(log: Path, *options: object) -> Outcome:
 
 
 class Listener:
-    """Collects what a tracker publishes, and sends messages to it; `pid` is the tracker's."""
+    """Collects what a tracker publishes, and sends messages to it; `pid` is the tracker's.
+
+    Of several people `estimates` and `statuses` are the first one's, `second` are estimates of the second.
+    """
 
     pid = 0
 
     def __init__(self, url: str) -> None:
         self._lcm = open_lcm(url)
         self.estimates: list[Any] = []
+        self.second: list[Any] = []
         self.statuses: list[Any] = []
         self.lifted: list[Any] = []
-        self._keep("GAIT_ESTIMATE", gaitmsg.estimate_t, self.estimates)
-        self._keep("GAIT_STATUS", gaitmsg.status_t, self.statuses)
+        self._keep("GAIT_ESTIMATE(_1)?", gaitmsg.estimate_t, self.estimates)
+        self._keep("GAIT_ESTIMATE_2", gaitmsg.estimate_t, self.second)
+        self._keep("GAIT_STATUS(_1)?", gaitmsg.status_t, self.statuses)
         self._keep("GAIT_LIFT", gaitmsg.estimate_t, self.lifted)
 
     def _keep(self, channel: str, kind: Any, into: list[Any]) -> None:

@@ -1,5 +1,7 @@
 """gait-trackd --people and --person: a tracker for each person, distinguished by their keypoints."""
 
+import os
+import signal
 from dataclasses import replace
 from functools import cache
 
@@ -13,8 +15,8 @@ from gait.bindings.abi import TrackStatus
 from gait.cli import main
 from gait.io.track_file import read_track
 from gait.lcm.detect import Numbers
-from gait.lcm.link import gaitmsg
-from gait.lcm.messages import camera_message, image_message, tracks_message
+from gait.lcm.link import gaitmsg, private_url
+from gait.lcm.messages import camera_message, command_message, image_message, tracks_message
 from gait.lcm.record import read_run
 from gait.live.feed import Feed
 
@@ -117,12 +119,60 @@ def test_people_together_are_tracked_the_same_on_every_run_and_better_than_alone
     assert together < 0.8 * apart
 
 
-@pytest.mark.parametrize(
-    "more", [["--snapshot", "s"], ["--lift"], ["--person", "1"], ["--further-streams", "1"]]
-)
+@pytest.mark.parametrize("more", [["--lift"], ["--person", "1"], ["--further-streams", "1"]])
 def test_what_is_for_one_person_is_refused_for_several(more):
     outcome = rig.run(*rig.command("--keypoints-term", "--people", 2, *more)[1:])
     assert outcome.code == 2 and "needs" in outcome.words and outcome.words.count("\n") == 1
+
+
+def followed(listener, first, stop):
+    """Send frames with everyone's joints, each after the estimates of the one before; the last estimates."""
+    names = list(rig.model().joint_names)
+    for frame in range(first, stop):
+        uv = {person: rig.CAMERA.project(joints(person, frame)) for person in (1, 2)}
+        sent = [(f"GAIT_TRACKS_0_{k}", tracks_message(names, uv[k], time_of(frame), frame)) for k in uv]
+        listener.send([*sent, ("GAIT_IMAGE_0", image(frame))])
+        for heard in (listener.estimates, listener.second):
+            listener.until(lambda h=heard, f=frame: h and h[-1].frame == f, f"estimates of frame {frame}")
+    return listener.estimates[-1], listener.second[-1]
+
+
+def test_after_a_kill_everyone_is_followed_by_number_as_if_nothing_had_happened(tmp_path):
+    """They meet in frame 21."""
+    rig.need_multicast()
+    begin, killed, end = 15, 20, 26
+    scene = [("GAIT_CAMERA_0", camera_message(rig.CAMERA, 1)), ("GAIT_BACKGROUND_0", image(BACK - 1))]
+    starts = [
+        (
+            f"GAIT_COMMAND_{k}",
+            command_message(gaitmsg.command_t.START, time_of(begin), state(k, begin), rig.SD),
+        )
+        for k in (2, 1)
+    ]
+    last = {}
+    for kill in (False, True):
+        url, snapshot = private_url(), tmp_path / f"state-{kill}"
+        words = ["--keypoints-term", "--people", 2, "--snapshot", snapshot, "--snapshot-s", 0.1]
+        with rig.daemon(url, *words) as (listener, finish):
+            listener.ask(scene, lambda s: s.background_mask, "camera and background")
+            listener.ask(starts, lambda s: s.state == s.ARMED, "a start")
+            last[kill] = followed(listener, begin, killed if kill else end)
+            if not kill:
+                continue
+            before = len(listener.statuses)
+            listener.until(lambda n=before: len(listener.statuses) > n + 2, "a second without frames")
+            os.kill(listener.pid, signal.SIGKILL)
+        with rig.daemon(url, *words) as (listener, finish):
+            listener.ask(scene[1:], lambda s: s.background_mask, "the background")
+            last[kill] = followed(listener, killed, end)
+            printed = finish().words
+            assert all(f"following person {k} of frame {killed - 1}" in printed for k in (1, 2))
+        words[2] = 1
+        with rig.daemon(url, *words) as (_, finish):
+            assert "person 2 is not used: --people is less" in finish().words
+    for person, one, other in zip((1, 2), last[True], last[False], strict=True):
+        assert one.tracker_digest == other.tracker_digest and one.step == other.step
+        assert off(person, one) < 0.35
 
 
 def test_a_person_who_comes_back_has_the_same_number(streams):

@@ -103,6 +103,11 @@ void keypoint_cue_open(keypoint_cue *cue, const gait_model *model, int32_t joint
         cue->past[i].utime = -1;
 }
 
+void keypoint_cue_resume(keypoint_cue *cue, int64_t utime)
+{
+    cue->frame_utime = cue->used_utime = utime;
+}
+
 void keypoint_cue_forget(keypoint_cue *cue)
 {
     cue->frame_utime = -1;

@@ -70,6 +70,8 @@ typedef struct keypoint_cue {
 
 /* `model` must outlive `cue`. */
 void keypoint_cue_open(keypoint_cue *cue, const gait_model *model, int32_t joints, float sd);
+/* The tracker continues after a frame of this time, as if that had had keypoints. */
+void keypoint_cue_resume(keypoint_cue *cue, int64_t utime);
 /* Tracking has stopped: accept keypoints of any time again. */
 void keypoint_cue_forget(keypoint_cue *cue);
 /* Keep the keypoints of one message.  false if none is known to the model or their frame has been tracked. */

@@ -140,8 +140,8 @@ void service_lack(const service *s, message *why);
 /* GAIT_ESTIMATE, GAIT_ESTIMATE_LAG, GAIT_STRIDE and GAIT_PARTICLES of a frame that was tracked. */
 void service_send_estimate(service *s, const image_view *v, const gait_estimate *e, int64_t received,
                            int64_t step_us);
-/* Continue tracking the person of a restored tracker, whose last tracked frame is this one. */
-void service_resume(service *s, int64_t utime, int64_t frame);
+/* Continue tracking the person of a restored tracker, whose last tracked frame is this one, after so many steps. */
+void service_resume(service *s, int64_t utime, int64_t frame, int64_t steps);
 void service_send_status(service *s);
 /* A GAIT_STATUS message sent at `utime` was received.  If this service did not send it, another daemon did; report
  * that. */

@@ -51,15 +51,24 @@ static void run(service *s, const image_view *v, int64_t utime)
     s->last_arrived = v->utime;
     s->missed = false;
     s->steps = 0;
+    s->last_status = GAIT_TRACK_INIT;
     memset(s->past, 0xff, sizeof s->past); /* a number that no step has */
     s->meter.running = false;
     service_set_state(s, GAITMSG_STATUS_T_RUNNING, "tracking");
 }
 
-void service_resume(service *s, int64_t utime, int64_t frame)
+void service_resume(service *s, int64_t utime, int64_t frame, int64_t steps)
 {
     image_view const last = {.utime = utime, .frame = frame};
+    gait_estimate e;
     run(s, &last, utime);
+    s->steps = steps;
+    if (gait_tracker_lagged(s->track.tracker, 0, &e, NULL) == GAIT_OK) {
+        s->last = e.mean;
+        s->last_status = e.status;
+    }
+    if (s->cue)
+        keypoint_cue_resume(s->cue, utime);
 }
 
 /* Begin to track if the frame of the start has arrived; true when the tracker runs. */
@@ -391,8 +400,8 @@ static void draw_nearest(service *s, int64_t utime)
         return;
     for (service *each = s; each; each = each->next) {
         double const seconds = 1e-6 * (double)(utime - each->last_utime);
-        if (each->state != GAITMSG_STATUS_T_RUNNING || each->steps == 0 ||
-            each->last_status == GAIT_TRACK_INIT || each->last_status == GAIT_TRACK_LOST || seconds < 0)
+        if (each->state != GAITMSG_STATUS_T_RUNNING || each->last_status == GAIT_TRACK_INIT ||
+            each->last_status == GAIT_TRACK_LOST || seconds < 0)
             continue;
         body[count] = (nearest_body){each->person, each->last};
         if (gait_tracker_predict(each->track.tracker, &body[count].state, 1, seconds, NULL) == GAIT_OK)

@@ -125,7 +125,7 @@ static int make_table(settings *s, option *table)
          "        precedence",
          TEXT(config)},
         {"snapshot", 0, "FILE",
-         "live, with --init auto: save the state of the tracker in FILE while a person is followed, and\n"
+         "live, with --init auto: save the state of every tracker in FILE while someone is followed, and\n"
          "        resume from it at the next start; a folder in memory, such as /run, spares the disk",
          TEXT(snapshot)},
         {"snapshot-s", 0, "S", "seconds between two snapshots, default 1", OPTION_FLOAT, &s->snapshot_s, 0.1,
@@ -263,7 +263,6 @@ static bool check_dependencies(const settings *s, message *why)
         {"people", "a single camera", s->people > 0, !s->further_streams[0]},
         {"people", "no --person", s->people > 0, !s->person},
         {"lift", "a single person: --person", s->lift, !s->people},
-        {"snapshot", "a single person: --person", s->snapshot[0], !s->people},
         {"pose-turn-sd", "moving-camera", s->pose_turn_sd > 0, s->moving_camera},
         {"pose-place-sd", "moving-camera", s->pose_place_sd > 0, s->moving_camera},
         {"lift", "a static camera", s->lift, !s->moving_camera},

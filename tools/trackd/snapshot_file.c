@@ -12,34 +12,70 @@
 #include <string.h>
 #include <unistd.h>
 
-/* Header of the file; the tracker's snapshot follows.  Only a daemon on the same machine and with the same version
- * of the library reads it. */
+/* The file: this header, then for each person who is tracked a record and the snapshot of the tracker.  Only a daemon on
+ * the same machine and with the same version of the library reads it. */
 typedef struct head {
     char magic[8];
     gait_camera camera;
-    int32_t stream;
-    int64_t utime, frame; /* of the last frame tracked */
+    int32_t stream, people;
 } head;
 
-static const char MAGIC[8] = "GAITTRD1";
+typedef struct record {
+    int64_t person;       /* number, 0: people are not distinguished */
+    int64_t utime, frame; /* of the last frame tracked */
+    int64_t steps;        /* frames tracked since START */
+    uint64_t bytes;       /* of the tracker's snapshot */
+} record;
+
+static const char MAGIC[8] = "GAITTRD2";
 
 /* ---- writing ---- */
+static bool is_tracked(const service *s)
+{
+    return s->state == GAITMSG_STATUS_T_RUNNING;
+}
+
+/* Size of the file; 0: it cannot be written. */
+static size_t file_bytes_of(const service *s, head *h)
+{
+    size_t all = sizeof *h, state;
+    for (const service *each = s; each; each = each->next) {
+        if (!is_tracked(each))
+            continue;
+        if (gait_tracker_save(each->track.tracker, NULL, 0, &state, NULL) != GAIT_OK)
+            return 0;
+        all += sizeof(record) + state;
+        h->people++;
+    }
+    return all;
+}
+
 /* The whole file in allocated memory; NULL: there is not enough. */
 static unsigned char *encode(const service *s, size_t *bytes)
 {
-    head h = {.stream = s->stream, .utime = s->last_utime, .frame = s->last_frame};
-    size_t state = 0;
-    if (gait_tracker_save(s->track.tracker, NULL, 0, &state, NULL) != GAIT_OK)
-        return NULL;
-    unsigned char *const out = malloc(sizeof h + state);
+    head h = {.camera = s->track.config.camera[0], .stream = s->stream};
     memcpy(h.magic, MAGIC, sizeof MAGIC);
-    h.camera = s->track.config.camera[0];
-    *bytes = sizeof h + state;
-    if (!out || gait_tracker_save(s->track.tracker, out + sizeof h, state, &state, NULL) != GAIT_OK) {
-        free(out);
+    *bytes = file_bytes_of(s, &h);
+    unsigned char *const out = *bytes ? malloc(*bytes) : NULL;
+    if (!out)
         return NULL;
-    }
     memcpy(out, &h, sizeof h);
+    unsigned char *at = out + sizeof h;
+    for (const service *each = s; each; each = each->next) {
+        record r = {each->person, each->last_utime, each->last_frame, each->steps, 0};
+        unsigned char *const state = at + sizeof r;
+        size_t taken = 0;
+        if (!is_tracked(each))
+            continue;
+        if (gait_tracker_save(each->track.tracker, state, (size_t)(out + *bytes - state), &taken, NULL) !=
+            GAIT_OK) {
+            free(out);
+            return NULL;
+        }
+        r.bytes = taken;
+        memcpy(at, &r, sizeof r);
+        at = state + taken;
+    }
     return out;
 }
 
@@ -119,7 +155,10 @@ void snapshot_file_write(snapshot_file *f, const service *s, bool at_once)
     if (!f->path || (!at_once && now < f->due))
         return;
     f->due = now + f->period;
-    if (s->state != GAITMSG_STATUS_T_RUNNING) {
+    const service *first = s; /* who is tracked */
+    while (first && !is_tracked(first))
+        first = first->next;
+    if (!first) {
         unlink(f->path);
         return;
     }
@@ -133,6 +172,30 @@ void snapshot_file_write(snapshot_file *f, const service *s, bool at_once)
 }
 
 /* ---- reading ---- */
+/* The record at *at, which then is that of the next one; NULL: the file ends too early.  Otherwise the tracker's snapshot. */
+static const unsigned char *next_record(const file_bytes *file, size_t *at, record *r)
+{
+    if (file->size - *at < sizeof *r)
+        return NULL;
+    memcpy(r, file->data + *at, sizeof *r);
+    size_t const begin = *at + sizeof *r;
+    if (r->bytes > file->size - begin)
+        return NULL;
+    *at = begin + (size_t)r->bytes;
+    return file->data + begin;
+}
+
+/* Whether all records are there, and nothing else. */
+static bool is_whole(const file_bytes *file, const head *h)
+{
+    size_t at = sizeof *h;
+    record r;
+    for (int32_t i = 0; i < h->people; i++)
+        if (!next_record(file, &at, &r))
+            return false;
+    return at == file->size;
+}
+
 /* Whether the file may be used by this service as it is configured. */
 static bool fits(const service *s, const file_bytes *file, head *h, message *why)
 {
@@ -140,7 +203,9 @@ static bool fits(const service *s, const file_bytes *file, head *h, message *why
         return message_set(why, "too short for a snapshot");
     memcpy(h, file->data, sizeof *h);
     if (memcmp(h->magic, MAGIC, sizeof MAGIC) != 0)
-        return message_set(why, "not a snapshot of gait-trackd");
+        return message_set(why, "not a snapshot of this version of gait-trackd");
+    if (!is_whole(file, h))
+        return message_set(why, "shorter or longer than its lengths state");
     if (h->stream != s->stream)
         return message_set(why, "for --stream %d", (int)h->stream);
     if (s->camera_fixed && !camera_same(&h->camera, &s->track.config.camera[0]))
@@ -148,15 +213,38 @@ static bool fits(const service *s, const file_bytes *file, head *h, message *why
     return camera_check(&h->camera, s->max_pixels, why);
 }
 
-static bool resume(service *s, const file_bytes *file, message *why)
+/* Continue with one person. */
+static bool resume_person(service *s, const record *r, const unsigned char *state, message *why)
+{
+    gait_error err = {.text = ""};
+    while (s && s->person != r->person)
+        s = s->next;
+    if (!s)
+        return message_set(why, r->person ? "--people is less" : "it has no number, but people have");
+    if (gait_tracker_restore(s->track.tracker, state, (size_t)r->bytes, &err) != GAIT_OK)
+        return message_set(why, "%s", err.text);
+    service_resume(s, r->utime, r->frame, r->steps);
+    return true;
+}
+
+/* Continue with the people of the file, and report each of them. */
+static bool resume(const char *path, service *s, const file_bytes *file, message *why)
 {
     head h;
-    gait_error err = {.text = ""};
+    record r;
+    size_t at = sizeof h;
     if (!fits(s, file, &h, why) || (!s->track.tracker && !service_set_camera(s, &h.camera, why)))
         return false;
-    if (gait_tracker_restore(s->track.tracker, file->data + sizeof h, file->size - sizeof h, &err) != GAIT_OK)
-        return message_set(why, "%s", err.text);
-    service_resume(s, h.utime, h.frame);
+    for (int32_t i = 0; i < h.people; i++) {
+        const unsigned char *const state = next_record(file, &at, &r);
+        char who[32] = "the person";
+        if (r.person)
+            snprintf(who, sizeof who, "person %d", (int)r.person);
+        if (resume_person(s, &r, state, why))
+            log_line("--snapshot %.160s: following %s of frame %" PRId64, path, who, r.frame);
+        else
+            log_line("--snapshot %.120s: %s is not used: %.90s", path, who, why->text);
+    }
     return true;
 }
 
@@ -173,9 +261,7 @@ void snapshot_file_resume(const snapshot_file *f, service *s)
         log_line("%s", why.text);
         return;
     }
-    if (resume(s, &file, &why))
-        log_line("--snapshot %.160s: following the person of frame %" PRId64, f->path, s->last_frame);
-    else
+    if (!resume(f->path, s, &file, &why))
         log_line("--snapshot %.120s is not used: %.110s", f->path, why.text);
     free(file.data);
 }

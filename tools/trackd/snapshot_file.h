@@ -1,4 +1,4 @@
-/* snapshot_file.h - the tracker's state in a file, from which the next daemon continues. */
+/* snapshot_file.h - the trackers' states in a file, from which the next daemon continues. */
 #ifndef TRACKD_SNAPSHOT_FILE_H
 #define TRACKD_SNAPSHOT_FILE_H
 #include "service.h"
@@ -10,8 +10,8 @@ typedef struct snapshot_file { /* all zero: not requested */
     bool failed;    /* writing has been reported as failed */
 } snapshot_file;
 
-/* Continue with the person and the camera of the file.  If the file is for another model, configuration, camera or
- * stream number, the service starts without it and prints the reason to stderr. */
+/* Continue with the people, by their numbers, and the camera of the file.  If the file is for another model,
+ * configuration, camera or stream number, the service starts without it and prints the reason to stderr. */
 void snapshot_file_resume(const snapshot_file *f, service *s);
 /* Replace the file if a snapshot is due or if `at_once`; the file is never incomplete, and is removed while no
  * person is tracked.  A failure is reported once. */
