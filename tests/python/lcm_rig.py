@@ -257,6 +257,13 @@ class Listener:
             self._lcm.handle_timeout(200)
 
 
+def kill(listener: Listener) -> None:
+    """Kill a tracker after a second without frames, in which it writes a snapshot, if it is to."""
+    before = len(listener.statuses)
+    listener.until(lambda: len(listener.statuses) > before + 2, "a second without frames")
+    os.kill(listener.pid, signal.SIGKILL)
+
+
 def peak_kb(pid: int) -> int:
     """Largest resident memory that a process has had; skip if the kernel does not report it."""
     lines = Path(f"/proc/{pid}/status")

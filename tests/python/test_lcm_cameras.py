@@ -10,6 +10,7 @@ import pytest
 
 from gait.bindings.config import TrackerConfig
 from gait.camera.camera import Camera
+from gait.lcm.link import private_url
 from gait.lcm.messages import camera_message, image_message
 from gait.track.tracker import Tracker
 
@@ -95,6 +96,32 @@ def test_the_tracker_waits_for_all_cameras_and_reports_which(tmp_path):
     assert outcome.code == 1 and outcome.words.count("announce it on GAIT_CAMERA_3") == 2
     late = play(tmp_path, [*events, *opening(), *rig.frames(4, 8), second(7)], "--further-streams", 3)
     assert used(late) == (1, 3)
+
+
+def test_after_a_kill_two_streams_are_tracked_as_if_nothing_had_happened(tmp_path):
+    rig.need_multicast()
+    url, killed = private_url(), 8
+    words = ["-n", 300, "--further-streams", 3, "--snapshot", tmp_path / "state", "--snapshot-s", 0.1]
+
+    def feed(listener, first, stop):
+        for i in range(first, stop):
+            listener.send([second(i), *rig.frames(i, i + 1)])
+            listener.until(lambda i=i: any(e.frame == i for e in listener.estimates), f"estimate {i}")
+        return listener.estimates[-1]
+
+    with rig.daemon(url, *words) as (listener, _):
+        listener.ask(opening()[:-1], lambda s: s.background_mask, "cameras and backgrounds")
+        listener.ask(opening()[-1:], lambda s: s.state == s.ARMED, "a start")
+        feed(listener, 0, killed)
+        rig.kill(listener)
+    with rig.daemon(url, *words) as (listener, finish):
+        backgrounds = [event for event in opening() if "BACKGROUND" in event[0]]
+        listener.ask(backgrounds, lambda s: s.background_mask, "backgrounds")
+        last = feed(listener, killed, FRAMES)
+        assert f"following the person of frame {killed - 1}" in finish().words
+    assert f"{last.tracker_digest % 2**64:016x}" == by_python(set(range(FRAMES)))
+    with rig.daemon(url, *words, "--further-streams", 4) as (_, finish):
+        assert "is not used: for --further-streams 3" in finish().words
 
 
 @pytest.mark.parametrize("streams", ["0", "1,1", "1,", "x", "31", "1,2,3,4"])

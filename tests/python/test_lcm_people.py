@@ -1,7 +1,5 @@
 """gait-trackd --people and --person: a tracker for each person, distinguished by their keypoints."""
 
-import os
-import signal
 from dataclasses import replace
 from functools import cache
 
@@ -159,9 +157,7 @@ def test_after_a_kill_everyone_is_followed_by_number_as_if_nothing_had_happened(
             last[kill] = followed(listener, begin, killed if kill else end)
             if not kill:
                 continue
-            before = len(listener.statuses)
-            listener.until(lambda n=before: len(listener.statuses) > n + 2, "a second without frames")
-            os.kill(listener.pid, signal.SIGKILL)
+            rig.kill(listener)
         with rig.daemon(url, *words) as (listener, finish):
             listener.ask(scene[1:], lambda s: s.background_mask, "the background")
             last[kill] = followed(listener, killed, end)

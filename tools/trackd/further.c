@@ -59,6 +59,18 @@ size_t further_bytes(const further_camera *c)
     return (1 + FURTHER_PAST) * picture_bytes(&c->camera);
 }
 
+bool further_set_camera(further_camera *c, const gait_camera *camera, message *why)
+{
+    c->camera = *camera;
+    c->pixels = aligned_memory(further_bytes(c), "frames of a camera", why);
+    if (!c->pixels)
+        return false;
+    for (int i = 0; i < FURTHER_PAST; i++)
+        c->utime[i] = -1;
+    c->known = true;
+    return true;
+}
+
 bool further_take_camera(further_camera *c, const gaitmsg_camera_t *in, int32_t max_pixels, message *why)
 {
     gait_camera camera;
@@ -72,14 +84,7 @@ bool further_take_camera(further_camera *c, const gaitmsg_camera_t *in, int32_t 
         return camera_same(&camera, &c->camera) ||
                message_set(why, "another camera on GAIT_CAMERA_%d than before is ignored; start anew with it",
                            c->stream);
-    c->camera = camera;
-    c->pixels = aligned_memory(further_bytes(c), "frames of a camera", why);
-    if (!c->pixels)
-        return false;
-    for (int i = 0; i < FURTHER_PAST; i++)
-        c->utime[i] = -1;
-    c->known = true;
-    return true;
+    return further_set_camera(c, &camera, why);
 }
 
 /* Copy a picture to the place of this number. */

@@ -40,6 +40,8 @@ further_camera *further_find(further *f, int stream);
 const further_camera *further_unknown(const further *f);
 /* Take a camera when it is first announced; a different one is refused later. */
 bool further_take_camera(further_camera *c, const gaitmsg_camera_t *in, int32_t max_pixels, message *why);
+/* Use a camera; it must be valid, and none known. */
+bool further_set_camera(further_camera *c, const gait_camera *camera, message *why);
 /* Copy a background or a frame, which must have the camera's size. */
 bool further_take_background(further_camera *c, const image_view *v, message *why);
 bool further_take_frame(further_camera *c, const image_view *v, message *why);

@@ -269,7 +269,6 @@ static bool check_dependencies(const settings *s, message *why)
         {"further-streams", "a static camera", s->further_streams[0], !s->moving_camera},
         {"further-streams", "a background on GAIT_BACKGROUND_<i>, not --background", s->further_streams[0],
          !s->background[0]},
-        {"snapshot", "a single camera", s->snapshot[0], !s->further_streams[0]},
         {"background", "a static camera", s->background[0], !s->moving_camera},
     };
     for (size_t i = 0; i < sizeof pair / sizeof *pair; i++)

@@ -16,8 +16,9 @@
  * the same machine and with the same version of the library reads it. */
 typedef struct head {
     char magic[8];
-    gait_camera camera;
-    int32_t stream, people;
+    int32_t people, cameras;
+    int32_t stream[GAIT_MAX_CAMERAS]; /* their numbers */
+    gait_camera camera[GAIT_MAX_CAMERAS];
 } head;
 
 typedef struct record {
@@ -28,6 +29,17 @@ typedef struct record {
 } record;
 
 static const char MAGIC[8] = "GAITTRD2";
+
+static int count_cameras(const service *s)
+{
+    return 1 + (s->further ? s->further->count : 0);
+}
+
+/* Number of a camera. */
+static int stream_of(const service *s, int camera)
+{
+    return camera ? s->further->camera[camera - 1].stream : s->stream;
+}
 
 /* ---- writing ---- */
 static bool is_tracked(const service *s)
@@ -53,8 +65,12 @@ static size_t file_bytes_of(const service *s, head *h)
 /* The whole file in allocated memory; NULL: there is not enough. */
 static unsigned char *encode(const service *s, size_t *bytes)
 {
-    head h = {.camera = s->track.config.camera[0], .stream = s->stream};
+    head h = {.cameras = s->track.config.cameras};
     memcpy(h.magic, MAGIC, sizeof MAGIC);
+    for (int i = 0; i < h.cameras; i++) {
+        h.stream[i] = stream_of(s, i);
+        h.camera[i] = s->track.config.camera[i];
+    }
     *bytes = file_bytes_of(s, &h);
     unsigned char *const out = *bytes ? malloc(*bytes) : NULL;
     if (!out)
@@ -206,11 +222,27 @@ static bool fits(const service *s, const file_bytes *file, head *h, message *why
         return message_set(why, "not a snapshot of this version of gait-trackd");
     if (!is_whole(file, h))
         return message_set(why, "shorter or longer than its lengths state");
-    if (h->stream != s->stream)
-        return message_set(why, "for --stream %d", (int)h->stream);
-    if (s->camera_fixed && !camera_same(&h->camera, &s->track.config.camera[0]))
-        return message_set(why, "for a camera other than --camera");
-    return camera_check(&h->camera, s->max_pixels, why);
+    if (h->cameras != count_cameras(s))
+        return message_set(why, "for another number of cameras");
+    for (int i = 0; i < h->cameras; i++) {
+        if (h->stream[i] != stream_of(s, i))
+            return message_set(why, "for --%s %d", i ? "further-streams" : "stream", (int)h->stream[i]);
+        if (!camera_check(&h->camera[i], s->max_pixels, why))
+            return false;
+    }
+    return !s->camera_fixed || camera_same(&h->camera[0], &s->first_camera) ||
+           message_set(why, "for a camera other than --camera");
+}
+
+/* Make the trackers, unless --camera has done so. */
+static bool set_cameras(service *s, const head *h, message *why)
+{
+    for (int i = 1; i < h->cameras; i++) {
+        if (!further_set_camera(&s->further->camera[i - 1], &h->camera[i], why))
+            return false;
+        s->track.memory_bytes += further_bytes(&s->further->camera[i - 1]);
+    }
+    return s->track.tracker || service_set_camera(s, &h->camera[0], why);
 }
 
 /* Continue with one person. */
@@ -221,6 +253,10 @@ static bool resume_person(service *s, const record *r, const unsigned char *stat
         s = s->next;
     if (!s)
         return message_set(why, r->person ? "--people is less" : "it has no number, but people have");
+    if (!clock_check(r->utime, why))
+        return false;
+    if (r->frame < -1 || r->steps < 0 || r->steps > INT64_MAX / 2)
+        return message_set(why, "damaged record");
     if (gait_tracker_restore(s->track.tracker, state, (size_t)r->bytes, &err) != GAIT_OK)
         return message_set(why, "%s", err.text);
     service_resume(s, r->utime, r->frame, r->steps);
@@ -233,7 +269,7 @@ static bool resume(const char *path, service *s, const file_bytes *file, message
     head h;
     record r;
     size_t at = sizeof h;
-    if (!fits(s, file, &h, why) || (!s->track.tracker && !service_set_camera(s, &h.camera, why)))
+    if (!fits(s, file, &h, why) || !set_cameras(s, &h, why))
         return false;
     for (int32_t i = 0; i < h.people; i++) {
         const unsigned char *const state = next_record(file, &at, &r);
