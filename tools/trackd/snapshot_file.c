@@ -284,12 +284,13 @@ static bool resume(const char *path, service *s, const file_bytes *file, message
     return true;
 }
 
-void snapshot_file_resume(const snapshot_file *f, service *s)
+void snapshot_file_resume(snapshot_file *f, service *s)
 {
     file_bytes file;
     message why;
     if (!f->path)
         return;
+    f->due = clock_monotonic() + f->period; /* do not delay the first frame */
     sweep(f->path);
     if (access(f->path, F_OK) != 0)
         return;

@@ -12,7 +12,7 @@ typedef struct snapshot_file { /* all zero: not requested */
 
 /* Continue with the people, by their numbers, and the camera of the file.  If the file is for another model,
  * configuration, camera or stream number, the service starts without it and prints the reason to stderr. */
-void snapshot_file_resume(const snapshot_file *f, service *s);
+void snapshot_file_resume(snapshot_file *f, service *s);
 /* Replace the file if a snapshot is due or if `at_once`; the file is never incomplete, and is removed while no
  * person is tracked.  A failure is reported once. */
 void snapshot_file_write(snapshot_file *f, const service *s, bool at_once);
