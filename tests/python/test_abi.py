@@ -98,6 +98,7 @@ def test_another_library_is_refused():
     [
         (abi, "ABI", 99, "ABI 10, this package needs 99"),
         (loader, "__version__", "9.9.9", "this package is 9.9.9"),
+        (abi, "NEWEST_FIELD", ("gait_frame", "next"), "older than this package, without gait_frame.next"),
     ],
 )
 def test_version_and_abi_mismatch_name_the_file(monkeypatch, where, name, value, words):

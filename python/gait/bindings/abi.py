@@ -26,6 +26,10 @@ from enum import IntEnum, IntFlag
 from typing import Any, NamedTuple
 
 ABI = 10
+NEWEST_FIELD = (
+    "gait_frame",
+    "person",
+)  # added last; an older library of this ABI lacks it
 ALIGN = 64
 MAX_JOINTS, MAX_ANGLES, MAX_COMPONENTS, MAX_PROPORTIONS, MAX_CAMERAS = 32, 32, 16, 8, 4
 MAX_CLASSES, MAX_PIXELS = 8, 16000

@@ -74,6 +74,9 @@ def open_library(path: str) -> ctypes.CDLL:
     if version != __version__:
         raise LibraryError(f"{path}: version {version}, this package is {__version__}")
     rows = abi.fields(loaded)
+    if not any((row.of, row.name) == abi.NEWEST_FIELD for row in rows):
+        lacking = ".".join(abi.NEWEST_FIELD)
+        raise LibraryError(f"{path}: older than this package, without {lacking}; build it again")
     try:
         abi.define(rows)
     except KeyError as exc:
