@@ -8,6 +8,7 @@ from gait.io import blob
 from gait.io.track_file import read_track
 from gait.lcm.link import gaitmsg
 from gait.lcm.messages import estimate_of
+from gait.lcm.record import Recorder, read_run
 from gait.learn.classes import standing
 from gait.learn.classes.join import Change, MotionClass, join
 
@@ -34,22 +35,30 @@ def places(messages):
     return np.array([[joint.position for joint in m.joints] for m in messages])
 
 
-def test_classes_of_motion_follow_each_estimate(walk, tmp_path):
-    """With a model of one class it publishes no classes."""
+def test_classes_of_motion_come_with_each_estimate(walk, tmp_path):
+    """``gait record`` writes them; with a model of one class there are none."""
     learnt = blob.read(rig.MODEL)
     classes = [
         MotionClass("walk", changes={"stand": Change(0.5, 6.0, 0.05)}),
         MotionClass("stand", 0, own=standing.sections(learnt), changes={"walk": Change(0.5, 6.0)}),
     ]
     blob.write(tmp_path / "m.gait", join(learnt, classes))
-    now, _, _ = played(walk, "-m", tmp_path / "m.gait")
-    found = rig.read_log(walk.with_suffix(".out"), "GAIT_CLASSES", gaitmsg.classes_t)
-    assert [(m.utime, m.frame) for m in found] == [(m.utime, m.frame) for m in now]
-    assert all(
-        m.name == ["walk", "stand"] and sum(m.probability) == pytest.approx(1, abs=1e-4) for m in found
-    )
-    assert all(m.most_probable == int(m.probability[1] > m.probability[0]) for m in found)
-    assert np.mean([m.most_probable == 0 for m in found]) > 0.9
+    now, past, _ = played(walk, "-m", tmp_path / "m.gait")
+    out, log = walk.with_suffix(".out"), tmp_path / "e.log"
+    found = {lag: rig.read_log(out, f"GAIT_CLASSES{lag}", gaitmsg.classes_t) for lag in ("", "_LAG")}
+    for lag, estimates in (("_LAG", past), ("", now)):
+        Recorder(f"file://{out}?speed=0", str(tmp_path / "t.csv"), str(log), f"GAIT_ESTIMATE{lag}").run()
+        track = read_track(tmp_path / "t.csv")
+        assert [(m.utime, m.frame) for m in found[lag]] == [(m.utime, m.frame) for m in estimates]
+        assert all(
+            m.name == ["walk", "stand"] and sum(m.probability) == pytest.approx(1, abs=1e-4)
+            and m.most_probable == int(m.probability[1] > m.probability[0]) for m in found[lag]
+        )  # fmt: skip
+        assert track.motion_class == [m.name[m.most_probable] for m in found[lag]]
+        share = [m.probability[1] for m in found[lag]]
+        np.testing.assert_allclose(track.numbers["p_stand"], share, atol=1e-4)
+        assert track.motion_class.count("walk") > 0.9 * len(estimates)
+    assert [one.class_probability[1] for one in read_run(str(log)).estimates] == share
     played(walk)
     assert rig.read_log(walk.with_suffix(".out"), "GAIT_CLASSES", gaitmsg.classes_t) == []
 

@@ -19,7 +19,7 @@ import pytest
 
 from gait.cli import main
 from gait.errors import UserError
-from gait.lcm.link import LogWriter, private_url
+from gait.lcm.link import LogWriter, gaitmsg, private_url
 from gait.lcm.messages import camera_message, estimate_of
 from gait.live import feed as feeds
 from gait.live import server
@@ -31,14 +31,22 @@ from gait.report.drawing import Overlay
 
 @pytest.fixture
 def log(tmp_path):
-    """Frames and their estimates in one log, the estimate of frame 3 before its frame."""
+    """Frames and their estimates with classes in one log, the estimate of frame 3 before its frame."""
     opening = rig.opening()
     estimates = rig.play(rig.write_log(tmp_path / "in.log", [*opening, *rig.frames(0, 6)])).estimates
     events = [*opening]
     for i, (frame, estimate) in enumerate(zip(rig.frames(0, 6), estimates, strict=True)):
         pair = [frame, ("GAIT_ESTIMATE", estimate)]
+        events += [("GAIT_CLASSES", classes_at(i))] if i != 4 else []  # one is lost
         events += pair if i != 3 else pair[::-1]
     return rig.write_log(tmp_path / "both.log", events), estimates
+
+
+def classes_at(i):
+    one = gaitmsg.classes_t()
+    one.utime, one.frame, one.most_probable, one.nclasses = rig.utime(i), i, 1, 2
+    one.name, one.probability = ["walk", "run"], [0.125, 0.875]
+    return one
 
 
 def follow(path, camera=None, watched=lambda: True):
@@ -65,11 +73,14 @@ def view(path, camera=None):
 
 def test_each_estimate_is_drawn_into_its_own_frame(log):
     path, estimates = log
-    shown = view(path)
+    shown, reports, _ = follow(path)
+    motions = [found["motion"] for topic, found in reports if topic == "sample"]
+    assert motions == [*["run 88 %"] * 4, "", "run 88 %"]
     assert len(shown) == 5, "an estimate without its frame is passed over"
     overlay = Overlay(rig.model(), rig.CAMERA)
     for picture, i in zip(shown, (0, 1, 2, 4, 5), strict=True):
-        estimate = replace(estimate_of(estimates[i]), utime=rig.utime(i) - rig.utime(0))
+        estimate = estimate_of(estimates[i], classes_at(i) if i != 4 else None)
+        estimate = replace(estimate, utime=rig.utime(i) - rig.utime(0))
         np.testing.assert_array_equal(picture, overlay.draw(rig.picture(i), estimate, i))
 
 

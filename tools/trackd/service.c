@@ -453,6 +453,29 @@ static void send_stride(service *s, const gait_estimate *e, int64_t frame)
                  gaitmsg_stride_t_encode(bytes, 0, sizeof bytes, &m));
 }
 
+/* Probabilities of the classes of motion, where the model has several: before the estimate, so that a receiver has
+   both when the estimate arrives. */
+static void send_classes(service *s, const char *channel, int64_t frame, const gait_estimate *e)
+{
+    uint8_t bytes[1024];
+    float probability[GAIT_MAX_CLASSES];
+    char *name[GAIT_MAX_CLASSES];
+    int32_t const n = s->track.info.classes;
+    if (n < 2)
+        return;
+    for (int32_t k = 0; k < n; k++)
+        name[k] = (char *)gait_model_class_name(s->track.model, k); /* LCM's strings lack const; read only */
+    memcpy(probability, e->class_probability, sizeof probability);
+    gaitmsg_classes_t const m = {.utime = e->utime,
+                                 .frame = frame,
+                                 .most_probable = e->motion_class,
+                                 .nclasses = n,
+                                 .name = name,
+                                 .probability = probability};
+    sink_publish(s->out, channel, s->person, bytes,
+                 gaitmsg_classes_t_encode(bytes, 0, sizeof bytes, &m));
+}
+
 /* The estimate of the frame `lag` steps ago; steps that bridge a pause have no frame and are skipped. */
 static void send_lagged(service *s)
 {
@@ -465,31 +488,10 @@ static void send_lagged(service *s)
         return;
     convert_estimate(s->track.model, &s->track.info, &e, &lagged);
     set_counters(&lagged.msg, s, p);
+    send_classes(s, "GAIT_CLASSES_LAG", p->frame, &e);
     sink_publish(s->out, "GAIT_ESTIMATE_LAG", s->person, encoded,
                  gaitmsg_estimate_t_encode(encoded, 0, MESSAGE_BYTES, &lagged.msg));
     send_stride(s, &e, p->frame);
-}
-
-/* Probabilities of the classes of motion, where the model has several. */
-static void send_classes(service *s, const image_view *v, const gait_estimate *e)
-{
-    uint8_t bytes[1024];
-    float probability[GAIT_MAX_CLASSES];
-    char *name[GAIT_MAX_CLASSES];
-    int32_t const n = s->track.info.classes;
-    if (n < 2)
-        return;
-    for (int32_t k = 0; k < n; k++)
-        name[k] = (char *)gait_model_class_name(s->track.model, k); /* LCM's strings lack const; read only */
-    memcpy(probability, e->class_probability, sizeof probability);
-    gaitmsg_classes_t const m = {.utime = e->utime,
-                                 .frame = v->frame,
-                                 .most_probable = e->motion_class,
-                                 .nclasses = n,
-                                 .name = name,
-                                 .probability = probability};
-    sink_publish(s->out, "GAIT_CLASSES", s->person, bytes,
-                 gaitmsg_classes_t_encode(bytes, 0, sizeof bytes, &m));
 }
 
 void service_send_estimate(service *s, const image_view *v, const gait_estimate *e, int64_t received,
@@ -500,9 +502,9 @@ void service_send_estimate(service *s, const image_view *v, const gait_estimate 
     past_frame *const now = &s->past[e->frame % SERVICE_PAST];
     *now = (past_frame){e->frame, v->frame, s->steps, received, (int32_t)step_us};
     set_counters(m, s, now);
+    send_classes(s, "GAIT_CLASSES", v->frame, e);
     sink_publish(s->out, "GAIT_ESTIMATE", s->person, encoded,
                  gaitmsg_estimate_t_encode(encoded, 0, MESSAGE_BYTES, m));
-    send_classes(s, v, e);
     if (s->track.config.lag > 0)
         send_lagged(s);
     else

@@ -35,7 +35,7 @@ STRIDE_COLUMNS = ("phase", "stride_hz", "speed_m_s", "phase_sd", "stride_hz_sd")
 STATUSES = ("init", "tracking", "ambiguous", "lost")
 
 
-CLASS_COLUMN = "motion_class"
+CLASS_COLUMN, CLASS_PREFIX = "motion_class", "p_"
 CLIP_COLUMNS = ("reason", "first_frame", "last_frame")
 FILM_COLUMN = "film"
 PERSON_COLUMN = "person"
@@ -47,7 +47,7 @@ def header(components: int, angle_names: tuple[str, ...], classes: tuple[str, ..
     scores = [f"c_{k + 1}" for k in range(components)]
     joints = [f"{joint}_{axis}" for joint in JOINTS for axis in ("x", "y", "z", "sx", "sy", "sz")]
     sds = [*SD_COLUMNS, *(f"{score}_sd" for score in scores)]
-    of_classes = [CLASS_COLUMN, *(f"p_{name}" for name in classes)] if len(classes) > 1 else []
+    of_classes = [CLASS_COLUMN, *(f"{CLASS_PREFIX}{name}" for name in classes)] if len(classes) > 1 else []
     return [*STATE_COLUMNS, *scores, *joints, *(f"{name}_deg" for name in angle_names), *sds, *of_classes]
 
 
@@ -114,7 +114,7 @@ class TrackWriter:
         return self._stack.__exit__(kind, exc, trace)
 
     def write(self, frame: Frame, estimate: Estimate) -> None:
-        """Append the estimate of one frame."""
+        """Append the estimate of one frame; without probabilities of all classes, their cells are empty."""
         state, sd = estimate.mean, estimate.sd
         joints = np.hstack([estimate.joints, estimate.joint_sd])[self._order]
         values = [state.phase, state.stride_hz, state.heading, state.stature, estimate.speed]
@@ -127,12 +127,18 @@ class TrackWriter:
             + [f"{value:.3f}" for value in np.degrees(estimate.angles)]
             + [_or_empty(value) for value in (sd.phase, sd.stride_hz, sd.heading, sd.stature)]
             + [f"{value:.4f}" for value in self._scores(sd.coef)]
-            + ([estimate.motion_class] if self._classes else [])
-            + [f"{value:.4f}" for value in estimate.class_probability[: self._classes]]
+            + self._of_class(estimate)
             + self._of_clip(estimate)
             + self._of_camera(frame.time)
             + [*self._last.values()]
         )
+
+    def _of_class(self, estimate: Estimate) -> list[str]:
+        if not self._classes:
+            return []
+        if len(estimate.class_probability) != self._classes:
+            return [""] * (1 + self._classes)
+        return [estimate.motion_class, *(f"{value:.4f}" for value in estimate.class_probability)]
 
     def _of_clip(self, estimate: Estimate) -> list[object]:
         if self._frames is None:
@@ -183,9 +189,9 @@ class Track(Joints):
     phase: Array  #: (n,) NaN where the person takes no strides
     sd: dict[str, Array]  #: (n, 3) posterior standard deviations, metres
     #: (n,) for each other column of numbers, by name: state, scores, angles and their standard deviations;
-    #: NaN in `STRIDE_COLUMNS` where the person takes no strides.
+    #: NaN in `STRIDE_COLUMNS` where the person takes no strides, in those of classes where not recorded.
     numbers: dict[str, Array] = field(default_factory=dict)
-    #: Class of motion of each frame; empty if the model has only one.
+    #: Class of motion of each frame, '' where not recorded; empty if the model has only one.
     motion_class: list[str] = field(default_factory=list)
     #: Frames that were to be tracked; None if the file does not state them.
     frames: range | None = None
@@ -291,7 +297,7 @@ def _camera_change(table: _Table) -> Array:
 def _is_number(column: str) -> bool:
     """Whether a column belongs in `Track.numbers`."""
     known = column in (*STATE_COLUMNS[3:], *SD_COLUMNS, PERSON_COLUMN) or column.endswith("_deg")
-    return known or column.startswith("p_") or re.fullmatch(r"c_\d+(_sd)?", column) is not None
+    return known or column.startswith(CLASS_PREFIX) or re.fullmatch(r"c_\d+(_sd)?", column) is not None
 
 
 class _Table:
@@ -328,7 +334,7 @@ class _Table:
         cells = self.column(name)
         values = np.empty(len(cells))
         for i, cell in enumerate(cells):
-            if not cell and name in STRIDE_COLUMNS:
+            if not cell and (name in STRIDE_COLUMNS or name.startswith(CLASS_PREFIX)):
                 values[i] = np.nan
                 continue
             try:

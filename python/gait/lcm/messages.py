@@ -266,14 +266,36 @@ def command_message(
     return message
 
 
-def estimate_of(message: Any) -> Estimate:
-    """Read an ``estimate_t``.
+def classes_message(data: bytes, channel: str) -> Any:
+    """Decode a ``classes_t``.
+
+    Raises
+    ------
+    UserError
+        If it is damaged.
+    """
+    message = decode(gaitmsg.classes_t, data, channel)
+    if not (0 <= message.most_probable < message.nclasses and np.isfinite(message.probability).all()):
+        raise UserError(f"{channel}: probabilities of no class of motion")
+    return message
+
+
+def estimate_of(message: Any, classes: Any = None) -> Estimate:
+    """Read an ``estimate_t``, and the ``classes_t`` of its frame if the model has several classes.
 
     Raises
     ------
     UserError
         If its status is unknown.
     """
+    of_classes = (
+        {}
+        if classes is None
+        else {
+            "motion_class": classes.name[classes.most_probable],
+            "class_probability": np.array(classes.probability, float),
+        }
+    )
     if message.status not in list(TrackStatus):
         raise UserError(f"estimate: status {message.status} is unknown")
     return Estimate(
@@ -293,4 +315,5 @@ def estimate_of(message: Any) -> Estimate:
         joint_sd=np.array([joint.sd for joint in message.joints], float).reshape(-1, 3),
         angles=np.array([angle.angle for angle in message.angles], float),
         joint_names=tuple(joint.name for joint in message.joints),
+        **of_classes,
     )

@@ -16,7 +16,7 @@ from gait.io.files import replacing
 from gait.io.track_file import TrackWriter
 from gait.io.video import Frame
 from gait.lcm.link import LogWriter, break_of, events_of, handle, is_log, listener, log_of, now, require_log
-from gait.lcm.messages import estimate_after, estimate_of
+from gait.lcm.messages import classes_message, estimate_after, estimate_of
 from gait.progress import durations
 
 LISTENING = "listening"
@@ -65,6 +65,8 @@ class Figures:
 
 
 ESTIMATE, LAGGED = "GAIT_ESTIMATE", "GAIT_ESTIMATE_LAG"
+CLASSES = {ESTIMATE: "GAIT_CLASSES", LAGGED: "GAIT_CLASSES_LAG"}
+"""Channel of the class probabilities that come before each estimate."""
 
 
 def channel_of(person: int | None, channel: str = ESTIMATE) -> str:
@@ -109,7 +111,8 @@ class Recorder:
         self._lcm, self._live, self._url = listener(url), not is_log(url), url
         self._output, self._path, self._person = output, log, person
         self._channel = channel_of(person, channel)
-        self._waiting: list[Any] = []
+        self._waiting: list[tuple[Any, Any]] = []  # estimates and their classes
+        self._classes: tuple[Any, bytes] | None = None  # the newest
         self._writer: TrackWriter | None = None
         self._log: LogWriter | None = None
         self._origin = 0
@@ -119,7 +122,9 @@ class Recorder:
         self.stop = False
         self.other: str | None = None
         self.damage: str | None = None
+        self._classes_channel = channel_of(person, CLASSES[channel])
         self._lcm.subscribe(self._channel, self._on_estimate).set_queue_capacity(_QUEUE)
+        self._lcm.subscribe(self._classes_channel, self._on_classes).set_queue_capacity(_QUEUE)
 
     def run(
         self, frames: int | None = None, idle: float | None = None, patience: float | None = None
@@ -164,13 +169,23 @@ class Recorder:
         """Return the figures of the recording."""
         return self.figures.summary(self._live)
 
+    def _on_classes(self, channel: str, data: bytes) -> None:
+        try:
+            self._classes = classes_message(data, channel), data
+        except UserError as fault:
+            self._skip(fault)
+
+    def _skip(self, fault: UserError) -> None:
+        """Count a bad message, which does not end a recording."""
+        self.figures.damaged += 1
+        self.damage = self.damage or str(fault)
+
     def _on_estimate(self, channel: str, data: bytes) -> None:
         arrived = now()
         try:
             message = estimate_after(data, channel, self.figures.last)
-        except UserError as fault:  # a bad message does not end a recording
-            self.figures.damaged += 1
-            self.damage = self.damage or str(fault)
+        except UserError as fault:
+            self._skip(fault)
             return
         if self.figures.last is None:
             self._first = message.receive_utime
@@ -178,10 +193,15 @@ class Recorder:
             self.stop = True
             return
         self.figures.add(message, arrived)
+        classes, encoded = self._classes or (None, b"")
+        if classes is not None and classes.utime != message.utime:
+            classes = None
         if self._log is not None:
+            if classes is not None:
+                self._log.write(arrived, self._classes_channel, encoded)
             self._log.write(arrived, channel, data)
         self._last = time.monotonic()
-        self._waiting.append(message)
+        self._waiting.append((message, classes))
         if self._writer is not None or len(self._waiting) == 2:
             self._flush()
 
@@ -207,20 +227,21 @@ class Recorder:
         """Write waiting rows; the first waits for the second, as both are needed for the time of frame 0."""
         if self._waiting and self._writer is None:
             self._open()
-        for message in self._waiting:
+        for message, classes in self._waiting:
             assert self._writer is not None
             seconds = (message.utime - self._origin) / 1e6
-            self._writer.write(Frame(_number(message), seconds, _NO_IMAGE), estimate_of(message))
+            self._writer.write(Frame(_number(message), seconds, _NO_IMAGE), estimate_of(message, classes))
         self._waiting.clear()
 
     def _open(self) -> None:
-        first, last = self._waiting[0], self._waiting[-1]
+        first, last = self._waiting[0][0], self._waiting[-1][0]
         interval = (last.utime - first.utime) / max(1, _number(last) - _number(first))
         self._origin = first.utime - round(interval * _number(first))
         joints = tuple(joint.name for joint in first.joints)
         angles = tuple(angle.name for angle in first.angles)
+        classes = next((tuple(one.name) for _, one in self._waiting if one is not None), ())
         self._writer = self._stack.enter_context(
-            TrackWriter(self._output, first.mean.ncoef, joints, angles, person=self._person)
+            TrackWriter(self._output, first.mean.ncoef, joints, angles, classes, person=self._person)
         )
 
 
@@ -289,12 +310,17 @@ def read_run(path: str, person: int | None = None) -> Run:
     """
     require_log(path)
     messages: list[Any] = []
+    classes: dict[int, Any] = {}  # by capture time
     remark, damage = None, None
     arrived: list[int] = []
     for event in events_of(path, whole=False):
-        if event.channel != channel_of(person):
+        if event.channel not in (channel_of(person), channel_of(person, CLASSES[ESTIMATE])):
             continue
         try:
+            if event.channel != channel_of(person):
+                one = classes_message(event.data, path)
+                classes[one.utime] = one
+                continue
             message = estimate_after(event.data, path, messages[0] if messages else None)
         except UserError as fault:
             damage = damage or f"a message is skipped: {fault}"
@@ -311,7 +337,7 @@ def read_run(path: str, person: int | None = None) -> Run:
     return Run(
         frame=np.array([m.frame for m in messages], np.int64),
         seconds=(utime - utime[0]) / 1e6,
-        estimates=[estimate_of(m) for m in messages],
+        estimates=[estimate_of(m, classes.get(m.utime)) for m in messages],
         step_ms=np.array([m.step_us for m in messages]) / 1e3,
         latency_ms=(np.array(arrived, np.int64) - utime) / 1e3,
         dropped=messages[-1].dropped,

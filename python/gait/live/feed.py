@@ -23,8 +23,8 @@ from gait.camera.camera import Camera
 from gait.errors import UsageError, UserError
 from gait.io.video import Image
 from gait.lcm.link import gaitmsg, handle, is_log, listener, now, waiting
-from gait.lcm.messages import camera_of, decode, estimate_of, picture
-from gait.report.drawing import Overlay
+from gait.lcm.messages import camera_of, classes_message, decode, estimate_of, picture
+from gait.report.drawing import Overlay, class_words
 from gait.web.motion_data import curve, motion_data, rounded
 
 _KEPT_FRAMES = 64  # most frames that wait for their estimate, and most bytes of them
@@ -115,6 +115,7 @@ class _Person:
     arrivals: deque[int]
     drops: Drops
     heard: float = -np.inf  # seconds, monotonic
+    classes: Any = None  # the newest ``classes_t``, which comes before its estimate
 
     def rate(self) -> float | None:
         """Count an estimate that arrives now; return estimates per second."""
@@ -193,6 +194,9 @@ class Feed:
         for person, one in enumerate(self.people):
             self._subscribe(one.url, one.channel, partial(self._on_estimate, person), _KEPT_FRAMES)
             self._subscribe(
+                one.url, f"GAIT_CLASSES{one.ending}", partial(self._on_classes, person), _KEPT_FRAMES
+            )
+            self._subscribe(
                 one.url, f"GAIT_STATUS{one.ending}", partial(self._on_status, person), _KEPT_FRAMES
             )
 
@@ -266,9 +270,14 @@ class Feed:
         if not view.given:  # the newest counts, as an earlier one may have been wrong
             view.use(camera_of(decode(gaitmsg.camera_t, data, channel)), self._model)
 
+    def _on_classes(self, person: int, channel: str, data: bytes) -> None:
+        self._persons[person].classes = classes_message(data, channel)
+
     def _on_estimate(self, person: int, channel: str, data: bytes) -> None:
         message = decode(gaitmsg.estimate_t, data, channel)
-        estimate = estimate_of(message)
+        classes = self._persons[person].classes
+        fits = classes is not None and classes.utime == message.utime
+        estimate = estimate_of(message, classes if fits else None)
         if estimate.joint_names != self._model.joint_names:
             raise UserError(
                 f"{channel}: an estimate of other joints than the model's; give the model that is tracked"
@@ -297,6 +306,7 @@ class Feed:
             "phase": round(float(mean.phase), 4),
             "cadence": round(120.0 * float(mean.stride_hz), 1),
             "speed": round(float(estimate.speed), 3),
+            "motion": class_words(estimate),
             "rate": self._persons[person].rate(),
             "latency_ms": None if self._log else round(1e-3 * (now() - message.utime), 1),
             "step_ms": round(1e-3 * message.step_us, 2),

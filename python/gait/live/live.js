@@ -117,6 +117,7 @@ function onSample(one) {
   setStatus(one.status, TEXT[one.status] ?? one.status);
   show('cadence', unit(one.cadence, 0, 'steps/min'));
   show('speed', unit(one.speed, 2, 'm/s'));
+  if (one.motion) show('motion', one.motion);
   show('rate', unit(one.rate, 1, 'Hz'));
   show('latency', unit(one.latency_ms, 0, 'ms'));
   show('step', unit(one.step_ms, 1, 'ms'));

@@ -19,6 +19,7 @@ from gait.io.video import Image
 from gait.report.colours import OVER_PICTURES
 
 _PANEL_SIZE = (236, 92)  # size of the panel, pixels at scale 1
+_ROW = 18  # height of its further line for the class of motion
 _INK = (240, 240, 240)
 _DIM = (170, 170, 170)
 _STATUS = {
@@ -47,25 +48,31 @@ _FONT = cv2.FONT_HERSHEY_DUPLEX
 
 def draw_panel(canvas: Image, estimate: Estimate, frame: int, scale: float) -> None:
     """Draw the panel into the top left corner of a BGR picture, in place; `scale` 1 suits 540 lines."""
-    region = _panel(canvas, scale)
     lost = estimate.status == TrackStatus.LOST
-    _dial(region, estimate, (round(46 * scale), round(46 * scale)), 32 * scale, scale)
     words = ("figure: last guess", "") if lost else _figures(estimate)
+    region = _panel(canvas, scale, len(words) - 2)
+    _dial(region, estimate, (round(46 * scale), round(46 * scale)), 32 * scale, scale)
     time = f"frame {frame}   {estimate.utime / 1e6:.2f} s"
     _lines(region, (_WORDS[estimate.status], *words, time), _STATUS[estimate.status], scale)
 
 
-def _figures(estimate: Estimate) -> tuple[str, str]:
+def _figures(estimate: Estimate) -> tuple[str, ...]:
     if np.isnan(estimate.mean.phase):
         return "no strides", ""
     steps = 120 * estimate.mean.stride_hz if estimate.speed else 0.0
-    of_class = f" {estimate.motion_class}" if len(estimate.class_probability) > 1 else ""
-    return f"{steps:5.1f} steps/min", f"{estimate.speed:5.2f} m/s{of_class}"
+    of_class = class_words(estimate)
+    return (f"{steps:5.1f} steps/min", f"{estimate.speed:5.2f} m/s", *([of_class] if of_class else []))
 
 
-def _panel(canvas: Image, scale: float) -> Image:
-    """Darken the top left corner; return that part of the picture."""
-    width, height = (round(side * scale) for side in _PANEL_SIZE)
+def class_words(estimate: Estimate) -> str:
+    """Return the most probable class of motion with its probability; '' if the model has only one."""
+    several = len(estimate.class_probability) > 1
+    return f"{estimate.motion_class} {100 * estimate.class_probability.max():.0f} %" if several else ""
+
+
+def _panel(canvas: Image, scale: float, further: int = 0) -> Image:
+    """Darken the top left corner, with space for further lines; return that part of the picture."""
+    width, height = (round(side * scale) for side in (_PANEL_SIZE[0], _PANEL_SIZE[1] + further * _ROW))
     edge = round(8 * scale)
     return _darkened(canvas[edge : edge + height, edge : edge + width])
 
@@ -77,9 +84,10 @@ def _darkened(region: Image) -> Image:
 
 
 def _lines(region: Image, words: tuple[str, ...], colour: tuple[int, int, int], scale: float) -> None:
-    """Write the panel's four lines, the first in colour."""
-    left = round(96 * scale)
-    rows = ((22, 0.52, colour), (43, 0.4, _INK), (61, 0.4, _INK), (80, 0.36, _DIM))
+    """Write the panel's lines, the first in colour, the last dim."""
+    left, count = round(96 * scale), len(words) - 2
+    rows = [(22.0, 0.52, colour), *((43.0 + _ROW * k, 0.4, _INK) for k in range(count))]
+    rows += [(44.0 + _ROW * count, 0.36, _DIM)]
     for line, (row, size, ink) in zip(words, rows, strict=True):
         _write(region, line, (left, round(row * scale)), size * scale, ink)
 
