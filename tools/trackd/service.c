@@ -472,8 +472,7 @@ static void send_classes(service *s, const char *channel, int64_t frame, const g
                                  .nclasses = n,
                                  .name = name,
                                  .probability = probability};
-    sink_publish(s->out, channel, s->person, bytes,
-                 gaitmsg_classes_t_encode(bytes, 0, sizeof bytes, &m));
+    sink_publish(s->out, channel, s->person, bytes, gaitmsg_classes_t_encode(bytes, 0, sizeof bytes, &m));
 }
 
 /* The estimate of the frame `lag` steps ago; steps that bridge a pause have no frame and are skipped. */
