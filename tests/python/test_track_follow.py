@@ -161,6 +161,51 @@ def test_a_lost_person_is_found_again_within_a_second_in_full_view(known, folder
     assert off[again].max() < 0.15 and "lost" not in np.array(rows.status)[again]
 
 
+@pytest.mark.parametrize("cut", ["picture's edge", "occluder"])
+def test_feet_that_leave_the_picture_do_not_end_the_track(cut, folder, capsys):
+    """The person walks towards the camera, or something hides them up to the knees for half a second."""
+    view, count, hidden = camera(), 45, slice(15, 30)
+    way = {"start": (-1.2, 0.0)}
+    if cut == "picture's edge":
+        view = camera(place=(0.0, -5.0, 1.5))
+        way = {"start": (0.0, -1.1), "heading": -np.pi / 2}
+    pictures, states = clip(MODEL, SECTIONS, count, view=view, **way)
+    joints = np.array([MODEL.pose(state)[0] for state in states])
+    feet = [MODEL.joint_names.index(name) for name in ("l_ankle", "r_ankle")]
+    if cut == "occluder":
+        knees = view.project(joints[:, [MODEL.joint_names.index("l_knee")]])[..., 1]
+        for picture in pictures[hidden]:
+            picture[int(knees.min()) :] = 60
+    else:
+        assert (view.project(joints[-1, feet])[..., 1] > pictures[0].shape[0]).all()
+    write(folder / "walk.mp4", pictures)
+    (folder / "camera.json").write_text(json.dumps(view.to_dict()))
+    init(folder, states[0], 0)
+    assert track(folder) == 0
+    rows, mine, order = errors(folder)
+    assert set(rows.status) == {"tracking"} and f"from frame 0 to {count - 1}" in capsys.readouterr().err
+    assert np.linalg.norm(mine - joints[:, order], axis=2).max() < 0.2
+
+
+def test_a_mirror_image_with_keypoints_loses_against_the_person(folder, monkeypatch):
+    """The detector takes it for a second person, and for a while finds only this one."""
+    real = camera().project(JOINTS)
+    swap = {"l_": "r_", "r_": "l_"}
+    other = [MODEL.joint_names.index(swap.get(n[:2], n[:2]) + n[2:]) for n in MODEL.joint_names]
+    image = camera().project(JOINTS[:, other] * [1, -1, 1] + [0, 3.0, 0])  # in a mirror 1.5 m behind the path
+    real[10:18] = np.nan
+    frame = np.arange(len(FRAMES))
+    people = {
+        id: keypoints_file.Keypoints(frame, frame / 30, MODEL.joint_names, uv, np.ones(uv.shape[:2]))
+        for id, uv in ((1, image), (2, real))
+    }
+    monkeypatch.setattr(scene, "_detect", lambda *_: (people, 1))
+    assert track(folder, "--init", "auto") == 0
+    rows, mine, order = errors(folder)
+    assert rows.frame.tolist() == frame.tolist() and "lost" not in rows.status
+    assert np.linalg.norm(mine - JOINTS[:, order], axis=2).mean(axis=1).max() < 0.2
+
+
 @pytest.mark.long
 def test_a_film_of_noise_ends_with_a_warning(folder, capsys):
     random = np.random.default_rng(1)
