@@ -137,6 +137,21 @@ def test_several_people_have_rows_and_files_of_their_own(place):
     assert "a, person 2" in page and 'href="a/report-2/report.html"' in page
 
 
+def test_several_films_are_one_clip_and_all_their_files_count(place, capsys):
+    """gait track takes these words, and fails because the films have a few bytes only."""
+    (place / "calib.json").write_text("{}")
+    text = '[[clip]]\nvideos = ["a.mp4", "b.mp4"]\ncameras = ["calib.json", "calib.json"]\nmake = ["track"]\n'
+    [clip] = clips_of(place, text)
+    words = clip.command(place)
+    films, camera = [str(place / "a.mp4"), str(place / "b.mp4")], ["--camera", str(place / "calib.json")]
+    assert clip.name == "a" and words[1:3] == films and words[-4:] == 2 * camera
+    before = clip.key()
+    (place / "b.mp4").write_bytes(b"another")
+    assert clip.key() != before
+    assert gait.cli.main(words) == 1 and "a.mp4: cannot be read as video" in capsys.readouterr().err
+    assert runner(place).run([clip], 1, lambda _: None)[0]["input"] == films[0]
+
+
 def test_a_cluster_runs_the_same_project(place, monkeypatch):
     distributed = pytest.importorskip("distributed", reason="Dask is not installed: extra dask")
     from gait.batch import cluster
@@ -240,6 +255,12 @@ def test_an_interrupt_ends_the_commands(place):
         (
             "[[clip]]\nvideo = 'a.mp4'\nheight = 1.7\npeople = 2\nmake = ['lift']\n",
             "people cannot be combined with lift",
+        ),
+        ("[[clip]]\nvideos = 'a.mp4'\nheight = 1.7\n", r"videos is not a list.*left.mp4"),
+        ("[[clip]]\nvideo = 'a.mp4'\nvideos = ['b.mp4']\nheight = 1.7\n", "videos is given beside video"),
+        (
+            "[[clip]]\nvideos = ['a.mp4', 'b.mp4']\nheight = 1.7\nmake = ['lift']\n",
+            "videos cannot be combined with lift",
         ),
         ("[[clip]\n", "not valid TOML"),
     ],

@@ -22,8 +22,9 @@ else:
 
 EXPORT_FORMATS = ("trc", "c3d", "bvh", "mot", "parquet", "rrd", "mcap")
 MADE = ("track", "lift", "overlay", "report", *EXPORT_FORMATS)
-_FILES = ("video", "keypoints", "camera")
-_KEYS = ("subject", "height", "person", "people", "start", "stop", "make", "options", *_FILES)
+_FILES = {"video": "videos", "camera": "cameras"}  # of one film; of several
+_KEYS = ("subject", "height", "person", "people", "start", "stop", "make", "options", "keypoints",
+         *_FILES, *_FILES.values())  # fmt: skip
 
 
 @dataclass(frozen=True)
@@ -31,9 +32,9 @@ class Clip:
     """One clip of a project; paths of files are absolute."""
 
     name: str
-    video: str | None = None
+    videos: tuple[str, ...] = ()  #: several: the same walk, each with its camera
     keypoints: str | None = None
-    camera: str | None = None
+    cameras: tuple[str, ...] = ()
     subject: str = ""  #: the person's name, for the summary
     height: float | None = None  #: metres
     person: str | None = None  #: which of several people in `keypoints`
@@ -42,6 +43,11 @@ class Clip:
     stop: int | None = None
     make: tuple[str, ...] = ("track", "report")
     options: tuple[str, ...] = ()  #: further arguments of gait track or gait lift
+
+    @property
+    def video(self) -> str | None:
+        """The film whose frames the track has."""
+        return self.videos[0] if self.videos else None
 
     @property
     def lifted(self) -> bool:
@@ -55,7 +61,8 @@ class Clip:
 
     def key(self) -> str:
         """Hash of all that the outputs depend on: settings, version, size and time of the input files."""
-        files = [os.stat(path) for path in (getattr(self, name) for name in _FILES) if path]
+        paths = [*self.videos, *self.cameras, *([self.keypoints] if self.keypoints else [])]
+        files = [os.stat(path) for path in paths]
         state = [asdict(self), [(file.st_size, file.st_mtime_ns) for file in files], __version__]
         return hashlib.sha256(json.dumps(state).encode()).hexdigest()
 
@@ -78,7 +85,7 @@ class Clip:
         return found
 
     def _track(self, result: str, folder: Path) -> list[str]:
-        words = ["track", self.video or "", "-o", result, "--json", "--quiet", *self._common()]
+        words = ["track", *self.videos, "-o", result, "--json", "--quiet", *self._common()]
         if "overlay" in self.make:
             words += ["--overlay", str(folder / "overlay.mp4")]
         if self.keypoints:
@@ -100,11 +107,10 @@ class Clip:
         return [*words, *self.options]
 
     def _common(self) -> list[str]:
-        names = ("camera", "height", "person", "people", "start", "stop")
-        given = {name: getattr(self, name) for name in names}
-        return [
-            word for name, value in given.items() if value is not None for word in (f"--{name}", str(value))
-        ]
+        names = ("height", "person", "people", "start", "stop")
+        given = [("camera", camera) for camera in self.cameras]
+        given += [(name, getattr(self, name)) for name in names]
+        return [word for name, value in given if value is not None for word in (f"--{name}", str(value))]
 
 
 def read(path: str | os.PathLike[str]) -> list[Clip]:
@@ -145,10 +151,18 @@ def _clip(fields: Fields, common: Clip, folder: Path, named: bool = False) -> Cl
     """Make a clip from its table; entries that it lacks come from the common ones."""
     fields.only((*_KEYS, "name") if named else _KEYS)
     given: dict[str, Any] = {}
-    for name in (*_FILES, "subject", "person"):
+    for name in ("subject", "person"):
         if name in fields:
             given[name] = _text(fields, name)
-    given |= {name: str(folder / given[name]) for name in _FILES if name in given}
+    if "keypoints" in fields:
+        given["keypoints"] = str(folder / _text(fields, "keypoints"))
+    for one, several in _FILES.items():
+        if one in fields and several in fields:
+            raise fields.fail(several, f"is given beside {one}", "leave out one of them")
+        if one in fields:
+            given[several] = (str(folder / _text(fields, one)),)
+        if several in fields:
+            given[several] = tuple(str(folder / file) for file in _words(fields, several, None))
     if "people" in fields:
         given["people"] = (
             "all"
@@ -164,7 +178,7 @@ def _clip(fields: Fields, common: Clip, folder: Path, named: bool = False) -> Cl
         if name in fields:
             given[name] = _words(fields, name, known)
     if named:
-        stem = Path(given.get("video") or given.get("keypoints") or "").stem
+        stem = Path(next(iter(given.get("videos", ())), given.get("keypoints", ""))).stem
         given["name"] = _text(fields, "name") if "name" in fields else stem
     return replace(common, **given)
 
@@ -179,11 +193,13 @@ def _require(fields: Fields, clip: Clip) -> None:
         raise fields.fail("video", "and keypoints are missing", "give one of them")
     if clip.lifted and {"track", "overlay", "report"} & set(clip.make):
         raise fields.fail("make", "has lift together with track, overlay or report", "make a clip of each")
+    if len(clip.videos) > 1 and clip.lifted:
+        raise fields.fail("videos", "cannot be combined with lift", "give video, or make track")
     if clip.people and (clip.lifted or clip.keypoints):
         raise fields.fail(
             "people", "cannot be combined with lift or keypoints", "several people are tracked in a video"
         )
-    if not clip.camera and clip.height is None and not (clip.lifted and clip.keypoints):
+    if not clip.cameras and clip.height is None and not (clip.lifted and clip.keypoints):
         raise fields.fail("camera", "and height are missing", "give one of them, here or in [defaults]")
 
 
@@ -194,10 +210,18 @@ def _text(fields: Fields, name: str) -> str:
     return value
 
 
+_EXAMPLES = {
+    "make": '["track", "report"]',
+    "options": '["--detector", "lite"]',
+    "videos": '["left.mp4", "right.mp4"]',
+    "cameras": '["left.json", "right.json"]',
+}
+
+
 def _words(fields: Fields, name: str, known: tuple[str, ...] | None) -> tuple[str, ...]:
     value = fields.get(name, "give a list of words")
     if not isinstance(value, list) or not all(isinstance(word, str) for word in value):
-        raise fields.fail(name, "is not a list of words", 'give it as ["track", "report"]')
+        raise fields.fail(name, "is not a list of words", f"give it as {_EXAMPLES[name]}")
     wrong = [word for word in value if known is not None and word not in known]
     if wrong:
         raise fields.fail(name, f"has {wrong[0]!r}", f"use {' '.join(known or ())}")

@@ -12,6 +12,9 @@ PROJECT.toml lists the clips and the outputs of each; paths are relative to it:
   video = "group.mp4"
   people = "all"                # or how many: tracks several, each with files and a row of their own
   [[clip]]
+  videos = ["left.mp4", "right.mp4"]  # films of one walk
+  camera = "calibration.toml"         # of all of them; or cameras = ["left.json", "right.json"]
+  [[clip]]
   keypoints = "ben.json"
   make = ["lift", "mot"]
   options = ["--fps", "30"]     # further options of gait track or gait lift
