@@ -82,6 +82,8 @@ def streams(tmp_path_factory):
             if state(person, frame) is not None and (person == 2 or not 17 < frame < 24):  # hidden
                 uv = rig.CAMERA.project(joints(person, frame)) + 0.5 * rng.normal(size=(len(names), 2))
                 log.append((f"GAIT_TRACKS_0_{person}", tracks_message(names, uv, at, frame)))
+            elif person == 1 and frame >= WALK:  # a detector may send that there is no one
+                log.append(("GAIT_TRACKS_0_1", tracks_message([], np.zeros((0, 2)), at, frame)))
     path = rig.write_log(tmp_path_factory.mktemp("people") / "a.log", log)
     found, printed = played(path, "--people", 2)
     assert "person 1 found" in printed and "person 2 found" in printed

@@ -133,14 +133,17 @@ bool keypoint_cue_take(keypoint_cue *cue, keypoints_view *v, message *why)
         return message_set(why, "keypoints arrived after their frame had been tracked; publish them "
                                 "before the next frame");
     }
+    to->seen = false;
     for (int32_t j = 0; j < cue->joints; j++)
         to->joint[j].sd = -1.0f;
     keypoints_filter_begin(&cue->filter);
     while (keypoints_view_next(v, &k)) {
         int32_t const j = find(cue, k.name);
         known += j >= 0;
-        if (keypoints_filter_pass(&cue->filter, &k, j))
-            to->joint[j] = (gait_keypoint){k.u, k.v, (float)keypoints_view_sd(&k, (double)cue->sd)};
+        if (!keypoints_filter_pass(&cue->filter, &k, j))
+            continue;
+        to->joint[j] = (gait_keypoint){k.u, k.v, (float)keypoints_view_sd(&k, (double)cue->sd)};
+        to->seen = to->seen || to->joint[j].sd >= 0.0f;
     }
     if (announced && known == 0)
         return keypoints_view_unknown(why);
@@ -148,12 +151,23 @@ bool keypoint_cue_take(keypoint_cue *cue, keypoints_view *v, message *why)
     return true;
 }
 
-const gait_keypoint *keypoint_cue_at(const keypoint_cue *cue, int64_t utime)
+static const cue_keypoints *message_at(const keypoint_cue *cue, int64_t utime)
 {
     for (int32_t i = 0; i < KEYPOINT_CUE_PAST; i++)
         if (cue->past[i].utime == utime)
-            return cue->past[i].joint;
+            return &cue->past[i];
     return NULL;
+}
+
+bool keypoint_cue_arrived(const keypoint_cue *cue, int64_t utime)
+{
+    return message_at(cue, utime) != NULL;
+}
+
+const gait_keypoint *keypoint_cue_at(const keypoint_cue *cue, int64_t utime)
+{
+    const cue_keypoints *const found = message_at(cue, utime);
+    return found && found->seen ? found->joint : NULL;
 }
 
 const gait_keypoint *keypoint_cue_use(keypoint_cue *cue, int64_t utime)

@@ -53,6 +53,7 @@ enum { KEYPOINT_CUE_PAST = 8 }; /* messages that wait for their frames */
 
 typedef struct cue_keypoints {
     int64_t utime; /* of the frame; -1: none */
+    bool seen;     /* at least one joint is */
     gait_keypoint joint[GAIT_MAX_JOINTS];
 } cue_keypoints;
 
@@ -76,7 +77,10 @@ void keypoint_cue_resume(keypoint_cue *cue, int64_t utime);
 void keypoint_cue_forget(keypoint_cue *cue);
 /* Keep the keypoints of one message.  false if none is known to the model or their frame has been tracked. */
 bool keypoint_cue_take(keypoint_cue *cue, keypoints_view *v, message *why);
-/* Keypoints of the frame with this capture time, in the order of the model's joints; NULL: none have arrived. */
+/* Whether the message for the frame with this capture time has arrived. */
+bool keypoint_cue_arrived(const keypoint_cue *cue, int64_t utime);
+/* Keypoints of that frame, in the order of the model's joints; NULL: none have arrived, or the message says that no joint
+ * is seen. */
 const gait_keypoint *keypoint_cue_at(const keypoint_cue *cue, int64_t utime);
 /* The same for the frame that is being tracked, and count it. */
 const gait_keypoint *keypoint_cue_use(keypoint_cue *cue, int64_t utime);

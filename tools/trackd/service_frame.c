@@ -384,7 +384,7 @@ bool service_waits(const service *s, int64_t utime)
     gait_camera_pose pose;
     message why;
     for (const service *each = s; each; each = each->next)
-        if (each->cue && !keypoint_cue_at(each->cue, utime))
+        if (each->cue && !keypoint_cue_arrived(each->cue, utime))
             return true;
     return (s->path && pose_path_at(s->path, utime, &pose, &why) == POSE_LATER) ||
            (s->further && further_waits(s->further, utime));
