@@ -133,7 +133,7 @@ bool keypoint_cue_take(keypoint_cue *cue, keypoints_view *v, message *why)
         return message_set(why, "keypoints arrived after their frame had been tracked; publish them "
                                 "before the next frame");
     }
-    to->seen = false;
+    to->observed = false;
     for (int32_t j = 0; j < cue->joints; j++)
         to->joint[j].sd = -1.0f;
     keypoints_filter_begin(&cue->filter);
@@ -143,7 +143,7 @@ bool keypoint_cue_take(keypoint_cue *cue, keypoints_view *v, message *why)
         if (!keypoints_filter_pass(&cue->filter, &k, j))
             continue;
         to->joint[j] = (gait_keypoint){k.u, k.v, (float)keypoints_view_sd(&k, (double)cue->sd)};
-        to->seen = to->seen || to->joint[j].sd >= 0.0f;
+        to->observed = to->observed || to->joint[j].sd >= 0.0f;
     }
     if (announced && known == 0)
         return keypoints_view_unknown(why);
@@ -167,7 +167,7 @@ bool keypoint_cue_arrived(const keypoint_cue *cue, int64_t utime)
 const gait_keypoint *keypoint_cue_at(const keypoint_cue *cue, int64_t utime)
 {
     const cue_keypoints *const found = message_at(cue, utime);
-    return found && found->seen ? found->joint : NULL;
+    return found && found->observed ? found->joint : NULL;
 }
 
 const gait_keypoint *keypoint_cue_use(keypoint_cue *cue, int64_t utime)

@@ -53,7 +53,7 @@ enum { KEYPOINT_CUE_PAST = 8 }; /* messages that wait for their frames */
 
 typedef struct cue_keypoints {
     int64_t utime; /* of the frame; -1: none */
-    bool seen;     /* at least one joint is */
+    bool observed; /* at least one joint is */
     gait_keypoint joint[GAIT_MAX_JOINTS];
 } cue_keypoints;
 
@@ -79,7 +79,7 @@ void keypoint_cue_forget(keypoint_cue *cue);
 bool keypoint_cue_take(keypoint_cue *cue, keypoints_view *v, message *why);
 /* Whether the message for the frame with this capture time has arrived. */
 bool keypoint_cue_arrived(const keypoint_cue *cue, int64_t utime);
-/* Keypoints of that frame, in the order of the model's joints; NULL: none have arrived, or the message says that no joint
+/* Keypoints of that frame, in the order of the model's joints; NULL: none have arrived, or the message reports that no joint
  * is seen. */
 const gait_keypoint *keypoint_cue_at(const keypoint_cue *cue, int64_t utime);
 /* The same for the frame that is being tracked, and count it. */
