@@ -2,6 +2,7 @@
 
 import json
 import pickle
+import struct
 from pathlib import Path
 
 import cv2
@@ -212,6 +213,20 @@ def test_a_picture_of_colmap_places_its_camera(tmp_path):
     camera = Camera.read(colmap(tmp_path / "cameras.txt", name="walk 01.jpg"))
     np.testing.assert_allclose(camera.R, turn, atol=1e-12)
     np.testing.assert_allclose(camera.t, place)
+    (tmp_path / "b").mkdir()
+    values = [*FOCAL, CENTRE[0] + 0.5, CENTRE[1] + 0.5, *LENS]
+    cameras = struct.pack("<QIiQQ5dIiQQ8d", 2, 2, 7, 64, 48, 9, 9, 32, 24, 0.9, 1, 4, 1280, 720, *values)
+    points = struct.pack("<Qddq", 1, 1.0, 2.0, -1)
+    pictures = struct.pack("<QI7dI", 1, 7, *quaternion, *place, 1) + b"walk 01.jpg\0" + points
+    (tmp_path / "b/cameras.bin").write_bytes(cameras)
+    (tmp_path / "b/images.bin").write_bytes(pictures)
+    binary = Camera.read(f"{tmp_path}/b/cameras.bin:walk 01.jpg")
+    np.testing.assert_array_equal(binary.R, camera.R)
+    np.testing.assert_array_equal(binary.matrix, camera.matrix)
+    np.testing.assert_array_equal(binary.distortion, camera.distortion)
+    (tmp_path / "b/images.bin").write_bytes(pictures[:-8])
+    with pytest.raises(UserError, match="images.bin: not a binary file of COLMAP .it has"):
+        Camera.read(f"{tmp_path}/b/cameras.bin:walk 01.jpg")
 
 
 def test_freemocap_is_in_millimetres(tmp_path):

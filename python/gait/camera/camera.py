@@ -302,8 +302,8 @@ def read_camera(
     Parameters
     ----------
     path : str
-        ``.json``, ``.yaml``, ``.yml``, ``.xml``, ``.toml``, ``.txt`` (COLMAP, Qualisys) or ``.pickle``
-        (OpenCap); followed by ``:name`` if the file has several cameras.
+        ``.json``, ``.yaml``, ``.yml``, ``.xml``, ``.toml``, ``.txt`` (COLMAP, Qualisys), ``.bin``
+        (COLMAP) or ``.pickle`` (OpenCap); followed by ``:name`` if the file has several cameras.
     size : (int, int), optional
         Width and height of the video, pixels: checked, and used for OpenCV files, which may lack the size.
     placed : bool
@@ -321,15 +321,13 @@ def read_camera(
     suffix, stated = Path(file).suffix.lower(), True
     if suffix == ".json":
         camera = _from_json(file, placed)
-    elif suffix in (".yaml", ".yml", ".xml", ".txt", ".pickle", ".pkl"):
+    elif suffix in (".yaml", ".yml", ".xml", ".txt", ".bin", ".pickle", ".pkl"):
         camera, stated = _from_entries(file, _entries(file, suffix, name), size, placed)
     elif suffix == ".toml":
         camera = _from_toml(file, name)
-    elif suffix == ".bin":
-        raise UserError(f"{file}: binary; convert it with colmap model_converter --output_type TXT")
     else:
         raise UserError(
-            f"{file}: unknown camera suffix; use .json, .yaml, .yml, .xml, .toml, .txt or .pickle"
+            f"{file}: unknown camera suffix; use .json, .yaml, .yml, .xml, .toml, .txt, .bin or .pickle"
         )
     _check_middle(str(path), camera, stated)
     focal = max(camera.fx, camera.fy)
@@ -373,7 +371,7 @@ def write_lens(path: Path, camera: Camera, note: str) -> None:
 def _split(path: str) -> tuple[str, str | None]:
     """Split FILE.toml:name into file and name."""
     file, colon, name = path.rpartition(":")
-    several = file.lower().endswith((".toml", ".txt", ".yaml", ".yml", ".xml"))
+    several = file.lower().endswith((".toml", ".txt", ".bin", ".yaml", ".yml", ".xml"))
     return (file, name) if colon and several else (path, None)
 
 
@@ -413,6 +411,8 @@ def _entries(path: str, suffix: str, name: str | None) -> dict[str, Any]:
     start = Path(path).read_bytes()[:4096]
     if suffix == ".txt" or b"<calibration" in start:
         return other_files.read_text(path, name)
+    if suffix == ".bin":
+        return other_files.read_binary(path, name)
     if suffix in (".pickle", ".pkl"):
         return other_files.read_opencap(path)
     if suffix in (".yaml", ".yml") and b"%YAML" not in start:

@@ -9,6 +9,7 @@ t.
 from __future__ import annotations
 
 import re
+import struct
 from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
@@ -37,6 +38,15 @@ _COLMAP = {
     "SIMPLE_RADIAL_FISHEYE": "f cx cy k1",
     "RADIAL_FISHEYE": "f cx cy k1 k2",
 }
+#: Its other models, with their numbers of parameters.
+_COLMAP_OTHERS = {"FOV": 5, "THIN_PRISM_FISHEYE": 12, "RAD_TAN_THIN_PRISM_FISHEYE": 16, "SIMPLE_DIVISION": 4,
+                  "DIVISION": 5}  # fmt: skip
+#: All of them, in the order of their numbers in binary files.
+_COLMAP_MODELS = (
+    "SIMPLE_PINHOLE", "PINHOLE", "SIMPLE_RADIAL", "RADIAL", "OPENCV", "OPENCV_FISHEYE", "FULL_OPENCV", "FOV",
+    "SIMPLE_RADIAL_FISHEYE", "RADIAL_FISHEYE", "THIN_PRISM_FISHEYE", "RAD_TAN_THIN_PRISM_FISHEYE",
+    "SIMPLE_DIVISION", "DIVISION",
+)  # fmt: skip
 _OPENCV_ORDER = ("k1", "k2", "p1", "p2", "k3", "k4", "k5", "k6")
 _KALIBR = {"radtan": "", "none": "", "equidistant": "fisheye", "equi": "fisheye"}
 
@@ -142,16 +152,76 @@ def read_text(path: str, name: str | None) -> Entries:
             f"{path}: contains no camera; give a JSON camera file, or as text cameras.txt of COLMAP or a "
             "calibration of Qualisys"
         )
-    return _colmap(path, rows, name)
+    return _colmap(path, rows, _colmap_pictures(Path(path).with_name("images.txt")), name)
 
 
-_COLMAP_OTHERS = ("FOV", "THIN_PRISM_FISHEYE", "RAD_TAN_THIN_PRISM_FISHEYE", "SIMPLE_DIVISION", "DIVISION")
+def read_binary(path: str, name: str | None) -> Entries:
+    """Read COLMAP's cameras.bin with images.bin beside it, which contain the rows of the text files."""
+    data, rows = _Binary(path), []
+    for _ in range(data.take("Q")[0]):
+        id, model, width, height = data.take("IiQQ")
+        kind = _COLMAP_MODELS[model] if 0 <= model < len(_COLMAP_MODELS) else ""
+        count = len(_COLMAP[kind].split()) if kind in _COLMAP else _COLMAP_OTHERS.get(kind)
+        if count is None:
+            raise data.fault(f"camera {id} has a model of the unknown number {model}")
+        rows.append([str(id), kind, str(width), str(height), *map(repr, data.take(f"{count}d"))])
+    data.require_end()
+    return _colmap(path, rows, _binary_pictures(Path(path).with_name("images.bin")), name)
 
 
-def _colmap(path: str, rows: list[list[str]], name: str | None) -> Entries:
+class _Binary:
+    """A binary file of COLMAP, read from its beginning."""
+
+    def __init__(self, path: str) -> None:
+        self._path, self._data, self._at = path, Path(path).read_bytes(), 0
+
+    def take(self, kinds: str) -> tuple[Any, ...]:
+        """Take the next numbers, in the format of struct."""
+        begin = self._at
+        self.skip(struct.calcsize(f"<{kinds}"))
+        if self._at > len(self._data):
+            raise self.fault("it ends in the middle of an entry")
+        return struct.unpack_from(f"<{kinds}", self._data, begin)
+
+    def text(self) -> str:
+        """Take the text up to the next zero."""
+        end = self._data.find(b"\0", self._at)
+        if end < 0:
+            raise self.fault("it ends in the middle of a name")
+        begin, self._at = self._at, end + 1
+        return self._data[begin:end].decode(errors="replace")
+
+    def skip(self, count: int) -> None:
+        """Go on by so many bytes."""
+        self._at += count
+
+    def require_end(self) -> None:
+        """UserError if there are more bytes, or fewer than were skipped."""
+        if self._at != len(self._data):
+            raise self.fault(f"it has {len(self._data)} bytes instead of {self._at}")
+
+    def fault(self, what: str) -> UserError:
+        """Make an error that names the file."""
+        return UserError(f"{self._path}: not a binary file of COLMAP ({what}); export the model again")
+
+
+def _binary_pictures(path: Path) -> dict[str, list[str]]:
+    """Read images.bin by the picture's name, as `_colmap_pictures`; points are skipped."""
+    if not path.is_file():
+        return {}
+    data, found = _Binary(str(path)), {}
+    for _ in range(data.take("Q")[0]):
+        id, *pose, camera = data.take("I7dI")
+        name = data.text()
+        found[name] = [str(id), *map(repr, pose), str(camera), name]
+        data.skip(24 * data.take("Q")[0])  # u, v, id of each point
+    data.require_end()
+    return found
+
+
+def _colmap(path: str, rows: list[list[str]], pictures: dict[str, list[str]], name: str | None) -> Entries:
     """Read a camera of COLMAP by its id, or, with extrinsics, by the name of a picture."""
     cameras = {row[0]: row for row in rows}
-    pictures = _colmap_pictures(Path(path).with_name("images.txt"))
     picture = pictures.get(name or "")
     row = _choose(path, cameras, picture[8] if picture else name)
     if row[1] not in _COLMAP:
