@@ -105,7 +105,10 @@ def test_learn_makes_classes_and_info_shows_them(tmp_path: Path, capsys: pytest.
     assert gait.Model(out).classes == ("walk", "stand", "backwards")
     page = (tmp_path / "report" / "index.html").read_text()
     assert '<a href="#classes">Classes of motion</a>' in page
-    assert "<td>stand</td><td>derived from the walk</td>" in page and ">walk 0.7, backwards 0.3<" in page
+    assert (
+        "<td>stand</td><td>derived from the walk</td>" in page
+        and ">walk 0.7 (prior), backwards 0.3 (prior)<" in page
+    )
 
 
 def test_a_class_of_one_cycle_is_refused_and_nothing_is_written(

@@ -64,13 +64,13 @@ def describe(sections: Mapping[str, Any], size: int, crc: int, name: str = "blob
         )
     if "SCST" in sections:
         result["scores"] = np.round(sections["SCST"].astype(float), 4).tolist()
+    if "META" in sections:
+        text, remedy = sections["META"].tobytes(), "learn the model again"
+        result["meta"] = json_of(f"{name}: section META", text, remedy, remedy)
     if found := classes.figures(sections):
         result["classes"] = found
     if any(tag in sections for tag in TAGS):
         result["segments"] = segment_summary.summary(SegmentPrior.from_sections(sections, name))
-    if "META" in sections:
-        text, remedy = sections["META"].tobytes(), "learn the model again"
-        result["meta"] = json_of(f"{name}: section META", text, remedy, remedy)
     return result
 
 

@@ -150,6 +150,17 @@ def _add_model(group: argparse._ArgumentGroup) -> None:
         "if that is a model. With a walking model as the only source, the classes are added to it",
     )
     group.add_argument(
+        "--changes",
+        nargs="+",
+        action="extend",
+        default=[],
+        metavar="SRC",
+        help="recordings, or folders of them, in which people change between these classes, as it "
+        "happened and not cut about the changes: learn how often and at which phases people change. The "
+        "usual assumptions count as 2 changes of each kind. With a model of several classes as the only "
+        "source, only this is learnt",
+    )
+    group.add_argument(
         "--components",
         type=lambda text: _auto_or(text, MOST_READ_COMPONENTS),
         metavar="auto|N",
@@ -248,7 +259,7 @@ def run(args: argparse.Namespace) -> int:
     from gait.learn.classes import run as classes
     from gait.learn.report import summary
 
-    learn = classes.learn if options.classes else learning.run
+    learn = classes.learn if options.classes or options.changes else learning.run
     figures = learn(options, partial(note, quiet=args.quiet))
     print(json.dumps(figures) if args.json else summary.text(args.output, figures))
     return 0
@@ -269,6 +280,7 @@ def _options(args: argparse.Namespace) -> LearnOptions:
             "generic_lengths": tuple(args.generic_lengths),
             "static": tuple(args.static),
             "classes": tuple(args.classes),
+            "changes": tuple(args.changes),
             "markers": markers.read_map(args.markers) if args.markers else None,
             "trim": not args.no_trim,
             "segments": _segment_options(args),

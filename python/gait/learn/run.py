@@ -78,7 +78,12 @@ def check(options: LearnOptions, note: Note = lambda line: None) -> None:
         raise UsageError(
             f"-o {options.output}: has the name of a recording; name the model M.gait, and sources before -o"
         )
-    read = [*options.sources, *options.static, *([str(options.markers.path)] if options.markers else [])]
+    read = [
+        *options.sources,
+        *options.static,
+        *options.changes,
+        *([str(options.markers.path)] if options.markers else []),
+    ]
     if any(os.path.realpath(path) == str(output) for path in read if path):
         raise UsageError(f"-o {options.output}: is also an input; give the model another name")
     if report and output in ((folder := Path(os.path.realpath(report))), *folder.parents):

@@ -6,25 +6,30 @@ import json
 import tempfile
 from collections.abc import Mapping
 from dataclasses import replace
+from functools import reduce
+from operator import add
 from pathlib import Path
 from typing import Any
 
 from gait.bindings.model import read_cyclic
 from gait.errors import UsageError, UserError
 from gait.io import blob
-from gait.learn.classes import standing
+from gait.learn.classes import changes, standing
 from gait.learn.classes.join import Change, MotionClass, join
 from gait.learn.corpus.load import NothingLeft
+from gait.learn.corpus.sources import find
 from gait.learn.options import LearnOptions, SegmentOptions
 from gait.learn.report.classes import figures as class_figures
 from gait.learn.run import Note, check, run
+from gait.learn.solve import readers
+from gait.progress import progress
 
 WALK, STAND, BACKWARDS, RUN = "walk", "stand", "backwards", "run"
 DERIVED = STAND, BACKWARDS  # made from the walk
 STEP_CONCENTRATION = 6.0  # concentration with an sd of about a twentieth of a stride
-#: Rates of change from one class to another, per second at the most likely phase and pace.  Changes are
-#: rarely recorded, so these are assumptions about people indoors and in streets: they walk for a few seconds
-#: up to a minute, and stop with both feet on the ground.
+#: Rates of change from one class to another, per second at the most likely phase and pace, before recordings
+#: of changes (``LearnOptions.changes``).  They are assumptions about people indoors and in streets:
+#: they walk for a few seconds up to a minute, and stop with both feet on the ground.
 CLASS_CHANGES: dict[str, dict[str, Change]] = {
     WALK: {
         STAND: Change(1.0, STEP_CONCENTRATION, 0.05),
@@ -48,9 +53,13 @@ def learn(options: LearnOptions, note: Note) -> dict[str, Any]:
     A class is ``stand`` or ``backwards``, derived from the walk; or ``NAME=SRC``, learnt from those
     recordings (``backwards`` in reversed time, as a walk whose phase decreases) or taken from a model
     (``.gait``); or ``run``, learnt from the runs among the sources.  Returns the figures of the walk, with
-    those of the classes under ``classes``.  UsageError or UserError with one line if it cannot be done.
+    those of the classes under ``classes``.  With ``options.changes``, changes between the classes are learnt
+    from those recordings; without classes they are those of a model.  UsageError or UserError with one line
+    if it cannot be done.
     """
     wanted, alone = _parsed(options), replace(options, classes=())
+    if options.changes and not wanted:
+        return _only_changes(options, note)
     if not adds_to_a_model(options):
         check(alone)
     learnt = {
@@ -65,7 +74,8 @@ def learn(options: LearnOptions, note: Note) -> dict[str, Any]:
             one = learnt[name] if name in learnt else _derived(name, walk, options.activity)
             classes += [one] if one is not None else []
         names = [one.name for one in classes]
-        return join(walk, [replace(one, changes=_changes(one.name, names)) for one in classes])
+        joined = join(walk, [replace(one, changes=_changes(one.name, names)) for one in classes])
+        return changes.with_changes(joined, _observed(joined, options, note)) if options.changes else joined
 
     if adds_to_a_model(options):
         data = blob.write(options.output, with_classes(read_cyclic(options.sources[0])))
@@ -74,6 +84,37 @@ def learn(options: LearnOptions, note: Note) -> dict[str, Any]:
         figures = run(alone, note, with_classes)
         data = Path(options.output).read_bytes()
     return figures | {"classes": class_figures(blob.decode(data))}
+
+
+def _only_changes(options: LearnOptions, note: Note) -> dict[str, Any]:
+    """Learn only the changes between the classes of a model."""
+    own = read_cyclic(options.sources[0]) if adds_to_a_model(options) else {}
+    if "CLNM" not in own:
+        raise UsageError("--changes: are between classes of motion; give --class, or a model that has some")
+    check(options)
+    data = blob.write(options.output, changes.with_changes(own, _observed(own, options, note)))
+    figures = class_figures(blob.decode(data))
+    return {"bytes": len(data), "crc32": f"{blob.checksum(data):08x}", "classes": figures}
+
+
+def _observed(sections: Mapping[str, blob.Array], options: LearnOptions, note: Note) -> changes.Observed:
+    """Count the changes in ``options.changes``."""
+    files, closed = find(options.changes, options.exclude, note)
+    observed = list[changes.Observed]()
+    with progress("counting changes", len(files), options.quiet) as update:
+        for k, (path, in_folder) in enumerate(files, 1):
+            try:
+                observed.append(changes.count(sections, changes.frames_of(path, readers.read(path, options))))
+            except UserError as error:
+                if not in_folder:
+                    raise
+                closed.append(str(error))
+            update(k)
+    for line in closed:
+        note(f"left out: {line}")
+    if not observed:
+        raise UserError(f"--changes {' '.join(options.changes)}: none of the recordings can be used")
+    return reduce(add, observed)
 
 
 def adds_to_a_model(options: LearnOptions) -> bool:

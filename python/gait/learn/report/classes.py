@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 from collections.abc import Mapping
 from typing import Any
 
@@ -13,7 +14,8 @@ def figures(sections: Mapping[str, blob.Array]) -> list[dict[str, Any]]:
     if "CLNM" not in sections:
         return []
     names = blob.unpack_names(sections["CLNM"])
-    found = []
+    meta = json.loads(sections["META"].tobytes()) if "META" in sections else {}
+    found, observed = [], meta.get("changes", {})
     for name, row, change in zip(names, sections["CLIN"], sections["CLSW"], strict=True):
         direction, source, cycles, recordings = (int(value) for value in row)
         own = "" if source == 0 else str(source)
@@ -28,6 +30,7 @@ def figures(sections: Mapping[str, blob.Array]) -> list[dict[str, Any]]:
             "recordings": recordings,
             "stride_hz": round(gait[0], 4) if direction else 0.0,
             "speed_statures_s": round(direction * gait[0] * gait[3], 4),
+            "changes_observed": observed.get(name, {}).get("to", {}),
             "changes_per_s": {to: round(float(c[0]), 4) for to, c in zip(names, change, strict=True) if c[0]},
         })  # fmt: skip
     return found
@@ -45,5 +48,12 @@ def words(one: Mapping[str, Any]) -> dict[str, str]:
         "strides/s": f"{one['stride_hz']:.2f}" if moves else "stands still",
         "statures/s": f"{one['speed_statures_s']:.2f}" if moves else "",
         "components": str(one["components"]),
-        "changes per second": ", ".join(f"{to} {rate:g}" for to, rate in one["changes_per_s"].items()),
+        "changes per second": ", ".join(
+            f"{to} {rate:g} ({_observed(one['changes_observed'].get(to, 0))})"
+            for to, rate in one["changes_per_s"].items()
+        ),
     }
+
+
+def _observed(count: int) -> str:
+    return "prior" if not count else f"{count} change{'s' * (count > 1)}"
