@@ -16,6 +16,7 @@ from drawn_person import FPS, camera, clip, write
 from walking_track import walking_track
 
 from gait import Estimate, Flag, Frame, Model, State, TrackStatus, Video
+from gait.batch.run import DONE, FAILED, write_summary
 from gait.bindings.model import read_blob
 from gait.cli import main
 from gait.errors import UserError
@@ -229,6 +230,15 @@ def page_file(whole):
 
 def overflow(page):
     return page.evaluate("document.documentElement.scrollWidth - innerWidth")
+
+
+def test_the_page_of_a_batch_fits_screens(tmp_path):
+    name, done = "visit_1/walk_with_the_long_name_of_a_camera_GX010234", {"state": DONE, "speed_m_s": 1.2345}
+    (tmp_path / name / "report").mkdir(parents=True)
+    (tmp_path / name / "report/report.html").write_text("")
+    rows = [{"name": name, "subject": "Anna", **done}, {"name": "b", "state": FAILED, "error": "b: damaged"}]
+    write_summary(tmp_path, rows)
+    accessibility.check_file(tmp_path / "index.html")
 
 
 def test_the_page_fits_screens(page_file):

@@ -198,21 +198,24 @@ _SHOWN = {
 
 def _page(output: Path, rows: Sequence[Row]) -> str:
     """Page with a row for each clip and links to its files."""
-    failed = sum(row["state"] == FAILED for row in rows)
-    lead = f"{len(rows)} clips, {failed} failed." if failed else f"{len(rows)} clips, all done."
-    page = Page("Clips", lead)
-    head = "".join(f"<th scope=col>{escape(text)}</th>" for text in ("clip", *_SHOWN.values(), "files"))
+    clips, failed = (len({row["name"] for row in found}) for found in (rows, _failed(rows)))
+    page = Page("Clips", f"{clips} clip{'s' * (clips > 1)}, {f'{failed} failed' if failed else 'all done'}.")
+    head = "".join(f"<th scope=col>{escape(text)}</th>" for text in ("clip", *_SHOWN.values()))
     body = "".join(
         f"<tr><th scope=row>{escape(row['name'])}{f', person {n}' if (n := row.get('person')) else ''}</th>"
         + "".join(f"<td>{escape(_shown(row, name))}</td>" for name in _SHOWN)
-        + f"<td>{_links(output, row)}</td></tr>"
+        + f"<td class=links>{_links(output, row)}</td></tr>"
         for row in rows
     )
-    page.html(movable(f"<table><thead><tr>{head}</tr></thead><tbody>{body}</tbody></table>"))
-    for row in rows:
-        if row["state"] == FAILED:
-            page.words(f"{row['name']}: {row['error']}", "warning")
+    table = f"<thead><tr>{head}<th scope=col class=links>files</th></tr></thead><tbody>{body}</tbody></table>"
+    page.html(movable(f'<table class="grid" style="--columns: {len(_SHOWN)}">{table}'))
+    for row in _failed(rows):
+        page.words(f"{row['name']}: {row['error']}", "warning")
     return page.text()
+
+
+def _failed(rows: Sequence[Row]) -> list[Row]:
+    return [row for row in rows if row["state"] == FAILED]
 
 
 def _shown(row: Mapping[str, Any], name: str) -> str:
@@ -221,11 +224,15 @@ def _shown(row: Mapping[str, Any], name: str) -> str:
 
 
 def _links(output: Path, row: Mapping[str, Any]) -> str:
-    """Links to the files of a clip that is done."""
+    """Links to the files of a clip that is done, without those of other people."""
     if row["state"] != DONE:
         return ""
-    folder, of_person = output / row["name"], f"-{row['person']}" if "person" in row else ""
-    files = [folder / f"report{of_person}" / "report.html", *sorted(folder.iterdir())]
-    shown = [file for file in files if file.is_file() and file.name != RECORD]
-    names = [os.path.relpath(file, output) for file in shown]
-    return " ".join(f'<a href="{escape(name)}">{escape(Path(name).name)}</a>' for name in names)
+    folder, person = output / row["name"], str(row.get("person", ""))
+    files = [folder / (f"report-{person}" if person else "report") / "report.html", *sorted(folder.iterdir())]
+    numbers = [file.stem.rpartition("-")[2] for file in files]
+    shown = [
+        os.path.relpath(file, output)
+        for file, number in zip(files, numbers, strict=True)
+        if file.is_file() and file.name != RECORD and not (person and number.isdigit() and number != person)
+    ]
+    return " ".join(f'<a href="{escape(name)}">{escape(Path(name).name)}</a>' for name in shown)
