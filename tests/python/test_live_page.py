@@ -15,6 +15,7 @@ from gait.lcm.link import private_url
 from gait.live import server
 from gait.live.feed import Feed
 from gait.live.server import Hub, Pace, Page
+from gait.report.terms import STATUS_TERMS
 
 pytestmark = pytest.mark.long
 
@@ -86,20 +87,30 @@ def test_the_page_waits_and_then_shows_a_tracker(live, reports):
         browser.until(page, "live.scene.data.times.length > 2 && live.curves.data.times.length > 2")
         last = reports[0][5]
         browser.until(page, f"live.scene.data.times.at(-1) === {last['time']}")
-        assert page.inner_text("#status") == {"init": "settling"}.get(last["status"], last["status"])
+        assert page.inner_text("#status") == STATUS_TERMS[last["status"]][0]
         numbers = page.inner_text("#list")
         assert (
             f"{last['speed']:.2f} m/s" in numbers
-            and "dropped here\n2" in numbers
+            and "frames dropped\n2" in numbers
             and not page.inner_text("#waiting")
         )
         browser.until(page, "document.querySelector('#pictures img').naturalWidth === 160")
+        browser.until(page, ON_THE_FIGURE)
         assert not page.evaluate("live.curves.data.curves[0].values.includes(null)")
         live.report("sample", last | {"time": last["time"] + 5})  # no line crosses that gap
         browser.until(page, "live.curves.data.curves[0].values.includes(null)")
         accessibility.check(page)
 
 
+ON_THE_FIGURE = """(({scene}) => {
+  const canvas = scene.renderer.domElement, pixels = canvas.getContext('2d');
+  return Boolean(pixels) && scene.limbs.balls.every((ball) => {  // without a card, a 2-D canvas
+    const {x, y} = ball.position.clone().project(scene.camera);
+    const at = [(1 + x) * canvas.width / 2, (1 - y) * canvas.height / 2].map(Math.round);
+    const [back, found] = [[2, canvas.height - 2], at].map((uv) => pixels.getImageData(...uv, 1, 1).data);
+    return found.some((value, k) => Math.abs(value - back[k]) > 40);
+  });
+})(live)"""  # whether each joint has another colour than the ground
 OUTSIDE = """[...document.querySelectorAll('.panel, header')].flatMap((panel) => {
   const box = panel.getBoundingClientRect();
   return [...panel.querySelectorAll('*'), ...(panel.matches('header') ? [] : [panel])].filter((each) => {
@@ -268,6 +279,7 @@ def test_browsers_get_less_often_what_a_busy_machine_shows_and_miss_no_sample(tm
     for _ in range(20):
         pace.adapt(idle=0.0)
     assert pace.current == 2.0
+    assert [round(pace.wait() - (1 + 0.1 * k) * pace.current, 2) for k in range(10)] == [0.0] * 10  # in turn
     monkeypatch.setattr(server, "_STAT", tmp_path / "no Linux")
     monkeypatch.setattr(os, "getloadavg", lambda: (0.0, 0.0, 0.0))
     pace.begin(1)

@@ -2,14 +2,13 @@
 const element = (id) => document.getElementById(id);
 const DRAW_MS = 250; // between two drawings of the plots
 const SLOW_DRAW_MS = 1000; // the same where the processor draws the page
-const FIGURE_MS = 500; // between two drawings of the figure where the processor draws it
 const GAP = 1; // seconds without an estimate that no line crosses
 const KEPT = 1200; // samples
 const QUIET_MS = 3000; // without an estimate the page reports that there is none
-const TEXT = { tracking: 'tracking', ambiguous: 'ambiguous', lost: 'lost', init: 'settling' };
+const TEXT = { tracking: 'tracking', ambiguous: 'uncertain', lost: 'lost', init: 'settling' };
 
 const start = await (await fetch('/state')).json();
-let scene, curves, software = false, shown = 0, showing = 0, paused = false, recording = Boolean(start.recording.path);
+let scene, curves, software = false, paused = false, recording = Boolean(start.recording.path);
 let chosen = 0; // person whose numbers and plots are shown
 const PHASE = start.curves.findIndex((curve) => curve.name === 'phase');
 const people = start.people.map((one) => ({ ...one, last: 0, heard: -Infinity, health: null, body: null }));
@@ -18,7 +17,7 @@ const people = start.people.map((one) => ({ ...one, last: 0, heard: -Infinity, h
 if (start.parts) {
   const [{ Scene, SOFTWARE }, { Curves }] = await Promise.all([import('gait/scene.js'), import('gait/curves.js')]);
   software = SOFTWARE;
-  scene = new Scene(element('scene'), { ...start, times: [], points: [], sd: [] });
+  scene = new Scene(element('scene'), { ...start, times: [], points: [], sd: [] }, software);
   curves = new Curves(element('curves'), { times: [], curves: start.curves });
   curves.show(-1); // no cursor: the plots end now
 } else {
@@ -48,14 +47,20 @@ function draw() {
   }, Math.round(start.seconds * Math.max(5, found.at(-1).rate ?? 30)));
   scene.append({});
 }
-setInterval(draw, software ? SLOW_DRAW_MS : DRAW_MS);
 
-/** Draw the figure of the newest sample. */
-function showFigure() {
-  showing = 0;
-  shown = performance.now();
-  scene.show(scene.data.times.length - 1);
+/** A function that calls another at once, but at most so often, milliseconds; what is asked for meanwhile is done later. */
+function atMost(period, act) {
+  let asked = 0, last = -Infinity;
+  return () => {
+    asked ||= setTimeout(() => {
+      asked = 0;
+      last = performance.now();
+      act();
+    }, Math.max(last + period - performance.now(), 0));
+  };
 }
+const drawSoon = atMost(software ? SLOW_DRAW_MS : DRAW_MS, draw);
+const showFigureSoon = atMost(0, () => scene.show(scene.data.times.length - 1));
 
 // ---- people: each has a tracker of its own ----
 function choose(who) {
@@ -121,7 +126,7 @@ function onSample(one) {
   show('rate', unit(one.rate, 1, 'Hz'));
   show('latency', unit(one.latency_ms, 0, 'ms'));
   show('step', unit(one.step_ms, 1, 'ms'));
-  show('left/right sure', `${Math.round(100 * one.sure)} %`);
+  show('left/right certainty', `${Math.round(100 * one.sure)} %`);
   show('frame', one.frame < 0 ? '–' : String(one.frame));
   element('hand').removeAttribute('hidden');
   element('hand').setAttribute('transform', `rotate(${360 * one.phase})`);
@@ -133,14 +138,15 @@ function onSample(one) {
   data.points.push(one.points);
   data.sd.push(one.sd);
   if (data.times.length > KEPT) for (const key of ['times', 'points', 'sd']) data[key].shift();
-  showing ||= setTimeout(showFigure, software ? Math.max(shown + FIGURE_MS - person.last, 0) : 0);
+  drawSoon();
+  showFigureSoon();
 }
 
 function onHealth(one) {
   Object.assign(people[one.person], { health: one, heard: performance.now() });
   if (one.person !== chosen) return;
   element('text').textContent = one.state === 'running' && one.text === 'tracking' ? '' : one.text;
-  show('dropped here', String(one.dropped));
+  show('frames dropped', String(one.dropped));
   show('particles', String(one.particles));
   if (quiet()) explain();
 }

@@ -51,7 +51,8 @@ def _described(recording: Recording) -> dict[str, Any]:
 class Pace:
     """Time between messages to a browser: longer while no core is idle.
 
-    Browsers on this machine use the cores that track, and tracking has priority.
+    Browsers on this machine use the cores that track, and tracking has priority.  They get their messages in
+    turn, so that they do not all draw at the same time.
 
     Attributes
     ----------
@@ -61,7 +62,18 @@ class Pace:
 
     def __init__(self) -> None:
         self.current = self._slowest = _SLOWEST
+        self._browsers, self._turn = 1, 0.0
         self._at, self._before = time.monotonic(), _idle_time()
+
+    def apart(self) -> float:
+        """Present time between the turns of two browsers, seconds."""
+        return self.interval() / self._browsers
+
+    def wait(self) -> float:
+        """Give a browser its next turn, and return the seconds until then."""
+        now = time.monotonic()
+        self._turn = max(now + self.interval(), self._turn + self.apart())
+        return self._turn - now
 
     def interval(self) -> float:
         """Present interval, seconds."""
@@ -83,7 +95,8 @@ class Pace:
 
     def begin(self, browsers: int) -> None:
         """Begin slowly with this number of browsers."""
-        self.current = self._slowest = min(_SLOWEST * max(browsers, 1), _RAREST)
+        self._browsers = max(browsers, 1)
+        self.current = self._slowest = min(_SLOWEST * self._browsers, _RAREST)
         self._at, self._before = time.monotonic(), _idle_time()
 
 
@@ -200,7 +213,7 @@ class Page:
 
     def watched(self) -> bool:
         """Whether a browser shows the page, and it is time for a picture."""
-        return self._open > 0 and time.monotonic() - self._shown > self._pace.interval()
+        return self._open > 0 and time.monotonic() - self._shown > self._pace.apart()
 
     def close(self) -> None:
         """Stop the server and a recording."""
@@ -275,7 +288,7 @@ class Page:
                     for value in values:
                         text += f"event: {name.split()[0]}\ndata: {value}\n\n".encode()
                 yield text or b": here\n\n"
-                await asyncio.sleep(self._pace.interval())
+                await asyncio.sleep(self._pace.wait())
 
         if self._open >= _MOST_BROWSERS:
             return PlainTextResponse("too many browsers\n", 503)

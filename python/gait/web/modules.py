@@ -13,7 +13,7 @@ from pathlib import Path
 
 from gait.web import parts
 
-OWN = ("scene.js", "film.js", "curves.js")
+OWN = ("scene.js", "flat.js", "film.js", "curves.js")
 """Our modules, imported as ``gait/NAME``."""
 _PLAIN = {"three": parts.THREE, "three/OrbitControls.js": parts.ORBIT}
 _HERE = Path(__file__).parent

@@ -2,6 +2,7 @@
 // The object that it draws is described in motion_data.py.
 import * as THREE from 'three';
 import { OrbitControls } from 'three/OrbitControls.js';
+import { FlatRenderer } from 'gait/flat.js';
 
 const DEGREE = Math.PI / 180;
 const SPHERE = new THREE.SphereGeometry(1, 16, 12);
@@ -19,23 +20,26 @@ export const SOFTWARE = (() => {
   return !gl || /SwiftShader|llvmpipe|Basic Render/i.test(named ? gl.getParameter(named.UNMASKED_RENDERER_WEBGL) : '');
 })();
 
+function makeRenderer(flat) {
+  try {
+    return flat ? new FlatRenderer() : new THREE.WebGLRenderer({ antialias: !SOFTWARE });
+  } catch { // no WebGL
+    return new FlatRenderer();
+  }
+}
+
 export class Scene {
   /**
    * @param {HTMLElement} element  filled by the view
    * @param {object} data          see motion_data.py
+   * @param {boolean} flat         whether to draw without WebGL
    */
-  constructor(element, data) {
+  constructor(element, data, flat = false) {
     this.element = element;
     element.classList.add('scene');
     this.shown = { cylinders: true, ellipsoids: true, trajectory: true };
     this.index = 0;
-    try {
-      this.renderer = new THREE.WebGLRenderer({ antialias: !SOFTWARE });
-    } catch {
-      element.innerHTML = '<p class="none">This browser has no WebGL: the 3-D view is off.</p>';
-      this.setData(data);
-      return;
-    }
+    this.renderer = makeRenderer(flat);
     const canvas = this.renderer.domElement;
     canvas.tabIndex = 0;
     canvas.setAttribute('role', 'img');
@@ -70,7 +74,6 @@ export class Scene {
   setData(data) {
     const same = this.limbs && [data.bones, data.joints].join() === [this.data.bones, this.data.joints].join();
     this.data = data;
-    if (!this.renderer) return;
     if (!same) this.#build();
     this.#floor();
     this.show(Math.min(this.index, data.times.length - 1));
@@ -97,13 +100,12 @@ export class Scene {
   /** Append frames: an object with the keys by frame alone. */
   append(more) {
     for (const key of ['times', 'points', 'sd', 'uv', 'status']) if (more[key]) (this.data[key] ||= []).push(...more[key]);
-    if (this.renderer) this.#floor();
+    this.#floor();
   }
 
   /** Draw a frame, by its index. */
   show(index) {
     this.index = Math.max(0, index);
-    if (!this.renderer) return;
     const { points, sd } = this.data;
     const body = points[this.index];
     this.figure.visible = Boolean(body);
@@ -121,7 +123,6 @@ export class Scene {
 
   /** Draw further people as stick figures: joints of each, as in `points`. */
   showOthers(bodies) {
-    if (!this.renderer) return;
     while (this.others.length < bodies.length) this.others.push(this.makeLimbs());
     this.others.forEach((limbs, k) => {
       for (const mesh of [...limbs.parts, ...limbs.balls]) mesh.visible = k < bodies.length;
@@ -149,7 +150,6 @@ export class Scene {
 
   /** Look at the figure from so many degrees above the floor, and about z from the camera (0) or the side (90). */
   lookFrom(elevation, azimuth = 30) {
-    if (!this.renderer) return;
     const middle = this.#middle(), camera = this.data.camera;
     const seen = camera ? Math.atan2(camera[1] - middle.y, camera[0] - middle.x) : -Math.PI / 2;
     const about = seen + azimuth * DEGREE, up = Math.min(elevation, 89) * DEGREE, far = 4.3;
@@ -169,10 +169,10 @@ export class Scene {
   }
 
   dispose() {
-    this.sized?.disconnect();
-    this.dark?.removeEventListener('change', this.recolour);
-    this.controls?.dispose();
-    this.renderer?.dispose();
+    this.sized.disconnect();
+    this.dark.removeEventListener('change', this.recolour);
+    this.controls.dispose();
+    this.renderer.dispose();
   }
 
   #middle() {
