@@ -84,6 +84,18 @@ def test_each_estimate_is_drawn_into_its_own_frame(log):
         np.testing.assert_array_equal(picture, overlay.draw(rig.picture(i), estimate, i))
 
 
+@pytest.mark.parametrize("width, height", [(720, 1280), (320, 240), (1280, 720)])
+def test_a_legend_fits_films_of_any_aspect_and_leaves_the_panel(width, height):
+    overlay = Overlay(rig.model(), replace(rig.CAMERA, width=width, height=height))
+    plain, explained = (
+        overlay.draw_absent(np.zeros((height, width, 3), np.uint8), 0.0, 0, legend=legend)
+        for legend in (False, True)
+    )
+    changed, panel = ((plain != explained).any(2), plain.any(2))
+    assert not (changed & panel).any() and changed.sum() > 0.7 * panel.sum()
+    assert not changed[-1].any() and not changed[:, -1].any()
+
+
 def test_nothing_is_drawn_until_a_browser_is_there_and_then_the_newest(log):
     open_pages = []
     shown, reports, feed = follow(log[0], watched=lambda: bool(open_pages))

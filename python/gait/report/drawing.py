@@ -17,6 +17,7 @@ from gait.body.skeleton import BONES, side_of
 from gait.camera.camera import Camera
 from gait.io.video import Image
 from gait.report.colours import OVER_PICTURES
+from gait.report.terms import STATUS_TERMS
 
 _PANEL_SIZE = (236, 92)  # size of the panel, pixels at scale 1
 _ROW = 18  # height of its further line for the class of motion
@@ -27,12 +28,6 @@ _STATUS = {
     TrackStatus.TRACKING: (120, 210, 110),
     TrackStatus.AMBIGUOUS: (60, 200, 250),
     TrackStatus.LOST: (70, 70, 240),
-}
-_WORDS = {
-    TrackStatus.INIT: "settling",
-    TrackStatus.TRACKING: "tracking",
-    TrackStatus.AMBIGUOUS: "left/right?",
-    TrackStatus.LOST: "lost",
 }
 _LEGEND = (
     ("Dial: phase of the stride, top: right heel strike", None),
@@ -53,7 +48,8 @@ def draw_panel(canvas: Image, estimate: Estimate, frame: int, scale: float) -> N
     region = _panel(canvas, scale, len(words) - 2)
     _dial(region, estimate, (round(46 * scale), round(46 * scale)), 32 * scale, scale)
     time = f"frame {frame}   {estimate.utime / 1e6:.2f} s"
-    _lines(region, (_WORDS[estimate.status], *words, time), _STATUS[estimate.status], scale)
+    status, _ = STATUS_TERMS[estimate.status.name.lower()]
+    _lines(region, (status, *words, time), _STATUS[estimate.status], scale)
 
 
 def _figures(estimate: Estimate) -> tuple[str, ...]:
@@ -93,14 +89,14 @@ def _lines(region: Image, words: tuple[str, ...], colour: tuple[int, int, int], 
 
 
 def _draw_legend(canvas: Image, scale: float) -> None:
-    """Explain dial, ellipses and colours in the top right corner, if the panel does not reach there."""
+    """Explain dial, ellipses and colours in the top right corner, or below the panel if it reaches there."""
     size, edge, row = 0.4 * scale, round(8 * scale), 19 * scale
     width = max(cv2.getTextSize(words, _FONT, size, 1)[0][0] for words, _ in _LEGEND) + round(16 * scale)
     height = round(row * len(_LEGEND) + 8 * scale)
-    left = canvas.shape[1] - edge - width
-    if left < round(_PANEL_SIZE[0] * scale) + 2 * edge or height + 2 * edge > canvas.shape[0] / 2:
-        return
-    region = _darkened(canvas[edge : edge + height, left : left + width])
+    left, top = canvas.shape[1] - edge - width, edge
+    if left < round(_PANEL_SIZE[0] * scale) + 2 * edge:
+        left, top = edge, round(_PANEL_SIZE[1] * scale) + 2 * edge
+    region = _darkened(canvas[top : top + height, left : left + width])
     for k, (words, side) in enumerate(_LEGEND):
         colour = OVER_PICTURES[side] if side else _INK
         _write(region, words, (round(8 * scale), round(row * (k + 0.8))), size, colour)
