@@ -3,6 +3,7 @@
 ``python accessibility.py`` fetches axe-core by npm (make setup does); without it the check is left out.
 """
 
+import itertools
 import shutil
 import sys
 import warnings
@@ -11,7 +12,7 @@ import browser
 
 from gait.io.published import Published, Store
 
-SCREENS = ((390, 844, "light"), (1280, 720, "dark"), (1920, 1080, "light"))
+SIZES, SCHEMES = ((390, 844), (1280, 720), (1920, 1080)), ("light", "dark")
 AXE = Published(
     "axe.min.js",
     "axe-core@4.10.3",
@@ -37,7 +38,7 @@ _BEYOND = """[...document.querySelectorAll('body *')]
 
 def check(page):
     """Assert that a page does not scroll sideways and has no serious finding, light and dark."""
-    for width, height, scheme in SCREENS:
+    for (width, height), scheme in itertools.product(SIZES, SCHEMES):
         page.set_viewport_size({"width": width, "height": height})
         page.emulate_media(color_scheme=scheme)
         across = page.evaluate("document.documentElement.scrollWidth")

@@ -60,7 +60,7 @@ def test_files_state_the_same_as_the_library(folder, capsys):
 def test_the_page_needs_nothing_else_and_its_drawings_are_sound(folder, capsys):
     assert main(["report", "track", str(folder / "walk.csv"), "-o", str(folder / "page")]) == 0
     words = capsys.readouterr().out
-    assert "stride time, s" in words and "of each frame, whose errors last" in words
+    assert "stride time, s" in words and "of each frame, whose errors persist" in words
     page = (folder / "page/report.html").read_text(encoding="utf-8")
     accessibility.check_file(folder / "page/report.html")
     assert not re.search(r'(src|href)="(?!data:|#)', page)

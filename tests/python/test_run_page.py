@@ -250,6 +250,10 @@ def test_the_page_fits_screens(page_file):
             page.set_viewport_size({"width": width, "height": 844})
             shown = page.evaluate("getComputedStyle(document.querySelector('.plot-narrow')).display")
             assert (shown == "none") == (width > 760)
+        explained = "document.querySelector('details.terms dd').checkVisibility()"
+        assert not page.evaluate(explained)
+        page.emulate_media(media="print")
+        assert page.evaluate(explained)
 
 
 def test_the_page_plays_and_turns_and_fetches_nothing(page_file):

@@ -66,7 +66,7 @@ def draw_contacts(
         found.append(same_events(find_events(motion), events))
         for side in STRIKE_SIDES:
             drawn[side].append(contacts(motion, found[-1], side, stride))
-    source = "the standard deviations of each frame, whose errors last"
+    source = "the standard deviations of each frame, whose errors persist over frames"
     if draws is not None:
         source = (
             f"{len(found)} motions drawn from the posterior, plus the variation that the model cannot express"

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections import Counter
+from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
@@ -75,10 +76,10 @@ class Verdict:
         rest |= {"lost": self.counts["lost"], "still settling": self.counts["init"], "not found": self.absent}
         return "; ".join([text, *(f"{what} in {count_of(n, 'frame')}" for what, n in rest.items() if n)])
 
-    def statuses(self) -> str:
-        """Numbers of frames by status, in words."""
+    def statuses(self, named: Callable[[str], str] = str) -> str:
+        """Numbers of frames by status, in words; `named` returns those of a status."""
         text = f"{sum(self.counts.values())} frames: "
-        text += ", ".join(f"{self.counts[status]} {status}" for status in STATUSES)
+        text += ", ".join(f"{self.counts[status]} {named(status)}" for status in STATUSES)
         return text + (f"; {self.absent} more without an estimate" if self.absent else "")
 
     def warning(self) -> str | None:

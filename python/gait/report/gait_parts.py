@@ -61,7 +61,7 @@ def add_norms(page: Page, norms: Sequence[Compared]) -> None:
     """Add the parameters beside their norms, with a summary of those outside and how certain that is."""
     if not norms:
         return
-    tips = {words: terms.NORMS[source] for source, words in _SOURCES.items()} | terms.COLUMN_TERMS
+    tips = {words: terms.NORMS[source] for source, words in _SOURCES.items()}
     page.grid("Beside norms", NORM_HEAD, norm_rows(norms), tips)
     page.words(
         "Mean ± standard deviation. A value is outside if it is more than two standard deviations from the "
@@ -107,7 +107,7 @@ def add_angles(page: Page, cycles: Mapping[str, AngleCycle]) -> None:
 
 
 _KEY = (
-    '<ul class="key"><li><i style="background: var(--right)"></i>right</li>'
+    '<ul class="key"><li><i style="background: var(--right)"></i>right, dashed</li>'
     '<li><i style="background: var(--left)"></i>left</li>'
     '<li><i style="background: var(--middle)"></i>middle</li>'
     '<li><i style="background: var(--line)"></i>norm, two standard deviations</li>'

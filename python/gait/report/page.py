@@ -60,7 +60,7 @@ class Page:
         )
         body = "".join(
             f"<tr><th scope=row>{_explained(row[0], tips)}</th>"
-            + "".join(f"<td>{escape(cell)}</td>" for cell in row[1:])
+            + "".join(f"<td>{_explained(cell, tips)}</td>" for cell in row[1:])
             + "</tr>"
             for row in rows
         )

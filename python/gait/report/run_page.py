@@ -93,7 +93,7 @@ def cycles_of(
 def run_page(run: Run) -> str:
     """Return the text of the page."""
     page = Page(run.title, run.verdict.sentence() + ".")
-    page.words(run.verdict.statuses() + ".", "faint")
+    page.words(run.verdict.statuses(lambda status: terms.STATUS_TERMS[status][0]) + ".", "faint")
     if warning := run.verdict.warning():
         page.words(f"{warning[0].upper()}{warning[1:]}.", "warning")
     if run.film is not None:

@@ -490,7 +490,7 @@ function go(frame, joint) {
 }
 
 function propose(k) {
-  if (!data.proposals.length) return announce('There are no more suggestions.', 2);
+  if (!data.proposals.length) return announce('There are no suggestions.', 2);
   proposal = k % data.proposals.length;
   const { frame, joint } = data.proposals[proposal];
   go(frame, joint);

@@ -93,7 +93,7 @@ export class Curves {
     const text = { color: colour('faint') }, line = { lineStyle: { color: colour('grid') } };
     plot.chart.setOption({
       animation: false,
-      aria: { enabled: true, label: { description: `${plot.name} by time, with 90 % intervals` } },
+      aria: { enabled: true, label: { description: `${plot.name} by time${curves.some((curve) => curve.low) ? ', with 90 % intervals' : ''}` } },
       grid: GRID,
       tooltip: { trigger: 'axis', confine: true, valueFormatter: (value) => (value === null || value === undefined ? '–' : value.toFixed(1)) },
       xAxis: { type: 'value', min: this.data.times[0], max: this.data.times.at(-1), axisLabel: { ...text, showMinLabel: this.data.times[0] === 0, showMaxLabel: false, formatter: (value) => `${Math.round(value * 100) / 100} s` }, splitLine: { show: false }, axisLine: line },

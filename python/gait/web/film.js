@@ -236,7 +236,7 @@ export class Film {
     this.strip = document.createElement('canvas');
     this.strip.className = 'strip';
     this.strip.height = 1;
-    this.strip.title = 'The darker, the less certain';
+    this.strip.title = 'The stronger the colour, the less certain';
     track.append(this.strip, this.slider, this.marks);
     bar.append(track);
     this.clock = document.createElement('span');
