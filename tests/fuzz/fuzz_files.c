@@ -30,7 +30,7 @@ static service *running(const memory_file *file)
         !service_open(&s, &out, 0, 1, NULL, false, &why) || !service_set_camera(&s, &camera, &why) ||
         !tracking_start(&s.track, &mean, &sd, 0, &why))
         abort();
-    fuzz_steps(s.track.tracker, 0, 2);
+    fuzz_steps(s.track.tracker, 0, 2, 1);
     return &s;
 }
 
@@ -40,7 +40,7 @@ static void snapshot(const memory_file *file)
     snapshot_file const f = {.path = file->path};
     snapshot_file_resume(&f, s);
     if (s->track.tracker)
-        fuzz_steps(s->track.tracker, s->last_utime + 40000, 1);
+        fuzz_steps(s->track.tracker, s->last_utime + 40000, 1, 1);
 }
 
 static void jpeg(fuzz_bytes *b)

@@ -13,7 +13,7 @@ static void fill_frame(gait_frame *frame, gait_image *image, fuzz_bytes *b, uint
         image->stride = (int32_t)fuzz_word(b);
     } else if (what % 8 == 2)
         image->format = fuzz_take(b);
-    if (what % 8 != 3)
+    if (what % 8 < 3 || what % 8 == 7)
         frame->image[0] = *image;
     if (what & 8) {
         for (int j = 0; j < GAIT_MAX_JOINTS; j++)

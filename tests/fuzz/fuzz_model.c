@@ -19,7 +19,7 @@ static size_t write_model(uint8_t *out, int which)
     return toy_segments_write(out, &segments);
 }
 
-static void track(const gait_model *m)
+static void track(const gait_model *m, int pictures)
 {
     static uint8_t ids[FUZZ_WIDTH * FUZZ_HEIGHT];
     gait_camera const camera = fuzz_camera();
@@ -33,11 +33,12 @@ static void track(const gait_model *m)
         mean.phase = 0.4f * (float)i;
         gait_model_pelvis_height(m, &mean, &mean.pelvis[2], NULL);
         gait_model_pose(m, &mean, &pose, NULL);
-        gait_render(m, &camera, &mean, ids, FUZZ_WIDTH, NULL);
+        if (pictures)
+            gait_render(m, &camera, &mean, ids, FUZZ_WIDTH, NULL);
     }
     gait_tracker *const t = fuzz_tracker(m, &config, &memory);
     if (t && gait_tracker_start(t, &mean, &sd, 0, NULL) == GAIT_OK)
-        fuzz_steps(t, 0, 2);
+        fuzz_steps(t, 0, 2, pictures);
     free(memory);
 }
 
@@ -76,6 +77,7 @@ int LLVMFuzzerTestOneInput(const uint8_t *data, size_t size)
     static uint8_t made[TOY_BYTES];
     fuzz_bytes b = {data, size};
     uint8_t const choice = fuzz_take(&b);
+    int const pictures = fuzz_one_in(&b, 16);
     size_t const left = fuzz_damage(made, write_model(made, choice % 3), &b);
     if (left >= 24)
         toy_seal(made, left); /* otherwise all would be refused for their checksums */
@@ -86,7 +88,7 @@ int LLVMFuzzerTestOneInput(const uint8_t *data, size_t size)
         void *const memory = fuzz_memory(bytes);
         gait_lift_info info;
         if (memory && gait_model_init(memory, bytes, blob, left, &m, NULL) == GAIT_OK) {
-            track(m);
+            track(m, pictures);
             if (gait_lift_get_info(m, &info, NULL) == GAIT_OK)
                 lift(m, choice / 3 % 2);
         }

@@ -35,7 +35,7 @@ static void prepare(struct saved *s, int kind)
     s->tracker = fuzz_tracker(model, &config, &memory);
     gait_tracker_prior(model, &mean, &sd, NULL);
     gait_tracker_start(s->tracker, &mean, &sd, 0, NULL);
-    fuzz_steps(s->tracker, 0, 3);
+    fuzz_steps(s->tracker, 0, 3, 1);
     gait_tracker_save(s->tracker, NULL, 0, &s->bytes, NULL);
     s->good = fuzz_memory(s->bytes);
     s->work = fuzz_memory(s->bytes);
@@ -45,7 +45,7 @@ static void prepare(struct saved *s, int kind)
 int LLVMFuzzerTestOneInput(const uint8_t *data, size_t size)
 {
     fuzz_bytes b = {data, size};
-    int const kind = fuzz_take(&b) % KINDS;
+    int const kind = fuzz_take(&b) % KINDS, pictures = fuzz_one_in(&b, 16);
     struct saved *const s = &saved[kind];
     if (!s->tracker)
         prepare(s, kind);
@@ -55,7 +55,7 @@ int LLVMFuzzerTestOneInput(const uint8_t *data, size_t size)
     repair(s->work, left);
     uint8_t *const copy = fuzz_copy(s->work, left);
     if (gait_tracker_restore(s->tracker, copy, left, NULL) == GAIT_OK)
-        fuzz_steps(s->tracker, 200000, 2);
+        fuzz_steps(s->tracker, 200000, 2, pictures);
     else if (!damaged)
         abort();
     free(copy);

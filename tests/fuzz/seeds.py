@@ -17,6 +17,7 @@ import lcm
 import numpy as np
 
 import gait
+from gait.bindings.abi import MAX_JOINTS
 from gait.lcm.link import gaitmsg
 from gait.lcm.messages import camera_message, command_message, image_message, tracks_message
 
@@ -90,6 +91,31 @@ def files(kind: int, text: str | bytes) -> bytes:
     return bytes([kind]) + (text.encode() if isinstance(text, str) else text)
 
 
+def number(value: float) -> bytes:
+    """What fuzz_number() reads as about this value, in [-1.75, 59.75)."""
+    quarters = int((value + 4) * 4)
+    return bytes([quarters, round(100 * (value + 4 - quarters / 4))])
+
+
+def person_walks(keypoints: bool) -> bytes:
+    """Ten frames for fuzz_start.c of a person who walks to the right: keypoints, or a box."""
+    random = np.random.default_rng(1)
+    frames = []
+    for frame in range(10):
+        at = 22 + 0.4 * frame
+        joints = [(at + random.normal(), v, 1) for v in np.linspace(9, 26, MAX_JOINTS)]
+        box = (at, 26, at, 9, 1)
+        frames += [
+            b"".join(number(x) for joint in joints for x in joint),
+            bytes([keypoints]),
+            bytes(192),  # pictures
+            b"" if keypoints else b"\1" + b"".join(number(x) for x in box),
+            bytes([0, 60]),  # no further box; time to the next frame
+        ]
+    data = bytes(2) + b"".join(frames)
+    return data + bytes([-sum(data) % 8])  # one of the inputs on which the search is spent
+
+
 def log() -> bytes:
     """An LCM log of two events."""
     with tempfile.TemporaryDirectory() as folder:
@@ -113,7 +139,7 @@ def main() -> int:
         "snapshot": [bytes([kind]) for kind in range(3)],
         "frame": [random.integers(9, 255, 900, np.uint8).tobytes() for _ in range(4)],
         "lift": [random.integers(9, 200, 300, np.uint8).tobytes() for _ in range(4)],
-        "start": [bytes(range(9, 200)) * 20],
+        "start": [bytes(range(9, 200)) * 20, person_walks(True), person_walks(False)],
         "messages": [
             messages(choice, quality)
             for choice, quality in ((0, None), (1, 80), (10, None), (13, 60), (17, 60), (33, 60), (65, 60))
