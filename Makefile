@@ -342,7 +342,7 @@ fuzz-run: $(FUZZ)
 RUNS ?= 2000
 SEED ?= $(shell date +%s)
 fuzz: ## damaged models, snapshots, frames, messages, files ... under the sanitizers (RUNS=2000 SEED=, else a fresh one)
-	@$(MAKE) --no-print-directory $(SANITIZED) fuzz-run
+	@$(MAKE) --no-print-directory $(JOBS) $(SANITIZED) fuzz-run
 
 fuzz-long: setup ## 10^6 executions of each (ARGS='--runs N --record')
 	@$(MAKE) --no-print-directory config=fuzz CC=clang fuzz-targets

@@ -16,7 +16,7 @@ def facts(command: str) -> str:
     """Command, commit, machine and versions that made the numbers."""
     versions = ", ".join(f"{name} {version(name)}" for name in PACKAGES)
     return (
-        f"`{command}` at commit {_commit()}; {_processor()}, {os.cpu_count()} cores, "
+        f"`{command}` at commit {commit()}; {_processor()}, {os.cpu_count()} cores, "
         f"{platform.system()} {platform.machine()}; Python {platform.python_version()}, {versions}."
     )
 
@@ -30,7 +30,9 @@ def _processor() -> str:
     return names[0] if names else platform.processor() or "unknown processor"
 
 
-def _commit() -> str:
+def commit() -> str:
+    """Short name of the commit, and whether sources differ from it."""
+
     def git(*words: str) -> str:
         done = subprocess.run(["git", "-C", str(HERE), *words], capture_output=True, text=True, check=False)
         return done.stdout.strip()

@@ -4,36 +4,45 @@
     fuzz_long.py [--runs N] [--only NAME] [--keep] [--record]
 
 ``make fuzz-long`` builds them.  With --keep, inputs that reach branches which no kept input reaches are added
-to tests/fuzz/corpus; they run with every ``make test``.
+to tests/fuzz/corpus; they run with every ``make test``.  With --record, the row of a target replaces its
+earlier one.
 """
 
 from __future__ import annotations
 
 import argparse
+import csv
 import hashlib
 import re
+import resource
 import shutil
 import subprocess
 import sys
-import time
 from pathlib import Path
 
 import table
-from facts import facts
+from facts import commit, facts
 
 ROOT = Path(__file__).resolve().parents[2]
 BUILT, FOUND, CORPUS = ROOT / "build/fuzz/fuzz", ROOT / "build/fuzz/found", ROOT / "tests/fuzz/corpus"
 LONGEST = 4096  # bytes of an input
 KEPT_BYTES, KEPT_FILES = 2048, 40  # largest size of a kept input, and of the kept inputs of one target
+HEAD = ["target", "executions", "branches", "CPU s", "a CPU second", "MB", "faults", "seed", "commit"]
 
 
-def fuzz(name: str, runs: int, seed: int, seconds: int) -> list[int]:
-    """Run one target; executions, branches reached, executions per second, peak memory in MB, faults."""
+def cpu_seconds() -> float:
+    """CPU time of the processes that have ended."""
+    used = resource.getrusage(resource.RUSAGE_CHILDREN)
+    return used.ru_utime + used.ru_stime
+
+
+def fuzz(name: str, runs: int, seed: int, seconds: int) -> list[object]:
+    """Run one target; the cells of HEAD after its name."""
     found = FOUND / name
     found.mkdir(parents=True, exist_ok=True)
     options = {"runs": runs, "seed": seed, "max_total_time": seconds, "max_len": LONGEST, "timeout": 60}
     words = [f"-{key}={value}" for key, value in options.items()] + ["-print_final_stats=1"]
-    began = time.monotonic()
+    began = cpu_seconds()
     done = subprocess.run(
         [str(BUILT / f"fuzz_{name}"), *words, f"-artifact_prefix={ROOT}/build/fuzz/", found, CORPUS / name],
         cwd=ROOT,
@@ -47,13 +56,16 @@ def fuzz(name: str, runs: int, seed: int, seconds: int) -> list[int]:
     reached = [int(n) for n in re.findall(r"cov: (\d+)", done.stderr)]
     stats = dict(re.findall(r"stat::(\w+):\s+(\d+)", done.stderr))
     executed = int(stats.get("number_of_executed_units", 0))
-    rate = round(executed / (time.monotonic() - began))
+    used = cpu_seconds() - began
     return [
         executed,
         reached[-1] if reached else 0,
-        rate,
+        round(used),
+        round(executed / used),
         int(stats.get("peak_rss_mb", 0)),
         int(done.returncode != 0),
+        seed,
+        commit(),
     ]
 
 
@@ -71,6 +83,15 @@ def keep(name: str) -> None:
         (CORPUS / name / hashlib.sha256(data).hexdigest()[:12]).write_bytes(data)
 
 
+def recorded() -> dict[str, list[str]]:
+    """Rows of the recorded page, by target."""
+    page = table.RESULTS / "fuzz.csv"
+    if not page.exists():
+        return {}
+    with page.open(newline="") as file:
+        return {row[0]: row for row in csv.reader(file) if row[:1] != HEAD[:1]}
+
+
 def main() -> int:
     """Fuzz, print; exit code 1 if anything was found."""
     options = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawTextHelpFormatter)
@@ -81,26 +102,28 @@ def main() -> int:
     options.add_argument("--keep", action="store_true")
     options.add_argument("--record", action="store_true")
     args = options.parse_args()
-    rows = []
-    for name in args.only or sorted(folder.name for folder in CORPUS.iterdir()):
-        rows.append([name, *fuzz(name, args.runs, args.seed, args.seconds)])
-        print(*rows[-1], flush=True)
-        if args.keep:
-            keep(name)
-    head = ["target", "executions", "branches", "a second", "MB", "faults"]
-    title = "Fuzzing"
+    title, faults = "Fuzzing", 0
     note = (
         f"{facts('tests/bench/fuzz_long.py --record')}\n\nlibFuzzer on clang's address and "
-        f"undefined-behaviour sanitizers, one process, seed {args.seed}, {args.runs} executions or "
-        f"{args.seconds or 'any number of'} seconds, inputs of at most {LONGEST} bytes; "
-        "a fault is a report of a sanitizer, a target that aborts because a promise is broken, 60 s for one "
-        "input, or 2 GB of memory."
+        f"undefined-behaviour sanitizers, one process, inputs of at most {LONGEST} bytes; "
+        f"wanted are {1_000_000:,} executions of each target, the table says how many there were; a fault is "
+        "a report of a sanitizer, a target that aborts because a promise is broken, 60 s for one input, or "
+        "2 GB of memory."
     )
-    if args.record:
-        table.publish("fuzz", title, head, rows, note)
-    else:
-        table.show(title, head, rows)
-    return int(any(row[-1] for row in rows))
+    rows = recorded() if args.record else {}
+    for name in args.only or sorted(folder.name for folder in CORPUS.iterdir()):
+        row = [name, *fuzz(name, args.runs, args.seed, args.seconds)]
+        faults += row[HEAD.index("faults")]
+        rows[name] = row
+        if args.keep:
+            keep(name)
+        if args.record:
+            table.publish("fuzz", title, HEAD, [rows[each] for each in sorted(rows)], note)
+        else:
+            print(*row, flush=True)
+    if not args.record:
+        table.show(title, HEAD, rows.values())
+    return int(faults > 0)
 
 
 if __name__ == "__main__":

@@ -37,7 +37,7 @@ static service *running(const memory_file *file)
 static void snapshot(const memory_file *file)
 {
     service *const s = running(file);
-    snapshot_file const f = {.path = file->path};
+    snapshot_file f = {.path = file->path};
     snapshot_file_resume(&f, s);
     if (s->track.tracker)
         fuzz_steps(s->track.tracker, s->last_utime + 40000, 1, 1);
