@@ -7,6 +7,7 @@ import json
 from dataclasses import replace
 from pathlib import Path
 
+import drawn_person
 import mocap_files
 import numpy as np
 import pytest
@@ -259,6 +260,51 @@ def test_a_run_flies_falls_and_does_not_slide() -> None:
         flat = (phase > 0.15) & (phase < 0.35)
         toe = np.diff(points[f"{side}_toe"], axis=0)[flat[1:] & flat[:-1]]
         assert np.linalg.norm(toe, axis=1).max() < 1e-3 and points[f"{side}_toe"][:, 2].min() > 0
+
+
+def test_a_walk_becomes_a_run_at_a_heel_strike_and_no_foot_slides() -> None:
+    stage = set_stage(Scenario(motion="accelerate", frames=90, **TINY))  # type: ignore[arg-type]
+    timing, clip = stage.walk.timing, slice(stage.frames[0], stage.frames[-1] + 1)
+    first, phase = stage.classes.index("run"), timing.phase[stage.frames]
+    assert (
+        30 < first < 60 and set(stage.classes[:first]) == {"walk"} and set(stage.classes[first:]) == {"run"}
+    )
+    assert phase[first - 1] < np.ceil(phase[first - 1]) <= phase[first] and np.diff(phase).min() > 0
+    speed = stage.walk.speed[stage.frames]
+    assert speed[0] < 1.8 and speed[-1] > 2.4 and np.abs(np.diff(speed)).max() < 0.06
+    points, feet = stage.walk.points(clip), {side: timing.of_side(side)[clip] % 1 for side in "lr"}
+    flies = (feet["l"] > TOE_OFF) & (feet["r"] > TOE_OFF)
+    running = np.arange(len(flies)) >= (stage.frames[first] - stage.frames[0])
+    assert not flies[~running].any() and 0.2 < flies[running].mean() < 0.3
+    for side, own in feet.items():
+        flat = (own > 0.15) & (own < 0.35)
+        toe = np.diff(points[f"{side}_toe"], axis=0)[flat[1:] & flat[:-1]]
+        assert np.linalg.norm(toe, axis=1).max() < 1e-3 and points[f"{side}_toe"][:, 2].min() > 0
+
+
+def test_the_class_becomes_run_while_the_phase_goes_on() -> None:
+    """A person of the model walks faster and faster for a second, then runs."""
+    model, view, plate = gait.Model("classes"), drawn_person.camera(), drawn_person.wall()
+    tracker = gait.Tracker(model, view, gait.TrackerConfig.default(particles=600, seed=2), background=plate)
+    phase, place, found, true = 0.1, -2.4, list[Estimate](), list[float]()
+    for i in range(60):
+        now, rate = ("walk", 0.95 + 0.008 * i) if i < 30 else ("run", 1.36)
+        info = model.class_info(model.classes.index(now))
+        state = gait.State(phase=phase % 1, stride_hz=rate, motion_class=model.classes.index(now))
+        state.stature, state.pelvis[0] = 1.75, place
+        state.pelvis[2] = model.pelvis_height(state)
+        if i == 0:
+            sd = gait.State(phase=0.02, stride_hz=0.03, heading=0.03, stature=0.01)
+            sd.pelvis = np.full(3, 0.01)
+            tracker.start(state, sd, 0)
+        found.append(tracker.step(drawn_person.draw(model, view, state, plate, i), round(1e6 * i / 30)))
+        true.append(phase)
+        place += 1.75 * info.stride_length * rate / 30
+        phase += rate / 30
+    classes_found = [one.motion_class for one in found]
+    assert classes_found[:30].count("walk") >= 28 and classes_found[45:] == ["run"] * 15
+    off = np.array([(one.mean.phase - at + 0.5) % 1 - 0.5 for one, at in zip(found, true, strict=True)])
+    assert np.abs(off).max() < 0.08
 
 
 def test_the_truth_names_the_class_where_it_is_not_always_a_walk(

@@ -18,7 +18,8 @@ presets (other options change them; the defaults below are those of demo):
            corner
   slow, fast, limping, stick, crutches
            0.6 m/s from the side; 1.9 m/s; spares the left leg; walks with a stick or with forearm crutches
-  running  from the side, like the runners of the package's model
+  running, accelerating
+           from the side, like the runners of the package's model; walks and begins to run
 """
 
 from __future__ import annotations
@@ -69,7 +70,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         "--motion",
         choices=MOTIONS,
         help="stop: walk, stop, stand and walk on; turn: turn a corner; run: as in --gait, or like the "
-        "package's runners",
+        "package's runners; accelerate: walk and begin to run",
     )
     add(
         "--asymmetry",

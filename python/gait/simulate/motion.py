@@ -1,7 +1,8 @@
-"""Motions in a clip other than walking straight: stopping, standing, walking backwards, turning, running.
+"""Motions in a clip other than walking straight: stopping, standing, backwards, turning, running.
 
 A stop slows the gait's clock until both feet are on the ground, while steps get shorter, so that the feet
-come together; a start is the reverse.  Walking backwards is a walk in reversed time.
+come together; a start is the reverse.  Walking backwards is a walk in reversed time.  A walk that accelerates
+has faster and longer steps, and becomes a run at a heel strike, from which feet leave the ground earlier.
 """
 
 from __future__ import annotations
@@ -12,13 +13,16 @@ import numpy as np
 from scipy.integrate import cumulative_trapezoid
 from scipy.ndimage import gaussian_filter1d
 
+from gait.simulate.curves import Curves
 from gait.simulate.geometry import Array
-from gait.simulate.walk import Timing, Walk, smoothstep
+from gait.simulate.walk import Faster, Timing, Walk, smoothstep
 
-WALK, STAND, BACKWARDS, RUN = "walk", "stand", "backwards", "run"
+WALK, STAND, BACKWARDS, RUN, ACCELERATE = "walk", "stand", "backwards", "run", "accelerate"
 _RAMP = 0.8  # seconds from walking to standing
 _SHORTER = 0.3  # seconds before that, when steps begin to get shorter
 _BOTH_FEET = 0.06  # phase, modulo half a stride, with both feet on the ground
+_SPEEDING = 2.0  # seconds from the pace of a walk to that of a run
+_BLEND = 0.6  # strides from the first running strike, in which the posture changes
 _MOVES = 0.25  # share of the usual stride rate above which a person walks rather than stands
 # movements of arms, trunk and head while standing, degrees and seconds
 _IDLE = {"l_shoulder_flexion": 7, "r_shoulder_flexion": 7, "l_elbow_flexion": 10, "r_elbow_flexion": 10,
@@ -81,6 +85,29 @@ def posture(angles: dict[str, Array], stop: Pause, rng: np.random.Generator) -> 
     return out
 
 
+def accelerate(timing: Timing, run_timing: Timing, speeds: tuple[float, float], run: Curves) -> Faster:
+    """Return how a walk of this timing becomes a run near the middle of the clip, at a right heel strike.
+
+    `run_timing`: of a run on the same grid; `speeds` of walk and run, m/s.
+    """
+    time = timing.time
+    middle = 0.5 * (time[0] + time[-1])
+    cadence = run_timing.stride_hz / timing.stride_hz
+    rate = np.gradient(timing.phase, timing.step) * (1 + (cadence - 1) * _pace_share(time, middle))
+    phase = timing.phase[0] + cumulative_trapezoid(rate, dx=timing.step, initial=0)
+    strike = float(np.round(np.interp(middle, time, phase)))
+    at = float(np.interp(strike, phase, time))
+    speed = speeds[0] + (speeds[1] - speeds[0]) * _pace_share(time, at)
+    changed = replace(timing, phase=phase, usual_hz=timing.stride_hz, runs_from=strike)
+    runs = smoothstep(phase, strike, strike + _BLEND)
+    return Faster(changed, run, run_timing, speeds[1], runs, speed)
+
+
+def _pace_share(time: Array, at: float) -> Array:
+    """Return the share of the way (T,) from the pace of a walk to that of a run, halfway at `at`."""
+    return smoothstep(time, at - 0.5 * _SPEEDING, at + 0.5 * _SPEEDING)
+
+
 def reversed_in_time(walk: Walk) -> Walk:
     """Return a walk in reversed time: the body faces forwards and moves backwards."""
     timing = replace(walk.timing, phase=walk.timing.phase[::-1], scores=walk.timing.scores[::-1])
@@ -95,8 +122,9 @@ def reversed_in_time(walk: Walk) -> Walk:
     )
 
 
-def classes(motion: str, stop: Pause | None, count: int) -> list[str]:
-    """Return the class of motion at each of `count` steps of the time grid."""
+def classes(motion: str, stop: Pause | None, timing: Timing) -> list[str]:
+    """Return the class of motion at each step of the time grid of a walk's timing."""
     if stop is None:
-        return [motion if motion in (BACKWARDS, RUN) else WALK] * count
+        usual = motion if motion in (BACKWARDS, RUN) else WALK
+        return [RUN if runs else usual for runs in (timing.phase >= timing.runs_from).tolist()]
     return [WALK if moving else STAND for moving in (stop.share > _MOVES).tolist()]

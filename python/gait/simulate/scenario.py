@@ -13,7 +13,7 @@ if TYPE_CHECKING:
 GENERATOR = "generator"
 VIEWS = ("side", "oblique", "toward", "away", "above", "circle")
 DIRECTIONS = ("lr", "rl")
-MOTIONS = ("walk", "stop", "stand", "backwards", "turn", "run")
+MOTIONS = ("walk", "stop", "stand", "backwards", "turn", "run", "accelerate")
 AIDS = ("none", "stick", "crutches")
 BODIES = ("table", "drawn")
 MOVING = ("none", "follow", "pan", "shake")
@@ -55,7 +55,7 @@ class Scenario:
     flicker: float = 0.0  #: standard deviation of the exposure, per cent
     noise: float = 2.0  #: standard deviation of the sensor noise, grey levels
     #: One of `MOTIONS`: ``stop`` walks, stops, stands and continues, ``turn`` turns a corner, ``run``
-    #: has the curves of runs, those of `gait` or of the package.
+    #: has the curves of runs, those of `gait` or of the package, ``accelerate`` walks and begins to run.
     motion: str = "walk"
     #: Per cent by which the left leg is spared, as with a prosthesis, negative the right one: it strikes
     #: later and further ahead, stands shorter, its knee stays straighter and its foot pushes off less.
@@ -85,7 +85,7 @@ class Scenario:
             raise UsageError(f"--aid {self.aid}: unknown; use one of {' '.join(AIDS)}")
         if self.body not in BODIES:
             raise UsageError(f"--body {self.body}: unknown; use table or drawn")
-        if (self.asymmetry or self.aid != "none") and self.motion in ("backwards", "run"):
+        if (self.asymmetry or self.aid != "none") and self.motion in ("backwards", "run", "accelerate"):
             raise UsageError(
                 f"--motion {self.motion}: cannot be combined with --asymmetry and --aid; leave them out"
             )
@@ -136,6 +136,7 @@ PRESETS: dict[str, Scenario] = {
     "stick": Scenario(direction="rl", speed=0.8, asymmetry=-12.0, aid="stick", frames=150, seed=68),
     "crutches": Scenario(speed=0.7, asymmetry=15.0, aid="crutches", frames=160, seed=69),
     "running": Scenario(motion="run", frames=90, seed=70),
+    "accelerating": Scenario(motion="accelerate", frames=120, seed=71),
 }
 """Scenarios for the demo and for evaluation.
 
@@ -155,5 +156,6 @@ limping    45 degrees, spares the left leg, as with a prosthesis
 stick      side view, spares the right leg, a stick in the left hand
 crutches   side view, forearm crutches, spares the left leg
 running    side view, curves of the package's runners
+accelerating  side view, walks and begins to run
 =========  =============================================================
 """

@@ -92,6 +92,7 @@ def _extent(points: Array, place: Array, rotation: Array) -> tuple[Array, Array]
 
 
 _RUN = 2.5, 1.36  # m/s, strides/s
+_BRISK = 0.3  # m/s; how much faster people walk who are about to run
 _USUAL_SPEED, _USUAL_CADENCE, _USUAL_STATURE = 1.25, 0.92, 1.75  # m/s, strides/s, m
 _SURFACE = 0.10  # metres from a joint to the skin, hair or shoe around it
 _APART = (0.65, 0.95)  # metres between the paths of people who meet
@@ -183,13 +184,19 @@ def _cast(scenario: Scenario, path: Path) -> Stage:
     if stop is not None:
         blend = partial(motion.posture, stop=stop, rng=scenario.stream("idle"))
         shaped = Shaped(stop.timing, stop.clock, stop.amplitude, blend)
-    walk = make_walk(body, curves, timing, path, speed, rng, shaped)
+    faster = None
+    if scenario.motion == motion.ACCELERATE:
+        own = scenario.stream("run")
+        run = curves_of_model("classes", own, _RUN[1], motion.RUN)
+        even = replace(timing, phase=_RUN[1] * timing.time, toe_off=RUN_TOE_OFF)
+        faster = motion.accelerate(timing, even, (speed, _RUN[0]), run)
+    walk = make_walk(body, curves, timing, path, speed, rng, shaped, faster)
     held = aids.hands(scenario.aid, scenario.asymmetry)
     if held:
         aids.carry(walk, held)
     if scenario.motion == motion.BACKWARDS:
         walk = motion.reversed_in_time(walk)
-    names = motion.classes(scenario.motion, stop, len(timing.time))
+    names = motion.classes(scenario.motion, stop, walk.timing)
     zero = int(np.argmin(np.abs(timing.time)))
     frames = zero + timing.per_frame * np.arange(scenario.frames)
     unplaced = Camera(*scenario.size, 1.0, 1.0, 0.0, 0.0, np.eye(3), np.zeros(3))
@@ -260,6 +267,8 @@ def pace(scenario: Scenario, stature: float) -> tuple[float, float]:
     if scenario.motion == motion.RUN:
         return speed or _RUN[0], cadence or _RUN[1]
     drawn = float(rng.uniform(1.12, 1.38))
+    if scenario.motion == motion.ACCELERATE:
+        drawn += _BRISK
     if speed is None:
         speed = drawn if cadence is None else _USUAL_SPEED * (cadence / usual) ** 2
     if cadence is None:

@@ -88,11 +88,12 @@ class Timing:
     scores: Array  #: (T, modes) smooth stride-to-stride scores, unit variance
     #: Grid steps per frame, a multiple of 4, so that a half-open shutter opens and closes on the grid.
     per_frame: int
-    #: Strides per second while walking, if the person also stands; 0: the average from the phase.
+    #: Strides per second while walking, if the person also stands or runs; 0: the average from the phase.
     usual_hz: float = 0.0
     #: Share by which the left leg is spared, negative for the right leg; see `Scenario.asymmetry`.
     spared: float = 0.0
     toe_off: float = TOE_OFF  #: share of the cycle at which a foot leaves the ground; below 0.5 for runs
+    runs_from: float = np.inf  #: phase, a right heel strike, from which a walk is a run
 
     @property
     def stride_hz(self) -> float:
@@ -107,20 +108,28 @@ class Timing:
     def of_side(self, side: str) -> Array:
         """Return a foot's unwrapped phase: whole at its own heel strikes, swinging from `TOE_OFF`."""
         phase = self.phase + (0.5 - _LATE * self.spared if side == "l" else 0.0)
+        if np.isfinite(self.runs_from):
+            strike = np.floor(phase) - (0.5 if side == "l" else 0.0)
+            return np.where(strike < self.runs_from, phase, _warped(phase, RUN_TOE_OFF))
         if not self.spared and self.toe_off == TOE_OFF:
             return phase
         off = self.toe_off * (1 - self.sparing(side) * (_SHORT if self.sparing(side) > 0 else _LONG))
-        knots = np.array([0, 0.5 * off, off, 0.5 * (1 + off)])
-        meant = np.array([0, 0.5 * TOE_OFF, TOE_OFF, 0.5 * (1 + TOE_OFF)])
-        warp = PchipInterpolator(
-            np.concatenate([knots - 1, knots, knots + 1]), np.concatenate([meant - 1, meant, meant + 1])
-        )
-        whole = np.floor(phase)
-        return np.asarray(whole + warp(phase - whole))
+        return _warped(phase, off)
 
     def sparing(self, side: str) -> float:
         """Return the share by which this leg is spared; negative if the other one is."""
         return self.spared if side == "l" else -self.spared
+
+
+def _warped(phase: Array, off: float) -> Array:
+    """Return phases (T,) that pass `TOE_OFF` where `phase` passes `off`."""
+    knots = np.array([0, 0.5 * off, off, 0.5 * (1 + off)])
+    meant = np.array([0, 0.5 * TOE_OFF, TOE_OFF, 0.5 * (1 + TOE_OFF)])
+    warp = PchipInterpolator(
+        np.concatenate([knots - 1, knots, knots + 1]), np.concatenate([meant - 1, meant, meant + 1])
+    )
+    whole = np.floor(phase)
+    return np.asarray(whole + warp(phase - whole))
 
 
 def draw_timing(stride_hz: float, fps: float, frames: int, modes: int, rng: np.random.Generator) -> Timing:
@@ -313,11 +322,12 @@ def make_walk(
     speed: float,
     rng: np.random.Generator,
     shaped: Shaped | None = None,
+    faster: Faster | None = None,
 ) -> Walk:
     """Compute a walk at `speed` m/s (mean over the grid) along `path`.
 
     `shaped`: a stop; `timing` is then that of the walk without the stop, which determines the length of the
-    steps.
+    steps. `faster`: the walk becomes a run; `timing` and `speed` are likewise those of the walk.
 
     UsageError if no step length of this person gives that speed at this cadence.
     """
@@ -328,7 +338,11 @@ def make_walk(
     if shaped is not None:
         angles = shaped.posture({name: np.interp(shaped.clock, timing.time, v) for name, v in angles.items()})
         timing, gain = shaped.timing, gain * shaped.amplitude
-    forward = _forward_speed(angles, timing, body, gain)
+    if faster is not None:
+        angles, gain, timing = _faster(curves, timing, usual, faster, body)
+        forward = faster.speed
+    else:
+        forward = _forward_speed(angles, timing, body, gain)
     along = cumulative_trapezoid(forward, dx=timing.step, initial=0)
     along -= np.interp(0.5 * (timing.time[0] + timing.time[-1]), timing.time, along)  # the clip's middle
     heading = path.direction(along)
@@ -338,11 +352,14 @@ def make_walk(
     plans = {side: _plan_foot(side, course, rng) for side in SIDES}
     sway = -_SWAY * body.stature * np.sin(2 * np.pi * (timing.phase - 0.02))
     ground = path.point(along, sway)
-    runs = timing.toe_off < 0.5
-    height = (_running_height if runs else _pelvis_height)(ground, turn, plans, course)
+    runs: Array = np.full(len(along), float(timing.toe_off < 0.5)) if faster is None else faster.runs
+    height = np.zeros(len(along))
+    for share, of in ((1 - runs, _pelvis_height), (runs, _running_height)):
+        if share.any():
+            height += share * of(ground, turn, plans, course)
     pelvis = np.column_stack([ground, height])
-    if runs:
-        plans = {side: _carried(side, plan, pelvis, course) for side, plan in plans.items()}
+    if runs.any():
+        plans = {side: _carried(side, plan, pelvis, runs, course) for side, plan in plans.items()}
     origins, turns = np.zeros((len(along), len(BODY_BONES), 3)), np.zeros((len(along), len(BODY_BONES), 3, 3))
     _set(origins, turns, "pelvis", pelvis, turn)
     for side in SIDES:
@@ -373,6 +390,42 @@ class Shaped:
 
 
 @dataclass(frozen=True)
+class Faster:
+    """Differences of a walk that becomes a run from one that does not."""
+
+    timing: Timing
+    run: Curves
+    run_timing: Timing  #: of a run throughout
+    run_speed: float  #: m/s
+    runs: Array  #: (T,) share of the run in the posture: 0 walking, 1 running
+    speed: Array  #: (T,) m/s
+
+
+def _faster(
+    curves: Curves, timing: Timing, walking: float, faster: Faster, body: Anatomy
+) -> tuple[dict[str, Array], Array, Timing]:
+    """Blend the angles of a walk into those of a run; return them, the gain of the steps, and the timing.
+
+    `walking`: gain at the walk's usual speed; with the speed, the steps get longer in walk and run alike.
+    """
+    stride = faster.speed / np.gradient(faster.timing.phase, timing.step)
+    parts = []
+    for one, gain, usual in (
+        (curves, walking, faster.speed[0] / timing.stride_hz),
+        (
+            faster.run,
+            _stride_gain(_angles(faster.run, faster.run_timing), faster.run_timing, body, faster.run_speed),
+            faster.run_speed / faster.run_timing.stride_hz,
+        ),
+    ):
+        longer = gain * _smoothed(stride / usual, 0.2, timing)
+        parts.append((_stretched(_angles(one, faster.timing), longer), longer))
+    (walk, walk_gain), (run, run_gain) = parts
+    angles = {name: value + faster.runs * (run[name] - value) for name, value in walk.items()}
+    return angles, walk_gain + faster.runs * (run_gain - walk_gain), faster.timing
+
+
+@dataclass(frozen=True)
 class _Course:
     """What both feet share: the pelvis's progress along the path, and the joint angles."""
 
@@ -394,7 +447,7 @@ class _FootPlan:
     phase: Array
 
 
-def _stretched(angles: dict[str, Array], gain: float) -> dict[str, Array]:
+def _stretched(angles: dict[str, Array], gain: float | Array) -> dict[str, Array]:
     """Scale the swing of legs, arms and pelvis for a longer (gain > 1) or shorter step."""
     out = dict(angles)
     for name, value in angles.items():
@@ -523,6 +576,8 @@ def _pelvis_height(ground: Array, turn: Array, plans: dict[str, _FootPlan], cour
         reach = body.leg * np.where(p < TOE_OFF, _bent(p, yields), 1.0)
         highest = plan.ankle[:, 2] + np.sqrt(np.maximum(reach**2 - aside**2, 0)) - hip[:, 2]
         limit = np.minimum(limit, np.where((p < TOE_OFF) | (p > _LANDING), highest, np.inf))
+    planted = np.flatnonzero(np.isfinite(limit))  # a run also flies
+    limit = np.interp(np.arange(len(limit)), planted, limit[planted])
     height = _smoothed(limit, 0.045, timing)
     for _ in range(4):
         height -= _smoothed(np.maximum(height - limit, 0), 0.03, timing)
@@ -550,10 +605,13 @@ def _running_height(ground: Array, turn: Array, plans: dict[str, _FootPlan], cou
     return _smoothed(height, 0.01, course.timing)
 
 
-def _carried(side: str, plan: _FootPlan, pelvis: Array, course: _Course) -> _FootPlan:
-    """Return the plan of a foot that moves with the pelvis (T, 3), by the angles, while it swings."""
+def _carried(side: str, plan: _FootPlan, pelvis: Array, runs: Array, course: _Course) -> _FootPlan:
+    """Return the plan of a foot that moves with the pelvis (T, 3), by the angles, while it swings.
+
+    `runs`: share (T,) of this motion, which is a runner's.
+    """
     p = plan.phase % 1.0
-    window = smoothstep(p, TOE_OFF, TOE_OFF + 0.1) * (1 - smoothstep(p, 0.85, 1.0))
+    window = runs * smoothstep(p, TOE_OFF, TOE_OFF + 0.1) * (1 - smoothstep(p, 0.85, 1.0))
     free = pelvis + apply(about(2, course.heading), _free_ankle(side, course.angles, course.body))
     return replace(plan, ankle=plan.ankle + window[:, None] * (free - plan.ankle))
 

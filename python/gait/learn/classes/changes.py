@@ -33,7 +33,7 @@ PHASES = 60  # of a class that moves
 JOINTS = tuple(ANGLES.index(f"{s}_{j}_flexion") for s in SIDES for j in ("hip", "knee", "ankle"))
 INDEPENDENT = 1 / 6  # share of the frames that count, as errors persist for 0.2 s
 FARTHEST = 9.0  # largest squared error in variances of one number, as people differ
-ANGLE_SD = np.radians(5.0)  # of a person's joint from the learnt people, added to their own spread
+ANGLE_SD = np.radians(5.0)  # of a person's joint from the learnt people, added to their own statistics
 SPEED_SD = 0.35, 0.1  # relative, and statures per second
 ADVANCES = np.arange(7)  # phases per frame; the usual is about 2
 ADVANCE_SD = 0.35  # relative
@@ -93,15 +93,15 @@ def _classes(sections: Sections) -> list[_Class]:
     columns = [names.index(ANGLES[joint]) for joint in JOINTS]
     for direction, source, _, _ in np.asarray(sections["CLIN"], int):
         curves = np.asarray(sections[f"CUR{source}" if source else "CURV"], float)[..., columns]
-        spread = np.asarray(sections[f"CHS{source}" if source else "CHST"], float)[columns]
+        statistics = np.asarray(sections[f"CHS{source}" if source else "CHST"], float)[columns]
         gait = np.asarray(sections[f"GAI{source}" if source else "GAIT"], float)
-        variance = (curves[1:] ** 2).sum(axis=0) + spread[:, 0] ** 2 + spread[:, 3] ** 2 + ANGLE_SD**2
+        variance = (curves[1:] ** 2).sum(axis=0) + statistics[:, 0] ** 2 + statistics[:, 3] ** 2 + ANGLE_SD**2
         at = np.arange(PHASES if direction else 1) * len(curves[0]) // (PHASES if direction else 1)
         speed = direction * gait[0] * gait[3]
         sd = np.hypot(SPEED_SD[0] * speed, SPEED_SD[1])
         mean = np.column_stack([curves[0][at], np.full(len(at), speed)])
-        spreads = np.column_stack([np.sqrt(variance[at]), np.full(len(at), sd)])
-        found.append(_Class(int(direction), PHASES * gait[0] / RATE, mean, spreads))
+        sds = np.column_stack([np.sqrt(variance[at]), np.full(len(at), sd)])
+        found.append(_Class(int(direction), PHASES * gait[0] / RATE, mean, sds))
     return found
 
 
@@ -216,6 +216,12 @@ def _concentration(length: float) -> float:
     return (
         float(brentq(lambda k: _sharpness(k) - length, 0.0, most + 1)) if length < _sharpness(most) else most
     )
+
+
+def without_numbers(sections: Sections) -> Sections:
+    """Return a model's sections without the numbers of changes, as for classes with assumed ones."""
+    meta = json.loads(np.asarray(sections["META"]).tobytes()) if "META" in sections else {}
+    return {**sections, "META": model.meta_section(meta)} if meta.pop("changes", None) else sections
 
 
 def with_changes(sections: Sections, observed: Observed) -> dict[str, blob.Array]:

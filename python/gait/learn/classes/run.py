@@ -69,6 +69,7 @@ def learn(options: LearnOptions, note: Note) -> dict[str, Any]:
     }
 
     def with_classes(walk: Mapping[str, blob.Array]) -> dict[str, blob.Array]:
+        walk = changes.without_numbers(walk)
         classes = [_counted(MotionClass(options.activity), walk)]
         for name in wanted:
             one = learnt[name] if name in learnt else _derived(name, walk, options.activity)
