@@ -141,6 +141,14 @@ static bool save(size_t at, int with)
     return !f.failed;
 }
 
+/* Nobody may read a new file; a file that is there keeps its mode. */
+static void test_mode(void)
+{
+    struct stat now;
+    CHECK(save(0, 0) && stat(path, &now) == 0 && (now.st_mode & 0777) == 0600);
+    CHECK(chmod(path, 0640) == 0 && save(0, 0) && stat(path, &now) == 0 && (now.st_mode & 0777) == 0640);
+}
+
 /* The data are on the disk before the file gets its name, and the name before anything is reported as written. */
 static void test_order(void)
 {
@@ -210,7 +218,7 @@ static void test_torn(void)
 /* Leftovers of killed daemons are removed; those of running ones and other files stay. */
 static void test_leftovers(void)
 {
-    static const char *const names[] = {"2147483646", "1", "bak", "7x"};
+    static const char *const names[] = {"2147483646.0123abcd", "1.0123abcd", "2147483646", "2147483646.bak"};
     snapshot_file f = {.path = path};
     char name[96];
     CHECK(save(0, 0));
@@ -230,6 +238,7 @@ static void test_leftovers(void)
 int main(void)
 {
     start();
+    test_mode();
     test_order();
     test_every_call();
     test_interrupted_and_short_writes();

@@ -10,6 +10,8 @@
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
+#include <sys/random.h>
+#include <sys/stat.h>
 #include <unistd.h>
 
 /* The file: this header, then for each person who is tracked a record and the snapshot of the tracker.  Only a daemon on
@@ -118,14 +120,30 @@ static int open_folder(const char *path)
     return open(folder, O_RDONLY | O_DIRECTORY | O_CLOEXEC);
 }
 
+/* What a file PATH is written to first: PATH.PROCESS.RANDOM. */
+enum { RANDOM_DIGITS = 8 };
+
+/* Create that file, with the mode of the old one; -1: it cannot be created. */
+static int create_beside(const char *path, char *beside, size_t capacity)
+{
+    uint32_t number = 0;
+    struct stat old;
+    bool const known = stat(path, &old) == 0;
+    if (getrandom(&number, sizeof number, GRND_NONBLOCK) < 0)
+        number = (uint32_t)clock_monotonic();
+    snprintf(beside, capacity, "%s.%d.%0*" PRIx32, path, (int)getpid(), RANDOM_DIGITS, number);
+    int const file = open(beside, O_WRONLY | O_CREAT | O_EXCL | O_NOFOLLOW | O_CLOEXEC, 0600);
+    if (file >= 0 && known && fchmod(file, old.st_mode & 0777) != 0)
+        log_line("--snapshot %.160s: keeps no permissions: %s", path, strerror(errno));
+    return file;
+}
+
 /* Write beside the file, then rename; returns 0 or an errno.  After a loss of power the old or the new file is there,
  * complete. */
 static int replace(const char *path, const unsigned char *data, size_t bytes)
 {
-    char beside[OPTION_TEXT + 16];
-    snprintf(beside, sizeof beside, "%s.%d", path, (int)getpid());
-    unlink(beside); /* left by a process that was killed and had this number */
-    int const file = open(beside, O_WRONLY | O_CREAT | O_EXCL | O_CLOEXEC, 0600);
+    char beside[OPTION_TEXT + 32];
+    int const file = create_beside(path, beside, sizeof beside);
     if (file < 0)
         return errno;
     int fault = write_all(file, data, bytes) && fsync(file) == 0 ? 0 : errno;
@@ -156,7 +174,8 @@ static void sweep(const char *path)
         char *end = e->d_name;
         long const writer =
             strncmp(e->d_name, name, n) == 0 && e->d_name[n] == '.' ? strtol(e->d_name + n + 1, &end, 10) : 0;
-        if (writer > 0 && *end == '\0' && kill((pid_t)writer, 0) != 0 && errno == ESRCH)
+        if (writer > 0 && *end == '.' && strspn(end + 1, "0123456789abcdef") == RANDOM_DIGITS &&
+            end[1 + RANDOM_DIGITS] == '\0' && kill((pid_t)writer, 0) != 0 && errno == ESRCH)
             unlinkat(folder, e->d_name, 0);
     }
     if (list)
