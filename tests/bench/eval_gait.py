@@ -307,7 +307,7 @@ def report(runs: list[Run], record: str | None) -> list[str]:
     errors += [_median_row(errors, arm) for arm in ARMS if any(row[1] == arm for row in errors)]
     wanted, missed = _verdicts(errors, angle, intervals)
     parts = [
-        ("Wanted and reached", ["measure", "wanted", "track", "smooth", ""], wanted, ""),
+        ("Wanted and reached", ["measure", "wanted", "track", "smooth", "smooth reaches it"], wanted, ""),
         ("Footfalls and parameters, mean absolute errors", heads[0], errors, _READING),
         ("Joint angles, mean absolute errors in degrees", heads[1], angle, _ANGLE_READING),
         ("Intervals of parameters", heads[2], intervals, _INTERVAL_READING),
@@ -316,7 +316,9 @@ def report(runs: list[Run], record: str | None) -> list[str]:
     text = [f"# What a gait lab compares\n\n{facts(_command())}\n"]
     for title, head, rows, note in parts:
         shown, cells, numbers = table.show(title, head, rows)
-        text.append(f"## {title}\n\n{note}\n\n{table.markdown(shown, cells, numbers)}\n")
+        text.append(
+            "\n\n".join(filter(None, [f"## {title}", note, table.markdown(shown, cells, numbers)])) + "\n"
+        )
     if record:
         table.RESULTS.mkdir(parents=True, exist_ok=True)
         (table.RESULTS / f"{record}.md").write_text("\n".join(text), encoding="utf-8")
@@ -449,7 +451,7 @@ def _verdicts(
         met = smooth is not None and low <= smooth <= high
         rows.append([f"90 % intervals, {title}", f"{low:g}-{high:g} %", track, smooth, met])
     missed = [row[0] for row in rows if not row[-1]]
-    return [[*row[:-1], "pass" if row[-1] else "missed"] for row in rows], missed
+    return [[*row[:-1], "yes" if row[-1] else "no"] for row in rows], missed
 
 
 def _write_values(path: Path, runs: list[Run]) -> None:

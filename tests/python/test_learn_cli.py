@@ -237,7 +237,8 @@ def test_columns_of_info_widen_for_long_names():
     assert len({len(line) for line in lines}) == 1 and lines[1].startswith("a_recording_of_a_long_name  ")
 
 
-def test_info_of_something_else_fails(tmp_path, capsys):
+def test_info_reads_shipped_models_by_name_and_refuses_something_else(tmp_path, capsys):
+    assert run("info", "classes") == 0 and "class run: " in capsys.readouterr().out
     (tmp_path / "x.gait").write_text("hello")
     assert run("info", tmp_path / "x.gait") == 1
     assert "not a .gait model" in capsys.readouterr().err

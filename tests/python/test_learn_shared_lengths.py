@@ -292,7 +292,7 @@ MORE = Path(__file__).resolve().parents[2] / "../shared/data/mocap/more/c3dorg"
 
 @pytest.mark.skipif(not MORE.is_dir(), reason="needs recordings of further people beside the repository")
 def test_recordings_accepted_alone_are_accepted_together():
-    files, _ = sources.find([str(MORE / "o11")])
+    files, _ = sources.find([str(MORE / name) for name in ("o11", "o12/o12_01.trc", "o12/o12_05.trc")])
     options = LearnOptions(jobs=1)
     loaded = load.load_all(files, options, shared=load.shared_lengths(files, options))
-    assert len(loaded.sequences) == 2 and not loaded.refused
+    assert len(loaded.sequences) == 4 and not loaded.refused

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import argparse
 import json
-import os
 from collections.abc import Mapping
 from typing import Any
 
@@ -23,15 +22,20 @@ examples:
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Add the command's options."""
-    parser.add_argument("model", metavar="M.gait", help="model written by gait learn")
+    parser.add_argument(
+        "model",
+        metavar="M.gait",
+        help="model written by gait learn, or walk, classes or paper of the package",
+    )
 
 
 def run(args: argparse.Namespace) -> int:
     """Read the model and print its description."""
+    from gait.bindings.model import read_blob
     from gait.io import blob
 
-    sections = blob.read(args.model)
-    summary = describe(sections, os.path.getsize(args.model), blob.stored_checksum(args.model), args.model)
+    data = read_blob(args.model)
+    summary = describe(blob.decode(data, args.model), len(data), blob.checksum(data), args.model)
     print(json.dumps(summary) if args.json else text(args.model, summary))
     return 0
 

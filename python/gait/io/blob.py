@@ -85,12 +85,6 @@ def checksum(blob: bytes) -> int:
     return zlib.crc32(blob[CRC_OFFSET + 4 :], zlib.crc32(bytes(4), zlib.crc32(blob[:CRC_OFFSET])))
 
 
-def stored_checksum(path: str | os.PathLike[str]) -> int:
-    """Read the CRC-32 stated in a blob's header."""
-    with open(path, "rb") as file:
-        return int(HEADER.unpack(file.read(HEADER.size))[5])
-
-
 def write(path: str | os.PathLike[str], sections: Mapping[str, Array]) -> bytes:
     """Write a blob, completely or not at all; return its bytes."""
     blob = encode(sections)
