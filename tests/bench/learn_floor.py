@@ -88,19 +88,20 @@ the walk with one constant vector of scores (and proportions) and one phase offs
 and stature.  The figures are mean distances of 14 joints after alignment of the pelvis, mm, averaged over a
 subject's walks.
 
-- model: *paper* is `gait learn --prior paper --components 5`, *libgait* is the default.  The rows
-  between them are the paper's analysis with 12 components, and what is added to it step by step.  libgait
-  uses 4 of its 12 dimensions for the lengths of limbs and places of shoulders, which are also learnt from
-  {others} people who do not walk (`cmu_misc`).  With *+ stride rate* and in *libgait* the mean cycle follows the stride rate,
-  here the walk's own.  The rate is also a state of the paper's tracker (eq. 7), so it does not count as a
-  dimension. *libgait, as tracked* is the tracker's default: {used} components, no proportions, and offsets of
-  trunk, shoulders and elbows.
-- offsets: constants added to single angles; they are the last of the dimensions.  The most probable
-  offsets are taken, given their standard deviations among the learners (section `CHST`, learnt anew without
-  the subject) and that of a joint's coordinate, which is the residual of the walk without offsets.  If every frame counts,
-  the frames outweigh what was learnt and the offsets are nearly free; with *frames alike* a walk counts as
-  one frame, because a model has the same errors in all strides.  Scores and proportions are free in all rows.
-  Standard deviations of the offsets tracked, degrees, with all people among the learners: {offsets_sd}.
+- model: *paper* is `gait learn --prior paper --components 5`, *libgait* is the default. The rows between
+  them are the paper's analysis with 12 components, and what is added to it step by step. libgait uses 4
+  of its 12 dimensions for the lengths of limbs and places of shoulders, which are also learnt from
+  {others} people who do not walk (`cmu_misc`). With *+ stride rate* and in *libgait* the mean cycle
+  follows the stride rate, here the walk's own. The rate is also a state of the paper's tracker (eq. 7),
+  so it does not count as a dimension. *libgait, as tracked* is the tracker's default: {used} components,
+  no proportions, and offsets of trunk, shoulders and elbows.
+- offsets: constants added to single angles; they are the last of the dimensions. The most probable
+  offsets are taken, given their standard deviations among the learners (section `CHST`, learnt anew
+  without the subject) and that of a joint's coordinate, which is the residual of the walk without
+  offsets. If every frame counts, the frames outweigh what was learnt and the offsets are nearly free;
+  with *frames alike* a walk counts as one frame, because a model has the same errors in all strides.
+  Scores and proportions are free in all rows. Standard deviations of the offsets tracked, degrees, with
+  all people among the learners: {offsets_sd}.
 - body: *mean of the learners*, or *as shipped*: joints moved by hand to anatomical places
   (`generic_proportions`).  The joints of these recordings lie elsewhere, so both models then have large
   errors.
