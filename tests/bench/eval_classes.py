@@ -280,6 +280,8 @@ def _rows(runs: list[Run]) -> Iterator[tuple[object, ...]]:
     for clip in dict.fromkeys(run.clip for run in runs):
         for model in dict.fromkeys(run.model for run in runs):
             these = [run for run in runs if run.clip == clip and run.model == model]
+            if not these:
+                continue
             wrong = [run.wrong for run in these if run.wrong is not None]
             roots = [run.root for run in these]
             yield (
