@@ -52,7 +52,8 @@ def main() -> int:
     note = (
         f"{facts('tests/bench/detector_crops.py')}\n\n"
         f"Network {NETWORK}. Share of the frames in which the person is found, and distance of the joints "
-        "found from the true ones in per cent of the person's height. For a box painted over the person "
+        "found from the true ones in per cent of the person's height. The joints are moved by the detector's "
+        "profile, which is learnt from other people. For a box painted over the person "
         f"for {HIDDEN_S:g} s: share of these frames in which a person is found, and seconds from their "
         f"end to the first frame whose median joint is within {100 * RIGHT:g} % of the height."
     )

@@ -4,10 +4,11 @@
     eval_stabilize.py [--only NAME...] [--turns] [--record]
 
 --turns: no tracks, only how far the cameras of the real films turn, and how large that is at the person.
-never: --stabilize off, with a background and without; moving: --stabilize auto, which leaves cameras alone
-that stand still; always: the same, with every camera assumed to move.  If auto finds that the camera stands
-still, the result is that of never, which is not run; if it finds that the camera moves, always is the same as
-moving.  Clips of `gait simulate` are kept in build/eval-stabilize.
+never: --stabilize off; moving: --stabilize auto, which leaves cameras alone that stand still; always: the
+same, with every camera assumed to move.  If auto finds no turns, the result is that of never, which is not
+run; if it finds turns, always is the same as moving.  The command's default, pans, gives the result of moving
+if the camera turns by more than a tenth of the picture's width, otherwise that of never.
+Clips of `gait simulate` are kept in build/eval-stabilize.
 """
 
 from __future__ import annotations
@@ -36,7 +37,7 @@ from gait.track.stabilise import find_motion
 ROOT = Path(__file__).resolve().parents[2]
 FOLDER = ROOT / "build" / "eval-stabilize"
 SIMULATED = [(preset, moving) for preset in ("demo", "oblique") for moving in ("pan", "shake")]
-AUTO = ["--stabilize", "auto"]
+AUTO, OFF = ["--stabilize", "auto"], ["--stabilize", "off"]
 ALWAYS = (
     "-c",
     "import sys; from gait.cli import main; from gait.track import stabilise; "
@@ -52,9 +53,10 @@ _READING = """\
 The arm `auto` of `make eval-real` (camera given, detector on). never: --stabilize off; moving: --stabilize
 auto; always: auto with every camera assumed to move. good, wrong under `tracking`: as there, with joints
 projected by the camera of each frame. one camera: good frames if the joints are projected by the one
-camera that was given, as in a program that knows no other. If auto finds that the camera of a clip stands
-still, its track is the same as with off. Simulated: `gait simulate --preset P --moving KIND`, with errors
-of 15 joints in space."""
+camera that was given, as in a program that knows no other. If auto finds no turns, because the camera stands
+still or does not only turn, its track is the same as with off. The default, pans, is the same as auto if the
+camera turns by more than a tenth of the picture's width, otherwise as off. Simulated: `gait simulate
+--preset P --moving KIND`, with errors of 15 joints in space."""
 
 
 def main() -> int:
@@ -133,24 +135,23 @@ def _rows(clip: Clip) -> list[list[object]]:
     auto = _row(clip, "moving", run(clip, "auto", AUTO))
     cameras = _cameras(clip)
     if len({camera.R.tobytes() for camera in cameras.values()}) > 1:
-        plain = _row(clip, "never", run(clip, "auto", []))
-        return [plain, _row(clip, "never, no background", run(clip, "nobg", []), "nobg"), auto]
-    auto[1:3] = "still", "never, moving"
+        return [_row(clip, "never", run(clip, "auto", OFF)), auto]
+    auto[1:3] = "no turns found", "never, moving"
     always = _row(clip, "always", run(clip, "auto", AUTO, ALWAYS))
-    always[1] = "still"
+    always[1] = "no turns found"
     return [auto, always]
 
 
-def _row(clip: Clip, arm: str, found: Result, start: str = "auto") -> list[object]:
-    """Cells of a run, with the arm `start` of eval-real, on a clip whose camera moves."""
+def _row(clip: Clip, arm: str, found: Result) -> list[object]:
+    """Cells of a run, with the arm `auto` of eval-real, on a clip whose camera turns."""
     own, one, errors = found.score, 0.0, [np.nan, np.nan]
     if not found.failed:
-        track, given = read_estimates(OUT / f"{clip.folder.name}_{start}.csv"), _given(clip)
+        track, given = read_estimates(OUT / f"{clip.folder.name}_auto.csv"), _given(clip)
         if (clip.folder / "truth.csv").is_file():
             errors = errors_in_space(clip, track, np.isin(track.frame, list(clip.reference)))
         one = score(clip, track, dict.fromkeys(track.frame.tolist(), given)).share["good"]
     return [
-        *(clip.folder.name, "moves", arm, 100 * own.share["good"], 100 * one, own.tracking, own.wrong),
+        *(clip.folder.name, "turns", arm, 100 * own.share["good"], 100 * one, own.tracking, own.wrong),
         *(100 * own.error, 100 * own.stride_error, *errors, found.cpu, found.failed),
     ]
 

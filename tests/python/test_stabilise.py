@@ -140,17 +140,21 @@ def test_a_camera_that_stands_still_is_left_alone(tmp_path):
     assert not moves(CAMERA, sample_frames(video), people())
 
 
-@pytest.mark.parametrize(("shake", "kept"), [(0.0, True), (0.02, False)])
-def test_the_median_of_a_camera_that_moves_is_no_background(tmp_path, capsys, shake, kept):
-    """Although it counts as static, as it does by default."""
-    film(tmp_path / "v.mp4", views(0.0, shake))
+@pytest.mark.parametrize("background", ["auto", "none"])
+@pytest.mark.parametrize(("pan", "shake"), [(0.0, 0.0), (0.0, 0.02), (0.3, 0.004)])
+def test_by_default_a_camera_that_turns_far_is_stabilised_and_one_that_shakes_is_reported(
+    tmp_path, capsys, pan, shake, background
+):
+    """A tenth of the picture's width are 32 px; the median of a camera that moves is no background."""
+    film(tmp_path / "v.mp4", views(pan, shake))
     write_camera(tmp_path / "camera.json", CAMERA)
-    options = ClipOptions(
-        str(tmp_path / "v.mp4"), str(tmp_path / "camera.json"), str(tmp_path / "t.csv"), detector="none"
-    )
-    read = Scene.read(options)
-    assert (read.plate is not None) == kept and read.moved != kept
-    assert ("its median is not a background" in capsys.readouterr().err) != kept
+    names = (str(tmp_path / name) for name in ("v.mp4", "camera.json", "t.csv"))
+    read = Scene.read(ClipOptions(*names, detector="none", background=background))
+    err = capsys.readouterr().err
+    assert (read.motion is not None) == bool(read.poses) == bool(pan)
+    assert ("turned by up to" in err and "to frame 0" in err) == bool(pan)
+    assert ("counts as still" in err) == (read.moved != "") == (shake > 0 and not pan)
+    assert (read.empty is not None) == (background == "auto" and not read.moved)
 
 
 def test_a_scene_without_texture_is_reported(tmp_path):

@@ -220,7 +220,12 @@ def _add_video(group: argparse._ArgumentGroup) -> None:
         metavar="CAM.json",
         help="also write the camera, estimated or given",
     )
-    values.add_stabilize(group, default=None)
+    group.add_argument(
+        "--stabilize",
+        choices=["auto", "off"],
+        help="auto: estimate how the camera moves; joints are then in the scene's frame: that of the first "
+        "frame if a camera is given, or else of the frame that the command names (default: off)",
+    )
     group.add_argument(
         "--start",
         type=values.whole(0),

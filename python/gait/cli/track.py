@@ -138,7 +138,14 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         help="standard deviation of keypoints at full confidence, including the difference between the "
         f"detector's joints and the model's, where the file does not give theirs (default: {KEYPOINTS_SD:g})",
     )
-    values.add_stabilize(parser, default="off")
+    add(
+        "--stabilize",
+        choices=["pans", "auto", "off"],
+        default="pans",
+        help="which motion of the camera is estimated: pans: turns by more than a tenth of the picture's "
+        "width; auto: any; off: none. Joints are then in the scene's frame: that of the first frame if a "
+        "camera is given, or else of the frame that the command names (default: pans)",
+    )
     add(
         "--overlay",
         type=values.named(*values.FILMS),
@@ -255,7 +262,7 @@ def _cameras(args: argparse.Namespace) -> list[str]:
         return (args.camera or [])[-1:]
     alone = {
         "--people": args.people, "--keypoints": args.keypoints, "--camera-path": args.camera_path,
-        "--stabilize": args.stabilize != "off", "--cameras-out": args.cameras_out,
+        "--stabilize": args.stabilize == "auto", "--cameras-out": args.cameras_out,
         "--background with a file": args.background not in ("auto", "none"),
     }  # fmt: skip
     for option, given in alone.items():

@@ -153,17 +153,6 @@ def add_fov(parser: _ActionsContainer) -> None:
     )
 
 
-def add_stabilize(parser: _ActionsContainer, default: str | None) -> None:
-    """Add ``--stabilize``."""
-    parser.add_argument(
-        "--stabilize",
-        choices=["auto", "off"],
-        default=default,
-        help="auto: estimate how the camera moves; joints are then in the scene's frame: that of the first "
-        "frame if a camera is given, or else of the frame that the command names (default: off)",
-    )
-
-
 def add_norms(parser: ArgumentParser) -> None:
     """Add ``--age`` and ``--sex``, on which the norm of the comfortable speed depends."""
     parser.add_argument(

@@ -37,14 +37,13 @@ from gait.studio.keypoint_lift import KeypointLift
 from gait.studio.picture_lift import PictureLift
 from gait.studio.shown import Lift
 from gait.track.from_walk import Calibration
-from gait.track.stabilise import find_motion, moves
+from gait.track.stabilise import FURTHEST_TURN, find_motion, moves
 from gait.track.walk_camera import calibrate_film, expected_camera, find_people, note_camera
 
 Floats = npt.NDArray[np.float64]
 
 LARGEST_SIDE_PX = 1280  # pixels; largest longer side of the film for browsers
 DETECTED = "keypoints.csv"  # the detector's keypoints, in the folder beside the film
-FURTHEST_TURN = 0.1  # of the picture's width; a camera that turns less counts as still
 KEYFRAMES = 8  # frames from one I-frame to the next, the most that seeking has to decode
 LEAST_JOINT_SD_PX = 1.0  # pixels; least standard deviation of a track's joints
 WITHOUT_PERSON = ("init", "lost")  # statuses of frames whose joints are not used

@@ -91,7 +91,16 @@ def with_further_cameras(options: ClipOptions, scene: Scene) -> Scene:
         return scene
     scenes, offsets, began = [], [], []
     for k, (video, camera) in enumerate(options.further):
-        own = replace(options, video=video, camera=camera, start=None, stop=None, further=(), offsets=None)
+        own = replace(
+            options,
+            video=video,
+            camera=camera,
+            start=None,
+            stop=None,
+            further=(),
+            offsets=None,
+            stabilize="off",
+        )
         one = Scene.read(own, starts=False)
         if one.video.count < 2:
             raise UserError(f"{video}: has one frame; give a film of the walk")

@@ -65,7 +65,8 @@ class ClipOptions:
     keypoints_sd : float
         Standard deviation of keypoints at full confidence, pixels.
     stabilize : str
-        ``auto``: estimate how the camera moves; ``off``: it stands still, or its poses are given.
+        Which motion of the camera is estimated: ``pans``, where it turns by more than a tenth of the
+        picture's width; ``auto``, any; ``off``, none: it counts as still, or its poses are given.
     overlay, draws, trc, report : str, optional
         Further files to write.
     smooth : bool
@@ -101,7 +102,7 @@ class ClipOptions:
     person: str | None = None
     people: int | None = None
     keypoints_sd: float = KEYPOINTS_SD
-    stabilize: str = "off"
+    stabilize: str = "pans"
     overlay: str | None = None
     smooth: bool = False
     draws: str | None = None

@@ -32,7 +32,7 @@ from gait.track.keypoint_start import find_keypoint_start, keypoint_noise
 from gait.track.moving_video import MovingVideo, map_pixels, panorama_of
 from gait.track.options import ClipOptions
 from gait.track.other_people import OtherPeople, Outline
-from gait.track.stabilise import CameraTurns, find_travel, find_turns, moves
+from gait.track.stabilise import FURTHEST_TURN, CameraTurns, find_travel, find_turns, turn_in_samples
 from gait.track.walk_camera import calibrate_film, expected_camera, note_camera
 
 Array = NDArray[np.float64]
@@ -79,8 +79,8 @@ class Scene:
         The same walk filmed by further cameras; `video` contains their frames.
     began : tuple of str
         Time offset of each of these films, in words.
-    moved : bool
-        Whether the camera moves although it is treated as static.
+    moved : str
+        How the camera moves although it counts as still, in words; empty if it does not.
     """
 
     video: Video
@@ -97,7 +97,7 @@ class Scene:
     outlines: dict[int, Outline] = field(default_factory=dict)
     further: tuple[Scene, ...] = ()
     began: tuple[str, ...] = ()
-    moved: bool = False
+    moved: str = ""
 
     @property
     def moving(self) -> MovingVideo | None:
@@ -170,14 +170,9 @@ class Scene:
                 people, person = _detect(options, video, frames)
             if beside is not None:
                 samples, plate = beside.result()
-        moved = options.stabilize == "off" and _moves(options, video, camera, samples, people)
-        motion = None
-        if options.stabilize != "off" and not poses:
-            lens, first = camera or expected_camera(video, options.fov), camera is not None
-            if first and given is None:
-                poses = find_travel(video, lens, samples, people, options.quiet)
-            if not poses:
-                motion = find_turns(video, lens, samples, people, given, options.quiet, first=first)
+        motion, moved = None, ""
+        if not options.camera_path:
+            poses, motion, moved = _camera_motion(options, video, camera, samples, people, given)
         calibration = None
         if camera is None:
             person, calibration = _calibrate(options, video, model, people, motion)
@@ -226,31 +221,47 @@ def _sample(
     update: Callable[[int], None] | None = None,
 ) -> tuple[list[Frame], Image | None]:
     """Sample frames over the clip if they are needed, and compute their median if it is the background."""
-    if options.background != "auto" and options.stabilize == "off":
+    if options.background != "auto" and (options.stabilize == "off" or options.camera_path):
         return [], None
     samples = sample_frames(video, progress=update)
     static = options.background == "auto" and not poses
     return samples, median([frame.image for frame in samples]) if static else None
 
 
-def _moves(
+def _camera_motion(
     options: ClipOptions,
     video: Video,
     camera: Camera | None,
     samples: list[Frame],
     people: dict[int, Keypoints],
-) -> bool:
-    """Whether a camera treated as static moves in the samples of the background; if so, print a note."""
-    if not samples or options.camera_path:
-        return False
-    if not moves(camera or expected_camera(video, options.fov), samples, people):
-        return False
-    note(
-        "the camera moves during the clip, so its median is not a background: --stabilize auto estimates its "
-        "rotation, --camera-path gives its poses",
-        options.quiet,
-    )
-    return True
+    given: Image | None,
+) -> tuple[dict[int, CameraPose], CameraTurns | None, str]:
+    """Estimate the poses or turns of a camera that is not to count as still.
+
+    Of one that counts as still although it moves, return how it does, and print a note.
+    """
+    lens, first = camera or expected_camera(video, options.fov), camera is not None
+    turn = turn_in_samples(lens, samples, people) if samples else 0.0
+    far = turn is not None and turn > FURTHEST_TURN * video.width and not options.further
+    estimated = options.stabilize == "auto" or (options.stabilize == "pans" and far)
+    if options.stabilize == "auto" and first and given is None:
+        poses = find_travel(video, lens, samples, people, options.quiet)
+        if poses:
+            return poses, None, ""
+    motion = None
+    if estimated:
+        motion = find_turns(video, lens, samples, people, given, options.quiet, first=first)
+    if motion is not None or turn == 0:
+        return {}, motion, ""
+    how = "moves" if turn is None else f"turns by up to {turn:.0f} px"
+    if not estimated:
+        without = ", without a background" if options.background == "auto" else ""
+        note(
+            f"the camera {how} and counts as still{without}: --stabilize auto estimates its motion, "
+            "--camera-path gives its poses",
+            options.quiet,
+        )
+    return {}, None, how
 
 
 def _calibrate(

@@ -11,6 +11,7 @@ from gait.io.video import EMPTY_SCENE_FRAMES
 from gait.report.camera_facts import camera_facts
 from gait.track.options import ClipOptions
 from gait.track.scene import Scene, detects, start_words
+from gait.track.stabilise import CameraTurns
 
 _BESIDE = {"init": "init.json", "camera": "camera.json"}
 
@@ -93,11 +94,26 @@ def _background(options: ClipOptions, scene: Scene, used: bool) -> str:
 
 
 def _camera(options: ClipOptions, scene: Scene) -> str:
+    if options.camera_path:
+        return f"{options.camera}, moving as in {options.camera_path}"
+    motion = ""
+    if scene.moved:
+        remedy = "--camera-path gives its poses"
+        if options.stabilize != "auto":
+            remedy = "--stabilize auto estimates its motion"
+        motion = f", which {scene.moved}, counts as still ({remedy})"
+    elif scene.motion is not None:
+        turn = f"which turns by up to {scene.motion.furthest():.0f} px"
+        motion = f"{_reference(scene.motion)}, {turn} (--cameras-out writes that of each frame)"
+    elif scene.poses:
+        motion = ", in frame 0, which travels (--cameras-out writes that of each frame)"
     if scene.calibration is None:
-        if options.camera_path:
-            return f"{options.camera}, moving as in {options.camera_path}"
-        return f"{options.camera}, in frame 0" if scene.poses else str(options.camera)
-    return f"estimated from the walk and the stature of {options.height:.2f} m"
+        return f"{options.camera}{motion}"
+    return f"estimated from the walk and the stature of {options.height:.2f} m{motion}"
+
+
+def _reference(motion: CameraTurns) -> str:
+    return ", of the background" if motion.reference < 0 else f", in frame {motion.reference}"
 
 
 def _keypoints(options: ClipOptions, scene: Scene) -> str:

@@ -24,6 +24,8 @@ from gait.track.moving_video import map_pixels
 Array = NDArray[np.float64]
 
 _KEYPOINT_MARGIN = 0.15  # of a person's height, around the keypoints
+#: Of the picture's width; a camera that turns less may count as still.
+FURTHEST_TURN = 0.1
 _MOSTLY = 0.8  # share of the frames in which the camera must be found, or be still
 _TRAVELS = 1.0  # pixels in a picture 640 wide; median residual from which the camera does not only turn
 #: Metres in a second from which it travels, if the floor is seen; more than a hand moves.
@@ -122,8 +124,7 @@ def find_motion(
         views.append(motion.step(frame.image, boxes.get(frame.number, ())))
         if update is not None:
             update(frame.number)
-    found = np.isfinite([view.residual for view in views])
-    if found.mean() < _MOSTLY or motion.scale * np.median([v.residual for v in views]) > _TRAVELS:
+    if not _only_turns(motion, views):
         return None, "the camera travels, or the scene has too little texture to show how it turns"
     reference = -1 if plate is not None else 0 if first else _middle(views)
     if reference >= 0:
@@ -205,6 +206,27 @@ def find_travel(
     return poses
 
 
+def turn_in_samples(
+    camera: Camera, samples: Sequence[Frame], people: Mapping[int, Keypoints]
+) -> float | None:
+    """Return how far the camera turns between the samples and the first of them.
+
+    Parameters are as for `find_motion`.
+
+    Returns
+    -------
+    turn : float or None
+        The largest shift of a sample, pixels in the middle of the picture; 0 if the camera stands still, None
+        if it does not only turn.
+    """
+    boxes = _boxes(people)
+    motion = _begin(camera, samples, boxes, None)
+    if _still(motion, samples):
+        return 0.0
+    views = [motion.step(frame.image, boxes.get(frame.number, ())) for frame in samples]
+    return CameraTurns(camera, views, 0).furthest() if _only_turns(motion, views) else None
+
+
 def moves(
     camera: Camera, samples: Sequence[Frame], people: Mapping[int, Keypoints], plate: Image | None = None
 ) -> bool:
@@ -227,6 +249,13 @@ def _begin(
 def _still(motion: CameraMotion, samples: Sequence[Frame]) -> bool:
     """Whether most samples have the view of the reference."""
     return bool(np.mean([motion.still(frame.image) for frame in samples]) > _MOSTLY)
+
+
+def _only_turns(motion: CameraMotion, views: Sequence[View]) -> bool:
+    """Whether a rotation of the camera explains most frames, of which `motion` found these views."""
+    residuals = np.array([view.residual for view in views])
+    found = residuals[np.isfinite(residuals)]
+    return len(found) >= _MOSTLY * len(residuals) and bool(motion.scale * np.median(found) <= _TRAVELS)
 
 
 def _boxes(people: Mapping[int, Keypoints]) -> dict[int, list[Box]]:
