@@ -141,7 +141,7 @@ static bool save(size_t at, int with)
     return !f.failed;
 }
 
-/* Nobody may read a new file; a file that is there keeps its mode. */
+/* A new file can be read by its owner alone; a file that is there keeps its mode. */
 static void test_mode(void)
 {
     struct stat now;
