@@ -106,7 +106,7 @@ def main() -> int:
     note = (
         f"{facts('tests/bench/fuzz_long.py --record')}\n\nlibFuzzer on clang's address and "
         f"undefined-behaviour sanitizers, one process, inputs of at most {LONGEST} bytes; "
-        f"wanted are {1_000_000:,} executions of each target, the table says how many there were; a fault is "
+        f"wanted are {1_000_000:,} executions of each target, the table states how many were run; a fault is "
         "a report of a sanitizer, a target that aborts because a promise is broken, 60 s for one input, or "
         "2 GB of memory."
     )

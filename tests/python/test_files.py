@@ -2,14 +2,21 @@
 
 import errno
 import os
+import resource
 import subprocess
 import sys
+from contextlib import closing
+from functools import partial
 from pathlib import Path
 
+import numpy as np
 import pytest
+from test_trackfile import write as write_track
 
 from gait.errors import UserError
+from gait.io import blob
 from gait.io.files import filling, replacing, require_file, require_folder, require_writable
+from gait.lcm.link import LogWriter
 
 
 def test_files_to_read_are_files_that_hold_something(tmp_path):
@@ -181,6 +188,78 @@ def test_data_are_on_the_disk_before_the_name_and_the_name_before_the_end(tmp_pa
     with replacing(tmp_path / "a.csv") as temporary:
         temporary.write_text("new")
     assert calls == ["file", "rename", "folder"]
+
+
+def write_log(path):
+    with replacing(path) as temporary, closing(LogWriter(temporary, name=str(path))) as log:
+        for utime in range(3):
+            log.write(utime, "GAIT_ESTIMATE", bytes(40))
+
+
+WRITERS = {
+    "model": lambda path: blob.write(path, {"AAAA": np.arange(40, dtype=np.float32)}),
+    "log": write_log,
+    "track": partial(write_track, count=2),
+}
+
+
+@pytest.fixture(params=WRITERS.values(), ids=WRITERS)
+def written(request, tmp_path):
+    """A writer, its file, and what it writes there."""
+    path = tmp_path / "a.csv"
+    request.param(path)
+    return request.param, path, path.read_bytes()
+
+
+def test_whichever_call_fails_the_file_is_the_old_or_the_new_one(written, monkeypatch):
+    write, path, whole = written
+    calls = at = 0
+
+    def layer(call):
+        def fails_once(*words, **options):
+            nonlocal calls
+            calls += 1
+            if calls == at:
+                raise OSError(errno.EIO, os.strerror(errno.EIO))
+            return call(*words, **options)
+
+        return fails_once
+
+    for name in ("open", "fsync", "replace"):
+        monkeypatch.setattr(os, name, layer(getattr(os, name)))
+    failures = []
+    for at in range(1, 50):  # read by the layer
+        calls = 0
+        path.write_text("old")
+        try:
+            write(path)
+        except UserError as error:
+            assert str(error).startswith(str(path)) and "\n" not in str(error)
+            failures.append(path.read_bytes())
+            (path.parent / "a.unfinished.csv").unlink(missing_ok=True)
+        else:
+            assert path.read_bytes() == whole
+        assert list(path.parent.iterdir()) == [path]
+        if calls < at:
+            break
+    new = failures.count(whole)  # its folder could not be flushed
+    assert calls < at and 0 < new <= 2 and failures == [b"old"] * (len(failures) - new) + [whole] * new
+
+
+def test_a_disk_that_is_full_at_any_byte_leaves_the_old_file(written, capsys):  # capsys: no limit on stderr
+    write, path, whole = written
+    path.write_text("old")
+    limits = resource.getrlimit(resource.RLIMIT_FSIZE)
+    for size in range(0, len(whole), 1 + len(whole) // 200):
+        try:
+            resource.setrlimit(resource.RLIMIT_FSIZE, (size, limits[1]))
+            with pytest.raises(UserError, match="a.csv: .*File too large"):
+                write(path)
+        finally:
+            resource.setrlimit(resource.RLIMIT_FSIZE, limits)
+        assert path.read_text() == "old"
+        (path.parent / "a.unfinished.csv").unlink(missing_ok=True)
+        assert list(path.parent.iterdir()) == [path]
 
 
 def test_what_a_killed_command_left_is_named_and_kept(tmp_path, capsys):

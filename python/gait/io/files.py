@@ -52,7 +52,8 @@ def replacing(path: str | os.PathLike[str], partial: Callable[[Path], bool] | No
         os.replace(temporary, target)
         _flush(target.parent)
     except BaseException as error:
-        if partial is not None and _ends_early(error) and partial(temporary):
+        is_there = temporary.exists()  # neither if creating it failed nor after it got its name
+        if is_there and partial is not None and _ends_early(error) and partial(temporary):
             _keep(temporary, target, "not finished; what was written")
         if not isinstance(error, OSError):
             raise
