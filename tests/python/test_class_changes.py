@@ -100,6 +100,12 @@ def test_known_changes_are_learnt(tmp_path: Path, capsys: pytest.CaptureFixture[
     printed = capsys.readouterr().out
     assert re.search(r"class stand: .* walk [0-9.]+ \(\d+ changes\).* run [0-9.]+ \(prior\)", printed)
     assert gait.Model(out).classes == NAMES
+    # other classes have assumed changes again
+    assert main(["learn", str(out), "-o", str(out), "--class", "stand", "--quiet"]) == 0
+    capsys.readouterr()
+    assert main(["info", str(out)]) == 0
+    printed = capsys.readouterr().out
+    assert "stand 1 (prior)" in printed and "changes)" not in printed
 
 
 def _vector(phase: float, length: float) -> complex:
