@@ -102,7 +102,7 @@ UNIT := $(patsubst tests/unit/%.c,$(B)/unit/%,$(sort $(wildcard tests/unit/test_
 TOOLS := $(BIN)/gait-trackd
 LIBS := $(B)/libgait.so $(B)/libgait.a
 
-.PHONY: help setup lock lib tools test test-all built check unit python-test demo model paper bench bench-board bench-instructions bench-peers size bench-lift detector-profile eval eval-body eval-camera eval-cameras eval-gait eval-moving eval-real eval-learn eval-lift eval-paper eval-people eval-studio soak kills mutants asan sanitizers tsan coverage unit-threads fuzz fuzz-run fuzz-long fuzz-targets golden-check \
+.PHONY: help setup lock lib tools test test-all built check unit python-test demo model paper bench bench-board bench-instructions bench-peers size bench-lift detector-profile eval eval-body eval-camera eval-cameras eval-gait eval-moving eval-real eval-learn eval-lift eval-paper eval-people eval-studio soak kills mutants asan sanitizers tsan coverage unit-threads fuzz fuzz-run fuzz-long fuzz-targets golden-check lowest \
         docs screenshots sbom lint format wheel sdist wheel-check reproducible install install-daemon uninstall clean
 
 help: ## list the targets
@@ -295,6 +295,11 @@ COMPILED_ONCE := PYTHONDONTWRITEBYTECODE= PYTHONPYCACHEPREFIX='$(abspath build/p
 PYTEST_AT_ONCE = -n $(shell expr $$(getconf _NPROCESSORS_ONLN) + 1) --maxprocesses 8 --dist loadfile --no-loadscope-reorder
 python-test: setup lib tools ## all Python tests (ARGS='-k blob' or '-m long' to select)
 	@$(COMPILED_ONCE) $(PY) -m pytest -q -c python/pyproject.toml --rootdir . $(PYTEST_AT_ONCE) $(MARKED) tests/python $(ARGS)
+
+lowest: setup lib tools ## Python tests with the lowest numpy and scipy that pyproject.toml allows (ARGS='-k blob' to select)
+	$(PIP_INSTALL) --upgrade --no-deps --target build/lowest \
+	    $$(grep -oE '"(numpy|scipy)>=[0-9.]+' python/pyproject.toml | sed 's/"//; s/>=/==/' | sort -u)
+	@PYTHONPATH='$(abspath build/lowest)' $(MAKE) --no-print-directory python-test
 
 asan: ## C tests under the address and undefined-behaviour sanitizers
 	@LIMIT=1200 $(MAKE) --no-print-directory config=sanitize unit

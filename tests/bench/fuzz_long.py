@@ -38,7 +38,7 @@ def cpu_seconds() -> float:
 
 def fuzz(name: str, runs: int, seed: int, seconds: int) -> list[object]:
     """Run one target; the cells of HEAD after its name."""
-    found = FOUND / name
+    found, source = FOUND / name, commit()
     found.mkdir(parents=True, exist_ok=True)
     options = {"runs": runs, "seed": seed, "max_total_time": seconds, "max_len": LONGEST, "timeout": 60}
     words = [f"-{key}={value}" for key, value in options.items()] + ["-print_final_stats=1"]
@@ -65,7 +65,7 @@ def fuzz(name: str, runs: int, seed: int, seconds: int) -> list[object]:
         int(stats.get("peak_rss_mb", 0)),
         int(done.returncode != 0),
         seed,
-        commit(),
+        source,
     ]
 
 
