@@ -36,6 +36,8 @@ CLIP = ROOT / "build/bench/live_view_two"
 GAIT = [str(ROOT / ".venv/bin/gait")]
 REAL_TIME = ("chrt", "--rr", "10")
 RATE = 30  # frames a second
+BEGIN_S = 4.0  # seconds in which the page finds its rate; pictures are counted from then on
+SPARED = 3  # frames that may be dropped beside those of the tracker alone
 SUMMARY = re.compile(
     r"frames (\d+) dropped (\d+) .*step_ms median ([\d.]+) .*latency_ms median ([\d.]+) p99 ([\d.]+)"
 )
@@ -63,6 +65,7 @@ def main() -> int:
     rows = [
         measure("tracker alone"),
         measure("with gait view", streams=(0,)),
+        measure("with 1 client", streams=(0,), clients=1),
         measure(f"with {args.clients} clients", streams=(0,), clients=args.clients),
         measure("two cameras, tracker alone", sent=both),
         measure("two cameras on the page of a client", sent=both, streams=both, clients=1),
@@ -75,17 +78,22 @@ def main() -> int:
         rows.append(measure(name, streams=(0,), pages=opened[-1], first=REAL_TIME))
     head = [*HEAD, "pictures/s of a camera and browser", "cores busy"]
     note = f"{facts('tests/bench/live_view.py --record')}\n\n{args.seconds:.0f} s at {RATE} frames a second, "
-    note += "640 x 480; a frame is dropped if the tracker answered none. Chromium is headless and has no "
-    note += "graphics card: it draws each page's figure on the cores that track and send. It has the "
-    note += (
-        "priority of an ordinary user; as root it would raise itself above the tracker. If the tracker alone "
-    )
-    note += "leaves no core idle, other programs were running; browsers then get pictures at the lowest rate."
+    note += "640 x 480; a frame is dropped if the tracker answered none. "
+    note += f"Pictures are counted after {BEGIN_S:.0f} s, in which the page finds its rate. Chromium is "
+    note += "headless and has no graphics card: it draws on the cores that track and send, with the priority "
+    note += "of a user; as root it would raise itself above the tracker. If the tracker alone leaves no core "
+    note += "idle, other programs were running; browsers then get pictures at the lowest rate. "
+    most, watched = rows[0][2] + SPARED, rows[1:4] + rows[6:]
+    missed = [f"{row[0]} ({row[2] / (row[1] + row[2]):.1%})" for row in watched if row[2] > most]
+    verdict = f"Target, with one camera: at most {most} frames dropped; "
+    verdict += f"MISSED {', '.join(missed)}." if missed else "met."
+    note += verdict
     if args.record:
         table.publish("live_view", "The live page beside a tracker", head, rows, note)
     else:
         table.show("The live page beside a tracker", head, rows)
-    return int(max(rows[2][2], rows[-1][2]) > rows[0][2] + 3)
+        print(verdict)
+    return int(bool(missed))
 
 
 class Case:
@@ -131,8 +139,11 @@ class Case:
                 for stream in reversed(sent):  # what the tracker waits for comes last
                     stack.enter_context(running([*first, *GAIT, "capture", *sender(stream, url)]))
                 before, begin = busy(), time.monotonic()
-                time.sleep(self._seconds)
-                lasted = time.monotonic() - begin
+                time.sleep(BEGIN_S)
+                early = [*shown, *(tab.evaluate("window.loaded") for tab in tabs)]
+                counted = time.monotonic()
+                time.sleep(max(begin + self._seconds - counted, 0))
+                lasted, counted = time.monotonic() - begin, time.monotonic() - counted
                 cores, own = (busy() - before) / lasted, processor_seconds(trackd.pid)
                 shown += [tab.evaluate("window.loaded") for tab in tabs]
         finally:
@@ -142,7 +153,8 @@ class Case:
         if found is None:
             sys.exit(f"live_view: gait-trackd printed {printed!r}")
         frames, dropped = int(found[1]), int(found[2])
-        rate = sum(shown) / len(shown) / len(streams) / lasted if shown else float("nan")
+        later = [last - first for last, first in zip(shown, early, strict=True)]
+        rate = sum(later) / len(later) / len(streams) / counted if later else float("nan")
         step, latency, slowest = (float(found[k]) for k in (3, 4, 5))
         return [name, frames, dropped, step, 1000 * own / max(frames, 1), latency, slowest, rate, cores]
 

@@ -1,5 +1,6 @@
 """The live page in a real Chromium: numbers, figure, plots, pause, what is missing, recording."""
 
+import math
 import os
 import time
 import urllib.request
@@ -277,8 +278,14 @@ def test_browsers_get_less_often_what_a_busy_machine_shows_and_miss_no_sample(tm
         pace.adapt(idle=0.8)
     assert pace.current < 1 / 30
     for _ in range(20):
+        pace.adapt(idle=0.5, dropped=True)
+    assert pace.current == 4.0
+    pace.adapt(idle=0.9, dropped=True)  # the tracker itself is too slow
+    assert pace.current < 4.0
+    for _ in range(20):
         pace.adapt(idle=0.0)
-    assert pace.current == 2.0
+    assert pace.current == 4.0
+    pace._at = math.inf  # stays as it is
     assert [round(pace.wait() - (1 + 0.1 * k) * pace.current, 2) for k in range(10)] == [0.0] * 10  # in turn
     monkeypatch.setattr(server, "_STAT", tmp_path / "no Linux")
     monkeypatch.setattr(os, "getloadavg", lambda: (0.0, 0.0, 0.0))

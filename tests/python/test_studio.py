@@ -368,6 +368,29 @@ def test_pictures_are_corrected_as_the_batch_command_does(clip, monkeypatch):
     assert (folder / "pictures/batch.csv").read_bytes() == exported
 
 
+def test_a_track_is_corrected_as_the_batch_command_does(clip, monkeypatch):
+    """Without a browser; the state is that of the page."""
+    folder, truth = clip
+    here = folder / "tracked/clip"
+    shutil.copytree(folder / "clip", here, ignore=shutil.ignore_patterns("*.studio"))
+    monkeypatch.chdir(here.parent)
+    words = ["clip/video.mp4", "--camera", "clip/camera.json", "--particles", "300", "--stop", "40"]
+    words += ["--init", "clip/init.json", "--quiet"]
+    assert main(["track", *words, "-o", "track.csv"]) == 0
+    server = Server(here.parent, "--track", "track.csv", "--stop", "40")
+    state = json.loads(get(server.url, "state"))
+    joint, target = state["joints"].index("r_ankle"), truth[20, JOINTS.index("r_ankle")] + [6.0, 0.0]
+    assert math.dist(state["uv"][20][joint], truth[20, JOINTS.index("r_ankle")]) < 8
+    pull = {"do": "pull", "frame": 20, "joint": "r_ankle", "uv": target.tolist(), "sd_px": 1.0}
+    assert post(server.url, "edit", pull)[0] == 200
+    exported = get(server.url, "export/csv")  # waits for the whole motion
+    state = json.loads(get(server.url, "state"))
+    assert math.dist(state["uv"][20][joint], target) < 3 and state["fault"] == ""
+    assert server.end(signal.SIGINT) == 0
+    assert main([*state["command"].replace("motion.csv", "batch.csv").split()[1:], "--quiet"]) == 0
+    assert (here.parent / "batch.csv").read_bytes() == exported
+
+
 def test_a_refused_start_leaves_nothing(clip, capsys, tmp_path, monkeypatch):
     monkeypatch.setenv("GAIT_WEB", str(browser.FETCHED))
     shutil.copy(clip[0] / "clip/video.mp4", tmp_path)

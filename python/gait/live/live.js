@@ -4,7 +4,7 @@ const DRAW_MS = 250; // between two drawings of the plots
 const SLOW_DRAW_MS = 1000; // the same where the processor draws the page
 const GAP = 1; // seconds without an estimate that no line crosses
 const KEPT = 1200; // samples
-const QUIET_MS = 3000; // without an estimate the page reports that there is none
+const QUIET_MS = 6000; // without an estimate the page reports that there is none
 const TEXT = { tracking: 'tracking', ambiguous: 'uncertain', lost: 'lost', init: 'settling' };
 
 const start = await (await fetch('/state')).json();

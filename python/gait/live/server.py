@@ -32,10 +32,11 @@ _ALIVE_S = 0.5  # seconds after which a quiet stream sends a sign of life, or en
 _QUALITY = 80  # of JPEG pictures
 _KEPT_SAMPLES = 256  # most samples that a slow browser gets late
 _FASTEST = 1 / 60  # least seconds between messages to a browser
-_SLOWEST = 0.2  # the same at first and on a busy machine, times the number of browsers,
-_RAREST = 2.0  # but at most this
+_SLOWEST = 0.4  # the same at first and on a busy machine, times the number of browsers,
+_RAREST = 4.0  # but at most this
 _MEASURED = 0.5  # seconds over which idle time is measured
 _BUSY, _IDLE = 0.15, 0.3  # share of idle time below which messages become rarer, above which more frequent
+_SPARE = 0.6  # share of idle time from which on browsers are not the cause of dropped frames
 _QUICKEST = 0.4  # least factor by which the time between messages changes at one measurement
 
 
@@ -49,7 +50,7 @@ def _described(recording: Recording) -> dict[str, Any]:
 
 
 class Pace:
-    """Time between messages to a browser: longer while no core is idle.
+    """Time between messages to a browser: longer while no core is idle or the tracker drops frames.
 
     Browsers on this machine use the cores that track, and tracking has priority.  They get their messages in
     turn, so that they do not all draw at the same time.
@@ -58,11 +59,14 @@ class Pace:
     ----------
     current : float
         Present interval, seconds.
+    dropped : int
+        Frames that the tracker has dropped so far.
     """
 
     def __init__(self) -> None:
         self.current = self._slowest = _SLOWEST
         self._browsers, self._turn = 1, 0.0
+        self.dropped = self._dropped = 0
         self._at, self._before = time.monotonic(), _idle_time()
 
     def apart(self) -> float:
@@ -82,15 +86,17 @@ class Pace:
             found = _idle_time()
             idle, total = (a - b for a, b in zip(found, self._before, strict=True))
             self._at, self._before = now, found
-            self.adapt(idle / total if total > 0 else _share_idle())
+            self.adapt(idle / total if total > 0 else _share_idle(), self.dropped > self._dropped)
+            self._dropped = self.dropped
         return self.current
 
-    def adapt(self, idle: float) -> None:
-        """Adapt the interval to the share of idle time.
+    def adapt(self, idle: float, dropped: bool = False) -> None:
+        """Adapt the interval to the share of idle time, and to whether frames were dropped meanwhile.
 
         Messages become more frequent by the factor that leaves `_IDLE` if all work is proportional to them.
         """
-        factor = 1.5 if idle < _BUSY else min(max((1 - idle) / (1 - _IDLE), _QUICKEST), 1.0)
+        busy = idle < (_SPARE if dropped else _BUSY)
+        factor = 1.5 if busy else min(max((1 - idle) / (1 - _IDLE), _QUICKEST), 1.0)
         self.current = min(max(factor * self.current, _FASTEST), self._slowest)
 
     def begin(self, browsers: int) -> None:
@@ -189,6 +195,7 @@ class Page:
         self._recording: Recording | None = None
         self._topics = [f"{topic} {k}" for topic in ("sample", "health") for k in range(len(self._people))]
         self._topics += ["recording", "frames", *map(_picture, streams)]
+        self._drops: dict[int, int] = {}  # frames, by person
         self._pictures: dict[int, Image] = {}
         self._jpeg: dict[int, tuple[int, bytes]] = {}
         self._open, self._pace, self._shown = 0, Pace(), 0.0
@@ -207,6 +214,9 @@ class Page:
 
     def report(self, topic: str, value: dict[str, Any]) -> None:
         """Make a sample, the tracker's health, or the arrival of frames the newest of its topic."""
+        if topic == "health":
+            self._drops[value["person"]] = value["dropped"]
+            self._pace.dropped = sum(self._drops.values())
         of_person = f"{topic} {value['person']}" if "person" in value else topic
         text = json.dumps(value, allow_nan=False, separators=(",", ":"))
         self.hub.put(of_person, text, _KEPT_SAMPLES if topic == "sample" else 1)
