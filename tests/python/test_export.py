@@ -95,27 +95,45 @@ def test_the_skeleton_of_constant_lengths_is_at_the_joints(walk):
     np.testing.assert_allclose(np.degrees(knee), np.degrees(np.arccos(cosine)), atol=0.5)
 
 
+BONES = {
+    "Hips": "pelvis", "LeftArm": "l_upper_arm", "RightForeArm": "r_forearm", "LeftFoot": "l_foot",
+    "Head": "head",
+}  # fmt: skip
+
+
+def bones(walk):
+    """Places of bones in some frames of the BVH file, metres, y up."""
+    fitted = angles.fit(motion.read(walk.path).places)
+    _, origins, _ = fitted.pose(walk.kept)
+    return {
+        (k if k < 20 else k + 1, bone): opensim.GROUND @ origins[k, fitted.frames.index(frame)]
+        for k in (0, 19, 40)
+        for bone, frame in BONES.items()
+    }
+
+
 def test_bvh_is_read_by_another_reader(walk, tmp_path, capsys):
     bvhio = pytest.importorskip("bvhio", reason="bvhio is not installed: extra dev")
     path = export(walk, tmp_path, ".bvh")
     assert "lacks 1 frames, which repeat the previous frame" in capsys.readouterr().err
-    fitted = angles.fit(motion.read(walk.path).places)
-    turns, origins, _ = fitted.pose(walk.kept)
     root = bvhio.readAsHierarchy(str(path))
-    bones = {
-        "Hips": "pelvis",
-        "LeftArm": "l_upper_arm",
-        "RightForeArm": "r_forearm",
-        "LeftFoot": "l_foot",
-        "Head": "head",
-    }
-    for k in (0, 19, 40):
-        root.loadPose(k if k < 20 else k + 1)
+    for (frame, bone), at in bones(walk).items():
+        root.loadPose(frame)
         placed = {joint.Name: np.array(joint.PositionWorld) for joint, _, _ in root.layout()}
-        for bone, frame in bones.items():
-            at = origins[k, fitted.frames.index(frame)]
-            np.testing.assert_allclose(placed[bone] / 100, opensim.GROUND @ at, atol=TENTH)
+        np.testing.assert_allclose(placed[bone] / 100, at, atol=TENTH)
     assert float(path.read_text().split("Frame Time: ")[1].split()[0]) == pytest.approx(1 / FPS, rel=1e-6)
+
+
+@pytest.mark.filterwarnings("ignore")
+def test_bvh_is_read_by_blender(walk, tmp_path):
+    """Its first frame is 1."""
+    bpy = pytest.importorskip("bpy", reason="bpy is not installed")
+    bpy.ops.import_anim.bvh(filepath=str(export(walk, tmp_path, ".bvh")), global_scale=0.01, frame_start=1)
+    armature = bpy.context.object
+    for (frame, bone), (x, y, z) in bones(walk).items():
+        bpy.context.scene.frame_set(1 + frame)
+        placed = armature.matrix_world @ armature.pose.bones[bone].head
+        np.testing.assert_allclose(placed, (x, -z, y), atol=TENTH)  # z up
 
 
 def test_parquet_has_every_number(walk, tmp_path):
