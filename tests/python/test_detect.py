@@ -111,6 +111,13 @@ def test_a_thing_taken_for_a_person_hides_no_small_person(stage):
     assert stage.step(0, red=200) == {1: pytest.approx(200)}
 
 
+def test_a_second_person_who_shows_only_in_parts_is_found_soon_after_the_first(stage):
+    """A scan stops at the part with someone new; the next one comes before the usual second is over."""
+    stage.detector._find = lambda image, small: iter([[stage.crop(200)], [stage.crop(500)]])
+    found = [set(stage.step(n, red=200, blue=500)) for n in range(10)]
+    assert found[0] == {1} and found[-1] == {1, 2}
+
+
 def test_a_crop_follows_at_the_persons_speed(stage):
     for n in range(10):
         assert set(stage.step(n, red=100 + 50 * n)) == {1}

@@ -1,7 +1,8 @@
 """Find people with the detector and follow them from frame to frame, each with an id.
 
 A person's crop is predicted from the landmarks of earlier frames, at constant speed.  The person network
-scans the whole picture at the start, when a person is lost, and every second to find new people.
+scans the whole picture at the start, when a person is lost, and every second to find new people.  Once it has
+found someone new it stops, and goes on with smaller parts of the picture a little later.
 
 People who meet in the picture are distinguished by their courses and the colours of their clothes: while two
 are near each other, landmarks off a person's course belong to another person, and the person counts as
@@ -29,7 +30,7 @@ Colours = NDArray[np.float32]
 
 _LEAST_SCORE = 0.5  # of a person in a crop
 _SCAN_PERIOD = 1.0  # seconds between scans of the whole picture
-_RETRY = 0.2  # the same while a person is lost or none has been found
+_RETRY = 0.2  # the same while a person is lost or none has been found, and after one was found
 _FORGET = 60.0  # seconds after which a person who comes back gets a new id
 _SAME_CROP = 0.25  # crop sides between the centres of crops around the same person
 #: Crop sides per second by which a lost person may leave their course, in addition to `_SAME_CROP`.
@@ -130,6 +131,7 @@ class PeopleDetector:
         self._landmarks = LandmarkNetwork(network)
         self._most, self._everyone = most, everyone
         self._scanned = -np.inf
+        self._searched = 0  # sizes of parts that the last scan had searched when it found someone new
         self.people: list[Followed] = []
 
     def step(self, frame: Frame) -> list[tuple[Followed, Person]]:
@@ -160,10 +162,10 @@ class PeopleDetector:
                 self._add(one, frame, person, near[one.id])
                 found.append((one, person))
         since = frame.time - self._scanned
-        missing = not found or any(self._just_lost(p, frame.time) for p in self.people)
+        missing = not found or self._searched or any(self._just_lost(p, frame.time) for p in self.people)
         if since >= (_RETRY if missing else _SCAN_PERIOD):
             self._scanned = frame.time
-            self._scan(frame, found)
+            self._searched = self._scan(frame, found)
         return found
 
     def keypoints(self, times: Mapping[int, float] | Array, correct: bool = True) -> dict[int, Keypoints]:
@@ -210,18 +212,24 @@ class PeopleDetector:
             return off or any(_alike(colours, other.colours) > own + _CLEAR_OVERLAP_GAIN for other in near)
         return own < _COLOUR_OVERLAP
 
-    def _scan(self, frame: Frame, found: list[tuple[Followed, Person]]) -> None:
+    def _scan(self, frame: Frame, found: list[tuple[Followed, Person]]) -> int:
         """Search for people who are not followed, where people were hidden and in the picture.
 
         Parts of the picture are searched, then all of it as one crop, until landmarks confirm a person.
+        Returns how many sizes of parts it had searched by then, which the next scan leaves out, unless
+        everyone is lost; 0: all.
         """
-        time = frame.time
+        time, searched = frame.time, self._searched if found else 0
         self._add_new(frame, found, [p.expected(time) for p in self.people if self._just_lost(p, time)])
-        for crops in self._find(frame.image, small=self._everyone or not found):
+        parts = self._find(frame.image, small=self._everyone or not found)
+        for size, crops in enumerate(parts, 1):
+            if size <= searched:
+                continue
             if self._add_new(frame, found, crops) and not self._everyone:
-                return
+                return size
         if not found:
             self._add_new(frame, found, [whole_picture(frame.image)])
+        return 0
 
     def _add_new(self, frame: Frame, found: list[tuple[Followed, Person]], crops: list[Crop]) -> bool:
         """Add people in crops who have not been found yet; return whether there is one."""
