@@ -33,6 +33,8 @@ _SHARE = 0.3  # least share of the corners that agree
 _AREA = 0.2  # least area that these cover, relative to corners all over the picture
 _FEW_LEFT = 0.5  # share of a key frame's corners below which a new key frame is taken
 TUKEY, SHARPEST, BLUNTEST = 4.685, 0.15, 2.0  # standard deviations to weight 0; least and most sd, pixels
+#: Pixels; largest residual in a frame whose view is found.  A hand also moves the camera by centimetres.
+_WORST_FIT = 4.0
 _ZOOM = 1e-4  # variance of the logarithm of the zoom
 FIT_ITERATIONS, COARSE = 20, 4  # iterations of the fit; the first ones use the sd of all corners
 
@@ -133,7 +135,7 @@ class CameraMotion:
         places = after[visible].astype(float)
         view, agree = fit_view(self._camera, self._corners[visible].astype(float), places, guess)
         enough = agree.sum() >= FEWEST_CORNERS and self._everywhere(places[agree])
-        found = enough and agree.mean() > _SHARE and view.residual < BLUNTEST
+        found = enough and agree.mean() > _SHARE and view.residual < _WORST_FIT
         return view.after(self._key_view) if found else None, agree.sum() / len(after)
 
     def _everywhere(self, places: Array) -> bool:
