@@ -10,8 +10,9 @@ from gait.camera.camera import Camera
 from gait.io.keypoints_file import Keypoints
 from gait.io.video import Video, sample_frames
 from gait.lift.keypoints.corrections import read_corrections, read_edits
+from gait.progress import note
 from gait.track.from_walk import Calibration
-from gait.track.stabilise import CameraTurns, find_turns
+from gait.track.stabilise import CameraTurns, find_turns, in_words, turn_in_samples
 from gait.track.walk_camera import calibrate_film, expected_camera, find_people, note_camera
 
 
@@ -87,10 +88,11 @@ def find_keypoints(request: Request, prior: SegmentPrior, quiet: bool) -> Detect
     if request.corrections:
         read_edits(request.corrections, prior, video.span(request.start or 0, request.stop), video.size)
     people = find_people(video, quiet, request.start or 0, request.stop)
-    turns = None
+    turns, samples, camera = None, sample_frames(video), given or expected_camera(video, request.fov)
     if request.stabilize:
-        camera = given or expected_camera(video, request.fov)
-        turns = find_turns(video, camera, sample_frames(video), people, None, quiet, first=given is not None)
+        turns = find_turns(video, camera, samples, people, None, quiet, first=given is not None)
+    elif (turn := turn_in_samples(camera, samples, people)) != 0:
+        note(f"the camera {in_words(turn)} and counts as still: --stabilize auto estimates its turns", quiet)
     if turns is not None:
         people = {id: turns.in_reference(keypoints) for id, keypoints in people.items()}
     if request.camera or request.parallel:

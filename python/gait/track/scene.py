@@ -32,7 +32,14 @@ from gait.track.keypoint_start import find_keypoint_start, keypoint_noise
 from gait.track.moving_video import MovingVideo, map_pixels, panorama_of
 from gait.track.options import ClipOptions
 from gait.track.other_people import OtherPeople, Outline
-from gait.track.stabilise import FURTHEST_TURN, CameraTurns, find_travel, find_turns, turn_in_samples
+from gait.track.stabilise import (
+    FURTHEST_TURN,
+    CameraTurns,
+    find_travel,
+    find_turns,
+    in_words,
+    turn_in_samples,
+)
 from gait.track.walk_camera import calibrate_film, expected_camera, note_camera
 
 Array = NDArray[np.float64]
@@ -253,7 +260,7 @@ def _camera_motion(
         motion = find_turns(video, lens, samples, people, given, options.quiet, first=first)
     if motion is not None or turn == 0:
         return {}, motion, ""
-    how = "moves" if turn is None else f"turns by up to {turn:.0f} px"
+    how = in_words(turn)
     if not estimated:
         without = ", without a background" if options.background == "auto" else ""
         note(

@@ -227,6 +227,11 @@ def turn_in_samples(
     return CameraTurns(camera, views, 0).furthest() if _only_turns(motion, views) else None
 
 
+def in_words(turn: float | None) -> str:
+    """Describe a result of `turn_in_samples`: what the camera does."""
+    return "moves" if turn is None else f"turns by up to {turn:.0f} px"
+
+
 def moves(
     camera: Camera, samples: Sequence[Frame], people: Mapping[int, Keypoints], plate: Image | None = None
 ) -> bool:
