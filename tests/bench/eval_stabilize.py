@@ -95,7 +95,8 @@ def main() -> int:
         rows.append(["mean", *kind, *np.nanmean(np.array(same, float), axis=0).tolist(), ""])
     head = ["clip", "camera", "stabilised", "good %", "one camera, good %", "tracking", "wrong",
             "error % of height", "stride rate %", "root mm", "abs mm", "CPU s", "failed"]  # fmt: skip
-    note = f"{facts('tests/bench/eval_stabilize.py')}\n\n{_READING}"
+    only = " ".join(["", "--only", *args.only]) if args.only else ""
+    note = f"{facts(f'tests/bench/eval_stabilize.py{only}')}\n\n{_READING}"
     publish("eval_stabilize", "Stabilising", head, rows, note)
     return 0
 
