@@ -63,7 +63,8 @@ CODE_FLAGS   += $(if $(filter fuzz,$(config)),-fno-sanitize-coverage=trace-cmp)
 LESS_WATCHED := -fno-sanitize=undefined,fuzzer-no-link -fsanitize=float-cast-overflow
 WATCHED = $(if $(filter fuzz,$(config)),$(if $(filter scalar,$(1)),,$(LESS_WATCHED)))
 CXX_FLAGS    += $(if $(filter fuzz,$(config)),-fno-sanitize=function) # needs the C++ runtime
-OPT_coverage := -O0 --coverage -fprofile-abs-path
+# As slow as under a sanitizer, so that tests use their shorter films.
+OPT_coverage := -O0 --coverage -fprofile-abs-path -DSANITIZED=1
 OPT ?= $(OPT_$(config))
 ifeq ($(OPT),)
 $(error unknown config=$(config): use release, debug, sanitize, thread, fuzz or coverage)

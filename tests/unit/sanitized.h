@@ -1,4 +1,5 @@
-/* sanitized.h - whether this is compiled with the address or the thread sanitizer, which are slow. */
+/* sanitized.h - whether this is compiled with the address or the thread sanitizer, which are slow; coverage builds, which
+ * are slow too, define SANITIZED themselves. */
 #ifndef SANITIZED_H
 #define SANITIZED_H
 
