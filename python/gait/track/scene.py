@@ -251,7 +251,7 @@ def _camera_motion(
     turn = turn_in_samples(lens, samples, people) if samples else 0.0
     far = turn is not None and turn > FURTHEST_TURN * video.width and not options.further
     estimated = options.stabilize == "auto" or (options.stabilize == "pans" and far)
-    if options.stabilize == "auto" and first and given is None:
+    if estimated and first and given is None:
         poses = find_travel(video, lens, samples, people, options.quiet)
         if poses:
             return poses, None, ""
