@@ -377,8 +377,12 @@ static void test_arguments(void)
     CHECK(gait_lift_init(toy_lift_memory + 8, bytes, toy_lift_model, &good, &l, &err) == GAIT_ERR_MEMORY);
     CHECK(gait_lift_bytes(NULL, &good, &bytes, &err) == GAIT_ERR_ARG && !l);
     CHECK(gait_lift_segment(NULL, uv, NULL, &fit, NULL) == GAIT_ERR_ARG);
-    gait_lift_config bad[16];
-    for (int i = 0; i < 16; i++)
+    for (int i = 0; i < 4; i++)
+        CHECK(gait_lift_init(i == 0 ? NULL : toy_lift_memory, bytes, i == 1 ? NULL : toy_lift_model,
+                             i == 2 ? NULL : &good, i == 3 ? NULL : &l, NULL) == GAIT_ERR_ARG);
+    enum { BAD = 22 };
+    gait_lift_config bad[BAD];
+    for (int i = 0; i < BAD; i++)
         bad[i] = good;
     bad[0].projection = 2;
     bad[1].stature = -1;
@@ -397,19 +401,35 @@ static void test_arguments(void)
     bad[13].axis[0][1] = 0.1;
     bad[14].cpu_mask = 8;
     bad[15].camera.t[1] = -5e4f;
-    for (int i = 0; i < 16; i++) {
+    bad[16].camera.t[0] = 5e4f;
+    bad[17].camera.t[2] = 5e4f;
+    bad[18].stature_sd = -0.5;
+    bad[19].residual = -0.5;
+    for (int i = 0; i < 2; i++) {
+        bad[20 + i].projection = GAIT_LIFT_ORTHOGRAPHIC;
+        bad[20 + i].axis[i][0] = 2.0;
+    }
+    for (int i = 0; i < BAD; i++) {
         err.text[0] = '\0';
         bool const whole = i == 6 || i == 7; /* max_iterations, lag */
         CHECK(gait_lift_bytes(toy_lift_model, &bad[i], &bytes, &err) ==
               (whole ? GAIT_ERR_LIMIT : GAIT_ERR_ARG));
         CHECK(strstr(err.text, "lift config") != NULL);
+        CHECK(gait_lift_init(toy_lift_memory, bytes, toy_lift_model, &bad[i], &l, NULL) != GAIT_OK);
     }
     bad[0].struct_size = 0;
     CHECK(gait_lift_bytes(toy_lift_model, &bad[0], &bytes, &err) == GAIT_ERR_STRUCT);
     l = toy_lift_open(&good);
     CHECK(strcmp(gait_lift_marker_name(l, 3), "l_shoulder") == 0 && !gait_lift_marker_name(l, TOY_MARKERS));
+    CHECK(!gait_lift_marker_name(l, -1));
     CHECK(gait_lift_positions(l, mean, sd, NULL) == GAIT_ERR_STATE);
+    CHECK(gait_lift_posterior(l, mean, NULL, NULL) == GAIT_ERR_STATE);
     CHECK(gait_lift_least_squares(l, mean, NULL) == GAIT_ERR_STATE);
+    CHECK(gait_lift_fix(l, sds, NULL) == GAIT_ERR_STATE); /* a perspective view */
+    CHECK(gait_lift_batch(l, -1, uv, mean, NULL) == GAIT_ERR_ARG);
+    CHECK(gait_lift_uncertain(l, 0, mean, sd, NULL) == GAIT_ERR_ARG);
+    CHECK(gait_lift_push(l, -1, uv, NULL, NULL) == GAIT_ERR_STATE);
+    CHECK(gait_lift_weight_outliers(0, mean, sd, uv) == 0);
 }
 
 /* A prior with rotated copies is in the axes of the world: its heading is not searched for. */
