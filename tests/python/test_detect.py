@@ -118,6 +118,12 @@ def test_a_second_person_who_shows_only_in_parts_is_found_soon_after_the_first(s
     assert found[0] == {1} and found[-1] == {1, 2}
 
 
+def test_people_of_a_group_whose_boxes_are_one_are_found_beside_each_other(stage):
+    stage.detector = people.PeopleDetector(everyone=True)
+    stage.detector._find = lambda image, small: iter([[stage.crop(300)]])
+    assert len(stage.step(0, red=230, green=300, blue=370)) == 3
+
+
 def test_a_crop_follows_at_the_persons_speed(stage):
     for n in range(10):
         assert set(stage.step(n, red=100 + 50 * n)) == {1}

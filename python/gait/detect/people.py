@@ -35,6 +35,7 @@ _FORGET = 60.0  # seconds after which a person who comes back gets a new id
 _SAME_CROP = 0.25  # crop sides between the centres of crops around the same person
 #: Crop sides per second by which a lost person may leave their course, in addition to `_SAME_CROP`.
 _CROP_SPEED = 0.8
+_BESIDE = 0.33  # crop sides from a person to the next of a group
 _COURSE = 0.3  # seconds from which the speed on a course is computed
 _CONTACT = 0.35  # crop sides; people closer than this may be mistaken for each other
 _LONG_CONTACT = 1.0  # seconds, after which people walk together and their courses are computed afresh
@@ -215,7 +216,8 @@ class PeopleDetector:
     def _scan(self, frame: Frame, found: list[tuple[Followed, Person]]) -> int:
         """Search for people who are not followed, where people were hidden and in the picture.
 
-        Parts of the picture are searched, then all of it as one crop, until landmarks confirm a person.
+        Parts of the picture are searched, then all of it as one crop, until landmarks confirm a person; if
+        everyone is wanted also beside people found, where the person network merges boxes of a group.
         Returns how many sizes of parts it had searched by then, which the next scan leaves out, unless
         everyone is lost; 0: all.
         """
@@ -229,6 +231,11 @@ class PeopleDetector:
                 return size
         if not found:
             self._add_new(frame, found, [whole_picture(frame.image)])
+        if self._everyone:
+            count = 0
+            while count < len(found):  # also beside people found there
+                count, beside = len(found), [crop for _, one in found for crop in _beside(one.crop)]
+                self._add_new(frame, found, beside)
         return 0
 
     def _add_new(self, frame: Frame, found: list[tuple[Followed, Person]], crops: list[Crop]) -> bool:
@@ -394,6 +401,12 @@ def main_person(people: dict[int, Keypoints]) -> int:
 def _apart(a: Crop, b: Crop) -> float:
     """Distance between the centres of two crops, in sides of the smaller one."""
     return float(np.hypot(*(a.centre - b.centre)) / min(a.side, b.side))
+
+
+def _beside(crop: Crop) -> list[Crop]:
+    """Make the crops of two people of the same size who walk to the left and to the right of one."""
+    aside = np.array([_BESIDE * crop.side, 0.0])
+    return [crop._replace(centre=crop.centre + shift) for shift in (-aside, aside)]
 
 
 def _same(a: Person, b: Person) -> bool:
