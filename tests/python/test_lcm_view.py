@@ -250,11 +250,11 @@ def test_browsers_get_the_page_and_the_newest_picture(page):
 
 
 def test_events_reach_a_browser(page):
-    page.report("health", {"person": 0, "text": "tracking"})
+    page.report("health", {"person": 0, "dropped": 0, "text": "tracking"})
     with get(page, "events") as events:
         assert [events.readline() for _ in range(2)] == [
             b"event: health\n",
-            b'data: {"person":0,"text":"tracking"}\n',
+            b'data: {"person":0,"dropped":0,"text":"tracking"}\n',
         ]
         page.report("sample", {"person": 0, "frame": 7})
         page.show(0, rig.picture(0))
@@ -465,7 +465,7 @@ def test_other_hosts_are_refused(host, page):
 
 def test_browsers_are_bounded_and_their_places_come_free(page, monkeypatch):
     monkeypatch.setattr(server, "_MOST_BROWSERS", 3)
-    page.report("health", {"person": 0})
+    page.report("health", {"person": 0, "dropped": 0})
     open_now = [get(page, "events") for _ in range(3)]
     for stream in open_now:
         stream.readline()
@@ -475,7 +475,7 @@ def test_browsers_are_bounded_and_their_places_come_free(page, monkeypatch):
         stream.close()
     deadline = time.monotonic() + rig.PATIENCE
     while True:
-        page.report("health", {"person": 0})  # a server finds out when it sends
+        page.report("health", {"person": 0, "dropped": 0})  # a server finds out when it sends
         try:
             get(page, "events").close()
             break
