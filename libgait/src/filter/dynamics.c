@@ -117,7 +117,8 @@ dynamics_step dynamics_step_init(const dynamics *d, float dt, float age, uint32_
         .mean_rate = mean_rate,
         .travel = 1.0f - (float)c->belt,
         .phase_noise = fabsf(direction) * c->phase_noise * root_dt,
-        .forward_noise = c->forward_noise * root_dt,
+        /* people who stand sway, but do not drift like people who walk slowly */
+        .forward_noise = (direction != 0.0f ? c->forward_noise : c->lateral_noise) * root_dt,
         .lateral_noise = c->lateral_noise * root_dt,
         .heading_noise = c->heading_noise * root_dt,
         .stature_noise =
