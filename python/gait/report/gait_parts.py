@@ -38,7 +38,7 @@ def add_gait(page: Page, track: Track, parameters: Parameters, cycles: Mapping[s
     if parameters.all_unsure:
         page.words(
             "Every stride has uncertain frames. The values are means over these strides anyway: left and "
-            "right may be swapped.",
+            "right may be swapped, or the figure may be off.",
             "warning",
         )
     page.words(
