@@ -45,22 +45,21 @@ int main(int argc, char **argv)
         {"state: core and weights", t->core},
         {"state: surface samples of the particles", t->texture},
         {"state: templates", t->template[0][0]},
-        {"state: two generations of particles", t->history.record},
+        {"state: generations of particles", t->history.record},
         {"features of the image", t->camera[0].features.edge},
         {"background plate of the region", t->camera[0].plate.channel[0]},
         {"likelihood setup", t->like},
         {"log-likelihoods", t->loglik_raw},
-        {"joints, rows of rejuvenation, image planes (shared)", t->joint},
         {"rules and mirrors of the classes", t->layouts},
         {"dominant particles, surface of the estimate", t->dominant},
-        {"scratch of a task and of the fixed lag", t->work},
+        {"task, joints, rows, image planes (shared)", t->work},
         {"", (const char *)memory + bytes},
     };
     enum { PARTS = sizeof parts / sizeof *parts - 1 };
     for (int i = 0; i < PARTS; i++)
         printf("%-52s %9td\n", parts[i].name,
                (const char *)parts[i + 1].begin - (const char *)parts[i].begin);
-    printf("%-52s %9zu bytes for %d particles, %d while acquiring\n", "tracker", bytes, c.particles,
-           t->capacity);
+    printf("%-52s %9zu bytes for %d particles, %d while acquiring, a lag of %d frames\n", "tracker", bytes,
+           c.particles, t->capacity, c.lag);
     return 0;
 }

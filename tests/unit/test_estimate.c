@@ -1,5 +1,6 @@
 /* The estimate of weighted particles, against direct sums in double precision. */
 #include "tracker/estimate.h"
+#include "tracker/likelihood_step.h"
 
 #include "kernel_check.h"
 #include "base/rng.h"
@@ -21,7 +22,7 @@ static void reset(void)
         particle_state const w = {.f = {[F_PHASE] = 0.5f, [F_RATE] = 0.9f, [F_STATURE] = 1.75f}};
         particle_put(particles, i, &w);
     }
-    memset(t->joint, 0, (size_t)(3 * TOY_POINTS * N) * sizeof *t->joint);
+    memset(t->joints.value, 0, (size_t)(3 * TOY_POINTS * N) * sizeof *t->joints.value);
 }
 
 static float normal(uint32_t index, uint32_t draw)
@@ -213,14 +214,14 @@ static void test_joints(void)
     reset();
     set_weights(11);
     for (uint32_t i = 0; i < 3 * TOY_POINTS * N; i++)
-        t->joint[i] = (float)(i / N % 7) + (0.1f + 0.01f * (float)(i / N)) * normal(i, 3);
+        t->joints.value[i] = (float)(i / N % 7) + (0.1f + 0.01f * (float)(i / N)) * normal(i, 3);
     gait_estimate const e = estimate(11);
     for (int p = 0; p < 3 * TOY_POINTS; p++) {
         double sum = 0.0, square = 0.0;
         for (int i = 0; i < N; i++)
-            sum += t->filter.weight[i] * (double)t->joint[p * N + i];
+            sum += t->filter.weight[i] * (double)t->joints.value[p * N + i];
         for (int i = 0; i < N; i++)
-            square += t->filter.weight[i] * pow((double)t->joint[p * N + i] - sum, 2.0);
+            square += t->filter.weight[i] * pow((double)t->joints.value[p * N + i] - sum, 2.0);
         CHECK_NEAR(e.pose.joint[p / 3][p % 3], sum, 1e-6);
         double const model = 0.01 * (double)e.mean.stature;
         CHECK_NEAR(e.joint_sd[p / 3][p % 3], sqrt(square + model * model), 1e-6);
@@ -228,6 +229,26 @@ static void test_joints(void)
     for (int k = 0; k < 3; k++)
         CHECK(e.sd.pelvis[k] == e.joint_sd[0][k]);
     CHECK(e.pose.joint[TOY_POINTS][0] == 0.0f && e.joint_sd[TOY_POINTS][1] == 0.0f); /* unused */
+}
+
+/* Joints placed anew, some particles at a time, give the same bits as those kept from the likelihood step. */
+static void test_joints_in_parts(void)
+{
+    enum { MANY = 300, AT_ONCE = 128 };
+    gait_tracker_config cfg = toy_config(1);
+    cfg.particles = MANY;
+    gait_tracker *const many = toy_tracker_new(&cfg);
+    gait_estimate kept = {0}, anew = {0};
+    toy_tracker_start(many, 0, 1.0f);
+    for (int32_t i = 0; i < MANY; i++)
+        many->filter.weight[i] *= 0.5 + (double)(i % 3) / 2.0;
+    likelihood_step(many);
+    estimate_particles(many, 7, &kept);
+    many->joints.most = AT_ONCE;
+    memset(many->joints.value, 0xff, AT_ONCE * sizeof *many->joints.value);
+    estimate_particles(many, 7, &anew);
+    CHECK(memcmp(&kept, &anew, sizeof kept) == 0 && kept.joint_sd[3][0] > 0.001f);
+    toy_tracker_free(many);
 }
 
 /* Of one camera whose start had an uncertain stature: size and distance, as a fraction of both. */
@@ -238,7 +259,7 @@ static void test_size(void)
     reset();
     set_weights(11);
     for (uint32_t i = 0; i < 3 * TOY_POINTS * N; i++)
-        t->joint[i] = 0.1f * (float)(i / N) + 0.02f * normal(i, 3);
+        t->joints.value[i] = 0.1f * (float)(i / N) + 0.02f * normal(i, 3);
     gait_estimate const sure = estimate(11);
     t->core->stature_sd_ratio = (float)start_sd;
     gait_estimate const e = estimate(11);
@@ -339,7 +360,11 @@ static void test_sums(void)
             const double *const w = weight + off;
             guarded const g = guard_fill(memory[k >= 0], (size_t)n);
             to[0] = run->estimate_dominant(v[0] + off, v[1] + off, w, n, n / 2, g.begin);
-            run->estimate_moments(v[2] + off, w, g.begin, n, 0.25, to + 1);
+            double lane[3][SUM_LANES] = {{0.0}};
+            to[1] = to[2] = to[3] = 0.0;
+            run->estimate_moments(v[2] + off, w, g.begin, n, 0.25, lane);
+            for (int i = 0; i < 3 * SUM_LANES; i++)
+                to[1 + i / SUM_LANES] += lane[i / SUM_LANES][i % SUM_LANES];
             run->estimate_resultant(v[1] + off, 1.5f, w, g.begin, n, to + 4);
             run->estimate_rotations(v[0] + off, v[1] + off, v[2] + off, w, g.begin, n, to + 8);
             CHECK(guard_whole(&g));
@@ -376,6 +401,7 @@ int main(void)
     test_modes();
     test_rotation();
     test_joints();
+    test_joints_in_parts();
     test_size();
     test_fields();
     toy_tracker_free(t);

@@ -352,7 +352,7 @@ static void test_compute(void)
     int32_t wrong = 0;
     for (int32_t y = 0; y < H; y++)
         for (int32_t x = 0; x < W; x++)
-            wrong += f.surface[(y + 50) * VIEW_SIZE + x + 100] != i_max(pixels[y * W + x] - 128, -127);
+            wrong += scratch.surface[(y + 50) * VIEW_SIZE + x + 100] != i_max(pixels[y * W + x] - 128, -127);
     CHECK(wrong == 0);
     im.format = GAIT_RGB8;
     im.stride = 3 * W;

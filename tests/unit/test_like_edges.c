@@ -179,7 +179,7 @@ static void test_beyond(void)
     static const float x[2][4] = {{234, 234, 258, 258}, {116, 116, 140, 140}};
     static const float y[2][4] = {{68, 188, 188, 68}, {148, 268, 268, 148}};
     edge_field(0.0, 0.0, false);
-    memset(v->f.surface, 0x7f, VIEW_PIXELS); /* what lies behind the edges in memory */
+    memset(v->f.pairs, 0x7f, VIEW_PIXELS * sizeof *v->f.pairs); /* what lies behind the edges in memory */
     for (int32_t i = 0; i < VIEW_SIZE; i++)
         for (int32_t k = 0; k < 20; k++)
             v->f.edge[i * VIEW_SIZE + k] = (edge_cell){.trace = EDGE_ONE, .xx_yy = EDGE_ONE};

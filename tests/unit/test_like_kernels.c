@@ -85,7 +85,7 @@ static int8_t sample(int32_t l, int32_t i, int32_t lane)
         return TEXTURE_HIDDEN;
     int32_t const a = i_min((int32_t)(x * 256.0f), 255 * 256 - 1),
                   b = i_min((int32_t)(y * 256.0f), 255 * 256 - 1);
-    const int8_t *const m = v->f.surface + (b >> 8) * VIEW_SIZE + (a >> 8);
+    const int8_t *const m = v->scratch.surface + (b >> 8) * VIEW_SIZE + (a >> 8);
     int32_t const top = m[0] * (256 - (a & 255)) + m[1] * (a & 255);
     int32_t const low = m[VIEW_SIZE] * (256 - (a & 255)) + m[VIEW_SIZE + 1] * (a & 255);
     return (int8_t)((top * (256 - (b & 255)) + low * (b & 255)) / 65536);
@@ -113,12 +113,12 @@ static void test_sample(void)
         shift_region(round);
         toy_body_at(v, frame, NULL);
         for (int32_t i = 0; i < VIEW_PIXELS && round % 6 == 5; i++) { /* the extremes */
-            v->f.surface[i] = (int8_t)(draw((uint32_t)i, round) & 1 ? 127 : -127);
+            v->scratch.surface[i] = (int8_t)(draw((uint32_t)i, round) & 1 ? 127 : -127);
             v->f.pairs[i] = 0;
         }
         for (int32_t i = 0; i < VIEW_PIXELS - VIEW_SIZE; i++)
             for (int32_t k = 0; k < 2; k++) {
-                int32_t const value = (uint8_t)v->f.surface[i + k * VIEW_SIZE];
+                int32_t const value = (uint8_t)v->scratch.surface[i + k * VIEW_SIZE];
                 if (round % 6 == 5)
                     v->f.pairs[i] = (uint16_t)(v->f.pairs[i] | value << 8 * k);
                 wrong += (v->f.pairs[i] >> 8 * k & 255) != value;

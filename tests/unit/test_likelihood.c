@@ -98,8 +98,8 @@ static void test_sample(void)
                 int32_t const at = (int32_t)y * VIEW_SIZE + (int32_t)x;
                 int32_t lo = 127, hi = -127;
                 for (int k = 0; k < 4; k++) {
-                    lo = i_min(lo, v->f.surface[at + k % 2 + k / 2 * VIEW_SIZE]);
-                    hi = i_max(hi, v->f.surface[at + k % 2 + k / 2 * VIEW_SIZE]);
+                    lo = i_min(lo, v->scratch.surface[at + k % 2 + k / 2 * VIEW_SIZE]);
+                    hi = i_max(hi, v->scratch.surface[at + k % 2 + k / 2 * VIEW_SIZE]);
                 }
                 seen++;
                 far += have < lo || have > hi;

@@ -86,7 +86,7 @@ static void test_particles(void)
         CHECK(gait_model_pose(toy_model(), &s[i], &pose, NULL) == GAIT_OK);
         worst = fmax(worst, fabs((double)(t->loglik_raw[i] - toy_likelihood(&b))));
         for (int32_t p = 0; p < 3 * TOY_POINTS; p++)
-            place = fmax(place, fabs((double)(t->joint[p * N + i] - pose.joint[p / 3][p % 3])));
+            place = fmax(place, fabs((double)(t->joints.value[p * N + i] - pose.joint[p / 3][p % 3])));
     }
     CHECK_NEAR(worst, 0.0,
                0.3); /* a body from its state differs by rounding: a cell or an edge point flips */

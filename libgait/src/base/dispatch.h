@@ -12,6 +12,9 @@
 
 enum { BLOCK = 16 }; /* bodies or particles that a kernel works on at once, one per lane */
 
+/* Running sums over particles, each of every SUM_LANES-th one, added up in order at the end. */
+enum { SUM_LANES = 64 };
+
 typedef float body_lanes[BLOCK];
 
 /* Types of higher folders, whose headers the file of each kernel includes. */
@@ -90,10 +93,11 @@ struct particle_block;
       (const struct dynamics_step *s, int32_t first, const struct particle_block *from,                         \
        struct particle_block *to))                                                                              \
     /* Weighted sums over particles.  dominant: 1 for particles of the dominant hypothesis. */                  \
-    /* With d = v - about: of d, of d^2, and of d over the dominant hypothesis */                               \
+    /* With d = v - about, add d, d^2, and d over the dominant hypothesis to SUM_LANES running sums of each. */  \
+    /* Only the last of several calls may have an n that is no multiple of SUM_LANES. */                        \
     K(void, estimate_moments,                                                                                   \
       (const float *v, const double *weight, const uint8_t *dominant, int32_t n, double about,                  \
-       double out[3]))                                                                                          \
+       double (*sum)[SUM_LANES]))                                                                               \
     /* Of cosine and sine, over all and over the dominant hypothesis */                                         \
     K(void, estimate_resultant,                                                                                 \
       (const float *angle, float turn, const double *weight, const uint8_t *dominant, int32_t n,                \

@@ -5,7 +5,6 @@ features features_layout(arena *a)
 {
     features f = {0};
     f.edge = TAKE(a, edge_cell, VIEW_PIXELS);
-    f.surface = TAKE(a, int8_t, VIEW_PIXELS);
     f.pairs = TAKE(a, uint16_t, VIEW_PIXELS);
     f.foreground =
         (uint64_t (*)[GRID_SIZE][GRID_WORDS])arena_take(a, sizeof *f.foreground, FOREGROUND_PLANES);
@@ -19,6 +18,7 @@ features_scratch features_scratch_layout(arena *a)
     features_scratch s;
     s.planes = view_planes_layout(a, 3);
     s.grey = TAKE(a, uint8_t, VIEW_PIXELS);
+    s.surface = TAKE(a, int8_t, VIEW_PIXELS);
     s.rows = TAKE(a, edge_rows, 1);
     return s;
 }
@@ -101,10 +101,10 @@ static void surface(const kernels *run, features *f, bool raw, const features_sc
 {
     if (raw)
         for (int32_t i = 0; i < VIEW_PIXELS; i++)
-            f->surface[i] = (int8_t)i_max(s->grey[i] - 128, -127);
+            s->surface[i] = (int8_t)i_max(s->grey[i] - 128, -127);
     else
-        run->features_contrast(s->grey, f->surface);
-    run->features_pairs(f->surface, f->pairs);
+        run->features_contrast(s->grey, s->surface);
+    run->features_pairs(s->surface, f->pairs);
 }
 
 void features_map(const kernels *run, features *f, int32_t map, const gait_camera *cam,

@@ -30,8 +30,7 @@ typedef struct features {
     bool has_image;      /* this frame had an image */
     bool has_foreground; /* and a background plate */
     edge_cell *edge;     /* VIEW_PIXELS */
-    int8_t *surface; /* VIEW_PIXELS: values of surface samples: local contrast, or grey - 128 in paper mode */
-    uint16_t *pairs; /* VIEW_PIXELS: each value, and in the high byte the one below it */
+    uint16_t *pairs; /* VIEW_PIXELS: each value of the surface map, and in the high byte the one below it */
     int32_t foreground_total; /* sum of the foreground over the grid, FOREGROUND_ONE = 1 */
     uint64_t (*foreground)[GRID_SIZE][GRID_WORDS]; /* FOREGROUND_PLANES bit planes of the probability */
     uint64_t (*inside)[GRID_WORDS]; /* cells inside the camera's image that show no other person */
@@ -54,7 +53,8 @@ typedef struct
 
 typedef struct features_scratch { /* shared by the cameras */
     view_planes planes;
-    uint8_t *grey; /* VIEW_PIXELS */
+    uint8_t *grey;   /* VIEW_PIXELS */
+    int8_t *surface; /* VIEW_PIXELS: values of surface samples: local contrast, or grey - 128 in paper mode */
     edge_rows *rows;
 } features_scratch;
 

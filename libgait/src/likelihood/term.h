@@ -106,9 +106,9 @@ typedef struct like_setup { /* constant while a tracker lives */
     float weight[LIKE_TERMS];
     float missed_weight;
     limb_geometry geometry[MODEL_MAX_LIMBS];
-    like_surface surface[MODEL_MAX_LIMBS];
-    like_costs robust; /* Student-t cost, LIKE_COST_ONE = 1 nat */
-    like_costs square; /* the difference squared */
+    like_costs robust;                     /* Student-t cost, LIKE_COST_ONE = 1 nat */
+    like_costs square;                     /* the difference squared */
+    like_surface surface[MODEL_MAX_LIMBS]; /* a tracker stores as many as the model has */
 } like_setup;
 
 /* Values of the terms for the bodies of a block. */

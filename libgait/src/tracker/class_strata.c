@@ -117,8 +117,8 @@ void class_strata_resample(gait_tracker *t, int32_t begin, int32_t end, int32_t 
     const strata *const then = tracker_strata(t);
     pf *const f = &t->filter;
     size_t const all = (size_t)f->n;
-    float *const to = t->joint; /* classes x f->n; like lag.weight free until the likelihood step */
-    double *const weight = t->lag.weight, total[GAIT_MAX_CLASSES];
+    double *const weight = (double *)(void *)t->rows, total[GAIT_MAX_CLASSES]; /* f->n */
+    float *const to = t->rows + 2 * all;                                       /* classes x f->n */
     float const seconds = seconds_since(t, t->core->start_utime + t->classes->resampled);
     double now[GAIT_MAX_CLASSES] = {0.0};
     for (int32_t k = 0; k < then->count; k++) {

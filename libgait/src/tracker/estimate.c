@@ -4,6 +4,7 @@
 #include "base/linalg.h"
 #include "image/camera.h"
 #include "tracker/class_strata.h"
+#include "tracker/likelihood_step.h"
 #include "tracker/pose_error.h"
 #include <string.h>
 
@@ -21,6 +22,7 @@ typedef struct sums {
     const kernels *run;
     const weighted_particles *of;
     int32_t best;
+    int32_t first; /* particle whose joints are the first in t->joints */
     double weight; /* of the dominant hypothesis */
     moments field[F_MAX], joint[3 * GAIT_MAX_JOINTS];
     double phase[4], heading[4]; /* mean cosine and sine: over all, then over the dominant hypothesis */
@@ -40,13 +42,23 @@ static const float *column(const sums *s, int32_t f, int32_t array)
     return gathered;
 }
 
+/* From the running sums about a value. */
+static moments moments_about(const sums *s, double about, const double (*lane)[SUM_LANES])
+{
+    double sum[3] = {0.0};
+    for (int32_t k = 0; k < 3; k++)
+        for (int32_t i = 0; i < SUM_LANES; i++)
+            sum[k] += lane[k][i];
+    double const square = sum[1] - sum[0] * sum[0];
+    return (moments){about + sum[0], square > 0.0 ? square : 0.0, about + sum[2] / s->weight};
+}
+
 static moments moments_of(const sums *s, const float *v)
 {
     double const about = (double)v[s->best];
-    double sum[3];
+    double sum[3][SUM_LANES] = {{0.0}};
     s->run->estimate_moments(v, s->of->weight, s->t->dominant, s->of->n, about, sum);
-    double const square = sum[1] - sum[0] * sum[0];
-    return (moments){about + sum[0], square > 0.0 ? square : 0.0, about + sum[2] / s->weight};
+    return moments_about(s, about, (const double (*)[SUM_LANES])sum);
 }
 
 static void mean_direction(const sums *s, int32_t f, float turn, double out[4])
@@ -54,17 +66,11 @@ static void mean_direction(const sums *s, int32_t f, float turn, double out[4])
     s->run->estimate_resultant(column(s, f, 0), turn, s->of->weight, s->t->dominant, s->of->n, out);
 }
 
-enum {
-    SUM_PHASE,
-    SUM_HEADING,
-    SUM_ROTATION,
-    SUM_FIELDS
-}; /* items of the tasks: then the fields, then the joints */
+enum { SUM_PHASE, SUM_HEADING, SUM_ROTATION, SUM_FIELDS }; /* items of the tasks: then the fields */
 
 static void sums_range(void *ctx, int32_t begin, int32_t end, int32_t task)
 {
     sums *const s = ctx;
-    int32_t const joints = SUM_FIELDS + s->of->all.fields;
     (void)task;
     for (int32_t k = begin; k < end; k++)
         if (k == SUM_PHASE)
@@ -74,19 +80,83 @@ static void sums_range(void *ctx, int32_t begin, int32_t end, int32_t task)
         else if (k == SUM_ROTATION)
             s->run->estimate_rotations(column(s, F_HEADING, 0), column(s, F_PITCH, 1), column(s, F_ROLL, 2),
                                        s->of->weight, s->t->dominant, s->of->n, s->rotation);
-        else if (k < joints)
-            s->field[k - SUM_FIELDS] = moments_of(s, column(s, k - SUM_FIELDS, 0));
         else
-            s->joint[k - joints] = moments_of(s, s->t->joint + (size_t)(k - joints) * (size_t)s->of->n);
+            s->field[k - SUM_FIELDS] = moments_of(s, column(s, k - SUM_FIELDS, 0));
 }
 
-/* Gathered fields share one array, so their sums are made one after the other. */
+/* ---- joints ---- */
+/* Place the bodies of particles first .. first + lanes - 1, of one class, and their joints. */
+static void place(const sums *s, int32_t first, int32_t lanes, likelihood_scratch *w)
+{
+    const weighted_particles *const p = s->of;
+    int32_t const motion_class = p->strata ? p->strata->motion_class[stratum_at(p->strata, first)] : 0;
+    const state_layout *const layout = &s->t->layouts[motion_class];
+    particle_block block;
+    if (!p->index)
+        particle_set_bodies(layout, &p->all, first, &w->body);
+    else {
+        particle_block_get(&p->all, p->index + first, lanes, &block);
+        particle_block_bodies(layout, &block, &w->body);
+    }
+    kin_points(s->t->model, &w->body, w->points);
+}
+
+/* Joints of particles s->first + begin .. s->first + end - 1. */
+static void place_range(void *ctx, int32_t begin, int32_t end, int32_t task)
+{
+    const sums *const s = ctx;
+    likelihood_scratch *const w = &s->t->work[task];
+    for (int32_t lanes; begin < end; begin += lanes) {
+        int32_t const first = s->first + begin;
+        lanes = i_min(BLOCK, end - begin);
+        if (s->of->strata)
+            lanes = i_min(lanes, s->of->strata->first[stratum_at(s->of->strata, first) + 1] - first);
+        place(s, first, lanes, w);
+        joints_put(s->t, begin, lanes, w);
+    }
+}
+
+static int32_t joints_at_once(const sums *s)
+{
+    return i_min(s->of->n - s->first, s->t->joints.most);
+}
+
+/* Add some of the joints' numbers to their running sums. */
+static void joints_range(void *ctx, int32_t begin, int32_t end, int32_t task)
+{
+    const sums *const s = ctx;
+    const joint_scratch *const j = &s->t->joints;
+    (void)task;
+    for (int32_t k = begin; k < end; k++)
+        s->run->estimate_moments(j->value + (size_t)k * (size_t)j->most, s->of->weight + s->first,
+                                 s->t->dominant + s->first, joints_at_once(s), s->joint[k].mean, j->sum[k]);
+}
+
+static void sum_joints(sums *s, const gait_tasks *exec)
+{
+    const gait_tracker *const t = s->t;
+    int32_t const numbers = 3 * t->model->points;
+    bool const kept = !s->of->index && s->of->n <= t->joints.most;
+    place(s, s->best, 1, t->work);
+    for (int32_t k = 0; k < numbers; k++)
+        s->joint[k].mean = (double)t->work->points[k / 3][k % 3][0];
+    memset(t->joints.sum, 0, (size_t)numbers * sizeof *t->joints.sum);
+    for (s->first = 0; s->first < s->of->n; s->first += t->joints.most) {
+        if (!kept)
+            task_run(exec, t->cfg.tasks, joints_at_once(s), BLOCK, place_range, s);
+        task_run(exec, t->cfg.tasks, numbers, 1, joints_range, s);
+    }
+    for (int32_t k = 0; k < numbers; k++)
+        s->joint[k] = moments_about(s, s->joint[k].mean, (const double (*)[SUM_LANES])t->joints.sum[k]);
+}
+
+/* Gathered fields share one array, and scratch of other tasks holds their index: their sums are made one after the other. */
 static void sum_up(sums *s)
 {
     static const gait_tasks calling_thread = {NULL, NULL};
     const gait_tasks *const exec = s->of->index ? &calling_thread : &s->t->cfg.exec;
-    int32_t const items = SUM_FIELDS + s->of->all.fields + 3 * s->t->model->points;
-    task_run(exec, s->t->cfg.tasks, items, 1, sums_range, s);
+    task_run(exec, s->t->cfg.tasks, SUM_FIELDS + s->of->all.fields, 1, sums_range, s);
+    sum_joints(s, exec);
 }
 
 /* ---- what is reported ---- */

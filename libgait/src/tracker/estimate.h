@@ -5,7 +5,7 @@
 
 #define DOMINANT_WEIGHT 0.7f /* weight of the dominant hypothesis from which its mean is a good estimate */
 
-typedef struct weighted_particles { /* their joints are in t->joint */
+typedef struct weighted_particles {
     particle_set all;
     const int32_t *index; /* n: which of all; NULL: every one.  Their fields are gathered in t->lag.column */
     int32_t n;

@@ -1,23 +1,20 @@
-/* Weighted sums over the particles: CHUNK running sums, each of every CHUNK-th particle, added up in order at the end, so
- * that all instruction sets give the same bits.  Particles that are not dominant are multiplied by 0: for a conditional gcc 12
- * generates masked loads, with AVX2 under the wrong mask.  With a CHUNK below 32 gcc unrolls the inner loops before it
+/* Weighted sums over the particles, in SUM_LANES running sums, so that all instruction sets give the same bits.  Particles that are not dominant are multiplied by 0: for a conditional gcc 12
+ * generates masked loads, with AVX2 under the wrong mask.  With a SUM_LANES below 32 gcc unrolls the inner loops before it
  * vectorises, which is slower. */
 #include "base/dispatch.h"
 #include "base/fmath.h"
 #include <string.h>
 
-enum { CHUNK = 64 };
-
-typedef struct tail { /* the particles after the last whole CHUNK, filled up with weights of 0 */
-    float v[3][CHUNK];
-    double weight[CHUNK];
-    uint8_t dominant[CHUNK];
+typedef struct tail { /* the particles after the last whole SUM_LANES, filled up with weights of 0 */
+    float v[3][SUM_LANES];
+    double weight[SUM_LANES];
+    uint8_t dominant[SUM_LANES];
 } tail;
 
 KERNEL_ROW double total(const double *lane)
 {
     double sum = 0.0;
-    for (int32_t i = 0; i < CHUNK; i++)
+    for (int32_t i = 0; i < SUM_LANES; i++)
         sum += lane[i];
     return sum;
 }
@@ -26,7 +23,7 @@ KERNEL_ROW double total(const double *lane)
 KERNEL_ROW tail tail_of(int32_t n, int32_t count, const float *const v[], const double *weight,
                         const uint8_t *dominant)
 {
-    int32_t const first = n - n % CHUNK;
+    int32_t const first = n - n % SUM_LANES;
     tail rest;
     memset(&rest, 0, sizeof rest);
     for (int32_t k = 0; k < count; k++)
@@ -40,10 +37,10 @@ KERNEL_ROW tail tail_of(int32_t n, int32_t count, const float *const v[], const 
 /* ---- moments ---- */
 KERNEL_ROW void moments_add(const float *restrict v, const double *restrict weight,
                             const uint8_t *restrict dominant, int32_t n, double about,
-                            double (*restrict sum)[CHUNK])
+                            double (*restrict sum)[SUM_LANES])
 {
-    for (int32_t i = 0; i < n; i += CHUNK)
-        for (int32_t lane = 0; lane < CHUNK; lane++) {
+    for (int32_t i = 0; i < n; i += SUM_LANES)
+        for (int32_t lane = 0; lane < SUM_LANES; lane++) {
             double const d = (double)v[i + lane] - about, wd = weight[i + lane] * d;
             sum[0][lane] += wd;
             sum[1][lane] += wd * d;
@@ -52,22 +49,19 @@ KERNEL_ROW void moments_add(const float *restrict v, const double *restrict weig
 }
 
 void KERNEL(estimate_moments)(const float *v, const double *weight, const uint8_t *dominant, int32_t n,
-                              double about, double out[3])
+                              double about, double (*sum)[SUM_LANES])
 {
     tail const rest = tail_of(n, 1, &v, weight, dominant);
-    double sum[3][CHUNK] = {{0.0}};
-    moments_add(v, weight, dominant, n - n % CHUNK, about, sum);
-    moments_add(rest.v[0], rest.weight, rest.dominant, CHUNK, about, sum);
-    for (int32_t k = 0; k < 3; k++)
-        out[k] = total(sum[k]);
+    moments_add(v, weight, dominant, n - n % SUM_LANES, about, sum);
+    moments_add(rest.v[0], rest.weight, rest.dominant, SUM_LANES, about, sum);
 }
 
 /* ---- directions ---- */
-KERNEL_ROW void terms_add(const float (*restrict term)[CHUNK], int32_t count, const double *restrict weight,
-                          double (*restrict sum)[CHUNK])
+KERNEL_ROW void terms_add(const float (*restrict term)[SUM_LANES], int32_t count,
+                          const double *restrict weight, double (*restrict sum)[SUM_LANES])
 {
     for (int32_t k = 0; k < count; k++)
-        for (int32_t lane = 0; lane < CHUNK; lane++)
+        for (int32_t lane = 0; lane < SUM_LANES; lane++)
             sum[k][lane] += weight[lane] * (double)term[k][lane];
 }
 
@@ -75,26 +69,26 @@ KERNEL_ROW void terms_add(const float (*restrict term)[CHUNK], int32_t count, co
 KERNEL_ROW void dominant_weights(const double *restrict weight, const uint8_t *restrict dominant,
                                  double *restrict out)
 {
-    for (int32_t lane = 0; lane < CHUNK; lane++)
+    for (int32_t lane = 0; lane < SUM_LANES; lane++)
         out[lane] = (double)dominant[lane] * weight[lane];
 }
 
-KERNEL_ROW void directions(const float *restrict angle, float turn, float (*restrict out)[CHUNK])
+KERNEL_ROW void directions(const float *restrict angle, float turn, float (*restrict out)[SUM_LANES])
 {
-    for (int32_t lane = 0; lane < CHUNK; lane++)
+    for (int32_t lane = 0; lane < SUM_LANES; lane++)
         m_sincos(turn * angle[lane], &out[1][lane], &out[0][lane]);
 }
 
 static void resultant_add(const float *angle, float turn, const double *weight, const uint8_t *dominant,
-                          int32_t n, double (*sum)[CHUNK])
+                          int32_t n, double (*sum)[SUM_LANES])
 {
-    float cs[2][CHUNK];
-    double dominant_weight[CHUNK];
-    for (int32_t i = 0; i < n; i += CHUNK) {
+    float cs[2][SUM_LANES];
+    double dominant_weight[SUM_LANES];
+    for (int32_t i = 0; i < n; i += SUM_LANES) {
         directions(angle + i, turn, cs);
         dominant_weights(weight + i, dominant + i, dominant_weight);
-        terms_add((const float (*)[CHUNK])cs, 2, weight + i, sum);
-        terms_add((const float (*)[CHUNK])cs, 2, dominant_weight, sum + 2);
+        terms_add((const float (*)[SUM_LANES])cs, 2, weight + i, sum);
+        terms_add((const float (*)[SUM_LANES])cs, 2, dominant_weight, sum + 2);
     }
 }
 
@@ -102,9 +96,9 @@ void KERNEL(estimate_resultant)(const float *angle, float turn, const double *we
                                 int32_t n, double out[4])
 {
     tail const rest = tail_of(n, 1, &angle, weight, dominant);
-    double sum[4][CHUNK] = {{0.0}};
-    resultant_add(angle, turn, weight, dominant, n - n % CHUNK, sum);
-    resultant_add(rest.v[0], turn, rest.weight, rest.dominant, CHUNK, sum);
+    double sum[4][SUM_LANES] = {{0.0}};
+    resultant_add(angle, turn, weight, dominant, n - n % SUM_LANES, sum);
+    resultant_add(rest.v[0], turn, rest.weight, rest.dominant, SUM_LANES, sum);
     for (int32_t k = 0; k < 4; k++)
         out[k] = total(sum[k]);
 }
@@ -114,21 +108,21 @@ KERNEL_ROW void near_to(const float *restrict phase, const float *restrict headi
                         float heading0, uint8_t *restrict dominant)
 {
     float const near_phase = 0.15f * TWO_PI_F, near_heading = 0.5f;
-    float off[2 * CHUNK];
-    for (int32_t i = 0; i < CHUNK; i++) {
+    float off[2 * SUM_LANES];
+    for (int32_t i = 0; i < SUM_LANES; i++) {
         off[i] = TWO_PI_F * (phase[i] - phase0);
-        off[CHUNK + i] = heading[i] - heading0;
+        off[SUM_LANES + i] = heading[i] - heading0;
     }
-    for (int32_t i = 0; i < 2 * CHUNK; i++)
+    for (int32_t i = 0; i < 2 * SUM_LANES; i++)
         off[i] = fabsf(m_wrap_pi(off[i]));
-    for (int32_t i = 0; i < CHUNK; i++)
-        dominant[i] = (uint8_t)(m_less(off[i], near_phase) & m_less(off[CHUNK + i], near_heading) & 1u);
+    for (int32_t i = 0; i < SUM_LANES; i++)
+        dominant[i] = (uint8_t)(m_less(off[i], near_phase) & m_less(off[SUM_LANES + i], near_heading) & 1u);
 }
 
 KERNEL_ROW void weight_add(const double *restrict weight, const uint8_t *restrict dominant,
                            double *restrict sum)
 {
-    for (int32_t lane = 0; lane < CHUNK; lane++)
+    for (int32_t lane = 0; lane < SUM_LANES; lane++)
         sum[lane] += (double)dominant[lane] * weight[lane];
 }
 
@@ -136,10 +130,10 @@ double KERNEL(estimate_dominant)(const float *phase, const float *heading, const
                                  int32_t best, uint8_t *dominant)
 {
     const float *const angles[] = {phase, heading};
-    double sum[CHUNK] = {0.0};
-    int32_t const whole = n - n % CHUNK;
+    double sum[SUM_LANES] = {0.0};
+    int32_t const whole = n - n % SUM_LANES;
     tail rest = tail_of(n, 2, angles, weight, NULL);
-    for (int32_t i = 0; i < whole; i += CHUNK) {
+    for (int32_t i = 0; i < whole; i += SUM_LANES) {
         near_to(phase + i, heading + i, phase[best], heading[best], dominant + i);
         weight_add(weight + i, dominant + i, sum);
     }
@@ -154,13 +148,13 @@ enum { PAIRS = 10 };
 
 /* Products of the components of the quaternion of Rz(heading) Ry(pitch) Rx(roll), w x y z. */
 KERNEL_ROW void pairs_of(const float *restrict heading, const float *restrict pitch,
-                         const float *restrict roll, float (*restrict pair)[CHUNK])
+                         const float *restrict roll, float (*restrict pair)[SUM_LANES])
 {
-    float h[2][CHUNK], p[2][CHUNK], r[2][CHUNK];
+    float h[2][SUM_LANES], p[2][SUM_LANES], r[2][SUM_LANES];
     directions(heading, 0.5f, h);
     directions(pitch, 0.5f, p);
     directions(roll, 0.5f, r);
-    for (int32_t i = 0; i < CHUNK; i++) {
+    for (int32_t i = 0; i < SUM_LANES; i++) {
         float const ch = h[0][i], sh = h[1][i], cp = p[0][i], sp = p[1][i], cr = r[0][i], sr = r[1][i];
         float const w = ch * cp * cr + sh * sp * sr, x = ch * cp * sr - sh * sp * cr;
         float const y = ch * sp * cr + sh * cp * sr, z = sh * cp * cr - ch * sp * sr;
@@ -178,14 +172,14 @@ KERNEL_ROW void pairs_of(const float *restrict heading, const float *restrict pi
 }
 
 static void rotations_add(const float *heading, const float *pitch, const float *roll, const double *weight,
-                          const uint8_t *dominant, int32_t n, double (*sum)[CHUNK])
+                          const uint8_t *dominant, int32_t n, double (*sum)[SUM_LANES])
 {
-    float pair[PAIRS][CHUNK];
-    double dominant_weight[CHUNK];
-    for (int32_t i = 0; i < n; i += CHUNK) {
+    float pair[PAIRS][SUM_LANES];
+    double dominant_weight[SUM_LANES];
+    for (int32_t i = 0; i < n; i += SUM_LANES) {
         pairs_of(heading + i, pitch + i, roll + i, pair);
         dominant_weights(weight + i, dominant + i, dominant_weight);
-        terms_add((const float (*)[CHUNK])pair, PAIRS, dominant_weight, sum);
+        terms_add((const float (*)[SUM_LANES])pair, PAIRS, dominant_weight, sum);
     }
 }
 
@@ -194,9 +188,9 @@ void KERNEL(estimate_rotations)(const float *heading, const float *pitch, const 
 {
     static const uint8_t place[16] = {0, 1, 2, 3, 1, 4, 5, 6, 2, 5, 7, 8, 3, 6, 8, 9};
     tail const rest = tail_of(n, 3, (const float *const[]){heading, pitch, roll}, weight, dominant);
-    double sum[PAIRS][CHUNK] = {{0.0}};
-    rotations_add(heading, pitch, roll, weight, dominant, n - n % CHUNK, sum);
-    rotations_add(rest.v[0], rest.v[1], rest.v[2], rest.weight, rest.dominant, CHUNK, sum);
+    double sum[PAIRS][SUM_LANES] = {{0.0}};
+    rotations_add(heading, pitch, roll, weight, dominant, n - n % SUM_LANES, sum);
+    rotations_add(rest.v[0], rest.v[1], rest.v[2], rest.weight, rest.dominant, SUM_LANES, sum);
     for (int32_t k = 0; k < 16; k++)
         out[k] = total(sum[place[k]]);
 }

@@ -60,24 +60,6 @@ static strata gathered_strata(const strata *all, const int32_t *ancestor, int32_
     return s;
 }
 
-/* Joints of gathered ancestors first .. end - 1, of one class. */
-static void place_joints(gait_tracker *t, const weighted_particles *p, const state_layout *of, int32_t first,
-                         int32_t end)
-{
-    likelihood_scratch *const w = &t->work[0];
-    size_t const n = (size_t)p->n;
-    for (int32_t begin = first; begin < end; begin += BLOCK) {
-        int32_t const lanes = i_min(BLOCK, end - begin);
-        particle_block block;
-        particle_block_get(&p->all, p->index + begin, lanes, &block);
-        particle_block_bodies(of, &block, &w->body);
-        kin_points(t->model, &w->body, w->points);
-        for (size_t j = 0; j < (size_t)t->model->points; j++)
-            for (size_t k = 0; k < 3; k++)
-                block_copy(t->joint + (3 * j + k) * n + (size_t)begin, w->points[j][k], lanes);
-    }
-}
-
 /* A track that was lost stays lost; otherwise the status depends on what is known now of left and right. */
 static gait_track_status lagged_status(const gait_tracker *t, gait_track_status then, float hypothesis_weight)
 {
@@ -107,10 +89,7 @@ void fixed_lag_estimate(gait_tracker *t, int32_t back, gait_estimate *out)
         of = gathered_strata(&t->history.strata[slot], s->ancestor, p.n);
         p.strata = &of;
         (void)class_strata_best(&of, s->weight, &best);
-        for (int32_t k = 0; k < of.count; k++)
-            place_joints(t, &p, &t->layouts[of.motion_class[k]], of.first[k], of.first[k + 1]);
-    } else
-        place_joints(t, &p, &t->layout, 0, p.n);
+    }
     estimate_weighted(t, &p, best, &e);
     e.ess = (float)pf_ess(&weights);
     e.flags = record.flags;

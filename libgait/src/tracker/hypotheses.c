@@ -302,7 +302,7 @@ static void deal(gait_tracker *t)
 {
     pf *const f = &t->filter;
     int32_t const n = f->n, second = hypothesis_first(n, 1);
-    float *const before = t->joint; /* not needed until the likelihood step */
+    float *const before = t->rows;
     for (int32_t k = 0; k < t->particles.fields; k++) {
         float *const now = field(&t->particles, k);
         memcpy(before, now, (size_t)n * sizeof *before);

@@ -151,14 +151,11 @@ static void block_in_camera(gait_tracker *t, int32_t c, int32_t begin, int32_t l
     }
 }
 
-static void block_joints(gait_tracker *t, int32_t begin, int32_t lanes, likelihood_scratch *w)
+void joints_put(const gait_tracker *t, int32_t first, int32_t lanes, const likelihood_scratch *w)
 {
-    size_t const n = (size_t)t->cfg.particles;
-    particle_set_bodies(layout_at(t, begin), &t->particles, begin, &w->body);
-    kin_points(t->model, &w->body, w->points);
-    for (size_t p = 0; p < (size_t)t->model->points; p++)
-        for (size_t k = 0; k < 3; k++)
-            block_copy(t->joint + (3 * p + k) * n + (size_t)begin, w->points[p][k], lanes);
+    for (int32_t k = 0; k < 3 * t->model->points; k++)
+        block_copy(t->joints.value + (size_t)k * (size_t)t->joints.most + first, w->points[k / 3][k % 3],
+                   lanes);
 }
 
 static void likelihood_range(void *ctx, int32_t begin, int32_t end, int32_t task)
@@ -167,7 +164,10 @@ static void likelihood_range(void *ctx, int32_t begin, int32_t end, int32_t task
     likelihood_scratch *const w = &t->work[task];
     for (int32_t first = begin; first < end; first += BLOCK) {
         int32_t const lanes = i_min(BLOCK, end - first);
-        block_joints(t, first, lanes, w);
+        particle_set_bodies(layout_at(t, first), &t->particles, first, &w->body);
+        kin_points(t->model, &w->body, w->points);
+        if (t->cfg.particles <= t->joints.most)
+            joints_put(t, first, lanes, w);
         for (int32_t i = first; i < first + lanes; i++)
             t->loglik_raw[i] = t->loglik_without_silhouette[i] = t->explained[i] = 0.0f;
         for (int32_t c = 0; c < t->cfg.cameras; c++)

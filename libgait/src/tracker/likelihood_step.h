@@ -3,8 +3,11 @@
 #define GAIT_TRACKER_LIKELIHOOD_STEP_H
 #include "tracker/tracker_state.h"
 
-/* Fills loglik_raw, loglik_without_silhouette, explained, joint and texture for all particles. */
+/* Fills loglik_raw, loglik_without_silhouette, explained, texture and, if they fit, joints for all particles. */
 void likelihood_step(gait_tracker *t);
+
+/* The joints of the block in w->points become those of particles first .. first + lanes - 1 in t->joints. */
+void joints_put(const gait_tracker *t, int32_t first, int32_t lanes, const likelihood_scratch *w);
 
 typedef struct body_evidence { /* of one body, over all cameras */
     /* Log-likelihood with the body less that of an empty scene, nats; exactly 0 if no term applies. */

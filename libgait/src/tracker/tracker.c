@@ -208,6 +208,10 @@ static void predict(gait_tracker *t, float dt, const rejuvenation *r, uint32_t c
     move_job j = {.t = t, .from = t->particles, .rejuvenation = *r, .counter = counter};
     if (r->shrink > 0.0f)
         task_run(&t->cfg.exec, t->cfg.tasks, j.from.n, BLOCK, rows_range, &j);
+    else if (t->history.depth == 1) { /* the next generation replaces this one */
+        memcpy(t->rows, j.from.value, (size_t)(j.from.n * j.from.fields) * sizeof *t->rows);
+        j.from.value = t->rows;
+    }
     for (int32_t c = 0; c < t->model->classes; c++) {
         dynamics const d = tracker_dynamics(t, c);
         j.step[c] = dynamics_step_init(&d, dt, hypotheses_settled_time(t), counter);
@@ -360,7 +364,7 @@ void tracker_step(gait_tracker *t, const gait_frame *frame, gait_estimate *out)
     particle_state const place = particle_set_place(&t->particles, t->filter.weight);
     bool const has_image = features_step(t, frame, &place) > 0;
     pose_error_correct(t);
-    likelihood_step(t); /* without an image it only computes the joints */
+    likelihood_step(t); /* without an image it only computes joints */
     if (has_image)
         track_loss_bound(t);
     pf_summary s = has_image ? hypotheses_update(t, dt)

@@ -8,7 +8,7 @@
 static void layout_history(particle_history *h, arena *a, int32_t lag, int32_t n, int32_t fields,
                            bool classes)
 {
-    h->depth = i_max(lag, 1) + 1;
+    h->depth = lag + 1;
     h->capacity = n;
     h->fields = fields;
     h->record = TAKE(a, generation_record, h->depth);
@@ -45,17 +45,17 @@ static void layout_state(arena *a, gait_tracker *t)
     t->state_end = TAKE(a, unsigned char, 1);
 }
 
-/* One block of memory serves in turn the rows for rejuvenation, the resampled planes of a frame, and the joints. */
-static void layout_joints(arena *a, gait_tracker *t)
+static const arena COUNT = {.cap = SIZE_MAX, .solid = true};
+
+/* Arenas that have counted: place them all in the same memory. */
+static void share(arena *a, arena *const *all, int32_t n)
 {
-    arena size = {.cap = SIZE_MAX, .solid = true};
-    features_scratch_layout(&size);
-    int32_t const floats = i_max(3 * t->model->points, rejuvenation_stride(state_layout_fields(&t->layout)));
-    size_t const all = (size_t)floats * (size_t)t->cfg.particles * sizeof *t->joint;
-    size_t const bytes = all > size.used ? all : size.used;
-    t->joint = t->rows = (float *)(void *)TAKE(a, unsigned char, bytes);
-    arena planes = {.base = (unsigned char *)t->joint, .cap = bytes, .solid = true};
-    t->planes = features_scratch_layout(&planes);
+    size_t bytes = 0;
+    for (int32_t k = 0; k < n; k++)
+        bytes = all[k]->used > bytes ? all[k]->used : bytes;
+    unsigned char *const memory = TAKE(a, unsigned char, bytes);
+    for (int32_t k = 0; k < n; k++)
+        *all[k] = (arena){.base = memory, .cap = bytes, .solid = true};
 }
 
 /* Place one task's arrays; w NULL: only count. */
@@ -82,25 +82,59 @@ static void layout_likelihood_scratch(arena *a, const gait_model *m, likelihood_
 
 static void layout_lag(arena *a, gait_tracker *t)
 {
+    if (t->cfg.lag == 0)
+        return;
     t->lag.ancestor = TAKE(a, int32_t, t->capacity);
     t->lag.weight = TAKE(a, double, t->capacity);
 }
 
-/* Without threads there is one task.  The lagged estimate runs between steps, in the scratch of the tasks. */
-static void layout_tasks(arena *a, gait_tracker *t)
+/* With so many particles at once an estimate computes their joints anew, which makes a step some per cent longer; but all
+ * joints of a tracker of many particles, for which there is memory, are kept from the likelihood step. */
+enum { JOINTS_AT_ONCE = 512, MANY_PARTICLES = 4096 }; /* multiples of SUM_LANES */
+
+static void layout_joints(arena *a, gait_tracker *t)
 {
-    int32_t const tasks = t->cfg.exec.run ? t->cfg.tasks : 1;
-    arena lag = {.cap = SIZE_MAX, .solid = true}, others = lag;
+    t->joints.most = t->capacity > MANY_PARTICLES ? t->capacity : i_min(t->capacity, JOINTS_AT_ONCE);
+    size_t const numbers = 3 * (size_t)t->model->points;
+    t->joints.sum = (double (*)[3][SUM_LANES])arena_take(a, sizeof *t->joints.sum, numbers);
+    t->joints.value = TAKE(a, float, numbers *(size_t)t->joints.most);
+}
+
+/* Without threads there is one task.  The lagged estimate runs between steps, in the scratch of the tasks but the first. */
+static void layout_tasks(arena *a, gait_tracker *t, int32_t tasks)
+{
+    arena lag = COUNT, others = COUNT;
     layout_lag(&lag, t);
     for (int32_t k = 1; k < tasks; k++)
         layout_likelihood_scratch(&others, t->model, NULL);
-    t->work = TAKE(a, likelihood_scratch, tasks);
+    layout_joints(a, t);
     layout_likelihood_scratch(a, t->model, t->work);
-    size_t const bytes = lag.used > others.used ? lag.used : others.used;
-    lag = others = (arena){.base = TAKE(a, unsigned char, bytes), .cap = bytes, .solid = true};
+    share(a, (arena *[]){&lag, &others}, 2);
     layout_lag(&lag, t);
     for (int32_t k = 1; k < tasks; k++)
         layout_likelihood_scratch(&others, t->model, t->work ? t->work + k : NULL);
+}
+
+static float *layout_rows(arena *a, const gait_tracker *t)
+{
+    int32_t const stride = rejuvenation_stride(state_layout_fields(&t->layout));
+    return TAKE(a, float, (size_t)t->cfg.particles *(size_t)stride);
+}
+
+/* One block of memory serves in turn the rows for rejuvenation, the resampled planes of a frame, and the tasks. */
+static void layout_scratch(arena *a, gait_tracker *t)
+{
+    int32_t const n = t->cfg.exec.run ? t->cfg.tasks : 1;
+    arena rows = COUNT, planes = COUNT, tasks = COUNT;
+    t->work = NULL;
+    layout_rows(&rows, t);
+    features_scratch_layout(&planes);
+    layout_tasks(&tasks, t, n);
+    t->work = TAKE(a, likelihood_scratch, n);
+    share(a, (arena *[]){&rows, &planes, &tasks}, 3);
+    t->rows = layout_rows(&rows, t);
+    t->planes = features_scratch_layout(&planes);
+    layout_tasks(&tasks, t, n);
 }
 
 static void layout_logliks(arena *a, gait_tracker *t)
@@ -120,9 +154,8 @@ static void layout_work(arena *a, gait_tracker *t)
         if (t->cfg.terms & GAIT_TERM_SILHOUETTE)
             t->camera[c].plate = view_planes_layout(a, 3);
     }
-    t->like = TAKE(a, like_setup, 1);
+    t->like = arena_take(a, offsetof(like_setup, surface) + limbs * sizeof(like_surface), 1);
     layout_logliks(a, t);
-    layout_joints(a, t);
     t->layouts = TAKE(a, state_layout, t->model->classes);
     t->mirror = TAKE(a, mirror, t->model->classes);
     t->next = TAKE(a, strata, 1);
@@ -131,7 +164,7 @@ static void layout_work(arena *a, gait_tracker *t)
         t->estimate_patch = TAKE(a, like_patch, (size_t)cameras * limbs);
     for (int32_t c = 0; c < 2 * cameras && uses_texture(&t->cfg); c++)
         t->template_ring[c / cameras][c % cameras] = TAKE(a, int8_t, LIKE_RING *limbs);
-    layout_tasks(a, t);
+    layout_scratch(a, t);
 }
 
 /* Two hypotheses need twice the particles of one, and so does an open phase. */

@@ -109,7 +109,7 @@ typedef struct generation_record { /* what an estimate reports of its frame as a
 
 /* The last generations of particles: a ring, in which the lagged estimate follows ancestors. */
 typedef struct particle_history {
-    int32_t depth; /* generations kept: the configured lag and the current one, at least two */
+    int32_t depth; /* generations kept: the configured lag and the current one */
     int32_t capacity, fields;
     generation_record *record; /* depth */
     int32_t *count;            /* depth: particles of each generation */
@@ -123,6 +123,13 @@ typedef struct lag_scratch { /* of fixed_lag_estimate() */
     double *weight;          /* capacity: total weight of these descendants */
     float *column[3]; /* capacity: the ancestors' values of a field; the memory of the log-likelihoods */
 } lag_scratch;
+
+/* Joints of particles: x, y and z of every joint of the model, which are 3 x points numbers each. */
+typedef struct joint_scratch {
+    int32_t most;                /* particles whose joints fit */
+    float *value;                /* 3 x points x most, metres, world */
+    double (*sum)[3][SUM_LANES]; /* 3 x points: running sums of estimate_moments */
+} joint_scratch;
 
 struct gait_tracker {
     const gait_model *model;
@@ -155,10 +162,11 @@ struct gait_tracker {
         float *explained; /* after the likelihood step: foreground that each particle explains, nats; */
         float *loglik;    /* after track_loss_bound(): the log-likelihood that moves the weights */
     };
-    /* Points x 3 x n, metres: of the particles, or of the ancestors that fixed_lag_estimate() gathers. */
-    float *joint;
-    float *rows;             /* until the particles have moved: rejuvenation_rows(); in the memory of joint */
-    features_scratch planes; /* until the features are complete; in the memory of joint */
+    /* Until the features are computed, in the memory of the arrays of work: scratch of the resampling, then
+     * rejuvenation_rows() or a copy of the generation before, then scratch of the split. */
+    float *rows;
+    features_scratch planes; /* until the features are complete; in the same memory */
+    joint_scratch joints;    /* of all particles after the likelihood step, if they fit */
     state_layout *layouts;   /* of every class; constant */
     mirror *mirror;          /* of every class; constant */
     strata *next;            /* with several classes: ranges of the particles after resampling */
@@ -170,7 +178,8 @@ struct gait_tracker {
     /* limbs x LIKE_RING: the templates in the form of template_ring(), for this frame. */
     int8_t *template_ring[2][GAIT_MAX_CAMERAS];
     likelihood_scratch *work; /* tasks, or 1 without threads */
-    lag_scratch lag;          /* ancestor and weight: in the memory of the work of all tasks but the first */
+    lag_scratch
+        lag; /* ancestor and weight: in the memory of the work of all tasks but the first; without a lag NULL */
 };
 
 /* Place a tracker in memory; NULL if the arena only counts or overflows.  run: the kernels to use; NULL: when counting. */
