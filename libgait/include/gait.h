@@ -275,7 +275,7 @@ typedef struct gait_tasks { GAIT_TASKS_FIELDS(GAIT_DECLARE) } gait_tasks;
     SETTING("Parts of a step that can run in parallel, one per thread of exec; each takes 0.1 MB if exec is set.",    \
           int32_t, tasks, , "", 8, 1, 256)                                                                            \
     SETTING("Frames that gait_tracker_lagged() can go back; 0: none.",                                                \
-          int32_t, lag, , "frames", 5, 0, 64)                                                                         \
+          int32_t, lag, , "frames", 0, 0, 64)                                                                         \
     PAPER("Likelihood terms in use, a set of GAIT_TERM_*.",                                                           \
           uint32_t, terms, , "mask", GAIT_TERMS_DEFAULT, GAIT_TERM_TEXTURE, NAN, NAN)                                 \
     FIELD("The cameras; the first `cameras` are used.",                                                               \

@@ -43,6 +43,7 @@ int LLVMFuzzerTestOneInput(const uint8_t *data, size_t size)
     if (mode & 1)
         gait_tracker_fill(&c, sizeof c, GAIT_MODE_PAPER);
     c.particles = c.acquisition_particles = 16;
+    c.lag = 5;
     c.camera[0] = fuzz_camera();
     c.terms |= mode & 2 ? GAIT_TERM_KEYPOINTS : 0;
     fuzz_settings("gait_tracker_config", &c, &b);

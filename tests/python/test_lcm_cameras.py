@@ -65,7 +65,7 @@ def by_python(there):
     tracker = Tracker(
         rig.model(),
         [in_message(rig.CAMERA), in_message(SIDE)],
-        TrackerConfig.default(particles=300),
+        TrackerConfig.default(particles=300, lag=5),
         background=[rig.plate(), rig.plate()],
     )
     tracker.start(rig.person(0), rig.SD, rig.utime(0))

@@ -381,7 +381,7 @@ def test_a_shorter_pause_is_bridged_by_prediction(tmp_path):
     assert [m.step for m in outcome.estimates] == [0, 1, 2, 3, 4] and outcome.dropped == 0
     assert not any(m.flags & m.FLAG_NO_IMAGE for m in outcome.estimates)
     tracker = Tracker(
-        rig.model(), rig.CAMERA, TrackerConfig.default(particles=rig.PARTICLES), background=rig.plate()
+        rig.model(), rig.CAMERA, TrackerConfig.default(particles=rig.PARTICLES, lag=5), background=rig.plate()
     )
     tracker.start(rig.person(0), rig.SD, rig.utime(0))
     for i in range(3):

@@ -60,7 +60,7 @@ def test_poses_at_the_frames_times_give_the_bits_of_the_library(tmp_path):
     sd = ("--pose-turn-sd", 0.5, "--pose-place-sd", 0.02)
     outcome, counts = play(tmp_path, events, *sd)
     assert outcome.frames == FRAMES and counts == (0, 0)
-    config = TrackerConfig.default(particles=rig.PARTICLES)
+    config = TrackerConfig.default(particles=rig.PARTICLES, lag=5)
     tracker = Tracker(rig.model(), camera_at(0), config)
     tracker.start(rig.person(0), rig.SD, rig.utime(0))
     for i in range(FRAMES):

@@ -75,7 +75,7 @@ def by_python(stated: bool = False) -> str:
     tracker = Tracker(
         rig.model(),
         as_in_messages(rig.CAMERA),
-        TrackerConfig.default(particles=rig.PARTICLES, terms=terms),
+        TrackerConfig.default(particles=rig.PARTICLES, terms=terms, lag=5),
         background=rig.plate(),
     )
     tracker.start(rig.person(0), rig.SD, rig.utime(0))

@@ -173,7 +173,7 @@ def test_estimates_of_the_daemon_are_those_of_the_library(tmp_path):
     from gait.track.tracker import Tracker
 
     outcome = rig.play(rig.write_log(tmp_path / "a.log", [*rig.opening(), *rig.frames(0, 6)]))
-    config = TrackerConfig.default(particles=rig.PARTICLES)
+    config = TrackerConfig.default(particles=rig.PARTICLES, lag=5)
     tracker = Tracker(rig.model(), rig.CAMERA, config, background=rig.plate())
     tracker.start(rig.person(0), rig.SD, rig.utime(0))
     for i, message in enumerate(outcome.estimates):

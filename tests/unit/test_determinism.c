@@ -193,6 +193,22 @@ static void test_a_crowd_in_pieces(void)
     }
 }
 
+/* How many generations are kept changes no estimate. */
+static void test_no_lag(void)
+{
+    for (int film_kind = 0; film_kind < FILMS; film_kind++) {
+        gait_tracker_config cfg = films_config(film_kind);
+        uint64_t hash[3];
+        for (int lag = 0; lag < 3; lag++) {
+            cfg.lag = lag;
+            gait_tracker *const t = start(&cfg, 0, 1.0f);
+            hash[lag] = advance(&cfg, t, 0, SHOTS, 0);
+            toy_tracker_free(t);
+        }
+        CHECK(hash[0] == hash[1] && hash[0] == hash[2]);
+    }
+}
+
 /* Each instruction set alone with every film; of several the best one is used, which one film suffices to show. */
 static void test_instruction_sets(void)
 {
@@ -239,6 +255,7 @@ int main(int argc, char **argv)
     test_a_crowd_in_pieces();
     if (!THREADS_WATCHED) {
         test_instruction_sets();
+    test_no_lag();
         test_order();
         test_another_seed();
     }

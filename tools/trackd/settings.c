@@ -27,6 +27,8 @@ typedef struct setting {
     ROW(name, type, unit, meaning, usual, paper, low, high)
 #define FIELD(...)
 
+enum { USUAL_LAG = 5 }; /* frames; the library keeps none by default, because they take memory */
+
 static const setting SETTINGS[] = {GAIT_TRACKER_CONFIG_FIELDS(SETTING, PAPER, FIELD)};
 enum { SETTING_COUNT = sizeof SETTINGS / sizeof *SETTINGS };
 
@@ -65,7 +67,7 @@ static const char *option_help(const setting *s)
     if (s->paper != s->usual)
         snprintf(paper, sizeof paper, ", paper mode %g", s->paper);
     snprintf(help, sizeof helps[0], "%s\n        %s%sdefault %g%s", s->meaning, s->unit, *s->unit ? "; " : "",
-             s->usual, paper);
+             strcmp(s->name, "lag") == 0 ? USUAL_LAG : s->usual, paper);
     return help;
 }
 
@@ -342,6 +344,7 @@ option_result settings_read(settings *s, int argc, char **argv, message *why)
         result = parse(s, table, count, argc, argv, why); /* which mode? */
     gait_tracker_default(&s->tracker, mode(s));
     s->tracker.tasks = 0;
+    s->tracker.lag = USUAL_LAG;
     if (result == OPTION_OK)
         result = parse(s, table, count, argc, argv, why);
     if (result != OPTION_OK)

@@ -193,7 +193,7 @@ class Tracker:
         Parameters
         ----------
         back : int, optional
-            At most ``config.lag``, which is also the default.
+            At most ``config.lag``, which is also the default.  Configure a lag: without one, nothing is kept.
 
         Returns
         -------
