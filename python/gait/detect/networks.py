@@ -163,14 +163,16 @@ def _sigmoid(x: NDArray[np.float32]) -> Array:
 
 
 def _refined(place: Array, heat: NDArray[np.float32]) -> Array:
-    """Replace regressed positions by the centres of the heat maps around them, where these have a peak."""
+    """Replace regressed positions in use by the centres of the heat maps around them, if there is a peak."""
     cell = _CROP_SIDE / _HEAT_SIDE
-    for j, (x, y) in enumerate((place / cell).astype(int)):
+    for j in (*LANDMARK_JOINTS.values(), _CENTRE, _TOP):
+        x, y = (place[j] / cell).astype(int)
         rows = slice(max(y - _HEAT_RADIUS, 0), max(y + _HEAT_RADIUS + 1, 0))
         columns = slice(max(x - _HEAT_RADIUS, 0), max(x + _HEAT_RADIUS + 1, 0))
         warm = _sigmoid(heat[rows, columns, j])
         if warm.size and warm.max() >= _LEAST_HEAT:
-            v, u = np.mgrid[rows, columns][:, : warm.shape[0], : warm.shape[1]]
+            u = np.arange(columns.start, columns.start + warm.shape[1])
+            v = np.arange(rows.start, rows.start + warm.shape[0])[:, None]
             place[j] = cell * np.array([(warm * u).sum(), (warm * v).sum()]) / warm.sum()
     return place
 

@@ -121,15 +121,17 @@ class Video:
     def frames(self, start: int = 0, stop: int | None = None, *, grey: bool = False) -> Iterator[Frame]:
         """Yield the frames `start` <= index < `stop` in order, as BGR or grey."""
         pixels = "gray" if grey else "bgr24"
+        convert = _converter()
         for index, time, frame in self._decode(stop):
             if index >= start:
-                yield Frame(index, time, self._upright(frame, pixels))
+                yield Frame(index, time, self._upright(convert(frame, format=pixels)))
 
     def pick(self, wanted: Collection[int], progress: Callable[[int], None] | None = None) -> Iterator[Frame]:
         """Yield the frames with the numbers `wanted`, as BGR; `progress` as in `sample_frames`."""
+        convert = _converter()
         for index, time, frame in self._decode(None):
             if index in wanted:
-                yield Frame(index, time, self._upright(frame, "bgr24"))
+                yield Frame(index, time, self._upright(convert(frame, format="bgr24")))
             if progress is not None:
                 progress(index)
 
@@ -165,7 +167,7 @@ class Video:
                 found = f"breaks off after frame {self.count} of {stated}"
                 self.broken = f"{self.path}: {found}; copy it again if you need the rest"
         for _, _, frame in self._decode(1):
-            self.height, self.width = self._upright(frame, "gray").shape
+            self.height, self.width = self._upright(_converter()(frame, format="gray")).shape
             return
         raise UserError(f"{self.path}: has no frame that can be decoded; convert it with ffmpeg first")
 
@@ -191,9 +193,9 @@ class Video:
         except av.error.FFmpegError as exc:
             raise self._unreadable(exc) from exc
 
-    def _upright(self, frame: av.VideoFrame, pixels: str) -> Image:
-        """Convert a frame to a pixel format, rotated and mirrored as the container states."""
-        image = np.asarray(frame.to_ndarray(format=pixels), np.uint8)
+    def _upright(self, frame: av.VideoFrame) -> Image:
+        """Return a frame's pixels, rotated and mirrored as the container states."""
+        image = np.asarray(frame.to_ndarray(), np.uint8)
         side_data: Any = frame.side_data.get("DISPLAYMATRIX")
         if side_data is None:
             return image
@@ -217,6 +219,13 @@ class Video:
     def _unreadable(self, exc: av.error.FFmpegError) -> UserError:
         reason = exc.strerror or type(exc).__name__
         return UserError(f"{self.path}: cannot be read as video ({reason}); give a file that ffmpeg plays")
+
+
+def _converter() -> Callable[..., av.VideoFrame]:
+    """Return a converter of frames to a pixel format, set up once rather than for every frame."""
+    from av.video.reformatter import VideoReformatter
+
+    return VideoReformatter().reformat
 
 
 def _times(stamps: list[int | None], unit: float, fps: float) -> NDArray[np.float64]:

@@ -54,6 +54,8 @@ class PersonKeypoints:
     ) -> None:
         self._camera, self._keypoints, self._apart, self.ids = camera, keypoints, apart or {}, [person]
         self._further = further
+        self._asked: tuple[Frame, NDArray[np.float64]] | None = None
+        self._known: dict[int, tuple[FrameKeypoints, float]] = {}  # distances from that estimate
 
     def add(self, id: int) -> None:
         """Add an id of this person."""
@@ -143,8 +145,12 @@ class PersonKeypoints:
 
     def _distance(self, frame: Frame, estimate: Estimate, keypoints: FrameKeypoints) -> float:
         """Median distance from the estimated joints, person's heights; infinite if no joint was found."""
-        apart = self._distances(frame, estimate, keypoints, tuple(keypoints.names))
-        return float(np.median(apart)) if len(apart) else np.inf
+        if self._asked is None or self._asked[0] is not frame or self._asked[1] is not estimate.joints:
+            self._asked, self._known = (frame, estimate.joints), {}
+        if id(keypoints) not in self._known:
+            apart = self._distances(frame, estimate, keypoints, tuple(keypoints.names))
+            self._known[id(keypoints)] = keypoints, float(np.median(apart)) if len(apart) else np.inf
+        return self._known[id(keypoints)][1]
 
     def _distances(
         self, frame: Frame, estimate: Estimate, keypoints: FrameKeypoints, names: tuple[str, ...]
