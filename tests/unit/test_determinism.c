@@ -255,7 +255,7 @@ int main(int argc, char **argv)
     test_a_crowd_in_pieces();
     if (!THREADS_WATCHED) {
         test_instruction_sets();
-    test_no_lag();
+        test_no_lag();
         test_order();
         test_another_seed();
     }

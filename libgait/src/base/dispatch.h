@@ -93,7 +93,7 @@ struct particle_block;
       (const struct dynamics_step *s, int32_t first, const struct particle_block *from,                         \
        struct particle_block *to))                                                                              \
     /* Weighted sums over particles.  dominant: 1 for particles of the dominant hypothesis. */                  \
-    /* With d = v - about, add d, d^2, and d over the dominant hypothesis to SUM_LANES running sums of each. */  \
+    /* With d = v - about, add d, d^2, and d over the dominant hypothesis to SUM_LANES running sums of each. */ \
     /* Only the last of several calls may have an n that is no multiple of SUM_LANES. */                        \
     K(void, estimate_moments,                                                                                   \
       (const float *v, const double *weight, const uint8_t *dominant, int32_t n, double about,                  \
