@@ -65,11 +65,41 @@ def test_a_lens_is_used_under_every_name_in_use(name, tmp_path):
         matrix("D1", LENS),
         matrix("radial_distortion", LENS[:2]),
         matrix("undistorted_lens_dist", LENS[:2]),
+        matrix("coefficients", LENS),
+        matrix("kc", LENS),
+        "camera_type: PINHOLE_EQUI\n",
+        "made_by: [ calibrate, KannalaBrandt8 ]\n",
+        "lens_parameters:\n   k1: -0.25\n",
+        "left:\n   lens:\n      - kind: omnidirectional\n",
     ],
 )
 def test_lenses_described_in_other_ways_are_refused(entry, tmp_path):
     with pytest.raises(UserError, match=f"a.yaml: {entry.split(':')[0]} .*undistort the video"):
         Camera.read(opencv(tmp_path / "a.yaml", matrix("distortion_coefficients", LENS[:4]), entry))
+
+
+@pytest.mark.parametrize("count", [4, 5, 8, 12, 14])
+def test_a_list_that_may_be_the_lens_is_named_if_there_is_none(count, tmp_path):
+    entry = matrix("intrinsics_kc", np.full(count, 0.1))
+    with pytest.raises(
+        UserError, match=f"intrinsics_kc may be .*{count} numbers.*distortion_coefficients with"
+    ):
+        Camera.read(opencv(tmp_path / "a.yaml", entry, matrix("D", np.zeros(5))))
+    others = matrix("per_view_errors", np.full(count, 0.1)) + matrix("crop", np.full(count, 400))
+    assert Camera.read(opencv(tmp_path / "a.yaml", others)).fx == 330
+    assert Camera.read(opencv(tmp_path / "a.yaml", entry, matrix("D", LENS))).distortion[0] == LENS[0]
+
+
+@pytest.mark.parametrize(
+    "key", ["type", "lens", "projection", "flags", "nonlinear_model", "distortion_model"]
+)
+def test_a_fisheye_is_one_under_any_key(key, tmp_path):
+    lens = matrix("D", (-0.02, 0.01, -0.004, 0.001))
+    with pytest.raises(UserError, match="describes a fisheye lens that"):
+        Camera.read(opencv(tmp_path / "a.yaml", lens, f"{key}: Fish-Eye\n"))
+    with pytest.raises(UserError, match=f"{key} and lens_model name different lenses"):
+        Camera.read(opencv(tmp_path / "a.yaml", lens, f"{key}: equidistant\n", "lens_model: radtan\n"))
+    assert Camera.read(opencv(tmp_path / "a.yaml", lens, "camera_name: fisheye\n")).distortion[0] == -0.02
 
 
 @pytest.mark.parametrize("count", [1, 2, 3, 6, 7, 9, 13])

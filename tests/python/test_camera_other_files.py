@@ -127,6 +127,23 @@ REFUSED = {
         lambda p: kalibr(p / "c.yaml").replace("cam0", "cam1"),
         "lens omni-none is not supported",
     ),
+    "kalibr_key": (
+        lambda p: changed(kalibr(p / "c.yaml"), "distortion_coeffs", "distortion_terms"),
+        "distortion_terms describes an unknown kind of lens; .* distortion_coefficients with k1 k2",
+    ),
+    "kalibr_no_model": (
+        lambda p: changed(kalibr(p / "c.yaml"), "  distortion_model: radtan\n", ""),
+        "distortion_coeffs without distortion_model; add radtan or equidistant",
+    ),
+    "kalibr_none": (lambda p: kalibr(p / "c.yaml", "none"), "without distortion_model; add radtan"),
+    "kalibr_two": (
+        lambda p: changed(kalibr(p / "c.yaml"), "  rostopic", "  fisheye: true\n  rostopic"),
+        "fisheye and distortion_model name different lenses; remove one",
+    ),
+    "ros_key": (
+        lambda p: changed(ros_message(p / "a.yaml"), "\nd: ", "\nlens: "),
+        r"lens may be a lens \(5 numbers\); lenses are distortion_coefficients",
+    ),
     "kalibr_fov": (lambda p: kalibr(p / "c.yaml", "fov", [0.9]), "pinhole-fov is not supported; undistort"),
     "kalibr_choice": (
         lambda p: kalibr(p / "c.yaml")[:-5],
@@ -170,6 +187,14 @@ def broad(path):
 def written(path, text):
     path.write_text(text)
     return str(path)
+
+
+def changed(path, old, new):
+    """Replace the first `old` in a file, which may be followed by a camera's name."""
+    file = Path(path.split(".yaml")[0] + ".yaml")
+    assert old in file.read_text()
+    file.write_text(file.read_text().replace(old, new, 1))
+    return path
 
 
 def foreign_pickle(path):

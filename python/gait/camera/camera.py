@@ -261,8 +261,14 @@ _TOML_KEYS = ("name", "size", "matrix", "distortions", "rotation", "translation"
 #: Keys that describe a lens, as `_plain` returns them: words in keys, and whole keys.
 _LENS_WORD = re.compile(
     r"dist(?!ance)|fisheye|omni|radial|tangential|prism|equidistant|kannala|(lens|camera|projection)(model|type)"
+    r"|(?<!correlation)coef"
 )
-_LENS_KEYS = re.compile(r"model|d\d+|k[1-9]|p[12]|s[1-4]|xi|tau[xy]|skew")
+_LENS_KEYS = re.compile(r"model|d\d+|k[1-9]|p[12]|s[1-4]|xi|tau[xy]|skew|kc\d*")
+#: Keys of names, which may contain any word, and words in the keys of other short lists of numbers.
+_NAME_KEYS = re.compile(r"(camera|cam)?name|.*(topic|path|file|time|date)")
+_OTHER_LISTS = re.compile(
+    r"error|rms|roi|quat|rot|orient|pos|size|board|square|rect|box|crop|view|overlap|time"
+)
 #: Names of lens models with at most k1 k2 p1 p2 k3; the number of coefficients reveals rational ones with
 #: more.
 _LENSES = {
@@ -281,13 +287,15 @@ _LENSES = {
 }
 #: Words in the names of other lens models; keys "model" and "type" may also name the manufacturer's product.
 _FOREIGN = re.compile(
-    r"fisheye|equidist|equisolid|stereographic|kannala|^kb\d|omni|^mei$|e?ucm|unified|doublesphere|^ds$|^fov$"
+    r"fisheye|equi(?![pv])|stereographic|kannala|^kb\d|omni|^mei$|e?ucm|unified|doublesphere|^ds$|^fov$"
     r"|division|ocam|scaramuzza|prism|spline|spheric|panoram"
 )
-_MODEL_KEYS = ("distortionmodel", "cameramodel", "lensmodel", "projectionmodel", "model", "cameratype")
 #: Names of OpenCV's fisheye lens, with four coefficients.
 _FISHEYES = ("fisheye", "opencvfisheye", "equidistant", "equi", "kannalabrandt", "kannalabrandt4", "kb4")
+#: Names of lenses that are certainly none of those.
+_NO_FISHEYES = ("plumbbob", "radtan", "radialtangential", "brown", "brownconrady", "rationalpolynomial")
 _MORE_TERMS = (8, 12, 14)  # coefficients of OpenCV's lenses with rational terms, thin prisms, and tilt
+_LARGEST_COEFFICIENT = 100  # below focal lengths and pictures' sizes, in pixels
 #: Largest relative difference in size between the picture and one with the principal point in its middle: if
 #: the file states the size, so that the picture may be cropped; otherwise; and, for a picture that was
 #: resized, between the factors of width and height.
@@ -479,9 +487,12 @@ def _opencv_fields(path: str, content: dict[str, Any]) -> tuple[Fields, bool]:
         else:
             data[name], source[name] = value, key
     fields = Fields(path, data)
-    fisheye = [key for key, value in others.items() if _is_fisheye(key, value)]
-    others = {key: value for key, value in others.items() if key not in fisheye}
-    _refuse_other_lenses(Fields(path, others), others)
+    fisheye = [key for key, value in others.items() if _is_fisheye(_plain(key), value)]
+    rest = {key: value for key, value in others.items() if key not in fisheye}
+    other = next((key for key, value in rest.items() if _plain(str(value)) in _NO_FISHEYES), None)
+    if fisheye and other is not None:
+        raise UserError(f"{path}: {fisheye[0]} and {other} name different lenses; remove one")
+    _refuse_other_lenses(fields, rest, "distortion_coefficients")
     if (
         "R" in fields
         and "rvec" in fields
@@ -492,29 +503,49 @@ def _opencv_fields(path: str, content: dict[str, Any]) -> tuple[Fields, bool]:
 
 
 def _is_fisheye(key: str, value: Any) -> bool:
-    """Whether an entry names OpenCV's fisheye lens."""
+    """Whether an entry names OpenCV's fisheye lens; `key` as `_plain` returns it."""
     if isinstance(value, str):
-        return _plain(key) in _MODEL_KEYS and _plain(value) in _FISHEYES
-    return _plain(key) in ("fisheye", "fisheyemodel") and value == 1
+        return not _NAME_KEYS.fullmatch(key) and _plain(value) in _FISHEYES
+    return key in ("fisheye", "fisheyemodel") and value == 1
 
 
-def _refuse_other_lenses(fields: Fields, others: Mapping[str, Any]) -> None:
-    """Raise UserError for unknown keys that describe another kind of lens, unless they are 0, false or ''."""
+def _refuse_other_lenses(fields: Fields, others: Mapping[str, Any], name: str) -> None:
+    """Raise UserError for unknown keys that describe a lens, unless they are 0, false or ''.
+
+    `name`: key of the coefficients.
+    """
+    without = name not in fields or not np.any(fields.get(name, ""))
     for key, value in others.items():
-        if not _LENS_KEYS.fullmatch(_plain(key)) and not _LENS_WORD.search(_plain(key)):
-            continue
-        if isinstance(value, str):
-            made = _plain(key) in ("cameramodel", "cameratype") and not _FOREIGN.search(_plain(value))
-            if made or _plain(value) in _LENSES:
-                continue
-            what = f"is {value[:40]!r}"
-        elif not np.any(value):
-            continue
-        else:
-            what = "describes an unknown kind of lens"
-        raise fields.fail(
-            key, what, "lenses have k1 k2 p1 p2 [k3]: undistort the video, or calibrate with them"
-        )
+        if what := _other_lens(_plain(key), value, without):
+            remedy = (
+                f"lenses are {name} with k1 k2 p1 p2 [k3]: rename it, undistort the video, or calibrate anew"
+            )
+            raise fields.fail(key, what, remedy)
+
+
+def _other_lens(key: str, value: Any, without: bool) -> str:
+    """Return how an unknown entry, its key from `_plain`, describes a lens, or ''.
+
+    `without`: whether the coefficients are missing, so that any list of as many numbers may be them.
+    """
+    named = _LENS_KEYS.fullmatch(key) or _LENS_WORD.search(key)
+    if isinstance(value, str):
+        foreign = _FOREIGN.search(_plain(value)) and not _NAME_KEYS.fullmatch(key)
+        known = key in ("cameramodel", "cameratype") or _plain(value) in _LENSES
+        return f"is {value[:40]!r}" if foreign or (named and not known) else ""
+    if named and np.any(value):
+        return "describes an unknown kind of lens"
+    if isinstance(value, Mapping):
+        found = (_other_lens(_plain(str(inner)), entry, False) for inner, entry in value.items())
+        return "describes an unknown kind of lens" if any(found) else ""
+    if isinstance(value, list):
+        if words := next((said for entry in value if (said := _other_lens("", entry, False))), ""):
+            return words
+        numbers = np.ravel(value) if without and not _OTHER_LISTS.search(key) else np.zeros(0)
+        if len(numbers) in (4, 5, *_MORE_TERMS) and max(np.shape(value)) == len(numbers):
+            small = numbers.dtype.kind in "fi" and 0 < np.abs(numbers).max() < _LARGEST_COEFFICIENT
+            return f"may be a lens ({len(numbers)} numbers)" if small else ""
+    return ""
 
 
 def _toml_cameras(path: str) -> tuple[dict[str, Any], dict[str, Mapping[str, Any]]]:
@@ -535,9 +566,8 @@ def _from_toml(path: str, name: str | None) -> Camera:
         asked = f"no camera {name}" if name else "several cameras or none"
         raise UserError(f"{path}: {asked}; choose one as {Path(path).name}:NAME, found: {found}")
     fields = Fields(f"{path}: [{name}]", cameras[name])
-    _refuse_other_lenses(
-        fields, {key: value for key, value in cameras[name].items() if key not in _TOML_KEYS}
-    )
+    others = {key: value for key, value in cameras[name].items() if key not in _TOML_KEYS}
+    _refuse_other_lenses(fields, others, "distortions")
     size = _size(fields, "size", "give [width, height] in pixels")
     given, turn = _intrinsics(fields, "matrix"), _rodrigues(fields, "rotation")
     intrinsics, lens = _lens(fields, "distortions", given, size, bool(cameras[name].get("fisheye")))

@@ -48,7 +48,10 @@ _COLMAP_MODELS = (
     "SIMPLE_DIVISION", "DIVISION",
 )  # fmt: skip
 _OPENCV_ORDER = ("k1", "k2", "p1", "p2", "k3", "k4", "k5", "k6")
-_KALIBR = {"radtan": "", "none": "", "equidistant": "fisheye", "equi": "fisheye"}
+_KALIBR = {"radtan": "radtan", "none": "none", "equidistant": "fisheye", "equi": "fisheye"}
+#: Keys of Kalibr and ROS that are read, or do not describe the lens.
+_KALIBR_KEYS = ("camera_model", "distortion_model", "intrinsics", "resolution", "rostopic", "cam_overlaps")
+_ROS_KEYS = ("header", "width", "height", "k", "r", "p", "binning_x", "binning_y", "roi")
 
 
 def read_plain_yaml(path: str, name: str | None) -> Entries:
@@ -111,9 +114,10 @@ def _kalibr(path: str, chain: Mapping[str, Any], name: str | None) -> Entries:
         raise UserError(
             f"{path}: intrinsics are fu fv pu pv and resolution is [width, height]; correct them"
         ) from None
-    entries = _pinhole(fx, fy, cx, cy, width, height)
-    entries["distortion_coefficients"] = camera.get("distortion_coeffs", []) if lens != "none" else []
-    return entries | ({"distortion_model": _KALIBR[lens]} if _KALIBR[lens] else {})
+    others = {str(key): value for key, value in camera.items() if key not in _KALIBR_KEYS}
+    if lens == "none" and any("dist" in key.lower() and np.any(value) for key, value in others.items()):
+        raise UserError(f"{path}: distortion_coeffs without distortion_model; add radtan or equidistant")
+    return others | _pinhole(fx, fy, cx, cy, width, height) | {"distortion_model": _KALIBR[lens]}
 
 
 def _pinhole(fx: float, fy: float, cx: float, cy: float, width: Any, height: Any) -> Entries:
@@ -132,12 +136,10 @@ def _ros(path: str, data: Mapping[str, Any]) -> Entries:
     values = np.asarray(plain["k"], float)
     if values.size != 9:
         raise UserError(f"{path}: k has {values.size} numbers, not 9; write the message again")
-    return {
+    return {key: value for key, value in plain.items() if key not in _ROS_KEYS} | {
         "camera_matrix": values.reshape(3, 3).tolist(),
         "image_width": plain.get("width"),
         "image_height": plain.get("height"),
-        "distortion_model": plain["distortion_model"],
-        "distortion_coefficients": plain.get("d", []),
     }
 
 
