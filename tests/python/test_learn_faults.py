@@ -77,7 +77,9 @@ def test_times_rounded_to_milliseconds_or_left_out_are_accepted(marked, tmp_path
 
 
 def header(path, at, value, form="<H"):
+    """Change a value of the header, at a byte, or of the parameter with a name."""
     content = bytearray(path.read_bytes())
+    at = content.index(at) + len(at) + 4 if isinstance(at, bytes) else at
     struct.pack_into(form, content, at, value)
     path.write_bytes(content)
     return path
@@ -90,6 +92,13 @@ def header(path, at, value, form="<H"):
         (2, 18, "<H", "the header states 18 points, POINT:USED 17"),
         (4, 6, "<H", r"6 analog values per frame, ANALOG:USED and ANALOG:RATE 0 \(0 channels"),
         (20, 60.0, "<f", "60 frames per second, POINT:RATE 120; .* give --fps"),
+        (8, 180, "<H", "180 frames, POINT:FRAMES 240"),
+        (6, 50, "<H", "191 frames, POINT:FRAMES 240"),
+        (16, 9, "<H", "points from block 9 on, POINT:DATA_START 4"),
+        (12, 0.5, "<f", "a scale of 0.5, POINT:SCALE -1"),
+        (b"FRAMES", 800, "<H", "240 frames, POINT:FRAMES 800"),
+        (b"DATA_START", 5, "<H", "points from block 4 on, POINT:DATA_START 5"),
+        (b"SCALE", 0.1, "<f", "a scale of -1, POINT:SCALE 0.1"),
     ],
 )
 def test_a_header_that_differs_from_the_parameters_is_named(at, value, form, words, marked, tmp_path):
@@ -240,12 +249,6 @@ def test_without_pelvis_markers_it_is_level_across_the_hips(tmp_path):
     assert np.isfinite(body.pelvis).all() and body.pelvis[:, 2, 2] == pytest.approx(1, abs=0.02)
 
 
-def test_strides_beyond_the_search_are_named():
-    angles = mw.walk_angles(600, 120.0)
-    with pytest.raises(UserError, match="a.csv: not learnt as 'walk': strides of 2.40 s are longer than 2.1"):
-        sequence.prepare(Path("a.csv"), AngleTable("a", 50.0, angles))
-
-
 def test_markers_of_legs_in_another_unit_are_named_by_their_size(tmp_path):
     labels = ["RHip", "RKnee", "RAnkle", "LHip", "LKnee", "LAnkle"]
     legs = [[0.0, side, height] for side in (0.1, -0.1) for height in (0.9, 0.5, 0.1)]
@@ -260,11 +263,18 @@ def test_too_few_markers_do_not_lack_names(tmp_path):
         readers.read(path)
 
 
-@pytest.mark.parametrize("fps", [200.0, 100.0 / 0.33])
-def test_strides_shorter_than_the_search_are_not_taken_for_two(fps):
-    angles = mw.walk_angles(600, 60.0)
-    with pytest.raises(UserError, match=f"strides of {60 / fps:.2f} s are shorter than 0.4 s.*see --fps"):
+@pytest.mark.parametrize("stride", [0.2, 0.3, 0.33, 0.37, 0.395, 2.11, 2.15, 2.25, 2.4, 4.4])
+def test_strides_outside_the_search_are_named_and_never_learnt_as_others(stride):
+    fps, angles = 60 / stride, mw.walk_angles(240, 60.0)
+    limit = "longer than 2.1 s" if stride > 1 else "shorter than 0.4 s"
+    with pytest.raises(UserError, match=f"a.csv: not .*strides of {stride:.2f} s are {limit}.*see --fps"):
         sequence.prepare(Path("a.csv"), AngleTable("a", fps, angles))
+
+
+@pytest.mark.parametrize("stride", [0.405, 2.095])
+def test_strides_just_inside_the_search_are_learnt(stride):
+    found = sequence.prepare(Path("a.csv"), AngleTable("a", 60 / stride, mw.walk_angles(240, 60.0)))
+    assert found.period.frames / found.fps == pytest.approx(stride, rel=0.002)
 
 
 def test_noise_is_not_blamed_on_the_search():

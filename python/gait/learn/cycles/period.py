@@ -26,6 +26,7 @@ DIVISOR_SCORE = 0.5  # share of its best score that an accepting angle has at th
 FEWEST_CYCLES = 1.5
 SECONDS = (0.4, 2.1)
 LONGER = 4.0  # multiple of the longest period up to which `find_longer` searches
+MOST_CLIMBS = 50  # most frames from an end of the search to the best period outside it
 LITERAL_SECONDS = (50 / 120, 250 / 120)  # the paper's 50 to 250 frames, assumed at 120 per second
 
 
@@ -166,6 +167,22 @@ def find_longer(signals: Floats, fps: float, mode: str = "refined") -> float:
 def refined(signals: Floats, frames: float) -> float:
     """Return the best period, frames, near one that is almost right."""
     return _refine(signals[:, _moving(signals)], frames)
+
+
+def climbed(signals: Floats, fps: float, frames: float, mode: str = "refined") -> float:
+    """Return the best period, frames, near one at an end of the search, where it may be outside.
+
+    The end scores better than all periods inside if the best one is a little beyond it; a period further than
+    a frame from the ends is returned as it is.
+    """
+    low, high = _bounds(fps, mode)
+    if not np.isfinite(frames) or low + 1 <= frames <= high - 1:
+        return frames
+    for _ in range(MOST_CLIMBS):
+        before, frames = frames, refined(signals, frames)
+        if abs(frames - before) < 0.5:
+            break
+    return frames
 
 
 def seconds(mode: str) -> tuple[float, float]:

@@ -94,6 +94,8 @@ def _short(path: Path, read: Body | AngleTable, options: LearnOptions) -> Sequen
     judged, channels, heading = _judge(motion, found, options.activity, by_steps=True)
     if not judged.accepted or not cutting.fewest_cycles(channels, found.frames, OBSERVED_PHASES):
         return None
+    if _outside(motion.angles, read.fps, found.frames, options.period_mode, repeats=True):
+        return None
     made = _sequence(path, read.fps, motion, kept, (judged, channels, heading), found)
     return replace(made, short=True)
 
@@ -105,18 +107,17 @@ def _long(path: Path, read: Body | AngleTable, options: LearnOptions) -> Sequenc
     if options.trim:
         kept, found = steady.steady_part(motion.angles, read.fps, mode, motion.path)
         if not kept.stop - kept.start >= period.FEWEST_CYCLES * found.frames:
-            reason = _too_long(motion.angles, read.fps, options) or _unsteady(kept, found, read.fps)
-            raise _refused(path, activity, reason)
+            outside = _outside(motion.angles, read.fps, found.frames, mode, repeats=False)
+            raise _refused(path, activity, outside or _unsteady(kept, found, read.fps))
     if found is None or kept.stop - kept.start < read.frames:
         motion = _motion(read.part(kept.start, kept.stop))
         found = stride.find(motion.angles, read.fps, mode)
-    if too_short := _too_short(motion.angles, read.fps, found.frames, options):
-        raise _refused(path, activity, too_short)
     judged, channels, heading = _judge(motion, found, activity)
+    if outside := _outside(motion.angles, read.fps, found.frames, mode, judged.cyclic):
+        raise _refused(path, activity, outside)
     if not judged.accepted:
         other = judged.activity if {judged.activity, activity} == {"walk", "run"} else ""
-        too_long = "" if judged.cyclic else _too_long(motion.angles, read.fps, options)
-        raise _refused(path, activity, too_long or judged.reason, other)
+        raise _refused(path, activity, judged.reason, other)
     if not cutting.fewest_cycles(channels, found.frames, OBSERVED_PHASES):
         raise _refused(path, activity, "too little of each cycle is observed")
     return _sequence(path, read.fps, motion, kept, (judged, channels, heading), found)
@@ -148,29 +149,26 @@ def _sequence(
     )
 
 
-def _too_long(angles: Floats, fps: float, options: LearnOptions) -> str:
-    """Explain that no cycle was found because it is too long, or return ''."""
-    frames, longest = (
-        period.find_longer(angles, fps, options.period_mode),
-        period.seconds(options.period_mode)[1],
-    )
-    if not _is_stride(angles, frames):
-        return ""
-    return (
-        f"strides of {frames / fps:.2f} s are longer than {longest:.3g} s, which is the longest allowed (see "
-        f"--fps unless it is {fps:g} frames per second)"
-    )
+def _outside(angles: Floats, fps: float, found: float, mode: str, repeats: bool) -> str:
+    """Explain that the strides are shorter or longer than those searched for, or return ''.
 
-
-def _too_short(angles: Floats, fps: float, found: float, options: LearnOptions) -> str:
-    """Explain that the cycle found, of `found` frames, is several too short strides, or return ''."""
-    shortest = period.seconds(options.period_mode)[0]
-    for frames in (found / 2, found / 3):
-        if frames / fps < shortest and _is_stride(angles, frames):
-            return (
-                f"strides of {frames / fps:.2f} s are shorter than {shortest:.3g} s, which is the shortest "
-                f"allowed (see --fps unless it is {fps:g} frames per second)"
-            )
+    `found`: the period found, frames; a stride if the motion does not repeat even better just beyond an end
+    of the search, and if it is not two or three strides.  `repeats`: whether the motion repeats after it.
+    """
+    shortest, longest = period.seconds(mode)
+    reached = period.climbed(angles, fps, found, mode)
+    tried = [found / 2, found / 3] if reached / fps <= longest else []
+    if not repeats or reached / fps > longest:
+        tried.append(period.find_longer(angles, fps, mode))
+    strides = [f for f in (reached, *tried) if _is_stride(angles, f)] + [reached] * repeats
+    for seconds in (frames / fps for frames in strides):
+        if seconds < shortest:
+            what = f"shorter than {shortest:.3g} s, which is the shortest allowed"
+        elif seconds > longest:
+            what = f"longer than {longest:.3g} s, which is the longest allowed"
+        else:
+            continue
+        return f"strides of {seconds:.2f} s are {what} (see --fps unless it is {fps:g} frames per second)"
     return ""
 
 

@@ -11,6 +11,12 @@ from typing import Any
 import ezc3d
 import numpy as np
 
+#: Parameters that the header also states.
+STATED = (
+    *(("POINT", "USED"), ("POINT", "RATE"), ("POINT", "DATA_START"), ("POINT", "SCALE")),
+    *(("ANALOG", "USED"), ("ANALOG", "RATE")),
+)
+
 
 def main(path: str) -> None:
     """Read `path` and write its points to stdout."""
@@ -19,8 +25,7 @@ def main(path: str) -> None:
     units = parameters["UNITS"]["value"] if "UNITS" in parameters else []
     labels = [label for k in ("", *range(2, 100)) for label in _labels(parameters, f"LABELS{k}")]
     stated: dict[str, Any] = {
-        f"{group}:{name}": _number(c3d["parameters"], group, name)
-        for group, name in (("POINT", "USED"), ("POINT", "RATE"), ("ANALOG", "USED"), ("ANALOG", "RATE"))
+        f"{group}:{name}": _number(c3d["parameters"], group, name) for group, name in STATED
     }
     buffer = io.BytesIO()
     np.savez(

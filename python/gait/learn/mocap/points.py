@@ -23,7 +23,7 @@ READ_TIMEOUT_S = 120.0  # seconds for one file
 #: Bytes; the first is the header, and its first byte is the block in which the parameters begin.
 BLOCK_BYTES = 512
 BIG_ENDIAN, DEC = 86, 85  # processor types, fourth byte of the parameters
-RATE_TOLERANCE = 1e-3  # relative difference from which rates are different
+TOLERANCE = 1e-3  # relative difference from which rates or scales are different
 MOST_HEADER_FRAMES = 65535  # frames; more do not fit in the header
 
 
@@ -82,24 +82,46 @@ def read_c3d(path: Path, fps: float | None = None) -> tuple[list[str], Floats, f
 
 
 class Header(NamedTuple):
-    """Contents of the header; ezc3d silently replaces them by the parameters."""
+    """Contents of the header, and POINT:FRAMES; ezc3d silently replaces or ignores them."""
 
     points: int
     analog: int  #: values per frame of points
     frames: int  #: 0 if their number does not fit
-    rate: float  #: frames per second; NaN if written by a DEC
+    rate: float  #: frames per second; NaN if written by a DEC, as the next
+    scale: float  #: of whole numbers, in units of the file; negative if points are floating-point numbers
+    data_block: int  #: number of the block in which the points begin
+    stated_frames: int  #: POINT:FRAMES; 0 if missing or too large for it
 
 
 def _header(path: Path) -> Header:
-    with path.open("rb") as file:
-        header = file.read(BLOCK_BYTES)
-        file.seek((header[0] - 1) * BLOCK_BYTES)
-        kind = file.read(4)[3]
+    content = path.read_bytes()
+    begin = (content[0] - 1) * BLOCK_BYTES
+    kind = content[begin + 3]
     order = ">" if kind == BIG_ENDIAN else "<"
-    points, analog, first, last = struct.unpack_from(f"{order}4H", header, 2)
-    (rate,) = struct.unpack_from(f"{order}f", header, 20)
+    points, analog, first, last, _, scale, block, _, rate = struct.unpack_from(f"{order}5Hf2Hf", content, 2)
     frames = 0 if last >= MOST_HEADER_FRAMES else max(0, last - first + 1)
-    return Header(points, analog, frames, float("nan") if kind == DEC else rate)
+    if kind == DEC:
+        rate = scale = float("nan")
+    return Header(points, analog, frames, rate, scale, block, _stated_frames(content[begin:], order))
+
+
+def _stated_frames(parameters: bytes, order: str) -> int:
+    """Return POINT:FRAMES from the bytes of the parameters: records of a name, a group's id and a value."""
+    at, group, frames = 4, 0, dict[int, int]()
+    while at + 2 < len(parameters) and (length := abs(struct.unpack_from("b", parameters, at)[0])):
+        (id,) = struct.unpack_from("b", parameters, at + 1)
+        name, end = parameters[at + 2 : at + 2 + length].upper(), at + 2 + length
+        if end + 6 > len(parameters):
+            break
+        step, kind, dimensions, value = struct.unpack_from(f"{order}HbBH", parameters, end)
+        if id < 0 and name == b"POINT":
+            group = -id
+        elif name == b"FRAMES" and (kind, dimensions) == (2, 0):
+            frames[id] = value % MOST_HEADER_FRAMES
+        if not step:
+            break
+        at = end + step
+    return frames.get(group, 0)
 
 
 def _require_agreement(path: Path, header: Header, stated: Mapping[str, float], rated: bool) -> None:
@@ -110,6 +132,7 @@ def _require_agreement(path: Path, header: Header, stated: Mapping[str, float], 
     point_rate, analog_rate = stated["POINT:RATE"], stated["ANALOG:RATE"]
     samples = analog_rate / point_rate if point_rate > 0 else 0.0
     analog = round(stated["ANALOG:USED"] * samples)
+    block, scale = round(stated["POINT:DATA_START"]), stated["POINT:SCALE"]
     fault = ""
     if header.points != round(stated["POINT:USED"]):
         fault = f"{header.points} points, POINT:USED {stated['POINT:USED']:g}"
@@ -118,8 +141,21 @@ def _require_agreement(path: Path, header: Header, stated: Mapping[str, float], 
             f"{header.analog} analog values per frame, ANALOG:USED and ANALOG:RATE {analog} "
             f"({stated['ANALOG:USED']:g} channels at {analog_rate:g} Hz)"
         )
-    elif rated and point_rate > 0 and abs(header.rate / point_rate - 1) > RATE_TOLERANCE:
+    elif rated and point_rate > 0 and abs(header.rate / point_rate - 1) > TOLERANCE:
         fault = f"{header.rate:g} frames per second, POINT:RATE {point_rate:g}"
+    elif block and header.data_block != block:
+        fault = f"points from block {header.data_block} on, POINT:DATA_START {block}"
+    elif header.frames and header.stated_frames and header.frames != header.stated_frames:
+        fault = f"{header.frames} frames, POINT:FRAMES {header.stated_frames}"
+    elif scale and _scales_differ(header.scale, scale):
+        fault = f"a scale of {header.scale:g}, POINT:SCALE {scale:g} (negative: floating-point numbers)"
     if fault:
         remedy = "export it again" + ", or give --fps" * ("per second" in fault)
         raise UserError(f"{path}: header and parameters differ: the header states {fault}; {remedy}")
+
+
+def _scales_differ(first: float, second: float) -> bool:
+    """Whether two scales give different points: floating-point numbers are not scaled."""
+    if first < 0 or second < 0:
+        return (first < 0) != (second < 0)
+    return abs(first / second - 1) > TOLERANCE  # NaN: no
