@@ -3,6 +3,7 @@
 import csv
 import json
 import re
+from dataclasses import replace
 
 import cv2
 import numpy as np
@@ -223,6 +224,11 @@ def test_tracks_of_other_frames_are_refused(scene, tracks, capsys):
     (scene / "late.csv").write_text("\n".join(late) + "\n")
     assert track(scene, "--keypoints", scene / "late.csv", out="fault.csv") == 1
     assert "late.csv: has none of the tracked frames; number frames as in the" in capsys.readouterr().err
+    read, _ = tracks_file.read(tracks, MODEL.joint_names, ignore_unknown=True)
+    tracks_file.write(scene / "large.csv", replace(read, uv=2 * read.uv))
+    assert track(scene, "--keypoints", scene / "large.csv", out="fault.csv") == 1
+    assert "large.csv: " in (printed := capsys.readouterr().err)
+    assert "outside the video's 320x240 pictures; give keypoints found in this video" in printed
     assert not (scene / "fault.csv").exists()
 
 

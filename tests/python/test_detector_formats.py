@@ -53,6 +53,14 @@ REFUSED = {
     "track": ("frame,time,neck_x,neck_y,neck_z\n0,0,1,2,3\n", "3-D positions"),
     "labels": ("0 0.5 0.5 0.2 0.6 " + " ".join(["0.4 0.5 0.9"] * 17) + "\n", "YOLO labels"),
 }
+MOTION = {
+    "vicon": ("Trajectories\n100\n,,LASI,,\nFrame,Sub Frame,X,Y,Z\n1,0,1,2,3\n", "3-D motion of Vicon"),
+    "bvh": ("HIERARCHY\nROOT Hips\n", "3-D motion of a .bvh"),
+    "amc": ("#!OML:ASF F:\\a.ASF\n:FULLY-SPECIFIED\n:DEGREES\n1\n", "3-D motion of an .asf or .amc"),
+    "mot": ("Coordinates\nversion=1\nendheader\ntime\tpelvis_tx\n", "3-D motion of OpenSim"),
+    "c3d": ("\x02P\x10\0", "3-D motion of a .c3d"),
+    "other": ("Sheet,1\nwhatever,2,3,4\n", "is no table of keypoints, its first line is 'Sheet'.*DeepLabCut"),
+}
 BINARY = {
     "pkl": (b"\x80\x04\x95", "pickle"),
     "npz": (b"PK\x03\x04\x14", "archive"),
@@ -84,6 +92,23 @@ def test_other_files_are_named_by_their_first_bytes(kind, tmp_path):
     (tmp_path / "a.bin").write_bytes(BINARY[kind][0] + bytes(100))
     with pytest.raises(UserError, match=BINARY[kind][1]):
         reader_of(tmp_path / "a.bin")
+
+
+@pytest.mark.parametrize("kind", MOTION)
+def test_motion_and_unknown_tables_are_named(kind, tmp_path):
+    text, words = MOTION[kind]
+    path = tmp_path / "a.csv"
+    path.write_text(text, newline="")
+    with pytest.raises(UserError, match=words):
+        keypoints_file.read(path, ("neck",), clip=Clip(fps=30))
+
+
+@pytest.mark.parametrize("suffix", [".json", ".h5", ".mat"])
+def test_data_that_are_no_keypoints_are_not_called_a_video(suffix, tmp_path, capsys):
+    path = tmp_path / f"a{suffix}"
+    path.write_text("hello")
+    assert gait.cli.main(["lift", str(path), "--height", "1.7", "-o", str(tmp_path / "a.csv")]) == 1
+    assert "is neither a video nor known keypoints; keypoints are CSV" in capsys.readouterr().err
 
 
 @pytest.mark.parametrize("kind", ["yolo", "long", "track"])

@@ -146,6 +146,25 @@ def test_frames_left_out_but_numbered_on_are_reported():
     assert "0.0667 s off" in counted(np.arange(58), time).compare_times("t.csv", TIMES)
 
 
+def test_keypoints_of_a_longer_video_are_reported():
+    words = counted(np.arange(90), np.arange(90) / 30).compare_times("t.csv", TIMES)
+    assert words == "has frame 89, the video ends at 59"
+
+
+@pytest.mark.parametrize("factor", [0.5, 1.0, 2.0])
+def test_points_mostly_outside_the_pictures_are_of_another_size(factor):
+    uv = factor * np.random.default_rng(0).uniform((300, 100), (400, 460), (30, 5, 2))
+    keypoints = Keypoints(np.arange(30), TIMES[:30], tuple("abcde"), uv, np.ones((30, 5)))
+    assert np.array(keypoints.reach()) == pytest.approx((400 * factor, 460 * factor), rel=0.02)
+    if factor <= 1:
+        keypoints.require_inside("t.csv", (640, 480))
+        return
+    with pytest.raises(
+        UserError, match=r"t.csv: .*% of the points are outside the video's 640x480 pict.*in its"
+    ):
+        keypoints.require_inside("t.csv", (640, 480))
+
+
 @pytest.mark.skipif(not FAULTS.is_dir(), reason="../shared/data/faults is absent")
 def test_public_files_of_times():
     names = ("neck", "l_knee")

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 from dataclasses import replace
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -68,6 +69,22 @@ def test_a_calibration_of_another_size_is_reported(folder, capsys):
     other_camera(width=1920, height=1080, cx=959.5, cy=539.5)
     for camera in ("other.json", "cam.json"):
         assert "outside" not in lift(capsys, "t.csv", camera)[1]
+
+
+@pytest.mark.parametrize(
+    ("rate", "size", "code", "words"),
+    [
+        (20, FRONT, 0, ""),
+        (10, FRONT, 1, "t.csv: time increases by 0.05 s a frame, the video by 0.1 s; frame must number"),
+        (40, FRONT, 1, "t.csv: time increases by 0.05 s a frame, the video by 0.025 s"),
+        (20, (120, 90), 1, "t.csv: 100% of the points are outside the video's 120x90 pictures"),
+    ],
+)
+def test_keypoints_are_compared_with_their_video(rate, size, code, words, folder, capsys, monkeypatch):
+    film = SimpleNamespace(size=size, times=np.arange(40) / rate)
+    monkeypatch.setattr("gait.io.video.Video", lambda path: film)
+    found, printed = lift(capsys, "t.csv", "cam.json", "--video", "walk.mp4")
+    assert found == code and (words in printed if words else "video" not in printed)
 
 
 def test_the_share_outside_counts_visible_points():

@@ -201,8 +201,6 @@ def _calibrate(args: argparse.Namespace, model: Model) -> Calibration:
 
 def _check_size(args: argparse.Namespace, keypoints: Keypoints) -> None:
     """Raise UserError if points are outside the picture; print a note if they fill only a part of it."""
-    import numpy as np
-
     width, height = args.size
     outside = keypoints.outside(args.size)
     if outside > _OUTSIDE:
@@ -210,7 +208,7 @@ def _check_size(args: argparse.Namespace, keypoints: Keypoints) -> None:
             f"{args.walk}: {outside:.0%} of the points are outside --size {width}x{height}; give the "
             "size of the video in which they were found"
         )
-    u, v = np.nanquantile(keypoints.uv, 0.999, axis=(0, 1))
+    u, v = keypoints.reach()
     if u < _FILLED * width and v < _FILLED * height:
         note(
             f"{args.walk}: all points are in the upper left {u:.0f}x{v:.0f} of --size {width}x{height}: is "

@@ -294,13 +294,16 @@ def _take_views(args: argparse.Namespace) -> None:
 
 def _is_video(path: str, pictures: bool) -> bool:
     """Whether a file is a video, not keypoints; without a suffix, only if its `pictures` are to be lifted."""
-    from gait.io.detector_formats import reader_of
+    from gait.io.detector_formats import DATA, KNOWN, reader_of
 
     suffix = Path(path).suffix.lower()
     video = suffix not in (".csv", ".tsv", ".txt") and bool(suffix or pictures)
     if video and not set("%:") & set(path) and not Path(path).exists():
         raise UserError(f"{path}: no such file; check the name")
-    return video and not (Path(path).exists() and reader_of(path) is not None)
+    reader = reader_of(path) if video and Path(path).exists() else None
+    if reader is None and suffix in DATA:
+        raise UserError(f"{path}: is neither a video nor known keypoints; {KNOWN}")
+    return video and reader is None
 
 
 def _lift_keypoints(args: argparse.Namespace, video: bool) -> tuple[dict[str, Any], str]:

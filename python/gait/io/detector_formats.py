@@ -13,6 +13,26 @@ from gait.io.detections import Detections
 
 _HEADER_BYTES = 1 << 16  # bytes at the beginning from which the format is recognised
 _CSV = "keypoints are CSV with one row per frame of one person: frame,time,<joint>_u,<joint>_v[,<joint>_c]"
+#: Formats that are read, for messages about unknown ones.
+KNOWN = (
+    "keypoints are CSV frame,time,<joint>_u,<joint>_v[,<joint>_c], or files of OpenPose, COCO, AlphaPose, "
+    "MMPose, MediaPipe, DeepLabCut, SLEAP, Sports2D or Pose2Sim"
+)
+#: Suffixes of data that are no videos.
+DATA = (
+    ".json",
+    ".h5",
+    ".hdf5",
+    ".pkl",
+    ".pickle",
+    ".npy",
+    ".npz",
+    ".mat",
+    ".parquet",
+    ".xml",
+    ".yaml",
+    ".toml",
+)
 Reader = Callable[[str | os.PathLike[str]], Detections]
 
 #: First bytes of binary files.
@@ -44,6 +64,16 @@ _REFUSED = (
     (r"^[^\n]*\w[_. ]x[,;\t][^\n]*\w[_. ]y\b", "columns <joint>_x,<joint>_y"),
     (r"^\d+( [-+.\de]+){10,}\s", "YOLO labels"),
 )
+#: First lines of files of 3-D motion, and what they are.
+_MOTION = (
+    (r"^HIERARCHY\b", "of a .bvh"),
+    (r"^(#.*\n)*:(version|fully-specified)\b", "of an .asf or .amc"),
+    (r"^(Trajectories|Joints|Model Outputs)\b", "of Vicon"),
+    (r"^NO_OF_FRAMES\b", "of Qualisys"),
+    (r"^Format Version,", "of Motive"),
+    (r"^(.*\n){0,20}endheader\b", "of OpenSim"),
+)
+_C3D_SECOND, _C3D_FIRST = 80, range(2, 32)  # first bytes of a .c3d: its kind, the block of its parameters
 _OWN = re.compile(r"^(?=[^\n]*\bframe\b)(?=[^\n]*\btime\b)[^\n]*\w_u\b")
 
 
@@ -61,6 +91,8 @@ def reader_of(path: str | os.PathLike[str]) -> Reader | None:
         raise unreadable(path, error) from error
     if head.startswith(b"\x89HDF"):
         return detector_tables.read_h5
+    if head[1:2] == bytes([_C3D_SECOND]) and head[0] in _C3D_FIRST:
+        raise _motion(path, "of a .c3d")
     binary = next((what for magic, what in _BINARY.items() if head.startswith(magic)), "")
     if binary:
         raise UserError(f"{path}: is {binary}; {_CSV}")
@@ -76,7 +108,18 @@ def reader_of(path: str | os.PathLike[str]) -> Reader | None:
     for pattern, reader in _TABLES:
         if re.search(pattern, text):
             return reader
+    for pattern, what in _MOTION:
+        if re.search(pattern, text, re.IGNORECASE):
+            raise _motion(path, what)
     for pattern, what in _REFUSED:
         if re.search(pattern, text):
             raise UserError(f"{path}: is a table of {what}; {_CSV}")
     return None
+
+
+def _motion(path: str | os.PathLike[str], what: str) -> UserError:
+    """Return the error for a file of 3-D motion."""
+    return UserError(
+        f"{path}: is 3-D motion {what}, which has nothing to lift; gait learn takes .amc .bvh .c3d .trc "
+        "and .csv, gait lift a video or 2-D keypoints"
+    )

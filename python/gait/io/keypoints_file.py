@@ -23,7 +23,7 @@ from numpy.typing import NDArray
 
 from gait.errors import UserError
 from gait.io.detections import Clip, one_person
-from gait.io.detector_formats import Reader, reader_of
+from gait.io.detector_formats import KNOWN, Reader, reader_of
 from gait.io.fields import frame_numbers, table_rows
 from gait.io.files import replacing
 
@@ -37,6 +37,7 @@ LONGEST_STEP = 1.0  # seconds between frames; about one stride
 SHORTEST_STEP = 1e-5  # seconds between frames; no camera is this fast
 LONGEST_ROW_GAP_S = 10.0  # seconds without a row that lifting bridges; nothing is known in the middle of it
 RATE_DIFFERENCE = 0.05  # relative difference between the rates of keypoints and video; phones vary less
+MOST_OUTSIDE_SHARE = 0.5  # share of the points outside the pictures from which they are of another size
 TIME_OFF = 0.6  # frames; times are often rounded to half a frame
 FURTHEST = 1e6  # largest coordinate, in pixels or units of an orthographic view
 
@@ -101,6 +102,19 @@ class Keypoints:
         observed = self.uv[self.visible]
         return float(((observed < -0.5) | (observed > np.array(size) - 0.5)).any(axis=1).mean())
 
+    def reach(self) -> tuple[float, float]:
+        """Largest u and v, pixels, apart from outliers."""
+        u, v = np.nanquantile(self.uv, 0.999, axis=(0, 1))
+        return float(u), float(v)
+
+    def require_inside(self, path: str | os.PathLike[str], size: tuple[int, int]) -> None:
+        """Raise UserError if most points lie outside a video's pictures of `size`."""
+        if (outside := self.outside(size)) > MOST_OUTSIDE_SHARE:
+            raise UserError(
+                f"{path}: {outside:.0%} of the points are outside the video's {size[0]}x{size[1]} pictures; "
+                "give keypoints found in this video, in its pixels"
+            )
+
     def require_extent(self, path: str | os.PathLike[str], sd: float) -> None:
         """Raise UserError if several points all lie within `sd`, and so cannot be in the same unit."""
         observed = self.uv[self.visible]
@@ -117,8 +131,10 @@ class Keypoints:
         UserError if the rates differ, since `frame` then does not number the video's frames.
         """
         shared = (self.frame >= 0) & (self.frame < len(times))
+        last = int(self.frame[-1])
+        beyond = f"has frame {last}, the video ends at {len(times) - 1}" if last >= len(times) else ""
         if len(times) < 2 or shared.sum() < 2:
-            return ""
+            return beyond
         own, shown = self.time[shared], times[self.frame[shared]]
         interval = float(np.median(np.diff(times)))
         rate = float(own[-1] - own[0]) / float(shown[-1] - shown[0])
@@ -130,7 +146,7 @@ class Keypoints:
             )
         late = own - shown
         if not np.abs(late).max() > TIME_OFF * interval:
-            return ""
+            return beyond
         frames = float(np.median(late)) / interval
         remedy = "frame numbers the video's frames, from 0"
         return f"time is up to {np.abs(late).max():.3g} s off the video's ({frames:+.1f} frames); {remedy}"
@@ -202,9 +218,9 @@ def read(
         raise UserError(f"{path}: no such file of keypoints; check the name")
     if (reader := reader_of(path)) is not None:
         return _read_foreign(path, reader, known, clip)
+    head, rows = _table(path)
     if clip.given:
         raise UserError(f"{path}: has one person and times; leave out --person and --fps")
-    head, rows = _table(path)
     columns = {name: i for i, name in enumerate(head)}
     for name in ("frame", "time"):
         if name not in columns:
@@ -389,6 +405,8 @@ def _table(path: str | os.PathLike[str]) -> tuple[list[str], list[list[str]]]:
     if len(lines) < 2:
         raise UserError(f"{path}: has no rows; keypoints are a header and one row per frame")
     head = [name.strip() for name in lines[0]]
+    if not {"frame", "time"} & set(head) and not any(name.endswith("_u") for name in head):
+        raise UserError(f"{path}: is no table of keypoints, its first line is {lines[0][0][:40]!r}; {KNOWN}")
     twice = next((name for name in head if head.count(name) > 1), None)
     if twice is not None:
         raise UserError(f"{path}: column {twice} appears twice; remove one")

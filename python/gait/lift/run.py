@@ -154,7 +154,18 @@ def lift_file(path: str, prior: SegmentPrior, request: Request, warn: Warn, quie
     keypoints, ignored = keypoints_file.read(path, prior.names, request.ignore_unknown, request.clip)
     if ignored:
         warn(f"ignored, unknown to the model: {' '.join(ignored)}")
+    _compare_video(path, keypoints, request, warn)
     return lift_keypoints(path, keypoints, prior, request, warn, quiet)
+
+
+def _compare_video(path: str, keypoints: Keypoints, request: Request, warn: Warn) -> None:
+    """Raise UserError if keypoints cannot be of the video that the request names; warn if times differ."""
+    if request.clip.times is None:
+        return
+    if words := keypoints.compare_times(path, request.clip.times):
+        warn(f"{path}: {words}")
+    if request.clip.size is not None and not request.stabilised:
+        keypoints.require_inside(path, request.clip.size)
 
 
 def lift_keypoints(

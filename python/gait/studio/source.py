@@ -294,8 +294,6 @@ def _keypoints(
     keypoints, _ = keypoints_file.read(path, prior.names, ignore_unknown=True)
     if note := keypoints.compare_times(path, video.times):
         raise UserError(f"{path}: {note}")
-    if keypoints.frame[-1] >= video.count:
-        raise UserError(f"{path}: has frame {keypoints.frame[-1]}, and {video.path} {video.count} frames")
     return path, keypoints
 
 

@@ -50,6 +50,7 @@ _TRUNKS = 200  # frames whose trunks are compared, evenly spread over the clip
 _SHAPES = 16  # frames searched for people's shapes, which is slow
 _TRUNK_HEIGHTS = (0.52, 0.81)  # of hips and shoulders, fractions of a person's height
 _TRUNK_HALF_WIDTH = 0.2  # of a trunk seen from the side, as a fraction of its height
+_FILLED = 0.72  # of the pictures' sides; all points of a copy of two thirds of their size or less are within
 _STAYS = 0.45  # share of a clip's frames from which the median may show a person
 
 
@@ -446,6 +447,10 @@ def _against_camera(options: ClipOptions, scene: Scene) -> str:
     if options.camera is None or keypoints is None:
         return ""
     words = contradiction(scene.camera, keypoints, scene.model, options.height)
+    u, v = keypoints.reach()
+    if words and options.keypoints and max(u / scene.video.size[0], v / scene.video.size[1]) < _FILLED:
+        what = f"{options.keypoints}: all points are in the upper left {u:.0f}x{v:.0f} of the pictures: "
+        return f"{what}were they found in smaller ones? They contradict {options.camera}: {words}"
     return f"{options.camera}: {words}" if words else ""
 
 
@@ -568,6 +573,7 @@ def _read_keypoints(options: ClipOptions, video: Video, model: Model, frames: ra
     if ignored:
         note(f"ignored: {' '.join(ignored)}", options.quiet)
     read.require_extent(options.keypoints, options.keypoints_sd)
+    read.require_inside(options.keypoints, video.size)
     if not any(frame in frames for frame in read.frame.tolist()):
         raise UserError(
             f"{options.keypoints}: has none of the tracked frames; number frames as in the video, from 0"
