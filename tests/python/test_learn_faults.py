@@ -63,6 +63,38 @@ def test_rows_that_are_missing_from_a_trc_are_named(marked, tmp_path):
         read_trc(path)
 
 
+@pytest.mark.parametrize(
+    ("number", "original", "words"),
+    [
+        (lambda t: t + 481, 120, ""),
+        (lambda t: 2 * t + 1, 240, ""),
+        (
+            lambda t: 2 * t + 1,
+            120,
+            "a.trc:8: Frame# is 3 after 1, but no frame is missing by DataRate and col",
+        ),
+        (lambda t: t + 11 * (t > 99), 120, "a.trc:107: Frame# is 111 after 99, but no frame is missing"),
+        (lambda t: t - (t > 99), 120, "a.trc:107: Frame# is 99 after 99"),
+    ],
+)
+def test_frame_numbers_agree_with_times(number, original, words, marked, tmp_path):
+    path = edited(
+        write_trc(tmp_path / "a.trc", mw.LOWER, marked),
+        ("\tUnits\n", "\tUnits\tOrigDataRate\n"),
+        ("\t mm\n", f"\t mm\t{original}\n"),
+    )
+    lines = path.read_text().split("\n")
+    head, rows = lines[:6], [line.split("\t") for line in lines[6:-1]]
+    text = ["\t".join([str(number(t)), *row[1:]]) for t, row in enumerate(rows)]
+    path.write_text("\n".join([*head, *text]) + "\n")
+    if not words:
+        assert read_trc(path)[2] == 120
+        return
+    with pytest.raises(UserError, match=words):
+        read_trc(path)
+    assert points.read(path, 120.0)[2] == 120.0  # --fps decides
+
+
 def test_times_rounded_to_milliseconds_or_left_out_are_accepted(marked, tmp_path):
     path = write_trc(tmp_path / "a.trc", mw.LOWER, marked)
     head, rows = path.read_text().split("\n")[:6], path.read_text().split("\n")[6:-1]

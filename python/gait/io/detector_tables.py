@@ -94,8 +94,8 @@ def read_pixel_trc(path: str | os.PathLike[str]) -> Detections:
 
     Column Time gives the frame.
     """
-    labels, points, rate, numbered = read_trc_table(Path(path), dict.fromkeys([*METRES, "px"], 1.0))
-    times = np.array([time for _, time in numbered])
+    labels, points, rate, _, rows = read_trc_table(Path(path), dict.fromkeys([*METRES, "px"], 1.0))
+    times = np.array([row.time for row in rows])
     if not np.isfinite(times).all():
         raise UserError(f"{path}: column Time is empty; export the file again")
     flat = points[..., 2]

@@ -6,6 +6,7 @@ import os
 import re
 from collections.abc import Mapping
 from pathlib import Path
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -24,6 +25,24 @@ _RATE_OFF, _COLUMN_GAP = (
 HEADER_LINES = 5  # lines of the header; an empty line may follow
 
 
+class Row(NamedTuple):
+    """A frame's line in the file, and what its first columns state."""
+
+    line: int
+    time: float  #: seconds; NaN if empty
+    frame: float  #: Frame#; NaN if empty
+
+
+class Table(NamedTuple):
+    """Contents of a file with T frames of M points."""
+
+    labels: list[str]
+    points: Array  #: (T, M, 3); NaN where cells are empty
+    rate: float  #: DataRate, frames per second
+    original: float  #: OrigDataRate, that of the recording from which these frames were taken; NaN if missing
+    rows: list[Row]
+
+
 def read_trc(path: Path, fps: float | None = None) -> tuple[list[str], Array, float]:
     """Read the points of a .trc.
 
@@ -31,16 +50,15 @@ def read_trc(path: Path, fps: float | None = None) -> tuple[list[str], Array, fl
     per second: `fps`, or DataRate, which must then agree with the times.  UserError names file, line and
     remedy.
     """
-    labels, points, rate, times = read_trc_table(path, METRES)
+    table = read_trc_table(path, METRES)
     if fps is None:
-        _require_rate(path, rate, times)
-    return labels, points, fps or rate
+        _require_rate(path, table.rate, table.rows)
+        _require_numbers(path, table)
+    return table.labels, table.points, fps or table.rate
 
 
-def read_trc_table(
-    path: Path, scales: Mapping[str, float]
-) -> tuple[list[str], Array, float, list[tuple[int, float]]]:
-    """Read labels, points (T, M, 3) times their unit's factor in `scales`, DataRate, and lines with times."""
+def read_trc_table(path: Path, scales: Mapping[str, float]) -> Table:
+    """Read a file; points are multiplied by their unit's factor in `scales`."""
     lines = text_lines(path)
     if len(lines) < HEADER_LINES or not set(lines[1].split()) >= NAMED:
         raise UserError(f"{path}: not a .trc header of five lines; export the file again")
@@ -54,9 +72,11 @@ def read_trc_table(
     rows = [_row(line, 2 + 3 * count, f"{path}:{i}") for i, line in numbered]
     if len(rows) < 3:
         raise UserError(f"{path}: too few frames ({len(rows)}); a recording of a few seconds is needed")
-    times = [(i, row[1]) for (i, _), row in zip(numbered, rows, strict=True)]
+    times = [Row(i, row[1], row[0]) for (i, _), row in zip(numbered, rows, strict=True)]
     _require_consistent(path, head, labels, times)
-    return labels, np.array(rows)[:, 2:].reshape(len(rows), count, 3) * scale, rate, times
+    points = np.array(rows)[:, 2:].reshape(len(rows), count, 3) * scale
+    original = head.get("OrigDataRate", "")
+    return Table(labels, points, rate, float(original) if _NUMBER.fullmatch(original) else np.nan, times)
 
 
 def _rate_and_scale(path: Path, head: dict[str, str], scales: Mapping[str, float]) -> tuple[float, float]:
@@ -69,9 +89,7 @@ def _rate_and_scale(path: Path, head: dict[str, str], scales: Mapping[str, float
     return float(rate), scales[units.lower()]
 
 
-def _require_consistent(
-    path: Path, head: dict[str, str], labels: list[str], times: list[tuple[int, float]]
-) -> None:
+def _require_consistent(path: Path, head: dict[str, str], labels: list[str], times: list[Row]) -> None:
     """Raise UserError if labels are not unique, frames are missing, or times do not increase."""
     twice = next((label for label in labels if labels.count(label) > 1), None)
     if twice is not None:
@@ -87,9 +105,9 @@ def _require_consistent(
         raise UserError(f"{path}:{times[late][0]}: the times do not increase; correct column Time")
 
 
-def _require_rate(path: Path, rate: float, times: list[tuple[int, float]]) -> None:
+def _require_rate(path: Path, rate: float, times: list[Row]) -> None:
     """Raise UserError if times contradict the rate, or have gaps because rows are missing."""
-    seconds = np.array([time for _, time in times])
+    seconds = np.array([row.time for row in times])
     if np.isnan(seconds).any():  # the column may be empty
         return
     steps = np.diff(seconds)
@@ -105,6 +123,25 @@ def _require_rate(path: Path, rate: float, times: list[tuple[int, float]]) -> No
             f"{path}: DataRate is {rate:g} per second, but column Time increases by {1 / measured:.4g} s, "
             f"{measured:.4g} per second; correct one of them, or give --fps"
         )
+
+
+def _require_numbers(path: Path, table: Table) -> None:
+    """Raise UserError if the numbers of frames have gaps where the times have none.
+
+    The first number may be any; of a recording of a higher rate, every second frame or so may have been kept.
+    """
+    steps = np.diff([row.frame for row in table.rows])
+    usual = (
+        table.original / table.rate if abs(steps[0] * table.rate / table.original - 1) < _RATE_OFF else 1.0
+    )
+    if np.isnan(steps).any() or (np.abs(steps - usual) < 0.5).all():  # the column may be empty
+        return
+    at = int(np.argmax(np.abs(steps - usual) >= 0.5))
+    before, row = table.rows[at], table.rows[at + 1]
+    raise UserError(
+        f"{path}:{row.line}: Frame# is {row.frame:g} after {before.frame:g}, but no frame is missing by "
+        "DataRate and column Time; correct one of them, or give --fps"
+    )
 
 
 def _row(line: str, width: int, where: str) -> list[float]:
