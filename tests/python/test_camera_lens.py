@@ -96,7 +96,7 @@ def test_a_list_that_may_be_the_lens_is_named_if_there_is_none(count, tmp_path):
 def test_a_fisheye_is_one_under_any_key(key, tmp_path):
     lens = matrix("D", (-0.02, 0.01, -0.004, 0.001))
     with pytest.raises(UserError, match="describes a fisheye lens that"):
-        Camera.read(opencv(tmp_path / "a.yaml", lens, f"{key}: Fish-Eye\n"))
+        Camera.read(opencv(tmp_path / "a.yaml", lens, f"{key}: Fisheye\n"))
     with pytest.raises(UserError, match=f"{key} and lens_model name different lenses"):
         Camera.read(opencv(tmp_path / "a.yaml", lens, f"{key}: equidistant\n", "lens_model: radtan\n"))
     assert Camera.read(opencv(tmp_path / "a.yaml", lens, "camera_name: fisheye\n")).distortion[0] == -0.02
@@ -110,6 +110,7 @@ def test_other_numbers_of_coefficients_are_refused(count, tmp_path):
 
 def test_entries_about_no_lens_do_not_matter(tmp_path):
     more = (
+        "views: [ [ 1, 2 ], [ 3 ], { name: a } ]\n", "weights: [ [ 1, 2 ], [ 3 ] ]\n",
         "fisheye_model: 0\n", "camera_model: pinhole\n", "distortion_model: plumb_bob\n", "flags: 3\n",
         'camera_type: "Hero 9"\n', "avg_reprojection_error: 0.2\n", "distance: 4.5\n",
         'calibration_time: "Tue"\n',

@@ -533,19 +533,27 @@ def _other_lens(key: str, value: Any, without: bool) -> str:
         foreign = _FOREIGN.search(_plain(value)) and not _NAME_KEYS.fullmatch(key)
         known = key in ("cameramodel", "cameratype") or _plain(value) in _LENSES
         return f"is {value[:40]!r}" if foreign or (named and not known) else ""
-    if named and np.any(value):
+    if named and np.any(np.array(value, object)):
         return "describes an unknown kind of lens"
     if isinstance(value, Mapping):
         found = (_other_lens(_plain(str(inner)), entry, False) for inner, entry in value.items())
         return "describes an unknown kind of lens" if any(found) else ""
     if isinstance(value, list):
-        if words := next((said for entry in value if (said := _other_lens("", entry, False))), ""):
+        if words := next(filter(None, (_other_lens("", entry, False) for entry in value)), ""):
             return words
-        numbers = np.ravel(value) if without and not _OTHER_LISTS.search(key) else np.zeros(0)
-        if len(numbers) in (4, 5, *_MORE_TERMS) and max(np.shape(value)) == len(numbers):
-            small = numbers.dtype.kind in "fi" and 0 < np.abs(numbers).max() < _LARGEST_COEFFICIENT
-            return f"may be a lens ({len(numbers)} numbers)" if small else ""
+        numbers = _row_or_column(value) if without and not _OTHER_LISTS.search(key) else np.zeros(0)
+        if len(numbers) in (4, 5, *_MORE_TERMS) and 0 < np.abs(numbers).max() < _LARGEST_COEFFICIENT:
+            return f"may be a lens ({len(numbers)} numbers)"
     return ""
+
+
+def _row_or_column(value: list[Any]) -> Array:
+    """Return the numbers of a list, or of a matrix of one row or column; empty if it is neither."""
+    try:
+        numbers = np.array(value, np.float64)
+    except (TypeError, ValueError):
+        return np.zeros(0)
+    return numbers.ravel() if max(numbers.shape) == numbers.size else np.zeros(0)
 
 
 def _toml_cameras(path: str) -> tuple[dict[str, Any], dict[str, Mapping[str, Any]]]:

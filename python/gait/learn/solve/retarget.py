@@ -128,9 +128,11 @@ def _distance(a: Floats, b: Floats) -> float:
 
 
 def _in_frame(frames: Floats, vectors: Floats) -> Floats:
-    """Mean of vectors (T, 3) in the axes of frames (T, 3, 3)."""
-    visible = np.einsum("tji,tj->ti", frames, vectors)
-    return np.asarray(np.nanmean(visible, axis=0)) if np.isfinite(visible).any() else np.full(3, np.nan)
+    """Mean of vectors (T, 3) in the axes of frames (T, 3, 3); NaN along axes that are never visible."""
+    along = np.einsum("tji,tj->ti", frames, vectors)
+    visible = np.isfinite(along)
+    total = np.where(visible, along, 0).sum(axis=0)
+    return np.asarray(np.where(visible.any(axis=0), total / np.maximum(visible.sum(axis=0), 1), np.nan))
 
 
 def torso_frames(body: Body) -> Floats:
