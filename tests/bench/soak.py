@@ -84,7 +84,7 @@ def main() -> int:
     options.add_argument("--record", action="store_true")
     args = options.parse_args()
     row = soak(args.frames, args.rate)
-    head = ["frames", "CPU ms, median", "99.9 %", "ratio", "kB", "at the end", "files", "at the end "]
+    head = ["frames", "CPU ms, median", "99.9 %", "ratio", "kB", "kB at the end", "files", "files at the end"]
     title = "The daemon for a long time"
     pace = (
         f"{args.rate:g} frames a second" if args.rate else "each frame when the one before has been estimated"

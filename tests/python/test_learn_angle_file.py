@@ -193,7 +193,7 @@ NAMES = st.sampled_from(
 )
 
 
-@settings(max_examples=300, deadline=None)
+@settings(max_examples=300)
 @given(
     st.lists(NAMES, max_size=14), st.lists(st.lists(CELLS, max_size=14), max_size=8), st.sampled_from(",;\t")
 )
@@ -203,7 +203,7 @@ def test_any_table_is_read_or_refused_in_one_line(tmp_path_factory, names, rows,
     check_read_or_refused(path)
 
 
-@settings(max_examples=200, deadline=None)
+@settings(max_examples=200)
 @given(st.binary(max_size=400))
 def test_any_bytes_are_read_or_refused_in_one_line(tmp_path_factory, content):
     path = tmp_path_factory.mktemp("any") / "a.csv"

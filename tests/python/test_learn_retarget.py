@@ -42,7 +42,7 @@ def column(name):
     return CHANNELS.index(name)
 
 
-@settings(max_examples=40, deadline=None)
+@settings(max_examples=40)
 @given(st.integers(0, 2**32 - 1), st.floats(0.1, 1.2))
 def test_angles_survive_a_round_trip(seed, size):
     rng = np.random.default_rng(seed)
