@@ -2,6 +2,7 @@
 
 import re
 from dataclasses import replace
+from types import SimpleNamespace
 
 import drawn_person
 import numpy as np
@@ -19,6 +20,8 @@ from gait.track import camera_check
 from gait.track.camera_check import _lean, _parameters, _turned, contradiction
 from gait.track.from_walk import calibrate
 from gait.track.keypoint_start import find_keypoint_start
+from gait.track.options import ClipOptions
+from gait.track.setup import _camera
 
 STATURE = 1.75
 Y_UP, Y_DOWN = (np.array([[1, 0, 0], [0, 0, s], [0, -s, 0]], float) for s in (1, -1))
@@ -209,3 +212,9 @@ def test_gait_track_reports_it(tmp_path, monkeypatch, capsys):
     assert reports[1].startswith("wrong.json: the person appears")
     focal = float(re.search(r"camera from the walk: focal length (\d+) ", reports[1])[1])
     assert abs(focal / drawn.fx - 1) < 0.15
+
+
+def test_the_summary_states_what_contradicts_the_camera():
+    text = "c.json: the walk contradicts its tilt"
+    scene = SimpleNamespace(against_camera=text, moved="", motion=None, poses={}, calibration=None)
+    assert _camera(ClipOptions("walk.mp4", "c.json", "track.csv"), scene) == text

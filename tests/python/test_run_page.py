@@ -197,6 +197,8 @@ def test_without_a_camera_or_the_parts_the_page_names_how_to_get_the_figure(
     page = (tmp_path / "run.html").read_text(encoding="utf-8")
     assert "The 3-D figure is not in this page: run gait studio --fetch" in page
     assert 'id="run-figure"' not in page and "echarts" not in page and len(page) < 2e6
+    assert main([str(word) for word in words]) == 1  # that page may be a better one, of gait track
+    assert "run.html: exists already; give -o" in capsys.readouterr().err
 
 
 @pytest.mark.parametrize(

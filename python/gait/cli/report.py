@@ -81,6 +81,8 @@ def run(args: argparse.Namespace) -> int:
         raise UsageError(f"{args.source}: is not a track OUT.csv; with a log, also give --track")
     values.require_age(args.age, args.sex)
     output = args.output or str(Path(args.source).with_suffix(".html"))
+    if not args.output and Path(output).exists():
+        raise UserError(f"{output}: exists already; give -o {output} to replace it, or another name")
     inputs = (args.source, args.track, args.video, args.camera, args.truth, args.draws, args.model)
     require_outputs((output, args.overlay), inputs)
     files = RunFiles(

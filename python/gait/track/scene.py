@@ -89,6 +89,8 @@ class Scene:
         Time offset of each of these films, in words.
     moved : str
         How the camera moves although it counts as still, in words; empty if it does not.
+    against_camera : str
+        How the camera file contradicts the walk, in words; empty if it does not.
     """
 
     video: Video
@@ -106,6 +108,7 @@ class Scene:
     further: tuple[Scene, ...] = ()
     began: tuple[str, ...] = ()
     moved: str = ""
+    against_camera: str = ""
 
     @property
     def moving(self) -> MovingVideo | None:
@@ -197,9 +200,10 @@ class Scene:
                 person = _who_starts(options, people, person, camera, model, frames, poses)
             _require_feet(people[person], video)
         sure = {id: keypoint_noise(found) for id, found in people.items()}
-        return Scene(
+        scene = Scene(
             video, camera, model, plate, motion, frames, people, person, sure, calibration, moved=moved
         )
+        return replace(scene, against_camera=_against_camera(options, scene)) if starts else scene
 
 
 def _cameras(
@@ -292,7 +296,6 @@ def _calibrate(
 
 def first_state(options: ClipOptions, scene: Scene) -> Start:
     """Return the first state, from the init file or found in the clip."""
-    against_camera = _against_camera(options, scene)
     if options.init != "auto":
         start = _read_start(options, scene.video, scene.camera, scene.poses, scene.model)
         require_scene(options, scene, start.frame)
@@ -302,9 +305,9 @@ def first_state(options: ClipOptions, scene: Scene) -> Start:
         try:
             start = _find_first_state(options, scene)
         except UserError as error:
-            raise UserError(against_camera or str(error)) from error
-    if against_camera:
-        note(against_camera, options.quiet)
+            raise UserError(scene.against_camera or str(error)) from error
+    if scene.against_camera:
+        note(scene.against_camera, options.quiet)
     if options.init == "auto":
         _note_start(options, scene, start)
     wanted = options.detector == "auto" and not options.keypoints and options.mode != Mode.PAPER

@@ -108,7 +108,7 @@ def _camera(options: ClipOptions, scene: Scene) -> str:
     elif scene.poses:
         motion = ", in frame 0, which travels (--cameras-out writes that of each frame)"
     if scene.calibration is None:
-        return f"{options.camera}{motion}"
+        return f"{scene.against_camera or options.camera}{motion}"
     return f"estimated from the walk and the stature of {options.height:.2f} m{motion}"
 
 
