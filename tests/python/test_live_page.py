@@ -280,6 +280,9 @@ def test_browsers_get_less_often_what_a_busy_machine_shows_and_miss_no_sample(tm
     for _ in range(20):
         pace.adapt(idle=0.5, dropped=True)
     assert pace.current == 4.0
+    pace.adapt(idle=0.9)
+    assert pace.current == 4.0  # frames were dropped just before
+    pace._held = 0.0
     pace.adapt(idle=0.9, dropped=True)  # the tracker itself is too slow
     assert pace.current < 4.0
     for _ in range(20):

@@ -37,6 +37,7 @@ _RAREST = 4.0  # but at most this
 _MEASURED = 0.5  # seconds over which idle time is measured
 _BUSY, _IDLE = 0.15, 0.3  # share of idle time below which messages become rarer, above which more frequent
 _SPARE = 0.6  # share of idle time from which on browsers are not the cause of dropped frames
+_HELD = 20.0  # seconds after a dropped frame in which messages do not become more frequent
 _QUICKEST = 0.4  # least factor by which the time between messages changes at one measurement
 
 
@@ -67,6 +68,7 @@ class Pace:
         self.current = self._slowest = _SLOWEST
         self._browsers, self._turn = 1, 0.0
         self.dropped = self._dropped = 0
+        self._held = 0.0
         self._at, self._before = time.monotonic(), _idle_time()
 
     def apart(self) -> float:
@@ -95,8 +97,11 @@ class Pace:
 
         Messages become more frequent by the factor that leaves `_IDLE` if all work is proportional to them.
         """
+        if dropped and idle < _SPARE:
+            self._held = time.monotonic() + _HELD
         busy = idle < (_SPARE if dropped else _BUSY)
-        factor = 1.5 if busy else min(max((1 - idle) / (1 - _IDLE), _QUICKEST), 1.0)
+        quicker = 1.0 if time.monotonic() < self._held else max((1 - idle) / (1 - _IDLE), _QUICKEST)
+        factor = 2.0 if busy else min(quicker, 1.0)
         self.current = min(max(factor * self.current, _FASTEST), self._slowest)
 
     def begin(self, browsers: int) -> None:
