@@ -178,8 +178,7 @@ struct gait_tracker {
     /* limbs x LIKE_RING: the templates in the form of template_ring(), for this frame. */
     int8_t *template_ring[2][GAIT_MAX_CAMERAS];
     likelihood_scratch *work; /* tasks, or 1 without threads */
-    lag_scratch
-        lag; /* ancestor and weight: in the memory of the work of all tasks but the first; without a lag NULL */
+    lag_scratch lag; /* ancestor and weight: in the memory of work[1] and later; without a lag NULL */
 };
 
 /* Place a tracker in memory; NULL if the arena only counts or overflows.  run: the kernels to use; NULL: when counting. */
