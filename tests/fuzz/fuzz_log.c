@@ -11,11 +11,12 @@ int LLVMFuzzerTestOneInput(const uint8_t *data, size_t size)
     if (!file.path[0])
         file = memory_file_make();
     memory_file_write(&file, data, size);
-    int64_t const events = log_scan(file.path, &why);
+    bool safe;
+    int64_t const events = scan(file.path, &safe, &why);
     if (events < 0 || (events == 0 && !why.text[0]))
         abort();
     bool const damaged = why.text[0] != '\0';
-    if (!log_readable(file.path, &why))
+    if (!safe)
         return 0;
     lcm_eventlog_t *const log = lcm_eventlog_create(file.path, "r");
     int64_t read = 0;

@@ -153,7 +153,7 @@ def main() -> int:
             files(4, b"GAITTRD1" + bytes(200)),
             files(5, bytes([15, 15]) + jpeg),
         ],
-        "log": [log(), log()[:-3]],
+        "log": [log(), log()[:-3], b"x" + log()[:24] + bytes([127] + 3 * [255]) + log()[28:], b"x" + log()],
     }
     for name, inputs in seeds.items():
         (folder / name).mkdir(parents=True, exist_ok=True)

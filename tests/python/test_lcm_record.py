@@ -1,6 +1,7 @@
 """gait record as a process: whatever ends it, the track so far is complete and the reason is reported."""
 
 import json
+import os
 import resource
 import signal
 import struct
@@ -237,20 +238,40 @@ def test_a_log_for_which_there_is_no_space_is_reported(estimates, tmp_path):
     assert not (tmp_path / "e.log").exists()
 
 
-@pytest.mark.parametrize("length", [2**31 - 1, 2**31 - 2, 1 << 30])
-@pytest.mark.parametrize("program", ["record", "view", "trackd"])
-def test_a_log_whose_event_states_more_than_the_file_holds_is_one_line(program, length, tmp_path):
-    path = rig.write_log(tmp_path / "in.log", [*rig.opening(), *rig.frames(0, 2)])
-    content = bytearray(path.read_bytes())
-    struct.pack_into(">i", content, 24, length)
-    path.write_bytes(content)
+def states_too_much(content, begin, length=2**31 - 1):
+    """A log whose event at byte `begin` states so many bytes."""
+    changed = bytearray(content)
+    struct.pack_into(">i", changed, begin + 24, length)
+    return bytes(changed)
+
+
+@pytest.mark.parametrize("program", ["record", "view", "trackd", "report"])
+def test_a_log_that_could_exhaust_memory_is_one_line(program, estimates, tmp_path, tmp_path_factory):
+    """liblcm searches for the first event, and allocates what an event states."""
+    path = rig.write_log(tmp_path / "in.log", [("GAIT_ESTIMATE", e) for e in estimates])
+    whole, second = path.read_bytes(), log_end(path, 1)
+    clip = rig.write_clip(tmp_path_factory.mktemp("clip"), 3)
+    film = ["--video", clip / "video.mp4", "--camera", clip / "camera.json", "--track", "t.csv"]
     url = f"file://{path}?speed=0"
-    if program == "trackd":
-        done = rig.run("-m", rig.MODEL, "--url", url)
-        code, printed = done.code, done.words
-    else:
-        output = ["-o", tmp_path / "a.csv"] if program == "record" else ["--save", tmp_path / "a.png"]
-        done = rig.gait(program, "--url", url, *output)
-        code, printed = done.returncode, done.stderr
-    assert code == 1 and "damaged or" in printed and "Traceback" not in printed
-    assert [p.name for p in tmp_path.iterdir()] == ["in.log"]
+    contents = [states_too_much(whole, 0, length) for length in (2**31 - 1, 2**31 - 2, 1 << 30)]
+    contents += [states_too_much(whole, second), b"x" + states_too_much(whole, 0), b"x" * 99]
+    for content in contents:
+        path.write_bytes(content)
+        if program == "trackd":
+            done = rig.run("-m", rig.MODEL, "--url", url)
+            code, printed = done.code, done.words
+        else:
+            output = {"record": ["-o", tmp_path / "a.csv"], "view": ["--save", tmp_path / "a.png"]}
+            words = [path, *film] if program == "report" else ["--url", url, *output[program]]
+            done = rig.gait(program, *words)
+            code, printed = done.returncode, done.stderr
+        assert code == 1 and printed.count("\n") == 1, printed
+        assert "damaged or" in printed or "is not an LCM log" in printed
+        assert [p.name for p in tmp_path.iterdir()] == ["in.log"]
+
+
+def test_a_pipe_is_not_a_log(tmp_path):
+    """A check of a pipe would take the bytes that liblcm then lacks, or wait for ever."""
+    os.mkfifo(tmp_path / "pipe")
+    done = rig.run("-m", rig.MODEL, "--url", f"file://{tmp_path}/pipe?speed=0")
+    assert done.code == 1 and "pipe: cannot open this log" in done.words

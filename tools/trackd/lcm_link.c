@@ -33,25 +33,26 @@ static int64_t event_bytes(FILE *f)
     return name <= 0 || name >= LONGEST || data < 0 ? 0 : HEAD + name + data;
 }
 
-/* `beyond`: bytes that the last event states, if they are more than the whole file has; else 0. */
-static int64_t scan(const char *path, int64_t *beyond, message *why)
+/* Number of complete messages; `safe`: liblcm can read it without taking more memory than the file has. */
+static int64_t scan(const char *path, bool *safe, message *why)
 {
     struct stat is;
     int64_t at = 0, events = 0, size = 0;
-    FILE *const f = fopen(path, "rb");
-    why->text[0] = '\0';
-    if (!f || fstat(fileno(f), &is) != 0 || !S_ISREG(is.st_mode)) {
-        if (f)
-            fclose(f);
+    FILE *const f = stat(path, &is) == 0 && S_ISREG(is.st_mode) ? fopen(path, "rb") : NULL; /* a pipe would wait */
+    *safe = false;
+    if (!f) {
+        message_set(why, "%.160s: cannot open this log; give file:///PATH?speed=0", path);
         return -1;
     }
+    why->text[0] = '\0';
     while (at < is.st_size && (size = event_bytes(f)) > 0 && at + size <= is.st_size) {
         at += size;
         events++;
         fseeko(f, (off_t)at, SEEK_SET);
     }
     fclose(f);
-    *beyond = size > is.st_size ? size : 0;
+    /* liblcm searches for the first event, and allocates what an event states */
+    *safe = events > 0 && size <= is.st_size;
     if (is.st_size == 0)
         message_set(why, "%.160s: this log is empty", path);
     else if (at != is.st_size)
@@ -63,18 +64,8 @@ static int64_t scan(const char *path, int64_t *beyond, message *why)
 
 int64_t log_scan(const char *path, message *why)
 {
-    int64_t beyond;
-    return scan(path, &beyond, why);
-}
-
-/* Whether liblcm can safely read a log: it allocates the length that an event states, which may exceed the file. */
-static bool log_readable(const char *path, message *why)
-{
-    int64_t beyond = 0;
-    if (scan(path, &beyond, why) >= 0 && beyond > 0)
-        return false;
-    why->text[0] = '\0';
-    return true;
+    bool safe;
+    return scan(path, &safe, why);
 }
 
 /* ---- connections ---- */
@@ -139,14 +130,14 @@ static bool not_multicast(const char *url, char address[INET_ADDRSTRLEN])
 lcm_t *link_open(const char *url, message *why)
 {
     char path[LINK_PATH], address[INET_ADDRSTRLEN];
-    if (link_is_log(url) && link_log(url, path) == 'r' && !log_readable(path, why))
+    bool safe = true;
+    if (link_is_log(url) && link_log(url, path) == 'r' && (scan(path, &safe, why) < 0 || !safe))
         return NULL;
     int const saved = mute();
     lcm_t *const lcm = lcm_create(url);
     unmute(saved);
-    link_log(url, path);
-    if (!lcm && link_is_log(url) && log_scan(path, why) != 0)
-        message_set(why, "%.160s: cannot open this log; give file:///PATH?speed=0", url);
+    if (!lcm && link_is_log(url) && link_log(url, path) == 'r')
+        message_set(why, "%.160s: liblcm cannot read this log", path);
     else if (!lcm && not_multicast(url, address))
         message_set(why, "%.100s: %s is not a multicast address; give one from 224.0.0.0 to 239.255.255.255",
                     url, address);

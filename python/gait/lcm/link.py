@@ -75,18 +75,23 @@ def log_of(url: str) -> tuple[str, str]:
 
 
 def break_of(path: str | os.PathLike[str]) -> str | None:
-    """Describe where an incomplete log breaks off; None if the log is complete."""
-    return _scan(path)[0]
+    """Describe where an incomplete log breaks off; None if the log is complete.
+
+    UserError if liblcm cannot read it safely, as in `events_of`.
+    """
+    return _scan(path)
 
 
 def events_of(path: str | os.PathLike[str], whole: bool = True) -> Iterator[Any]:
     """Yield the events of a log; if it breaks off, those before, unless it has to be `whole`.
 
-    UserError if it breaks off but has to be whole, or if a channel's name or a time is invalid.
+    UserError if it breaks off but has to be whole, if an event states more bytes than the file has, or if a
+    channel's name or a time is invalid.
     """
     import lcm
 
-    if whole and (broken := break_of(path)):
+    broken = _scan(path)
+    if whole and broken:
         raise UserError(f"{path}: {broken}; record it again")
     try:
         for event in lcm.EventLog(os.fspath(path), "r"):
@@ -99,26 +104,32 @@ def events_of(path: str | os.PathLike[str], whole: bool = True) -> Iterator[Any]
         raise UserError(f"{path}: the name of a channel is not UTF-8; record it again") from None
 
 
-def _scan(path: str | os.PathLike[str]) -> tuple[str | None, bool]:
-    """Describe where an incomplete log breaks off; return also whether an event claims more than the file."""
-    size, at, events, beyond = Path(path).stat().st_size, 0, 0, False
+def _scan(path: str | os.PathLike[str]) -> str | None:
+    """Describe where an incomplete log breaks off.
+
+    UserError if liblcm would take more memory than the file has: it searches for the first event, and
+    allocates what an event states.  gait-trackd has the same rule (lcm_link.c), as neither can call the other.
+    """
+    size, at, events, stated = Path(path).stat().st_size, 0, 0, 0
     with open(path, "rb") as file:
         while at < size:
             head = file.read(_EVENT_HEADER.size)
             if len(head) < _EVENT_HEADER.size:
                 break
             sync, _, _, channel, data = _EVENT_HEADER.unpack(head)
-            end = at + _EVENT_HEADER.size + channel + data
             if sync != _SYNC or not 0 < channel < _LONGEST_CHANNEL_BYTES or data < 0:
                 break
-            if end > size:
-                beyond = end - at > size
+            stated = _EVENT_HEADER.size + channel + data
+            if at + stated > size:
                 break
-            file.seek(end)
-            at, events = end, events + 1
+            at, events = at + stated, events + 1
+            file.seek(at)
     if at == size:
-        return None, False
-    return f"the log is damaged or ends at byte {at}, messages before: {events}", beyond
+        return None
+    fault = f"the log is damaged or ends at byte {at}, messages before: {events}"
+    if events == 0 or stated > size:
+        raise UserError(f"{path}: {fault}; record it again")
+    return fault
 
 
 class LogWriter:
@@ -209,9 +220,7 @@ def open_lcm(url: str | None = None) -> lcm.LCM:
     (path, mode), damage = log_of(wanted), None
     if is_log(wanted) and mode == "r":
         require_log(path)
-        damage, beyond = _scan(path)
-        if beyond:  # liblcm would allocate what the event claims
-            raise UserError(f"{wanted}: {damage}")
+        damage = _scan(path)
     _require_group(wanted)
     try:
         with muted_stderr():
