@@ -350,7 +350,7 @@ SEED ?= $(shell date +%s)
 fuzz: ## damaged models, snapshots, frames, messages, files ... under the sanitizers (RUNS=2000 SEED=, else a fresh one)
 	@$(MAKE) --no-print-directory $(JOBS) $(SANITIZED) fuzz-run
 
-fuzz-long: setup ## 10^6 executions of each (ARGS='--runs N --record')
+fuzz-long: setup ## 10^6 executions of each target (ARGS='--runs N --record')
 	@$(MAKE) --no-print-directory config=fuzz CC=clang fuzz-targets
 	@$(PY) tests/bench/fuzz_long.py $(ARGS)
 fuzz-targets: $(FUZZ)
@@ -506,7 +506,7 @@ eval-lift: setup lib ## lifting of held-out motion, clips and a real motion: tes
 eval-studio: setup lib ## corrections by hand, suggested and random, and the time each takes: tests/bench/results/studio.md *
 	@$(PY) tests/bench/studio_corrections.py
 
-soak: setup tools ## the daemon for 10^6 frames: memory, files, CPU time per frame (ARGS='--frames 108000 --rate 30': an hour)
+soak: setup lib tools ## the daemon for 10^6 frames: memory, files, CPU time per frame (ARGS='--frames 108000 --rate 30': an hour)
 	@$(PY) tests/bench/soak.py $(ARGS)
 
 kills: setup lib tools ## writers and the daemon killed at random moments: kills.md, daemon_kills.md (ARGS=--record)
