@@ -8,8 +8,8 @@
 DIR has a folder for each clip: video.* (the film), camera.json, meta.json (window, fps, stature_m,
 stride_hz), reference2d.csv (frame, <joint>_u, <joint>_v, pixels) and, for the arm `known`, init.json.
 Arms: auto: film and camera alone; nobg: without a background; known: from init.json; nocam: the stature
-instead of a camera.  auto-none, nobg-none and known-none: the same with --detector none, in a table of
-their own.
+instead of a camera.  auto-none, nobg-none and known-none: the same with --detector none; auto-classes and
+known-classes: the same with -m classes; both in tables of their own.
 Contact sheets are written into build/eval-real; no picture of these people may enter the repository.
 """
 
@@ -35,8 +35,19 @@ from gait.progress import progress
 
 ROOT = Path(__file__).resolve().parents[2]
 OUT = ROOT / "build" / "eval-real"
-WITHOUT = "-none"  # end of the names of arms without the detector
-ARMS = ("auto", "nobg", "known", "nocam", *(f"{arm}{WITHOUT}" for arm in ("auto", "nobg", "known")))
+#: Ends of the names of arms: without the detector, and with the model of classes.
+WITHOUT, CLASSES = "-none", "-classes"
+#: Page and title of the arms with each end.
+PAGES = {
+    "": ("eval_real", "Films of real people"),
+    WITHOUT: ("eval_real_none", "Films of real people, without a detector"),
+    CLASSES: ("eval_real_classes", "Films of real people, tracked with -m classes"),
+}
+ARMS = (
+    *("auto", "nobg", "known", "nocam"),
+    *(f"{arm}{WITHOUT}" for arm in ("auto", "nobg", "known")),
+    *(f"{arm}{CLASSES}" for arm in ("auto", "known")),
+)
 MEAN = {"auto": 0.85, "nocam": 0.75, "known": 0.90}  # least mean share of good frames
 LEAST = {"auto": 0.65}  # and the least of each clip
 NEAR = {"nobg": ("auto", 0.05)}  # the mean may be this much lower than that of another arm
@@ -78,7 +89,7 @@ def main() -> int:
     add("--arms", nargs="+", choices=ARMS, default=list(ARMS), help="(all)")
     add("--only", nargs="+", metavar="NAME", help="names of clips (all)")
     add("--extra", default="", metavar="OPTIONS", help="further options of gait track")
-    add("--record", action="store_true", help="also write tests/bench/results/eval_real.md and .csv")
+    add("--record", action="store_true", help="also write the pages, eval_real*.md and .csv")
     args = parser.parse_args()
     clips = read_clips(args.clips, args.only)
     if not clips:
@@ -91,14 +102,18 @@ def main() -> int:
             results.append(run(clip, arm, shlex.split(args.extra)))
             update(done)
     missed = {arm: _missed([r for r in results if r.arm == arm], results) for arm in args.arms}
-    for without in (False, True):
-        shown = [r for r in results if r.arm.endswith(WITHOUT) == without]
+    for end in PAGES:
+        shown = [r for r in results if _end(r.arm) == end]
         if shown:
-            _publish(
-                shown, sum((missed[arm] for arm in dict.fromkeys(r.arm for r in shown)), []), args.record
-            )
+            words = sum((missed[arm] for arm in dict.fromkeys(r.arm for r in shown)), [])
+            _publish(end, shown, words, args.record)
     print(f"contact sheets: {OUT.relative_to(ROOT)}")
     return any(missed.values())
+
+
+def _end(arm: str) -> str:
+    """End of an arm's name, a key of `PAGES`."""
+    return next((end for end in PAGES if end and arm.endswith(end)), "")
 
 
 def _has(clip: Clip, arm: str) -> bool:
@@ -122,8 +137,8 @@ def run(
         "nobg": ["--camera", given, "--background", "none"],
         "known": ["--camera", given, "--init", clip.folder / "init.json"],
         "nocam": ["--height", clip.stature, "--camera-out", found],
-    }[arm.removesuffix(WITHOUT)]
-    options += ["--detector", "none"] if arm.endswith(WITHOUT) else []
+    }[arm.removesuffix(_end(arm))]
+    options += {WITHOUT: ["--detector", "none"], CLASSES: ["--model", "classes"]}.get(_end(arm), [])
     command = [sys.executable, *program, "track", clip.video, "-o", out]
     command += ["--cameras-out", turned, "--quiet", *options, *extra]
     for path in (out, found, turned):
@@ -148,17 +163,16 @@ def _missed(results: list[Result], everything: list[Result]) -> list[str]:
     if not results:
         return []
     arm = results[0].arm
-    without = arm.endswith(
-        WITHOUT
-    )  # an error message is acceptable if the images do not suffice, a wrong track never is
+    bounds = arm.removesuffix(CLASSES)
+    without = _end(arm) == WITHOUT  # an error is acceptable if images do not suffice, a wrong track is not
     missed = [f"{r.clip} {r.arm}: {r.failed}" for r in results if r.failed and not without]
     mean = _mean(results)
-    if mean < MEAN.get(arm, 0):
-        missed.append(f"{arm}: good {mean:.0%} on average, {MEAN[arm]:.0%} wanted")
+    if mean < MEAN.get(bounds, 0):
+        missed.append(f"{arm}: good {mean:.0%} on average, {MEAN[bounds]:.0%} wanted")
     missed += [
-        f"{r.clip} {arm}: good {r.score.share['good']:.0%}, {LEAST[arm]:.0%} wanted"
+        f"{r.clip} {arm}: good {r.score.share['good']:.0%}, {LEAST[bounds]:.0%} wanted"
         for r in results
-        if r.score.share["good"] < LEAST.get(arm, 0)
+        if r.score.share["good"] < LEAST.get(bounds, 0)
     ]
     other, near = NEAR.get(arm, ("", 0.0))
     beside = [r for r in everything if r.arm == other]
@@ -179,8 +193,8 @@ def _mean(results: list[Result]) -> float:
     return float(np.mean([r.score.share["good"] for r in results]))
 
 
-def _publish(results: list[Result], missed: list[str], record: bool) -> None:
-    """Print the table, and write it if asked to."""
+def _publish(end: str, results: list[Result], missed: list[str], record: bool) -> None:
+    """Print the table of the arms with this end, and write it if asked to."""
     columns = ["arm", "clip", *(f"{kind} %" for kind in KINDS), "error % of height", "tracking", "wrong"]
     columns += ["stride rate %", "strikes: frames off", "CPU s", "frames/s", "failed"]
     rows = [
@@ -193,15 +207,13 @@ def _publish(results: list[Result], missed: list[str], record: bool) -> None:
     ]
     arms = dict.fromkeys(r.arm for r in results)
     means = [f"{arm} {_mean([r for r in results if r.arm == arm]):.0%}" for arm in arms]
-    without = results[0].arm.endswith(WITHOUT)
-    met = "The bound on wrong frames, the only one, is met." if without else "All bounds are met."
+    met = "The bound on wrong frames, the only one, is met." if end == WITHOUT else "All bounds are met."
     notes = [
-        facts("make eval-real"),
+        facts(" ".join(["tests/bench/eval_real.py", *sys.argv[1:]])),
         f"Good frames on average: {', '.join(means)}.  {_READING}",
         f"**Bounds missed:** {'; '.join(missed)}." if missed else met,
     ]
-    name = "eval_real_none" if without else "eval_real"
-    title = "Films of real people, without a detector" if without else "Films of real people"
+    name, title = PAGES[end]
     if record:
         table.publish(name, title, columns, rows, "\n\n".join(notes))
     else:

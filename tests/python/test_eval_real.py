@@ -114,6 +114,7 @@ def result(arm="auto", good=1.0, **changes):
         ([result(), result(good=0.9)], None),
         ([result(), result(good=0.6)], "clip auto: good 60%"),
         ([result(good=0.8), result(good=0.8)], "auto: good 80% on average"),
+        ([result("auto-classes", good=0.6)], "clip auto-classes: good 60%"),
         ([result(wrong=3)], "3 of 100 frames"),
         ([result(stride_error=-0.04)], "stride rate -4.0%"),
         ([replace(result(), failed="no person")], "clip auto: no person"),
