@@ -26,8 +26,9 @@ static service *running(const memory_file *file)
     s.max_gap = 2;
     s.max_pixels = FUZZ_WIDTH * FUZZ_HEIGHT;
     gait_tracker_prior(toy_model(), &mean, &sd, NULL);
+    camera_use(&s.slot, &camera);
     if (!tracking_open(&s.track, file->path, &config, &why) ||
-        !service_open(&s, &out, 0, 1, NULL, false, &why) || !service_set_camera(&s, &camera, &why) ||
+        !service_open(&s, &out, 0, 1, NULL, false, &why) || !service_make_trackers(&s, &why) ||
         !tracking_start(&s.track, &mean, &sd, 0, &why))
         abort();
     fuzz_steps(s.track.tracker, 0, 2, 1);

@@ -43,7 +43,7 @@ static void start(service *s, lift_service *lift, keypoint_cue *cue, pose_path *
     if (choice & 16 && !s->path && further_open(more, "1", 0, &why))
         s->further = more;
     s->max_gap = 2;
-    s->max_pixels = FUZZ_WIDTH * FUZZ_HEIGHT;
+    s->max_pixels = 2 * FUZZ_WIDTH * FUZZ_HEIGHT;
     ok = ok && service_open(s, out, 0, 1, NULL, choice & 8, &why);
     if (choice & 64 && s->cue && !s->lift && !s->further) {
         keypoint_cue_open(second_cue, s->track.model, s->track.info.joints, 4);
@@ -72,7 +72,7 @@ int LLVMFuzzerTestOneInput(const uint8_t *data, size_t size)
         {on_keypoints, __gaitmsg_tracks2_t_get_hash},
     };
     static const struct handler of_further[] = {{on_further_frame, __gaitmsg_image_t_get_hash},
-                                                {on_further_camera, __gaitmsg_camera_t_get_hash},
+                                                {on_camera, __gaitmsg_camera_t_get_hash},
                                                 {on_further_background, __gaitmsg_image_t_get_hash}};
     enum {
         HANDLERS = sizeof handlers / sizeof *handlers,
@@ -93,8 +93,8 @@ int LLVMFuzzerTestOneInput(const uint8_t *data, size_t size)
         uint8_t const kind = fuzz_take(&b);
         size_t const stated = (size_t)(fuzz_take(&b) << 8 | fuzz_take(&b)),
                      n = stated < b.left ? stated : b.left;
-        struct handler const h =
-            s.further && kind & 64 ? of_further[kind % FURTHER] : handlers[kind % 8 % HANDLERS];
+        bool const is_further = s.further && kind & 64;
+        struct handler const h = is_further ? of_further[kind % FURTHER] : handlers[kind % 8 % HANDLERS];
         int64_t const type = h.type();
         uint8_t *const message_bytes =
             malloc(TYPE + n); /* ends with the message, so that an overrun is noticed */
@@ -106,7 +106,7 @@ int LLVMFuzzerTestOneInput(const uint8_t *data, size_t size)
         lcm_recv_buf_t const buffer = {.data = message_bytes + (kind & 128 ? TYPE : 0),
                                        .data_size = (uint32_t)(n + (kind & 128 ? 0 : TYPE)),
                                        .recv_utime = 1};
-        h.call(&buffer, s.next && kind & 32 ? "FUZZ_2" : "FUZZ_1", &r);
+        h.call(&buffer, s.next && kind & 32 ? "FUZZ_2" : is_further ? "FUZZ_1" : "FUZZ_0", &r);
         b.at += n;
         b.left -= n;
         free(message_bytes);

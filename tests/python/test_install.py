@@ -69,6 +69,14 @@ def test_the_installed_daemon_runs_by_itself(installed):
     assert "--snapshot" not in (prefix / "lib/systemd/system/gait-trackd.service").read_text()
 
 
+def test_the_unit_waits_for_the_network_and_never_gives_up(installed):
+    unit = (installed / "opt/gait/lib/systemd/system/gait-trackd.service").read_text()
+    head, service = unit.split("[Service]")
+    for line in ("StartLimitIntervalSec=0", "Wants=network-online.target", "After=network-online.target"):
+        assert f"\n{line}\n" in head
+    assert "\nRestart=on-failure\nRestartSec=0\n" in service
+
+
 def test_the_unit_is_one_that_systemd_accepts(installed):
     if not shutil.which("systemd-analyze"):
         pytest.skip("systemd-analyze is not installed")

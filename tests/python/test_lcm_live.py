@@ -17,7 +17,7 @@ from gait.io.track_file import read_track
 from gait.io.video import Frame
 from gait.lcm.capture import Pacer, Publisher, Setup
 from gait.lcm.link import gaitmsg, now, open_lcm, private_url
-from gait.lcm.messages import command_message
+from gait.lcm.messages import camera_message, command_message
 from gait.lcm.record import Recorder
 
 STATUS = gaitmsg.status_t
@@ -187,21 +187,38 @@ def test_damaged_messages_do_not_stop_a_running_tracker(url):
         assert finish().code == 0
 
 
-def test_junk_does_not_flood_the_log_and_the_status(url):
-    """Messages of two channels in turn, so that no line repeats the one before."""
+@pytest.mark.parametrize("line", ["damaged message", "searching for a person"])
+def test_a_flood_reaches_neither_the_log_nor_the_status(line, url):
+    """Two messages in turn, so that no line repeats the one before: junk, and commands between frames."""
     with rig.daemon(url) as (listener, finish):
         ready(listener)
         listener.statuses.clear()
-        begun, raw = time.monotonic(), open_lcm(url)
+        begun, raw, frame = time.monotonic(), open_lcm(url), rig.frame_message(0).encode()
         while time.monotonic() < begun + 1.5:  # past the second after which the lines left out are counted
-            for channel in ("GAIT_CAMERA_0", "GAIT_COMMAND"):
-                raw.publish(channel, b"junk")
+            reset = command_message(gaitmsg.command_t.RESET).encode()
+            junk = ("GAIT_CAMERA_0", b"junk"), ("GAIT_COMMAND", b"junk")
+            for channel, data in (
+                junk if line == "damaged message" else (("GAIT_COMMAND", reset), ("GAIT_IMAGE_0", frame))
+            ):
+                raw.publish(channel, data)
                 time.sleep(0.002)  # LCM's queues are finite
         listener.until(lambda: bool(listener.statuses), "a status")
         words, seconds = finish().words, time.monotonic() - begun
         assert len(listener.statuses) <= 25 * seconds + 3
-        assert 10 <= words.count("damaged message") <= 10 * (seconds + 2)
+        assert 10 <= words.count(line) <= 10 * (seconds + 2)
         assert sum(map(int, re.findall(r"(\d+) more lines suppressed", words))) > 50
+
+
+def test_a_sender_cannot_state_that_ten_seconds_have_passed(url):
+    with rig.daemon(url) as (listener, finish):
+        ready(listener)
+        other = rig.CAMERA.scaled(0.5)
+        stranger = [("GAIT_CAMERA_0", camera_message(other, 2_000_000 * k)) for k in range(12)]
+        listener.ask(stranger, lambda s: "different camera" in s.text, "a complaint")
+        listener.ask(rig.opening()[2:], lambda s: s.state == STATUS.ARMED, "a start")
+        listener.send(rig.frames(0, 1))
+        listener.until(lambda: bool(listener.estimates), "an estimate")
+        assert "camera 80x60" not in finish().words
 
 
 def test_two_daemons_on_one_url_are_reported_by_both(url):

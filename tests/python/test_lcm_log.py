@@ -211,10 +211,10 @@ def test_a_camera_with_too_many_pixels_is_refused_before_it_takes_memory(tmp_pat
     huge.width = huge.height = 16000
     plain = track(tmp_path, [*rig.opening(), *rig.frames(0, 2)])
     outcome = track(tmp_path, [("GAIT_CAMERA_0", huge), *rig.opening(), *rig.frames(0, 2)])
-    assert "16000x16000 pixels, more than the 16777216 of --max-pixels" in outcome.words
+    assert "16000x16000 pixels, more than the 8388608 that --max-pixels leaves" in outcome.words
     assert outcome.digest == plain.digest
     small = track(tmp_path, [*rig.opening(), *rig.frames(0, 2)], "--max-pixels", 160 * 120 - 1)
-    assert "160x120 pixels, more than the 19199 of --max-pixels" in small.words and small.frames == 0
+    assert "160x120 pixels, more than the 19199 that --max-pixels leaves" in small.words and small.frames == 0
 
 
 def test_a_frame_number_far_away_begins_another_count(tmp_path):

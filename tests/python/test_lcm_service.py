@@ -5,12 +5,14 @@ import os
 import signal
 import socket
 import threading
+import time
 from queue import SimpleQueue
 
 import lcm_rig as rig
 import pytest
 
 from gait.lcm.link import private_url
+from gait.lcm.messages import camera_message
 
 COUNT, KILLED = 10, 6
 
@@ -88,6 +90,14 @@ def test_a_snapshot_of_another_camera_is_not_used(tmp_path):
         assert "for a camera other than --camera" in finish().words
 
 
+def test_a_camera_that_is_announced_replaces_that_of_a_snapshot(tmp_path):
+    url = followed(tmp_path)
+    with rig.daemon(url, *options(tmp_path)) as (listener, finish):
+        other = camera_message(rig.CAMERA.scaled(0.5), 1)
+        listener.ask([("GAIT_CAMERA_0", other)], lambda s: s.state == s.READY, "the other camera")
+        assert "following the person" in finish().words
+
+
 def test_a_folder_that_cannot_be_written_is_reported_once(tmp_path):
     url = private_url()
     with rig.daemon(url, *options(tmp_path)[:3], tmp_path / "no" / "state") as (listener, finish):
@@ -144,6 +154,13 @@ def test_a_service_manager_is_reported_and_settings_are_read_again(tmp_path, man
         assert manager() == "STOPPING=1"
     assert outcome.code == 0 and "settings were not reloaded" in outcome.words
     assert "--particles many: give a whole number" in outcome.words
+
+
+@pytest.mark.parametrize("words", [["--url", "nonsense://"], ["--particles", "many"]])
+def test_under_a_service_manager_a_daemon_that_cannot_start_ends_after_a_second(words, manager):
+    """The manager starts it again at once, however often."""
+    begun = time.monotonic()
+    assert rig.run(*rig.command(*words)[1:]).code != 0 and time.monotonic() - begun >= 1.0
 
 
 def test_a_configuration_is_toml(tmp_path):

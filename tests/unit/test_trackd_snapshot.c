@@ -105,8 +105,9 @@ static void start(void)
     config.particles = config.acquisition_particles = 16;
     s.max_pixels = 48 * 32;
     gait_tracker_prior(toy_model(), &mean, &sd, NULL);
+    camera_use(&s.slot, &camera);
     if (!tracking_open(&s.track, model, &config, &why) || !service_open(&s, &out, 0, 1, NULL, false, &why) ||
-        !service_set_camera(&s, &camera, &why) || !tracking_start(&s.track, &mean, &sd, 0, &why))
+        !service_make_trackers(&s, &why) || !tracking_start(&s.track, &mean, &sd, 0, &why))
         abort();
     s.state = GAITMSG_STATUS_T_RUNNING;
     s.last_utime = 33333;

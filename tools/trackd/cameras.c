@@ -2,6 +2,7 @@
 
 #include "json.h"
 
+#include <inttypes.h>
 #include <math.h>
 #include <stddef.h>
 #include <string.h>
@@ -118,21 +119,27 @@ bool camera_file_read(const char *path, gait_camera *out, message *why)
 }
 
 /* ---- messages ---- */
-bool camera_check(const gait_camera *c, int32_t max_pixels, message *why)
+int64_t camera_pixels(const gait_camera *camera)
+{
+    return (int64_t)camera->width * camera->height;
+}
+
+bool camera_check(const gait_camera *c, int64_t max_pixels, message *why)
 {
     if (c->width < 1 || c->height < 1 || c->width > GAIT_MAX_PIXELS || c->height > GAIT_MAX_PIXELS)
         return message_set(why, "camera with a size of %dx%d; send 1 to %d", c->width, c->height,
                            GAIT_MAX_PIXELS);
-    if (c->width * c->height > max_pixels)
-        return message_set(why, "camera with %dx%d pixels, more than the %d of --max-pixels", c->width,
-                           c->height, max_pixels);
+    if (camera_pixels(c) > max_pixels)
+        return message_set(why,
+                           "camera with %dx%d pixels, more than the %" PRId64 " that --max-pixels leaves",
+                           c->width, c->height, max_pixels);
     if (!(c->fx > 0) || !(c->fy > 0))
         return message_set(why, "camera with focal lengths %g and %g; send pixels", (double)c->fx,
                            (double)c->fy);
     return check_rotation(c, "camera", why);
 }
 
-bool camera_from_message(const gaitmsg_camera_t *in, int32_t max_pixels, gait_camera *out, message *why)
+bool camera_from_message(const gaitmsg_camera_t *in, int64_t max_pixels, gait_camera *out, message *why)
 {
     gait_camera c = {.width = in->width,
                      .height = in->height,
@@ -162,4 +169,29 @@ bool camera_same(const gait_camera *a, const gait_camera *b)
     for (int k = 0; k < NUMBERS; k++)
         same = same && fabsf(x[k] - y[k]) <= 1e-5f * fmaxf(1.0f, fabsf(x[k]));
     return same;
+}
+
+/* ---- streams ---- */
+void camera_use(camera_slot *slot, const gait_camera *camera)
+{
+    *slot = (camera_slot){.known = true, .fixed = slot->fixed, .camera = *camera, .other_since = -1};
+}
+
+camera_answer camera_announced(camera_slot *slot, const gait_camera *camera, int64_t arrival)
+{
+    if (slot->known && camera_same(camera, &slot->camera)) {
+        slot->provisional = false;
+        slot->other_since = -1;
+        return CAMERA_SAME;
+    }
+    if (slot->known && !slot->provisional) {
+        if (slot->other_since < 0 || arrival < slot->other_since || !camera_same(camera, &slot->other)) {
+            slot->other = *camera;
+            slot->other_since = arrival;
+        }
+        if (slot->fixed || arrival - slot->other_since < CAMERA_SILENT) /* both are 0 or more */
+            return CAMERA_REFUSED;
+    }
+    camera_use(slot, camera);
+    return CAMERA_NEW;
 }

@@ -30,6 +30,31 @@ void log_line(const char *format, ...)
     va_end(args);
 }
 
+void log_event(const char *format, ...)
+{
+    enum { LINES_A_SECOND = 10, SECOND = 1000000 };
+    static int64_t since = -SECOND;
+    static int lines, suppressed;
+    int64_t const now = clock_monotonic();
+    message line;
+    va_list args;
+    if (now - since >= SECOND) {
+        if (suppressed > 0)
+            log_line("%d more lines suppressed", suppressed);
+        since = now;
+        lines = suppressed = 0;
+    }
+    if (lines == LINES_A_SECOND) {
+        suppressed++;
+        return;
+    }
+    lines++;
+    va_start(args, format);
+    vsnprintf(line.text, sizeof line.text, format, args);
+    va_end(args);
+    log_line("%s", line.text);
+}
+
 static int64_t clock_us(clockid_t clock)
 {
     struct timespec t;
@@ -64,7 +89,7 @@ void *aligned_memory(size_t bytes, const char *what, message *why)
 
 /* ---- files ---- */
 /* Bytes, far more than any model, camera or image has: a device or a wrong file must not fill the memory. */
-enum { MAX_FILE = 1 << 28 };
+enum { MAX_FILE = 1 << 25 };
 
 static bool read_stream(FILE *f, const char *path, const char *what, file_bytes *out, message *why)
 {
@@ -72,7 +97,7 @@ static bool read_stream(FILE *f, const char *path, const char *what, file_bytes 
     if (fseek(f, 0, SEEK_END) == 0)
         size = ftell(f);
     if (size < 0 || size > MAX_FILE || fseek(f, 0, SEEK_SET) != 0)
-        return message_set(why, "%s: not a regular file, or larger than 256 MiB; give the name of a %s file",
+        return message_set(why, "%s: not a regular file, or larger than 32 MiB; give the name of a %s file",
                            path, what);
     out->data = aligned_memory((size_t)size + 1, path, why);
     if (!out->data)

@@ -16,6 +16,8 @@ typedef struct message {
 bool message_set(message *m, const char *format, ...) __attribute__((format(printf, 2, 3)));
 /* Print a line to stderr. */
 void log_line(const char *format, ...) __attribute__((format(printf, 1, 2)));
+/* The same for everything that a message can cause: at most ten lines a second, then their number. */
+void log_event(const char *format, ...) __attribute__((format(printf, 1, 2)));
 
 /* ---- clocks, microseconds. */
 int64_t clock_wall(void);      /* since the Unix epoch */

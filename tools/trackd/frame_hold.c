@@ -5,18 +5,19 @@
 
 enum { BESIDE_PIXELS = 1 << 16 }; /* of an image_t: fields, metadata, padding of rows */
 
-bool frame_hold_allocate(frame_hold *h, const gait_camera *camera, message *why)
-{
-    free(h->frame);
-    *h = (frame_hold){.capacity = (size_t)camera->width * (size_t)camera->height * 3 + BESIDE_PIXELS};
-    h->frame = malloc(h->capacity);
-    return h->frame || message_set(why, "not enough memory for a waiting frame of %zu bytes", h->capacity);
-}
-
 void frame_hold_close(frame_hold *h)
 {
     free(h->frame);
     *h = (frame_hold){0};
+}
+
+bool frame_hold_allocate(frame_hold *h, const gait_camera *camera, message *why)
+{
+    size_t const bytes = (size_t)camera->width * (size_t)camera->height * 3 + BESIDE_PIXELS;
+    frame_hold_close(h);
+    h->frame = malloc(bytes);
+    h->capacity = h->frame ? bytes : 0;
+    return h->frame || message_set(why, "not enough memory for a waiting frame of %zu bytes", bytes);
 }
 
 bool frame_hold_keep(frame_hold *h, int64_t utime, const void *image, size_t bytes, int64_t arrival)

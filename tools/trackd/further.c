@@ -1,6 +1,5 @@
 #include "further.h"
 
-#include "cameras.h"
 #include "gaitmsg_image_t.h"
 
 #include <stdio.h>
@@ -44,7 +43,7 @@ further_camera *further_find(further *f, int stream)
 const further_camera *further_unknown(const further *f)
 {
     for (int i = 0; i < f->count; i++)
-        if (!f->camera[i].known)
+        if (!f->camera[i].slot.known)
             return &f->camera[i];
     return NULL;
 }
@@ -54,47 +53,30 @@ static size_t picture_bytes(const gait_camera *c)
     return (size_t)c->width * (size_t)c->height * 3;
 }
 
-size_t further_bytes(const further_camera *c)
+bool further_allocate(further_camera *c, message *why)
 {
-    return (1 + FURTHER_PAST) * picture_bytes(&c->camera);
-}
-
-bool further_set_camera(further_camera *c, const gait_camera *camera, message *why)
-{
-    c->camera = *camera;
-    c->pixels = aligned_memory(further_bytes(c), "frames of a camera", why);
-    if (!c->pixels)
-        return false;
+    free(c->pixels);
+    c->bytes = (1 + FURTHER_PAST) * picture_bytes(&c->slot.camera);
+    c->pixels = aligned_memory(c->bytes, "frames of a camera", why);
+    c->background.data = NULL;
     for (int i = 0; i < FURTHER_PAST; i++)
         c->utime[i] = -1;
-    c->known = true;
-    return true;
-}
-
-bool further_take_camera(further_camera *c, const gaitmsg_camera_t *in, int32_t max_pixels, message *why)
-{
-    gait_camera camera;
-    char channel[24];
-    if (!camera_from_message(in, max_pixels, &camera, why))
-        return false;
-    snprintf(channel, sizeof channel, "GAIT_CAMERA_%d", c->stream);
-    if (!camera_plausible(&camera, channel, why))
-        return false;
-    if (c->known)
-        return camera_same(&camera, &c->camera) ||
-               message_set(why, "another camera on GAIT_CAMERA_%d than before is ignored; start anew with it",
-                           c->stream);
-    return further_set_camera(c, &camera, why);
+    if (!c->pixels) {
+        c->slot.known = false;
+        c->bytes = 0;
+    }
+    return c->slot.known;
 }
 
 /* Copy a picture to the place of this number. */
 static bool copy(further_camera *c, const image_view *v, int place, gait_image *out, message *why)
 {
-    uint8_t *const to = c->pixels + (size_t)place * picture_bytes(&c->camera);
+    uint8_t *const to = c->pixels + (size_t)place * picture_bytes(&c->slot.camera);
     gait_image in;
     if (v->pixelformat == GAITMSG_IMAGE_T_PIXEL_FORMAT_MJPEG)
-        return jpeg_decode(v->data, (size_t)v->size, c->camera.width, c->camera.height, to, out, why);
-    if (!image_view_pixels(v, c->camera.width, c->camera.height, &in, why))
+        return jpeg_decode(v->data, (size_t)v->size, c->slot.camera.width, c->slot.camera.height, to, out,
+                           why);
+    if (!image_view_pixels(v, c->slot.camera.width, c->slot.camera.height, &in, why))
         return false;
     int32_t const row = in.width * (in.format == GAIT_GREY8 ? 1 : 3);
     for (int32_t y = 0; y < in.height; y++)
@@ -105,13 +87,13 @@ static bool copy(further_camera *c, const image_view *v, int place, gait_image *
 
 bool further_take_background(further_camera *c, const image_view *v, message *why)
 {
-    return !c->known || copy(c, v, 0, &c->background, why);
+    return !c->slot.known || copy(c, v, 0, &c->background, why);
 }
 
 bool further_take_frame(further_camera *c, const image_view *v, message *why)
 {
     int const at = (int)(c->frames % FURTHER_PAST);
-    if (!c->known)
+    if (!c->slot.known)
         return true; /* no fault: its camera is announced every few seconds */
     c->utime[at] = -1;
     if (!copy(c, v, 1 + at, &c->frame[at], why))
@@ -138,9 +120,9 @@ bool further_waits(const further *f, int64_t utime)
     for (int i = 0; i < f->count; i++) {
         const further_camera *const c = &f->camera[i];
         int64_t newest = -1;
-        for (int k = 0; k < FURTHER_PAST && c->known; k++)
+        for (int k = 0; k < FURTHER_PAST && c->slot.known; k++)
             newest = c->utime[k] > newest ? c->utime[k] : newest;
-        if (c->known && newest < utime - reach(f, utime) / 2)
+        if (c->slot.known && newest < utime - reach(f, utime) / 2)
             return true;
     }
     return false;

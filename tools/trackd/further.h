@@ -2,7 +2,7 @@
  * arrives. */
 #ifndef TRACKD_FURTHER_H
 #define TRACKD_FURTHER_H
-#include "gaitmsg_camera_t.h"
+#include "cameras.h"
 #include "image_view.h"
 
 enum {
@@ -13,9 +13,9 @@ enum {
 
 typedef struct further_camera {
     int stream; /* its number */
-    bool known; /* announced */
-    gait_camera camera;
+    camera_slot slot;
     uint8_t *pixels;       /* of the background, then of the frames */
+    size_t bytes;          /* of pixels */
     gait_image background; /* data NULL: none */
     gait_image frame[FURTHER_PAST];
     int64_t utime[FURTHER_PAST]; /* of the frames, a ring by their number; -1: none */
@@ -32,16 +32,13 @@ typedef struct further {
 /* Numbers of cameras, separated by commas; false unless they are 1 to FURTHER_MOST, none twice and none `first`. */
 bool further_open(further *f, const char *streams, int first, message *why);
 void further_close(further *f);
-/* Memory of its pictures. */
-size_t further_bytes(const further_camera *c);
 /* The camera with this number. */
 further_camera *further_find(further *f, int stream);
 /* The first camera that has not been announced; NULL: all have been. */
 const further_camera *further_unknown(const further *f);
-/* Take a camera when it is first announced; a different one is refused later. */
-bool further_take_camera(further_camera *c, const gaitmsg_camera_t *in, int32_t max_pixels, message *why);
-/* Use a camera; it must be valid, and none known. */
-bool further_set_camera(further_camera *c, const gait_camera *camera, message *why);
+/* Take memory for pictures of the camera in the slot, after freeing those of another; no tracker may use them.  If there is
+ * not enough, the camera is not known. */
+bool further_allocate(further_camera *c, message *why);
 /* Copy a background or a frame, which must have the camera's size. */
 bool further_take_background(further_camera *c, const image_view *v, message *why);
 bool further_take_frame(further_camera *c, const image_view *v, message *why);

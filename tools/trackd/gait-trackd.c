@@ -132,7 +132,6 @@ static bool load(service *s, const settings *want, parts *p, workers *threads, s
     s->further = p->further.count ? &p->further : NULL;
     s->max_gap = (double)want->max_gap;
     s->max_pixels = want->max_pixels;
-    s->camera_fixed = want->camera[0] != '\0';
     s->budget = (budget){.limit_us = (int64_t)(1e3f * want->budget_ms),
                          .low = want->adapt_particles,
                          .high = config.particles};
@@ -142,9 +141,14 @@ static bool load(service *s, const settings *want, parts *p, workers *threads, s
                       why) ||
         !add_people(s, want, p, out, why))
         return false;
-    if (want->camera[0] &&
-        (!camera_file_read(want->camera, &camera, why) || !service_set_camera(s, &camera, why)))
-        return false;
+    if (want->camera[0]) {
+        if (!camera_file_read(want->camera, &camera, why))
+            return false;
+        s->slot.fixed = true;
+        camera_use(&s->slot, &camera);
+        if (!service_make_trackers(s, why))
+            return false;
+    }
     if (!read_background(s, want->background, why))
         return false;
     service_share_background(s);
@@ -278,6 +282,15 @@ static bool serve(service *s, const settings *want, parts *p, workers *threads, 
     return ok;
 }
 
+/* A service manager starts the program again at once, as after a crash: do not spin. */
+static int failed(const message *why, int code)
+{
+    log_line("%s", why->text);
+    if (manager_listens())
+        sleep(1);
+    return code;
+}
+
 int main(int argc, char **argv)
 {
     static settings want;
@@ -290,9 +303,9 @@ int main(int argc, char **argv)
     if (result == OPTION_HELP)
         settings_help();
     if (result == OPTION_BAD)
-        log_line("%s", why.text);
-    if (result != OPTION_OK)
-        return result == OPTION_HELP ? 0 : 2;
+        return failed(&why, 2);
+    if (result == OPTION_HELP)
+        return 0;
     if (want.version) {
         uint32_t const v = gait_version();
         printf("gait-trackd %u.%u.%u jpeg %s\n", v / 10000, v / 100 % 100, v % 100,
@@ -315,7 +328,5 @@ int main(int argc, char **argv)
         execvp(argv[0], argv);
         ok = message_set(&why, "%.200s: cannot be restarted: %s", argv[0], strerror(errno));
     }
-    if (!ok)
-        log_line("%s", why.text);
-    return ok ? 0 : 1;
+    return ok ? 0 : failed(&why, 1);
 }

@@ -85,7 +85,7 @@ bool keypoints_filter_pass(keypoints_filter *f, const keypoint_view *k, int32_t 
         return true;
     f->left_out++;
     if (!f->reported[why])
-        log_line("keypoint '%.40s' is ignored: %s; all such keypoints are counted", k->name, reason[why]);
+        log_event("keypoint '%.40s' is ignored: %s; all such keypoints are counted", k->name, reason[why]);
     f->reported[why] = true;
     return false;
 }

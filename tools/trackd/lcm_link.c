@@ -38,7 +38,8 @@ static int64_t scan(const char *path, bool *safe, message *why)
 {
     struct stat is;
     int64_t at = 0, events = 0, size = 0;
-    FILE *const f = stat(path, &is) == 0 && S_ISREG(is.st_mode) ? fopen(path, "rb") : NULL; /* a pipe would wait */
+    FILE *const f =
+        stat(path, &is) == 0 && S_ISREG(is.st_mode) ? fopen(path, "rb") : NULL; /* a pipe would wait */
     *safe = false;
     if (!f) {
         message_set(why, "%.160s: cannot open this log; give file:///PATH?speed=0", path);

@@ -151,8 +151,8 @@ static bool in_time(lift_service *s, int64_t utime, message *why)
         return true;
     gait_lift_reset(s->lift);
     if (!s->reported_back)
-        log_line("keypoints: capture time went back by %.3f s: the lift restarts",
-                 1e-6 * (double)(s->last - utime));
+        log_event("keypoints: capture time went back by %.3f s: the lift restarts",
+                  1e-6 * (double)(s->last - utime));
     s->reported_back = true;
     return true;
 }

@@ -104,21 +104,25 @@ static void on_keypoints(const lcm_recv_buf_t *buf, const char *channel, void *u
     flush_complete(r);
 }
 
+/* The further camera of a channel; NULL: it is the first camera's. */
+static further_camera *further_of(const receiver *r, const char *channel)
+{
+    further *const f = r->service->further;
+    return f ? further_find(f, atoi(strrchr(channel, '_') + 1)) : NULL;
+}
+
 static void on_camera(const lcm_recv_buf_t *buf, const char *channel, void *user)
 {
     receiver *const r = user;
     gaitmsg_camera_t msg;
     if (gaitmsg_camera_t_decode(buf->data, 0, (int)buf->data_size, &msg) < 0)
         service_complain(r->service, DAMAGED, channel);
-    else
-        service_camera(r->service, &msg);
+    else /* liblcm does not report when a message of a log arrived */
+        service_camera(r->service, further_of(r, channel), &msg,
+                       !r->log         ? clock_monotonic()
+                       : msg.utime < 0 ? 0
+                                       : msg.utime);
     flush_complete(r);
-}
-
-/* The further camera of a channel. */
-static further_camera *further_of(const receiver *r, const char *channel)
-{
-    return further_find(r->service->further, atoi(strrchr(channel, '_') + 1));
 }
 
 static void on_further_frame(const lcm_recv_buf_t *buf, const char *channel, void *user)
@@ -141,16 +145,6 @@ static void on_further_background(const lcm_recv_buf_t *buf, const char *channel
     image_view v;
     if (open_view(r->service, buf, channel, &v))
         service_further_background(r->service, further_of(r, channel), &v);
-}
-
-static void on_further_camera(const lcm_recv_buf_t *buf, const char *channel, void *user)
-{
-    receiver *const r = user;
-    gaitmsg_camera_t msg;
-    if (gaitmsg_camera_t_decode(buf->data, 0, (int)buf->data_size, &msg) < 0)
-        service_complain(r->service, DAMAGED, channel);
-    else
-        service_further_camera(r->service, further_of(r, channel), &msg);
 }
 
 static void on_command(const lcm_recv_buf_t *buf, const char *channel, void *user)
@@ -177,7 +171,7 @@ static bool subscribe_further(receiver *r, message *why)
     static const struct {
         const char *channel;
         lcm_msg_handler_t fn;
-    } kinds[] = {{"GAIT_CAMERA", on_further_camera},
+    } kinds[] = {{"GAIT_CAMERA", on_camera},
                  {"GAIT_BACKGROUND", on_further_background},
                  {"GAIT_IMAGE", on_further_frame}};
     const further *const f = r->service->further;

@@ -21,23 +21,6 @@ void service_set_state(service *s, int8_t state, const char *text)
         message_set(&s->text, "%s", text);
 }
 
-/* Whether one more line may be logged in this second; suppressed lines are counted. */
-static bool may_log(service *s)
-{
-    enum { LINES_A_SECOND = 10, SECOND = 1000000 };
-    int64_t const now = clock_monotonic();
-    if (now - s->lines_since >= SECOND) {
-        if (s->lines_left_out > 0)
-            log_line("%d more lines suppressed", s->lines_left_out);
-        s->lines_since = now;
-        s->lines = s->lines_left_out = 0;
-    }
-    if (s->lines < LINES_A_SECOND)
-        return ++s->lines > 0;
-    s->lines_left_out++;
-    return false;
-}
-
 void service_complain(service *s, const char *format, ...)
 {
     message line;
@@ -47,8 +30,8 @@ void service_complain(service *s, const char *format, ...)
     va_end(args);
     s->news = true;
     if (strcmp(s->complaint.text, line.text) != 0 &&
-        !(s->first && strcmp(s->first->complaint.text, line.text) == 0) && may_log(s))
-        log_line("%s", line.text);
+        !(s->first && strcmp(s->first->complaint.text, line.text) == 0))
+        log_event("%s", line.text);
     s->text = s->complaint = line;
 }
 
@@ -118,7 +101,6 @@ bool service_open(service *s, sink *out, int stream, int threads, const init_sta
     s->has_init = init != NULL;
     if (init)
         s->init = *init;
-    s->other_since = -1;
     rearm(s);
     return !particles || open_particles(s, why);
 }
@@ -183,16 +165,16 @@ static bool set_camera(service *s, const gait_camera *camera, message *why)
     return true;
 }
 
-bool service_set_camera(service *s, const gait_camera *camera, message *why)
+bool service_make_trackers(service *s, message *why)
 {
-    s->first_camera = *camera;
-    s->first_given = true;
+    const gait_camera *const camera = &s->slot.camera;
     if (s->further && further_unknown(s->further))
         return true;
     for (int i = 0; s->further && i < s->further->count; i++)
-        s->track.config.camera[1 + i] = s->further->camera[i].camera;
+        s->track.config.camera[1 + i] = s->further->camera[i].slot.camera;
     s->track.config.cameras = 1 + (s->further ? s->further->count : 0);
     s->track.memory_bytes -= s->hold.capacity;
+    frame_hold_close(&s->hold);
     bool made = set_camera(s, camera, why);
     size_t bytes = s->track.memory_bytes;
     int people = 1;
@@ -203,29 +185,19 @@ bool service_set_camera(service *s, const gait_camera *camera, message *why)
     }
     if (!made || ((s->cue || s->path || s->further) && !frame_hold_allocate(&s->hold, camera, why)) ||
         (s->lift && !lift_service_camera(s->lift, camera, why)))
-        return false;
+        return (s->slot.known = s->slot.fixed), false;
     s->track.memory_bytes += s->hold.capacity;
     set_further_backgrounds(s);
     const tracking *const t = &s->track;
     char trackers[32] = "tracker";
     if (people > 1)
         snprintf(trackers, sizeof trackers, "each of %d trackers", people);
-    log_line("model %016" PRIx64 ", camera %dx%d, %d particles, %d thread%s, %s, %zu bytes (model %zu, "
-             "%s %zu, pool %zu, pictures %zu)",
-             t->info.digest, camera->width, camera->height, t->config.particles, s->threads,
-             s->threads == 1 ? "" : "s", gait_cpu_name(t->config.cpu_mask), bytes + s->hold.capacity,
-             t->model_bytes, trackers, t->tracker_bytes, s->pool_bytes, t->picture_bytes);
+    log_event("model %016" PRIx64 ", camera %dx%d, %d particles, %d thread%s, %s, %zu bytes (model %zu, "
+              "%s %zu, pool %zu, pictures %zu)",
+              t->info.digest, camera->width, camera->height, t->config.particles, s->threads,
+              s->threads == 1 ? "" : "s", gait_cpu_name(t->config.cpu_mask), bytes + s->hold.capacity,
+              t->model_bytes, trackers, t->tracker_bytes, s->pool_bytes, t->picture_bytes);
     return true;
-}
-
-/* Whether a camera that differs from the one in use has been announced alone for long enough to replace it. */
-static bool replaces(service *s, const gait_camera *camera, int64_t utime)
-{
-    if (s->other_since < 0 || utime < s->other_since || !camera_same(camera, &s->other_camera)) {
-        s->other_camera = *camera;
-        s->other_since = utime;
-    }
-    return !s->camera_fixed && utime - s->other_since >= SERVICE_CAMERA_SILENT; /* both are 0 or more */
 }
 
 /* Whether two cameras differ at most in their poses. */
@@ -237,64 +209,72 @@ static bool same_lens(const gait_camera *a, const gait_camera *b)
     return camera_same(&there, b);
 }
 
+int64_t service_pixels_left(const service *s, const camera_slot *slot)
+{
+    int64_t left = s->max_pixels;
+    if (slot != &s->slot && s->slot.known)
+        left -= camera_pixels(&s->slot.camera);
+    for (int i = 0; s->further && i < s->further->count; i++) {
+        const camera_slot *const other = &s->further->camera[i].slot;
+        left -= other != slot && other->known ? camera_pixels(&other->camera) : 0;
+    }
+    return left > 0 ? left : 0;
+}
+
 /* The camera of a message.  Its pose must be plausible, unless it is one of the poses of a moving camera. */
-static bool take_camera(const service *s, const gaitmsg_camera_t *msg, gait_camera *out, message *why)
+static bool take_camera(const service *s, const camera_slot *slot, int stream, const gaitmsg_camera_t *msg,
+                        gait_camera *out, message *why)
 {
     char channel[24];
-    snprintf(channel, sizeof channel, "GAIT_CAMERA_%d", s->stream);
-    return camera_from_message(msg, s->max_pixels, out, why) &&
-           ((s->path && s->track.tracker && same_lens(out, &s->track.config.camera[0])) ||
-            camera_plausible(out, channel, why));
+    snprintf(channel, sizeof channel, "GAIT_CAMERA_%d", stream);
+    return camera_from_message(msg, service_pixels_left(s, slot), out, why) &&
+           ((s->path && slot->known && same_lens(out, &slot->camera)) || camera_plausible(out, channel, why));
 }
 
-void service_camera(service *s, const gaitmsg_camera_t *msg)
+/* The new camera is in its slot: begin anew with it. */
+static bool begin_anew(service *s, further_camera *c, message *why)
 {
-    gait_camera camera;
-    message why;
-    bool const known = s->track.tracker != NULL;
-    message const before = s->refused;
-    s->refused.text[0] = '\0';
-    if (!take_camera(s, msg, &camera, &why)) {
-        if (strcmp(before.text, why.text) != 0)
-            s->idle = SERVICE_IDLE_NOT; /* the new reason is reported with the next frame */
-        s->refused = why;
-        service_complain(s, "%s", why.text);
-        return;
+    bool const followed = s->track.tracker != NULL;
+    bool made = true;
+    for (service *each = s; each; each = each->next)
+        tracking_drop_camera(&each->track); /* its tracker borrows the background of a further camera */
+    if (c) {
+        s->track.memory_bytes -= c->bytes;
+        made = further_allocate(c, why);
+        s->track.memory_bytes += c->bytes;
     }
-    if (s->path && (!known || same_lens(&camera, &s->track.config.camera[0]))) {
+    made = made && (!s->slot.known || service_make_trackers(s, why));
+    for (service *each = s; followed && each; each = each->next)
+        rearm(each);
+    return made;
+}
+
+void service_camera(service *s, further_camera *c, const gaitmsg_camera_t *msg, int64_t arrival)
+{
+    camera_slot *const slot = c ? &c->slot : &s->slot;
+    gait_camera camera;
+    message why, refused = {.text = ""};
+    if (!take_camera(s, slot, c ? c->stream : s->stream, msg, &camera, &refused))
+        service_complain(s, "%s", refused.text);
+    if (!c) {
+        if (refused.text[0] && strcmp(s->refused.text, refused.text) != 0)
+            s->idle = SERVICE_IDLE_NOT; /* the new reason is reported with the next frame */
+        s->refused = refused;
+    }
+    if (refused.text[0])
+        return;
+    if (s->path && (!slot->known || same_lens(&camera, &slot->camera))) {
         if (!pose_path_add(s->path, msg->utime, &camera, &why))
             service_complain(s, "%s", why.text);
-        s->other_since = -1;
-        if (known)
-            return;
-    } else if (known && camera_same(&camera, &s->track.config.camera[0])) {
-        s->other_since = -1;
-        return;
+        camera = slot->known ? slot->camera : camera;
     }
-    if (known && !replaces(s, &camera, msg->utime < 0 ? 0 : msg->utime)) {
+    camera_answer const answer = camera_announced(slot, &camera, arrival);
+    if (answer == CAMERA_REFUSED)
         service_complain(
-            s, s->camera_fixed ? "a camera other than that of --camera was announced; it is ignored"
-                               : "a different camera from the one in use was announced: it replaces that one "
-                                 "after 10 seconds in which only it is announced");
-        return;
-    }
-    s->other_since = -1;
-    bool const made = service_set_camera(s, &camera, &why);
-    for (service *each = s; known && each; each = each->next)
-        rearm(each);
-    if (!made)
-        service_complain(s, "%s", why.text);
-}
-
-void service_further_camera(service *s, further_camera *c, const gaitmsg_camera_t *msg)
-{
-    bool const known = c->known;
-    message why;
-    bool ok = further_take_camera(c, msg, s->max_pixels, &why);
-    s->track.memory_bytes += ok && !known ? further_bytes(c) : 0;
-    if (ok && !known && s->first_given)
-        ok = service_set_camera(s, &s->first_camera, &why);
-    if (!ok)
+            s, slot->fixed ? "a camera other than that of --camera was announced; it is ignored"
+                           : "a different camera from the one in use was announced: it replaces that one "
+                             "after 10 seconds in which only it is announced");
+    else if (answer == CAMERA_NEW && !begin_anew(s, c, &why))
         service_complain(s, "%s", why.text);
 }
 

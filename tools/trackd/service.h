@@ -24,9 +24,8 @@ typedef struct service_counts {
 } service_counts;
 
 enum {
-    SERVICE_PAST = 65,               /* more than the longest lag */
-    SERVICE_SENT = 64,               /* own statuses that are still recognised */
-    SERVICE_CAMERA_SILENT = 10000000 /* microseconds; cameras are announced every two seconds */
+    SERVICE_PAST = 65, /* more than the longest lag */
+    SERVICE_SENT = 64  /* own statuses that are still recognised */
 };
 
 typedef struct past_frame { /* a frame that was tracked */
@@ -56,16 +55,12 @@ typedef struct service {
     keypoint_cue *cue;  /* a detector's keypoints for the tracker; NULL: not requested */
     pose_path *path;    /* poses of a camera that moves; NULL: it stands still */
     further *further;   /* further cameras; NULL: there is one */
-    bool first_given;   /* the first camera is known and waits for the others */
-    gait_camera first_camera;
-    frame_hold hold; /* the frame that waits for keypoints, a pose or further cameras */
-    sink *out;       /* where messages go */
+    camera_slot slot;   /* the first camera; the tracker is there when all cameras are known */
+    frame_hold hold;    /* the frame that waits for keypoints, a pose or further cameras */
+    sink *out;          /* where messages go */
     int threads;
-    int stream;               /* number of the camera, [0, 30] */
-    int32_t max_pixels;       /* of a camera that is announced */
-    bool camera_fixed;        /* by --camera */
-    gait_camera other_camera; /* announced, but not the one in use */
-    int64_t other_since;      /* time of its first message since the one in use was announced; -1: none */
+    int stream;         /* number of the camera, [0, 30] */
+    int32_t max_pixels; /* of all cameras that are announced, together */
     bool has_init;
     init_state init; /* of --init FILE */
     start_trigger start;
@@ -92,8 +87,6 @@ typedef struct service {
     int idle;                 /* SERVICE_IDLE_* that was reported last */
     message refused;          /* why the camera that was announced last cannot be used */
     message text, complaint;  /* text of the status; last complaint on stderr */
-    int64_t lines_since;      /* monotonic microseconds; lines of log are counted from here for a second */
-    int32_t lines, lines_left_out;
     estimate_message estimate;
     past_frame past[SERVICE_PAST];
     stride_meter meter;
@@ -112,16 +105,17 @@ void service_close(service *s);
 /* Make a service for one more person, before it is opened and the camera is set. */
 void service_share(service *s, service *first, int person, keypoint_cue *cue);
 /* The following calls are of the first service, and concern everyone. */
-bool service_set_camera(service *s, const gait_camera *camera, message *why);
+/* Make everyone's tracker for the camera in the slot, if all further ones are known, too.  false: there are none, and the
+ * camera is not known. */
+bool service_make_trackers(service *s, message *why);
 /* Everyone's background is that of the first service. */
 void service_share_background(service *s);
-/* A camera was announced.  With a path it is a pose, if the lens is that of the camera in use.  A camera that differs from
- * the one in use replaces it, unless that is from a file, after only it has been announced for SERVICE_CAMERA_SILENT by the
- * times of the messages. */
-void service_camera(service *s, const gaitmsg_camera_t *msg);
+/* A camera was announced, the first one or, unless NULL, a further one; see camera_announced().  With a path it is a pose,
+ * if the lens is that of the camera in use. */
+void service_camera(service *s, further_camera *c, const gaitmsg_camera_t *msg, int64_t arrival);
+/* Pixels that --max-pixels leaves to the camera of this slot. */
+int64_t service_pixels_left(const service *s, const camera_slot *slot);
 void service_background(service *s, const image_view *v);
-/* The same for a further camera. */
-void service_further_camera(service *s, further_camera *c, const gaitmsg_camera_t *msg);
 void service_further_background(service *s, further_camera *c, const image_view *v);
 /* To one service. */
 void service_command(service *s, const gaitmsg_command_t *msg);

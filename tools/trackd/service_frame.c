@@ -94,7 +94,7 @@ static void leave(service *s)
 {
     stop(s);
     message_set(&s->text, "person %d is out of view", s->person);
-    log_line("%s", s->text.text);
+    log_event("%s", s->text.text);
 }
 
 /* What happens after tracking has stopped. */
@@ -185,8 +185,8 @@ static bool try_auto_start(service *s, const image_view *v, const gait_image *fr
     char number[12] = "";
     if (s->person)
         snprintf(number, sizeof number, " %d", s->person);
-    log_line("person%s found at frame %" PRId64 ": x %.2f y %.2f m, heading %.0f degrees", number, v->frame,
-             (double)h->mean.pelvis[0], (double)h->mean.pelvis[1], (double)h->mean.heading * 57.29578);
+    log_event("person%s found at frame %" PRId64 ": x %.2f y %.2f m, heading %.0f degrees", number, v->frame,
+              (double)h->mean.pelvis[0], (double)h->mean.pelvis[1], (double)h->mean.heading * 57.29578);
     return true;
 }
 
@@ -219,12 +219,12 @@ static void log_particles(const service *s, int32_t had)
 {
     const budget *const b = &s->budget;
     if (b->reason == BUDGET_DROPPED)
-        log_line("%d particles instead of %d: %d frames were dropped", (int)s->wanted, (int)had,
-                 (int)b->lost);
+        log_event("%d particles instead of %d: %d frames were dropped", (int)s->wanted, (int)had,
+                  (int)b->lost);
     else
-        log_line("%d particles instead of %d: a step %s %.1f ms of %.1f", (int)s->wanted, (int)had,
-                 b->reason == BUDGET_SPARE ? "takes only" : "took", (double)b->took_us / 1e3,
-                 (double)b->limit_us / 1e3);
+        log_event("%d particles instead of %d: a step %s %.1f ms of %.1f", (int)s->wanted, (int)had,
+                  b->reason == BUDGET_SPARE ? "takes only" : "took", (double)b->took_us / 1e3,
+                  (double)b->limit_us / 1e3);
 }
 
 /* Change the number of particles if the budget requires it. */
@@ -233,7 +233,7 @@ static void adapt(service *s, int64_t birth, int64_t step_us)
     int32_t const had = s->wanted;
     s->wanted = budget_stepped(&s->budget, birth, clock_wall(), step_us, had);
     if (budget_hopeless(&s->budget, s->wanted))
-        log_line(
+        log_event(
             "a step takes %.1f ms, more than the budget of %.1f: use fewer --particles, more --threads or "
             "--adapt-particles",
             (double)s->budget.step_us / 1e3, (double)s->budget.limit_us / 1e3);
@@ -333,7 +333,7 @@ static int idle_of(const service *s)
 static void set_lack(const service *s, int idle, message *why)
 {
     int const i = s->stream;
-    const further_camera *const unknown = s->first_given && s->further ? further_unknown(s->further) : NULL;
+    const further_camera *const unknown = s->slot.known && s->further ? further_unknown(s->further) : NULL;
     if (idle == SERVICE_IDLE_CAMERA && unknown)
         message_set(why, "no camera: announce it on GAIT_CAMERA_%d", unknown->stream);
     else if (idle == SERVICE_IDLE_CAMERA && s->refused.text[0])
@@ -366,9 +366,9 @@ static void log_idle(service *s)
     s->idle = idle;
     set_lack(s, idle, &why);
     if (idle == SERVICE_IDLE_SEARCHING)
-        log_line("searching for a person who walks in full view");
+        log_event("searching for a person who walks in full view");
     else if (idle != SERVICE_IDLE_NOT)
-        log_line("frames arrive, but %s", why.text);
+        log_event("frames arrive, but %s", why.text);
 }
 
 void service_lack(const service *s, message *why)

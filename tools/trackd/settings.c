@@ -158,8 +158,8 @@ static int make_table(settings *s, option *table)
          "        depend on timing; default: constant",
          INT(adapt_particles, 16, 1 << 20)},
         {"max-pixels", 0, "N",
-         "largest number of pixels of an image; a camera message with more is rejected, so that it\n"
-         "        cannot exhaust memory; default 16777216",
+         "most pixels of all cameras together: a camera message with more is rejected, so that it\n"
+         "        cannot exhaust memory; default 8388608, enough for four cameras of 1920x1080",
          INT(max_pixels, 1, GAIT_MAX_PIXELS * GAIT_MAX_PIXELS)},
         {"threads", 't', "N",
          "threads, default 1, which is also the default of --tasks; results do not depend on it",
@@ -216,7 +216,7 @@ static void set_defaults(settings *s)
                     .init = "auto",
                     .threads = 1,
                     .cpu_mask = -1,
-                    .max_pixels = 1 << 24,
+                    .max_pixels = 1 << 23,
                     .max_gap = 2,
                     .lift_lag = -1};
 }

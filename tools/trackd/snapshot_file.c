@@ -243,25 +243,33 @@ static bool fits(const service *s, const file_bytes *file, head *h, message *why
         return message_set(why, "shorter or longer than its lengths state");
     if (h->cameras != count_cameras(s))
         return message_set(why, "for another number of cameras");
+    int64_t left = s->max_pixels;
     for (int i = 0; i < h->cameras; i++) {
         if (h->stream[i] != stream_of(s, i))
             return message_set(why, "for --%s %d", i ? "further-streams" : "stream", (int)h->stream[i]);
-        if (!camera_check(&h->camera[i], s->max_pixels, why))
+        if (!camera_check(&h->camera[i], i || !s->slot.fixed ? left : INT64_MAX, why))
             return false;
+        left -= camera_pixels(&h->camera[i]);
     }
-    return !s->camera_fixed || camera_same(&h->camera[0], &s->first_camera) ||
+    return !s->slot.known || camera_same(&h->camera[0], &s->slot.camera) ||
            message_set(why, "for a camera other than --camera");
 }
 
-/* Make the trackers, unless --camera has done so. */
+/* Make the trackers, unless --camera has done so.  Cameras of the file are those in use until others are announced. */
 static bool set_cameras(service *s, const head *h, message *why)
 {
-    for (int i = 1; i < h->cameras; i++) {
-        if (!further_set_camera(&s->further->camera[i - 1], &h->camera[i], why))
+    for (int i = 0; i < h->cameras; i++) {
+        further_camera *const c = i ? &s->further->camera[i - 1] : NULL;
+        camera_slot *const slot = c ? &c->slot : &s->slot;
+        if (slot->known)
+            continue;
+        camera_use(slot, &h->camera[i]);
+        slot->provisional = true;
+        if (c && !further_allocate(c, why))
             return false;
-        s->track.memory_bytes += further_bytes(&s->further->camera[i - 1]);
+        s->track.memory_bytes += c ? c->bytes : 0;
     }
-    return s->track.tracker || service_set_camera(s, &h->camera[0], why);
+    return s->track.tracker || service_make_trackers(s, why);
 }
 
 /* Continue with one person. */

@@ -105,8 +105,7 @@ void tracking_close(tracking *t)
     *t = (tracking){0};
 }
 
-/* Free the tracker of the present camera. */
-static void drop_camera(tracking *t)
+void tracking_drop_camera(tracking *t)
 {
     t->memory_bytes -= t->tracker_bytes + t->picture_bytes;
     t->tracker_bytes = t->picture_bytes = 0;
@@ -125,7 +124,7 @@ bool tracking_set_camera(tracking *t, const gait_camera *camera, message *why)
     size_t const pixels = (size_t)camera->width * (size_t)camera->height;
     size_t const picture = padded(3 * pixels), byte_each = t->several ? padded(pixels) : 0;
     size_t const pictures = t->first ? 0 : 2 * picture + 2 * byte_each;
-    drop_camera(t);
+    tracking_drop_camera(t);
     if (t->first && !t->first->block)
         return message_set(why, "there is no tracker of the first person");
     t->config.camera[0] = *camera;
@@ -145,7 +144,7 @@ bool tracking_set_camera(tracking *t, const gait_camera *camera, message *why)
     if (status == GAIT_OK)
         status = gait_start_init(t->block + padded(bytes), start_bytes, t->model, &start, &t->start, &err);
     if (status != GAIT_OK) {
-        drop_camera(t);
+        tracking_drop_camera(t);
         return message_set(why, "cannot create the tracker: %s (%s)", err.text, gait_result_name(status));
     }
     t->tracker_bytes = before;

@@ -59,6 +59,8 @@ void tracking_close(tracking *t);
 /* Allocate the block and create the tracker, in place of that of another camera, if there is one; first that of
  * `first`. */
 bool tracking_set_camera(tracking *t, const gait_camera *camera, message *why);
+/* Free the tracker and its pictures. */
+void tracking_drop_camera(tracking *t);
 /* Copy the background, unless it is already in use.  It must have the camera's size. */
 bool tracking_set_background(tracking *t, const gait_image *plate, message *why);
 /* Use the background of `first`. */

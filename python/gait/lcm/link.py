@@ -108,7 +108,7 @@ def _scan(path: str | os.PathLike[str]) -> str | None:
     """Describe where an incomplete log breaks off.
 
     UserError if liblcm would take more memory than the file has: it searches for the first event, and
-    allocates what an event states.  gait-trackd has the same rule (lcm_link.c), as neither can call the other.
+    allocates what an event states.  gait-trackd has the same rule (lcm_link.c): neither can call the other.
     """
     size, at, events, stated = Path(path).stat().st_size, 0, 0, 0
     with open(path, "rb") as file:
