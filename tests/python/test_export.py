@@ -17,7 +17,7 @@ import gait.cli
 from gait.body.skeleton import CHANNELS, JOINTS
 from gait.export import angles, motion, opensim
 from gait.io.track_file import write_lifted
-from gait.io.trc import read_trc
+from gait.io.trc import METRES, read_trc, read_trc_table
 from gait.motion.footfalls import find_events
 
 FPS = 30.0
@@ -43,10 +43,16 @@ def export(walk, tmp_path, suffix):
     return out
 
 
-def test_trc_reads_back(walk, tmp_path):
-    names, points, rate = read_trc(export(walk, tmp_path, ".trc"), fps=FPS)
+@pytest.mark.parametrize("fps", [None, FPS])
+def test_trc_reads_back(walk, tmp_path, fps):
+    path = export(walk, tmp_path, ".trc")
+    names, points, rate = read_trc(path, fps)
     assert names == JOINTS and rate == FPS
-    np.testing.assert_allclose(points[..., [2, 0, 1]], walk.places[walk.kept], atol=TENTH)
+    np.testing.assert_allclose(points[walk.kept][..., [2, 0, 1]], walk.places[walk.kept], atol=TENTH)
+    assert len(points) == 60 and np.isnan(points[20]).all()
+    rows = read_trc_table(path, METRES).rows
+    np.testing.assert_allclose([row.time for row in rows], walk.time[walk.kept], atol=1e-6)
+    assert [row.frame for row in rows] == (6 + np.flatnonzero(walk.kept)).tolist()  # the motion's, from 1
 
 
 @pytest.mark.filterwarnings("ignore:No analog data found")
@@ -284,6 +290,10 @@ def test_mcap_of_a_log_keeps_every_message_and_its_time(tmp_path):
     joint = gaitmsg.joint_t()
     joint.name, joint.position = "l_knee", [1.0, 2.0, 0.5]
     estimate.njoints, estimate.joints, estimate.speed = 1, [joint], float("nan")
+    unknown = gaitmsg.estimate_t()
+    nowhere = gaitmsg.joint_t()
+    nowhere.name, nowhere.position = "l_knee", [1.0, float("inf"), float("nan")]
+    unknown.njoints, unknown.joints = 1, [nowhere]
     picture = np.arange(32 * 24, dtype=np.uint8).reshape(24, 32)
     writer, wanted = LogWriter(log), []
     for k in range(12):
@@ -294,6 +304,7 @@ def test_mcap_of_a_log_keeps_every_message_and_its_time(tmp_path):
             ("GAIT_IMAGE_0", image_message(picture, at, k)),
             ("GAIT_IMAGE_1", image_message(picture, at, k, jpeg=90)),
             ("GAIT_ESTIMATE", estimate),
+            ("GAIT_ESTIMATE_2", unknown),
         ):
             writer.write(at + 7, channel, message.encode())
             wanted.append((channel, (at + 7) * 1000))
@@ -311,6 +322,7 @@ def test_mcap_of_a_log_keeps_every_message_and_its_time(tmp_path):
         "foxglove.CompressedImage GAIT_IMAGE_1": 12,
         "gaitmsg.estimate_t GAIT_ESTIMATE": 12,
         "foxglove.SceneUpdate GAIT_ESTIMATE/scene": 12,
+        "gaitmsg.estimate_t GAIT_ESTIMATE_2": 12,
         "None OTHER": 12,
     }
     last = json.loads(next(m.data for _, c, m in reversed(found) if c.topic == "GAIT_ESTIMATE"))
@@ -343,9 +355,20 @@ def test_strange_messages_of_a_log_are_kept_and_a_strange_log_is_one_line(tmp_pa
         assert not (tmp_path / "b.mcap").exists()
 
 
-def test_rerun(walk, tmp_path):
+def test_rerun_reads_back(walk, tmp_path):
     pytest.importorskip("rerun", reason="rerun-sdk is not installed: extra rerun")
-    assert export(walk, tmp_path, ".rrd").read_bytes()[:3] == b"RRF"
+    reader = pytest.importorskip("rerun.chunk", reason="rerun-sdk before 0.41 does not read files")
+    path = export(walk, tmp_path, ".rrd")
+    chunks = [chunk for chunk in reader.RrdReader(path).stream() if chunk.entity_path == "/person/joints"]
+    columns = "frame", "time", "Points3D:positions"
+    frames, times, places = (
+        np.concatenate([chunk.to_record_batch().column(name).to_numpy(False) for chunk in chunks])
+        for name in columns
+    )
+    assert frames.tolist() == (5 + np.flatnonzero(walk.kept)).tolist()
+    np.testing.assert_allclose(times.astype(np.int64) * 1e-9, walk.time[walk.kept], atol=1e-6)
+    found = np.array([np.stack(row) for row in places])
+    np.testing.assert_allclose(found, walk.places[walk.kept], atol=TENTH)
 
 
 @pytest.mark.parametrize(

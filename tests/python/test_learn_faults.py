@@ -54,11 +54,17 @@ def test_the_rate_of_a_trc_is_that_of_its_times(rate, fits, marked, tmp_path):
     assert points.read(path, 120.0)[2] == 120.0  # --fps decides
 
 
-def test_rows_that_are_missing_from_a_trc_are_named(marked, tmp_path):
+def test_rows_that_are_missing_from_a_trc_are_named_unless_frames_are_numbered(marked, tmp_path):
     path = write_trc(tmp_path / "a.trc", mw.LOWER, marked)
-    lines = path.read_text().split("\n")
+    whole, lines = read_trc(path)[1], path.read_text().replace("\t 240\t", "\t 237\t").split("\n")
     del lines[106:109]
-    path.write_text("\n".join(lines).replace("\t 240\t", "\t 237\t"))
+    path.write_text("\n".join(lines))
+    _, points, _ = read_trc(path)
+    assert np.isnan(points[100:103]).all()
+    np.testing.assert_array_equal(
+        np.delete(points, [100, 101, 102], axis=0), np.delete(whole, [100, 101, 102], axis=0)
+    )
+    path.write_text("\n".join([*lines[:6], *("\t" + line.partition("\t")[2] for line in lines[6:-1]), ""]))
     with pytest.raises(UserError, match=r"a.trc:107: 0.0333 s after the row before"):
         read_trc(path)
 

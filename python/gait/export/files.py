@@ -63,8 +63,8 @@ def _plain(source: str, target: str, suffix: str) -> dict[str, Any]:
 
     if suffix == ".trc":
         found = motion.read(source)
-        rows = found.present
-        write_trc(target, found.names, found.time[rows], found.places[rows], found.rate)
+        rows, frames = found.present, found.track.frame
+        write_trc(target, found.names, found.time[rows], found.places[rows], found.rate, frames)
         return {"frames": int(rows.sum())}
     with replacing(target) as file:
         if suffix == ".parquet":

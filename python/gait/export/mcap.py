@@ -241,13 +241,20 @@ def write_log(path: Path, log: str | os.PathLike[str]) -> dict[str, int]:
                 message = None
             if message is None:
                 writer.add_bytes(event.channel, event.data, at, event.eventnum)
-            elif type(message).__name__ == "estimate_t" and message.joints:
-                places = np.array([joint.position for joint in message.joints])
+            elif (update := _scene_of(message, at)) is not None:
                 topic = f"{event.channel}/scene"
                 counts[topic] = counts.get(topic, 0) + 1
-                update = scene([joint.name for joint in message.joints], places, at)
                 writer.add(topic, "foxglove.SceneUpdate", update, at, event.eventnum)
     return counts
+
+
+def _scene_of(message: Any, nanoseconds: int) -> dict[str, Any] | None:
+    """Draw an estimate; None for other messages, and where joints are not finite numbers."""
+    if type(message).__name__ != "estimate_t" or not message.joints:
+        return None
+    places = np.array([joint.position for joint in message.joints])
+    names = [joint.name for joint in message.joints]
+    return scene(names, places, nanoseconds) if np.isfinite(places).all() else None
 
 
 def _foxglove(message: Any, nanoseconds: int) -> tuple[str, dict[str, Any]]:

@@ -22,6 +22,7 @@ _RATE_OFF, _COLUMN_GAP = (
     0.02,
     1.7,
 )  # largest relative difference of rates; frame times from which a step is a gap
+_OFF_TIME = 0.3  # frame times by which a step of column Time may differ from that of Frame#
 HEADER_LINES = 5  # lines of the header; an empty line may follow
 
 
@@ -46,11 +47,11 @@ class Table(NamedTuple):
 def read_trc(path: Path, fps: float | None = None) -> tuple[list[str], Array, float]:
     """Read the points of a .trc.
 
-    Returns M labels, points (T, M, 3) in metres and in the file's axes, NaN where cells are empty, and frames
-    per second: `fps`, or DataRate, which must then agree with the times.  UserError names file, line and
-    remedy.
+    Returns M labels, points (T, M, 3) in metres and in the file's axes, NaN where cells are empty or, by both
+    Frame# and Time, a row is missing, and frames per second: `fps`, or DataRate, which must then agree with
+    the times.  UserError names file, line and remedy.
     """
-    table = read_trc_table(path, METRES)
+    table = _with_missing_rows(read_trc_table(path, METRES))
     if fps is None:
         _require_rate(path, table.rate, table.rows)
         _require_numbers(path, table)
@@ -103,6 +104,23 @@ def _require_consistent(path: Path, head: dict[str, str], labels: list[str], tim
     late = next((k for k in range(1, len(times)) if times[k][1] <= times[k - 1][1]), None)
     if late is not None:
         raise UserError(f"{path}:{times[late][0]}: the times do not increase; correct column Time")
+
+
+def _with_missing_rows(table: Table) -> Table:
+    """Insert rows of NaN where numbers and times agree that some are missing, at most as many as there are."""
+    frames, seconds = (np.array([getattr(row, name) for row in table.rows]) for name in ("frame", "time"))
+    steps, spans = np.diff(frames), np.diff(seconds)
+    count = np.round(steps / np.median(steps))  # NaN if a column is empty
+    agree = (count >= 1) & (np.abs(spans / np.median(spans) - count) < _OFF_TIME)
+    if not agree.all() or not 0 < count.sum() - len(count) <= len(table.rows):
+        return table
+    at = np.concatenate([[0], np.cumsum(count)]).astype(int)
+    points = np.full((at[-1] + 1, *table.points.shape[1:]), np.nan)
+    points[at] = table.points
+    every = np.arange(len(points))
+    lines = [table.rows[k].line for k in np.searchsorted(at, every)]
+    times, numbers = (np.interp(every, at, column).tolist() for column in (seconds, frames))
+    return table._replace(points=points, rows=list(map(Row, lines, times, numbers)))
 
 
 def _require_rate(path: Path, rate: float, times: list[Row]) -> None:
@@ -161,25 +179,33 @@ _NUMBER = re.compile(r"[-+]?(\d+\.?\d*|\.\d+)([eE][-+]?\d+)?|[-+]?(nan|inf|infin
 
 
 def write_trc(
-    path: str | os.PathLike[str], names: tuple[str, ...], times: Array, joints: Array, rate: float
+    path: str | os.PathLike[str],
+    names: tuple[str, ...],
+    times: Array,
+    joints: Array,
+    rate: float,
+    frames: NDArray[np.int64] | None = None,
 ) -> None:
     """Write joints (n, P, 3) in metres, z up, as OpenSim's y-up frame: x_trc = y, y_trc = z, z_trc = x.
 
-    `names`: the P joints; `times` (n,): seconds; `rate`: frames per second.
+    `names`: the P joints; `times` (n,): seconds; `rate`: frames per second; `frames` (n,): numbers of the
+    frames, from 0.  Frames that are missing have no row, since OpenSim's inverse kinematics stops at an empty
+    one; Frame# and Time show them.
     """
     count, markers = joints.shape[:2]
+    numbers = 1 + (np.arange(count) if frames is None else frames)
     head = [
         f"PathFileType\t4\t(X/Y/Z)\t{os.path.basename(path)}",
         "DataRate\tCameraRate\tNumFrames\tNumMarkers\tUnits\tOrigDataRate\tOrigDataStartFrame\tOrigNumFrames",
-        f"{rate:g}\t{rate:g}\t{count}\t{markers}\tm\t{rate:g}\t1\t{count}",
+        f"{rate:g}\t{rate:g}\t{count}\t{markers}\tm\t{rate:g}\t{numbers[0]}\t{count}",
         "Frame#\tTime\t" + "".join(f"{name}\t\t\t" for name in names).rstrip("\t"),
         "\t\t" + "\t".join(f"{axis}{i + 1}" for i in range(markers) for axis in "XYZ"),
         "",
     ]
     turned = joints[..., [1, 2, 0]].reshape(count, -1)
     body = [
-        f"{i + 1}\t{time:.6f}\t" + "\t".join(f"{value:.5f}" for value in row)
-        for i, (time, row) in enumerate(zip(times, turned, strict=True))
+        f"{number}\t{time:.6f}\t" + "\t".join(f"{value:.5f}" for value in row)
+        for number, time, row in zip(numbers, times, turned, strict=True)
     ]
     with replacing(path) as temporary:
         temporary.write_text("\n".join([*head, *body, ""]), encoding="utf-8")
