@@ -107,7 +107,7 @@ def _require_consistent(path: Path, head: dict[str, str], labels: list[str], tim
 
 
 def _with_missing_rows(table: Table) -> Table:
-    """Insert rows of NaN where numbers and times agree that some are missing, at most as many as there are."""
+    """Insert rows of NaN where numbers and times agree that some are missing, at most as many again."""
     frames, seconds = (np.array([getattr(row, name) for row in table.rows]) for name in ("frame", "time"))
     steps, spans = np.diff(frames), np.diff(seconds)
     count = np.round(steps / np.median(steps))  # NaN if a column is empty
