@@ -139,6 +139,13 @@ def test_several_people_have_rows_and_files_of_their_own(place):
     assert re.findall('href="(.*?)"', row) == files
 
 
+def test_clips_are_counted_not_people(place, monkeypatch, capsys):
+    clips_of(place, GROUP)
+    monkeypatch.setattr(Runner.__init__, "__defaults__", (runner(place).gait,))
+    assert gait.cli.main(["batch", str(place / "p.toml"), "-o", str(place / "out")]) == 0
+    assert capsys.readouterr().out.startswith("1 clip, 0 failed")
+
+
 def test_several_films_are_one_clip_and_all_their_files_count(place, capsys):
     """gait track takes these words, and fails because the films have a few bytes only."""
     (place / "calib.json").write_text("{}")
@@ -152,6 +159,24 @@ def test_several_films_are_one_clip_and_all_their_files_count(place, capsys):
     assert clip.key() != before
     assert gait.cli.main(words) == 1 and "a.mp4: cannot be read as video" in capsys.readouterr().err
     assert runner(place).run([clip], 1, lambda _: None)[0]["input"] == films[0]
+
+
+def test_cameras_of_one_file_keypoint_folders_and_files_in_options_count(place):
+    """A name of a camera is no part of the path; an edited file in a folder does not change the folder."""
+    (place / "calib.toml").write_text("")
+    (place / "joints").mkdir()
+    frame, start = place / "joints/000.json", place / "start.json"
+    for file in (frame, start):
+        file.write_text("{}")
+    text = '[[clip]]\nkeypoints = "joints"\ncamera = "calib.toml:cam_01"\nmake = ["lift"]\noptions = ["{}"]\n'
+    keys = []
+    for option in (start, f"--init={start}"):
+        [clip] = clips_of(place, text.replace("{}", str(option)))
+        keys += [clip.key(), clip.key()]
+        for file in (frame, start):
+            file.write_text(file.read_text() + " ")
+            keys.append(clip.key())
+    assert keys[0] == keys[1] and keys[4] == keys[5] and len(set(keys)) == 6
 
 
 def test_a_cluster_runs_the_same_project(place, monkeypatch):

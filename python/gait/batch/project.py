@@ -12,6 +12,7 @@ from pathlib import Path
 from typing import Any
 
 from gait._version import __version__
+from gait.camera.camera import split_name
 from gait.errors import UserError, unreadable
 from gait.io.fields import Fields, parsing
 
@@ -60,8 +61,15 @@ class Clip:
         return "motion.csv" if self.lifted else "track.csv"
 
     def key(self) -> str:
-        """Hash of all that the outputs depend on: settings, version, size and time of the input files."""
-        paths = [*self.videos, *self.cameras, *([self.keypoints] if self.keypoints else [])]
+        """Hash of all that the outputs depend on: settings, version, size and time of the input files.
+
+        Files named in `options` count, and all files in a folder of keypoints.
+        """
+        paths = [*self.videos, *(split_name(camera)[0] for camera in self.cameras)]
+        paths += [self.keypoints] if self.keypoints else []
+        named = (word.partition("=")[2] if word.startswith("--") else word for word in self.options)
+        paths += [path for path in named if os.path.exists(path)]
+        paths += sorted(entry.path for path in paths if os.path.isdir(path) for entry in os.scandir(path))
         files = [os.stat(path) for path in paths]
         state = [asdict(self), [(file.st_size, file.st_mtime_ns) for file in files], __version__]
         return hashlib.sha256(json.dumps(state).encode()).hexdigest()

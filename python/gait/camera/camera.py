@@ -324,7 +324,7 @@ def read_camera(
     UserError
         One line naming file, key and remedy.
     """
-    file, name = _split(str(path))
+    file, name = split_name(str(path))
     require_file(file, "camera file")
     suffix, stated = Path(file).suffix.lower(), True
     if suffix == ".json":
@@ -359,7 +359,7 @@ def camera_names(path: str) -> list[str]:
     UserError
         If the file cannot be read.
     """
-    file, name = _split(path)
+    file, name = split_name(path)
     if name is not None or Path(file).suffix.lower() != ".toml" or not Path(file).is_file():
         return [path]
     return [f"{file}:{name}" for name in _toml_cameras(file)[1]]
@@ -376,8 +376,8 @@ def write_lens(path: Path, camera: Camera, note: str) -> None:
     path.write_text(json.dumps(lens | {"note": note}, indent=1) + "\n")
 
 
-def _split(path: str) -> tuple[str, str | None]:
-    """Split FILE.toml:name into file and name."""
+def split_name(path: str) -> tuple[str, str | None]:
+    """Split FILE.toml:name into file and name of a camera; the name is None if there is none."""
     file, colon, name = path.rpartition(":")
     several = file.lower().endswith((".toml", ".txt", ".bin", ".yaml", ".yml", ".xml"))
     return (file, name) if colon and several else (path, None)

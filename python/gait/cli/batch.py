@@ -23,8 +23,9 @@ make: track or lift; overlay and report of a track; trc c3d bvh mot parquet rrd 
 
 Every clip has its own folder in DIR and its own processes: one that is damaged or crashes becomes a failed
 row of the summary, and the others continue.  Run the same command again to resume: it skips clips that are
-done with the same settings, files and version, and retries failed ones.  DIR/summary.csv (and .parquet, with
-PyArrow) has one row per clip, DIR/index.html links to all files.  The exit code is 1 if a clip failed.
+done with the same settings, files (also those that options name) and version, and retries failed ones.
+DIR/summary.csv (and .parquet, with PyArrow) has one row per clip and person, DIR/index.html links to all
+files.  The exit code is 1 if a clip failed.
 """
 
 from __future__ import annotations
@@ -85,11 +86,12 @@ def run(args: argparse.Namespace) -> int:
     else:
         rows = Runner(output).run(clips, args.jobs or _usual_jobs(), report)
     names = write_summary(output, rows)
-    failed = sum(row["state"] == FAILED for row in rows)
+    failed = sum(row["state"] == FAILED for row in rows)  # with one row each
     if args.json:
-        print(json.dumps({"clips": len(rows), "failed": failed, "rows": rows}))
+        print(json.dumps({"clips": len(clips), "failed": failed, "rows": rows}))
     else:
-        print(f"{len(rows)} clips, {failed} failed; {', '.join(str(output / name) for name in names)}")
+        files = ", ".join(str(output / name) for name in names)
+        print(f"{len(clips)} clip{'s' * (len(clips) > 1)}, {failed} failed; {files}")
     return int(failed > 0)
 
 
