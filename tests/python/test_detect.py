@@ -129,6 +129,37 @@ def test_a_crop_follows_at_the_persons_speed(stage):
         assert set(stage.step(n, red=100 + 50 * n)) == {1}
 
 
+def test_a_live_detector_finds_the_same_and_keeps_little(stage):
+    """People cross, turn back, leave and return for a minute."""
+    live, whole = people.PeopleDetector(live=True), stage.detector
+    for n in range(1500):
+        second, places = n / 25, {"blue": 320 + 230 * np.cos(n / 60)}
+        if second % 20 < 12:
+            places["red"] = 80 + 480 * (second % 20) / 12
+        stage.detector = whole
+        expected = stage.step(n, **places)
+        stage.detector = live
+        assert stage.step(n, **places) == expected
+        assert all(len(one.frames) == len(one.keypoints) == len(one.times) < 60 for one in live.people)
+    assert sum(len(one.frames) for one in whole.people) > 2000
+    for n in range(1500, 1500 + 61 * 25):
+        stage.step(n)
+    assert live.people == []  # no one would get an old id
+
+
+def test_who_is_lost_does_not_bring_more_searches_for_everyone(stage):
+    """They are looked for five times a second; small people and groups once."""
+    stage.detector = people.PeopleDetector(everyone=True)
+    find, asked = stage.detector._find, []
+    stage.detector._find = lambda image, small: asked.append(small) or find(image, small)
+    for n in range(10):
+        stage.step(n, red=200, blue=500)
+    asked.clear()
+    for n in range(10, 60):
+        stage.step(n, red=200)
+    assert 6 <= len(asked) <= 10 and sum(asked) == 2
+
+
 def test_the_main_person_is_in_view_long_and_large():
     def keypoints(frames, height):
         uv = np.zeros((frames, 16, 2))

@@ -26,7 +26,8 @@ CONFIDENCE = np.linspace(0.3, 1, len(LANDMARK_JOINTS))
 class FakePeople:
     """In every frame brighter than 10 finds a passer-by and a person who was detected before."""
 
-    def __init__(self, network, most):
+    def __init__(self, network, most, live):
+        assert live
         self.one, self.times = Followed(1), []
 
     def step(self, frame):
@@ -38,7 +39,8 @@ class FakePeople:
         self.one.frames.append(frame.number)
         self.one.times.append(frame.time)
         self.one.keypoints.append(person)
-        passer_by = Followed(2, [frame.number], [frame.time], [person._replace(uv=UV + 50)])
+        self.one.count += 1
+        passer_by = Followed(2, [frame.number], [frame.time], [person._replace(uv=UV + 50)], count=1)
         return [(passer_by, passer_by.keypoints[0]), (self.one, person)]
 
 

@@ -2,7 +2,8 @@
 
 A person's crop is predicted from the landmarks of earlier frames, at constant speed.  The person network
 scans the whole picture at the start, when a person is lost, and every second to find new people.  Once it has
-found someone new it stops, and goes on with smaller parts of the picture a little later.
+found someone new it stops, and goes on with smaller parts of the picture a little later.  If everyone is
+wanted, it searches small parts too, and beside people found, but once a second only, even while one is lost.
 
 People who meet in the picture are distinguished by their courses and the colours of their clothes: while two
 are near each other, landmarks off a person's course belong to another person, and the person counts as
@@ -11,6 +12,7 @@ hidden. A person who comes back gets the old id if position and colours agree.
 
 from __future__ import annotations
 
+import itertools
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 
@@ -71,6 +73,8 @@ class Followed:
     """Mean over samples."""
     samples: int = 0
     """Number of samples of the colours."""
+    count: int = 0
+    """Number of frames in which the person was found, also of those left out by `forget`."""
     free: int = 0
     """Index of the last frame in which no other person was near."""
     lost: bool = False
@@ -87,14 +91,26 @@ class Followed:
 
     def on_course(self, time: float) -> Array:
         """Predict the crop's centre at a time from the person's course before others were near."""
-        free, begin = self.free, self.free
-        while begin > 0 and self.times[free] - self.times[begin - 1] <= _COURSE:
-            begin -= 1
+        free, begin = self.free, self._course_begin()
         centre, since = self.keypoints[free].crop.centre, self.keypoints[begin].crop.centre
         if self.times[free] - self.times[begin] < _COURSE / 2:
             return centre
         speed = (centre - since) / (self.times[free] - self.times[begin])
         return np.asarray(centre + (time - self.times[free]) * speed)
+
+    def _course_begin(self) -> int:
+        """Index of the first frame from which the speed on the course is computed."""
+        begin = self.free
+        while begin > 0 and self.times[self.free] - self.times[begin - 1] <= _COURSE:
+            begin -= 1
+        return begin
+
+    def forget(self) -> None:
+        """Leave out frames that `expected` and `on_course` do not need any more."""
+        begin = max(0, min(self._course_begin(), len(self.frames) - 2))
+        for values in (self.frames, self.times, self.keypoints):
+            del values[:begin]
+        self.free -= begin
 
     def off_course(self, time: float, person: Person) -> float:
         """Distance of a detected person from the course, crop sides."""
@@ -114,6 +130,9 @@ class PeopleDetector:
         Most people followed at a time.
     everyone : bool
         Search the whole picture for small people even if larger ones were found.
+    live : bool
+        Keep only what later frames need, for a stream without end: `people` then lacks earlier frames, and
+        people whose id will not come back; `keypoints` cannot be used.
 
     Attributes
     ----------
@@ -126,12 +145,19 @@ class PeopleDetector:
         If the weights are missing or damaged.
     """
 
-    def __init__(self, network: str = "full", most: int = _MOST_PEOPLE, everyone: bool = False) -> None:
+    def __init__(
+        self,
+        network: str = "full",
+        most: int = _MOST_PEOPLE,
+        everyone: bool = False,
+        live: bool = False,
+    ) -> None:
         self._network = network
         self._find = PersonNetwork()
         self._landmarks = LandmarkNetwork(network)
-        self._most, self._everyone = most, everyone
-        self._scanned = -np.inf
+        self._most, self._everyone, self._live = most, everyone, live
+        self._ids = itertools.count(1)
+        self._scanned = self._scanned_for_all = -np.inf
         self._searched = 0  # sizes of parts that the last scan had searched when it found someone new
         self.people: list[Followed] = []
 
@@ -167,6 +193,10 @@ class PeopleDetector:
         if since >= (_RETRY if missing else _SCAN_PERIOD):
             self._scanned = frame.time
             self._searched = self._scan(frame, found)
+        if self._live:
+            for one, _ in found:
+                one.forget()
+            self.people = [one for one in self.people if frame.time - one.times[-1] <= _FORGET]
         return found
 
     def keypoints(self, times: Mapping[int, float] | Array, correct: bool = True) -> dict[int, Keypoints]:
@@ -217,21 +247,24 @@ class PeopleDetector:
         """Search for people who are not followed, where people were hidden and in the picture.
 
         Parts of the picture are searched, then all of it as one crop, until landmarks confirm a person; if
-        everyone is wanted also beside people found, where the person network merges boxes of a group.
-        Returns how many sizes of parts it had searched by then, which the next scan leaves out, unless
-        everyone is lost; 0: all.
+        everyone is wanted, once a second, all parts and also beside people found, where the person network
+        merges boxes of a group.  Returns how many sizes of parts it had searched by then, which the next scan
+        leaves out, unless everyone is lost; 0: all.
         """
         time, searched = frame.time, self._searched if found else 0
+        everyone = self._everyone and time - self._scanned_for_all >= _SCAN_PERIOD
+        if everyone:
+            self._scanned_for_all, searched = time, 0
         self._add_new(frame, found, [p.expected(time) for p in self.people if self._just_lost(p, time)])
-        parts = self._find(frame.image, small=self._everyone or not found)
+        parts = self._find(frame.image, small=everyone or not found)
         for size, crops in enumerate(parts, 1):
             if size <= searched:
                 continue
-            if self._add_new(frame, found, crops) and not self._everyone:
+            if self._add_new(frame, found, crops) and not everyone:
                 return size
         if not found:
             self._add_new(frame, found, [whole_picture(frame.image)])
-        if self._everyone:
+        if everyone:
             count = 0
             while count < len(found):  # also beside people found there
                 count, beside = len(found), [crop for _, one in found for crop in _beside(one.crop)]
@@ -272,7 +305,7 @@ class PeopleDetector:
             if off < 1 and off - alike < least:
                 best, least = one, off - alike
         if best is None:
-            best = Followed(len(self.people) + 1)
+            best = Followed(next(self._ids))
             self.people.append(best)
         best.lost = False
         return best
@@ -282,9 +315,10 @@ class PeopleDetector:
         one.frames.append(frame.number)
         one.times.append(frame.time)
         one.keypoints.append(person)
+        one.count += 1
         if not near or frame.time - one.times[one.free] > _LONG_CONTACT:
             one.free = len(one.frames) - 1
-        if one.colours is None or (not near and len(one.frames) % _SAMPLE == 0):
+        if one.colours is None or (not near and one.count % _SAMPLE == 0):
             colours = _colours(frame.image, person)
             one.samples += 1
             if one.colours is None:

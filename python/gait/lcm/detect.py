@@ -82,7 +82,7 @@ class LiveDetector:
     def __init__(self, url: str, stream: int, network: str, people: int) -> None:
         if is_log(url):
             raise UserError(f"--url {url}: --lcm needs a network, not a log; use gait detect VIDEO")
-        self._network, self._detector = network, PeopleDetector(network, people)
+        self._network, self._detector = network, PeopleDetector(network, people, live=True)
         self._numbers = Numbers(people)
         self._lcm = open_lcm(url)
         self._channel = f"GAIT_TRACKS_{stream}"
@@ -108,7 +108,7 @@ class LiveDetector:
         people = self._detector.step(Frame(self.frames, seconds, image))
         self.frames += 1
         if people:
-            longest, _ = max(people, key=lambda pair: len(pair[0].frames))
+            longest, _ = max(people, key=lambda pair: pair[0].count)
             self.found += 1
             for one, _ in people:
                 data = self._tracks(one, message).encode()
