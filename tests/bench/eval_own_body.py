@@ -7,7 +7,8 @@ Simulated walks by two cameras (gait simulate --cameras 2) of people with the pr
 and with those of people who were recorded (drawn); and the development clips, one camera, each with a model
 learnt without its subject.  own: the body from a first pass (gait track --body auto), two cameras; live: the
 proportions vary among the particles (setting `proportions` of the tracker).  With the detector and all
-defaults, one run each.  Clips and tracks are kept in build/eval-cameras.
+defaults, one run each.  The development clips alone have a page of their own.  Clips and tracks are kept in
+build/eval-cameras.
 """
 
 from __future__ import annotations
@@ -79,7 +80,9 @@ def main() -> int:
     note, missed = words(found)
     if args.record:
         command = f"tests/bench/eval_own_body.py {' '.join(sys.argv[1:])}"
-        table.publish("own_body", TITLE, HEAD, rows, f"{facts(command)}\n\n{note}")
+        alone = list(args.groups) == [DEVELOPMENT]
+        page = f"own_body_{DEVELOPMENT}" if alone else "own_body"
+        table.publish(page, TITLE, HEAD, rows, f"{facts(command)}\n\n{note}")
     else:
         table.show(TITLE, HEAD, rows)
         print(note)
