@@ -311,7 +311,7 @@ unit-threads: $(THREADED)
 	@tests/unit/run.sh $^
 
 COVERED := $(wildcard tests/python/test_lcm_*.py)
-coverage: setup ## branches that the tests of library and daemon take (ARGS='--all --least-library 97')
+coverage: setup lib ## branches that the tests of library and daemon take (ARGS='--all --least-library 97')
 	@rm -f $$(find build/coverage -name '*.gcda' 2>/dev/null)
 	@$(MAKE) --no-print-directory config=coverage CC=gcc tools
 	@LIMIT=3600 $(MAKE) --no-print-directory config=coverage CC=gcc unit
@@ -322,7 +322,7 @@ coverage: setup ## branches that the tests of library and daemon take (ARGS='--a
 # One build for the sanitizers and for fuzzing, where there is clang.
 SANITIZED := $(if $(call has,clang),config=fuzz CC=clang,config=sanitize)
 SANITIZED_DAEMON := $(addprefix tests/python/test_lcm_,log.py lift.py moving.py cameras.py)
-sanitizers: setup ## C tests, the daemon and fuzzing under asan and ubsan, C tests of threads under tsan (RUNS= SEED=)
+sanitizers: setup lib ## C tests, the daemon and fuzzing under asan and ubsan, C tests of threads under tsan (RUNS= SEED=)
 	@LIMIT=1200 $(MAKE) --no-print-directory $(JOBS) $(SANITIZED) tools unit fuzz-run
 	@$(COMPILED_ONCE) GAIT_TRACKD='$(abspath build/$(if $(call has,clang),fuzz,sanitize)/bin/gait-trackd)' $(PY) -m pytest -q \
 	    -c python/pyproject.toml --rootdir . $(PYTEST_AT_ONCE) $(SANITIZED_DAEMON)
