@@ -38,7 +38,7 @@ int LLVMFuzzerTestOneInput(const uint8_t *data, size_t size)
     gait_start *s = NULL;
     fuzz_bytes b = {data, size};
     size_t need = 0;
-    int const solved = fuzz_one_in(&b, 8); /* the search takes long */
+    int const solved = fuzz_one_in(&b, 32); /* the search takes long */
     int32_t count = 0;
     void *memory = NULL;
     gait_start_default(&cfg);
@@ -57,8 +57,7 @@ int LLVMFuzzerTestOneInput(const uint8_t *data, size_t size)
     if (memory && gait_start_init(memory, need, toy_model(), &cfg, &s, NULL) == GAIT_OK)
         for (int64_t n = 0, utime = 0; n < FRAMES; n++, utime += 30000 + 300 * (int64_t)fuzz_take(&b))
             show(s, &b, utime, pixels);
-    if (s && solved &&
-        gait_start_solve(s, 0, h, GAIT_START_MAX_HYPOTHESES, &count, NULL) == GAIT_OK) {
+    if (s && solved && gait_start_solve(s, 0, h, GAIT_START_MAX_HYPOTHESES, &count, NULL) == GAIT_OK) {
         gait_tracker_config const config = fuzz_config();
         void *own;
         gait_tracker *const t = fuzz_tracker(toy_model(), &config, &own);
