@@ -116,6 +116,25 @@ def test_what_was_written_is_read_back(tmp_path):
     np.testing.assert_allclose(track.eval15()[2, 14], estimate(2).joints[14], atol=6e-6)
 
 
+def test_a_track_cut_anywhere_is_refused_or_has_fewer_rows(tmp_path):
+    write(tmp_path / "t.csv", 3)
+    data, cut = (tmp_path / "t.csv").read_bytes(), tmp_path / "cut.csv"
+    whole = read_track(tmp_path / "t.csv")
+    counts = set()
+    for size in range(len(data)):
+        cut.write_bytes(data[:size])
+        try:
+            track = read_track(cut)
+        except UserError as exc:
+            assert str(exc).startswith(f"{cut}: ") and "\n" not in str(exc)
+            continue
+        count = len(track.frame)
+        counts.add(count)
+        assert data[:size].endswith(b"\n")
+        assert np.array_equal(track.eval15(), whole.eval15()[:count])
+    assert counts == {1, 2}
+
+
 def test_another_joint_order_of_the_model_is_sorted_out(tmp_path):
     turned = MODEL.joint_names[::-1]
     with TrackWriter(tmp_path / "t.csv", 5, turned, MODEL.angle_names) as rows:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import csv
+import io
 import os
 import re
 from collections.abc import Callable, Sequence
@@ -309,7 +310,8 @@ class _Table:
         form = f"give a {what} CSV with a header and one row per frame"
         try:
             with open(path, newline="", encoding="utf-8-sig") as file:
-                lines = list(csv.reader(file))
+                text = file.read()
+            lines = list(csv.reader(io.StringIO(text, newline="")))
         except (UnicodeDecodeError, csv.Error) as exc:
             raise UserError(f"{path}: not a CSV file in UTF-8 ({exc}); {form}") from None
         if len(lines) < 2:
@@ -323,6 +325,8 @@ class _Table:
                     f"{path}: line {number} has {len(row)} cells, the header {len(names)}; "
                     "cut off? write it again"
                 )
+        if what == "track" and not text.endswith(("\n", "\r")):
+            raise UserError(f"{path}: line {len(lines)} does not end; cut off? write it again")
         self.rows = dict(zip(names, zip(*rows, strict=True), strict=True))
 
     def column(self, name: str) -> list[str]:
