@@ -18,6 +18,7 @@
  * the same machine and with the same version of the library reads it. */
 typedef struct head {
     char magic[8];
+    uint64_t checksum; /* of all that follows */
     int32_t people, cameras;
     int32_t stream[GAIT_MAX_CAMERAS]; /* their numbers */
     gait_camera camera[GAIT_MAX_CAMERAS];
@@ -30,7 +31,7 @@ typedef struct record {
     uint64_t bytes;       /* of the tracker's snapshot */
 } record;
 
-static const char MAGIC[8] = "GAITTRD2";
+static const char MAGIC[8] = "GAITTRD3";
 
 static int count_cameras(const service *s)
 {
@@ -41,6 +42,15 @@ static int count_cameras(const service *s)
 static int stream_of(const service *s, int camera)
 {
     return camera ? s->further->camera[camera - 1].stream : s->stream;
+}
+
+/* FNV-1a of a file but for magic and checksum: another byte anywhere changes it. */
+static uint64_t checksum_of(const unsigned char *file, size_t bytes)
+{
+    uint64_t hash = UINT64_C(0xcbf29ce484222325);
+    for (size_t i = offsetof(head, people); i < bytes; i++)
+        hash = (hash ^ file[i]) * UINT64_C(0x100000001b3);
+    return hash;
 }
 
 /* ---- writing ---- */
@@ -94,6 +104,8 @@ static unsigned char *encode(const service *s, size_t *bytes)
         memcpy(at, &r, sizeof r);
         at = state + taken;
     }
+    h.checksum = checksum_of(out, *bytes);
+    memcpy(out, &h, sizeof h);
     return out;
 }
 
@@ -239,6 +251,8 @@ static bool fits(const service *s, const file_bytes *file, head *h, message *why
     memcpy(h, file->data, sizeof *h);
     if (memcmp(h->magic, MAGIC, sizeof MAGIC) != 0)
         return message_set(why, "not a snapshot of this version of gait-trackd");
+    if (h->checksum != checksum_of(file->data, file->size))
+        return message_set(why, "damaged, its checksum differs");
     if (!is_whole(file, h))
         return message_set(why, "shorter or longer than its lengths state");
     if (h->cameras != count_cameras(s))
