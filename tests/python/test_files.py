@@ -131,6 +131,11 @@ def test_a_folder_is_filled_whole_or_not_at_all(tmp_path):
             (folder / "a.png").write_text(text)
         assert sorted(p.name for p in path.iterdir()) == ["a.png", "report.html"]
         assert (path / "report.html").read_text() == text
+        (path / "a.png").chmod(0o640)
+    assert (path / "a.png").stat().st_mode & 0o777 == 0o640
+    with filling(path) as folder:
+        (folder / "a.png").write_text("keeps its mode")
+    assert (path / "a.png").stat().st_mode & 0o777 == 0o640
 
 
 def test_a_file_is_no_folder(tmp_path):
@@ -286,6 +291,30 @@ def test_what_a_killed_command_left_is_named_and_kept(tmp_path, capsys):
     assert {p.read_text() for p in kept} == {"an hour of work", "another"}
     assert set(tmp_path.iterdir()) == {path, *kept}
     assert "was killed; what it wrote is in a.unfinished.csv" in capsys.readouterr().err
+
+
+def test_leftovers_that_are_not_ours_or_cannot_be_renamed_stay(tmp_path, monkeypatch):
+    path, left = tmp_path / "a.csv", tmp_path / f".a.{'0' * 16}.csv"
+    left.write_text("theirs")
+    os.utime(left, (0, 0))
+
+    def refuse(*names):
+        raise PermissionError(1, "Operation not permitted")
+
+    def write(text):
+        with replacing(path) as temporary:
+            temporary.write_text(text)
+        assert path.read_text() == text and left.read_text() == "theirs"
+
+    with monkeypatch.context() as other:
+        other.setattr("os.geteuid", lambda: os.getuid() + 1)
+        write("of another user")
+    with monkeypatch.context() as sticky:
+        sticky.setattr("gait.io.files._keep", refuse)
+        write("in a folder in which only the owner may rename")
+    with monkeypatch.context() as hidden:
+        hidden.setattr("os.listdir", refuse)
+        write("in a folder that cannot be listed")
 
 
 def test_what_was_reported_as_written_outlives_a_kill():

@@ -45,6 +45,14 @@ def test_the_log_that_is_played_is_never_overwritten(tmp_path, link):
     assert source.read_bytes() == before
 
 
+def test_a_daemon_that_cannot_start_leaves_the_old_log(tmp_path):
+    out = log(tmp_path, name="out.log")
+    before = out.read_bytes()
+    for wrong in (["-m", tmp_path], ["--camera", tmp_path / "none.json"]):
+        done = run(log(tmp_path), f"file://{out}?mode=w", *wrong)
+        assert done.returncode == 1 and out.read_bytes() == before
+
+
 def test_a_file_that_is_read_is_never_overwritten(tmp_path):
     camera = tmp_path / "camera.json"
     camera.write_text("{}")

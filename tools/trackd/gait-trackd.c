@@ -253,10 +253,9 @@ static bool serve(service *s, const settings *want, parts *p, workers *threads, 
     receiver r = {0};
     sink out = {0};
     message lost;
-    bool const opened = !to || sink_open(&out, to, why);
     s->person = want->people ? 1 : want->person;
-    bool const ready =
-        opened && load(s, want, p, threads, &out, why) && receiver_open(&r, s, &snapshot, url, why);
+    bool const ready = load(s, want, p, threads, &out, why) && receiver_open(&r, s, &snapshot, url, why) &&
+                       (!to || sink_open(&out, to, why)); /* last, as it empties a log */
     if (ready)
         snapshot_file_resume(&snapshot, s);
     if (ready && !log && !want->quiet)

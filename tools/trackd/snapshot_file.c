@@ -115,6 +115,8 @@ static bool write_all(int file, const unsigned char *data, size_t bytes)
         ssize_t const done = write(file, data, bytes);
         if (done < 0 && errno == EINTR)
             continue;
+        if (done == 0)
+            errno = EIO;
         if (done <= 0)
             return false;
         data += done;
@@ -175,6 +177,12 @@ static int replace(const char *path, const unsigned char *data, size_t bytes)
     return fault;
 }
 
+/* Whether a daemon that wrote a file has ended.  One with our own number has: in a container all have the same. */
+static bool is_gone(pid_t writer)
+{
+    return writer == getpid() || (kill(writer, 0) != 0 && errno == ESRCH);
+}
+
 /* Remove what daemons that were killed while they wrote left beside the file. */
 static void sweep(const char *path)
 {
@@ -187,7 +195,7 @@ static void sweep(const char *path)
         long const writer =
             strncmp(e->d_name, name, n) == 0 && e->d_name[n] == '.' ? strtol(e->d_name + n + 1, &end, 10) : 0;
         if (writer > 0 && *end == '.' && strspn(end + 1, "0123456789abcdef") == RANDOM_DIGITS &&
-            end[1 + RANDOM_DIGITS] == '\0' && kill((pid_t)writer, 0) != 0 && errno == ESRCH)
+            end[1 + RANDOM_DIGITS] == '\0' && is_gone((pid_t)writer))
             unlinkat(folder, e->d_name, 0);
     }
     if (list)

@@ -19,14 +19,14 @@ from __future__ import annotations
 import argparse
 import json
 from collections.abc import Iterator
-from contextlib import closing, suppress
+from contextlib import suppress
 from itertools import chain
 from typing import TYPE_CHECKING
 
 from gait.cli import values
 from gait.errors import UsageError, UserError
 from gait.io.files import require_unread
-from gait.lcm.link import buffer_warning, is_log, lcm_url, log_of
+from gait.lcm.link import buffer_warning, is_log, lcm_url, log_of, publisher
 from gait.progress import note, progress
 from gait.signals import Interruptible
 
@@ -95,9 +95,10 @@ def run(args: argparse.Namespace) -> int:
         warning = buffer_warning(url)
         if warning:
             note(f"gait capture: {warning}", args.quiet)
-        with closing(Publisher(url, setup)) as publisher:
-            pacer = _send(args, source, publisher, rate, signals)
-    _report(args, publisher, pacer)
+        with publisher(url) as out:
+            sender = Publisher(out, setup)
+            pacer = _send(args, source, sender, rate, signals)
+    _report(args, sender, pacer)
     return 0
 
 

@@ -11,7 +11,7 @@ import stat
 import tempfile
 import time
 from collections.abc import Callable, Iterator, Sequence
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from pathlib import Path
 
 from gait.errors import UserError, unreadable
@@ -70,24 +70,33 @@ def _flush(path: Path) -> None:
     """Flush a file, or the entries of a folder, to the disk; not all file systems can do the latter."""
     descriptor = os.open(path, os.O_RDONLY)
     try:
-        os.fsync(descriptor)
-    except OSError as error:
-        if error.errno != errno.EINVAL:
-            raise
+        flush(descriptor)
     finally:
         os.close(descriptor)
 
 
+def flush(descriptor: int) -> None:
+    """Flush an open file to the disk, unless it is of a kind that cannot be."""
+    try:
+        os.fsync(descriptor)
+    except OSError as error:
+        if error.errno not in (errno.EINVAL, errno.EROFS):
+            raise
+
+
 def _recover(target: Path) -> None:
-    """Rename files left by killed writers of `target`, and report them; remove empty ones."""
+    """Rename our files left by killed writers of `target`, and report them; remove empty ones."""
     pattern = re.compile(rf"\.{re.escape(target.stem)}\.[0-9a-f]{{16}}{re.escape(target.suffix)}")
-    for left in [entry for entry in target.parent.iterdir() if pattern.fullmatch(entry.name)]:
-        if not _is_left(left):
-            continue
-        if left.stat().st_size == 0:
-            left.unlink(missing_ok=True)
-            continue
-        _keep(left, target, "the command that wrote it was killed; what it wrote")
+    try:
+        names = [name for name in os.listdir(target.parent) if pattern.fullmatch(name)]
+    except OSError:  # a folder that may be written, but not listed
+        return
+    for left in filter(_is_left, map(target.with_name, names)):
+        with suppress(OSError):  # another command was faster
+            if left.stat().st_size == 0:
+                left.unlink()
+            else:
+                _keep(left, target, "the command that wrote it was killed; what it wrote")
 
 
 def is_unfinished(path: str | os.PathLike[str]) -> bool:
@@ -112,15 +121,16 @@ def _ends_early(error: BaseException) -> bool:
 
 
 def _is_left(temporary: Path) -> bool:
-    """Whether no process is writing a temporary file any more."""
+    """Whether a temporary file is ours, and no process is writing it any more."""
     try:
         descriptor = os.open(temporary, os.O_RDONLY | os.O_NOFOLLOW | os.O_CLOEXEC | os.O_NONBLOCK)
     except OSError:
         return False
     try:
         fcntl.flock(descriptor, fcntl.LOCK_EX | fcntl.LOCK_NB)
-        is_file = stat.S_ISREG(os.fstat(descriptor).st_mode)
-        return is_file and time.time() - os.fstat(descriptor).st_mtime > _LEFTOVER_AGE_S
+        found = os.fstat(descriptor)
+        is_ours = stat.S_ISREG(found.st_mode) and found.st_uid == os.geteuid()
+        return is_ours and time.time() - found.st_mtime > _LEFTOVER_AGE_S
     except OSError:
         return False
     finally:
@@ -199,9 +209,12 @@ def filling(path: str | os.PathLike[str]) -> Iterator[Path]:
         yield Path(name)
         folder.mkdir(exist_ok=True)
         for file in sorted(Path(name).iterdir(), key=lambda p: (p.suffix == ".html", p.name)):
+            target = folder / file.name
             if file.is_file():
+                if target.is_file():
+                    file.chmod(stat.S_IMODE(target.stat().st_mode))
                 _flush(file)
-            os.replace(file, folder / file.name)
+            os.replace(file, target)
         _flush(folder)
 
 

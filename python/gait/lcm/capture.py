@@ -10,7 +10,7 @@ from contextlib import AbstractContextManager, nullcontext
 from dataclasses import dataclass, field
 from functools import partial
 from pathlib import Path
-from typing import Any, TypeVar
+from typing import TYPE_CHECKING, Any, TypeVar
 
 import cv2
 import numpy as np
@@ -19,8 +19,11 @@ from gait.bindings.initial import Start
 from gait.camera.camera import Camera
 from gait.errors import UsageError, UserError
 from gait.io.video import Frame, Image, Video
-from gait.lcm.link import LogWriter, gaitmsg, handle, now, publisher
+from gait.lcm.link import LogWriter, gaitmsg, handle, now
 from gait.lcm.messages import camera_message, command_message, decode, image_message
+
+if TYPE_CHECKING:
+    import lcm
 
 
 class FileSource:
@@ -269,14 +272,20 @@ class Setup:
 class Publisher:
     """Sends one stream of frames on ``GAIT_IMAGE_<i>``, with calibration, empty scene and START.
 
+    Parameters
+    ----------
+    out : LCM or LogWriter
+        From `gait.lcm.link.publisher`.
+    setup : Setup
+
     Attributes
     ----------
     sent : int
         Number of frames sent.
     """
 
-    def __init__(self, url: str, setup: Setup) -> None:
-        self._setup, self._out = setup, publisher(url)
+    def __init__(self, out: lcm.LCM | LogWriter, setup: Setup) -> None:
+        self._setup, self._out = setup, out
         self._status: Any = None
         self._announced = 0.0
         self.sent = 0
@@ -315,11 +324,6 @@ class Publisher:
         raise UserError(
             f"no tracker confirmed START within {patience:g} s; is gait-trackd running on this URL?"
         )
-
-    def close(self) -> None:
-        """Flush the log, if this writes one."""
-        if isinstance(self._out, LogWriter):
-            self._out.close()
 
     def send(
         self,

@@ -11,6 +11,7 @@ import struct
 import sys
 import time
 from collections.abc import Iterator, Sequence
+from contextlib import closing, contextmanager, nullcontext
 from importlib import import_module
 from io import BufferedWriter, FileIO
 from ipaddress import ip_address
@@ -20,7 +21,7 @@ from typing import Any
 from urllib.parse import urlsplit
 
 from gait.errors import UsageError, UserError
-from gait.io.files import require_file
+from gait.io.files import flush, replacing, require_file
 
 _HERE = Path(__file__).resolve().parent
 _PLACES = (_HERE.parent / "lib", _HERE.parents[2] / "build" / "lcm" / "python")
@@ -171,9 +172,11 @@ class LogWriter:
         self.write(now(), channel, data)
 
     def close(self) -> None:
-        """Flush and close the file."""
+        """Write everything to the disk and close the file."""
         try:
-            self._file.close()
+            with self._file:
+                self._file.flush()
+                flush(self._file.fileno())
         except OSError as error:
             raise self._fault(error) from None
 
@@ -267,15 +270,19 @@ def listener(url: str) -> lcm.LCM:
     return open_lcm(url)
 
 
-def publisher(url: str) -> lcm.LCM | LogWriter:
-    """Connect to send to a network or a log."""
+@contextmanager
+def publisher(url: str) -> Iterator[lcm.LCM | LogWriter]:
+    """Connect to send to a network or a log; a new log gets its name when the block has succeeded."""
     if not is_log(url):
-        return open_lcm(url)
+        yield open_lcm(url)
+        return
     generated()
     path, mode = log_of(url)
     if mode not in ("w", "a"):
         raise UsageError(f"--url {url}: names no log to write; add ?mode=w (new) or ?mode=a (at its end)")
-    return LogWriter(path, mode)
+    named = nullcontext(path) if mode == "a" else replacing(path)
+    with named as file, closing(LogWriter(file, mode, path)) as log:
+        yield log
 
 
 def waiting(links: Sequence[lcm.LCM], seconds: float = 0.0) -> list[lcm.LCM]:
