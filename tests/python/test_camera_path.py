@@ -114,9 +114,23 @@ def test_a_person_before_a_robot_is_followed_in_the_world(clip):
     )
     off = [found[f"pelvis_{axis}"] - truth[f"pelvis_{axis}"] for axis in "xy"]
     assert np.ptp(truth["pelvis_x"]) > 1.5 and np.hypot(*off).max() < 0.15
-    again = CameraPath.read(str(clip / "c.csv")).at_times([0.0, 0.05])
-    made = CameraPath.read(str(clip / "poses.csv")).at_times([0.0, 0.05])
-    assert [one.R for one in again] == [pytest.approx(one.R, abs=1e-8) for one in made]
+
+
+def test_the_cameras_that_a_track_writes_give_the_same_track(clip):
+    """Also the standard deviations of their poses."""
+    made = CameraPath.read(str(clip / "poses.csv"))
+    unsure = [replace(pose, turn_sd=0.01, place_sd=0.02) for pose in made.poses]
+    write_path(clip / "unsure.csv", made.at.tolist(), unsure, by_frame=False)
+    given, outputs = "unsure.csv", []
+    for name in ("c.csv", "d.csv"):
+        words = ["--camera-path", str(clip / given), "--cameras-out", str(clip / name), "--stop", "8"]
+        assert track(clip, *words) == 0
+        outputs.append((clip / "out.csv").read_bytes())
+        given = name
+    assert outputs[0] == outputs[1]
+    assert (clip / "c.csv").read_bytes() == (clip / "d.csv").read_bytes()
+    one = CameraPath.read(str(clip / "d.csv")).poses[3]
+    assert one.turn_sd == pytest.approx(0.01) and one.place_sd == 0.02
 
 
 def test_a_path_of_equal_poses_gives_the_bits_of_a_still_camera(clip):

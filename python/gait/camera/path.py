@@ -196,16 +196,25 @@ def between(left: CameraPose, right: CameraPose, share: float) -> CameraPose:
     return CameraPose(R, -R @ (left.centre + share * (right.centre - left.centre)), *sd)
 
 
-def write_path(path: Path, at: Sequence[float], poses: Sequence[CameraPose], *, by_frame: bool) -> None:
-    """Write poses for `CameraPath.read`, with full precision."""
+def write_path(
+    path: Path,
+    at: Sequence[float],
+    poses: Sequence[CameraPose],
+    *,
+    by_frame: bool,
+    lens: Camera | None = None,
+) -> None:
+    """Write poses for `CameraPath.read`, with full precision, and the intrinsics of `lens` in each row."""
     uncertain = any(pose.turn_sd + pose.place_sd > 0 for pose in poses)
+    of_lens = {} if lens is None else {name: getattr(lens, name) for name in _LENS}
     with path.open("w", newline="", encoding="ascii") as file:
         rows = csv.writer(file)
-        rows.writerow(["frame" if by_frame else "time", *_MATRIX, *(_SD_COLUMNS if uncertain else ())])
+        head = ["frame" if by_frame else "time", *of_lens, *_MATRIX, *(_SD_COLUMNS if uncertain else ())]
+        rows.writerow(head)
         for moment, pose in zip(at, poses, strict=True):
             sd = [float(np.degrees(pose.turn_sd)), pose.place_sd] if uncertain else []
-            numbers = [*pose.R.ravel().tolist(), *pose.t.tolist(), *sd]
-            rows.writerow([moment if by_frame else f"{moment:.6f}", *map(repr, numbers)])
+            numbers = [*of_lens.values(), *pose.R.ravel().tolist(), *pose.t.tolist(), *sd]
+            rows.writerow([moment if by_frame else f"{moment:.6f}", *(repr(float(x)) for x in numbers)])
 
 
 def _read_table(path: str) -> tuple[list[str], Array, list[int]]:

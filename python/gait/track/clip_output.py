@@ -2,12 +2,10 @@
 
 from __future__ import annotations
 
-import csv
 import time
 from collections.abc import Iterable, Sequence
 from contextlib import ExitStack
 from itertools import groupby
-from pathlib import Path
 from typing import Any
 
 import cv2
@@ -17,6 +15,7 @@ from gait.bindings.abi import TrackStatus
 from gait.bindings.estimate import Estimate
 from gait.bindings.model import Model
 from gait.camera.camera import Camera, write_camera
+from gait.camera.path import CameraPose, write_path
 from gait.io.files import replacing
 from gait.io.track_file import TrackWriter
 from gait.io.video import Frame, Video
@@ -134,7 +133,10 @@ def write(
         if options.camera_out:
             write_camera(stack.enter_context(replacing(options.camera_out)), scene.camera)
         if options.cameras_out:
-            _write_cameras(stack.enter_context(replacing(options.cameras_out)), scene)
+            still = CameraPose.of(scene.camera)
+            poses = [scene.poses.get(number, still) for number in span]
+            file = stack.enter_context(replacing(options.cameras_out))
+            write_path(file, span, poses, by_frame=True, lens=scene.camera)
         sinks: list[Sink] = [results.add, _widened(stack.enter_context(rows).write, scene.calibration)]
         if also is not None:
             sinks.append(also)
@@ -161,18 +163,6 @@ def write(
             raise video.no_frame(span.start)
     results.film = films.page
     return results
-
-
-def _write_cameras(path: Path, scene: Scene) -> None:
-    """Write the camera of each frame, for `CameraPath.read`: frame, fx fy cx cy, R by rows, t."""
-    with path.open("w", newline="") as file:
-        rows = csv.writer(file)
-        names = [f"r{row}{column}" for row in (1, 2, 3) for column in (1, 2, 3)]
-        rows.writerow(["frame", "fx", "fy", "cx", "cy", *names, "tx", "ty", "tz"])
-        for number in scene.frames:
-            one = scene.camera_at(number)
-            values = [one.fx, one.fy, one.cx, one.cy, *one.R.ravel(), *one.t]
-            rows.writerow([number, *(f"{value:.9g}" for value in values)])
 
 
 class Drawing:
