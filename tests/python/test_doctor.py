@@ -1,11 +1,15 @@
 """gait doctor names the remedy of each planted fault, and of nothing else."""
 
+import errno
 import json
+import os
 from collections import namedtuple
+from pathlib import Path
 
 import pytest
 
 import gait.cli
+from gait.bindings import abi
 from gait.bindings import library as bindings
 from gait.cli import doctor
 
@@ -38,6 +42,26 @@ def test_a_library_that_is_none(monkeypatch, tmp_path, capsys):
         assert line.startswith("fault model: ")
         assert gait.cli.main(["doctor", "--quiet"]) == 1
         assert all(row.startswith("fault") for row in capsys.readouterr().out.splitlines())
+    finally:
+        bindings.library.cache_clear()
+
+
+@pytest.mark.parametrize(
+    ("where", "name", "words"),
+    [
+        (abi, "ABI", "ABI 10, this package needs 99"),
+        (bindings, "__version__", "this package is 99"),
+        (abi, "NEWEST_FIELD", "older than this package"),
+    ],
+)
+def test_a_library_of_another_version(where, name, words, monkeypatch):
+    monkeypatch.setattr(where, name, {"ABI": 99, "__version__": "99"}.get(name, ("gait_state", "none")))
+    monkeypatch.setenv("GAIT_LIBRARY", next(path for path in bindings.candidates() if Path(path).is_file()))
+    bindings.library.cache_clear()
+    try:
+        (line,) = lines(doctor.check_library)
+        assert line.startswith("fault library: cannot load") and words in line
+        assert os.environ["GAIT_LIBRARY"] in line and "make lib, or set GAIT_LIBRARY" in line
     finally:
         bindings.library.cache_clear()
 
@@ -125,15 +149,22 @@ def test_a_daemon_that_is_old_broken_or_missing(script, state, monkeypatch, tmp_
     assert line.startswith(f"{state:5} gait-trackd: ") and "make tools" in line
 
 
-def test_a_camera_that_may_not_be_read(monkeypatch, tmp_path):
+def test_a_camera_that_may_not_be_read_or_is_gone(monkeypatch, tmp_path):
     (tmp_path / "video0").write_bytes(b"")
     monkeypatch.setattr(doctor, "_DEVICES", tmp_path)
     assert lines(doctor.check_cameras) == [f"ok    camera: {tmp_path / 'video0'}"]
-    monkeypatch.setattr(doctor.os, "access", lambda *_: False)
-    (line,) = lines(doctor.check_cameras)
-    assert line.startswith("fault camera: ") and "usermod -aG video" in line
     (tmp_path / "video0").unlink()
     assert lines(doctor.check_cameras)[0].startswith("note  camera: no camera")
+    for error, remedy in ((errno.EACCES, "usermod -aG video"), (errno.ENODEV, "connect it again")):
+        (tmp_path / "video0").write_bytes(b"")
+
+        def refuse(*_, error=error):
+            raise OSError(error, os.strerror(error))
+
+        with monkeypatch.context() as here:
+            here.setattr(doctor.os, "open", refuse)
+            (line,) = lines(doctor.check_cameras)
+        assert line.startswith("fault camera: ") and os.strerror(error) in line and remedy in line
 
 
 def test_a_full_disk_and_a_folder_that_takes_no_files(monkeypatch, tmp_path):

@@ -4,6 +4,8 @@ import io
 import threading
 import time
 from http.server import BaseHTTPRequestHandler, ThreadingHTTPServer
+from itertools import chain, repeat
+from typing import NamedTuple
 
 import numpy as np
 import pytest
@@ -12,6 +14,7 @@ av = pytest.importorskip("av", reason="PyAV is not installed: extra video")
 pytest.importorskip("lcm", reason="lcm is not installed: extra lcm")
 
 from gait.errors import UserError  # noqa: E402
+from gait.lcm import streams  # noqa: E402
 from gait.lcm.streams import StreamSource, is_stream  # noqa: E402
 
 
@@ -31,14 +34,30 @@ def transport_stream(frames, size=(160, 120)):
     return out.getvalue()
 
 
+class Hung(NamedTuple):
+    after: int | None
+
+
 @pytest.fixture
 def camera():
-    """A server that answers each request by the next of `camera.answers`: bytes, or a status."""
+    """A server that answers each request by the next of `camera.answers`: bytes, a status, or by hanging.
+
+    `Hung` comes after that many bytes of an answer; None: before its header.
+    """
 
     class Handler(BaseHTTPRequestHandler):
         def do_GET(self):
             times.append(time.monotonic())
             answer = server.answers.pop(0) if server.answers else 503
+            if isinstance(answer, Hung):
+                if answer.after is not None:
+                    self.send_response(200)
+                    self.send_header("Content-Type", "video/mp2t")
+                    self.end_headers()
+                    self.wfile.write(transport_stream(5)[: answer.after])
+                    self.wfile.flush()
+                server.over.wait()
+                return
             self.send_response(answer if isinstance(answer, int) else 200)
             self.send_header("Content-Type", "video/mp2t")
             self.send_header("Content-Length", str(0 if isinstance(answer, int) else len(answer)))
@@ -51,11 +70,12 @@ def camera():
 
     times = []
     server = ThreadingHTTPServer(("127.0.0.1", 0), Handler)
-    server.answers, server.times = [], times
+    server.answers, server.times, server.over = [], times, threading.Event()
     thread = threading.Thread(target=server.serve_forever, args=(0.02,), daemon=True)
     thread.start()
     server.url = f"http://user:secret@127.0.0.1:{server.server_port}/live.ts"
     yield server
+    server.over.set()
     server.shutdown()
     server.server_close()
 
@@ -76,6 +96,31 @@ def test_frames_go_on_after_the_stream_broke_off(camera, capsys):
     printed = capsys.readouterr().err
     assert "connection lost; reconnecting" in printed and "back after" in printed
     assert "secret" not in printed
+
+
+@pytest.mark.parametrize("after", [None, 0, 400, 6000])
+def test_a_camera_that_hangs_is_left_in_time(after, camera):
+    """Before the header, before and in what is analysed, and between frames."""
+    camera.answers = [transport_stream(5), Hung(after), *4 * [transport_stream(6)]]
+    source = StreamSource(camera.url, grey=True, quiet=True)
+    source._limit = streams._OPEN  # also on a busy machine
+    frames = source.frames()
+    for _ in range(11):
+        next(frames)
+    assert len(camera.times) >= 3
+    limits = [streams._OPEN, streams._OPEN, streams._READ, max(streams._WAITS)]  # one after the other
+    assert sum(limits) < 5.0
+
+
+def test_a_slow_camera_has_twice_the_time_that_it_took_at_first(camera, monkeypatch):
+    camera.answers = [transport_stream(2), *4 * [transport_stream(3)]]
+    given, opened, clock = [], av.open, chain([0.0], repeat(3.0))
+    monkeypatch.setattr(streams.av, "open", lambda *a, **k: given.append(k["timeout"][0]) or opened(*a, **k))
+    monkeypatch.setattr(streams.time, "monotonic", lambda: next(clock))
+    frames = StreamSource(camera.url, grey=True, quiet=True).frames()
+    for _ in range(3):
+        next(frames)
+    assert given[:2] == [streams._FIRST, 6.0]
 
 
 def test_a_stream_that_never_comes_is_one_line_without_the_password(camera):

@@ -194,18 +194,21 @@ def check_daemon() -> Iterator[Finding]:
 
 
 def check_cameras() -> Iterator[Finding]:
-    """Check for cameras on this machine, and permission to read them."""
+    """Check for cameras on this machine, and that they can be opened."""
     cameras = sorted(_DEVICES.glob("video*"))
     if not cameras:
         yield Finding(
             "camera", "note", "no camera at /dev/video*", "gait capture also takes files and streams"
         )
     for camera in cameras:
-        if os.access(camera, os.R_OK | os.W_OK):
+        try:
+            os.close(os.open(camera, os.O_RDWR | os.O_NONBLOCK))
             yield Finding("camera", "ok", str(camera))
-        else:
-            remedy = "add yourself to its group: sudo usermod -aG video $USER, then log in again"
-            yield Finding("camera", "fault", f"{camera} cannot be read", remedy)
+        except OSError as error:
+            remedy = "connect it again, or see dmesg"
+            if isinstance(error, PermissionError):
+                remedy = "add yourself to its group: sudo usermod -aG video $USER, then log in again"
+            yield Finding("camera", "fault", f"{camera} cannot be opened: {error.strerror}", remedy)
 
 
 def check_disk() -> Iterator[Finding]:

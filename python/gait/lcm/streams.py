@@ -22,8 +22,12 @@ BROKEN: tuple[type[BaseException], ...] = (av.error.FFmpegError, OSError, ValueE
 """Exceptions for a stream that cannot be opened or breaks off."""
 STOPPED: tuple[type[BaseException], ...] = (*BROKEN, StopIteration)
 """The same, and the end of its frames."""
-_OPEN, _READ = 4.0, 2.0  # seconds that opening, and one read, may take
-_WAITS = (0.0, 0.25, 0.5, 1.0)  # seconds before each attempt to reconnect; the last value is repeated
+#: Seconds that connecting, analysing, and one read may take; at first the former two may take longer.
+_FIRST, _OPEN, _READ = 8.0, 1.5, 1.25
+_SLOWER = 2.0  # times as long as at first, which they may take again if that is more
+#: Seconds before each attempt to reconnect; the last value is repeated.  So a camera that returns just after
+#: an attempt began, which hangs, is asked again 2 * 1.5 + 1.25 + 0.5 s later.
+_WAITS = (0.0, 0.25, 0.5)
 #: One second, in microseconds, suffices to analyse a stream; RTSP over TCP loses no packets.
 _OPTIONS = {"analyzeduration": "1000000", "flags": "low_delay", "rtsp_transport": "tcp"}
 
@@ -44,12 +48,13 @@ class StreamSource(DeviceSource):
         self._url, self._grey, self._quiet = url, grey, quiet
         self._name = _LOGIN.sub("", url)  # no password in messages
         self._opened = time.monotonic()
-        self._frames = self._connect()
+        self._frames = self._connect(_FIRST)
         try:
             first = next(self._frames)
         except STOPPED as error:
             what = str(error).replace(url, self._name) or "it has no picture"
             raise UserError(f"{self._name}: cannot be opened ({what}); check the URL in a player") from None
+        self._limit = max(_OPEN, _SLOWER * (time.monotonic() - self._opened))
         self.size = first.width, first.height
         self._frames = chain([first], self._frames)
 
@@ -71,9 +76,9 @@ class StreamSource(DeviceSource):
                 pass
             self._frames = self._again()
 
-    def _connect(self) -> Iterator[av.VideoFrame]:
-        """Open the stream and decode it; errors are those of `BROKEN`."""
-        with closing(av.open(self._url, options=_OPTIONS, timeout=(_OPEN, _READ))) as container:
+    def _connect(self, limit: float) -> Iterator[av.VideoFrame]:
+        """Open the stream, in two steps of at most `limit` seconds, and decode it; errors are `BROKEN`'s."""
+        with closing(av.open(self._url, options=_OPTIONS, timeout=(limit, _READ))) as container:
             if not container.streams.video:
                 raise ValueError("it has no video")
             yield from container.decode(video=0)
@@ -84,7 +89,7 @@ class StreamSource(DeviceSource):
         lost, waits = time.monotonic(), chain(_WAITS, iter(lambda: _WAITS[-1], None))
         while True:
             time.sleep(next(waits))
-            frames = self._connect()
+            frames = self._connect(self._limit)
             try:
                 first = next(frames)
             except STOPPED:
