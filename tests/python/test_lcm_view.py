@@ -1,7 +1,10 @@
 """gait view: each frame shows its own estimate, in a file and in a browser."""
 
+import asyncio
+import contextlib
 import json
 import signal
+import socket
 import subprocess
 import time
 import urllib.error
@@ -27,6 +30,7 @@ from gait.live.feed import Drops, Feed
 from gait.live.recording import Recording
 from gait.live.server import Page
 from gait.report.drawing import Overlay
+from gait.web import serve
 
 
 @pytest.fixture
@@ -461,6 +465,31 @@ def test_other_hosts_are_refused(host, page):
         get(page, "frame/0.jpg", Host=host)
     local = urllib.request.Request(page.address.replace("127.0.0.1", "localhost"))
     assert urllib.request.urlopen(local, timeout=rig.PATIENCE).status == 200
+
+
+def test_simultaneous_browsers_are_bounded(page, monkeypatch):
+    monkeypatch.setattr(server, "_MOST_BROWSERS", 3)
+
+    async def ask():
+        return [(await page._events(None)).status_code for _ in range(5)]  # none is answered meanwhile
+
+    assert asyncio.run(ask()) == [200, 200, 200, 503, 503]
+
+
+def test_connections_are_bounded(page):
+    address = "127.0.0.1", int(page.address.rstrip("/").rpartition(":")[2])
+    with contextlib.ExitStack() as stack:
+        for _ in range(serve.MOST_CONNECTIONS):
+            stack.enter_context(socket.create_connection(address))
+        with pytest.raises(urllib.error.HTTPError, match="503"):
+            get(page, "state")
+    deadline = time.monotonic() + rig.PATIENCE
+    while True:
+        try:
+            get(page, "state").close()
+            break
+        except urllib.error.HTTPError:
+            assert time.monotonic() < deadline
 
 
 def test_browsers_are_bounded_and_their_places_come_free(page, monkeypatch):

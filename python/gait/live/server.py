@@ -17,7 +17,7 @@ import cv2
 from starlette.requests import Request
 from starlette.responses import JSONResponse, PlainTextResponse, Response, StreamingResponse
 from starlette.routing import Route
-from starlette.types import ASGIApp
+from starlette.types import ASGIApp, Receive, Scope, Send
 
 from gait.errors import UserError
 from gait.io.video import Image
@@ -287,7 +287,7 @@ class Page:
             self._jpeg[stream] = count, jpeg
         return Response(jpeg, media_type="image/jpeg", headers={"cache-control": "no-store"})
 
-    def _events(self, request: Request) -> Response:
+    async def _events(self, request: Request) -> Response:
         async def lines() -> AsyncIterator[bytes]:
             counts = dict.fromkeys(self._topics, 0)
             while not serve.ending(request):
@@ -307,17 +307,23 @@ class Page:
 
         if self._open >= _MOST_BROWSERS:
             return PlainTextResponse("too many browsers\n", 503)
+        self._count(1)  # at once: otherwise simultaneous requests would all pass
+        return _Stream(lines(), lambda: self._count(-1))
 
-        async def counted() -> AsyncIterator[bytes]:
-            self._open += 1
-            self._pace.begin(self._open)
-            try:
-                async for part in lines():
-                    yield part
-            finally:
-                self._open -= 1
-                self._pace.begin(self._open)
+    def _count(self, more: int) -> None:
+        self._open += more
+        self._pace.begin(self._open)
 
-        return StreamingResponse(
-            counted(), media_type="text/event-stream", headers={"cache-control": "no-store"}
-        )
+
+class _Stream(StreamingResponse):
+    """Stream of events; `ended` is called at its end, also if it never began."""
+
+    def __init__(self, lines: AsyncIterator[bytes], ended: Callable[[], None]) -> None:
+        super().__init__(lines, media_type="text/event-stream", headers={"cache-control": "no-store"})
+        self._ended = ended
+
+    async def __call__(self, scope: Scope, receive: Receive, send: Send) -> None:
+        try:
+            await super().__call__(scope, receive, send)
+        finally:
+            self._ended()

@@ -24,6 +24,7 @@ from gait.errors import UserError
 from gait.web import modules
 
 HOST = "127.0.0.1"
+MOST_CONNECTIONS = 128  # of browsers, each of which opens up to six; further ones are refused
 STREAMS_END = 3  # seconds that event streams have to end when the server does
 _NAMES = (HOST, "localhost", "[::1]")
 _POLICY = (
@@ -215,7 +216,12 @@ def _server(app: ASGIApp, ready: Callable[[], None]) -> uvicorn.Server:
         await app(dict(scope) | {"ending": lambda: server.should_exit}, receive, send)
 
     config = uvicorn.Config(
-        informed, log_level="error", access_log=False, lifespan="off", timeout_graceful_shutdown=STREAMS_END
+        informed,
+        log_level="error",
+        access_log=False,
+        lifespan="off",
+        timeout_graceful_shutdown=STREAMS_END,
+        limit_concurrency=MOST_CONNECTIONS,
     )
     server = _Server(config, ready)
     return server
