@@ -54,7 +54,7 @@ def main() -> int:
     rows.append(["reported", *(f"{count} of {len(chosen)}" for count in counts)])
     head = ["clip", "right", *(name for name, _ in _changes()), "frames turned by 180", "size halved"]
     note = (
-        f"{facts('tests/bench/camera_check.py')}\n\n"
+        f"{facts()}\n\n"
         "The table shows what is reported about each camera file: unchanged (correct for the six "
         "rendered clips, guessed for the films), and with one fault. The stature is given. refused: an "
         "error before the clip is read; stature: the person appears more than 12 % taller or shorter; "

@@ -54,7 +54,7 @@ def main() -> int:
     head = ["clip", "focal %", "focal sd %", "tilt deg", "tilt sd", "roll deg", "height %", "height sd %"]
     head += ["joints mm", "with camera", "speed %", "with camera %", "pelvis in 90 %", "missed"]
     note = (
-        f"{facts('tests/bench/camera_walk.py')}\n\n"
+        f"{facts()}\n\n"
         "Errors of focal length, tilt, roll and height of the camera that is found, with their reported "
         "standard deviations; root-aligned error of the 15 joints and error of the speed, without a "
         "camera and with the true one; share of frames in which the pelvis is inside its 90 % interval "

@@ -93,7 +93,7 @@ def main() -> int:
     most = max(row[5] for row in rows)
     verdict = "reached" if most < WANTED_MS else f"missed: {most:.0f} at most"
     note = (
-        f"{facts(f'tests/bench/daemon_kills.py --kills {args.kills} --record')}\n\n"
+        f"{facts()}\n\n"
         f"SIGKILL at random moments of a stream of {RATE:.0f} frames a second; snapshots every "
         f"{PERIOD_S:.0f} s in {MEMORY}, {rig.PARTICLES} particles, 160 x 120. Milliseconds from the start of "
         f"the next daemon to its first estimate of everyone, target: below {WANTED_MS:.0f} ({verdict}); "

@@ -50,7 +50,7 @@ def main() -> int:
     rows = [row for clip in clips for row in _rows(clip)]
     head = ["clip", "crops", "found %", "median %", "95th percentile %", "found, hidden %", "back after s"]
     note = (
-        f"{facts('tests/bench/detector_crops.py')}\n\n"
+        f"{facts()}\n\n"
         f"Network {NETWORK}. Share of the frames in which the person is found, and distance of the joints "
         "found from the true ones in per cent of the person's height. The joints are moved by the detector's "
         "profile, which is learnt from other people. For a box painted over the person "

@@ -30,7 +30,6 @@ from gait.detect.networks import LandmarkNetwork, whole_picture
 FILM = eval_clips.DATA / "real" / "lab_side"
 RUNS = 40
 WANTED = 25.0  # frames per second of gait track with lite, on two cores
-BUSY = 0.5  # load average from which figures are not recorded
 
 Row = list[object]
 
@@ -48,18 +47,13 @@ def main() -> int:
     rows += [_track("lite"), _track("full")]
     head = ["what", "runtime", "ms wall", "ms CPU", "frames/s", "wanted", "reached"]
     note = (
-        f"{facts('make bench ARGS=--record')} Load average before: {load:.1f}.\n\n"
+        f"{facts()}\n\n"
         f"Median time per person of the landmark network, {RUNS} runs; LiteRT has two threads, OpenCV one "
         "for each core. gait track: time per frame of the whole command, including start-up, on a film "
         "of 1280 x 720."
     )
     title = "Speed of the detector"
-    if "--record" in sys.argv and load < BUSY:
-        table.publish("detector_speed", title, head, rows, note)
-    else:
-        table.show(title, head, rows)
-        if "--record" in sys.argv:
-            print(f"load average {load:.1f}: not recorded; wait until the host is quiet", file=sys.stderr)
+    table.publish_speed("--record" in sys.argv, load, "detector_speed", title, head, rows, note)
     return 0
 
 

@@ -77,8 +77,7 @@ def main() -> int:
     note, missed = words(rows, [case.name for case in cases if case.folder.parent != FOLDER])
     if args.record:
         title = "People whose limbs were measured"
-        command = f"make eval-body ARGS='{' '.join(sys.argv[1:])}'"
-        table.publish("body", title, HEAD, rows, f"{facts(command)}\n\n{note}")
+        table.publish("body", title, HEAD, rows, f"{facts()}\n\n{note}")
     else:
         table.show("People whose limbs were measured", HEAD, rows)
         print(note)

@@ -63,7 +63,7 @@ def main() -> int:
     middle = float(np.median(toward))
     missed = middle > WANTED
     note = (
-        f"{facts('make eval-cameras ARGS=--record')}\n\n"
+        f"{facts()}\n\n"
         f"Simulated walks of {args.frames} frames, seeds {args.seeds}, with the detector and all "
         "defaults, with one camera and with two. The second camera stands 60 degrees around the path. "
         f"Its film begins with the first one (two) or {args.late:g} s later (cut); this offset is found "

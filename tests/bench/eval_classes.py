@@ -149,7 +149,7 @@ def main() -> None:
     if not args.only and not eval_clips.absent():
         notes.append(_outdoor(args.seeds))
     if args.record:
-        command = facts(f"tests/bench/eval_classes.py --seeds {args.seeds} --record")
+        command = facts()
         table.publish("eval_classes", TITLE, COLUMNS, rows, "\n\n".join([command, _READING, *notes]))
     else:
         table.show(TITLE, COLUMNS, rows)

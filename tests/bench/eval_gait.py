@@ -313,7 +313,7 @@ def report(runs: list[Run], record: str | None) -> list[str]:
         ("Intervals of parameters", heads[2], intervals, _INTERVAL_READING),
         ("Beside others", heads[3], list(_beside_others(runs)), PUBLISHED_NOTE),
     ]
-    text = [f"# What a gait lab compares\n\n{facts(_command())}\n"]
+    text = [f"# What a gait lab compares\n\n{facts()}\n"]
     for title, head, rows, note in parts:
         shown, cells, numbers = table.show(title, head, rows)
         text.append(
@@ -324,10 +324,6 @@ def report(runs: list[Run], record: str | None) -> list[str]:
         (table.RESULTS / f"{record}.md").write_text("\n".join(text), encoding="utf-8")
         _write_values(table.RESULTS / f"{record}.csv", runs)
     return missed
-
-
-def _command() -> str:
-    return f"make eval-gait ARGS='{' '.join(sys.argv[1:])}'"
 
 
 _READING = """\

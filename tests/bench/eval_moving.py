@@ -84,7 +84,7 @@ def main() -> int:
     head = ["camera", "poses", "root mm", "from-to", "to still", "wanted", "abs mm", "lost"]
     title = "Cameras that move"
     note = (
-        f"{facts('make eval-moving ARGS=--record')}\n\n"
+        f"{facts()}\n\n"
         f"Simulated walks of {args.frames} frames, seeds {args.seeds}, {SIZE[0]} x {SIZE[1]}, from an "
         "init file, without a detector. root, abs: medians over clips of the median over frames, with "
         "the range in brackets. to still: relative to a still camera with that view. noisy: errors of "

@@ -79,10 +79,9 @@ def main() -> int:
     ]
     note, missed = words(found)
     if args.record:
-        command = f"tests/bench/eval_own_body.py {' '.join(sys.argv[1:])}"
         alone = list(args.groups) == [DEVELOPMENT]
         page = f"own_body_{DEVELOPMENT}" if alone else "own_body"
-        table.publish(page, TITLE, HEAD, rows, f"{facts(command)}\n\n{note}")
+        table.publish(page, TITLE, HEAD, rows, f"{facts()}\n\n{note}")
     else:
         table.show(TITLE, HEAD, rows)
         print(note)

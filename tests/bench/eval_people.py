@@ -72,9 +72,8 @@ def main() -> int:
     cost = float(np.median(costs))
     within = sum(ratio <= WANTED[0] for ratio in ratios)
     missed = within < len(ratios) or kept < WANTED[1] * crossings or strays > 0 or cost > COST
-    command = f"make eval-people ARGS='--record --seeds {args.seeds}'"
     note = (
-        f"{facts(command)}\n\n"
+        f"{facts()}\n\n"
         f"Simulated clips of {args.frames} frames, {FPS:.0f} per second, seeds {args.seeds}, {SIZE[0]} x "
         f"{SIZE[1]}; camera and background given, detector `full`. Errors are medians over frames of the "
         "root error of a person's track, mm: with all people together, and alone in the same scene. "

@@ -209,7 +209,7 @@ def _publish(end: str, results: list[Result], missed: list[str], record: bool) -
     means = [f"{arm} {_mean([r for r in results if r.arm == arm]):.0%}" for arm in arms]
     met = "The bound on wrong frames, the only one, is met." if end == WITHOUT else "All bounds are met."
     notes = [
-        facts(" ".join(["tests/bench/eval_real.py", *sys.argv[1:]])),
+        facts(),
         f"Good frames on average: {', '.join(means)}.  {_READING}",
         f"**Bounds missed:** {'; '.join(missed)}." if missed else met,
     ]

@@ -79,7 +79,7 @@ def main() -> int:
             "most %",
             f"over {100 * GOOD:g} % of it %",
         ]
-        note = f"{facts('tests/bench/eval_stabilize.py --turns')}\n\n{_TURNS}"
+        note = f"{facts()}\n\n{_TURNS}"
         publish("eval_stabilize_turns", "Turns of the cameras of real films", head, map(_turns, clips), note)
         return 0
     clips += [
@@ -95,8 +95,7 @@ def main() -> int:
         rows.append(["mean", *kind, *np.nanmean(np.array(same, float), axis=0).tolist(), ""])
     head = ["clip", "camera", "stabilised", "good %", "one camera, good %", "tracking", "wrong",
             "error % of height", "stride rate %", "root mm", "abs mm", "CPU s", "failed"]  # fmt: skip
-    only = " ".join(["", "--only", *args.only]) if args.only else ""
-    note = f"{facts(f'tests/bench/eval_stabilize.py{only}')}\n\n{_READING}"
+    note = f"{facts()}\n\n{_READING}"
     publish("eval_stabilize", "Stabilising", head, rows, note)
     return 0
 

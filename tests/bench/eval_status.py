@@ -65,7 +65,7 @@ def main() -> int:
             update(done)
     head = ["clip", *(f"{status} %" for status in STATUSES), "good %", "swap %", "off %", "wrong %",
             "root mm", "abs mm", "heading deg", "stride rate %", "failed"]  # fmt: skip
-    note = f"{facts(' '.join(['tests/bench/eval_status.py', *sys.argv[1:]]))}\n\n{_READING}"
+    note = f"{facts()}\n\n{_READING}"
     page, title = "eval_status", "Status of unusual walks"
     if args.model != "walk":
         page, title = f"{page}_{Path(args.model).stem}", f"{title}, tracked with -m {args.model}"

@@ -4,7 +4,9 @@ from __future__ import annotations
 
 import os
 import platform
+import shlex
 import subprocess
+import sys
 from importlib.metadata import version
 from pathlib import Path
 
@@ -12,8 +14,9 @@ HERE = Path(__file__).resolve().parent
 PACKAGES = ("libgait", "numpy", "scipy")
 
 
-def facts(command: str) -> str:
-    """Command, commit, machine and versions that made the numbers."""
+def facts(command: str | None = None) -> str:
+    """Command (default: the one that runs), commit, machine and versions that made the numbers."""
+    command = command or shlex.join([f"tests/bench/{Path(sys.argv[0]).name}", *sys.argv[1:]])
     versions = ", ".join(f"{name} {version(name)}" for name in PACKAGES)
     return (
         f"`{command}` at commit {commit()}; {_processor()}, {os.cpu_count()} cores, "

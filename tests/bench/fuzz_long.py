@@ -118,7 +118,7 @@ def main() -> int:
     args = options.parse_args()
     title, faults = "Fuzzing", 0
     note = (
-        f"{facts('make fuzz-long')}\n\nlibFuzzer on clang's address and undefined-behaviour sanitizers, one "
+        f"{facts()}\n\nlibFuzzer on clang's address and undefined-behaviour sanitizers, one "
         f"process, inputs of at most {LONGEST} bytes. Wanted are {WANTED:,} executions of each target; the "
         "table states how many were run, by which options (`ARGS='--only TARGET --add ...'`) and at which "
         "commit; executions and CPU time of several runs are added up. A fault is a report of a sanitizer, a "

@@ -70,7 +70,7 @@ def main() -> int:
     head = ["clip", "film", "weight", "root mm", "abs mm", "good %", "wrong", "strikes: frames off",
             "stride rate %"]  # fmt: skip
     default = TrackerConfig.default().keypoints_weight
-    note = f"{facts('tests/bench/keypoints_weight.py')}\n\n{_READING.format(default=default)}"
+    note = f"{facts()}\n\n{_READING.format(default=default)}"
     if args.record:
         table.publish("keypoints_weight", "Weight of the keypoint term", head, rows, note)
     else:

@@ -129,7 +129,7 @@ def main() -> int:
     head = ["file", "kills", "reported as written", "files that lost some", "kills amid a write"]
     title = "Writers that are killed"
     note = (
-        f"{facts(f'tests/bench/kills.py --kills {args.kills} --record')}\n\nSIGKILL at random moments, up to "
+        f"{facts()}\n\nSIGKILL at random moments, up to "
         f"{1e3 * LONGEST:.0f} ms after the first report, of a process that writes a file again and again, "
         "each time with one entry more."
     )

@@ -71,7 +71,7 @@ def main() -> int:
         "Coverage of right intervals",
         HEAD,
         rows,
-        f"{facts('tests/bench/lift_coverage.py')}\n\n{note}",
+        f"{facts()}\n\n{note}",
     )
     return 0
 

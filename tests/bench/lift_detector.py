@@ -138,9 +138,7 @@ def main() -> int:
         for done, (network, clip) in enumerate(jobs, 1):
             rows.append(["detector", clip.name, network, *row(clip, network, Path(folder))])
             update(done)
-    table.publish(
-        "lift_detector", "Joints of the detector", HEAD, rows, f"{facts('make eval-lift')}\n\n{note(rows)}"
-    )
+    table.publish("lift_detector", "Joints of the detector", HEAD, rows, f"{facts()}\n\n{note(rows)}")
     return 0
 
 

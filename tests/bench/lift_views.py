@@ -123,7 +123,7 @@ def main() -> int:
     ]
     head += ["prior widened"]
     note = (
-        f"{facts('lift_views.py --record')}\n\n"
+        f"{facts()}\n\n"
         "The balancing man ([one camera](lift_balancing.md)): reference joints, which were triangulated "
         f"from four views, in the picture of each camera with {noise:g} px of noise; prior of walks, "
         "stature unknown. The errors are medians over frames of the mean over 14 joints, root-aligned "

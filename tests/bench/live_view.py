@@ -77,7 +77,7 @@ def main() -> int:
         name = f"with {opened[-1]} Chromium pages, real-time priority"
         rows.append(measure(name, streams=(0,), pages=opened[-1], first=REAL_TIME))
     head = [*HEAD, "pictures/s of a camera and browser", "cores busy"]
-    note = f"{facts('tests/bench/live_view.py --record')}\n\n{args.seconds:.0f} s at {RATE} frames a second, "
+    note = f"{facts()}\n\n{args.seconds:.0f} s at {RATE} frames a second, "
     note += "640 x 480; a frame is dropped if the tracker answered none. "
     note += f"Pictures are counted after {BEGIN_S:.0f} s, in which the page finds its rate. Chromium is "
     note += "headless and has no graphics card: it draws on the cores that track and send, with the priority "

@@ -107,7 +107,7 @@ def main() -> int:
             done(len(rows))
     columns = ["equation", "change", "file", "verdict", "test"]
     note = (
-        f"{facts('make mutants')} Took {time.perf_counter() - begun:.0f} s.\n\nEach equation of both papers "
+        f"{facts()} Took {time.perf_counter() - begun:.0f} s.\n\nEach equation of both papers "
         "(O: Ormoneit et al. 2000, L: Leventon & Freeman 1998) changed once, and the test that noticed. No "
         "golden digest is among the tests."
     )

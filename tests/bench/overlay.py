@@ -40,7 +40,7 @@ def main() -> int:
     rows = [_row(clip) for clip in clips]
     head = ["clip", "frames", "tracking ms", "drawing ms", "share"]
     note = (
-        f"{facts('tests/bench/overlay.py --record')}\n\n"
+        f"{facts()}\n\n"
         "Milliseconds of processor time per frame: of the command without an overlay (decoding, "
         "tracking, its start), and what `--overlay` adds (drawing and encoding). Share: the addition "
         "relative to the former. Target: drawing takes no more than tracking."

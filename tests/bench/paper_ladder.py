@@ -188,7 +188,7 @@ def draw(errors: dict[str, float], range_of: dict[str, tuple[float, float]]) -> 
 def about(seeds: int, found: list[Climbed]) -> str:
     """State how the runs were made, and how often a run is reported as lost."""
     runs = [run for each in found for run in each.runs[ladder.PAPER_RUNG.name]]
-    return f"""{facts(f"paper_ladder.py --record --seeds {seeds}")}
+    return f"""{facts()}
 
 Frames 0 to 50 (outdoor: from the first frame in full view), 10,000 particles, models of 19 angles and 5
 components learnt without the clip's subject. The start is the truth with noise (pelvis 3 cm, phase 0.03, rate
@@ -219,7 +219,7 @@ def reached(found: list[Climbed]) -> str:
 
 def about_ladder(seeds: int, rung_seeds: int) -> str:
     """State how the ladder was made."""
-    return f"""{facts(f"paper_ladder.py --record --seeds {seeds} --rung-seeds {rung_seeds}")}
+    return f"""{facts()}
 
 Root-aligned error in mm of frames 0 to 50: median over the frames, then over the seeds (in brackets the range
 over the seeds). The paper's filter and the default have {seeds} seeds, every other rung {rung_seeds}; models

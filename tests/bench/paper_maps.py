@@ -105,7 +105,7 @@ def draw(probe: preference.Probe, path: Path) -> None:
 
 def about() -> str:
     """State what the table shows."""
-    return f"""{facts("paper_maps.py --record")}
+    return f"""{facts()}
 
 Mean log-likelihood (eqs. 10-13) of a frame given the one before, over 11 frames. The body has the mean cycle,
 at the true state or displaced from it; between the two frames it walks on with the person or stands still.
@@ -117,7 +117,7 @@ def about_terms(found: list[freeze.Freeze]) -> str:
     """State what the table of terms shows."""
     places = ", ".join(f"{f.scene.name} {f.place}" for f in found)
     gains = ", ".join(f"{f.scene.name} {e:+.1f} and {rest:+.1f}" for f in found for e, rest in (f.causes(),))
-    return f"""{facts("paper_maps.py --record")}
+    return f"""{facts()}
 
 Log-likelihood in nats of a frame given the one before, in paper mode, relative to limbs that face the camera,
 are fully visible and do not change: for the true, walking body and for the best body at rest on the

@@ -77,7 +77,7 @@ def main() -> None:
     head = ("paper", "figure", *rows[0][2])
     whole = [(p, name, *each.values()) for p, name, each in rows]
     verdicts = counted([e["verdict"] for _, _, e in rows])
-    made = facts("make paper ARGS=--record")
+    made = facts()
     note = NOTE.format(facts=made, verdicts=verdicts, criterion=CRITERION, **seven())
     table.publish("paper", title, head, whole, note)
 

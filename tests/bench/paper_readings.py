@@ -177,7 +177,7 @@ class Judged:
 def about(seeds: int) -> str:
     """State how the readings were compared, and which could not be compared."""
     same = summed(SUMS[-1])["surface_sd"]
-    return f"""{facts(f"paper_readings.py --record --seeds {seeds}")}
+    return f"""{facts()}
 
 Some equations of the filter can be read in two ways.  The table compares paper mode with both readings on the
 clips of [search_paper](search_paper.md), frames 0 to 50: root-aligned error, mm, mean of {seeds} seeds; root

@@ -86,6 +86,7 @@ def main() -> int:
     args = parser.parse_args()
     if eval_clips.absent():
         return 0
+    load = os.getloadavg()[0]
     cv2.setNumThreads(1)
     clips, models = eval_clips.people(args.clips)
     missing = [name for name in ("mediapipe", "bodytrack") if not getattr(args, name)]
@@ -97,12 +98,11 @@ def main() -> int:
         rows += [_blazepose(clip)] if detects else []
         rows += [_mediapipe(clip, args.mediapipe)] if args.mediapipe else []
     rows += [_bodytrack(*args.bodytrack)] if args.bodytrack else []
-    load = f"Load average: {os.getloadavg()[0]:.1f}."
     own = f"bodytrack has its own pictures, of four cameras, {PARTICLES} particles and {LAYERS} layers."
-    note = f"{facts('make bench-peers')} {load}\n\n{NOTE} {own}"
+    note = f"{facts()}\n\n{NOTE} {own}"
     note += "".join(f"\n\nLeft out, {GET[name]}." for name in missing)
     title = "The tracker beside its peers"
-    table.publish("peers", title, HEAD, rows, note) if args.record else table.show(title, HEAD, rows)
+    table.publish_speed(args.record, load, "peers", title, HEAD, rows, note)
     for name in missing:
         print(f"left out, {GET[name]}", file=sys.stderr)
     return 0

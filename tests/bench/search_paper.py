@@ -235,7 +235,7 @@ def lost(search: Search, record: bool) -> None:
         shares = [np.mean([r.lost > 0 for r in each if r.held == held] or [0]) for held in (False, True)]
         rows.append([nats, reported(each, False), reported(each, True), float(shares[0] - shares[1])])
     best = max(rows, key=lambda row: (row[-1], row[0]))[0]
-    note = f"""{facts("search_paper.py --lost --record")}
+    note = f"""{facts()}
 
 How many of the runs that leave the person, and of those that stay on it, are reported as lost in some
 frame, by stayed_nats; on the clips of [search_paper](search_paper.md), {len(MORE)} seeds each.  The value
@@ -254,7 +254,7 @@ def about(search: Search, counts: str) -> str:
     """State how the search was made."""
     people = ", ".join(CLIPS)
     tried = sum(row["seeds"] == list(FIRST) for row in search.rows)
-    return f"""{facts(f"search_paper.py {counts} --record")}
+    return f"""{facts()}
 
 The defaults of paper mode are the best of {tried} settings in [search_paper_runs](search_paper_runs.md).  The
 score is the mean over six clips of the root-aligned error divided by that of the free-running cycle, plus the

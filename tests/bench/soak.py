@@ -90,7 +90,7 @@ def main() -> int:
         f"{args.rate:g} frames a second" if args.rate else "each frame when the one before has been estimated"
     )
     note = (
-        f"{facts(' '.join(['tests/bench/soak.py', *sys.argv[1:]]))}\n\n"
+        f"{facts()}\n\n"
         f"{pace}; {rig.PARTICLES} particles, 160 x 120. Memory and open files after {SETTLED:.0%} of the "
         f"frames and at the end. Targets: at most {MOST_KB} kB more and no additional open file; 99.9 % "
         f"of the frames within {MOST_RATIO:g} times the median."

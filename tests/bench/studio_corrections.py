@@ -171,7 +171,7 @@ def main() -> int:
     painted = studio_page.seconds(folder / LONG, long.points, drags)
     verdict = "met" if cpu.max() <= WANTED_S else "MISSED"
     note = (
-        f"{facts('make eval-studio')}\n\n"
+        f"{facts()}\n\n"
         f"The first {FRAMES} frames of clips on which the rule for proposals was compared with the one "
         "before it (it was chosen on other clips), with the detector's joints (`full`) and corrections "
         f"at the true joint with a noise of {100 * POINTING:g} % of the height. mm: median error about "

@@ -5,6 +5,7 @@ from __future__ import annotations
 import csv
 import io
 import math
+import sys
 from collections.abc import Iterable, Sequence
 from pathlib import Path
 from typing import Any
@@ -12,6 +13,7 @@ from typing import Any
 from gait.io.files import replacing
 
 RESULTS = Path(__file__).resolve().parent / "results"
+BUSY = 0.5  # load average from which figures of speed are not recorded
 DIGITS = 4  # significant digits of a number that is not whole
 
 
@@ -51,6 +53,24 @@ def publish(
     RESULTS.mkdir(parents=True, exist_ok=True)
     _write(RESULTS / f"{name}.csv", _csv(head, cells))
     _write(RESULTS / f"{name}.md", "\n\n".join(filter(None, parts)) + "\n")
+
+
+def publish_speed(
+    record: bool,
+    load: float,
+    name: str,
+    title: str,
+    columns: Sequence[str],
+    rows: Iterable[Sequence[Any]],
+    note: str,
+) -> None:
+    """Publish figures of speed, if asked to and if the load average before the run, `load`, is below BUSY."""
+    if record and load < BUSY:
+        publish(name, title, columns, rows, f"{note}\n\nLoad average before: {load:.1f}.")
+        return
+    show(title, columns, rows)
+    if record:
+        print(f"{name}: load average {load:.1f}: not recorded; wait until the host is quiet", file=sys.stderr)
 
 
 def _text(value: Any) -> str:
