@@ -38,7 +38,7 @@ static gait_start *toy_start_new(gait_camera camera, uint32_t cpu_mask)
 }
 
 /* Hash of all hypotheses without their classes of motion, which are 0. */
-static uint64_t toy_hash_hypotheses(const gait_hypothesis h[GAIT_START_MAX_HYPOTHESES])
+static inline uint64_t toy_hash_hypotheses(const gait_hypothesis h[GAIT_START_MAX_HYPOTHESES])
 {
     size_t const state = offsetof(gait_state, motion_class);
     uint64_t hash = HASH_INIT;
