@@ -61,9 +61,9 @@ CODE_FLAGS   += $(if $(filter fuzz,$(config)),-fno-sanitize-coverage=trace-cmp)
 # Vector kernels are made of the same sources as the scalar ones, on which every check runs; checks of arithmetic and
 # libFuzzer's counters in these loops would take three quarters of the time.
 LESS_WATCHED := -fno-sanitize=undefined,fuzzer-no-link -fsanitize=float-cast-overflow
-WATCHED = $(if $(filter fuzz,$(config)),$(if $(filter scalar,$(1)),,$(LESS_WATCHED)))
+WATCHED = $(if $(filter fuzz,$(config)),$(if $(filter scalar,$(1)),,$(LESS_WATCHED)))$(if $(filter coverage,$(config)),-O1)
 CXX_FLAGS    += $(if $(filter fuzz,$(config)),-fno-sanitize=function) # needs the C++ runtime
-# As slow as under a sanitizer, so that tests use their shorter films.
+# As slow as under a sanitizer, so that tests use their shorter films; kernels, in which most time is spent, have -O1.
 OPT_coverage := -O0 --coverage -fprofile-abs-path -DSANITIZED=1
 OPT ?= $(OPT_$(config))
 ifeq ($(OPT),)
