@@ -311,7 +311,7 @@ unit-threads: $(THREADED)
 	@tests/unit/run.sh $^
 
 COVERED := $(wildcard tests/python/test_lcm_*.py)
-coverage: setup lib ## branches that the tests of library and daemon take (ARGS='--all --least-library 97')
+coverage: setup lib ## branches that the tests of library and daemon take (ARGS='--all --least-library 97'; --record)
 	@rm -f $$(find build/coverage -name '*.gcda' 2>/dev/null)
 	@$(MAKE) --no-print-directory config=coverage CC=gcc tools
 	@LIMIT=3600 $(MAKE) --no-print-directory config=coverage CC=gcc unit
@@ -321,15 +321,19 @@ coverage: setup lib ## branches that the tests of library and daemon take (ARGS=
 
 # One build for the sanitizers and for fuzzing, where there is clang.
 SANITIZED := $(if $(call has,clang),config=fuzz CC=clang,config=sanitize)
-SANITIZED_DAEMON := $(addprefix tests/python/test_lcm_,log.py lift.py moving.py cameras.py)
-sanitizers: setup lib ## C tests, the daemon and fuzzing under asan and ubsan, C tests of threads under tsan (RUNS= SEED=)
+# Tests of the daemon, but not the one of speed, and not the layer under malloc(), which is the sanitizers' own.
+SANITIZED_DAEMON := $(patsubst %,tests/python/test_lcm_%.py,cameras faults idle lift live log moving output people service start stream strides tracks)
+RACED_DAEMON := $(patsubst %,tests/python/test_lcm_%.py,cameras live log people service)
+daemon_tests = $(COMPILED_ONCE) GAIT_TRACKD='$(abspath build/$(1)/bin/gait-trackd)' $(PY) -m pytest -q \
+    -c python/pyproject.toml --rootdir . $(PYTEST_AT_ONCE) -k 'not newest_frame_wins' $(2)
+sanitizers: setup lib ## C tests, the daemon and fuzzing under asan and ubsan, then make tsan (RUNS= SEED=)
 	@LIMIT=1200 $(MAKE) --no-print-directory $(JOBS) $(SANITIZED) tools unit fuzz-run
-	@$(COMPILED_ONCE) GAIT_TRACKD='$(abspath build/$(if $(call has,clang),fuzz,sanitize)/bin/gait-trackd)' $(PY) -m pytest -q \
-	    -c python/pyproject.toml --rootdir . $(PYTEST_AT_ONCE) $(SANITIZED_DAEMON)
+	@$(call daemon_tests,$(if $(call has,clang),fuzz,sanitize),$(SANITIZED_DAEMON))
 	@$(MAKE) --no-print-directory $(JOBS) tsan
 
-tsan: ## C tests of threads under the thread sanitizer
-	@LIMIT=1200 $(MAKE) --no-print-directory config=thread unit-threads
+tsan: setup lib ## C tests of threads, and the daemon, under the thread sanitizer
+	@LIMIT=1200 $(MAKE) --no-print-directory config=thread tools unit-threads
+	@$(call daemon_tests,thread,$(RACED_DAEMON))
 
 # With config=fuzz, which needs clang, libFuzzer drives the targets, else standalone.c.
 FUZZ := $(patsubst tests/fuzz/%.c,$(B)/fuzz/%,$(sort $(wildcard tests/fuzz/fuzz_*.c)))
