@@ -27,6 +27,13 @@ def same_columns(visible: Mask) -> list[list[int]]:
     return list(groups.values())
 
 
+def column_means(values: Floats) -> Floats:
+    """Return the mean (M,) of each column of (T, M) over its finite values; NaN without any."""
+    visible = np.isfinite(values)
+    total = np.where(visible, values, 0).sum(axis=0)
+    return np.asarray(np.where(visible.any(axis=0), total / np.maximum(visible.sum(axis=0), 1), np.nan))
+
+
 def disk_full(error: OSError) -> UserError:
     """Return the error for temporary files that cannot be written."""
     return UserError(

@@ -15,7 +15,7 @@ from dataclasses import replace
 import numpy as np
 
 from gait.body.skeleton import ANGLES, SIDES
-from gait.learn.arrays import Floats
+from gait.learn.arrays import Floats, column_means
 from gait.learn.cycles import period
 from gait.learn.cycles.fourier import first_harmonic
 
@@ -79,7 +79,7 @@ def find_by_steps(angles: Floats, fps: float) -> period.Period:
 def step_repeats(angles: Floats, frames: float) -> float:
     """Return the correlation of each side with the other side half a period later; NaN without overlap."""
     columns = [[ANGLES.index(f"{s}_{name}") for name in PAIRED] for s in SIDES]
-    left, right = (angles[:, k] - _mean(angles[:, k]) for k in columns)
+    left, right = (angles[:, k] - column_means(angles[:, k]) for k in columns)
     time = np.arange(max(0, int(np.ceil(len(angles) - 1 - frames / 2))))
     at = time + frames / 2
     low = at.astype(int)
@@ -92,12 +92,6 @@ def step_repeats(angles: Floats, frames: float) -> float:
         squares += [np.sum(one[time][both] ** 2), np.sum(later[both] ** 2)]
     scale = float(np.sqrt(np.prod(squares)))
     return product / scale if scale > 0 else float("nan")
-
-
-def _mean(values: Floats) -> Floats:
-    """Return the mean of each column over its finite values; 0 without any."""
-    visible = np.isfinite(values)
-    return np.asarray(np.where(visible, values, 0).sum(axis=0) / np.maximum(visible.sum(axis=0), 1))
 
 
 def _sums_and_differences(angles: Floats) -> list[tuple[Floats, tuple[int, ...]]]:

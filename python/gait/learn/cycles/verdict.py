@@ -11,7 +11,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from gait.body.skeleton import ANGLES, JOINTS, SIDES, default_skeleton, points
-from gait.learn.arrays import Floats
+from gait.learn.arrays import Floats, column_means
 from gait.learn.cycles import stride
 from gait.learn.cycles.fourier import first_harmonic
 from gait.learn.cycles.period import FEWEST_CYCLES, Period
@@ -38,7 +38,6 @@ LIFT = 0.02  # statures
 STEPS = 0.03  # statures
 LEAST_FORWARD_SHARE = 0.5  # the walks of CMU reach 0.98 and more, with left and right swapped -0.98 and less
 CYCLIC = ("cycles", "sharpness", "repeats")  # names of evidence
-SWING_ANGLES = ("hip_flexion", "knee_flexion")
 
 
 @dataclass(frozen=True)
@@ -173,7 +172,7 @@ def repeats(angles: Floats, period: float) -> float:
     at = time + period
     low = at.astype(int)
     share = (at - low)[:, None]
-    moved = _about_mean(angles)
+    moved = angles - column_means(angles)
     later = moved[low] * (1 - share) + moved[np.minimum(low + 1, len(moved) - 1)] * share
     both = np.isfinite(moved[time] + later)
     a, b = moved[time][both], later[both]
@@ -189,18 +188,14 @@ def legs(angles: Floats, period: float) -> float:
     left and right do not count, as people limp.  NaN if nothing moves or is visible.
     """
     left, right = (
-        np.array([first_harmonic(angles[:, ANGLES.index(f"{s}_{name}")], period) for name in SWING_ANGLES])
+        np.array(
+            [first_harmonic(angles[:, ANGLES.index(f"{s}_{name}")], period) for name in stride.SWING_ANGLES]
+        )
         for s in SIDES
     )
     products = left * right.conj()
     scale = float(np.abs(products).sum())
     return -float(products.real.sum()) / scale if scale > 0 else float("nan")
-
-
-def _about_mean(values: Floats) -> Floats:
-    visible = np.isfinite(values)
-    mean = np.where(visible, values, 0).sum(axis=0) / np.maximum(visible.sum(axis=0), 1)
-    return np.asarray(values - mean)
 
 
 @dataclass(frozen=True)
