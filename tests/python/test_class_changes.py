@@ -7,6 +7,7 @@ import re
 from collections import Counter
 from itertools import pairwise
 from pathlib import Path
+from statistics import NormalDist
 
 import numpy as np
 import pytest
@@ -85,8 +86,7 @@ def test_known_changes_are_learnt(tmp_path: Path, capsys: pytest.CaptureFixture[
     for (before, to), (_, phase) in KNOWN.items():
         at = NAMES.index(before), NAMES.index(to)
         prior, change = (Change(*map(float, one[at])) for one in (assumed, learnt))
-        moving = before != "stand"
-        usual, found = (one.rate * (i0e(one.concentration) if moving else 1) for one in (prior, change))
+        usual, found = (mean_rate(one) if before != "stand" else one.rate for one in (prior, change))
         mean = (2 + count[before, to]) / (2 / usual + seconds[before] / FPS)
         assert found == pytest.approx(mean, rel=0.12), (before, to)
         # the assumed phases count as two changes
@@ -100,12 +100,33 @@ def test_known_changes_are_learnt(tmp_path: Path, capsys: pytest.CaptureFixture[
     printed = capsys.readouterr().out
     assert re.search(r"class stand: .* walk [0-9.]+ \(\d+ changes\).* run [0-9.]+ \(prior\)", printed)
     assert gait.Model(out).classes == NAMES
-    # other classes have assumed changes again
-    assert main(["learn", str(out), "-o", str(out), "--class", "stand", "--quiet"]) == 0
-    capsys.readouterr()
+    # a class that is made again has assumed changes again; others keep theirs
+    assert main(["learn", str(out), "-o", str(out), "--class", "stand"]) == 0
+    assert f"{out}: keeps its classes backwards run" in capsys.readouterr().err
+    assert gait.Model(out).classes == NAMES
+    again = read_cyclic(out)["CLSW"]
+    stand = np.isin(np.arange(len(NAMES)), NAMES.index("stand"))
+    stand = stand[:, None] | stand
+    assert np.array_equal(again[stand], assumed[stand]) and np.array_equal(again[~stand], learnt[~stand])
     assert main(["info", str(out)]) == 0
     printed = capsys.readouterr().out
-    assert "stand 1 (prior)" in printed and "changes)" not in printed
+    assert "stand 1 (prior)" in printed and re.search(r"class walk: .* run [0-9.]+ \(\d+ changes\)", printed)
+
+
+def mean_rate(change: Change) -> float:
+    """The rate of `Change` over all phases and the paces of people, by quadrature."""
+    phase = np.arange(1000) / 1000
+    pace = np.clip(np.array([NormalDist().inv_cdf(p) for p in phase + 5e-4]), -2, 2)
+    by_phase = np.exp(change.concentration * (np.cos(4 * np.pi * (phase - change.phase)) - 1))
+    return float(change.rate * by_phase.mean() * np.exp(change.slope * pace).mean())
+
+
+def test_a_learnt_rate_that_depends_on_the_pace_is_that_of_all_paces() -> None:
+    """Of 30 changes in 100 s, with the pace and phase at which they are most likely assumed."""
+    assumed = Change(0.3, 2.0, 0.1, slope=1.0)
+    found = changes.learnt(assumed, 1, seconds=100.0, count=30, phasor=30 * _vector(0.1, 0.7))
+    assert found.slope == 1.0 and found.phase == pytest.approx(0.1, abs=0.01)
+    assert mean_rate(found) == pytest.approx((2 + 30) / (2 / mean_rate(assumed) + 100), rel=0.002)
 
 
 def _vector(phase: float, length: float) -> complex:

@@ -14,11 +14,13 @@ import pytest
 
 import gait
 from gait.bindings.estimate import Estimate
+from gait.body.skeleton import JOINTS
 from gait.cli import main
 from gait.errors import GaitError, UserError
 from gait.io import blob, track_file
 from gait.learn.classes import standing
 from gait.learn.classes.join import Change, MotionClass, join
+from gait.learn.prior.model import meta_section
 from gait.motion.verdict import verdict_of
 from gait.report.run_page import Run, run_page
 from gait.simulate.clip import simulate
@@ -27,6 +29,7 @@ from gait.simulate.stage import set_stage
 from gait.simulate.walk import TOE_OFF
 
 SHIPPED = Path(gait.__file__).parent / "data/walk.gait"
+CLASSES = SHIPPED.with_name("classes.gait")
 
 
 def classes() -> list[MotionClass]:
@@ -154,16 +157,94 @@ def test_classes_are_added_to_a_model(tmp_path: Path, capsys: pytest.CaptureFixt
     assert "--report: draws what is learnt from recordings" in capsys.readouterr().err
 
 
+def test_a_class_is_taken_from_a_model_by_its_name(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    out, four = tmp_path / "m.gait", blob.read(CLASSES)
+    words = ["--class", f"run={CLASSES}", "--class", f"backwards={CLASSES}"]
+    assert main(["learn", str(SHIPPED), "-o", str(out), *words]) == 0
+    made = blob.read(out)
+    assert np.array_equal(made["CUR1"], four["CUR3"]) and np.array_equal(made["PAC1"], four["PAC3"])
+    assert np.array_equal(made["CUR2"], four["CURV"])  # it has those of the walk there
+    assert made["CLIN"][1:].tolist() == [[1, 1, *four["CLIN"][3, 2:]], [-1, 2, *four["CLIN"][2, 2:]]]
+    capsys.readouterr()
+    for given, expected in (
+        (f"trot={CLASSES}", "has no class trot; name one of its classes, walk stand backwards run"),
+        (f"run={SHIPPED}", "is a model of 'walk'; give recordings, or a model of run"),
+        (f"stand={SHIPPED}", "is a model of 'walk'; give recordings, or a model of stand"),
+        (f"backwards={SHIPPED}", "is a model of 'walk'; give recordings, or a model of backwards"),
+    ):
+        assert main(["learn", str(SHIPPED), "-o", str(tmp_path / "no.gait"), "--class", given]) == 1
+        assert f"--class {given}: {expected}" in capsys.readouterr().err
+    assert not (tmp_path / "no.gait").exists()
+
+
+def test_a_model_keeps_its_classes_and_the_name_of_the_first(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    out = tmp_path / "m.gait"
+    assert main(["learn", str(CLASSES), "-o", str(out), "--class", f"limp={SHIPPED}"]) == 0
+    assert f"{CLASSES}: keeps its classes stand backwards run" in capsys.readouterr().err
+    assert gait.Model(out).classes == ("walk", "stand", "backwards", "run", "limp")
+    before, after = blob.read(CLASSES), blob.read(out)
+    assert np.array_equal(after["CLSW"][:4, :4], before["CLSW"]) and after["CLSW"][4, 0, 0] > 0
+    assert all(np.array_equal(after[tag], before[tag]) for tag in before if tag[:2] != "CL")
+    runs = blob.read(SHIPPED) | {"META": meta_section({"activity": "run"})}
+    blob.write(tmp_path / "runs.gait", runs)
+    assert main(["learn", str(tmp_path / "runs.gait"), "-o", str(out), "--class", "stand"]) == 0
+    assert gait.Model(out).classes == ("run", "stand")
+
+
+def stand(folder: Path, name: str, model: gait.Model, elbow: float, walks: bool = False) -> None:
+    """Write three seconds of joints of a person with bent elbows who sways, or walks, at 30 frames/s."""
+    rng = np.random.default_rng(1)
+    folder.mkdir(exist_ok=True)
+    with (folder / f"{name}.csv").open("w", newline="") as file:
+        rows = csv.writer(file)
+        rows.writerow(["frame", "time", *(f"{joint}_{axis}" for joint in JOINTS for axis in "xyz")])
+        order = [model.joint_names.index(joint) for joint in JOINTS]
+        for frame in range(90):
+            state = gait.State(stature=1.7, motion_class=0 if walks else 1, offset=np.zeros(24))
+            state.phase = frame / 33 % 1 if walks else 0
+            state.offset[[model.angle_names.index(f"{s}_elbow_flexion") for s in "lr"]] = elbow
+            ahead = 1.4 * frame / 33 if walks else 0.004 * np.sin(frame / 10)
+            state.pelvis = np.array([ahead, 0.001 * rng.normal(), model.pelvis_height(state)])
+            places = model.pose(state)[0][order]
+            rows.writerow([frame, f"{frame / 30:.6f}", *(f"{x:.4f}" for x in places.ravel())])
+
+
+def test_standing_is_learnt_from_people_who_stand(
+    model: gait.Model, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """The mean of two people, one of them in two recordings; a recording of a walk is left out."""
+    for name, elbow in (("anna_01", 1.0), ("anna_02", 1.0), ("ben_01", 0.4)):
+        stand(tmp_path / "in", name, model, elbow)
+    stand(tmp_path / "in", "carl_01", model, 0.0, walks=True)
+    out, words = tmp_path / "m.gait", ["learn", str(SHIPPED), "-o", str(tmp_path / "m.gait")]
+    assert main([*words, "--class", f"stand={tmp_path / 'in'}"]) == 0
+    assert "carl_01.csv: not learnt as 'stand': the person does not stand still" in capsys.readouterr().err
+    derived, learnt = standing.sections(blob.read(SHIPPED))["CURV"], blob.read(out)["CUR1"]
+    change = np.degrees(learnt[0, 0] - derived[0, 0])
+    names = blob.unpack_names(blob.read(SHIPPED)["CHNM"])
+    elbows = [name.endswith("elbow_flexion") for name in names]
+    assert change[elbows] == pytest.approx(np.degrees(0.7), abs=3)
+    legs = [any(joint in name for joint in ("hip", "knee", "ankle")) for name in names]
+    assert np.abs(change[legs]).max() < 4 and np.allclose(learnt[1:], derived[1:], atol=2e-3)
+    assert gait.Model(out).class_info(1).direction == 0
+    assert main(["info", str(out)]) == 0
+    assert "class stand: of 3 recordings of people who stand, stands still" in capsys.readouterr().out
+    stand(tmp_path / "walks", "carl_01", model, 0.0, walks=True)
+    out.unlink()
+    assert main([*words, "--class", f"stand={tmp_path / 'walks'}"]) == 1
+    assert "none of the recordings can be used" in capsys.readouterr().err and not out.exists()
+
+
 @pytest.mark.parametrize(
     ("given", "words"),
     [
         (["limp"], "--class limp: give recordings"),
         (["stand", "stand"], "--class stand: give each class its own name"),
         (["walk"], "--class walk: give each class its own name, not walk"),
-        (
-            ["backwards=here.gait"],
-            "--class backwards=here.gait: give recordings, or nothing to derive it from the walk",
-        ),
     ],
 )
 def test_bad_classes_are_one_line(

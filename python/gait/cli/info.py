@@ -120,7 +120,7 @@ def _class_line(one: Mapping[str, Any]) -> str:
     from gait.learn.report.classes import words
 
     cells = words(one)
-    source = f"of {cells['from']}" if one["cycles"] and one["curves_of"] == one["name"] else cells["from"]
+    source = f"of {cells['from']}" if one["recordings"] and one["curves_of"] == one["name"] else cells["from"]
     moves = f"{cells['strides/s']} strides/s" if one["direction"] else cells["strides/s"]
     return (
         f"class {cells['class']}: {source}, {moves}, {cells['components']} components; changes per second: "

@@ -13,6 +13,7 @@ from numpy.typing import ArrayLike
 
 from gait.bindings.model import read_blob
 from gait.body.model_curves import pace, slope_of
+from gait.body.motion_classes import class_names, class_sections
 from gait.errors import UserError
 from gait.io import blob
 from gait.simulate.geometry import Array
@@ -140,7 +141,6 @@ def _calm(name: str) -> float:
 
 
 _ROOT = {"pelvis_yaw": "root_yaw", "pelvis_pitch": "root_pitch", "pelvis_roll": "root_roll"}
-_OF_CLASS = "CURV", "SCST", "GAIT", "PACE"
 _NEEDED = tuple(f"{side}_{name}" for side in "lr" for name in ("hip_flexion", "knee_flexion"))
 
 
@@ -153,10 +153,8 @@ def curves_of_model(path: str, rng: np.random.Generator, cadence: float, motion_
     UserError if the file is not a valid model or lacks the legs' angles.
     """
     sections = blob.decode(read_blob(path), path)
-    names = blob.unpack_names(sections["CLNM"]) if "CLNM" in sections else []
-    if motion_class in names[1:]:
-        own = str(names.index(motion_class))
-        sections = sections | {tag: sections[tag[:3] + own] for tag in _OF_CLASS if tag[:3] + own in sections}
+    if motion_class in (classes := class_names(sections)):
+        sections = class_sections(sections, classes.index(motion_class))
     for tag in ("CHNM", "CURV", "SCST"):
         if tag not in sections:
             raise UserError(

@@ -8,18 +8,22 @@ frame.  Assumed changes (`gait.learn.classes.run`) count as `PRIOR_CHANGES` of e
 from __future__ import annotations
 
 import json
+from collections.abc import Collection
 from dataclasses import dataclass
+from itertools import pairwise
 from pathlib import Path
 
 import numpy as np
 import numpy.typing as npt
 from scipy.optimize import brentq
-from scipy.special import i0e, i1e
+from scipy.special import i0e, i1e, ndtr
 
+from gait.body.model_curves import MOST_PACE_SDS
+from gait.body.motion_classes import class_sections
 from gait.body.skeleton import ANGLES, SIDES
-from gait.errors import UserError
 from gait.io import blob
 from gait.learn.arrays import Floats, Indices
+from gait.learn.classes import standing
 from gait.learn.classes.join import Change, Sections
 from gait.learn.mocap.tables import AngleTable
 from gait.learn.prior import model
@@ -71,9 +75,7 @@ def frames_of(path: Path, read: Body | AngleTable) -> Floats:
 
     UserError if it has only angles, which show no speed.
     """
-    if isinstance(read, AngleTable):
-        raise UserError(f"{path}: has only angles; give recordings of places, which show the speed")
-    body = retarget.levelled(read)
+    body = standing.body_of(path, read)
     measures = retarget.measure(body)
     angles = retarget.observed_angles(body, measures)[:, JOINTS]
     ahead = body.pelvis[:, :2, 0] / np.linalg.norm(body.pelvis[:, :2, 0], axis=1, keepdims=True)
@@ -91,10 +93,11 @@ def _classes(sections: Sections) -> list[_Class]:
     found = []
     names = blob.unpack_names(sections["CHNM"])
     columns = [names.index(ANGLES[joint]) for joint in JOINTS]
-    for direction, source, _, _ in np.asarray(sections["CLIN"], int):
-        curves = np.asarray(sections[f"CUR{source}" if source else "CURV"], float)[..., columns]
-        statistics = np.asarray(sections[f"CHS{source}" if source else "CHST"], float)[columns]
-        gait = np.asarray(sections[f"GAI{source}" if source else "GAIT"], float)
+    for k, direction in enumerate(np.asarray(sections["CLIN"], int)[:, 0]):
+        own = class_sections(sections, k)
+        curves = np.asarray(own["CURV"], float)[..., columns]
+        statistics = np.asarray(own["CHST"], float)[columns]
+        gait = np.asarray(own["GAIT"], float)
         variance = (curves[1:] ** 2).sum(axis=0) + statistics[:, 0] ** 2 + statistics[:, 3] ** 2 + ANGLE_SD**2
         at = np.arange(PHASES if direction else 1) * len(curves[0]) // (PHASES if direction else 1)
         speed = direction * gait[0] * gait[3]
@@ -116,9 +119,13 @@ def _likelihood(one: _Class, frames: Floats) -> Floats:
 
 
 def _decoded(sections: Sections, frames: Floats) -> tuple[Indices, Floats]:
-    """Return class and phase of each frame, (T,) each, on the most likely path."""
+    """Return class and phase of each frame, (T,) each, on the most likely path.
+
+    States are all phases of the first class, then those of the second, and so on.
+    """
     classes = _classes(sections)
     first = np.cumsum([0, *(len(one.mean) for one in classes)])
+    own = [slice(a, b) for a, b in pairwise(first)]
     emitted = np.concatenate([_likelihood(one, frames) for one in classes], axis=1)
     rates = np.array([
         [_mean_rate(_change(row), one.direction) for row in rows]
@@ -128,32 +135,33 @@ def _decoded(sections: Sections, frames: Floats) -> tuple[Indices, Floats]:
         change = np.log(rates / RATE)
     score, back = emitted[0], np.zeros(emitted.shape, np.int32)
     for t in range(1, len(frames)):
-        before = [score[a:b] for a, b in zip(first, first[1:], strict=False)]
-        best = np.array([part.max() for part in before])
-        origin = first[:-1] + [int(part.argmax()) for part in before]
-        score = np.empty(first[-1])
-        for k, one in enumerate(classes):
-            here = np.arange(len(one.mean))
-            if one.direction:
-                sources = (here[None] - one.direction * ADVANCES[:, None]) % PHASES
-                pace = -0.5 * ((ADVANCES - one.advance) / (ADVANCE_SD * one.advance)) ** 2
-                offers = before[k][sources] + INDEPENDENT * pace[:, None]
-                chosen = offers.argmax(axis=0)
-                stay, came = offers[chosen, here], first[k] + sources[chosen, here]
-            else:
-                stay, came = before[k], first[k] + here
-            entries = best + change[:, k] - np.log(len(here))
-            entry = int(entries.argmax())
-            enters = entries[entry] > stay
-            score[first[k] : first[k + 1]] = np.where(enters, entries[entry], stay)
-            back[t, first[k] : first[k + 1]] = np.where(enters, origin[entry], came)
-        score += emitted[t]
+        best = np.array([first[k] + score[part].argmax() for k, part in enumerate(own)])  # state by class
+        after = np.empty_like(score)
+        for k, part in enumerate(own):
+            stay, source = _staying(classes[k], score[part])
+            entries = score[best] + change[:, k] - np.log(len(stay))
+            enters = entries.max() > stay
+            after[part] = np.where(enters, entries.max(), stay)
+            back[t, part] = np.where(enters, best[entries.argmax()], first[k] + source)
+        score = after + emitted[t]
     path = np.empty(len(frames), int)
     path[-1] = score.argmax()
     for t in range(len(frames) - 1, 0, -1):
         path[t - 1] = back[t, path[t]]
     found = np.searchsorted(first, path, side="right") - 1
     return found, (path - first[found]) / PHASES
+
+
+def _staying(one: _Class, score: Floats) -> tuple[Floats, Indices]:
+    """Return the best score (phases,) of each phase after a frame in the same class, and the phase before."""
+    here = np.arange(len(score))
+    if not one.direction:
+        return score, here
+    sources = (here - one.direction * ADVANCES[:, None]) % PHASES
+    pace = -0.5 * ((ADVANCES - one.advance) / (ADVANCE_SD * one.advance)) ** 2
+    offers = score[sources] + INDEPENDENT * pace[:, None]
+    chosen = offers.argmax(axis=0)
+    return offers[chosen, here], sources[chosen, here]
 
 
 def count(sections: Sections, frames: Floats) -> Observed:
@@ -181,8 +189,8 @@ def count(sections: Sections, frames: Floats) -> Observed:
 def learnt(assumed: Change, direction: int, seconds: float, count: int, phasor: complex) -> Change:
     """Return a change as assumed and as observed together; `direction`: of the class that is left.
 
-    The mean rate has a Gamma prior of `PRIOR_CHANGES` changes at the assumed rate; the phase adds to as many
-    at the assumed phases.  The slope with the pace stays as assumed.
+    The mean rate has a Gamma prior of `PRIOR_CHANGES` changes at the assumed mean rate; the phase adds to as
+    many at the assumed phases.  The slope with the pace stays as assumed.
     """
     together = PRIOR_CHANGES * _sharpness(assumed.concentration) * np.exp(4j * np.pi * assumed.phase) + phasor
     length = min(abs(together) / (PRIOR_CHANGES + count), _sharpness(MOST_CONCENTRATION))
@@ -199,8 +207,17 @@ def _change(row: Floats) -> Change:
 
 
 def _mean_rate(change: Change, direction: int) -> float:
-    """Return the mean of the rate over the phases; the rate itself in a class without phases."""
-    return change.rate * float(i0e(change.concentration)) if direction else change.rate
+    """Return the mean of the rate over phases and people's paces; the rate itself in a class without them."""
+    if not direction:
+        return change.rate
+    return change.rate * float(i0e(change.concentration)) * _mean_of_paces(change.slope)
+
+
+def _mean_of_paces(slope: float) -> float:
+    """Return the mean of exp(slope u) over paces u, which are N(0, 1) clipped at `MOST_PACE_SDS`."""
+    most = MOST_PACE_SDS
+    inside = np.exp(0.5 * slope**2) * (ndtr(most - slope) - ndtr(-most - slope))
+    return float(inside + ndtr(-most) * 2 * np.cosh(most * slope))
 
 
 def _sharpness(concentration: float) -> float:
@@ -218,10 +235,17 @@ def _concentration(length: float) -> float:
     )
 
 
-def without_numbers(sections: Sections) -> Sections:
-    """Return a model's sections without the numbers of changes, as for classes with assumed ones."""
+def with_numbers_of(sections: Sections, names: Collection[str]) -> Sections:
+    """Return a model's sections with the numbers of changes between these classes only."""
     meta = json.loads(np.asarray(sections["META"]).tobytes()) if "META" in sections else {}
-    return {**sections, "META": model.meta_section(meta)} if meta.pop("changes", None) else sections
+    if "changes" not in meta:
+        return sections
+    kept = {
+        name: one | {"to": {to: count for to, count in one["to"].items() if to in names}}
+        for name, one in meta.pop("changes").items()
+        if name in names
+    }
+    return {**sections, "META": model.meta_section(meta | ({"changes": kept} if kept else {}))}
 
 
 def with_changes(sections: Sections, observed: Observed) -> dict[str, blob.Array]:

@@ -8,13 +8,11 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from gait.bindings.abi import MAX_CLASSES
+from gait.body.motion_classes import CLASS_TAGS, class_names, class_sections, of_class
 from gait.errors import UserError
 from gait.io import blob
 
 Sections = Mapping[str, blob.Array]
-#: Sections that a class may have itself, with their tags for class k.
-CLASS_TAGS = {"CURV": "CUR{}", "CHST": "CHS{}", "SCST": "SCS{}", "GAIT": "GAI{}", "PACE": "PAC{}"}
-CYCLES_COLUMN, RECORDINGS_COLUMN = 2, 3  # columns of CLIN
 
 
 @dataclass(frozen=True)
@@ -64,9 +62,19 @@ def join(first: Sections, classes: Sequence[MotionClass]) -> dict[str, blob.Arra
     return out
 
 
-def of_class(tag: str) -> bool:
-    """Whether a section belongs to classes after the first, or lists them."""
-    return tag[:2] == "CL" or tag[3].isdigit()
+def classes_of(sections: Sections) -> list[MotionClass]:
+    """Return the classes of a model with their changes, as `join` takes them; empty if it has no classes."""
+    names, found = class_names(sections), []
+    for k, (name, row) in enumerate(zip(names, sections.get("CLIN", ()), strict=True)):
+        direction, source, cycles, recordings = (int(value) for value in row)
+        changes = {
+            to: Change(*(float(value) for value in change))
+            for to, change in zip(names, sections["CLSW"][k], strict=True)
+            if change[0]
+        }
+        own = class_sections(sections, k) if source == k else None
+        found.append(MotionClass(name, direction, own, names[source], cycles, recordings, changes))
+    return found
 
 
 def _source(one: MotionClass, k: int, classes: Sequence[MotionClass]) -> int:

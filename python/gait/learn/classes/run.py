@@ -4,20 +4,25 @@ from __future__ import annotations
 
 import json
 import tempfile
-from collections.abc import Mapping
+from collections.abc import Callable, Collection, Mapping, Sequence
 from dataclasses import replace
 from functools import reduce
 from operator import add
 from pathlib import Path
-from typing import Any
+from typing import Any, TypeVar
+
+import numpy as np
 
 from gait.bindings.model import read_cyclic
+from gait.body.motion_classes import class_names, class_sections
 from gait.errors import UsageError, UserError
 from gait.io import blob
+from gait.learn.arrays import Floats, column_means
 from gait.learn.classes import changes, standing
-from gait.learn.classes.join import Change, MotionClass, join
+from gait.learn.classes.join import Change, MotionClass, classes_of, join
 from gait.learn.corpus.load import NothingLeft
-from gait.learn.corpus.sources import find
+from gait.learn.corpus.sources import find, subjects
+from gait.learn.cycles.verdict import NAMES
 from gait.learn.options import LearnOptions, SegmentOptions
 from gait.learn.report.classes import figures as class_figures
 from gait.learn.run import Note, check, run
@@ -26,6 +31,8 @@ from gait.progress import progress
 
 WALK, STAND, BACKWARDS, RUN = "walk", "stand", "backwards", "run"
 DERIVED = STAND, BACKWARDS  # made from the walk
+MODEL = ".gait"  # suffix
+T = TypeVar("T")
 STEP_CONCENTRATION = 6.0  # concentration with an sd of about a twentieth of a stride
 #: Rates of change from one class to another, per second at the most likely phase and pace, before recordings
 #: of changes (``LearnOptions.changes``).  They are assumptions about people indoors and in streets:
@@ -51,35 +58,44 @@ def learn(options: LearnOptions, note: Note) -> dict[str, Any]:
     """Learn each of ``options.classes`` that has recordings, then the walk, and write one blob.
 
     A class is ``stand`` or ``backwards``, derived from the walk; or ``NAME=SRC``, learnt from those
-    recordings (``backwards`` in reversed time, as a walk whose phase decreases) or taken from a model
-    (``.gait``); or ``run``, learnt from the runs among the sources.  Returns the figures of the walk, with
-    those of the classes under ``classes``.  With ``options.changes``, changes between the classes are learnt
-    from those recordings; without classes they are those of a model.  UsageError or UserError with one line
-    if it cannot be done.
+    recordings (``backwards`` in reversed time, as a walk whose phase decreases; ``stand`` from people who
+    stand still) or taken from a model (``.gait``); or ``run``, learnt from the runs among the sources.  If
+    the only source is a model, the classes are added to its own, or replace those of their names.  Returns
+    the figures of the walk, with those of the classes under ``classes``.  With ``options.changes``, changes
+    between the classes are learnt from those recordings; without classes they are those of a model.
+    UsageError or UserError with one line if it cannot be done.
     """
-    wanted, alone = _parsed(options), replace(options, classes=())
+    own = read_cyclic(options.sources[0]) if adds_to_a_model(options) else None
+    first = options.activity if own is None else _first_name(own)
+    wanted, alone = _parsed(options, first), replace(options, classes=())
     if options.changes and not wanted:
-        return _only_changes(options, note)
-    if not adds_to_a_model(options):
+        return _only_changes(own, options, note)
+    if own is None:
         check(alone)
-    learnt = {
-        name: _learnt(name, source, options, note)
-        for name, source in wanted.items()
-        if source or name not in DERIVED
-    }
+    learnt, posture = dict[str, MotionClass | None](), None
+    for name, source in wanted.items():
+        if Path(source).suffix == MODEL:
+            learnt[name] = _taken(name, source)
+        elif name == STAND:
+            posture = _posture(source, options, note) if source else None
+        elif source or name != BACKWARDS:
+            learnt[name] = _learnt(name, source, options, note)
 
     def with_classes(walk: Mapping[str, blob.Array]) -> dict[str, blob.Array]:
-        walk = changes.without_numbers(walk)
-        classes = [_counted(MotionClass(options.activity), walk)]
+        classes = {one.name: one for one in classes_of(walk) or [_counted(MotionClass(first), walk)]}
+        kept = classes.keys() - wanted.keys()
         for name in wanted:
-            one = learnt[name] if name in learnt else _derived(name, walk, options.activity)
-            classes += [one] if one is not None else []
-        names = [one.name for one in classes]
-        joined = join(walk, [replace(one, changes=_changes(one.name, names)) for one in classes])
+            one = learnt[name] if name in learnt else _derived(name, walk, first, posture)
+            classes |= {} if one is None else {name: one}
+        names = list(classes)
+        if others := [name for name in names[1:] if name in kept]:
+            note(f"{options.sources[0]}: keeps its classes {' '.join(others)}")
+        every = [replace(one, changes=_changes(one, names, kept)) for one in classes.values()]
+        joined = join(changes.with_numbers_of(walk, kept), every)
         return changes.with_changes(joined, _observed(joined, options, note)) if options.changes else joined
 
-    if adds_to_a_model(options):
-        data = blob.write(options.output, with_classes(read_cyclic(options.sources[0])))
+    if own is not None:
+        data = blob.write(options.output, with_classes(own))
         figures: dict[str, Any] = {"bytes": len(data), "crc32": f"{blob.checksum(data):08x}"}
     else:
         figures = run(alone, note, with_classes)
@@ -87,10 +103,20 @@ def learn(options: LearnOptions, note: Note) -> dict[str, Any]:
     return figures | {"classes": class_figures(blob.decode(data))}
 
 
-def _only_changes(options: LearnOptions, note: Note) -> dict[str, Any]:
+def _first_name(own: Mapping[str, blob.Array]) -> str:
+    """Name of a model's first class of motion."""
+    names = class_names(own)
+    return names[0] if names else str(_meta(own).get("activity", WALK))
+
+
+def _meta(own: Mapping[str, blob.Array]) -> dict[str, Any]:
+    meta: dict[str, Any] = json.loads(own["META"].tobytes()) if "META" in own else {}
+    return meta
+
+
+def _only_changes(own: Mapping[str, blob.Array] | None, options: LearnOptions, note: Note) -> dict[str, Any]:
     """Learn only the changes between the classes of a model."""
-    own = read_cyclic(options.sources[0]) if adds_to_a_model(options) else {}
-    if "CLNM" not in own:
+    if own is None or not class_names(own):
         raise UsageError("--changes: are between classes of motion; give --class, or a model that has some")
     check(options)
     data = blob.write(options.output, changes.with_changes(own, _observed(own, options, note)))
@@ -100,38 +126,61 @@ def _only_changes(options: LearnOptions, note: Note) -> dict[str, Any]:
 
 def _observed(sections: Mapping[str, blob.Array], options: LearnOptions, note: Note) -> changes.Observed:
     """Count the changes in ``options.changes``."""
-    files, closed = find(options.changes, options.exclude, note)
-    observed = list[changes.Observed]()
-    with progress("counting changes", len(files), options.quiet) as update:
+
+    def counted(path: Path) -> changes.Observed:
+        return changes.count(sections, changes.frames_of(path, readers.read(path, options)))
+
+    found = _each("--changes", options.changes, counted, options, note)
+    return reduce(add, found.values())
+
+
+def _posture(source: str, options: LearnOptions, note: Note) -> tuple[Floats, int]:
+    """Return the mean angles (24,) over people who stand in recordings, and the number of recordings."""
+
+    def angles(path: Path) -> Floats:
+        return standing.posture_of(path, readers.read(path, options))
+
+    found = _each(f"--class {STAND}", (source,), angles, options, note)
+    people: dict[str, list[Floats]] = {}
+    for person, one in zip(subjects(list(found), options.subjects), found.values(), strict=True):
+        people.setdefault(person, []).append(one)
+    return column_means(np.array([column_means(np.array(each)) for each in people.values()])), len(found)
+
+
+def _each(
+    option: str, sources: Sequence[str], use: Callable[[Path], T], options: LearnOptions, note: Note
+) -> dict[Path, T]:
+    """Return what `use` makes of each recording; those in folders that it refuses are left out."""
+    files, closed = find(sources, options.exclude, note)
+    found: dict[Path, T] = {}
+    with progress(f"recordings of {option}", len(files), options.quiet) as update:
         for k, (path, in_folder) in enumerate(files, 1):
             try:
-                observed.append(changes.count(sections, changes.frames_of(path, readers.read(path, options))))
+                found[path] = use(path)
             except UserError as error:
                 if not in_folder:
                     raise
                 closed.append(str(error))
             update(k)
+    if not found:
+        raise UserError(f"{option} {' '.join(sources)}: none of the recordings can be used ({closed[0]})")
     for line in closed:
         note(f"left out: {line}")
-    if not observed:
-        raise UserError(f"--changes {' '.join(options.changes)}: none of the recordings can be used")
-    return reduce(add, observed)
+    return found
 
 
 def adds_to_a_model(options: LearnOptions) -> bool:
     """Whether the walk is that of a model rather than learnt from recordings."""
-    return len(options.sources) == 1 and Path(options.sources[0]).suffix == ".gait"
+    return len(options.sources) == 1 and Path(options.sources[0]).suffix == MODEL
 
 
-def _parsed(options: LearnOptions) -> dict[str, str]:
-    """Parse the names of the classes and their sources."""
+def _parsed(options: LearnOptions, first: str) -> dict[str, str]:
+    """Parse the names of the classes and their sources; `first`: name of the first class."""
     wanted: dict[str, str] = {}
     for text in options.classes:
         name, _, source = text.partition("=")
-        if not name or name in wanted or name == options.activity:
-            raise UsageError(f"--class {text}: give each class its own name, not {options.activity}")
-        if name == BACKWARDS and Path(source).suffix == ".gait":
-            raise UsageError(f"--class {text}: give recordings, or nothing to derive it from the walk")
+        if not name or name in wanted or name == first:
+            raise UsageError(f"--class {text}: give each class its own name, not {first}")
         if not source and (name not in (*DERIVED, RUN) or (name == RUN and adds_to_a_model(options))):
             raise UsageError(f"--class {text}: give recordings, --class {name}=FOLDER")
         wanted[name] = source
@@ -142,16 +191,38 @@ def _parsed(options: LearnOptions) -> dict[str, str]:
     return wanted
 
 
-def _derived(name: str, walk: Mapping[str, blob.Array], activity: str) -> MotionClass:
-    if name == STAND:
-        return MotionClass(STAND, 0, own=standing.sections(walk))
-    return MotionClass(BACKWARDS, -1, source=activity)
+def _derived(
+    name: str, walk: Mapping[str, blob.Array], first: str, posture: tuple[Floats, int] | None
+) -> MotionClass:
+    """Return a class derived from the first; `posture`: result of `_posture`, for standing."""
+    if name == BACKWARDS:
+        return MotionClass(BACKWARDS, -1, source=first)
+    angles, recordings = posture or (None, 0)
+    return MotionClass(STAND, 0, own=standing.sections(walk, angles), recordings=recordings)
+
+
+def _taken(name: str, source: str) -> MotionClass:
+    """Return the class of this name of a model, or the only class of a model, under this name."""
+    own = read_cyclic(source)
+    names = class_names(own)
+    if name in names:
+        k = names.index(name)
+        return replace(classes_of(own)[k], own=class_sections(own, k))
+    if names:
+        raise UserError(
+            f"--class {name}={source}: has no class {name}; name one of its classes, {' '.join(names)}"
+        )
+    activity = str(_meta(own).get("activity", WALK))
+    kinds = {NAMES.get(activity.lower()), NAMES.get(name)} - {None}
+    if name in DERIVED or len(kinds) > 1:
+        raise UserError(
+            f"--class {name}={source}: is a model of {activity!r}; give recordings, or a model of {name}"
+        )
+    return _counted(MotionClass(name, own=own), own)
 
 
 def _learnt(name: str, source: str, options: LearnOptions, note: Note) -> MotionClass | None:
-    """Learn a class from recordings, or take it from a model; None if no source belongs to it."""
-    if Path(source).suffix == ".gait":
-        return _counted(MotionClass(name, own=read_cyclic(source)), None)
+    """Learn a class from recordings; None if none of the sources belongs to it."""
     with tempfile.TemporaryDirectory() as folder:
         own = replace(
             options,
@@ -172,18 +243,27 @@ def _learnt(name: str, source: str, options: LearnOptions, note: Note) -> Motion
             return None
         except UserError as exc:
             raise UserError(f"class {name}: {exc}") from None
-        return _counted(MotionClass(name, -1 if own.reverse else 1, blob.read(own.output)), None)
+        found = blob.read(own.output)
+        return _counted(MotionClass(name, -1 if own.reverse else 1, found), found)
 
 
-def _counted(one: MotionClass, walk: Mapping[str, blob.Array] | None) -> MotionClass:
-    """Return a class with the numbers of cycles and recordings in its META."""
-    sections = one.own if one.own is not None else walk or {}
-    meta = json.loads(sections["META"].tobytes()) if "META" in sections else {}
+def _counted(one: MotionClass, own: Mapping[str, blob.Array]) -> MotionClass:
+    """Return a class with the numbers of cycles and recordings in the META of its model."""
+    meta = _meta(own)
     recordings = meta.get("sequences", {}).get("count", 0)
     return replace(one, cycles=int(meta.get("cycles", 0)), recordings=int(recordings))
 
 
-def _changes(name: str, names: list[str]) -> dict[str, Change]:
+def _changes(one: MotionClass, names: list[str], kept: Collection[str]) -> dict[str, Change]:
+    """Return a class's changes: between kept classes as they were, others as assumed."""
+    assumed = _assumed(one.name, names)
+    if one.name not in kept:
+        return assumed
+    others = {to: change for to, change in assumed.items() if to not in kept}
+    return others | {to: change for to, change in one.changes.items() if to in kept}
+
+
+def _assumed(name: str, names: list[str]) -> dict[str, Change]:
     known = CLASS_CHANGES.get(name)
     if known is None:
         return {other: OTHER_CHANGE for other in (names[0], STAND) if other in names and other != name}

@@ -1,19 +1,26 @@
-"""Derive standing from the walk: legs as in mid-stance but below the hips, everything else average.
+"""Standing, derived from the walk: legs as in mid-stance but below the hips, everything else average.
 
 Few recordings show people standing, but every walk shows which angles of its skeleton mean a straight leg, a
 level foot and hanging arms.  People stand in different ways: components, in units of their standard
 deviation, are one foot in front of the other, the width of the stance, bent knees and weight on one leg; the
-height of the pelvis follows from the legs.
+height of the pelvis follows from the legs.  Recordings of people who stand replace the mean angles.
 """
 
 from __future__ import annotations
 
 from collections.abc import Mapping
+from pathlib import Path
 
 import numpy as np
+import numpy.typing as npt
 
+from gait.body.skeleton import ANGLES, SIDES
+from gait.errors import UserError
 from gait.io import blob
-from gait.learn.arrays import Floats
+from gait.learn.arrays import Floats, column_means
+from gait.learn.mocap.tables import AngleTable
+from gait.learn.solve import retarget
+from gait.learn.solve.body import Body
 
 STANDING_PHASES = 8  # the fewest that a model may have, as nothing moves
 STANCE_PHASES = 0.15, 0.45  # phases in which the right foot carries the body and is flat
@@ -27,16 +34,70 @@ STANDING_COMPONENTS: tuple[dict[str, float], ...] = (
     {"root_roll": 3.0, "l_hip_abduction": 4.0, "r_hip_abduction": -4.0, "torso_x": -3.0},
 )  # fmt: skip
 """Degrees for one standard deviation."""
+STILL_S = 1.0  # seconds for which a person must stand still; feet of people who walk slowly rest for 0.4 s
+STILL_M = 0.03  # metres; most that pelvis and ankles move in them
+BENT_KNEES = np.radians(40.0)  # from which a person sits or crouches
 #: Standard deviations of posture, degrees: arms may hang, fold, point or carry.
 STANDING_POSTURE_SD_DEG = {"shoulder_flexion": 25.0, "shoulder_abduction": 12.0, "shoulder_rotation": 20.0,
            "elbow_flexion": 35.0, "torso_y": 6.0, "torso_x": 4.0, "torso_z": 8.0}  # fmt: skip
 
 
-def sections(walk: Mapping[str, blob.Array]) -> dict[str, blob.Array]:
-    """Return CURV, CHST, SCST and GAIT of standing from those of a walk of the default skeleton."""
+def body_of(path: Path, read: Body | AngleTable) -> Body:
+    """Return a recording on a level floor. UserError if it has only angles, which show no speed."""
+    if isinstance(read, AngleTable):
+        raise UserError(f"{path}: has only angles; give recordings of places, which show the speed")
+    return retarget.levelled(read)
+
+
+def posture_of(path: Path, read: Body | AngleTable) -> Floats:
+    """Return the mean angles (24,), radians, of a person while standing still; NaN where nothing shows them.
+
+    UserError if the person does not stand still for `STILL_S`.
+    """
+    body = body_of(path, read)
+    still = _still(body)
+    if not still.any():
+        raise UserError(
+            f"{path}: not learnt as 'stand': the person does not stand still for {STILL_S:g} s; leave it out"
+        )
+    posture = column_means(retarget.observed_angles(body, retarget.measure(body))[still])
+    knees = posture[[ANGLES.index(f"{s}_knee_flexion") for s in SIDES]]
+    if (knees > BENT_KNEES).any():
+        bent, most = np.degrees((np.nanmax(knees), BENT_KNEES))
+        raise UserError(
+            f"{path}: not learnt as 'stand': the knees are bent by {bent:.0f} degrees (at most {most:.0f}); "
+            "leave it out"
+        )
+    return posture
+
+
+def _still(body: Body) -> npt.NDArray[np.bool_]:
+    """Return the frames (T,) within a second in which neither the pelvis nor an ankle moves."""
+    width = round(STILL_S * body.fps)
+    still = np.zeros(body.frames, bool)
+    if body.frames < width:
+        return still
+    places = np.stack([body.joints[name] for name in ("pelvis", "l_ankle", "r_ankle")], axis=1)
+    windows = np.lib.stride_tricks.sliding_window_view(places, width, axis=0)
+    quiet = (np.ptp(windows, axis=-1) <= STILL_M).all(axis=(1, 2))  # not where a place is missing
+    for start in np.flatnonzero(quiet):
+        still[start : start + width] = True
+    return still
+
+
+def sections(walk: Mapping[str, blob.Array], angles: Floats | None = None) -> dict[str, blob.Array]:
+    """Return CURV, CHST, SCST and GAIT of standing from those of a walk of the default skeleton.
+
+    `angles` (24,): mean angles of people who stand, as from `posture_of`; where missing, those of the walk.
+    """
     names = blob.unpack_names(walk["CHNM"])
     mean = np.asarray(walk["CURV"], float)[0]
-    posture = _standing(walk, names, mean)
+    posture, lowest = _standing(walk, names, mean)
+    if angles is not None:
+        for name, angle in zip(ANGLES, angles, strict=True):
+            if np.isfinite(angle):
+                posture[names.index(name)] = angle
+    posture[names.index("root_height")] = lowest + _leg_height(walk, names, posture)
     rows = [posture]
     for component in STANDING_COMPONENTS:
         change = np.zeros(len(names))
@@ -70,8 +131,8 @@ def _stored(values: Floats) -> blob.Array:
     return np.asarray(values, np.float32)
 
 
-def _standing(walk: Mapping[str, blob.Array], names: list[str], mean: Floats) -> Floats:
-    """Mean channels (M,) of a person who stands with feet together."""
+def _standing(walk: Mapping[str, blob.Array], names: list[str], mean: Floats) -> tuple[Floats, float]:
+    """Mean channels (M,) of a person who stands with feet together; the ankles' height in statures."""
     at = {name: k for k, name in enumerate(names)}
     posture = mean.mean(axis=0)
     first, last = (int(phase * len(mean)) for phase in STANCE_PHASES)
@@ -97,8 +158,7 @@ def _standing(walk: Mapping[str, blob.Array], names: list[str], mean: Floats) ->
         "neck_z",
     ):
         posture[at[name]] = 0.0
-    posture[at["root_height"]] = min(ankle) + _leg_height(walk, names, posture)
-    return posture
+    return posture, float(min(ankle))
 
 
 def _lengths(walk: Mapping[str, blob.Array]) -> tuple[float, float]:

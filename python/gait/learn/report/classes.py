@@ -6,21 +6,20 @@ import json
 from collections.abc import Mapping
 from typing import Any
 
+from gait.body.motion_classes import class_names, class_sections
 from gait.io import blob
 
 
 def figures(sections: Mapping[str, blob.Array]) -> list[dict[str, Any]]:
     """Return for each class its rate, speed and how often people change from it; empty without classes."""
-    if "CLNM" not in sections:
+    if not (names := class_names(sections)):
         return []
-    names = blob.unpack_names(sections["CLNM"])
     meta = json.loads(sections["META"].tobytes()) if "META" in sections else {}
     found, observed = [], meta.get("changes", {})
-    for name, row, change in zip(names, sections["CLIN"], sections["CLSW"], strict=True):
+    for k, (name, row, change) in enumerate(zip(names, sections["CLIN"], sections["CLSW"], strict=True)):
         direction, source, cycles, recordings = (int(value) for value in row)
-        own = "" if source == 0 else str(source)
-        gait = sections[f"GAI{own}" if own else "GAIT"].astype(float)
-        curves = sections[f"CUR{own}" if own else "CURV"]
+        own = class_sections(sections, k)
+        gait, curves = own["GAIT"].astype(float), own["CURV"]
         found.append({
             "name": name,
             "direction": direction,
@@ -38,7 +37,11 @@ def figures(sections: Mapping[str, blob.Array]) -> list[dict[str, Any]]:
 
 def words(one: Mapping[str, Any]) -> dict[str, str]:
     """Describe a class of `figures`, by column of a table."""
-    source = f"{one['cycles']} cycles" if one["cycles"] else "derived from the walk"
+    source = "derived from the walk"
+    if one["cycles"]:
+        source = f"{one['cycles']} cycles"
+    elif one["recordings"]:
+        source = f"{one['recordings']} recording{'s' * (one['recordings'] > 1)} of people who stand"
     if one["curves_of"] != one["name"]:
         source = f"the curves of {one['curves_of']} in reverse"
     moves = one["direction"] != 0
