@@ -18,6 +18,7 @@ from gait.io import blob
 from gait.io.track_file import read_track
 from gait.io.video import Frame
 from gait.motion.footfalls import Draws
+from gait.track.class_changes import ClassChanges
 from gait.track.smooth import Smoother, Spool, draw_motions, smoothed
 
 SECTIONS = blob.decode(read_blob(None))
@@ -173,6 +174,91 @@ def test_a_new_start_begins_motions_of_its_own():
     joined, apart = (draw_motions(Pairs(frames, Still(), s), 300, 1) for s in ((), (3,)))
     together = np.corrcoef(joined[:, 2, 3], joined[:, 3, 3])[0, 1]
     assert abs(np.corrcoef(apart[:, 2, 3], apart[:, 3, 3])[0, 1]) < 0.2 < together
+
+
+FOUR = Model("classes")
+WALK, STAND = (FOUR.classes.index(name) for name in ("walk", "stand"))
+
+
+def of_classes(which):
+    """States (N,) of these classes of a person at the origin, with stride rates and scores of their own."""
+    state = FOUR.prior()[0]
+    state.pelvis = np.array([0.0, 0.0, 0.95])
+    states = np.tile(np.ctypeslib.as_array(state.to_c()), len(which))
+    states["motion_class"] = which
+    states["stride_hz"][which == STAND] = 0.5
+    states["coef"][which == STAND, 0] = 1.0
+    return states
+
+
+def test_classes_are_drawn_as_the_exact_smoother_of_a_markov_chain_has_them():
+    """Against the forward-backward algorithm; the person stops, and is seen badly while doing so."""
+    sections, random, seconds = dict(FOUR.sections()), np.random.default_rng(4), 0.1
+    sections["CLSW"] = np.zeros((4, 4, 4), np.float32)
+    sections["CLSW"][WALK, STAND, 0], sections["CLSW"][STAND, WALK, 0] = 1.0, 0.5
+    to = np.array([[0.9, 0.1], [0.05, 0.95]])
+    seen = np.array([[0.9, 0.1]] * 4 + [[0.6, 0.4]] * 6 + [[0.3, 0.7]] * 6)
+    ahead, now = [], np.array([0.9, 0.1])
+    for row in seen:
+        now = row * (now @ to)
+        now /= now.sum()
+        ahead.append(now)
+    wanted, later = [], np.ones(2)
+    for row, forward in zip(seen[::-1], ahead[::-1], strict=True):
+        both = forward * later
+        wanted.insert(0, both[1] / both.sum())
+        later = to @ (row * later)
+
+    class Spooled:
+        frames = [of_classes(np.where(random.random(1000) < p[1], STAND, WALK)) for p in ahead]
+
+        def __len__(self):
+            return len(self.frames)
+
+        def read(self, index):
+            table = self.frames[index].view(np.float32).reshape(1000, -1)
+            return table, table if index + 1 < len(self) else None
+
+        def seconds(self, index):
+            return seconds
+
+    drawn = draw_motions(Spooled(), 1000, 1, changes=ClassChanges(sections))
+    which = np.stack([ClassChanges.of(motion) for motion in drawn])
+    assert set(np.unique(which)) == {WALK, STAND}
+    assert np.abs((which == STAND).mean(axis=0) - wanted).max() < 0.06
+    assert np.abs(np.array(wanted) - [p[1] for p in ahead]).max() > 0.2  # the filter differs
+    rates = drawn[..., 1]
+    assert (rates[which == STAND] == 0.5).all() and (rates[which == WALK] > 0.6).all()
+
+
+def test_an_estimate_is_that_of_the_most_frequent_class():
+    states = of_classes(np.repeat([STAND, WALK], [60, 40]))
+    joints, angles = FOUR.poses(states)
+    tracker = Tracker(FOUR, camera(), TrackerConfig.default(particles=64))
+    tracker.start(FOUR.prior()[0], State(phase=0.05), 0)
+    then = tracker.step(None, 0)
+    assert then.motion_class == "walk"
+    now = smoothed(then, FOUR, states, joints, angles)
+    assert now.motion_class == "stand" and now.mean.motion_class == STAND and now.speed == 0
+    assert now.class_probability[[WALK, STAND]].tolist() == [0.4, 0.6]
+    assert now.mean.stride_hz == pytest.approx(0.5) and now.mean.coef[0] == pytest.approx(1.0)
+    np.testing.assert_allclose(FOUR.pose(now.mean)[0], joints[0], atol=1e-4)
+    np.testing.assert_allclose(now.angles, angles[0], atol=1e-5)
+
+
+def test_a_clip_of_a_model_with_classes_is_smoothed():
+    tracker = Tracker(FOUR, camera(), TrackerConfig.default(particles=400))
+    mean, sd = FOUR.prior()
+    mean.pelvis, sd.phase, sd.heading = state_at(MODEL, SECTIONS, 0.0).pelvis, 0.02, 0.02
+    tracker.start(mean, sd, 0)
+    with Smoother(tracker) as smoother:
+        for i in range(12):
+            smoother.add(Frame(i, i / 30, wall()), tracker.step(None, 33333 * i))
+        rows, _ = smoother.finish(40)
+    for _, now in rows:
+        assert now.class_probability.sum() == pytest.approx(1)
+        assert now.motion_class == FOUR.classes[now.mean.motion_class]
+        assert now.class_probability[now.mean.motion_class] == now.class_probability.max()
 
 
 def test_the_spool_gives_back_pairs_and_knows_the_starts():

@@ -154,6 +154,10 @@ class Model:
         name = getattr(self._lib, f"gait_model_{kind}_name")
         return tuple(name(self.handle, i).decode(errors="backslashreplace") for i in range(count))
 
+    def sections(self) -> dict[str, NDArray[np.generic]]:
+        """Return the arrays of the blob by tag (model-format.md)."""
+        return decode(self._loaded.blob.tobytes())
+
     def class_info(self, motion_class: int) -> ModelInfo:
         """Return the contents of the model for one class of motion; IndexError if it has no such class."""
         handle = self._lib.gait_model_of_class(self.handle, motion_class)

@@ -7,7 +7,7 @@ fits: of 100 motions only 8 differed.  Therefore particles are picked with a wid
 difference is corrected by linear regression (as in Beaumont, Zhang and Balding 2002, Genetics 162:2025): with
 pairs (x, x') of a particle and its drawn successor, and J = cov(x, x') cov(x')^-1, the state before s is x +
 J (s - x').  For linear dynamics with normal noise this is exact for any kernel: it samples from the smoother
-of Rauch, Tung and Striebel (1965).
+of Rauch, Tung and Striebel (1965).  The class of motion is drawn first (`gait.track.class_changes`).
 """
 
 from __future__ import annotations
@@ -28,6 +28,7 @@ from gait.bindings.model import Model
 from gait.bindings.state import State
 from gait.io.video import Frame
 from gait.motion.footfalls import Draws
+from gait.track.class_changes import ClassChanges, Part
 from gait.track.tracker import Tracker
 
 Array = NDArray[np.float64]
@@ -62,6 +63,7 @@ class Spool:
         self._last: tuple[NDArray[np.void], Estimate] | None = None  # states and estimate of the last frame
         self._chosen: list[_Record] = []  # for each frame
         self._moved: list[_Record | None] = []  # successors of the previous frame's; None at a start
+        self._seconds: list[float] = []  # since the previous frame
 
     def __enter__(self) -> Spool:
         self._file = tempfile.TemporaryFile(prefix="gait-")
@@ -74,15 +76,17 @@ class Spool:
 
     def add(self, tracker: Tracker, estimate: Estimate) -> None:
         """Store pairs after a step."""
-        moved = None
+        moved, seconds = None, 0.0
         if self._last is not None:
             before, then = self._last
             if estimate.frame == then.frame + 1:
-                moved = self._put(tracker.predict(before, 1e-6 * (estimate.utime - then.utime)))
+                seconds = 1e-6 * (estimate.utime - then.utime)
+                moved = self._put(tracker.predict(before, seconds))
         states, weights = tracker.particles()
         chosen = states[_pick(weights, _PAIRS, self._random)]
         self._last = chosen, estimate
         self._moved.append(moved)
+        self._seconds.append(seconds)
         self._chosen.append(self._put(chosen))
 
     def __len__(self) -> int:
@@ -92,6 +96,10 @@ class Spool:
         """Read a frame's states (N, columns) and their successors, which are None if the next is a start."""
         moved = self._moved[index + 1] if index + 1 < len(self) else None
         return self._get(self._chosen[index]), None if moved is None else self._get(moved)
+
+    def seconds(self, index: int) -> float:
+        """Return the time from a frame to the next."""
+        return self._seconds[index + 1]
 
     def _put(self, states: NDArray[np.void]) -> _Record:
         table = _table(states)
@@ -123,7 +131,11 @@ def _table(states: NDArray[np.void]) -> Table:
 
 
 def draw_motions(
-    spool: Spool, count: int, seed: int, update: Callable[[int], None] = lambda done: None
+    spool: Spool,
+    count: int,
+    seed: int,
+    update: Callable[[int], None] = lambda done: None,
+    changes: ClassChanges | None = None,
 ) -> Table:
     """Draw motions from the posterior given all frames.
 
@@ -136,6 +148,8 @@ def draw_motions(
         Seed of the random numbers.
     update : callable, optional
         Called with the number of frames done.
+    changes : ClassChanges, optional
+        Changes between classes of motion, if the model has several.
 
     Returns
     -------
@@ -149,9 +163,15 @@ def draw_motions(
         if after is None:
             frames.append(before[random.permutation(_pick(np.ones(len(before)), count, random))])
         else:
-            drawn = np.empty_like(frames[-1])
-            for these in _groups(frames[-1]):
-                drawn[these] = _before(before, after, frames[-1][these], random)
+            s, parts = frames[-1], [Part(np.arange(count), np.arange(len(before)))]
+            if changes is not None:
+                parts = list(changes.parts(before, s, spool.seconds(i), random))
+            drawn = np.empty_like(s)
+            for part in parts:
+                pairs = before[part.pairs], after[part.pairs]
+                for group in _groups(s[part.motions]):
+                    these = part.motions[group]
+                    drawn[these] = _before(*pairs, s[these], random, part.columns)
             frames.append(drawn)
         update(len(frames))
     out = np.stack(frames[::-1], axis=1)
@@ -159,19 +179,30 @@ def draw_motions(
     return out
 
 
-def _before(before: Table, after: Table, s: Table, random: np.random.Generator) -> Array:
-    """Draw a predecessor for each state of `s` (M, columns) from pairs of states and successors."""
+def _before(
+    before: Table,
+    after: Table,
+    s: Table,
+    random: np.random.Generator,
+    continuing: NDArray[np.bool_] | None = None,
+) -> Array:
+    """Draw a predecessor for each state of `s` (M, columns) from pairs of states and successors.
+
+    `continuing` (columns,): numbers that do not change with the class of motion; None: all.
+    """
     varying = (after != after[0]).any(axis=0)
+    if continuing is not None:
+        varying &= continuing
     columns = int(varying.sum())
-    close = _near(after, s[0])
+    close = _near(after, s[0], by_phase=continuing is None or bool(continuing[PHASE_FIELD]))
     if close.sum() > 4 * columns:
         before, after = before[close], after[close]
     # relative to one of the states, since phase and heading are angles
     gain, scatter = _regression(_difference(before, s[0])[:, varying], _difference(after, s[0])[:, varying])
     root = np.linalg.cholesky(scatter)
     gap = _difference(s[:, None], after)[..., varying]  # (M, N, columns)
-    distance = np.sum(np.linalg.solve(root, gap.reshape(-1, columns).T) ** 2, axis=0)
-    logs = -0.5 * distance.reshape(len(s), -1) / _KERNEL_WIDTH**2
+    distance = np.sum(np.linalg.solve(root, gap.reshape(len(s) * len(after), columns).T) ** 2, axis=0)
+    logs = -0.5 * distance.reshape(len(s), len(after)) / _KERNEL_WIDTH**2
     weights = np.exp(logs - logs.max(axis=1, keepdims=True))
     sums = np.cumsum(weights, axis=1)
     chosen = np.sum(sums < random.random((len(s), 1)) * sums[:, -1:], axis=1)
@@ -203,9 +234,9 @@ def _regression(b: Array, a: Array) -> tuple[Array, Array]:
     return np.linalg.solve(scatter, a.T @ b / len(a)).T, scatter
 
 
-def _near(states: Table, one: Table) -> NDArray[np.bool_]:
-    """Which states are similar to `one` in phase and heading."""
-    phase = np.abs(wrap(states[:, PHASE_FIELD] - one[PHASE_FIELD], 1.0)) < _GROUP[0]
+def _near(states: Table, one: Table, by_phase: bool = True) -> NDArray[np.bool_]:
+    """Which states are similar to `one` in heading and, if wanted, in phase."""
+    phase = (np.abs(wrap(states[:, PHASE_FIELD] - one[PHASE_FIELD], 1.0)) < _GROUP[0]) | (not by_phase)
     return np.asarray(
         phase & (np.abs(wrap(states[:, HEADING_FIELD] - one[HEADING_FIELD], 2 * np.pi)) < _GROUP[1])
     )
@@ -269,7 +300,8 @@ class Smoother:
     ) -> tuple[list[tuple[Frame, Estimate]], Draws]:
         """Draw `count` motions; return the frames with smoothed estimates, and the motions."""
         model = self._tracker.model
-        tables = draw_motions(self._spool, count, self._tracker.config.seed, update)
+        changes = ClassChanges(model.sections()) if model.info.classes > 1 else None
+        tables = draw_motions(self._spool, count, self._tracker.config.seed, update, changes)
         states = tables.view(np.ctypeslib.as_array(abi.StateC()).dtype)[..., 0]
         joints, angles = model.poses(states)
         frames = [frame for frame, _ in self._filtered]
@@ -327,14 +359,19 @@ def smoothed(
     joints : ndarray of shape (M, P, 3)
     angles : ndarray of shape (M, A)
     """
-    use, weight = _dominant(states)
-    mean, sd = State(coef=np.zeros(model.info.components), offset=np.zeros(model.info.angles)), State()
+    found = np.bincount(states["motion_class"], minlength=model.info.classes)
+    same = states["motion_class"] == found.argmax()
+    use, weight = _dominant(states, same)
+    mean, sd = State(motion_class=int(found.argmax())), State()
     for name in ("stride_hz", "stature", "pitch", "roll", "turn_rate"):
         setattr(mean, name, float(states[name][use].mean()))
         setattr(sd, name, float(states[name].std()))
     mean.phase, sd.phase = _circular(states["phase"], use, 1.0)
     mean.heading, sd.heading = _circular(states["heading"], use, 2 * np.pi)
     mean.heading = float(wrap(np.array(mean.heading), 2 * np.pi))
+    of_class = model.class_info(mean.motion_class)
+    if of_class.direction == 0:
+        mean.phase, sd.phase = then.mean.phase, then.sd.phase
     mean.pelvis, sd.pelvis = states["pelvis"][use].mean(axis=0), states["pelvis"].std(axis=0)
     for name, count in (
         ("coef", model.info.components),
@@ -351,28 +388,35 @@ def smoothed(
         ess=float(len(states)),
         phase_r=phase_r,
         hypothesis_weight=weight,
-        speed=then.speed * _pace(then.mean, mean),
+        speed=_speed(then, model, mean),
         mean=mean,
         sd=sd,
         best=mean,
         joints=joints.mean(axis=0, dtype=float),
         joint_sd=joints.std(axis=0, dtype=float),
         angles=angles[use].mean(axis=0, dtype=float),
+        motion_class=model.classes[mean.motion_class],
+        class_probability=found / len(states),
     )
 
 
-def _pace(then: State, now: State) -> float:
-    """Factor of the speed due to changes of stature and stride rate."""
-    return now.stature * now.stride_hz / (then.stature * then.stride_hz)
+def _speed(then: Estimate, model: Model, now: State) -> float:
+    """Speed along the ground, metres per second: that of the filter at another stature, rate or class."""
+    pace = now.stature * now.stride_hz
+    if now.motion_class == then.mean.motion_class:
+        return then.speed * pace / (then.mean.stature * then.mean.stride_hz)
+    info = model.class_info(now.motion_class)
+    return abs(info.direction) * info.stride_length * pace
 
 
-def _dominant(states: NDArray[np.void]) -> tuple[NDArray[np.bool_], float]:
-    """Which states belong to the largest hypothesis, and their share."""
+def _dominant(states: NDArray[np.void], same: NDArray[np.bool_]) -> tuple[NDArray[np.bool_], float]:
+    """Which states belong to the largest hypothesis of those that count, and its share of these."""
     phase, heading = states["phase"].astype(float), states["heading"].astype(float)
     near = np.abs(wrap(phase[:, None] - phase, 1.0)) < _SAME_HYPOTHESIS[0]
     near &= np.abs(wrap(heading[:, None] - heading, 2 * np.pi)) < _SAME_HYPOTHESIS[1]
+    near &= same & same[:, None]
     use = near[np.argmax(near.sum(axis=1))]
-    return use, float(use.mean())
+    return use, float(use.sum() / same.sum())
 
 
 def _circular(values: Array, use: NDArray[np.bool_], turn: float) -> tuple[float, float]:
