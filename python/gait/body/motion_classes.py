@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 from collections.abc import Mapping
 from typing import Any
 
@@ -15,6 +16,13 @@ _SOURCE_COLUMN = 1  # of CLIN
 def class_names(sections: Mapping[str, Any]) -> list[str]:
     """Return the names of a model's classes of motion; empty if it has no sections of classes."""
     return blob.unpack_names(sections["CLNM"]) if "CLNM" in sections else []
+
+
+def first_class(sections: Mapping[str, Any]) -> str:
+    """Return the name of a model's first class of motion, also if it has no sections of classes."""
+    names = class_names(sections)
+    meta = json.loads(sections["META"].tobytes()) if "META" in sections else {}
+    return names[0] if names else str(meta.get("activity", "walk"))
 
 
 def of_class(tag: str) -> bool:

@@ -47,13 +47,12 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 def run(args: argparse.Namespace) -> int:
     """Measure the parameters, write page and tables, and print a summary."""
     from gait.bindings.model import read_cyclic
-    from gait.body.model_curves import ModelCurves
     from gait.io.track_file import read_track
     from gait.motion.footfalls import Draws
     from gait.motion.norms import beside_norms
-    from gait.motion.parameters import angle_cycles, as_json, measure, write_tables
+    from gait.motion.parameters import as_json, measure, without_norm, write_tables
     from gait.motion.verdict import verdict_of
-    from gait.report.run_page import Run, run_page
+    from gait.report.run_page import Run, cycles_of, run_page
 
     values.require_age(args.age, args.sex)
     source = Path(args.track)
@@ -66,30 +65,32 @@ def run(args: argparse.Namespace) -> int:
     except UserError as exc:
         raise UserError(f"{args.track}: {exc}") from None
     model = read_cyclic(args.model)
-    cycles = angle_cycles(track, parameters, ModelCurves(model), draws)
+    cycles = cycles_of(track, parameters, model, draws)
     norms = beside_norms(track, parameters, model, args.age, args.sex)
-    verdict = verdict_of(track, parameters=parameters)
+    verdict, reason = verdict_of(track, parameters=parameters), without_norm(parameters, model)
     found = as_json(track, parameters, cycles) | {"norms": [norm.as_json() for norm in norms]}
     with filling(output) as folder:
         write_tables(folder, found, parameters, cycles)
-        page = run_page(Run(source.name, track, verdict, parameters, cycles, norms))
+        page = run_page(Run(source.name, track, verdict, parameters, cycles, norms, reason))
         (folder / "report.html").write_text(page, encoding="utf-8")
     print(
         json.dumps(found, allow_nan=False)
         if args.json
-        else f"{verdict.sentence()}.\n{_text(parameters, norms)}"
+        else f"{verdict.sentence()}.\n{_text(parameters, norms, reason)}"
     )
     return 0
 
 
-def _text(parameters: Parameters, norms: Sequence[Compared]) -> str:
+def _text(parameters: Parameters, norms: Sequence[Compared], without: str) -> str:
     """Format tables for the terminal."""
     from gait.report.gait_parts import NORM_HEAD, PARAMETER_HEADER, norm_rows, parameter_rows
 
-    notes = f"mean ± its standard deviation (between strides); uncertainty from {parameters.source}"
+    notes = f"mean ± its standard deviation (between strides) over {parameters.counted()}; uncertainty from "
+    notes += parameters.source
     lines = [*_table([list(PARAMETER_HEADER), *parameter_rows(parameters)]), notes]
     if norms:
         lines += ["", *_table([list(NORM_HEAD), *norm_rows(norms)])]
+    lines += [f"no norm: {without}"] * bool(without)
     return "\n".join(lines)
 
 

@@ -16,12 +16,21 @@ import numpy as np
 from numpy.typing import NDArray
 
 from gait.body.model_curves import curves
+from gait.body.motion_classes import first_class
 from gait.body.skeleton import points
 from gait.errors import UserError
 from gait.io.blob import unpack_names
 from gait.io.track_file import Joints, Track
 from gait.motion.footfalls import STRIKE_SIDES, find_events
-from gait.motion.parameters import MIRRORED_PARAMETERS, PARAMETER_LABELS, Parameters, asymmetry, strides_of
+from gait.motion.parameters import (
+    MIRRORED_PARAMETERS,
+    PARAMETER_LABELS,
+    Parameters,
+    asymmetry,
+    norm_model,
+    strides_of,
+    without_norm,
+)
 
 Array = NDArray[np.float64]
 
@@ -108,9 +117,14 @@ def beside_norms(
 ) -> list[Compared]:
     """Compare means over the sure strides with norms; empty if no stride is sure or the stature is unknown.
 
-    `model`: sections of the blob; `age`: years, within `AGES`; `sex`: one of `SEXES`; both for the
-    comfortable speed only. UserError if there is no norm for the age.
+    `model`: sections of the blob, of whose classes that of the strides counts; `age`: years, within `AGES`;
+    `sex`: one of `SEXES`; both for the comfortable speed of walking only. Empty if the model has no norm for
+    the class (`without_norm`). UserError if there is no norm for the age.
     """
+    if without_norm(parameters, model):
+        return []
+    walking = parameters.motion_class in ("", first_class(model))
+    model = norm_model(parameters, model)
     summary = parameters.summary()
     pace = summary["stride_time_s"]["both"]
     stature = float(np.median(track.numbers.get("stature_m", 0.0)))
@@ -126,7 +140,7 @@ def beside_norms(
             norms[name] = share / mean, share * sd / mean**2, "speed"
         for name, share in (("stride_length_m", speed["mean"]), ("step_length_m", 0.5 * speed["mean"])):
             norms[name] = share / mean, share * sd / mean**2, "speed"
-    if age is not None:
+    if age is not None and walking:
         norms["speed_m_s"] = (*comfortable(age, sex), "age")
     out = []
     for name, (mean, sd, source) in norms.items():

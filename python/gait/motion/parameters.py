@@ -9,6 +9,7 @@ from __future__ import annotations
 import csv
 import json
 import warnings
+from collections import Counter
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -18,6 +19,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from gait.body.model_curves import ModelCurves
+from gait.body.motion_classes import class_names, class_sections, first_class
 from gait.errors import UserError
 from gait.io.track_file import Joints, Track
 from gait.motion.footfalls import (
@@ -66,8 +68,11 @@ class Strides:
     sd: dict[str, Array]
     draws: dict[str, Array]  #: (D, k) `PARAMETER_LABELS` in each draw
     #: (k,) whether the stride counts: none of its frames is lost or ambiguous (if all strides have ambiguous
-    #: frames, none is lost), and the person neither starts nor stops in it
+    #: frames, none is lost), the person neither starts nor stops in it, and its class is
+    #: `Parameters.motion_class`
     sure: NDArray[np.bool_]
+    #: Class of motion of each stride, or "" if it changes; empty if the track has none.
+    motion_class: Sequence[str] = ()
 
 
 @dataclass(frozen=True)
@@ -81,6 +86,8 @@ class Parameters:
     source: str  #: where the uncertainty comes from, in words
     all_unsure: bool = False  #: every stride has ambiguous frames; those that were not lost count as sure
     slowing: int = 0  #: number of strides that do not count because the person starts or stops in them
+    motion_class: str = ""  #: of the strides that count, the most frequent; "" if the track has no classes
+    others: int = 0  #: number of strides that do not count because they are of another class
 
     @property
     def speed(self) -> float | None:
@@ -95,8 +102,9 @@ class Parameters:
         left_out = sum(len(s.sure) for s in self.strides.values()) - right - left
         if not left_out:
             return text
-        unsure = left_out - self.slowing
+        unsure = left_out - self.slowing - self.others
         why = [f"{unsure} uncertain"] * bool(unsure)
+        why += [f"{self.others} not of class {self.motion_class}"] * bool(self.others)
         why += [f"{self.slowing} while starting or stopping"] * bool(self.slowing)
         return f"{text} (not counted: {', '.join(why)})"
 
@@ -179,12 +187,50 @@ def measure(track: Track, draws: Draws | None = None) -> Parameters:
             np.array(
                 [_is_free(track, _UNSURE_STATUSES, *ends) for ends in zip(start, end, strict=True)], bool
             )[whole],
+            [_class_of(track, *ends) for ends in zip(start[whole], end[whole], strict=True)]
+            if track.motion_class
+            else [],
         )
     some = any(s.sure.any() for s in strides.values())
     if not some:  # better than nothing, since left and right seldom swap in only some frames
         for s in strides.values():
             s.sure[:] = [_is_free(track, {"lost"}, *ends) for ends in zip(s.start, s.end, strict=True)]
-    return Parameters(events, event_sd, strides, source, all_unsure=not some, slowing=_leave_out(strides))
+    motion_class, others = _most_frequent_class(strides)
+    return Parameters(
+        events,
+        event_sd,
+        strides,
+        source,
+        all_unsure=not some,
+        slowing=_leave_out(strides),
+        motion_class=motion_class,
+        others=others,
+    )
+
+
+def _class_of(track: Track, start: float, end: float) -> str:
+    """Return the class of motion in all frames of a stride that have one; "" if it changes."""
+    inside = np.flatnonzero((track.time >= start) & (track.time <= end))
+    found = {track.motion_class[i] for i in inside} - {""}
+    return found.pop() if len(found) == 1 else ""
+
+
+def _most_frequent_class(strides: Mapping[str, Strides]) -> tuple[str, int]:
+    """Mark strides of all but the most frequent class as not sure; return that class and their number."""
+    if not any(s.motion_class for s in strides.values()):
+        return "", 0
+    sure = Counter(
+        name
+        for s in strides.values()
+        for name, counts in zip(s.motion_class, s.sure, strict=True)
+        if counts and name
+    )
+    most, count = max(sure, key=lambda name: (sure[name], name), default=""), 0
+    for s in strides.values():
+        other = s.sure & [name != most or not name for name in s.motion_class]
+        count += int(other.sum())
+        s.sure[other] = False
+    return most, count
 
 
 def _leave_out(strides: Mapping[str, Strides]) -> int:
@@ -340,6 +386,24 @@ class AngleCycle:
         }
 
 
+def without_norm(parameters: Parameters, model: Mapping[str, Any]) -> str:
+    """Explain why a model has no norm for the strides that count; "" if it has one."""
+    name, names = parameters.motion_class, class_names(model) or [first_class(model)]
+    if name and name not in names:
+        return f"the model has no class {name}; give the model that was tracked with, -m MODEL"
+    if name and "CLIN" in model and model["CLIN"][names.index(name)][0] < 0:
+        return f"strides of class {name} are the model's in reverse, for which there is no norm"
+    return ""
+
+
+def norm_model(parameters: Parameters, model: Mapping[str, Any]) -> Mapping[str, Any]:
+    """Return the model of the class of the strides that count; UserError `without_norm`."""
+    if reason := without_norm(parameters, model):
+        raise UserError(reason)
+    name, names = parameters.motion_class, class_names(model)
+    return class_sections(model, names.index(name)) if name in names else model
+
+
 def angle_cycles(
     track: Track, parameters: Parameters, curves: ModelCurves, draws: Draws | None = None
 ) -> dict[str, AngleCycle]:
@@ -471,6 +535,8 @@ def stride_rows(parameters: Parameters) -> Iterator[dict[str, Any]]:
         for k in range(len(s.start)):
             row: dict[str, Any] = {"side": side, "start_s": float(s.start[k]), "end_s": float(s.end[k])}
             row["sure"] = bool(s.sure[k])
+            if s.motion_class:
+                row["motion_class"] = s.motion_class[k]
             for name in PARAMETER_LABELS:
                 row[name], row[f"{name}_sd"] = float(s.values[name][k]), float(s.sd[name][k])
             rows.append(row)

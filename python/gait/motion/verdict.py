@@ -115,7 +115,7 @@ def verdict_of(
         unsure = [k for k, status in enumerate(track.status) if status == "ambiguous"]
         reasons.update(track.reason[k] or WHICH_LEG for k in unsure)
     speed, in_place = _speed(track)
-    if parameters is not None and not in_place:
+    if parameters is not None and not in_place and not parameters.others:
         speed = parameters.speed or speed
     return Verdict(
         total=max(len(track.frame), total or 0) if track.frames is None else len(track.frames),

@@ -12,7 +12,6 @@ from gait.bindings.abi import Flag, TrackStatus
 from gait.bindings.estimate import Estimate
 from gait.bindings.model import Model, read_cyclic
 from gait.bindings.state import State
-from gait.body.model_curves import ModelCurves
 from gait.body.skeleton import JOINTS
 from gait.camera.camera import Camera
 from gait.errors import UserError
@@ -22,7 +21,7 @@ from gait.io.video import Video
 from gait.motion.evaluate import Measures
 from gait.motion.footfalls import Draws
 from gait.motion.norms import beside_norms
-from gait.motion.parameters import measured
+from gait.motion.parameters import measured, without_norm
 from gait.motion.verdict import Verdict, verdict_of
 from gait.progress import note, progress
 from gait.report.camera_facts import camera_facts
@@ -117,8 +116,9 @@ def write_report(
         track=track,
         verdict=verdict_of(track, video.count, parameters=parameters),
         parameters=parameters,
-        cycles=cycles_of(track, parameters, ModelCurves(sections), draws),
+        cycles=cycles_of(track, parameters, sections, draws),
         norms=norms,
+        without_norm="" if parameters is None else without_norm(parameters, sections),
         film=film,
         times=video.times[film.frames.start : film.frames.stop],
         camera=camera,

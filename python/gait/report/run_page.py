@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from html import escape
+from typing import Any
 
 import numpy as np
 from matplotlib.axes import Axes
@@ -16,7 +17,7 @@ from gait.camera.camera import Camera
 from gait.io.track_file import Track
 from gait.motion.footfalls import STRIKE_SIDES, Draws, contacts, stride_time
 from gait.motion.norms import Compared
-from gait.motion.parameters import AngleCycle, Parameters, angle_cycles
+from gait.motion.parameters import AngleCycle, Parameters, angle_cycles, norm_model, without_norm
 from gait.motion.verdict import Verdict
 from gait.report import terms
 from gait.report.colours import BLUE, DARK, GREY, ON_PAPER, ORANGE
@@ -54,6 +55,8 @@ class Run:
         Empty without strides.
     norms : sequence of Compared
         Parameters compared with norms.
+    without_norm : str
+        Why there is no norm, nor angles over the stride.
     film : PageFilm or None
     times : ndarray of shape (frames of the film,)
         Seconds; empty without a film.
@@ -74,6 +77,7 @@ class Run:
     parameters: Parameters | None = None
     cycles: Mapping[str, AngleCycle] = field(default_factory=dict)
     norms: Sequence[Compared] = ()
+    without_norm: str = ""
     film: PageFilm | None = None
     times: Array = field(default_factory=lambda: np.zeros(0))
     camera: Camera | None = None
@@ -84,10 +88,12 @@ class Run:
 
 
 def cycles_of(
-    track: Track, parameters: Parameters | None, curves: ModelCurves, draws: Draws | None = None
+    track: Track, parameters: Parameters | None, model: Mapping[str, Any], draws: Draws | None = None
 ) -> dict[str, AngleCycle]:
-    """Compute the angles over the stride; empty without strides."""
-    return {} if parameters is None else angle_cycles(track, parameters, curves, draws)
+    """Compute the angles over the stride; empty without strides, or without a norm for their class."""
+    if parameters is None or without_norm(parameters, model):
+        return {}
+    return angle_cycles(track, parameters, ModelCurves(norm_model(parameters, model)), draws)
 
 
 def run_page(run: Run) -> str:
@@ -106,6 +112,8 @@ def run_page(run: Run) -> str:
     else:
         add_gait(page, run.track, run.parameters, run.cycles)
         add_norms(page, run.norms)
+        if run.without_norm:
+            page.words(f"No norm, and no angles over the stride: {run.without_norm}.", "faint")
     if run.film is not None and modules.available():
         drawing = '<h2>Angles over time</h2><div id="run-curves"></div>'
         page.html(f'<section class="screen-only">{drawing}</section>')

@@ -7,12 +7,11 @@ from pathlib import Path
 from typing import Any
 
 from gait.bindings.model import read_cyclic
-from gait.body.model_curves import ModelCurves
 from gait.io.files import replacing
 from gait.io.track_file import read_track
 from gait.motion.footfalls import Draws
 from gait.motion.norms import beside_norms
-from gait.motion.parameters import measured
+from gait.motion.parameters import measured, without_norm
 from gait.motion.verdict import verdict_of
 from gait.report.film import PageFilm
 from gait.track.options import ClipOptions
@@ -64,8 +63,9 @@ class RunReport:
             track=track,
             verdict=self._verdict,
             parameters=self._parameters,
-            cycles=cycles_of(track, found, ModelCurves(sections), self._draws),
+            cycles=cycles_of(track, found, sections, self._draws),
             norms=[] if found is None else beside_norms(track, found, sections),
+            without_norm="" if found is None else without_norm(found, sections),
             film=film,
             times=scene.video.times[film.frames.start : film.frames.stop],
             camera=scene.camera,

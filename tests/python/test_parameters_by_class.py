@@ -1,0 +1,89 @@
+"""Gait parameters and norms of people who run, become faster or walk backwards, by class of motion."""
+
+from dataclasses import replace
+from functools import cache
+from html import escape
+
+import numpy as np
+import pytest
+
+from gait.bindings.model import read_cyclic
+from gait.body.motion_classes import class_names
+from gait.body.skeleton import JOINTS
+from gait.io.track_file import Track
+from gait.motion.norms import beside_norms
+from gait.motion.parameters import as_json, measure, norm_model, stride_rows, without_norm
+from gait.motion.verdict import verdict_of
+from gait.report.run_page import Run, cycles_of, run_page
+from gait.simulate.scenario import PRESETS
+from gait.simulate.stage import set_stage
+
+CLASSES = read_cyclic("classes")
+
+
+@cache
+def true_track(preset: str, frames: int = 180) -> Track:
+    """The true motion of a person of `gait simulate`, as a track with its classes of motion."""
+    stage = set_stage(replace(PRESETS[preset], frames=frames, size=(96, 72), noise=0.0))
+    at, timing, n = stage.frames, stage.walk.timing, len(stage.frames)
+    places = {name: place for name, place in stage.walk.points(at).items() if name in JOINTS}
+    phase = timing.phase[at] % 1
+    numbers = {f"c_{k}{end}": np.zeros(n) for k in range(1, 9) for end in ("", "_sd")}
+    numbers |= {"phase": phase, "phase_sd": np.full(n, 0.01), "stature_m": np.full(n, 1.75)}
+    numbers |= {"stride_hz": np.gradient(timing.phase[at]) * 30, "stature_sd_m": np.full(n, 0.01)}
+    numbers |= {"speed_m_s": stage.walk.speed[at]}
+    numbers |= {f"p_{name}": np.array(stage.classes) == name for name in class_names(CLASSES)}
+    numbers |= {"heading_rad": stage.walk.heading[at], "r_knee_flexion_deg": np.zeros(n)}
+    return Track(
+        frame=np.arange(n),
+        time=np.arange(n) / 30,
+        places=places,
+        status=["tracking"] * n,
+        phase=phase,
+        sd={name: np.full((n, 3), 0.005) for name in JOINTS},
+        numbers=numbers,
+        motion_class=list(stage.classes),
+    )
+
+
+def test_a_walk_that_becomes_a_run_gives_the_means_of_one_class():
+    track = true_track("accelerating")
+    found = measure(track)
+    assert found.motion_class == "run" and found.others == 6
+    assert "not counted: 6 not of class run" in found.counted()
+    speeds = np.concatenate([s.values["speed_m_s"][s.sure] for s in found.strides.values()])
+    assert len(speeds) == 6 and speeds.min() > 2.4 and found.speed == pytest.approx(2.49, abs=0.02)
+    rows = list(stride_rows(found))
+    assert {row["motion_class"] for row in rows} == {"walk", "", "run"}
+    assert all(row["sure"] == (row["motion_class"] == "run") for row in rows)
+    assert verdict_of(track).speed < 2.3  # of the whole path
+    plain = measure(replace(track, motion_class=[]))
+    assert plain.others == 0 and "motion_class" not in next(stride_rows(plain))
+
+
+def test_a_run_is_compared_with_runs():
+    track = true_track("running")
+    found = measure(track)
+    norms = {c.name: c for c in beside_norms(track, found, CLASSES, age=30)}
+    walks = {c.name: c for c in beside_norms(track, replace(found, motion_class="walk"), CLASSES, age=30)}
+    assert "speed_m_s" in walks and "speed_m_s" not in norms  # people walk at that speed
+    assert norms["stance_percent"].words == "inside" and walks["stance_percent"].words == "below (100 %)"
+    both = found, replace(found, motion_class="walk")
+    tilts = [cycles_of(track, one, CLASSES)["root_pitch"] for one in both]
+    run = norm_model(found, CLASSES)
+    assert run["CURV"].tobytes() == CLASSES["CUR3"].tobytes() and not any(tag[3:].isdigit() for tag in run)
+    assert np.abs(tilts[0].mean - tilts[0].norm_mean).max() < 1.0  # both are those of the mean run
+    assert np.abs(tilts[0].mean - tilts[1].mean).max() > 2.0
+
+
+def test_strides_without_a_norm_say_so():
+    back, run = (measure(true_track(name)) for name in ("backwards", "running"))
+    reason = without_norm(back, CLASSES)
+    assert reason == "strides of class backwards are the model's in reverse, for which there is no norm"
+    assert beside_norms(true_track("backwards"), back, CLASSES) == []
+    assert cycles_of(true_track("backwards"), back, CLASSES) == {}
+    assert without_norm(run, read_cyclic("walk")).startswith("the model has no class run; give the model")
+    track = true_track("backwards")
+    page = run_page(Run("a", track, verdict_of(track), back, without_norm=reason))
+    assert f"No norm, and no angles over the stride: {escape(reason)}." in page
+    assert as_json(track, back, {})["strides"][0]["motion_class"] == "backwards"
