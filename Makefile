@@ -375,12 +375,20 @@ MORE = $(MOCAP)/../more
 WALKING := btk/b2 gaitalytics/g1 bvhtoolbox opensim/p2 opensim/p4 mcgill cmu_more/c12 cmu_more/c15 cmu_more/c46
 RUNNING := run_cmu run_rbds
 LEARN_CLASSES = $(VENV)/bin/gait learn --subjects folder --segments none
+# Credits of these people, besides CMU's.
+CREDIT_RUNS = --credit 'R. Fukuchi, C. Fukuchi and M. Duarte 2017, figshare 4543435, CC BY 4.0; 6 of 30 s of each run' \
+    --credit 'Convolutional-Sequence-to-Sequence-Model-for-Human-Dynamics (copies of recordings of CMU), MIT'
+CREDIT_WALKS = --credit 'BTKData, Biomechanical ToolKit, BSD-3-Clause' --credit 'python-gaitalytics, DART Lab, MIT' \
+    --credit 'bvh-toolbox, O. Haag, MIT' --credit 'OpenSim, Apache-2.0' --credit 'OpenSim JAM, C. Smith, Apache-2.0' \
+    --credit 'biomechZoo, McGill motion lab, MIT'
 model: setup lib ## learn the shipped models from MOCAP= *
 	$(VENV)/bin/gait learn $(MOCAP) -o python/gait/data/walk.gait $(ARGS)
 	$(VENV)/bin/gait learn $(MOCAP) --prior paper --segments none -o python/gait/data/paper.gait $(ARGS)
 	@mkdir -p build
-	$(LEARN_CLASSES) $(addprefix $(MORE)/,$(RUNNING)) --activity run -o build/run.gait $(ARGS)
+	$(LEARN_CLASSES) $(addprefix $(MORE)/,$(RUNNING)) --activity run $(CREDIT_RUNS) \
+	    -o build/run.gait $(ARGS)
 	$(LEARN_CLASSES) $(MOCAP) $(addprefix $(MORE)/,$(WALKING)) --generic-lengths cmu_more/c15 cmu_more/c46 \
+	    $(CREDIT_WALKS) \
 	    --class stand --class backwards --class run=build/run.gait -o python/gait/data/classes.gait $(ARGS)
 
 PAPER_MOCAP ?= $(MOCAP) ../shared/data/mocap/cmu_misc

@@ -20,7 +20,8 @@ from gait.errors import GaitError, UserError
 from gait.io import blob, track_file
 from gait.learn.classes import standing
 from gait.learn.classes.join import Change, MotionClass, join
-from gait.learn.prior.model import meta_section
+from gait.learn.options import LearnOptions
+from gait.learn.prior.model import meta_section, origin
 from gait.motion.verdict import verdict_of
 from gait.report.run_page import Run, run_page
 from gait.simulate.clip import simulate
@@ -193,6 +194,21 @@ def test_a_model_keeps_its_classes_and_the_name_of_the_first(
     blob.write(tmp_path / "runs.gait", runs)
     assert main(["learn", str(tmp_path / "runs.gait"), "-o", str(out), "--class", "stand"]) == 0
     assert gait.Model(out).classes == ("run", "stand")
+
+
+def test_a_model_contains_the_credits_of_all_its_classes(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    own = {tag: array for tag, array in blob.read(SHIPPED).items() if tag != "META"}
+    limp, plain, out = (tmp_path / f"{name}.gait" for name in ("limp", "plain", "m"))
+    blob.write(limp, own | {"META": meta_section({"acknowledgement": "Thanks.", "credits": ["Lab A, MIT"]})})
+    blob.write(plain, own)
+    words = ["--class", f"limp={limp}", "--credit", "Lab B, CC BY 4.0", "--credit", "Lab A, MIT"]
+    assert main(["learn", str(plain), "-o", str(out), *words]) == 0
+    assert main(["info", str(out)]) == 0
+    printed = capsys.readouterr().out.splitlines()
+    assert printed[-3:] == ["Thanks.", "Lab B, CC BY 4.0", "Lab A, MIT"]
+    assert origin(LearnOptions(credit=("Lab C",)), [])["credits"] == ["Lab C"]
 
 
 def stand(folder: Path, name: str, model: gait.Model, elbow: float, walks: bool = False) -> None:

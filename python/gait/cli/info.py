@@ -112,6 +112,7 @@ def text(name: str, s: Mapping[str, Any]) -> str:
         lines += segment_summary.lines(s["segments"])
     if "acknowledgement" in meta:
         lines.append(meta["acknowledgement"])
+    lines += meta.get("credits", [])
     return "\n".join(lines)
 
 

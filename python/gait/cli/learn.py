@@ -121,6 +121,14 @@ def _add_recordings(group: argparse._ArgumentGroup) -> None:
         "points (empty cells of .csv, and points of .c3d and .trc at the origin, are always missing)",
     )
     group.add_argument(
+        "--credit",
+        action="append",
+        default=[],
+        metavar="TEXT",
+        help="origin and licence of the recordings, stored in the model and printed by gait info; may be "
+        "repeated. Recordings of CMU (.amc) are acknowledged anyway",
+    )
+    group.add_argument(
         "--no-trim", action="store_true", help="keep starts, stops and turns at the ends of recordings"
     )
 
@@ -281,6 +289,7 @@ def _options(args: argparse.Namespace) -> LearnOptions:
             "exclude": tuple(args.exclude),
             "generic_lengths": tuple(args.generic_lengths),
             "static": tuple(args.static),
+            "credit": tuple(args.credit),
             "classes": tuple(args.classes),
             "changes": tuple(args.changes),
             "markers": markers.read_map(args.markers) if args.markers else None,

@@ -70,6 +70,7 @@ class LearnOptions:
     zeros_missing: bool = False  #: three or more exact zeros in a row are missing data
     trim: bool = True  #: cut starts, stops and turns off the ends of recordings
     seed: int = 1  #: of the choice of held-out data
+    credit: tuple[str, ...] = ()  #: origins and licences of the recordings, stored in the model
     segments: SegmentOptions = SegmentOptions(source="none")
     jobs: int = 1  #: processes that read files
     dask: str | None = None  #: scheduler of a Dask cluster that reads them instead

@@ -7,7 +7,6 @@ frame.  Assumed changes (`gait.learn.classes.run`) count as `PRIOR_CHANGES` of e
 
 from __future__ import annotations
 
-import json
 from collections.abc import Collection
 from dataclasses import dataclass
 from itertools import pairwise
@@ -237,7 +236,7 @@ def _concentration(length: float) -> float:
 
 def with_numbers_of(sections: Sections, names: Collection[str]) -> Sections:
     """Return a model's sections with the numbers of changes between these classes only."""
-    meta = json.loads(np.asarray(sections["META"]).tobytes()) if "META" in sections else {}
+    meta = model.read_meta(sections)
     if "changes" not in meta:
         return sections
     kept = {
@@ -265,7 +264,7 @@ def with_changes(sections: Sections, observed: Observed) -> dict[str, blob.Array
             )
             changes[i, j] = one.rate, one.concentration, one.phase, one.slope
     names = blob.unpack_names(sections["CLNM"])
-    meta = json.loads(np.asarray(sections["META"]).tobytes()) if "META" in sections else {}
+    meta = model.read_meta(sections)
     counts = [{to: int(n) for to, n in zip(names, row, strict=True) if n} for row in observed.counts]
     meta["changes"] = {
         name: {"seconds": round(float(seconds), 1), "to": to}

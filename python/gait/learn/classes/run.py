@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 import tempfile
 from collections.abc import Callable, Collection, Mapping, Sequence
 from dataclasses import replace
@@ -14,7 +13,7 @@ from typing import Any, TypeVar
 import numpy as np
 
 from gait.bindings.model import read_cyclic
-from gait.body.motion_classes import class_names, class_sections
+from gait.body.motion_classes import class_names, class_sections, first_class
 from gait.errors import UsageError, UserError
 from gait.io import blob
 from gait.learn.arrays import Floats, column_means
@@ -24,6 +23,7 @@ from gait.learn.corpus.load import NothingLeft
 from gait.learn.corpus.sources import find, subjects
 from gait.learn.cycles.verdict import NAMES
 from gait.learn.options import LearnOptions, SegmentOptions
+from gait.learn.prior import model
 from gait.learn.report.classes import figures as class_figures
 from gait.learn.run import Note, check, run
 from gait.learn.solve import readers
@@ -66,7 +66,7 @@ def learn(options: LearnOptions, note: Note) -> dict[str, Any]:
     UsageError or UserError with one line if it cannot be done.
     """
     own = read_cyclic(options.sources[0]) if adds_to_a_model(options) else None
-    first = options.activity if own is None else _first_name(own)
+    first = options.activity if own is None else first_class(own)
     wanted, alone = _parsed(options, first), replace(options, classes=())
     if options.changes and not wanted:
         return _only_changes(own, options, note)
@@ -91,7 +91,10 @@ def learn(options: LearnOptions, note: Note) -> dict[str, Any]:
         if others := [name for name in names[1:] if name in kept]:
             note(f"{options.sources[0]}: keeps its classes {' '.join(others)}")
         every = [replace(one, changes=_changes(one, names, kept)) for one in classes.values()]
-        joined = join(changes.with_numbers_of(walk, kept), every)
+        credited = model.with_credits(
+            walk, [{"credits": options.credit}, *(model.read_meta(one.own or {}) for one in every)]
+        )
+        joined = join(changes.with_numbers_of(credited, kept), every)
         return changes.with_changes(joined, _observed(joined, options, note)) if options.changes else joined
 
     if own is not None:
@@ -101,17 +104,6 @@ def learn(options: LearnOptions, note: Note) -> dict[str, Any]:
         figures = run(alone, note, with_classes)
         data = Path(options.output).read_bytes()
     return figures | {"classes": class_figures(blob.decode(data))}
-
-
-def _first_name(own: Mapping[str, blob.Array]) -> str:
-    """Name of a model's first class of motion."""
-    names = class_names(own)
-    return names[0] if names else str(_meta(own).get("activity", WALK))
-
-
-def _meta(own: Mapping[str, blob.Array]) -> dict[str, Any]:
-    meta: dict[str, Any] = json.loads(own["META"].tobytes()) if "META" in own else {}
-    return meta
 
 
 def _only_changes(own: Mapping[str, blob.Array] | None, options: LearnOptions, note: Note) -> dict[str, Any]:
@@ -212,7 +204,7 @@ def _taken(name: str, source: str) -> MotionClass:
         raise UserError(
             f"--class {name}={source}: has no class {name}; name one of its classes, {' '.join(names)}"
         )
-    activity = str(_meta(own).get("activity", WALK))
+    activity = first_class(own)
     kinds = {NAMES.get(activity.lower()), NAMES.get(name)} - {None}
     if name in DERIVED or len(kinds) > 1:
         raise UserError(
@@ -249,7 +241,7 @@ def _learnt(name: str, source: str, options: LearnOptions, note: Note) -> Motion
 
 def _counted(one: MotionClass, own: Mapping[str, blob.Array]) -> MotionClass:
     """Return a class with the numbers of cycles and recordings in the META of its model."""
-    meta = _meta(own)
+    meta = model.read_meta(own)
     recordings = meta.get("sequences", {}).get("count", 0)
     return replace(one, cycles=int(meta.get("cycles", 0)), recordings=int(recordings))
 

@@ -63,7 +63,25 @@ def meta_section(meta: Mapping[str, Any]) -> npt.NDArray[np.uint8]:
 def origin(options: LearnOptions, sources: Iterable[Path]) -> dict[str, Any]:
     """Return the entries of META about the kind and origin of a blob."""
     made = {"activity": shortened(options.activity), "generator": GENERATOR, "seed": options.seed}
-    return made | ({"acknowledgement": CMU} if from_cmu(sources) else {})
+    credits = {"acknowledgement": CMU} if from_cmu(sources) else {}
+    return made | credits | ({"credits": list(options.credit)} if options.credit else {})
+
+
+def with_credits(sections: Mapping[str, blob.Array], others: Iterable[Mapping[str, Any]]) -> dict[str, Any]:
+    """Return a model's sections with the credits of other models too, whose METAs are given."""
+    own = read_meta(sections)
+    credits = dict.fromkeys(own.get("credits", []))
+    for meta in others:
+        credits |= dict.fromkeys(meta.get("credits", []))
+        own |= {key: meta[key] for key in ("acknowledgement",) if key in meta}
+    own |= {"credits": list(credits)} if credits else {}
+    return {**sections, **({"META": meta_section(own)} if own else {})}
+
+
+def read_meta(sections: Mapping[str, blob.Array]) -> dict[str, Any]:
+    """Decode META; empty if a model has none."""
+    meta: dict[str, Any] = json.loads(np.asarray(sections["META"]).tobytes()) if "META" in sections else {}
+    return meta
 
 
 def shortened(name: str) -> str:
