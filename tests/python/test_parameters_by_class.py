@@ -76,7 +76,7 @@ def test_a_run_is_compared_with_runs():
     assert np.abs(tilts[0].mean - tilts[1].mean).max() > 2.0
 
 
-def test_strides_without_a_norm_say_so():
+def test_strides_without_a_norm_state_why():
     back, run = (measure(true_track(name)) for name in ("backwards", "running"))
     reason = without_norm(back, CLASSES)
     assert reason == "strides of class backwards are the model's in reverse, for which there is no norm"

@@ -192,19 +192,19 @@ def of_classes(which):
 
 
 def test_classes_are_drawn_as_the_exact_smoother_of_a_markov_chain_has_them():
-    """Against the forward-backward algorithm; the person stops, and is seen badly while doing so."""
+    """Against the forward-backward algorithm; the person stops, and is shown badly while doing so."""
     sections, random, seconds = dict(FOUR.sections()), np.random.default_rng(4), 0.1
     sections["CLSW"] = np.zeros((4, 4, 4), np.float32)
     sections["CLSW"][WALK, STAND, 0], sections["CLSW"][STAND, WALK, 0] = 1.0, 0.5
     to = np.array([[0.9, 0.1], [0.05, 0.95]])
-    seen = np.array([[0.9, 0.1]] * 4 + [[0.6, 0.4]] * 6 + [[0.3, 0.7]] * 6)
+    shown = np.array([[0.9, 0.1]] * 4 + [[0.6, 0.4]] * 6 + [[0.3, 0.7]] * 6)
     ahead, now = [], np.array([0.9, 0.1])
-    for row in seen:
+    for row in shown:
         now = row * (now @ to)
         now /= now.sum()
         ahead.append(now)
     wanted, later = [], np.ones(2)
-    for row, forward in zip(seen[::-1], ahead[::-1], strict=True):
+    for row, forward in zip(shown[::-1], ahead[::-1], strict=True):
         both = forward * later
         wanted.insert(0, both[1] / both.sum())
         later = to @ (row * later)
