@@ -7,6 +7,8 @@ from pathlib import Path
 import lcm_rig as rig
 import pytest
 
+from gait.lcm.messages import camera_message
+
 LAYER = Path(__file__).with_name("fault_layer.c")
 LONGEST = 200  # calls that may fail in one run
 
@@ -60,6 +62,25 @@ def test_every_call_that_fails_is_one_line_and_exit_1(layer, words, tmp_path, fa
         assert ended.returncode == 1 and len(lines) == 1 and reason in lines[0], (at, ended)
     assert came is False and at > {"malloc": 8, "fwrite": 20, "fsync": 1}[fault]
     assert ended.returncode == 0, ended
+
+
+@pytest.mark.parametrize(
+    "options", [("--further-streams", 3), ("--people", 2, "--keypoints-term")], ids=["cameras", "people"]
+)
+def test_further_cameras_and_people_without_memory_are_reported_and_left_out(layer, tmp_path, options):
+    cameras = [("GAIT_CAMERA_3", camera_message(rig.CAMERA, rig.utime(0))), *rig.opening()]
+    log = rig.write_log(tmp_path / "in.log", [*cameras, *rig.frames(0, 3)])
+    words = rig.command(
+        "--url", f"file://{log}?speed=0", "--out", f"file://{tmp_path}/out.log?mode=w", *options
+    )
+    for at in range(1, LONGEST):
+        ended, came = run(words, layer, tmp_path / "done", "malloc", at)
+        if not came:
+            break
+        lines = ended.stderr.splitlines()
+        assert ended.returncode in (0, 1) and "not enough memory for" in lines[0], (at, ended)
+        assert all(line.startswith("gait-trackd: ") for line in lines), (at, ended)
+    assert came is False and at > 6
 
 
 def test_a_wall_clock_set_to_and_fro_changes_no_result(layer, words, tmp_path):

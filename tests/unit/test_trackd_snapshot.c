@@ -61,12 +61,21 @@ static int layer_rename(const char *from, const char *to)
     return fails('r') ? -1 : rename(from, to);
 }
 
+static bool no_memory;
+
+static void *layer_malloc(size_t bytes)
+{
+    return no_memory ? NULL : malloc(bytes);
+}
+
+#define malloc layer_malloc
 #define open   layer_open
 #define write  layer_write
 #define fsync  layer_fsync
 #define close  layer_close
 #define rename layer_rename
 #include "../../tools/trackd/snapshot_file.c"
+#undef malloc
 #undef open
 #undef write
 #undef fsync
@@ -178,6 +187,17 @@ static void test_every_call(void)
         }
 }
 
+static void test_no_memory(void)
+{
+    write_file(path, "old", 3);
+    no_memory = true;
+    CHECK(!save(0, 0) && called == 0);
+    no_memory = false;
+    file_bytes const now = content();
+    CHECK(now.size == 3 && files() == 1);
+    free(now.data);
+}
+
 static void test_interrupted_and_short_writes(void)
 {
     CHECK(save(0, 0));
@@ -243,6 +263,7 @@ int main(void)
     test_mode();
     test_order();
     test_every_call();
+    test_no_memory();
     test_interrupted_and_short_writes();
     test_torn();
     test_leftovers();
