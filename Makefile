@@ -321,9 +321,9 @@ coverage: setup lib ## branches that the tests of library and daemon take (ARGS=
 
 # One build for the sanitizers and for fuzzing, where there is clang.
 SANITIZED := $(if $(call has,clang),config=fuzz CC=clang,config=sanitize)
-# Tests of the daemon, but not the one of speed, and not the layer under malloc(), which is the sanitizers' own.
+# Tests of the daemon, but not those of speed, and not the layer under malloc(), which is the sanitizers' own.
 SANITIZED_DAEMON := $(patsubst %,tests/python/test_lcm_%.py,cameras faults idle lift live log moving output people service start stream strides tracks)
-RACED_DAEMON := $(patsubst %,tests/python/test_lcm_%.py,cameras live log people service)
+RACED_DAEMON := $(patsubst %,tests/python/test_lcm_%.py,cameras log service) # slower by ten
 daemon_tests = $(COMPILED_ONCE) GAIT_TRACKD='$(abspath build/$(1)/bin/gait-trackd)' $(PY) -m pytest -q \
     -c python/pyproject.toml --rootdir . $(PYTEST_AT_ONCE) -k 'not newest_frame_wins' $(2)
 sanitizers: setup lib ## C tests, the daemon and fuzzing under asan and ubsan, then make tsan (RUNS= SEED=)

@@ -1,6 +1,8 @@
 """gait-trackd when memory, disk or clock fail, simulated by a layer under its calls."""
 
 import json
+import re
+import resource
 import subprocess
 from pathlib import Path
 
@@ -81,6 +83,21 @@ def test_further_cameras_and_people_without_memory_are_reported_and_left_out(lay
         assert ended.returncode in (0, 1) and "not enough memory for" in lines[0], (at, ended)
         assert all(line.startswith("gait-trackd: ") for line in lines), (at, ended)
     assert came is False and at > 6
+
+
+def test_a_limit_of_memory_is_one_clear_line(tmp_path):
+    """Nothing fails but the largest request: 200,000 particles take 207 MB."""
+
+    def little():
+        resource.setrlimit(resource.RLIMIT_AS, (100 << 20, 100 << 20))
+
+    log = rig.write_log(tmp_path / "in.log", [*rig.opening(), *rig.frames(0, 3)])
+    words = rig.command("--url", f"file://{log}?speed=0", "-n", 200_000)
+    ended = subprocess.run(
+        words, capture_output=True, text=True, timeout=rig.PATIENCE, check=False, preexec_fn=little
+    )
+    assert ended.returncode == 1 and "frames 0 " in ended.stdout, ended
+    assert re.match("gait-trackd: tracker: not enough memory for 2[0-9]{8} bytes\n", ended.stderr), ended
 
 
 def test_a_wall_clock_set_to_and_fro_changes_no_result(layer, words, tmp_path):
