@@ -123,6 +123,47 @@ static void test_state(void)
     CHECK(gait_model_pose(m, &s, &pose, NULL) == GAIT_OK && pose.joint[0][2] == s.pelvis[2]);
 }
 
+/* A picture that cannot be drawn is refused, and no pixel of it is written. */
+static void test_render(void)
+{
+    enum { WIDTH = 16, HEIGHT = 8 };
+    const gait_model *const m = toy_model();
+    gait_camera const good = {WIDTH, HEIGHT, 20, 20, 8, 4, {1, 0, 0, 0, 0, -1, 0, 1, 0}, {0, 1, 5}, {0}};
+    gait_camera wrong = good, large = good;
+    gait_state const s = toy_state(0.1f);
+    gait_state bad = s;
+    gait_error err = {0};
+    uint8_t ids[WIDTH * HEIGHT], before[WIDTH * HEIGHT];
+    memset(ids, 0x5a, sizeof ids);
+    memcpy(before, ids, sizeof ids);
+    wrong.R[0] = 0.5f;
+    large.width = GAIT_MAX_PIXELS + 1;
+    bad.stature = -1.0f;
+    CHECK(gait_render(NULL, &good, &s, ids, WIDTH, NULL) == GAIT_ERR_ARG);
+    CHECK(gait_render(m, NULL, &s, ids, WIDTH, NULL) == GAIT_ERR_ARG);
+    CHECK(gait_render(m, &good, NULL, ids, WIDTH, NULL) == GAIT_ERR_ARG);
+    CHECK(gait_render(m, &good, &s, NULL, WIDTH, NULL) == GAIT_ERR_ARG);
+    CHECK(gait_render(m, &wrong, &s, ids, WIDTH, &err) == GAIT_ERR_ARG && strstr(err.text, "camera"));
+    CHECK(gait_render(m, &large, &s, ids, WIDTH, NULL) == GAIT_ERR_LIMIT);
+    CHECK(gait_render(m, &good, &s, ids, WIDTH - 1, &err) == GAIT_ERR_ARG && strstr(err.text, "ids_stride"));
+    CHECK(gait_render(m, &good, &bad, ids, WIDTH, &err) == GAIT_ERR_ARG && strstr(err.text, "gait_render"));
+    CHECK(memcmp(ids, before, sizeof ids) == 0);
+    CHECK(gait_render(m, &good, &s, ids, WIDTH, NULL) == GAIT_OK && memcmp(ids, before, sizeof ids) != 0);
+}
+
+static void test_classes(void)
+{
+    const gait_model *const m = toy_model();
+    uint32_t mask = 7;
+    CHECK(!gait_model_class_name(NULL, 0) && !gait_model_class_name(m, -1) && !gait_model_class_name(m, 1));
+    CHECK(strcmp(gait_model_class_name(m, 0), "walk") == 0);
+    CHECK(!gait_model_of_class(NULL, 0) && !gait_model_of_class(m, -1) && !gait_model_of_class(m, 1));
+    CHECK(gait_model_of_class(m, 0) == m);
+    CHECK(gait_model_angle_mask(NULL, "", &mask, NULL) == GAIT_ERR_ARG);
+    CHECK(gait_model_angle_mask(m, NULL, &mask, NULL) == GAIT_ERR_ARG);
+    CHECK(gait_model_angle_mask(m, "", NULL, NULL) == GAIT_ERR_ARG && mask == 7);
+}
+
 int main(void)
 {
     test_library();
@@ -130,5 +171,7 @@ int main(void)
     test_null();
     test_info();
     test_state();
+    test_render();
+    test_classes();
     return CHECK_DONE();
 }
