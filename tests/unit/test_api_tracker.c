@@ -388,6 +388,51 @@ static void test_particles(void)
     toy_tracker_free(t);
 }
 
+/* Steps, lagged estimates, snapshots and numbers of particles that are refused change nothing. */
+static void test_calls(void)
+{
+    gait_tracker_config cfg = toy_config(1);
+    cfg.lag = 2;
+    gait_tracker *const t = toy_tracker_new(&cfg);
+    gait_frame frame = {.utime = 5}, late = {.utime = 5 + INT64_C(3600000000)};
+    gait_estimate out;
+    gait_state mean, sd;
+    gait_error err = {0};
+    unsigned char little[8];
+    size_t bytes = 7;
+    CHECK(gait_tracker_step(t, &frame, &out, &err) == GAIT_ERR_STATE && strstr(err.text, "not started"));
+    CHECK(gait_tracker_lagged(t, 1, &out, &err) == GAIT_ERR_STATE);
+    CHECK(gait_tracker_particles(t, NULL, NULL, 0, &err) == GAIT_ERR_STATE);
+    gait_tracker_prior(toy_model(), &mean, &sd, NULL);
+    CHECK(gait_tracker_start(t, &mean, &sd, 5, NULL) == GAIT_OK);
+    uint64_t const digest = gait_tracker_digest(t);
+    CHECK(gait_tracker_step(NULL, &frame, &out, NULL) == GAIT_ERR_ARG);
+    CHECK(gait_tracker_step(t, NULL, &out, NULL) == GAIT_ERR_ARG);
+    CHECK(gait_tracker_step(t, &frame, NULL, NULL) == GAIT_ERR_ARG);
+    CHECK(gait_tracker_step(t, &late, &out, &err) == GAIT_ERR_STATE && strstr(err.text, "start again"));
+    frame.utime = 4;
+    CHECK(gait_tracker_step(t, &frame, &out, &err) == GAIT_ERR_STATE && strstr(err.text, "is not after 5"));
+    CHECK(gait_tracker_lagged(NULL, 0, &out, NULL) == GAIT_ERR_ARG);
+    CHECK(gait_tracker_lagged(t, 0, NULL, NULL) == GAIT_ERR_ARG);
+    CHECK(gait_tracker_lagged(t, -1, &out, NULL) == GAIT_ERR_ARG);
+    CHECK(gait_tracker_lagged(t, 3, &out, &err) == GAIT_ERR_ARG && strstr(err.text, "lag of 2"));
+    CHECK(gait_tracker_lagged(t, 2, &out, &err) == GAIT_ERR_STATE && strstr(err.text, "fewer steps"));
+    CHECK(gait_tracker_set_particles(NULL, 100, NULL) == GAIT_ERR_ARG);
+    CHECK(gait_tracker_set_particles(t, 15, &err) == GAIT_ERR_LIMIT && strstr(err.text, "[16, "));
+    CHECK(gait_tracker_set_particles(t, cfg.particles + 1, NULL) == GAIT_ERR_LIMIT);
+    CHECK(gait_tracker_save(NULL, NULL, 0, &bytes, NULL) == GAIT_ERR_ARG);
+    CHECK(gait_tracker_save(t, NULL, 0, NULL, NULL) == GAIT_ERR_ARG);
+    CHECK(gait_tracker_save(t, little, sizeof little, &bytes, NULL) == GAIT_ERR_MEMORY && bytes == 7);
+    CHECK(gait_tracker_restore(NULL, little, sizeof little, NULL) == GAIT_ERR_ARG);
+    CHECK(gait_tracker_restore(t, NULL, sizeof little, NULL) == GAIT_ERR_ARG);
+    CHECK(gait_tracker_restore(t, little, sizeof little, NULL) != GAIT_OK);
+    CHECK(gait_tracker_digest(t) == digest);
+    frame.utime = 6;
+    CHECK(gait_tracker_step(t, &frame, &out, NULL) == GAIT_OK);
+    CHECK(gait_tracker_step(t, &frame, &out, NULL) == GAIT_ERR_STATE); /* the same time again */
+    toy_tracker_free(t);
+}
+
 int main(void)
 {
     test_integers();
@@ -403,5 +448,6 @@ int main(void)
     test_background();
     test_predict();
     test_particles();
+    test_calls();
     return CHECK_DONE();
 }
