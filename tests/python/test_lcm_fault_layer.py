@@ -4,11 +4,13 @@ import json
 import re
 import resource
 import subprocess
+from functools import partial
 from pathlib import Path
 
 import lcm_rig as rig
 import pytest
 
+from gait.lcm.link import now, private_url
 from gait.lcm.messages import camera_message
 
 LAYER = Path(__file__).with_name("fault_layer.c")
@@ -100,8 +102,49 @@ def test_a_limit_of_memory_is_one_clear_line(tmp_path):
     assert re.match("gait-trackd: tracker: not enough memory for 2[0-9]{8} bytes\n", ended.stderr), ended
 
 
+def test_at_every_size_of_the_address_space_a_start_without_memory_is_one_line():
+    """Whether the memory of the daemon, of its threads or of LCM's library is missing."""
+    rig.need_multicast()
+    words, reasons = rig.command("--url", private_url(), "--threads", 2), set()
+    for size in range(8 << 20, 200 << 20, 1 << 20):
+        limits = partial(resource.setrlimit, resource.RLIMIT_AS, (size, size))
+        process = subprocess.Popen(words, stderr=subprocess.PIPE, text=True, preexec_fn=limits)
+        line = process.stderr.readline()
+        if "listening" in line:
+            process.kill()
+            process.communicate()
+            break
+        rest = process.communicate(timeout=rig.PATIENCE)[1]
+        if "shared librar" in line:  # the loader's own
+            continue
+        assert process.returncode == 1 and not rest and ("memory" in line or "threads" in line), (size, line)
+        reasons.add(line.split()[1])
+    assert "listening" in line and {"--threads", "LCM"} <= reasons
+
+
 def test_a_wall_clock_set_to_and_fro_changes_no_result(layer, words, tmp_path):
     still, moved = (run(words, layer, tmp_path / "done", fault)[0] for fault in ("none", "clock"))
     assert still.returncode == moved.returncode == 0 and moved.stderr == still.stderr
     digest = rig.SUMMARY.search(still.stdout).group(4)
     assert rig.SUMMARY.search(moved.stdout).group(4) == digest
+
+
+def test_live_a_wall_clock_set_to_and_fro_changes_no_result(layer, tmp_path, monkeypatch):
+    """As an NTP server does at any moment: between arrival and step, between statuses and snapshots."""
+    rig.need_multicast()
+    count = 8
+    whole = rig.play(rig.write_log(tmp_path / "a.log", [*rig.opening(), *rig.frames(0, count)]))
+    monkeypatch.setenv("LD_PRELOAD", str(layer))
+    monkeypatch.setenv("GAIT_FAULT", "clock")
+    options = ("--snapshot", tmp_path / "state", "--snapshot-s", 0.1)
+    with rig.daemon(private_url(), *options) as (listener, finish):
+        listener.ask(rig.opening()[:2], lambda s: s.background_mask, "camera and background")
+        listener.ask(rig.opening()[2:], lambda s: s.state == s.ARMED, "a start")
+        for i in range(count):
+            listener.send(rig.frames(i, i + 1))
+            listener.until(lambda i=i: any(e.frame == i for e in listener.estimates), f"estimate {i}")
+        off = [abs(e.receive_utime - now()) for e in listener.estimates]
+        ended = finish()
+    assert min(off) > 86000e6, "the clock was not set"
+    assert (ended.code, ended.digest, ended.dropped) == (0, whole.digest, 0)
+    assert ended.words.count("\n") == 2 and (tmp_path / "state").exists(), ended.words

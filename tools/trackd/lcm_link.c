@@ -5,6 +5,7 @@
 #include <fcntl.h>
 #include <inttypes.h>
 #include <netinet/in.h>
+#include <signal.h>
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
@@ -72,20 +73,39 @@ int64_t log_scan(const char *path, message *why)
 /* ---- connections ---- */
 #define ROUTE_REMEDY "if this machine has no multicast route: ip route add 224.0.0.0/4 dev lo (as root)"
 
-/* liblcm prints pages about a missing route to stderr, which the daemon reports in one line. */
-static int mute(void)
+/* While liblcm connects, its pages about a missing route are not printed: the daemon reports that in one line.  Without
+ * memory it and GLib end the program by one of these signals; then the line is printed here. */
+static const int ENDS[] = {SIGSEGV, SIGABRT, SIGTRAP};
+enum { ENDINGS = sizeof ENDS / sizeof *ENDS };
+static struct sigaction before[ENDINGS];
+static int saved; /* stderr */
+
+static void on_end(int number)
 {
+    static const char line[] = "gait-trackd: LCM cannot connect: not enough memory\n";
+    (void)!write(saved, line, sizeof line - 1);
+    (void)number;
+    _exit(1);
+}
+
+static void mute(void)
+{
+    struct sigaction const action = {.sa_handler = on_end};
     fflush(stderr);
-    int const saved = dup(STDERR_FILENO), null = open("/dev/null", O_WRONLY);
+    saved = dup(STDERR_FILENO);
+    int const null = open("/dev/null", O_WRONLY);
     if (saved >= 0 && null >= 0)
         dup2(null, STDERR_FILENO);
     if (null >= 0)
         close(null);
-    return saved;
+    for (int i = 0; i < ENDINGS; i++)
+        sigaction(ENDS[i], &action, &before[i]);
 }
 
-static void unmute(int saved)
+static void unmute(void)
 {
+    for (int i = 0; i < ENDINGS; i++)
+        sigaction(ENDS[i], &before[i], NULL);
     if (saved < 0)
         return;
     fflush(stderr);
@@ -134,9 +154,9 @@ lcm_t *link_open(const char *url, message *why)
     bool safe = true;
     if (link_is_log(url) && link_log(url, path) == 'r' && (scan(path, &safe, why) < 0 || !safe))
         return NULL;
-    int const saved = mute();
+    mute();
     lcm_t *const lcm = lcm_create(url);
-    unmute(saved);
+    unmute();
     if (!lcm && link_is_log(url) && link_log(url, path) == 'r')
         message_set(why, "%.160s: liblcm cannot read this log", path);
     else if (!lcm && not_multicast(url, address))
@@ -155,9 +175,9 @@ lcm_t *link_open(const char *url, message *why)
 lcm_subscription_t *link_subscribe(lcm_t *lcm, const char *channel, lcm_msg_handler_t fn, void *user,
                                    int capacity, message *why)
 {
-    int const saved = mute();
+    mute();
     lcm_subscription_t *const s = lcm_subscribe(lcm, channel, fn, user);
-    unmute(saved);
+    unmute();
     if (s)
         lcm_subscription_set_queue_capacity(s, capacity);
     else
