@@ -145,6 +145,9 @@ static void test_render(void)
     CHECK(gait_render(m, &good, &s, NULL, WIDTH, NULL) == GAIT_ERR_ARG);
     CHECK(gait_render(m, &wrong, &s, ids, WIDTH, &err) == GAIT_ERR_ARG && strstr(err.text, "camera"));
     CHECK(gait_render(m, &large, &s, ids, WIDTH, NULL) == GAIT_ERR_LIMIT);
+    large = good;
+    large.height = GAIT_MAX_PIXELS + 1;
+    CHECK(gait_render(m, &large, &s, ids, WIDTH, NULL) == GAIT_ERR_LIMIT);
     CHECK(gait_render(m, &good, &s, ids, WIDTH - 1, &err) == GAIT_ERR_ARG && strstr(err.text, "ids_stride"));
     CHECK(gait_render(m, &good, &bad, ids, WIDTH, &err) == GAIT_ERR_ARG && strstr(err.text, "gait_render"));
     CHECK(memcmp(ids, before, sizeof ids) == 0);

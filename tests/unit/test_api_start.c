@@ -154,6 +154,38 @@ static void test_stature(void)
     free(s);
 }
 
+/* A start from joints or from boxes; each value at which it does not count as a walk. */
+static void test_walks(void)
+{
+    gait_hypothesis const joints = {.mean = {.stride_hz = 0.9f}, .speed = 1, .chi2_per_observation = 1};
+    gait_hypothesis const boxes = {.sd = {.phase = 0.5f, .heading = 1},
+                                   .speed = 1,
+                                   .speed_sd = 0.2f,
+                                   .probability = 0.5f,
+                                   .chi2_per_observation = 1};
+    gait_hypothesis h = joints;
+    CHECK(gait_hypothesis_walks(&joints) && gait_hypothesis_walks(&boxes));
+    h.speed = 0.2f;
+    CHECK(!gait_hypothesis_walks(&h));
+    h.in_place = 1;
+    CHECK(gait_hypothesis_walks(&h));
+    h.mean.stride_hz = 0.2f;
+    CHECK(!gait_hypothesis_walks(&h));
+    h = joints;
+    h.chi2_per_observation = 2;
+    CHECK(!gait_hypothesis_walks(&h));
+    for (int i = 0; i < 6; i++) {
+        h = boxes;
+        h.in_place = i == 0;
+        h.speed = i == 1 ? 0.35f : h.speed;
+        h.speed_sd = i == 2 ? 0.6f : h.speed_sd;
+        h.probability = i == 3 ? 0.2f : h.probability;
+        h.sd.heading = i == 4 ? 3.2f : h.sd.heading;
+        h.chi2_per_observation = i == 5 ? 2 : h.chi2_per_observation;
+        CHECK(!gait_hypothesis_walks(&h));
+    }
+}
+
 int main(void)
 {
     test_null();
@@ -162,5 +194,6 @@ int main(void)
     test_model();
     test_memory();
     test_stature();
+    test_walks();
     return CHECK_DONE();
 }

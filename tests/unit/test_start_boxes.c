@@ -158,6 +158,37 @@ static void test_largest_change(void)
     free(s);
 }
 
+/* Of grey and of coloured pictures the same boxes are found; a person at any border is not in full view. */
+static void test_formats_and_borders(void)
+{
+    gait_start *const s = toy_start_new(camera(), ~0u);
+    static uint8_t grey[2][HEIGHT][WIDTH];
+    gait_image const scene = image_of(plate), frame = image_of(picture),
+                     grey_scene = {grey[0][0], WIDTH, HEIGHT, WIDTH, GAIT_GREY8},
+                     grey_frame = {grey[1][0], WIDTH, HEIGHT, WIDTH, GAIT_GREY8};
+    static const int place[5][4] = {
+        {100, 130, 60, 160}, {0, 30, 60, 160}, {290, 320, 60, 160}, {100, 130, 0, 100}, {100, 130, 80, 180}};
+    for (int i = 0; i < 5; i++) {
+        gait_box b[4][2];
+        int32_t count = -1;
+        memset(plate, 90, sizeof plate);
+        memset(picture, 90, sizeof picture);
+        draw(place[i][0], place[i][1], place[i][2], place[i][3], 200);
+        for (int y = 0; y < HEIGHT; y++)
+            for (int x = 0; x < WIDTH; x++) {
+                grey[0][y][x] = plate[y][x][0];
+                grey[1][y][x] = picture[y][x][0];
+            }
+        for (int k = 0; k < 4; k++) {
+            const gait_image *const now = k & 1 ? &grey_frame : &frame, *const then =
+                                                                            k & 2 ? &grey_scene : &scene;
+            CHECK(gait_start_find_boxes(s, now, then, b[k], 2, &count, NULL) == GAIT_OK && count == (i == 0));
+            CHECK(i || memcmp(b[k], b[0], sizeof b[k][0]) == 0);
+        }
+    }
+    free(s);
+}
+
 static void test_refused(void)
 {
     gait_start *const s = toy_start_new(camera(), ~0u);
@@ -200,6 +231,7 @@ static void tests(void)
     test_one_stands_and_one_walks();
     test_blobs();
     test_largest_change();
+    test_formats_and_borders();
     test_refused();
 }
 
