@@ -152,7 +152,7 @@ def from_truth(folder: Path) -> Clip:
 
 def _read_reference(path: Path) -> dict[int, Points]:
     found = {}
-    for row in csv.DictReader(path.open()):
+    for row in csv.DictReader(path.read_text().splitlines()):
         names = [key[:-2] for key in row if key.endswith("_u") and row[key]]
         if "l_hip" in names:
             found[int(row["frame"])] = {
@@ -171,7 +171,7 @@ def read_cameras(path: Path, reference: Camera) -> dict[int, Camera]:
             R=np.array([float(row[f"r{i}{j}"]) for i in (1, 2, 3) for j in (1, 2, 3)]).reshape(3, 3),
             t=np.array([float(row[f"t{axis}"]) for axis in "xyz"]),
         )
-        for row in csv.DictReader(path.open())
+        for row in csv.DictReader(path.read_text().splitlines())
     }
 
 

@@ -9,6 +9,8 @@ import pytest
 from test_evaluate import FIRST_PHASE, RATE, TRUTH, track
 
 from gait import Camera
+from gait.cli import main
+from gait.io.track_file import read_estimates
 
 sys.path.insert(0, str(Path(__file__).resolve().parents[1] / "bench"))
 import eval_real
@@ -128,3 +130,20 @@ def test_a_missed_bound_is_named(results, words):
 def test_the_arm_without_background_is_judged_beside_auto():
     everything = [result(), result("nobg", good=0.9)]
     assert "nobg: good 90% on average, auto 100%" in eval_real._missed(everything[1:], everything)
+
+
+@pytest.mark.long
+def test_who_is_passed_by_others_is_followed_among_them(tmp_path, fetched):
+    """A man with a cane walks towards the camera; a woman passes behind him and goes up the stairs."""
+    clips = Path(__file__).parents[3] / "shared/data/real"
+    if not clips.is_dir():
+        pytest.skip("the real films are not beside the repository")
+    [man] = real_clip.read_clips(clips, ["cane"])
+    camera, out = str(man.folder / "camera.json"), str(tmp_path / "t.csv")
+    given = [str(man.video), "--camera", camera, "--people", "all", "-o", out]
+    assert main(["track", *given, "--quiet"]) == 0
+    followed, woman = (read_estimates(str(tmp_path / f"t-{id}.csv")) for id in (1, 3))
+    cameras = dict.fromkeys(followed.frame.tolist(), Camera.read(camera))
+    found = real_clip.score(man, followed, cameras)
+    assert found.share["good"] > 0.95 and found.tracking > 120 and found.wrong == 0
+    assert "tracking" not in woman.status[30:]  # she is hidden, or elsewhere
