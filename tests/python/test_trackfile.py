@@ -2,14 +2,17 @@
 
 import resource
 import signal
+from dataclasses import replace
 
 import numpy as np
 import pytest
 
+import gait.cli
 from gait import Estimate, Flag, Frame, Model, State, TrackStatus, UserError
 from gait.body.skeleton import EVAL15, JOINTS
 from gait.io.track_file import TrackWriter, read_track, read_truth
 from gait.io.trc import write_trc
+from gait.motion.parameters import write_rows
 
 MODEL = Model()
 HEADER = (
@@ -50,6 +53,31 @@ def write(path, count=4):
     with TrackWriter(path, 5, MODEL.joint_names, MODEL.angle_names) as rows:
         for i in range(count):
             rows.write(Frame(10 + i, (10 + i) / 30, None), estimate(i))
+
+
+def test_every_column_of_a_track_and_of_a_reports_tables_has_its_type_in_parquet(tmp_path):
+    """A film's digest may look like a number; the frames of events are between frames."""
+    parquet = pytest.importorskip("pyarrow.parquet", reason="pyarrow is not installed: extra parquet")
+    names = MODEL.joint_names, MODEL.angle_names, ("walk", "stand")
+    with TrackWriter(tmp_path / "t.csv", 5, *names, range(8), person=2, film="12e4") as rows:
+        for i in range(8):
+            one = replace(estimate(i), reason="legs cross", class_probability=np.array([0.75, 0.25]))
+            rows.write(Frame(i, i / 30, None), one)
+    events = [{"event": "right_heel_strike", "time_s": 0.5, "frame": 15.25, "sd_s": np.nan}]
+    strides = [{"side": "left", "start_s": 0.5, "sure": True}]
+    write_rows(tmp_path / "events.csv", events)
+    write_rows(tmp_path / "strides.csv", strides)
+    found = {}
+    for table in ("t", "events", "strides"):
+        out = tmp_path / f"{table}.parquet"
+        assert gait.cli.main(["export", str(tmp_path / f"{table}.csv"), "-o", str(out)]) == 0
+        found[table] = parquet.read_table(out).to_pylist()[-2:]
+    ambiguous, lost = found["t"]
+    assert (ambiguous["status"], ambiguous["reason"], lost["reason"]) == ("ambiguous", "legs cross", None)
+    assert (lost["film"], lost["person"], lost["last_frame"]) == ("12e4", 2, 7)
+    assert (lost["motion_class"], lost["p_walk"], lost["frame"]) == ("walk", 0.75, 7)
+    assert found["events"] == [events[0] | {"sd_s": None}]
+    assert found["strides"] == [strides[0] | {"sure": 1.0}]
 
 
 @pytest.mark.parametrize("count", [0, 3])

@@ -8,9 +8,10 @@ from pathlib import Path
 
 from gait._version import __version__
 from gait.errors import UserError, unreadable
+from gait.io.track_file import TEXT_COLUMNS, WHOLE_COLUMNS
 
-_TEXT = ("status", "side", "joint")
-_WHOLE = ("frame",)
+#: Columns of words: of a track, and of the tables of a report.
+_TEXT = (*TEXT_COLUMNS, "event", "side")
 
 
 def write(path: Path, table: str | os.PathLike[str]) -> int:
@@ -29,13 +30,13 @@ def write(path: Path, table: str | os.PathLike[str]) -> int:
         raise UserError(f"{table}: rows of different lengths; give a track or a motion")
     columns = {}
     for i, name in enumerate(head):
-        cells = [row[i] for row in rows]
+        cells = [row[i] or None for row in rows]
         try:
             if name in _TEXT:
                 columns[name] = pa.array(cells, pa.string())
-            elif name in _WHOLE:
-                columns[name] = pa.array([int(cell) for cell in cells], pa.int64())
-            else:
+            elif name in WHOLE_COLUMNS and not any("." in cell for cell in cells if cell):
+                columns[name] = pa.array([int(cell) if cell else None for cell in cells], pa.int64())
+            else:  # also the frames of events, which are between frames
                 columns[name] = pa.array([float(cell) if cell else None for cell in cells], pa.float64())
         except ValueError as error:
             raise UserError(f"{table}: column {name}: {error}; give a track or a motion") from None

@@ -40,6 +40,9 @@ CLASS_COLUMN, CLASS_PREFIX = "motion_class", "p_"
 CLIP_COLUMNS = ("reason", "first_frame", "last_frame")
 FILM_COLUMN = "film"
 PERSON_COLUMN = "person"
+#: Columns of words and of whole numbers; all others have numbers.
+TEXT_COLUMNS = ("status", CLASS_COLUMN, CLIP_COLUMNS[0], FILM_COLUMN)
+WHOLE_COLUMNS = ("frame", *CLIP_COLUMNS[1:], PERSON_COLUMN)
 CAMERA_COLUMNS = tuple(f"camera_{k}_{what}" for k in range(1, 5) for what in ("x", "y", "heading"))
 
 

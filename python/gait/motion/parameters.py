@@ -559,12 +559,12 @@ def write_tables(
     """Write parameters.json (`found`, from `as_json`), events.csv, strides.csv and curves.csv to `folder`."""
     text = json.dumps(found, indent=1, allow_nan=False) + "\n"
     (folder / "parameters.json").write_text(text, encoding="utf-8")
-    _write_csv(folder / "events.csv", found["events"])
-    _write_csv(folder / "strides.csv", list(stride_rows(parameters)))
-    _write_csv(folder / "curves.csv", list(curve_rows(cycles)))
+    write_rows(folder / "events.csv", found["events"])
+    write_rows(folder / "strides.csv", list(stride_rows(parameters)))
+    write_rows(folder / "curves.csv", list(curve_rows(cycles)))
 
 
-def _write_csv(path: Path, rows: Sequence[Mapping[str, Any]]) -> None:
+def write_rows(path: Path, rows: Sequence[Mapping[str, Any]]) -> None:
     """Write rows with the same keys; unknown values are left empty."""
     with open(path, "w", newline="", encoding="utf-8") as file:
         table = csv.writer(file, lineterminator="\n")
