@@ -47,7 +47,11 @@ elif words[:2] == ["report", "track"]:
     (folder / "report.html").write_text("page")
     print(json.dumps({"summary": {"speed_m_s": {"both": {"mean": 1.25, "sd": 0.1, "between": None}}}}))
 else:
-    Path(words[words.index("-o") + 1]).write_text("made")
+    out = Path(words[words.index("-o") + 1])
+    if out.suffix == ".bvh" and not log.with_name("GO").exists():
+        print("gait export: cannot", file=sys.stderr)
+        sys.exit(1)
+    out.write_text("made")
     print(json.dumps({"frames": 3}))
 """
 
@@ -117,6 +121,30 @@ def test_one_damaged_clip_never_ends_the_rest(place):
         and "5 clips, 3 failed" in page
         and "http" not in page.split("<body")[1]
     )
+
+
+def test_a_file_that_cannot_be_made_fails_the_clip_but_not_its_other_files(place):
+    """Run again, the clip is not tracked anew; a file that an earlier run left is not passed off as made."""
+    clips = clips_of(place, '[[clip]]\nvideo = "a.mp4"\nheight = 1.7\nmake = ["bvh", "c3d", "report"]\n')
+    (place / "out/a").mkdir(parents=True)
+    (place / "out/a/track.bvh").write_text("old")
+    rows = runner(place).run(clips, 1, lambda _: None)
+    assert (rows[0]["state"], rows[0]["error"], rows[0]["tracking"]) == (FAILED, "gait export: cannot", 2)
+    write_summary(place / "out", rows)
+    files = ["a/report/report.html", "a/track.c3d", "a/track.csv"]
+    assert re.findall('href="(.*?)"', (place / "out/index.html").read_text().partition("<tbody")[2]) == files
+    (place / "GO").touch()
+    assert runner(place).run(clips, 1, lambda _: None)[0]["state"] == DONE
+    assert calls(place).count(f"track {place}/a.mp4") == 1 and (place / "out/a/track.bvh").is_file()
+
+
+def test_failures_do_not_change_the_columns_order(place):
+    clips, heads = clips_of(place, PROJECT), []
+    rows = runner(place).run(clips, 2, lambda _: None)
+    for some in (rows, rows[::-1]):
+        write_summary(place / "out", some)
+        heads.append((place / "out/summary.csv").read_text().splitlines()[0])
+    assert heads[0] == heads[1]
 
 
 GROUP = '[[clip]]\nvideo = "a.mp4"\npeople = "all"\nheight = 1.7\nmake = ["track", "report", "c3d"]\n'
@@ -288,6 +316,10 @@ def test_an_interrupt_ends_the_commands(place):
         (
             "[[clip]]\nvideos = ['a.mp4', 'b.mp4']\nheight = 1.7\nmake = ['lift']\n",
             "videos cannot be combined with lift",
+        ),
+        (
+            "[defaults]\nstop = 9\n[[clip]]\nkeypoints = 'k.json'\nmake = ['lift']\n",
+            r"clip 1: stop is for a film, .*leave out stop here and in \[defaults\]",
         ),
         ("[[clip]\n", "not valid TOML"),
     ],

@@ -79,18 +79,18 @@ class Clip:
         result = str(folder / self.result)
         return self._lift(result) if self.lifted else self._track(result, folder)
 
-    def further(self, folder: Path, person: str | None) -> list[list[str]]:
-        """Arguments of the gait commands that make the other files, of one person if there are several."""
+    def further(self, folder: Path, person: str | None) -> dict[Path, list[str]]:
+        """Other files and folders, of one person if there are several, and arguments of gait to make each."""
         ending = "" if person is None else f"-{person}"
         stem = self.result.partition(".")[0] + ending
         result = str(folder / f"{stem}.csv")
-        found = []
+        made = {}
         if "report" in self.make and not self.lifted:
-            found.append(["report", "track", result, "-o", str(folder / f"report{ending}"), "--json"])
+            made[folder / f"report{ending}"] = ["report", "track", result]
         for suffix in EXPORT_FORMATS:
             if suffix in self.make:
-                found.append(["export", result, "-o", str(folder / f"{stem}.{suffix}"), "--json"])
-        return found
+                made[folder / f"{stem}.{suffix}"] = ["export", result]
+        return {path: [*words, "-o", str(path), "--json"] for path, words in made.items()}
 
     def _track(self, result: str, folder: Path) -> list[str]:
         words = ["track", *self.videos, "-o", result, "--json", "--quiet", *self._common()]
@@ -207,6 +207,10 @@ def _require(fields: Fields, clip: Clip) -> None:
         raise fields.fail(
             "people", "cannot be combined with lift or keypoints", "several people are tracked in a video"
         )
+    for name in ("start", "stop"):
+        if clip.lifted and clip.keypoints and getattr(clip, name) is not None:
+            why = "is for a film, and this clip lifts keypoints"
+            raise fields.fail(name, why, f"leave out {name} here and in [defaults], and give it to each film")
     if not clip.cameras and clip.height is None and not (clip.lifted and clip.keypoints):
         raise fields.fail("camera", "and height are missing", "give one of them, here or in [defaults]")
 

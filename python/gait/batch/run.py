@@ -5,6 +5,7 @@ from __future__ import annotations
 import csv
 import json
 import os
+import shutil
 import subprocess
 import sys
 import threading
@@ -22,9 +23,11 @@ from gait.report.page import Page, movable
 from gait.signals import die_with_parent
 
 DONE, FAILED = "done", "failed"
-RECORD = "done.json"  #: written to the folder of a clip when it is done
+RECORD = "done.json"  #: written to the folder of a clip that is tracked or lifted
 GAIT_COMMAND = (sys.executable, "-m", "gait")
 _COUNTS = ("frames", "init", "tracking", "ambiguous", "lost")
+#: First columns of the summary; the others follow by name, so that failures do not change the order.
+_FIRST_COLUMNS = ("name", "subject", "person", "input", "state", "error", "seconds", *_COUNTS)
 _GRACE = 5.0  # seconds that commands have to end after an interrupt
 
 Row = dict[str, Any]
@@ -70,16 +73,17 @@ class Runner:
         folder = self.output / clip.name
         try:
             key = clip.key()
-            if (before := self._recorded(folder, key)) is not None:
-                return before
+            if before := self._recorded(folder, key, "rows"):
+                return list(before)
             folder.mkdir(parents=True, exist_ok=True)
             began = time.monotonic()
-            found = self._command(clip.command(folder))
+            found = self._recorded(folder, key, "found") or self._command(clip.command(folder))
             people = {None: found} if clip.people is None else found["people"]
             rows = [self._row(clip, folder, person, own) for person, own in people.items()]
             rows = [row | {"seconds": round(time.monotonic() - began, 1)} for row in rows]
+            record = {"key": key, "found": found} | ({} if _failed(rows) else {"rows": rows})
             with replacing(folder / RECORD) as file:
-                file.write_text(json.dumps({"key": key, "rows": rows}, indent=1) + "\n", encoding="utf-8")
+                file.write_text(json.dumps(record, indent=1) + "\n", encoding="utf-8")
         except OSError as error:
             return [failed(clip, f"{error.filename}: {error.strerror}")]
         except _Failed as error:
@@ -87,20 +91,27 @@ class Runner:
         return rows
 
     def _row(self, clip: Clip, folder: Path, person: str | None, found: Any) -> Row:
-        """Make the files that follow from a track or a motion; return its row."""
-        row = _begun(clip) | ({} if person is None else {"person": int(person)})
+        """Make the files that follow from a track or a motion; return its row, with the first failure."""
+        row, errors = _begun(clip) | ({} if person is None else {"person": int(person)}), []
         row |= _figures("lift" if clip.lifted else "track", found)
-        for command in clip.further(folder, person):
-            row |= _figures(command[0], self._command(command))
-        return row | {"state": DONE, "error": ""}
+        for target, command in clip.further(folder, person).items():
+            try:
+                row |= _figures(command[0], self._command(command))
+            except _Failed as error:
+                errors.append(str(error))
+                _remove(target)
+        return row | {"state": FAILED if errors else DONE, "error": errors[0] if errors else ""}
 
-    def _recorded(self, folder: Path, key: str) -> list[Row] | None:
-        """Return the rows of a clip if it was done with the same settings, files and version."""
+    def _recorded(self, folder: Path, key: str, what: str) -> Any:
+        """Return what was recorded of a clip with the same settings, files and version; None if nothing was.
+
+        `what`: ``rows``, if all its files were made, or ``found``, the figures of its track or motion.
+        """
         try:
             record = json.loads((folder / RECORD).read_text(encoding="utf-8"))
         except (OSError, ValueError):
             return None
-        return record["rows"] if isinstance(record, dict) and record.get("key") == key else None
+        return record.get(what) if isinstance(record, dict) and record.get("key") == key else None
 
     def _command(self, words: Sequence[str]) -> Any:
         """Run a command and return the JSON that it prints; _Failed, with its last line, if it fails."""
@@ -151,6 +162,14 @@ def failed(clip: Clip, error: str) -> Row:
     return _begun(clip) | {"state": FAILED, "error": error}
 
 
+def _remove(path: Path) -> None:
+    """Remove a file or folder of an earlier run."""
+    if path.is_dir():
+        shutil.rmtree(path)
+    else:
+        path.unlink(missing_ok=True)
+
+
 class _Failed(Exception):
     """A command of a clip failed; its text is one line."""
 
@@ -170,7 +189,8 @@ def _figures(command: str, found: Any) -> Row:
 
 def write_summary(output: Path, rows: Sequence[Row]) -> list[str]:
     """Write summary.csv, summary.parquet if PyArrow is installed, and index.html; return their names."""
-    head = list(dict.fromkeys(name for row in rows for name in row))
+    known = {name for row in rows for name in row}
+    head = [name for name in _FIRST_COLUMNS if name in known] + sorted(known - set(_FIRST_COLUMNS))
     table = output / "summary.csv"
     with replacing(table) as temporary, open(temporary, "w", newline="", encoding="utf-8") as file:
         writer = csv.DictWriter(file, head, lineterminator="\n")
@@ -224,8 +244,8 @@ def _shown(row: Mapping[str, Any], name: str) -> str:
 
 
 def _links(output: Path, row: Mapping[str, Any]) -> str:
-    """Links to the files of a clip that is done, without those of other people."""
-    if row["state"] != DONE:
+    """Links to the files of a clip that was tracked or lifted, without those of other people."""
+    if "frames" not in row:
         return ""
     folder, person = output / row["name"], str(row.get("person", ""))
     files = [folder / (f"report-{person}" if person else "report") / "report.html", *sorted(folder.iterdir())]
