@@ -125,6 +125,29 @@ def test_no_multicast_route_and_a_small_buffer(monkeypatch, tmp_path):
     )
 
 
+@pytest.mark.parametrize(
+    ("url", "words"),
+    [("bogus://x", "fault lcm url: LCM_DEFAULT_URL: bogus://x"), ("memq://", "ok    lcm url: "), (None, "")],
+)
+def test_the_network_of_the_environment_is_checked(url, words, monkeypatch):
+    pytest.importorskip("lcm", reason="lcm is not installed: extra lcm")
+    if url is None:
+        monkeypatch.delenv("LCM_DEFAULT_URL", raising=False)
+    else:
+        monkeypatch.setenv("LCM_DEFAULT_URL", url)
+    found = [line for line in lines(doctor.check_network) if "lcm url" in line]
+    assert len(found) == (url is not None) and all(line.startswith(words) for line in found)
+    assert "fault" not in words or "; " in found[0]
+
+
+def test_a_log_of_the_environment_is_left_alone(monkeypatch, tmp_path):
+    pytest.importorskip("lcm", reason="lcm is not installed: extra lcm")
+    (tmp_path / "a.lcm").write_bytes(b"kept")
+    monkeypatch.setenv("LCM_DEFAULT_URL", f"file://{tmp_path}/a.lcm?mode=w")
+    assert any(line.startswith("ok    lcm url") for line in lines(doctor.check_network))
+    assert (tmp_path / "a.lcm").read_bytes() == b"kept"
+
+
 def test_a_message_that_is_lost(monkeypatch):
     link = pytest.importorskip("gait.lcm.link", reason="lcm is not installed: extra lcm")
 

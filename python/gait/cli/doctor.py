@@ -13,7 +13,7 @@ import os
 import shutil
 from collections.abc import Callable, Iterator
 from pathlib import Path
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 EXAMPLES = """\
 examples:
@@ -142,21 +142,37 @@ def check_network() -> Iterator[Finding]:
         yield Finding("lcm route", "fault", "a multicast message does not return", link.ROUTE_REMEDY)
     else:
         yield Finding("lcm route", "ok", "a multicast message returns")
+    url = link.lcm_url()
+    if os.environ.get("LCM_DEFAULT_URL"):
+        yield _given_network(link, url)
     granted = link.receive_buffer()
-    if warning := link.buffer_warning(link.DEFAULT_URL):
+    if warning := link.buffer_warning(url):
         text, _, remedy = warning.partition(": some will be lost; ")
         yield Finding("lcm buffer", "fault", text, remedy)
     else:
         yield Finding("lcm buffer", "ok", f"{granted} bytes")
 
 
-def _comes_back(link: object) -> bool:
+def _given_network(link: Any, url: str) -> Finding:
+    """Check that the network of ``LCM_DEFAULT_URL`` can be opened; a log is left alone."""
+    from gait.errors import UserError
+
+    try:
+        if not link.is_log(url):
+            link.open_lcm(url)
+    except UserError as error:
+        text, _, remedy = str(error).rpartition("; ")
+        return Finding("lcm url", "fault", f"LCM_DEFAULT_URL: {text}", f"{remedy}, or unset LCM_DEFAULT_URL")
+    return Finding("lcm url", "ok", f"LCM_DEFAULT_URL is {url}")
+
+
+def _comes_back(link: Any) -> bool:
     """Whether a message sent over LCM, on a private port, is received."""
     from gait.errors import UserError
 
     received: list[bytes] = []
     try:
-        network = link.open_lcm(link.private_url())  # type: ignore[attr-defined]
+        network = link.open_lcm(link.private_url())
         network.subscribe("GAIT_DOCTOR", lambda _, data: received.append(data))
         network.publish("GAIT_DOCTOR", _MESSAGE)
         network.handle_timeout(int(1000 * _SECONDS))
