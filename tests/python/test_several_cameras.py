@@ -10,6 +10,7 @@ import pytest
 from gait import Video
 from gait.body.skeleton import axis_rotation
 from gait.cli import main
+from gait.errors import UserError
 from gait.io.keypoints_file import Keypoints
 from gait.io.track_file import read_estimates, read_truth
 from gait.io.video import Frame
@@ -107,6 +108,9 @@ def test_each_frame_has_the_nearest_of_the_other_film_and_none_is_used_twice():
             (frame.number, frame.others[0] and frame.others[0].number) for frame in several.backwards(18, 3)
         ]
         assert back[::-1] == [(f.number, f.others[0] and f.others[0].number) for f in forwards]
+    for never in (100.0, -100.0):
+        with pytest.raises(UserError, match="no frame is at the time of one of .*correct --offsets"):
+            SeveralVideos(slow, [fast], [never])
     early = list(SeveralVideos(slow, [fast], [0.5]).frames(0, 5))
     assert all(frame.others == (None,) for frame in early)  # the other film had not begun
 
@@ -207,6 +211,14 @@ def test_without_joints_the_offset_must_be_given(tmp_path, monkeypatch, capsys):
     assert main([*words, "--init", "init.json", "--detector", "none", "-o", "t.csv"]) == 1
     assert "give --offsets" in capsys.readouterr().err
     assert not (tmp_path / "t.csv").exists()
+
+
+def test_a_film_given_twice_is_one_line(tmp_path, monkeypatch, capsys):
+    monkeypatch.chdir(tmp_path)
+    simulate(replace(SCENARIO, frames=8), ".")
+    words = ["track", "video.mp4", "video.mp4", "--camera", "camera.json", "--camera", "camera.json"]
+    assert main([*words, "--init", "init.json", "--detector", "none", "-o", "t.csv"]) == 1
+    assert "its camera is at the same place as that of video.mp4" in capsys.readouterr().err
 
 
 def test_only_the_first_film_has_to_show_the_start(tmp_path, monkeypatch, capsys):

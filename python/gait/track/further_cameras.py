@@ -17,9 +17,13 @@ from gait.track.synchronise import Offset, find_offset
 
 Array = NDArray[np.float64]
 
+_SAME_PLACE_M = 0.01  # metres between two cameras; from nearer by, their rays give no distance
+
 
 class SeveralVideos(Video):
     """The film of the first camera, in which each frame contains the other cameras' nearest frames.
+
+    UserError if the frames of one of these have no partner among those of the first film.
 
     Parameters
     ----------
@@ -37,6 +41,12 @@ class SeveralVideos(Video):
         self._partners = [
             _nearest(video.times, other.times + offset) for other, offset in zip(others, offsets, strict=True)
         ]
+        for other, offset, partners in zip(others, offsets, self._partners, strict=True):
+            if not (partners >= 0).any():
+                raise UserError(
+                    f"{other.path}: no frame is at the time of one of {video.path}: it begins {offset:.2f} s "
+                    f"after that, which takes {video.times[-1]:.2f} s; correct --offsets"
+                )
 
     def frames(self, start: int = 0, stop: int | None = None, *, grey: bool = False) -> Iterator[Frame]:
         """Yield the frames `start` <= index < `stop` in order, as BGR or grey."""
@@ -105,6 +115,7 @@ def with_further_cameras(options: ClipOptions, scene: Scene) -> Scene:
         if one.video.count < 2:
             raise UserError(f"{video}: has one frame; give a film of the walk")
         require_scene(options, one, 0)
+        _require_apart(scene, one)
         given = None if options.offsets is None else options.offsets[k]
         person, offset = _offset(scene, one, given)
         one = replace(one, person=person)
@@ -116,6 +127,15 @@ def with_further_cameras(options: ClipOptions, scene: Scene) -> Scene:
         offsets.append(offset.seconds)
     several = SeveralVideos(scene.video, [one.video for one in scenes], offsets)
     return replace(scene, video=several, further=tuple(scenes), began=tuple(began))
+
+
+def _require_apart(scene: Scene, other: Scene) -> None:
+    """Raise UserError if two cameras are at the same place, as when a file is given twice."""
+    if np.linalg.norm(other.camera.centre - scene.camera.centre) < _SAME_PLACE_M:
+        raise UserError(
+            f"{other.video.path}: its camera is at the same place as that of {scene.video.path}; give each "
+            "film and camera once"
+        )
 
 
 def _offset(scene: Scene, other: Scene, given: float | None) -> tuple[int, Offset]:
