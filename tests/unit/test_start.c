@@ -349,7 +349,7 @@ static void test_keypoints_that_are_no_numbers(void)
 {
     walk const w = usual();
     uint64_t hash[2];
-    for (int odd = 0; odd < 2; odd++) {
+    for (int spoilt = 0; spoilt < 2; spoilt++) {
         gait_start *const s = toy_start_new(camera(), ~0u);
         gait_hypothesis h[GAIT_START_MAX_HYPOTHESES];
         int32_t count = 0;
@@ -357,15 +357,15 @@ static void test_keypoints_that_are_no_numbers(void)
         for (int n = 0; n < FRAMES; n++) {
             gait_keypoint k[JOINTS];
             detect(&w, (float)n / 25.0f, (uint32_t)n, k);
-            k[1] = odd ? (gait_keypoint){NAN, k[1].v, 1} : (gait_keypoint){0};
-            k[2] = odd ? (gait_keypoint){k[2].u, INFINITY, 1} : (gait_keypoint){0};
-            k[3] = odd ? (gait_keypoint){k[3].u, k[3].v, INFINITY} : (gait_keypoint){0};
-            k[4] = odd ? (gait_keypoint){k[4].u, k[4].v, NAN} : (gait_keypoint){0};
+            k[1] = spoilt ? (gait_keypoint){NAN, k[1].v, 1} : (gait_keypoint){0};
+            k[2] = spoilt ? (gait_keypoint){k[2].u, INFINITY, 1} : (gait_keypoint){0};
+            k[3] = spoilt ? (gait_keypoint){k[3].u, k[3].v, INFINITY} : (gait_keypoint){0};
+            k[4] = spoilt ? (gait_keypoint){k[4].u, k[4].v, NAN} : (gait_keypoint){0};
             CHECK(gait_start_add(s, 1000000 + n * 40000, k, NULL) == GAIT_OK);
         }
         CHECK(gait_start_solve(s, 1000000, h, GAIT_START_MAX_HYPOTHESES, &count, NULL) == GAIT_OK);
         check_found(&w, h);
-        hash[odd] = toy_hash_hypotheses(h);
+        hash[spoilt] = toy_hash_hypotheses(h);
         free(s);
     }
     CHECK(hash[0] == hash[1]);
