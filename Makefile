@@ -310,12 +310,14 @@ THREADED := $(patsubst %,$(B)/unit/test_%,pool task determinism)
 unit-threads: $(THREADED)
 	@tests/unit/run.sh $^
 
+# A daemon that a test kills while it writes its counts leaves a file of which others would complain on stderr.
 COVERED := $(wildcard tests/python/test_lcm_*.py)
 coverage: setup lib ## branches that the tests of library and daemon take (ARGS='--all --least-library 97'; --record)
 	@rm -f $$(find build/coverage -name '*.gcda' 2>/dev/null)
 	@$(MAKE) --no-print-directory config=coverage CC=gcc tools
 	@LIMIT=3600 $(MAKE) --no-print-directory config=coverage CC=gcc unit
-	@$(COMPILED_ONCE) GAIT_TRACKD='$(abspath build/coverage/bin/gait-trackd)' $(PY) -m pytest -q -c python/pyproject.toml \
+	@$(COMPILED_ONCE) GCOV_ERROR_FILE='$(abspath build/coverage/gcov.log)' \
+	    GAIT_TRACKD='$(abspath build/coverage/bin/gait-trackd)' $(PY) -m pytest -q -c python/pyproject.toml \
 	    --rootdir . $(PYTEST_AT_ONCE) $(COVERED)
 	@$(PY) tests/check/coverage.py build/coverage $(ARGS)
 
