@@ -53,6 +53,12 @@ static void test_valid(void)
     c.fx = 0.0f;
     CHECK(!camera_valid(&c));
     c = toward_origin();
+    c.fy = -1.0f;
+    CHECK(!camera_valid(&c));
+    c = toward_origin();
+    c.width = -1;
+    CHECK(!camera_valid(&c));
+    c = toward_origin();
     c.height = 0;
     CHECK(!camera_valid(&c));
 }

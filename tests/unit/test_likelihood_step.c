@@ -78,7 +78,8 @@ static void test_particles(void)
     CHECK(gait_tracker_particles(t, s, weight, N, NULL) == N);
     v->f.map = t->core->map[0];
     toy_body_at(v, shot[1][0], wall[1]);
-    v->setup = *t->like;
+    memcpy(&v->setup, t->like, /* it ends after the last limb */
+           offsetof(like_setup, surface) + (size_t)t->like->limbs * sizeof(like_surface));
     double worst = 0.0, place = 0.0;
     for (int32_t i = 0; i < N; i++) {
         like_body const b = toy_body_body(v, &s[i]);

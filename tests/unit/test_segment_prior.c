@@ -41,13 +41,25 @@ typedef struct patch {
 static void test_refused(void)
 {
     const patch patches[] = {
-        {"SGIN", &toy.count[1], 1, 0},           {"SGIN", &toy.count[1], 1, TOY_SEGMENT_FRAMES + 1},
-        {"SGIN", &toy.count[2], 1, 3},           {"SGIN", &toy.count[0], 1, -1},
-        {"SGRT", &toy.rate[0], 0, 1e-6},         {"SGRT", &toy.rate[1], 0, -1},
-        {"SGRT", &toy.rate[2], 0, NAN},          {"SGWT", &toy.weight[0], 0, 0},
-        {"SGWT", &toy.weight[0], 0, 0.9},        {"SGMN", &toy.mean[0][5][1], 0, HUGE_VAL},
-        {"SGMD", &toy.mode[0][4][9][2], 0, NAN}, {"SGSD", &toy.sd[0][2], 0, -0.1},
-        {"SGPS", &toy.residual[0][3], 0, 0},     {"SGNM", &toy.name[2][0], 1, 0},
+        {"SGIN", &toy.count[1], 1, 0},
+        {"SGIN", &toy.count[1], 1, TOY_SEGMENT_FRAMES + 1},
+        {"SGIN", &toy.count[2], 1, 3},
+        {"SGIN", &toy.count[0], 1, -1},
+        {"SGIN", &toy.count[3], 1, 0},
+        {"SGIN", &toy.count[4], 1, 0},
+        {"SGRT", &toy.rate[0], 0, 1e9},
+        {"SGRT", &toy.rate[2], 0, 100},
+        {"SGRT", &toy.rate[2], 0, 0},
+        {"SGRT", &toy.rate[0], 0, 1e-6},
+        {"SGRT", &toy.rate[1], 0, -1},
+        {"SGRT", &toy.rate[2], 0, NAN},
+        {"SGWT", &toy.weight[0], 0, 0},
+        {"SGWT", &toy.weight[0], 0, 0.9},
+        {"SGMN", &toy.mean[0][5][1], 0, HUGE_VAL},
+        {"SGMD", &toy.mode[0][4][9][2], 0, NAN},
+        {"SGSD", &toy.sd[0][2], 0, -0.1},
+        {"SGPS", &toy.residual[0][3], 0, 0},
+        {"SGNM", &toy.name[2][0], 1, 0},
     };
     for (size_t i = 0; i < sizeof patches / sizeof *patches; i++) {
         int32_t const n = patches[i].as_int ? (int32_t)patches[i].value : 0;

@@ -344,6 +344,33 @@ static uint64_t digest(uint32_t cpu_mask)
     return toy_hash_hypotheses(h);
 }
 
+/* A known stature is kept; with it, and with errors that are independent from frame to frame, the walk is the same. */
+static void test_a_known_stature(void)
+{
+    walk w = usual();
+    w.stature = 1.9f;
+    w.noise = 2.0f;
+    gait_start_config cfg;
+    gait_start *s = NULL;
+    gait_hypothesis h[GAIT_START_MAX_HYPOTHESES];
+    size_t bytes = 0;
+    int32_t count = 0;
+    gait_start_default(&cfg);
+    cfg.camera = camera();
+    cfg.stature = 1.9f;
+    cfg.stature_sd = 0.01f;
+    cfg.error_time = 0.0f;
+    CHECK(gait_start_bytes(toy_model(), &cfg, &bytes, NULL) == GAIT_OK);
+    void *const mem = aligned_alloc(GAIT_ALIGN, (bytes + GAIT_ALIGN - 1) / GAIT_ALIGN * GAIT_ALIGN);
+    CHECK(gait_start_init(mem, bytes, toy_model(), &cfg, &s, NULL) == GAIT_OK);
+    show(s, &w, FRAMES);
+    CHECK(gait_start_solve(s, 1000000, h, GAIT_START_MAX_HYPOTHESES, &count, NULL) == GAIT_OK);
+    check_found(&w, h);
+    CHECK_NEAR(h[0].mean.stature, 1.9f, 0.03);
+    CHECK(h[0].sd.stature == 0.03f); /* the least that is stated */
+    free(mem);
+}
+
 /* Keypoints with a number that is not finite count as not observed. */
 static void test_keypoints_that_are_no_numbers(void)
 {
@@ -387,6 +414,7 @@ static void tests(void)
     test_fewest_frames();
     test_config();
     test_old_frames_are_dropped();
+    test_a_known_stature();
     test_keypoints_that_are_no_numbers();
 }
 

@@ -189,6 +189,40 @@ static void test_formats_and_borders(void)
     free(s);
 }
 
+/* Of more people than there is room for the largest are returned, the largest first, wherever they stand. */
+static void test_the_largest_people(void)
+{
+    gait_start *const s = toy_start_new(camera(), ~0u);
+    gait_image const scene = image_of(plate), frame = image_of(picture);
+    static const int tall[5] = {70, 100, 80, 110, 60};
+    gait_box b[3];
+    int32_t count = -1;
+    memset(plate, 90, sizeof plate);
+    memset(picture, 90, sizeof picture);
+    for (int i = 0; i < 5; i++)
+        draw(20 + 60 * i, 44 + 60 * i, 170 - tall[i], 170, 200);
+    CHECK(gait_start_find_boxes(s, &frame, &scene, b, 3, &count, NULL) == GAIT_OK && count == 3);
+    CHECK_NEAR(b[0].foot[0], 32 + 60 * 3, 1.5);
+    CHECK_NEAR(b[1].foot[0], 32 + 60 * 1, 1.5);
+    CHECK_NEAR(b[2].foot[0], 32 + 60 * 2, 1.5);
+    free(s);
+}
+
+/* Boxes of nobody: too tall, too short, of no height, or too sparse. */
+static void test_boxes_of_nobody(void)
+{
+    gait_start *const s = toy_start_new(camera(), ~0u);
+    gait_hypothesis h[GAIT_START_MAX_HYPOTHESES];
+    int32_t count = 0;
+    for (int n = 0; n < FRAMES; n++) {
+        walk const giant = {.stature = 3.0f, .x = -1, .y = 6}, child = {.stature = 0.9f, .x = 1, .y = 6};
+        gait_box b[3] = {box_of(&giant, 0, 0), box_of(&child, 0, 0), {{50, 100}, {50, 99.5f}, 1}};
+        CHECK(gait_start_add_boxes(s, n * 40000, b, 3, NULL) == GAIT_OK);
+    }
+    CHECK(gait_start_solve(s, 0, h, GAIT_START_MAX_HYPOTHESES, &count, NULL) == GAIT_ERR_STATE && count == 0);
+    free(s);
+}
+
 static void test_refused(void)
 {
     gait_start *const s = toy_start_new(camera(), ~0u);
@@ -232,6 +266,8 @@ static void tests(void)
     test_blobs();
     test_largest_change();
     test_formats_and_borders();
+    test_the_largest_people();
+    test_boxes_of_nobody();
     test_refused();
 }
 
