@@ -208,8 +208,8 @@ static void test_the_largest_people(void)
     free(s);
 }
 
-/* Boxes of nobody: too tall, too short, of no height, or too sparse. */
-static void test_boxes_of_nobody(void)
+/* Boxes of no person: too tall, too short, of no height, or too sparse. */
+static void test_boxes_of_no_person(void)
 {
     gait_start *const s = toy_start_new(camera(), ~0u);
     gait_hypothesis h[GAIT_START_MAX_HYPOTHESES];
@@ -267,7 +267,7 @@ static void tests(void)
     test_largest_change();
     test_formats_and_borders();
     test_the_largest_people();
-    test_boxes_of_nobody();
+    test_boxes_of_no_person();
     test_refused();
 }
 
