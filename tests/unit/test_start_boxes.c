@@ -189,7 +189,7 @@ static void test_formats_and_borders(void)
     free(s);
 }
 
-/* Of more people than there is room for the largest are returned, the largest first, wherever they stand. */
+/* Of too many people the largest are returned, the largest first, wherever they stand. */
 static void test_the_largest_people(void)
 {
     gait_start *const s = toy_start_new(camera(), ~0u);
