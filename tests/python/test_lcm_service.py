@@ -67,7 +67,7 @@ def test_a_snapshot_that_does_not_fit_is_not_used(tmp_path):
     good = (tmp_path / "state").read_bytes()
     torn = [good[:n] for n in (0, 7, 100, len(good) // 2, len(good) - 1)]
     flipped = [
-        good[:k] + bytes([good[k] ^ 1]) + good[k + 1 :] for k in (0, 8, 12, len(good) // 2, len(good) - 9)
+        good[:k] + bytes([good[k] ^ 1]) + good[k + 1 :] for k in (7, 8, 12, len(good) // 2, len(good) - 9)
     ]
     cases = [((), b, "") for b in (*torn, *flipped)]
     cases += [
@@ -80,7 +80,7 @@ def test_a_snapshot_that_does_not_fit_is_not_used(tmp_path):
             assert listener.last.state != listener.last.RUNNING
             words = finish().words
         assert words.count("is not used: " + why) == 1 and "following" not in words, (more, len(content))
-        assert not (tmp_path / "state").exists()  # no person is followed
+        assert (tmp_path / "state").read_bytes() == content  # no person is followed: it stays for its own daemon
 
 
 def test_a_snapshot_of_another_camera_is_not_used(tmp_path):
@@ -98,15 +98,32 @@ def test_a_camera_that_is_announced_replaces_that_of_a_snapshot(tmp_path):
         assert "following the person" in finish().words
 
 
-def test_a_folder_that_cannot_be_written_is_reported_once(tmp_path):
-    url = private_url()
-    with rig.daemon(url, *options(tmp_path)[:3], tmp_path / "no" / "state") as (listener, finish):
+def test_a_folder_that_can_no_longer_be_written_is_reported_once(tmp_path):
+    folder = tmp_path / "folder"
+    folder.mkdir()
+    with rig.daemon(private_url(), *options(folder)) as (listener, finish):
+        folder.rmdir()
         begin(listener)
         feed(listener, 0, KILLED)
         before = len(listener.statuses)
         listener.until(lambda: len(listener.statuses) > before + 2, "more statuses")
         outcome = finish()
     assert outcome.code == 0 and outcome.words.count("cannot be written: No such file") == 1
+
+
+def test_only_a_snapshot_is_replaced_and_only_a_folder_that_takes_it_accepted(tmp_path):
+    notes, link = tmp_path / "notes.txt", tmp_path / "link"
+    notes.write_text("of a summer")
+    link.symlink_to(notes)
+    for path, words in (
+        (notes, "is not a snapshot; give another name"),
+        (link, "is not a snapshot; give another name"),
+        (tmp_path, "is not a snapshot; give another name"),
+        (tmp_path / "no" / "state", "cannot be written: No such file"),
+    ):
+        outcome = rig.run(*rig.command("--init", "auto", "--snapshot", path)[1:])
+        assert outcome.code == 1 and f"{path}: {words}" in outcome.words and outcome.words.count("\n") == 1
+    assert notes.read_text() == "of a summer" and set(tmp_path.iterdir()) == {notes, link}
 
 
 @pytest.fixture

@@ -248,13 +248,30 @@ static void test_leftovers(void)
         snprintf(name, sizeof name, "%s.%s", path, names[i]);
         write_file(name, "x", 1);
     }
-    snapshot_file_resume(&f, &s);
-    CHECK(files() == 4);
+    message why;
+    CHECK(snapshot_file_check(&f, &why) && files() == 4);
     for (size_t i = 0; i < sizeof names / sizeof *names; i++) {
         snprintf(name, sizeof name, "%s.%s", path, names[i]);
         CHECK((access(name, F_OK) == 0) == (i > 1));
         unlink(name);
     }
+}
+
+/* While no person is tracked the file is removed, if it is our own; what is none of ours is neither removed nor replaced. */
+static void test_own(void)
+{
+    snapshot_file f = {.path = path}, other = {.path = path};
+    message why;
+    snapshot_file_write(&f, &s, true);
+    s.state = GAITMSG_STATUS_T_READY;
+    snapshot_file_write(&other, &s, true);
+    CHECK(snapshot_file_check(&other, &why) && access(path, F_OK) == 0);
+    snapshot_file_write(&f, &s, true);
+    CHECK(access(path, F_OK) != 0);
+    write_file(path, "of a summer", 11);
+    snapshot_file_write(&f, &s, true);
+    CHECK(access(path, F_OK) == 0 && !snapshot_file_check(&other, &why));
+    s.state = GAITMSG_STATUS_T_RUNNING;
 }
 
 int main(void)
@@ -267,6 +284,7 @@ int main(void)
     test_interrupted_and_short_writes();
     test_torn();
     test_leftovers();
+    test_own();
     unlink(path);
     unlink(model);
     rmdir(folder);

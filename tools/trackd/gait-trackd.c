@@ -254,7 +254,8 @@ static bool serve(service *s, const settings *want, parts *p, workers *threads, 
     sink out = {0};
     message lost;
     s->person = want->people ? 1 : want->person;
-    bool const ready = load(s, want, p, threads, &out, why) && receiver_open(&r, s, &snapshot, url, why) &&
+    bool const ready = snapshot_file_check(&snapshot, why) && load(s, want, p, threads, &out, why) &&
+                       receiver_open(&r, s, &snapshot, url, why) &&
                        (!to || sink_open(&out, to, why)); /* last, as it empties a log */
     if (ready)
         snapshot_file_resume(&snapshot, s);

@@ -31,6 +31,7 @@ typedef struct record {
     uint64_t bytes;       /* of the tracker's snapshot */
 } record;
 
+enum { FAMILY = 7 }; /* letters of all versions */
 static const char MAGIC[8] = "GAITTRD3";
 
 static int count_cameras(const service *s)
@@ -57,6 +58,13 @@ static uint64_t checksum_of(const unsigned char *file, size_t bytes)
 static bool is_tracked(const service *s)
 {
     return s->state == GAITMSG_STATUS_T_RUNNING;
+}
+
+static bool anyone(const service *s)
+{
+    while (s && !is_tracked(s))
+        s = s->next;
+    return s;
 }
 
 /* Size of the file; 0: it cannot be written. */
@@ -204,17 +212,48 @@ static void sweep(const char *path)
         close(folder);
 }
 
+/* Whether a file may be replaced: it is not there, empty, or a snapshot, of whichever version. */
+static bool is_replaceable(const char *path)
+{
+    char begin[FAMILY];
+    struct stat is;
+    if (lstat(path, &is) != 0)
+        return errno == ENOENT;
+    if (!S_ISREG(is.st_mode))
+        return false;
+    FILE *const f = fopen(path, "rb");
+    size_t const bytes = f ? fread(begin, 1, sizeof begin, f) : 1;
+    if (f)
+        fclose(f);
+    return bytes == 0 || (bytes == sizeof begin && memcmp(begin, MAGIC, sizeof begin) == 0);
+}
+
+bool snapshot_file_check(const snapshot_file *f, message *why)
+{
+    char beside[OPTION_TEXT + 32];
+    if (!f->path)
+        return true;
+    if (!is_replaceable(f->path))
+        return message_set(why, "--snapshot %.160s: is not a snapshot; give another name", f->path);
+    sweep(f->path);
+    int const file = create_beside(f->path, beside, sizeof beside);
+    if (file < 0)
+        return message_set(why, "--snapshot %.160s: cannot be written: %s", f->path, strerror(errno));
+    close(file);
+    unlink(beside);
+    return true;
+}
+
 void snapshot_file_write(snapshot_file *f, const service *s, bool at_once)
 {
     int64_t const now = clock_monotonic();
     if (!f->path || (!at_once && now < f->due))
         return;
     f->due = now + f->period;
-    const service *first = s; /* who is tracked */
-    while (first && !is_tracked(first))
-        first = first->next;
-    if (!first) {
-        unlink(f->path);
+    if (!anyone(s)) {
+        if (f->own)
+            unlink(f->path);
+        f->own = false;
         return;
     }
     size_t bytes = 0;
@@ -224,6 +263,7 @@ void snapshot_file_write(snapshot_file *f, const service *s, bool at_once)
     if (fault && !f->failed)
         log_line("--snapshot %.160s: cannot be written: %s", f->path, strerror(fault));
     f->failed = fault != 0;
+    f->own = f->own || !fault;
 }
 
 /* ---- reading ---- */
@@ -340,14 +380,15 @@ void snapshot_file_resume(snapshot_file *f, service *s)
     if (!f->path)
         return;
     f->due = clock_monotonic() + f->period; /* do not delay the first frame */
-    sweep(f->path);
     if (access(f->path, F_OK) != 0)
         return;
     if (!file_read(f->path, "snapshot", &file, &why)) {
         log_line("%s", why.text);
         return;
     }
-    if (!resume(f->path, s, &file, &why))
+    bool const used = resume(f->path, s, &file, &why);
+    f->own = used && anyone(s);
+    if (!used)
         log_line("--snapshot %.120s is not used: %.110s", f->path, why.text);
     free(file.data);
 }
