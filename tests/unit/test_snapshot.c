@@ -215,7 +215,7 @@ static void test_implausible(gait_tracker *t)
         SPOIL(s->reported, int32_t, -1, TOY_CLASSES);
         SPOIL(s->supported, int32_t, -1, TOY_CLASSES);
         SPOIL(s->resampled, int64_t, -1, INT64_MAX);
-        SPOIL(s->still, int64_t, INT64_MIN, INT64_MAX);
+        SPOIL(s->moved, int64_t, INT64_MIN, INT64_MAX);
         SPOIL(s->score[1][0], float, NOT_FINITE);
         SPOIL(of->count, int32_t, 0, MAX_STRATA + 1, 1);
         SPOIL(of->first[0], int32_t, BLOCK);

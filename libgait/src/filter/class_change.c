@@ -6,6 +6,9 @@ static const float ANY = 4.0f;   /* sd of a phase, strides: in effect uniform */
 static const float JITTER_HEADING = 0.1f;    /* sd, radians: people who change class often turn a little */
 static const float RELATIVE_RATE_SD = 0.07f; /* relative; that of the people learnt from, if it is larger */
 static const float POSTURE_SHARE = 0.3f;     /* of the posture's sd: by this the posture changes at once */
+static const float RESUMED_SD = 0.03f;       /* of the phase of people who have walked on, strides */
+static const float NEVER_STOOD =
+    1.28f; /* normal quantile of the share, 0.9, of them among those who seem to stand for a moment */
 
 float class_change_rate(const gait_model *m, int32_t to, float phase, float stride_hz)
 {
@@ -38,14 +41,19 @@ void class_change_enter(const class_entry *e, int32_t from, int32_t i, particle_
     const gait_model *const m = r->model, *const before = m->of_class[from];
     const float *const change = m->class_change + CLASS_CHANGE * (from * m->classes + m->motion_class);
     bool const other_curves = m->curves != before->curves;
-    float n[4];
+    float n[4], resumed[4];
+    normals(e, i, 1, resumed);
+    bool const resumes =
+        e->resumes && before->direction == 0 && m->motion_class == 0 && resumed[0] < NEVER_STOOD;
     normals(e, i, 0, n);
     p->f[F_HEADING] = m_wrap_pi(p->f[F_HEADING] + JITTER_HEADING * n[0]);
     if (m->direction == 0)
         p->f[F_PHASE] = 0.0f;
+    else if (resumes)
+        p->f[F_PHASE] = m_wrap1(e->phase + e->seconds * p->f[F_RATE] + RESUMED_SD * resumed[1]);
     else if (before->direction == 0)
         p->f[F_PHASE] = first_phase(change, n[1], n[3]);
-    if (m->direction != 0 && (before->direction == 0 || other_curves))
+    if (m->direction != 0 && !resumes && (before->direction == 0 || other_curves))
         p->f[F_RATE] = dynamics_reflect_rate(m->stride_hz +
                                              f_max(m->stride_hz_sd, RELATIVE_RATE_SD * m->stride_hz) * n[2]);
     for (int32_t k = 0; other_curves && k < r->curve_components; k++) {

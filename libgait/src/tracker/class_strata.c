@@ -154,17 +154,22 @@ void class_strata_origins(gait_tracker *t, const strata *then)
         t->origin[i] = (uint8_t)then->motion_class[stratum_at(then, t->filter.parent[i])];
 }
 
-void class_strata_enter(const gait_tracker *t, uint32_t counter, int32_t first, int32_t lanes,
+void class_strata_enter(const gait_tracker *t, uint32_t counter, float dt, int32_t first, int32_t lanes,
                         particle_block *p)
 {
     const class_state *const s = t->classes;
     int32_t const to = class_at(t, first);
     const state_layout *const layout = &t->layouts[to];
+    int64_t const still = t->core->utime - t->core->start_utime - s->moved;
     class_entry const e = {.layout = layout,
                            .seed = t->cfg.seed,
                            .frame = counter,
                            .score = s->score[to],
-                           .score_sd = s->known >> to & 1u ? SCORE_SD : 1.0f};
+                           .score_sd = s->known >> to & 1u ? SCORE_SD : 1.0f,
+                           .resumes = t->layouts[s->reported].model->direction == 0 &&
+                                      t->core->hypotheses.stage == HYPOTHESES_ONE && still < STILL_TIME,
+                           .phase = t->core->reported_phase,
+                           .seconds = in_walking_time(t, 1e-6f * (float)still) - dt};
     for (int32_t lane = 0; lane < lanes; lane++) {
         particle_state one;
         if (t->origin[first + lane] == to)
@@ -220,9 +225,7 @@ void class_strata_report(gait_tracker *t, const particle_state *mean, gait_estim
     bool const was_still = t->layouts[s->reported].model->direction == 0;
     if (still)
         e->mean.phase = t->core->reported_phase;
-    if (still && !was_still)
-        s->still = age;
-    if (was_still && age - s->still >= STILL_TIME && t->core->hypotheses.stage != HYPOTHESES_ACQUISITION) {
+    if (was_still && age - s->moved >= STILL_TIME && t->core->hypotheses.stage != HYPOTHESES_ACQUISITION) {
         if (still)
             t->core->hypotheses.stage = HYPOTHESES_ONE;
         else
@@ -233,5 +236,7 @@ void class_strata_report(gait_tracker *t, const particle_state *mean, gait_estim
             memcpy(s->score[c], mean->f + F_COEF, sizeof s->score[c]);
             s->known |= 1u << c;
         }
+    if (!still)
+        s->moved = age;
     s->reported = now;
 }

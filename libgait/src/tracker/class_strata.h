@@ -27,8 +27,9 @@ void class_strata_split(gait_tracker *t, const double share[2]);
 /* Set t->origin, the class of each new particle's ancestor; `then`: strata of the generation before. */
 void class_strata_origins(gait_tracker *t, const strata *then);
 
-/* For particles from `first` on, all of one class: those whose ancestor was of another class enter this class. */
-void class_strata_enter(const gait_tracker *t, uint32_t counter, int32_t first, int32_t lanes,
+/* For particles from `first` on, all of one class, which then move by dt: those whose ancestor was of another class enter
+ * this class. */
+void class_strata_enter(const gait_tracker *t, uint32_t counter, float dt, int32_t first, int32_t lanes,
                         particle_block *p);
 
 /* Probability of each class under these weights. */

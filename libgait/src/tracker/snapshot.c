@@ -166,7 +166,7 @@ static bool classes_plausible(const gait_tracker *t, const unsigned char *body)
         return true;
     memcpy(&s, in_body(t, body, t->classes), sizeof s);
     bool ok = (uint32_t)s.reported < classes && (uint32_t)s.supported < classes && s.resampled >= 0 &&
-              s.resampled <= c.utime - c.start_utime && s.still >= 0 && s.still <= c.utime - c.start_utime &&
+              s.resampled <= c.utime - c.start_utime && s.moved >= 0 && s.moved <= c.utime - c.start_utime &&
               f_finite(s.score[0], GAIT_MAX_CLASSES * GAIT_MAX_COMPONENTS);
     for (int32_t k = 0; ok && k < h->depth && ((uint64_t)k < c.frame || k == 0); k++) {
         int32_t const slot = history_slot(h, c.generation, k);

@@ -186,7 +186,7 @@ static void move_range(void *ctx, int32_t begin, int32_t end, int32_t task)
         else
             particle_block_get(&j->from, t->filter.parent + i, lanes, &then);
         if (t->classes)
-            class_strata_enter(t, j->counter, i, lanes, &then);
+            class_strata_enter(t, j->counter, step->dt, i, lanes, &then);
         if (step->dt != 0.0f)
             t->like->run->dynamics_move(step, i, &then, &now);
         particle_block_put(&to, i, lanes, step->dt != 0.0f ? &now : &then);

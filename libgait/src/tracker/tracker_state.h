@@ -68,8 +68,8 @@ typedef struct strata {
 } strata;
 
 typedef struct class_state { /* of a model with several classes (class_strata.h) */
-    /* Microseconds since the start: last resampling; since when standing still is reported. */
-    int64_t resampled, still;
+    /* Microseconds since the start: last resampling; last estimate that moves. */
+    int64_t resampled, moved;
     int32_t reported, supported; /* class of the last estimate, and of core.last_supported */
     int32_t open_sides;          /* 1: the person stood still, so left and right will be split */
     uint32_t known;              /* bit c: there are scores of the person in class c */
