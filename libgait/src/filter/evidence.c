@@ -1,9 +1,8 @@
 #include "filter/evidence.h"
 #include "base/fmath.h"
 
-enum { CHUNK = 64 };                 /* particles whose exponentials are computed at once */
-static const double NONE = -1e300;   /* log of 0 */
-static const double ESS_SHARE = 0.2; /* effective sample size that must remain, as a share of the particles */
+enum { CHUNK = 64 };                    /* particles whose exponentials are computed at once */
+static const double NONE = -1e300;      /* log of 0 */
 static const float LEAST_POWER = 0.05f; /* smallest power */
 
 double evidence_of(const pf *p, const float *loglik)
@@ -59,10 +58,10 @@ void evidence_temper(float *loglik, int32_t n, float power)
         loglik[i] *= power;
 }
 
-void evidence_anneal(const pf *p, float *loglik)
+void evidence_anneal(const pf *p, float *loglik, double share)
 {
     float power = 1.0f;
-    while (power > LEAST_POWER && ess_after(p, loglik, power) < ESS_SHARE * (double)p->n)
+    while (power > LEAST_POWER && ess_after(p, loglik, power) < share * (double)p->n)
         power *= 0.5f;
     evidence_temper(loglik, p->n, power);
 }

@@ -11,8 +11,8 @@ double evidence_of(const pf *p, const float *loglik);
 /* Raise the likelihoods to a power. */
 void evidence_temper(float *loglik, int32_t n, float power);
 
-/* Raise the likelihoods to the largest power 1, 1/2, 1/4 ... that leaves enough particles with weight, so that a
- * start from a broad prior does not follow a few particles that fit the first frame by chance (annealing;
- * Deutscher and Reid 2005). */
-void evidence_anneal(const pf *p, float *loglik);
+/* Raise the likelihoods to the largest power 1, 1/2, 1/4 ... that leaves an effective sample size of this share of the
+ * particles, so that a start from a broad prior does not follow a few particles that fit the first frame by chance
+ * (annealing; Deutscher and Reid 2005). */
+void evidence_anneal(const pf *p, float *loglik, double share);
 #endif

@@ -15,6 +15,9 @@ static const float JITTER_SCORE = 0.5f, JITTER_HEADING = 0.1f, JITTER_RATE = 0.0
                    JITTER_PHASE = 0.05f; /* sd */
 /* Log odds from which left and right are reported as known (probability 0.99), and the other hypothesis is dropped. */
 static const double REPORT_LOG_ODDS = 4.5, MERGE_LOG_ODDS = 9.0;
+/* Effective sample size that remains after each frame of acquisition, as a share of the particles: with known phase, and
+ * without, where particles that agree on a body too soon leave left and right to chance. */
+static const double KNOWN_ESS = 0.2, UNKNOWN_ESS = 0.4;
 /* Initial log odds against the person of an automatic start (probability 0.95), until images show one. */
 static const double PROOF = 3.0;
 
@@ -405,7 +408,7 @@ static pf_summary update_hypotheses(gait_tracker *t, float dt)
         without_silhouette[h] = evidence_of(&f, t->loglik_without_silhouette + first);
         of_all[h] = evidence_of(&f, t->loglik_raw + first);
         if (hypotheses_acquiring(t))
-            evidence_anneal(&f, t->loglik + first);
+            evidence_anneal(&f, t->loglik + first, UNKNOWN_ESS);
         s[h] = pf_update(&f, t->loglik + first);
         s[h].best += first;
         if (s[h].degenerate)
@@ -431,6 +434,7 @@ pf_summary hypotheses_update(gait_tracker *t, float dt)
     if (t->core->hypotheses.stage == HYPOTHESES_TWO)
         return update_hypotheses(t, dt);
     if (t->core->hypotheses.stage == HYPOTHESES_ACQUISITION)
-        evidence_anneal(&t->filter, t->loglik);
+        evidence_anneal(&t->filter, t->loglik,
+                        t->core->hypotheses.left_right_known ? KNOWN_ESS : UNKNOWN_ESS);
     return pf_update(&t->filter, t->loglik);
 }
