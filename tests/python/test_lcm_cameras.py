@@ -133,4 +133,4 @@ def test_after_a_kill_two_streams_are_tracked_as_if_nothing_had_happened(tmp_pat
 @pytest.mark.parametrize("streams", ["0", "1,1", "1,", "x", "31", "1,2,3,4"])
 def test_numbers_that_are_no_further_cameras_are_refused(streams):
     done = rig.run(*rig.command("--further-streams", streams, "--url", "file:///nothing")[1:])
-    assert done.code == 1 and "at most 3 numbers of cameras other than" in done.words
+    assert done.code == 2 and "at most 3 numbers of cameras other than" in done.words

@@ -103,6 +103,11 @@ def test_equal_poses_give_the_bits_of_a_still_camera(tmp_path):
     assert rig.play(log, "--moving-camera").digest == rig.play(log).digest
 
 
+def test_a_camera_that_moves_unexpectedly_is_named_with_the_option(tmp_path):
+    events = [*rig.opening(), *rig.frames(0, 2), pose(2), *rig.frames(2, 4)]
+    assert "run with --moving-camera" in rig.play(rig.write_log(tmp_path / "a.log", events)).words
+
+
 def test_capture_announces_the_pose_of_each_frame(tmp_path):
     folder = rig.write_clip(tmp_path, 4)
     poses = [CameraPose(camera_at(i).R, camera_at(i).t) for i in range(4)]

@@ -80,7 +80,7 @@ def test_a_snapshot_that_does_not_fit_is_not_used(tmp_path):
             assert listener.last.state != listener.last.RUNNING
             words = finish().words
         assert words.count("is not used: " + why) == 1 and "following" not in words, (more, len(content))
-        assert (tmp_path / "state").read_bytes() == content  # no person is followed: it stays for its own daemon
+        assert (tmp_path / "state").read_bytes() == content  # it stays for the daemon that it fits
 
 
 def test_a_snapshot_of_another_camera_is_not_used(tmp_path):
@@ -163,13 +163,16 @@ def test_a_service_manager_is_reported_and_settings_are_read_again(tmp_path, man
         assert manager() == "RELOADING=1" and manager() == "READY=1"
         listener.ask(rig.opening()[1:2], lambda s: s.background_mask, "the background")
         feed(listener, 3, 5)  # the same person, without a start
+        listener.until(lambda: "no frames arrive" in listener.last.text, "that the stream has ended")
         config.write_text("particles = many\n")
         os.kill(listener.pid, signal.SIGHUP)
         assert manager() == "RELOADING=1" and manager() == "READY=1"
         feed(listener, 5, 7)
+        listener.until(lambda: listener.last.text == "tracking", "that it is tracked again")
         outcome = finish()
         assert manager() == "STOPPING=1"
     assert outcome.code == 0 and "settings were not reloaded" in outcome.words
+    assert outcome.printed.count("frames ") == 2  # a summary before the reload and at the end
     assert "--particles many: give a whole number" in outcome.words
 
 

@@ -127,8 +127,7 @@ static bool load(service *s, const settings *want, parts *p, workers *threads, s
         p->path = (pose_path){.turn_sd = want->pose_turn_sd / 57.29578f, .place_sd = want->pose_place_sd};
         s->path = &p->path;
     }
-    if (!further_open(&p->further, want->further_streams, want->stream, why))
-        return false;
+    (void)further_open(&p->further, want->further_streams, want->stream, why); /* checked with the settings */
     s->further = p->further.count ? &p->further : NULL;
     s->max_gap = (double)want->max_gap;
     s->max_pixels = want->max_pixels;
@@ -325,6 +324,7 @@ int main(int argc, char **argv)
     }
     if (ok && quit == RELOAD) {
         sigprocmask(SIG_SETMASK, &call.unblocked, NULL);
+        fflush(stdout);
         execvp(argv[0], argv);
         ok = message_set(&why, "%.200s: cannot be restarted: %s", argv[0], strerror(errno));
     }

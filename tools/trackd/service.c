@@ -269,11 +269,15 @@ void service_camera(service *s, further_camera *c, const gaitmsg_camera_t *msg, 
         camera = slot->known ? slot->camera : camera;
     }
     camera_answer const answer = camera_announced(slot, &camera, arrival);
-    if (answer == CAMERA_REFUSED)
-        service_complain(
-            s, slot->fixed ? "a camera other than that of --camera was announced; it is ignored"
-                           : "a different camera from the one in use was announced: it replaces that one "
-                             "after 10 seconds in which only it is announced");
+    if (answer == CAMERA_REFUSED && slot->fixed)
+        service_complain(s, "a camera other than that of --camera was announced; it is ignored");
+    else if (answer == CAMERA_REFUSED)
+        service_complain(s,
+                         "a different camera from the one in use was announced: it replaces that one after "
+                         "10 seconds in which only it is announced%s",
+                         !s->path && same_lens(&camera, &slot->camera)
+                             ? "; if the camera moves, run with --moving-camera"
+                             : "");
     else if (answer == CAMERA_NEW && !begin_anew(s, c, &why))
         service_complain(s, "%s", why.text);
 }
@@ -511,6 +515,8 @@ void service_send_status(service *s)
     char version[32];
     const histogram *const st = &s->counts.step, *const la = &s->counts.latency;
     uint32_t const v = gait_version();
+    bool const starved =
+        s->state == GAITMSG_STATUS_T_RUNNING && 1e-6 * (double)(clock_monotonic() - s->stepped) > s->max_gap;
     snprintf(version, sizeof version, "%u.%u.%u", v / 10000, v / 100 % 100, v % 100);
     gaitmsg_status_t const msg = {
         .utime = clock_wall(),
@@ -532,7 +538,7 @@ void service_send_status(service *s)
         .latency_us_p99 = histogram_quantile(la, 0.99),
         .latency_us_max = la->largest,
         .memory_bytes = (int64_t)s->track.memory_bytes,
-        .text = s->text.text,
+        .text = starved ? "no frames arrive" : s->text.text,
     };
     s->sent[s->statuses++ % SERVICE_SENT] = msg.utime;
     sink_publish(s->out, "GAIT_STATUS", s->person, encoded,

@@ -80,6 +80,7 @@ typedef struct service {
     bool missed;              /* that frame was not tracked and is counted as dropped */
     int64_t last_utime;       /* capture time of the last tracked frame, or of the start */
     int64_t steps;            /* frames tracked since START */
+    int64_t stepped;          /* monotonic time of the last tracked frame, or of the start */
     budget budget;            /* limit 0 for a log, which is played without dropping frames */
     int32_t wanted;           /* particles requested last; 0 before there is a tracker */
     size_t pool_bytes;        /* of the threads */

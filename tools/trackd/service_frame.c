@@ -46,6 +46,7 @@ static void stop(service *s)
 static void run(service *s, const image_view *v, int64_t utime)
 {
     s->last_utime = utime;
+    s->stepped = clock_monotonic();
     s->dropped_before = s->counts.dropped;
     s->last_frame = v->frame;
     s->last_arrived = v->utime;
@@ -284,6 +285,7 @@ static bool step(service *s, const image_view *v, int64_t received, int64_t birt
     }
     int64_t const step_us = clock_monotonic() - begun;
     s->last_utime = v->utime;
+    s->stepped = clock_monotonic();
     s->last = estimate.mean;
     s->last_status = estimate.status;
     s->counts.frames++;

@@ -1,5 +1,6 @@
 #include "settings.h"
 
+#include "further.h"
 #include "gait_pool.h"
 #include "input_files.h"
 #include "lcm_link.h"
@@ -360,7 +361,8 @@ option_result settings_read(settings *s, int argc, char **argv, message *why)
          message_set(why, "--budget-ms: a log is played without dropping frames; leave out --budget-ms")) &&
         (!s->snapshot[0] || !link_is_log(link_url(s->url)) ||
          message_set(why, "--snapshot: a log is played from its start; leave out --snapshot")) &&
-        check_dependencies(s, why) && choose_model(s, why) && check_logs(s, why) &&
+        further_open(&(further){0}, s->further_streams, s->stream, why) && check_dependencies(s, why) &&
+        choose_model(s, why) && check_logs(s, why) &&
         (s->adapt_particles <= s->tracker.particles ||
          message_set(why, "--adapt-particles %d: at most the %d of --particles", (int)s->adapt_particles,
                      (int)s->tracker.particles));
