@@ -106,6 +106,8 @@ static void speed_lines(const verdict *v)
     rate_lines("paper mode, 10,000 particles, one core", 30, paper->one);
     rate_lines("paper mode, 10,000 particles, two cores", 55, paper->two);
     rate_lines("default number of particles, one core", 200, v->usual.one);
+    line("    on a core a sixth as fast", 30, fps(v->usual.one) / 6, true, "fps");
+    line("    memory of the tracker", 2.5, (double)v->usual.one->bytes / 1e6, false, "MB");
     rate_lines("    while it searches for the phase, with twice as many", 30, v->search.one);
     thread_lines(many);
     latency_lines(v);
@@ -122,7 +124,10 @@ static void kernel_lines(const verdict *v)
     double const limit_ns = 1e6 / ((double)LIMIT_PARTICLES * LIMIT_LIMBS * LIMIT_SAMPLES),
                  stage_ns = 1e6 * best->stage_ms[STAGE_LIKELIHOOD] / best->particles;
     for (int k = 0; k < v->isas; k++)
-        if (v->isa[k]->plan.cpu_mask == (GAIT_CPU_BASE | GAIT_CPU_AVX2))
+        if (v->isa[k]->plan.cpu_mask == GAIT_CPU_BASE)
+            line("SSE2 or NEON, 10,000 particles, one core, stages timed", 33, v->isa[k]->median_ms, false,
+                 "ms");
+        else if (v->isa[k]->plan.cpu_mask == (GAIT_CPU_BASE | GAIT_CPU_AVX2))
             line("AVX2 at most, 10,000 particles, one core, stages timed", 30, fps(v->isa[k]), true, "fps");
     line("likelihood stage, scalar against the best instruction set", 5,
          v->isa[0]->stage_ms[STAGE_LIKELIHOOD] / best->stage_ms[STAGE_LIKELIHOOD], true, "times");
