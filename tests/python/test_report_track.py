@@ -68,6 +68,7 @@ def test_the_page_needs_nothing_else_and_its_drawings_are_sound(folder, capsys):
     assert len(drawings) == 6 + 5 + 2 * 6  # strides and angles; what has a form for telephones too
     for drawing in drawings:
         ElementTree.fromstring(drawing.replace("xlink:href", "href"))
+    assert "knees are about 10 degrees more flexed than in ISB" in page
     for heading in ("Gait", "Footfalls", "Stride by stride", "Departure from the norm", "Conventions"):
         assert f"<h2>{heading}</h2>" in page
     assert '<p class="lead">Tracked 150 of 150 frames, 3 whole strides, 1.17 m/s.</p>' in page

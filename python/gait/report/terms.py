@@ -143,6 +143,9 @@ CONVENTIONS = (
     "Angles are those of the model's joints in degrees. The trunk is measured relative to the pelvis, the "
     "head relative to the trunk; flexion moves a limb forward, abduction away from the body, rotation "
     "inwards, on both sides alike.",
+    "With the default model, knees are about 10 degrees more flexed than in ISB's convention, because it has "
+    "the knee centres of CMU's skeletons. The pelvis is level on average; ISB's is tilted forward by about "
+    "10 degrees.",
     "Standard deviations and bands assume that model and camera are correct. Errors of these, such as a "
     "stature that is wrong by a few per cent, come on top.",
     "The norm is the people whose motion the model was learnt from. If the picture does not show a limb, "
