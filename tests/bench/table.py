@@ -10,6 +10,8 @@ from collections.abc import Iterable, Sequence
 from pathlib import Path
 from typing import Any
 
+from facts import facts
+
 from gait.io.files import replacing
 
 RESULTS = Path(__file__).resolve().parent / "results"
@@ -46,10 +48,12 @@ def publish(
     rows : iterable of sequences
         As for `show`.
     note : str
-        What a reader must know to judge the numbers: data, method, command; paragraphs of Markdown.
+        What a reader must know to judge the numbers: data, method; paragraphs of Markdown. `facts` are added
+        unless it has some.
     """
     head, cells, numbers = show(title, columns, rows)
-    parts = [f"## {title}", note.strip(), markdown(head, cells, numbers)]
+    made = "" if " at commit " in note else facts()
+    parts = [f"## {title}", made, note.strip(), markdown(head, cells, numbers)]
     RESULTS.mkdir(parents=True, exist_ok=True)
     _write(RESULTS / f"{name}.csv", _csv(head, cells))
     _write(RESULTS / f"{name}.md", "\n\n".join(filter(None, parts)) + "\n")
