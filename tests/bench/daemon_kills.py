@@ -6,8 +6,8 @@
 A stream of 30 frames a second of a drawn person; at random times a SIGKILL, after which another daemon is
 started at once on the same snapshot, as systemd does by the unit.  A daemon has continued if it reports that
 it follows the person from a frame and estimates follow without a START.  Time counts from the SIGKILL.  A
-frame is lost if it was sent and no daemon estimated it.  Then the same with --people 2, two trackers of the same person with keypoints.  No other program may publish on the
-URL.
+frame is lost if it was sent and no daemon estimated it.  Then the same with --people 2, two trackers of the
+same person with keypoints.  No other program may publish on the URL.
 """
 
 from __future__ import annotations
