@@ -207,10 +207,7 @@ def fit_view(
         expected, slope = _motion(rays, view, camera)
         miss = after - expected
         off = np.hypot(*miss.T)
-        near = off if iteration < COARSE else off[off < TUKEY * sd]
-        near_sd = float(np.median(near)) / 1.177 if len(near) else np.inf  # median of a Rayleigh distribution
-        sd = max(SHARPEST, near_sd if iteration < COARSE else min(sd, near_sd))
-        weight = np.square(np.clip(1 - np.square(off / (TUKEY * sd)), 0, None))
+        sd, weight = tukey(off, sd, iteration < COARSE)
         normal = np.einsum("nki,n,nkj->ij", slope, weight, slope)
         right = np.einsum("nki,n,nk->i", slope, weight, miss)
         normal[3, 3] += 1 / _ZOOM
@@ -220,6 +217,17 @@ def fit_view(
         if iteration > COARSE and np.abs(step).max() < 1e-7:
             break
     return view, off < TUKEY * sd
+
+
+def tukey(off: Array, sd: float, coarse: bool) -> tuple[float, Array]:
+    """Return the sd of a pixel and Tukey's weights (N,) for distances (N,) of points, pixels.
+
+    `sd`: the last one, which limits the points that count and the next sd, except in `coarse` iterations.
+    """
+    near = off if coarse else off[off < TUKEY * sd]
+    near_sd = float(np.median(near)) / 1.177 if len(near) else np.inf  # median of a Rayleigh distribution
+    sd = max(SHARPEST, near_sd if coarse else min(sd, near_sd))
+    return sd, np.square(np.clip(1 - np.square(off / (TUKEY * sd)), 0, None))
 
 
 def _motion(rays: Array, view: View, camera: Camera) -> tuple[Array, Array]:

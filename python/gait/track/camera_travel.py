@@ -25,11 +25,11 @@ from gait.track.camera_motion import (
     COARSE,
     FEWEST_CORNERS,
     FIT_ITERATIONS,
-    SHARPEST,
     TUKEY,
     Box,
     find_corners,
     small_picture,
+    tukey,
     working_scale,
 )
 
@@ -248,10 +248,7 @@ def _fit(
         covariance = by_inverse[:, :, None] * by_inverse[:, None] * visible.variance[:, None, None]
         precision = np.linalg.inv(unit**2 * np.eye(2) + covariance)
         off = unit * np.sqrt(np.einsum("nk,nkl,nl->n", miss, precision, miss))
-        near = off if iteration < COARSE else off[off < TUKEY * sd]
-        near_sd = float(np.median(near)) / 1.177 if len(near) else np.inf  # median of a Rayleigh distribution
-        sd = max(SHARPEST, near_sd if iteration < COARSE else min(sd, near_sd))
-        weight = np.square(np.clip(1 - np.square(off / (TUKEY * sd)), 0, None))
+        sd, weight = tukey(off, sd, iteration < COARSE)
         normal = np.einsum("nki,n,nkl,nlj->ij", slope, weight, precision, slope, optimize=True)
         right = np.einsum("nki,n,nkl,nl->i", slope, weight, precision, miss, optimize=True)
         step = np.linalg.solve(normal + 1e-6 * np.eye(6), right)
