@@ -81,6 +81,7 @@ def test_rows_that_are_missing_from_a_trc_are_named_unless_frames_are_numbered(m
         ),
         (lambda t: t + 11 * (t > 99), 120, "a.trc:107: Frame# is 111 after 99, but no frame is missing"),
         (lambda t: t - (t > 99), 120, "a.trc:107: Frame# is 99 after 99"),
+        (lambda t: 1, 120, "a.trc:8: Frame# is 1 after 1"),
     ],
 )
 def test_frame_numbers_agree_with_times(number, original, words, marked, tmp_path):

@@ -110,8 +110,11 @@ def _with_missing_rows(table: Table) -> Table:
     """Insert rows of NaN where numbers and times agree that some are missing, at most as many again."""
     frames, seconds = (np.array([getattr(row, name) for row in table.rows]) for name in ("frame", "time"))
     steps, spans = np.diff(frames), np.diff(seconds)
-    count = np.round(steps / np.median(steps))  # NaN if a column is empty
-    agree = (count >= 1) & (np.abs(spans / np.median(spans) - count) < _OFF_TIME)
+    usual = np.median(steps), np.median(spans)  # NaN if a column is empty
+    if not min(usual) > 0:
+        return table
+    count = np.round(steps / usual[0])
+    agree = (count >= 1) & (np.abs(spans / usual[1] - count) < _OFF_TIME)
     if not agree.all() or not 0 < count.sum() - len(count) <= len(table.rows):
         return table
     at = np.concatenate([[0], np.cumsum(count)]).astype(int)
