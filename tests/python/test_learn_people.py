@@ -16,6 +16,7 @@ from gait.errors import UserError
 from gait.io import blob
 from gait.learn.cycles.fourier import decode, encode, fourier_basis
 from gait.learn.prior import imputation, people
+from gait.learn.prior.model import sides_alike
 from gait.learn.prior.people import bounded, mirrored, never_shown
 
 SAMPLES, HARMONICS = 64, 5
@@ -133,13 +134,23 @@ def test_static_offset_is_what_others_do_not_explain():
     subject = np.repeat(np.arange(number), 3)
     base = smooth(rng, 1)
     rows = base + people.mirrored(base) + offset[subject][:, None]
-    uncertainty = people.static_sd(rows, subject, 1, PLAIN)
+    uncertainty = np.sqrt(np.mean(people.lasting_offsets(rows, subject, 1, PLAIN) ** 2, axis=0))
     assert uncertainty[knee] == pytest.approx(0.3 / np.sqrt(number), rel=0.1)
     # others' learners see that person, whose image has the other knee; nothing else was ever different
     knees = [CHANNELS.index(f"{s}_knee_flexion") for s in "lr"]
     assert np.delete(uncertainty, knees).max() < 0.01
     shifted = rows + 0.3 * (rng.normal(size=number)[subject] > 0)[:, None, None] * (np.arange(30) == 0)
-    assert people.static_sd(shifted, subject, 4, PLAIN)[0] < 1e-6
+    assert np.abs(people.lasting_offsets(shifted, subject, 4, PLAIN)[:, 0]).max() < 1e-6
+
+
+def test_sides_are_as_alike_as_the_lasting_angles_of_the_legs():
+    rng = np.random.default_rng(3)
+    lasting, same = 9 * rng.normal(size=(400, len(CHANNELS))), rng.normal(size=400)
+    for name in CHANNELS:
+        if name[2:5] in ("hip", "kne", "ank"):
+            lasting[:, CHANNELS.index(name)] = 0.6**0.5 * same + 0.4**0.5 * rng.normal(size=400)
+    assert sides_alike(lasting) == pytest.approx(0.6, abs=0.06)
+    assert sides_alike(np.zeros((1, len(CHANNELS)))) is None
 
 
 @pytest.mark.parametrize("rows", [10, 40, 200], ids=["few", "more", "many"])
@@ -163,7 +174,7 @@ def test_leading_directions_of_rows_that_hardly_vary_are_fewer():
 def test_static_offset_of_too_few_people_is_zero():
     rows = smooth(np.random.default_rng(11), 5)
     for subject in (np.zeros(5, int), np.array([0, 0, 1, 1, 1])):
-        assert not people.static_sd(rows, subject, 2, PLAIN).any()
+        assert not people.lasting_offsets(rows, subject, 2, PLAIN).any()
 
 
 def test_encoding_keeps_the_mean_of_the_metric():

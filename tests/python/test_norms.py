@@ -1,5 +1,6 @@
 """Norms: people at this pace, comfortable speeds by age, and values outside with their certainty."""
 
+import json
 from dataclasses import replace
 
 import numpy as np
@@ -9,7 +10,7 @@ from walking_track import walking_track
 from gait import UserError
 from gait.bindings.model import read_cyclic
 from gait.cli import main
-from gait.motion.norms import Compared, beside_norms, comfortable, rate_at
+from gait.motion.norms import Compared, beside_norms, comfortable, people, rate_at
 from gait.motion.parameters import measure
 from gait.report.gait_parts import add_norms
 from gait.report.page import Page
@@ -53,6 +54,18 @@ def test_a_large_step_width_is_outside_and_an_ordinary_walk_inside():
     without = {c.name for c in beside_norms(usual, measure(usual), MODEL)}
     assert without == set(inside) - {"speed_m_s"}
     assert beside_norms(walking_track(), measure(walking_track()), MODEL) == []  # no stature
+
+
+def test_people_whose_sides_differ_more_have_wider_norms_of_asymmetry():
+    """META states how alike both sides are; otherwise it is as in the package's recordings."""
+    meta = json.loads(MODEL["META"].tobytes())
+    sds = []
+    for alike in (1.0, None, 0.2):
+        stated = meta if alike is None else meta | {"sides_alike": alike}
+        found = people(MODEL | {"META": np.frombuffer(json.dumps(stated).encode(), np.uint8)}, 0.9, 1.7)
+        sds.append([found[f"asymmetry:{name}"][1] for name in ("step_length_m", "stance_percent")])
+        assert found["step_width_m"][1] > 0
+    assert (np.diff(sds, axis=0) > 0).all() and sds[1][0] > 1.3 * sds[0][0]
 
 
 def test_norms_know_their_limits():

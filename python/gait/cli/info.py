@@ -106,6 +106,8 @@ def text(name: str, s: Mapping[str, Any]) -> str:
     if "variance_explained" in meta:
         shares = meta["variance_explained"][: s.get("components")]
         lines.append("variance explained: " + " ".join(f"{100 * v:.1f}" for v in shares) + " %")
+    if "sides_alike" in meta:
+        lines.append(f"lasting angles of left and right leg: correlation {meta['sides_alike']:.2f}")
     for one in s.get("classes", []):
         lines.append(_class_line(one))
     if "segments" in s:

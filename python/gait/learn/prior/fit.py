@@ -87,7 +87,7 @@ class Learned:
     held_out: Floats  #: error on held-out data for 0, 1 ... components, scaled units; empty unless "auto"
     lengths: Floats  #: (p, F + 1) section PROP: variation of limb lengths; empty in the paper's model
     shifts: Floats  #: (p, F, 3) section SHFT: additional variation of the shoulders' origins
-    static: Floats  #: (M,) sd over subjects of a person's constant offsets from the model
+    lasting: Floats  #: (people, M) constant offsets of people from a model of the others
     paper: bool = False  #: whether the components are the paper's, of 19 angles, the other channels constant
 
     @property
@@ -95,6 +95,11 @@ class Learned:
         """Section CURV: mean, then components times their standard deviation, (1 + q, T, M), own units."""
         c = self.components
         return np.concatenate([c.mean[None], c.curves * c.sd[:, None, None]])
+
+    @property
+    def static(self) -> Floats:
+        """Standard deviations (M,) over people of their constant offsets."""
+        return np.asarray(np.sqrt(np.mean(np.square(self.lasting), axis=0)))
 
     @cached_property
     def residuals(self) -> Residuals:
@@ -161,7 +166,7 @@ def fit(
     if not paper:
         slope, even = _paces_removed(model.filled, rows.mask, row_subject, paces[rows.sequence])
         model = people.refine(model, even, row_subject, wanted, metric)
-    static = people.static_sd(even, row_subject, wanted, metric)
+    lasting = people.lasting_offsets(even, row_subject, wanted, metric)
     model = grounded(model, rows.visible, proportions)
     bodies = [] if paper else [*own, *(others or [])]
     table, shifts = lengths.learn(bodies, proportions, model.mean)
@@ -179,7 +184,7 @@ def fit(
         held_out=held_out,
         lengths=table,
         shifts=shifts,
-        static=static,
+        lasting=lasting,
         paper=paper,
     )
 

@@ -12,7 +12,7 @@ import numpy.typing as npt
 
 from gait._version import __version__
 from gait.body.model_curves import series
-from gait.body.skeleton import ANGLES, CHANNELS, default_skeleton
+from gait.body.skeleton import ANGLES, CHANNELS, SIDES, default_skeleton
 from gait.io import blob
 from gait.learn.arrays import Floats, Indices, Mask, by_rows, release
 from gait.learn.options import LearnOptions
@@ -187,11 +187,20 @@ def meta(learned: Learned, options: LearnOptions) -> dict[str, Any]:
             "rows": [[shortened(name), *row] for name, *row in sequence_table(learned)[:MOST_ROWS]],
         },
         **({"unobserved": missing} if (missing := unobserved(learned)) else {}),
+        **({"sides_alike": round(alike, 2)} if (alike := sides_alike(learned.lasting)) is not None else {}),
         "cycles": len(c.scores),
         "missing": round(float(1 - learned.cycles.mask.mean()), 3),
         "variance_explained": [round(float(v), 3) for v in np.cumsum(c.spectrum)[: len(c.sd)]],
         "iterations": {"alignment": len(learned.alignment.objective), "imputation": len(c.rmse)},
     }
+
+
+def sides_alike(lasting: Floats) -> float | None:
+    """Return the correlation of left and right over people's lasting angles of the legs; None if unknown."""
+    legs = [name[2:] for name in ANGLES if name.startswith(("l_hip", "l_knee", "l_ankle"))]
+    left, right = (lasting[:, [CHANNELS.index(f"{s}_{name}") for name in legs]] for s in SIDES)
+    total = float(np.mean(left**2 + right**2))
+    return float(np.mean(left * right)) / (0.5 * total) if total > 0 else None
 
 
 def unobserved(learned: Learned) -> list[str]:

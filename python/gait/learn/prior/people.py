@@ -132,13 +132,13 @@ def _sign(curves: Floats) -> Floats:
     return np.asarray(np.where(half[np.arange(len(half)), np.abs(half).argmax(axis=1)] < 0, -1.0, 1.0))
 
 
-def static_sd(filled: Floats, subject: Indices, count: int, metric: Floats) -> Floats:
-    """Return the sd (M,) over people of the mean over the cycle that the others' components do not explain.
+def lasting_offsets(filled: Floats, subject: Indices, count: int, metric: Floats) -> Floats:
+    """Return each person's mean over the cycle that the others' components do not explain, (people, M).
 
-    Zero if there are fewer than three subjects.
+    One row of zeros if there are fewer than three subjects.
     """
     if subject.max() < 2:
-        return np.zeros(filled.shape[2])
+        return np.zeros((1, filled.shape[2]))
     basis = fourier_basis(filled.shape[1], CYCLE_HARMONICS)
     coded, image = _with_images(filled, metric, basis), np.tile(subject, 2)
     left = []
@@ -152,7 +152,7 @@ def static_sd(filled: Floats, subject: Indices, count: int, metric: Floats) -> F
         rest = coded[: len(subject)][subject == held].mean(axis=0) - mean
         rest -= (right @ rest) @ right
         left.append(rest[: filled.shape[2]] / np.sqrt(filled.shape[1]) @ np.linalg.inv(metric))
-    return np.sqrt(np.mean(np.square(left), axis=0))
+    return np.array(left)
 
 
 def by_subject(values: Floats, group: Indices, usual: float) -> tuple[float, float]:
