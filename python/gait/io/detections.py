@@ -18,6 +18,7 @@ from gait.progress import note
 Array = NDArray[np.float64]
 
 _LONGEST_BREAK = 30  # frames; a person who is missing for longer counts as another one
+_SHORT_BREAK = 5  # frames; people who are missing for longer may have changed places
 _MOVED = 0.6  # largest movement of points between detections, as a fraction of the person's extent
 _NAMED = 6  # most people that a note lists
 
@@ -89,7 +90,14 @@ def one_person(
             f"{path}: none of its points is a joint of the model ({shown or 'they have no names'}); "
             "name them as l_knee, left_knee or LKnee"
         )
-    chain = _choose(path, _people(detected.found), clip)
+    people, anew = _people(detected.found)
+    if anew:
+        note(
+            f"{path}: people may have changed places before frame {', '.join(map(str, anew[:_NAMED]))}, "
+            "after a gap; from there they count as others",
+            clip.quiet,
+        )
+    chain = _choose(path, people, clip)
     frame = np.array([detection.frame for detection in chain], np.int64)
     points = np.stack([detection.points[used] for detection in chain])
     uv = points[..., :2].copy()
@@ -108,46 +116,69 @@ def one_person(
     return frame, _times(path, frame, detected, clip), names, uv, confidence, ignored
 
 
-def _people(found: Sequence[Detection]) -> dict[str, list[Detection]]:
-    """Group the detections by person; keys are ids, values in the order of frames."""
+def _people(found: Sequence[Detection]) -> tuple[dict[str, list[Detection]], list[int]]:
+    """Group the detections by person; keys are ids, values in the order of frames.
+
+    Also return the frames before which people may have changed places, so that new persons begin there.
+    """
     ordered = sorted(found, key=lambda detection: detection.frame)
     ids = Counter((detection.frame, detection.person) for detection in ordered)
     people: dict[str, list[Detection]] = {}
     if all(person is not None for _, person in ids) and max(ids.values(), default=0) == 1:
         for detection in ordered:
             people.setdefault(str(detection.person), []).append(detection)
-        return people
+        return people, []
+    anew: list[int] = []
     open_chains: list[list[Detection]] = []
     frames: dict[int, list[Detection]] = {}
     for detection in ordered:
         frames.setdefault(detection.frame, []).append(detection)
     for number, present in frames.items():
         open_chains = [chain for chain in open_chains if number - chain[-1].frame <= _LONGEST_BREAK]
-        for detection, chain in _linked(present, open_chains):
+        linked, doubtful = _linked(present, open_chains)
+        anew += [number] * bool(doubtful)
+        open_chains = [chain for chain in open_chains if not any(chain is one for one in doubtful)]
+        for detection, chain in linked:
             if chain is None:
                 people[str(len(people))] = chain = []
                 open_chains.append(chain)
             chain.append(detection)
-    return people
+    return people, anew
 
 
 def _linked(
     present: list[Detection], chains: list[list[Detection]]
-) -> list[tuple[Detection, list[Detection] | None]]:
-    """Pair each detection of a frame with the chain that it continues, nearest first; None: a new person."""
-    pairs = [
-        (moved, i, k)
+) -> tuple[list[tuple[Detection, list[Detection] | None]], list[list[Detection]]]:
+    """Pair each detection of a frame with the chain that it continues, nearest first; None: a new person.
+
+    Chains without a long gap come first.  Also return the chains with one that two detections, or one of two
+    such chains, may continue: they end.
+    """
+    pairs = sorted(
+        (_is_missed(chain, detection.frame), moved, i, k)
         for i, detection in enumerate(present)
         for k, chain in enumerate(chains)
         if (moved := _moved(chain[-1].points, detection.points)) <= _MOVED
-    ]
+    )
     continued: dict[int, list[Detection]] = {}
     taken: set[int] = set()
-    for _, i, k in sorted(pairs):
-        if i not in continued and k not in taken:
-            continued[i] = chains[k]
-            taken.add(k)
-    return [(detection, continued.get(i)) for i, detection in enumerate(present)]
+    doubtful: set[int] = set()
+    for missed, _, i, k in pairs:
+        if i in continued or k in taken:
+            continue
+        left = [(n, m) for late, _, n, m in pairs if late and n not in continued and m not in taken]
+        if missed and sum(n == i or m == k for n, m in left) > 1:
+            doubtful |= {m for n, m in left if n == i or m == k}
+            continue
+        continued[i] = chains[k]
+        taken.add(k)
+    ended = [chains[k] for k in sorted(doubtful - taken)]
+    return [(detection, continued.get(i)) for i, detection in enumerate(present)], ended
+
+
+def _is_missed(chain: list[Detection], frame: int) -> bool:
+    """Whether a person was missing for so long that others may have taken the place."""
+    return frame - chain[-1].frame > _SHORT_BREAK + 1
 
 
 def _moved(before: Array, after: Array) -> float:
