@@ -144,8 +144,9 @@ def _writing(path: Path) -> Iterator[_Writer]:
 
 
 def write_motion(path: Path, motion: Motion) -> int:
-    """Write a motion's frames: /person or /person_N as a scene, /state as numbers; return their count."""
+    """Write a motion's frames: /person[_N] as a scene, /state[_N] as numbers; return their count."""
     rows = np.flatnonzero(motion.present).tolist()
+    state_topic = "/" + motion.person.replace("person", "state")
     with _writing(path) as writer:
         for row, k in enumerate(rows):
             at = round(float(motion.track.time[row]) * 1e9)
@@ -153,7 +154,7 @@ def write_motion(path: Path, motion: Motion) -> int:
             writer.add(f"/{motion.person}", "foxglove.SceneUpdate", update, at)
             state = {name: _plain(float(values[row])) for name, values in motion.track.numbers.items()}
             state |= {"frame": int(motion.track.frame[row]), "status": motion.track.status[row]}
-            writer.add("/state", "gait.State", state, at)
+            writer.add(state_topic, "gait.State", state, at)
     return len(rows)
 
 
