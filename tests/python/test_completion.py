@@ -6,6 +6,7 @@ import subprocess
 import pytest
 
 import gait.cli
+from gait.bindings.model import SHIPPED
 from gait.cli import COMMANDS, completion
 
 
@@ -42,6 +43,8 @@ def test_words_are_completed(script, tmp_path):
     assert "--json" in complete(script, "gait", "report", "track", "--")
     assert complete(script, "gait", "completion", "") == {"bash", "zsh"}
     assert complete(script, "gait", "track", "wa", cwd=tmp_path) == {"walk.mp4"}
+    assert complete(script, "gait", "track", "--people", "") == {"all"}
+    assert complete(script, "gait", "track", "-m", "", cwd=tmp_path) == {*SHIPPED, "walk.mp4"}
 
 
 @pytest.mark.parametrize("shell", completion.SHELLS)

@@ -10,6 +10,7 @@ import argparse
 import shlex
 from collections.abc import Iterator
 
+from gait.bindings.model import SHIPPED
 from gait.errors import UserError
 
 JSON = False
@@ -44,6 +45,7 @@ _gait() {{
     case "$word" in -*) ;; *) if (( COMP_CWORD > 1 )); then found="$(_gait_choices "$command")"; fi ;; esac
   fi
   COMPREPLY=($(compgen -W "$found" -- "$word"))
+  case "$before" in -m|--model) COMPREPLY+=($(compgen -f -- "$word")) ;; esac
   if (( COMP_CWORD > 1 )) && [ "${{#COMPREPLY[@]}}" = 0 ]; then COMPREPLY=($(compgen -f -- "$word")); fi
 }}
 complete -o filenames -F _gait gait
@@ -79,13 +81,19 @@ def script() -> str:
         ]
         choices[name] = [word.partition(" ")[2] for word in COMMANDS if word.startswith(f"{name} ")]
         for action in actions:
-            if not action.choices:
-                continue
+            listed = action.choices or _named(name, action)
             if not action.option_strings:
-                choices[name] += [str(choice) for choice in action.choices]
-            for option in action.option_strings:
-                choices[f"{name} {option}"] = [str(choice) for choice in action.choices]
+                choices[name] += map(str, listed)
+            for option in action.option_strings if listed else ():
+                choices[f"{name} {option}"] = [str(choice) for choice in listed]
     return _SCRIPT.format(version=__version__, words=_cases(words), choices=_cases(choices))
+
+
+def _named(command: str, action: argparse.Action) -> tuple[str, ...]:
+    """Return words that an option takes besides files or numbers."""
+    if action.dest == "model":
+        return SHIPPED
+    return ("all",) if (command, action.dest) == ("track", "people") else ()
 
 
 def _actions(parser: argparse.ArgumentParser) -> Iterator[argparse.Action]:
