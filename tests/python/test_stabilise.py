@@ -26,6 +26,7 @@ from gait.track.stabilise import find_motion, find_travel, moves
 CAMERA = Camera.looking((0.0, -6.0, 1.5), (0.0, 0.0, 1.0), (320, 240), 270.0)
 PANORAMA = replace(CAMERA, width=800, height=600, cx=400.0, cy=300.0)
 FRAMES, PERSON = 10, 40
+LANE = 0.5  # metres; of a floor that shows 13 to 24 corners
 
 
 def scene(texture: float) -> np.ndarray:
@@ -89,8 +90,14 @@ def test_the_turns_of_the_camera_are_found(tmp_path, pan, shake):
         assert motion.in_reference(moved).uv[0] == pytest.approx(pixels[:2], abs=0.7)
 
 
-def travelling(path, away: float, angle: float, floor: bool = True) -> tuple[Video, list[Camera]]:
-    """Write what a robot's camera sees that drives `away` metres and turns by `angle`: floor, sky, a box."""
+def travelling(
+    path, away: float, angle: float, floor: float = 99.0, wall: float = 0.0
+) -> tuple[Video, list[Camera]]:
+    """Write what a robot's camera sees that drives `away` metres and turns by `angle`: floor, sky, a box.
+
+    `floor`: metres to each side of the robot's way where the floor is not plain.  `wall`: y of a wall that
+    hides everything else, metres; 0 for none.
+    """
     rng, count = np.random.default_rng(4), 12
     texture = cv2.resize(rng.integers(40, 220, (300, 300)).astype(np.uint8), (1800, 1800))
     ways = np.linspace(0, 1, count)
@@ -109,18 +116,21 @@ def travelling(path, away: float, angle: float, floor: bool = True) -> tuple[Vid
             there = 60 * (camera.centre[:2] - camera.centre[2] * rays[..., :2] / down) + 900
             sky = 300 * np.stack([np.arctan2(rays[..., 0], rays[..., 1]), rays[..., 2]], axis=-1) + 900
             ground = rays[..., 2:] < -0.02
+            if wall:
+                hit = camera.centre + (wall - camera.centre[1]) / rays[..., 1:2] * rays
+                there = sky = 60 * hit[..., ::2] + 900
             maps = np.where(ground, there, sky).astype(np.float32)
             picture = cv2.remap(texture, *cv2.split(maps), cv2.INTER_LINEAR, borderMode=cv2.BORDER_WRAP)
-            if not floor:
-                picture[ground[..., 0]] = 120
+            picture[ground[..., 0] & (np.abs(there[..., 0] - 900) > 60 * floor)] = 120
             picture[100:180, 130 + 2 * k : 170 + 2 * k] = 30
             out.write(np.repeat(picture[..., None], 3, axis=2))
     return Video(path), cameras
 
 
-def test_the_poses_of_a_camera_that_travels_over_a_floor_are_found(tmp_path, capsys):
-    """Although a box moves with the camera and is not known to be a person."""
-    video, cameras = travelling(tmp_path / "v.mp4", 0.8, 0.2)
+@pytest.mark.parametrize("floor", [99.0, LANE])
+def test_the_poses_of_a_camera_that_travels_over_a_floor_are_found(tmp_path, capsys, floor):
+    """Although a box moves with the camera and is not known to be a person, or only a lane has texture."""
+    video, cameras = travelling(tmp_path / "v.mp4", 0.8, 0.2, floor)
     poses = find_travel(video, cameras[0], sample_frames(video), {}, quiet=False)
     assert len(poses) == len(cameras) and "the camera travelled up to 0.8 m" in capsys.readouterr().err
     for number, camera in enumerate(cameras):
@@ -128,10 +138,22 @@ def test_the_poses_of_a_camera_that_travels_over_a_floor_are_found(tmp_path, cap
         assert np.degrees(np.linalg.norm(cv2.Rodrigues(poses[number].R @ camera.R.T)[0])) < 0.3
 
 
-@pytest.mark.parametrize(("away", "floor"), [(0.0, True), (0.8, False)])
-def test_a_camera_that_only_turns_or_sees_no_floor_has_no_path(tmp_path, away, floor):
-    video, cameras = travelling(tmp_path / "v.mp4", away, 0.2, floor)
+@pytest.mark.parametrize(("away", "floor", "wall"), [(0.0, 99.0, 0.0), (0.8, 0.0, 0.0), (0.8, 99.0, 2.0)])
+def test_a_camera_that_only_turns_or_sees_no_floor_has_no_path(tmp_path, away, floor, wall):
+    video, cameras = travelling(tmp_path / "v.mp4", away, 0.0 if wall else 0.2, floor, wall)
     assert find_travel(video, cameras[0], sample_frames(video), {}, quiet=True) == {}
+
+
+@pytest.mark.parametrize(("stabilize", "remedy"), [("auto", "--camera-path"), ("pans", "--stabilize auto")])
+def test_a_path_that_was_not_estimated_is_not_written(tmp_path, monkeypatch, stabilize, remedy):
+    monkeypatch.setattr("gait.track.scene.find_travel", lambda *_: {})
+    monkeypatch.setattr("gait.track.scene.find_turns", lambda *_, first: None)
+    _, cameras = travelling(tmp_path / "v.mp4", 0.8, 0.2)
+    write_camera(tmp_path / "camera.json", cameras[0])
+    names = (str(tmp_path / name) for name in ("v.mp4", "camera.json", "t.csv"))
+    options = ClipOptions(*names, detector="none", stabilize=stabilize, cameras_out=str(tmp_path / "p.csv"))
+    with pytest.raises(UserError, match=f"p.csv: not written, as the camera .* is not estimated; .*{remedy}"):
+        Scene.read(options)
 
 
 def test_a_camera_that_stands_still_is_left_alone(tmp_path):

@@ -39,6 +39,9 @@ _FLOW_WINDOW, _LEVELS = (9, 9), 3  # of Lucas-Kanade
 _RETURN_PX = 0.5  # pixels; largest distance of a corner tracked forwards and back from its origin
 _DROPPED_MARGIN_PX = 4  # pixels from the picture's edge at which a landmark is dropped
 _FURTHEST_LANDMARK_M = 40.0  # metres to the furthest landmark on the floor
+#: Fewest corners on the floor that give the scale, and their least share of the landmarks below the horizon:
+#: with a wall instead of a floor, about a tenth fit by chance.  Other landmarks keep the scale for a while.
+_FLOOR_CORNERS, _FLOOR_SHARE = 10, 0.125
 _INVERSE, _INVERSE_SD = 0.1, 0.3  # 1/m; prior of the inverse distance of other landmarks
 _NEAREST = 5.0  # 1/m; largest inverse distance
 _DRIFT = 3.0  # pixels; sd of a tracked corner over the time for which it is seen
@@ -74,11 +77,11 @@ class _Landmarks:
         """Make landmarks at pixels (N, 2) of a picture; `floor`: those below the horizon are on the floor."""
         ray = camera.rays(pixels.astype(float))
         ray /= np.linalg.norm(ray, axis=1, keepdims=True)
-        inverse = -ray[:, 2] / camera.centre[2]
-        below = floor & (inverse > 1 / _FURTHEST_LANDMARK_M)
+        origin = np.tile(camera.centre, (len(ray), 1))
+        inverse, below = -ray[:, 2] / camera.centre[2], floor & _below(ray, origin)
         return _Landmarks(
             pixels,
-            np.tile(camera.centre, (len(ray), 1)),
+            origin,
             ray,
             np.where(below, inverse, _INVERSE),
             np.where(below, 0.0, _INVERSE_SD**2),
@@ -105,6 +108,11 @@ class _Landmarks:
         self.variance[chosen] = 1 / information
 
 
+def _below(ray: Array, origin: Array) -> NDArray[np.bool_]:
+    """Whether rays (N, 3) from `origin` (N, 3) reach the floor near enough for landmarks on it."""
+    return np.asarray(-ray[:, 2] / origin[:, 2] > 1 / _FURTHEST_LANDMARK_M)
+
+
 class CameraTravel:
     """Finds the pose of each frame of one camera.
 
@@ -119,8 +127,8 @@ class CameraTravel:
 
     Attributes
     ----------
-    floor : int
-        Number of landmarks on the floor that fitted in the last frame.
+    on_floor : bool
+        Whether enough landmarks on the floor fitted in the last frame to give the scale.
     """
 
     def __init__(self, camera: Camera, image: Image, people: Iterable[Box] = ()) -> None:
@@ -128,7 +136,7 @@ class CameraTravel:
         self._camera = camera.scaled(self._scale)
         self._picture = small_picture(image, self._camera)
         self._landmarks = _Landmarks.at(self._camera, np.zeros((0, 2), np.float32))
-        self.floor = 0
+        self.on_floor = False
         self._add(self._boxes(people))
 
     def step(self, image: Image, people: Iterable[Box] = ()) -> CameraPose | None:
@@ -147,7 +155,8 @@ class CameraTravel:
         visible.improve(self._camera, ideal, sd, fits)
         visible.misses = np.where(fits, np.maximum(visible.misses - 1, 0), visible.misses + 1)
         wrong = visible.misses >= _MISSES
-        self.floor = int((fits & floor).sum())
+        below = _below(visible.ray, visible.origin)
+        self.on_floor = (fits & floor).sum() >= max(_FLOOR_CORNERS, _FLOOR_SHARE * below.sum())
         raised = _Landmarks.at(self._camera, visible.pixels[wrong & floor], floor=False)
         self._landmarks = visible.where(~wrong).and_(raised)
         self._add(boxes)

@@ -98,10 +98,9 @@ def _camera(options: ClipOptions, scene: Scene) -> str:
         return f"{options.camera}, moving as in {options.camera_path}"
     motion = ""
     if scene.moved:
-        remedy = "--camera-path gives its poses"
-        if options.stabilize != "auto":
-            remedy = "--stabilize auto estimates its motion"
-        motion = f", which {scene.moved}, counts as still ({remedy})"
+        motion = f", which {scene.moved}, counts as still (--stabilize auto estimates its motion)"
+        if options.stabilize == "auto":
+            motion = f", which {scene.moved}, but its motion was not found (--camera-path gives its poses)"
     elif scene.motion is not None:
         turn = f"which turns by up to {scene.motion.furthest():.0f} px"
         motion = f"{_reference(scene.motion)}, {turn} (--cameras-out writes that of each frame)"

@@ -17,7 +17,7 @@ from gait.camera.path import CameraPose
 from gait.io.keypoints_file import Keypoints
 from gait.io.video import Frame, Image, Video
 from gait.progress import note, progress
-from gait.track.camera_motion import FEWEST_CORNERS, Box, CameraMotion, View, fit_view
+from gait.track.camera_motion import Box, CameraMotion, View, fit_view
 from gait.track.camera_travel import CameraTravel
 from gait.track.moving_video import map_pixels
 
@@ -187,7 +187,7 @@ def find_travel(
                 travel = CameraTravel(camera, frame.image, there)
             else:
                 pose = travel.step(frame.image, there)
-                on_floor.append(travel.floor)
+                on_floor.append(travel.on_floor)
             if pose is None:
                 return {}
             poses[frame.number] = pose
@@ -195,7 +195,7 @@ def find_travel(
     centres = np.array([pose.centre for pose in poses.values()])
     second = min(max(1, round(video.fps)), len(centres) - 1)
     away = np.linalg.norm(centres[second:] - centres[:-second], axis=1).max()
-    if away < _TRAVEL_M_PER_S or np.mean(np.array(on_floor) >= FEWEST_CORNERS) < _MOSTLY:
+    if away < _TRAVEL_M_PER_S or np.mean(on_floor) < _MOSTLY:
         return {}
     far = float(np.linalg.norm(centres - centres[0], axis=1).max())
     note(
