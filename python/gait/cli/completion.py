@@ -10,7 +10,6 @@ import argparse
 import shlex
 from collections.abc import Iterator
 
-from gait.bindings.model import SHIPPED
 from gait.errors import UserError
 
 JSON = False
@@ -73,25 +72,26 @@ def script() -> str:
     choices: dict[str, list[str]] = {}
     for name in COMMANDS:
         try:
-            actions = list(_actions(parser_of(name)))
+            listed = [(one, one.choices or _named(name, one)) for one in _actions(parser_of(name))]
         except (ModuleNotFoundError, UserError):  # its extra is missing, so the command cannot be used
-            actions = []
+            listed = []
         words[name] = [
-            option for action in actions for option in action.option_strings if option.startswith("--")
+            option for action, _ in listed for option in action.option_strings if option.startswith("--")
         ]
         choices[name] = [word.partition(" ")[2] for word in COMMANDS if word.startswith(f"{name} ")]
-        for action in actions:
-            listed = action.choices or _named(name, action)
+        for action, known in listed:
             if not action.option_strings:
-                choices[name] += map(str, listed)
-            for option in action.option_strings if listed else ():
-                choices[f"{name} {option}"] = [str(choice) for choice in listed]
+                choices[name] += map(str, known)
+            for option in action.option_strings if known else ():
+                choices[f"{name} {option}"] = [str(choice) for choice in known]
     return _SCRIPT.format(version=__version__, words=_cases(words), choices=_cases(choices))
 
 
 def _named(command: str, action: argparse.Action) -> tuple[str, ...]:
     """Return words that an option takes besides files or numbers."""
     if action.dest == "model":
+        from gait.bindings.model import SHIPPED  # here, as it needs NumPy, which this command may lack
+
         return SHIPPED
     return ("all",) if (command, action.dest) == ("track", "people") else ()
 
