@@ -93,10 +93,11 @@ LIBGAIT := $(COMMON) $(CODE_FLAGS) $(ATOMICS) -fstack-usage $(CALLS) -Wframe-lar
            -Ilibgait/include -iquote libgait/src
 KERNEL_ISAS := scalar base $(if $(findstring x86_64,$(MACHINE)),$(X86_ISAS))
 KERNEL_SRC := $(sort $(wildcard libgait/src/*/*_kernel.c))
-KERNEL_OBJ := $(foreach isa,$(KERNEL_ISAS),$(KERNEL_SRC:libgait/src/%.c=$(B)/src/%.$(isa).o))
+own = $(filter-out $(addprefix %/,$(SHARED_$(1))),$(KERNEL_SRC))
+KERNEL_OBJ := $(foreach isa,$(KERNEL_ISAS),$(patsubst libgait/src/%.c,$(B)/src/%.$(isa).o,$(call own,$(isa))))
 SRC := $(filter-out $(KERNEL_SRC),$(sort $(wildcard libgait/src/*/*.c libgait/src/*/*.cpp)))
 OBJ := $(SRC:libgait/src/%=$(B)/src/%.o) $(KERNEL_OBJ)
-GONE := $(filter-out $(notdir $(SRC) $(KERNEL_SRC)),$(O3_SOURCES) $(VECTOR_SOURCES) $(O2_SOURCES) $(O2_SCALAR_SOURCES))
+GONE := $(filter-out $(notdir $(SRC) $(KERNEL_SRC)),$(O3_SOURCES) $(VECTOR_SOURCES) $(O2_SOURCES) $(O2_SCALAR_SOURCES) $(SHARED_sse4) $(SHARED_avx512))
 $(if $(GONE),$(error libgait/flags.mk lists $(GONE), which libgait/src does not have))
 SRC_DIRS := $(sort $(dir $(OBJ)))
 UNIT := $(patsubst tests/unit/%.c,$(B)/unit/%,$(sort $(wildcard tests/unit/test_*.c)))

@@ -30,9 +30,13 @@ GCC_KERNEL     := --param=max-completely-peel-times=8
 
 # Kernels are compiled once per instruction set; the results of `scalar` define those of the others.  It runs only
 # where a mask allows no other, so that release builds compile it at -Os, but for the kernels that gain most.
-O2_SCALAR_SOURCES := outline_kernel.c surface_kernel.c texture_kernel.c edges_kernel.c silhouette_kernel.c
-X86_ISAS     := avx2 avx512
+O2_SCALAR_SOURCES := surface_kernel.c silhouette_kernel.c
+X86_ISAS     := sse4 avx2 avx512
+# Those whose kernels an instruction set takes from the set before (KERNELS_WIDE, KERNELS_FRAME in dispatch.h).
+SHARED_sse4   := kinematics_kernel.c texture_kernel.c sides_kernel.c cholesky_kernel.c lift_kernel.c dynamics_kernel.c view_kernel.c features_kernel.c estimate_kernel.c track_loss_kernel.c
+SHARED_avx512 := view_kernel.c features_kernel.c estimate_kernel.c track_loss_kernel.c
 FLAGS_scalar := -DKERNEL_SCALAR -fno-tree-vectorize -fno-tree-slp-vectorize
 FLAGS_base   :=
+FLAGS_sse4   := -mssse3 -msse4.1 -mpopcnt
 FLAGS_avx2   := -mavx2 -mpopcnt -mbmi -mbmi2
 FLAGS_avx512 := -mavx2 -mpopcnt -mbmi -mbmi2 -mavx512f -mavx512bw -mavx512dq -mavx512vl -mavx512vbmi -mavx512vpopcntdq -mavx512bitalg -mprefer-vector-width=512

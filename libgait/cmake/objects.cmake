@@ -71,7 +71,11 @@ foreach(level O3 VECTOR LESS O2 OS)
   gait_objects(${level} "${code_${level}}" ${level})
   gait_objects(${level}_scalar "${scalar_${level}}" ${level} -DKERNEL_ISA=scalar ${FLAGS_scalar})
   foreach(isa base ${X86_ISAS})
-    gait_objects(${level}_${isa} "${kernel_${level}}" ${level} ${kernel_flags_${level}} ${GCC_${level}_${isa}}
+    set(own ${kernel_${level}})
+    foreach(name IN LISTS SHARED_${isa})
+      list(FILTER own EXCLUDE REGEX "/${name}$")
+    endforeach()
+    gait_objects(${level}_${isa} "${own}" ${level} ${kernel_flags_${level}} ${GCC_${level}_${isa}}
                  -DKERNEL_ISA=${isa} ${FLAGS_${isa}})
   endforeach()
 endforeach()

@@ -510,8 +510,9 @@ GAIT_API gait_result gait_tracker_lagged(gait_tracker *t, int32_t back, gait_est
 #define GAIT_CPU_BASE   0x1u /* of every CPU of the architecture: SSE2, NEON */
 #define GAIT_CPU_AVX2   0x2u /* and POPCNT, BMI2 */
 #define GAIT_CPU_AVX512 0x4u /* F, BW, DQ, VL, VBMI, VPOPCNTDQ, BITALG */
+#define GAIT_CPU_SSE4   0x8u /* x86-64-v2: SSSE3, SSE4.1, POPCNT */
 GAIT_API uint32_t    gait_cpu_features(void);      /* GAIT_CPU_* of this CPU and build */
-GAIT_API const char *gait_cpu_name(uint32_t mask); /* what cpu_mask gives here: "scalar", "base", "avx2" or "avx512" */
+GAIT_API const char *gait_cpu_name(uint32_t mask); /* what cpu_mask gives here: "scalar", "base", "sse4", "avx2" or "avx512" */
 
 /* ---- advanced: particles, snapshots, replay ---------------------------------------------------------- */
 /* Continue with another number of particles in [16, config particles], drawn by weight in the next step.  The change

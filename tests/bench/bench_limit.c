@@ -7,7 +7,9 @@
 enum { LIMBS = LIMIT_PARTICLES * LIMIT_LIMBS, BYTES = LIMBS * LIMIT_SAMPLES, RUNS = 15 };
 
 #if defined(__x86_64__)
-#define ISAS(S) S(scalar, 0) S(base, GAIT_CPU_BASE) S(avx2, GAIT_CPU_AVX2) S(avx512, GAIT_CPU_AVX512)
+#define ISAS(S)                                                                                              \
+    S(scalar, 0)                                                                                             \
+    S(base, GAIT_CPU_BASE) S(sse4, GAIT_CPU_SSE4) S(avx2, GAIT_CPU_AVX2) S(avx512, GAIT_CPU_AVX512)
 #else
 #define ISAS(S) S(scalar, 0) S(base, GAIT_CPU_BASE)
 #endif

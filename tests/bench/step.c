@@ -128,7 +128,8 @@ static bool modes(bench *b)
 /* The same with each instruction set, with the stages' times. */
 static bool instruction_sets(bench *b)
 {
-    static const uint32_t masks[] = {0, GAIT_CPU_BASE, GAIT_CPU_BASE | GAIT_CPU_AVX2,
+    static const uint32_t masks[] = {0, GAIT_CPU_BASE, GAIT_CPU_BASE | GAIT_CPU_SSE4,
+                                     GAIT_CPU_BASE | GAIT_CPU_AVX2,
                                      GAIT_CPU_BASE | GAIT_CPU_AVX2 | GAIT_CPU_AVX512};
     enum { SETS = sizeof masks / sizeof *masks };
     bench_plan plans[SETS];
@@ -225,7 +226,8 @@ static bool pictures(bench *b)
 
 static bool limit(bench *b)
 {
-    static const uint32_t masks[] = {0, GAIT_CPU_BASE, GAIT_CPU_BASE | GAIT_CPU_AVX2, ~0u};
+    static const uint32_t masks[] = {0, GAIT_CPU_BASE, GAIT_CPU_BASE | GAIT_CPU_SSE4,
+                                     GAIT_CPU_BASE | GAIT_CPU_AVX2, ~0u};
     printf(
         "\ntexture-only limit, %d particles x %d limbs x %d samples, CPU ms: two look-ups, ancestor kept\n",
         LIMIT_PARTICLES, LIMIT_LIMBS, LIMIT_SAMPLES);

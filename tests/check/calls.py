@@ -16,7 +16,7 @@ EDGE = re.compile(r'^edge: \{ sourcename: "([^"]+)" targetname: "([^"]+)"(?: lab
 UNIT = re.compile(r'^graph: \{ title: "([^"]+)"', re.M)
 NO_CODE = re.compile(r"""/\*.*?\*/|//[^\n]*|"(?:\\.|[^"\\])*"|'(?:\\.|[^'\\])+'""", re.S)
 VALUE = re.compile(r"(?:[,(){=&?:]|\breturn\b)\s*(?!return\b)(\w+)\b(?!\s*\()")
-ISA = r"_(scalar|base|avx2|avx512)"
+ISA = r"_(scalar|base|sse4|avx2|avx512)"
 POINTER = "__indirect_call"
 POINTERS = {  # file and name of a pointer: functions it may point to
     "task.c:run": "run",

@@ -47,7 +47,7 @@ model = gait.Model()
 mean, sd = model.prior()
 view = gait.Camera.looking([0, -5, 1.2], [0, 0, 1], (320, 240), 300.0)
 empty = np.zeros((240, 320), np.uint8)
-for mask in (0, 1, 3, 7):  # GAIT_CPU_*: scalar, base, AVX2, AVX-512
+for mask in (0, 1, 9, 11, 15):  # GAIT_CPU_*: scalar, base, SSE4, AVX2, AVX-512
     config = gait.TrackerConfig.default(particles=500, seed=5, cpu_mask=mask)
     tracker = gait.Tracker(model, view, config, background=empty)
     tracker.start(mean, sd, 0)

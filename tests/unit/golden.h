@@ -24,6 +24,7 @@ static inline int golden_print(uint64_t (*digest)(uint32_t mask), uint64_t wante
         const char *name;
     } set[] = {{0, "scalar"},
                {GAIT_CPU_BASE, "base"},
+               {GAIT_CPU_BASE | GAIT_CPU_SSE4, "sse4"},
                {GAIT_CPU_BASE | GAIT_CPU_AVX2, "avx2"},
                {GAIT_CPU_BASE | GAIT_CPU_AVX2 | GAIT_CPU_AVX512, "avx512"}};
     int wrong = 0;
@@ -43,7 +44,7 @@ static inline int golden_main(int argc, char **argv, void (*tests)(void), uint64
     if (argc == 2)
         return strcmp(argv[1], "digest") == 0 ? (golden_print(digest, wanted, name) + check_failed) != 0 : 2;
     tests();
-    for (uint32_t mask = 0; mask <= (GAIT_CPU_BASE | GAIT_CPU_AVX2 | GAIT_CPU_AVX512); mask++)
+    for (uint32_t mask = 0; mask <= (GAIT_CPU_BASE | GAIT_CPU_SSE4 | GAIT_CPU_AVX2 | GAIT_CPU_AVX512); mask++)
         CHECK(digest(mask) == wanted);
     CHECK(golden_line(digest(~0u), wanted, name, "best") == wanted);
     return check_done(argv[0]);

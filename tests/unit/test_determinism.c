@@ -105,7 +105,7 @@ static uint64_t run(const gait_tracker_config *cfg, int save_at)
 }
 
 /* Masks of instruction sets: each of them alone, any together, none (scalar). */
-enum { MASKS = (GAIT_CPU_BASE | GAIT_CPU_AVX2 | GAIT_CPU_AVX512) + 1 };
+enum { MASKS = (GAIT_CPU_BASE | GAIT_CPU_SSE4 | GAIT_CPU_AVX2 | GAIT_CPU_AVX512) + 1 };
 
 static uint64_t masked(gait_tracker_config cfg, uint32_t mask)
 {

@@ -166,9 +166,9 @@ static int make_table(settings *s, option *table)
          "threads, default 1, which is also the default of --tasks; results do not depend on it",
          INT(threads, 1, GAIT_POOL_MAX)},
         {"cpu-mask", 0, "N",
-         "sum of the instruction sets to use: 1 SSE2 or NEON, 2 AVX2, 4 AVX-512; 0: none; default all\n"
-         "        that the CPU has; results do not depend on it",
-         INT(cpu_mask, 0, GAIT_CPU_BASE | GAIT_CPU_AVX2 | GAIT_CPU_AVX512)},
+         "sum of the instruction sets to use: 1 SSE2 or NEON, 2 AVX2, 4 AVX-512, 8 SSE4.1; 0: none;\n"
+         "        default all that the CPU has; results do not depend on it",
+         INT(cpu_mask, 0, GAIT_CPU_BASE | GAIT_CPU_SSE4 | GAIT_CPU_AVX2 | GAIT_CPU_AVX512)},
         {"max-gap", 0, "S",
          "longest pause between frames, default 2 seconds. Pauses longer than --max-dt are bridged by\n"
          "        predictions of at most --max-dt each. After a pause longer than S, or if the clock is set\n"

@@ -5,14 +5,29 @@
 /* Declarations of the kernels of every ISA, and one constant table of each. */
 #define DECLARE_scalar(result, name, parameters) result name##_scalar parameters;
 #define DECLARE_base(result, name, parameters)   result name##_base parameters;
+#define DECLARE_sse4(result, name, parameters)   result name##_sse4 parameters;
 #define DECLARE_avx2(result, name, parameters)   result name##_avx2 parameters;
 #define DECLARE_avx512(result, name, parameters) result name##_avx512 parameters;
 #define MEMBER_scalar(result, name, parameters)  .name = name##_scalar,
 #define MEMBER_base(result, name, parameters)    .name = name##_base,
+#define MEMBER_sse4(result, name, parameters)    .name = name##_sse4,
 #define MEMBER_avx2(result, name, parameters)    .name = name##_avx2,
 #define MEMBER_avx512(result, name, parameters)  .name = name##_avx512,
+#define WIDE_scalar                              MEMBER_scalar
+#define WIDE_base                                MEMBER_base
+#define WIDE_sse4                                MEMBER_base
+#define WIDE_avx2                                MEMBER_avx2
+#define WIDE_avx512                              MEMBER_avx512
+#define FRAME_scalar                             MEMBER_scalar
+#define FRAME_base                               MEMBER_base
+#define FRAME_sse4                               MEMBER_base
+#define FRAME_avx2                               MEMBER_avx2
+#define FRAME_avx512                             MEMBER_avx2
 #define TABLE(which, bit)                                                                                    \
-    KERNELS(DECLARE_##which) static const kernels which = {.isa = #which, KERNELS(MEMBER_##which)};
+    KERNELS(DECLARE_##which)                                                                                 \
+    static const kernels which = {.isa = #which,                                                             \
+                                  KERNELS_EACH(MEMBER_##which) KERNELS_WIDE(WIDE_##which)                    \
+                                      KERNELS_FRAME(FRAME_##which)};
 KERNEL_ISAS(TABLE)
 
 const kernels *kernels_choose(uint32_t mask)

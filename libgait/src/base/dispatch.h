@@ -40,8 +40,47 @@ struct view_map;
 struct view_planes;
 struct particle_block;
 
-/* Result, name, parameters. */
-#define KERNELS(K)                                                                                              \
+/* Result, name, parameters. Every instruction set has a version of its own of these, in which a step spends its time. */
+#define KERNELS_EACH(K)                                                                                      \
+    /* Outlines of the limbs of a block of bodies in one camera's working image. */                          \
+    K(void, outline_project,                                                                                 \
+      (const struct limb_geometry *limbs, int32_t count, const struct kin_body *body,                        \
+       const gait_camera *cam, const struct view_map *map, struct outline_block *out))                       \
+    /* Outlines as lines in the grid, with the depth order of the limbs; then masks of one body. */          \
+    K(void, layers_prepare,                                                                                  \
+      (const struct outline_block *outline, const struct limb_geometry *limbs, int32_t count,                \
+       struct layers_block *out))                                                                            \
+    K(void, layers_draw, (const struct layers_block *block, int32_t lane, struct layers *out))               \
+    K(void, silhouette_count,                                                                                \
+      (const struct features *f, const struct grid_mask *whole, int32_t *area, int32_t *covered))            \
+    /* Surface points of a block of bodies in a camera, samples of one body, and their comparison. */        \
+    K(void, surface_pose,                                                                                    \
+      (const struct like_setup *s, const gait_camera *cam, const struct view_map *map,                       \
+       const struct kin_body *body, struct like_pose *out))                                                  \
+    K(void, surface_sample,                                                                                  \
+      (const struct like_setup *s, const struct features *f, const struct like_pose *pose, int32_t lane,     \
+       const struct layers *drawn, struct like_patch *out))                                                  \
+    K(void, edges_count, (const struct like_body *b, struct like_edge_tally *out))
+
+/* SSE4 has those of the base: its own would be no faster. */
+#define KERNELS_WIDE(K)                                                                                         \
+    /* Every channel at each lane's phase from the first `components` scores (Ormoneit et al., eq. 3). */       \
+    K(void, kin_curves,                                                                                         \
+      (const struct gait_model *m, const struct kin_input *in, int32_t components,                              \
+       struct kin_channels *out))                                                                               \
+    /* Every frame in the world; the first `proportions` scores of limb lengths apply. */                       \
+    K(void, kin_pose,                                                                                           \
+      (const struct gait_model *m, const struct kin_channels *ch, const struct kin_input *in,                   \
+       int32_t proportions, struct kin_body *out))                                                              \
+    K(void, texture_costs, (const struct like_body *b, int32_t (*cost)[16]))                                    \
+    K(void, texture_logs,                                                                                       \
+      (const struct like_setup *s, const struct outline_block *outline, const int32_t (*cost)[16],              \
+       float *restrict log))                                                                                    \
+    K(int64_t, template_cost, (const struct like_body *b))                                                      \
+    /* Sides of the limbs of a block of bodies, and the gradient along those of one body. */                    \
+    K(void, edges_prepare,                                                                                      \
+      (const struct outline_block *outline, const struct limb_geometry *limbs, int32_t count,                   \
+       struct like_outline *out))                                                                               \
     /* Upper triangle of A += W'W, A and W of ld columns (base/cholesky.h) */                                   \
     K(void, cholesky_rank, (double *A, int32_t ld, const double *W, int32_t rows))                              \
     /* A = U'U, n rows, U may be A; column n becomes U^-T b and the residual; false: not definite */            \
@@ -69,14 +108,13 @@ struct particle_block;
       (float *v, size_t stride, size_t apart, const double *shape, int32_t modes, double M[9][8]))              \
     /* x[j] += sum_i Z[i * stride + j]^2, j < width, of CHOLESKY_LANES */                                       \
     K(void, lift_squares, (double *x, int32_t width, const float *Z, size_t stride, int32_t rows))              \
-    /* Every channel at each lane's phase from the first `components` scores (Ormoneit et al., eq. 3). */       \
-    K(void, kin_curves,                                                                                         \
-      (const struct gait_model *m, const struct kin_input *in, int32_t components,                              \
-       struct kin_channels *out))                                                                               \
-    /* Every frame in the world; the first `proportions` scores of limb lengths apply. */                       \
-    K(void, kin_pose,                                                                                           \
-      (const struct gait_model *m, const struct kin_channels *ch, const struct kin_input *in,                   \
-       int32_t proportions, struct kin_body *out))                                                              \
+    /* A block of particles over one interval. */                                                               \
+    K(void, dynamics_move,                                                                                      \
+      (const struct dynamics_step *s, int32_t first, const struct particle_block *from,                         \
+       struct particle_block *to))
+
+/* So has SSE4 of these, and AVX-512 has those of AVX2: they take little of a step. */
+#define KERNELS_FRAME(K)                                                                                        \
     /* A captured frame resampled to the working image, and its feature maps. */                                \
     K(void, view_rows,                                                                                          \
       (const struct view_map *map, const gait_camera *cam, const gait_image *im, int32_t begin, int32_t end,    \
@@ -88,10 +126,6 @@ struct particle_block;
     K(void, features_edges, (const uint8_t *grey, struct edge_cell *out, struct edge_rows *s))                  \
     K(void, features_contrast, (const uint8_t *grey, int8_t *out))                                              \
     K(void, features_pairs, (const int8_t *surface, uint16_t *pairs))                                           \
-    /* A block of particles over one interval. */                                                               \
-    K(void, dynamics_move,                                                                                      \
-      (const struct dynamics_step *s, int32_t first, const struct particle_block *from,                         \
-       struct particle_block *to))                                                                              \
     /* Weighted sums over particles.  dominant: 1 for particles of the dominant hypothesis. */                  \
     /* With d = v - about, add d, d^2, and d over the dominant hypothesis to SUM_LANES running sums of each. */ \
     /* Only the last of several calls may have an n that is no multiple of SUM_LANES. */                        \
@@ -111,46 +145,22 @@ struct particle_block;
       (const float *heading, const float *pitch, const float *roll, const double *weight,                       \
        const uint8_t *dominant, int32_t n, double out[16]))                                                     \
     /* hidden[i] = log(exp(visible[i]) + exp(base + hidden[i])) */                                              \
-    K(void, track_loss_join, (const float *visible, float base, int32_t n, float *hidden))                      \
-    /* Outlines of the limbs of a block of bodies in one camera's working image. */                             \
-    K(void, outline_project,                                                                                    \
-      (const struct limb_geometry *limbs, int32_t count, const struct kin_body *body,                           \
-       const gait_camera *cam, const struct view_map *map, struct outline_block *out))                          \
-    /* Outlines as lines in the grid, with the depth order of the limbs; then masks of one body. */             \
-    K(void, layers_prepare,                                                                                     \
-      (const struct outline_block *outline, const struct limb_geometry *limbs, int32_t count,                   \
-       struct layers_block *out))                                                                               \
-    K(void, layers_draw, (const struct layers_block *block, int32_t lane, struct layers *out))                  \
-    K(void, silhouette_count,                                                                                   \
-      (const struct features *f, const struct grid_mask *whole, int32_t *area, int32_t *covered))               \
-    /* Surface points of a block of bodies in a camera, samples of one body, and their comparison. */           \
-    K(void, surface_pose,                                                                                       \
-      (const struct like_setup *s, const gait_camera *cam, const struct view_map *map,                          \
-       const struct kin_body *body, struct like_pose *out))                                                     \
-    K(void, surface_sample,                                                                                     \
-      (const struct like_setup *s, const struct features *f, const struct like_pose *pose, int32_t lane,        \
-       const struct layers *drawn, struct like_patch *out))                                                     \
-    K(void, texture_costs, (const struct like_body *b, int32_t (*cost)[16]))                                    \
-    K(void, texture_logs,                                                                                       \
-      (const struct like_setup *s, const struct outline_block *outline, const int32_t (*cost)[16],              \
-       float *restrict log))                                                                                    \
-    K(int64_t, template_cost, (const struct like_body *b))                                                      \
-    /* Sides of the limbs of a block of bodies, and the gradient along those of one body. */                    \
-    K(void, edges_prepare,                                                                                      \
-      (const struct outline_block *outline, const struct limb_geometry *limbs, int32_t count,                   \
-       struct like_outline *out))                                                                               \
-    K(void, edges_count, (const struct like_body *b, struct like_edge_tally *out))
+    K(void, track_loss_join, (const float *visible, float base, int32_t n, float *hidden))
+
+#define KERNELS(K) KERNELS_EACH(K) KERNELS_WIDE(K) KERNELS_FRAME(K)
 
 /* The instruction sets of this build, best last, each with the bit that a CPU mask must have. */
 #if defined(__x86_64__)
-#define KERNEL_ISAS(S) S(scalar, 0) S(base, GAIT_CPU_BASE) S(avx2, GAIT_CPU_AVX2) S(avx512, GAIT_CPU_AVX512)
+#define KERNEL_ISAS(S)                                                                                       \
+    S(scalar, 0)                                                                                             \
+    S(base, GAIT_CPU_BASE) S(sse4, GAIT_CPU_SSE4) S(avx2, GAIT_CPU_AVX2) S(avx512, GAIT_CPU_AVX512)
 #else
 #define KERNEL_ISAS(S) S(scalar, 0) S(base, GAIT_CPU_BASE)
 #endif
 
 #define KERNEL_MEMBER(result, name, parameters) result(*name) parameters;
 typedef struct kernels {
-    const char *isa; /* "scalar", "base", "avx2" or "avx512" */
+    const char *isa; /* "scalar", "base", "sse4", "avx2" or "avx512" */
     KERNELS(KERNEL_MEMBER)
 } kernels;
 

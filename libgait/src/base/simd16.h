@@ -18,6 +18,42 @@ enum { SIMD16 = 16 };
 #define SIMD16_NEON
 #endif
 
+#if defined(SIMD16_SSE2) || defined(SIMD16_NEON)
+#define SIMD4_F
+typedef float simd4_f __attribute__((vector_size(16)));
+
+static inline simd4_f simd4_all(float x)
+{
+    return (simd4_f){x, x, x, x};
+}
+
+static inline simd4_f simd4_load(const float *from)
+{
+    simd4_f x;
+    memcpy(&x, from, sizeof x);
+    return x;
+}
+#endif
+#if (defined(__SSE4_1__) && defined(SIMD16_SSE2)) || defined(SIMD16_NEON)
+#define SIMD4 /* shuffles of bytes: masks are drawn and read in registers of four numbers */
+#endif
+
+/* A word or byte that is read by itself: compilers would build vectors of such, which takes longer. */
+static inline uint32_t simd16_single(uint32_t x)
+{
+#if defined(__GNUC__) && !defined(KERNEL_SCALAR)
+    __asm__("" : "+r"(x));
+#endif
+    return x;
+}
+
+/* Before an array's elements are read one by one: from memory, not out of vector registers. */
+#if defined(__GNUC__) && !defined(KERNEL_SCALAR)
+#define SIMD16_STORED(array) __asm__("" : "+m"(array))
+#else
+#define SIMD16_STORED(array) ((void)0)
+#endif
+
 #if defined(__AVX2__)
 /* With a mask, even a full one, a gather does not wait for the old value of its register. The scale must be a
  * constant. */
@@ -41,51 +77,41 @@ static inline __m512i simd16_lookup16(const void *table, int32_t bytes, __m512i 
 #pragma GCC diagnostic pop
 #endif
 
-/* out[i] = the word `bytes` (2 or 4) times index[i] into the table, which has at least one, where take[i] is
- * negative, elsewhere 0. */
-#if defined(__AVX2__)
-static inline void simd16_lookup_every(int32_t bytes, const void *table, const int32_t *index,
-                                       const int32_t *take, int32_t *out)
+/* out[i] = the word `bytes` (2 or 4) times index[i] into the table where take[i] is negative, elsewhere anything;
+ * i < count, a multiple of SIMD16. Every index must be in the table. */
+static inline void simd16_read(int32_t bytes, const void *table, const int32_t *index, const int32_t *take,
+                               int32_t count, int32_t *out)
 {
 #if defined(__AVX512F__)
-    __mmask16 const on = _mm512_movepi32_mask(_mm512_loadu_si512(take));
-    _mm512_storeu_si512(out, simd16_lookup16(table, bytes, _mm512_loadu_si512(index), on));
-#else
-    for (int32_t i = 0; i < SIMD16; i += 8)
+    for (int32_t i = 0; i < count; i += 16) {
+        __mmask16 const on = _mm512_movepi32_mask(_mm512_loadu_si512(take + i));
+        _mm512_storeu_si512(out + i, simd16_lookup16(table, bytes, _mm512_loadu_si512(index + i), on));
+    }
+#elif defined(__AVX2__)
+    for (int32_t i = 0; i < count; i += 8)
         _mm256_storeu_si256((__m256i_u *)(out + i),
                             simd16_lookup8(table, bytes, _mm256_loadu_si256((const __m256i_u *)(index + i)),
                                            _mm256_loadu_si256((const __m256i_u *)(take + i))));
-#endif
-}
-#elif defined(KERNEL_SCALAR)
-static inline void simd16_lookup_every(int32_t bytes, const void *table, const int32_t *index,
-                                       const int32_t *take, int32_t *out)
-{
-    for (int32_t i = 0; i < SIMD16; i++) {
-        int32_t found = 0;
-        if (take[i] < 0)
-            memcpy(&found, (const char *)table + (ptrdiff_t)bytes * index[i], sizeof found);
-        out[i] = found; /* out may be index */
+#else
+    (void)take;
+#pragma GCC unroll 8
+    for (int32_t i = 0; i < count; i++) { /* out may be index */
+        uint32_t found;
+        memcpy(&found, (const char *)table + (size_t)bytes * (uint32_t)index[i], sizeof found);
+        out[i] = (int32_t)simd16_single(found);
     }
-}
-#else /* word 0 is read where nothing is taken, which is cheaper than a branch; once per file, because long */
-static __attribute__((noinline, unused)) void
-simd16_lookup_every(int32_t bytes, const void *table, const int32_t *index, const int32_t *take, int32_t *out)
-{
-    int32_t at[SIMD16], found[SIMD16];
-    for (int32_t i = 0; i < SIMD16; i++)
-        at[i] = (index[i] & take[i] >> 31) << (bytes >> 1); /* times 2 or 4 */
-    for (int32_t i = 0; i < SIMD16; i++)
-        memcpy(&found[i], (const char *)table + at[i], sizeof found[i]);
-    for (int32_t i = 0; i < SIMD16; i++)
-        out[i] = found[i] & take[i] >> 31; /* out may be index */
-}
 #endif
+}
 
-/* out[i] = table[index[i]] where take[i] is negative, elsewhere 0. */
-static inline void simd16_lookup(const void *table, const int32_t *index, const int32_t *take, int32_t *out)
+/* The same of words of four bytes, elsewhere 0. */
+static inline void simd16_lookup(const void *table, const int32_t *index, const int32_t *take, int32_t count,
+                                 int32_t *out)
 {
-    simd16_lookup_every(4, table, index, take, out);
+    simd16_read(4, table, index, take, count, out);
+#if !defined(__AVX2__)
+    for (int32_t i = 0; i < count; i++)
+        out[i] &= take[i] >> 31;
+#endif
 }
 
 #if defined(__AVX512BW__)
@@ -198,39 +224,110 @@ static inline void simd16_bilinear_bytes(const uint16_t *pairs, const int32_t *u
 }
 #endif
 
-/* Sum over `count` words, a multiple of SIMD16, of byte 1 times the low half of the pair plus byte 3 times
- * the high half. */
-static inline int32_t odd_bytes_dot(const int32_t *bytes, const int32_t *pair, int32_t count)
+/* Words to bytes; the values fit. */
+static inline void simd16_narrow(const int32_t *in, int8_t *out)
 {
-    int32_t sum = 0;
-#if defined(SIMD16_WORDS)
-    int32_t part[SIMD16_WORDS];
-    simd16_words all = WORDS_OP(set1_epi32)(0);
-    for (int32_t i = 0; i < count; i += SIMD16_WORDS)
-        all = WORDS_OP(add_epi32)(
-            all, WORDS_OP(madd_epi16)(WORDS_OP(srai_epi16)(words_load(bytes + i), 8), words_load(pair + i)));
-    words_store(part, all);
-    for (int32_t i = 0; i < SIMD16_WORDS; i++)
-        sum += part[i];
+#if defined(__AVX2__)
+    __m256i const low = _mm256_loadu_si256((const __m256i_u *)in);
+    __m256i const high = _mm256_loadu_si256((const __m256i_u *)(in + 8));
+    __m256i const half = _mm256_permute4x64_epi64(_mm256_packs_epi32(low, high), 0xd8);
+    _mm_storeu_si128((__m128i_u *)out,
+                     _mm_packs_epi16(_mm256_castsi256_si128(half), _mm256_extracti128_si256(half, 1)));
 #else
-    for (int32_t i = 0; i < count; i++) {
-        uint32_t const v = (uint32_t)bytes[i], p = (uint32_t)pair[i];
-        sum +=
-            ((int32_t)(v << 16) >> 24) * ((int32_t)(p << 16) >> 16) + ((int32_t)v >> 24) * ((int32_t)p >> 16);
-    }
+    for (int32_t i = 0; i < SIMD16; i++)
+        out[i] = (int8_t)in[i];
 #endif
-    return sum;
 }
 
-/* Copy sixteen numbers that are read repeatedly into registers. */
-static inline void simd16_load(const float *in, float *restrict out)
+#if defined(__SSE4_1__) && defined(SIMD16_SSE2)
+/* simd16_bilinear of four as bytes, `hidden` where shown is 0. */
+static inline void simd16_bilinear_narrow(const int32_t *four, const int32_t *u, const int32_t *v,
+                                          const int32_t *shown, int8_t hidden, int8_t *out)
 {
-#if defined(__AVX512F__)
-    _mm512_storeu_ps(out, _mm512_loadu_ps(in));
+    __m128i const bytes = _mm_setr_epi8(0, 0, 0, 0, 4, 4, 4, 4, 8, 8, 8, 8, 12, 12, 12, 12);
+    __m128i const words = _mm_or_si128(bytes, _mm_set1_epi16((short)0x8000));
+    __m128i value[4], in[4];
+    for (int32_t i = 0; i < 4; i++) {
+        __m128i const w = words_load(four + 4 * i);
+        __m128i const down =
+            _mm_xor_si128(_mm_shuffle_epi8(words_load(v + 4 * i), bytes), _mm_set1_epi16(0x00ff));
+        __m128i const left = _mm_srai_epi16(_mm_slli_epi16(w, 8), 8);
+        __m128i const both = _mm_add_epi16(_mm_maddubs_epi16(down, w), left);
+        __m128i const fx = _mm_shuffle_epi8(words_load(u + 4 * i), words);
+        __m128i const across = _mm_add_epi16(_mm_xor_si128(fx, _mm_set1_epi32(0xffff)), _mm_set1_epi32(257));
+        __m128i const sum = _mm_madd_epi16(both, across);
+        __m128i const up = _mm_srli_epi32(_mm_srai_epi32(sum, 31), 16);
+        value[i] = _mm_srai_epi32(_mm_add_epi32(sum, up), 16);
+        in[i] = words_load(shown + 4 * i);
+    }
+    __m128i const all =
+        _mm_packs_epi16(_mm_packs_epi32(value[0], value[1]), _mm_packs_epi32(value[2], value[3]));
+    __m128i const on = _mm_packs_epi16(_mm_packs_epi32(in[0], in[1]), _mm_packs_epi32(in[2], in[3]));
+    _mm_storeu_si128((__m128i *)(void *)out, _mm_blendv_epi8(_mm_set1_epi8(hidden), all, on));
+}
 #else
-    memcpy(out, in, SIMD16 * sizeof *out);
+static inline void simd16_bilinear_narrow(const int32_t *four, const int32_t *u, const int32_t *v,
+                                          const int32_t *shown, int8_t hidden, int8_t *out)
+{
+    int32_t all[SIMD16];
+    simd16_bilinear(four, u, v, all);
+#pragma GCC unroll 1
+    for (int32_t i = 0; i < SIMD16; i++)
+        all[i] = shown[i] < 0 ? all[i] : hidden;
+    simd16_narrow(all, out);
+}
+#endif
+
+typedef struct simd16_sums {
+    int32_t low, dot,
+        count; /* of byte 0; of byte 1 times the low half of the pair plus byte 3 times the high half; words */
+} simd16_sums;
+
+/* Sums over `count` words, a multiple of SIMD16, where take is negative; the others must be 0. */
+static inline simd16_sums simd16_sum_bytes(const int32_t *bytes, const int32_t *pair, const int32_t *take,
+                                           int32_t count)
+{
+#if defined(SIMD16_WORDS)
+    int32_t part[3][SIMD16_WORDS];
+    simd16_words low = WORDS_OP(set1_epi32)(0), dot = low, taken = low;
+    simd16_sums sum = {0, 0, 0};
+    for (int32_t i = 0; i < count; i += SIMD16_WORDS) {
+        simd16_words const w = words_load(bytes + i);
+        low = WORDS_OP(add_epi32)(low, WORDS_AND(w, WORDS_OP(set1_epi32)(255)));
+        dot =
+            WORDS_OP(add_epi32)(dot, WORDS_OP(madd_epi16)(WORDS_OP(srai_epi16)(w, 8), words_load(pair + i)));
+        taken = WORDS_OP(add_epi32)(taken, WORDS_OP(srli_epi32)(words_load(take + i), 31));
+    }
+    words_store(part[0], low);
+    words_store(part[1], dot);
+    words_store(part[2], taken);
+    for (int32_t i = 0; i < SIMD16_WORDS; i++) {
+        sum.low += part[0][i];
+        sum.dot += part[1][i];
+        sum.count += part[2][i];
+    }
+    return sum;
+#else
+    int32_t low = 0, dot = 0, taken = 0;
+    for (int32_t i = 0; i < count; i++) {
+        uint32_t const v = (uint32_t)bytes[i], p = (uint32_t)pair[i];
+        low += (int32_t)(v & 255);
+        dot +=
+            ((int32_t)(v << 16) >> 24) * ((int32_t)(p << 16) >> 16) + ((int32_t)v >> 24) * ((int32_t)p >> 16);
+        taken += (int32_t)((uint32_t)take[i] >> 31);
+    }
+    return (simd16_sums){low, dot, taken};
 #endif
 }
+
+#if defined(__AVX512F__)
+/* Sixteen numbers that are read repeatedly, in a register. */
+#define SIMD16_LOADED(name, in)                                                                              \
+    float name[SIMD16];                                                                                      \
+    _mm512_storeu_ps(name, _mm512_loadu_ps(in))
+#else
+#define SIMD16_LOADED(name, in) const float *const name = (in)
+#endif
 
 /* out[i] is negative where bit column[i], modulo 32, of bits[i] is set. */
 static inline void simd16_bit(const int32_t *bits, const int32_t *column, int32_t *out)
@@ -245,21 +342,6 @@ static inline void simd16_bit(const int32_t *bits, const int32_t *column, int32_
 #else
     for (int32_t i = 0; i < SIMD16; i++)
         out[i] = (int32_t)((uint32_t)bits[i] << (~column[i] & 31));
-#endif
-}
-
-/* Words to bytes; the values fit. */
-static inline void simd16_narrow(const int32_t *in, int8_t *out)
-{
-#if defined(__AVX2__)
-    __m256i const low = _mm256_loadu_si256((const __m256i_u *)in);
-    __m256i const high = _mm256_loadu_si256((const __m256i_u *)(in + 8));
-    __m256i const half = _mm256_permute4x64_epi64(_mm256_packs_epi32(low, high), 0xd8);
-    _mm_storeu_si128((__m128i_u *)out,
-                     _mm_packs_epi16(_mm256_castsi256_si128(half), _mm256_extracti128_si256(half, 1)));
-#else
-    for (int32_t i = 0; i < SIMD16; i++)
-        out[i] = (int8_t)in[i];
 #endif
 }
 
@@ -375,6 +457,161 @@ static inline void simd16_cover(const int32_t *span, uint64_t *restrict whole, u
     }
 #endif
 }
+
+#ifdef SIMD4
+/* The first if it is less (greater), else the second. */
+static inline simd4_f simd4_min(simd4_f a, simd4_f b)
+{
+#if defined(SIMD16_NEON)
+    return (simd4_f)vbslq_f32(vcltq_f32((float32x4_t)a, (float32x4_t)b), (float32x4_t)a, (float32x4_t)b);
+#else
+    return (simd4_f)_mm_min_ps((__m128)a, (__m128)b);
+#endif
+}
+
+static inline simd4_f simd4_max(simd4_f a, simd4_f b)
+{
+#if defined(SIMD16_NEON)
+    return (simd4_f)vbslq_f32(vcgtq_f32((float32x4_t)a, (float32x4_t)b), (float32x4_t)a, (float32x4_t)b);
+#else
+    return (simd4_f)_mm_max_ps((__m128)a, (__m128)b);
+#endif
+}
+
+/* x where from <= y < to, elsewhere 0. */
+static inline simd4_f simd4_inside(simd4_f y, simd4_f from, simd4_f to, simd4_f x)
+{
+    typedef int32_t words __attribute__((vector_size(16)));
+    return (simd4_f)((words)x & (y >= from) & (y < to));
+}
+
+/* Draw one limb into four rows of masks. The bits from `from` up to `to` (numbers of at most 64, rounded towards 0;
+ * less than 0 counts as 0) are set in `whole`; those that were not set before are returned in `visible`. */
+static inline void simd4_cover(simd4_f from, simd4_f to, uint64_t *restrict whole, uint64_t *restrict visible)
+{
+#if defined(SIMD16_NEON)
+    uint64x2_t const ones = vdupq_n_u64(~UINT64_C(0));
+    uint32x4_t const left = vcvtq_u32_f32((float32x4_t)from), right = vcvtq_u32_f32((float32x4_t)to);
+    uint64x2_t const low = vbicq_u64(vshlq_u64(ones, vreinterpretq_s64_u64(vmovl_u32(vget_low_u32(left)))),
+                                     vshlq_u64(ones, vreinterpretq_s64_u64(vmovl_u32(vget_low_u32(right)))));
+    uint64x2_t const high = vbicq_u64(vshlq_u64(ones, vreinterpretq_s64_u64(vmovl_high_u32(left))),
+                                      vshlq_u64(ones, vreinterpretq_s64_u64(vmovl_high_u32(right))));
+    uint64x2_t const low_nearer = vld1q_u64(whole), high_nearer = vld1q_u64(whole + 2);
+    vst1q_u64(visible, vbicq_u64(low, low_nearer));
+    vst1q_u64(visible + 2, vbicq_u64(high, high_nearer));
+    vst1q_u64(whole, vorrq_u64(low_nearer, low));
+    vst1q_u64(whole + 2, vorrq_u64(high_nearer, high));
+#else
+    /* Byte k of a word of bits [c, 64) from max(c - 8 k, 0), of which 8 and more leave none. */
+    __m128i const before = _mm_set_epi64x(0x3830282018100800, 0x3830282018100800), eight = _mm_set1_epi8(8);
+    __m128i const bits = _mm_set_epi64x(0, (int64_t)0x80c0e0f0f8fcfeff);
+    __m128i const columns =
+        _mm_packs_epi32(_mm_cvttps_epi32((__m128)from), _mm_cvttps_epi32((__m128)to)); /* four of each */
+    __m128i const c = _mm_packus_epi16(columns, columns);
+    for (int32_t i = 0; i < 2; i++) {
+        __m128i const pick = _mm_set1_epi8((char)(2 * i));
+        __m128i const row = _mm_add_epi8(_mm_set_epi64x(0x0101010101010101, 0), pick);
+        __m128i const left = _mm_subs_epu8(_mm_shuffle_epi8(c, row), before);
+        __m128i const right = _mm_subs_epu8(_mm_shuffle_epi8(c, _mm_add_epi8(row, _mm_set1_epi8(4))), before);
+        __m128i const mine = _mm_andnot_si128(_mm_shuffle_epi8(bits, _mm_min_epu8(right, eight)),
+                                              _mm_shuffle_epi8(bits, _mm_min_epu8(left, eight)));
+        __m128i *const all = (__m128i *)(void *)(whole + 2 * i);
+        __m128i const nearer = _mm_loadu_si128(all);
+        _mm_storeu_si128(all, _mm_or_si128(nearer, mine));
+        _mm_storeu_si128((__m128i *)(void *)(visible + 2 * i), _mm_andnot_si128(nearer, mine));
+    }
+#endif
+}
+
+/* Sixteen points of a mask as bytes: those of a column or row are exact from -128 to 126. */
+#if defined(SIMD16_NEON)
+typedef int8x16_t simd16_bytes;
+#else
+typedef __m128i simd16_bytes;
+#endif
+
+/* (v[i] >> shift) - from, saturated. */
+static inline simd16_bytes simd16_bytes_of(const int32_t *v, int32_t shift, int32_t from)
+{
+#if defined(SIMD16_NEON)
+    int32x4_t const by = vdupq_n_s32(-shift);
+    int16x8_t const off = vdupq_n_s16((int16_t)from);
+    int16x8_t const low =
+        vcombine_s16(vqmovn_s32(vshlq_s32(vld1q_s32(v), by)), vqmovn_s32(vshlq_s32(vld1q_s32(v + 4), by)));
+    int16x8_t const high = vcombine_s16(vqmovn_s32(vshlq_s32(vld1q_s32(v + 8), by)),
+                                        vqmovn_s32(vshlq_s32(vld1q_s32(v + 12), by)));
+    return vcombine_s8(vqmovn_s16(vqsubq_s16(low, off)), vqmovn_s16(vqsubq_s16(high, off)));
+#else
+    __m128i const off = _mm_set1_epi16((int16_t)from);
+    __m128i const low =
+        _mm_packs_epi32(_mm_srai_epi32(words_load(v), shift), _mm_srai_epi32(words_load(v + 4), shift));
+    __m128i const high =
+        _mm_packs_epi32(_mm_srai_epi32(words_load(v + 8), shift), _mm_srai_epi32(words_load(v + 12), shift));
+    return _mm_packs_epi16(_mm_subs_epi16(low, off), _mm_subs_epi16(high, off));
+#endif
+}
+
+/* All ones where 0 <= row < rows, 0 <= column < 64 and shown is negative. */
+static inline simd16_bytes simd16_bytes_inside(simd16_bytes row, int32_t rows, simd16_bytes column,
+                                               const int32_t *shown)
+{
+#if defined(SIMD16_NEON)
+    int16x8_t const low = vcombine_s16(vqmovn_s32(vld1q_s32(shown)), vqmovn_s32(vld1q_s32(shown + 4)));
+    int16x8_t const high = vcombine_s16(vqmovn_s32(vld1q_s32(shown + 8)), vqmovn_s32(vld1q_s32(shown + 12)));
+    uint8x16_t const on = vcltzq_s8(vcombine_s8(vqmovn_s16(low), vqmovn_s16(high)));
+    uint8x16_t const across = vcltq_u8(vreinterpretq_u8_s8(column), vdupq_n_u8(64));
+    uint8x16_t const down = vcltq_u8(vreinterpretq_u8_s8(row), vdupq_n_u8((uint8_t)rows));
+    return vreinterpretq_s8_u8(vandq_u8(on, vandq_u8(across, down)));
+#else
+    __m128i const none = _mm_setzero_si128();
+    __m128i const low = _mm_packs_epi32(words_load(shown), words_load(shown + 4));
+    __m128i const high = _mm_packs_epi32(words_load(shown + 8), words_load(shown + 12));
+    __m128i const across = _mm_cmpeq_epi8(_mm_and_si128(column, _mm_set1_epi8((char)0xc0)), none);
+    __m128i const beyond = _mm_cmpeq_epi8(_mm_subs_epu8(_mm_set1_epi8((char)rows), row), none);
+    return _mm_andnot_si128(beyond, _mm_and_si128(across, _mm_packs_epi16(low, high)));
+#endif
+}
+
+/* at[i] = 8 row + column / 8: the byte of a mask's first word. */
+static inline void simd16_byte_places(simd16_bytes row, simd16_bytes column, uint16_t *at)
+{
+#if defined(SIMD16_NEON)
+    uint8x16_t const r = vreinterpretq_u8_s8(row), c = vshrq_n_u8(vreinterpretq_u8_s8(column), 3);
+    vst1q_u16(at, vaddw_u8(vshll_n_u8(vget_low_u8(r), 3), vget_low_u8(c)));
+    vst1q_u16(at + 8, vaddw_high_u8(vshll_high_n_u8(r, 3), c));
+#else
+    __m128i const eighths = _mm_and_si128(_mm_srli_epi16(column, 3), _mm_set1_epi8(7)),
+                  by = _mm_set1_epi16(0x0108);
+    _mm_storeu_si128((__m128i *)(void *)at, _mm_maddubs_epi16(_mm_unpacklo_epi8(row, eighths), by));
+    _mm_storeu_si128((__m128i *)(void *)(at + 8), _mm_maddubs_epi16(_mm_unpackhi_epi8(row, eighths), by));
+#endif
+}
+
+/* shown[i] = -1 where bit column[i], modulo 8, of bits[i] and a bit of in[i] are set, elsewhere 0. */
+static inline void simd16_bytes_show(const uint8_t *bits, simd16_bytes column, simd16_bytes in,
+                                     int32_t *shown)
+{
+#if defined(SIMD16_NEON)
+    int8x16_t const low = vandq_s8(column, vdupq_n_s8(7));
+    uint8x16_t const bit = vshlq_u8(vdupq_n_u8(1), low);
+    int8x16_t const on = vandq_s8(vreinterpretq_s8_u8(vtstq_u8(vld1q_u8(bits), bit)), in);
+    int16x8_t const a = vmovl_s8(vget_low_s8(on)), b = vmovl_high_s8(on);
+    vst1q_s32(shown, vmovl_s16(vget_low_s16(a)));
+    vst1q_s32(shown + 4, vmovl_high_s16(a));
+    vst1q_s32(shown + 8, vmovl_s16(vget_low_s16(b)));
+    vst1q_s32(shown + 12, vmovl_high_s16(b));
+#else
+    __m128i const powers = _mm_set1_epi64x((int64_t)0x8040201008040201);
+    __m128i const bit = _mm_shuffle_epi8(powers, _mm_and_si128(column, _mm_set1_epi8(7)));
+    __m128i const on = _mm_and_si128(
+        _mm_cmpeq_epi8(_mm_and_si128(_mm_loadu_si128((const __m128i *)(const void *)bits), bit), bit), in);
+    words_store(shown, _mm_cvtepi8_epi32(on));
+    words_store(shown + 4, _mm_cvtepi8_epi32(_mm_srli_si128(on, 4)));
+    words_store(shown + 8, _mm_cvtepi8_epi32(_mm_srli_si128(on, 8)));
+    words_store(shown + 12, _mm_cvtepi8_epi32(_mm_srli_si128(on, 12)));
+#endif
+}
+#endif
 
 /* Transpose sixteen numbers of sixteen bodies from in[number][body] to out[body][number], one cache line
  * each. */

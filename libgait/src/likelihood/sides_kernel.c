@@ -11,7 +11,7 @@ typedef struct side_words { /* where the values of one side are stored */
  * image. */
 static void side(const outline_lanes *o, int32_t from, int32_t next, side_words out)
 {
-    float const outside = -1e4f, far = 1e6f;
+    float const outside = -1e4f, far = f_bound(1e6f);
     const float *const x0 = o->x[from], *const y0 = o->y[from], *const x1 = o->x[next],
                        *const y1 = o->y[next];
     KERNEL_LANES
@@ -31,7 +31,7 @@ static void side(const outline_lanes *o, int32_t from, int32_t next, side_words 
 /* The part of the inner points that comes from the middle of the limb, cells. */
 static void middle(const body_lanes *v, const int32_t corner[4], float *restrict out)
 {
-    float const far = 1e6f, share = 0.125f * LIKE_INWARD;
+    float const far = f_bound(1e6f), share = 0.125f * LIKE_INWARD;
     const float *const a = v[corner[0]], *const b = v[corner[1]], *const c = v[corner[2]],
                        *const d = v[corner[3]];
     for (int32_t i = 0; i < BLOCK; i++)

@@ -11,6 +11,7 @@ void KERNEL(silhouette_count)(const features *f, const grid_mask *whole, int32_t
         const uint64_t (*const words)[GRID_SIZE] =
             (const uint64_t (*)[GRID_SIZE])f->words[(whole->column + 64 * w) / GRID_STEP];
         const uint64_t *const body = whole->word[w], *const inside = words[FOREGROUND_PLANES];
+#pragma GCC unroll 4
         for (int32_t y = whole->first; y < whole->last; y++) {
             uint64_t const m = body[y] & inside[y];
             cells += grid_popcount(m);

@@ -97,9 +97,12 @@ void KERNEL(surface_pose)(const like_setup *s, const gait_camera *cam, const vie
 
 /* ---- the points of one body ---- */
 
-typedef struct spots {                  /* the points of half a limb */
-    int32_t u[LIKE_HALF], v[LIKE_HALF]; /* 1/256 working pixels, 0 where not shown */
-    int32_t shown[LIKE_HALF];           /* negative: faces the camera well enough and is in the image */
+typedef struct spots { /* the points of half of each limb */
+    int32_t u[MODEL_MAX_LIMBS][LIKE_HALF],
+        v[MODEL_MAX_LIMBS][LIKE_HALF];      /* 1/256 working pixels, 0 where not shown */
+    int32_t at[MODEL_MAX_LIMBS][LIKE_HALF]; /* index into the surface map */
+    int32_t shown[MODEL_MAX_LIMBS]
+                 [LIKE_HALF]; /* negative: faces the camera well enough and is in the image */
 } spots;
 
 static inline uint32_t u_max(uint32_t a, uint32_t b)
@@ -108,7 +111,8 @@ static inline uint32_t u_max(uint32_t a, uint32_t b)
 }
 
 /* Project the points of half a limb. Values that are read repeatedly stay in registers. */
-static inline void place(const like_surface *s, const like_pose_limb *pose, int32_t lane, spots *restrict out)
+static inline void place(const like_surface *s, const like_pose_limb *pose, int32_t lane, int32_t l,
+                         spots *restrict out)
 {
     float const end = (float)((VIEW_SIZE - 1) * LIKE_SUBPIXELS); /* one pixel further has no neighbours */
     int32_t const first = 2 * pose->turn[lane];
@@ -119,43 +123,41 @@ static inline void place(const like_surface *s, const like_pose_limb *pose, int3
                 Z2 = Z[2];
     float const E0 = E[0], E1 = E[1], E2 = E[2], S0 = w[LIKE_VIEW_SHIFT], S1 = w[LIKE_VIEW_SHIFT + 1],
                 S2 = w[LIKE_VIEW_SHIFT + 2];
-    float const graze = w[LIKE_VIEW_GRAZE];
-    float px[LIKE_HALF], py[LIKE_HALF], pz[LIKE_HALF];
-    simd16_load(s->point[0] + first, px);
-    simd16_load(s->point[1] + first, py);
-    simd16_load(s->point[2] + first, pz);
+    float const graze = w[LIKE_VIEW_GRAZE], near = f_bound(CAMERA_NEAR), one = f_bound(1.0f);
+    SIMD16_LOADED(px, s->point[0] + first);
+    SIMD16_LOADED(py, s->point[1] + first);
+    SIMD16_LOADED(pz, s->point[2] + first);
 #pragma GCC unroll 1
     for (int32_t i = 0; i < LIKE_HALF; i++) {
         int32_t const j = first + i;
         float const nx = s->normal[0][j], ny = s->normal[1][j], nz = s->normal[2][j];
-        float const z = f_max(Z0 * px[i] + Z1 * py[i] + Z2 * pz[i] + S2, CAMERA_NEAR), inv = 1.0f / z;
+        float const z = f_max(Z0 * px[i] + Z1 * py[i] + Z2 * pz[i] + S2, near), inv = one / z;
         float const x = (X0 * px[i] + X1 * py[i] + X2 * pz[i] + S0) * inv;
         float const y = (Y0 * px[i] + Y1 * py[i] + Y2 * pz[i] + S1) * inv;
         float const away = nx * E0 + ny * E1 + nz * E2 + s->outward[j];
         /* Non-negative floats are ordered like their bits; the bits of negative ones are greater. */
         int32_t const shown = -((away < graze) & (u_max(m_bits(x), m_bits(y)) < m_bits(end)));
-        out->shown[i] = shown;
-        out->u[i] = shown ? (int32_t)x : 0;
-        out->v[i] = shown ? (int32_t)y : 0;
+        out->shown[l][i] = shown;
+        int32_t const u = shown ? (int32_t)x : 0, v = shown ? (int32_t)y : 0;
+        out->u[l][i] = u;
+        out->v[l][i] = v;
+#ifndef SIMD16_BILINEAR_BYTES
+        out->at[l][i] = (v & ~(LIKE_SUBPIXELS - 1)) | u >> 8;
+#endif
     }
 }
 
 /* Read the surface map by bilinear interpolation, rounded towards 0. */
-static inline void read_surface(const features *f, const spots *p, int8_t *restrict value)
+static inline void read_surface(const features *f, const spots *p, int32_t limbs, like_patch *restrict out)
 {
 #ifdef SIMD16_BILINEAR_BYTES
-    simd16_bilinear_bytes(f->pairs, p->u, p->v, p->shown, TEXTURE_HIDDEN, value);
+    for (int32_t l = 0; l < limbs; l++)
+        simd16_bilinear_bytes(f->pairs, p->u[l], p->v[l], p->shown[l], TEXTURE_HIDDEN, out[l].value);
 #else
-    int32_t at[LIKE_HALF], quad[LIKE_HALF], all[LIKE_HALF];
-#pragma GCC unroll 1
-    for (int32_t i = 0; i < LIKE_HALF; i++)
-        at[i] = p->v[i] >> 8 << 8 | p->u[i] >> 8;
-    simd16_lookup_every(2, f->pairs, at, p->shown, quad);
-    simd16_bilinear(quad, p->u, p->v, all);
-#pragma GCC unroll 1
-    for (int32_t i = 0; i < LIKE_HALF; i++)
-        all[i] = p->shown[i] < 0 ? all[i] : TEXTURE_HIDDEN;
-    simd16_narrow(all, value);
+    int32_t quad[MODEL_MAX_LIMBS][LIKE_HALF];
+    simd16_read(2, f->pairs, p->at[0], p->shown[0], limbs * LIKE_HALF, quad[0]);
+    for (int32_t l = 0; l < limbs; l++)
+        simd16_bilinear_narrow(quad[l], p->u[l], p->v[l], p->shown[l], TEXTURE_HIDDEN, out[l].value);
 #endif
 }
 
@@ -164,13 +166,12 @@ static inline void read_surface(const features *f, const spots *p, int8_t *restr
 void KERNEL(surface_sample)(const like_setup *s, const features *f, const like_pose *pose, int32_t lane,
                             const layers *drawn, like_patch *restrict out)
 {
-    spots p[MODEL_MAX_LIMBS];
-    for (int32_t l = 0; l < s->limbs; l++)
-        place(&s->surface[l], &pose->limb[l], lane, &p[l]);
-    for (int32_t l = 0; l < s->limbs; l++)
-        hide(&drawn->visible[l], p[l].u, p[l].v, LIKE_CELL_BITS, p[l].shown);
+    spots p;
     for (int32_t l = 0; l < s->limbs; l++) {
+        place(&s->surface[l], &pose->limb[l], lane, l, &p);
         out[l].turn = (uint8_t)pose->limb[l].turn[lane];
-        read_surface(f, &p[l], out[l].value);
     }
+    hide(drawn->visible, s->limbs, (const int32_t (*)[SIMD16])p.u, (const int32_t (*)[SIMD16])p.v,
+         LIKE_CELL_BITS, p.shown);
+    read_surface(f, &p, s->limbs, out);
 }

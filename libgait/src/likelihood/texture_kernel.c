@@ -35,7 +35,8 @@ static inline int32_t compare(const int8_t *restrict a, const int8_t *restrict b
         bool const hidden = (x == TEXTURE_HIDDEN) | (y == TEXTURE_HIDDEN);
         difference[i] = hidden ? LIKE_COST_NONE : d;
     }
-#pragma GCC unroll 8
+    SIMD16_STORED(difference);
+#pragma GCC unroll 16
     for (int32_t i = 0; i < LIKE_HALF; i++)
         sum += cost[difference[i]];
     return sum;

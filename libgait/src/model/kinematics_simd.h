@@ -26,20 +26,35 @@ typedef struct bodies {
     float *R, *o, *scale; /* F x 9 x n, F x 3 x n, F x n */
 } bodies;
 
-/* Channels first .. first + count - 1 of one body; component k's score is coef[k * stride]. */
-KIN_INLINE void curves_part(const gait_model *m, float phase, float pace, const float *coef, int32_t stride,
-                            int32_t components, int32_t first, int32_t count, float *acc)
+/* Where on the curves a phase is: between two samples. */
+typedef struct curve_place {
+    size_t here, next; /* index of channel `first` in a curve's samples */
+    float w;           /* weight of the next one */
+} curve_place;
+
+KIN_INLINE curve_place curve_place_of(const gait_model *m, float phase, int32_t first)
 {
     int32_t const T = m->phases, M = m->channels;
     float const at = m_wrap1(phase) * (float)T;
     int32_t const j = i_min((int32_t)at, T - 1), next = j + 1 < T ? j + 1 : 0;
-    float const w = at - (float)j;
+    return (curve_place){(size_t)j * (size_t)M + (size_t)first, (size_t)next * (size_t)M + (size_t)first,
+                         at - (float)j};
+}
+
+/* Channels first .. first + count - 1 of one body; component k's score is coef[k * stride]. */
+KIN_INLINE void curves_part(const gait_model *m, float phase, float pace, const float *coef, int32_t stride,
+                            int32_t components, int32_t first, int32_t count, float *acc)
+{
+    curve_place const at = curve_place_of(m, phase, first);
+    size_t const each = (size_t)m->phases * (size_t)m->channels;
     memset(acc, 0, (size_t)count * sizeof *acc);
     for (int32_t k = m->pace_curve ? -1 : 0; k <= components; k++) {
-        const float *const curve = k < 0 ? m->pace_curve : m->curves + (size_t)k * (size_t)T * (size_t)M;
-        const float *const a = curve + (size_t)j * (size_t)M + first;
-        const float *const b = curve + (size_t)next * (size_t)M + first;
-        float const c = k < 0 ? pace : k ? coef[(k - 1) * stride] : 1.0f, ca = c * (1.0f - w), cb = c * w;
+        const float *const curve = k < 0 ? m->pace_curve : m->curves + (size_t)k * each;
+        const float *const a = curve + at.here, *const b = curve + at.next;
+        float const c = k < 0 ? pace
+                        : k   ? coef[(k - 1) * stride]
+                              : 1.0f,
+                    ca = c * (1.0f - at.w), cb = c * at.w;
         for (int32_t i = 0; i < count; i++)
             acc[i] += ca * a[i] + cb * b[i];
     }

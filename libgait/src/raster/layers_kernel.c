@@ -15,9 +15,9 @@
 #define NOWHERE   1e6f               /* column of a line that does not bound anything */
 
 /* Working pixels to grid cells: the centre of cell c is working pixel 2 c + 1/2. */
-static float to_cell(float v)
+static float to_cell(float v, float far)
 {
-    return f_clamp(0.5f * v - 0.25f, -FAR_CELLS, FAR_CELLS);
+    return f_clamp(0.5f * v - 0.25f, -far, far);
 }
 
 /* First row whose centre is at or below y. */
@@ -58,20 +58,24 @@ static void box_join(box *restrict body, const box *limb, const float *depth, la
 
 typedef struct corners { /* cells */
     float x[RAST_MAX_VERTICES][BLOCK], y[RAST_MAX_VERTICES][BLOCK];
+    int32_t row[RAST_MAX_VERTICES][BLOCK]; /* the first whose centre is at or below the corner */
 } corners;
 
 static void corners_of(const outline_lanes *limb, int32_t n, corners *restrict c, box *restrict own)
 {
+    float const far = f_bound(FAR_CELLS);
     for (int32_t k = 0; k < n; k++)
         for (int32_t i = 0; i < BLOCK; i++) {
-            float const x = to_cell(limb->x[k][i]), y = to_cell(limb->y[k][i]);
+            float const x = to_cell(limb->x[k][i], far), y = to_cell(limb->y[k][i], far);
+            int32_t const column = row_from(x), row = row_from(y);
             c->x[k][i] = x;
             c->y[k][i] = y;
+            c->row[k][i] = row;
             /* one more column on each side, because lines are rounded */
-            own->left[i] = i_min(own->left[i], row_from(x) - 2);
-            own->right[i] = i_max(own->right[i], row_from(x) + 2);
-            own->top[i] = i_min(own->top[i], row_from(y));
-            own->end[i] = i_max(own->end[i], row_from(y));
+            own->left[i] = i_min(own->left[i], column - 2);
+            own->right[i] = i_max(own->right[i], column + 2);
+            own->top[i] = i_min(own->top[i], row);
+            own->end[i] = i_max(own->end[i], row);
         }
 }
 
@@ -81,15 +85,16 @@ typedef float line_lanes[2][2][BLOCK];
 /* The side from corner j to corner k. Going down, it is on the right if the corners are in clockwise order. */
 static void side(const corners *c, int32_t j, int32_t k, const int32_t *clockwise, line_lanes *restrict out)
 {
+    float const nowhere = f_bound(NOWHERE), shallow = f_bound(SHALLOW);
     KERNEL_LANES
     for (int32_t i = 0; i < BLOCK; i++) {
         bool const down = c->y[j][i] < c->y[k][i];
         float const x0 = down ? c->x[j][i] : c->x[k][i], y0 = down ? c->y[j][i] : c->y[k][i];
-        float const x1 = down ? c->x[k][i] : c->x[j][i], y1 = down ? c->y[k][i] : c->y[j][i];
-        int32_t const first = row_from(y0), last = row_from(y1);
-        bool const crosses = first < last, right = down == clockwise[i];
-        float const slope = f_clamp((x1 - x0) / (crosses ? y1 - y0 : 1.0f), -NOWHERE, NOWHERE);
-        float const steep = f_clamp(slope, -SHALLOW, SHALLOW);
+        float const dx = c->x[k][i] - c->x[j][i], dy = c->y[k][i] - c->y[j][i];
+        int32_t const first = i_min(c->row[j][i], c->row[k][i]);
+        bool const crosses = c->row[j][i] != c->row[k][i], right = down == clockwise[i];
+        float const slope = f_clamp(dx / (crosses ? dy : 1.0f), -nowhere, nowhere);
+        float const steep = f_clamp(slope, -shallow, shallow);
         float const at = x0 + slope * ((float)first - y0) - steep * (float)first;
         bool const to_left = crosses & !right, to_right = crosses & right;
         (*out)[0][0][i] = to_left ? at : (*out)[0][0][i];
@@ -191,12 +196,56 @@ void KERNEL(layers_prepare)(const outline_block *outline, const limb_geometry *l
 /* ---- masks, lanes are rows ---- */
 
 /* The first cell of a word whose centre is at or right of a column, except for rounding errors. */
+#define SLACK (1.0f / 1024.0f) /* cells */
 static inline int32_t cell_from(float x)
 {
-    float const slack = 1.0f / 1024.0f; /* cells */
-    return i_max((int32_t)f_min(x + (1.0f - slack), 64.0f), 0);
+    return i_max((int32_t)f_min(x + (1.0f - SLACK), 64.0f), 0);
 }
 
+#ifdef SIMD4
+typedef struct side_lines { /* of one side of a polygon, each in all four elements */
+    simd4_f at[LAYERS_LINES], slope[LAYERS_LINES];
+} side_lines;
+
+static inline side_lines side_of(const float *line, int32_t lines)
+{
+    side_lines s;
+#pragma GCC unroll 4
+    for (int32_t k = 0; k < lines; k++) {
+        s.at[k] = simd4_all(line[4 * k]);
+        s.slope[k] = simd4_all(line[4 * k + 2]);
+    }
+    return s;
+}
+
+static inline simd4_f column_of(const side_lines *s, int32_t lines, simd4_f y)
+{
+    simd4_f x = s->at[0] + s->slope[0] * y;
+#pragma GCC unroll 4
+    for (int32_t k = 1; k < lines; k++)
+        x = simd4_max(s->at[k] + s->slope[k] * y, x);
+    return x;
+}
+
+/* The bits of one limb in one word, four rows at once. */
+static inline __attribute__((always_inline)) void draw_limb(const float *line, int32_t lines, int32_t top,
+                                                            int32_t end, uint64_t *restrict whole,
+                                                            uint64_t *restrict visible)
+{
+    simd4_f const slack = simd4_all(1.0f - SLACK), most = simd4_all(64.0f);
+    simd4_f const from = simd4_all((float)top), to = simd4_all((float)end);
+    side_lines const left = side_of(line, lines), right = side_of(line + 1, lines);
+    int32_t const first = top & -4;
+    simd4_f y = simd4_all((float)first) + (simd4_f){0.0f, 1.0f, 2.0f, 3.0f};
+    memset(visible + (top & -LAYERS_BAND), 0, 4 * sizeof *visible); /* rows before `first` */
+    for (int32_t strip = first; strip < end; strip += 4) {
+        simd4_f const begin = simd4_min(column_of(&left, lines, y) + slack, most);
+        simd4_f const stop = simd4_min(slack - column_of(&right, lines, y), most);
+        simd4_cover(begin, simd4_inside(y, from, to, stop), whole + strip, visible + strip);
+        y += simd4_all(4.0f);
+    }
+}
+#else
 /* The bits of one limb in one word, SIMD16_ROWS rows at once, each as a left and a right column. Arrays are
  * stored and loaded in pieces of the same size, so that loads do not wait. */
 static inline __attribute__((always_inline)) void draw_limb(const float *line, int32_t lines, int32_t top,
@@ -232,6 +281,7 @@ static inline __attribute__((always_inline)) void draw_limb(const float *line, i
         simd16_cover(span, whole + strip, visible + strip);
     }
 }
+#endif
 
 /* Draw one word of every row. */
 static void draw_word(const layers_block *block, int32_t lane, int32_t word, layers *restrict out)
