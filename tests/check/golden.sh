@@ -26,9 +26,9 @@ make_tests() { # CC BUILD_FOLDER OPT TEST...
     ${MAKE:-make} -s -j"$(getconf _NPROCESSORS_ONLN)" B="$folder" OPT="$opt" CC="$cc" \
         $(printf "$folder/unit/%s " "$@") >/dev/null || exit 1
 }
-# A line for each of the four instruction sets and each film: four of the tracker, one of the others.
+# A line for each of the five instruction sets and each film: four of the tracker, one of the others.
 compare() { # CC BUILD_FOLDER OPT [RUNNER]
-    for part in determinism:16 lift_stream:4 start:4 start_boxes:4 start_hypotheses:4 classes:4; do
+    for part in determinism:20 lift_stream:5 start:5 start_boxes:5 start_hypotheses:5 classes:5; do
         test=test_${part%:*}
         make_tests "$1" "$2" "$3" $test
         output=$($4 "$2/unit/$test" digest)

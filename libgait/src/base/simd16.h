@@ -265,6 +265,37 @@ static inline void simd16_bilinear_narrow(const int32_t *four, const int32_t *u,
     __m128i const on = _mm_packs_epi16(_mm_packs_epi32(in[0], in[1]), _mm_packs_epi32(in[2], in[3]));
     _mm_storeu_si128((__m128i *)(void *)out, _mm_blendv_epi8(_mm_set1_epi8(hidden), all, on));
 }
+#elif defined(SIMD16_NEON)
+static inline int16x4_t bilinear4(const int32_t *four, const int32_t *u, const int32_t *v)
+{
+    int32x4_t const byte = vdupq_n_s32(255), fx = vandq_s32(vld1q_s32(u), byte),
+                    fy = vandq_s32(vld1q_s32(v), byte);
+    int16x8_t const w = vreinterpretq_s16_s32(vld1q_s32(four)), above = vshlq_n_s16(w, 8);
+    int16x8_t const down = vreinterpretq_s16_s32(vorrq_s32(fy, vshlq_n_s32(fy, 16)));
+    int32x4_t const both = vreinterpretq_s32_s16(
+        vmlaq_s16(above, vsubq_s16(vshrq_n_s16(w, 8), vshrq_n_s16(above, 8)), down)); /* left, right */
+    int32x4_t const left = vshrq_n_s32(vshlq_n_s32(both, 16), 16), right = vshrq_n_s32(both, 16);
+    int32x4_t const sum = vmlaq_s32(vshlq_n_s32(left, 8), vsubq_s32(right, left), fx);
+    uint32x4_t const up = vshrq_n_u32(vreinterpretq_u32_s32(vshrq_n_s32(sum, 31)), 16);
+    return vshrn_n_s32(vaddq_s32(sum, vreinterpretq_s32_u32(up)), 16);
+}
+
+static inline int8x16_t bytes_of_words(const int32_t *v)
+{
+    int16x8_t const low = vcombine_s16(vmovn_s32(vld1q_s32(v)), vmovn_s32(vld1q_s32(v + 4)));
+    int16x8_t const high = vcombine_s16(vmovn_s32(vld1q_s32(v + 8)), vmovn_s32(vld1q_s32(v + 12)));
+    return vcombine_s8(vmovn_s16(low), vmovn_s16(high));
+}
+
+static inline void simd16_bilinear_narrow(const int32_t *four, const int32_t *u, const int32_t *v,
+                                          const int32_t *shown, int8_t hidden, int8_t *out)
+{
+    int16x8_t const low = vcombine_s16(bilinear4(four, u, v), bilinear4(four + 4, u + 4, v + 4));
+    int16x8_t const high =
+        vcombine_s16(bilinear4(four + 8, u + 8, v + 8), bilinear4(four + 12, u + 12, v + 12));
+    uint8x16_t const on = vreinterpretq_u8_s8(bytes_of_words(shown));
+    vst1q_s8(out, vbslq_s8(on, vcombine_s8(vmovn_s16(low), vmovn_s16(high)), vdupq_n_s8(hidden)));
+}
 #else
 static inline void simd16_bilinear_narrow(const int32_t *four, const int32_t *u, const int32_t *v,
                                           const int32_t *shown, int8_t hidden, int8_t *out)

@@ -2,6 +2,7 @@
  * together. */
 #include "image/features.h"
 #include "base/dispatch.h"
+#include "base/simd16.h"
 
 #if defined(__POPCNT__) || defined(KERNEL_SCALAR)
 void KERNEL(silhouette_count)(const features *f, const grid_mask *whole, int32_t *area, int32_t *covered)
@@ -23,6 +24,44 @@ void KERNEL(silhouette_count)(const features *f, const grid_mask *whole, int32_t
         sum += part[k] << k;
     *area = (int32_t)cells * FOREGROUND_ONE;
     *covered = (int32_t)sum;
+}
+#elif defined(SIMD16_NEON)
+/* Two rows at once; the last of an odd number alone. */
+static void count_rows(const uint64_t *body, const uint64_t (*words)[GRID_SIZE], int32_t first, int32_t last,
+                       int32_t *cells, int32_t *sum)
+{
+    const uint64_t *const inside = words[FOREGROUND_PLANES];
+    uint16x8_t count = vdupq_n_u16(0), covered = count;
+    int32_t y = first;
+    for (; y + 2 <= last; y += 2) {
+        uint64x2_t const m = vandq_u64(vld1q_u64(body + y), vld1q_u64(inside + y));
+        uint8x16_t part = vdupq_n_u8(0);
+#pragma GCC unroll 4
+        for (int32_t k = FOREGROUND_PLANES; k-- > 0;) /* the bits of greatest weight are doubled most often */
+            part = vaddq_u8(vaddq_u8(part, part),
+                            vcntq_u8(vreinterpretq_u8_u64(vandq_u64(m, vld1q_u64(words[k] + y)))));
+        count = vpadalq_u8(count, vcntq_u8(vreinterpretq_u8_u64(m)));
+        covered = vpadalq_u8(covered, part);
+    }
+    *cells += (int32_t)vaddlvq_u16(count);
+    *sum += (int32_t)vaddlvq_u16(covered);
+    for (; y < last; y++) {
+        uint64_t const m = body[y] & inside[y];
+        *cells += grid_popcount(m);
+        for (int32_t k = 0; k < FOREGROUND_PLANES; k++)
+            *sum += grid_popcount(m & words[k][y]) << k;
+    }
+}
+
+void KERNEL(silhouette_count)(const features *f, const grid_mask *whole, int32_t *area, int32_t *covered)
+{
+    int32_t cells = 0, sum = 0;
+    for (int32_t w = 0; 64 * w < whole->width; w++)
+        count_rows(whole->word[w],
+                   (const uint64_t (*)[GRID_SIZE])f->words[(whole->column + 64 * w) / GRID_STEP],
+                   whole->first, whole->last, &cells, &sum);
+    *area = cells * FOREGROUND_ONE;
+    *covered = sum;
 }
 #else /* counts of bytes, which vector code adds and shifts as well as words */
 static inline uint64_t count_bytes(uint64_t v)

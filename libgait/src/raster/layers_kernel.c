@@ -15,13 +15,13 @@
 #define NOWHERE   1e6f               /* column of a line that does not bound anything */
 
 /* Working pixels to grid cells: the centre of cell c is working pixel 2 c + 1/2. */
-static float to_cell(float v, float far)
+static inline float to_cell(float v, float far)
 {
     return f_clamp(0.5f * v - 0.25f, -far, far);
 }
 
 /* First row whose centre is at or below y. */
-static int32_t row_from(float y)
+static inline int32_t row_from(float y)
 {
     enum { BELOW = 1024 }; /* makes the number positive before it is rounded down */
     return BELOW - (int32_t)((float)BELOW - y);
