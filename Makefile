@@ -447,10 +447,9 @@ $(B)/bench/step-static: $(BENCH_OBJ) $(BENCH_PARTS) $(OBJ)
 
 # Of a particle: what 1,000 more take in three steps.
 QEMU ?= qemu-$(CPU)
-bench-instructions: $(B)/bench/instructions build/bench/instructions_plugin.so ## instructions of a particle under QEMU (CC=aarch64-linux-gnu-gcc)
+bench-instructions: $(B)/bench/instructions build/bench/instructions_plugin.so | $(READY) ## instructions of a particle under QEMU (CC=aarch64-linux-gnu-gcc; --record)
 	@command -v $(QEMU) >/dev/null || { echo 'bench-instructions: no $(QEMU): install qemu-user' >&2; exit 1; }
-	@count() { $(QEMU) -plugin build/bench/instructions_plugin.so $< python/gait/data/walk.gait $$1; }; \
-	    few=$$(count 200) && many=$$(count 1200) && echo "$(MACHINE): $$(( (many - few) / 3000 )) instructions of a particle"
+	@$(PY) tests/bench/instructions.py $(MACHINE) '$(QEMU)' build/bench/instructions_plugin.so $< $(ARGS)
 
 $(B)/bench/instructions: $(B)/bench/instructions.o $(B)/bench/bench_scene.o $(B)/tools/trackd/common.c.o $(OBJ)
 	$(call log,LD   $@)$(CC) $(OPT) $(LDFLAGS) -static -o $@ $^ -lm -pthread

@@ -32,7 +32,7 @@ GCC_KERNEL     := --param=max-completely-peel-times=8
 # where a mask allows no other, so that release builds compile it at -Os, but for the kernels that gain most.
 O2_SCALAR_SOURCES := surface_kernel.c silhouette_kernel.c
 X86_ISAS     := sse4 avx2 avx512
-# Those whose kernels an instruction set takes from the set before (KERNELS_WIDE, KERNELS_FRAME in dispatch.h).
+# Those whose kernels an instruction set takes from the set before (KERNELS_AVX, KERNELS_FRAME in dispatch.h).
 SHARED_sse4   := kinematics_kernel.c texture_kernel.c sides_kernel.c cholesky_kernel.c lift_kernel.c dynamics_kernel.c view_kernel.c features_kernel.c estimate_kernel.c track_loss_kernel.c
 SHARED_avx512 := view_kernel.c features_kernel.c estimate_kernel.c track_loss_kernel.c
 FLAGS_scalar := -DKERNEL_SCALAR -fno-tree-vectorize -fno-tree-slp-vectorize

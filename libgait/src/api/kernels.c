@@ -13,11 +13,11 @@
 #define MEMBER_sse4(result, name, parameters)    .name = name##_sse4,
 #define MEMBER_avx2(result, name, parameters)    .name = name##_avx2,
 #define MEMBER_avx512(result, name, parameters)  .name = name##_avx512,
-#define WIDE_scalar                              MEMBER_scalar
-#define WIDE_base                                MEMBER_base
-#define WIDE_sse4                                MEMBER_base
-#define WIDE_avx2                                MEMBER_avx2
-#define WIDE_avx512                              MEMBER_avx512
+#define AVX_scalar                               MEMBER_scalar
+#define AVX_base                                 MEMBER_base
+#define AVX_sse4                                 MEMBER_base
+#define AVX_avx2                                 MEMBER_avx2
+#define AVX_avx512                               MEMBER_avx512
 #define FRAME_scalar                             MEMBER_scalar
 #define FRAME_base                               MEMBER_base
 #define FRAME_sse4                               MEMBER_base
@@ -25,9 +25,8 @@
 #define FRAME_avx512                             MEMBER_avx2
 #define TABLE(which, bit)                                                                                    \
     KERNELS(DECLARE_##which)                                                                                 \
-    static const kernels which = {.isa = #which,                                                             \
-                                  KERNELS_EACH(MEMBER_##which) KERNELS_WIDE(WIDE_##which)                    \
-                                      KERNELS_FRAME(FRAME_##which)};
+    static const kernels which = {                                                                           \
+        .isa = #which, KERNELS_EACH(MEMBER_##which) KERNELS_AVX(AVX_##which) KERNELS_FRAME(FRAME_##which)};
 KERNEL_ISAS(TABLE)
 
 const kernels *kernels_choose(uint32_t mask)

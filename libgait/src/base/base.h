@@ -61,7 +61,7 @@ static inline float f_max(float a, float b)
 }
 
 /* A bound that is used in a loop over lanes, prepared before it. gcc makes one instruction of a minimum only if it does
- * not know the bound: otherwise two copies of the number differ in its eyes, and it compares and selects. */
+ * not know the bound, and else compares and selects. */
 static inline float f_bound(float x)
 {
 #if defined(__GNUC__) && !defined(__clang__) && defined(__SSE2__)

@@ -63,7 +63,7 @@ struct particle_block;
     K(void, edges_count, (const struct like_body *b, struct like_edge_tally *out))
 
 /* SSE4 has those of the base: its own would be no faster. */
-#define KERNELS_WIDE(K)                                                                                         \
+#define KERNELS_AVX(K)                                                                                          \
     /* Every channel at each lane's phase from the first `components` scores (Ormoneit et al., eq. 3). */       \
     K(void, kin_curves,                                                                                         \
       (const struct gait_model *m, const struct kin_input *in, int32_t components,                              \
@@ -147,7 +147,7 @@ struct particle_block;
     /* hidden[i] = log(exp(visible[i]) + exp(base + hidden[i])) */                                              \
     K(void, track_loss_join, (const float *visible, float base, int32_t n, float *hidden))
 
-#define KERNELS(K) KERNELS_EACH(K) KERNELS_WIDE(K) KERNELS_FRAME(K)
+#define KERNELS(K) KERNELS_EACH(K) KERNELS_AVX(K) KERNELS_FRAME(K)
 
 /* The instruction sets of this build, best last, each with the bit that a CPU mask must have. */
 #if defined(__x86_64__)

@@ -280,11 +280,12 @@ static inline int16x4_t bilinear4(const int32_t *four, const int32_t *u, const i
     return vshrn_n_s32(vaddq_s32(sum, vreinterpretq_s32_u32(up)), 16);
 }
 
-static inline int8x16_t bytes_of_words(const int32_t *v)
+/* All ones where v[i] is negative. */
+static inline uint8x16_t bytes_negative(const int32_t *v)
 {
-    int16x8_t const low = vcombine_s16(vmovn_s32(vld1q_s32(v)), vmovn_s32(vld1q_s32(v + 4)));
-    int16x8_t const high = vcombine_s16(vmovn_s32(vld1q_s32(v + 8)), vmovn_s32(vld1q_s32(v + 12)));
-    return vcombine_s8(vmovn_s16(low), vmovn_s16(high));
+    int16x8_t const low = vcombine_s16(vqmovn_s32(vld1q_s32(v)), vqmovn_s32(vld1q_s32(v + 4)));
+    int16x8_t const high = vcombine_s16(vqmovn_s32(vld1q_s32(v + 8)), vqmovn_s32(vld1q_s32(v + 12)));
+    return vcltzq_s8(vcombine_s8(vqmovn_s16(low), vqmovn_s16(high)));
 }
 
 static inline void simd16_bilinear_narrow(const int32_t *four, const int32_t *u, const int32_t *v,
@@ -293,8 +294,8 @@ static inline void simd16_bilinear_narrow(const int32_t *four, const int32_t *u,
     int16x8_t const low = vcombine_s16(bilinear4(four, u, v), bilinear4(four + 4, u + 4, v + 4));
     int16x8_t const high =
         vcombine_s16(bilinear4(four + 8, u + 8, v + 8), bilinear4(four + 12, u + 12, v + 12));
-    uint8x16_t const on = vreinterpretq_u8_s8(bytes_of_words(shown));
-    vst1q_s8(out, vbslq_s8(on, vcombine_s8(vmovn_s16(low), vmovn_s16(high)), vdupq_n_s8(hidden)));
+    vst1q_s8(out, vbslq_s8(bytes_negative(shown), vcombine_s8(vmovn_s16(low), vmovn_s16(high)),
+                           vdupq_n_s8(hidden)));
 }
 #else
 static inline void simd16_bilinear_narrow(const int32_t *four, const int32_t *u, const int32_t *v,
@@ -587,9 +588,7 @@ static inline simd16_bytes simd16_bytes_inside(simd16_bytes row, int32_t rows, s
                                                const int32_t *shown)
 {
 #if defined(SIMD16_NEON)
-    int16x8_t const low = vcombine_s16(vqmovn_s32(vld1q_s32(shown)), vqmovn_s32(vld1q_s32(shown + 4)));
-    int16x8_t const high = vcombine_s16(vqmovn_s32(vld1q_s32(shown + 8)), vqmovn_s32(vld1q_s32(shown + 12)));
-    uint8x16_t const on = vcltzq_s8(vcombine_s8(vqmovn_s16(low), vqmovn_s16(high)));
+    uint8x16_t const on = bytes_negative(shown);
     uint8x16_t const across = vcltq_u8(vreinterpretq_u8_s8(column), vdupq_n_u8(64));
     uint8x16_t const down = vcltq_u8(vreinterpretq_u8_s8(row), vdupq_n_u8((uint8_t)rows));
     return vreinterpretq_s8_u8(vandq_u8(on, vandq_u8(across, down)));
