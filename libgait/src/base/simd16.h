@@ -47,7 +47,7 @@ static inline uint32_t simd16_single(uint32_t x)
     return x;
 }
 
-/* Before an array's elements are read one by one: from memory, not out of vector registers. */
+/* Before elements are read one by one: from memory. */
 #if defined(__GNUC__) && !defined(KERNEL_SCALAR)
 #define SIMD16_STORED(array) __asm__("" : "+m"(array))
 #else
@@ -287,7 +287,6 @@ static inline uint8x16_t bytes_negative(const int32_t *v)
     int16x8_t const high = vcombine_s16(vqmovn_s32(vld1q_s32(v + 8)), vqmovn_s32(vld1q_s32(v + 12)));
     return vcltzq_s8(vcombine_s8(vqmovn_s16(low), vqmovn_s16(high)));
 }
-
 static inline void simd16_bilinear_narrow(const int32_t *four, const int32_t *u, const int32_t *v,
                                           const int32_t *shown, int8_t hidden, int8_t *out)
 {
@@ -379,7 +378,6 @@ static inline void simd16_bit(const int32_t *bits, const int32_t *column, int32_
 
 #if defined(__AVX512VBMI__)
 #define SIMD16_BYTES 4 /* rows of SIMD16 bytes in a register */
-
 static inline __m512i bytes_load(const int8_t *const *row)
 {
     __m512i v = _mm512_castsi128_si512(_mm_loadu_si128((const __m128i_u *)row[0]));
@@ -500,7 +498,6 @@ static inline simd4_f simd4_min(simd4_f a, simd4_f b)
     return (simd4_f)_mm_min_ps((__m128)a, (__m128)b);
 #endif
 }
-
 static inline simd4_f simd4_max(simd4_f a, simd4_f b)
 {
 #if defined(SIMD16_NEON)

@@ -195,12 +195,7 @@ void KERNEL(layers_prepare)(const outline_block *outline, const limb_geometry *l
 
 /* ---- masks, lanes are rows ---- */
 
-/* The first cell of a word whose centre is at or right of a column, except for rounding errors. */
-#define SLACK (1.0f / 1024.0f) /* cells */
-static inline int32_t cell_from(float x)
-{
-    return i_max((int32_t)f_min(x + (1.0f - SLACK), 64.0f), 0);
-}
+#define SLACK (1.0f / 1024.0f) /* cells: allowed for rounding errors of a column */
 
 #ifdef SIMD4
 typedef struct side_lines { /* of one side of a polygon, each in all four elements */
@@ -246,6 +241,12 @@ static inline __attribute__((always_inline)) void draw_limb(const float *line, i
     }
 }
 #else
+/* The first cell of a word whose centre is at or right of a column, except for rounding errors. */
+static inline int32_t cell_from(float x)
+{
+    return i_max((int32_t)f_min(x + (1.0f - SLACK), 64.0f), 0);
+}
+
 /* The bits of one limb in one word, SIMD16_ROWS rows at once, each as a left and a right column. Arrays are
  * stored and loaded in pieces of the same size, so that loads do not wait. */
 static inline __attribute__((always_inline)) void draw_limb(const float *line, int32_t lines, int32_t top,
