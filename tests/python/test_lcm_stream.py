@@ -2,7 +2,6 @@
 
 import json
 import re
-import threading
 
 import cv2
 import lcm_rig as rig
@@ -12,7 +11,7 @@ import pytest
 from gait.errors import UserError
 from gait.io.track_file import read_track
 from gait.lcm import link
-from gait.lcm.capture import FileSource, Pacer, ahead, parse_rate
+from gait.lcm.capture import FileSource, Pacer, parse_rate
 from gait.lcm.link import gaitmsg
 from gait.lcm.record import Recorder, read_run
 
@@ -128,31 +127,6 @@ def test_rates():
     for bad in ("fast", "0", "-3", "1e9", "nan"):
         with pytest.raises(UserError, match="--rate"):
             parse_rate(bad)
-
-
-def test_work_ahead_keeps_order_and_raises_at_its_place():
-    def source():
-        yield from range(5)
-        raise UserError("broken")
-
-    items = ahead(source(), 2)
-    assert [next(items) for _ in range(5)] == list(range(5))
-    with pytest.raises(UserError, match="broken"):
-        next(items)
-
-
-def test_work_ahead_stops_when_no_more_is_wanted():
-    drawn = []
-
-    def source():
-        for i in range(1000):
-            drawn.append(i)
-            yield i
-
-    items = ahead(source(), 3)
-    assert next(items) == 0
-    items.close()
-    assert len(drawn) <= 6 and not any(t.name == "ahead" for t in threading.enumerate())
 
 
 # ---- capture ----

@@ -28,11 +28,11 @@ def track(path, stands, view=None, rate=0.9, depth_sd=0.0):
     seconds = np.arange(stands + WALKS) / FPS
     order = [MODEL.joint_names.index(name) for name in NAMES]
     noise = np.random.default_rng(1)
-    estimates, found = [], {}
+    estimates, observed = [], {}
     for k, time in enumerate(seconds):
         state = state_at(MODEL, SECTIONS, max(0.0, time - seconds[stands]), phase=0.3, rate=rate)
         joints = MODEL.pose(state)[0]
-        found[k] = FrameKeypoints(NAMES, view.project(joints[order]) + noise.normal(0, 0.3, (4, 2)))
+        observed[k] = FrameKeypoints(NAMES, view.project(joints[order]) + noise.normal(0, 0.3, (4, 2)))
         phase = state.phase if k > stands else 0.3 - 0.1 * (1 - k / max(stands, 1))
         pelvis = state.pelvis + [depth_sd * np.sin(3.5 * time), 0.0, 0.0]
         mean = replace(state, phase=phase, pelvis=pelvis)
@@ -42,10 +42,11 @@ def track(path, stands, view=None, rate=0.9, depth_sd=0.0):
                      mean, sd, mean, joints, np.full((len(joints), 3), 0.02), np.zeros(24), MODEL.joint_names)
         )  # fmt: skip
     with TrackWriter(path, 5, MODEL.joint_names, MODEL.angle_names) as rows:
-        standing = Standing(PersonKeypoints(view, {1: found}, 1), view, [rows.write])
-        for k, (time, one) in enumerate(zip(seconds, estimates, strict=True)):
-            standing.add(Frame(k, time, None), one)
-        standing.finish()
+        found = (
+            (Frame(k, time, None), one) for k, (time, one) in enumerate(zip(seconds, estimates, strict=True))
+        )
+        for frame, estimate in Standing(PersonKeypoints(view, {1: observed}, 1)).decided(found):
+            rows.write(frame, estimate)
     return read_track(path)
 
 

@@ -2,19 +2,18 @@
 
 from __future__ import annotations
 
-import queue
-import threading
 import time
 from collections.abc import Callable, Iterable, Iterator, Mapping
 from contextlib import AbstractContextManager, nullcontext
 from dataclasses import dataclass, field
 from functools import partial
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, TypeVar
+from typing import TYPE_CHECKING, Any
 
 import cv2
 import numpy as np
 
+from gait.ahead import ahead
 from gait.bindings.initial import Start
 from gait.camera.camera import Camera
 from gait.errors import UsageError, UserError
@@ -180,57 +179,6 @@ def parse_rate(text: str) -> float | None:
     if not 0 < hertz <= _MAX_HZ:
         raise UsageError(f"--rate {text}: give true, max or frames per second up to {_MAX_HZ:g}")
     return hertz
-
-
-T = TypeVar("T")
-_TURN = 0.1  # seconds between attempts to append to a full queue
-
-
-class _End:
-    """Last entry of the queue, which states how the source ended."""
-
-    def __init__(self, reason: BaseException | None) -> None:
-        self.reason = reason
-
-
-def ahead(source: Iterable[T], limit: int) -> Iterator[T]:
-    """Yield the items of `source`, which another thread reads up to `limit` items ahead.
-
-    A frame that is slow to decode is then not sent late.  An exception of the source is raised here, after
-    the items before it.
-    """
-    waiting: queue.Queue[T | _End] = queue.Queue(limit)
-    left = threading.Event()
-
-    def put(item: T | _End) -> bool:
-        while not left.is_set():
-            try:
-                waiting.put(item, timeout=_TURN)
-            except queue.Full:
-                continue
-            return True
-        return False
-
-    def work() -> None:
-        reason: BaseException | None = None
-        try:
-            for item in source:
-                if not put(item):
-                    return
-        except BaseException as exc:  # to be raised in the consumer's thread
-            reason = exc
-        put(_End(reason))
-
-    thread = threading.Thread(target=work, name="ahead", daemon=True)
-    thread.start()
-    try:
-        while not isinstance(item := waiting.get(), _End):
-            yield item
-        if item.reason is not None:
-            raise item.reason
-    finally:
-        left.set()
-        thread.join()
 
 
 ANNOUNCE = 2.0  # seconds of video between announcements of camera and empty scene

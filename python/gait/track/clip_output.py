@@ -3,14 +3,15 @@
 from __future__ import annotations
 
 import time
-from collections.abc import Iterable, Sequence
-from contextlib import ExitStack
+from collections.abc import Callable, Iterable, Iterator, Sequence
+from contextlib import ExitStack, closing
 from itertools import groupby
 from typing import Any
 
 import cv2
 import numpy as np
 
+from gait.ahead import ahead
 from gait.bindings.abi import TrackStatus
 from gait.bindings.estimate import Estimate
 from gait.bindings.model import Model
@@ -18,7 +19,7 @@ from gait.camera.camera import Camera, write_camera
 from gait.camera.path import CameraPose, write_path
 from gait.io.files import replacing
 from gait.io.track_file import TrackWriter
-from gait.io.video import Frame, Video
+from gait.io.video import Frame
 from gait.progress import durations, progress
 from gait.report.drawing import LEGEND_SECONDS, Overlay
 from gait.report.film import Films, PageFilm
@@ -28,7 +29,7 @@ from gait.track.person_keypoints import PersonKeypoints
 from gait.track.plausible import Plausibility
 from gait.track.scene import Scene
 from gait.track.smooth import Smoother
-from gait.track.standing import Sink, Standing
+from gait.track.standing import Estimated, Sink, Standing
 from gait.track.tracker import Tracker
 
 _HARDLY = 0.1  # share of the frames; a person followed in fewer was hardly followed
@@ -114,7 +115,7 @@ def write(
     options: ClipOptions,
     scene: Scene,
     tracker: Tracker,
-    found: Iterable[tuple[Frame, Estimate]],
+    found: Iterable[Estimated],
     plausibility: Plausibility,
     keypoints: PersonKeypoints | None,
     also: Sink | None = None,
@@ -144,21 +145,17 @@ def write(
         films = stack.enter_context(Films(options.overlay, options.report, span, size, video.fps))
         if films.wanted:
             sinks.append(Drawing(model, scene, films).add)
-        standing = None if keypoints is None else Standing(keypoints, scene.camera, sinks)
-        sinks = sinks if standing is None else [standing.add]
-        smoother = None
-        if options.smooth:
-            smoother = stack.enter_context(Smoother(tracker))
         update = stack.enter_context(progress("tracking", len(span), options.quiet))
-        for done, (frame, estimate) in enumerate(found, 1):
-            results.step(frame, estimate)
-            for sink in sinks if smoother is None else [smoother.add]:
+        estimates = _counted(found, results, update)
+        if options.smooth:
+            estimates = _smoothed(options, scene, tracker, estimates, plausibility)
+        if keypoints is not None:
+            estimates = Standing(keypoints).decided(estimates)
+        if not options.smooth:  # frames are tracked while earlier ones are written
+            estimates = stack.enter_context(closing(ahead(estimates)))
+        for frame, estimate in estimates:
+            for sink in sinks:
                 sink(frame, estimate)
-            update(done)
-        if smoother is not None and len(smoother):
-            _smooth(options, video, smoother, sinks, plausibility)
-        if standing is not None:
-            standing.finish()
         if not results.times:
             raise video.no_frame(span.start)
     results.film = films.page
@@ -229,19 +226,36 @@ def _widened(sink: Sink, calibration: Calibration | None) -> Sink:
     return lambda frame, estimate: sink(frame, calibration.widened(frame.time, estimate))
 
 
-def _smooth(
-    options: ClipOptions, video: Video, smoother: Smoother, sinks: list[Sink], plausibility: Plausibility
-) -> None:
-    """Pass every frame with its smoothed estimate to the sinks, and write the draws."""
-    with progress("smoothing", len(smoother), options.quiet) as update:
-        rows, draws = smoother.finish(update=update)
+def _counted(
+    found: Iterable[Estimated], results: Results, update: Callable[[int], None]
+) -> Iterator[Estimated]:
+    """Yield every frame with its estimate, and count the steps."""
+    for done, (frame, estimate) in enumerate(found, 1):
+        results.step(frame, estimate)
+        update(done)
+        yield frame, estimate
+
+
+def _smoothed(
+    options: ClipOptions,
+    scene: Scene,
+    tracker: Tracker,
+    found: Iterable[Estimated],
+    plausibility: Plausibility,
+) -> Iterator[Estimated]:
+    """Yield every frame with its smoothed estimate, and write the draws."""
+    with Smoother(tracker) as smoother:
+        for frame, estimate in found:
+            smoother.add(frame, estimate)
+        if not len(smoother):
+            return
+        with progress("smoothing", len(smoother), options.quiet) as update:
+            rows, draws = smoother.finish(update=update)
     frames: Iterable[Frame] = (frame for frame, _ in rows)
     if options.overlay or options.report:  # decode the pictures again
-        frames = video.frames(rows[0][0].number, rows[-1][0].number + 1)
+        frames = scene.video.frames(rows[0][0].number, rows[-1][0].number + 1)
     plausibility.restart()
     for frame, (_, estimate) in zip(frames, rows, strict=True):
-        judged = plausibility.judged(frame, estimate)
-        for sink in sinks:
-            sink(frame, judged)
+        yield frame, plausibility.judged(frame, estimate)
     if options.draws:  # last, so that they are never left beside an unfinished track
         draws.write(options.draws)

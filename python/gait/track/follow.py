@@ -7,6 +7,7 @@ from dataclasses import replace
 
 import numpy as np
 
+from gait.ahead import ahead
 from gait.bindings.abi import Flag, TrackStatus
 from gait.bindings.estimate import Estimate
 from gait.bindings.initial import DEFAULT_SD, Start
@@ -105,7 +106,7 @@ class Follower:
         following: Start | None = first
         now: Estimate | None = None
         lost = True
-        for frame in self._video.frames(min([first.frame, *before]), frames.stop):
+        for frame in ahead(self._video.frames(min([first.frame, *before]), frames.stop)):
             if following is not None and frame.number == following.frame:
                 if now is None or lost or following is given or not self._keypoints.near(frame, now):
                     self._start(self._tracker, following, frame.utime)

@@ -55,6 +55,7 @@ class PersonKeypoints:
         self._camera, self._keypoints, self._apart, self.ids = camera, keypoints, apart or {}, [person]
         self._further = further
         self._asked: tuple[Frame, NDArray[np.float64]] | None = None
+        self._expected = np.empty((0, 2))  # that estimate's joints in the picture
         self._known: dict[int, tuple[FrameKeypoints, float]] = {}  # distances from that estimate
 
     def add(self, id: int) -> None:
@@ -145,18 +146,24 @@ class PersonKeypoints:
 
     def _distance(self, frame: Frame, estimate: Estimate, keypoints: FrameKeypoints) -> float:
         """Median distance from the estimated joints, person's heights; infinite if no joint was found."""
-        if self._asked is None or self._asked[0] is not frame or self._asked[1] is not estimate.joints:
-            self._asked, self._known = (frame, estimate.joints), {}
+        self.joints_in(frame, estimate)
         if id(keypoints) not in self._known:
             apart = self._distances(frame, estimate, keypoints, tuple(keypoints.names))
             self._known[id(keypoints)] = keypoints, float(np.median(apart)) if len(apart) else np.inf
         return self._known[id(keypoints)][1]
 
+    def joints_in(self, frame: Frame, estimate: Estimate) -> NDArray[np.float64]:
+        """Project the estimated joints into a frame of the first camera, (J, 2) pixels; the last is kept."""
+        if self._asked is None or self._asked[0] is not frame or self._asked[1] is not estimate.joints:
+            self._asked, self._known = (frame, estimate.joints), {}
+            self._expected = frame.camera(self._camera).project(estimate.joints)
+        return self._expected
+
     def _distances(
         self, frame: Frame, estimate: Estimate, keypoints: FrameKeypoints, names: tuple[str, ...]
     ) -> NDArray[np.float64]:
         """Distances (K,) of the named keypoints, where found, from the estimated joints, person's heights."""
-        expected = frame.camera(self._camera).project(estimate.joints)
+        expected = self.joints_in(frame, estimate)
         if np.isnan(expected).any():  # behind the camera
             return np.full(len(names), np.inf)
         common = [name for name in names if name in keypoints.names and name in estimate.joint_names]

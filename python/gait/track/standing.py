@@ -9,17 +9,17 @@ one foot, there is none after that until both feet have struck.
 from __future__ import annotations
 
 from collections import deque
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterable, Iterator
 from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
 
 from gait.bindings.estimate import Estimate
-from gait.camera.camera import Camera
 from gait.io.video import Frame
 from gait.track.person_keypoints import PersonKeypoints
 
+Estimated = tuple[Frame, Estimate]
 Sink = Callable[[Frame, Estimate], None]
 
 _STILL_S = 0.3  # seconds; longer than both feet are on the floor in a step
@@ -40,34 +40,30 @@ class _Held:
 
 
 class Standing:
-    """Passes estimates on to sinks in order, without phase, rate and speed where there are no strides.
+    """Removes phase, rate and speed where there are no strides.
 
     Parameters
     ----------
     keypoints : PersonKeypoints
-    camera : Camera
-    sinks : sequence of Sink
     """
 
-    def __init__(self, keypoints: PersonKeypoints, camera: Camera, sinks: Sequence[Sink]) -> None:
-        self._keypoints, self._camera, self._sinks = keypoints, camera, sinks
+    def __init__(self, keypoints: PersonKeypoints) -> None:
+        self._keypoints = keypoints
         self._held: deque[_Held] = deque()
         self._strikes = 2  # since the person stood last
         self._half = 0  # half strides of the last phase
 
-    def add(self, frame: Frame, estimate: Estimate) -> None:
-        """Add the next frame, and pass on those that are decided."""
-        self._held.append(_Held(frame, estimate, self._ankles(frame, estimate)))
-        while len(self._held) > 1 and frame.time - self._held[1].frame.time >= _STILL_S:
-            self._pass_on(self._held.popleft())
-        if frame.time - self._held[0].frame.time >= _STILL_S and self._still():
-            for held in self._held:
-                held.stands = True
-
-    def finish(self) -> None:
-        """Pass on the frames that are still waiting."""
+    def decided(self, found: Iterable[Estimated]) -> Iterator[Estimated]:
+        """Yield the frames in order, each as soon as it is decided."""
+        for frame, estimate in found:
+            self._held.append(_Held(frame, estimate, self._ankles(frame, estimate)))
+            while len(self._held) > 1 and frame.time - self._held[1].frame.time >= _STILL_S:
+                yield self._next()
+            if frame.time - self._held[0].frame.time >= _STILL_S and self._still():
+                for held in self._held:
+                    held.stands = True
         while self._held:
-            self._pass_on(self._held.popleft())
+            yield self._next()
 
     def _ankles(self, frame: Frame, estimate: Estimate) -> NDArray[np.float64]:
         found = self._keypoints.choose(frame, estimate)
@@ -75,7 +71,7 @@ class Standing:
             return np.full((2, 2), np.nan)
         uv = np.asarray(found.uv, float)
         hips, ankles = (uv[[list(found.names).index(name) for name in names]] for names in (_HIPS, _ANKLES))
-        height = np.ptp(frame.camera(self._camera).project(estimate.joints)[:, 1])
+        height = np.ptp(self._keypoints.joints_in(frame, estimate)[:, 1])
         return np.asarray((ankles - hips.mean(axis=0)) / height)
 
     def _still(self) -> bool:
@@ -92,16 +88,15 @@ class Standing:
         unsure = np.linalg.norm(self._held[-1].estimate.sd.pelvis[:2] * way)  # sd along the way, times it
         return bool(moved < _WAY * whole and moved + _WITHIN * unsure < whole)
 
-    def _pass_on(self, held: _Held) -> None:
+    def _next(self) -> Estimated:
+        held = self._held.popleft()
         half = int(2 * held.estimate.mean.phase)
         if held.stands:
             self._strikes = 0
         elif half != self._half:
             self._strikes += 1
         self._half = half
-        estimate = held.estimate if self._strikes >= 2 else _without_stride(held.estimate)
-        for sink in self._sinks:
-            sink(held.frame, estimate)
+        return held.frame, held.estimate if self._strikes >= 2 else _without_stride(held.estimate)
 
 
 def _without_stride(estimate: Estimate) -> Estimate:
