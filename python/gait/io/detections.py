@@ -135,9 +135,9 @@ def _people(found: Sequence[Detection]) -> tuple[dict[str, list[Detection]], lis
         frames.setdefault(detection.frame, []).append(detection)
     for number, present in frames.items():
         open_chains = [chain for chain in open_chains if number - chain[-1].frame <= _LONGEST_BREAK]
-        linked, doubtful = _linked(present, open_chains)
-        anew += [number] * bool(doubtful)
-        open_chains = [chain for chain in open_chains if not any(chain is one for one in doubtful)]
+        linked, contested = _linked(present, open_chains)
+        anew += [number] * bool(contested)
+        open_chains = [chain for chain in open_chains if not any(chain is one for one in contested)]
         for detection, chain in linked:
             if chain is None:
                 people[str(len(people))] = chain = []
@@ -162,17 +162,17 @@ def _linked(
     )
     continued: dict[int, list[Detection]] = {}
     taken: set[int] = set()
-    doubtful: set[int] = set()
+    contested: set[int] = set()
     for missed, _, i, k in pairs:
         if i in continued or k in taken:
             continue
         left = [(n, m) for late, _, n, m in pairs if late and n not in continued and m not in taken]
         if missed and sum(n == i or m == k for n, m in left) > 1:
-            doubtful |= {m for n, m in left if n == i or m == k}
+            contested |= {m for n, m in left if n == i or m == k}
             continue
         continued[i] = chains[k]
         taken.add(k)
-    ended = [chains[k] for k in sorted(doubtful - taken)]
+    ended = [chains[k] for k in sorted(contested - taken)]
     return [(detection, continued.get(i)) for i, detection in enumerate(present)], ended
 
 
