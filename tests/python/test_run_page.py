@@ -216,7 +216,9 @@ def test_without_a_camera_or_the_parts_the_page_names_how_to_get_the_figure(
 def test_what_does_not_fit_is_one_line(folder, options, words, monkeypatch, capsys):
     monkeypatch.chdir(folder)
     head, *rows = (folder / "run.csv").read_text().splitlines()
-    (folder / "long.csv").write_text("\n".join([head, *(re.sub(r"^(\d+)", r"1\1", r) for r in rows[-80:])]))
+    (folder / "long.csv").write_text(
+        "".join(f"{row}\n" for row in [head, *(re.sub(r"^(\d+)", r"1\1", r) for r in rows[-80:])])
+    )
     before = sorted(folder.iterdir())
     assert main(["report", *options, "--video", "walk.mp4"]) in (1, 2)
     printed = capsys.readouterr().err
