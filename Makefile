@@ -376,7 +376,7 @@ demo: ## clip -> LCM -> gait-trackd -> report (VIDEO CAMERA INIT BACKGROUND HEIG
 MOCAP ?= ../shared/data/mocap/cmu_walk
 # People whose recordings may be shipped and show the whole body.
 MORE = $(MOCAP)/../more
-WALKING := btk/b2 gaitalytics/g1 bvhtoolbox opensim/p2 opensim/p4 mcgill cmu_more/c12 cmu_more/c15 cmu_more/c46
+WALKING := btk/b2 gaitalytics/g1 bvhtoolbox opensim/p2 opensim/p4 mcgill cmu_more/c12 cmu_more/c46
 RUNNING := run_cmu run_rbds
 LEARN_CLASSES = $(VENV)/bin/gait learn --subjects folder --segments none
 # Credits of these people, besides CMU's.
@@ -391,7 +391,7 @@ model: setup lib ## learn the shipped models from MOCAP= *
 	@mkdir -p build
 	$(LEARN_CLASSES) $(addprefix $(MORE)/,$(RUNNING)) --activity run $(CREDIT_RUNS) \
 	    -o build/run.gait $(ARGS)
-	$(LEARN_CLASSES) $(MOCAP) $(addprefix $(MORE)/,$(WALKING)) --generic-lengths cmu_more/c15 cmu_more/c46 \
+	$(LEARN_CLASSES) $(MOCAP) $(addprefix $(MORE)/,$(WALKING)) --generic-lengths cmu_more/c46 \
 	    $(CREDIT_WALKS) \
 	    --class stand --class backwards --class run=build/run.gait -o python/gait/data/classes.gait $(ARGS)
 

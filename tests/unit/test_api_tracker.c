@@ -46,7 +46,7 @@ static void test_integers(void)
         {offsetof(gait_tracker_config, lag), 65, GAIT_ERR_LIMIT, "lag"},
         {offsetof(gait_tracker_config, terms), 0, GAIT_ERR_ARG, "terms"},
         {offsetof(gait_tracker_config, terms), 0x21, GAIT_ERR_ARG, "terms"},
-        {offsetof(gait_tracker_config, cpu_mask), 8, GAIT_ERR_ARG, "cpu_mask"},
+        {offsetof(gait_tracker_config, cpu_mask), 16, GAIT_ERR_ARG, "cpu_mask"},
         {offsetof(gait_tracker_config, cpu_mask), INT32_MAX, GAIT_ERR_ARG, "cpu_mask"},
     };
     for (size_t k = 0; k < sizeof bad / sizeof *bad; k++) {

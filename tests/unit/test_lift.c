@@ -402,7 +402,7 @@ static void test_arguments(void)
     bad[12].place[0] = INFINITY;
     bad[13].projection = GAIT_LIFT_ORTHOGRAPHIC;
     bad[13].axis[0][1] = 0.1;
-    bad[14].cpu_mask = 8;
+    bad[14].cpu_mask = 16;
     bad[15].camera.t[1] = -5e4f;
     bad[16].camera.t[0] = 5e4f;
     bad[17].camera.t[2] = 5e4f;
