@@ -267,6 +267,8 @@ def test_options_named_in_the_text_exist():
         "--arms",
         "--add-architecture",
         "--keep",
+        "--add",
+        "--seconds",
     }  # of others
     unknown = []
     for page in PAGES:

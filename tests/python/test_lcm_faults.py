@@ -239,7 +239,7 @@ def test_a_background_with_comments_is_read(tmp_path):
         (["-m", "x", "--lift-sd", "3"], "--lift-sd needs --lift"),
         (["-m", "x", "--lift-lag", "0"], "--lift-lag needs --lift"),
         (["-m", "x", "--keypoints-sd", "4"], "--keypoints-sd needs --keypoints-term"),
-        (["-m", "x", "--cpu-mask", "8"], "--cpu-mask 8"),
+        (["-m", "x", "--cpu-mask", "16"], "--cpu-mask 16"),
         (["-m", "x", "--url", "u" * 2000], "--url: give a value of 1 to 1023 characters"),
     ],
 )

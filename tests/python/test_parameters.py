@@ -153,6 +153,15 @@ def test_a_missed_strike_does_not_make_one_long_stride():
     assert len(right.start) >= 3 and (right.values["stride_time_s"] < 1.6 / 0.9).all()
 
 
+def test_classes_of_a_walk_with_strides_of_one_foot_alone():
+    track = walking_track(seconds=8)
+    track.places["l_heel"][:] = track.places["pelvis"] - [0, 0, 0.9]
+    track = replace(track, motion_class=["walk"] * len(track.time))
+    found = measure(track)
+    assert not len(found.strides["left"].start) and found.strides["right"].sure.any()
+    assert found.motion_class == "walk" and found.others == 0
+
+
 def test_too_short_tracks_are_refused():
     with pytest.raises(UserError, match="no whole stride in 0.97 s"):
         measure(walking_track(seconds=1.0))

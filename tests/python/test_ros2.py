@@ -122,7 +122,7 @@ def test_a_lifted_motion(tmp_path):
     assert ahead @ (places_in[3] - places_in[0])[JOINTS.index("pelvis")] > 0  # from the hips
 
     head, *rows = source.read_text().splitlines()
-    source.write_text("\n".join([f"{head},person", *(f"{row},2" for row in rows)]))
+    source.write_text("".join(f"{row}\n" for row in [f"{head},person", *(f"{row},2" for row in rows)]))
     for name, more in (("b", ["--ros2"]), ("c", [])):
         assert gait.cli.main(["export", str(source), "-o", str(tmp_path / f"{name}.mcap"), *more]) == 0
     topics = Counter(topic for _, topic, _ in read(tmp_path / "b.mcap"))

@@ -227,7 +227,7 @@ def _most_frequent_class(strides: Mapping[str, Strides]) -> tuple[str, int]:
     )
     most, count = max(sure, key=lambda name: (sure[name], name), default=""), 0
     for s in strides.values():
-        other = s.sure & [name != most or not name for name in s.motion_class]
+        other = s.sure & np.array([name != most or not name for name in s.motion_class], bool)
         count += int(other.sum())
         s.sure[other] = False
     return most, count
