@@ -121,9 +121,9 @@ def _of_events(parameters: Parameters, events: Events) -> dict[str, Compared]:
 
 
 def _matched(found: Strides, true: Strides) -> tuple[list[int], list[int]]:
-    """Rows of the strides that are sure and that the truth also has, and their rows in the truth."""
+    """Rows of the strides that count and that the truth also has, and their rows in the truth."""
     rows, theirs = [], []
-    for i in np.flatnonzero(found.sure):
+    for i in np.flatnonzero(found.counts):
         off = np.maximum(np.abs(true.start - found.start[i]), np.abs(true.end - found.end[i]))
         if len(off) and off.min() <= MATCHING_STRIKES_S:
             rows.append(int(i))

@@ -15,8 +15,16 @@ from gait.body.model_curves import ModelCurves
 from gait.io import blob
 from gait.io.fields import read_json
 from gait.io.track_file import read_truth
-from gait.motion.footfalls import STRIKE_SIDES, Draws, find_events, maxima, stride_time, strikes_from_meta
-from gait.motion.parameters import PARAMETER_LABELS, angle_cycles, measure
+from gait.motion.footfalls import (
+    STRIKE_SIDES,
+    Draws,
+    contacts,
+    find_events,
+    maxima,
+    stride_time,
+    strikes_from_meta,
+)
+from gait.motion.parameters import PARAMETER_LABELS, angle_cycles, measure, stride_rows
 from gait.motion.verdict import verdict_of
 
 MODEL = Model()
@@ -146,6 +154,35 @@ def test_the_stride_in_which_the_person_stops_does_not_count():
     assert verdict_of(slow).speed == found.speed  # one speed on the page
 
 
+def test_a_missed_event_leaves_double_support_empty():
+    track = walking_track()
+    start = find_events(track).strike["right"][1]
+    heel = track.places["l_heel"]
+    hidden = (track.time > start - 0.8) & (track.time < start - 0.3)  # the left strike before that stride
+    heel[hidden] = track.places["pelvis"][hidden] - [0, 0, 0.9]
+    right = measure(track).strides["right"]
+    values = dict(zip(right.start.round(2), right.values["double_support_percent"], strict=True))
+    assert np.isnan(values.pop(start.round(2))) and np.nanmin([*values.values()]) > 10
+
+
+def test_a_toe_off_just_after_the_strike_is_not_its_own():
+    track = walking_track()
+    events = find_events(track)
+    strike = events.strike["right"]
+    early = np.sort(np.append(events.off["right"], strike[1] + 0.06))
+    here = contacts(track, replace(events, off=events.off | {"right": early}), "right", stride_time(events))
+    np.testing.assert_array_equal(here.off, contacts(track, events, "right", stride_time(events)).off)
+
+
+def test_strides_that_count_for_want_of_better_ones_are_not_sure():
+    track = walking_track()
+    found = measure(replace(track, status=["ambiguous"] * len(track.time)))
+    rows = list(stride_rows(found))
+    assert all(row["counts"] and not row["sure"] for row in rows)
+    assert found.warning().startswith("Every stride has uncertain frames.")
+    assert not measure(track).warning()
+
+
 def test_a_missed_strike_does_not_make_one_long_stride():
     track = walking_track(seconds=8)
     track.places["r_heel"][100:140] = track.places["pelvis"][100:140] - [0, 0, 0.9]
@@ -158,7 +195,7 @@ def test_classes_of_a_walk_with_strides_of_one_foot_alone():
     track.places["l_heel"][:] = track.places["pelvis"] - [0, 0, 0.9]
     track = replace(track, motion_class=["walk"] * len(track.time))
     found = measure(track)
-    assert not len(found.strides["left"].start) and found.strides["right"].sure.any()
+    assert not len(found.strides["left"].start) and found.strides["right"].counts.any()
     assert found.motion_class == "walk" and found.others == 0
 
 

@@ -51,14 +51,26 @@ def test_a_walk_that_becomes_a_run_gives_the_means_of_one_class():
     found = measure(track)
     assert found.motion_class == "run" and found.others == 6
     assert "not counted: 6 not of class run" in found.counted()
-    speeds = np.concatenate([s.values["speed_m_s"][s.sure] for s in found.strides.values()])
+    speeds = np.concatenate([s.values["speed_m_s"][s.counts] for s in found.strides.values()])
     assert len(speeds) == 6 and speeds.min() > 2.4 and found.speed == pytest.approx(2.49, abs=0.02)
     rows = list(stride_rows(found))
     assert {row["motion_class"] for row in rows} == {"walk", "", "run"}
-    assert all(row["sure"] == (row["motion_class"] == "run") for row in rows)
-    assert verdict_of(track).speed < 2.3  # of the whole path
+    assert all(row["counts"] == (row["motion_class"] == "run") for row in rows)
+    verdict = verdict_of(track)
+    assert verdict.speed < 2.3
+    assert f"3 whole strides of class run, {verdict.speed:.2f} m/s along the whole path" in verdict.sentence()
     plain = measure(replace(track, motion_class=[]))
     assert plain.others == 0 and "motion_class" not in next(stride_rows(plain))
+
+
+def test_a_track_whose_class_changes_in_every_stride_gives_a_warning():
+    track = true_track("accelerating")
+    changing = replace(track, motion_class=["walk" if k // 3 % 2 else "run" for k in track.frame])
+    found = measure(changing)
+    assert found.counted() == "0 right and 0 left strides (not counted: 12 in which the class changes)"
+    assert "No stride has one class of motion throughout" in found.warning()
+    verdict = verdict_of(changing)
+    assert found.warning() in run_page(Run("a", changing, verdict, found))
 
 
 def test_a_run_is_compared_with_runs():

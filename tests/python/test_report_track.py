@@ -56,6 +56,13 @@ def test_files_state_the_same_as_the_library(folder, capsys):
     assert set(printed["angles"]) == {"r_hip_flexion", "l_hip_flexion", "torso_x"} | pelvis
 
 
+def test_uncertain_means_are_printed_with_a_warning(folder, capsys):
+    text = (folder / "walk.csv").read_text().replace("tracking", "ambiguous")
+    (folder / "unsure.csv").write_text(text)
+    assert main(["report", "track", str(folder / "unsure.csv")]) == 0
+    assert "\nEvery stride has uncertain frames." in capsys.readouterr().out
+
+
 @pytest.mark.long
 def test_the_page_needs_nothing_else_and_its_drawings_are_sound(folder, capsys):
     assert main(["report", "track", str(folder / "walk.csv"), "-o", str(folder / "page")]) == 0

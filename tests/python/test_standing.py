@@ -60,8 +60,8 @@ def test_strides_begin_when_both_feet_have_struck(tmp_path):
     rate = np.polyfit(rows.time[walks], np.unwrap(rows.phase[walks], period=1.0), 1)[0]
     assert rate == pytest.approx(0.9, rel=0.01)
     strides = measure(rows).strides
-    assert all((one.start[one.sure] >= rows.time[walks][0] - 0.05).all() for one in strides.values())
-    assert any(one.sure.any() for one in strides.values())
+    assert all((one.start[one.counts] >= rows.time[walks][0] - 0.05).all() for one in strides.values())
+    assert any(one.counts.any() for one in strides.values())
 
 
 def test_who_walks_keeps_every_phase(tmp_path):

@@ -88,6 +88,7 @@ def _text(parameters: Parameters, norms: Sequence[Compared], without: str) -> st
     notes = f"mean ± its standard deviation (between strides) over {parameters.counted()}; uncertainty from "
     notes += parameters.source
     lines = [*_table([list(PARAMETER_HEADER), *parameter_rows(parameters)]), notes]
+    lines += [parameters.warning()] * bool(parameters.warning())
     if norms:
         lines += ["", *_table([list(NORM_HEAD), *norm_rows(norms)])]
     lines += [f"no norm: {without}"] * bool(without)

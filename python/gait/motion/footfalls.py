@@ -163,6 +163,7 @@ STRIKE_SIDES = ("right", "left")
 
 _FLAT_FOOT_STRIDES = np.linspace(0.10, 0.30, 5)  # strides after the strike, when the foot is flat
 _SWING = np.linspace(0.12, 0.26, 8)  # strides before the strike, when the toe passes the other foot
+_SHORTEST_CONTACT = 0.15  # strides; sprinters' last about 0.2
 MATCHING_STRIKES_S = 0.25  # seconds; events further apart are not the same
 
 
@@ -250,10 +251,10 @@ def stack(draws: list[Contacts]) -> Contacts:
 
 
 def _offs(strike: Array, off: Array, stride: float) -> Array:
-    """Find the first toe-off within a stride after each strike; NaN if there is none."""
+    """Find the toe-off that ends the contact after each strike; NaN if there is none within a stride."""
     out = np.full(len(strike), np.nan)
     for k, begun in enumerate(strike):
-        after = off[(off > begun) & (off < begun + 0.9 * stride)]
+        after = off[(off > begun + _SHORTEST_CONTACT * stride) & (off < begun + 0.9 * stride)]
         if len(after):
             out[k] = after[0]
     return out

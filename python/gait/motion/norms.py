@@ -118,7 +118,7 @@ def beside_norms(
     age: float | None = None,
     sex: str | None = None,
 ) -> list[Compared]:
-    """Compare means over the sure strides with norms; empty if no stride is sure or the stature is unknown.
+    """Compare means over the strides that count with norms; empty if none counts or the stature is unknown.
 
     `model`: sections of the blob, of whose classes that of the strides counts; `age`: years, within `AGES`;
     `sex`: one of `SEXES`; both for the comfortable speed of walking only. Empty if the model has no norm for

@@ -50,6 +50,7 @@ PARAMETER_LABELS = {
 """Names in files, with names and units for people."""
 
 _UNSURE_STATUSES = {"lost", "ambiguous"}
+_LONGEST_FLIGHT = 0.25  # of a stride, from one foot's toe-off to the other's strike; longer: one was missed
 _STEADY = 0.8  # of the median speed; at the ends of the walk, slower strides are starting or stopping
 MIRRORED_PARAMETERS = ("step_time_s", "step_length_m", "stance_percent")
 """Quantities for which left and right are compared."""
@@ -67,10 +68,10 @@ class Strides:
     values: dict[str, Array]
     sd: dict[str, Array]
     draws: dict[str, Array]  #: (D, k) `PARAMETER_LABELS` in each draw
-    #: (k,) whether the stride counts: none of its frames is lost or ambiguous (if all strides have ambiguous
-    #: frames, none is lost), the person neither starts nor stops in it, and its class is
-    #: `Parameters.motion_class`
-    sure: NDArray[np.bool_]
+    sure: NDArray[np.bool_]  #: (k,) none of its frames is lost or ambiguous
+    #: (k,) whether the stride counts for the means: it is sure (if no stride is, none of its frames is lost),
+    #: the person neither starts nor stops in it, and its class is `Parameters.motion_class`
+    counts: NDArray[np.bool_]
     #: Class of motion of each stride, or "" if it changes; empty if the track has none.
     motion_class: Sequence[str] = ()
 
@@ -84,32 +85,44 @@ class Parameters:
     event_sd: Events
     strides: dict[str, Strides]  #: by side
     source: str  #: where the uncertainty comes from, in words
-    all_unsure: bool = False  #: every stride has ambiguous frames; those that were not lost count as sure
+    all_unsure: bool = False  #: every stride has ambiguous frames; those that were not lost count
     slowing: int = 0  #: number of strides that do not count because the person starts or stops in them
     motion_class: str = ""  #: of the strides that count, the most frequent; "" if the track has no classes
     others: int = 0  #: number of strides that do not count because they are of another class
 
     @property
     def speed(self) -> float | None:
-        """Mean over the sure strides of both feet, metres per second."""
+        """Mean over the strides of both feet that count, metres per second."""
         found = self._mean("speed_m_s", STRIKE_SIDES)
         return None if found is None else found["mean"]
 
     def counted(self) -> str:
         """Describe the strides over which the means are taken."""
-        right, left = (int(self.strides[side].sure.sum()) for side in STRIKE_SIDES)
+        right, left = (int(self.strides[side].counts.sum()) for side in STRIKE_SIDES)
         text = f"{right} right and {left} left strides"
-        left_out = sum(len(s.sure) for s in self.strides.values()) - right - left
+        left_out = sum(len(s.counts) for s in self.strides.values()) - right - left
         if not left_out:
             return text
         unsure = left_out - self.slowing - self.others
         why = [f"{unsure} uncertain"] * bool(unsure)
-        why += [f"{self.others} not of class {self.motion_class}"] * bool(self.others)
+        other = f"not of class {self.motion_class}" if self.motion_class else "in which the class changes"
+        why += [f"{self.others} {other}"] * bool(self.others)
         why += [f"{self.slowing} while starting or stopping"] * bool(self.slowing)
         return f"{text} (not counted: {', '.join(why)})"
 
+    def warning(self) -> str:
+        """Return why the means are missing or cannot be relied on, as a sentence; empty if they can."""
+        if self.others and not self.motion_class:
+            return "No stride has one class of motion throughout, so none counts and there are no means."
+        if self.all_unsure:
+            return (
+                "Every stride has uncertain frames. The values are means over these strides anyway: left and "
+                "right may be swapped, or the figure may be off."
+            )
+        return ""
+
     def summary(self) -> dict[str, dict[str, Any]]:
-        """Compute means over the sure strides: by quantity, for right, left and both feet.
+        """Compute means over the strides that count: by quantity, for right, left and both feet.
 
         Each is ``{"mean", "sd", "between"}``: the mean, its standard deviation, and the standard deviation
         between strides; ``"asymmetry_percent"`` is 200 (right - left) / (right + left) (Robinson 1987).
@@ -123,23 +136,23 @@ class Parameters:
             out[name] = row
         return out
 
-    def _sure(self, name: str, sides: tuple[str, ...]) -> tuple[Array, Array]:
-        """Return values (k,) and draws (D, k) of a quantity in the sure strides of some feet."""
+    def _counting(self, name: str, sides: tuple[str, ...]) -> tuple[Array, Array]:
+        """Return values (k,) and draws (D, k) of a quantity in the strides of some feet that count."""
         chosen = [self.strides[side] for side in sides]
-        values = np.concatenate([s.values[name][s.sure] for s in chosen])
-        draws = np.concatenate([s.draws[name][:, s.sure] for s in chosen], axis=1)
+        values = np.concatenate([s.values[name][s.counts] for s in chosen])
+        draws = np.concatenate([s.draws[name][:, s.counts] for s in chosen], axis=1)
         seen = np.isfinite(values)
         return values[seen], draws[:, seen]
 
     def _mean(self, name: str, sides: tuple[str, ...]) -> dict[str, float] | None:
-        values, draws = self._sure(name, sides)
+        values, draws = self._counting(name, sides)
         if not len(values):
             return None
         between = float(values.std(ddof=1)) if len(values) > 1 else float("nan")
         return {"mean": float(values.mean()), "sd": float(sd_of(mean_of(draws, 1))), "between": between}
 
     def _asymmetry(self, name: str) -> dict[str, float] | None:
-        right, left = (self._sure(name, (side,)) for side in STRIKE_SIDES)
+        right, left = (self._counting(name, (side,)) for side in STRIKE_SIDES)
         if not len(right[0]) or not len(left[0]):
             return None
 
@@ -177,6 +190,8 @@ def measure(track: Track, draws: Draws | None = None) -> Parameters:
         many = stride_quantities(drawn[side], drawn[other], between)
         start, end = feet[side].strike[:-1], feet[side].strike[1:]
         whole = _whole(start, end, stride)
+        free = [_is_free(track, _UNSURE_STATUSES, *ends) for ends in zip(start, end, strict=True)]
+        sure = np.array(free, bool)[whole]
         strides[side] = Strides(
             side,
             start[whole],
@@ -184,17 +199,16 @@ def measure(track: Track, draws: Draws | None = None) -> Parameters:
             {name: value[whole] for name, value in values.items()},
             {name: sd_of(value[:, whole]) for name, value in many.items()},
             {name: value[:, whole] for name, value in many.items()},
-            np.array(
-                [_is_free(track, _UNSURE_STATUSES, *ends) for ends in zip(start, end, strict=True)], bool
-            )[whole],
+            sure,
+            sure.copy(),
             [_class_of(track, *ends) for ends in zip(start[whole], end[whole], strict=True)]
             if track.motion_class
             else [],
         )
-    some = any(s.sure.any() for s in strides.values())
+    some = any(s.counts.any() for s in strides.values())
     if not some:  # better than nothing, since left and right seldom swap in only some frames
         for s in strides.values():
-            s.sure[:] = [_is_free(track, {"lost"}, *ends) for ends in zip(s.start, s.end, strict=True)]
+            s.counts[:] = [_is_free(track, {"lost"}, *ends) for ends in zip(s.start, s.end, strict=True)]
     motion_class, others = _most_frequent_class(strides)
     return Parameters(
         events,
@@ -216,41 +230,41 @@ def _class_of(track: Track, start: float, end: float) -> str:
 
 
 def _most_frequent_class(strides: Mapping[str, Strides]) -> tuple[str, int]:
-    """Mark strides of all but the most frequent class as not sure; return that class and their number."""
+    """Leave out strides of all but the most frequent class; return that class and their number."""
     if not any(s.motion_class for s in strides.values()):
         return "", 0
-    sure = Counter(
+    numbers = Counter(
         name
         for s in strides.values()
-        for name, counts in zip(s.motion_class, s.sure, strict=True)
+        for name, counts in zip(s.motion_class, s.counts, strict=True)
         if counts and name
     )
-    most, count = max(sure, key=lambda name: (sure[name], name), default=""), 0
+    most, count = max(numbers, key=lambda name: (numbers[name], name), default=""), 0
     for s in strides.values():
-        other = s.sure & np.array([name != most or not name for name in s.motion_class], bool)
+        other = s.counts & np.array([name != most or not name for name in s.motion_class], bool)
         count += int(other.sum())
-        s.sure[other] = False
+        s.counts[other] = False
     return most, count
 
 
 def _leave_out(strides: Mapping[str, Strides]) -> int:
-    """Mark much slower strides at the ends of the walk as not sure; return how many there are."""
+    """Leave out much slower strides at the ends of the walk; return how many there are."""
     speed = np.concatenate([s.values["speed_m_s"] for s in strides.values()])
     start = np.concatenate([s.start for s in strides.values()])
-    sure = np.concatenate([s.sure for s in strides.values()])
-    steady = sure & (speed >= _STEADY * np.median(speed[sure])) if sure.any() else sure
+    counts = np.concatenate([s.counts for s in strides.values()])
+    steady = counts & (speed >= _STEADY * np.median(speed[counts])) if counts.any() else counts
     if not steady.any():
         return 0
     count = 0
     for s in strides.values():
         slow = (s.start < start[steady].min()) | (s.start > start[steady].max())
-        count += int((slow & s.sure).sum())
-        s.sure[slow] = False
+        count += int((slow & s.counts).sum())
+        s.counts[slow] = False
     return count
 
 
 def strides_of(motion: Joints, events: Events) -> dict[str, Strides]:
-    """Make the strides of a motion with known events, by side; all are sure, and there are no draws.
+    """Make the strides of a motion with known events, by side; all are sure and count; there are no draws.
 
     UserError if no foot strikes twice.
     """
@@ -266,7 +280,8 @@ def strides_of(motion: Joints, events: Events) -> dict[str, Strides]:
         known = {name: value[whole] for name, value in values.items()}
         unknown = {name: np.full(value.shape, np.nan) for name, value in known.items()}
         draws = {name: value[None] for name, value in unknown.items()}
-        out[side] = Strides(side, start[whole], end[whole], known, unknown, draws, np.ones(whole.sum(), bool))
+        sure = np.ones(whole.sum(), bool)
+        out[side] = Strides(side, start[whole], end[whole], known, unknown, draws, sure, sure.copy())
     return out
 
 
@@ -298,6 +313,12 @@ def stride_quantities(foot: Contacts, other: Contacts, between: NDArray[np.int64
     length = np.linalg.norm(way, axis=-1)
     ahead = way / np.maximum(length, 1e-9)[..., None]
     stride = foot.place[..., 1:, :2] - foot.place[..., :-1, :2]
+
+    def both_feet(strike: Array, off: Array) -> Array:
+        """Share of the stride from a strike to the other foot's toe-off; negative: both are off the floor."""
+        share = (off - strike) / time
+        return np.where(share >= -_LONGEST_FLIGHT, share, np.nan)
+
     step = foot.place[..., 1:, :2] - _pick(other.place, between, -2)[..., :2]
     aside = ahead[..., 0] * step[..., 1] - ahead[..., 1] * step[..., 0]
     return {
@@ -310,7 +331,7 @@ def stride_quantities(foot: Contacts, other: Contacts, between: NDArray[np.int64
         "step_width_m": np.abs(aside),
         "foot_clearance_m": foot.clearance[..., 1:],
         "stance_percent": 100 * (foot.off[..., :-1] - start) / time,
-        "double_support_percent": 100 * (last_off - start + foot.off[..., :-1] - middle) / time,
+        "double_support_percent": 100 * (both_feet(start, last_off) + both_feet(middle, foot.off[..., :-1])),
     }
 
 
@@ -360,7 +381,7 @@ _SMALL = 0.005  # strides; step of the phase for numerical derivatives
 class AngleCycle:
     """One angle over the cycle, degrees; arrays have shape (101,) unless stated otherwise."""
 
-    strides: Array  #: (k, 101) the sure strides
+    strides: Array  #: (k, 101) the strides that count
     #: Mean of the strides, and its posterior standard deviation (NaN if the track has none).
     mean: Array
     sd: Array
@@ -462,9 +483,9 @@ def _scores(track: Track, curves: ModelCurves) -> list[str]:
 
 
 def _times(parameters: Parameters, side: str) -> Array:
-    """Return the times (k, 101) of the sure strides of a foot."""
+    """Return the times (k, 101) of the strides of a foot that count."""
     s = parameters.strides[side]
-    start, end = s.start[s.sure, None], s.end[s.sure, None]
+    start, end = s.start[s.counts, None], s.end[s.counts, None]
     return np.asarray(start + (end - start) * PERCENT / 100)
 
 
@@ -534,7 +555,7 @@ def stride_rows(parameters: Parameters) -> Iterator[dict[str, Any]]:
         s = parameters.strides[side]
         for k in range(len(s.start)):
             row: dict[str, Any] = {"side": side, "start_s": float(s.start[k]), "end_s": float(s.end[k])}
-            row["sure"] = bool(s.sure[k])
+            row |= {"sure": bool(s.sure[k]), "counts": bool(s.counts[k])}
             if s.motion_class:
                 row["motion_class"] = s.motion_class[k]
             for name in PARAMETER_LABELS:

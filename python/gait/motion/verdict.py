@@ -38,6 +38,10 @@ class Verdict:
         The person walks in place, as on a treadmill.
     no_strides : int
         Frames with an estimate in which the person takes no strides.
+    motion_class : str
+        Class of the strides that count, if others are left out because of their class.
+    along_path : bool
+        There are whole strides, but the speed is that along the whole path, because not all are of one class.
     why : dict of str to int
         Number of ambiguous frames for each reason, most frequent first; empty if reasons are unknown.
     """
@@ -49,6 +53,8 @@ class Verdict:
     in_place: bool
     no_strides: int
     why: dict[str, int]
+    motion_class: str = ""
+    along_path: bool = False
 
     @property
     def tracked(self) -> int:
@@ -63,9 +69,10 @@ class Verdict:
     def sentence(self) -> str:
         """One sentence: what was tracked, how the person walked, and what is uncertain."""
         parts = [f"Tracked {self.tracked} of {count_of(self.total, 'frame')}"]
-        parts.append(count_of(self.strides, "whole stride") if self.strides else "no whole stride")
+        strides = count_of(self.strides, "whole stride") if self.strides else "no whole stride"
+        parts.append(strides + (f" of class {self.motion_class}" if self.motion_class else ""))
         if self.speed is not None:
-            parts.append(f"{self.speed:.2f} m/s" + (" in place" if self.in_place else ""))
+            parts.append(f"{self.speed:.2f} m/s" + self._speed_words())
         text = ", ".join(parts)
         if self.counts["ambiguous"]:
             what = "left and right uncertain" if set(self.why) == {WHICH_LEG} else "uncertain"
@@ -75,6 +82,9 @@ class Verdict:
         rest = {"no strides yet": self.no_strides} if self.no_strides else {}
         rest |= {"lost": self.counts["lost"], "still settling": self.counts["init"], "not found": self.absent}
         return "; ".join([text, *(f"{what} in {count_of(n, 'frame')}" for what, n in rest.items() if n)])
+
+    def _speed_words(self) -> str:
+        return " in place" if self.in_place else " along the whole path" if self.along_path else ""
 
     def statuses(self, named: Callable[[str], str] = str) -> str:
         """Numbers of frames by status, in words; `named` returns those of a status."""
@@ -115,7 +125,8 @@ def verdict_of(
         unsure = [k for k, status in enumerate(track.status) if status == "ambiguous"]
         reasons.update(track.reason[k] or WHICH_LEG for k in unsure)
     speed, in_place = _speed(track)
-    if parameters is not None and not in_place and not parameters.others:
+    others = parameters is not None and parameters.others > 0
+    if parameters is not None and not in_place and not others:
         speed = parameters.speed or speed
     return Verdict(
         total=max(len(track.frame), total or 0) if track.frames is None else len(track.frames),
@@ -125,12 +136,14 @@ def verdict_of(
         in_place=in_place,
         no_strides=0 if np.isnan(track.phase).all() else int(np.isnan(track.phase).sum()),
         why=dict(reasons.most_common()),
+        motion_class=parameters.motion_class if parameters is not None and others else "",
+        along_path=others,
     )
 
 
 def _strides(parameters: Parameters) -> int:
     every = parameters.strides.values()
-    return max(int(s.sure.sum()) for s in every) or max(len(s.start) for s in every)
+    return max(int(s.counts.sum()) for s in every) or max(len(s.start) for s in every)
 
 
 def _speed(track: Track) -> tuple[float | None, bool]:

@@ -35,12 +35,8 @@ def add_gait(page: Page, track: Track, parameters: Parameters, cycles: Mapping[s
         PARAMETER_LABELS[name]: words for name, words in terms.QUANTITY_TERMS.items()
     } | terms.COLUMN_TERMS
     page.grid("Gait", PARAMETER_HEADER, parameter_rows(parameters), tips)
-    if parameters.all_unsure:
-        page.words(
-            "Every stride has uncertain frames. The values are means over these strides anyway: left and "
-            "right may be swapped, or the figure may be off.",
-            "warning",
-        )
+    if warning := parameters.warning():
+        page.words(warning, "warning")
     page.words(
         f"Mean over {parameters.counted()} ± its standard deviation; in brackets the standard deviation "
         f"between strides. Source of the uncertainty: {parameters.source}.",
@@ -147,7 +143,7 @@ def footfall_plot(track: Track, parameters: Parameters) -> str:
 
 
 def stride_plot(track: Track, parameters: Parameters) -> str:
-    """Draw quantities stride by stride with two standard deviations; uncertain strides are hollow."""
+    """Draw quantities stride by stride with two standard deviations; hollow: strides that do not count."""
 
     def painter(name: str) -> Painter:
         def paint(axes: Axes) -> None:
@@ -155,12 +151,12 @@ def stride_plot(track: Track, parameters: Parameters) -> str:
                 s = parameters.strides[side]
                 middle = (s.start + s.end) / 2
                 seen = np.isfinite(s.values[name])
-                for sure in (True, False):
-                    use = seen & (s.sure == sure)
+                for counts in (True, False):
+                    use = seen & (s.counts == counts)
                     axes.errorbar(
                         middle[use], s.values[name][use], yerr=2 * s.sd[name][use],
                         fmt="o" if side == "right" else "s", ms=4, lw=1, color=ON_PAPER[side],
-                        mfc=ON_PAPER[side] if sure else "none",
+                        mfc=ON_PAPER[side] if counts else "none",
                     )  # fmt: skip
             axes.set(title=PARAMETER_LABELS[name], xlabel="time, s")
             axes.set_xlim(*time_span(track))
