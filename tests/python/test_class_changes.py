@@ -19,6 +19,7 @@ from gait.body.skeleton import JOINTS
 from gait.cli import main
 from gait.learn.classes import changes
 from gait.learn.classes.join import Change
+from gait.learn.report.classes import figures, words
 from gait.learn.solve.joints import from_joints
 from gait.simulate.scenario import PRESETS
 from gait.simulate.stage import set_stage
@@ -98,7 +99,7 @@ def test_known_changes_are_learnt(tmp_path: Path, capsys: pytest.CaptureFixture[
     capsys.readouterr()
     assert main(["info", str(out)]) == 0
     printed = capsys.readouterr().out
-    assert re.search(r"class stand: .* walk [0-9.]+ \(\d+ changes\).* run [0-9.]+ \(prior\)", printed)
+    assert re.search(r"class stand: .* walk [0-9.]+ \(\d+ changes\).* run [0-9.]+ \(0 changes\)", printed)
     assert gait.Model(out).classes == NAMES
     # a class that is made again has assumed changes again; others keep theirs
     assert main(["learn", str(out), "-o", str(out), "--class", "stand"]) == 0
@@ -139,6 +140,16 @@ def test_a_simulated_stop_is_one_change_each_way() -> None:
     body = from_joints(Path("stop"), stage.walk.points(stage.frames), FPS)
     observed = changes.count(read_cyclic(CLASSES), changes.frames_of(Path("a.csv"), body))
     assert observed.counts.tolist() == [[0, 1, 0, 0], [1, 0, 0, 0], [0] * 4, [0] * 4]
+
+
+def test_a_rate_learnt_from_no_change_is_not_called_prior() -> None:
+    sections = read_cyclic(CLASSES)
+    none = np.zeros((len(NAMES), len(NAMES)))
+    seen = changes.Observed(np.full(len(NAMES), 60.0), none.astype(int), none.astype(complex))
+    learnt = figures(changes.with_changes(sections, seen))
+    assert learnt[0]["changes_per_s"]["run"] < figures(sections)[0]["changes_per_s"]["run"]
+    assert re.search(r"run [0-9.]+ \(0 changes\)", words(learnt[0])["changes per second"])
+    assert "run 0.3 (prior)" in words(figures(sections)[0])["changes per second"]
 
 
 def test_changes_need_classes_and_places(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:

@@ -18,9 +18,11 @@ from gait.body.skeleton import JOINTS
 from gait.cli import main
 from gait.errors import GaitError, UserError
 from gait.io import blob, track_file
+from gait.learn.classes import run as class_run
 from gait.learn.classes import standing
 from gait.learn.classes.join import Change, MotionClass, join
-from gait.learn.options import LearnOptions
+from gait.learn.corpus.load import NothingLeft
+from gait.learn.options import LearnOptions, SegmentOptions
 from gait.learn.prior.model import meta_section, origin
 from gait.motion.verdict import verdict_of
 from gait.report.run_page import Run, run_page
@@ -99,9 +101,9 @@ def test_learn_makes_classes_and_info_shows_them(tmp_path: Path, capsys: pytest.
     walks, out = mocap_files.write_trials(tmp_path / "walks", 4), tmp_path / "m.gait"
     words = ["learn", str(walks), "-o", str(out), "--segments", "none", "--quiet", "--json", "--jobs", "1"]
     words += ["--report", str(tmp_path / "report")]
-    assert main([*words, "--class", "stand", "--class", "backwards", "--class", "run"]) == 0
+    assert main([*words, "--class", "stand", "--class", "backwards"]) == 0
     figures = json.loads(capsys.readouterr().out)
-    assert [one["name"] for one in figures["classes"]] == ["walk", "stand", "backwards"]  # no run among them
+    assert [one["name"] for one in figures["classes"]] == ["walk", "stand", "backwards"]
     assert figures["bytes"] == out.stat().st_size and figures["classes"][0]["cycles"] >= 4
     assert main(["info", str(out)]) == 0
     printed = capsys.readouterr().out
@@ -130,6 +132,62 @@ def test_a_class_of_one_cycle_is_refused_and_nothing_is_written(
     assert not out.exists()
 
 
+def test_a_class_without_recordings_among_the_sources_is_an_error(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    def no_runs(*given: object, **more: object) -> None:
+        raise NothingLeft(["a.amc: not learnt as 'run': this is not running"])
+
+    monkeypatch.setattr(class_run, "run", no_runs)
+    out = tmp_path / "m.gait"
+    assert main(["learn", str(tmp_path), "-o", str(out), "--class", "run"]) == 1
+    error = capsys.readouterr().err
+    assert "--class run: none of the recordings is a run (a.amc: " in error
+    assert "give --class run=FOLDER, or leave it out" in error and not out.exists()
+
+
+def test_files_learnt_as_another_class_are_not_reported_as_left_out(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Runs when the walk is learnt, and walks when the run is."""
+    reported = {}
+    lines = (
+        "r.amc: not learnt as 'walk': this is running; leave it out, or give --activity run",
+        "w.amc: not learnt as 'run': this is not running; leave it out, or give --activity walk",
+        "bad.amc: cannot be read",
+    )
+
+    def learnt(options, note, complete=lambda sections: sections, elsewhere=lambda line: False):
+        reported[options.activity] = [line for line in lines if not elsewhere(line)]
+        blob.write(options.output, complete(blob.read(SHIPPED)))
+        return {"sequences": [{"source": f"{options.activity[0]}.amc"}]}
+
+    monkeypatch.setattr(class_run, "run", learnt)
+    options = LearnOptions(sources=("in",), output=str(tmp_path / "m.gait"), classes=("run",))
+    figures = class_run.learn(options, lambda line: None)
+    assert [one["name"] for one in figures["classes"]] == ["walk", "run"]
+    assert reported == {"run": [lines[0], lines[2]], "walk": [lines[1], lines[2]]}
+
+
+def test_what_belongs_elsewhere_is_neither_noted_nor_counted(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    walks, notes = mocap_files.write_trials(tmp_path / "in", 3), list[str]()
+    options = LearnOptions(
+        sources=(str(walks),),
+        output=str(tmp_path / "m.gait"),
+        segments=SegmentOptions(source="none"),
+        components=1,
+        jobs=1,
+        quiet=True,
+    )
+    figures = class_run.run(options, notes.append, elsewhere=lambda line: "01_02x" in line)
+    assert figures["left_out"] == [] and not any("left out" in line for line in notes)
+    capsys.readouterr()
+    assert main(["info", options.output]) == 0
+    assert "\n1 component, " in capsys.readouterr().out
+
+
 def test_recorded_backward_walks_are_learnt_in_reversed_time(tmp_path: Path) -> None:
     for folder, motion in (("walks", {}), ("backward", {"period": -120.0, "speed": -1.3})):
         for k in range(3):
@@ -152,6 +210,8 @@ def test_classes_are_added_to_a_model(tmp_path: Path, capsys: pytest.CaptureFixt
     assert model.classes == ("walk", "backwards", "stand", "stroll")
     assert model.class_info(3).components == model.info.components
     assert blob.read(out)["SGMD"].tobytes() == blob.read(SHIPPED)["SGMD"].tobytes()
+    assert main(["learn", str(SHIPPED), "-o", str(tmp_path / "x.gait")]) == 1
+    assert "walk.gait: is a model, not a recording; to add to a model" in capsys.readouterr().err
     assert main(["learn", str(SHIPPED), "-o", str(out), "--class", "run"]) == 2
     assert "--class run: give recordings" in capsys.readouterr().err
     assert main(["learn", str(SHIPPED), "-o", str(out), *words, "--report", str(tmp_path / "report")]) == 2

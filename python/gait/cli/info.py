@@ -81,6 +81,7 @@ def describe(sections: Mapping[str, Any], size: int, crc: int, name: str = "blob
 def text(name: str, s: Mapping[str, Any]) -> str:
     """Format the figures for people."""
     from gait.learn.segments import summary as segment_summary
+    from gait.motion.verdict import count_of
 
     meta, gait = s.get("meta", {}), s.get("gait", {})
     lines = [f"{name}: {s['bytes']} bytes, checksum {s['crc32']}"]
@@ -90,7 +91,7 @@ def text(name: str, s: Mapping[str, Any]) -> str:
         counts = ", ".join(
             f"{len(s[key])} {key}" for key in ("channels", "frames", "joints", "limbs") if key in s
         )
-        lines.append(f"{s['components']} components, {s['phases']} phases, {counts}")
+        lines.append(f"{count_of(s['components'], 'component')}, {s['phases']} phases, {counts}")
     if gait:
         lines += [
             "{stride_hz:.3f} +- {stride_hz_sd:.3f} strides/s, varying by {stride_time_cv:.1%}".format(**gait)
@@ -121,13 +122,14 @@ def text(name: str, s: Mapping[str, Any]) -> str:
 def _class_line(one: Mapping[str, Any]) -> str:
     """One class in words."""
     from gait.learn.report.classes import words
+    from gait.motion.verdict import count_of
 
     cells = words(one)
     source = f"of {cells['from']}" if one["recordings"] and one["curves_of"] == one["name"] else cells["from"]
     moves = f"{cells['strides/s']} strides/s" if one["direction"] else cells["strides/s"]
     return (
-        f"class {cells['class']}: {source}, {moves}, {cells['components']} components; changes per second: "
-        f"{cells['changes per second']}"
+        f"class {cells['class']}: {source}, {moves}, {count_of(int(cells['components']), 'component')}; "
+        f"changes per second: {cells['changes per second']}"
     )
 
 

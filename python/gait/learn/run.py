@@ -38,15 +38,17 @@ def run(
     options: LearnOptions,
     note: Note = lambda line: None,
     complete: Callable[[Sections], Sections] = lambda sections: sections,
+    elsewhere: Callable[[str], bool] = lambda line: False,
 ) -> dict[str, Any]:
     """Learn a model, write it and its report, and return the figures of `report.summary`.
 
     `note` gets lines that a user should know.  `complete` adds to the sections of the model before they are
-    written.  UsageError or UserError with one line if it cannot be done.
+    written.  Lines about files left out are not reported if `elsewhere` is true for them: the files belong to
+    another class.  UsageError or UserError with one line if it cannot be done.
     """
     check(options, note)
     with one_thread(), Corpus() as corpus:
-        loaded = _load(options, corpus, note)
+        loaded = _load(options, corpus, note, elsewhere)
         if options.segments.source == "only":
             return _segments_alone(options, corpus, loaded.refused)
         learned = fit.fit(loaded.sequences, options, loaded.others)
@@ -94,7 +96,7 @@ def check(options: LearnOptions, note: Note = lambda line: None) -> None:
         page.require_own(Path(report))
 
 
-def _load(options: LearnOptions, corpus: Corpus, note: Note) -> load.Loaded:
+def _load(options: LearnOptions, corpus: Corpus, note: Note, elsewhere: Callable[[str], bool]) -> load.Loaded:
     """Find and prepare the files; report files that were left out, and the readers' observations."""
     files, closed = sources.find(options.sources, options.exclude, note)
     trials = {os.path.realpath(name) for name in options.static}
@@ -116,7 +118,7 @@ def _load(options: LearnOptions, corpus: Corpus, note: Note) -> load.Loaded:
                 _note_left_out(closed + error.refused[1:], "", note)
             _note_all(_hints(options, notes), note)  # they may be the reason
             raise
-    refused = closed + loaded.refused
+    refused = [line for line in closed + loaded.refused if not elsewhere(line)]
     _note_left_out(refused, " (see --json or --report)", note)
     _note_all(_hints(options, notes), note)
     return loaded._replace(refused=refused)

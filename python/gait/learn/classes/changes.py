@@ -265,7 +265,10 @@ def with_changes(sections: Sections, observed: Observed) -> dict[str, blob.Array
             changes[i, j] = one.rate, one.concentration, one.phase, one.slope
     names = blob.unpack_names(sections["CLNM"])
     meta = model.read_meta(sections)
-    counts = [{to: int(n) for to, n in zip(names, row, strict=True) if n} for row in observed.counts]
+    counts = [
+        {to: int(n) for to, n, rate in zip(names, row, rates, strict=True) if n or rate}
+        for row, rates in zip(observed.counts, changes[:, :, 0], strict=True)
+    ]
     meta["changes"] = {
         name: {"seconds": round(float(seconds), 1), "to": to}
         for name, seconds, to in zip(names, observed.seconds, counts, strict=True)

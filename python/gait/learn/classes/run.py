@@ -72,21 +72,22 @@ def learn(options: LearnOptions, note: Note) -> dict[str, Any]:
         return _only_changes(own, options, note)
     if own is None:
         check(alone)
-    learnt, posture = dict[str, MotionClass | None](), None
+    learnt, posture = dict[str, MotionClass](), None
+    used = set[str]()  # files among the sources that are learnt as another class
     for name, source in wanted.items():
         if Path(source).suffix == MODEL:
             learnt[name] = _taken(name, source)
         elif name == STAND:
             posture = _posture(source, options, note) if source else None
         elif source or name != BACKWARDS:
-            learnt[name] = _learnt(name, source, options, note)
+            learnt[name], files = _learnt(name, source, options, note)
+            used |= set() if source else files
 
     def with_classes(walk: Mapping[str, blob.Array]) -> dict[str, blob.Array]:
         classes = {one.name: one for one in classes_of(walk) or [_counted(MotionClass(first), walk)]}
         kept = classes.keys() - wanted.keys()
         for name in wanted:
-            one = learnt[name] if name in learnt else _derived(name, walk, first, posture)
-            classes |= {} if one is None else {name: one}
+            classes[name] = learnt[name] if name in learnt else _derived(name, walk, first, posture)
         names = list(classes)
         if others := [name for name in names[1:] if name in kept]:
             note(f"{options.sources[0]}: keeps its classes {' '.join(others)}")
@@ -101,7 +102,9 @@ def learn(options: LearnOptions, note: Note) -> dict[str, Any]:
         data = blob.write(options.output, with_classes(own))
         figures: dict[str, Any] = {"bytes": len(data), "crc32": f"{blob.checksum(data):08x}"}
     else:
-        figures = run(alone, note, with_classes)
+        figures = run(
+            alone, note, with_classes, lambda line: any(line.startswith(f"{path}: ") for path in used)
+        )
         data = Path(options.output).read_bytes()
     return figures | {"classes": class_figures(blob.decode(data))}
 
@@ -213,8 +216,12 @@ def _taken(name: str, source: str) -> MotionClass:
     return _counted(MotionClass(name, own=own), own)
 
 
-def _learnt(name: str, source: str, options: LearnOptions, note: Note) -> MotionClass | None:
-    """Learn a class from recordings; None if none of the sources belongs to it."""
+def _learnt(name: str, source: str, options: LearnOptions, note: Note) -> tuple[MotionClass, set[str]]:
+    """Learn a class from recordings; return also the files that were used."""
+
+    def of_the_first(line: str) -> bool:
+        return not source and line.endswith(f"give --activity {options.activity}")
+
     with tempfile.TemporaryDirectory() as folder:
         own = replace(
             options,
@@ -227,16 +234,17 @@ def _learnt(name: str, source: str, options: LearnOptions, note: Note) -> Motion
             classes=(),
         )
         try:
-            run(own, lambda line: note(f"class {name}: {line}"))
+            figures = run(own, lambda line: note(f"class {name}: {line}"), elsewhere=of_the_first)
         except NothingLeft as exc:
             if source:
                 raise
-            note(f"class {name}: skipped, none of the recordings is a {name} ({exc})")
-            return None
+            remedy = f"give --class {name}=FOLDER, or leave it out"
+            raise UserError(f"--class {name}: none of the recordings is a {name} ({exc}); {remedy}") from None
         except UserError as exc:
             raise UserError(f"class {name}: {exc}") from None
         found = blob.read(own.output)
-        return _counted(MotionClass(name, -1 if own.reverse else 1, found), found)
+        files = {one["source"] for one in figures["sequences"]}
+        return _counted(MotionClass(name, -1 if own.reverse else 1, found), found), files
 
 
 def _counted(one: MotionClass, own: Mapping[str, blob.Array]) -> MotionClass:

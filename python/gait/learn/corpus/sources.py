@@ -39,6 +39,11 @@ def find(
             raise UserError(f"{source}: no such file or folder; check the name")
         elif source.suffix.lower() == ".asf":
             raise UserError(f"{source}: is a skeleton without motion; name the .amc files beside it")
+        elif source.suffix.lower() == ".gait":
+            raise UserError(
+                f"{source}: is a model, not a recording; to add to a model, name it as the only source, with "
+                "--class or --changes"
+            )
         elif source.suffix.lower() not in SUFFIXES:
             raise UserError(
                 f"{source}: {source.suffix or 'no suffix'} is not supported; convert it to {_kinds()}"

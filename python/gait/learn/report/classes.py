@@ -52,11 +52,12 @@ def words(one: Mapping[str, Any]) -> dict[str, str]:
         "statures/s": f"{one['speed_statures_s']:.2f}" if moves else "",
         "components": str(one["components"]),
         "changes per second": ", ".join(
-            f"{to} {rate:g} ({_observed(one['changes_observed'].get(to, 0))})"
+            f"{to} {rate:g} ({_observed(one['changes_observed'].get(to))})"
             for to, rate in one["changes_per_s"].items()
         ),
     }
 
 
-def _observed(count: int) -> str:
-    return "prior" if not count else f"{count} change{'s' * (count > 1)}"
+def _observed(count: int | None) -> str:
+    """How many changes a rate was learnt from; None: it was not."""
+    return "prior" if count is None else f"{count} change{'s' * (count != 1)}"
