@@ -145,8 +145,8 @@ def test_a_simulated_stop_is_one_change_each_way() -> None:
 def test_a_rate_learnt_from_no_change_is_not_called_prior() -> None:
     sections = read_cyclic(CLASSES)
     none = np.zeros((len(NAMES), len(NAMES)))
-    seen = changes.Observed(np.full(len(NAMES), 60.0), none.astype(int), none.astype(complex))
-    learnt = figures(changes.with_changes(sections, seen))
+    observed = changes.Observed(np.full(len(NAMES), 60.0), none.astype(int), none.astype(complex))
+    learnt = figures(changes.with_changes(sections, observed))
     assert learnt[0]["changes_per_s"]["run"] < figures(sections)[0]["changes_per_s"]["run"]
     assert re.search(r"run [0-9.]+ \(0 changes\)", words(learnt[0])["changes per second"])
     assert "run 0.3 (prior)" in words(figures(sections)[0])["changes per second"]

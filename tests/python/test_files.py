@@ -26,6 +26,7 @@ def test_files_to_read_are_files_that_hold_something(tmp_path):
     for path, words in (
         (tmp_path, "is a folder; give the video file itself"),
         (tmp_path / "none", "no such video file; check the name"),
+        ("/dev/null", "is a device or a pipe, not a file; write the video file to a file first"),
         (tmp_path / "empty", "is empty; copy or make the video file again"),
     ):
         with pytest.raises(UserError, match=f"{path}: {words}"):

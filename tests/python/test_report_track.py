@@ -13,6 +13,7 @@ from walking_track import walking_track, write_track
 
 from gait.cli import main
 from gait.motion.parameters import PARAMETER_LABELS, measure
+from gait.motion.verdict import verdict_of
 from gait.report.colours import BLUE, ORANGE
 from gait.report.drawing import side_colour
 from gait.report.gait_parts import footfall_plot
@@ -101,6 +102,23 @@ def test_draws_are_used_where_given(folder, capsys):
     own = json.loads((folder / "walk_gait/parameters.json").read_text())
     late = [e["sd_s"] for e in printed["events"]]
     assert np.median(late) > 2 * np.median([e["sd_s"] for e in own["events"]])
+
+
+def test_draws_of_another_track_are_refused(folder, capsys):
+    track = walking_track()
+    for place in track.places.values():
+        place[:, 0] += 0.2
+    write_track(folder / "other.csv", track)
+    command = ["report", "track", str(folder / "other.csv"), "--draws", str(folder / "draws.npz")]
+    assert main(command) == 1
+    error = capsys.readouterr().err
+    assert re.search(r"draws\.npz: its positions are 0\.(19|2\d) m from those of the track", error)
+
+
+def test_settling_may_be_in_the_middle():
+    track = walking_track()
+    track.status[28] = "init"
+    assert verdict_of(track).sentence().endswith("; settling in 1 frame")
 
 
 def test_a_track_that_was_lost_all_along_still_has_a_page(folder):

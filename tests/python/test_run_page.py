@@ -98,7 +98,7 @@ def test_the_verdict_counts_what_is_tracked_unsure_and_missing(folder):
     assert found.counts == {"init": 3, "tracking": 73, "ambiguous": 4, "lost": 4}
     assert re.fullmatch(
         r"Tracked 77 of 90 frames, [12] whole strides?, 1\.\d\d m/s; uncertain in 4 frames; "
-        "lost in 4 frames; still settling in 3 frames; not found in 6 frames",
+        "lost in 4 frames; settling in 3 frames; not found in 6 frames",
         found.sentence(),  # without why, which this file does not hold
     )
     assert found.statuses() == (

@@ -62,7 +62,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     values.add_camera(
         parser,
         "; without it the camera is estimated from the walk, which needs --height; for several films one for "
-        "each in their order, or a TOML file with as many cameras",
+        "each in their order (--camera A --camera B), or a TOML file with as many cameras",
         scale=True,
         several=True,
     )

@@ -145,6 +145,8 @@ def require_file(path: str | os.PathLike[str], what: str, remedy: str = "check t
     file = Path(path)
     if file.is_dir():
         raise UserError(f"{path}: is a folder; give the {what} itself")
+    if file.exists() and not file.is_file():
+        raise UserError(f"{path}: is a device or a pipe, not a file; write the {what} to a file first")
     if not file.is_file():
         raise UserError(f"{path}: no such {what}; {remedy}")
     if file.stat().st_size == 0:

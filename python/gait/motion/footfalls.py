@@ -164,6 +164,7 @@ STRIKE_SIDES = ("right", "left")
 _FLAT_FOOT_STRIDES = np.linspace(0.10, 0.30, 5)  # strides after the strike, when the foot is flat
 _SWING = np.linspace(0.12, 0.26, 8)  # strides before the strike, when the toe passes the other foot
 _SHORTEST_CONTACT = 0.15  # strides; sprinters' last about 0.2
+_OWN_TRACK_M = 0.05  # most between a track and the mean of its own draws
 MATCHING_STRIKES_S = 0.25  # seconds; events further apart are not the same
 
 
@@ -305,7 +306,7 @@ class Draws:
 
     @staticmethod
     def read(path: str | os.PathLike[str], track: Track) -> Draws:
-        """Read a file from `write`; UserError unless its frames are those of `track`."""
+        """Read a file from `write`; UserError unless frames and positions are those of `track`."""
         require_file(path, "file of draws", "gait track --smooth --draws writes it")
         try:
             with np.load(path, allow_pickle=False) as stored:
@@ -317,7 +318,16 @@ class Draws:
         draws = Draws(**arrays)
         if not np.array_equal(draws.frame, track.frame):
             raise UserError(f"{path}: its frames are not those of the track; give the draws made with it")
+        apart = np.linalg.norm(draws._pelvis() - track.places["pelvis"], axis=1)  # the track is their mean
+        if float(np.median(apart)) > _OWN_TRACK_M:
+            words = f"its positions are {np.median(apart):.2f} m from those of the track"
+            raise UserError(f"{path}: {words}; give the draws made with it")
         return draws
+
+    def _pelvis(self) -> Array:
+        """Mean positions (n, 3) of the pelvis, metres, world."""
+        pelvis = self.joints[:, :, self.joint_names.index("pelvis")]
+        return np.asarray(pelvis.mean(axis=0, dtype=float))
 
 
 _ARRAYS = ("frame", "time", "joint_names", "angle_names", "joints", "angles", "phase")

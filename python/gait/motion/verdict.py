@@ -80,7 +80,7 @@ class Verdict:
             why = [f"{reason} ({count})" for reason, count in self.why.items()]
             text += f": {', '.join(why if len(why) > 1 else self.why)}" if why else ""
         rest = {"no strides yet": self.no_strides} if self.no_strides else {}
-        rest |= {"lost": self.counts["lost"], "still settling": self.counts["init"], "not found": self.absent}
+        rest |= {"lost": self.counts["lost"], "settling": self.counts["init"], "not found": self.absent}
         return "; ".join([text, *(f"{what} in {count_of(n, 'frame')}" for what, n in rest.items() if n)])
 
     def _speed_words(self) -> str:

@@ -71,7 +71,7 @@ STATUS_TERMS = {
         "uncertain",
         "the person is followed, but left and right may be swapped or the figure may be off",
     ),
-    "init": ("settling", "the track has just begun"),
+    "init": ("settling", "tracking has just begun, in the first frames or at a later start"),
     "lost": ("lost", "the drawn figure is a guess"),
     "": ("no estimate", "the person was not found in the frame"),
 }
